@@ -1,0 +1,68 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+
+namespace joulecast::energy {
+
+// Where battery energy goes. Energy leaving the battery is positive, and over any span
+//   battery = sum over terms of sign(term) * energy[term],
+// sign being -1 for `recovered` and +1 for the others. `kinetic` and `potential` are signed changes of stored energy.
+enum class Term : std::size_t {
+  accessories,        // idle power and other constant loads
+  driver,             // losses of the motor drivers
+  copper,             // R i^2 in the windings
+  brush,              // brush drop times current
+  friction_internal,  // inside motors and gears: T_m, viscous, gear loss
+  friction_rolling,   // between wheels and floor, driving
+  friction_scrub,     // between wheels and floor, turning
+  friction_zone,      // extra rolling resistance of a region of the floor
+  friction_slip,      // wheel travel that moves nothing
+  drag,               // air
+  kinetic,            // change of translational, yaw, wheel and rotor energy
+  potential,          // change of height
+  braking,            // electrical energy that the motors generate while braking
+  recovered,          // the part of `braking` that reaches the battery
+  sensor,             // what a known sensor fault adds to the reading
+  unexplained         // measured minus modelled, integrated on its own
+};
+inline constexpr std::size_t term_count = 16;
+
+inline constexpr std::array<std::string_view, term_count> term_names = {
+    "accessories", "driver",         "copper", "brush",   "friction_internal", "friction_rolling", "friction_scrub", "friction_zone",
+    "friction_slip", "drag", "kinetic", "potential", "braking", "recovered", "sensor", "unexplained"};
+
+constexpr double sign(Term term) { return term == Term::recovered ? -1.0 : 1.0; }
+
+// One value a term: watts where it holds rates, joules where it holds energies.
+struct Ledger {
+  std::array<double, term_count> value{};
+
+  double& operator[](Term term) { return value[static_cast<std::size_t>(term)]; }
+  double operator[](Term term) const { return value[static_cast<std::size_t>(term)]; }
+
+  // The signed sum, equal to what leaves the battery.
+  double total() const {
+    double sum = 0;
+    for (std::size_t k = 0; k < term_count; ++k) sum += sign(static_cast<Term>(k)) * value[k];
+    return sum;
+  }
+};
+
+// The accounts of one mission or one span of it, in joules unless the name says otherwise.
+struct Accounts {
+  double measured_j = 0;                       // at the battery terminals; NaN when not measured
+  std::array<double, 2> measured_motor_j{};    // V i of each motor; NaN when not measured
+  double modelled_j = 0;                       // at the battery terminals, from the measured motion
+  std::array<double, 2> modelled_motor_j{};
+  double drawn_j = 0;                          // measured, positive part only
+  double returned_j = 0;                       // measured, negative part only, >= 0
+  double charge_ah = 0;                        // net charge out of the battery
+  double distance_m = 0;                       // path travelled, >= 0
+  double turned_rad = 0;                       // heading travelled, >= 0
+  double duration_s = 0;
+  Ledger ledger;
+};
+
+}  // namespace joulecast::energy

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace joulecast::robot {
+
+// Sides are indexed everywhere: [0] right, [1] left. Inertia and friction values are at the wheel.
+inline constexpr std::size_t right = 0;
+inline constexpr std::size_t left = 1;
+
+inline constexpr double standard_gravity_m_s2 = 9.80665;
+
+// Yaw inertia that each kilogram of payload adds; the payload sits over the axle [m^2].
+inline constexpr double payload_yaw_inertia_m2 = 0.02;
+
+struct Kinematics {
+  double wheel_radius_m = 0;
+  double half_track_m = 0;    // half the distance between the wheels, the thesis's l
+  double com_offset_m = 0;    // centre of mass ahead of the axle, the thesis's d
+};
+
+struct Mass {
+  double chassis_kg = 0;            // without wheels, rotors and payload
+  double wheel_kg = 0;              // one wheel with its rotor
+  double yaw_inertia_kg_m2 = 0;     // whole robot without payload, about the vertical through the axle's middle
+  double wheel_inertia_kg_m2 = 0;   // one wheel about its axle
+};
+
+struct Motor {
+  double resistance_ohm = 0;
+  double inductance_h = 0;
+  double torque_constant_nm_a = 0;         // at the motor shaft
+  double voltage_constant_v_s_rad = 0;     // at the motor shaft
+  double gear_ratio = 1;
+  double rotor_inertia_kg_m2 = 0;          // seen at the wheel, the thesis's I_s
+  double viscous_friction_nm_s_rad = 0;    // at the wheel
+  std::array<double, 2> friction_torque_nm{};  // at the wheel, opposing motion
+};
+
+// One resistor-capacitor branch of the battery's equivalent circuit.
+struct BatteryBranch {
+  double resistance_ohm = 0;
+  double time_constant_s = 0;
+};
+
+struct Battery {
+  double nominal_voltage_v = 0;
+  double capacity_ah = 0;
+  double internal_resistance_ohm = 0;
+  double reserve_fraction = 0;  // charge that planning leaves untouched, 0 to 1
+  // Optional refinements; absent ones are derived from the four numbers above (src/battery).
+  std::vector<std::pair<double, double>> open_circuit_voltage;  // (state of charge 0..1, V), charge ascending
+  std::vector<std::pair<double, double>> resistance_curve;      // (state of charge 0..1, ohm), charge ascending
+  std::vector<BatteryBranch> branches;                          // at most 2
+  std::optional<double> cutoff_voltage_v;
+  std::optional<double> coulombic_efficiency;                   // charge returned over charge put in, (0, 1]
+  std::optional<double> ageing_factor;                          // present over rated capacity, (0, 1.2]
+};
+
+struct Limits {
+  double speed_m_s = 0;
+  double acceleration_m_s2 = 0;
+  double yaw_rate_rad_s = 0;
+  double current_a = 0;  // armature, each motor
+  double payload_kg = 0;
+};
+
+// An unmodelled effect adopted from a diagnosis: its catalogue id and named parameters (src/dynamics/effects).
+struct AdoptedEffect {
+  std::string id;
+  std::vector<std::pair<std::string, double>> parameters;
+
+  friend bool operator==(const AdoptedEffect&, const AdoptedEffect&) = default;
+};
+
+// What is known of one robot. Immutable once stored: a change is a new version.
+struct RobotModel {
+  std::string robot_id;
+  Kinematics kinematics;
+  Mass mass;
+  Motor motor;
+  Battery battery;
+  double idle_power_w = 0;
+  Limits limits;
+  std::vector<AdoptedEffect> effects;
+
+  // m = m_c + 2 m_w + m_p (FACTS, notation) [kg].
+  double total_mass_kg(double payload_kg) const { return mass.chassis_kg + 2 * mass.wheel_kg + payload_kg; }
+};
+
+}  // namespace joulecast::robot
