@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "history/records.h"
+
+// Everything that changes the store. A command is applied whole or not at all, and is never split over
+// transactions.
+namespace joulecast::history {
+
+// Adds the next version of a robot's model and makes it the active one. The robot is created when new.
+// Outcome: the version. A text equal to the active version's adds nothing and answers the active version.
+struct AddModel {
+  std::string robot_id;
+  std::int64_t utime_us = 0;
+  ModelOrigin origin = ModelOrigin::file;
+  std::string note;
+  std::string model_json;
+  // When set, the active version that the caller has seen (0: none); another one is a Fault::conflict.
+  std::optional<std::int64_t> expected_active;
+};
+
+// Makes an existing version the active one (roll back, roll forward). Outcome: the version.
+struct ActivateModel {
+  std::string robot_id;
+  std::int64_t version = 0;
+};
+
+// Begins a mission under a key from Store::mission_key, or begins it anew: what was stored under the key is
+// replaced. The robot is created when new. Outcome: the key.
+struct StartMission {
+  Mission mission;
+};
+
+// Brings a started mission up to date, ends it (by its state), and appends what came since the last
+// checkpoint, all in one transaction. `mission` replaces the stored record but for its identity (key, robot,
+// mission_id, start). Buckets replace stored ones of the same start; samples are appended in the order given.
+// Outcome: the key.
+struct CheckpointMission {
+  Mission mission;
+  std::vector<TraceBucket> trace;
+  std::vector<telemetry::Sample> samples;
+  std::optional<EnergyState> energy_state;
+};
+
+// Replaces a robot's energy state, for robots outside missions. The robot is created when new. Outcome: 0.
+struct PutEnergyState {
+  EnergyState state;
+};
+
+// Outcome: the event's id; `event.id` is ignored.
+struct AppendEvent {
+  Event event;
+};
+
+// How much raw telemetry to keep; an absent bound does not bind.
+struct Retention {
+  std::optional<std::int64_t> telemetry_max_age_us;  // since a chunk's last sample
+  std::optional<std::int64_t> telemetry_max_bytes;   // of encoded chunks, oldest dropped first
+};
+
+// Drops raw telemetry beyond the retention, oldest first, at most `max_chunks` of it. Missions, ledgers and
+// traces stay. Outcome: the number of chunks dropped; less than max_chunks means that the retention now
+// holds.
+struct Prune {
+  Retention retention;
+  std::int64_t now_utime_us = 0;
+  std::int64_t max_chunks = 1000;
+};
+
+using Command = std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutEnergyState,
+                             AppendEvent, Prune>;
+
+// Approximate memory that a queued command holds, in bytes.
+std::size_t weight_bytes(const Command& command);
+
+}  // namespace joulecast::history

@@ -1,0 +1,122 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "energy/ledger.h"
+#include "telemetry/sample.h"
+
+// What the store keeps. Times are microseconds since the Unix epoch (the robot's clock for missions, traces
+// and samples; the daemon's for versions and events). NaN = not measured or not declared; stored as NULL.
+namespace joulecast::history {
+
+// Surrogate key of a mission: positive, never reused within one store. 0 names no mission.
+using MissionKey = std::int64_t;
+
+enum class ModelOrigin { file, http, calibration, diagnosis };
+std::string_view name(ModelOrigin origin);
+
+// One immutable version of a robot's model.
+struct ModelVersion {
+  std::string robot_id;
+  std::int64_t version = 0;  // 1, 2, 3 ... within the robot
+  std::int64_t created_utime_us = 0;
+  ModelOrigin origin = ModelOrigin::file;
+  std::string note;
+  std::optional<std::int64_t> parent_version;  // the version that was active when this one was added
+  bool active = false;
+  std::string model_json;  // the robot file's text, byte for byte as added
+};
+
+struct RobotRecord {
+  std::string robot_id;
+  std::int64_t created_utime_us = 0;
+  std::optional<std::int64_t> active_version;  // absent: the robot was heard of, but nobody gave its model
+};
+
+enum class MissionState {
+  open,        // samples may still come
+  finished,    // the robot said so
+  aborted,     // the robot said so
+  unfinished,  // the robot fell silent before it said either
+  superseded,  // the robot started another mission without ending this one
+  interrupted  // the daemon was down while it ran
+};
+inline constexpr std::size_t mission_state_count = 6;
+std::string_view name(MissionState state);
+std::optional<MissionState> mission_state_from(std::string_view text);
+
+struct Mission {
+  MissionKey key = 0;
+  std::string robot_id;
+  std::string mission_id;  // the robot's name for it; unique only together with robot_id and start
+  std::int64_t start_utime_us = 0;
+  std::int64_t end_utime_us = 0;  // of an open mission: the last sample accounted for
+  MissionState state = MissionState::open;
+  bool implicit = false;          // began with a sample, not with a mission event
+  bool incomplete = false;        // a part of it was not measured: its energy is a lower bound
+  std::string incomplete_reason;  // empty when complete
+  double payload_kg = telemetry::unmeasured;
+  std::string note;
+  std::optional<std::int64_t> model_version;  // of robot_id; absent when the robot's model was unknown
+  energy::Accounts accounts;
+  std::int64_t samples = 0;                           // accepted and accounted for
+  std::map<std::string, std::int64_t> sample_faults;  // reason -> samples counted out or repaired
+  std::int64_t gap_count = 0;
+  double gap_s = 0;  // time without samples, bridged or not
+};
+
+// Least, mean and greatest of a quantity; all NaN when it was not measured.
+struct Band {
+  double min = telemetry::unmeasured;
+  double mean = telemetry::unmeasured;  // over time
+  double max = telemetry::unmeasured;
+};
+
+inline constexpr std::int64_t trace_bucket_us = 1'000'000;
+
+// A mission over [start, start + width): width is trace_bucket_us as stored, a multiple of it when read
+// downsampled.
+struct TraceBucket {
+  std::int64_t start_utime_us = 0;  // a multiple of trace_bucket_us since the epoch
+  double covered_s = 0;             // time within the bucket that samples cover: the weight of its means
+  Band measured_power_w;            // out of the battery positive
+  Band modelled_power_w;
+  Band speed_m_s;
+  double state_of_charge = telemetry::unmeasured;  // at the bucket's end, 0 to 1
+  double measured_j = telemetry::unmeasured;       // since the mission's start, at the bucket's end
+  double modelled_j = telemetry::unmeasured;       // since the mission's start, at the bucket's end
+  double x_m = telemetry::unmeasured;              // mean position
+  double y_m = telemetry::unmeasured;
+};
+
+struct Trace {
+  std::int64_t width_us = trace_bucket_us;
+  std::vector<TraceBucket> buckets;  // by start; buckets without samples are absent
+};
+
+// What a restarted daemon must know of a robot to carry on.
+struct EnergyState {
+  std::string robot_id;
+  std::int64_t utime_us = 0;  // of the last sample accounted for
+  std::int64_t sequence = 0;  // of the last sample accounted for
+  double state_of_charge = telemetry::unmeasured;
+  std::array<double, 2> winding_temperature_c{telemetry::unmeasured, telemetry::unmeasured};
+};
+
+// An entry of the audit log.
+struct Event {
+  std::int64_t id = 0;  // increasing in order of commit; given by the store
+  std::int64_t utime_us = 0;
+  std::string robot_id;  // empty: concerns no single robot
+  std::string kind;      // e.g. "mission_finished", "model_added"
+  std::string detail_json = "{}";
+};
+
+}  // namespace joulecast::history

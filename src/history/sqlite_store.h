@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+
+#include "base/error.h"
+#include "history/store.h"
+
+namespace joulecast::history {
+
+struct SqliteOptions {
+  std::string path;                     // of the database file; created when absent, its folder is not
+  std::size_t readers = 4;              // connections for queries; a query beyond that many waits for one
+  std::int64_t busy_timeout_ms = 2000;  // how long a lock of another process is waited for
+};
+
+// Opens the store, creating or migrating its schema. Fault::conflict: the file's schema is newer than this
+// program. Fault::corrupt: the file is no database, or damaged. Fault::unavailable: it cannot be opened or
+// written.
+Result<std::unique_ptr<Store>> open_sqlite_store(const SqliteOptions& options);
+
+}  // namespace joulecast::history

@@ -1,0 +1,136 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "history/commands.h"
+#include "history/records.h"
+
+namespace joulecast::history {
+
+// Which missions; an absent member does not filter. Bounds are half-open: from <= value < to.
+struct MissionFilter {
+  std::optional<std::string> robot_id;
+  std::optional<std::string> mission_id;
+  std::optional<std::int64_t> start_from_utime_us;
+  std::optional<std::int64_t> start_to_utime_us;
+  std::vector<MissionState> states;  // empty: any
+  std::optional<bool> incomplete;
+  // Closed: min <= payload <= max. Either one excludes missions of undeclared payload.
+  std::optional<double> payload_min_kg;
+  std::optional<double> payload_max_kg;
+};
+
+inline constexpr std::int64_t max_page_size = 1000;
+
+// `cursor` is a page's `next_cursor`, or empty for the first page. A cursor is opaque, valid only with the
+// query it came from; any other is a Fault::invalid on field "cursor". `limit` is 1 to max_page_size.
+struct PageRequest {
+  std::int64_t limit = 50;
+  std::string cursor;
+};
+
+// Newest start first (ties: greatest key first). A mission that starts between two pages shifts nothing.
+struct MissionPage {
+  std::vector<Mission> missions;
+  std::string next_cursor;  // empty: the last page
+};
+
+// Sums over missions. A mission that did not measure a quantity (NaN) adds nothing to it.
+struct Totals {
+  std::int64_t missions = 0;
+  std::int64_t measured_missions = 0;  // those with measured energy
+  std::int64_t incomplete_missions = 0;
+  std::int64_t samples = 0;
+  std::int64_t gap_count = 0;
+  double gap_s = 0;
+  energy::Accounts accounts;  // measured_j is NaN when no mission measured
+};
+
+inline constexpr std::int64_t whole_past = std::numeric_limits<std::int64_t>::min();
+inline constexpr std::int64_t whole_future = std::numeric_limits<std::int64_t>::max();
+
+// Half-open: from <= utime < to.
+struct TimeRange {
+  std::int64_t from_utime_us = whole_past;
+  std::int64_t to_utime_us = whole_future;
+};
+
+inline constexpr std::int64_t max_trace_points = 20'000;
+inline constexpr std::int64_t max_telemetry_samples = 100'000;
+
+// In the order of arrival, which is not always that of utime.
+struct TelemetryPage {
+  std::vector<telemetry::Sample> samples;
+  std::string next_cursor;  // empty: nothing follows
+};
+
+struct StoreSize {
+  std::int64_t database_bytes = 0;   // pages in use and free
+  std::int64_t journal_bytes = 0;    // committed, not yet in the database's pages
+  std::int64_t telemetry_bytes = 0;  // encoded raw telemetry
+};
+
+// What came of one command: a number that its description names, or why it was refused.
+using Outcome = Result<std::int64_t>;
+
+// The history of a fleet. One implementation a database; everything else speaks to this.
+//
+// Threads: apply() from one thread at a time (the Writer's); everything else from any thread, also during
+// apply(). A query sees what was committed before it began. Errors: Fault::not_found for a named thing that
+// is absent, ::invalid for a broken constraint of the arguments,
+// ::unavailable when the disk or database fails for now, ::corrupt when stored bytes cannot be trusted.
+class Store {
+ public:
+  virtual ~Store() = default;
+
+  // Applies the commands in order in one transaction. The result is one outcome a command: a refused one
+  // (not_found, conflict, invalid) leaves no trace and the others stand. An error means that nothing was
+  // applied.
+  virtual Result<std::vector<Outcome>> apply(std::span<const Command> commands) = 0;
+
+  // The key of the mission of that robot, name and start: the stored one's, or else a new one which
+  // StartMission then uses. Asked again before that, it answers the same.
+  virtual Result<MissionKey> mission_key(std::string_view robot_id, std::string_view mission_id,
+                                         std::int64_t start_utime_us) = 0;
+
+  // By robot_id ascending.
+  virtual Result<std::vector<RobotRecord>> robots() const = 0;
+  // The active version, or the given one.
+  virtual Result<ModelVersion> model(std::string_view robot_id,
+                                     std::optional<std::int64_t> version = std::nullopt) const = 0;
+  // Newest first; not_found when the robot is unknown.
+  virtual Result<std::vector<ModelVersion>> model_versions(std::string_view robot_id) const = 0;
+
+  virtual Result<Mission> mission(MissionKey key) const = 0;
+  virtual Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page) const = 0;
+  virtual Result<Totals> totals(const MissionFilter& filter) const = 0;
+
+  // At most max_points buckets (1 to max_trace_points): neighbours are merged by least, time-weighted mean
+  // and greatest, cumulative values by the last. not_found when the mission is unknown.
+  virtual Result<Trace> trace(MissionKey key, TimeRange range, std::int64_t max_points) const = 0;
+  // At most `page.limit` samples (1 to max_telemetry_samples). Empty when the retention dropped them;
+  // not_found when the mission is unknown.
+  virtual Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const = 0;
+
+  // Events with id > after_id, ascending, at most `limit` (1 to max_page_size); of one robot when given.
+  virtual Result<std::vector<Event>> events(std::int64_t after_id, std::int64_t limit,
+                                            std::optional<std::string> robot_id = std::nullopt) const = 0;
+
+  // Absent when none was ever put.
+  virtual Result<std::optional<EnergyState>> energy_state(std::string_view robot_id) const = 0;
+
+  // At start: the missions that were open when the last daemon ended, oldest first. Each is to be resumed
+  // (just go on checkpointing it) or ended by a checkpoint with MissionState::interrupted.
+  virtual Result<std::vector<Mission>> recover() const = 0;
+
+  virtual Result<StoreSize> size() const = 0;
+};
+
+}  // namespace joulecast::history
