@@ -1,0 +1,58 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "server/http/message.h"
+
+namespace joulecast::http {
+
+// Server-sent events: what is published goes to every subscriber through a bounded queue of its own. A
+// subscriber whose queue is full is dropped, told nothing, and counted; it may reconnect with Last-Event-ID.
+// Event ids are "<epoch>-<n>", the epoch naming this run of the daemon. A returning client whose id is still
+// in the backlog gets what it missed; any other id is answered by an event "reset": read the state afresh.
+class EventHub {
+ public:
+  struct Options {
+    std::size_t queue_bytes = 256 * 1024;    // per client
+    std::size_t backlog_bytes = 512 * 1024;  // kept for returning clients
+    std::chrono::milliseconds heartbeat{15'000};
+    std::size_t max_subscribers = 256;
+  };
+  struct Counts {
+    std::uint64_t published = 0;
+    std::uint64_t dropped_clients = 0;
+    std::size_t subscribers = 0;
+  };
+
+  EventHub();
+  explicit EventHub(const Options& options);
+  ~EventHub();
+  EventHub(const EventHub&) = delete;
+  EventHub& operator=(const EventHub&) = delete;
+
+  // Any thread; never blocks on a client. `data` is one JSON text, `topic` what subscribers may select by (a
+  // robot's id; empty goes to all).
+  void publish(std::string_view event, std::string_view data, std::string_view topic = {});
+
+  // The event stream of one client; an empty topic selects everything. Fault::unavailable beyond
+  // max_subscribers. A stream may outlive its hub and then ends.
+  Result<std::shared_ptr<StreamSource>> subscribe(std::string_view last_event_id = {},
+                                                  std::string_view topic = {});
+
+  // Response of content type text/event-stream around subscribe(), honouring the request's Last-Event-ID
+  // header.
+  Result<Response> respond(const Request& request, std::string_view topic = {});
+
+  Counts counts() const;
+
+ private:
+  struct State;
+  std::shared_ptr<State> state_;
+};
+
+}  // namespace joulecast::http

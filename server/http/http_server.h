@@ -1,0 +1,94 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "base/error.h"
+#include "server/http/router.h"
+
+namespace joulecast::http {
+
+// Limits that keep one client from starving the others.
+struct ServerOptions {
+  std::string address = "127.0.0.1";
+  std::uint16_t port = 0;  // 0: the system chooses, see HttpServer::port()
+  unsigned worker_threads = 2;
+  std::size_t worker_queue = 256;  // requests waiting for a worker; beyond: 503
+  std::size_t max_connections = 1024;
+  std::uint32_t max_header_bytes = 16 * 1024;
+  std::uint64_t max_body_bytes = 4 * 1024 * 1024;
+  std::chrono::milliseconds read_timeout{10'000};   // from a request's first byte to its last
+  std::chrono::milliseconds write_timeout{30'000};  // without progress of the answer
+  std::chrono::milliseconds idle_timeout{60'000};   // between requests of one connection
+};
+
+// Why the server closed a connection or refused a request by itself.
+enum class Refusal : std::uint8_t {
+  connections,  // more than max_connections
+  header_size,
+  body_size,
+  malformed,
+  read_timeout,
+  write_timeout,
+  worker_queue,
+  slow_stream,  // a client too slow for its event stream
+  count_
+};
+
+std::string_view to_string(Refusal refusal);
+
+// One answered request, for metrics and the access log.
+struct Exchange {
+  std::string_view operation;  // operation id, or "unmatched"
+  Method method = Method::get;
+  unsigned status = 0;
+  double duration_s = 0;  // from the last byte of the request to the last byte of the answer's head and body
+  std::uint64_t request_bytes = 0;
+  std::uint64_t response_bytes = 0;
+  std::string_view target;
+  std::string_view request_id;
+};
+
+// Told of everything the server does; called on the I/O thread, must not block.
+class ServerObserver {
+ public:
+  virtual ~ServerObserver() = default;
+  virtual void exchanged(const Exchange& exchange) { (void)exchange; }
+  virtual void refused(Refusal refusal) { (void)refusal; }
+  virtual void connections(std::size_t open) { (void)open; }
+};
+
+// HTTP/1.1 server: one I/O thread, a small worker pool, keep-alive, pipelining answered in order.
+// Thread-safe where stated; router and observer must outlive it.
+class HttpServer {
+ public:
+  // Binds, listens and starts its threads. Fails with Fault::unavailable when the address cannot be bound and
+  // Fault::invalid when it is no IP address.
+  static Result<std::unique_ptr<HttpServer>> start(const ServerOptions& options, const Router& router,
+                                                   ServerObserver* observer = nullptr);
+  ~HttpServer();
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
+
+  // The port really bound.
+  std::uint16_t port() const;
+
+  // Time since the I/O thread last ran its tick (every 100 ms): what a watchdog looks at. Any thread.
+  std::chrono::milliseconds silence() const;
+
+  // Stops accepting, closes idle connections and endless streams, lets running requests finish until the
+  // deadline, closes what is left, joins the threads. Any thread but the server's own; a second call returns
+  // at once when the first has finished. Returns false when requests had to be cut off.
+  bool stop(std::chrono::milliseconds deadline);
+
+ private:
+  struct Impl;
+  explicit HttpServer(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace joulecast::http

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+
+// What an endpoint sees of HTTP. Nothing here knows the library that speaks the protocol.
+namespace joulecast::http {
+
+enum class Method : std::uint8_t { get, head, post, put, patch, del, options, other };
+
+std::string_view to_string(Method method);
+
+// One request, valid for the duration of the handler's call. Header names and values are views into the
+// connection's buffers; copy what must live longer.
+struct Request {
+  Method method = Method::get;
+  std::string_view target;                                 // as sent: path and query, still encoded
+  std::string path;                                        // decoded
+  std::vector<std::pair<std::string, std::string>> query;  // decoded, each key once
+  std::vector<std::pair<std::string_view, std::string>>
+      path_params;  // "{id}" of the template -> decoded segment
+  std::vector<std::pair<std::string_view, std::string_view>> headers;
+  std::string body;
+  std::shared_ptr<const nlohmann::json> json;  // the parsed body where the endpoint declares a request schema
+  std::string id;                              // request id: the client's X-Request-Id when sane, else ours
+  std::stop_token stop;  // set when the server's patience with running requests has ended
+
+  // Value of a path parameter of the endpoint's template. Asking for one that is not in the template is our
+  // bug.
+  const std::string& param(std::string_view name) const;
+  // Decoded query value, or nullopt when the key is absent.
+  std::optional<std::string_view> query_value(std::string_view name) const;
+  // Query values that the router has checked against the declared type and bounds of the endpoint's
+  // parameter.
+  std::optional<double> query_number(std::string_view name) const;
+  std::optional<std::int64_t> query_integer(std::string_view name) const;
+  std::optional<bool> query_boolean(std::string_view name) const;
+  // First header of that name in any case; empty when absent.
+  std::string_view header(std::string_view name) const;
+};
+
+// A body that is produced piece by piece. The server asks for the next piece only when the one before has
+// left, so a slow client holds back its source. All calls for one stream come one at a time.
+class StreamSource {
+ public:
+  enum class Next : std::uint8_t {
+    more,  // `out` holds a piece, call again when it has been written
+    wait,  // nothing for now (`out` may hold a piece); call again after the wake function was called, or in a
+           // second
+    end,   // `out` holds the last piece, which may be empty
+    abort  // the stream is broken: close the connection without a proper end
+  };
+  virtual ~StreamSource() = default;
+  // Appends the next piece to `out`.
+  virtual Next pull(std::string& out) = 0;
+  // Gives the function, callable from any thread and at any time, that makes the server pull again.
+  virtual void on_wake(std::function<void()> wake) { (void)wake; }
+  // The client left or the server stops; may come while pull() runs on another thread.
+  virtual void cancel() {}
+  // True when the source wants its connection closed even though a piece is still on its way (a slow client).
+  virtual bool hopeless() const { return false; }
+  // True for streams that never end by themselves: a graceful stop closes them at once.
+  virtual bool endless() const { return false; }
+  // Where pull() runs: true when it computes or blocks.
+  virtual bool on_worker() const { return true; }
+};
+
+// A stream from a function that appends the next piece and returns false after the last one. The token is set
+// when the client has left. Runs on a worker.
+std::shared_ptr<StreamSource> generate(
+    std::function<bool(std::string& out, const std::stop_token& left)> next);
+
+struct Response {
+  unsigned status = 200;
+  std::string content_type = "application/json";
+  std::string body;
+  std::shared_ptr<const std::string>
+      shared_body;  // sent instead of `body` when set (assets, cached documents)
+  std::vector<std::pair<std::string, std::string>> headers;
+  std::shared_ptr<StreamSource> stream;  // sent instead of a body when set
+};
+
+// A JSON answer with status 200 from text already serialised.
+Response json_response(std::string body);
+
+using Handler = std::function<Result<Response>(const Request&)>;
+
+}  // namespace joulecast::http

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "base/error.h"
+#include "server/http/message.h"
+
+namespace joulecast::http {
+
+// Statuses of the faults. 400 is kept for requests that cannot be read at all (JSON syntax, percent-encoding,
+// unknown or repeated query keys); one that is read but breaks a stated constraint is 422, like one without a
+// solution.
+//   invalid 422 · not_found 404 · conflict 409 · infeasible 422 · too_large 413 · unavailable 503
+//   corrupt 500 · internal 500
+unsigned status_of(Fault fault);
+
+std::string_view reason_phrase(unsigned status);
+
+// RFC 9457 document: type ("urn:joulecast:problem:<slug>"), title, status, detail, instance (the request id
+// as urn:joulecast:request:<id>), and our members request_id, field and constraint. `field` and `constraint`
+// are left out when empty. Answers of status 429 and 503 carry Retry-After.
+Response problem(unsigned status, std::string_view slug, std::string_view detail, std::string_view request_id,
+                 std::string_view field = {}, std::string_view constraint = {});
+
+// The problem of an error. Faults of ours (internal, corrupt) name no detail to the client beyond the request
+// id.
+Response problem(const Error& error, std::string_view request_id);
+
+}  // namespace joulecast::http

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/http/message.h"
+
+namespace joulecast::http {
+
+// Where an endpoint runs. `io` handlers run on the I/O thread: they neither block nor compute for more than
+// some tens of microseconds, and save two thread changes. All others run on the worker pool.
+enum class Run : std::uint8_t { worker, io };
+
+// One query parameter. Values are checked before the handler runs; keys that are not declared are errors.
+struct Parameter {
+  enum class Type : std::uint8_t { text, integer, number, boolean };
+  std::string name;
+  Type type = Type::text;
+  std::string description;
+  std::optional<double> minimum = std::nullopt;
+  std::optional<double> maximum = std::nullopt;
+  bool required = false;
+  std::vector<std::string> choices = {};  // for text: the only values allowed, when not empty
+};
+
+// One row of the table of endpoints. Routes, the Allow headers and the OpenAPI document all come from it.
+// GET implies HEAD; OPTIONS is answered by the router.
+struct Endpoint {
+  Method method = Method::get;
+  std::string path;          // template, e.g. "/v1/robots/{id}/profile"
+  std::string operation_id;  // e.g. "computeProfile"; also the label of the request metrics
+  std::string summary;
+  std::vector<Parameter> parameters = {};
+  std::string request_schema = {};   // name of schemas/<name>.schema.json; empty when there is no body
+  std::string response_schema = {};  // likewise; empty when the answer is not JSON
+  std::string response_type = "application/json";
+  unsigned success_status = 200;
+  std::vector<unsigned> error_statuses = {};  // beyond those the frame itself can answer
+  Run run = Run::worker;
+  bool documented = true;  // false: left out of the OpenAPI document (assets)
+  Handler handler = {};
+};
+
+class Router {
+ public:
+  // Two endpoints with the same method and path shape, or a malformed template, are our bug and abort.
+  explicit Router(std::vector<Endpoint> endpoints);
+  ~Router();
+  Router(const Router&) = delete;
+  Router& operator=(const Router&) = delete;
+
+  // What a request's head leads to: an endpoint to run, or an answer that is already certain.
+  struct Match {
+    const Endpoint* endpoint = nullptr;
+    std::optional<Response> answer;
+  };
+
+  // Fills path, query and path_params of the request from its target. Cheap; never blocks.
+  Match match(Request& request) const;
+
+  // Checks and parses the body, calls the handler, turns errors into problem documents. Never throws.
+  Response run(const Endpoint& endpoint, Request& request) const;
+
+  // match() and run() in one: what the tests and in-process callers use.
+  Response handle(Request& request) const;
+
+  const std::vector<Endpoint>& endpoints() const { return endpoints_; }
+
+ private:
+  struct Node;
+  const Node* find(const std::vector<std::string>& segments, Request& request) const;
+
+  std::vector<Endpoint> endpoints_;
+  std::unique_ptr<Node> root_;
+};
+
+}  // namespace joulecast::http
