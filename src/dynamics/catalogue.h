@@ -1,0 +1,35 @@
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "base/error.h"
+#include "dynamics/effect.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::dynamics {
+
+// Every effect of the catalogue, in the order in which they are applied.
+std::span<const Effect* const> catalogue();
+
+// The effect with that id, or null.
+const Effect* find_effect(std::string_view id);
+
+// An effect with its numbers.
+struct ActiveEffect {
+  const Effect* effect = nullptr;
+  EffectValues<double> values{};
+};
+
+// An effect at zero strength with its shape parameters at their initial values.
+ActiveEffect initial(const Effect& effect);
+
+// Reads an adopted effect; unknown ids, unknown or missing parameters and values outside their bounds are
+// errors that name "/effects/<id>/<parameter>". Shape parameters may be left out and take their initial
+// values.
+Result<ActiveEffect> activate(const robot::AdoptedEffect& adopted);
+
+// The inverse of activate.
+robot::AdoptedEffect adopt(const ActiveEffect& active);
+
+}  // namespace joulecast::dynamics

@@ -1,0 +1,180 @@
+#include "dynamics/drive_model.h"
+
+#include <cmath>
+#include <utility>
+
+namespace joulecast::dynamics {
+
+template <class S>
+template <class Values>
+void BasicDriveModel<S>::apply(std::span<const ActiveEffect> effects, Values&& values_of) {
+  for (std::size_t k = 0; k < effects.size(); ++k) {
+    const EffectValues<S> values = values_of(k);
+    if (effects[k].effect->adjusts()) effects[k].effect->adjust(values, parameters_);
+    if (effects[k].effect->loads()) loads_.push_back({effects[k].effect, values});
+  }
+}
+
+template <class S>
+BasicDriveModel<S>::BasicDriveModel(const robot::RobotModel& robot,
+                                    std::span<const ActiveEffect> effects) requires std::is_same_v<S, double>
+    : parameters_(nominal_parameters<S>(robot)) {
+  apply(effects, [&](std::size_t k) { return effects[k].values; });
+}
+
+template <class S>
+BasicDriveModel<S>::BasicDriveModel(const robot::RobotModel& robot, std::span<const ActiveEffect> effects,
+                                    std::size_t effect,
+                                    std::size_t parameter) requires std::is_same_v<S, Dual>
+    : parameters_(nominal_parameters<S>(robot)) {
+  apply(effects, [&](std::size_t k) {
+    EffectValues<Dual> values{};
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = Dual(effects[k].values[i], k == effect && i == parameter ? 1.0 : 0.0);
+    }
+    return values;
+  });
+}
+
+template <class S>
+TorqueBalance<S> BasicDriveModel<S>::balance(const Instant& at) const {
+  const Parameters<S>& p = parameters_;
+  TorqueBalance<S> b;
+  b.body = body_of_wheels(p, at.wheel_speed_rad_s, at.wheel_acceleration_rad_s2);
+
+  const S payload = p.payload_factor * at.payload_kg + p.payload_extra_kg;
+  const S mass = p.chassis_kg + 2.0 * p.wheel_kg + payload;
+  const S yaw_inertia = p.yaw_inertia_kg_m2 + payload * robot::payload_yaw_inertia_m2;
+  const S coupling = p.chassis_kg * p.com_offset_m;
+  // Thesis (2-31) in the body frame: F = m a - m_c d yaw^2, N = I yaw' + m_c d v yaw.
+  const S force = mass * p.inertial_factor * b.body.acceleration_m_s2 -
+                  coupling * b.body.yaw_rate_rad_s * b.body.yaw_rate_rad_s;
+  const S moment =
+      yaw_inertia * b.body.yaw_acceleration_rad_s2 + coupling * b.body.speed_m_s * b.body.yaw_rate_rad_s;
+  const S arm = moment / (2.0 * p.half_track_m);
+  const std::array<S, 2> ground{p.wheel_radius_m[0] * (force * 0.5 + arm),
+                                p.wheel_radius_m[1] * (force * 0.5 - arm)};
+
+  const LoadContext<S> context{at,
+                               p,
+                               b.body,
+                               {smooth_sign(at.wheel_speed_rad_s[0], friction_width_rad_s),
+                                smooth_sign(at.wheel_speed_rad_s[1], friction_width_rad_s)},
+                               mass * robot::standard_gravity_m_s2,
+                               payload * robot::standard_gravity_m_s2};
+  for (const LoadEffect& load : loads_) load.effect->load(load.values, context, b.loads);
+
+  for (std::size_t s : {0u, 1u}) {
+    b.inertial_nm[s] = ground[s] + p.wheel_inertia_kg_m2 * at.wheel_acceleration_rad_s2[s];
+    S transmitted = b.inertial_nm[s];
+    S inside = 0;
+    for (std::size_t k = 0; k < load_count; ++k) {
+      (k == static_cast<std::size_t>(Load::internal) ? inside : transmitted) += b.loads.torque[k][s];
+    }
+    b.gear_nm[s] = p.gear_loss * abs(transmitted) * context.direction[s];
+    b.friction_nm[s] = p.friction_torque_nm[s] * context.direction[s] +
+                       p.viscous_friction_nm_s_rad * at.wheel_speed_rad_s[s];
+    b.total_nm[s] = transmitted + inside + b.gear_nm[s] + b.friction_nm[s];
+  }
+  return b;
+}
+
+template <class S>
+S BasicDriveModel<S>::resistance(std::size_t side, const Instant& at) const {
+  return parameters_.resistance_ohm[side] *
+         (S(1) +
+          copper_temperature_coefficient_per_k * parameters_.thermal_resistance_k_w * at.copper_heat_w[side]);
+}
+
+template <class S>
+S BasicDriveModel<S>::voltage_for(std::size_t side, S current_a, const Instant& at) const {
+  const Parameters<S>& p = parameters_;
+  return resistance(side, at) * current_a + p.inductance_h * at.current_slope_a_s[side] +
+         p.voltage_constant_v_s_rad * at.wheel_speed_rad_s[side] +
+         p.brush_drop_v * smooth_sign(current_a, brush_width_a);
+}
+
+template <class S>
+S BasicDriveModel<S>::battery_power_for(const std::array<S, 2>& motor_power_w) const {
+  const Parameters<S>& p = parameters_;
+  S power = p.idle_power_w + p.accessory_power_w;
+  for (const S& motor : motor_power_w) {
+    power += p.driver_loss * abs(motor);
+    power += motor > S(0) ? motor : motor * (S(1) - p.unreturned);
+  }
+  return power;
+}
+
+template <class S>
+PowerFlow<S> BasicDriveModel<S>::flow(const Instant& at) const {
+  const Parameters<S>& p = parameters_;
+  const TorqueBalance<S> b = balance(at);
+  const S grip = S(1) - p.slip;
+  PowerFlow<S> f;
+  f.accessories_w = p.idle_power_w + p.accessory_power_w;
+  for (std::size_t s : {0u, 1u}) {
+    const double speed = at.wheel_speed_rad_s[s];
+    f.torque_nm[s] = b.total_nm[s];
+    f.current_a[s] = current_for(b.total_nm[s]);
+    f.voltage_v[s] = voltage_for(s, f.current_a[s], at);
+    f.motor_power_w[s] = f.voltage_v[s] * f.current_a[s];
+
+    f.copper_w += resistance(s, at) * f.current_a[s] * f.current_a[s];
+    f.brush_w += p.brush_drop_v * smooth_sign(f.current_a[s], brush_width_a) * f.current_a[s];
+    // Field energy of the winding, and what unequal SI values of K_t and K_w leave over, are stored or lost
+    // in the motor.
+    f.kinetic_w += p.inductance_h * at.current_slope_a_s[s] * f.current_a[s];
+    f.friction_internal_w += (p.voltage_constant_v_s_rad - p.torque_constant_nm_a) * speed * f.current_a[s];
+    const auto power = [&](Load load) { return b.loads.torque[static_cast<std::size_t>(load)][s] * speed; };
+    f.friction_internal_w += (b.friction_nm[s] + b.gear_nm[s]) * speed + power(Load::internal);
+    f.friction_rolling_w += power(Load::rolling);
+    f.friction_zone_w += power(Load::zone);
+    // Slip: of what reaches the ground through the wheel, the body gets (1 - slip).
+    const S wheel_inertia = p.wheel_inertia_kg_m2 * at.wheel_acceleration_rad_s2[s];
+    const S body_inertia = (b.inertial_nm[s] - wheel_inertia) * speed;
+    f.kinetic_w += wheel_inertia * speed + body_inertia * grip;
+    f.friction_scrub_w += power(Load::scrub) * grip;
+    f.drag_w += power(Load::drag) * grip;
+    f.potential_w += power(Load::potential) * grip;
+    f.friction_slip_w +=
+        (body_inertia + power(Load::scrub) + power(Load::drag) + power(Load::potential)) * p.slip;
+
+    f.driver_w += p.driver_loss * abs(f.motor_power_w[s]);
+    if (f.motor_power_w[s] < S(0)) {
+      f.braking_w -= f.motor_power_w[s];
+      f.recovered_w -= f.motor_power_w[s] * (S(1) - p.unreturned);
+    }
+  }
+  f.battery_power_w = battery_power_for(f.motor_power_w);
+  return f;
+}
+
+template <class S>
+S BasicDriveModel<S>::metered_battery_power(S power_w, double battery_voltage_v) const {
+  const Parameters<S>& p = parameters_;
+  const double volts = std::isfinite(battery_voltage_v) ? battery_voltage_v : p.battery_voltage_v;
+  return (S(1) + p.battery_voltage.gain) *
+         (power_w * (S(1) + p.battery_current.gain) + p.battery_current.bias * volts);
+}
+
+template class BasicDriveModel<double>;
+template class BasicDriveModel<Dual>;
+
+Result<std::vector<ActiveEffect>> active_effects(const robot::RobotModel& robot) {
+  std::vector<ActiveEffect> effects;
+  effects.reserve(robot.effects.size());
+  for (const robot::AdoptedEffect& adopted : robot.effects) {
+    Result<ActiveEffect> active = activate(adopted);
+    if (!active) return tl::unexpected(std::move(active.error()));
+    effects.push_back(*active);
+  }
+  return effects;
+}
+
+Result<DriveModel> drive_model(const robot::RobotModel& robot) {
+  Result<std::vector<ActiveEffect>> effects = active_effects(robot);
+  if (!effects) return tl::unexpected(std::move(effects.error()));
+  return DriveModel(robot, *effects);
+}
+
+}  // namespace joulecast::dynamics

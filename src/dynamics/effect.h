@@ -1,0 +1,132 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <span>
+#include <string_view>
+
+#include "dynamics/dual.h"
+#include "dynamics/motion.h"
+#include "dynamics/parameters.h"
+
+namespace joulecast::dynamics {
+
+enum class ActsOn { wheel_torque, inertia, motor, battery_side, kinematics, sensors };
+
+// One named number of an effect. The first parameter of every effect is its strength: at zero the effect is
+// absent.
+struct EffectParameter {
+  std::string_view name;
+  std::string_view unit;  // "1" for a pure number
+  double initial;         // for shapes: where a search starts; for the strength: 0
+  double minimum;
+  double maximum;
+  std::string_view meaning;
+};
+
+// What an effect is, for people and for tools; the numbers are contracts of bounds.
+struct EffectInfo {
+  std::string_view id;
+  ActsOn acts_on;
+  std::string_view formula;
+  std::string_view validity;
+  std::string_view source;
+  std::span<const EffectParameter> parameters;
+  bool needs_position = false;  // does nothing while the map position is unknown
+  bool needs_heading = false;   // does nothing while the heading is unknown
+};
+
+// Torques on the wheels that the motors must overcome, apart from inertia: [N m] at the wheel, positive
+// resists forward rotation. One row for each ledger term that they feed.
+enum class Load : std::size_t { internal, rolling, scrub, zone, drag, potential };
+inline constexpr std::size_t load_count = 6;
+
+template <class S>
+struct Loads {
+  std::array<std::array<S, 2>, load_count> torque{};
+
+  void wheel(Load load, std::size_t side, S torque_nm) {
+    torque[static_cast<std::size_t>(load)][side] += torque_nm;
+  }
+};
+
+// What a load depends on.
+template <class S>
+struct LoadContext {
+  const Instant& at;
+  const Parameters<S>& parameters;
+  const Body<S>& body;
+  std::array<double, 2> direction;  // smooth sign of each wheel's rotation
+  S weight_n;                       // whole robot with its payload
+  S payload_weight_n;
+
+  // A force on the body, positive pushing it backwards, shared by both wheels.
+  void force(Loads<S>& loads, Load load, S force_n) const {
+    for (std::size_t s : {0u, 1u}) loads.wheel(load, s, parameters.wheel_radius_m[s] * force_n * 0.5);
+  }
+  // A yaw moment on the body, positive turning it to the right.
+  void moment(Loads<S>& loads, Load load, S moment_nm) const {
+    const S arm = moment_nm / (2.0 * parameters.half_track_m);
+    loads.wheel(load, 0, parameters.wheel_radius_m[0] * arm);
+    loads.wheel(load, 1, S(-1) * parameters.wheel_radius_m[1] * arm);
+  }
+};
+
+inline constexpr std::size_t max_effect_parameters = 5;
+template <class S>
+using EffectValues = std::array<S, max_effect_parameters>;
+
+// A physical effect that the nominal model leaves out. Implementations are the small files in effects/: a
+// struct with a static `info()` and whichever of these static templates it needs:
+//   adjust(values, Parameters<S>&)                      changes constants
+//   load(values, const LoadContext<S>&, Loads<S>&)      adds torque at the wheels
+// Both are instantiated for double and for Dual, so that every derivative is exact.
+class Effect {
+ public:
+  virtual ~Effect() = default;
+  virtual const EffectInfo& info() const = 0;
+  virtual bool adjusts() const = 0;
+  virtual bool loads() const = 0;
+  virtual void adjust(const EffectValues<double>&, Parameters<double>&) const = 0;
+  virtual void adjust(const EffectValues<Dual>&, Parameters<Dual>&) const = 0;
+  virtual void load(const EffectValues<double>&, const LoadContext<double>&, Loads<double>&) const = 0;
+  virtual void load(const EffectValues<Dual>&, const LoadContext<Dual>&, Loads<Dual>&) const = 0;
+};
+
+// Adapts one effect struct to the interface.
+template <class E>
+class EffectOf final : public Effect {
+  static constexpr bool has_adjust = requires(const EffectValues<double>& a, Parameters<double>& p) {
+    E::adjust(a, p);
+  };
+  static constexpr bool has_load =
+      requires(const EffectValues<double>& a, const LoadContext<double>& c, Loads<double>& l) {
+    E::load(a, c, l);
+  };
+  static_assert(has_adjust || has_load);
+
+ public:
+  const EffectInfo& info() const override { return E::info; }
+  bool adjusts() const override { return has_adjust; }
+  bool loads() const override { return has_load; }
+  void adjust(const EffectValues<double>& a, Parameters<double>& p) const override { adjust_any(a, p); }
+  void adjust(const EffectValues<Dual>& a, Parameters<Dual>& p) const override { adjust_any(a, p); }
+  void load(const EffectValues<double>& a, const LoadContext<double>& c, Loads<double>& l) const override {
+    load_any(a, c, l);
+  }
+  void load(const EffectValues<Dual>& a, const LoadContext<Dual>& c, Loads<Dual>& l) const override {
+    load_any(a, c, l);
+  }
+
+ private:
+  template <class S>
+  static void adjust_any(const EffectValues<S>& a, Parameters<S>& p) {
+    if constexpr (has_adjust) E::adjust(a, p);
+  }
+  template <class S>
+  static void load_any(const EffectValues<S>& a, const LoadContext<S>& c, Loads<S>& l) {
+    if constexpr (has_load) E::load(a, c, l);
+  }
+};
+
+}  // namespace joulecast::dynamics
