@@ -59,7 +59,7 @@ struct AppendEvent {
 
 // How much raw telemetry to keep; an absent bound does not bind.
 struct Retention {
-  std::optional<std::int64_t> telemetry_max_age_us;  // since a chunk's last sample
+  std::optional<std::int64_t> telemetry_max_age_us;  // since it was stored: a replayed old log is young
   std::optional<std::int64_t> telemetry_max_bytes;   // of encoded chunks, oldest dropped first
 };
 
@@ -68,7 +68,6 @@ struct Retention {
 // holds.
 struct Prune {
   Retention retention;
-  std::int64_t now_utime_us = 0;
   std::int64_t max_chunks = 1000;
 };
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -13,6 +15,7 @@ struct SqliteOptions {
   std::string path;                     // of the database file; created when absent, its folder is not
   std::size_t readers = 4;              // connections for queries; a query beyond that many waits for one
   std::int64_t busy_timeout_ms = 2000;  // how long a lock of another process is waited for
+  std::function<std::int64_t()> now_utime_us;  // the clock that retention goes by; empty: the system's
 };
 
 // Opens the store, creating or migrating its schema. Fault::conflict: the file's schema is newer than this

@@ -42,7 +42,8 @@ struct MissionPage {
   std::string next_cursor;  // empty: the last page
 };
 
-// Sums over missions. A mission that did not measure a quantity (NaN) adds nothing to it.
+// Sums over missions. A mission that did not measure a quantity adds nothing to it; a quantity that none
+// measured is NaN.
 struct Totals {
   std::int64_t missions = 0;
   std::int64_t measured_missions = 0;  // those with measured energy
@@ -50,7 +51,7 @@ struct Totals {
   std::int64_t samples = 0;
   std::int64_t gap_count = 0;
   double gap_s = 0;
-  energy::Accounts accounts;  // measured_j is NaN when no mission measured
+  energy::Accounts accounts;
 };
 
 inline constexpr std::int64_t whole_past = std::numeric_limits<std::int64_t>::min();
