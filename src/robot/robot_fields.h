@@ -1,0 +1,80 @@
+#pragma once
+
+#include <array>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "robot/robot_model.h"
+
+namespace joulecast::robot {
+
+// The interval a number must lie in; infinite ends are no bound. Not-a-number lies in none.
+struct Bounds {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+  bool low_excluded = false;
+  bool high_excluded = false;
+
+  bool contain(double value) const {
+    return (low_excluded ? value > low : value >= low) && (high_excluded ? value < high : value <= high);
+  }
+};
+
+using Curve = std::vector<std::pair<double, double>>;  // (state of charge, value)
+
+// Where in the model a field lives. The kind of the member decides the JSON shape.
+using Member = std::variant<std::string& (*)(RobotModel&),            // string
+                            double& (*)(RobotModel&),                 // number
+                            std::optional<double>& (*)(RobotModel&),  // number that may be absent
+                            std::array<double, 2>& (*)(RobotModel&),  // [right, left]
+                            Curve& (*)(RobotModel&),                  // {"charge": [...], value_key: [...]}
+                            std::vector<BatteryBranch>& (*)(RobotModel&),  // [{branch_fields()}, ...]
+                            std::vector<AdoptedEffect>& (*)(RobotModel&)   // {id: {parameter: number}}
+                            >;
+
+enum class Presence { required, optional };
+
+// One key of the robot file. An absent optional number keeps the default that the model is born with.
+struct Field {
+  std::string_view pointer;  // JSON pointer in the robot file; its last part carries the unit
+  Member member;
+  Bounds bounds{};  // of the number, or of every value of an array or curve
+  Presence presence = Presence::required;
+  std::string_view value_key{};  // of a curve
+
+  std::string_view key() const { return pointer.substr(pointer.rfind('/') + 1); }
+};
+
+struct BranchField {
+  std::string_view key;
+  double BatteryBranch::*member;
+  Bounds bounds;
+};
+
+inline constexpr std::size_t max_curve_points = 1001;
+inline constexpr std::size_t max_branches = 2;
+inline constexpr std::size_t max_effects = 64;
+inline constexpr std::size_t max_effect_parameters = 64;
+inline constexpr std::string_view robot_id_pattern = "^[A-Za-z0-9._-]{1,64}$";
+inline constexpr std::string_view effect_name_pattern = "^[a-z0-9_]{1,64}$";
+inline constexpr Bounds charge_bounds{0.0, 1.0};
+
+// Every key of the robot file, once: parsing, validation, writing and the schema's test walk this table.
+std::span<const Field> fields();
+
+// The keys of one element of /battery/branches; all are required.
+std::span<const BranchField> branch_fields();
+
+bool is_robot_id(std::string_view text);     // robot_id_pattern
+bool is_effect_name(std::string_view text);  // effect_name_pattern, for effect ids and their parameters
+
+// The unit that ends a name ("speed_m_s" -> "m/s"), empty for pure numbers.
+std::string_view unit_of(std::string_view name);
+
+}  // namespace joulecast::robot

@@ -1,0 +1,596 @@
+#include "robot/robot_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "robot/robot_fields.h"
+
+namespace joulecast::robot {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t max_file_bytes = 1 << 20;
+constexpr std::string_view battery_prefix = "/battery";
+
+struct Problem {
+  std::string pointer;
+  std::string text;
+};
+
+// Collects problems; a pointer that has one is not reported again by later checks.
+class Problems {
+ public:
+  void add(std::string pointer, std::string text) {
+    if (pointers_.insert(pointer).second) list_.push_back({std::move(pointer), std::move(text)});
+  }
+
+  // Whether this pointer, one above or one below it has a problem already.
+  bool at(std::string_view pointer) const {
+    return std::any_of(list_.begin(), list_.end(), [&](const Problem& problem) {
+      return problem.pointer == pointer || is_below(problem.pointer, pointer) ||
+             is_below(pointer, problem.pointer);
+    });
+  }
+
+  bool none() const { return list_.empty(); }
+
+  Error error() const {
+    Error error{Fault::invalid, list_.front().pointer, list_.front().text};
+    for (auto problem = list_.begin() + 1; problem != list_.end(); ++problem)
+      error.message += fmt::format("; {}: {}", problem->pointer, problem->text);
+    return error;
+  }
+
+ private:
+  static bool is_below(std::string_view pointer, std::string_view parent) {
+    return pointer.size() > parent.size() && pointer.starts_with(parent) && pointer[parent.size()] == '/';
+  }
+
+  std::vector<Problem> list_;
+  std::set<std::string> pointers_;
+};
+
+template <class... Cases>
+struct Overloaded : Cases... {
+  using Cases::operator()...;
+};
+template <class... Cases>
+Overloaded(Cases...) -> Overloaded<Cases...>;
+
+// The pointer of a member, escaped after RFC 6901.
+std::string child(std::string pointer, std::string_view key) {
+  pointer += '/';
+  for (const char c : key) {
+    if (c == '~')
+      pointer += "~0";
+    else if (c == '/')
+      pointer += "~1";
+    else
+      pointer += c;
+  }
+  return pointer;
+}
+
+std::string with_unit(double value, std::string_view unit) {
+  return unit.empty() ? fmt::format("{}", value) : fmt::format("{} {}", value, unit);
+}
+
+// "is -2 kg, must be greater than 0 kg and at most 100000 kg"
+std::string out_of_bounds(double value, const Bounds& bounds, std::string_view unit) {
+  return fmt::format("is {}, must be {} {} and {} {}", with_unit(value, unit),
+                     bounds.low_excluded ? "greater than" : "at least", with_unit(bounds.low, unit),
+                     bounds.high_excluded ? "less than" : "at most", with_unit(bounds.high, unit));
+}
+
+std::optional<double> number(const json& value, const std::string& pointer, Problems& problems) {
+  if (!value.is_number()) {
+    problems.add(pointer, fmt::format("is {}, must be a number", value.type_name()));
+    return std::nullopt;
+  }
+  return value.get<double>();
+}
+
+std::optional<std::vector<double>> numbers(const json& value, const std::string& pointer,
+                                           Problems& problems) {
+  if (!value.is_array()) {
+    problems.add(pointer, fmt::format("is {}, must be an array of numbers", value.type_name()));
+    return std::nullopt;
+  }
+  std::vector<double> out;
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    const auto element = number(value[i], fmt::format("{}/{}", pointer, i), problems);
+    if (!element) return std::nullopt;
+    out.push_back(*element);
+  }
+  return out;
+}
+
+// Reports every key of the object that is not in `known`; false when the value is no object.
+bool object_of(const json& value, const std::string& pointer, const std::set<std::string_view>& known,
+               Problems& problems) {
+  if (!value.is_object()) {
+    problems.add(pointer, fmt::format("is {}, must be an object", value.type_name()));
+    return false;
+  }
+  for (const auto& [key, unused] : value.items())
+    if (!known.contains(key)) problems.add(child(pointer, key), "is not a known key");
+  return true;
+}
+
+// ---- reading: shapes into the model ----
+
+void read(const json& value, const std::string& pointer, std::string& out, Problems& problems) {
+  if (value.is_string())
+    out = value.get<std::string>();
+  else
+    problems.add(pointer, fmt::format("is {}, must be a string", value.type_name()));
+}
+
+void read(const json& value, const std::string& pointer, double& out, Problems& problems) {
+  if (const auto read_value = number(value, pointer, problems)) out = *read_value;
+}
+
+void read(const json& value, const std::string& pointer, std::optional<double>& out, Problems& problems) {
+  out = number(value, pointer, problems);
+}
+
+void read(const json& value, const std::string& pointer, std::array<double, 2>& out, Problems& problems) {
+  const auto both = numbers(value, pointer, problems);
+  if (!both) return;
+  if (both->size() != 2) {
+    problems.add(pointer, fmt::format("has {} numbers, must have 2: [right, left]", both->size()));
+    return;
+  }
+  std::copy(both->begin(), both->end(), out.begin());
+}
+
+void read_curve(const json& value, const std::string& pointer, std::string_view value_key, Curve& out,
+                Problems& problems) {
+  if (!object_of(value, pointer, {"charge", value_key}, problems)) return;
+  std::optional<std::vector<double>> columns[2];
+  const std::string keys[2] = {"charge", std::string(value_key)};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const std::string column = pointer + "/" + keys[i];
+    if (!value.contains(keys[i]))
+      problems.add(column, "is missing");
+    else
+      columns[i] = numbers(value[keys[i]], column, problems);
+  }
+  if (!columns[0] || !columns[1]) return;
+  if (columns[0]->size() != columns[1]->size()) {
+    problems.add(pointer, fmt::format("has {} charge but {} {} numbers, must have as many of each",
+                                      columns[0]->size(), columns[1]->size(), value_key));
+    return;
+  }
+  for (std::size_t i = 0; i < columns[0]->size(); ++i) out.emplace_back((*columns[0])[i], (*columns[1])[i]);
+  if (out.empty()) problems.add(pointer, "has no points, must have at least 2");
+}
+
+void read(const json& value, const std::string& pointer, std::vector<BatteryBranch>& out,
+          Problems& problems) {
+  if (!value.is_array()) {
+    problems.add(pointer, fmt::format("is {}, must be an array of objects", value.type_name()));
+    return;
+  }
+  std::set<std::string_view> known;
+  for (const BranchField& field : branch_fields()) known.insert(field.key);
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    const std::string element = fmt::format("{}/{}", pointer, i);
+    BatteryBranch& branch = out.emplace_back();
+    if (!object_of(value[i], element, known, problems)) continue;
+    for (const BranchField& field : branch_fields()) {
+      const std::string member = fmt::format("{}/{}", element, field.key);
+      const auto found = value[i].find(field.key);
+      if (found == value[i].end())
+        problems.add(member, "is missing");
+      else
+        read(*found, member, branch.*field.member, problems);
+    }
+  }
+}
+
+void read(const json& value, const std::string& pointer, std::vector<AdoptedEffect>& out,
+          Problems& problems) {
+  if (!value.is_object()) {
+    problems.add(pointer, fmt::format("is {}, must be an object", value.type_name()));
+    return;
+  }
+  for (const auto& [id, parameters] : value.items()) {
+    const std::string effect_pointer = child(pointer, id);
+    AdoptedEffect& effect = out.emplace_back();
+    effect.id = id;
+    if (!parameters.is_object()) {
+      problems.add(effect_pointer, fmt::format("is {}, must be an object", parameters.type_name()));
+      continue;
+    }
+    for (const auto& [name, parameter] : parameters.items()) {
+      const std::string name_pointer = child(effect_pointer, name);
+      if (const auto read_value = number(parameter, name_pointer, problems))
+        effect.parameters.emplace_back(name, *read_value);
+    }
+  }
+}
+
+// ---- checking: bounds of every field, then what several fields must satisfy together ----
+
+void check_bounds(double value, const Bounds& bounds, const std::string& pointer, std::string_view name,
+                  Problems& problems) {
+  if (!bounds.contain(value)) problems.add(pointer, out_of_bounds(value, bounds, unit_of(name)));
+}
+
+void check_curve(const Curve& curve, const Field& field, const std::string& pointer, Problems& problems) {
+  if (curve.empty()) return;
+  if (curve.size() < 2 || curve.size() > max_curve_points) {
+    problems.add(pointer, fmt::format("has {} points, must have 2 to {}", curve.size(), max_curve_points));
+    return;
+  }
+  for (std::size_t i = 0; i < curve.size(); ++i) {
+    const std::string charge_pointer = fmt::format("{}/charge/{}", pointer, i);
+    check_bounds(curve[i].first, charge_bounds, charge_pointer, "charge", problems);
+    check_bounds(curve[i].second, field.bounds, fmt::format("{}/{}/{}", pointer, field.value_key, i),
+                 field.value_key, problems);
+    if (i > 0 && !(curve[i].first > curve[i - 1].first))
+      problems.add(charge_pointer, fmt::format("is {}, must be greater than the one before, {}",
+                                               curve[i].first, curve[i - 1].first));
+  }
+}
+
+void check_branches(const std::vector<BatteryBranch>& branches, const std::string& pointer,
+                    Problems& problems) {
+  if (branches.size() > max_branches)
+    problems.add(pointer,
+                 fmt::format("has {} branches, must have at most {}", branches.size(), max_branches));
+  for (std::size_t i = 0; i < branches.size(); ++i)
+    for (const BranchField& field : branch_fields())
+      check_bounds(branches[i].*field.member, field.bounds, fmt::format("{}/{}/{}", pointer, i, field.key),
+                   field.key, problems);
+}
+
+void check_effects(const std::vector<AdoptedEffect>& effects, const std::string& pointer,
+                   Problems& problems) {
+  if (effects.size() > max_effects)
+    problems.add(pointer, fmt::format("has {} effects, must have at most {}", effects.size(), max_effects));
+  std::set<std::string_view> ids;
+  for (const AdoptedEffect& effect : effects) {
+    const std::string effect_pointer = child(pointer, effect.id);
+    if (!is_effect_name(effect.id))
+      problems.add(effect_pointer, fmt::format("is no effect id, must match {}", effect_name_pattern));
+    if (!ids.insert(effect.id).second) problems.add(effect_pointer, "is given twice");
+    if (effect.parameters.size() > max_effect_parameters)
+      problems.add(effect_pointer, fmt::format("has {} parameters, must have at most {}",
+                                               effect.parameters.size(), max_effect_parameters));
+    std::set<std::string_view> names;
+    for (const auto& [name, value] : effect.parameters) {
+      const std::string name_pointer = child(effect_pointer, name);
+      if (!is_effect_name(name))
+        problems.add(name_pointer, fmt::format("is no parameter name, must match {}", effect_name_pattern));
+      if (!names.insert(name).second) problems.add(name_pointer, "is given twice");
+      if (!std::isfinite(value))
+        problems.add(name_pointer, fmt::format("is {}, must be a finite number", value));
+    }
+  }
+}
+
+void check_field(const Field& field, RobotModel& model, Problems& problems) {
+  const std::string pointer(field.pointer);
+  if (problems.at(pointer)) return;
+  std::visit(Overloaded{
+                 [&](std::string& (*member)(RobotModel&)) {
+                   if (!is_robot_id(member(model)))
+                     problems.add(pointer, fmt::format("is \"{}\", must match {}",
+                                                       member(model).substr(0, 80), robot_id_pattern));
+                 },
+                 [&](double& (*member)(RobotModel&)) {
+                   check_bounds(member(model), field.bounds, pointer, field.key(), problems);
+                 },
+                 [&](std::optional<double>& (*member)(RobotModel&)) {
+                   if (member(model))
+                     check_bounds(*member(model), field.bounds, pointer, field.key(), problems);
+                 },
+                 [&](std::array<double, 2>& (*member)(RobotModel&)) {
+                   for (std::size_t side = 0; side < 2; ++side)
+                     check_bounds(member(model)[side], field.bounds, fmt::format("{}/{}", pointer, side),
+                                  field.key(), problems);
+                 },
+                 [&](Curve& (*member)(RobotModel&)) { check_curve(member(model), field, pointer, problems); },
+                 [&](std::vector<BatteryBranch>& (*member)(RobotModel&)) {
+                   check_branches(member(model), pointer, problems);
+                 },
+                 [&](std::vector<AdoptedEffect>& (*member)(RobotModel&)) {
+                   check_effects(member(model), pointer, problems);
+                 },
+             },
+             field.member);
+}
+
+// Parallel-axis bound: the chassis's mass centre sits d ahead of the axle, the wheels l beside its middle.
+void check_inertia(const RobotModel& model, Problems& problems) {
+  if (problems.at("/kinematics") || problems.at("/mass")) return;
+  const double d = model.kinematics.com_offset_m;
+  const double l = model.kinematics.half_track_m;
+  const double least = model.mass.chassis_kg * d * d + 2 * model.mass.wheel_kg * l * l;
+  if (model.mass.yaw_inertia_kg_m2 < least)
+    problems.add("/mass/yaw_inertia_kg_m2",
+                 fmt::format("is {} kg m², must be at least chassis_kg·com_offset_m² + "
+                             "2·wheel_kg·half_track_m² = {} kg m² (is com_offset_m = {} m right?)",
+                             model.mass.yaw_inertia_kg_m2, least, d));
+}
+
+void check_open_circuit_voltage(const Battery& battery, Problems& problems) {
+  const std::string pointer = "/battery/open_circuit_voltage";
+  const Curve& curve = battery.open_circuit_voltage;
+  if (curve.size() < 2 || problems.at(pointer)) return;
+  if (curve.front().first != 0 || curve.back().first != 1)
+    problems.add(pointer + "/charge", fmt::format("runs from {} to {}, must run from 0 to 1",
+                                                  curve.front().first, curve.back().first));
+  for (std::size_t i = 1; i < curve.size(); ++i)
+    if (curve[i].second < curve[i - 1].second)
+      problems.add(fmt::format("{}/voltage_v/{}", pointer, i),
+                   fmt::format("is {} V, must be at least the one before, {} V", curve[i].second,
+                               curve[i - 1].second));
+  const double lowest = curve.front().second;
+  const double highest = curve.back().second;
+  if (battery.nominal_voltage_v < lowest || battery.nominal_voltage_v > highest)
+    problems.add("/battery/nominal_voltage_v",
+                 fmt::format("is {} V, must lie in the open-circuit voltage's range, {} V to {} V",
+                             battery.nominal_voltage_v, lowest, highest));
+}
+
+void check_battery(const Battery& battery, Problems& problems) {
+  check_open_circuit_voltage(battery, problems);
+  if (problems.at("/battery/nominal_voltage_v")) return;
+  if (battery.cutoff_voltage_v && !problems.at("/battery/cutoff_voltage_v") &&
+      *battery.cutoff_voltage_v >= battery.nominal_voltage_v)
+    problems.add("/battery/cutoff_voltage_v",
+                 fmt::format("is {} V, must be below nominal_voltage_v = {} V", *battery.cutoff_voltage_v,
+                             battery.nominal_voltage_v));
+}
+
+// A source of voltage U behind R gives at most U²/(4R).
+void check_idle_power(const RobotModel& model, Problems& problems) {
+  if (problems.at("/battery") || problems.at("/idle_power_w")) return;
+  const Battery& battery = model.battery;
+  if (battery.internal_resistance_ohm == 0) return;
+  const double most =
+      battery.nominal_voltage_v * battery.nominal_voltage_v / (4 * battery.internal_resistance_ohm);
+  if (model.idle_power_w >= most)
+    problems.add("/idle_power_w", fmt::format("is {} W, must be less than what the battery can give, "
+                                              "nominal_voltage_v²/(4·internal_resistance_ohm) = {} W",
+                                              model.idle_power_w, most));
+}
+
+void check_robot(RobotModel& model, Problems& problems) {
+  for (const Field& field : fields()) check_field(field, model, problems);
+  check_inertia(model, problems);
+  check_battery(model.battery, problems);
+  check_idle_power(model, problems);
+}
+
+// ---- the document as a whole ----
+
+void read_field(const Field& field, const json& value, RobotModel& model, Problems& problems) {
+  const std::string pointer(field.pointer);
+  std::visit(Overloaded{[&](Curve& (*member)(RobotModel&)) {
+                          read_curve(value, pointer, field.value_key, member(model), problems);
+                        },
+                        [&](auto member) { read(value, pointer, member(model), problems); }},
+             field.member);
+}
+
+bool is_battery_field(const Field& field) {
+  return field.pointer.starts_with("/battery/");
+}
+
+// The keys allowed in each object of the file, by the object's own pointer.
+std::set<std::string_view> keys_below(std::string_view object_pointer) {
+  std::set<std::string_view> keys;
+  for (const Field& field : fields()) {
+    if (!field.pointer.starts_with(object_pointer) || field.pointer[object_pointer.size()] != '/') continue;
+    const std::string_view rest = field.pointer.substr(object_pointer.size() + 1);
+    keys.insert(rest.substr(0, rest.find('/')));
+  }
+  return keys;
+}
+
+// Reads the rows of the table that `wanted` selects out of a document whose root is at `root` of a robot
+// file.
+template <class Wanted>
+void read_document(const json& document, std::string_view root, Wanted wanted, RobotModel& model,
+                   Problems& problems) {
+  const std::string root_pointer(root);
+  if (!object_of(document, root_pointer, keys_below(root), problems)) return;
+  std::set<std::string_view> visited{root};
+  for (const Field& field : fields()) {
+    if (!wanted(field)) continue;
+    const std::string_view parent = field.pointer.substr(0, field.pointer.rfind('/'));
+    const json* object = &document;
+    if (parent != root) {
+      const std::string key(parent.substr(root.size() + 1));
+      const auto found = document.find(key);
+      if (found == document.end()) {
+        problems.add(std::string(parent), "is missing");
+        continue;
+      }
+      const bool first_visit = visited.insert(parent).second;
+      if (first_visit) object_of(*found, std::string(parent), keys_below(parent), problems);
+      if (!found->is_object()) continue;
+      object = &*found;
+    }
+    const auto value = object->find(field.key());
+    if (value != object->end())
+      read_field(field, *value, model, problems);
+    else if (field.presence == Presence::required)
+      problems.add(std::string(field.pointer), "is missing");
+  }
+}
+
+// nlohmann keeps the last of two equal keys; a file that says two things is refused instead.
+Result<json> parse_text(std::string_view text) {
+  if (text.size() > max_file_bytes)
+    return fail(Fault::too_large, "",
+                fmt::format("is {} bytes, must be at most {}", text.size(), max_file_bytes));
+  std::vector<std::set<std::string>> open_objects;
+  std::string repeated;
+  const auto watch = [&](int, json::parse_event_t event, json& parsed) {
+    if (event == json::parse_event_t::object_start) open_objects.emplace_back();
+    if (event == json::parse_event_t::object_end) open_objects.pop_back();
+    if (event == json::parse_event_t::key && !open_objects.back().insert(parsed.get<std::string>()).second)
+      repeated = parsed.get<std::string>();
+    return true;
+  };
+  try {
+    json document = json::parse(text.begin(), text.end(), watch);
+    if (!repeated.empty()) return invalid(child("", repeated), "is given twice in one object");
+    return document;
+  } catch (const json::exception& error) {
+    return invalid("", fmt::format("is not JSON: {}", error.what()));
+  }
+}
+
+Result<Battery> parse_battery_document(const json& document) {
+  Problems problems;
+  RobotModel model;
+  read_document(document, battery_prefix, is_battery_field, model, problems);
+  for (const Field& field : fields())
+    if (is_battery_field(field)) check_field(field, model, problems);
+  check_battery(model.battery, problems);
+  if (!problems.none()) return tl::unexpected(problems.error());
+  return model.battery;
+}
+
+Result<std::string> read_file(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file.is_open() || file.bad()) return fail(Fault::not_found, path.string(), "cannot be read");
+  return text;
+}
+
+template <class T>
+Result<T> load(const std::filesystem::path& path, Result<T> (*parse)(std::string_view)) {
+  return read_file(path).and_then(parse).map_error([&](Error error) {
+    if (error.field != path.string()) error.message = path.string() + ": " + error.message;
+    return error;
+  });
+}
+
+// ---- writing ----
+
+json written(const Curve& curve, std::string_view value_key) {
+  json charge = json::array();
+  json values = json::array();
+  for (const auto& [at_charge, value] : curve) {
+    charge.push_back(at_charge);
+    values.push_back(value);
+  }
+  return {{"charge", std::move(charge)}, {std::string(value_key), std::move(values)}};
+}
+
+json written(const std::vector<BatteryBranch>& branches) {
+  json out = json::array();
+  for (const BatteryBranch& branch : branches) {
+    json& element = out.emplace_back(json::object());
+    for (const BranchField& field : branch_fields()) element[std::string(field.key)] = branch.*field.member;
+  }
+  return out;
+}
+
+json written(const std::vector<AdoptedEffect>& effects) {
+  json out = json::object();
+  for (const AdoptedEffect& effect : effects) {
+    json& parameters = out[effect.id] = json::object();
+    for (const auto& [name, value] : effect.parameters) parameters[name] = value;
+  }
+  return out;
+}
+
+void write_field(const Field& field, RobotModel& model, json& document) {
+  const json::json_pointer pointer{std::string(field.pointer)};
+  std::visit(Overloaded{[&](std::optional<double>& (*member)(RobotModel&)) {
+                          if (member(model)) document[pointer] = *member(model);
+                        },
+                        [&](Curve& (*member)(RobotModel&)) {
+                          if (!member(model).empty())
+                            document[pointer] = written(member(model), field.value_key);
+                        },
+                        [&](std::vector<BatteryBranch>& (*member)(RobotModel&)) {
+                          if (!member(model).empty()) document[pointer] = written(member(model));
+                        },
+                        [&](std::vector<AdoptedEffect>& (*member)(RobotModel&)) {
+                          if (!member(model).empty()) document[pointer] = written(member(model));
+                        },
+                        [&](auto member) { document[pointer] = member(model); }},
+             field.member);
+}
+
+std::string dumped(const json& document, int indent) {
+  return document.dump(indent, ' ', false, json::error_handler_t::replace);
+}
+
+}  // namespace
+
+Result<RobotModel> parse_robot(const json& document) {
+  Problems problems;
+  RobotModel model;
+  read_document(
+      document, "", [](const Field&) { return true; }, model, problems);
+  check_robot(model, problems);
+  if (!problems.none()) return tl::unexpected(problems.error());
+  return model;
+}
+
+Result<RobotModel> parse_robot(std::string_view json_text) {
+  return parse_text(json_text).and_then([](const json& document) { return parse_robot(document); });
+}
+
+Result<RobotModel> load_robot(const std::filesystem::path& path) {
+  return load<RobotModel>(path, parse_robot);
+}
+
+Result<void> validate(const RobotModel& model) {
+  Problems problems;
+  RobotModel copy = model;
+  check_robot(copy, problems);
+  if (!problems.none()) return tl::unexpected(problems.error());
+  return {};
+}
+
+Result<Battery> parse_battery(std::string_view json_text) {
+  return parse_text(json_text).and_then(parse_battery_document);
+}
+
+Result<Battery> load_battery(const std::filesystem::path& path) {
+  return load<Battery>(path, parse_battery);
+}
+
+json robot_to_json(const RobotModel& model) {
+  RobotModel copy = model;
+  json document = json::object();
+  for (const Field& field : fields()) write_field(field, copy, document);
+  return document;
+}
+
+json battery_to_json(const Battery& battery) {
+  RobotModel model;
+  model.battery = battery;
+  json document = json::object();
+  for (const Field& field : fields())
+    if (is_battery_field(field)) write_field(field, model, document);
+  return document["battery"];
+}
+
+std::string to_json_text(const RobotModel& model, int indent) {
+  return dumped(robot_to_json(model), indent);
+}
+
+std::string to_json_text(const Battery& battery, int indent) {
+  return dumped(battery_to_json(battery), indent);
+}
+
+}  // namespace joulecast::robot
