@@ -8,7 +8,8 @@ namespace joulecast::energy {
 
 // Where battery energy goes. Energy leaving the battery is positive, and over any span
 //   battery = sum over terms of sign(term) * energy[term],
-// sign being -1 for `recovered` and +1 for the others. `kinetic` and `potential` are signed changes of stored energy.
+// sign being -1 for `recovered` and +1 for the others. `kinetic` and `potential` are signed changes of stored
+// energy.
 enum class Term : std::size_t {
   accessories,        // idle power and other constant loads
   driver,             // losses of the motor drivers
@@ -30,10 +31,13 @@ enum class Term : std::size_t {
 inline constexpr std::size_t term_count = 16;
 
 inline constexpr std::array<std::string_view, term_count> term_names = {
-    "accessories", "driver",         "copper", "brush",   "friction_internal", "friction_rolling", "friction_scrub", "friction_zone",
-    "friction_slip", "drag", "kinetic", "potential", "braking", "recovered", "sensor", "unexplained"};
+    "accessories",    "driver",        "copper",        "brush",      "friction_internal", "friction_rolling",
+    "friction_scrub", "friction_zone", "friction_slip", "drag",       "kinetic",           "potential",
+    "braking",        "recovered",     "sensor",        "unexplained"};
 
-constexpr double sign(Term term) { return term == Term::recovered ? -1.0 : 1.0; }
+constexpr double sign(Term term) {
+  return term == Term::recovered ? -1.0 : 1.0;
+}
 
 // One value a term: watts where it holds rates, joules where it holds energies.
 struct Ledger {
@@ -52,15 +56,19 @@ struct Ledger {
 
 // The accounts of one mission or one span of it, in joules unless the name says otherwise.
 struct Accounts {
-  double measured_j = 0;                       // at the battery terminals; NaN when not measured
-  std::array<double, 2> measured_motor_j{};    // V i of each motor; NaN when not measured
-  double modelled_j = 0;                       // at the battery terminals, from the measured motion
+  double battery_j = 0;   // measured where measured, modelled elsewhere; the ledger adds up to it
+  double measured_j = 0;  // at the battery terminals, over the `measured_s` that were measured
+  double measured_s = 0;
+  std::array<double, 2>
+      measured_motor_j{};  // V i of each motor, over the `motor_measured_s` that were measured
+  double motor_measured_s = 0;
+  double modelled_j = 0;  // at the battery terminals, from the measured motion
   std::array<double, 2> modelled_motor_j{};
-  double drawn_j = 0;                          // measured, positive part only
-  double returned_j = 0;                       // measured, negative part only, >= 0
-  double charge_ah = 0;                        // net charge out of the battery
-  double distance_m = 0;                       // path travelled, >= 0
-  double turned_rad = 0;                       // heading travelled, >= 0
+  double drawn_j = 0;     // of battery_j, while power flows out
+  double returned_j = 0;  // of battery_j, while power flows in, >= 0
+  double charge_ah = 0;   // net charge out of the battery
+  double distance_m = 0;  // path travelled, >= 0
+  double turned_rad = 0;  // heading travelled, >= 0
   double duration_s = 0;
   Ledger ledger;
 };

@@ -1,0 +1,129 @@
+#include "energy/cvode.h"
+
+#include <cvode/cvode.h>
+#include <nvector/nvector_serial.h>
+#include <sundials/sundials_context.h>
+#include <sunlinsol/sunlinsol_dense.h>
+#include <sunmatrix/sunmatrix_dense.h>
+#include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
+
+#include <cmath>
+#include <cstdlib>
+
+namespace joulecast::energy {
+
+struct Cvode::Impl {
+  InitialValueProblem& problem;
+  std::size_t size;
+  SUNContext context = nullptr;
+  N_Vector y = nullptr;
+  SUNMatrix matrix = nullptr;
+  SUNLinearSolver linear = nullptr;
+  SUNNonlinearSolver nonlinear = nullptr;
+  void* memory = nullptr;
+  std::string message;
+
+  Impl(std::size_t n, Method method, InitialValueProblem& p) : problem(p), size(n) {
+    const auto length = static_cast<sunindextype>(n);
+    require(SUNContext_Create(nullptr, &context) == 0);
+    require((y = N_VNew_Serial(length, context)) != nullptr);
+    N_VConst(0, y);
+    require((memory = CVodeCreate(method == Method::adams ? CV_ADAMS : CV_BDF, context)) != nullptr);
+    require(CVodeInit(memory, &Impl::rate, 0, y) == CV_SUCCESS);
+    require(CVodeSetUserData(memory, this) == CV_SUCCESS);
+    require(CVodeWFtolerances(memory, &Impl::weights) == CV_SUCCESS);
+    require(CVodeSetErrHandlerFn(memory, &Impl::report, this) == CV_SUCCESS);
+    require(CVodeSetMaxNumSteps(memory, 100000) == CV_SUCCESS);
+    if (method == Method::adams) {
+      require((nonlinear = SUNNonlinSol_FixedPoint(y, 0, context)) != nullptr);
+      require(CVodeSetNonlinearSolver(memory, nonlinear) == CV_SUCCESS);
+    } else {
+      require((matrix = SUNDenseMatrix(length, length, context)) != nullptr);
+      require((linear = SUNLinSol_Dense(y, matrix, context)) != nullptr);
+      require(CVodeSetLinearSolver(memory, linear, matrix) == CV_SUCCESS);
+    }
+  }
+
+  ~Impl() {
+    if (memory != nullptr) CVodeFree(&memory);
+    if (nonlinear != nullptr) SUNNonlinSolFree(nonlinear);
+    if (linear != nullptr) SUNLinSolFree(linear);
+    if (matrix != nullptr) SUNMatDestroy(matrix);
+    if (y != nullptr) N_VDestroy(y);
+    if (context != nullptr) SUNContext_Free(&context);
+  }
+
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  // Construction fails only without memory or by our own misuse of the library.
+  static void require(bool ok) {
+    if (!ok) std::abort();
+  }
+
+  static std::span<double> values(N_Vector v) {
+    return {N_VGetArrayPointer(v), static_cast<std::size_t>(N_VGetLength(v))};
+  }
+
+  static int rate(sunrealtype t, N_Vector y, N_Vector ydot, void* self) {
+    const std::span<double> out = values(ydot);
+    static_cast<Impl*>(self)->problem.rate(t, values(y), out);
+    // The fixed-point solver would retry a NaN hundreds of times: refuse it as unrecoverable.
+    for (double v : out) {
+      if (!std::isfinite(v)) return -1;
+    }
+    return 0;
+  }
+
+  static int weights(N_Vector y, N_Vector weight, void* self) {
+    static_cast<Impl*>(self)->problem.weights(values(y), values(weight));
+    return 0;
+  }
+
+  static void report(int, const char*, const char*, char* text, void* self) {
+    static_cast<Impl*>(self)->message = text;
+  }
+};
+
+Cvode::Cvode(std::size_t size, Method method, InitialValueProblem& problem)
+    : impl_(std::make_unique<Impl>(size, method, problem)) {}
+Cvode::~Cvode() = default;
+Cvode::Cvode(Cvode&&) noexcept = default;
+Cvode& Cvode::operator=(Cvode&&) noexcept = default;
+
+std::span<double> Cvode::state() {
+  return Impl::values(impl_->y);
+}
+
+Result<void> Cvode::advance(double t0, double t1, double first_step) {
+  if (!(t1 > t0)) return invalid("t1", "must be after t0");
+  const auto check = [&](int flag) -> Result<void> {
+    if (flag >= 0) return {};
+    return fail(Fault::internal, "cvode",
+                impl_->message.empty() ? "failed with flag " + std::to_string(flag) : impl_->message);
+  };
+  impl_->message.clear();
+  if (Result<void> ok = check(CVodeReInit(impl_->memory, t0, impl_->y)); !ok) return ok;
+  if (Result<void> ok = check(CVodeSetInitStep(impl_->memory, first_step)); !ok) return ok;
+  if (Result<void> ok = check(CVodeSetStopTime(impl_->memory, t1)); !ok) return ok;
+  sunrealtype reached = t0;
+  const int flag = CVode(impl_->memory, t1, impl_->y, &reached, CV_NORMAL);
+  if (Result<void> ok = check(flag); !ok) return ok;
+  if (reached != t1)
+    return fail(Fault::internal, "cvode", "stopped at " + std::to_string(reached) + " s, short of its goal");
+  return {};
+}
+
+long Cvode::steps() const {
+  long count = 0;
+  CVodeGetNumSteps(impl_->memory, &count);
+  return count;
+}
+
+long Cvode::evaluations() const {
+  long count = 0;
+  CVodeGetNumRhsEvals(impl_->memory, &count);
+  return count;
+}
+
+}  // namespace joulecast::energy

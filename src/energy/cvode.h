@@ -1,0 +1,48 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+
+#include "base/error.h"
+
+namespace joulecast::energy {
+
+// The right-hand side of an initial value problem y' = f(t, y). `rate` has the size of `state`.
+class InitialValueProblem {
+ public:
+  virtual ~InitialValueProblem() = default;
+  virtual void rate(double t, std::span<const double> state, std::span<double> rate) = 0;
+  // Error weights 1/tolerance of each state; called at every step.
+  virtual void weights(std::span<const double> state, std::span<double> weight) const = 0;
+};
+
+enum class Method {
+  adams,  // Adams-Moulton with fixed-point iteration: smooth, non-stiff
+  bdf     // BDF with a dense Newton iteration: stiff
+};
+
+// One CVODE integrator of fixed size, restarted as often as wanted. Owns its SUNContext, so an instance
+// belongs to one thread at a time.
+class Cvode {
+ public:
+  Cvode(std::size_t size, Method method, InitialValueProblem& problem);
+  ~Cvode();
+  Cvode(Cvode&&) noexcept;
+  Cvode& operator=(Cvode&&) noexcept;
+
+  std::span<double> state();
+
+  // Integrates from `t0` with the present state() to exactly `t1` > t0, restarting the method at t0;
+  // `first_step` = 0 lets CVODE choose. The error carries CVODE's own message.
+  Result<void> advance(double t0, double t1, double first_step = 0);
+
+  long steps() const;        // since the last restart
+  long evaluations() const;  // of the right-hand side, since the last restart
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace joulecast::energy

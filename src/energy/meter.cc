@@ -1,0 +1,239 @@
+#include "energy/meter.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "energy/rates.h"
+
+namespace joulecast::energy {
+namespace {
+
+constexpr std::size_t heat_index = account::count;
+constexpr std::size_t state_size = heat_index + 2;
+constexpr double seconds_per_hour = 3600;
+constexpr double microseconds = 1e-6;
+
+}  // namespace
+
+// One settled sample.
+struct Meter::Node {
+  std::int64_t utime_us = 0;
+  Reading reading;
+  Coverage coverage;
+};
+
+// The initial value problem between two samples, in time since the first of them.
+class Meter::Segment final : public InitialValueProblem {
+ public:
+  Segment(const dynamics::DriveModel& model, double tolerance)
+      : model_(model), tolerance_(tolerance), cvode_(state_size, Method::adams, *this) {}
+
+  // Integrates from `a` to `b`; `copper_heat_w` goes in at `a` and comes out at `b`. Returns the accounts'
+  // increments.
+  Result<Rates> integrate(const Reading& a, const Reading& b, Coverage coverage, double interval_s,
+                          std::array<double, 2>& copper_heat_w) {
+    a_ = a;
+    b_ = b;
+    coverage_ = coverage;
+    interval_s_ = interval_s;
+    std::array<double, 2> copper{};
+    start_ = rates_at(model_, a, coverage, copper);
+    end_ = rates_at(model_, b, coverage, copper);
+    const double power_scale =
+        std::max({std::fabs(start_[account::modelled]), std::fabs(end_[account::modelled]),
+                  std::fabs(start_[account::battery]), std::fabs(end_[account::battery]),
+                  model_.parameters().idle_power_w, 1.0});
+    weight_ = 1 / (tolerance_ * power_scale * interval_s);
+    const std::span<double> y = cvode_.state();
+    std::ranges::fill(y, 0.0);
+    for (std::size_t s : {0u, 1u}) y[heat_index + s] = copper_heat_w[s];
+    // A first step of half the interval: the departure from the chord is zero at both ends and largest near
+    // the middle, so there CVODE's error test sees it, and shortens the step where it is not small.
+    const Result<void> done = cvode_.advance(0, interval_s, 0.5 * interval_s);
+    Rates increment;
+    for (std::size_t k = 0; k < account::count; ++k) {
+      const double departure = done ? y[k] : 0;
+      increment[k] = 0.5 * interval_s * (start_[k] + end_[k]) + departure;
+    }
+    if (!done) return tl::unexpected(done.error());
+    for (std::size_t s : {0u, 1u}) copper_heat_w[s] = y[heat_index + s];
+    return increment;
+  }
+
+  Rates chord() const {
+    Rates increment;
+    for (std::size_t k = 0; k < account::count; ++k) increment[k] = 0.5 * interval_s_ * (start_[k] + end_[k]);
+    return increment;
+  }
+
+  void rate(double t, std::span<const double> state, std::span<double> out) override {
+    const double s = t / interval_s_;
+    Reading reading = between(a_, b_, s);
+    reading.motion.copper_heat_w = {state[heat_index], state[heat_index + 1]};
+    std::array<double, 2> copper{};
+    const Rates now = rates_at(model_, reading, coverage_, copper);
+    for (std::size_t k = 0; k < account::count; ++k)
+      out[k] = now[k] - (start_[k] + s * (end_[k] - start_[k]));
+    for (std::size_t k : {0u, 1u})
+      out[heat_index + k] = (copper[k] - state[heat_index + k]) / model_.parameters().thermal_time_constant_s;
+  }
+
+  void weights(std::span<const double>, std::span<double> weight) const override {
+    std::ranges::fill(weight, weight_);
+    for (std::size_t s : {0u, 1u}) weight[heat_index + s] = 1;  // 1 W of low-passed copper heat
+  }
+
+ private:
+  const dynamics::DriveModel& model_;
+  double tolerance_;
+  Reading a_, b_;
+  Coverage coverage_;
+  double interval_s_ = 0;
+  Rates start_{}, end_{};
+  double weight_ = 1;
+  Cvode cvode_;
+};
+
+Meter::Meter(dynamics::DriveModel model, double capacity_ah, MeterSettings settings,
+             std::function<void(const MeterPoint&)> emit)
+    : model_(std::move(model)),
+      capacity_ah_(capacity_ah),
+      settings_(settings),
+      emit_(std::move(emit)),
+      segment_(std::make_unique<Segment>(model_, settings.tolerance)) {}
+
+Meter::~Meter() = default;
+
+void Meter::begin() {
+  waiting_.clear();
+  next_ = 0;
+  last_.reset();
+  accounts_ = {};
+  gaps_ = 0;
+  gap_seconds_ = 0;
+}
+
+Result<void> Meter::add(const telemetry::Sample& sample) {
+  waiting_.push_back(sample);
+  const double latest = static_cast<double>(sample.utime_us);
+  Result<void> outcome;
+  while (next_ < waiting_.size() &&
+         latest - static_cast<double>(waiting_[next_].utime_us) >= settings_.half_window_s / microseconds) {
+    if (Result<void> settled = settle(next_++); !settled) outcome = settled;
+  }
+  // History older than the window of the next sample to settle is done with.
+  const auto keep_from = static_cast<double>(waiting_[std::min(next_, waiting_.size() - 1)].utime_us) -
+                         settings_.half_window_s / microseconds;
+  while (next_ > 0 && static_cast<double>(waiting_.front().utime_us) < keep_from) {
+    waiting_.pop_front();
+    --next_;
+  }
+  return outcome;
+}
+
+Result<void> Meter::flush() {
+  Result<void> outcome;
+  while (next_ < waiting_.size()) {
+    if (Result<void> settled = settle(next_++); !settled) outcome = settled;
+  }
+  return outcome;
+}
+
+Result<void> Meter::settle(std::size_t index) {
+  const telemetry::Sample& sample = waiting_[index];
+  const double half_us = settings_.half_window_s / microseconds * (1 + 1e-9);
+  const double bridge_us = settings_.gap_bridge_s / microseconds;
+  const auto time_of = [&](std::size_t k) { return static_cast<double>(waiting_[k].utime_us); };
+
+  // The filter's window: samples within reach, not across a gap.
+  std::size_t first = index, last = index;
+  while (first > 0 && time_of(index) - time_of(first - 1) <= half_us &&
+         time_of(first) - time_of(first - 1) <= bridge_us)
+    --first;
+  while (last + 1 < waiting_.size() && time_of(last + 1) - time_of(index) <= half_us &&
+         time_of(last + 1) - time_of(last) <= bridge_us)
+    ++last;
+  window_.clear();
+  for (std::size_t k = first; k <= last; ++k) {
+    window_.push_back({static_cast<double>(waiting_[k].utime_us - sample.utime_us) * microseconds,
+                       waiting_[k].wheel_velocity_rad_s});
+  }
+  if (std::isfinite(sample.payload_kg)) payload_kg_ = sample.payload_kg;
+
+  MeterPoint point;
+  point.sample = sample;
+  point.wheel_acceleration_rad_s2 = fitted_acceleration(window_, index - first);
+  Node node{sample.utime_us,
+            reading_of(sample, point.wheel_acceleration_rad_s2, payload_kg_, copper_heat_w_),
+            {std::isfinite(sample.battery_voltage_v) && std::isfinite(sample.battery_current_a),
+             std::isfinite(sample.motor_voltage_v[0]) && std::isfinite(sample.motor_voltage_v[1]) &&
+                 std::isfinite(sample.motor_current_a[0]) && std::isfinite(sample.motor_current_a[1])}};
+
+  Result<void> outcome;
+  if (last_ == nullptr) {
+    origin_utime_us_ = sample.utime_us;
+  } else {
+    point.interval_s = static_cast<double>(sample.utime_us - last_->utime_us) * microseconds;
+    point.bridged = point.interval_s <= settings_.gap_bridge_s;
+    if (point.bridged) {
+      const Coverage both{node.coverage.battery && last_->coverage.battery,
+                          node.coverage.motors && last_->coverage.motors};
+      Reading from = last_->reading;
+      from.motion.copper_heat_w = copper_heat_w_;
+      Result<Rates> integrated =
+          segment_->integrate(from, node.reading, both, point.interval_s, copper_heat_w_);
+      if (!integrated) outcome = tl::unexpected(integrated.error());
+      const Rates increment = integrated ? *integrated : segment_->chord();
+
+      accounts_.battery_j += increment[account::battery];
+      accounts_.measured_j += increment[account::measured];
+      if (both.battery) accounts_.measured_s += point.interval_s;
+      if (both.motors) accounts_.motor_measured_s += point.interval_s;
+      accounts_.modelled_j += increment[account::modelled];
+      for (std::size_t s : {0u, 1u}) {
+        accounts_.measured_motor_j[s] += increment[account::measured_motor + s];
+        accounts_.modelled_motor_j[s] += increment[account::modelled_motor + s];
+      }
+      accounts_.drawn_j += increment[account::drawn];
+      accounts_.returned_j += increment[account::returned];
+      const double charge_ah = increment[account::charge_a] / seconds_per_hour;
+      accounts_.charge_ah += charge_ah;
+      state_of_charge_ -= charge_ah / capacity_ah_;
+      accounts_.distance_m += increment[account::distance];
+      accounts_.turned_rad += increment[account::turned];
+      accounts_.duration_s += point.interval_s;
+      for (std::size_t k = 0; k < term_count; ++k)
+        accounts_.ledger.value[k] += increment[account::ledger + k];
+    } else {
+      ++gaps_;
+      gap_seconds_ += point.interval_s;
+      // Windings cool while nobody looks.
+      const double decay = std::exp(-point.interval_s / model_.parameters().thermal_time_constant_s);
+      for (double& heat : copper_heat_w_) heat *= decay;
+    }
+  }
+  node.reading.motion.copper_heat_w = copper_heat_w_;
+
+  std::array<double, 2> copper{};
+  const Rates now = rates_at(model_, node.reading, node.coverage, copper);
+  const dynamics::Body<double> body =
+      dynamics::body_of_wheels(model_.parameters(), node.reading.motion.wheel_speed_rad_s,
+                               node.reading.motion.wheel_acceleration_rad_s2);
+  point.t_s = static_cast<double>(sample.utime_us - origin_utime_us_) * microseconds;
+  point.speed_m_s = body.speed_m_s;
+  point.yaw_rate_rad_s = body.yaw_rate_rad_s;
+  point.measured_power_w = node.coverage.battery ? now[account::measured] : telemetry::unmeasured;
+  point.modelled_power_w = now[account::modelled];
+  for (std::size_t s : {0u, 1u}) {
+    point.winding_temperature_c[s] =
+        std::isfinite(sample.motor_temperature_c[s])
+            ? sample.motor_temperature_c[s]
+            : settings_.winding_reference_c + model_.parameters().thermal_resistance_k_w * copper_heat_w_[s];
+  }
+  point.state_of_charge = state_of_charge_;
+  last_ = std::make_unique<Node>(node);
+  emit_(point);
+  return outcome;
+}
+
+}  // namespace joulecast::energy

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <array>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "base/error.h"
+#include "dynamics/drive_model.h"
+#include "energy/acceleration_filter.h"
+#include "energy/cvode.h"
+#include "energy/ledger.h"
+#include "telemetry/sample.h"
+
+namespace joulecast::energy {
+
+struct MeterSettings {
+  // CVODE's local error a sample interval, as a fraction of the energy (power scale times interval) at stake
+  // in it. The power scale is the larger of the idle power and the absolute battery power at either end.
+  double tolerance = 1e-4;
+  double half_window_s = default_half_window_s;  // of the acceleration filter, and so the meter's latency
+  double gap_bridge_s = 1.0;                     // longer silences are not integrated
+  double winding_reference_c = 25;
+};
+
+// What the meter knows at one sample, once the acceleration filter has seen enough of what follows it.
+struct MeterPoint {
+  telemetry::Sample sample;
+  double t_s = 0;         // since the first sample of the mission
+  double interval_s = 0;  // since the previous point; 0 for the first
+  bool bridged = true;    // false: the interval was longer than gap_bridge_s and was not integrated
+  std::array<double, 2> wheel_acceleration_rad_s2{};
+  double speed_m_s = 0;
+  double yaw_rate_rad_s = 0;
+  double measured_power_w = telemetry::unmeasured;
+  double modelled_power_w = 0;
+  std::array<double, 2> winding_temperature_c{};
+  double state_of_charge = telemetry::unmeasured;
+};
+
+// Integrates the energy accounts of one robot online. CVODE (Adams, fixed-point iteration) is restarted at
+// every sample and stopped exactly at the next; between samples every input is linear. Each account's rate is
+// split into the chord between its values at both ends, whose integral is exact, and the departure from the
+// chord, which CVODE integrates under error control; so smooth intervals cost one or two steps, and kinks (a
+// motor that begins to regenerate) are resolved. One formula a rate, and one integration for all, keep the
+// ledger closed to rounding.
+//
+// Not thread-safe; deterministic: the same samples give the same bits.
+class Meter {
+ public:
+  // `emit` receives every point in time order, `half_window_s` late. State of charge starts at
+  // `state_of_charge` (NaN = unknown, and stays so).
+  Meter(dynamics::DriveModel model, double capacity_ah, MeterSettings settings,
+        std::function<void(const MeterPoint&)> emit);
+  ~Meter();
+  Meter(const Meter&) = delete;
+  Meter& operator=(const Meter&) = delete;
+
+  void set_state_of_charge(double state_of_charge) { state_of_charge_ = state_of_charge; }
+
+  // Takes the next sample: later than the previous one, finite where measured (src/telemetry/validation
+  // refuses others). A payload of NaN counts as the last declared one. An error is CVODE's; the interval's
+  // chord then stands for it.
+  Result<void> add(const telemetry::Sample& sample);
+
+  // Processes the samples that still wait for the filter, with one-sided windows.
+  Result<void> flush();
+
+  // Starts new accounts at the next sample; flush() first. Temperature and charge carry over.
+  void begin();
+
+  const Accounts& accounts() const { return accounts_; }
+  std::size_t gaps() const { return gaps_; }  // intervals not integrated
+  double gap_seconds() const { return gap_seconds_; }
+  const dynamics::DriveModel& model() const { return model_; }
+
+ private:
+  class Segment;
+  struct Node;
+
+  Result<void> settle(std::size_t index);
+
+  dynamics::DriveModel model_;
+  double capacity_ah_;
+  MeterSettings settings_;
+  std::function<void(const MeterPoint&)> emit_;
+  std::deque<telemetry::Sample> waiting_;  // the filter's window; samples before next_ are history
+  std::size_t next_ = 0;                   // first sample not yet settled
+  std::unique_ptr<Node> last_;
+  std::unique_ptr<Segment> segment_;
+  std::vector<SpeedSample> window_;
+  Accounts accounts_;
+  std::array<double, 2> copper_heat_w_{};
+  double state_of_charge_ = telemetry::unmeasured;
+  double payload_kg_ = 0;
+  std::int64_t origin_utime_us_ = 0;
+  std::size_t gaps_ = 0;
+  double gap_seconds_ = 0;
+};
+
+}  // namespace joulecast::energy

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "dynamics/drive_model.h"
+#include "energy/ledger.h"
+#include "telemetry/sample.h"
+
+namespace joulecast::energy {
+
+// The meter's accounts as one vector, so that one integration serves them all. Rates are in W, A or m/s.
+namespace account {
+inline constexpr std::size_t battery = 0;
+inline constexpr std::size_t measured = 1;
+inline constexpr std::size_t measured_motor = 2;  // two
+inline constexpr std::size_t modelled = 4;
+inline constexpr std::size_t modelled_motor = 5;  // two
+inline constexpr std::size_t drawn = 7;
+inline constexpr std::size_t returned = 8;
+inline constexpr std::size_t charge_a = 9;
+inline constexpr std::size_t distance = 10;
+inline constexpr std::size_t turned = 11;
+inline constexpr std::size_t ledger = 12;  // term_count
+inline constexpr std::size_t count = ledger + term_count;
+}  // namespace account
+
+using Rates = std::array<double, account::count>;
+
+// What the rates depend on at one instant; linear in time between samples.
+struct Reading {
+  dynamics::Instant motion;
+  std::array<double, 2> motor_voltage_v{};
+  std::array<double, 2> motor_current_a{};
+  double battery_voltage_v = 0;
+  double battery_current_a = 0;
+};
+
+// Which channels both ends of an interval have.
+struct Coverage {
+  bool battery = false;
+  bool motors = false;
+};
+
+// The reading of a sample; unmeasured electrical channels are zero (the coverage says so).
+Reading reading_of(const telemetry::Sample& sample, const std::array<double, 2>& wheel_acceleration_rad_s2,
+                   double payload_kg, const std::array<double, 2>& copper_heat_w);
+
+// The reading at fraction s in [0, 1] between two.
+Reading between(const Reading& a, const Reading& b, double s);
+
+// All account rates at one instant. `copper_heat_rate` receives R i^2 of each motor [W].
+Rates rates_at(const dynamics::DriveModel& model, const Reading& reading, Coverage coverage,
+               std::array<double, 2>& copper_w, dynamics::PowerFlow<double>* flow_out = nullptr);
+
+}  // namespace joulecast::energy
