@@ -535,7 +535,7 @@ std::string dumped(const json& document, int indent) {
 
 }  // namespace
 
-Result<RobotModel> parse_robot(const json& document) {
+Result<RobotModel> read_robot(const json& document) {
   Problems problems;
   RobotModel model;
   read_document(
@@ -546,7 +546,7 @@ Result<RobotModel> parse_robot(const json& document) {
 }
 
 Result<RobotModel> parse_robot(std::string_view json_text) {
-  return parse_text(json_text).and_then([](const json& document) { return parse_robot(document); });
+  return parse_text(json_text).and_then([](const json& document) { return read_robot(document); });
 }
 
 Result<RobotModel> load_robot(const std::filesystem::path& path) {

@@ -10,11 +10,12 @@
 
 namespace joulecast::robot {
 
-// The robot file (schemas/robot.schema.json) in and out. All problems of a file are found in one go: the
-// error's field is the JSON pointer of the first, its message lists every violated constraint with the value
-// and the bound. Effects are checked for shape and finite numbers only; their catalogue knows the rest.
+// The robot file (schemas/robot.schema.json) in and out; read_robot takes a document parsed already. All
+// problems of a file are found in one go: the error's field is the JSON pointer of the first, its message
+// lists every violated constraint with the value and the bound. Effects are checked for shape and finite
+// numbers only; their catalogue knows the rest.
 Result<RobotModel> parse_robot(std::string_view json_text);
-Result<RobotModel> parse_robot(const nlohmann::json& document);
+Result<RobotModel> read_robot(const nlohmann::json& document);
 
 // As parse_robot; an unreadable file is Fault::not_found, and its path stands before the message.
 Result<RobotModel> load_robot(const std::filesystem::path& path);
