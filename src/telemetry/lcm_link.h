@@ -1,0 +1,59 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "base/error.h"
+
+namespace joulecast::telemetry {
+
+struct Received {
+  std::string_view channel;
+  std::span<const std::uint8_t> data;
+  std::int64_t recv_utime_us = 0;  // host clock when LCM took it off the wire; of a file: the log's timestamp
+};
+
+// One LCM instance: raw bytes in and out. The views handed to a handler are valid during the call only.
+// Not thread-safe but for wake() and publish(), which any thread may call.
+//
+// Providers: "udpm://239.255.76.67:7667?ttl=0" (network), "memq://" (this instance alone, for tests),
+// "file:///path/to.log?speed=0" (a log's events as if received; 0 = as fast as they are read).
+// LCM has no authentication: whoever reaches the segment may publish, so the default is ttl=0.
+class LcmLink {
+ public:
+  using Handler = std::function<void(const Received&)>;
+
+  static Result<LcmLink> open(const std::string& provider_url);
+  LcmLink(LcmLink&&) noexcept;
+  LcmLink& operator=(LcmLink&&) noexcept;
+  ~LcmLink();
+
+  // `pattern` is a regular expression that must match the whole channel; escape_regex() makes one of a plain
+  // name. `queue_capacity` is how many messages of this subscription LCM holds unhandled before it drops new
+  // ones silently.
+  Result<void> subscribe(const std::string& pattern, Handler handler, int queue_capacity = 10'000);
+
+  Result<void> publish(const std::string& channel, std::span<const std::uint8_t> data);
+
+  // Wait at most `timeout` for messages, then handle all that are waiting, `max_messages` at most. Returns
+  // the number handled; 0 after a timeout or wake(). An exception of a handler leaves through here, after LCM
+  // has returned. Fault::unavailable when the provider ended: the end of a file, or a broken socket.
+  Result<int> poll(std::chrono::milliseconds timeout, int max_messages = 1'000);
+
+  // Make a poll that waits (or the next one) return at once.
+  void wake() noexcept;
+
+ private:
+  struct State;
+  explicit LcmLink(std::unique_ptr<State> state) noexcept;
+  std::unique_ptr<State> state_;
+};
+
+[[nodiscard]] std::string escape_regex(std::string_view text);
+
+}  // namespace joulecast::telemetry

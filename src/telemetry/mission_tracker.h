@@ -1,0 +1,112 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "telemetry/sample.h"
+
+namespace joulecast::telemetry {
+
+struct MissionLimits {
+  std::int64_t implicit_idle_us = 60'000'000;    // silence that ends an implicit mission
+  std::int64_t implicit_max_us = 3'600'000'000;  // an implicit mission is cut into pieces no longer than this
+  std::int64_t explicit_silence_us = 600'000'000;  // silence after which a mission counts as never finished
+  std::int64_t explicit_max_us = 24 * 3'600'000'000LL;  // a mission longer than this counts as never finished
+  std::int64_t after_end_us = 500'000;  // samples this soon after a mission's end start no other
+};
+
+enum class MissionEnd {
+  finished,    // the robot said so
+  aborted,     // the robot said so
+  superseded,  // another mission was STARTED while this one was open
+  unfinished,  // an explicit mission that fell silent or outlived its longest duration
+  idle,        // an implicit mission that fell silent
+  expired      // an implicit mission that reached its longest duration
+};
+
+[[nodiscard]] std::string_view name_of(MissionEnd end) noexcept;
+
+struct OpenMission {
+  std::string mission_id;
+  std::int64_t start_utime_us = 0;
+  std::int64_t last_utime_us = 0;  // of the newest sample or event that belongs to it
+  double payload_kg = unmeasured;
+  bool implicit = false;
+
+  friend bool operator==(const OpenMission&, const OpenMission&) = default;
+};
+
+struct MissionAction {
+  enum class Kind { open, close };
+  Kind kind = Kind::open;
+  std::string mission_id;
+  std::int64_t utime_us = 0;  // robot's clock: where the mission begins or ends
+  bool implicit = false;
+  double payload_kg = unmeasured;         // open: as declared
+  MissionEnd end = MissionEnd::finished;  // close only
+  std::string note;                       // the event's note, if an event caused this
+};
+
+using MissionActions = std::vector<MissionAction>;
+
+struct SampleStep {
+  MissionActions actions;
+  bool belongs = false;  // to the mission open after the actions
+};
+
+struct MissionCounters {
+  std::uint64_t opened_explicit = 0;
+  std::uint64_t opened_implicit = 0;
+  std::uint64_t closed = 0;
+  std::uint64_t duplicate_events = 0;     // of a mission open or closed already
+  std::uint64_t out_of_order_events = 0;  // older than the mission they would change
+  std::uint64_t unknown_missions = 0;     // an end of a mission whose start was never heard
+  std::uint64_t samples_outside = 0;      // belong to no mission: before its start, or just after an end
+};
+
+// From the samples and events of ONE robot, in the order they arrived, to the boundaries of its missions. A
+// pure state machine: no clock, no store; the caller carries the returned actions out in order. All times are
+// the robot's.
+//
+// Telemetry without a mission opens an implicit one, `implicit-<utime>`. A STARTED closes whatever is open.
+// An end of a mission never heard of ends an open implicit mission (it was that mission, heard from its
+// middle) and is otherwise only counted.
+class MissionTracker {
+ public:
+  explicit MissionTracker(MissionLimits limits = {}) : limits_(limits) {}
+
+  // Call before integrating a sample that advances the stream: carry the actions out, then count the sample
+  // to current() if it belongs.
+  SampleStep on_sample(std::int64_t utime_us, double payload_kg);
+  MissionActions on_event(const MissionEvent& event);
+  // Nothing was heard of the robot for so long by the HOST's clock.
+  MissionActions on_silence(std::int64_t silent_us);
+  // The robot's clock was set (ClockStep of the sequence tracker): the open mission goes on in the new time.
+  void on_clock_step(std::int64_t utime_us);
+  // Continue a mission that a restarted service finds open in its store.
+  void resume(OpenMission mission);
+
+  // The mission open now.
+  [[nodiscard]] const std::optional<OpenMission>& current() const noexcept { return current_; }
+  [[nodiscard]] const MissionCounters& counters() const noexcept { return counters_; }
+
+ private:
+  void open(MissionActions& actions, std::string id, std::int64_t utime_us, double payload_kg, bool implicit,
+            std::string note);
+  void close(MissionActions& actions, std::int64_t utime_us, MissionEnd end, std::string note);
+  void start(MissionActions& actions, const MissionEvent& event);
+  void end(MissionActions& actions, const MissionEvent& event);
+  [[nodiscard]] bool was_closed(std::string_view mission_id) const noexcept;
+
+  MissionLimits limits_;
+  MissionCounters counters_;
+  std::optional<OpenMission> current_;
+  std::optional<std::int64_t> last_end_utime_us_;
+  std::deque<std::string> closed_;  // ids of the last missions, to know a repeated event by
+};
+
+}  // namespace joulecast::telemetry

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "telemetry/event_log.h"
+#include "telemetry/sample.h"
+
+namespace joulecast::telemetry {
+
+// One robot's samples over one mission, in time order.
+struct Recording {
+  std::string robot_id;
+  std::string mission_id;
+  double payload_kg = unmeasured;
+  std::vector<Sample> samples;
+};
+
+// Append to the log as the robot would have published it: STARTED at the first sample, every sample, FINISHED
+// at the last, stamped with the robot's clock. Fault::invalid for a recording without samples or with ids out
+// of bounds.
+Result<void> write_recording(EventLogWriter& log, const Recording& recording);
+
+}  // namespace joulecast::telemetry

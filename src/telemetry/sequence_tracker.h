@@ -1,0 +1,91 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace joulecast::telemetry {
+
+struct SequenceLimits {
+  std::int64_t gap_us = 1'000'000;  // a longer time between samples is a gap
+  std::int64_t forward_jump_us =
+      3'600'000'000;                          // a longer one is the robot's clock being set, not time passing
+  std::int64_t backward_jump_us = 5'000'000;  // an older sample by more than this is not merely late
+  std::int64_t max_missing = 1'000'000;       // a larger leap of the sequence is a restart, not a loss
+};
+
+enum class Arrival {
+  first,      // nothing was known of this robot's stream
+  fresh,      // newer than all before it
+  duplicate,  // seen already
+  late,       // older than one already taken and not seen yet: out of order
+  restart     // the robot's counter began anew: it booted
+};
+
+enum class ClockStep { none, backward, forward };
+
+// What the place of one sample in its robot's stream is.
+struct Placement {
+  Arrival arrival = Arrival::first;
+  ClockStep clock = ClockStep::none;
+  bool gap = false;          // elapsed_us is over the limit and the clock is trusted
+  std::int64_t missing = 0;  // sequence numbers skipped just before this sample
+  std::int64_t elapsed_us =
+      0;  // robot's clock since the newest sample before it; meaningless at a clock step
+
+  // The sample advances the stream; duplicates and late ones do not.
+  [[nodiscard]] bool advances() const noexcept {
+    return arrival != Arrival::duplicate && arrival != Arrival::late;
+  }
+  // The span from the sample before it is known and positive, so that power may be integrated over it.
+  [[nodiscard]] bool continues() const noexcept {
+    return (arrival == Arrival::fresh || arrival == Arrival::restart) && clock == ClockStep::none;
+  }
+};
+
+struct SequenceCounters {
+  std::uint64_t received = 0;
+  std::uint64_t fresh = 0;  // first, fresh and restart
+  std::uint64_t duplicate = 0;
+  std::uint64_t late = 0;
+  std::uint64_t missing =
+      0;  // numbers skipped; those that came late are in `late` too, so missing - late were lost
+  std::uint64_t restarts = 0;
+  std::uint64_t gaps = 0;
+  std::uint64_t clock_backward = 0;
+  std::uint64_t clock_forward = 0;
+};
+
+// Orders one robot's stream by its own sequence numbers and clock; depends on nothing else, so that a replay
+// counts what the live run counted. A number that goes back while the clock goes on is a restart; one that
+// goes back with the clock is late, or a duplicate when that number and instant were seen among the last
+// `memory` samples; one that goes back with a clock further back than backward_jump_us is a restart with a
+// clock step. A clock that does not advance while the sequence does is a backward step.
+class SequenceTracker {
+ public:
+  static constexpr std::size_t memory = 64;
+
+  explicit SequenceTracker(SequenceLimits limits = {}) noexcept : limits_(limits) {}
+
+  Placement place(std::int64_t sequence, std::int64_t utime_us) noexcept;
+
+  [[nodiscard]] const SequenceCounters& counters() const noexcept { return counters_; }
+
+ private:
+  struct Seen {
+    std::int64_t sequence = -1;
+    std::int64_t utime_us = 0;
+  };
+
+  [[nodiscard]] Seen& slot(std::int64_t sequence) noexcept;
+  [[nodiscard]] Placement classify(std::int64_t sequence, std::int64_t utime_us) noexcept;
+
+  SequenceLimits limits_;
+  SequenceCounters counters_;
+  std::array<Seen, memory> seen_{};
+  bool started_ = false;
+  std::int64_t newest_sequence_ = 0;
+  std::int64_t newest_utime_us_ = 0;
+};
+
+}  // namespace joulecast::telemetry

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "telemetry/sample.h"
+
+namespace joulecast::telemetry {
+
+// The widest value that a ground robot of any size could report, of every field in one table. Outside lies a
+// unit mistake or a broken sensor, not a robot; limits of a particular robot belong to its model.
+struct PlausibleRange {
+  std::string_view field;  // name in robot_telemetry_t
+  double low = 0;
+  double high = 0;
+};
+
+[[nodiscard]] std::span<const PlausibleRange> plausible_ranges() noexcept;
+
+enum class Implausibility {
+  missing,       // NaN in wheel_velocity, the one channel that every robot must measure
+  infinite,      // an infinity, in any field
+  out_of_range,  // beyond plausible_ranges()
+  bad_clock,     // utime before 1970 or after 2200
+  bad_sequence   // negative sequence number
+};
+
+struct Implausible {
+  Implausibility why = Implausibility::missing;
+  std::string_view field;  // name in robot_telemetry_t
+  double value = 0;
+};
+
+// What is wrong with the sample taken alone; empty when nothing is.
+[[nodiscard]] std::optional<Implausible> check_plausible(const Sample& sample) noexcept;
+[[nodiscard]] std::string describe(const Implausible& fault);
+[[nodiscard]] std::string_view name_of(Implausibility why) noexcept;
+
+}  // namespace joulecast::telemetry
