@@ -71,9 +71,10 @@ TorqueBalance<S> BasicDriveModel<S>::balance(const Instant& at) const {
     for (std::size_t k = 0; k < load_count; ++k) {
       (k == static_cast<std::size_t>(Load::internal) ? inside : transmitted) += b.loads.torque[k][s];
     }
-    b.gear_nm[s] = p.gear_loss * abs(transmitted) * context.direction[s];
     b.friction_nm[s] = p.friction_torque_nm[s] * context.direction[s] +
                        p.viscous_friction_nm_s_rad * at.wheel_speed_rad_s[s];
+    b.gear_nm[s] =
+        p.gear_loss * abs(transmitted + p.gear_friction_share * b.friction_nm[s]) * context.direction[s];
     b.total_nm[s] = transmitted + inside + b.gear_nm[s] + b.friction_nm[s];
   }
   return b;

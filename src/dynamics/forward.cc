@@ -22,17 +22,20 @@ std::array<double, 2> wheel_accelerations(const DriveModel& model, const DriveSt
                                           const std::array<double, 2>& torque_nm) {
   Instant at = instant_of(state, payload_kg);
   std::array<double, 2> acceleration{};
-  constexpr int max_steps = 8;  // the kink of gear loss is crossed at most once a wheel
+  constexpr int max_steps = 16;  // the kink of gear loss is crossed at most once a wheel
   for (int step = 0; step < max_steps; ++step) {
     const auto needed = [&](double right, double left) {
       at.wheel_acceleration_rad_s2 = {right, left};
       return model.balance(at).total_nm;
     };
-    // Differences over a unit acceleration are exact where the balance is affine.
+    // The balance is piecewise affine: differences are exact unless they straddle the kink, so they are
+    // short.
+    constexpr double reach = 1e-3;
     const auto base = needed(acceleration[0], acceleration[1]);
-    const auto right = needed(acceleration[0] + 1, acceleration[1]);
-    const auto left = needed(acceleration[0], acceleration[1] + 1);
-    const double a = right[0] - base[0], b = left[0] - base[0], c = right[1] - base[1], d = left[1] - base[1];
+    const auto right = needed(acceleration[0] + reach, acceleration[1]);
+    const auto left = needed(acceleration[0], acceleration[1] + reach);
+    const double a = (right[0] - base[0]) / reach, b = (left[0] - base[0]) / reach;
+    const double c = (right[1] - base[1]) / reach, d = (left[1] - base[1]) / reach;
     const double e = torque_nm[0] - base[0], f = torque_nm[1] - base[1];
     const double determinant = a * d - b * c;
     const double dr = (e * d - b * f) / determinant, dl = (a * f - e * c) / determinant;

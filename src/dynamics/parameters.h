@@ -40,6 +40,8 @@ struct Parameters {
   std::array<S, 2> friction_torque_nm{};
   S viscous_friction_nm_s_rad = 0;
   S gear_loss = 0;  // fraction of the torque that the gear transmits
+  S gear_friction_share =
+      0;  // of T_m and viscous friction: 1 on the wheel's side of the gear, 0 on the motor's
 
   S torque_constant_nm_a = 0;      // gear included: K_t n
   S voltage_constant_v_s_rad = 0;  // gear included: K_w n

@@ -104,10 +104,14 @@ Meter::Meter(dynamics::DriveModel model, double capacity_ah, MeterSettings setti
 
 Meter::~Meter() = default;
 
-void Meter::begin() {
+void Meter::interrupt() {
   waiting_.clear();
   next_ = 0;
   last_.reset();
+}
+
+void Meter::begin() {
+  interrupt();
   accounts_ = {};
   gaps_ = 0;
   gap_seconds_ = 0;

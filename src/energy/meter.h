@@ -70,6 +70,13 @@ class Meter {
   // Starts new accounts at the next sample; flush() first. Temperature and charge carry over.
   void begin();
 
+  // Goes on with accounts from before a restart of the service; call before the first sample.
+  void resume(const Accounts& accounts) { accounts_ = accounts; }
+
+  // Forgets the previous sample without ending the accounts: what lies between is not integrated. For a robot's clock that
+  // was set. flush() first.
+  void interrupt();
+
   const Accounts& accounts() const { return accounts_; }
   std::size_t gaps() const { return gaps_; }  // intervals not integrated
   double gap_seconds() const { return gap_seconds_; }

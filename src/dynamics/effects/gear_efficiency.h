@@ -18,6 +18,7 @@ struct GearEfficiency {
   template <class S>
   static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
     p.gear_loss += a[0];
+    p.gear_friction_share = a[1];
   }
 };
 

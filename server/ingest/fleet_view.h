@@ -1,0 +1,62 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <shared_mutex>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "energy/ledger.h"
+#include "telemetry/sample.h"
+
+namespace joulecast::server {
+
+// Energy used lately, weighted by exp(-age / recent_consumption_s): what live range and run time go by.
+struct RecentConsumption {
+  double energy_j = 0;
+  double distance_m = 0;
+  double duration_s = 0;
+};
+inline constexpr double recent_consumption_s = 900;
+
+// What is known of one robot at one moment; immutable once published.
+struct RobotSnapshot {
+  std::string robot_id;
+  bool has_model = false;
+  std::int64_t model_version = 0;
+  std::int64_t received_utime_us = 0;  // host clock at the last message; 0 = never heard
+  telemetry::Sample sample;            // the last one accounted for
+  double measured_power_w = telemetry::unmeasured;
+  double modelled_power_w = telemetry::unmeasured;
+  double speed_m_s = telemetry::unmeasured;
+  double yaw_rate_rad_s = telemetry::unmeasured;
+  double state_of_charge = telemetry::unmeasured;
+  std::array<double, 2> winding_temperature_c{telemetry::unmeasured, telemetry::unmeasured};
+  std::string mission_id;  // empty: no mission open
+  std::int64_t mission_key = 0;
+  std::int64_t mission_start_utime_us = 0;
+  energy::Accounts accounts;  // of the open mission
+  RecentConsumption recent;
+  std::uint64_t samples = 0;
+  std::map<std::string, std::uint64_t> faults;  // reason -> messages rejected or repaired, since the daemon started
+};
+
+// The latest snapshot of every robot. One thread publishes, any thread reads without waiting for it.
+class FleetView {
+ public:
+  void publish(std::shared_ptr<const RobotSnapshot> snapshot);
+  std::shared_ptr<const RobotSnapshot> find(std::string_view robot_id) const;
+  std::vector<std::shared_ptr<const RobotSnapshot>> all() const;
+
+ private:
+  struct Slot {
+    std::atomic<std::shared_ptr<const RobotSnapshot>> latest;
+  };
+  mutable std::shared_mutex mutex_;  // of the map; slots are never removed
+  std::map<std::string, std::unique_ptr<Slot>, std::less<>> slots_;
+};
+
+}  // namespace joulecast::server

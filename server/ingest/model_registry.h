@@ -1,0 +1,46 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <shared_mutex>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "dynamics/drive_model.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::server {
+
+// A robot's model as everything uses it: immutable, shared by reference.
+struct ModelInForce {
+  robot::RobotModel robot;
+  dynamics::DriveModel drive;
+  std::int64_t version = 0;
+};
+
+// The models in force, by robot. Any thread.
+class ModelRegistry {
+ public:
+  // Puts a robot's model in force; an effect that the catalogue rejects is an error and changes nothing.
+  Result<void> put(robot::RobotModel robot, std::int64_t version);
+
+  // Null when the robot's model is not known.
+  std::shared_ptr<const ModelInForce> find(std::string_view robot_id) const;
+
+  // All, by robot id.
+  std::vector<std::shared_ptr<const ModelInForce>> all() const;
+
+  // Grows with every put, so that users know when to look again.
+  std::uint64_t epoch() const { return epoch_.load(std::memory_order_acquire); }
+
+ private:
+  mutable std::shared_mutex mutex_;
+  std::map<std::string, std::shared_ptr<const ModelInForce>, std::less<>> models_;
+  std::atomic<std::uint64_t> epoch_ = 0;
+};
+
+}  // namespace joulecast::server
