@@ -51,6 +51,7 @@ struct Exchange {
   std::uint64_t response_bytes = 0;
   std::string_view target;
   std::string_view request_id;
+  bool stream = false;  // the duration is that of a stream, not of an answer
 };
 
 // Told of everything the server does; called on the I/O thread, must not block.

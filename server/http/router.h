@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -48,8 +48,11 @@ struct Endpoint {
 
 class Router {
  public:
+  // Told of every fault of ours (answered with status 500), since the client gets only the request id.
+  using FaultSink = std::function<void(const Endpoint&, const Request&, const Error&)>;
+
   // Two endpoints with the same method and path shape, or a malformed template, are our bug and abort.
-  explicit Router(std::vector<Endpoint> endpoints);
+  explicit Router(std::vector<Endpoint> endpoints, FaultSink on_fault = {});
   ~Router();
   Router(const Router&) = delete;
   Router& operator=(const Router&) = delete;
@@ -73,9 +76,11 @@ class Router {
 
  private:
   struct Node;
-  const Node* find(const std::vector<std::string>& segments, Request& request) const;
+
+  Response fault(const Endpoint& endpoint, const Request& request, const Error& error) const;
 
   std::vector<Endpoint> endpoints_;
+  FaultSink on_fault_;
   std::unique_ptr<Node> root_;
 };
 

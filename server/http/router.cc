@@ -1,0 +1,283 @@
+#include "server/http/router.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "server/http/json_text.h"
+#include "server/http/problem.h"
+#include "server/http/text.h"
+#include "server/http/uri.h"
+
+namespace joulecast::http {
+namespace {
+
+[[noreturn]] void refuse_table(const Endpoint& endpoint, const char* why) {
+  std::fprintf(stderr, "endpoint %s %s: %s\n", std::string(to_string(endpoint.method)).c_str(),
+               endpoint.path.c_str(), why);
+  std::abort();
+}
+
+// RFC 9110 section 12.5.1 without weights other than q=0, which excludes a range.
+bool accepts(std::string_view accept, std::string_view type) {
+  if (trim(accept).empty()) return true;
+  const auto base = trim(type.substr(0, type.find(';')));
+  const auto major = base.substr(0, base.find('/'));
+  int best = -1;  // specificity of the range that decides
+  bool allowed = false;
+  while (!accept.empty()) {
+    const auto comma = accept.find(',');
+    std::string_view item = accept.substr(0, comma);
+    accept.remove_prefix(comma == std::string_view::npos ? accept.size() : comma + 1);
+    const auto semicolon = item.find(';');
+    const auto range = trim(item.substr(0, semicolon));
+    bool zero = false;
+    while (!item.empty()) {
+      const auto next = item.find(';');
+      const auto part = trim(item.substr(0, next));
+      item.remove_prefix(next == std::string_view::npos ? item.size() : next + 1);
+      if (part.size() > 2 && lower(part[0]) == 'q' && part[1] == '=') {
+        zero = part.find_first_not_of("0.", 2) == std::string_view::npos;
+      }
+    }
+    int specificity = -1;
+    if (range == "*/*") {
+      specificity = 0;
+    } else if (range.size() > 2 && range.ends_with("/*") &&
+               equals_ignoring_case(range.substr(0, range.size() - 2), major)) {
+      specificity = 1;
+    } else if (equals_ignoring_case(range, base)) {
+      specificity = 2;
+    }
+    if (specificity > best) {
+      best = specificity;
+      allowed = !zero;
+    } else if (specificity == best && specificity >= 0) {
+      allowed = allowed || !zero;
+    }
+  }
+  return allowed;
+}
+
+bool is_json_type(std::string_view type) {
+  const auto base = trim(type.substr(0, type.find(';')));
+  return equals_ignoring_case(base, "application/json") ||
+         (base.size() > 17 && equals_ignoring_case(base.substr(0, 12), "application/") &&
+          equals_ignoring_case(base.substr(base.size() - 5), "+json"));
+}
+
+std::optional<std::string> broken_constraint(const Parameter& parameter, std::string_view text) {
+  switch (parameter.type) {
+    case Parameter::Type::text: {
+      const auto& choices = parameter.choices;
+      if (choices.empty() || std::find(choices.begin(), choices.end(), text) != choices.end())
+        return std::nullopt;
+      std::string message = "must be one of";
+      for (const auto& choice : choices) message += " " + choice;
+      return message;
+    }
+    case Parameter::Type::boolean:
+      if (text == "true" || text == "false") return std::nullopt;
+      return "must be true or false";
+    case Parameter::Type::integer:
+    case Parameter::Type::number: {
+      std::optional<double> value;
+      if (parameter.type == Parameter::Type::integer) {
+        if (const auto whole = parse_number<std::int64_t>(text)) value = static_cast<double>(*whole);
+      } else {
+        value = parse_number<double>(text);
+      }
+      if (!value)
+        return parameter.type == Parameter::Type::integer ? "must be an integer" : "must be a finite number";
+      if (parameter.minimum && *value < *parameter.minimum) {
+        return "must be at least " + number_text(*parameter.minimum) + ", is " + std::string(text);
+      }
+      if (parameter.maximum && *value > *parameter.maximum) {
+        return "must be at most " + number_text(*parameter.maximum) + ", is " + std::string(text);
+      }
+      return std::nullopt;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+struct Router::Node {
+  std::map<std::string, std::unique_ptr<Node>, std::less<>> children;
+  std::unique_ptr<Node> any;  // the child of a "{name}" segment; names differ by endpoint and live there
+  struct Slot {
+    const Endpoint* endpoint;
+    std::vector<std::string> names;  // of the "{...}" segments in order
+  };
+  std::vector<Slot> slots;
+  std::string allow;  // value of the Allow header
+
+  const Slot* slot(Method method) const {
+    for (const auto& candidate : slots) {
+      if (candidate.endpoint->method == method) return &candidate;
+    }
+    return nullptr;
+  }
+};
+
+Router::Router(std::vector<Endpoint> endpoints, FaultSink on_fault)
+    : endpoints_(std::move(endpoints)), on_fault_(std::move(on_fault)), root_(std::make_unique<Node>()) {
+  for (const Endpoint& endpoint : endpoints_) {
+    const auto target = parse_target(endpoint.path);
+    if (!target || !target->query.empty()) refuse_table(endpoint, "malformed path template");
+    if (!endpoint.handler) refuse_table(endpoint, "no handler");
+    if (endpoint.operation_id.empty()) refuse_table(endpoint, "no operation id");
+    Node* node = root_.get();
+    Node::Slot slot{&endpoint, {}};
+    for (const std::string& segment : target->segments) {
+      if (segment.size() > 2 && segment.front() == '{' && segment.back() == '}') {
+        if (!node->any) node->any = std::make_unique<Node>();
+        node = node->any.get();
+        slot.names.push_back(segment.substr(1, segment.size() - 2));
+      } else if (segment.find_first_of("{}") != std::string::npos) {
+        refuse_table(endpoint, "a template segment must be one whole {name}");
+      } else {
+        auto& child = node->children[segment];
+        if (!child) child = std::make_unique<Node>();
+        node = child.get();
+      }
+    }
+    if (node->slot(endpoint.method) != nullptr) refuse_table(endpoint, "the method and path shape are taken");
+    node->slots.push_back(std::move(slot));
+    if (!node->allow.empty()) node->allow += ", ";
+    node->allow += to_string(endpoint.method);
+    if (endpoint.method == Method::get) node->allow += ", HEAD";
+  }
+}
+
+Router::~Router() = default;
+
+namespace {
+
+// Depth-first with literal children first, so that "/v1/missions/latest" wins over "/v1/missions/{id}".
+template <class Node>
+const Node* descend(const Node& node, const std::vector<std::string>& segments, std::size_t at,
+                    std::vector<const std::string*>& captured) {
+  if (at == segments.size()) return node.slots.empty() ? nullptr : &node;
+  if (const auto child = node.children.find(segments[at]); child != node.children.end()) {
+    if (const Node* found = descend(*child->second, segments, at + 1, captured)) return found;
+  }
+  if (node.any && !segments[at].empty()) {
+    captured.push_back(&segments[at]);
+    if (const Node* found = descend(*node.any, segments, at + 1, captured)) return found;
+    captured.pop_back();
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+Router::Match Router::match(Request& request) const {
+  request.path_params.clear();
+  request.query.clear();
+  request.path.clear();
+  auto target = parse_target(request.target);
+  if (!target) {
+    return {nullptr, problem(400, "malformed-request", describe(target.error()), request.id,
+                             target.error().field, target.error().message)};
+  }
+  for (const auto& segment : target->segments) request.path.append("/").append(segment);
+  request.query = std::move(target->query);
+
+  std::vector<const std::string*> captured;
+  const Node* node = descend(*root_, target->segments, 0, captured);
+  if (node == nullptr) {
+    return {nullptr, problem(404, "not-found", "No resource at " + request.path, request.id)};
+  }
+  const Node::Slot* slot = node->slot(request.method == Method::head ? Method::get : request.method);
+  if (slot == nullptr) {
+    if (request.method == Method::options) {
+      Response response;
+      response.status = 204;
+      response.content_type.clear();
+      response.headers.emplace_back("Allow", node->allow + ", OPTIONS");
+      return {nullptr, std::move(response)};
+    }
+    auto response =
+        problem(405, "method-not-allowed", "Allowed here: " + node->allow + ", OPTIONS", request.id);
+    response.headers.emplace_back("Allow", node->allow + ", OPTIONS");
+    return {nullptr, std::move(response)};
+  }
+  const Endpoint& endpoint = *slot->endpoint;
+  for (std::size_t i = 0; i < slot->names.size(); ++i) {
+    request.path_params.emplace_back(slot->names[i], *captured[i]);
+  }
+
+  if (!accepts(request.header("accept"), endpoint.response_type)) {
+    return {nullptr, problem(406, "not-acceptable", "This resource is served as " + endpoint.response_type,
+                             request.id, "Accept", "must admit " + endpoint.response_type)};
+  }
+  if (!endpoint.request_schema.empty()) {
+    if (!is_json_type(request.header("content-type"))) {
+      return {nullptr, problem(415, "unsupported-media-type", "The body must be of type application/json",
+                               request.id, "Content-Type", "must be application/json")};
+    }
+    const auto coding = trim(request.header("content-encoding"));
+    if (!coding.empty() && !equals_ignoring_case(coding, "identity")) {
+      return {nullptr, problem(415, "unsupported-media-type", "The body must not be compressed", request.id,
+                               "Content-Encoding", "must be identity")};
+    }
+  }
+  for (const auto& [key, value] : request.query) {
+    const auto parameter = std::find_if(endpoint.parameters.begin(), endpoint.parameters.end(),
+                                        [&](const Parameter& candidate) { return candidate.name == key; });
+    if (parameter == endpoint.parameters.end()) {
+      std::string known =
+          endpoint.parameters.empty() ? "this resource has no query keys" : "known query keys:";
+      for (const auto& each : endpoint.parameters) known += " " + each.name;
+      return {nullptr, problem(400, "unknown-query-key", "Unknown query key " + key + "; " + known,
+                               request.id, key, known)};
+    }
+    if (const auto broken = broken_constraint(*parameter, value)) {
+      return {nullptr, problem(422, "invalid", key + ": " + *broken, request.id, key, *broken)};
+    }
+  }
+  for (const auto& parameter : endpoint.parameters) {
+    if (parameter.required && !request.query_value(parameter.name)) {
+      return {nullptr, problem(422, "invalid", parameter.name + ": this query key is required", request.id,
+                               parameter.name, "is required")};
+    }
+  }
+  return {&endpoint, std::nullopt};
+}
+
+Response Router::run(const Endpoint& endpoint, Request& request) const {
+  try {
+    if (!endpoint.request_schema.empty()) {
+      auto body = parse_json(request.body);
+      if (!body) {
+        return problem(400, "malformed-json", describe(body.error()), request.id, body.error().field,
+                       body.error().message);
+      }
+      request.json = std::make_shared<const nlohmann::json>(std::move(*body));
+    } else {
+      request.json.reset();
+    }
+    auto response = endpoint.handler(request);
+    if (!response) return fault(endpoint, request, response.error());
+    return std::move(*response);
+  } catch (const std::exception& cause) {
+    return fault(endpoint, request, Error{Fault::internal, "", cause.what()});
+  }
+}
+
+Response Router::fault(const Endpoint& endpoint, const Request& request, const Error& error) const {
+  if (status_of(error.fault) == 500 && on_fault_) on_fault_(endpoint, request, error);
+  return problem(error, request.id);
+}
+
+Response Router::handle(Request& request) const {
+  auto match = this->match(request);
+  return match.answer ? std::move(*match.answer) : run(*match.endpoint, request);
+}
+
+}  // namespace joulecast::http

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+
+namespace joulecast::http {
+
+// Decodes %XX; with `plus_is_space` also '+'. Fails on truncated or non-hexadecimal escapes, on NUL and
+// control characters and on text that is not UTF-8.
+std::optional<std::string> percent_decode(std::string_view text, bool plus_is_space);
+
+// True for well-formed UTF-8 without overlong forms, surrogates or values above U+10FFFF.
+bool is_utf8(std::string_view text);
+
+struct Target {
+  std::vector<std::string> segments;  // of the path, decoded one by one: "%2F" stays inside its segment
+  std::vector<std::pair<std::string, std::string>> query;
+};
+
+// Splits the origin form "/a/b?x=1" of a request target; a fragment is an error, like a repeated query key.
+// The absolute form is accepted, its authority ignored. Errors name the offending key or segment.
+Result<Target> parse_target(std::string_view target);
+
+}  // namespace joulecast::http

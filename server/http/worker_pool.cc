@@ -1,0 +1,52 @@
+#include "server/http/worker_pool.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace joulecast::http {
+
+WorkerPool::WorkerPool(unsigned threads, std::size_t capacity) : capacity_(capacity) {
+  threads_.reserve(std::max(threads, 1U));
+  for (unsigned i = 0; i < std::max(threads, 1U); ++i) threads_.emplace_back([this] { work(); });
+}
+
+WorkerPool::~WorkerPool() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  filled_.notify_all();
+  for (auto& thread : threads_) thread.join();
+}
+
+bool WorkerPool::submit(std::function<void()> task) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (queue_.size() >= capacity_) return false;
+    queue_.push_back(std::move(task));
+  }
+  filled_.notify_one();
+  return true;
+}
+
+void WorkerPool::submit_admitted(std::function<void()> task) {
+  {
+    const std::lock_guard lock(mutex_);
+    queue_.push_back(std::move(task));
+  }
+  filled_.notify_one();
+}
+
+void WorkerPool::work() {
+  for (;;) {
+    std::unique_lock lock(mutex_);
+    filled_.wait(lock, [this] { return stopping_ || !queue_.empty(); });
+    if (queue_.empty()) return;
+    auto task = std::move(queue_.front());
+    queue_.pop_front();
+    lock.unlock();
+    task();
+  }
+}
+
+}  // namespace joulecast::http

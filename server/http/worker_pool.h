@@ -1,0 +1,37 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace joulecast::http {
+
+// A few threads and a bounded queue. Tasks must not throw.
+class WorkerPool {
+ public:
+  WorkerPool(unsigned threads, std::size_t capacity);
+  ~WorkerPool();  // runs what is queued, then joins
+  WorkerPool(const WorkerPool&) = delete;
+  WorkerPool& operator=(const WorkerPool&) = delete;
+
+  // False when the queue is full. Any thread.
+  bool submit(std::function<void()> task);
+  // Next piece of work already admitted: never refused.
+  void submit_admitted(std::function<void()> task);
+
+ private:
+  void work();
+
+  std::mutex mutex_;
+  std::condition_variable filled_;
+  std::deque<std::function<void()>> queue_;
+  std::size_t capacity_;
+  bool stopping_ = false;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace joulecast::http
