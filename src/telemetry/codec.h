@@ -17,7 +17,8 @@
 // Decoding judges form only; whether the values make sense is validation.h's question.
 namespace joulecast::telemetry {
 
-inline constexpr std::size_t max_robot_id_length = 64;
+// LCM refuses channels over 63 characters, of which "ROBOT_TELEMETRY." takes 16.
+inline constexpr std::size_t max_robot_id_length = 47;
 inline constexpr std::size_t max_mission_id_length = 128;
 inline constexpr std::size_t max_note_length = 1024;
 

@@ -66,12 +66,11 @@ class EventLogReader {
   [[nodiscard]] std::uint64_t skipped_bytes() const noexcept { return skipped_; }
 
  private:
-  enum class Check { whole, implausible, beyond_end };
-
   // Bytes from the present place on, at least `wanted` of them unless the source ends first.
   std::span<const std::uint8_t> peek(std::size_t wanted);
   void advance(std::size_t count) noexcept;
-  [[nodiscard]] Check check_candidate(std::size_t at);
+  // A plausible, whole event is here, and another sync word or the end follows it.
+  [[nodiscard]] bool begins_event();
 
   Source source_;
   LogLimits limits_;

@@ -15,7 +15,8 @@ namespace joulecast::telemetry {
 struct Received {
   std::string_view channel;
   std::span<const std::uint8_t> data;
-  std::int64_t recv_utime_us = 0;  // host clock when LCM took it off the wire; of a file: the log's timestamp
+  std::int64_t recv_utime_us =
+      0;  // host clock when LCM took it off the wire, or when a file's event fell due
 };
 
 // One LCM instance: raw bytes in and out. The views handed to a handler are valid during the call only.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -16,6 +17,7 @@ struct MissionLimits {
   std::int64_t implicit_max_us = 3'600'000'000;  // an implicit mission is cut into pieces no longer than this
   std::int64_t explicit_silence_us = 600'000'000;  // silence after which a mission counts as never finished
   std::int64_t explicit_max_us = 24 * 3'600'000'000LL;  // a mission longer than this counts as never finished
+  std::int64_t reorder_us = 5'000'000;  // events older by more than this tell of a clock set back
   std::int64_t after_end_us = 500'000;  // samples this soon after a mission's end start no other
 };
 
@@ -77,6 +79,8 @@ struct MissionCounters {
 // middle) and is otherwise only counted.
 class MissionTracker {
  public:
+  static constexpr std::size_t memory = 64;
+
   explicit MissionTracker(MissionLimits limits = {}) : limits_(limits) {}
 
   // Call before integrating a sample that advances the stream: carry the actions out, then count the sample
@@ -95,18 +99,30 @@ class MissionTracker {
   [[nodiscard]] const MissionCounters& counters() const noexcept { return counters_; }
 
  private:
-  void open(MissionActions& actions, std::string id, std::int64_t utime_us, double payload_kg, bool implicit,
+  // A mission of the past, or (with an empty span) the id of one whose end came without a start.
+  struct Past {
+    std::string mission_id;
+    std::int64_t from_us = 0;
+    std::int64_t to_us = -1;
+  };
+
+  void open(MissionActions& actions, std::string id, std::int64_t utime_us, double payload_kg,
             std::string note);
-  void close(MissionActions& actions, std::int64_t utime_us, MissionEnd end, std::string note);
-  void start(MissionActions& actions, const MissionEvent& event);
-  void end(MissionActions& actions, const MissionEvent& event);
-  [[nodiscard]] bool was_closed(std::string_view mission_id) const noexcept;
+  void open_implicit(MissionActions& actions, std::int64_t utime_us, double payload_kg);
+  void close(MissionActions& actions, std::int64_t utime_us, MissionEnd end, std::string note = {});
+  void close_if_over(MissionActions& actions, std::int64_t utime_us);
+  void on_start(MissionActions& actions, const MissionEvent& event);
+  void on_end(MissionActions& actions, const MissionEvent& event);
+  void remember(Past past);
+  [[nodiscard]] const Past* find_past(std::string_view mission_id) const noexcept;
+  [[nodiscard]] bool lies_in_past(std::int64_t utime_us) const noexcept;
 
   MissionLimits limits_;
   MissionCounters counters_;
   std::optional<OpenMission> current_;
-  std::optional<std::int64_t> last_end_utime_us_;
-  std::deque<std::string> closed_;  // ids of the last missions, to know a repeated event by
+  std::int64_t begin_us_ = 0;  // start of the current mission in the robot's present clock
+  std::optional<std::int64_t> explicit_end_us_;
+  std::deque<Past> past_;
 };
 
 }  // namespace joulecast::telemetry

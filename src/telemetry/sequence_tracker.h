@@ -73,7 +73,7 @@ class SequenceTracker {
 
  private:
   struct Seen {
-    std::int64_t sequence = -1;
+    std::int64_t sequence = INT64_MIN;  // none: numbers are not negative
     std::int64_t utime_us = 0;
   };
 

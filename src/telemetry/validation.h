@@ -36,6 +36,7 @@ struct Implausible {
 
 // What is wrong with the sample taken alone; empty when nothing is.
 [[nodiscard]] std::optional<Implausible> check_plausible(const Sample& sample) noexcept;
+[[nodiscard]] std::optional<Implausible> check_plausible(const MissionEvent& event) noexcept;
 [[nodiscard]] std::string describe(const Implausible& fault);
 [[nodiscard]] std::string_view name_of(Implausibility why) noexcept;
 

@@ -1,0 +1,315 @@
+#include "telemetry/codec.h"
+
+#include <algorithm>
+#include <cstring>
+#include <joulecast/energy_state_t.hpp>
+#include <joulecast/mission_event_t.hpp>
+#include <joulecast/robot_telemetry_t.hpp>
+#include <limits>
+#include <utility>
+
+#include "telemetry/utf8.h"
+
+namespace joulecast::telemetry {
+namespace {
+
+// LCM counts in int; no message of the contract comes near this.
+constexpr std::size_t max_message_size = 64 * 1024;
+
+bool is_id_character(char c) noexcept {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
+         c == '-';
+}
+
+bool is_id(std::string_view id, std::size_t max_length) noexcept {
+  return !id.empty() && id.size() <= max_length && std::all_of(id.begin(), id.end(), is_id_character);
+}
+
+enum class Text { id, optional_id, note };
+
+// What is wrong with a string of the contract, empty when nothing is.
+std::string fault_of(std::string_view text, Text kind, std::size_t max_length) {
+  if (text.size() > max_length) {
+    return "is " + std::to_string(text.size()) + " bytes long; at most " + std::to_string(max_length) +
+           " are allowed";
+  }
+  if (kind == Text::note) {
+    if (text.find('\0') != std::string_view::npos) return "contains a NUL byte";
+    return is_utf8(text) ? "" : "is not UTF-8";
+  }
+  if (text.empty()) return kind == Text::optional_id ? "" : "is empty";
+  return is_id(text, max_length) ? "" : "may contain only letters, digits, '.', '_' and '-'";
+}
+
+std::uint64_t read_big_endian(const std::uint8_t* bytes, std::size_t size) noexcept {
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < size; ++i) value = value << 8 | bytes[i];
+  return value;
+}
+
+// Walks the declared layout of a message over its bytes without reading a value it has not checked to be
+// there. The first fault sticks; later steps do nothing.
+class Guard {
+ public:
+  Guard(std::span<const std::uint8_t> bytes, std::int64_t fingerprint) : bytes_(bytes) {
+    if (bytes.size() > max_message_size) {
+      refuse("", "message of " + std::to_string(bytes.size()) + " bytes; at most " +
+                     std::to_string(max_message_size) + " are accepted");
+      return;
+    }
+    const std::uint8_t* at = take(8, "fingerprint");
+    if (at != nullptr && read_big_endian(at, 8) != static_cast<std::uint64_t>(fingerprint)) {
+      refuse("fingerprint", "is not that of the type: another type or another version of it");
+    }
+  }
+
+  void fixed(std::size_t size, const char* field) { take(size, field); }
+
+  void text(const char* field, Text kind, std::size_t max_length) {
+    const std::uint8_t* head = take(4, field);
+    if (head == nullptr) return;
+    const std::uint64_t declared = read_big_endian(head, 4);  // includes the terminating NUL
+    const std::size_t left = bytes_.size() - position_;
+    if (declared < 1 || declared > left) {
+      refuse(field, "declares a length of " + std::to_string(declared) + " bytes where 1 to " +
+                        std::to_string(left) + " can follow");
+      return;
+    }
+    const std::uint8_t* body = take(static_cast<std::size_t>(declared), field);
+    if (body[declared - 1] != 0) {
+      refuse(field, "is not NUL-terminated");
+      return;
+    }
+    const std::string_view content(reinterpret_cast<const char*>(body),
+                                   static_cast<std::size_t>(declared) - 1);
+    if (std::string fault = fault_of(content, kind, max_length); !fault.empty())
+      refuse(field, std::move(fault));
+  }
+
+  void one_of(const char* field, std::int8_t low, std::int8_t high) {
+    const std::uint8_t* at = take(1, field);
+    if (at == nullptr) return;
+    const auto value = static_cast<std::int8_t>(*at);
+    if (value < low || value > high) refuse(field, "has the unknown value " + std::to_string(value));
+  }
+
+  Result<void> finish() {
+    if (!error_ && position_ != bytes_.size()) {
+      refuse("", std::to_string(bytes_.size() - position_) + " bytes follow the message");
+    }
+    if (error_) return tl::unexpected<Error>(std::move(*error_));
+    return {};
+  }
+
+ private:
+  const std::uint8_t* take(std::size_t size, const char* field) {
+    if (error_) return nullptr;
+    if (bytes_.size() - position_ < size) {
+      refuse(field,
+             "message ends " + std::to_string(size - (bytes_.size() - position_)) + " bytes too early");
+      return nullptr;
+    }
+    const std::uint8_t* at = bytes_.data() + position_;
+    position_ += size;
+    return at;
+  }
+
+  void refuse(const char* field, std::string message) {
+    if (!error_) error_ = Error{Fault::corrupt, field, std::move(message)};
+  }
+
+  std::span<const std::uint8_t> bytes_;
+  std::size_t position_ = 0;
+  std::optional<Error> error_;
+};
+
+template <class Message>
+Result<Message> decode_guarded(std::span<const std::uint8_t> bytes, Guard& guard) {
+  if (auto sound = guard.finish(); !sound) return tl::unexpected<Error>(std::move(sound.error()));
+  Message message;
+  const int size = static_cast<int>(bytes.size());
+  if (message.decode(bytes.data(), 0, size) != size) {
+    return fail(Fault::internal, "", "the generated decoder refused a message that the guard passed");
+  }
+  return message;
+}
+
+template <class Message>
+Result<std::vector<std::uint8_t>> encode(const Message& message) {
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
+  const int size = static_cast<int>(bytes.size());
+  if (message.encode(bytes.data(), 0, size) != size) {
+    return fail(Fault::internal, "", "the generated encoder wrote another size than it announced");
+  }
+  return bytes;
+}
+
+std::optional<Error> check_text(const char* field, std::string_view text, Text kind, std::size_t max_length) {
+  std::string fault = fault_of(text, kind, max_length);
+  if (fault.empty()) return std::nullopt;
+  return Error{Fault::invalid, field, std::move(fault)};
+}
+
+template <std::size_t N>
+void copy(const double (&from)[N], std::array<double, N>& to) {
+  std::copy(std::begin(from), std::end(from), to.begin());
+}
+
+template <std::size_t N>
+void copy(const std::array<double, N>& from, double (&to)[N]) {
+  std::copy(from.begin(), from.end(), std::begin(to));
+}
+
+constexpr std::size_t real = sizeof(double);
+
+}  // namespace
+
+bool is_valid_robot_id(std::string_view id) noexcept {
+  return is_id(id, max_robot_id_length);
+}
+bool is_valid_mission_id(std::string_view id) noexcept {
+  return is_id(id, max_mission_id_length);
+}
+
+Result<DecodedTelemetry> decode_telemetry(std::span<const std::uint8_t> bytes) {
+  static const std::int64_t fingerprint = robot_telemetry_t::getHash();
+  Guard guard(bytes, fingerprint);
+  guard.fixed(8, "utime");
+  guard.fixed(8, "sequence");
+  guard.text("robot_id", Text::id, max_robot_id_length);
+  guard.fixed(18 * real, "wheel_velocity to payload_mass");
+  auto decoded = decode_guarded<robot_telemetry_t>(bytes, guard);
+  if (!decoded) return tl::unexpected<Error>(std::move(decoded.error()));
+
+  DecodedTelemetry result;
+  result.robot_id = std::move(decoded->robot_id);
+  Sample& sample = result.sample;
+  sample.utime_us = decoded->utime;
+  sample.sequence = decoded->sequence;
+  copy(decoded->wheel_velocity, sample.wheel_velocity_rad_s);
+  copy(decoded->motor_voltage, sample.motor_voltage_v);
+  copy(decoded->motor_current, sample.motor_current_a);
+  sample.battery_voltage_v = decoded->battery_voltage;
+  sample.battery_current_a = decoded->battery_current;
+  copy(decoded->velocity_command, sample.velocity_command);
+  sample.yaw_rate_rad_s = decoded->yaw_rate;
+  sample.pitch_rad = decoded->pitch;
+  copy(decoded->pose, sample.pose);
+  copy(decoded->motor_temperature, sample.motor_temperature_c);
+  sample.payload_kg = decoded->payload_mass;
+  return result;
+}
+
+Result<DecodedMissionEvent> decode_mission_event(std::span<const std::uint8_t> bytes) {
+  static const std::int64_t fingerprint = mission_event_t::getHash();
+  Guard guard(bytes, fingerprint);
+  guard.fixed(8, "utime");
+  guard.text("robot_id", Text::id, max_robot_id_length);
+  guard.text("mission_id", Text::id, max_mission_id_length);
+  guard.one_of("event", mission_event_t::STARTED, mission_event_t::ABORTED);
+  guard.fixed(real, "payload_mass");
+  guard.text("note", Text::note, max_note_length);
+  auto decoded = decode_guarded<mission_event_t>(bytes, guard);
+  if (!decoded) return tl::unexpected<Error>(std::move(decoded.error()));
+
+  DecodedMissionEvent result;
+  result.robot_id = std::move(decoded->robot_id);
+  result.event.utime_us = decoded->utime;
+  result.event.mission_id = std::move(decoded->mission_id);
+  result.event.phase = static_cast<MissionPhase>(decoded->event);
+  result.event.payload_kg = decoded->payload_mass;
+  result.event.note = std::move(decoded->note);
+  return result;
+}
+
+Result<EnergyState> decode_energy_state(std::span<const std::uint8_t> bytes) {
+  static const std::int64_t fingerprint = energy_state_t::getHash();
+  Guard guard(bytes, fingerprint);
+  guard.fixed(8, "utime");
+  guard.text("robot_id", Text::id, max_robot_id_length);
+  guard.text("mission_id", Text::optional_id, max_mission_id_length);
+  guard.fixed(8, "model_version");
+  guard.fixed(11 * real, "measured_power to winding_temperature");
+  auto decoded = decode_guarded<energy_state_t>(bytes, guard);
+  if (!decoded) return tl::unexpected<Error>(std::move(decoded.error()));
+
+  EnergyState state;
+  state.utime_us = decoded->utime;
+  state.robot_id = std::move(decoded->robot_id);
+  state.mission_id = std::move(decoded->mission_id);
+  state.model_version = decoded->model_version;
+  state.measured_power_w = decoded->measured_power;
+  state.modelled_power_w = decoded->modelled_power;
+  state.measured_energy_j = decoded->measured_energy;
+  state.modelled_energy_j = decoded->modelled_energy;
+  state.unexplained_energy_j = decoded->unexplained_energy;
+  state.recovered_energy_j = decoded->recovered_energy;
+  state.state_of_charge = decoded->state_of_charge;
+  state.range_m = decoded->range;
+  state.run_time_s = decoded->run_time;
+  copy(decoded->winding_temperature, state.winding_temperature_c);
+  return state;
+}
+
+Result<std::vector<std::uint8_t>> encode_telemetry(std::string_view robot_id, const Sample& sample) {
+  if (auto fault = check_text("robot_id", robot_id, Text::id, max_robot_id_length)) {
+    return tl::unexpected<Error>(std::move(*fault));
+  }
+  robot_telemetry_t message;
+  message.utime = sample.utime_us;
+  message.sequence = sample.sequence;
+  message.robot_id = robot_id;
+  copy(sample.wheel_velocity_rad_s, message.wheel_velocity);
+  copy(sample.motor_voltage_v, message.motor_voltage);
+  copy(sample.motor_current_a, message.motor_current);
+  message.battery_voltage = sample.battery_voltage_v;
+  message.battery_current = sample.battery_current_a;
+  copy(sample.velocity_command, message.velocity_command);
+  message.yaw_rate = sample.yaw_rate_rad_s;
+  message.pitch = sample.pitch_rad;
+  copy(sample.pose, message.pose);
+  copy(sample.motor_temperature_c, message.motor_temperature);
+  message.payload_mass = sample.payload_kg;
+  return encode(message);
+}
+
+Result<std::vector<std::uint8_t>> encode_mission_event(std::string_view robot_id, const MissionEvent& event) {
+  for (auto& fault : {check_text("robot_id", robot_id, Text::id, max_robot_id_length),
+                      check_text("mission_id", event.mission_id, Text::id, max_mission_id_length),
+                      check_text("note", event.note, Text::note, max_note_length)}) {
+    if (fault) return tl::unexpected<Error>(*fault);
+  }
+  mission_event_t message;
+  message.utime = event.utime_us;
+  message.robot_id = robot_id;
+  message.mission_id = event.mission_id;
+  message.event = static_cast<std::int8_t>(event.phase);
+  message.payload_mass = event.payload_kg;
+  message.note = event.note;
+  return encode(message);
+}
+
+Result<std::vector<std::uint8_t>> encode_energy_state(const EnergyState& state) {
+  for (auto& fault : {check_text("robot_id", state.robot_id, Text::id, max_robot_id_length),
+                      check_text("mission_id", state.mission_id, Text::optional_id, max_mission_id_length)}) {
+    if (fault) return tl::unexpected<Error>(*fault);
+  }
+  energy_state_t message;
+  message.utime = state.utime_us;
+  message.robot_id = state.robot_id;
+  message.mission_id = state.mission_id;
+  message.model_version = state.model_version;
+  message.measured_power = state.measured_power_w;
+  message.modelled_power = state.modelled_power_w;
+  message.measured_energy = state.measured_energy_j;
+  message.modelled_energy = state.modelled_energy_j;
+  message.unexplained_energy = state.unexplained_energy_j;
+  message.recovered_energy = state.recovered_energy_j;
+  message.state_of_charge = state.state_of_charge;
+  message.range = state.range_m;
+  message.run_time = state.run_time_s;
+  copy(state.winding_temperature_c, message.winding_temperature);
+  return encode(message);
+}
+
+}  // namespace joulecast::telemetry

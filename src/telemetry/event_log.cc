@@ -1,0 +1,226 @@
+#include "telemetry/event_log.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+namespace joulecast::telemetry {
+namespace {
+
+constexpr std::size_t read_chunk = 1u << 20;
+constexpr std::array<std::uint8_t, 4> sync_bytes{0xED, 0xA1, 0xDA, 0x01};
+
+std::uint32_t read_u32(const std::uint8_t* at) noexcept {
+  return static_cast<std::uint32_t>(at[0]) << 24 | static_cast<std::uint32_t>(at[1]) << 16 |
+         static_cast<std::uint32_t>(at[2]) << 8 | at[3];
+}
+
+std::int64_t read_i64(const std::uint8_t* at) noexcept {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(read_u32(at)) << 32 | read_u32(at + 4));
+}
+
+template <class Unsigned>
+std::uint8_t* put(std::uint8_t* at, Unsigned value) noexcept {
+  for (std::size_t i = sizeof value; i-- > 0;) *at++ = static_cast<std::uint8_t>(value >> (8 * i));
+  return at;
+}
+
+struct Header {
+  bool sync = false;
+  std::int64_t number = 0;
+  std::int64_t timestamp_us = 0;
+  std::uint32_t channel_length = 0;
+  std::uint32_t data_length = 0;
+
+  explicit Header(const std::uint8_t* at) noexcept
+      : sync(read_u32(at) == log_sync_word),
+        number(read_i64(at + 4)),
+        timestamp_us(read_i64(at + 12)),
+        channel_length(read_u32(at + 20)),
+        data_length(read_u32(at + 24)) {}
+
+  // Negative lengths of the file are huge here and fail the same test.
+  [[nodiscard]] bool plausible(const LogLimits& limits) const noexcept {
+    return sync && channel_length >= 1 && channel_length <= limits.max_channel_length &&
+           data_length <= limits.max_data_length;
+  }
+  [[nodiscard]] std::size_t total() const noexcept { return log_header_size + channel_length + data_length; }
+};
+
+// A file descriptor that several copies of one Source may share.
+std::shared_ptr<const int> own(int descriptor) {
+  return {new int(descriptor), [](const int* held) {
+            ::close(*held);
+            delete held;
+          }};
+}
+
+}  // namespace
+
+Result<EventLogReader> EventLogReader::open(const std::string& path, LogLimits limits) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) {
+    return fail(errno == ENOENT ? Fault::not_found : Fault::unavailable, path, std::strerror(errno));
+  }
+  return EventLogReader(
+      [file = own(descriptor)](std::span<std::uint8_t> into) -> std::ptrdiff_t {
+        ssize_t got = 0;
+        do {
+          got = ::read(*file, into.data(), into.size());
+        } while (got < 0 && errno == EINTR);
+        return got;
+      },
+      limits);
+}
+
+EventLogReader::EventLogReader(Source source, LogLimits limits)
+    : source_(std::move(source)), limits_(limits) {}
+
+std::span<const std::uint8_t> EventLogReader::peek(std::size_t wanted) {
+  if (filled_ - begin_ < wanted && !exhausted_) {
+    if (begin_ > 0) {
+      std::memmove(buffer_.data(), buffer_.data() + begin_, filled_ - begin_);
+      filled_ -= begin_;
+      begin_ = 0;
+    }
+    if (buffer_.size() < std::max(wanted, read_chunk)) buffer_.resize(std::max(wanted, read_chunk));
+    while (filled_ < wanted && !exhausted_) {
+      const std::ptrdiff_t got = source_(std::span(buffer_).subspan(filled_));
+      failed_ = got < 0;
+      exhausted_ = got <= 0;
+      if (got > 0) filled_ += static_cast<std::size_t>(got);
+    }
+  }
+  return {buffer_.data() + begin_, filled_ - begin_};
+}
+
+void EventLogReader::advance(std::size_t count) noexcept {
+  begin_ += count;
+  offset_ += count;
+}
+
+LogRead EventLogReader::next() {
+  advance(std::exchange(pending_, 0));
+  LogRead read;
+  read.offset = offset_;
+
+  auto bytes = peek(log_header_size);
+  const auto ends_inside = [&](const char* part) {
+    read.status = failed_ ? LogStatus::failed : LogStatus::truncated;
+    read.message = failed_ ? "the log cannot be read on" : std::string("the log ends inside ") + part;
+    return read;
+  };
+  if (bytes.empty() && !failed_) {
+    read.status = LogStatus::end;
+    return read;
+  }
+  const std::size_t sync_there = std::min(bytes.size(), sync_bytes.size());
+  if (!std::equal(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(sync_there),
+                  sync_bytes.begin())) {
+    read.status = LogStatus::corrupt;
+    read.message = "no sync word where an event must begin";
+    return read;
+  }
+  if (bytes.size() < log_header_size) return ends_inside("an event's header");
+
+  const Header header(bytes.data());
+  if (!header.plausible(limits_)) {
+    read.status = LogStatus::corrupt;
+    read.message = "an event declares a channel of " +
+                   std::to_string(static_cast<std::int32_t>(header.channel_length)) + " and data of " +
+                   std::to_string(static_cast<std::int32_t>(header.data_length)) + " bytes; 1 to " +
+                   std::to_string(limits_.max_channel_length) + " and 0 to " +
+                   std::to_string(limits_.max_data_length) + " are accepted";
+    return read;
+  }
+  bytes = peek(header.total());
+  if (bytes.size() < header.total()) return ends_inside("an event");
+
+  read.status = LogStatus::event;
+  read.event.number = header.number;
+  read.event.timestamp_us = header.timestamp_us;
+  read.event.channel = {reinterpret_cast<const char*>(bytes.data()) + log_header_size, header.channel_length};
+  read.event.data = bytes.subspan(log_header_size + header.channel_length, header.data_length);
+  pending_ = header.total();
+  return read;
+}
+
+bool EventLogReader::begins_event() {
+  auto bytes = peek(log_header_size);
+  if (bytes.size() < log_header_size) return false;
+  const Header header(bytes.data());
+  if (!header.plausible(limits_)) return false;
+  bytes = peek(header.total() + sync_bytes.size());
+  if (bytes.size() == header.total()) return true;
+  return bytes.size() >= header.total() + sync_bytes.size() &&
+         std::equal(sync_bytes.begin(), sync_bytes.end(),
+                    bytes.begin() + static_cast<std::ptrdiff_t>(header.total()));
+}
+
+std::uint64_t EventLogReader::resync() {
+  const std::uint64_t from = offset_;
+  pending_ = 0;
+  if (!peek(1).empty()) advance(1);
+  while (true) {
+    const auto bytes = peek(sync_bytes.size());
+    if (bytes.size() < sync_bytes.size()) {
+      advance(bytes.size());
+      break;
+    }
+    const auto* found =
+        static_cast<const std::uint8_t*>(std::memchr(bytes.data(), sync_bytes[0], bytes.size()));
+    if (found == nullptr) {
+      advance(bytes.size());
+      continue;
+    }
+    advance(static_cast<std::size_t>(found - bytes.data()));
+    if (begins_event()) break;
+    if (!peek(1).empty()) advance(1);
+  }
+  skipped_ += offset_ - from;
+  return offset_ - from;
+}
+
+Result<EventLogWriter> EventLogWriter::create(const std::string& path) {
+  std::FILE* file = std::fopen(path.c_str(), "wbe");
+  if (file == nullptr) return fail(Fault::unavailable, path, std::strerror(errno));
+  return EventLogWriter(file, path);
+}
+
+Result<void> EventLogWriter::write(std::int64_t timestamp_us, std::string_view channel,
+                                   std::span<const std::uint8_t> data) {
+  const LogLimits limits;
+  if (channel.empty() || channel.size() > limits.max_channel_length) {
+    return invalid("channel", "must have 1 to " + std::to_string(limits.max_channel_length) + " characters");
+  }
+  if (data.size() > limits.max_data_length) {
+    return invalid("data", "must have at most " + std::to_string(limits.max_data_length) + " bytes");
+  }
+  if (!file_) return fail(Fault::unavailable, path_, "the log is closed");
+  std::array<std::uint8_t, log_header_size> header{};
+  std::uint8_t* at = put(header.data(), log_sync_word);
+  at = put(at, static_cast<std::uint64_t>(count_));
+  at = put(at, static_cast<std::uint64_t>(timestamp_us));
+  at = put(at, static_cast<std::uint32_t>(channel.size()));
+  put(at, static_cast<std::uint32_t>(data.size()));
+  if (std::fwrite(header.data(), 1, header.size(), file_.get()) != header.size() ||
+      std::fwrite(channel.data(), 1, channel.size(), file_.get()) != channel.size() ||
+      std::fwrite(data.data(), 1, data.size(), file_.get()) != data.size()) {
+    return fail(Fault::unavailable, path_, std::strerror(errno));
+  }
+  ++count_;
+  return {};
+}
+
+Result<void> EventLogWriter::close() {
+  if (!file_) return {};
+  if (std::fclose(file_.release()) != 0) return fail(Fault::unavailable, path_, std::strerror(errno));
+  return {};
+}
+
+}  // namespace joulecast::telemetry

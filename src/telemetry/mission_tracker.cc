@@ -1,0 +1,177 @@
+#include "telemetry/mission_tracker.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace joulecast::telemetry {
+
+std::string_view name_of(MissionEnd end) noexcept {
+  switch (end) {
+    case MissionEnd::finished:
+      return "finished";
+    case MissionEnd::aborted:
+      return "aborted";
+    case MissionEnd::superseded:
+      return "superseded";
+    case MissionEnd::unfinished:
+      return "unfinished";
+    case MissionEnd::idle:
+      return "idle";
+    case MissionEnd::expired:
+      return "expired";
+  }
+  return "";
+}
+
+SampleStep MissionTracker::on_sample(std::int64_t utime_us, double payload_kg) {
+  SampleStep step;
+  if (current_) close_if_over(step.actions, utime_us);
+  if (!current_) {
+    const bool just_after_end = explicit_end_us_ && utime_us > *explicit_end_us_ &&
+                                utime_us - *explicit_end_us_ <= limits_.after_end_us;
+    if (just_after_end || lies_in_past(utime_us)) {
+      ++counters_.samples_outside;
+      return step;
+    }
+    open_implicit(step.actions, utime_us, payload_kg);
+  }
+  step.belongs = utime_us >= begin_us_;
+  if (step.belongs) {
+    current_->last_utime_us = std::max(current_->last_utime_us, utime_us);
+  } else {
+    ++counters_.samples_outside;
+  }
+  return step;
+}
+
+MissionActions MissionTracker::on_event(const MissionEvent& event) {
+  MissionActions actions;
+  if (event.phase == MissionPhase::started) {
+    on_start(actions, event);
+  } else {
+    on_end(actions, event);
+  }
+  return actions;
+}
+
+MissionActions MissionTracker::on_silence(std::int64_t silent_us) {
+  MissionActions actions;
+  if (!current_) return actions;
+  const bool implicit = current_->implicit;
+  if (silent_us > (implicit ? limits_.implicit_idle_us : limits_.explicit_silence_us)) {
+    close(actions, current_->last_utime_us, implicit ? MissionEnd::idle : MissionEnd::unfinished);
+  }
+  return actions;
+}
+
+void MissionTracker::on_clock_step(std::int64_t utime_us) {
+  explicit_end_us_.reset();
+  if (!current_) return;
+  // The mission keeps the duration it had; the step itself is no time of it.
+  begin_us_ += utime_us - current_->last_utime_us;
+  current_->last_utime_us = utime_us;
+}
+
+void MissionTracker::resume(OpenMission mission) {
+  begin_us_ = mission.start_utime_us;
+  current_ = std::move(mission);
+}
+
+void MissionTracker::close_if_over(MissionActions& actions, std::int64_t utime_us) {
+  const bool implicit = current_->implicit;
+  const std::int64_t silent_us = utime_us - current_->last_utime_us;
+  const std::int64_t lasted_us = utime_us - begin_us_;
+  if (silent_us > (implicit ? limits_.implicit_idle_us : limits_.explicit_silence_us)) {
+    close(actions, current_->last_utime_us, implicit ? MissionEnd::idle : MissionEnd::unfinished);
+  } else if (lasted_us > (implicit ? limits_.implicit_max_us : limits_.explicit_max_us)) {
+    close(actions, current_->last_utime_us, implicit ? MissionEnd::expired : MissionEnd::unfinished);
+  }
+}
+
+void MissionTracker::on_start(MissionActions& actions, const MissionEvent& event) {
+  if (current_ && current_->mission_id == event.mission_id) {
+    ++counters_.duplicate_events;
+    return;
+  }
+  if (const Past* past = find_past(event.mission_id)) {
+    ++(past->to_us < past->from_us ? counters_.out_of_order_events : counters_.duplicate_events);
+    return;
+  }
+  if (current_) {
+    const std::int64_t older_us = begin_us_ - event.utime_us;
+    if (!current_->implicit && older_us > 0 && older_us <= limits_.reorder_us) {
+      ++counters_.out_of_order_events;
+      return;
+    }
+    close(actions, current_->last_utime_us, MissionEnd::superseded);
+  }
+  open(actions, event.mission_id, event.utime_us, event.payload_kg, event.note);
+}
+
+void MissionTracker::on_end(MissionActions& actions, const MissionEvent& event) {
+  const MissionEnd end = event.phase == MissionPhase::aborted ? MissionEnd::aborted : MissionEnd::finished;
+  if (current_ && current_->mission_id == event.mission_id) {
+    if (event.utime_us >= begin_us_) {
+      close(actions, event.utime_us, end, event.note);
+    } else {
+      ++counters_.out_of_order_events;
+      close(actions, current_->last_utime_us, end, event.note);
+    }
+    return;
+  }
+  if (find_past(event.mission_id) != nullptr) {
+    ++counters_.duplicate_events;
+    return;
+  }
+  ++counters_.unknown_missions;
+  if (current_ && current_->implicit && event.utime_us >= begin_us_) {
+    close(actions, event.utime_us, end, "known to the robot as " + event.mission_id);
+  }
+  remember({event.mission_id});
+}
+
+void MissionTracker::open(MissionActions& actions, std::string id, std::int64_t utime_us, double payload_kg,
+                          std::string note) {
+  ++counters_.opened_explicit;
+  begin_us_ = utime_us;
+  current_ = OpenMission{id, utime_us, utime_us, payload_kg, false};
+  actions.push_back(
+      {MissionAction::Kind::open, std::move(id), utime_us, false, payload_kg, {}, std::move(note)});
+}
+
+void MissionTracker::open_implicit(MissionActions& actions, std::int64_t utime_us, double payload_kg) {
+  ++counters_.opened_implicit;
+  begin_us_ = utime_us;
+  std::string id = "implicit-" + std::to_string(utime_us);
+  current_ = OpenMission{id, utime_us, utime_us, payload_kg, true};
+  actions.push_back({MissionAction::Kind::open, std::move(id), utime_us, true, payload_kg, {}, {}});
+}
+
+void MissionTracker::close(MissionActions& actions, std::int64_t utime_us, MissionEnd end, std::string note) {
+  ++counters_.closed;
+  // A sample may carry a slightly later clock than the event that ends its mission.
+  const std::int64_t end_us = std::max(utime_us, current_->last_utime_us);
+  if (end == MissionEnd::finished || end == MissionEnd::aborted) explicit_end_us_ = end_us;
+  remember({current_->mission_id, begin_us_, end_us});
+  actions.push_back({MissionAction::Kind::close, std::move(current_->mission_id), end_us, current_->implicit,
+                     current_->payload_kg, end, std::move(note)});
+  current_.reset();
+}
+
+void MissionTracker::remember(Past past) {
+  if (past_.size() == memory) past_.pop_front();
+  past_.push_back(std::move(past));
+}
+
+const MissionTracker::Past* MissionTracker::find_past(std::string_view mission_id) const noexcept {
+  const auto found = std::find_if(past_.rbegin(), past_.rend(),
+                                  [&](const Past& past) { return past.mission_id == mission_id; });
+  return found == past_.rend() ? nullptr : &*found;
+}
+
+bool MissionTracker::lies_in_past(std::int64_t utime_us) const noexcept {
+  return std::any_of(past_.begin(), past_.end(),
+                     [&](const Past& past) { return past.from_us <= utime_us && utime_us <= past.to_us; });
+}
+
+}  // namespace joulecast::telemetry

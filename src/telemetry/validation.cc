@@ -1,0 +1,135 @@
+#include "telemetry/validation.h"
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+
+namespace joulecast::telemetry {
+namespace {
+
+// The channels of a sample in one order, the same as that of the table below.
+constexpr std::array<PlausibleRange, 18> ranges{{
+    {"wheel_velocity[0]", -1e3, 1e3},  // rad/s: 100 m/s on a 0.1 m wheel
+    {"wheel_velocity[1]", -1e3, 1e3},
+    {"motor_voltage[0]", -1e3, 1e3},  // V
+    {"motor_voltage[1]", -1e3, 1e3},
+    {"motor_current[0]", -2e3, 2e3},  // A
+    {"motor_current[1]", -2e3, 2e3},
+    {"battery_voltage", -1.0, 1e3},      // V; an offset of a sensor may read just below zero
+    {"battery_current", -2e3, 2e3},      // A
+    {"velocity_command[0]", -100, 100},  // m/s
+    {"velocity_command[1]", -1e3, 1e3},  // rad/s
+    {"yaw_rate", -100, 100},  // rad/s: five times what a gyro of the usual 2000 deg/s can say, rounded
+    {"pitch", -3.2, 3.2},     // rad: just over half a turn either way
+    {"pose[0]", -1e7, 1e7},   // m: map frames may carry a projection's easting and northing
+    {"pose[1]", -1e7, 1e7},
+    {"pose[2]", -1e6, 1e6},              // rad: headings may be unwrapped
+    {"motor_temperature[0]", -90, 500},  // degrees Celsius
+    {"motor_temperature[1]", -90, 500},
+    {"payload_mass", 0, 1e5},  // kg
+}};
+
+constexpr std::size_t wheel_channels = 2;
+constexpr std::int64_t year_2200_us = 7'258'118'400'000'000;
+
+std::array<double, ranges.size()> channels(const Sample& s) noexcept {
+  return {s.wheel_velocity_rad_s[0],
+          s.wheel_velocity_rad_s[1],
+          s.motor_voltage_v[0],
+          s.motor_voltage_v[1],
+          s.motor_current_a[0],
+          s.motor_current_a[1],
+          s.battery_voltage_v,
+          s.battery_current_a,
+          s.velocity_command[0],
+          s.velocity_command[1],
+          s.yaw_rate_rad_s,
+          s.pitch_rad,
+          s.pose[0],
+          s.pose[1],
+          s.pose[2],
+          s.motor_temperature_c[0],
+          s.motor_temperature_c[1],
+          s.payload_kg};
+}
+
+std::optional<Implausible> check_clock(std::int64_t utime_us) noexcept {
+  if (utime_us >= 0 && utime_us < year_2200_us) return std::nullopt;
+  return Implausible{Implausibility::bad_clock, "utime", static_cast<double>(utime_us)};
+}
+
+std::optional<Implausible> check_value(double value, const PlausibleRange& range, bool required) noexcept {
+  if (value >= range.low && value <= range.high) return std::nullopt;
+  if (std::isnan(value)) {
+    if (!required) return std::nullopt;
+    return Implausible{Implausibility::missing, range.field, value};
+  }
+  return Implausible{std::isinf(value) ? Implausibility::infinite : Implausibility::out_of_range, range.field,
+                     value};
+}
+
+}  // namespace
+
+std::span<const PlausibleRange> plausible_ranges() noexcept {
+  return ranges;
+}
+
+std::optional<Implausible> check_plausible(const Sample& sample) noexcept {
+  if (auto fault = check_clock(sample.utime_us)) return fault;
+  if (sample.sequence < 0) {
+    return Implausible{Implausibility::bad_sequence, "sequence", static_cast<double>(sample.sequence)};
+  }
+  const auto values = channels(sample);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (auto fault = check_value(values[i], ranges[i], i < wheel_channels)) return fault;
+  }
+  return std::nullopt;
+}
+
+std::optional<Implausible> check_plausible(const MissionEvent& event) noexcept {
+  if (auto fault = check_clock(event.utime_us)) return fault;
+  return check_value(event.payload_kg, ranges.back(), false);
+}
+
+std::string_view name_of(Implausibility why) noexcept {
+  switch (why) {
+    case Implausibility::missing:
+      return "missing";
+    case Implausibility::infinite:
+      return "infinite";
+    case Implausibility::out_of_range:
+      return "out_of_range";
+    case Implausibility::bad_clock:
+      return "bad_clock";
+    case Implausibility::bad_sequence:
+      return "bad_sequence";
+  }
+  return "";
+}
+
+std::string describe(const Implausible& fault) {
+  std::string text(fault.field);
+  switch (fault.why) {
+    case Implausibility::missing:
+      return text + " must be measured";
+    case Implausibility::infinite:
+      return text + " is infinite";
+    case Implausibility::bad_clock:
+      return text + " lies before 1970 or after 2200";
+    case Implausibility::bad_sequence:
+      return text + " is negative";
+    case Implausibility::out_of_range:
+      break;
+  }
+  for (const PlausibleRange& range : ranges) {
+    if (range.field != fault.field) continue;
+    char numbers[128];
+    std::snprintf(numbers, sizeof numbers, " is %.6g; no robot reports values outside %g to %g", fault.value,
+                  range.low, range.high);
+    text += numbers;
+  }
+  return text;
+}
+
+}  // namespace joulecast::telemetry
