@@ -1,0 +1,264 @@
+#include "planning/line.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <string>
+
+namespace joulecast::planning {
+namespace {
+
+// Below this k T, sums of exponentials are replaced by their series in time.
+constexpr double series_below = 0.05;
+
+// tanh(x/2)/x, 1/2 at zero.
+double half_tanh(double x) {
+  return x < 1e-4 ? 0.5 - x * x / 24 : std::tanh(x / 2) / x;
+}
+
+// (x - 2 tanh(x/2))/x^3, 1/12 at zero.
+double bulge(double x) {
+  if (x > 0.3) return (x - 2 * std::tanh(x / 2)) / (x * x * x);
+  const double y = x * x;
+  return 1.0 / 12 - y * (1.0 / 120 - y * (17.0 / 20160 - y * (31.0 / 362880 - y * (691.0 / 79833600))));
+}
+
+// x/sinh(x) and x coth(x), 1 at zero.
+double over_sinh(double x) {
+  return x < 1e-6 ? 1 - x * x / 6 : -2 * x * std::exp(-x) / std::expm1(-2 * x);
+}
+double times_coth(double x) {
+  return x < 1e-6 ? 1 + x * x / 3 : x / std::tanh(x);
+}
+
+double thrust_of(const LineTask& task, double rate, double duration) {
+  const double x = rate * duration;
+  return (task.distance - (task.start_speed + task.end_speed) * duration * half_tanh(x)) /
+         (duration * duration * duration * bulge(x));
+}
+
+double start_acceleration_of(const LineTask& task, double rate, double thrust, double duration) {
+  const double x = rate * duration;
+  return thrust * duration * half_tanh(x) +
+         (task.end_speed * over_sinh(x) - task.start_speed * times_coth(x)) / duration;
+}
+
+// dE/dT + value of time along the family of extremals.
+double slope_of(const LineTask& task, double rate, double duration) {
+  const double thrust = thrust_of(task, rate, duration);
+  const double a = start_acceleration_of(task, rate, thrust, duration), v = task.start_speed;
+  return task.power.c0 + task.value_of_time_w +
+         task.power.c1 * (rate * rate * v * v - a * a - 2 * thrust * v);
+}
+
+// A zero of `f` between `low` (f < 0) and `high` (f > 0): bisection on the logarithm, hastened by inverse
+// quadratic steps (Chandrupatla 1997).
+template <class F>
+double zero_between(F&& f, double low, double f_low, double high, double f_high) {
+  double a = high, fa = f_high, b = low, fb = f_low, c = a, fc = fa, t = 0.5;
+  for (int k = 0; k < 100; ++k) {
+    const double x = a + t * (b - a), fx = f(x);
+    if ((fx < 0) == (fa < 0)) {
+      c = a, fc = fa;
+    } else {
+      c = b, b = a, fc = fb, fb = fa;
+    }
+    a = x, fa = fx;
+    const double best = std::fabs(fa) < std::fabs(fb) ? a : b;
+    const double tolerance = 2 * 2.3e-16 * std::fabs(best);
+    const double edge = tolerance / std::fabs(b - c);
+    if (edge > 0.5 || fa == 0) return best;
+    const double xi = (a - b) / (c - b), phi = (fa - fb) / (fc - fb);
+    const bool quadratic = phi * phi < xi && (1 - phi) * (1 - phi) < 1 - xi;
+    t = quadratic ? fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+                  : 0.5;
+    t = std::clamp(t, edge, 1 - edge);
+  }
+  return a;
+}
+
+Result<void> validate(const LineTask& task) {
+  const auto number = [](double x) { return std::to_string(x); };
+  if (!(std::isfinite(task.distance) && task.distance > 0)) {
+    return invalid("distance", "is " + number(task.distance) + ", must be positive and finite");
+  }
+  if (!(std::isfinite(task.start_speed) && task.start_speed >= 0)) {
+    return invalid("start_speed", "is " + number(task.start_speed) + ", must not be negative");
+  }
+  if (!(std::isfinite(task.end_speed) && task.end_speed >= 0)) {
+    return invalid("end_speed", "is " + number(task.end_speed) + ", must not be negative");
+  }
+  if (!(task.power.c1 > 0 && task.power.c2 >= 0)) {
+    return invalid("power", "needs c1 > 0 (losses grow with acceleration) and c2 >= 0");
+  }
+  return {};
+}
+
+}  // namespace
+
+LineProfile::LineProfile(const LineTask& task, double duration_s)
+    : power_(task.power),
+      value_of_time_(task.value_of_time_w),
+      distance_(task.distance),
+      start_(task.start_speed),
+      end_(task.end_speed),
+      duration_(duration_s),
+      rate_(std::sqrt(task.power.c2 / task.power.c1)),
+      thrust_(thrust_of(task, rate_, duration_s)),
+      start_acceleration_(start_acceleration_of(task, rate_, thrust_, duration_s)) {
+  assert(duration_s > 0);
+  const double x = rate_ * duration_;
+  end_acceleration_ =
+      -thrust_ * duration_ * half_tanh(x) + (end_ * times_coth(x) - start_ * over_sinh(x)) / duration_;
+}
+
+double LineProfile::speed(double t) const {
+  const double x = rate_ * duration_, a = rate_ * t, b = rate_ * (duration_ - t);
+  if (x < series_below) {
+    const double y = a * a;
+    const double bend = t * t / 2 * (1 + y / 12 * (1 + y / 30));  // (cosh a - 1)/k^2
+    return start_ * (1 + rate_ * rate_ * bend) +
+           start_acceleration_ * t * (1 + y / 6 * (1 + y / 20 * (1 + y / 42))) - thrust_ * bend;
+  }
+  const double whole = std::expm1(-2 * x);
+  const double rise = std::exp(-b) * std::expm1(-2 * a) / whole,
+               fall = std::exp(-a) * std::expm1(-2 * b) / whole;
+  const double hump = std::expm1(-a) * std::expm1(-b) / ((1 + std::exp(-x)) * rate_ * rate_);
+  return thrust_ * hump + start_ * fall + end_ * rise;
+}
+
+double LineProfile::acceleration(double t) const {
+  const double x = rate_ * duration_, a = rate_ * t, b = rate_ * (duration_ - t);
+  if (x < series_below) {
+    const double y = a * a;
+    const double sinh_over = t * (1 + y / 6 * (1 + y / 20));  // sinh(a)/k
+    return start_acceleration_ * (1 + y / 2 * (1 + y / 12 * (1 + y / 30))) +
+           (rate_ * rate_ * start_ - thrust_) * sinh_over;
+  }
+  const double whole = -std::expm1(-2 * x);
+  const double rise = rate_ * std::exp(-b) * (1 + std::exp(-2 * a)) / whole;
+  const double fall = rate_ * std::exp(-a) * (1 + std::exp(-2 * b)) / whole;
+  const double hump = (a < b ? -std::exp(-a) * std::expm1(a - b) : std::exp(-b) * std::expm1(b - a)) /
+                      (rate_ * (1 + std::exp(-x)));
+  return thrust_ * hump - start_ * fall + end_ * rise;
+}
+
+double LineProfile::position(double t) const {
+  const double x = rate_ * duration_, a = rate_ * t;
+  if (x < series_below) {
+    const double y = a * a;
+    const double bend = t * t / 2 * (1 + y / 12 * (1 + y / 30));
+    const double cubic = t * t * t / 6 * (1 + y / 20 * (1 + y / 42));  // (sinh a - a)/k^3
+    return start_ * (t + rate_ * rate_ * cubic) + start_acceleration_ * bend - thrust_ * cubic;
+  }
+  return (acceleration(t) - start_acceleration_ + thrust_ * t) / (rate_ * rate_);
+}
+
+double LineProfile::energy_j() const {
+  const double core =
+      power_.c1 * (end_ * end_acceleration_ - start_ * start_acceleration_ + thrust_ * distance_);
+  return core + (power_.cx / 2 * (end_ + start_) + power_.ca) * (end_ - start_) + power_.c3 * distance_ +
+         power_.c0 * duration_;
+}
+
+double LineProfile::energy_j(double t) const {
+  const double v = speed(t), x = position(t);
+  // c2 v^2 + c1 a^2 = c1 ((v a)' + B v), since a' = k^2 v - B.
+  const double core = power_.c1 * (v * acceleration(t) - start_ * start_acceleration_ + thrust_ * x);
+  return core + (power_.cx / 2 * (v + start_) + power_.ca) * (v - start_) + power_.c3 * x + power_.c0 * t;
+}
+
+double LineProfile::invariant() const {
+  return rate_ * rate_ * start_ * start_ - start_acceleration_ * start_acceleration_ - 2 * thrust_ * start_;
+}
+
+double LineProfile::peak_speed() const {
+  if (!(start_acceleration_ > 0 && end_acceleration_ < 0)) return std::max(start_, end_);
+  const double h = invariant();
+  return -h / (thrust_ + std::sqrt(std::max(0.0, thrust_ * thrust_ + rate_ * rate_ * h)));
+}
+
+double LineProfile::lowest_speed() const {
+  if (!(start_acceleration_ < 0 && end_acceleration_ > 0)) return std::min(start_, end_);
+  const double h = invariant();
+  return h / (-thrust_ + std::sqrt(std::max(0.0, thrust_ * thrust_ + rate_ * rate_ * h)));
+}
+
+double LineProfile::peak_acceleration() const {
+  return std::max(std::fabs(start_acceleration_), std::fabs(end_acceleration_));
+}
+
+double LineProfile::transversality_w() const {
+  return power_.c0 + value_of_time_ + power_.c1 * invariant();
+}
+
+double LineProfile::distance_multiplier() const {
+  return -power_.c3 - 2 * power_.c1 * thrust_;
+}
+
+LineSample LineProfile::at(double t) const {
+  const double v = speed(t), a = acceleration(t);
+  return {t, position(t), v, a, power_.power_w(v, a), energy_j(t)};
+}
+
+std::vector<LineSample> LineProfile::sample(std::size_t count) const {
+  assert(count >= 2);
+  std::vector<LineSample> samples;
+  samples.reserve(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    samples.push_back(at(duration_ * static_cast<double>(k) / static_cast<double>(count - 1)));
+  }
+  return samples;
+}
+
+Result<LineProfile> line_in_time(const LineTask& task, double duration_s) {
+  if (auto valid = validate(task); !valid) return tl::unexpected(std::move(valid.error()));
+  if (!(std::isfinite(duration_s) && duration_s > 0)) {
+    return invalid("duration_s", "is " + std::to_string(duration_s) + ", must be positive and finite");
+  }
+  LineProfile profile(task, duration_s);
+  const double slack = 1e-12 * (task.start_speed + task.end_speed);
+  if (profile.lowest_speed() >= -slack) return profile;
+  // At a mean speed of v0 + vf nothing dips; the longest forward time lies between there and `duration_s`.
+  double low = task.distance / (task.start_speed + task.end_speed), high = duration_s;
+  const auto lowest = [&](double duration) { return LineProfile(task, duration).lowest_speed(); };
+  for (int k = 0; k < 60 && high - low > 1e-9 * high; ++k) {
+    const double middle = 0.5 * (low + high);
+    (lowest(middle) >= 0 ? low : high) = middle;
+  }
+  return fail(Fault::infeasible, "duration_s",
+              "is " + std::to_string(duration_s) +
+                  " s: with these end speeds the closed form would run backwards; the longest is " +
+                  std::to_string(low) + " s");
+}
+
+Result<LineProfile> line_in_free_time(const LineTask& task) {
+  if (auto valid = validate(task); !valid) return tl::unexpected(std::move(valid.error()));
+  const double price = task.power.c0 + task.value_of_time_w;
+  if (!(price > 0)) {
+    return invalid("value_of_time_w", "plus the power at standstill is " + std::to_string(price) +
+                                          " W, must be positive for a best end time to exist");
+  }
+  const double rate = std::sqrt(task.power.c2 / task.power.c1);
+  const auto slope = [&](double duration) { return slope_of(task, rate, duration); };
+  const double ends = task.start_speed + task.end_speed;
+  // From rest a parabola (k = 0) takes D^2 c1 36/T^4 = price; viscosity and end speeds move that, hence the
+  // search. Slower than a mean speed of a third of v0 + vf the profile dips towards zero: a second, worse
+  // extremal.
+  const double dips = ends > 0 ? 3 * task.distance / ends : std::numeric_limits<double>::infinity();
+  const double parabola = std::sqrt(6 * task.distance * std::sqrt(task.power.c1 / price));
+  double high = std::min(dips, parabola * (1 + rate * parabola)), f_high = slope(high);
+  for (int k = 0; k < 200 && !(f_high > 0); ++k) {
+    high = high < dips ? std::min(dips, 1.5 * high) : 1.5 * high;
+    f_high = slope(high);
+  }
+  double low = high / 2, f_low = slope(low);
+  while (f_low >= 0) {
+    high = low, f_high = f_low;
+    f_low = slope(low /= 2);
+  }
+  return LineProfile(task, zero_between(slope, low, f_low, high, f_high));
+}
+
+}  // namespace joulecast::planning
