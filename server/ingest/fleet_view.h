@@ -41,7 +41,8 @@ struct RobotSnapshot {
   energy::Accounts accounts;  // of the open mission
   RecentConsumption recent;
   std::uint64_t samples = 0;
-  std::map<std::string, std::uint64_t> faults;  // reason -> messages rejected or repaired, since the daemon started
+  std::map<std::string, std::uint64_t>
+      faults;  // reason -> messages rejected or repaired, since the daemon started
 };
 
 // The latest snapshot of every robot. One thread publishes, any thread reads without waiting for it.

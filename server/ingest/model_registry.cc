@@ -9,7 +9,8 @@ Result<void> ModelRegistry::put(robot::RobotModel robot, std::int64_t version) {
   Result<dynamics::DriveModel> drive = dynamics::drive_model(robot);
   if (!drive) return tl::unexpected(std::move(drive.error()));
   std::string id = robot.robot_id;
-  auto model = std::make_shared<const ModelInForce>(ModelInForce{std::move(robot), std::move(*drive), version});
+  auto model =
+      std::make_shared<const ModelInForce>(ModelInForce{std::move(robot), std::move(*drive), version});
   const std::unique_lock lock(mutex_);
   models_.insert_or_assign(std::move(id), std::move(model));
   epoch_.fetch_add(1, std::memory_order_release);

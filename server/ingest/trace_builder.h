@@ -30,7 +30,8 @@ class TraceBuilder {
     double covered_s = 0;
     Sum measured, modelled, speed, x, y;
     history::TraceBucket bucket() const;
-    double state_of_charge = telemetry::unmeasured, measured_j = telemetry::unmeasured, modelled_j = telemetry::unmeasured;
+    double state_of_charge = telemetry::unmeasured, measured_j = telemetry::unmeasured,
+           modelled_j = telemetry::unmeasured;
   };
 
   std::vector<history::TraceBucket> finished_;

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace joulecast::api {
+
+// Writes JSON text front to back. Doubles that are not finite become null, so that "not measured" is never a
+// number. Several times faster than building a document first, which long series need.
+class JsonWriter {
+ public:
+  JsonWriter& begin_object();
+  JsonWriter& end_object();
+  JsonWriter& begin_array();
+  JsonWriter& end_array();
+  JsonWriter& key(std::string_view name);
+
+  JsonWriter& value(double number);  // shortest text that reads back as the same double
+  JsonWriter& value(std::int64_t number);
+  JsonWriter& value(std::uint64_t number);
+  JsonWriter& value(int number) { return value(static_cast<std::int64_t>(number)); }
+  JsonWriter& value(bool truth);
+  JsonWriter& value(std::string_view text);
+  JsonWriter& value(const char* text) { return value(std::string_view(text)); }
+  JsonWriter& value(const std::string& text) { return value(std::string_view(text)); }
+  JsonWriter& null();
+  // JSON text made elsewhere.
+  JsonWriter& raw(std::string_view json);
+
+  template <class T>
+  JsonWriter& field(std::string_view name, const T& content) {
+    key(name);
+    return value(content);
+  }
+
+  // An array of numbers rounded to `places` decimals: series for people and planners, where the digits behind
+  // are noise.
+  JsonWriter& column(std::string_view name, std::span<const double> numbers, int places = 6);
+
+  std::string take() { return std::move(text_); }
+  const std::string& text() const { return text_; }
+
+ private:
+  void separate();
+  void rounded(double number, double scale, int places);
+
+  std::string text_;
+  bool comma_ = false;
+};
+
+}  // namespace joulecast::api

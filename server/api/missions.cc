@@ -1,0 +1,331 @@
+#include <charconv>
+#include <functional>
+#include <utility>
+
+#include "server/api/mission_json.h"
+#include "server/api/services.h"
+
+namespace joulecast::api {
+namespace {
+
+using http::Endpoint;
+using http::Method;
+using http::Parameter;
+using http::Request;
+using http::Response;
+
+Result<history::MissionKey> mission_key(const Request& request) {
+  const std::string& text = request.param("id");
+  history::MissionKey key = 0;
+  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), key);
+  if (fault != std::errc() || end != text.data() + text.size() || key <= 0) {
+    return fail(joulecast::Fault::not_found, "id",
+                "\"" + text + "\" names no mission: ids are positive integers");
+  }
+  return key;
+}
+
+Result<history::MissionFilter> filter_of(const Request& request) {
+  history::MissionFilter filter;
+  if (const auto robot = request.query_value("robot_id")) filter.robot_id = std::string(*robot);
+  if (const auto mission = request.query_value("mission_id")) filter.mission_id = std::string(*mission);
+  filter.start_from_utime_us = request.query_integer("from_utime_us");
+  filter.start_to_utime_us = request.query_integer("to_utime_us");
+  filter.incomplete = request.query_boolean("incomplete");
+  filter.payload_min_kg = request.query_number("payload_min_kg");
+  filter.payload_max_kg = request.query_number("payload_max_kg");
+  if (const auto state = request.query_value("state"))
+    filter.states.push_back(*history::mission_state_from(*state));
+  return filter;
+}
+
+std::vector<Parameter> filter_parameters() {
+  using Type = Parameter::Type;
+  return {
+      {.name = "robot_id", .type = Type::text, .description = "only missions of this robot"},
+      {.name = "mission_id", .type = Type::text, .description = "only missions that the robot called so"},
+      {.name = "from_utime_us",
+       .type = Type::integer,
+       .description = "only missions that started at or after this time"},
+      {.name = "to_utime_us",
+       .type = Type::integer,
+       .description = "only missions that started before this time"},
+      {.name = "state",
+       .type = Type::text,
+       .description = "only missions in this state",
+       .choices = {"open", "finished", "aborted", "unfinished", "superseded", "interrupted"}},
+      {.name = "incomplete",
+       .type = Type::boolean,
+       .description = "only missions with (true) or without (false) unmeasured parts"},
+      {.name = "payload_min_kg",
+       .type = Type::number,
+       .description = "only missions with at least this payload",
+       .minimum = 0},
+      {.name = "payload_max_kg",
+       .type = Type::number,
+       .description = "only missions with at most this payload",
+       .minimum = 0},
+  };
+}
+
+std::vector<Parameter> with(std::vector<Parameter> parameters, std::vector<Parameter> more) {
+  parameters.insert(parameters.end(), std::make_move_iterator(more.begin()),
+                    std::make_move_iterator(more.end()));
+  return parameters;
+}
+
+void write_cursor(JsonWriter& json, const std::string& cursor) {
+  json.key("next_cursor");
+  cursor.empty() ? json.null() : json.value(cursor);
+}
+
+Result<Response> list(const Services& services, const Request& request) {
+  const Result<history::MissionFilter> filter = filter_of(request);
+  if (!filter) return tl::unexpected(filter.error());
+  history::PageRequest page;
+  page.limit = request.query_integer("limit").value_or(50);
+  page.cursor = std::string(request.query_value("cursor").value_or(""));
+  Result<history::MissionPage> found = services.store.missions(*filter, page);
+  if (!found) return tl::unexpected(std::move(found.error()));
+  JsonWriter json;
+  json.begin_object().key("missions").begin_array();
+  for (const history::Mission& mission : found->missions) write_mission(json, mission);
+  json.end_array();
+  write_cursor(json, found->next_cursor);
+  json.end_object();
+  return http::json_response(json.take());
+}
+
+Result<Response> totals(const Services& services, const Request& request) {
+  const Result<history::MissionFilter> filter = filter_of(request);
+  if (!filter) return tl::unexpected(filter.error());
+  Result<history::Totals> found = services.store.totals(*filter);
+  if (!found) return tl::unexpected(std::move(found.error()));
+  JsonWriter json;
+  json.begin_object();
+  json.field("missions", found->missions);
+  json.field("measured_missions", found->measured_missions);
+  json.field("incomplete_missions", found->incomplete_missions);
+  json.field("samples", found->samples);
+  json.field("gap_count", found->gap_count);
+  json.field("gap_s", found->gap_s);
+  json.key("energy");
+  write_accounts(json, found->accounts);
+  json.key("ledger");
+  write_ledger(json, found->accounts);
+  json.end_object();
+  return http::json_response(json.take());
+}
+
+Result<history::Mission> mission_of(const Services& services, const Request& request) {
+  const Result<history::MissionKey> key = mission_key(request);
+  if (!key) return tl::unexpected(key.error());
+  return services.store.mission(*key);
+}
+
+Result<Response> detail(const Services& services, const Request& request) {
+  const Result<history::Mission> mission = mission_of(services, request);
+  if (!mission) return tl::unexpected(mission.error());
+  JsonWriter json;
+  write_mission(json, *mission);
+  return http::json_response(json.take());
+}
+
+Result<Response> ledger(const Services& services, const Request& request) {
+  const Result<history::Mission> mission = mission_of(services, request);
+  if (!mission) return tl::unexpected(mission.error());
+  JsonWriter json;
+  json.begin_object();
+  json.field("id", mission->key);
+  json.field("robot_id", mission->robot_id);
+  json.field("mission_id", mission->mission_id);
+  json.key("model_version");
+  mission->model_version ? json.value(*mission->model_version) : json.null();
+  json.key("ledger");
+  write_ledger(json, mission->accounts);
+  json.end_object();
+  return http::json_response(json.take());
+}
+
+history::TimeRange range_of(const Request& request) {
+  return {request.query_integer("from_utime_us").value_or(history::whole_past),
+          request.query_integer("to_utime_us").value_or(history::whole_future)};
+}
+
+Result<Response> trace(const Services& services, const Request& request) {
+  const Result<history::MissionKey> key = mission_key(request);
+  if (!key) return tl::unexpected(key.error());
+  const Result<history::Trace> found =
+      services.store.trace(*key, range_of(request), request.query_integer("points").value_or(1000));
+  if (!found) return tl::unexpected(found.error());
+  JsonWriter json;
+  json.begin_object();
+  json.field("id", *key);
+  json.field("width_us", found->width_us);
+  std::vector<double> column(found->buckets.size());
+  const auto write = [&](std::string_view name, auto&& value, int places) {
+    for (std::size_t k = 0; k < column.size(); ++k) column[k] = value(found->buckets[k]);
+    json.column(name, column, places);
+  };
+  using Bucket = history::TraceBucket;
+  json.key("start_utime_us").begin_array();
+  for (const Bucket& b : found->buckets) json.value(b.start_utime_us);
+  json.end_array();
+  write(
+      "covered_s", [](const Bucket& b) { return b.covered_s; }, 6);
+  const auto band = [&](const std::string& name, history::Band Bucket::*member, int places) {
+    json.key(name).begin_object();
+    write(
+        "min", [&](const Bucket& b) { return (b.*member).min; }, places);
+    write(
+        "mean", [&](const Bucket& b) { return (b.*member).mean; }, places);
+    write(
+        "max", [&](const Bucket& b) { return (b.*member).max; }, places);
+    json.end_object();
+  };
+  band("measured_power_w", &Bucket::measured_power_w, 3);
+  band("modelled_power_w", &Bucket::modelled_power_w, 3);
+  band("speed_m_s", &Bucket::speed_m_s, 4);
+  write(
+      "state_of_charge", [](const Bucket& b) { return b.state_of_charge; }, 6);
+  write(
+      "measured_j", [](const Bucket& b) { return b.measured_j; }, 3);
+  write(
+      "modelled_j", [](const Bucket& b) { return b.modelled_j; }, 3);
+  write(
+      "x_m", [](const Bucket& b) { return b.x_m; }, 4);
+  write(
+      "y_m", [](const Bucket& b) { return b.y_m; }, 4);
+  json.end_object();
+  return http::json_response(json.take());
+}
+
+Result<Response> raw_telemetry(const Services& services, const Request& request) {
+  const Result<history::MissionKey> key = mission_key(request);
+  if (!key) return tl::unexpected(key.error());
+  history::PageRequest page;
+  page.limit = request.query_integer("limit").value_or(1000);
+  page.cursor = std::string(request.query_value("cursor").value_or(""));
+  const Result<history::TelemetryPage> found = services.store.telemetry(*key, range_of(request), page);
+  if (!found) return tl::unexpected(found.error());
+  const auto& samples = found->samples;
+  JsonWriter json;
+  json.begin_object();
+  json.field("id", *key);
+  using telemetry::Sample;
+  json.key("utime_us").begin_array();
+  for (const Sample& s : samples) json.value(s.utime_us);
+  json.end_array();
+  json.key("sequence").begin_array();
+  for (const Sample& s : samples) json.value(s.sequence);
+  json.end_array();
+  // Raw samples are evidence: every digit is kept.
+  const auto write = [&](std::string_view name, auto&& value) {
+    json.key(name).begin_array();
+    for (const Sample& s : samples) json.value(value(s));
+    json.end_array();
+  };
+  const auto pair = [&](std::string_view name, std::array<double, 2> Sample::*member) {
+    json.key(name).begin_object();
+    write("right", [&](const Sample& s) { return (s.*member)[0]; });
+    write("left", [&](const Sample& s) { return (s.*member)[1]; });
+    json.end_object();
+  };
+  pair("wheel_velocity_rad_s", &Sample::wheel_velocity_rad_s);
+  pair("motor_voltage_v", &Sample::motor_voltage_v);
+  pair("motor_current_a", &Sample::motor_current_a);
+  write("battery_voltage_v", [](const Sample& s) { return s.battery_voltage_v; });
+  write("battery_current_a", [](const Sample& s) { return s.battery_current_a; });
+  write("command_speed_m_s", [](const Sample& s) { return s.velocity_command[0]; });
+  write("command_yaw_rate_rad_s", [](const Sample& s) { return s.velocity_command[1]; });
+  write("yaw_rate_rad_s", [](const Sample& s) { return s.yaw_rate_rad_s; });
+  write("pitch_rad", [](const Sample& s) { return s.pitch_rad; });
+  write("x_m", [](const Sample& s) { return s.pose[0]; });
+  write("y_m", [](const Sample& s) { return s.pose[1]; });
+  write("heading_rad", [](const Sample& s) { return s.pose[2]; });
+  pair("motor_temperature_c", &Sample::motor_temperature_c);
+  write("payload_kg", [](const Sample& s) { return s.payload_kg; });
+  write_cursor(json, found->next_cursor);
+  json.end_object();
+  return http::json_response(json.take());
+}
+
+}  // namespace
+
+std::vector<Endpoint> mission_endpoints(Services& services) {
+  using Type = Parameter::Type;
+  const auto bound = [&services](Result<Response> (*answer)(const Services&, const Request&)) {
+    return [&services, answer](const Request& request) { return answer(services, request); };
+  };
+  const Parameter cursor{
+      .name = "cursor", .type = Type::text, .description = "the next_cursor of the page before"};
+  const std::vector<Parameter> span = {
+      {.name = "from_utime_us", .type = Type::integer, .description = "from this time on"},
+      {.name = "to_utime_us", .type = Type::integer, .description = "before this time"},
+  };
+  std::vector<Endpoint> rows;
+  rows.push_back(
+      {.method = Method::get,
+       .path = "/v1/missions",
+       .operation_id = "listMissions",
+       .summary = "Missions, newest first, in pages that stay stable while missions come",
+       .parameters = with(filter_parameters(), {{.name = "limit",
+                                                 .type = Type::integer,
+                                                 .description = "missions a page",
+                                                 .minimum = 1,
+                                                 .maximum = static_cast<double>(history::max_page_size)},
+                                                cursor}),
+       .response_schema = "mission-page",
+       .handler = bound(list)});
+  rows.push_back({.method = Method::get,
+                  .path = "/v1/mission-totals",
+                  .operation_id = "totalMissions",
+                  .summary = "Sums of energy and ledger over the missions that the filters choose",
+                  .parameters = filter_parameters(),
+                  .response_schema = "mission-totals",
+                  .handler = bound(totals)});
+  rows.push_back({.method = Method::get,
+                  .path = "/v1/missions/{id}",
+                  .operation_id = "getMission",
+                  .summary = "One mission: its energy, measured and modelled",
+                  .response_schema = "mission",
+                  .error_statuses = {404},
+                  .handler = bound(detail)});
+  rows.push_back({.method = Method::get,
+                  .path = "/v1/missions/{id}/ledger",
+                  .operation_id = "getMissionLedger",
+                  .summary = "Where the energy of a mission went; the terms add up to the battery's energy",
+                  .response_schema = "mission-ledger",
+                  .error_statuses = {404},
+                  .handler = bound(ledger)});
+  rows.push_back(
+      {.method = Method::get,
+       .path = "/v1/missions/{id}/trace",
+       .operation_id = "getMissionTrace",
+       .summary =
+           "Power, speed, charge and position over a mission, as least, mean and greatest of equal spans",
+       .parameters = with(span, {{.name = "points",
+                                  .type = Type::integer,
+                                  .description = "spans at most",
+                                  .minimum = 1,
+                                  .maximum = static_cast<double>(history::max_trace_points)}}),
+       .response_schema = "mission-trace",
+       .error_statuses = {404},
+       .handler = bound(trace)});
+  rows.push_back({.method = Method::get,
+                  .path = "/v1/missions/{id}/telemetry",
+                  .operation_id = "getMissionTelemetry",
+                  .summary = "The samples of a mission as received, as far as the retention keeps them",
+                  .parameters = with(span, {{.name = "limit",
+                                             .type = Type::integer,
+                                             .description = "samples a page",
+                                             .minimum = 1,
+                                             .maximum = static_cast<double>(history::max_telemetry_samples)},
+                                            cursor}),
+                  .response_schema = "mission-telemetry",
+                  .error_statuses = {404},
+                  .handler = bound(raw_telemetry)});
+  return rows;
+}
+
+}  // namespace joulecast::api

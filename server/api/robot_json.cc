@@ -1,0 +1,66 @@
+#include "server/api/robot_json.h"
+
+#include "server/api/mission_json.h"
+#include "server/ingest/ingest_service.h"
+
+namespace joulecast::api {
+namespace {
+
+constexpr double live_s = 5;
+
+void write_sides(JsonWriter& json, std::string_view name, const std::array<double, 2>& sides) {
+  json.key(name).begin_array().value(sides[0]).value(sides[1]).end_array();
+}
+
+}  // namespace
+
+void write_state(JsonWriter& json, const server::RobotSnapshot& s, const robot::Battery* battery,
+                 std::int64_t now_utime_us) {
+  const double silent_s = s.received_utime_us > 0
+                              ? static_cast<double>(now_utime_us - s.received_utime_us) * 1e-6
+                              : telemetry::unmeasured;
+  json.begin_object();
+  json.field("robot_id", s.robot_id);
+  json.field("has_model", s.has_model);
+  json.key("model_version");
+  s.has_model ? json.value(s.model_version) : json.null();
+  json.field("live", silent_s <= live_s);
+  json.field("silent_s", silent_s);
+  json.key("utime_us");
+  s.sample.utime_us != 0 ? json.value(s.sample.utime_us) : json.null();
+  json.field("measured_power_w", s.measured_power_w);
+  json.field("modelled_power_w", s.modelled_power_w);
+  json.field("speed_m_s", s.speed_m_s);
+  json.field("yaw_rate_rad_s", s.yaw_rate_rad_s);
+  json.key("pose").begin_array();
+  for (const double p : s.sample.pose) json.value(p);
+  json.end_array();
+  json.field("payload_kg", s.sample.payload_kg);
+  json.field("battery_voltage_v", s.sample.battery_voltage_v);
+  json.field("battery_current_a", s.sample.battery_current_a);
+  json.field("state_of_charge", s.state_of_charge);
+  const server::Endurance left =
+      battery != nullptr ? server::recent_endurance(s, *battery) : server::Endurance{};
+  json.field("range_m", left.range_m);
+  json.field("run_time_s", left.run_time_s);
+  write_sides(json, "winding_temperature_c", s.winding_temperature_c);
+  json.key("mission");
+  if (s.mission_id.empty()) {
+    json.null();
+  } else {
+    json.begin_object();
+    json.field("id", s.mission_key);
+    json.field("mission_id", s.mission_id);
+    json.field("start_utime_us", s.mission_start_utime_us);
+    json.key("energy");
+    write_accounts(json, s.accounts);
+    json.end_object();
+  }
+  json.field("samples", s.samples);
+  json.key("faults").begin_object();
+  for (const auto& [reason, count] : s.faults) json.field(reason, count);
+  json.end_object();
+  json.end_object();
+}
+
+}  // namespace joulecast::api

@@ -1,0 +1,150 @@
+#include <set>
+#include <utility>
+
+#include "robot/robot_file.h"
+#include "server/api/robot_json.h"
+#include "server/api/services.h"
+
+namespace joulecast::api {
+namespace {
+
+using http::Endpoint;
+using http::Method;
+using http::Request;
+using http::Response;
+
+void write_robot_state(JsonWriter& json, const Services& services, const std::string& robot_id) {
+  const auto model = services.models.find(robot_id);
+  auto snapshot = services.fleet.find(robot_id);
+  server::RobotSnapshot silent;
+  if (snapshot == nullptr) {
+    silent.robot_id = robot_id;
+    silent.has_model = model != nullptr;
+    silent.model_version = model != nullptr ? model->version : 0;
+  }
+  write_state(json, snapshot != nullptr ? *snapshot : silent,
+              model != nullptr ? &model->robot.battery : nullptr, services.now_utime_us());
+}
+
+Result<Response> list(const Services& services, const Request&) {
+  std::set<std::string> ids;
+  for (const auto& model : services.models.all()) ids.insert(model->robot.robot_id);
+  for (const auto& snapshot : services.fleet.all()) ids.insert(snapshot->robot_id);
+  JsonWriter json;
+  json.begin_object().key("robots").begin_array();
+  for (const std::string& id : ids) write_robot_state(json, services, id);
+  json.end_array().end_object();
+  return http::json_response(json.take());
+}
+
+Result<Response> get(const Services& services, const Request& request) {
+  const std::string& id = request.param("id");
+  const Result<history::ModelVersion> model = services.store.model(id);
+  if (!model) return tl::unexpected(model.error());
+  JsonWriter json;
+  json.begin_object();
+  json.field("robot_id", id);
+  json.field("model_version", model->version);
+  json.field("origin", history::name(model->origin));
+  json.field("created_utime_us", model->created_utime_us);
+  json.key("model").raw(model->model_json);
+  json.end_object();
+  return http::json_response(json.take());
+}
+
+Result<Response> put(Services& services, const Request& request) {
+  const std::string& id = request.param("id");
+  Result<robot::RobotModel> robot = robot::parse_robot(request.body);
+  if (!robot) return tl::unexpected(std::move(robot.error()));
+  if (robot->robot_id != id)
+    return invalid("/robot_id",
+                   "is \"" + robot->robot_id + "\", must equal the id in the path, \"" + id + "\"");
+  // The catalogue's bounds are checked before anything is stored.
+  if (auto effects = dynamics::active_effects(*robot); !effects)
+    return tl::unexpected(std::move(effects.error()));
+  history::AddModel command;
+  command.robot_id = id;
+  command.utime_us = services.now_utime_us();
+  command.origin = history::ModelOrigin::http;
+  command.model_json = robot::to_json_text(*robot);
+  const history::Outcome version = services.writer.execute(std::move(command));
+  if (!version) return tl::unexpected(version.error());
+  if (Result<void> placed = services.models.put(std::move(*robot), *version); !placed)
+    return tl::unexpected(std::move(placed.error()));
+  JsonWriter json;
+  json.begin_object().field("robot_id", id).field("model_version", *version).end_object();
+  return http::json_response(json.take());
+}
+
+Result<Response> state(const Services& services, const Request& request) {
+  const std::string& id = request.param("id");
+  if (services.models.find(id) == nullptr && services.fleet.find(id) == nullptr) {
+    return fail(Fault::not_found, "id", "no robot " + id);
+  }
+  JsonWriter json;
+  write_robot_state(json, services, id);
+  return http::json_response(json.take());
+}
+
+Result<Response> versions(const Services& services, const Request& request) {
+  const Result<std::vector<history::ModelVersion>> found = services.store.model_versions(request.param("id"));
+  if (!found) return tl::unexpected(found.error());
+  JsonWriter json;
+  json.begin_object().field("robot_id", request.param("id")).key("versions").begin_array();
+  for (const history::ModelVersion& v : *found) {
+    json.begin_object();
+    json.field("model_version", v.version).field("created_utime_us", v.created_utime_us);
+    json.field("origin", history::name(v.origin)).field("note", v.note).field("active", v.active);
+    json.key("parent_version");
+    v.parent_version ? json.value(*v.parent_version) : json.null();
+    json.key("model").raw(v.model_json);
+    json.end_object();
+  }
+  json.end_array().end_object();
+  return http::json_response(json.take());
+}
+
+}  // namespace
+
+std::vector<Endpoint> robot_endpoints(Services& services) {
+  std::vector<Endpoint> rows;
+  rows.push_back({.method = Method::get,
+                  .path = "/v1/robots",
+                  .operation_id = "listRobots",
+                  .summary = "The fleet: every robot that has a model or was heard of, with its live state",
+                  .response_schema = "robot-list",
+                  .handler = [&services](const Request& r) { return list(services, r); }});
+  rows.push_back({.method = Method::get,
+                  .path = "/v1/robots/{id}",
+                  .operation_id = "getRobot",
+                  .summary = "A robot's model in force",
+                  .response_schema = "robot-detail",
+                  .error_statuses = {404},
+                  .handler = [&services](const Request& r) { return get(services, r); }});
+  rows.push_back({.method = Method::put,
+                  .path = "/v1/robots/{id}",
+                  .operation_id = "putRobot",
+                  .summary = "Gives a robot a model; a changed one is a new version, used at once",
+                  .request_schema = "robot",
+                  .response_schema = "robot-version",
+                  .error_statuses = {422},
+                  .handler = [&services](const Request& r) { return put(services, r); }});
+  rows.push_back({.method = Method::get,
+                  .path = "/v1/robots/{id}/state",
+                  .operation_id = "getRobotState",
+                  .summary = "A robot's live state: power, charge, mission, health of its telemetry",
+                  .response_schema = "robot-state",
+                  .error_statuses = {404},
+                  .run = http::Run::io,
+                  .handler = [&services](const Request& r) { return state(services, r); }});
+  rows.push_back({.method = Method::get,
+                  .path = "/v1/robots/{id}/versions",
+                  .operation_id = "listRobotVersions",
+                  .summary = "Every version of a robot's model, newest first",
+                  .response_schema = "robot-version-list",
+                  .error_statuses = {404},
+                  .handler = [&services](const Request& r) { return versions(services, r); }});
+  return rows;
+}
+
+}  // namespace joulecast::api

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <string_view>
+
+namespace joulecast::server {
+
+// Why a message, a sample or an event was turned away or repaired. Each has one counter for the daemon and
+// one in the mission it happened in; names are labels of the metrics and keys of a mission's `sample_faults`.
+enum class IngestFault : std::size_t {
+  undecodable,      // the guard or the decoder refused the bytes
+  wrong_channel,    // the message's robot_id is not its channel's
+  queue_full,       // the bounded queue between receiving and accounting was full
+  too_many_robots,  // more robots than the setting allows
+  unknown_robot,    // no model: its samples are not accounted
+  implausible,      // a value is missing, infinite or absurd
+  duplicate,
+  late,     // out of order; older than what was accounted
+  missing,  // sequence numbers that never came (or came late)
+  restart,  // the robot's sequence began anew
+  clock_backward,
+  clock_forward,
+  outside_mission,  // belongs to no mission: just after an end, or before a start
+  bad_event,        // duplicate, out-of-order or unknown mission event
+  solver            // CVODE failed on an interval; its chord stood in
+};
+inline constexpr std::size_t ingest_fault_count = 15;
+
+inline constexpr std::array<std::string_view, ingest_fault_count> ingest_fault_names = {
+    "undecodable",     "wrong_channel", "queue_full", "too_many_robots", "unknown_robot",  "implausible",
+    "duplicate",       "late",          "missing",    "restart",         "clock_backward", "clock_forward",
+    "outside_mission", "bad_event",     "solver"};
+
+// Written by the ingest threads, read by the metrics.
+struct IngestCounters {
+  std::atomic<std::uint64_t> messages = 0;  // received on our channels
+  std::atomic<std::uint64_t> samples = 0;   // accounted for
+  std::atomic<std::uint64_t> missions_started = 0;
+  std::atomic<std::uint64_t> missions_ended = 0;
+  std::array<std::atomic<std::uint64_t>, ingest_fault_count> faults{};
+
+  void add(IngestFault fault, std::uint64_t count = 1) {
+    faults[static_cast<std::size_t>(fault)].fetch_add(count, std::memory_order_relaxed);
+  }
+};
+
+}  // namespace joulecast::server

@@ -1,0 +1,224 @@
+#include "server/ingest/ingest_service.h"
+
+#include <atomic>
+#include <cmath>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "telemetry/lcm_link.h"
+
+namespace joulecast::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+std::int64_t host_utime_us() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+constexpr std::int64_t live_us = 5'000'000;  // a robot not heard of for longer publishes no energy state
+
+}  // namespace
+
+Endurance recent_endurance(const RobotSnapshot& snapshot, const robot::Battery& battery) {
+  Endurance left;
+  const RecentConsumption& recent = snapshot.recent;
+  constexpr double enough_s = 10;
+  if (!std::isfinite(snapshot.state_of_charge) || recent.duration_s < enough_s || !(recent.energy_j > 0))
+    return left;
+  const double usable_j = std::max(0.0, snapshot.state_of_charge - battery.reserve_fraction) *
+                          battery.capacity_ah * 3600 * battery.nominal_voltage_v;
+  left.run_time_s = usable_j / (recent.energy_j / recent.duration_s);
+  if (recent.distance_m > 1) left.range_m = usable_j / (recent.energy_j / recent.distance_m);
+  return left;
+}
+
+class IngestService::Impl {
+ public:
+  Impl(IngestOptions options, const ModelRegistry& models, SessionOutputs outputs)
+      : options_(std::move(options)),
+        models_(models),
+        outputs_(outputs),
+        pipeline_(options_.session, options_.max_robots, models, std::move(outputs)) {}
+
+  ~Impl() { stop(); }
+
+  Result<void> start() {
+    if (Result<void> recovered = pipeline_.recover(); !recovered) return recovered;
+    Result<telemetry::LcmLink> link = telemetry::LcmLink::open(options_.lcm_url);
+    if (!link) return tl::unexpected(std::move(link.error()));
+    link_ = std::make_unique<telemetry::LcmLink>(std::move(*link));
+    const auto handler = [this](const telemetry::Received& received) {
+      std::optional<InboundMessage> message =
+          decode_message(received.channel, received.data, received.recv_utime_us, outputs_.counters);
+      if (message) batch_.push_back(std::move(*message));
+    };
+    for (telemetry::Subject subject : {telemetry::Subject::telemetry, telemetry::Subject::mission_event}) {
+      if (Result<void> done = link_->subscribe(telemetry::channel_pattern(subject), handler, 100'000); !done)
+        return done;
+    }
+    running_ = true;
+    receiving_ = true;
+    receiver_ = std::thread([this] { receive(); });
+    accountant_ = std::thread([this] { account(); });
+    return {};
+  }
+
+  void stop() {
+    if (!running_.exchange(false)) return;
+    link_->wake();
+    receiver_.join();
+    {
+      const std::lock_guard lock(mutex_);
+      draining_ = true;
+    }
+    ready_.notify_one();
+    accountant_.join();
+  }
+
+  IngestStatus status() const {
+    IngestStatus s;
+    {
+      const std::lock_guard lock(mutex_);
+      s.queue_messages = queue_.size();
+      s.error = error_;
+    }
+    s.receive_ticks = receive_ticks_;
+    s.account_ticks = account_ticks_;
+    s.receiving = receiving_;
+    return s;
+  }
+
+ private:
+  void receive() {
+    while (running_) {
+      ++receive_ticks_;
+      const Result<int> handled = link_->poll(std::chrono::milliseconds(100));
+      if (!handled) {
+        receiving_ = false;
+        {
+          const std::lock_guard lock(mutex_);
+          error_ = describe(handled.error());
+        }
+        outputs_.warn("", "LCM: " + describe(handled.error()));
+        while (running_) {
+          ++receive_ticks_;
+          std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        }
+        return;
+      }
+      if (batch_.empty()) continue;
+      std::size_t dropped = 0;
+      {
+        const std::lock_guard lock(mutex_);
+        const std::size_t room = options_.queue_messages - std::min(options_.queue_messages, queue_.size());
+        const std::size_t taken = std::min(room, batch_.size());
+        dropped = batch_.size() - taken;
+        queue_.insert(queue_.end(), std::make_move_iterator(batch_.begin()),
+                      std::make_move_iterator(batch_.begin() + static_cast<std::ptrdiff_t>(taken)));
+      }
+      batch_.clear();
+      if (dropped > 0) outputs_.counters.add(IngestFault::queue_full, dropped);
+      ready_.notify_one();
+    }
+  }
+
+  void account() {
+    std::vector<InboundMessage> work;
+    auto next_publish = Clock::now(), next_tick = next_publish, next_energy = next_publish;
+    for (bool last = false; !last;) {
+      ++account_ticks_;
+      {
+        std::unique_lock lock(mutex_);
+        ready_.wait_until(lock, next_publish, [&] { return !queue_.empty() || draining_; });
+        work.swap(queue_);
+        last = draining_ && work.empty();
+      }
+      for (const InboundMessage& message : work) pipeline_.handle(message);
+      work.clear();
+      const auto now = Clock::now();
+      if (now >= next_tick) {
+        pipeline_.tick(host_utime_us());
+        next_tick = now + std::chrono::milliseconds(500);
+      }
+      if (now >= next_publish) {
+        pipeline_.publish();
+        next_publish = now + options_.publish_period;
+      }
+      if (now >= next_energy) {
+        publish_energy_states();
+        next_energy = now + options_.energy_state_period;
+      }
+    }
+    pipeline_.suspend();
+  }
+
+  void publish_energy_states() {
+    const std::int64_t now = host_utime_us();
+    for (const auto& snapshot : outputs_.fleet.all()) {
+      if (!snapshot->has_model || now - snapshot->received_utime_us > live_us ||
+          snapshot->sample.utime_us == 0)
+        continue;
+      const std::shared_ptr<const ModelInForce> model = models_.find(snapshot->robot_id);
+      if (model == nullptr) continue;
+      const Endurance left = recent_endurance(*snapshot, model->robot.battery);
+      telemetry::EnergyState state;
+      state.utime_us = snapshot->sample.utime_us;
+      state.robot_id = snapshot->robot_id;
+      state.mission_id = snapshot->mission_id;
+      state.model_version = snapshot->model_version;
+      state.measured_power_w = snapshot->measured_power_w;
+      state.modelled_power_w = snapshot->modelled_power_w;
+      if (snapshot->accounts.measured_s > 0) {
+        state.measured_energy_j = snapshot->accounts.measured_j;
+        state.unexplained_energy_j = snapshot->accounts.ledger[energy::Term::unexplained];
+      }
+      state.modelled_energy_j = snapshot->accounts.modelled_j;
+      state.recovered_energy_j = snapshot->accounts.ledger[energy::Term::recovered];
+      state.state_of_charge = snapshot->state_of_charge;
+      state.range_m = left.range_m;
+      state.run_time_s = left.run_time_s;
+      state.winding_temperature_c = snapshot->winding_temperature_c;
+      const auto bytes = telemetry::encode_energy_state(state);
+      if (!bytes) continue;
+      const auto sent =
+          link_->publish(telemetry::channel_of(telemetry::Subject::energy_state, snapshot->robot_id), *bytes);
+      if (!sent) outputs_.warn(snapshot->robot_id, describe(sent.error()));
+    }
+  }
+
+  IngestOptions options_;
+  const ModelRegistry& models_;
+  SessionOutputs outputs_;
+  Pipeline pipeline_;
+  std::unique_ptr<telemetry::LcmLink> link_;
+  std::vector<InboundMessage> batch_;  // the receiver's
+  mutable std::mutex mutex_;
+  std::condition_variable ready_;
+  std::vector<InboundMessage> queue_;
+  std::string error_;
+  bool draining_ = false;
+  std::atomic<bool> running_ = false, receiving_ = false;
+  std::atomic<std::uint64_t> receive_ticks_ = 0, account_ticks_ = 0;
+  std::thread receiver_, accountant_;
+};
+
+IngestService::IngestService(IngestOptions options, const ModelRegistry& models, SessionOutputs outputs)
+    : impl_(std::make_unique<Impl>(std::move(options), models, std::move(outputs))) {}
+IngestService::~IngestService() = default;
+Result<void> IngestService::start() {
+  return impl_->start();
+}
+void IngestService::stop() {
+  impl_->stop();
+}
+IngestStatus IngestService::status() const {
+  return impl_->status();
+}
+
+}  // namespace joulecast::server

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "base/error.h"
+#include "server/ingest/pipeline.h"
+
+namespace joulecast::server {
+
+struct IngestOptions {
+  std::string lcm_url;
+  std::size_t queue_messages = 200'000;          // bound between receiving and accounting
+  std::chrono::milliseconds publish_period{50};  // snapshots are no older than this
+  std::chrono::milliseconds energy_state_period{1000};
+  SessionSettings session;
+  std::size_t max_robots = 1000;
+};
+
+struct IngestStatus {
+  std::size_t queue_messages = 0;
+  std::uint64_t receive_ticks = 0;  // turns of each loop, several a second: for the watchdog
+  std::uint64_t account_ticks = 0;
+  bool receiving = false;
+  std::string error;  // why not receiving
+};
+
+// The two ingest threads: one receives from LCM, guards, decodes and queues; the other runs the pipeline,
+// ticks it, and publishes each live robot's ENERGY_STATE.
+class IngestService {
+ public:
+  IngestService(IngestOptions options, const ModelRegistry& models, SessionOutputs outputs);
+  ~IngestService();
+
+  // Recovers open missions, opens LCM and starts the threads.
+  Result<void> start();
+  // Stops receiving, accounts for what is queued, checkpoints all missions.
+  void stop();
+
+  IngestStatus status() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// Range and run time left above the reserve at the recent consumption; NaN where not known.
+struct Endurance {
+  double range_m = telemetry::unmeasured;
+  double run_time_s = telemetry::unmeasured;
+};
+Endurance recent_endurance(const RobotSnapshot& snapshot, const robot::Battery& battery);
+
+}  // namespace joulecast::server

@@ -1,0 +1,306 @@
+#include "server/ingest/robot_session.h"
+
+#include <cmath>
+#include <utility>
+
+#include "telemetry/validation.h"
+
+namespace joulecast::server {
+namespace {
+
+history::MissionState state_of(telemetry::MissionEnd end) {
+  switch (end) {
+    case telemetry::MissionEnd::finished:
+    case telemetry::MissionEnd::idle:
+    case telemetry::MissionEnd::expired:
+      return history::MissionState::finished;
+    case telemetry::MissionEnd::aborted:
+      return history::MissionState::aborted;
+    case telemetry::MissionEnd::superseded:
+      return history::MissionState::superseded;
+    case telemetry::MissionEnd::unfinished:
+      return history::MissionState::unfinished;
+  }
+  return history::MissionState::unfinished;
+}
+
+}  // namespace
+
+// The mission that is open, as stored, with what came since its last checkpoint.
+struct RobotSession::OpenMission {
+  history::Mission record;
+  std::vector<telemetry::Sample> samples;
+  std::uint64_t unsaved = 0;
+  // Gaps that an earlier run of the daemon counted; the meter counts those of this run.
+  std::int64_t earlier_gaps = 0;
+  double earlier_gap_s = 0;
+  bool resumed_silent = false;  // resumed after a restart, and nothing came since
+};
+
+RobotSession::RobotSession(std::string robot_id, const SessionSettings& settings, SessionOutputs outputs)
+    : robot_id_(std::move(robot_id)),
+      settings_(settings),
+      outputs_(std::move(outputs)),
+      sequence_(settings.sequence),
+      missions_(settings.mission) {
+  snapshot_.robot_id = robot_id_;
+  if (const auto stored = outputs_.store.energy_state(robot_id_); stored && stored->has_value()) {
+    snapshot_.state_of_charge = (*stored)->state_of_charge;
+  }
+  changed_ = true;
+}
+
+RobotSession::~RobotSession() = default;
+
+void RobotSession::set_model(std::shared_ptr<const ModelInForce> model) {
+  if (model == model_) return;
+  flush_meter();
+  const energy::Accounts accounts = meter_ != nullptr ? meter_->accounts() : energy::Accounts{};
+  model_ = std::move(model);
+  meter_.reset();
+  snapshot_.has_model = model_ != nullptr;
+  snapshot_.model_version = model_ != nullptr ? model_->version : 0;
+  if (model_ != nullptr) {
+    meter_ =
+        std::make_unique<energy::Meter>(model_->drive, model_->robot.battery.capacity_ah, settings_.meter,
+                                        [this](const energy::MeterPoint& point) { on_point(point); });
+    meter_->set_state_of_charge(snapshot_.state_of_charge);
+    if (open_ != nullptr) {
+      open_->earlier_gaps = open_->record.gap_count;
+      open_->earlier_gap_s = open_->record.gap_s;
+      open_->record.model_version = model_->version;
+      meter_->resume(accounts.duration_s > 0 ? accounts : open_->record.accounts);
+    }
+  }
+  changed_ = true;
+}
+
+void RobotSession::resume(const history::Mission& mission) {
+  open_ = std::make_unique<OpenMission>();
+  open_->record = mission;
+  open_->earlier_gaps = mission.gap_count;
+  open_->earlier_gap_s = mission.gap_s;
+  open_->resumed_silent = true;
+  missions_.resume({mission.mission_id, mission.start_utime_us, mission.end_utime_us, mission.payload_kg,
+                    mission.implicit});
+  snapshot_.mission_id = mission.mission_id;
+  snapshot_.mission_key = mission.key;
+  snapshot_.mission_start_utime_us = mission.start_utime_us;
+  snapshot_.accounts = mission.accounts;
+  if (meter_ != nullptr) meter_->resume(mission.accounts);
+  changed_ = true;
+}
+
+void RobotSession::on_fault(IngestFault fault) {
+  const std::string name(ingest_fault_names[static_cast<std::size_t>(fault)]);
+  outputs_.counters.add(fault);
+  ++snapshot_.faults[name];
+  if (open_ != nullptr) ++open_->record.sample_faults[name];
+  changed_ = true;
+}
+
+void RobotSession::on_sample(const telemetry::Sample& sample, std::int64_t host_utime_us) {
+  snapshot_.received_utime_us = host_utime_us;
+  if (model_ == nullptr) return on_fault(IngestFault::unknown_robot);
+  if (telemetry::check_plausible(sample)) return on_fault(IngestFault::implausible);
+
+  const telemetry::Placement place = sequence_.place(sample.sequence, sample.utime_us);
+  for (std::int64_t k = 0; k < std::min<std::int64_t>(place.missing, 1); ++k) {
+    const std::string name(ingest_fault_names[static_cast<std::size_t>(IngestFault::missing)]);
+    outputs_.counters.add(IngestFault::missing, static_cast<std::uint64_t>(place.missing));
+    snapshot_.faults[name] += static_cast<std::uint64_t>(place.missing);
+    if (open_ != nullptr) open_->record.sample_faults[name] += place.missing;
+  }
+  if (place.arrival == telemetry::Arrival::duplicate) return on_fault(IngestFault::duplicate);
+  if (place.arrival == telemetry::Arrival::late) return on_fault(IngestFault::late);
+  if (place.arrival == telemetry::Arrival::restart) on_fault(IngestFault::restart);
+  if (place.clock != telemetry::ClockStep::none) {
+    on_fault(place.clock == telemetry::ClockStep::backward ? IngestFault::clock_backward
+                                                           : IngestFault::clock_forward);
+    flush_meter();
+    meter_->interrupt();
+    missions_.on_clock_step(sample.utime_us);
+    if (open_ != nullptr) {
+      open_->record.incomplete = true;
+      open_->record.incomplete_reason = "the robot's clock was set during the mission";
+    }
+  }
+  last_sequence_ = sample.sequence;
+
+  const telemetry::SampleStep step = missions_.on_sample(sample.utime_us, sample.payload_kg);
+  carry_out(step.actions);
+  if (!step.belongs || open_ == nullptr) return on_fault(IngestFault::outside_mission);
+
+  if (open_->resumed_silent) {
+    open_->resumed_silent = false;
+    const double down_s = static_cast<double>(sample.utime_us - open_->record.end_utime_us) * 1e-6;
+    if (down_s > settings_.meter.gap_bridge_s) {
+      ++open_->earlier_gaps;
+      open_->earlier_gap_s += down_s;
+      open_->record.incomplete = true;
+      open_->record.incomplete_reason = "the service was down during the mission";
+    }
+  }
+  ++open_->record.samples;
+  ++open_->unsaved;
+  ++snapshot_.samples;
+  outputs_.counters.samples.fetch_add(1, std::memory_order_relaxed);
+  open_->samples.push_back(sample);
+  if (const Result<void> metered = meter_->add(sample); !metered) {
+    on_fault(IngestFault::solver);
+    outputs_.warn(robot_id_, describe(metered.error()));
+  }
+  if (open_->samples.size() >= settings_.checkpoint_samples) checkpoint();
+  changed_ = true;
+}
+
+void RobotSession::on_event(const telemetry::MissionEvent& event, std::int64_t host_utime_us) {
+  snapshot_.received_utime_us = host_utime_us;
+  if (model_ == nullptr) return on_fault(IngestFault::unknown_robot);
+  const auto refused = [&] {
+    const telemetry::MissionCounters& c = missions_.counters();
+    return c.duplicate_events + c.out_of_order_events + c.unknown_missions;
+  };
+  const std::uint64_t before = refused();
+  carry_out(missions_.on_event(event));
+  if (refused() != before) on_fault(IngestFault::bad_event);
+  changed_ = true;
+}
+
+void RobotSession::carry_out(const telemetry::MissionActions& actions) {
+  for (const telemetry::MissionAction& action : actions) {
+    action.kind == telemetry::MissionAction::Kind::open ? open(action) : close(action);
+  }
+}
+
+void RobotSession::open(const telemetry::MissionAction& action) {
+  if (action.implicit && !settings_.implicit_missions) return;
+  flush_meter();
+  meter_->begin();
+  trace_.begin();
+  open_ = std::make_unique<OpenMission>();
+  history::Mission& record = open_->record;
+  record.robot_id = robot_id_;
+  record.mission_id = action.mission_id;
+  record.start_utime_us = record.end_utime_us = action.utime_us;
+  record.implicit = action.implicit;
+  record.payload_kg = action.payload_kg;
+  record.note = action.note;
+  record.model_version = model_->version;
+  const Result<history::MissionKey> key =
+      outputs_.store.mission_key(robot_id_, record.mission_id, record.start_utime_us);
+  if (!key) outputs_.warn(robot_id_, describe(key.error()));
+  record.key = key.value_or(0);
+  if (record.key > 0) outputs_.post(history::StartMission{record});
+  snapshot_.mission_id = record.mission_id;
+  snapshot_.mission_key = record.key;
+  snapshot_.mission_start_utime_us = record.start_utime_us;
+  snapshot_.accounts = {};
+  outputs_.counters.missions_started.fetch_add(1, std::memory_order_relaxed);
+}
+
+void RobotSession::close(const telemetry::MissionAction& action) {
+  if (open_ == nullptr) return;
+  flush_meter();
+  history::Mission& record = open_->record;
+  record.state = open_->resumed_silent ? history::MissionState::interrupted : state_of(action.end);
+  if (record.state == history::MissionState::unfinished ||
+      record.state == history::MissionState::interrupted) {
+    record.incomplete = true;
+    if (record.incomplete_reason.empty()) {
+      record.incomplete_reason =
+          open_->resumed_silent ? "the service stopped during the mission and the robot did not come back"
+                                : "the robot fell silent before the end";
+    }
+  }
+  if (!action.note.empty()) record.note += (record.note.empty() ? "" : "; ") + action.note;
+  record.end_utime_us = std::max(record.end_utime_us, action.utime_us);
+  checkpoint();
+  open_.reset();
+  snapshot_.mission_id.clear();
+  snapshot_.mission_key = 0;
+  outputs_.counters.missions_ended.fetch_add(1, std::memory_order_relaxed);
+  changed_ = true;
+}
+
+void RobotSession::flush_meter() {
+  if (meter_ == nullptr) return;
+  if (const Result<void> flushed = meter_->flush(); !flushed) {
+    on_fault(IngestFault::solver);
+    outputs_.warn(robot_id_, describe(flushed.error()));
+  }
+}
+
+void RobotSession::refresh_record() {
+  history::Mission& record = open_->record;
+  if (meter_ == nullptr || open_->resumed_silent) return;
+  record.accounts = meter_->accounts();
+  record.gap_count = open_->earlier_gaps + static_cast<std::int64_t>(meter_->gaps());
+  record.gap_s = open_->earlier_gap_s + meter_->gap_seconds();
+  if (meter_->gaps() > 0 && !record.incomplete) {
+    record.incomplete = true;
+    record.incomplete_reason = "no samples for longer than can be bridged";
+  }
+}
+
+void RobotSession::checkpoint() {
+  refresh_record();
+  history::CheckpointMission command;
+  command.mission = open_->record;
+  command.trace = trace_.take();
+  command.samples = std::exchange(open_->samples, {});
+  open_->samples.reserve(settings_.checkpoint_samples);
+  open_->unsaved = 0;
+  if (std::isfinite(snapshot_.state_of_charge)) {
+    command.energy_state = history::EnergyState{robot_id_, snapshot_.sample.utime_us, last_sequence_,
+                                                snapshot_.state_of_charge, snapshot_.winding_temperature_c};
+  }
+  if (open_->record.key > 0) outputs_.post(std::move(command));
+}
+
+void RobotSession::on_point(const energy::MeterPoint& point) {
+  const energy::Accounts& accounts = meter_->accounts();
+  trace_.add(point, accounts);
+  if (open_ != nullptr) open_->record.end_utime_us = point.sample.utime_us;
+  snapshot_.sample = point.sample;
+  snapshot_.measured_power_w = point.measured_power_w;
+  snapshot_.modelled_power_w = point.modelled_power_w;
+  snapshot_.speed_m_s = point.speed_m_s;
+  snapshot_.yaw_rate_rad_s = point.yaw_rate_rad_s;
+  snapshot_.state_of_charge = point.state_of_charge;
+  snapshot_.winding_temperature_c = point.winding_temperature_c;
+  if (point.bridged && point.interval_s > 0) {
+    RecentConsumption& recent = snapshot_.recent;
+    const double keep = 1 - std::min(1.0, point.interval_s / recent_consumption_s);
+    const double power =
+        std::isfinite(point.measured_power_w) ? point.measured_power_w : point.modelled_power_w;
+    recent.energy_j = keep * recent.energy_j + power * point.interval_s;
+    recent.distance_m = keep * recent.distance_m + std::fabs(point.speed_m_s) * point.interval_s;
+    recent.duration_s = keep * recent.duration_s + point.interval_s;
+  }
+  snapshot_.accounts = accounts;
+}
+
+void RobotSession::on_tick(std::int64_t host_utime_us) {
+  if (snapshot_.received_utime_us > 0) {
+    carry_out(missions_.on_silence(host_utime_us - snapshot_.received_utime_us));
+  } else if (open_ != nullptr) {
+    snapshot_.received_utime_us = host_utime_us;  // a resumed mission's silence counts from the restart
+  }
+  if (open_ != nullptr && open_->unsaved > 0) checkpoint();
+  publish();
+}
+
+void RobotSession::suspend() {
+  flush_meter();
+  if (open_ != nullptr) checkpoint();
+  publish();
+}
+
+void RobotSession::publish() {
+  if (!changed_) return;
+  changed_ = false;
+  outputs_.fleet.publish(std::make_shared<const RobotSnapshot>(snapshot_));
+}
+
+}  // namespace joulecast::server

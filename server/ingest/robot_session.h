@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "energy/meter.h"
+#include "history/commands.h"
+#include "history/store.h"
+#include "server/ingest/counters.h"
+#include "server/ingest/fleet_view.h"
+#include "server/ingest/model_registry.h"
+#include "server/ingest/trace_builder.h"
+#include "telemetry/mission_tracker.h"
+#include "telemetry/sample.h"
+#include "telemetry/sequence_tracker.h"
+
+namespace joulecast::server {
+
+struct SessionSettings {
+  energy::MeterSettings meter;
+  telemetry::SequenceLimits sequence;
+  telemetry::MissionLimits mission;
+  bool implicit_missions = true;
+  std::size_t checkpoint_samples = 1024;  // a mission is checkpointed at this many samples at the latest
+};
+
+// What a session acts on. `post` hands a command to the store's writer and may wait for it.
+struct SessionOutputs {
+  history::Store& store;
+  std::function<void(history::Command)> post;
+  FleetView& fleet;
+  IngestCounters& counters;
+  std::function<void(const std::string& robot_id, const std::string& text)> warn;
+};
+
+// Everything between one robot's decoded messages and its history: plausibility, order, mission tracking,
+// metering, trace, checkpoints, snapshot. A state machine without threads or clocks of its own:
+// `host_utime_us` is the caller's clock, and the accounts depend on the robot's clock alone, so that a replay
+// gives the same bits.
+class RobotSession {
+ public:
+  RobotSession(std::string robot_id, const SessionSettings& settings, SessionOutputs outputs);
+  ~RobotSession();
+
+  // Null: the model is not known; samples are counted out until it is. A change takes effect at the next
+  // sample.
+  void set_model(std::shared_ptr<const ModelInForce> model);
+
+  // Goes on with a mission that was open when the last daemon stopped.
+  void resume(const history::Mission& mission);
+
+  void on_sample(const telemetry::Sample& sample, std::int64_t host_utime_us);
+  void on_event(const telemetry::MissionEvent& event, std::int64_t host_utime_us);
+  void on_fault(IngestFault fault);
+
+  // Call about once a second: ends missions that fell silent, checkpoints the open one, publishes what
+  // changed.
+  void on_tick(std::int64_t host_utime_us);
+  // Checkpoints and publishes at once; for an orderly stop, which leaves an open mission to be resumed.
+  void suspend();
+
+  // Publishes the snapshot if anything changed since the last one.
+  void publish();
+
+  const std::string& robot_id() const { return robot_id_; }
+
+ private:
+  struct OpenMission;
+
+  void carry_out(const telemetry::MissionActions& actions);
+  void open(const telemetry::MissionAction& action);
+  void close(const telemetry::MissionAction& action);
+  void checkpoint();
+  void on_point(const energy::MeterPoint& point);
+  void flush_meter();
+  void refresh_record();
+
+  std::string robot_id_;
+  SessionSettings settings_;
+  SessionOutputs outputs_;
+  std::shared_ptr<const ModelInForce> model_;
+  telemetry::SequenceTracker sequence_;
+  telemetry::MissionTracker missions_;
+  std::unique_ptr<energy::Meter> meter_;
+  TraceBuilder trace_;
+  std::unique_ptr<OpenMission> open_;
+  RobotSnapshot snapshot_;
+  std::int64_t last_sequence_ = 0;
+  bool changed_ = false;
+};
+
+}  // namespace joulecast::server
