@@ -21,6 +21,7 @@ using MissionKey = std::int64_t;
 
 enum class ModelOrigin { file, http, calibration, diagnosis };
 std::string_view name(ModelOrigin origin);
+std::optional<ModelOrigin> model_origin_from(std::string_view text);
 
 // One immutable version of a robot's model.
 struct ModelVersion {

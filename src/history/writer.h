@@ -64,7 +64,8 @@ class Writer {
   Outcome execute(Command command, std::chrono::milliseconds timeout = std::chrono::milliseconds{10'000});
   // Waits until everything posted before the call is committed.
   Result<void> flush(std::chrono::milliseconds timeout = std::chrono::milliseconds{30'000});
-  // Accepts no more, commits what waits for at most `grace`. unavailable when commands were left.
+  // Accepts no more, commits what waits for at most `grace`. unavailable when commands were left. To be
+  // called by one thread only.
   Result<void> stop(std::chrono::milliseconds grace);
 
   WriterStatus status() const;

@@ -1,0 +1,46 @@
+#include "history/commands.h"
+
+namespace joulecast::history {
+namespace {
+
+std::size_t content_bytes(const AddModel& c) {
+  return c.robot_id.size() + c.note.size() + c.model_json.size();
+}
+std::size_t content_bytes(const ActivateModel& c) {
+  return c.robot_id.size();
+}
+
+std::size_t content_bytes(const Mission& mission) {
+  constexpr std::size_t map_node = 64;  // what std::map allocates around an entry
+  std::size_t bytes = mission.robot_id.size() + mission.mission_id.size() + mission.note.size() +
+                      mission.incomplete_reason.size();
+  for (const auto& [reason, count] : mission.sample_faults)
+    bytes += reason.size() + sizeof(reason) + sizeof(count) + map_node;
+  return bytes;
+}
+std::size_t content_bytes(const StartMission& c) {
+  return content_bytes(c.mission);
+}
+
+std::size_t content_bytes(const CheckpointMission& c) {
+  return content_bytes(c.mission) + c.trace.capacity() * sizeof(TraceBucket) +
+         c.samples.capacity() * sizeof(telemetry::Sample) +
+         (c.energy_state ? c.energy_state->robot_id.size() : 0);
+}
+std::size_t content_bytes(const PutEnergyState& c) {
+  return c.state.robot_id.size();
+}
+std::size_t content_bytes(const AppendEvent& c) {
+  return c.event.robot_id.size() + c.event.kind.size() + c.event.detail_json.size();
+}
+std::size_t content_bytes(const Prune&) {
+  return 0;
+}
+
+}  // namespace
+
+std::size_t weight_bytes(const Command& command) {
+  return sizeof(Command) + std::visit([](const auto& c) { return content_bytes(c); }, command);
+}
+
+}  // namespace joulecast::history

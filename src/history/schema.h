@@ -1,0 +1,35 @@
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "base/error.h"
+#include "history/sqlite.h"
+
+namespace joulecast::history {
+
+// One step from schema version `from` to from + 1.
+struct Migration {
+  std::int64_t from = 0;
+  std::string_view sql;
+};
+
+// A schema as it is now, and the way to it from older files.
+struct Schema {
+  std::int64_t version = 0;
+  std::string_view sql;                   // makes an empty database one of `version`
+  std::span<const Migration> migrations;  // ascending in `from`, without a hole up to version - 1
+};
+
+// The schema of schemas/store.sql.
+const Schema& store_schema();
+
+// Marks the file as a joulecast store in SQLite's application_id: "JLCT".
+inline constexpr std::int64_t store_application_id = 0x4a4c4354;
+
+// Brings the database to the schema, all in one transaction: creates it in an empty file, migrates an older
+// one, leaves the same one as it is. Fault::conflict: the file is newer, or too old for the list.
+// Fault::corrupt: it holds something else than a store. Throws SqliteError.
+Result<void> bring_to_schema(Database& database, const Schema& schema);
+
+}  // namespace joulecast::history

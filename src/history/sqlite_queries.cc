@@ -1,0 +1,355 @@
+#include "history/sqlite_queries.h"
+
+#include <bit>
+#include <cmath>
+#include <utility>
+
+#include "history/cursor.h"
+#include "history/sqlite_rows.h"
+#include "history/telemetry_chunk.h"
+#include "history/trace_merge.h"
+
+namespace joulecast::history::queries {
+namespace {
+
+tl::unexpected<Error> no_mission(MissionKey key) {
+  return fail(Fault::not_found, "mission", "no mission has key " + std::to_string(key));
+}
+
+tl::unexpected<Error> no_robot(std::string_view robot_id) {
+  return fail(Fault::not_found, "robot_id", "no robot is called '" + std::string(robot_id) + "'");
+}
+
+bool has_mission(Database& database, MissionKey key) {
+  Rows rows(database.statement("SELECT 1 FROM mission WHERE mission_key = ?"));
+  return rows.bind(key).next();
+}
+
+bool has_robot(Database& database, std::string_view robot_id) {
+  Rows rows(database.statement("SELECT 1 FROM robot WHERE robot_id = ?"));
+  return rows.bind(robot_id).next();
+}
+
+constexpr std::string_view select_model =
+    "SELECT model.robot_id, version, model.created_utime_us, origin, note, parent_version, "
+    "version IS active_version, model_json FROM model JOIN robot USING (robot_id) WHERE model.robot_id = ?";
+
+Result<ModelVersion> read_model(Rows& rows) {
+  ModelVersion m;
+  m.robot_id = rows.text();
+  m.version = rows.integer();
+  m.created_utime_us = rows.integer();
+  const std::string origin_name = rows.text();
+  const auto origin = model_origin_from(origin_name);
+  if (!origin) return fail(Fault::corrupt, "model.origin", "unknown origin '" + origin_name + "'");
+  m.origin = *origin;
+  m.note = rows.text();
+  m.parent_version = rows.optional_integer();
+  m.active = rows.boolean();
+  m.model_json = rows.text();
+  return m;
+}
+
+template <class T, class Read>
+Result<std::vector<T>> read_all(Rows& rows, Read read) {
+  std::vector<T> all;
+  while (rows.next()) {
+    Result<T> one = read(rows);
+    if (!one) return tl::unexpected(one.error());
+    all.push_back(std::move(*one));
+  }
+  return all;
+}
+
+// The WHERE clause of a filter, which also tells filters apart for cursors when its values are added.
+std::string where(const MissionFilter& f) {
+  std::string sql = " WHERE 1";
+  if (f.robot_id) sql += " AND robot_id = ?";
+  if (f.mission_id) sql += " AND mission_id = ?";
+  if (f.start_from_utime_us) sql += " AND start_utime_us >= ?";
+  if (f.start_to_utime_us) sql += " AND start_utime_us < ?";
+  if (!f.states.empty()) {
+    sql += " AND state IN (?";
+    for (std::size_t k = 1; k < f.states.size(); ++k) sql += ", ?";
+    sql += ")";
+  }
+  if (f.incomplete) sql += " AND incomplete = ?";
+  if (f.payload_min_kg) sql += " AND payload_kg >= ?";
+  if (f.payload_max_kg) sql += " AND payload_kg <= ?";
+  return sql;
+}
+
+void bind_filter(Rows& rows, const MissionFilter& f) {
+  if (f.robot_id) rows.bind(*f.robot_id);
+  if (f.mission_id) rows.bind(*f.mission_id);
+  if (f.start_from_utime_us) rows.bind(*f.start_from_utime_us);
+  if (f.start_to_utime_us) rows.bind(*f.start_to_utime_us);
+  for (const MissionState state : f.states) rows.bind(name(state));
+  if (f.incomplete) rows.bind(*f.incomplete);
+  if (f.payload_min_kg) rows.bind(*f.payload_min_kg);
+  if (f.payload_max_kg) rows.bind(*f.payload_max_kg);
+}
+
+// Text values carry their length, so that no two filters read alike.
+std::string identity(const MissionFilter& f) {
+  std::string text = "missions" + where(f);
+  const auto add_text = [&](std::string_view value) {
+    text += '|' + std::to_string(value.size()) + ':' + std::string(value);
+  };
+  if (f.robot_id) add_text(*f.robot_id);
+  if (f.mission_id) add_text(*f.mission_id);
+  for (const auto& bound : {f.start_from_utime_us, f.start_to_utime_us})
+    if (bound) text += '|' + std::to_string(*bound);
+  for (const MissionState state : f.states) add_text(name(state));
+  if (f.incomplete) text += *f.incomplete ? "|1" : "|0";
+  for (const auto& bound : {f.payload_min_kg, f.payload_max_kg})
+    if (bound) text += '|' + std::to_string(std::bit_cast<std::uint64_t>(*bound));
+  return text;
+}
+
+// At most 6 states: more are repeats, and would make endless statement texts.
+Result<void> check_filter(const MissionFilter& f) {
+  if (f.states.size() > mission_state_count) return invalid("state", "names a state more than once");
+  if (f.start_from_utime_us && f.start_to_utime_us && *f.start_from_utime_us > *f.start_to_utime_us)
+    return invalid("start_from", "must not be later than start_to");
+  if ((f.payload_min_kg && std::isnan(*f.payload_min_kg)) ||
+      (f.payload_max_kg && std::isnan(*f.payload_max_kg)))
+    return invalid("payload", "bounds must be numbers");
+  if (f.payload_min_kg && f.payload_max_kg && *f.payload_min_kg > *f.payload_max_kg)
+    return invalid("payload_min_kg", "must not be greater than payload_max_kg");
+  return {};
+}
+
+Result<void> check_limit(std::string_view field, std::int64_t limit, std::int64_t greatest) {
+  if (limit >= 1 && limit <= greatest) return {};
+  return invalid(std::string(field), std::to_string(limit) + " is outside 1 to " + std::to_string(greatest));
+}
+
+Result<void> check_range(TimeRange range) {
+  if (range.from_utime_us <= range.to_utime_us) return {};
+  return invalid("from", "must not be later than to");
+}
+
+std::string select_missions() {
+  return "SELECT " + std::string(mission_identity_columns) + ", " + mission_content_columns() +
+         " FROM mission";
+}
+
+}  // namespace
+
+Result<std::vector<RobotRecord>> robots(Database& database) {
+  Rows rows(
+      database.statement("SELECT robot_id, created_utime_us, active_version FROM robot ORDER BY robot_id"));
+  return read_all<RobotRecord>(rows, [](Rows& row) -> Result<RobotRecord> {
+    RobotRecord record;
+    record.robot_id = row.text();
+    record.created_utime_us = row.integer();
+    record.active_version = row.optional_integer();
+    return record;
+  });
+}
+
+Result<ModelVersion> model(Database& database, std::string_view robot_id,
+                           std::optional<std::int64_t> version) {
+  static const std::string active = std::string(select_model) + " AND version = active_version";
+  static const std::string given = std::string(select_model) + " AND version = ?";
+  Rows rows(database.statement(version ? given : active));
+  rows.bind(robot_id);
+  if (version) rows.bind(*version);
+  if (rows.next()) return read_model(rows);
+  if (!has_robot(database, robot_id)) return no_robot(robot_id);
+  return fail(Fault::not_found, "model_version",
+              "robot '" + std::string(robot_id) + "' has no " +
+                  (version ? "model version " + std::to_string(*version) : std::string("active model")));
+}
+
+Result<std::vector<ModelVersion>> model_versions(Database& database, std::string_view robot_id) {
+  if (!has_robot(database, robot_id)) return no_robot(robot_id);
+  static const std::string sql = std::string(select_model) + " ORDER BY version DESC";
+  Rows rows(database.statement(sql));
+  rows.bind(robot_id);
+  return read_all<ModelVersion>(rows, read_model);
+}
+
+Result<Mission> mission(Database& database, MissionKey key) {
+  static const std::string sql = select_missions() + " WHERE mission_key = ?";
+  Rows rows(database.statement(sql));
+  if (!rows.bind(key).next()) return no_mission(key);
+  return read_mission(rows);
+}
+
+Result<MissionPage> missions(Database& database, const MissionFilter& filter, const PageRequest& page) {
+  if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_limit("limit", page.limit, max_page_size); !ok) return tl::unexpected(ok.error());
+  const std::string query = identity(filter);
+  std::optional<CursorPlace> after;
+  if (!page.cursor.empty()) {
+    const auto place = decode_cursor(query, page.cursor);
+    if (!place) return tl::unexpected(place.error());
+    after = *place;
+  }
+  std::string sql = select_missions() + where(filter);
+  if (after) sql += " AND (start_utime_us, mission_key) < (?, ?)";
+  sql += " ORDER BY start_utime_us DESC, mission_key DESC LIMIT ?";
+  Rows rows(database.statement(sql));
+  bind_filter(rows, filter);
+  if (after) rows.bind((*after)[0]).bind((*after)[1]);
+  // One more than asked for tells whether a page follows.
+  rows.bind(page.limit + 1);
+  auto read = read_all<Mission>(rows, read_mission);
+  if (!read) return tl::unexpected(read.error());
+  MissionPage result{std::move(*read), {}};
+  if (static_cast<std::int64_t>(result.missions.size()) > page.limit) {
+    result.missions.pop_back();
+    const Mission& last = result.missions.back();
+    result.next_cursor = encode_cursor(query, {last.start_utime_us, last.key});
+  }
+  return result;
+}
+
+Result<Totals> totals(Database& database, const MissionFilter& filter) {
+  if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
+  static const std::string sums = [] {
+    std::string text = "sum(";
+    for (const char c : accounts_columns()) text += c == ',' ? std::string("), sum(") : std::string(1, c);
+    return text + ")";
+  }();
+  Rows rows(database.statement(
+      "SELECT count(*), count(measured_j), coalesce(sum(incomplete), 0), coalesce(sum(samples), 0), "
+      "coalesce(sum(gap_count), 0), coalesce(sum(gap_s), 0.0), " +
+      sums + " FROM mission" + where(filter)));
+  bind_filter(rows, filter);
+  rows.next();
+  Totals t;
+  t.missions = rows.integer();
+  t.measured_missions = rows.integer();
+  t.incomplete_missions = rows.integer();
+  t.samples = rows.integer();
+  t.gap_count = rows.integer();
+  t.gap_s = rows.real();
+  t.accounts = read_accounts(rows);
+  return t;
+}
+
+Result<std::vector<Mission>> open_missions(Database& database) {
+  static const std::string sql =
+      select_missions() + " WHERE state = 'open' ORDER BY start_utime_us, mission_key";
+  Rows rows(database.statement(sql));
+  return read_all<Mission>(rows, read_mission);
+}
+
+std::optional<MissionKey> key_of(Database& database, std::string_view robot_id, std::string_view mission_id,
+                                 std::int64_t start_utime_us) {
+  Rows rows(database.statement(
+      "SELECT mission_key FROM mission WHERE robot_id = ? AND mission_id = ? AND start_utime_us = ?"));
+  rows.bind(robot_id).bind(mission_id).bind(start_utime_us);
+  return rows.next() ? std::optional(rows.integer()) : std::nullopt;
+}
+
+MissionKey greatest_key(Database& database) {
+  return database.integer("SELECT coalesce(max(mission_key), 0) FROM mission");
+}
+
+Result<Trace> trace(Database& database, MissionKey key, TimeRange range, std::int64_t max_points) {
+  if (auto ok = check_range(range); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_limit("points", max_points, max_trace_points); !ok) return tl::unexpected(ok.error());
+  if (!has_mission(database, key)) return no_mission(key);
+  std::optional<std::int64_t> first;
+  std::optional<std::int64_t> last;
+  {
+    // Two lookups by primary key, where one query for both ends would scan.
+    Rows rows(database.statement(
+        "SELECT (SELECT min(start_utime_us) FROM trace WHERE mission_key = ?1 AND start_utime_us >= ?2 AND "
+        "start_utime_us < ?3), (SELECT max(start_utime_us) FROM trace WHERE mission_key = ?1 AND "
+        "start_utime_us >= ?2 AND start_utime_us < ?3)"));
+    rows.bind(key).bind(range.from_utime_us).bind(range.to_utime_us).next();
+    first = rows.optional_integer();
+    last = rows.optional_integer();
+  }
+  if (!first || !last) return Trace{};
+  TraceMerger merger(*first, merged_width_us(*first, *last + 1, max_points));
+  static const std::string sql = "SELECT " + std::string(trace_columns) +
+                                 " FROM trace WHERE mission_key = ? AND start_utime_us >= ? AND "
+                                 "start_utime_us < ? ORDER BY start_utime_us";
+  Rows rows(database.statement(sql));
+  rows.bind(key).bind(range.from_utime_us).bind(range.to_utime_us);
+  while (rows.next()) merger.add(read_bucket(rows));
+  return merger.finish();
+}
+
+Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range,
+                                const PageRequest& page) {
+  if (auto ok = check_range(range); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_limit("limit", page.limit, max_telemetry_samples); !ok)
+    return tl::unexpected(ok.error());
+  if (!has_mission(database, key)) return no_mission(key);
+  const std::string query = "telemetry|" + std::to_string(key) + '|' + std::to_string(range.from_utime_us) +
+                            '|' + std::to_string(range.to_utime_us);
+  std::int64_t from_ordinal = 0;
+  if (!page.cursor.empty()) {
+    const auto place = decode_cursor(query, page.cursor);
+    if (!place) return tl::unexpected(place.error());
+    from_ordinal = (*place)[0];
+  }
+  Rows rows(database.statement(
+      "SELECT first_ordinal, body FROM telemetry_chunk WHERE mission_key = ?1 AND first_ordinal >= "
+      "coalesce((SELECT max(first_ordinal) FROM telemetry_chunk WHERE mission_key = ?1 AND first_ordinal <= "
+      "?2), 0) "
+      "AND end_utime_us >= ?3 AND start_utime_us < ?4 ORDER BY first_ordinal"));
+  rows.bind(key).bind(from_ordinal).bind(range.from_utime_us).bind(range.to_utime_us);
+  TelemetryPage result;
+  while (rows.next()) {
+    std::int64_t ordinal = rows.integer();
+    const auto samples = decode_chunk(rows.blob());
+    if (!samples) return tl::unexpected(samples.error());
+    for (const telemetry::Sample& sample : *samples) {
+      const std::int64_t at = ordinal++;
+      if (at < from_ordinal || sample.utime_us < range.from_utime_us || sample.utime_us >= range.to_utime_us)
+        continue;
+      if (static_cast<std::int64_t>(result.samples.size()) == page.limit) {
+        result.next_cursor = encode_cursor(query, {at, 0});
+        return result;
+      }
+      result.samples.push_back(sample);
+    }
+  }
+  return result;
+}
+
+std::int64_t telemetry_bytes(Database& database) {
+  Rows rows(database.statement("SELECT coalesce(sum(bytes), 0) FROM telemetry_chunk"));
+  return rows.next() ? rows.integer() : 0;
+}
+
+Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std::int64_t limit,
+                                  const std::optional<std::string>& robot_id) {
+  if (auto ok = check_limit("limit", limit, max_page_size); !ok) return tl::unexpected(ok.error());
+  Rows rows(database.statement(
+      robot_id ? "SELECT event_id, utime_us, coalesce(robot_id, ''), kind, detail_json FROM event WHERE "
+                 "event_id > ? AND robot_id = ? ORDER BY event_id LIMIT ?"
+               : "SELECT event_id, utime_us, coalesce(robot_id, ''), kind, detail_json FROM event WHERE "
+                 "event_id > ? ORDER BY event_id LIMIT ?"));
+  rows.bind(after_id);
+  if (robot_id) rows.bind(*robot_id);
+  rows.bind(limit);
+  return read_all<Event>(rows, [](Rows& row) -> Result<Event> {
+    Event event;
+    event.id = row.integer();
+    event.utime_us = row.integer();
+    event.robot_id = row.text();
+    event.kind = row.text();
+    event.detail_json = row.text();
+    return event;
+  });
+}
+
+Result<std::optional<EnergyState>> energy_state(Database& database, std::string_view robot_id) {
+  static const std::string sql =
+      "SELECT " + std::string(energy_state_columns) + " FROM energy_state WHERE robot_id = ?";
+  Rows rows(database.statement(sql));
+  rows.bind(robot_id);
+  if (!rows.next()) return std::nullopt;
+  return read_energy_state(rows);
+}
+
+}  // namespace joulecast::history::queries

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "history/sqlite.h"
+#include "history/store.h"
+
+// Store's queries as SQL, each on a connection within a read transaction. They throw SqliteError.
+namespace joulecast::history::queries {
+
+Result<std::vector<RobotRecord>> robots(Database& database);
+Result<ModelVersion> model(Database& database, std::string_view robot_id,
+                           std::optional<std::int64_t> version);
+Result<std::vector<ModelVersion>> model_versions(Database& database, std::string_view robot_id);
+
+Result<Mission> mission(Database& database, MissionKey key);
+Result<MissionPage> missions(Database& database, const MissionFilter& filter, const PageRequest& page);
+Result<Totals> totals(Database& database, const MissionFilter& filter);
+Result<std::vector<Mission>> open_missions(Database& database);
+std::optional<MissionKey> key_of(Database& database, std::string_view robot_id, std::string_view mission_id,
+                                 std::int64_t start_utime_us);
+// 0 when there are no missions.
+MissionKey greatest_key(Database& database);
+
+Result<Trace> trace(Database& database, MissionKey key, TimeRange range, std::int64_t max_points);
+Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range, const PageRequest& page);
+std::int64_t telemetry_bytes(Database& database);
+
+Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std::int64_t limit,
+                                  const std::optional<std::string>& robot_id);
+Result<std::optional<EnergyState>> energy_state(Database& database, std::string_view robot_id);
+
+}  // namespace joulecast::history::queries

@@ -1,0 +1,255 @@
+#include "history/sqlite_store.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <tuple>
+#include <utility>
+
+#include "history/schema.h"
+#include "history/sqlite.h"
+#include "history/sqlite_changes.h"
+#include "history/sqlite_queries.h"
+
+namespace joulecast::history {
+namespace {
+
+Error error_of(const SqliteError& error) {
+  return Error{error.fault(), "database", error.what()};
+}
+
+// Runs work that throws SqliteError; nothing is thrown past this.
+template <class Work>
+auto guarded(Work work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const SqliteError& error) {
+    return tl::unexpected(error_of(error));
+  } catch (const std::exception& error) {
+    return fail(Fault::unavailable, "database", error.what());
+  }
+}
+
+// Keeps a second daemon off the same file; the kernel lets go of it however the process ends.
+class FileLock {
+ public:
+  explicit FileLock(int descriptor) : descriptor_(descriptor) {}
+  ~FileLock() { close(descriptor_); }
+  FileLock(const FileLock&) = delete;
+  FileLock& operator=(const FileLock&) = delete;
+
+  static Result<std::unique_ptr<FileLock>> acquire(const std::string& path) {
+    const int descriptor = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    if (descriptor < 0)
+      return fail(Fault::unavailable, "database", "cannot open " + path + ": " + std::strerror(errno));
+    auto lock = std::make_unique<FileLock>(descriptor);
+    if (flock(descriptor, LOCK_EX | LOCK_NB) != 0)
+      return fail(Fault::conflict, "database", path + " is locked: another store holds the file open");
+    return lock;
+  }
+
+ private:
+  int descriptor_;
+};
+
+// Reading connections, lent one at a time.
+class ReaderPool {
+ public:
+  ReaderPool(const std::string& path, std::size_t count, std::int64_t busy_timeout_ms) {
+    for (std::size_t k = 0; k < std::max<std::size_t>(count, 1); ++k)
+      idle_.push_back(std::make_unique<Database>(path, OpenMode::read_only, busy_timeout_ms));
+  }
+
+  class Lease {
+   public:
+    Lease(ReaderPool& pool, std::unique_ptr<Database> database)
+        : pool_(pool), database_(std::move(database)) {}
+    ~Lease() { pool_.give_back(std::move(database_)); }
+    Lease(const Lease&) = delete;
+    Lease& operator=(const Lease&) = delete;
+    Database& operator*() { return *database_; }
+
+   private:
+    ReaderPool& pool_;
+    std::unique_ptr<Database> database_;
+  };
+
+  Lease lend() {
+    std::unique_lock lock(mutex_);
+    returned_.wait(lock, [this] { return !idle_.empty(); });
+    std::unique_ptr<Database> database = std::move(idle_.back());
+    idle_.pop_back();
+    return Lease(*this, std::move(database));
+  }
+
+ private:
+  void give_back(std::unique_ptr<Database> database) {
+    {
+      std::lock_guard lock(mutex_);
+      idle_.push_back(std::move(database));
+    }
+    returned_.notify_one();
+  }
+
+  std::mutex mutex_;
+  std::condition_variable returned_;
+  std::vector<std::unique_ptr<Database>> idle_;
+};
+
+void configure_writer(Database& database) {
+  database.execute("PRAGMA journal_mode = WAL");
+  // In WAL mode NORMAL never corrupts; a power cut may lose the last commits, the end of the process loses
+  // none.
+  database.execute("PRAGMA synchronous = NORMAL");
+  database.execute("PRAGMA foreign_keys = ON");
+  // Give back a journal that a long read let grow.
+  database.execute("PRAGMA journal_size_limit = 67108864");
+}
+
+std::int64_t system_utime_us() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+class SqliteStore final : public Store {
+ public:
+  SqliteStore(const SqliteOptions& options, std::unique_ptr<FileLock> lock, std::unique_ptr<Database> writer)
+      : path_(options.path),
+        lock_(std::move(lock)),
+        writer_(std::move(writer)),
+        changes_(*writer_, options.now_utime_us ? options.now_utime_us : system_utime_us),
+        readers_(options.path, options.readers, options.busy_timeout_ms),
+        last_key_(queries::greatest_key(*writer_)) {}
+
+  Result<std::vector<Outcome>> apply(std::span<const Command> commands) override {
+    auto outcomes = guarded([&]() -> Result<std::vector<Outcome>> { return changes_.apply(commands); });
+    if (outcomes) forget_reservations(commands, *outcomes);
+    return outcomes;
+  }
+
+  Result<MissionKey> mission_key(std::string_view robot_id, std::string_view mission_id,
+                                 std::int64_t start_utime_us) override {
+    std::lock_guard lock(keys_mutex_);
+    const MissionName mission(robot_id, mission_id, start_utime_us);
+    if (const auto found = reserved_.find(mission); found != reserved_.end()) return found->second;
+    auto stored = read([&](Database& database) -> Result<std::optional<MissionKey>> {
+      return queries::key_of(database, robot_id, mission_id, start_utime_us);
+    });
+    if (!stored) return tl::unexpected(stored.error());
+    if (*stored) return **stored;
+    return reserved_[mission] = ++last_key_;
+  }
+
+  Result<std::vector<RobotRecord>> robots() const override { return read(queries::robots); }
+
+  Result<ModelVersion> model(std::string_view robot_id, std::optional<std::int64_t> version) const override {
+    return read([&](Database& database) { return queries::model(database, robot_id, version); });
+  }
+
+  Result<std::vector<ModelVersion>> model_versions(std::string_view robot_id) const override {
+    return read([&](Database& database) { return queries::model_versions(database, robot_id); });
+  }
+
+  Result<Mission> mission(MissionKey key) const override {
+    return read([&](Database& database) { return queries::mission(database, key); });
+  }
+
+  Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page) const override {
+    return read([&](Database& database) { return queries::missions(database, filter, page); });
+  }
+
+  Result<Totals> totals(const MissionFilter& filter) const override {
+    return read([&](Database& database) { return queries::totals(database, filter); });
+  }
+
+  Result<Trace> trace(MissionKey key, TimeRange range, std::int64_t max_points) const override {
+    return read([&](Database& database) { return queries::trace(database, key, range, max_points); });
+  }
+
+  Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const override {
+    return read([&](Database& database) { return queries::telemetry(database, key, range, page); });
+  }
+
+  Result<std::vector<Event>> events(std::int64_t after_id, std::int64_t limit,
+                                    std::optional<std::string> robot_id) const override {
+    return read([&](Database& database) { return queries::events(database, after_id, limit, robot_id); });
+  }
+
+  Result<std::optional<EnergyState>> energy_state(std::string_view robot_id) const override {
+    return read([&](Database& database) { return queries::energy_state(database, robot_id); });
+  }
+
+  Result<std::vector<Mission>> recover() const override { return read(queries::open_missions); }
+
+  Result<StoreSize> size() const override {
+    return read([&](Database& database) -> Result<StoreSize> {
+      StoreSize size;
+      size.database_bytes = database.integer("PRAGMA page_count") * database.integer("PRAGMA page_size");
+      std::error_code absent;
+      const auto journal = std::filesystem::file_size(path_ + "-wal", absent);
+      size.journal_bytes = absent ? 0 : static_cast<std::int64_t>(journal);
+      size.telemetry_bytes = queries::telemetry_bytes(database);
+      return size;
+    });
+  }
+
+ private:
+  using MissionName = std::tuple<std::string, std::string, std::int64_t>;
+
+  template <class Query>
+  auto read(Query query) const -> decltype(query(std::declval<Database&>())) {
+    return guarded([&] {
+      auto lease = readers_.lend();
+      // One snapshot for all statements of the query.
+      Transaction snapshot(*lease, Transaction::Kind::read);
+      return query(*lease);
+    });
+  }
+
+  void forget_reservations(std::span<const Command> commands, const std::vector<Outcome>& outcomes) {
+    std::lock_guard lock(keys_mutex_);
+    for (std::size_t k = 0; k < commands.size(); ++k) {
+      const auto* start = std::get_if<StartMission>(&commands[k]);
+      if (!start || !outcomes[k]) continue;
+      const Mission& mission = start->mission;
+      reserved_.erase({mission.robot_id, mission.mission_id, mission.start_utime_us});
+      last_key_ = std::max(last_key_, mission.key);
+    }
+  }
+
+  std::string path_;
+  std::unique_ptr<FileLock> lock_;
+  std::unique_ptr<Database> writer_;
+  SqliteChanges changes_;
+  mutable ReaderPool readers_;
+
+  std::mutex keys_mutex_;
+  MissionKey last_key_;
+  std::map<MissionName, MissionKey> reserved_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Store>> open_sqlite_store(const SqliteOptions& options) {
+  auto lock = FileLock::acquire(options.path + ".lock");
+  if (!lock) return tl::unexpected(lock.error());
+  return guarded([&]() -> Result<std::unique_ptr<Store>> {
+    auto writer =
+        std::make_unique<Database>(options.path, OpenMode::read_write_create, options.busy_timeout_ms);
+    // The schema first, so that a file which is refused is left exactly as it was.
+    if (auto ready = bring_to_schema(*writer, store_schema()); !ready) return tl::unexpected(ready.error());
+    configure_writer(*writer);
+    return std::make_unique<SqliteStore>(options, std::move(*lock), std::move(writer));
+  });
+}
+
+}  // namespace joulecast::history
