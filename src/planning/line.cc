@@ -44,12 +44,35 @@ double start_acceleration_of(const LineTask& task, double rate, double thrust, d
          (task.end_speed * over_sinh(x) - task.start_speed * times_coth(x)) / duration;
 }
 
-// dE/dT + value of time along the family of extremals.
+// dE/dT + value of time along the family of extremals; one exponential an evaluation, for the root finder's
+// sake.
 double slope_of(const LineTask& task, double rate, double duration) {
-  const double thrust = thrust_of(task, rate, duration);
-  const double a = start_acceleration_of(task, rate, thrust, duration), v = task.start_speed;
+  const double x = rate * duration, v0 = task.start_speed, v1 = task.end_speed;
+  double thrust = 0, a = 0;
+  if (x > 0.3) {
+    const double e = std::exp(-x), h = (1 - e) / (1 + e);
+    thrust = (task.distance - (v0 + v1) * h / rate) * rate * rate / (duration - 2 * h / rate);
+    a = thrust * h / rate + rate * (2 * e * v1 - (1 + e * e) * v0) / ((1 - e) * (1 + e));
+  } else {
+    thrust = thrust_of(task, rate, duration);
+    a = start_acceleration_of(task, rate, thrust, duration);
+  }
   return task.power.c0 + task.value_of_time_w +
-         task.power.c1 * (rate * rate * v * v - a * a - 2 * thrust * v);
+         task.power.c1 * (rate * rate * v0 * v0 - a * a - 2 * thrust * v0);
+}
+
+// From rest to rest, transversality reads x = tanh(x/2) (2 + k^2 D sqrt(c1/price)), x = k T. The difference
+// of its sides is convex and positive at `above`, so that Newton's method falls onto the root from there.
+double time_from_rest(double rate, double swing, double above) {
+  const double m = 2 + rate * rate * swing;
+  double x = std::min(m, above * rate);
+  for (int k = 0; k < 50; ++k) {
+    const double e = std::exp(-x), h = (1 - e) / (1 + e);
+    const double step = (x - m * h) / (1 - 0.5 * m * (1 - h) * (1 + h));
+    x -= step;
+    if (std::fabs(step) < 1e-7 * x) break;  // quadratic: the next one would be below 1e-14
+  }
+  return x / rate;
 }
 
 // A zero of `f` between `low` (f < 0) and `high` (f > 0): bisection on the logarithm, hastened by inverse
@@ -66,7 +89,7 @@ double zero_between(F&& f, double low, double f_low, double high, double f_high)
     }
     a = x, fa = fx;
     const double best = std::fabs(fa) < std::fabs(fb) ? a : b;
-    const double tolerance = 2 * 2.3e-16 * std::fabs(best);
+    const double tolerance = 1e-14 * std::fabs(best);
     const double edge = tolerance / std::fabs(b - c);
     if (edge > 0.5 || fa == 0) return best;
     const double xi = (a - b) / (c - b), phi = (fa - fb) / (fc - fb);
@@ -248,7 +271,11 @@ Result<LineProfile> line_in_free_time(const LineTask& task) {
   // extremal.
   const double dips = ends > 0 ? 3 * task.distance / ends : std::numeric_limits<double>::infinity();
   const double parabola = std::sqrt(6 * task.distance * std::sqrt(task.power.c1 / price));
-  double high = std::min(dips, parabola * (1 + rate * parabola)), f_high = slope(high);
+  const double slowest = parabola * (1 + rate * parabola);
+  if (ends == 0 && rate * parabola > 0.05) {
+    return LineProfile(task, time_from_rest(rate, task.distance * std::sqrt(task.power.c1 / price), slowest));
+  }
+  double high = std::min(dips, slowest), f_high = slope(high);
   for (int k = 0; k < 200 && !(f_high > 0); ++k) {
     high = high < dips ? std::min(dips, 1.5 * high) : 1.5 * high;
     f_high = slope(high);
