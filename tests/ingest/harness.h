@@ -1,0 +1,92 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "history/sqlite_store.h"
+#include "server/ingest/pipeline.h"
+
+namespace joulecast::testing {
+
+// A folder of its own that goes with the object.
+class TemporaryFolder {
+ public:
+  TemporaryFolder()
+      : path_(std::filesystem::temp_directory_path() /
+              ("joulecast-" + std::to_string(std::random_device{}()))) {
+    std::filesystem::create_directories(path_);
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  std::string file(const std::string& name) const { return (path_ / name).string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+// The pipeline on a store in a temporary folder; commands are applied at once instead of by a writer thread.
+class PipelineHarness {
+ public:
+  explicit PipelineHarness(server::SessionSettings settings = {}) : settings_(settings) { restart(); }
+
+  // As if the daemon was killed (nothing is flushed) and started again on the same store.
+  void restart() {
+    pipeline.reset();
+    store.reset();
+    auto opened = history::open_sqlite_store({.path = folder_.file("history.db")});
+    if (!opened) throw std::runtime_error(describe(opened.error()));
+    store = std::move(*opened);
+    pipeline = std::make_unique<server::Pipeline>(
+        settings_, 100, models,
+        server::SessionOutputs{
+            *store, [this](history::Command command) { apply(std::move(command)); }, fleet, counters,
+            [this](const std::string&, const std::string& text) { warnings.push_back(text); }});
+    if (auto recovered = pipeline->recover(); !recovered)
+      throw std::runtime_error(describe(recovered.error()));
+  }
+
+  void add_robot(const robot::RobotModel& robot) {
+    apply(history::AddModel{robot.robot_id, 1, history::ModelOrigin::file, "", "{}", std::nullopt});
+    ASSERT_TRUE(models.put(robot, 1));
+  }
+
+  std::vector<history::Mission> missions() {
+    auto page = store->missions({}, {.limit = 1000, .cursor = {}});
+    EXPECT_TRUE(page) << (page ? "" : describe(page.error()));
+    std::vector<history::Mission> found = page ? page->missions : std::vector<history::Mission>{};
+    std::reverse(found.begin(), found.end());
+    return found;
+  }
+
+  std::uint64_t faults(server::IngestFault fault) const {
+    return counters.faults[static_cast<std::size_t>(fault)];
+  }
+
+  server::ModelRegistry models;
+  server::FleetView fleet;
+  server::IngestCounters counters;
+  std::vector<std::string> warnings;
+  std::unique_ptr<history::Store> store;
+  std::unique_ptr<server::Pipeline> pipeline;
+
+ private:
+  void apply(history::Command command) {
+    const auto applied = store->apply({&command, 1});
+    ASSERT_TRUE(applied) << describe(applied.error());
+    ASSERT_TRUE(applied->front()) << describe(applied->front().error());
+  }
+
+  TemporaryFolder folder_;
+  server::SessionSettings settings_;
+};
+
+}  // namespace joulecast::testing

@@ -1,0 +1,251 @@
+#include "server/ingest/pipeline.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+
+#include "tests/ingest/harness.h"
+#include "tests/support/sample_robots.h"
+
+namespace joulecast::server {
+namespace {
+
+using telemetry::MissionEvent;
+using telemetry::MissionPhase;
+using telemetry::Sample;
+using testing::PipelineHarness;
+
+constexpr std::int64_t start_us = 1'750'000'000'000'000;
+
+Sample sample(std::int64_t sequence, double power_w = 48) {
+  Sample s;
+  s.utime_us = start_us + sequence * 20'000;
+  s.sequence = sequence;
+  s.wheel_velocity_rad_s = {3, 3};
+  s.battery_voltage_v = 24;
+  s.battery_current_a = power_w / 24;
+  s.payload_kg = 2;
+  return s;
+}
+
+MissionEvent event(MissionPhase phase, std::int64_t sequence, const std::string& id = "m1") {
+  return {start_us + sequence * 20'000 - 5'000, id, phase, 2, ""};
+}
+
+class PipelineTest : public ::testing::Test {
+ protected:
+  void SetUp() override { harness.add_robot(testing::nomad()); }
+
+  void send(const Sample& s) { harness.pipeline->handle({"nomad", s, s.utime_us}); }
+  void send(const MissionEvent& e) { harness.pipeline->handle({"nomad", e, e.utime_us}); }
+  void send_range(std::int64_t from, std::int64_t to) {
+    for (std::int64_t k = from; k < to; ++k) send(sample(k));
+  }
+
+  PipelineHarness harness;
+};
+
+TEST_F(PipelineTest, AccountsAMissionFromStartToFinish) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 501);
+  send(event(MissionPhase::finished, 502));
+  const auto missions = harness.missions();
+  ASSERT_EQ(missions.size(), 1u);
+  EXPECT_EQ(missions[0].state, history::MissionState::finished);
+  EXPECT_EQ(missions[0].mission_id, "m1");
+  EXPECT_FALSE(missions[0].implicit);
+  EXPECT_FALSE(missions[0].incomplete);
+  EXPECT_EQ(missions[0].samples, 501);
+  EXPECT_NEAR(missions[0].accounts.measured_j, 480, 1e-6);
+  EXPECT_NEAR(missions[0].accounts.duration_s, 10, 1e-9);
+  EXPECT_NEAR(missions[0].accounts.distance_m, 3, 1e-6);
+  EXPECT_NEAR(missions[0].accounts.ledger.total(), missions[0].accounts.battery_j, 1e-9 * 480);
+  const auto trace = harness.store->trace(missions[0].key, {}, 1000);
+  ASSERT_TRUE(trace);
+  EXPECT_EQ(trace->buckets.size(), 11u);
+  const auto raw = harness.store->telemetry(missions[0].key, {}, {.limit = 1000, .cursor = {}});
+  ASSERT_TRUE(raw);
+  EXPECT_EQ(raw->samples.size(), 501u);
+  EXPECT_TRUE(harness.warnings.empty());
+}
+
+TEST_F(PipelineTest, TelemetryWithoutAnEventIsAnImplicitMission) {
+  send_range(0, 100);
+  harness.pipeline->finish();
+  const auto missions = harness.missions();
+  ASSERT_EQ(missions.size(), 1u);
+  EXPECT_TRUE(missions[0].implicit);
+  EXPECT_EQ(missions[0].state, history::MissionState::finished);
+}
+
+TEST_F(PipelineTest, CountsDuplicatesLateAndMissing) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 50);
+  send(sample(49));
+  send(sample(52));  // 50, 51 missing
+  send(sample(51));  // late
+  send_range(53, 100);
+  send(event(MissionPhase::finished, 101));
+  EXPECT_EQ(harness.faults(IngestFault::duplicate), 1u);
+  EXPECT_EQ(harness.faults(IngestFault::missing), 2u);
+  EXPECT_EQ(harness.faults(IngestFault::late), 1u);
+  const auto mission = harness.missions().at(0);
+  EXPECT_EQ(mission.sample_faults.at("duplicate"), 1);
+  EXPECT_EQ(mission.sample_faults.at("missing"), 2);
+  EXPECT_EQ(mission.sample_faults.at("late"), 1);
+  EXPECT_NEAR(mission.accounts.measured_j, 48 * 99 * 0.02, 1e-6);
+}
+
+TEST_F(PipelineTest, RefusesNonFiniteAndAbsurdValues) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 50);
+  Sample infinite = sample(50);
+  infinite.battery_current_a = INFINITY;
+  send(infinite);
+  Sample absurd = sample(51);
+  absurd.wheel_velocity_rad_s[0] = 1e9;
+  send(absurd);
+  Sample blind = sample(52);
+  blind.wheel_velocity_rad_s[1] = NAN;
+  send(blind);
+  send_range(53, 100);
+  send(event(MissionPhase::finished, 101));
+  EXPECT_EQ(harness.faults(IngestFault::implausible), 3u);
+  EXPECT_NEAR(harness.missions().at(0).accounts.measured_j, 48 * 99 * 0.02, 1e-6);
+}
+
+TEST_F(PipelineTest, ALongSilenceMakesTheMissionIncomplete) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 50);
+  send_range(150, 200);
+  send(event(MissionPhase::finished, 201));
+  const auto mission = harness.missions().at(0);
+  EXPECT_TRUE(mission.incomplete);
+  EXPECT_EQ(mission.gap_count, 1);
+  EXPECT_NEAR(mission.gap_s, 101 * 0.02, 1e-9);
+}
+
+TEST_F(PipelineTest, ARobotThatBootsGoesOnWithItsMission) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 50);
+  for (std::int64_t k = 0; k < 50; ++k) {
+    Sample s = sample(60 + k);
+    s.sequence = k;
+    send(s);
+  }
+  send(event(MissionPhase::finished, 111));
+  EXPECT_EQ(harness.faults(IngestFault::restart), 1u);
+  const auto missions = harness.missions();
+  ASSERT_EQ(missions.size(), 1u);
+  EXPECT_EQ(missions[0].samples, 100);
+  EXPECT_FALSE(missions[0].incomplete);
+}
+
+TEST_F(PipelineTest, AClockThatIsSetMakesTheMissionIncompleteAndAddsNoEnergy) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 50);
+  for (std::int64_t k = 50; k < 100; ++k) {
+    Sample s = sample(k);
+    s.utime_us += 86'400'000'000;
+    send(s);
+  }
+  EXPECT_EQ(harness.faults(IngestFault::clock_forward), 1u);
+  harness.pipeline->suspend();
+  const auto mission = harness.missions().at(0);
+  EXPECT_TRUE(mission.incomplete);
+  EXPECT_NEAR(mission.accounts.measured_j, 48 * 98 * 0.02, 1e-6);
+}
+
+TEST_F(PipelineTest, UnmeasuredChannelsAreNotZero) {
+  send(event(MissionPhase::started, 0));
+  for (std::int64_t k = 0; k < 100; ++k) {
+    Sample s = sample(k);
+    s.battery_current_a = telemetry::unmeasured;
+    send(s);
+  }
+  send(event(MissionPhase::finished, 101));
+  const auto mission = harness.missions().at(0);
+  EXPECT_EQ(mission.accounts.measured_s, 0);
+  EXPECT_GT(mission.accounts.modelled_j, 0);
+  EXPECT_DOUBLE_EQ(mission.accounts.battery_j, mission.accounts.modelled_j);
+}
+
+TEST_F(PipelineTest, ARobotWithoutAModelIsCountedAndSeen) {
+  harness.pipeline->handle({"stranger", sample(0), start_us});
+  harness.pipeline->publish();
+  EXPECT_EQ(harness.faults(IngestFault::unknown_robot), 1u);
+  const auto snapshot = harness.fleet.find("stranger");
+  ASSERT_NE(snapshot, nullptr);
+  EXPECT_FALSE(snapshot->has_model);
+  EXPECT_TRUE(harness.missions().empty());
+}
+
+TEST_F(PipelineTest, AMissionNeverFinishedIsMarked) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 50);
+  harness.pipeline->finish();
+  const auto mission = harness.missions().at(0);
+  EXPECT_EQ(mission.state, history::MissionState::unfinished);
+  EXPECT_TRUE(mission.incomplete);
+}
+
+TEST_F(PipelineTest, AStartSupersedesTheOpenMission) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 50);
+  send(event(MissionPhase::started, 50, "m2"));
+  send_range(50, 100);
+  send(event(MissionPhase::finished, 101, "m2"));
+  const auto missions = harness.missions();
+  ASSERT_EQ(missions.size(), 2u);
+  EXPECT_EQ(missions[0].state, history::MissionState::superseded);
+  EXPECT_EQ(missions[1].state, history::MissionState::finished);
+}
+
+TEST_F(PipelineTest, AMissionGoesOnAfterAKill) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 100);
+  harness.pipeline->tick(start_us + 2'000'000);
+  harness.restart();
+  send_range(120, 200);
+  send(event(MissionPhase::finished, 201));
+  const auto missions = harness.missions();
+  ASSERT_EQ(missions.size(), 1u);
+  EXPECT_EQ(missions[0].state, history::MissionState::finished);
+  EXPECT_GE(missions[0].samples, 175);
+  EXPECT_NEAR(missions[0].accounts.measured_j, 48 * (200 - 22) * 0.02, 48 * 0.2);
+}
+
+TEST_F(PipelineTest, AMissionWhoseRobotDoesNotComeBackIsInterrupted) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 100);
+  harness.pipeline->tick(start_us + 2'000'000);
+  harness.restart();
+  harness.pipeline->tick(start_us + 3'000'000);
+  harness.pipeline->finish();
+  const auto mission = harness.missions().at(0);
+  EXPECT_EQ(mission.state, history::MissionState::interrupted);
+  EXPECT_TRUE(mission.incomplete);
+  EXPECT_GT(mission.accounts.measured_j, 0);
+}
+
+TEST_F(PipelineTest, TheSameMessagesGiveTheSameBits) {
+  const auto run = [] {
+    PipelineHarness h;
+    h.add_robot(testing::nomad());
+    h.pipeline->handle({"nomad", event(MissionPhase::started, 0), 0});
+    for (std::int64_t k = 0; k < 3000; ++k) {
+      Sample s = sample(k, 40 + 10 * std::sin(0.01 * static_cast<double>(k)));
+      s.wheel_velocity_rad_s = {3 + std::sin(0.02 * static_cast<double>(k)), 3};
+      h.pipeline->handle({"nomad", s, 0});
+    }
+    h.pipeline->handle({"nomad", event(MissionPhase::finished, 3001), 0});
+    return h.missions().at(0).accounts;
+  };
+  const energy::Accounts a = run(), b = run();
+  EXPECT_EQ(std::bit_cast<std::uint64_t>(a.measured_j), std::bit_cast<std::uint64_t>(b.measured_j));
+  EXPECT_EQ(std::bit_cast<std::uint64_t>(a.modelled_j), std::bit_cast<std::uint64_t>(b.modelled_j));
+}
+
+}  // namespace
+}  // namespace joulecast::server
