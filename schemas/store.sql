@@ -44,9 +44,12 @@ CREATE TABLE mission (
   sample_faults TEXT NOT NULL CHECK (json_valid(sample_faults)),  -- {"reason": count}
   gap_count INTEGER NOT NULL,
   gap_s REAL,
+  battery_j REAL,
   measured_j REAL,
+  measured_s REAL,
   measured_motor_right_j REAL,
   measured_motor_left_j REAL,
+  motor_measured_s REAL,
   modelled_j REAL,
   modelled_motor_right_j REAL,
   modelled_motor_left_j REAL,

@@ -215,7 +215,7 @@ Result<Totals> totals(Database& database, const MissionFilter& filter) {
     return text + ")";
   }();
   Rows rows(database.statement(
-      "SELECT count(*), count(measured_j), coalesce(sum(incomplete), 0), coalesce(sum(samples), 0), "
+      "SELECT count(*), coalesce(sum(measured_s > 0), 0), coalesce(sum(incomplete), 0), coalesce(sum(samples), 0), "
       "coalesce(sum(gap_count), 0), coalesce(sum(gap_s), 0.0), " +
       sums + " FROM mission" + where(filter)));
   bind_filter(rows, filter);

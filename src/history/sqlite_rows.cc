@@ -13,8 +13,11 @@ constexpr std::string_view plain_content_columns =
 // Visits the doubles of the accounts in the order of accounts_columns().
 template <class A, class Visit>
 void visit_accounts(A& a, Visit visit) {
+  visit(a.battery_j);
   visit(a.measured_j);
+  visit(a.measured_s);
   for (auto& value : a.measured_motor_j) visit(value);
+  visit(a.motor_measured_s);
   visit(a.modelled_j);
   for (auto& value : a.modelled_motor_j) visit(value);
   visit(a.drawn_j);
@@ -54,7 +57,8 @@ bool parse_faults(const std::string& text, std::map<std::string, std::int64_t>& 
 const std::string& accounts_columns() {
   static const std::string columns = [] {
     std::string text =
-        "measured_j, measured_motor_right_j, measured_motor_left_j, modelled_j, modelled_motor_right_j, "
+        "battery_j, measured_j, measured_s, measured_motor_right_j, measured_motor_left_j, motor_measured_s, "
+        "modelled_j, modelled_motor_right_j, "
         "modelled_motor_left_j, drawn_j, returned_j, charge_ah, distance_m, turned_rad, duration_s";
     for (const std::string_view term : energy::term_names) text += ", ledger_" + std::string(term) + "_j";
     return text;

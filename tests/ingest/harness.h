@@ -42,7 +42,9 @@ class PipelineHarness {
   void restart() {
     pipeline.reset();
     store.reset();
-    auto opened = history::open_sqlite_store({.path = folder_.file("history.db")});
+    history::SqliteOptions options;
+    options.path = folder_.file("history.db");
+    auto opened = history::open_sqlite_store(options);
     if (!opened) throw std::runtime_error(describe(opened.error()));
     store = std::move(*opened);
     pipeline = std::make_unique<server::Pipeline>(
