@@ -1,0 +1,26 @@
+#pragma once
+
+#include "base/error.h"
+
+namespace joulecast::client {
+
+// What the program tells its caller; part of the command line's contract.
+enum class Exit : int {
+  ok = 0,
+  fault = 1,        // an input was read and found wrong, missing or damaged
+  usage = 2,        // the command line itself is wrong
+  unreachable = 3,  // server, network or disk did not answer
+  infeasible = 4,   // well-formed, but nothing satisfies it
+  internal = 5      // a bug of joulecast's
+};
+
+inline constexpr const char* exit_codes_help =
+    "Exit codes: 0 done; 1 an input is wrong, missing or damaged; 2 wrong use of the command line; "
+    "3 server, network or disk not reachable; 4 no solution satisfies the request; 5 bug in joulecast.";
+
+[[nodiscard]] Exit exit_of(Fault fault);
+
+// Says the error on standard error and returns its exit code.
+Exit report(const Error& error);
+
+}  // namespace joulecast::client

@@ -1,0 +1,367 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "client/commands/table.h"
+#include "client/http_client.h"
+#include "client/interrupt.h"
+#include "client/virtual_robot/fleet.h"
+#include "client/virtual_robot/truth_json.h"
+#include "telemetry/codec.h"
+#include "telemetry/event_log.h"
+#include "telemetry/lcm_link.h"
+
+namespace joulecast::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+namespace vr = virtual_robot;
+
+constexpr std::int64_t batch_start_us = 1'700'000'000'000'000;  // logs made without a clock begin here
+
+struct Options {
+  std::size_t robots = 4;
+  std::uint64_t seed = 1;
+  std::string lcm_url = "udpm://239.255.76.67:7667?ttl=0";
+  double rate_hz = 50;
+  double speed = 1;
+  double duration_s = 0;
+  int missions = 0;
+  double mission_duration_s = 110;
+  std::vector<std::string> robot_files;
+  std::string log;
+  std::string truth;
+  std::string server;
+  std::vector<std::string> effects;
+  double scatter = 1;
+  double jitter = 0.05;
+  double loss = 0;
+  double pickups = 0.3;
+  bool no_motor_channels = false;
+  bool no_gyro = false;
+  bool no_pose = false;
+  bool temperature = false;
+  bool list_effects = false;
+  bool quiet = false;
+};
+
+// A robot file under the id that its robot has in this fleet.
+struct Member {
+  std::string json_text;
+  vr::SimulationSpec spec;
+};
+
+Result<std::vector<vr::EffectStrength>> parse_effects(const std::vector<std::string>& texts) {
+  std::vector<vr::EffectStrength> result;
+  for (const auto& text : texts) {
+    const std::size_t equals = text.find('=');
+    double strength = 0;
+    const char* end = text.data() + text.size();
+    if (equals == std::string::npos || std::from_chars(text.data() + equals + 1, end, strength) !=
+                                           std::from_chars_result{end, std::errc{}}) {
+      return invalid("effect", text + " is not id=strength");
+    }
+    result.emplace_back(text.substr(0, equals), strength);
+  }
+  return result;
+}
+
+Result<std::string> read_text(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) return fail(Fault::not_found, path, "cannot be opened");
+  return std::string{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+Result<Member> make_member(const std::string& source, const std::string& text,
+                           const std::optional<std::string>& id) {
+  auto document = nlohmann::json::parse(text, nullptr, false);
+  if (id && document.is_object()) document["robot_id"] = *id;
+  Member member{document.is_discarded() ? text : document.dump(), {}};
+  auto robot = vr::parse_robot(member.json_text);
+  if (!robot) return fail(robot.error().fault, source + "#" + robot.error().field, robot.error().message);
+  member.spec.robot = std::move(*robot);
+  return member;
+}
+
+std::string numbered(const std::string& kind, std::size_t index) {
+  std::string number = std::to_string(index + 1);
+  if (number.size() < 2) number.insert(0, "0");
+  return kind + "-" + number;
+}
+
+// Which robots: the given files (each once under its own id when no more robots are wanted), or the shipped
+// kinds in turn.
+Result<std::vector<Member>> assemble(const Options& options) {
+  auto effects = parse_effects(options.effects);
+  if (!effects) return tl::unexpected<Error>(effects.error());
+  const auto imperfections = vr::make_imperfections(*effects);
+  if (!imperfections) return tl::unexpected<Error>(imperfections.error());
+
+  std::vector<Member> members;
+  vr::Rng world_rng = vr::Rng::stream(options.seed, 1);
+  const vr::World floor = vr::draw_world(world_rng, vr::ScriptOptions{}.map_half_width_m);
+  for (std::size_t k = 0; k < options.robots; ++k) {
+    std::string source;
+    std::string text;
+    if (options.robot_files.empty()) {
+      const auto shipped = vr::shipped_robots();
+      source = std::string(shipped[k % shipped.size()].kind);
+      text = std::string(shipped[k % shipped.size()].json_text);
+    } else {
+      source = options.robot_files[k % options.robot_files.size()];
+      auto read = read_text(source);
+      if (!read) return tl::unexpected<Error>(read.error());
+      text = std::move(*read);
+    }
+    auto member = make_member(source, text, std::nullopt);
+    if (!member) return tl::unexpected<Error>(member.error());
+    if (options.robot_files.empty() || options.robots != options.robot_files.size()) {
+      member = make_member(source, text, numbered(member->spec.robot.robot_id, k));
+      if (!member) return tl::unexpected<Error>(member.error());
+    }
+    const std::string& id = member->spec.robot.robot_id;
+    if (!telemetry::is_valid_robot_id(id))
+      return invalid(source + "#/robot_id", "\"" + id + "\" is no robot id");
+    if (std::any_of(members.begin(), members.end(),
+                    [&](const Member& m) { return m.spec.robot.robot_id == id; })) {
+      return invalid("robot", "two robots are called " + id);
+    }
+    vr::SimulationSpec& spec = member->spec;
+    spec.imperfections = *imperfections;
+    spec.world = floor;
+    spec.rate_hz = options.rate_hz;
+    spec.missions = options.missions;
+    spec.scatter = options.scatter;
+    spec.script.duration_s = options.mission_duration_s;
+    spec.script.pickup_share = options.pickups;
+    spec.sensors.motor_channels = !options.no_motor_channels;
+    spec.sensors.gyro = !options.no_gyro;
+    spec.sensors.pose = !options.no_pose;
+    spec.sensors.temperature = options.temperature;
+    spec.sensors.sampling_jitter = options.jitter;
+    spec.sensors.loss_probability = options.loss;
+    members.push_back(std::move(*member));
+  }
+  return members;
+}
+
+Result<void> introduce(const std::vector<Member>& members, const std::string& url) {
+  auto server = parse_server_url(url);
+  if (!server) return tl::unexpected<Error>(server.error());
+  for (const auto& member : members) {
+    auto reply = http_request(*server, HttpMethod::put, "/v1/robots/" + member.spec.robot.robot_id,
+                              member.json_text, std::chrono::seconds(5));
+    if (!reply) return tl::unexpected<Error>(reply.error());
+    if (!reply->ok()) return tl::unexpected<Error>(error_of(*reply));
+  }
+  return {};
+}
+
+struct Outlets {
+  std::optional<telemetry::LcmLink> link;
+  std::optional<telemetry::EventLogWriter> log;
+
+  Result<void> send(const std::string& robot_id, const vr::Emission& emission) {
+    const auto* sample = std::get_if<telemetry::Sample>(&emission.message);
+    const auto bytes = sample != nullptr ? telemetry::encode_telemetry(robot_id, *sample)
+                                         : telemetry::encode_mission_event(
+                                               robot_id, std::get<telemetry::MissionEvent>(emission.message));
+    if (!bytes) return tl::unexpected<Error>(bytes.error());
+    const std::string channel = telemetry::channel_of(
+        sample != nullptr ? telemetry::Subject::telemetry : telemetry::Subject::mission_event, robot_id);
+    if (link) {
+      if (auto sent = link->publish(channel, *bytes); !sent) return sent;
+    }
+    if (log) {
+      if (auto written = log->write(emission.utime_us, channel, *bytes); !written) return written;
+    }
+    return {};
+  }
+};
+
+void print_effects() {
+  for (const auto& entry : vr::effect_table()) {
+    std::printf("%-26s %-10s up to %g%s\n", std::string(entry.id).c_str(), std::string(entry.unit).c_str(),
+                entry.search_limit, entry.outside ? "  (outside the catalogue)" : "");
+  }
+}
+
+Result<void> write_truth(const Options& options, const std::vector<Member>& members, const vr::Fleet& fleet) {
+  if (options.truth.empty()) return {};
+  std::vector<vr::Truth> truths;
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    const vr::SimulationSpec& spec = members[k].spec;
+    truths.push_back({spec.robot.robot_id, options.seed, vr::effects_of(spec.imperfections), spec.world,
+                      fleet.robot(k).finished()});
+  }
+  std::ofstream out(options.truth, std::ios::binary);
+  out << vr::truth_json(truths);
+  out.close();
+  if (!out) return fail(Fault::unavailable, options.truth, "cannot be written");
+  return {};
+}
+
+Exit run(const Options& options, bool lcm_asked) {
+  if (options.list_effects) {
+    print_effects();
+    return Exit::ok;
+  }
+  const bool over_lcm = options.log.empty() || lcm_asked;
+  if (!over_lcm && options.duration_s == 0 && options.missions == 0) {
+    return report({Fault::invalid, "log", "a log needs an end: give --duration or --missions"});
+  }
+  if (over_lcm && options.speed == 0) {
+    return report(
+        {Fault::invalid, "speed", "0 (unpaced) goes with --log alone; LCM receivers would lose messages"});
+  }
+  auto members = assemble(options);
+  if (!members) return report(members.error());
+
+  InterruptGuard interrupt;
+  Outlets outlets;
+  if (!options.log.empty()) {
+    auto log = telemetry::EventLogWriter::create(options.log);
+    if (!log) return report(log.error());
+    outlets.log = std::move(*log);
+  }
+  if (over_lcm) {
+    auto link = telemetry::LcmLink::open(options.lcm_url);
+    if (!link) return report(link.error());
+    outlets.link = std::move(*link);
+  }
+  if (!options.server.empty()) {
+    if (auto known = introduce(*members, options.server); !known) return report(known.error());
+  }
+
+  const std::int64_t start_us = over_lcm ? std::chrono::duration_cast<std::chrono::microseconds>(
+                                               std::chrono::system_clock::now().time_since_epoch())
+                                               .count()
+                                         : batch_start_us;
+  std::vector<vr::SimulationSpec> specs;
+  for (auto& member : *members) {
+    member.spec.start_utime_us = start_us;
+    specs.push_back(member.spec);
+  }
+  vr::Fleet fleet(specs, options.seed);
+  if (!options.quiet && over_lcm) {
+    for (const auto& spec : specs) {
+      std::printf("%s: %g kg, up to %g m/s, %g V\n", spec.robot.robot_id.c_str(),
+                  spec.robot.chassis_kg + 2 * spec.robot.wheel_kg, spec.robot.speed_limit_m_s,
+                  spec.robot.nominal_voltage_v);
+    }
+    std::printf("publishing on %s; ctrl-C stops\n", options.lcm_url.c_str());
+    std::fflush(stdout);
+  }
+
+  const auto began = Clock::now();
+  std::uint64_t sent = 0;
+  double simulated_s = 0;
+  while (auto message = fleet.next()) {
+    const double at_s = 1e-6 * static_cast<double>(message->emission.utime_us - start_us);
+    if (options.duration_s > 0 && at_s >= options.duration_s) break;
+    if (over_lcm) {
+      const auto due = began + std::chrono::duration_cast<Clock::duration>(
+                                   std::chrono::duration<double>(at_s / options.speed));
+      if (interrupt.wait_until(due)) break;
+    } else if (sent % 1024 == 0 && interrupt.interrupted()) {
+      break;
+    }
+    if (auto done = outlets.send(fleet.robot(message->robot).robot_id(), message->emission); !done) {
+      return report(done.error());
+    }
+    simulated_s = at_s;
+    ++sent;
+  }
+  for (const auto& message : fleet.abort()) {
+    if (auto done = outlets.send(fleet.robot(message.robot).robot_id(), message.emission); !done) {
+      return report(done.error());
+    }
+  }
+  if (outlets.log) {
+    if (auto closed = outlets.log->close(); !closed) return report(closed.error());
+  }
+  if (auto written = write_truth(options, *members, fleet); !written) return report(written.error());
+  if (!options.quiet) {
+    std::size_t missions = 0;
+    for (std::size_t k = 0; k < fleet.size(); ++k) missions += fleet.robot(k).finished().size();
+    const double wall_s = std::chrono::duration<double>(Clock::now() - began).count();
+    std::printf("%llu messages of %zu robots, %zu missions finished, %.1f s of robot time in %.1f s\n",
+                static_cast<unsigned long long>(sent), fleet.size(), missions, simulated_s, wall_s);
+  }
+  return Exit::ok;
+}
+
+}  // namespace
+
+void add_simulate(CLI::App& program, Exit& exit) {
+  auto options = std::make_shared<Options>();
+  auto* command = program.add_subcommand("simulate", "Run a fleet of virtual robots that publish telemetry");
+  auto* robots = command->add_option("--robots", options->robots, "how many robots")
+                     ->check(CLI::Range(1, 10'000))
+                     ->capture_default_str();
+  auto* files = command->add_option("--robot", options->robot_files,
+                                    "robot file, may be repeated; without it the shipped kinds take turns");
+  command->add_option("--seed", options->seed, "the same seed gives the same robots, missions and noise")
+      ->capture_default_str();
+  auto* url =
+      command->add_option("--lcm-url", options->lcm_url, "LCM provider to publish on")->capture_default_str();
+  command->add_option("--log", options->log,
+                      "write an LCM event log; without --lcm-url nothing is published");
+  command->add_option("--truth", options->truth,
+                      "write what was put into the robots and their true energies, JSON");
+  command->add_option("--server", options->server,
+                      "put the robot files into this joulecastd first, http://host:port");
+  command->add_option("--rate", options->rate_hz, "telemetry of each robot, Hz")
+      ->check(CLI::Range(1.0, 200.0))
+      ->capture_default_str();
+  command->add_option("--speed", options->speed, "robot seconds in one second; 0 = unpaced, with --log alone")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--duration", options->duration_s, "robot seconds to run; 0 = until stopped")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--missions", options->missions, "missions of each robot; 0 = without end")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--mission-duration", options->mission_duration_s, "of one mission, about, s")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_option("--effect", options->effects,
+                      "id=strength, an imperfection of the robots; may be repeated");
+  command->add_flag("--list-effects", options->list_effects, "print the effects with their units and leave");
+  command->add_option("--scatter", options->scatter, "size of the differences between missions, 0 = none")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--jitter", options->jitter, "of the sampling instant, part of the period")
+      ->check(CLI::Range(0.0, 0.45))
+      ->capture_default_str();
+  command->add_option("--loss", options->loss, "probability that a sample is lost")
+      ->check(CLI::Range(0.0, 0.99))
+      ->capture_default_str();
+  command->add_option("--pickups", options->pickups, "part of the halts at which the payload changes")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command->add_flag("--no-motor-channels", options->no_motor_channels,
+                    "robots without motor voltage and current");
+  command->add_flag("--no-gyro", options->no_gyro, "robots without gyro");
+  command->add_flag("--no-pose", options->no_pose, "robots without localisation");
+  command->add_flag("--temperature", options->temperature, "robots with winding temperature sensors");
+  command->add_flag("--quiet", options->quiet, "no summary");
+  command->callback([options, robots, files, url, &exit] {
+    if (files->count() > 0 && robots->count() == 0) options->robots = options->robot_files.size();
+    exit = run(*options, url->count() > 0);
+  });
+}
+
+}  // namespace joulecast::client

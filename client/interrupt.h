@@ -1,0 +1,27 @@
+#pragma once
+
+#include <chrono>
+#include <csignal>
+
+namespace joulecast::client {
+
+// While one lives, ctrl-C and SIGTERM end waits instead of the program. They are blocked and asked for, so no
+// code runs inside a handler; threads started meanwhile inherit the block. Make it before opening LCM.
+class InterruptGuard {
+ public:
+  InterruptGuard();
+  ~InterruptGuard();
+  InterruptGuard(const InterruptGuard&) = delete;
+  InterruptGuard& operator=(const InterruptGuard&) = delete;
+
+  // Waits until then or until interrupted; true from the first interrupt on.
+  bool wait_until(std::chrono::steady_clock::time_point until);
+  bool interrupted() { return wait_until({}); }
+
+ private:
+  sigset_t signals_;
+  sigset_t before_;
+  bool interrupted_ = false;
+};
+
+}  // namespace joulecast::client

@@ -1,0 +1,20 @@
+#include <CLI/CLI.hpp>
+
+#include "client/commands/table.h"
+
+int main(int argc, char** argv) {
+  using joulecast::client::Exit;
+  CLI::App program("joulecast: what a fleet of differential-drive robots spends, will spend and could save");
+  program.set_version_flag("--version", "joulecast " JOULECAST_VERSION);
+  program.footer(joulecast::client::exit_codes_help);
+  program.require_subcommand(1);
+  Exit exit = Exit::ok;
+  for (const auto add : joulecast::client::commands()) add(program, exit);
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    // Help and version come this way too, with code 0; every other parse error is wrong use.
+    return program.exit(error) == 0 ? static_cast<int>(Exit::ok) : static_cast<int>(Exit::usage);
+  }
+  return static_cast<int>(exit);
+}

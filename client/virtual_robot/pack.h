@@ -1,0 +1,43 @@
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "client/virtual_robot/robot_parameters.h"
+
+namespace joulecast::virtual_robot {
+
+// Battery: open-circuit voltage by charge, ohmic resistance and one resistor-capacitor branch for the slow
+// sag.
+class Pack {
+ public:
+  // resistance_error: fraction by which both resistances exceed the file's.
+  Pack(const RobotParameters& robot, double resistance_error, double state_of_charge);
+
+  // Draw power_w (negative: charge) for a time step.
+  void advance(double power_w, double step_s);
+
+  // Terminal current and voltage while power_w is drawn. A demand beyond what the pack can give is met with
+  // the current of its greatest power.
+  struct Terminals {
+    double voltage_v;
+    double current_a;
+  };
+  Terminals terminals(double power_w) const;
+
+  double open_circuit_voltage_v() const;
+  double state_of_charge() const { return charge_; }
+  void exchange() { charge_ = exchanged_charge, branch_v_ = 0; }
+
+  static constexpr double exchanged_charge = 0.95;
+
+ private:
+  std::vector<std::pair<double, double>> curve_;
+  double resistance_ohm_;
+  double branch_resistance_ohm_;
+  double capacity_c_;
+  double charge_;
+  double branch_v_ = 0;
+};
+
+}  // namespace joulecast::virtual_robot

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+
+#include "client/virtual_robot/controller.h"
+#include "client/virtual_robot/mission_script.h"
+#include "client/virtual_robot/robot_parameters.h"
+
+namespace joulecast::virtual_robot {
+
+// Distance travelled by ramps of one acceleration and a cruise; starts and ends at rest.
+class Trapezoid {
+ public:
+  Trapezoid() = default;
+  Trapezoid(double distance, double speed, double acceleration);
+
+  double duration_s() const { return duration_s_; }
+  double speed(double time_s) const;
+  double acceleration(double time_s) const;
+
+ private:
+  double speed_ = 0, acceleration_ = 0, ramp_s_ = 0, duration_s_ = 0;
+};
+
+// Drives a script: each leg is aimed from where the robot truly is when the leg begins (it localises itself),
+// so errors of wheels and track do not grow over a mission.
+class Pilot {
+ public:
+  explicit Pilot(const RobotParameters& robot) : robot_(robot) {}
+
+  void begin(MissionScript script);
+  bool done() const { return leg_ >= script_.legs.size(); }
+  double payload_kg() const { return payload_kg_; }
+
+  // The command for the next control period.
+  BodyCommand update(double x_m, double y_m, double heading_rad);
+
+ private:
+  void begin_leg(double x_m, double y_m, double heading_rad);
+  BodyCommand follow(double x_m, double y_m, double heading_rad) const;
+
+  RobotParameters robot_;
+  MissionScript script_;
+  std::size_t leg_ = 0;
+  bool begun_ = false;
+  double time_s_ = 0;      // since the leg began
+  double duration_s_ = 0;  // of the leg, settling included
+  double payload_kg_ = 0;
+  Trapezoid profile_;
+  double turn_sign_ = 1;
+};
+
+}  // namespace joulecast::virtual_robot

@@ -1,0 +1,282 @@
+#include "client/virtual_robot/plant.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace joulecast::virtual_robot {
+namespace {
+
+constexpr double gravity_m_s2 = 9.80665;
+constexpr double payload_yaw_m2 = 0.02;  // yaw inertia of a kilogram of payload, by the robot file's contract
+constexpr double copper_per_kelvin = 0.00393;
+constexpr double scrub_rate_rad_s = 0.02;          // yaw rate at which the tyres have built up their moment
+constexpr double gear_speed_rad_s = 0.05;          // wheel speed at which mesh losses have built up
+constexpr double zone_edge_m = 0.10;               // width over which a wheel enters the zone
+constexpr double shortest_electrical_s = 1e-4;     // a file without inductance still has some
+constexpr std::array<double, 2> sides{1.0, -1.0};  // right turns the robot left
+
+}  // namespace
+
+struct Plant::Rates {
+  PlantState state;
+  PlantAccounts power;
+};
+
+Plant::Plant(const RobotParameters& robot, const Imperfections& imperfections, const World& world)
+    : robot_(robot), effect_(imperfections), world_(world) {
+  const double slip = effect_.wheel_slip;
+  const double radius = robot_.wheel_radius_m * (1 + effect_.wheel_radius_error);
+  arm_m_ = {radius * (1 + 0.5 * effect_.wheel_radius_asymmetry) * (1 - slip),
+            radius * (1 - 0.5 * effect_.wheel_radius_asymmetry) * (1 - slip)};
+  half_track_m_ = robot_.half_track_m * (1 + effect_.track_error);
+  const double magnet = 1 - effect_.torque_constant_loss;
+  torque_per_a_ = robot_.torque_constant_nm_a * robot_.gear_ratio * magnet;
+  emf_per_rad_s_ = robot_.voltage_constant_v_s_rad * robot_.gear_ratio * magnet;
+  inductance_h_ =
+      std::max(robot_.inductance_h, shortest_electrical_s * robot_.resistance_ohm) + effect_.inductance;
+  const double friction_mean_nm = 0.5 * (robot_.friction_torque_nm[0] + robot_.friction_torque_nm[1]);
+  brush_scale_a_ = std::max(0.004 * robot_.current_limit_a, 0.1 * friction_mean_nm / torque_per_a_);
+  bristle_ = {effect_.stribeck_friction, world_.stribeck_speed_m_s / robot_.wheel_radius_m};
+
+  const double fastest_wheel_rad_s = 1.3 * robot_.speed_limit_m_s / robot_.wheel_radius_m;
+  const double electrical_rate = (2 * robot_.resistance_ohm * (1 + std::max(0.0, effect_.resistance_error)) +
+                                  std::abs(effect_.brush_drop) / brush_scale_a_) /
+                                 inductance_h_;
+  const double bristle_rate = fastest_wheel_rad_s / Bristle::bend_angle_rad;
+  longest_step_s_ = std::min({5e-4, 2.2 / electrical_rate, 2.2 / bristle_rate});
+  begin_mission(0, {});
+}
+
+void Plant::begin_mission(double payload_kg, const MissionScatter& scatter) {
+  scatter_ = scatter;
+  time_since_start_s_ = 0;
+  for (std::size_t s : {0u, 1u}) {
+    const double own = static_cast<std::size_t>(world_.weak_side) == s ? effect_.friction_asymmetry : 0;
+    dry_nm_[s] = robot_.friction_torque_nm[s] * (1 + effect_.coulomb_friction + own) * scatter_.friction[s];
+  }
+  viscous_nm_s_rad_ = robot_.viscous_friction_nm_s_rad * (1 + effect_.viscous_friction) * scatter_.viscous;
+  const double top_rad_s = robot_.speed_limit_m_s / robot_.wheel_radius_m;
+  const double reference_nm = 0.5 * (robot_.friction_torque_nm[0] + robot_.friction_torque_nm[1]) +
+                              robot_.viscous_friction_nm_s_rad * top_rad_s;
+  cubic_nm_s3_rad3_ = effect_.x_speed_cubed * reference_nm / (top_rad_s * top_rad_s * top_rad_s);
+  set_winding_rise({0, 0});
+  set_payload(payload_kg);
+}
+
+void Plant::set_payload(double declared_kg) {
+  payload_kg_ = declared_kg * (1 + effect_.payload_mass_error);
+  update_inertia();
+}
+
+void Plant::set_winding_rise(const std::array<double, 2>& kelvin) {
+  for (std::size_t s : {0u, 1u}) {
+    resistance_ohm_[s] = robot_.resistance_ohm * (1 + effect_.resistance_error) * scatter_.resistance *
+                         (1 + copper_per_kelvin * kelvin[s]);
+  }
+}
+
+void Plant::update_inertia() {
+  const double chassis_kg = robot_.chassis_kg * (1 + effect_.chassis_mass_error);
+  const double mass_kg = chassis_kg + 2 * robot_.wheel_kg + payload_kg_;
+  weight_n_ = mass_kg * gravity_m_s2;
+  inertial_mass_kg_ = mass_kg * (1 + effect_.linear_inertia_error);
+  yaw_inertia_kg_m2_ =
+      robot_.yaw_inertia_kg_m2 * (1 + effect_.yaw_inertia_error) + payload_yaw_m2 * payload_kg_;
+  coupling_kg_m_ = chassis_kg * (robot_.com_offset_m + effect_.com_offset);
+  payload_floor_n_ = effect_.load_rolling_resistance * payload_kg_ * gravity_m_s2;
+
+  // Kinetic energy with v = (a1 w1 + a2 w2)/2 and yaw rate = (a1 w1 - a2 w2)/(2 l) is half w' M w.
+  const double sum = 0.25 * inertial_mass_kg_;
+  const double difference = yaw_inertia_kg_m2_ / (4 * half_track_m_ * half_track_m_);
+  const double m00 = (sum + difference) * arm_m_[0] * arm_m_[0] + robot_.wheel_inertia_kg_m2;
+  const double m11 = (sum + difference) * arm_m_[1] * arm_m_[1] + robot_.wheel_inertia_kg_m2;
+  const double m01 = (sum - difference) * arm_m_[0] * arm_m_[1];
+  const double determinant = m00 * m11 - m01 * m01;
+  inverse_inertia_ = {{{m11 / determinant, -m01 / determinant}, {-m01 / determinant, m00 / determinant}}};
+}
+
+double Plant::zone_share(double x_m, double y_m) const {
+  const double inside_m = world_.zone_radius_m - std::hypot(x_m - world_.zone_x_m, y_m - world_.zone_y_m);
+  return std::clamp(0.5 + inside_m / zone_edge_m, 0.0, 1.0);
+}
+
+double Plant::driver_power_w(double motor_power_w) const {
+  const double drawn = motor_power_w < 0 ? motor_power_w * (1 - effect_.no_regeneration) : motor_power_w;
+  return drawn + effect_.driver_loss * std::abs(motor_power_w);
+}
+
+Plant::Rates Plant::rates(const PlantState& s, const std::array<double, 2>& voltage_v) const {
+  Rates out;
+  PlantAccounts& power = out.power;
+  const double rim0 = arm_m_[0] * s.wheel_speed_rad_s[0];
+  const double rim1 = arm_m_[1] * s.wheel_speed_rad_s[1];
+  const double v = 0.5 * (rim0 + rim1);
+  const double yaw = (rim0 - rim1) / (2 * half_track_m_);
+  out.state.x_m = v * std::cos(s.heading_rad);
+  out.state.y_m = v * std::sin(s.heading_rad);
+  out.state.heading_rad = yaw;
+  out.state.wheel_angle_rad = s.wheel_speed_rad_s;
+
+  // Forces on the body, positive against forward motion and against a turn to the left.
+  const double drag_n = effect_.aerodynamic_drag * v * std::abs(v);
+  const double slope_n = effect_.slope == 0 ? 0
+                                            : weight_n_ * std::sin(effect_.slope) *
+                                                  std::cos(s.heading_rad - world_.slope_direction_rad);
+  const double scrub_nm =
+      effect_.turning_scrub == 0
+          ? 0
+          : effect_.turning_scrub * weight_n_ * robot_.half_track_m / 2 * std::tanh(yaw / scrub_rate_rad_s);
+  const double force_n = drag_n + slope_n - coupling_kg_m_ * yaw * yaw;
+  const double moment_nm = scrub_nm + coupling_kg_m_ * v * yaw;
+  power.drag = drag_n * v;
+  power.potential = slope_n * v;
+  power.scrub = scrub_nm * yaw;
+
+  double floor_n = payload_floor_n_;
+  if (effect_.floor_resistance_zone != 0) {
+    floor_n += effect_.floor_resistance_zone * weight_n_ * zone_share(s.x_m, s.y_m);
+  }
+  double dry_factor = 1;
+  if (effect_.x_cold_bearing != 0) {
+    dry_factor += effect_.x_cold_bearing * std::exp(-time_since_start_s_ / world_.burst_time_s);
+  }
+
+  std::array<double, 2> net_nm{};
+  for (std::size_t side : {0u, 1u}) {
+    const double w = s.wheel_speed_rad_s[side];
+    const double i = s.current_a[side];
+    double dry_nm = dry_nm_[side] * dry_factor;
+    if (effect_.x_cogging != 0) {
+      const double angle = std::sin(1.5 * s.wheel_angle_rad[side]);
+      dry_nm += dry_nm_[side] * effect_.x_cogging * angle * angle;
+    }
+    const double floor_nm = 0.5 * floor_n * arm_m_[side];
+    const double bend_rate = bristle_.bend_rate(s.bend[side], w);
+    const double ratio = Bristle::torque_ratio(s.bend[side], bend_rate, w);
+    const double internal_nm = dry_nm * ratio + viscous_nm_s_rad_ * w + cubic_nm_s3_rad3_ * w * w * w;
+
+    // What the gear passes on, after friction ahead of it: driving x = tau (1 + a), braking x = tau (1 - a).
+    const double motor_nm = torque_per_a_ * i;
+    double mesh_nm = 0;
+    double slip_nm = 0;
+    if (effect_.gear_efficiency != 0 || effect_.wheel_slip != 0) {
+      const double passed_nm = motor_nm - internal_nm;
+      const double direction = std::tanh(w / gear_speed_rad_s);
+      const double a = effect_.gear_efficiency;
+      mesh_nm = a * std::abs(passed_nm) / (passed_nm * w > 0 ? 1 + a : 1 - a) * direction;
+      // The slipping contact turns part of the rim's force into heat, whichever way the force acts.
+      slip_nm = std::abs(effect_.wheel_slip * passed_nm) * direction;
+    }
+    net_nm[side] = motor_nm - internal_nm - floor_nm * ratio - mesh_nm - slip_nm -
+                   0.5 * arm_m_[side] * (force_n + sides[side] * moment_nm / half_track_m_);
+
+    const double emf_v = emf_per_rad_s_ * w;
+    const double brush_v = effect_.brush_drop == 0 ? 0 : effect_.brush_drop * std::tanh(i / brush_scale_a_);
+    out.state.current_a[side] =
+        (voltage_v[side] - resistance_ohm_[side] * i - emf_v - brush_v) / inductance_h_;
+    out.state.bend[side] = bend_rate;
+
+    const double electrical_w = voltage_v[side] * i;
+    power.motor += electrical_w;
+    power.bus += driver_power_w(electrical_w);
+    power.copper += resistance_ohm_[side] * i * i;
+    power.brush += brush_v * i;
+    power.conversion += emf_v * i - motor_nm * w;
+    power.internal += internal_nm * w;
+    power.floor += floor_nm * ratio * w;
+    power.gear += mesh_nm * w;
+    power.slip += slip_nm * w;
+  }
+  out.state.wheel_speed_rad_s = {inverse_inertia_[0][0] * net_nm[0] + inverse_inertia_[0][1] * net_nm[1],
+                                 inverse_inertia_[1][0] * net_nm[0] + inverse_inertia_[1][1] * net_nm[1]};
+  return out;
+}
+
+namespace {
+
+// Every member of the two structs is a double, so that the integrator may treat them as arrays.
+template <class T>
+using Flat = std::array<double, sizeof(T) / sizeof(double)>;
+
+template <class T>
+T moved(const T& from, const T& rate, double by) {
+  auto a = std::bit_cast<Flat<T>>(from);
+  const auto r = std::bit_cast<Flat<T>>(rate);
+  for (std::size_t k = 0; k < a.size(); ++k) a[k] += by * r[k];
+  return std::bit_cast<T>(a);
+}
+
+template <class T>
+void move_weighted(T& state, const T& a, const T& b, const T& c, const T& d, double step_s) {
+  state = moved(moved(moved(moved(state, a, step_s / 6), b, step_s / 3), c, step_s / 3), d, step_s / 6);
+}
+
+}  // namespace
+
+void Plant::advance(const std::array<double, 2>& voltage_v, double step_s) {
+  const Rates a = rates(state_, voltage_v);
+  const Rates b = rates(moved(state_, a.state, step_s / 2), voltage_v);
+  const Rates c = rates(moved(state_, b.state, step_s / 2), voltage_v);
+  const Rates d = rates(moved(state_, c.state, step_s), voltage_v);
+  move_weighted(state_, a.state, b.state, c.state, d.state, step_s);
+  move_weighted(accounts_, a.power, b.power, c.power, d.power, step_s);
+  time_since_start_s_ += step_s;
+}
+
+double Plant::speed_m_s() const {
+  return 0.5 * (arm_m_[0] * state_.wheel_speed_rad_s[0] + arm_m_[1] * state_.wheel_speed_rad_s[1]);
+}
+
+double Plant::yaw_rate_rad_s() const {
+  return (arm_m_[0] * state_.wheel_speed_rad_s[0] - arm_m_[1] * state_.wheel_speed_rad_s[1]) /
+         (2 * half_track_m_);
+}
+
+std::array<double, 2> Plant::wheel_acceleration_rad_s2(const std::array<double, 2>& voltage_v) const {
+  return rates(state_, voltage_v).state.wheel_speed_rad_s;
+}
+
+double Plant::motor_power_w(const std::array<double, 2>& voltage_v) const {
+  return voltage_v[0] * state_.current_a[0] + voltage_v[1] * state_.current_a[1];
+}
+
+double Plant::bus_power_w(const std::array<double, 2>& voltage_v) const {
+  return driver_power_w(voltage_v[0] * state_.current_a[0]) +
+         driver_power_w(voltage_v[1] * state_.current_a[1]);
+}
+
+double Plant::stored_energy_j() const {
+  const double v = speed_m_s();
+  const double yaw = yaw_rate_rad_s();
+  double energy_j = 0.5 * inertial_mass_kg_ * v * v + 0.5 * yaw_inertia_kg_m2_ * yaw * yaw;
+  for (std::size_t s : {0u, 1u}) {
+    const double w = state_.wheel_speed_rad_s[s];
+    energy_j += 0.5 * robot_.wheel_inertia_kg_m2 * w * w +
+                0.5 * inductance_h_ * state_.current_a[s] * state_.current_a[s];
+  }
+  return energy_j;
+}
+
+std::array<double, 2> Plant::copper_power_w() const {
+  return {resistance_ohm_[0] * state_.current_a[0] * state_.current_a[0],
+          resistance_ohm_[1] * state_.current_a[1] * state_.current_a[1]};
+}
+
+double Plant::outside_load_w() const {
+  double load_w = 0;
+  if (effect_.x_radio_zone != 0) load_w += effect_.x_radio_zone * zone_share(state_.x_m, state_.y_m);
+  if (effect_.x_periodic_load != 0 &&
+      std::fmod(time_since_start_s_, world_.period_s) < 0.5 * world_.period_s) {
+    load_w += effect_.x_periodic_load;
+  }
+  if (effect_.x_start_burst != 0) {
+    load_w += effect_.x_start_burst * std::exp(-time_since_start_s_ / world_.burst_time_s);
+  }
+  if (effect_.x_heading_load != 0) {
+    load_w += effect_.x_heading_load * 0.5 * (1 + std::cos(state_.heading_rad - world_.slope_direction_rad));
+  }
+  return load_w;
+}
+
+}  // namespace joulecast::virtual_robot

@@ -1,0 +1,116 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "client/virtual_robot/friction.h"
+#include "client/virtual_robot/imperfections.h"
+#include "client/virtual_robot/robot_parameters.h"
+
+namespace joulecast::virtual_robot {
+
+// Factors near 1 by which one mission's robot differs from the file: bearings, grease, floor of the day.
+struct MissionScatter {
+  std::array<double, 2> friction{1, 1};
+  double viscous = 1;
+  double resistance = 1;
+  double idle_power = 1;
+};
+
+// Mechanical and electrical state that is integrated together. Sides: [0] right, [1] left.
+struct PlantState {
+  double x_m = 0, y_m = 0, heading_rad = 0;
+  std::array<double, 2> wheel_angle_rad{};
+  std::array<double, 2> wheel_speed_rad_s{};
+  std::array<double, 2> current_a{};
+  std::array<double, 2> bend{};  // of the friction bristles
+};
+
+// Energy that has gone each way since the plant was made [J]. motor = copper + brush + conversion + internal
+// + floor
+// + gear + drag + scrub + slip + potential + change of stored, to the integrator's order (the balance that
+// tests hold). `internal` and `floor` include what the bristles hold, a few millijoules.
+struct PlantAccounts {
+  double motor = 0;  // V i of both armatures
+  double bus = 0;    // what the drivers draw for it: braking power lost, driver loss added
+  double copper = 0;
+  double brush = 0;
+  double conversion = 0;  // (K_w - K_t) n i w, zero when the constants agree
+  double internal = 0;    // bearings and gear at no load, dry and viscous
+  double floor = 0;       // rolling resistance of floor and payload
+  double gear = 0;
+  double drag = 0;
+  double scrub = 0;
+  double slip = 0;
+  double potential = 0;  // against the slope
+};
+
+// The body, wheels and motors of a differential-drive robot, driven by the two armature voltages.
+// Equations of motion from the kinetic energy of body and wheels without lateral slip, with the centre of
+// mass off the axle, wheels of unequal radius and armature inductance; Runge-Kutta of order four at a fixed
+// step.
+class Plant {
+ public:
+  Plant(const RobotParameters& robot, const Imperfections& imperfections, const World& world);
+
+  // Take a load and the scatter of a mission; time_since_start_s counts from here.
+  void begin_mission(double payload_kg, const MissionScatter& scatter);
+  void set_payload(double declared_kg);
+  void set_winding_rise(const std::array<double, 2>& kelvin);
+
+  // Advance by step_s with the voltages held.
+  void advance(const std::array<double, 2>& voltage_v, double step_s);
+  // The longest step that is stable by a margin and resolves the fastest mode [s].
+  double longest_step_s() const { return longest_step_s_; }
+
+  const PlantState& state() const { return state_; }
+  PlantState& state() { return state_; }
+  const PlantAccounts& accounts() const { return accounts_; }
+
+  double speed_m_s() const;
+  double yaw_rate_rad_s() const;
+  std::array<double, 2> wheel_acceleration_rad_s2(const std::array<double, 2>& voltage_v) const;
+  double motor_power_w(const std::array<double, 2>& voltage_v) const;  // V i of both
+  double bus_power_w(const std::array<double, 2>& voltage_v) const;    // drawn by the drivers
+  double stored_energy_j() const;                                      // kinetic and magnetic
+  std::array<double, 2> copper_power_w() const;
+  // Electrical loads that follow where the robot is, how it heads and how long it has been under way.
+  double outside_load_w() const;
+
+ private:
+  struct Rates;
+  Rates rates(const PlantState& s, const std::array<double, 2>& voltage_v) const;
+  double driver_power_w(double motor_power_w) const;
+  double zone_share(double x_m, double y_m) const;
+  void update_inertia();
+
+  RobotParameters robot_;
+  Imperfections effect_;
+  World world_;
+  MissionScatter scatter_;
+  PlantState state_;
+  PlantAccounts accounts_;
+  Bristle bristle_;
+
+  double payload_kg_ = 0;  // true one
+  double time_since_start_s_ = 0;
+  std::array<double, 2> arm_m_{};  // travel of the body per wheel angle, slip included
+  double half_track_m_ = 0;
+  double torque_per_a_ = 0;   // K_t n
+  double emf_per_rad_s_ = 0;  // K_w n
+  double inductance_h_ = 0;
+  std::array<double, 2> resistance_ohm_{};
+  double brush_scale_a_ = 0;
+  double weight_n_ = 0;
+  double coupling_kg_m_ = 0;  // m_c d
+  double inertial_mass_kg_ = 0;
+  double yaw_inertia_kg_m2_ = 0;
+  std::array<std::array<double, 2>, 2> inverse_inertia_{};
+  std::array<double, 2> dry_nm_{};  // T_m of this mission, effects in
+  double viscous_nm_s_rad_ = 0;
+  double cubic_nm_s3_rad3_ = 0;
+  double payload_floor_n_ = 0;
+  double longest_step_s_ = 0;
+};
+
+}  // namespace joulecast::virtual_robot

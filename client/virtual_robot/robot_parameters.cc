@@ -1,0 +1,139 @@
+#include "client/virtual_robot/robot_parameters.h"
+
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+namespace joulecast::virtual_robot {
+namespace {
+
+using nlohmann::json;
+
+enum class Sign { positive, not_negative, any };
+
+// Reads numbers by JSON pointer and keeps the first fault, so that the caller reads straight through.
+class Reader {
+ public:
+  explicit Reader(const json& document) : document_(document) {}
+
+  double number(const std::string& pointer, Sign sign) {
+    const json* value = find(pointer);
+    if (value == nullptr) {
+      report(pointer, "is missing");
+      return 1;
+    }
+    return check(pointer, *value, sign);
+  }
+
+  double number_or(const std::string& pointer, Sign sign, double fallback) {
+    const json* value = find(pointer);
+    return value == nullptr ? fallback : check(pointer, *value, sign);
+  }
+
+  const json* find(const std::string& pointer) const {
+    const json::json_pointer at(pointer);
+    return document_.contains(at) ? &document_.at(at) : nullptr;
+  }
+
+  double check(const std::string& pointer, const json& value, Sign sign) {
+    if (!value.is_number()) {
+      report(pointer, "must be a number");
+      return 1;
+    }
+    const double number = value.get<double>();
+    if (!std::isfinite(number)) report(pointer, "must be finite");
+    if (sign == Sign::positive && !(number > 0)) report(pointer, "must be above 0");
+    if (sign == Sign::not_negative && !(number >= 0)) report(pointer, "must not be negative");
+    return number;
+  }
+
+  void report(const std::string& pointer, const std::string& message) {
+    if (fault_.message.empty()) fault_ = Error{Fault::invalid, pointer, message};
+  }
+
+  const Error& fault() const { return fault_; }
+
+ private:
+  const json& document_;
+  Error fault_;
+};
+
+}  // namespace
+
+Result<RobotParameters> parse_robot(const std::string& json_text) {
+  const json document = json::parse(json_text, nullptr, false);
+  if (document.is_discarded() || !document.is_object()) return invalid("", "a robot file is one JSON object");
+  Reader in(document);
+  RobotParameters p;
+
+  const json* id = in.find("/robot_id");
+  if (id == nullptr || !id->is_string() || id->get<std::string>().empty()) {
+    in.report("/robot_id", "must be a string of one character or more");
+  } else {
+    p.robot_id = id->get<std::string>();
+  }
+  p.wheel_radius_m = in.number("/kinematics/wheel_radius_m", Sign::positive);
+  p.half_track_m = in.number("/kinematics/half_track_m", Sign::positive);
+  p.com_offset_m = in.number_or("/kinematics/com_offset_m", Sign::any, 0);
+  p.chassis_kg = in.number("/mass/chassis_kg", Sign::positive);
+  p.wheel_kg = in.number_or("/mass/wheel_kg", Sign::not_negative, 0);
+  p.yaw_inertia_kg_m2 = in.number("/mass/yaw_inertia_kg_m2", Sign::positive);
+  p.wheel_inertia_kg_m2 = in.number_or("/mass/wheel_inertia_kg_m2", Sign::not_negative, 0) +
+                          in.number_or("/motor/rotor_inertia_kg_m2", Sign::not_negative, 0);
+  p.resistance_ohm = in.number("/motor/resistance_ohm", Sign::positive);
+  p.inductance_h = in.number_or("/motor/inductance_h", Sign::not_negative, 0);
+  p.torque_constant_nm_a = in.number("/motor/torque_constant_nm_a", Sign::positive);
+  p.voltage_constant_v_s_rad = in.number("/motor/voltage_constant_v_s_rad", Sign::positive);
+  p.gear_ratio = in.number_or("/motor/gear_ratio", Sign::positive, 1);
+  p.viscous_friction_nm_s_rad = in.number_or("/motor/viscous_friction_nm_s_rad", Sign::not_negative, 0);
+  const json* friction = in.find("/motor/friction_torque_nm");
+  if (friction == nullptr || !friction->is_array() || friction->size() != 2) {
+    in.report("/motor/friction_torque_nm", "must be [right, left]");
+  } else {
+    for (std::size_t side : {0u, 1u}) {
+      p.friction_torque_nm[side] = in.check("/motor/friction_torque_nm/" + std::to_string(side),
+                                            (*friction)[side], Sign::not_negative);
+    }
+  }
+  p.nominal_voltage_v = in.number("/battery/nominal_voltage_v", Sign::positive);
+  p.capacity_ah = in.number("/battery/capacity_ah", Sign::positive);
+  p.internal_resistance_ohm = in.number("/battery/internal_resistance_ohm", Sign::not_negative);
+  if (const json* curve = in.find("/battery/open_circuit_voltage"); curve != nullptr && curve->is_array()) {
+    for (std::size_t k = 0; k < curve->size(); ++k) {
+      const std::string at = "/battery/open_circuit_voltage/" + std::to_string(k);
+      const json& point = (*curve)[k];
+      if (!point.is_array() || point.size() != 2) {
+        in.report(at, "must be [charge, volts]");
+        break;
+      }
+      const double charge = in.check(at + "/0", point[0], Sign::not_negative);
+      if (!p.open_circuit_voltage.empty() && charge <= p.open_circuit_voltage.back().first) {
+        in.report(at + "/0", "must ascend");
+      }
+      p.open_circuit_voltage.emplace_back(charge, in.check(at + "/1", point[1], Sign::positive));
+    }
+  }
+  p.idle_power_w = in.number_or("/idle_power_w", Sign::not_negative, 0);
+  p.speed_limit_m_s = in.number("/limits/speed_m_s", Sign::positive);
+  p.acceleration_limit_m_s2 = in.number("/limits/acceleration_m_s2", Sign::positive);
+  p.yaw_rate_limit_rad_s = in.number("/limits/yaw_rate_rad_s", Sign::positive);
+  p.current_limit_a = in.number("/limits/current_a", Sign::positive);
+  p.payload_limit_kg = in.number_or("/limits/payload_kg", Sign::not_negative, 0);
+  if (const json* effects = in.find("/effects"); effects != nullptr && !effects->empty()) {
+    in.report("/effects", "must be empty: a virtual robot's imperfections are given with --effect");
+  }
+  if (!in.fault().message.empty()) return tl::unexpected<Error>(in.fault());
+  return p;
+}
+
+Result<RobotParameters> read_robot_file(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) return fail(Fault::not_found, path, "cannot be opened");
+  const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  auto robot = parse_robot(text);
+  if (!robot) return fail(robot.error().fault, path + "#" + robot.error().field, robot.error().message);
+  return robot;
+}
+
+}  // namespace joulecast::virtual_robot

@@ -1,0 +1,137 @@
+#include "client/virtual_robot/simulate.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+namespace joulecast::virtual_robot {
+
+Simulation simulate_missions(const SimulationSpec& spec, std::uint64_t seed) {
+  assert(spec.missions > 0);
+  Simulation out;
+  VirtualRobot robot(spec, seed);
+  Emission emission;
+  while (robot.next(emission)) {
+    if (auto* event = std::get_if<telemetry::MissionEvent>(&emission.message)) {
+      out.events.push_back(std::move(*event));
+    } else {
+      out.samples.push_back(std::get<telemetry::Sample>(emission.message));
+    }
+  }
+  out.truth = {spec.robot.robot_id, seed, effects_of(spec.imperfections), spec.world, robot.finished()};
+  return out;
+}
+
+double nominal_power_w(const RobotParameters& robot, const std::array<double, 2>& w,
+                       const std::array<double, 2>& a, double payload_kg) {
+  const double r = robot.wheel_radius_m;
+  const double l = robot.half_track_m;
+  const double mass = robot.chassis_kg + 2 * robot.wheel_kg + payload_kg;
+  const double inertia = robot.yaw_inertia_kg_m2 + 0.02 * payload_kg;
+  const double coupling = robot.chassis_kg * robot.com_offset_m;
+  const double v = r * (w[0] + w[1]) / 2;
+  const double yaw = r * (w[0] - w[1]) / (2 * l);
+  const double force = mass * r * (a[0] + a[1]) / 2 - coupling * yaw * yaw;
+  const double moment = inertia * r * (a[0] - a[1]) / (2 * l) + coupling * v * yaw;
+  double power = robot.idle_power_w;
+  for (std::size_t s : {0u, 1u}) {
+    const double side = s == 0 ? 1 : -1;
+    // A wheel that stands has its friction take whatever torque is asked, none here.
+    const double dry = robot.friction_torque_nm[s] * std::tanh(w[s] / 0.02);
+    const double torque = r / 2 * force + side * r / (2 * l) * moment + robot.wheel_inertia_kg_m2 * a[s] +
+                          robot.viscous_friction_nm_s_rad * w[s] + dry;
+    const double current = torque / (robot.torque_constant_nm_a * robot.gear_ratio);
+    power +=
+        current * (robot.resistance_ohm * current + robot.voltage_constant_v_s_rad * robot.gear_ratio * w[s]);
+  }
+  return power;
+}
+
+namespace {
+
+struct GapIntegrals {
+  double absolute = 0;
+  double measured = 0;
+  double measured_signed = 0;
+  double nominal_signed = 0;
+};
+
+GapIntegrals integrate(const SimulationSpec& spec, std::uint64_t seed) {
+  GapIntegrals sums;
+  VirtualRobot robot(spec, seed);
+  Emission emission;
+  while (robot.next(emission)) {
+    if (!std::holds_alternative<telemetry::Sample>(emission.message)) continue;
+    const Witness& seen = robot.witness();
+    const double measured = seen.reading.battery_voltage_v * seen.reading.battery_current_a;
+    const double nominal = nominal_power_w(spec.robot, seen.reading.wheel_speed_rad_s,
+                                           seen.wheel_acceleration_rad_s2, seen.payload_kg);
+    sums.absolute += std::abs(measured - nominal);
+    sums.measured += std::abs(measured);
+    sums.measured_signed += measured;
+    sums.nominal_signed += nominal;
+  }
+  return sums;
+}
+
+SimulationSpec without_chance(SimulationSpec spec) {
+  spec.scatter = 0;
+  spec.sensors.noise = false;
+  spec.sensors.loss_probability = 0;
+  return spec;
+}
+
+double absolute_gap(const SimulationSpec& spec, std::uint64_t seed) {
+  const GapIntegrals sums = integrate(spec, seed);
+  return sums.absolute / sums.measured;
+}
+
+}  // namespace
+
+PowerGap power_gap(const SimulationSpec& spec, std::uint64_t seed) {
+  SimulationSpec clean = without_chance(spec);
+  const GapIntegrals with = integrate(clean, seed);
+  clean.imperfections = {};
+  return {with.absolute / with.measured, absolute_gap(clean, seed),
+          (with.measured_signed - with.nominal_signed) / with.measured_signed};
+}
+
+Result<double> strength_for_gap(const SimulationSpec& spec, std::uint64_t seed, std::string_view effect_id,
+                                double added_gap, double sign) {
+  const auto entries = effect_table();
+  const auto entry =
+      std::find_if(entries.begin(), entries.end(), [&](const auto& e) { return e.id == effect_id; });
+  if (entry == entries.end()) return invalid("effect", "no effect is called " + std::string(effect_id));
+  if (!(added_gap > 0)) return invalid("added_gap", "must be above 0");
+
+  SimulationSpec clean = without_chance(spec);
+  const auto gap_at = [&](double strength) {
+    clean.imperfections.*(entry->strength) = strength;
+    return absolute_gap(clean, seed);
+  };
+  const double goal = gap_at(0) + added_gap;
+  // Bracket from below: a strength far beyond need may stall the robot, and then the gap means nothing.
+  double low = 0;
+  double high = entry->search_limit / 1024;
+  double reached = 0;
+  while ((reached = gap_at(sign * high)) < goal) {
+    if (high >= entry->search_limit) {
+      std::ostringstream message;
+      message << effect_id << " adds at most " << reached - (goal - added_gap) << " with " << sign * high
+              << " " << entry->unit;
+      return fail(Fault::infeasible, "added_gap", message.str());
+    }
+    low = high;
+    high = std::min(2 * high, entry->search_limit);
+  }
+  for (int k = 0; k < 14 && high - low > 1e-3 * high; ++k) {
+    const double middle = 0.5 * (low + high);
+    (gap_at(sign * middle) < goal ? low : high) = middle;
+  }
+  return sign * 0.5 * (low + high);
+}
+
+}  // namespace joulecast::virtual_robot

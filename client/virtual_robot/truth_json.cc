@@ -1,0 +1,50 @@
+#include "client/virtual_robot/truth_json.h"
+
+#include <nlohmann/json.hpp>
+
+namespace joulecast::virtual_robot {
+
+std::string truth_json(const std::vector<Truth>& truths) {
+  using nlohmann::json;
+  json robots = json::array();
+  for (const Truth& truth : truths) {
+    json effects = json::object();
+    for (const auto& [id, strength] : truth.effects) effects[id] = strength;
+    json missions = json::array();
+    for (const MissionTruth& m : truth.missions) {
+      const PlantAccounts& a = m.accounts;
+      missions.push_back({{"mission_id", m.mission_id},
+                          {"payload_kg", m.payload_kg},
+                          {"duration_s", m.duration_s},
+                          {"distance_m", m.distance_m},
+                          {"battery_energy_j", m.battery_energy_j},
+                          {"motor_energy_j", a.motor},
+                          {"driver_energy_j", a.bus},
+                          {"copper_j", a.copper},
+                          {"brush_j", a.brush},
+                          {"internal_friction_j", a.internal},
+                          {"floor_friction_j", a.floor},
+                          {"gear_j", a.gear},
+                          {"drag_j", a.drag},
+                          {"scrub_j", a.scrub},
+                          {"slip_j", a.slip},
+                          {"potential_j", a.potential}});
+    }
+    const World& w = truth.world;
+    robots.push_back({{"robot_id", truth.robot_id},
+                      {"seed", truth.seed},
+                      {"effects", effects},
+                      {"world",
+                       {{"zone", {w.zone_x_m, w.zone_y_m, w.zone_radius_m}},
+                        {"slope_direction_rad", w.slope_direction_rad},
+                        {"weak_side", w.weak_side},
+                        {"stribeck_speed_m_s", w.stribeck_speed_m_s},
+                        {"thermal_time_constant_s", w.thermal_time_constant_s},
+                        {"period_s", w.period_s},
+                        {"burst_time_s", w.burst_time_s}}},
+                      {"missions", missions}});
+  }
+  return json{{"robots", robots}}.dump(2) + "\n";
+}
+
+}  // namespace joulecast::virtual_robot

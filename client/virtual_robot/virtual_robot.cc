@@ -1,0 +1,232 @@
+#include "client/virtual_robot/virtual_robot.h"
+
+#include <bit>
+#include <cmath>
+#include <utility>
+
+namespace joulecast::virtual_robot {
+namespace {
+
+enum Stream : std::uint64_t { missions_stream, scatter_stream, sensors_stream };
+
+constexpr double ambient_c = 24;
+constexpr double usual_thermal_resistance_k_w =
+    0.5;                                 // that the temperature sensor sees; R is the file's when warm
+constexpr double exchange_below = 0.25;  // charge at which the pack is exchanged between missions
+constexpr double scatter_friction = 0.025;
+constexpr double scatter_viscous = 0.04;
+constexpr double scatter_resistance = 0.008;
+constexpr double scatter_idle = 0.010;
+
+PlantAccounts difference(const PlantAccounts& a, const PlantAccounts& b) {
+  using Flat = std::array<double, sizeof(PlantAccounts) / sizeof(double)>;
+  auto x = std::bit_cast<Flat>(a);
+  const auto y = std::bit_cast<Flat>(b);
+  for (std::size_t k = 0; k < x.size(); ++k) x[k] -= y[k];
+  return std::bit_cast<PlantAccounts>(x);
+}
+
+}  // namespace
+
+VirtualRobot::VirtualRobot(const SimulationSpec& spec, std::uint64_t seed)
+    : spec_(spec),
+      mission_rng_(Rng::stream(seed, missions_stream)),
+      scatter_rng_(Rng::stream(seed, scatter_stream)),
+      plant_(spec.robot, spec.imperfections, spec.world),
+      pack_(spec.robot, spec.imperfections.battery_resistance, spec.initial_charge),
+      controller_(spec.robot),
+      pilot_(spec.robot),
+      sensors_(spec.sensors, spec.imperfections, spec.robot, Rng::stream(seed, sensors_stream)) {
+  steps_per_period_ = static_cast<int>(std::ceil(SpeedController::period_s / plant_.longest_step_s()));
+  step_s_ = SpeedController::period_s / steps_per_period_;
+  const double reach_m = spec_.script.map_half_width_m - spec_.script.clearance_m;
+  planned_pose_ = {mission_rng_.uniform(-reach_m, reach_m), mission_rng_.uniform(-reach_m, reach_m),
+                   mission_rng_.uniform(-3.1, 3.1)};
+  plant_.state().x_m = planned_pose_.x_m;
+  plant_.state().y_m = planned_pose_.y_m;
+  plant_.state().heading_rad = planned_pose_.heading_rad;
+  history_.fill(electrical());
+}
+
+bool VirtualRobot::next(Emission& out) {
+  while (outbox_.empty()) {
+    if (!under_way_ && spec_.missions != 0 && missions_begun_ >= spec_.missions) return false;
+    run_period();
+  }
+  out = std::move(outbox_.front());
+  outbox_.pop_front();
+  return true;
+}
+
+std::int64_t VirtualRobot::now_us() const {
+  return spec_.start_utime_us + std::llround(1e6 * step_s_ * static_cast<double>(step_));
+}
+
+double VirtualRobot::sample_time_s(std::int64_t index) {
+  double time_s = static_cast<double>(index) / spec_.rate_hz;
+  if (spec_.sensors.sampling_jitter > 0) {
+    time_s += spec_.sensors.sampling_jitter * sensors_.rng().uniform(-1, 1) / spec_.rate_hz;
+  }
+  return time_s;
+}
+
+void VirtualRobot::start_mission() {
+  ++missions_begun_;
+  under_way_ = true;
+  if (pack_.state_of_charge() < exchange_below) pack_.exchange();
+  MissionScatter scatter;
+  const auto factor = [&](double deviation) { return 1 + spec_.scatter * deviation * scatter_rng_.normal(); };
+  const double common = factor(scatter_friction);
+  scatter.friction = {common * factor(scatter_friction / 2), common * factor(scatter_friction / 2)};
+  scatter.viscous = factor(scatter_viscous);
+  scatter.resistance = factor(scatter_resistance);
+  scatter.idle_power = factor(scatter_idle);
+
+  MissionScript script = plan_mission(spec_.robot, spec_.script, planned_pose_, mission_rng_);
+  mission_ = {};
+  mission_.mission_id = spec_.robot.robot_id + "-m" + std::to_string(missions_begun_);
+  mission_.payload_kg = script.payload_kg;
+  mission_.scatter = scatter;
+  accounts_at_start_ = plant_.accounts();
+  plant_.begin_mission(script.payload_kg, scatter);
+  plant_.set_winding_rise(spec_.imperfections.winding_temperature != 0 ? winding_rise_k_
+                                                                       : std::array<double, 2>{});
+  controller_.set_payload(script.payload_kg);
+  pilot_.begin(std::move(script));
+  outbox_.push_back(
+      {now_us(), telemetry::MissionEvent{now_us(), mission_.mission_id, telemetry::MissionPhase::started,
+                                         mission_.payload_kg, "virtual robot"}});
+}
+
+void VirtualRobot::finish_mission() {
+  under_way_ = false;
+  mission_.accounts = difference(plant_.accounts(), accounts_at_start_);
+  outbox_.push_back(
+      {now_us(), telemetry::MissionEvent{now_us(), mission_.mission_id, telemetry::MissionPhase::finished,
+                                         mission_.payload_kg, "virtual robot"}});
+  finished_.push_back(mission_);
+}
+
+double VirtualRobot::load_power_w() const {
+  double load_w = spec_.robot.idle_power_w * mission_.scatter.idle_power +
+                  spec_.imperfections.accessory_load + plant_.outside_load_w();
+  if (spec_.imperfections.x_sag_load != 0) {
+    // The sag of the drives alone: the load's own sag would feed back on itself.
+    const auto driven = pack_.terminals(plant_.bus_power_w(voltage_v_) + spec_.robot.idle_power_w);
+    load_w += spec_.imperfections.x_sag_load * 100 * (1 - driven.voltage_v / pack_.open_circuit_voltage_v());
+  }
+  return load_w;
+}
+
+VirtualRobot::Electrical VirtualRobot::electrical() const {
+  const auto battery = pack_.terminals(plant_.bus_power_w(voltage_v_) + load_power_w());
+  return {voltage_v_, plant_.state().current_a, battery.voltage_v, battery.current_a};
+}
+
+// History holds the ends of past control periods; voltages are held between them, the rest is nearly
+// straight.
+VirtualRobot::Electrical VirtualRobot::delayed(double delay_s) const {
+  const double now_periods = static_cast<double>(step_) / steps_per_period_;
+  const double at = std::max(0.0, now_periods - delay_s / SpeedController::period_s);
+  const auto index = static_cast<std::int64_t>(at);
+  const double share = at - static_cast<double>(index);
+  const auto entry = [&](std::int64_t k) {
+    return k >= period_ ? electrical() : history_[static_cast<std::size_t>(k) % history_length];
+  };
+  const Electrical a = entry(index);
+  const Electrical b = entry(index + 1);
+  const auto blend = [&](double x, double y) { return x + share * (y - x); };
+  Electrical out;
+  for (std::size_t s : {0u, 1u}) {
+    out.motor_voltage_v[s] = blend(a.motor_voltage_v[s], b.motor_voltage_v[s]);
+    out.motor_current_a[s] = blend(a.motor_current_a[s], b.motor_current_a[s]);
+  }
+  out.battery_voltage_v = blend(a.battery_voltage_v, b.battery_voltage_v);
+  out.battery_current_a = blend(a.battery_current_a, b.battery_current_a);
+  return out;
+}
+
+Reading VirtualRobot::reading() const {
+  const double delay_s = spec_.imperfections.sensor_delay;
+  const Electrical e = delay_s > 0 ? delayed(delay_s) : electrical();
+  const PlantState& s = plant_.state();
+  Reading r;
+  r.wheel_speed_rad_s = s.wheel_speed_rad_s;
+  r.motor_voltage_v = e.motor_voltage_v;
+  r.motor_current_a = e.motor_current_a;
+  r.battery_voltage_v = e.battery_voltage_v;
+  r.battery_current_a = e.battery_current_a;
+  r.command = {command_.speed_m_s, command_.yaw_rate_rad_s};
+  r.yaw_rate_rad_s = plant_.yaw_rate_rad_s();
+  r.pitch_rad = spec_.imperfections.slope * std::cos(s.heading_rad - spec_.world.slope_direction_rad);
+  r.pose = {s.x_m, s.y_m, s.heading_rad};
+  r.winding_c = {ambient_c + winding_rise_k_[0], ambient_c + winding_rise_k_[1]};
+  r.declared_payload_kg = pilot_.payload_kg();
+  return r;
+}
+
+void VirtualRobot::take_sample() {
+  const Reading truth = reading();
+  witness_ = {sensors_.systematic(truth), plant_.wheel_acceleration_rad_s2(voltage_v_),
+              truth.declared_payload_kg};
+  telemetry::Sample sample = sensors_.sample(truth);
+  sample.utime_us = now_us();
+  sample.sequence = sample_index_;
+  const bool lost =
+      sensors_.suite().loss_probability > 0 && sensors_.rng().chance(sensors_.suite().loss_probability);
+  if (!lost) outbox_.push_back({sample.utime_us, sample});
+  ++sample_index_;
+  next_sample_s_ = sample_time_s(sample_index_);
+}
+
+void VirtualRobot::run_period() {
+  if (!under_way_) start_mission();
+  const PlantState& s = plant_.state();
+  const double payload_before_kg = pilot_.payload_kg();
+  command_ = pilot_.update(s.x_m, s.y_m, s.heading_rad);
+  if (pilot_.done()) {
+    // The command is at rest and the leg before the end was a halt: the mission ends here.
+    finish_mission();
+    if (spec_.missions != 0 && missions_begun_ >= spec_.missions) return;
+    start_mission();
+    command_ = pilot_.update(s.x_m, s.y_m, s.heading_rad);
+  } else if (pilot_.payload_kg() != payload_before_kg) {
+    plant_.set_payload(pilot_.payload_kg());
+    controller_.set_payload(pilot_.payload_kg());
+  }
+
+  const double encoder_step = spec_.sensors.encoder_step_rad_s;
+  const Electrical before = electrical();
+  voltage_v_ = controller_.update(
+      command_,
+      {quantised(s.wheel_speed_rad_s[0], encoder_step), quantised(s.wheel_speed_rad_s[1], encoder_step)},
+      before.battery_voltage_v);
+
+  const double bus_before_j = plant_.accounts().bus;
+  for (int k = 0; k < steps_per_period_; ++k) {
+    if (step_s_ * static_cast<double>(step_) >= next_sample_s_ - 0.5 * step_s_) take_sample();
+    plant_.advance(voltage_v_, step_s_);
+    ++step_;
+  }
+  const double battery_w =
+      (plant_.accounts().bus - bus_before_j) / SpeedController::period_s + load_power_w();
+  pack_.advance(battery_w, SpeedController::period_s);
+
+  const auto copper_w = plant_.copper_power_w();
+  const double thermal_k_w = spec_.imperfections.winding_temperature != 0
+                                 ? spec_.imperfections.winding_temperature
+                                 : usual_thermal_resistance_k_w;
+  const double share = -std::expm1(-SpeedController::period_s / spec_.world.thermal_time_constant_s);
+  for (std::size_t side : {0u, 1u}) {
+    winding_rise_k_[side] += share * (thermal_k_w * copper_w[side] - winding_rise_k_[side]);
+  }
+  if (spec_.imperfections.winding_temperature != 0) plant_.set_winding_rise(winding_rise_k_);
+
+  mission_.duration_s += SpeedController::period_s;
+  mission_.distance_m += std::abs(plant_.speed_m_s()) * SpeedController::period_s;
+  mission_.battery_energy_j += battery_w * SpeedController::period_s;
+  history_[static_cast<std::size_t>(period_) % history_length] = electrical();
+  ++period_;
+}
+
+}  // namespace joulecast::virtual_robot

@@ -1,0 +1,124 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "client/virtual_robot/controller.h"
+#include "client/virtual_robot/imperfections.h"
+#include "client/virtual_robot/mission_script.h"
+#include "client/virtual_robot/pack.h"
+#include "client/virtual_robot/pilot.h"
+#include "client/virtual_robot/plant.h"
+#include "client/virtual_robot/robot_parameters.h"
+#include "client/virtual_robot/sensors.h"
+#include "telemetry/sample.h"
+
+namespace joulecast::virtual_robot {
+
+struct SimulationSpec {
+  RobotParameters robot;
+  Imperfections imperfections;
+  World world;
+  SensorSuite sensors;
+  ScriptOptions script;
+  double rate_hz = 50;  // of telemetry
+  int missions = 5;     // 0: one after another without end
+  double scatter = 1;   // size of the differences between missions; 0: none, 1: 1 to 2 % of energy
+  double initial_charge = 0.8;
+  std::int64_t start_utime_us = 1'700'000'000'000'000;
+};
+
+// What happened on the way of one mission, in truth, without sensors.
+struct MissionTruth {
+  std::string mission_id;
+  double payload_kg = 0;  // declared at the start
+  double duration_s = 0;
+  double distance_m = 0;
+  double battery_energy_j = 0;
+  PlantAccounts accounts;  // of this mission
+  MissionScatter scatter;
+};
+
+struct Emission {
+  std::int64_t utime_us = 0;
+  std::variant<telemetry::MissionEvent, telemetry::Sample> message;
+};
+
+// What a perfect logger would have seen at the instant of the last sample, systematic sensor errors included.
+struct Witness {
+  Reading reading;
+  std::array<double, 2> wheel_acceleration_rad_s2{};
+  double payload_kg = 0;  // declared
+};
+
+// One robot at work: pilot, controller, plant, battery and sensors on one clock. Runs as far as its next
+// message each time it is asked, so that a fleet in real time and a batch use the same code. The same spec
+// and seed give the same messages, bit for bit.
+class VirtualRobot {
+ public:
+  VirtualRobot(const SimulationSpec& spec, std::uint64_t seed);
+
+  // Runs to the next message. False when the last mission is over.
+  bool next(Emission& out);
+
+  const Witness& witness() const { return witness_; }
+  // Missions that are over, in order.
+  const std::vector<MissionTruth>& finished() const { return finished_; }
+  const std::string& robot_id() const { return spec_.robot.robot_id; }
+  const Plant& plant() const { return plant_; }
+  double state_of_charge() const { return pack_.state_of_charge(); }
+
+ private:
+  static constexpr std::size_t history_length = 128;  // control periods; longer than any sensor delay
+
+  struct Electrical {
+    std::array<double, 2> motor_voltage_v{};
+    std::array<double, 2> motor_current_a{};
+    double battery_voltage_v = 0;
+    double battery_current_a = 0;
+  };
+
+  void run_period();
+  void start_mission();
+  void finish_mission();
+  void take_sample();
+  double load_power_w() const;
+  Electrical electrical() const;
+  Electrical delayed(double delay_s) const;
+  Reading reading() const;
+  std::int64_t now_us() const;
+  double sample_time_s(std::int64_t index);
+
+  SimulationSpec spec_;
+  Rng mission_rng_;
+  Rng scatter_rng_;
+  Plant plant_;
+  Pack pack_;
+  SpeedController controller_;
+  Pilot pilot_;
+  Sensors sensors_;
+  ScriptPose planned_pose_;
+  std::deque<Emission> outbox_;
+  std::vector<MissionTruth> finished_;
+  MissionTruth mission_;
+  PlantAccounts accounts_at_start_;
+  Witness witness_;
+  BodyCommand command_;
+  std::array<double, 2> voltage_v_{};
+  std::array<double, 2> winding_rise_k_{};
+  std::array<Electrical, history_length> history_{};
+  std::int64_t step_ = 0;  // integration steps since the beginning
+  int steps_per_period_ = 1;
+  double step_s_ = 0;
+  std::int64_t period_ = 0;  // control periods since the beginning
+  std::int64_t sample_index_ = 0;
+  double next_sample_s_ = 0;
+  int missions_begun_ = 0;
+  bool under_way_ = false;
+};
+
+}  // namespace joulecast::virtual_robot
