@@ -1,0 +1,257 @@
+#include "telemetry/import_mapping.h"
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "telemetry/codec.h"
+
+namespace joulecast::telemetry {
+namespace {
+
+using nlohmann::json;
+
+// Reads members of one JSON document; the first fault sticks and later reads give defaults.
+class Reader {
+ public:
+  std::optional<Error> error;
+
+  void refuse(std::string pointer, std::string message) {
+    if (!error) error = Error{Fault::invalid, std::move(pointer), std::move(message)};
+  }
+
+  bool object(const json& value, const std::string& pointer, std::initializer_list<std::string_view> known) {
+    if (!value.is_object()) {
+      refuse(pointer, "must be an object");
+      return false;
+    }
+    for (const auto& [key, member] : value.items()) {
+      if (std::find(known.begin(), known.end(), key) == known.end()) {
+        refuse(pointer + "/" + key, "is no member that a mapping knows");
+        return false;
+      }
+    }
+    return true;
+  }
+
+  std::string text(const json& value, const std::string& pointer) {
+    if (value.is_string() && !value.get_ref<const std::string&>().empty()) return value.get<std::string>();
+    refuse(pointer, "must be a string of one character at least");
+    return {};
+  }
+
+  bool boolean(const json& value, const std::string& pointer) {
+    if (value.is_boolean()) return value.get<bool>();
+    refuse(pointer, "must be true or false");
+    return false;
+  }
+
+  double number(const json& value, const std::string& pointer) {
+    if (value.is_number() && std::isfinite(value.get<double>())) return value.get<double>();
+    refuse(pointer, "must be a finite number");
+    return 0;
+  }
+
+  template <class Choice>
+  Choice choice(const json& value, const std::string& pointer,
+                std::initializer_list<std::pair<std::string_view, Choice>> choices) {
+    std::string names;
+    for (const auto& [name, meaning] : choices) {
+      if (value == name) return meaning;
+      names.append(names.empty() ? "" : ", ").append(name);
+    }
+    refuse(pointer, "must be one of " + names);
+    return choices.begin()->second;
+  }
+
+  ColumnTerm term(const json& value, const std::string& pointer) {
+    if (value.is_string()) return {text(value, pointer), false};
+    ColumnTerm result;
+    if (!object(value, pointer, {"column", "negate"})) return result;
+    result.column = text(value.value("column", json()), pointer + "/column");
+    if (value.contains("negate")) result.negate = boolean(value["negate"], pointer + "/negate");
+    return result;
+  }
+
+  std::vector<ColumnTerm> terms(const json& value, const std::string& pointer) {
+    std::vector<ColumnTerm> result;
+    if (!value.is_array() || value.empty()) {
+      refuse(pointer, "must be an array of one column at least");
+      return result;
+    }
+    for (std::size_t i = 0; i < value.size(); ++i)
+      result.push_back(term(value[i], pointer + "/" + std::to_string(i)));
+    return result;
+  }
+
+  ValueLimits limits(const json& value, const std::string& pointer, bool may_hold) {
+    ValueLimits result;
+    if (!object(value, pointer, {"low", "high", "outside"})) return result;
+    if (value.contains("low")) result.low = number(value["low"], pointer + "/low");
+    if (value.contains("high")) result.high = number(value["high"], pointer + "/high");
+    if (!(result.low < result.high)) refuse(pointer, "low must be below high");
+    result.outside = choice<OutsidePolicy>(value.value("outside", json()), pointer + "/outside",
+                                           {{"hold", OutsidePolicy::hold},
+                                            {"clamp", OutsidePolicy::clamp},
+                                            {"unmeasured", OutsidePolicy::blank},
+                                            {"drop_row", OutsidePolicy::drop_row}});
+    if (result.outside == OutsidePolicy::hold && !may_hold) {
+      refuse(pointer + "/outside", "hold belongs to column_limits; a field has no value of its own to hold");
+    }
+    return result;
+  }
+
+  FieldExpression expression(const json& value, const std::string& pointer) {
+    FieldExpression result;
+    if (!object(value, pointer,
+                {"constant", "column", "columns", "quaternion_yaw", "combine", "abs", "sign_from", "negate",
+                 "scale", "divide_by", "offset", "limits"})) {
+      return result;
+    }
+    const auto sources = value.count("constant") + value.count("column") + value.count("columns") +
+                         value.count("quaternion_yaw");
+    if (sources != 1) refuse(pointer, "must have exactly one of constant, column, columns, quaternion_yaw");
+    if (value.contains("constant")) {
+      result.constant = number(value["constant"], pointer + "/constant");
+    } else if (value.contains("column")) {
+      result.source = FieldExpression::Source::columns;
+      result.terms = {{text(value["column"], pointer + "/column"), false}};
+    } else if (value.contains("columns")) {
+      result.source = FieldExpression::Source::columns;
+      result.terms = terms(value["columns"], pointer + "/columns");
+    } else if (value.contains("quaternion_yaw")) {
+      result.source = FieldExpression::Source::quaternion_yaw;
+      result.terms = terms(value["quaternion_yaw"], pointer + "/quaternion_yaw");
+      if (result.terms.size() != 4)
+        refuse(pointer + "/quaternion_yaw", "must name the columns of x, y, z and w");
+    }
+    if (value.contains("combine")) {
+      result.mean = choice<bool>(value["combine"], pointer + "/combine", {{"sum", false}, {"mean", true}});
+    }
+    if (value.contains("abs")) result.absolute = boolean(value["abs"], pointer + "/abs");
+    if (value.contains("sign_from")) result.sign_from = terms(value["sign_from"], pointer + "/sign_from");
+    if (value.contains("negate")) result.negate = boolean(value["negate"], pointer + "/negate");
+    if (value.contains("scale")) result.scale = number(value["scale"], pointer + "/scale");
+    if (value.contains("divide_by")) result.divide_by = number(value["divide_by"], pointer + "/divide_by");
+    if (result.divide_by == 0) refuse(pointer + "/divide_by", "must not be 0");
+    if (value.contains("offset")) result.offset = number(value["offset"], pointer + "/offset");
+    if (value.contains("limits")) result.limits = limits(value["limits"], pointer + "/limits", false);
+    return result;
+  }
+
+  std::vector<FieldTarget> fields(const json& value, const std::string& pointer) {
+    std::vector<FieldTarget> targets;
+    if (!value.is_object()) {
+      refuse(pointer, "must be an object");
+      return targets;
+    }
+    for (const auto& [name, member] : value.items()) {
+      const std::string here = pointer + "/" + name;
+      const auto* slot =
+          std::find_if(sample_slots.begin(), sample_slots.end(),
+                       [&, &field = name](const SampleSlot& known) { return known.field == field; });
+      if (slot == sample_slots.end()) {
+        refuse(here, "is no field of a sample that a table can fill");
+        break;
+      }
+      if (slot->size == 1) {
+        targets.push_back({slot, 0, expression(member, here)});
+        continue;
+      }
+      if (!member.is_array() || member.size() != slot->size) {
+        refuse(here,
+               "must be an array of " + std::to_string(slot->size) + " expressions (null: not measured)");
+        break;
+      }
+      for (std::size_t i = 0; i < slot->size; ++i) {
+        if (!member[i].is_null()) {
+          targets.push_back({slot, i, expression(member[i], here + "/" + std::to_string(i))});
+        }
+      }
+    }
+    const auto wheels = std::count_if(targets.begin(), targets.end(), [](const FieldTarget& target) {
+      return target.slot == sample_slots.data();
+    });
+    if (wheels != 2) refuse(pointer + "/wheel_velocity", "must give both wheels: no sample is without them");
+    return targets;
+  }
+
+  void time(const json& value, ImportMapping::Content& content) {
+    if (!object(value, "/time", {"column", "unit", "epoch_us"})) return;
+    content.time_column = text(value.value("column", json()), "/time/column");
+    content.time_unit_ns =
+        choice<std::int64_t>(value.value("unit", json()), "/time/unit",
+                             {{"s", 1'000'000'000}, {"ms", 1'000'000}, {"us", 1'000}, {"ns", 1}});
+    if (!value.contains("epoch_us")) return;
+    if (value["epoch_us"].is_number_integer() && value["epoch_us"] >= 0 &&
+        value["epoch_us"] <= 4'102'444'800'000'000) {  // the year 2100
+      content.epoch_us = value["epoch_us"].get<std::int64_t>();
+    } else {
+      refuse("/time/epoch_us", "must be a whole number of microseconds from 0 to 4102444800000000");
+    }
+  }
+
+  ImportMapping::Content mapping(const json& value) {
+    ImportMapping::Content content;
+    if (!object(value, "",
+                {"$schema", "description", "robot_id", "mission_id", "payload_kg", "separator",
+                 "column_prefix", "time", "empty_cells", "require", "column_limits", "fields"})) {
+      return content;
+    }
+    content.robot_id = text(value.value("robot_id", json()), "/robot_id");
+    if (!is_valid_robot_id(content.robot_id)) {
+      refuse("/robot_id",
+             "must be 1 to " + std::to_string(max_robot_id_length) + " of letters, digits, '.', '_', '-'");
+    }
+    if (value.contains("mission_id")) content.mission_id = text(value["mission_id"], "/mission_id");
+    if (value.contains("payload_kg")) {
+      content.payload_kg = number(value["payload_kg"], "/payload_kg");
+      if (content.payload_kg < 0) refuse("/payload_kg", "must not be negative");
+    }
+    if (value.contains("separator")) {
+      const std::string separator = text(value["separator"], "/separator");
+      content.separator = separator.empty() ? ',' : separator[0];
+      if (separator.size() != 1 || separator == "\"" || separator == "\n" || separator == "\r") {
+        refuse("/separator", "must be one character, not a quote or line end");
+      }
+    }
+    if (value.contains("column_prefix"))
+      content.column_prefix = text(value["column_prefix"], "/column_prefix");
+    time(value.value("time", json()), content);
+    if (value.contains("empty_cells")) {
+      content.hold_empty_cells =
+          choice<bool>(value["empty_cells"], "/empty_cells", {{"hold", true}, {"unmeasured", false}});
+    }
+    if (value.contains("require") && value["require"].is_object()) {
+      for (const auto& [column, wanted] : value["require"].items()) {
+        content.require[column] = text(wanted, "/require/" + column);
+      }
+    } else if (value.contains("require")) {
+      refuse("/require", "must be an object");
+    }
+    if (value.contains("column_limits") && value["column_limits"].is_object()) {
+      for (const auto& [column, given] : value["column_limits"].items()) {
+        content.column_limits[column] = limits(given, "/column_limits/" + column, true);
+      }
+    } else if (value.contains("column_limits")) {
+      refuse("/column_limits", "must be an object");
+    }
+    content.targets = fields(value.value("fields", json()), "/fields");
+    return content;
+  }
+};
+
+}  // namespace
+
+Result<ImportMapping> ImportMapping::parse(std::string_view text) {
+  const json document = json::parse(text, nullptr, false);
+  if (document.is_discarded()) return fail(Fault::invalid, "", "the mapping is not JSON");
+  Reader reader;
+  auto content = std::make_shared<const Content>(reader.mapping(document));
+  if (reader.error) return tl::unexpected<Error>(std::move(*reader.error));
+  return ImportMapping(std::move(content));
+}
+
+}  // namespace joulecast::telemetry
