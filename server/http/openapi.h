@@ -1,0 +1,24 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "server/embedded.h"
+#include "server/http/router.h"
+
+namespace joulecast::http {
+
+// The OpenAPI 3.1 document of a table of endpoints: paths, parameters, bodies and errors from the table, the
+// components from the schema files it names and those they refer to. Pretty-printed and ending in a newline,
+// so that schemas/openapi.json is this text. Fails with Fault::internal when a schema is missing or
+// malformed.
+Result<std::string> openapi_document(std::span<const Endpoint> endpoints,
+                                     std::span<const EmbeddedFile> schemas);
+
+// The endpoints and, in front of them, GET /openapi.json, which serves the document of them all.
+Result<std::vector<Endpoint>> with_openapi(std::vector<Endpoint> endpoints,
+                                           std::span<const EmbeddedFile> schemas);
+
+}  // namespace joulecast::http

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+
+// The process's log: one line an event, on standard error. As JSON objects for machines, or readable on a
+// terminal.
+namespace joulecast {
+
+enum class LogLevel : std::uint8_t { debug, info, warning, error };
+enum class LogFormat : std::uint8_t { text, json };
+
+// What belongs to an event beside its sentence, e.g. {"robot_id", "amr-07"}.
+using LogFields = std::vector<std::pair<std::string_view, std::string>>;
+
+// Before the call, and in tests, the log is text at level info.
+void configure_logging(LogFormat format, LogLevel level);
+
+void log(LogLevel level, std::string_view message, const LogFields& fields = {});
+
+// True when a line of that level would be written: guards costly fields.
+bool log_enabled(LogLevel level);
+
+// The line of an event, without its newline; what log() writes.
+std::string format_log_line(LogFormat format, LogLevel level, std::string_view message,
+                            const LogFields& fields, std::int64_t utime_us);
+
+inline void log_debug(std::string_view message, const LogFields& fields = {}) {
+  log(LogLevel::debug, message, fields);
+}
+inline void log_info(std::string_view message, const LogFields& fields = {}) {
+  log(LogLevel::info, message, fields);
+}
+inline void log_warning(std::string_view message, const LogFields& fields = {}) {
+  log(LogLevel::warning, message, fields);
+}
+inline void log_error(std::string_view message, const LogFields& fields = {}) {
+  log(LogLevel::error, message, fields);
+}
+inline void log_error(std::string_view message, const Error& error) {
+  log(LogLevel::error, message, {{"cause", describe(error)}});
+}
+
+// Writes out what is buffered; call before the process ends.
+void flush_log();
+
+}  // namespace joulecast

@@ -1,0 +1,112 @@
+#include "server/metrics.h"
+
+#include <prometheus/counter.h>
+#include <prometheus/gauge.h>
+#include <prometheus/histogram.h>
+#include <prometheus/registry.h>
+#include <prometheus/text_serializer.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <mutex>
+
+namespace joulecast {
+namespace {
+
+std::map<std::string, std::string> to_map(const Labels& labels) {
+  return {labels.begin(), labels.end()};
+}
+
+void check_name(const std::string& name, bool is_counter) {
+  bool good = name.starts_with("joulecast_") && name.ends_with("_total") == is_counter;
+  for (const char c : name) good = good && ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_');
+  if (good) return;
+  std::fprintf(stderr, "metric name %s breaks the convention joulecast_<what>_<unit>[_total]\n",
+               name.c_str());
+  std::abort();
+}
+
+}  // namespace
+
+void Counter::add(double amount) const {
+  if (counter_ != nullptr) static_cast<prometheus::Counter*>(counter_)->Increment(amount);
+}
+
+void Counter::raise_to(double total) const {
+  if (counter_ == nullptr) return;
+  auto* counter = static_cast<prometheus::Counter*>(counter_);
+  const double missing = total - counter->Value();
+  if (missing > 0) counter->Increment(missing);
+}
+
+void Gauge::set(double value) const {
+  if (gauge_ != nullptr) static_cast<prometheus::Gauge*>(gauge_)->Set(value);
+}
+
+void Gauge::add(double amount) const {
+  if (gauge_ != nullptr) static_cast<prometheus::Gauge*>(gauge_)->Increment(amount);
+}
+
+void Histogram::observe(double value) const {
+  if (histogram_ != nullptr) static_cast<prometheus::Histogram*>(histogram_)->Observe(value);
+}
+
+struct Metrics::State {
+  prometheus::Registry registry;
+  mutable std::mutex mutex;
+  std::vector<std::function<void()>> refreshers;
+};
+
+Metrics::Metrics() : state_(std::make_unique<State>()) {}
+Metrics::~Metrics() = default;
+
+Counter Metrics::counter(const std::string& name, const std::string& help, const Labels& labels) {
+  check_name(name, true);
+  return Counter(
+      &prometheus::BuildCounter().Name(name).Help(help).Register(state_->registry).Add(to_map(labels)));
+}
+
+Gauge Metrics::gauge(const std::string& name, const std::string& help, const Labels& labels) {
+  check_name(name, false);
+  return Gauge(
+      &prometheus::BuildGauge().Name(name).Help(help).Register(state_->registry).Add(to_map(labels)));
+}
+
+Histogram Metrics::histogram(const std::string& name, const std::string& help,
+                             const std::vector<double>& upper_bounds, const Labels& labels) {
+  check_name(name, false);
+  return Histogram(&prometheus::BuildHistogram()
+                        .Name(name)
+                        .Help(help)
+                        .Register(state_->registry)
+                        .Add(to_map(labels), upper_bounds));
+}
+
+std::vector<Counter> Metrics::counters(const std::string& name, const std::string& help,
+                                       const std::string& label, const std::vector<std::string>& values) {
+  std::vector<Counter> made;
+  made.reserve(values.size());
+  for (const auto& value : values) made.push_back(counter(name, help, {{label, value}}));
+  return made;
+}
+
+void Metrics::before_scrape(std::function<void()> refresh) {
+  const std::lock_guard lock(state_->mutex);
+  state_->refreshers.push_back(std::move(refresh));
+}
+
+std::string Metrics::text() const {
+  // The lock also keeps concurrent scrapes from raising one counter twice.
+  const std::lock_guard lock(state_->mutex);
+  for (const auto& refresh : state_->refreshers) refresh();
+  return prometheus::TextSerializer().Serialize(state_->registry.Collect());
+}
+
+const std::vector<double>& Metrics::request_seconds() {
+  static const std::vector<double> bounds{50e-6, 100e-6, 250e-6, 500e-6, 1e-3, 2.5e-3, 5e-3, 10e-3,
+                                          25e-3, 50e-3,  100e-3, 250e-3, 0.5,  1.0,    2.5,  10.0};
+  return bounds;
+}
+
+}  // namespace joulecast

@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+// Prometheus metrics behind handles. Names are joulecast_<what>_<base unit>[_total]; a label's values are
+// fixed when the metric is made, so that no client can make their number grow. Handles are small, copyable,
+// usable from any thread, and valid as long as the Metrics they come from.
+namespace joulecast {
+
+class Counter {
+ public:
+  Counter() = default;
+  void add(double amount = 1) const;
+  // Raises the counter to a total kept elsewhere; smaller totals are ignored, since counters never fall.
+  void raise_to(double total) const;
+
+ private:
+  friend class Metrics;
+  explicit Counter(void* counter) : counter_(counter) {}
+  void* counter_ = nullptr;  // null: counts nothing
+};
+
+class Gauge {
+ public:
+  Gauge() = default;
+  void set(double value) const;
+  void add(double amount) const;
+
+ private:
+  friend class Metrics;
+  explicit Gauge(void* gauge) : gauge_(gauge) {}
+  void* gauge_ = nullptr;
+};
+
+class Histogram {
+ public:
+  Histogram() = default;
+  void observe(double value) const;
+
+ private:
+  friend class Metrics;
+  explicit Histogram(void* histogram) : histogram_(histogram) {}
+  void* histogram_ = nullptr;
+};
+
+using Labels = std::vector<std::pair<std::string, std::string>>;
+
+class Metrics {
+ public:
+  Metrics();
+  ~Metrics();
+  Metrics(const Metrics&) = delete;
+  Metrics& operator=(const Metrics&) = delete;
+
+  // The same name and labels give the same metric. A name that breaks the convention is our bug and aborts.
+  Counter counter(const std::string& name, const std::string& help, const Labels& labels = {});
+  Gauge gauge(const std::string& name, const std::string& help, const Labels& labels = {});
+  Histogram histogram(const std::string& name, const std::string& help,
+                      const std::vector<double>& upper_bounds, const Labels& labels = {});
+  // One counter for each value of a label, all present from the start at zero, in the order of the values.
+  std::vector<Counter> counters(const std::string& name, const std::string& help, const std::string& label,
+                                const std::vector<std::string>& values);
+
+  // Called before each text(): sets gauges from state kept elsewhere. Must be thread-safe.
+  void before_scrape(std::function<void()> refresh);
+
+  // Prometheus text exposition format 0.0.4.
+  std::string text() const;
+
+  // Content type of text().
+  static std::string_view content_type() { return "text/plain; version=0.0.4; charset=utf-8"; }
+
+  // Upper bounds for request durations, from 50 µs to 10 s.
+  static const std::vector<double>& request_seconds();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace joulecast

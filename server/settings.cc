@@ -1,0 +1,457 @@
+#include "server/settings.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <utility>
+
+#include "server/http/json_text.h"
+#include "server/http/text.h"
+
+namespace joulecast {
+namespace {
+
+using http::number_text;
+using http::parse_number;
+
+const Setting* find_setting(std::string_view key) {
+  for (const Setting& setting : settings_table()) {
+    if (setting.key == key) return &setting;
+  }
+  return nullptr;
+}
+
+std::string with_suggestion(std::string message, std::string_view word,
+                            const std::vector<std::string>& candidates) {
+  if (const auto near = nearest(word, candidates)) message += "; did you mean " + *near + "?";
+  return message;
+}
+
+template <class Name>
+std::vector<std::string> all_names(Name name) {
+  std::vector<std::string> names;
+  for (const Setting& setting : settings_table()) names.push_back(name(setting));
+  return names;
+}
+
+std::string kind(const Setting& setting) {
+  switch (setting.type) {
+    case Setting::Type::text:
+      return "text";
+    case Setting::Type::integer:
+      return "integer";
+    case Setting::Type::number:
+      return "number";
+    case Setting::Type::boolean:
+      return "true|false";
+    case Setting::Type::choice:
+      break;
+  }
+  std::string choices;
+  for (const auto choice : setting.choices) choices += (choices.empty() ? "" : "|") + std::string(choice);
+  return choices;
+}
+
+// The constraint that `value` breaks, or nullopt.
+std::optional<std::string> broken_constraint(const Setting& setting, std::string_view value) {
+  const std::string shown = ", is \"" + std::string(value) + "\"";
+  switch (setting.type) {
+    case Setting::Type::text:
+      if (value.find_first_of(std::string_view("\0\n\r", 3)) != std::string_view::npos) {
+        return "must not contain line breaks";
+      }
+      return std::nullopt;
+    case Setting::Type::boolean:
+      if (value == "true" || value == "false") return std::nullopt;
+      return "must be true or false" + shown;
+    case Setting::Type::choice:
+      if (std::find(setting.choices.begin(), setting.choices.end(), value) != setting.choices.end())
+        return std::nullopt;
+      return "must be one of " + kind(setting) + shown;
+    case Setting::Type::integer:
+    case Setting::Type::number:
+      break;
+  }
+  std::optional<double> number;
+  if (setting.type == Setting::Type::integer) {
+    if (const auto whole = parse_number<std::int64_t>(value)) number = static_cast<double>(*whole);
+    if (!number) return "must be an integer" + shown;
+  } else {
+    number = parse_number<double>(value);
+    if (!number) return "must be a finite number" + shown;
+  }
+  if (*number < setting.minimum || *number > setting.maximum) {
+    return "must lie in [" + number_text(setting.minimum) + ", " + number_text(setting.maximum) + "]" +
+           (setting.unit.empty() ? "" : " " + std::string(setting.unit)) + shown;
+  }
+  return std::nullopt;
+}
+
+// The text by which set() would be called for a JSON value; nullopt for values of a type the setting has not.
+std::optional<std::string> text_of(const Setting& setting, const nlohmann::json& value) {
+  switch (setting.type) {
+    case Setting::Type::text:
+    case Setting::Type::choice:
+      if (value.is_string()) return value.get<std::string>();
+      return std::nullopt;
+    case Setting::Type::boolean:
+      if (value.is_boolean()) return value.get<bool>() ? "true" : "false";
+      return std::nullopt;
+    case Setting::Type::integer:
+      if (value.is_number_unsigned()) return std::to_string(value.get<std::uint64_t>());
+      if (value.is_number_integer()) return std::to_string(value.get<std::int64_t>());
+      return std::nullopt;
+    case Setting::Type::number:
+      if (value.is_number()) return number_text(value.get<double>());
+      return std::nullopt;
+  }
+  return std::nullopt;
+}
+
+Result<std::string> read_whole(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  if (!file || !(text << file.rdbuf())) return fail(Fault::not_found, "--config", "cannot read " + path);
+  return std::move(text).str();
+}
+
+struct Pending {
+  std::string key;
+  std::string value;
+  std::string where;
+};
+
+}  // namespace
+
+std::string Setting::flag() const {
+  std::string name = "--" + std::string(key);
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return c == '.' || c == '_'; }, '-');
+  return name;
+}
+
+std::string Setting::environment() const {
+  std::string name = "JOULECAST_";
+  for (const char c : key) {
+    name.push_back(c == '.' ? '_' : (c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c));
+  }
+  return name;
+}
+
+std::string_view to_string(Origin origin) {
+  switch (origin) {
+    case Origin::default_value:
+      return "default";
+    case Origin::file:
+      return "file";
+    case Origin::environment:
+      return "environment";
+    case Origin::flag:
+      break;
+  }
+  return "flag";
+}
+
+Settings::Settings() {
+  for (const Setting& setting : settings_table()) {
+    values_.emplace(setting.key, Value{std::string(setting.default_value), Origin::default_value});
+  }
+}
+
+const Settings::Value& Settings::value(std::string_view key, Setting::Type type) const {
+  const Setting* setting = find_setting(key);
+  const bool readable =
+      setting != nullptr &&
+      (setting->type == type || (setting->type == Setting::Type::choice && type == Setting::Type::text));
+  if (!readable) {
+    std::fprintf(stderr, "no setting %.*s of that type\n", static_cast<int>(key.size()), key.data());
+    std::abort();
+  }
+  return values_.find(key)->second;
+}
+
+const std::string& Settings::text(std::string_view key) const {
+  return value(key, Setting::Type::text).text;
+}
+
+std::int64_t Settings::integer(std::string_view key) const {
+  return parse_number<std::int64_t>(value(key, Setting::Type::integer).text).value();
+}
+
+double Settings::number(std::string_view key) const {
+  return parse_number<double>(value(key, Setting::Type::number).text).value();
+}
+
+bool Settings::boolean(std::string_view key) const {
+  return value(key, Setting::Type::boolean).text == "true";
+}
+
+Origin Settings::origin(std::string_view key) const {
+  const Setting* setting = find_setting(key);
+  return value(key, setting == nullptr ? Setting::Type::text : setting->type).origin;
+}
+
+Result<void> Settings::set(std::string_view key, std::string_view value, Origin origin,
+                           std::string_view where) {
+  const Setting* setting = find_setting(key);
+  if (setting == nullptr) {
+    return invalid(std::string(where),
+                   with_suggestion("unknown setting", key,
+                                   all_names([](const Setting& each) { return std::string(each.key); })));
+  }
+  if (auto broken = broken_constraint(*setting, value))
+    return invalid(std::string(where), std::move(*broken));
+  values_.find(key)->second = Value{std::string(value), origin};
+  return {};
+}
+
+Result<void> Settings::read_file_text(std::string_view json_text, std::string_view file) {
+  auto document = http::parse_json(json_text);
+  const std::string prefix = std::string(file) + ": ";
+  if (!document) {
+    return invalid(prefix + document.error().field, document.error().message);
+  }
+  if (!document->is_object()) return invalid(std::string(file), "must be a JSON object of sections");
+  std::vector<std::string> keys = all_names([](const Setting& each) { return std::string(each.key); });
+  for (const auto& [section, content] : document->items()) {
+    if (section == "$schema" && content.is_string()) continue;
+    if (!content.is_object()) {
+      return invalid(
+          prefix + section,
+          with_suggestion("must be an object such as {\"http\": {\"port\": 8080}}", section, keys));
+    }
+    for (const auto& [name, value] : content.items()) {
+      const std::string key = section + "." + name;
+      const Setting* setting = find_setting(key);
+      if (setting == nullptr) return invalid(prefix + key, with_suggestion("unknown setting", key, keys));
+      const auto text = text_of(*setting, value);
+      if (!text) return invalid(prefix + key, "must be of type " + kind(*setting));
+      if (auto done = set(key, *text, Origin::file, prefix + key); !done) return done;
+    }
+  }
+  return {};
+}
+
+std::string Settings::print() const {
+  std::string text;
+  for (const Setting& setting : settings_table()) {
+    const Value& value = values_.find(setting.key)->second;
+    std::string line = std::string(setting.key) + " = ";
+    const bool quoted = setting.type == Setting::Type::text || setting.type == Setting::Type::choice;
+    line += quoted ? nlohmann::json(value.text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)
+                   : value.text;
+    line.resize(std::max<std::size_t>(line.size() + 2, 60), ' ');
+    text += line + "# " + std::string(to_string(value.origin)) +
+            (setting.unit.empty() ? "" : ", " + std::string(setting.unit)) + "\n";
+  }
+  return text;
+}
+
+Result<Invocation> read_settings(const std::vector<std::string>& arguments,
+                                 const std::vector<std::string>& environment) {
+  using Action = Invocation::Action;
+  static const std::vector<std::pair<std::string, Action>> actions{
+      {"--help", Action::help},
+      {"--version", Action::version},
+      {"--check-config", Action::check_config},
+      {"--print-config", Action::print_config},
+      {"--print-openapi", Action::print_openapi},
+      {"--print-config-schema", Action::print_config_schema},
+  };
+  Invocation invocation;
+  std::optional<std::string> config;
+  std::vector<Pending> flags;
+  bool acting = false;
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    const std::string& argument = arguments[i];
+    const auto equals = argument.find('=');
+    const std::string name = argument.substr(0, equals);
+    const auto action = std::find_if(actions.begin(), actions.end(),
+                                     [&](const auto& each) { return each.first == argument; });
+    if (action != actions.end()) {
+      if (acting && invocation.action != action->second)
+        return invalid(argument, "only one such command can be given");
+      invocation.action = action->second;
+      acting = true;
+      continue;
+    }
+    const auto table = settings_table();
+    const auto setting =
+        std::find_if(table.begin(), table.end(), [&](const Setting& each) { return each.flag() == name; });
+    if (setting == table.end() && name != "--config") {
+      auto known = all_names([](const Setting& each) { return each.flag(); });
+      for (const auto& each : actions) known.push_back(each.first);
+      known.emplace_back("--config");
+      return invalid(name, with_suggestion("unknown flag", name, known));
+    }
+    std::string value;
+    if (equals != std::string::npos) {
+      value = argument.substr(equals + 1);
+    } else if (i + 1 < arguments.size()) {
+      value = arguments[++i];
+    } else {
+      return invalid(name, "needs a value");
+    }
+    if (setting == table.end()) {
+      if (config) return invalid(name, "is given more than once");
+      config = std::move(value);
+      continue;
+    }
+    if (std::any_of(flags.begin(), flags.end(), [&](const Pending& each) { return each.where == name; })) {
+      return invalid(name, "is given more than once");
+    }
+    flags.push_back({std::string(setting->key), std::move(value), name});
+  }
+
+  std::vector<Pending> variables;
+  for (const std::string& entry : environment) {
+    if (!entry.starts_with("JOULECAST_")) continue;
+    const auto equals = entry.find('=');
+    const std::string name = entry.substr(0, equals);
+    std::string value = equals == std::string::npos ? "" : entry.substr(equals + 1);
+    if (name == "JOULECAST_CONFIG") {
+      if (!config) config = std::move(value);
+      continue;
+    }
+    const auto table = settings_table();
+    const auto setting = std::find_if(table.begin(), table.end(),
+                                      [&](const Setting& each) { return each.environment() == name; });
+    if (setting == table.end()) {
+      auto known = all_names([](const Setting& each) { return each.environment(); });
+      known.emplace_back("JOULECAST_CONFIG");
+      return invalid(name, with_suggestion("unknown environment variable", name, known));
+    }
+    variables.push_back({std::string(setting->key), std::move(value), name});
+  }
+
+  if (invocation.action == Action::help || invocation.action == Action::version) return invocation;
+  if (config) {
+    auto text = read_whole(*config);
+    if (!text) return tl::unexpected<Error>(text.error());
+    if (auto done = invocation.settings.read_file_text(*text, *config); !done)
+      return tl::unexpected<Error>(done.error());
+  }
+  for (const auto& [key, value, where] : variables) {
+    if (auto done = invocation.settings.set(key, value, Origin::environment, where); !done) {
+      return tl::unexpected<Error>(done.error());
+    }
+  }
+  for (const auto& [key, value, where] : flags) {
+    if (auto done = invocation.settings.set(key, value, Origin::flag, where); !done) {
+      return tl::unexpected<Error>(done.error());
+    }
+  }
+  return invocation;
+}
+
+std::vector<std::string> process_environment() {
+  std::vector<std::string> entries;
+  for (char** entry = environ; entry != nullptr && *entry != nullptr; ++entry) entries.emplace_back(*entry);
+  return entries;
+}
+
+std::string settings_help() {
+  std::string text =
+      "joulecastd: counts and forecasts the energy of a fleet of differential-drive robots\n\n"
+      "usage: joulecastd [--config FILE] [--SETTING VALUE ...] [COMMAND]\n\n"
+      "commands\n"
+      "  --check-config         check the settings and exit\n"
+      "  --print-config         print the effective settings with their origin and exit\n"
+      "  --print-config-schema  print the JSON Schema of the settings file and exit\n"
+      "  --print-openapi        print the OpenAPI document and exit\n"
+      "  --help, --version\n\n"
+      "settings (flag > environment > file > default; --http-port is JOULECAST_HTTP_PORT in the\n"
+      "environment and {\"http\": {\"port\": ...}} in the file)\n";
+  for (const Setting& setting : settings_table()) {
+    std::string line = "  " + setting.flag() + " <" + kind(setting) + ">";
+    line.resize(std::max<std::size_t>(line.size() + 2, 44), ' ');
+    text += line + std::string(setting.help);
+    text += " [" +
+            (setting.default_value.empty() ? std::string("empty") : std::string(setting.default_value)) +
+            (setting.unit.empty() ? "" : " " + std::string(setting.unit)) + "]\n";
+  }
+  return text;
+}
+
+std::string settings_schema() {
+  using nlohmann::ordered_json;
+  ordered_json sections = ordered_json::object();
+  sections["$schema"] = {{"type", "string"}};
+  for (const Setting& setting : settings_table()) {
+    const auto dot = setting.key.find('.');
+    auto& section = sections[std::string(setting.key.substr(0, dot))];
+    if (section.is_null()) {
+      section["type"] = "object";
+      section["additionalProperties"] = false;
+      section["properties"] = ordered_json::object();
+    }
+    ordered_json entry;
+    entry["description"] =
+        std::string(setting.help) + (setting.unit.empty() ? "" : " [" + std::string(setting.unit) + "]");
+    const auto number = [](double bound) {
+      return bound == static_cast<double>(static_cast<std::int64_t>(bound))
+                 ? ordered_json(static_cast<std::int64_t>(bound))
+                 : ordered_json(bound);
+    };
+    switch (setting.type) {
+      case Setting::Type::text:
+        entry["type"] = "string";
+        entry["default"] = setting.default_value;
+        break;
+      case Setting::Type::choice:
+        entry["enum"] = std::vector<std::string>(setting.choices.begin(), setting.choices.end());
+        entry["default"] = setting.default_value;
+        break;
+      case Setting::Type::boolean:
+        entry["type"] = "boolean";
+        entry["default"] = setting.default_value == "true";
+        break;
+      case Setting::Type::integer:
+      case Setting::Type::number:
+        entry["type"] = setting.type == Setting::Type::integer ? "integer" : "number";
+        entry["default"] = number(parse_number<double>(setting.default_value).value());
+        entry["minimum"] = number(setting.minimum);
+        entry["maximum"] = number(setting.maximum);
+        break;
+    }
+    section["properties"][std::string(setting.key.substr(dot + 1))] = std::move(entry);
+  }
+  ordered_json schema;
+  schema["$schema"] = "https://json-schema.org/draft/2020-12/schema";
+  schema["$id"] = "https://joulecast.invalid/schemas/config.schema.json";
+  schema["title"] = "Settings file of joulecastd";
+  schema["type"] = "object";
+  schema["additionalProperties"] = false;
+  schema["properties"] = std::move(sections);
+  return schema.dump(2) + "\n";
+}
+
+std::optional<std::string> nearest(std::string_view word, const std::vector<std::string>& candidates) {
+  std::optional<std::string> best;
+  std::size_t best_edits = std::max<std::size_t>(2, word.size() / 3) + 1;
+  for (const std::string& candidate : candidates) {
+    // Levenshtein distance, one row at a time.
+    std::vector<std::size_t> row(candidate.size() + 1);
+    for (std::size_t j = 0; j < row.size(); ++j) row[j] = j;
+    for (std::size_t i = 1; i <= word.size(); ++i) {
+      std::size_t diagonal = std::exchange(row[0], i);
+      for (std::size_t j = 1; j < row.size(); ++j) {
+        const std::size_t substituted = diagonal + (word[i - 1] == candidate[j - 1] ? 0U : 1U);
+        diagonal = row[j];
+        row[j] = std::min({substituted, row[j] + 1, row[j - 1] + 1});
+      }
+    }
+    if (row.back() < best_edits) {
+      best_edits = row.back();
+      best = candidate;
+    }
+  }
+  return best;
+}
+
+}  // namespace joulecast

@@ -1,0 +1,71 @@
+#include "server/settings.h"
+
+namespace joulecast {
+namespace {
+
+using Type = Setting::Type;
+constexpr std::string_view log_formats[] = {"text", "json"};
+constexpr std::string_view log_levels[] = {"debug", "info", "warning", "error"};
+constexpr double megabyte = 1024.0 * 1024.0;
+
+// key, type, default, minimum, maximum, unit, help
+constexpr Setting table[] = {
+    {"lcm.url", Type::text, "udpm://239.255.76.67:7667?ttl=0", 0, 0, "",
+     "LCM provider; ttl=0 keeps the unauthenticated messages on this machine"},
+
+    {"http.address", Type::text, "127.0.0.1", 0, 0, "", "IP address to listen on"},
+    {"http.port", Type::integer, "8080", 0, 65535, "", "port to listen on; 0 lets the system choose"},
+    {"http.worker_threads", Type::integer, "2", 1, 64, "",
+     "threads for requests that compute or read the store"},
+    {"http.worker_queue", Type::integer, "256", 1, 65536, "",
+     "requests that may wait for a worker; beyond: 503"},
+    {"http.max_connections", Type::integer, "1024", 1, 100000, "", "connections open at once; beyond: 503"},
+    {"http.max_header_bytes", Type::integer, "16384", 1024, 1048576, "B",
+     "request line and headers; beyond: 431"},
+    {"http.max_body_bytes", Type::integer, "4194304", 1024, 256 * megabyte, "B", "request body; beyond: 413"},
+    {"http.read_timeout_s", Type::number, "10", 0.1, 3600, "s", "from a request's first byte to its last"},
+    {"http.write_timeout_s", Type::number, "30", 0.1, 3600, "s", "without progress of an answer"},
+    {"http.idle_timeout_s", Type::number, "60", 0.1, 86400, "s", "between the requests of a connection"},
+    {"http.stop_deadline_s", Type::number, "5", 0, 600, "s", "patience with running requests when stopping"},
+    {"http.event_queue_bytes", Type::integer, "262144", 4096, 64 * megabyte, "B",
+     "unsent events a client of the event stream may have before it is dropped"},
+    {"http.event_streams", Type::integer, "256", 1, 100000, "",
+     "clients of the event stream at once; beyond: 503"},
+    {"http.web_directory", Type::text, "", 0, 0, "",
+     "serve the operator page from this directory; empty: the page built in"},
+
+    {"store.path", Type::text, "joulecast.db", 0, 0, "", "SQLite file of the history"},
+    {"store.retention_days", Type::number, "30", 0, 36500, "d",
+     "age at which raw telemetry is deleted; 0: never"},
+    {"store.retention_bytes", Type::integer, "10737418240", 0, 1e15, "B",
+     "size of raw telemetry beyond which the oldest is deleted; 0: no limit"},
+
+    {"ingest.queue_messages", Type::integer, "200000", 1000, 1e8, "",
+     "received messages that may wait to be accounted; beyond: dropped and counted"},
+    {"ingest.gap_bridge_s", Type::number, "2", 0, 3600, "s",
+     "longest silence bridged by interpolation; a longer one marks the mission incomplete"},
+    {"ingest.mission_idle_timeout_s", Type::number, "300", 1, 86400, "s",
+     "silence after which an unfinished mission is closed as abandoned"},
+    {"ingest.implicit_missions", Type::boolean, "true", 0, 0, "",
+     "open a mission for a robot that sends telemetry without having announced one"},
+    {"ingest.max_robots", Type::integer, "1000", 1, 1000000, "",
+     "robots followed at once; further ones are counted"},
+
+    {"robots.directory", Type::text, "", 0, 0, "", "robot files (*.json) loaded at start; empty: none"},
+    {"energy_state.period_s", Type::number, "1", 0.05, 3600, "s",
+     "period of each robot's energy state on LCM"},
+    {"meter.tolerance", Type::number, "1e-4", 1e-9, 1e-2, "",
+     "local error of the energy integration, as a fraction of the energy between two samples"},
+
+    {"log.format", Type::choice, "text", 0, 0, "", "one JSON object a line, or text for a terminal",
+     log_formats},
+    {"log.level", Type::choice, "info", 0, 0, "", "least level that is written", log_levels},
+};
+
+}  // namespace
+
+std::span<const Setting> settings_table() {
+  return table;
+}
+
+}  // namespace joulecast
