@@ -1,0 +1,248 @@
+#include "telemetry/codec.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <joulecast/energy_state_t.hpp>
+#include <joulecast/mission_event_t.hpp>
+#include <joulecast/robot_telemetry_t.hpp>
+#include <limits>
+
+#include "samples.h"
+
+namespace joulecast::telemetry {
+namespace {
+
+using test::distinct_sample;
+using test::same_bits;
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr std::size_t telemetry_text =
+    24;  // fingerprint, utime and sequence come before the robot id's length
+
+Bytes telemetry_bytes() {
+  return encode_telemetry("amr-07", distinct_sample()).value();
+}
+
+Bytes mission_bytes() {
+  return encode_mission_event("amr-07", {5, "m-1", MissionPhase::finished, 3.5, "über die Rampe"}).value();
+}
+
+Bytes state_bytes() {
+  EnergyState state;
+  state.robot_id = "amr-07";
+  state.mission_id = "m-1";
+  state.range_m = 1200;
+  return encode_energy_state(state).value();
+}
+
+void put_length(Bytes& bytes, std::size_t at, std::uint32_t length) {
+  for (std::size_t i = 0; i < 4; ++i) bytes[at + i] = static_cast<std::uint8_t>(length >> (24 - 8 * i));
+}
+
+template <class Message>
+Message generated_decode(const Bytes& bytes) {
+  Message message;
+  EXPECT_EQ(message.decode(bytes.data(), 0, static_cast<int>(bytes.size())), static_cast<int>(bytes.size()));
+  return message;
+}
+
+TEST(Codec, TelemetryReachesTheGeneratedClassFieldByField) {
+  const Sample s = distinct_sample();
+  const auto m = generated_decode<robot_telemetry_t>(telemetry_bytes());
+  EXPECT_EQ(m.utime, s.utime_us);
+  EXPECT_EQ(m.sequence, s.sequence);
+  EXPECT_EQ(m.robot_id, "amr-07");
+  EXPECT_THAT(m.wheel_velocity, testing::ElementsAre(1.25, -2.5));
+  EXPECT_THAT(m.motor_voltage, testing::ElementsAre(3, 4));
+  EXPECT_THAT(m.motor_current, testing::ElementsAre(5, 6));
+  EXPECT_EQ(m.battery_voltage, 24.5);
+  EXPECT_EQ(m.battery_current, -7);
+  EXPECT_THAT(m.velocity_command, testing::ElementsAre(0.75, -0.125));
+  EXPECT_EQ(m.yaw_rate, 0.375);
+  EXPECT_THAT(m.pitch, testing::IsNan());
+  EXPECT_THAT(m.pose, testing::ElementsAre(10, -11, 2));
+  EXPECT_EQ(m.motor_temperature[0], 55);
+  EXPECT_EQ(m.payload_mass, 12.5);
+}
+
+TEST(Codec, TelemetryRoundTripKeepsEveryBit) {
+  const auto decoded = decode_telemetry(telemetry_bytes());
+  ASSERT_TRUE(decoded) << describe(decoded.error());
+  EXPECT_EQ(decoded->robot_id, "amr-07");
+  EXPECT_TRUE(same_bits(decoded->sample, distinct_sample()));
+}
+
+TEST(Codec, MissionEventRoundTrip) {
+  const auto m = generated_decode<mission_event_t>(mission_bytes());
+  EXPECT_EQ(int{m.event}, int{mission_event_t::FINISHED});
+  const auto decoded = decode_mission_event(mission_bytes());
+  ASSERT_TRUE(decoded) << describe(decoded.error());
+  EXPECT_EQ(decoded->robot_id, "amr-07");
+  EXPECT_EQ(decoded->event.utime_us, 5);
+  EXPECT_EQ(decoded->event.mission_id, "m-1");
+  EXPECT_EQ(decoded->event.phase, MissionPhase::finished);
+  EXPECT_EQ(decoded->event.payload_kg, 3.5);
+  EXPECT_EQ(decoded->event.note, "über die Rampe");
+}
+
+TEST(Codec, EnergyStateRoundTrip) {
+  EnergyState state{7, "amr-07", "", 3, 1, 2, 3, 4, 5, 6, 0.5, 8, 9, {10, 11}};
+  const auto bytes = encode_energy_state(state);
+  ASSERT_TRUE(bytes);
+  const auto m = generated_decode<energy_state_t>(*bytes);
+  EXPECT_EQ(m.recovered_energy, 6);
+  EXPECT_EQ(m.winding_temperature[1], 11);
+  const auto decoded = decode_energy_state(*bytes);
+  ASSERT_TRUE(decoded) << describe(decoded.error());
+  EXPECT_EQ(decoded->utime_us, 7);
+  EXPECT_EQ(decoded->mission_id, "");
+  EXPECT_EQ(decoded->model_version, 3);
+  EXPECT_EQ(decoded->measured_power_w, 1);
+  EXPECT_EQ(decoded->modelled_power_w, 2);
+  EXPECT_EQ(decoded->measured_energy_j, 3);
+  EXPECT_EQ(decoded->modelled_energy_j, 4);
+  EXPECT_EQ(decoded->unexplained_energy_j, 5);
+  EXPECT_EQ(decoded->recovered_energy_j, 6);
+  EXPECT_EQ(decoded->state_of_charge, 0.5);
+  EXPECT_EQ(decoded->range_m, 8);
+  EXPECT_EQ(decoded->run_time_s, 9);
+  EXPECT_EQ(decoded->winding_temperature_c, (std::array<double, 2>{10, 11}));
+}
+
+// Every proper prefix, every message with bytes after it, and every single type mix-up is refused.
+template <class Decode>
+void expect_exact_size(const Bytes& whole, Decode decode) {
+  ASSERT_TRUE(decode(whole));
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    const Bytes part(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
+    const auto decoded = decode(part);
+    ASSERT_FALSE(decoded) << "a prefix of " << size << " bytes was accepted";
+    EXPECT_EQ(decoded.error().fault, Fault::corrupt);
+  }
+  Bytes longer = whole;
+  longer.push_back(0);
+  EXPECT_FALSE(decode(longer));
+}
+
+TEST(Codec, RefusesEveryTruncation) {
+  expect_exact_size(telemetry_bytes(), [](const Bytes& b) { return decode_telemetry(b); });
+  expect_exact_size(mission_bytes(), [](const Bytes& b) { return decode_mission_event(b); });
+  expect_exact_size(state_bytes(), [](const Bytes& b) { return decode_energy_state(b); });
+}
+
+TEST(Codec, RefusesAnotherType) {
+  EXPECT_EQ(decode_telemetry(mission_bytes()).error().field, "fingerprint");
+  EXPECT_EQ(decode_mission_event(telemetry_bytes()).error().field, "fingerprint");
+  EXPECT_EQ(decode_energy_state(mission_bytes()).error().field, "fingerprint");
+}
+
+TEST(Codec, RefusesHostileLengths) {
+  for (const std::uint32_t length : {0u, 1u, 6u, 8u, 100u, 0x7FFFFFFFu, 0x80000000u, 0xFFFFFFFFu}) {
+    Bytes bytes = telemetry_bytes();
+    put_length(bytes, telemetry_text, length);
+    const auto decoded = decode_telemetry(bytes);
+    ASSERT_FALSE(decoded) << length;
+    EXPECT_EQ(decoded.error().fault, Fault::corrupt);
+    EXPECT_EQ(decoded.error().field, "robot_id");
+  }
+}
+
+TEST(Codec, RefusesStringsWithoutTerminator) {
+  Bytes bytes = telemetry_bytes();
+  bytes[telemetry_text + 4 + 6] = 'x';
+  EXPECT_EQ(decode_telemetry(bytes).error().field, "robot_id");
+}
+
+TEST(Codec, RefusesIdsThatCannotTravel) {
+  for (const char bad : {'\0', '/', ' ', '\n', '\x80', '*'}) {
+    Bytes bytes = telemetry_bytes();
+    bytes[telemetry_text + 4 + 2] = static_cast<std::uint8_t>(bad);
+    EXPECT_FALSE(decode_telemetry(bytes)) << static_cast<int>(bad);
+  }
+  EXPECT_TRUE(is_valid_robot_id(std::string(max_robot_id_length, 'a')));
+  EXPECT_FALSE(is_valid_robot_id(std::string(max_robot_id_length + 1, 'a')));
+  EXPECT_FALSE(is_valid_robot_id(""));
+  EXPECT_EQ(encode_telemetry("a b", {}).error().field, "robot_id");
+  EXPECT_EQ(encode_mission_event("a", {0, "", MissionPhase::started, 0, ""}).error().field, "mission_id");
+  EXPECT_EQ(encode_mission_event("a", {0, "m", MissionPhase::started, 0, "\xC0\xAF"}).error().field, "note");
+}
+
+TEST(Codec, RefusesUnknownPhasesAndBadNotes) {
+  const std::size_t phase_at = 8 + 8 + (4 + 7) + (4 + 4);
+  for (const int phase : {0, 4, 127, 128, 255}) {
+    Bytes bytes = mission_bytes();
+    bytes[phase_at] = static_cast<std::uint8_t>(phase);
+    EXPECT_EQ(decode_mission_event(bytes).error().field, "event") << phase;
+  }
+  Bytes bytes = mission_bytes();
+  bytes[bytes.size() - 3] = 0xFF;
+  EXPECT_EQ(decode_mission_event(bytes).error().field, "note");
+}
+
+TEST(Codec, SurvivesAnyByteChange) {
+  // Whatever one byte becomes, the message is refused or decodes to something that encodes to the same bytes.
+  const Bytes whole = mission_bytes();
+  for (std::size_t at = 0; at < whole.size(); ++at) {
+    for (int value = 0; value < 256; ++value) {
+      Bytes bytes = whole;
+      bytes[at] = static_cast<std::uint8_t>(value);
+      const auto decoded = decode_mission_event(bytes);
+      if (!decoded) continue;
+      const auto again = encode_mission_event(decoded->robot_id, decoded->event);
+      ASSERT_TRUE(again);
+      EXPECT_EQ(*again, bytes) << "byte " << at << " = " << value;
+    }
+  }
+}
+
+TEST(Codec, AnySampleSurvives) {
+  EXPECT_TRUE(rc::check([] {
+    Sample s;
+    s.utime_us = *rc::gen::arbitrary<std::int64_t>();
+    s.sequence = *rc::gen::arbitrary<std::int64_t>();
+    const auto real = [] { return std::bit_cast<double>(*rc::gen::arbitrary<std::uint64_t>()); };
+    s.wheel_velocity_rad_s = {real(), real()};
+    s.motor_current_a = {real(), real()};
+    s.pose = {real(), real(), real()};
+    s.payload_kg = real();
+    const auto id = *rc::gen::resize(
+        40, rc::gen::nonEmpty(rc::gen::container<std::string>(rc::gen::elementOf(std::string("azAZ09._-")))));
+    const auto bytes = encode_telemetry(id, s);
+    RC_ASSERT(bytes.has_value());
+    const auto decoded = decode_telemetry(*bytes);
+    RC_ASSERT(decoded.has_value());
+    RC_ASSERT(decoded->robot_id == id);
+    RC_ASSERT(same_bits(decoded->sample, s));
+  }));
+}
+
+TEST(Codec, ArbitraryBytesAreRefusedOrExact) {
+  EXPECT_TRUE(rc::check([](Bytes tail) {
+    Bytes bytes = telemetry_bytes();
+    bytes.resize(telemetry_text);
+    bytes.insert(bytes.end(), tail.begin(), tail.end());
+    const auto decoded = decode_telemetry(bytes);
+    if (decoded.has_value()) RC_ASSERT(encode_telemetry(decoded->robot_id, decoded->sample).value() == bytes);
+  }));
+}
+
+TEST(Channel, NamesAndBack) {
+  for (const Subject subject : {Subject::telemetry, Subject::mission_event, Subject::energy_state}) {
+    const std::string channel = channel_of(subject, "r2.d2_x-1");
+    const auto parsed = parse_channel(channel);
+    ASSERT_TRUE(parsed);
+    EXPECT_EQ(parsed->subject, subject);
+    EXPECT_EQ(parsed->robot_id, "r2.d2_x-1");
+  }
+  EXPECT_EQ(channel_of(Subject::telemetry, "a"), "ROBOT_TELEMETRY.a");
+  EXPECT_FALSE(parse_channel("ROBOT_TELEMETRY."));
+  EXPECT_FALSE(parse_channel("ROBOT_TELEMETRY.a b"));
+  EXPECT_FALSE(parse_channel("ROBOT_TELEMETRYxa"));
+  EXPECT_FALSE(parse_channel("OTHER.a"));
+  EXPECT_FALSE(parse_channel(""));
+}
+
+}  // namespace
+}  // namespace joulecast::telemetry

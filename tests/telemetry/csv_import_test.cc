@@ -1,0 +1,245 @@
+#include "telemetry/csv_import.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace joulecast::telemetry {
+namespace {
+
+using testing::HasSubstr;
+
+// A mapping around the given members; wheels from columns r and l unless `fields` says otherwise.
+std::string mapping_text(const std::string& members, const std::string& fields = "") {
+  return R"({"robot_id": "r", "mission_id": "m", "time": {"column": "t", "unit": "s"},)" + members +
+         R"("fields": {"wheel_velocity": [{"column": "r"}, {"column": "l"}])" + fields + "}}";
+}
+
+ImportMapping mapping_of(const std::string& members, const std::string& fields = "") {
+  auto mapping = ImportMapping::parse(mapping_text(members, fields));
+  EXPECT_TRUE(mapping) << describe(mapping.error());
+  return mapping.value();
+}
+
+std::vector<double> battery_voltages(const std::string& csv, const std::string& members,
+                                     const std::string& field) {
+  auto import = import_csv(csv, mapping_of(members, R"(, "battery_voltage": )" + field));
+  EXPECT_TRUE(import) << describe(import.error());
+  std::vector<double> values;
+  if (import) {
+    for (const Sample& sample : import->recording.samples) values.push_back(sample.battery_voltage_v);
+  }
+  return values;
+}
+
+std::string mapping_fault(const std::string& json) {
+  const auto mapping = ImportMapping::parse(json);
+  return mapping ? "accepted" : mapping.error().field;
+}
+
+TEST(CsvImport, TimesSequencesAndNames) {
+  const auto import =
+      import_csv("t,r,l\n0.5,1,2\n0.75,3,4\n", mapping_of(R"("payload_kg": 5, )"),
+                 {.source_name = "x.csv", .robot_id = {}, .mission_id = {}, .start_utime_us = {}});
+  ASSERT_TRUE(import) << describe(import.error());
+  const Recording& recording = import->recording;
+  EXPECT_EQ(recording.robot_id, "r");
+  EXPECT_EQ(recording.mission_id, "m");
+  EXPECT_EQ(recording.payload_kg, 5);
+  ASSERT_EQ(recording.samples.size(), 2u);
+  EXPECT_EQ(recording.samples[0].utime_us, 500'000);
+  EXPECT_EQ(recording.samples[1].utime_us, 750'000);
+  EXPECT_EQ(recording.samples[1].sequence, 1);
+  EXPECT_EQ(recording.samples[1].wheel_velocity_rad_s, (std::array<double, 2>{3, 4}));
+  EXPECT_EQ(recording.samples[1].payload_kg, 5);
+  EXPECT_TRUE(std::isnan(recording.samples[1].battery_voltage_v));
+}
+
+TEST(CsvImport, CallerNamesAndStart) {
+  ImportOptions options{"data/ICE/run_1.csv", "robot-9", "{folder}-{stem}", 1'700'000'000'000'000};
+  const auto import = import_csv("t,r,l\n7,1,2\n8,3,4\n", mapping_of(""), options);
+  ASSERT_TRUE(import) << describe(import.error());
+  EXPECT_EQ(import->recording.robot_id, "robot-9");
+  EXPECT_EQ(import->recording.mission_id, "ICE-run_1");
+  EXPECT_EQ(import->recording.samples[0].utime_us, 1'700'000'000'000'000);
+  EXPECT_EQ(import->recording.samples[1].utime_us, 1'700'000'001'000'000);
+  options.mission_id = "no/such/id";
+  EXPECT_EQ(import_csv("t,r,l\n7,1,2\n", mapping_of(""), options).error().field, "mission_id");
+}
+
+TEST(CsvImport, NanosecondsStayExact) {
+  const auto mapping = ImportMapping::parse(R"({"robot_id": "r", "mission_id": "m",
+      "time": {"column": "t", "unit": "ns"}, "fields": {"wheel_velocity": [{"column": "r"}, {"column": "l"}]}})");
+  const auto import = import_csv("t,r,l\n1721335045320405150,1,2\n", *mapping);
+  ASSERT_TRUE(import) << describe(import.error());
+  EXPECT_EQ(import->recording.samples[0].utime_us, 1'721'335'045'320'405);
+}
+
+TEST(CsvImport, EmptyCellsHoldOrAreUnmeasured) {
+  const std::string csv = "t,r,l,v\n0,1,1,\n1,1,1,5\n2,1,1,\n";
+  EXPECT_THAT(battery_voltages(csv, "", R"({"column": "v"})"), testing::ElementsAre(testing::IsNan(), 5, 5));
+  EXPECT_THAT(battery_voltages(csv, R"("empty_cells": "unmeasured", )", R"({"column": "v"})"),
+              testing::ElementsAre(testing::IsNan(), 5, testing::IsNan()));
+}
+
+TEST(CsvImport, RowsBeforeBothWheelsAreKnownGiveNoSample) {
+  const auto import = import_csv("t,r,l\n0,1,\n1,,\n2,,3\n3,2,\n", mapping_of(""));
+  ASSERT_TRUE(import);
+  EXPECT_EQ(import->report.rows, 4u);
+  EXPECT_EQ(import->report.rows_without_motion, 2u);
+  EXPECT_EQ(import->report.samples, 2u);
+  EXPECT_EQ(import->recording.samples[0].utime_us, 2'000'000);
+  EXPECT_EQ(import->recording.samples[0].sequence, 0);
+  // Row 2 repeats r; row 3 repeats r; row 4 repeats l.
+  EXPECT_EQ(import->report.cells_filled, 3u);
+}
+
+TEST(CsvImport, RowsThatDoNotAdvanceTimeAreCounted) {
+  const auto import = import_csv("t,r,l\n1,1,1\n1,2,2\n0.5,3,3\n2,4,4\n", mapping_of(""));
+  ASSERT_TRUE(import);
+  EXPECT_EQ(import->report.rows_out_of_time, 2u);
+  EXPECT_EQ(import->recording.samples[1].wheel_velocity_rad_s[0], 4);
+}
+
+TEST(CsvImport, ExpressionsInTheirOrder) {
+  const std::string csv = "t,r,l,a,b\n0,1,1,3,-7\n";
+  const std::pair<const char*, double> cases[] = {
+      {R"({"column": "a"})", 3},
+      {R"({"columns": ["a", "b"]})", -4},
+      {R"({"columns": ["a", {"column": "b", "negate": true}]})", 10},
+      {R"({"columns": ["a", "b"], "combine": "mean"})", -2},
+      {R"({"columns": ["a", "b"], "abs": true})", 4},
+      {R"({"columns": ["a", "b"], "abs": true, "negate": true, "scale": 6, "divide_by": 4, "offset": 1})",
+       -5},
+      {R"({"column": "a", "sign_from": ["b"]})", -3},
+      {R"({"column": "b", "abs": true, "sign_from": ["b"]})", -7},
+      {R"({"column": "a", "sign_from": [{"column": "b", "negate": true}]})", 3},
+      {R"({"constant": 24})", 24},
+      {R"({"constant": 24, "sign_from": ["b"]})", -24},
+      {R"({"column": "a", "limits": {"high": 2, "outside": "clamp"}})", 2},
+      {R"({"column": "b", "limits": {"low": -5, "outside": "clamp"}})", -5},
+  };
+  for (const auto& [expression, expected] : cases) {
+    EXPECT_THAT(battery_voltages(csv, "", expression), testing::ElementsAre(expected)) << expression;
+  }
+}
+
+TEST(CsvImport, SignComesFromTheFirstReferenceThatHasOne) {
+  EXPECT_THAT(battery_voltages("t,r,l,a,s,u\n0,1,1,5,0,-2\n1,1,1,5,0,0\n2,1,1,5,3,-2\n3,1,1,5,nan,-1\n", "",
+                               R"({"column": "a", "sign_from": ["s", "u"]})"),
+              testing::ElementsAre(-5, 5, 5, -5));
+}
+
+TEST(CsvImport, YawOfAQuaternion) {
+  const double angle = 2.5;
+  const std::string csv = "t,r,l,x,y,z,w\n0,1,1,0,0," + std::to_string(std::sin(angle / 2)) + "," +
+                          std::to_string(std::cos(angle / 2)) + "\n";
+  const auto import =
+      import_csv(csv, mapping_of("", R"(, "pose": [null, null, {"quaternion_yaw": ["x", "y", "z", "w"]}])"));
+  ASSERT_TRUE(import);
+  // std::to_string prints six decimals: each half-angle component is off by 5e-7 at most, the angle by twice
+  // their sum.
+  EXPECT_NEAR(import->recording.samples[0].pose[2], angle, 2e-6);
+  EXPECT_TRUE(std::isnan(import->recording.samples[0].pose[0]));
+}
+
+TEST(CsvImport, GlitchesFollowTheirPolicyAndAreReported) {
+  const std::string csv = "t,r,l,v\n0,1,1,5\n1,1,1,-62.7\n2,1,1,6\n";
+  const auto limited = [](const std::string& policy) {
+    return R"("column_limits": {"v": {"low": 0, "high": 50, "outside": ")" + policy + R"("}}, )";
+  };
+  const std::string field = R"({"column": "v"})";
+  EXPECT_THAT(battery_voltages(csv, limited("hold"), field), testing::ElementsAre(5, 5, 6));
+  EXPECT_THAT(battery_voltages(csv, limited("clamp"), field), testing::ElementsAre(5, 0, 6));
+  EXPECT_THAT(battery_voltages(csv, limited("unmeasured"), field),
+              testing::ElementsAre(5, testing::IsNan(), 6));
+  EXPECT_THAT(battery_voltages(csv, limited("drop_row"), field), testing::ElementsAre(5, 6));
+
+  const auto import =
+      import_csv(csv, mapping_of(limited("drop_row"), R"(, "battery_voltage": {"column": "v"})"));
+  ASSERT_TRUE(import);
+  EXPECT_EQ(import->report.rows_glitched, 1u);
+  ASSERT_EQ(import->report.glitches.size(), 1u);
+  EXPECT_EQ(import->report.glitches[0].line, 3u);
+  EXPECT_EQ(import->report.glitches[0].column, "v");
+  EXPECT_EQ(import->report.glitches[0].value, -62.7);
+  EXPECT_EQ(import->report.glitches[0].action, "drop_row");
+}
+
+TEST(CsvImport, InfinityIsAGlitchOfAnyColumn) {
+  const std::string csv = "t,r,l,v\n0,1,1,inf\n";
+  const auto import = import_csv(csv, mapping_of("", R"(, "battery_voltage": {"column": "v"})"));
+  ASSERT_TRUE(import);
+  EXPECT_TRUE(std::isnan(import->recording.samples[0].battery_voltage_v));
+  EXPECT_EQ(import->report.glitches.size(), 1u);
+}
+
+TEST(CsvImport, PrefixIsTriedAfterThePlainName) {
+  const auto import = import_csv("t,p/r,p/l,l\n0,1,2,3\n", mapping_of(R"("column_prefix": "p/", )"));
+  ASSERT_TRUE(import) << describe(import.error());
+  EXPECT_EQ(import->recording.samples[0].wheel_velocity_rad_s, (std::array<double, 2>{1, 3}));
+}
+
+TEST(CsvImport, TableThatDoesNotMeetARequirementIsRefused) {
+  const ImportMapping mapping = mapping_of(R"("require": {"gear": "high"}, )");
+  EXPECT_TRUE(import_csv("t,r,l,gear\n0,1,1,\n1,1,1,high\n", mapping));
+  const auto refused = import_csv("t,r,l,gear\n0,1,1,high\n1,1,1,low\n", mapping, {"x.csv", {}, {}, {}});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().field, "x.csv: line 3");
+  EXPECT_THAT(refused.error().message, HasSubstr("gear"));
+}
+
+TEST(CsvImport, BadCellsNameLineColumnAndText) {
+  const ImportOptions options{"x.csv", {}, {}, {}};
+  const auto import = import_csv("t,r,l\n0,1,1\n1,1,fast\n", mapping_of(""), options);
+  ASSERT_FALSE(import);
+  EXPECT_EQ(import.error().field, "x.csv: line 3");
+  EXPECT_EQ(import.error().message, "column 'l': 'fast' is no number");
+  EXPECT_THAT(import_csv("t,r,l\nnoon,1,1\n", mapping_of("")).error().message, HasSubstr("is no time"));
+  EXPECT_THAT(import_csv("t,r,l\n,1,1\n", mapping_of("")).error().message, HasSubstr("is no time"));
+  EXPECT_THAT(import_csv("t,r,l\n-1,1,1\n", mapping_of("")).error().message, HasSubstr("1970"));
+  EXPECT_THAT(import_csv("t,r,l\n9223372036854775807,1,1\n", mapping_of("")).error().message,
+              HasSubstr("no time"));
+  EXPECT_THAT(import_csv("t,r\n0,1\n", mapping_of("")).error().message, HasSubstr("'l' is missing"));
+  EXPECT_THAT(import_csv("t,r,l\n0,,\n", mapping_of("")).error().message, HasSubstr("none of 1 rows"));
+}
+
+TEST(ImportMapping, FaultsPointToTheMember) {
+  EXPECT_EQ(mapping_fault("{"), "");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("robt_id": 1, )")), "/robt_id");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("payload_kg": -1, )")), "/payload_kg");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("separator": ",,", )")), "/separator");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("empty_cells": "guess", )")), "/empty_cells");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("require": [], )")), "/require");
+  EXPECT_EQ(
+      mapping_fault(mapping_text(R"("column_limits": {"r": {"low": 2, "high": 1, "outside": "hold"}}, )")),
+      "/column_limits/r");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("column_limits": {"r": {"low": 2}}, )")),
+            "/column_limits/r/outside");
+  EXPECT_EQ(mapping_fault(mapping_text("", R"(, "speed": {"column": "r"})")), "/fields/speed");
+  EXPECT_EQ(mapping_fault(mapping_text("", R"(, "pose": [null])")), "/fields/pose");
+  EXPECT_EQ(mapping_fault(mapping_text("", R"(, "pitch": {})")), "/fields/pitch");
+  EXPECT_EQ(mapping_fault(mapping_text("", R"(, "pitch": {"column": "a", "constant": 1})")), "/fields/pitch");
+  EXPECT_EQ(mapping_fault(mapping_text("", R"(, "pitch": {"column": "a", "divide_by": 0})")),
+            "/fields/pitch/divide_by");
+  EXPECT_EQ(mapping_fault(mapping_text("", R"(, "pitch": {"column": "a", "limits": {"outside": "hold"}})")),
+            "/fields/pitch/limits/outside");
+  EXPECT_EQ(mapping_fault(mapping_text("", R"(, "pose": [null, null, {"quaternion_yaw": ["x"]}])")),
+            "/fields/pose/2/quaternion_yaw");
+  EXPECT_EQ(mapping_fault(R"({"robot_id": "a b", "time": {"column": "t", "unit": "s"}, "fields": {}})"),
+            "/robot_id");
+  EXPECT_EQ(mapping_fault(R"({"robot_id": "a", "time": {"column": "t", "unit": "h"}, "fields": {}})"),
+            "/time/unit");
+  EXPECT_EQ(mapping_fault(R"({"robot_id": "a", "time": {"column": "t", "unit": "s"}, "fields": {}})"),
+            "/fields/wheel_velocity");
+}
+
+TEST(ImportMapping, LimitsOfAColumnThatNothingUsesAreAMistake) {
+  const ImportMapping mapping = mapping_of(R"("column_limits": {"v": {"low": 0, "outside": "hold"}}, )");
+  EXPECT_EQ(import_csv("t,r,l,v\n0,1,1,1\n", mapping).error().field, "/column_limits/v");
+}
+
+}  // namespace
+}  // namespace joulecast::telemetry

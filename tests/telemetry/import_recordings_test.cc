@@ -1,0 +1,223 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "telemetry/codec.h"
+#include "telemetry/csv_import.h"
+#include "telemetry/csv_table.h"
+#include "telemetry/validation.h"
+#include "temporary_file.h"
+
+// The shipped mapping files on the recordings they were written for.
+namespace joulecast::telemetry {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path real_data = JOULECAST_SHARED "/data/real";
+const std::string frc_prefix = "network_table:///SmartDashboard/";
+
+ImportMapping shipped(const std::string& name) {
+  auto mapping =
+      ImportMapping::parse(test::read_text(fs::path(JOULECAST_SOURCE_DIR "/deploy/import") / name));
+  EXPECT_TRUE(mapping) << describe(mapping.error());
+  return mapping.value();
+}
+
+Result<Import> import_file(const fs::path& path, const std::string& mapping) {
+  ImportOptions options;
+  options.source_name = path.string();
+  options.start_utime_us = 1'700'000'000'000'000;
+  return import_csv(test::read_text(path), shipped(mapping), options);
+}
+
+std::vector<fs::path> tables_in(const fs::path& folder) {
+  std::vector<fs::path> found;
+  std::error_code none;
+  for (const auto& entry : fs::recursive_directory_iterator(folder, none)) {
+    if (entry.path().extension() == ".csv") found.push_back(entry.path());
+  }
+  return found;
+}
+
+// Column `name` of a table with empty cells filled from above, as numbers.
+std::vector<double> column(const std::string& csv, const std::string& name) {
+  CsvTable table = CsvTable::open(csv, ',').value();
+  const std::size_t place = table.find(name).value();
+  std::vector<double> values;
+  std::vector<std::string_view> row;
+  double held = unmeasured;
+  while (table.next(row).value()) {
+    if (!row[place].empty()) held = std::stod(std::string(row[place]));
+    values.push_back(held);
+  }
+  return values;
+}
+
+TEST(ShippedMappings, EveryOneParses) {
+  for (const auto& entry : fs::directory_iterator(JOULECAST_SOURCE_DIR "/deploy/import")) {
+    EXPECT_TRUE(ImportMapping::parse(test::read_text(entry.path()))) << entry.path();
+  }
+}
+
+TEST(ImportFrc3314, EveryRecordingGivesOneMissionWithPlausibleSamples) {
+  const auto tables = tables_in(real_data / "frc3314_drivetrain");
+  if (tables.empty()) GTEST_SKIP() << "the frc3314_drivetrain recordings are not beside the project";
+  for (const fs::path& path : tables) {
+    SCOPED_TRACE(path.filename().string());
+    const bool high = path.stem().string().ends_with("high");
+    const auto import = import_file(path, high ? "frc3314_high.json" : "frc3314_low.json");
+    ASSERT_TRUE(import) << describe(import.error());
+    EXPECT_EQ(import->recording.robot_id, high ? "frc3314-high" : "frc3314-low");
+    EXPECT_EQ(import->recording.mission_id, path.stem().string());
+    EXPECT_EQ(import->report.samples, import->report.rows);
+    for (const Sample& sample : import->recording.samples) {
+      const auto fault = check_plausible(sample);
+      ASSERT_FALSE(fault) << describe(*fault);
+      EXPECT_TRUE(std::isnan(sample.battery_voltage_v));
+      EXPECT_TRUE(std::isnan(sample.battery_current_a));
+    }
+    EXPECT_FALSE(import_file(path, high ? "frc3314_low.json" : "frc3314_high.json"))
+        << "the wrong gear was accepted";
+  }
+}
+
+// The velocity that the mapping makes of "Speed Inches" against positions that it does not use: the encoder's
+// ticks, 42 to a motor revolution, and the revolution's travel of the recordings' notes. Both sides must roll
+// the same way.
+TEST(ImportFrc3314, IntegratedWheelSpeedMeetsTheEncoderTicks) {
+  const auto tables = tables_in(real_data / "frc3314_drivetrain");
+  if (tables.empty()) GTEST_SKIP() << "the frc3314_drivetrain recordings are not beside the project";
+  constexpr double wheel_radius_in = 6.125 / 2;
+  for (const fs::path& path : tables) {
+    SCOPED_TRACE(path.filename().string());
+    const bool high = path.stem().string().ends_with("high");
+    const bool forward = path.stem().string().find("forward") != std::string::npos;
+    const auto import = import_file(path, high ? "frc3314_high.json" : "frc3314_low.json");
+    ASSERT_TRUE(import);
+    const std::string csv = test::read_text(path);
+    const double tick_in = (high ? 3.5781 : 1.2245) / 42;
+    const auto& samples = import->recording.samples;
+    for (const std::size_t side : {0u, 1u}) {
+      const auto ticks =
+          column(csv, frc_prefix + (side == 0 ? "Right" : "Left") + " NEO Encoder Position Ticks");
+      ASSERT_EQ(ticks.size(), samples.size());
+      double travelled_in = 0;
+      double counted_in = 0;
+      double fastest = 0;
+      for (std::size_t i = 1; i < samples.size(); ++i) {
+        const double dt_s = static_cast<double>(samples[i].utime_us - samples[i - 1].utime_us) * 1e-6;
+        const double speed_rad_s =
+            (samples[i].wheel_velocity_rad_s[side] + samples[i - 1].wheel_velocity_rad_s[side]) / 2;
+        const double step_in = std::abs(ticks[i] - ticks[i - 1]) * tick_in;
+        fastest = std::max(fastest, std::abs(speed_rad_s));
+        // Positions reset inside the files: such a step is no travel.
+        if (step_in > 3 * std::abs(speed_rad_s) * wheel_radius_in * dt_s + 1) continue;
+        travelled_in += speed_rad_s * wheel_radius_in * dt_s;
+        counted_in += step_in;
+      }
+      EXPECT_EQ(travelled_in > 0, forward) << "side " << side;
+      // Each recording is one ramp or step up and a stop: what trapezoids of 0.1 s miss of a speed curve is
+      // at most one sample of the top speed at either end, and the ticks are held for up to one sample as
+      // well.
+      EXPECT_NEAR(std::abs(travelled_in), counted_in,
+                  2 * 0.1 * fastest * wheel_radius_in + 0.00005 / 1.2245 * counted_in);
+    }
+  }
+}
+
+// While the motors are driven, current has the voltage's sign on both sides and both sides push the same way.
+TEST(ImportFrc3314, DrivenSidesPushTheWayTheyRoll) {
+  const auto tables = tables_in(real_data / "frc3314_drivetrain");
+  if (tables.empty()) GTEST_SKIP() << "the frc3314_drivetrain recordings are not beside the project";
+  for (const fs::path& path : tables) {
+    SCOPED_TRACE(path.filename().string());
+    const bool high = path.stem().string().ends_with("high");
+    const auto import = import_file(path, high ? "frc3314_high.json" : "frc3314_low.json");
+    ASSERT_TRUE(import);
+    std::size_t driven = 0;
+    for (const Sample& s : import->recording.samples) {
+      for (const std::size_t side : {0u, 1u}) {
+        EXPECT_GE(s.motor_voltage_v[side] * s.motor_current_a[side], 0);
+        if (std::abs(s.motor_voltage_v[side]) < 1 || std::abs(s.wheel_velocity_rad_s[side]) < 1) continue;
+        EXPECT_GT(s.motor_voltage_v[side] * s.wheel_velocity_rad_s[side], 0);
+        ++driven;
+      }
+    }
+    EXPECT_GT(driven, 20u);
+  }
+}
+
+TEST(ImportFrc3314, TheOneGlitchIsReported) {
+  const fs::path path = real_data / "frc3314_drivetrain/step_voltage_forward_high.csv";
+  if (!fs::exists(path)) GTEST_SKIP() << "the frc3314_drivetrain recordings are not beside the project";
+  const auto import = import_file(path, "frc3314_high.json");
+  ASSERT_TRUE(import) << describe(import.error());
+  ASSERT_EQ(import->report.glitches.size(), 1u);
+  EXPECT_EQ(import->report.glitches[0].column, "Right Slave 1 Current");
+  EXPECT_EQ(import->report.glitches[0].value, -62.71875);
+  EXPECT_EQ(import->report.glitches[0].action, "hold");
+}
+
+TEST(ImportFrc3314, MotorCurrentIsTheSumOfThreeMotors) {
+  const fs::path path = real_data / "frc3314_drivetrain/step_voltage_backward_low.csv";
+  if (!fs::exists(path)) GTEST_SKIP() << "the frc3314_drivetrain recordings are not beside the project";
+  const auto import = import_file(path, "frc3314_low.json");
+  ASSERT_TRUE(import);
+  const std::string csv = test::read_text(path);
+  for (const std::size_t side : {0u, 1u}) {
+    const std::string name = frc_prefix + (side == 0 ? "Right" : "Left");
+    const auto a = column(csv, name + " Master Current");
+    const auto b = column(csv, name + " Slave 1 Current");
+    const auto c = column(csv, name + " Slave 2 Current");
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      EXPECT_EQ(std::abs(import->recording.samples[i].motor_current_a[side]), a[i] + b[i] + c[i]);
+    }
+  }
+}
+
+TEST(ImportHusky, EveryTableGivesPlausibleSamples) {
+  const auto tables = tables_in(real_data / "borealtc_husky");
+  if (tables.empty()) GTEST_SKIP() << "the borealtc_husky recordings are not beside the project";
+  for (const fs::path& path : tables) {
+    SCOPED_TRACE(path.string());
+    const auto import = import_file(path, "borealtc_husky.json");
+    ASSERT_TRUE(import) << describe(import.error());
+    EXPECT_TRUE(is_valid_mission_id(import->recording.mission_id));
+    EXPECT_EQ(import->report.samples, import->report.rows);
+    EXPECT_TRUE(import->report.glitches.empty());
+    for (const Sample& sample : import->recording.samples) {
+      ASSERT_FALSE(check_plausible(sample));
+      ASSERT_EQ(sample.battery_voltage_v, 24);
+      ASSERT_GE(sample.battery_current_a, 0);
+    }
+  }
+}
+
+TEST(ImportWarthog, TheTableGivesPlausibleSamplesAtItsOwnTimes) {
+  const fs::path path = real_data / "warthog_grass/warthog_wheels_grass_2024-07-18_a.csv";
+  if (!fs::exists(path)) GTEST_SKIP() << "the warthog_grass recording is not beside the project";
+  ImportOptions options;
+  options.source_name = path.string();
+  const auto import = import_csv(test::read_text(path), shipped("warthog_grass.json"), options);
+  ASSERT_TRUE(import) << describe(import.error());
+  EXPECT_EQ(import->report.samples, import->report.rows);
+  EXPECT_EQ(import->recording.samples[0].utime_us, 1'721'335'045'320'405);
+  std::size_t without_voltage = 0;
+  for (const Sample& sample : import->recording.samples) {
+    ASSERT_FALSE(check_plausible(sample));
+    if (std::isnan(sample.battery_voltage_v)) {
+      ++without_voltage;
+    } else {
+      ASSERT_GT(sample.battery_voltage_v, 40);
+    }
+  }
+  // Only the first second or so, before the drives report.
+  EXPECT_LT(without_voltage, 100u);
+}
+
+}  // namespace
+}  // namespace joulecast::telemetry

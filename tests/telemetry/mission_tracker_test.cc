@@ -1,0 +1,256 @@
+#include "telemetry/mission_tracker.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <set>
+
+namespace joulecast::telemetry {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+constexpr std::int64_t second_us = 1'000'000;
+
+// "open m-1 @5" or "close m-1 @9 finished", times in seconds.
+std::vector<std::string> told(const MissionActions& actions) {
+  std::vector<std::string> lines;
+  for (const MissionAction& action : actions) {
+    const std::string where = action.mission_id + " @" + std::to_string(action.utime_us / second_us);
+    lines.push_back(action.kind == MissionAction::Kind::open
+                        ? "open " + where
+                        : "close " + where + " " + std::string(name_of(action.end)));
+  }
+  return lines;
+}
+
+class MissionTrackerTest : public testing::Test {
+ protected:
+  std::vector<std::string> sample(std::int64_t second) {
+    SampleStep step = tracker.on_sample(second * second_us, 4.0);
+    belongs = step.belongs;
+    return told(step.actions);
+  }
+  std::vector<std::string> event(MissionPhase phase, const std::string& id, std::int64_t second) {
+    return told(tracker.on_event({second * second_us, id, phase, 7.0, "note"}));
+  }
+  std::vector<std::string> started(const std::string& id, std::int64_t second) {
+    return event(MissionPhase::started, id, second);
+  }
+  std::vector<std::string> finished(const std::string& id, std::int64_t second) {
+    return event(MissionPhase::finished, id, second);
+  }
+  std::vector<std::string> aborted(const std::string& id, std::int64_t second) {
+    return event(MissionPhase::aborted, id, second);
+  }
+
+  MissionTracker tracker;
+  bool belongs = false;
+};
+
+TEST_F(MissionTrackerTest, ExplicitMission) {
+  const MissionActions opened =
+      tracker.on_event({5 * second_us, "m-1", MissionPhase::started, 7.0, "to dock"});
+  ASSERT_EQ(opened.size(), 1u);
+  EXPECT_EQ(opened[0].payload_kg, 7.0);
+  EXPECT_EQ(opened[0].note, "to dock");
+  EXPECT_FALSE(opened[0].implicit);
+  EXPECT_THAT(sample(6), IsEmpty());
+  EXPECT_TRUE(belongs);
+  EXPECT_THAT(finished("m-1", 9), ElementsAre("close m-1 @9 finished"));
+  EXPECT_FALSE(tracker.current());
+}
+
+TEST_F(MissionTrackerTest, AbortedMission) {
+  started("m-1", 5);
+  EXPECT_THAT(aborted("m-1", 7), ElementsAre("close m-1 @7 aborted"));
+}
+
+TEST_F(MissionTrackerTest, SamplesWithoutEventOpenAnImplicitMission) {
+  EXPECT_THAT(sample(3), ElementsAre("open implicit-3000000 @3"));
+  EXPECT_TRUE(belongs);
+  EXPECT_TRUE(tracker.current()->implicit);
+  EXPECT_EQ(tracker.current()->payload_kg, 4.0);
+  EXPECT_THAT(sample(4), IsEmpty());
+  EXPECT_THAT(started("m-1", 5), ElementsAre("close implicit-3000000 @4 superseded", "open m-1 @5"));
+}
+
+TEST_F(MissionTrackerTest, ImplicitMissionEndsBySilenceInTelemetryOrByTheHostsClock) {
+  sample(3);
+  sample(10);
+  EXPECT_THAT(sample(71), ElementsAre("close implicit-3000000 @10 idle", "open implicit-71000000 @71"));
+  EXPECT_THAT(told(tracker.on_silence(60 * second_us)), IsEmpty());
+  EXPECT_THAT(told(tracker.on_silence(60 * second_us + 1)), ElementsAre("close implicit-71000000 @71 idle"));
+  EXPECT_THAT(told(tracker.on_silence(900 * second_us)), IsEmpty());
+}
+
+TEST_F(MissionTrackerTest, ImplicitMissionIsCutAtItsLongestDuration) {
+  sample(0);
+  for (std::int64_t t = 50; t <= 3600; t += 50) EXPECT_THAT(sample(t), IsEmpty());
+  EXPECT_THAT(sample(3601), ElementsAre("close implicit-0 @3600 expired", "open implicit-3601000000 @3601"));
+}
+
+TEST_F(MissionTrackerTest, MissionNeverFinished) {
+  started("m-1", 0);
+  sample(1);
+  EXPECT_THAT(sample(601), IsEmpty());
+  EXPECT_THAT(sample(1202), ElementsAre("close m-1 @601 unfinished", "open implicit-1202000000 @1202"));
+  started("m-2", 1203);
+  EXPECT_THAT(told(tracker.on_silence(601 * second_us)), ElementsAre("close m-2 @1203 unfinished"));
+}
+
+TEST_F(MissionTrackerTest, ExplicitMissionOutlivesItsLongestDuration) {
+  started("m-1", 0);
+  for (std::int64_t t = 500; t <= 86'400; t += 100) EXPECT_THAT(sample(t), IsEmpty());
+  EXPECT_THAT(sample(86'401), ElementsAre("close m-1 @86400 unfinished", "open implicit-86401000000 @86401"));
+}
+
+TEST_F(MissionTrackerTest, StartWhileOneIsOpenSupersedesIt) {
+  started("m-1", 0);
+  sample(3);
+  EXPECT_THAT(started("m-2", 4), ElementsAre("close m-1 @3 superseded", "open m-2 @4"));
+  EXPECT_THAT(finished("m-1", 5), IsEmpty());
+  EXPECT_EQ(tracker.counters().duplicate_events, 1u);
+  EXPECT_EQ(tracker.current()->mission_id, "m-2");
+}
+
+TEST_F(MissionTrackerTest, RepeatedEventsChangeNothing) {
+  started("m-1", 0);
+  EXPECT_THAT(started("m-1", 0), IsEmpty());
+  finished("m-1", 5);
+  EXPECT_THAT(finished("m-1", 5), IsEmpty());
+  EXPECT_THAT(started("m-1", 0), IsEmpty());
+  EXPECT_EQ(tracker.counters().duplicate_events, 3u);
+  EXPECT_FALSE(tracker.current());
+}
+
+TEST_F(MissionTrackerTest, StartThatArrivesAfterALaterStartIsOutOfOrder) {
+  started("m-2", 10);
+  EXPECT_THAT(started("m-1", 8), IsEmpty());
+  EXPECT_EQ(tracker.counters().out_of_order_events, 1u);
+  EXPECT_EQ(tracker.current()->mission_id, "m-2");
+}
+
+TEST_F(MissionTrackerTest, StartFarInThePastTellsOfAClockSetBack) {
+  started("m-2", 1000);
+  EXPECT_THAT(started("m-3", 8), ElementsAre("close m-2 @1000 superseded", "open m-3 @8"));
+}
+
+TEST_F(MissionTrackerTest, EndBeforeItsStartKeepsTheLateStartFromOpening) {
+  EXPECT_THAT(finished("m-1", 5), IsEmpty());
+  EXPECT_EQ(tracker.counters().unknown_missions, 1u);
+  EXPECT_THAT(started("m-1", 4), IsEmpty());
+  EXPECT_EQ(tracker.counters().out_of_order_events, 1u);
+}
+
+TEST_F(MissionTrackerTest, EndOlderThanTheStartClosesAtTheLastSample) {
+  started("m-1", 5);
+  sample(6);
+  EXPECT_THAT(finished("m-1", 4), ElementsAre("close m-1 @6 finished"));
+  EXPECT_EQ(tracker.counters().out_of_order_events, 1u);
+}
+
+TEST_F(MissionTrackerTest, UnknownEndLeavesAnExplicitMissionButEndsAnImplicitOne) {
+  started("m-2", 0);
+  EXPECT_THAT(finished("m-1", 1), IsEmpty());
+  EXPECT_EQ(tracker.current()->mission_id, "m-2");
+  finished("m-2", 2);
+  sample(10);
+  const MissionActions actions = tracker.on_event({12 * second_us, "m-9", MissionPhase::aborted, 0, ""});
+  EXPECT_THAT(told(actions), ElementsAre("close implicit-10000000 @12 aborted"));
+  EXPECT_NE(actions[0].note.find("m-9"), std::string::npos);
+}
+
+TEST_F(MissionTrackerTest, SamplesAtAndJustAfterAnEndStartNothing) {
+  started("m-1", 0);
+  finished("m-1", 10);
+  for (const std::int64_t utime : {10 * second_us, 10 * second_us + 1, 10 * second_us + 500'000}) {
+    EXPECT_FALSE(tracker.on_sample(utime, 0).belongs);
+  }
+  EXPECT_EQ(tracker.counters().samples_outside, 3u);
+  EXPECT_TRUE(tracker.on_sample(10 * second_us + 500'001, 0).belongs);
+}
+
+TEST_F(MissionTrackerTest, SampleOlderThanTheOpenMissionDoesNotBelong) {
+  started("m-1", 5);
+  EXPECT_THAT(sample(4), IsEmpty());
+  EXPECT_FALSE(belongs);
+}
+
+TEST_F(MissionTrackerTest, MissionEndsNoEarlierThanItsNewestSample) {
+  started("m-1", 0);
+  tracker.on_sample(9 * second_us + 20, 0);
+  const MissionActions actions = tracker.on_event({9 * second_us, "m-1", MissionPhase::finished, 0, ""});
+  EXPECT_EQ(actions.at(0).utime_us, 9 * second_us + 20);
+}
+
+TEST_F(MissionTrackerTest, ReplayOfAWholeMissionCountsOnce) {
+  for (int pass = 0; pass < 2; ++pass) {
+    if (pass == 1) tracker.on_clock_step(1 * second_us);
+    started("m-1", 0);
+    for (std::int64_t t = 1; t < 10; ++t) sample(t);
+    finished("m-1", 10);
+  }
+  EXPECT_EQ(tracker.counters().closed, 1u);
+  EXPECT_EQ(tracker.counters().opened_implicit, 0u);
+  EXPECT_EQ(tracker.counters().samples_outside, 9u);
+}
+
+TEST_F(MissionTrackerTest, MissionGoesOnThroughAClockStep) {
+  started("m-1", 1000);
+  sample(1010);
+  tracker.on_clock_step(20 * second_us);
+  EXPECT_THAT(sample(20), IsEmpty());
+  EXPECT_TRUE(belongs);
+  EXPECT_THAT(finished("m-1", 25), ElementsAre("close m-1 @25 finished"));
+}
+
+TEST_F(MissionTrackerTest, ResumesAMissionOfTheStore) {
+  tracker.resume({"m-1", 0, 5 * second_us, 2.0, false});
+  EXPECT_THAT(sample(6), IsEmpty());
+  EXPECT_TRUE(belongs);
+  EXPECT_THAT(finished("m-1", 9), ElementsAre("close m-1 @9 finished"));
+}
+
+// Whatever arrives, actions alternate open and close of the same mission, and every id opens once.
+TEST(MissionTrackerProperty, ActionsAlwaysPair) {
+  EXPECT_TRUE(rc::check([] {
+    MissionTracker tracker;
+    std::string open;
+    std::set<std::string> known;
+    const auto follow = [&](const MissionActions& actions) {
+      for (const MissionAction& action : actions) {
+        if (action.kind == MissionAction::Kind::open) {
+          RC_ASSERT(open.empty());
+          RC_ASSERT(known.insert(action.mission_id).second);
+          open = action.mission_id;
+        } else {
+          RC_ASSERT(open == action.mission_id);
+          open.clear();
+        }
+      }
+      RC_ASSERT(open == (tracker.current() ? tracker.current()->mission_id : ""));
+    };
+    const int steps = *rc::gen::inRange(1, static_cast<int>(MissionTracker::memory));
+    std::int64_t utime = 0;
+    for (int i = 0; i < steps; ++i) {
+      utime += *rc::gen::inRange<std::int64_t>(1, 100 * second_us);
+      switch (*rc::gen::inRange(0, 4)) {
+        case 0:
+          follow(tracker.on_event({utime, "m-" + std::to_string(*rc::gen::inRange(0, 30)),
+                                   static_cast<MissionPhase>(*rc::gen::inRange(1, 4)), 0, ""}));
+          break;
+        case 1:
+          follow(tracker.on_silence(*rc::gen::inRange<std::int64_t>(0, 1000 * second_us)));
+          break;
+        default:
+          follow(tracker.on_sample(utime, 0).actions);
+      }
+    }
+  }));
+}
+
+}  // namespace
+}  // namespace joulecast::telemetry
