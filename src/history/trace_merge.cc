@@ -1,7 +1,9 @@
 #include "history/trace_merge.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace joulecast::history {
@@ -55,8 +57,11 @@ void TraceMerger::end() {
 
 void TraceMerger::add(const TraceBucket& bucket) {
   assert(bucket.start_utime_us >= origin_utime_us_);
+  // Unsigned: two times may lie further apart than a signed difference holds.
+  const auto offset =
+      static_cast<std::uint64_t>(bucket.start_utime_us) - static_cast<std::uint64_t>(origin_utime_us_);
   const std::int64_t start =
-      bucket.start_utime_us - (bucket.start_utime_us - origin_utime_us_) % trace_.width_us;
+      bucket.start_utime_us - static_cast<std::int64_t>(offset % static_cast<std::uint64_t>(trace_.width_us));
   if (!has_group_ || start != group_.start_utime_us) {
     end();
     begin(start);
@@ -90,7 +95,9 @@ std::int64_t merged_width_us(std::int64_t from_utime_us, std::int64_t to_utime_u
   const auto bucket = static_cast<std::uint64_t>(trace_bucket_us);
   const auto points = static_cast<std::uint64_t>(max_points);
   const std::uint64_t buckets = span / bucket + (span % bucket != 0);
-  return static_cast<std::int64_t>((buckets / points + (buckets % points != 0)) * bucket);
+  const std::uint64_t width = buckets / points + (buckets % points != 0);
+  constexpr std::uint64_t greatest = std::numeric_limits<std::int64_t>::max() / trace_bucket_us;
+  return static_cast<std::int64_t>(std::min(width, greatest) * bucket);
 }
 
 }  // namespace joulecast::history

@@ -1,0 +1,123 @@
+#include "history/schema.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+#include <vector>
+
+#include "history/sqlite.h"
+#include "temporary_store.h"
+
+namespace joulecast::history {
+namespace {
+
+const Migration steps[] = {
+    {0, "CREATE TABLE colour (name TEXT NOT NULL) STRICT; INSERT INTO colour VALUES ('red');"},
+    {1, "ALTER TABLE colour ADD COLUMN hue_deg REAL; UPDATE colour SET hue_deg = 0;"},
+    {2, "UPDATE colour SET name = upper(name);"},
+};
+const Schema third{3, "CREATE TABLE colour (name TEXT NOT NULL, hue_deg REAL) STRICT;", steps};
+
+class SchemaTest : public testing::Test {
+ protected:
+  Database open() const { return {folder_.file("test.db"), OpenMode::read_write_create, 100}; }
+
+  TemporaryFolder folder_;
+};
+
+// A store's file at an older version, as the program of that time left it.
+void make_old(Database& database, std::int64_t version) {
+  for (std::int64_t k = 0; k < version; ++k) database.execute(std::string(steps[k].sql));
+  database.execute("PRAGMA application_id = " + std::to_string(store_application_id));
+  database.execute("PRAGMA user_version = " + std::to_string(version));
+}
+
+TEST_F(SchemaTest, CreatesAnEmptyFileAtTheNewestVersion) {
+  Database database = open();
+  ASSERT_TRUE(bring_to_schema(database, third));
+  EXPECT_EQ(database.integer("PRAGMA user_version"), 3);
+  EXPECT_EQ(database.integer("PRAGMA application_id"), store_application_id);
+  EXPECT_EQ(database.integer("SELECT count(*) FROM colour"), 0);
+  ASSERT_TRUE(bring_to_schema(database, third));
+}
+
+TEST_F(SchemaTest, MigratesFromEveryOlderVersion) {
+  for (std::int64_t version = 0; version < 3; ++version) {
+    const TemporaryFolder folder;
+    Database database(folder.file("old.db"), OpenMode::read_write_create, 100);
+    make_old(database, version);
+    const auto brought = bring_to_schema(database, third);
+    ASSERT_TRUE(brought) << version << describe(brought.error());
+    EXPECT_EQ(database.integer("PRAGMA user_version"), 3);
+    EXPECT_EQ(database.text("SELECT name || hue_deg FROM colour"), "RED0.0");
+  }
+}
+
+TEST_F(SchemaTest, AFailingMigrationChangesNothing) {
+  const Migration broken[] = {steps[0], steps[1], {2, "DELETE FROM colour; UPDATE nowhere SET x = 1;"}};
+  Database database = open();
+  make_old(database, 1);
+  EXPECT_THROW((void)bring_to_schema(database, Schema{3, third.sql, broken}), SqliteError);
+  EXPECT_FALSE(database.in_transaction());
+  EXPECT_EQ(database.integer("PRAGMA user_version"), 1);
+  EXPECT_EQ(database.integer("SELECT count(*) FROM colour"), 1);
+  EXPECT_EQ(database.integer("SELECT count(*) FROM pragma_table_info('colour')"), 1);
+  EXPECT_TRUE(bring_to_schema(database, third));
+}
+
+TEST_F(SchemaTest, RefusesANewerFileAndNamesBothVersions) {
+  Database database = open();
+  make_old(database, 1);
+  database.execute("PRAGMA user_version = 4");
+  const auto brought = bring_to_schema(database, third);
+  ASSERT_FALSE(brought);
+  EXPECT_EQ(brought.error().fault, Fault::conflict);
+  EXPECT_NE(brought.error().message.find("version 4 is newer than version 3"), std::string::npos);
+  EXPECT_EQ(database.integer("PRAGMA user_version"), 4);
+}
+
+TEST_F(SchemaTest, RefusesAFileTooOldForTheList) {
+  Database database = open();
+  make_old(database, 1);
+  const auto brought = bring_to_schema(database, Schema{3, third.sql, std::span(steps).subspan(2)});
+  ASSERT_FALSE(brought);
+  EXPECT_EQ(brought.error().fault, Fault::conflict);
+  EXPECT_EQ(database.integer("PRAGMA user_version"), 1);
+}
+
+TEST_F(SchemaTest, RefusesADatabaseOfAnotherProgram) {
+  Database database = open();
+  database.execute("CREATE TABLE something (x)");
+  const auto brought = bring_to_schema(database, third);
+  ASSERT_FALSE(brought);
+  EXPECT_EQ(brought.error().fault, Fault::corrupt);
+  EXPECT_EQ(database.integer("PRAGMA application_id"), 0);
+}
+
+TEST_F(SchemaTest, TheStoresMigrationsReachItsVersion) {
+  std::int64_t next =
+      store_schema().migrations.empty() ? store_schema().version : store_schema().migrations.front().from;
+  for (const Migration& migration : store_schema().migrations) EXPECT_EQ(migration.from, next++);
+  EXPECT_EQ(next, store_schema().version);
+}
+
+TEST_F(SchemaTest, EmbedsTheSchemaFile) {
+  std::ifstream file(JOULECAST_SOURCE_DIR "/schemas/store.sql");
+  std::stringstream text;
+  text << file.rdbuf();
+  ASSERT_FALSE(text.str().empty());
+  EXPECT_EQ(store_schema().sql, text.str());
+}
+
+TEST_F(SchemaTest, EveryTableIsStrict) {
+  Database database = open();
+  ASSERT_TRUE(bring_to_schema(database, store_schema()));
+  EXPECT_GT(database.integer("SELECT count(*) FROM pragma_table_list WHERE schema = 'main'"), 5);
+  EXPECT_EQ(database.text("SELECT group_concat(name) FROM pragma_table_list WHERE schema = 'main' AND "
+                          "type = 'table' AND NOT strict AND name NOT LIKE 'sqlite_%'"),
+            "");
+}
+
+}  // namespace
+}  // namespace joulecast::history

@@ -1,0 +1,202 @@
+// What is particular to the store's files in SQLite.
+
+#include "history/sqlite_store.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "history/schema.h"
+#include "history/sqlite.h"
+#include "temporary_store.h"
+
+namespace joulecast::history {
+namespace {
+
+class SqliteStoreTest : public testing::Test {
+ protected:
+  Result<std::unique_ptr<Store>> open() const {
+    SqliteOptions options;
+    options.path = path_;
+    options.busy_timeout_ms = 50;
+    return open_sqlite_store(options);
+  }
+
+  TemporaryFolder folder_;
+  const std::string path_ = folder_.file("store.db");
+};
+
+TEST_F(SqliteStoreTest, WritesAheadWithForeignKeys) {
+  auto store = need(open());
+  Database other(path_, OpenMode::read_only, 50);
+  EXPECT_EQ(other.text("PRAGMA journal_mode"), "wal");
+  // The foreign key is what refuses this.
+  Mission m = new_mission(*store, "amr-1", "m", 0);
+  m.model_version = 1;
+  const Outcome outcome = apply_one(*store, StartMission{m});
+  ASSERT_FALSE(outcome);
+  EXPECT_NE(outcome.error().message.find("FOREIGN KEY"), std::string::npos);
+}
+
+TEST_F(SqliteStoreTest, RefusesANewerSchemaAndLeavesTheFileAlone) {
+  {
+    Database database(path_, OpenMode::read_write_create, 50);
+    ASSERT_TRUE(bring_to_schema(database, store_schema()));
+    database.execute("PRAGMA user_version = 1000");
+  }
+  const auto before = std::filesystem::last_write_time(path_);
+  const auto store = open();
+  ASSERT_FALSE(store);
+  EXPECT_EQ(store.error().fault, Fault::conflict);
+  EXPECT_NE(describe(store.error()).find("newer"), std::string::npos);
+  EXPECT_EQ(std::filesystem::last_write_time(path_), before);
+}
+
+TEST_F(SqliteStoreTest, RefusesAFileThatIsNoDatabase) {
+  std::ofstream(path_) << std::string(10'000, 'x');
+  const auto store = open();
+  ASSERT_FALSE(store);
+  EXPECT_EQ(store.error().fault, Fault::corrupt);
+}
+
+TEST_F(SqliteStoreTest, ReportsAFolderThatIsNot) {
+  SqliteOptions options;
+  options.path = folder_.file("absent/store.db");
+  const auto store = open_sqlite_store(options);
+  ASSERT_FALSE(store);
+  EXPECT_EQ(store.error().fault, Fault::unavailable);
+}
+
+TEST_F(SqliteStoreTest, IsHeldOpenByOneOnly) {
+  auto store = need(open());
+  const auto second = open();
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().fault, Fault::conflict);
+  store.reset();
+  EXPECT_TRUE(open());
+}
+
+TEST_F(SqliteStoreTest, ReportsPagesOverwrittenByOthers) {
+  MissionKey key = 0;
+  {
+    auto store = need(open());
+    Mission m = start_mission(*store, "amr-1", "m", 0);
+    key = m.key;
+    m.state = MissionState::finished;
+    need(apply_one(*store, CheckpointMission{m, {}, some_samples(0, 0, 20'000), {}}));
+  }
+  ASSERT_FALSE(std::filesystem::exists(path_ + "-wal"));
+  const auto size = std::filesystem::file_size(path_);
+  {
+    // Everything behind the first pages, which hold the schema.
+    std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(size / 2));
+    file << std::string(size - size / 2, '\xa5');
+  }
+  const auto store = open();
+  if (!store) {
+    EXPECT_EQ(store.error().fault, Fault::corrupt);
+    return;
+  }
+  const auto page = (*store)->telemetry(key, {}, {100'000, {}});
+  ASSERT_FALSE(page);
+  EXPECT_EQ(page.error().fault, Fault::corrupt);
+}
+
+TEST_F(SqliteStoreTest, ADamagedTailDoesNotStopWhatStillComes) {
+  MissionKey key = 0;
+  {
+    auto store = need(open());
+    const Mission m = start_mission(*store, "amr-1", "m", 0);
+    key = m.key;
+    need(apply_one(*store, CheckpointMission{m, {}, some_samples(0, 0, 10), {}}));
+  }
+  {
+    Database database(path_, OpenMode::read_write_create, 50);
+    database.execute("UPDATE telemetry_chunk SET body = zeroblob(5), bytes = 5");
+  }
+  auto store = need(open());
+  Mission m = need(store->mission(key));
+  need(apply_one(*store, CheckpointMission{m, {}, some_samples(1'000'000, 10, 3000), {}}));
+  m.state = MissionState::finished;
+  need(apply_one(*store, CheckpointMission{m, {}, {}, {}}));
+  EXPECT_EQ(store->telemetry(key, {}, {100, {}}).error().fault, Fault::corrupt);
+  const TelemetryPage later = need(store->telemetry(key, {1'000'000, whole_future}, {100'000, {}}));
+  ASSERT_EQ(later.samples.size(), 3000U);
+  EXPECT_EQ(later.samples.front().sequence, 10);
+}
+
+TEST_F(SqliteStoreTest, MergesSmallChunks) {
+  auto store = need(open());
+  Mission m = start_mission(*store, "amr-1", "m", 0);
+  Database other(path_, OpenMode::read_only, 50);
+  for (int i = 0; i < 250; ++i)
+    need(apply_one(*store, CheckpointMission{m, {}, some_samples(100'000 * i, 10 * i, 10), {}}));
+  // 2500 samples: two full chunks, and the tail of small ones.
+  EXPECT_EQ(other.integer("SELECT count(*) FROM telemetry_chunk WHERE sealed = 1"), 2);
+  EXPECT_EQ(other.integer("SELECT sum(samples) FROM telemetry_chunk WHERE sealed = 1"), 2048);
+  m.state = MissionState::finished;
+  need(apply_one(*store, CheckpointMission{m, {}, {}, {}}));
+  EXPECT_EQ(other.integer("SELECT count(*) FROM telemetry_chunk"), 3);
+  EXPECT_EQ(other.integer("SELECT count(*) FROM telemetry_chunk WHERE sealed = 0"), 0);
+}
+
+TEST_F(SqliteStoreTest, PagesOfMissionsComeFromAnIndex) {
+  auto store = need(open());
+  Database other(path_, OpenMode::read_only, 50);
+  const auto plan = [&](const std::string& sql) {
+    Rows rows(other.statement("EXPLAIN QUERY PLAN " + sql));
+    std::string text;
+    while (rows.next()) {
+      (void)rows.integer();
+      (void)rows.integer();
+      (void)rows.integer();
+      text += rows.text() + "\n";
+    }
+    return text;
+  };
+  for (const std::string filter : {"", "robot_id = 'amr-1' AND "}) {
+    const std::string text = plan("SELECT * FROM mission WHERE " + filter +
+                                  "(start_utime_us, mission_key) < (1, 2) ORDER BY start_utime_us DESC, "
+                                  "mission_key DESC LIMIT 50");
+    EXPECT_NE(text.find("USING INDEX mission_by_"), std::string::npos) << text;
+    EXPECT_EQ(text.find("TEMP B-TREE"), std::string::npos) << text;
+  }
+}
+
+TEST_F(SqliteStoreTest, OpensAMillionTraceRowsWithinASecond) {
+  constexpr int missions = 50;
+  constexpr int seconds = 20'000;
+  MissionKey last = 0;
+  {
+    auto store = need(open());
+    for (int k = 0; k < missions; ++k) {
+      Mission m = start_mission(*store, "amr-" + std::to_string(k), "long", 0);
+      last = m.key;
+      std::vector<TraceBucket> trace(seconds);
+      for (int s = 0; s < seconds; ++s) {
+        trace[static_cast<std::size_t>(s)].start_utime_us = s * trace_bucket_us;
+        trace[static_cast<std::size_t>(s)].covered_s = 1;
+        trace[static_cast<std::size_t>(s)].measured_power_w = {1.0 * s, 1.5 * s, 2.0 * s};
+      }
+      need(apply_one(*store, CheckpointMission{m, std::move(trace), {}, {}}));
+    }
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  auto store = need(open());
+  ASSERT_EQ(need(store->recover()).size(), static_cast<std::size_t>(missions));
+  ASSERT_EQ(need(store->missions({}, {50, {}})).missions.size(), static_cast<std::size_t>(missions));
+  const std::chrono::duration<double> open_s = std::chrono::steady_clock::now() - begin;
+  // The project's bound for restart to ready.
+  EXPECT_LT(open_s.count(), 1.0);
+  RecordProperty("open_s", std::to_string(open_s.count()));
+  const Trace trace = need(store->trace(last, {}, 500));
+  EXPECT_EQ(trace.buckets.size(), 500U);
+  EXPECT_EQ(trace.buckets.back().measured_power_w.max, 2.0 * (seconds - 1));
+}
+
+}  // namespace
+}  // namespace joulecast::history

@@ -1,0 +1,660 @@
+// What every store must do, whatever database it keeps things in.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <functional>
+#include <ostream>
+#include <set>
+#include <thread>
+
+#include "temporary_store.h"
+
+namespace joulecast::history {
+namespace {
+
+using telemetry::Sample;
+
+struct StoreKind {
+  std::string name;
+  // Opens the store kept in the folder, with a clock for retention.
+  std::function<std::unique_ptr<Store>(const TemporaryFolder&, std::function<std::int64_t()>)> open;
+};
+
+std::ostream& operator<<(std::ostream& out, const StoreKind& kind) {
+  return out << kind.name;
+}
+
+const StoreKind sqlite{"Sqlite", [](const TemporaryFolder& folder, std::function<std::int64_t()> clock) {
+                         SqliteOptions options;
+                         options.path = folder.file("store.db");
+                         options.now_utime_us = std::move(clock);
+                         return need(open_sqlite_store(options));
+                       }};
+
+class StoreConformance : public testing::TestWithParam<StoreKind> {
+ protected:
+  void SetUp() override { reopen(); }
+
+  void reopen() {
+    store_.reset();
+    store_ = GetParam().open(folder_, [this] { return now_utime_us_; });
+  }
+
+  Outcome apply(const Command& command) { return apply_one(*store_, command); }
+
+  // Ended missions m0, m1, ... of one robot, a second apart from 1000 s on.
+  std::vector<Mission> add_missions(const std::string& robot_id, int count) {
+    std::vector<Mission> missions;
+    for (int i = 0; i < count; ++i) {
+      Mission m = start_mission(*store_, robot_id, "m" + std::to_string(i), (1000 + i) * 1'000'000LL);
+      m.state = MissionState::finished;
+      m.payload_kg = i;
+      m.accounts.measured_j = 10.0 * i;
+      m.accounts.measured_s = 5;
+      need(apply(CheckpointMission{m, {}, {}, {}}));
+      missions.push_back(m);
+    }
+    return missions;
+  }
+
+  std::vector<MissionKey> walk(const MissionFilter& filter, std::int64_t limit) {
+    std::vector<MissionKey> keys;
+    PageRequest page{limit, {}};
+    do {
+      const MissionPage got = need(store_->missions(filter, page));
+      EXPECT_LE(static_cast<std::int64_t>(got.missions.size()), limit);
+      for (const Mission& m : got.missions) keys.push_back(m.key);
+      page.cursor = got.next_cursor;
+    } while (!page.cursor.empty());
+    return keys;
+  }
+
+  std::vector<Sample> all_samples(MissionKey key, TimeRange range = {}, std::int64_t limit = 100'000) {
+    std::vector<Sample> samples;
+    PageRequest page{limit, {}};
+    do {
+      const TelemetryPage got = need(store_->telemetry(key, range, page));
+      samples.insert(samples.end(), got.samples.begin(), got.samples.end());
+      page.cursor = got.next_cursor;
+    } while (!page.cursor.empty());
+    return samples;
+  }
+
+  static std::vector<std::int64_t> sequences(const std::vector<Sample>& samples) {
+    std::vector<std::int64_t> numbers;
+    for (const Sample& s : samples) numbers.push_back(s.sequence);
+    return numbers;
+  }
+
+  TemporaryFolder folder_;
+  std::int64_t now_utime_us_ = 1'000'000;
+  std::unique_ptr<Store> store_;
+};
+
+bool same_bits(double a, double b) {
+  return (std::isnan(a) && std::isnan(b)) ||
+         std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
+
+// Accounts are nothing but doubles: as an array of them, none is forgotten when one is added.
+using AccountNumbers = std::array<double, sizeof(energy::Accounts) / sizeof(double)>;
+
+void expect_same_accounts(const energy::Accounts& a, const energy::Accounts& b) {
+  const auto left = std::bit_cast<AccountNumbers>(a);
+  const auto right = std::bit_cast<AccountNumbers>(b);
+  for (std::size_t k = 0; k < left.size(); ++k) EXPECT_PRED2(same_bits, left[k], right[k]) << k;
+}
+
+void expect_same_mission(const Mission& a, const Mission& b) {
+  EXPECT_EQ(a.key, b.key);
+  EXPECT_EQ(a.robot_id, b.robot_id);
+  EXPECT_EQ(a.mission_id, b.mission_id);
+  EXPECT_EQ(a.start_utime_us, b.start_utime_us);
+  EXPECT_EQ(a.end_utime_us, b.end_utime_us);
+  EXPECT_EQ(a.state, b.state);
+  EXPECT_EQ(a.implicit, b.implicit);
+  EXPECT_EQ(a.incomplete, b.incomplete);
+  EXPECT_EQ(a.incomplete_reason, b.incomplete_reason);
+  EXPECT_PRED2(same_bits, a.payload_kg, b.payload_kg);
+  EXPECT_EQ(a.note, b.note);
+  EXPECT_EQ(a.model_version, b.model_version);
+  EXPECT_EQ(a.samples, b.samples);
+  EXPECT_EQ(a.sample_faults, b.sample_faults);
+  EXPECT_EQ(a.gap_count, b.gap_count);
+  EXPECT_PRED2(same_bits, a.gap_s, b.gap_s);
+  expect_same_accounts(a.accounts, b.accounts);
+}
+
+// Every number differs from every other.
+energy::Accounts distinct_accounts() {
+  AccountNumbers numbers{};
+  for (std::size_t k = 0; k < numbers.size(); ++k) numbers[k] = 0.1 + static_cast<double>(k);
+  return std::bit_cast<energy::Accounts>(numbers);
+}
+
+// ---- models
+
+TEST_P(StoreConformance, NumbersModelVersionsWithinEachRobot) {
+  EXPECT_EQ(apply(AddModel{"amr-1", 5, ModelOrigin::file, "first", R"({"a": 1})", {}}), 1);
+  EXPECT_EQ(apply(AddModel{"amr-1", 6, ModelOrigin::calibration, "second", R"({"a": 2})", {}}), 2);
+  EXPECT_EQ(apply(AddModel{"amr-2", 7, ModelOrigin::http, "", R"({"a": 3})", {}}), 1);
+
+  const ModelVersion active = need(store_->model("amr-1"));
+  EXPECT_EQ(active.version, 2);
+  EXPECT_EQ(active.model_json, R"({"a": 2})");
+  EXPECT_EQ(active.origin, ModelOrigin::calibration);
+  EXPECT_EQ(active.note, "second");
+  EXPECT_EQ(active.created_utime_us, 6);
+  EXPECT_EQ(active.parent_version, 1);
+  EXPECT_TRUE(active.active);
+
+  const auto versions = need(store_->model_versions("amr-1"));
+  ASSERT_EQ(versions.size(), 2U);
+  EXPECT_EQ(versions[1].version, 1);
+  EXPECT_FALSE(versions[1].active);
+  EXPECT_EQ(versions[1].parent_version, std::nullopt);
+
+  const auto robots = need(store_->robots());
+  ASSERT_EQ(robots.size(), 2U);
+  EXPECT_EQ(robots[0].robot_id, "amr-1");
+  EXPECT_EQ(robots[0].active_version, 2);
+}
+
+TEST_P(StoreConformance, AddsNoVersionForTheTextThatIsActive) {
+  EXPECT_EQ(apply(AddModel{"amr-1", 1, ModelOrigin::file, "", "{}", {}}), 1);
+  EXPECT_EQ(apply(AddModel{"amr-1", 2, ModelOrigin::file, "", "{}", {}}), 1);
+  EXPECT_EQ(need(store_->model_versions("amr-1")).size(), 1U);
+}
+
+TEST_P(StoreConformance, RollsTheActiveVersionBackAndBranchesFromThere) {
+  for (const char* text : {"[1]", "[2]", "[3]"})
+    need(apply(AddModel{"amr-1", 1, ModelOrigin::file, "", text, {}}));
+  EXPECT_EQ(apply(ActivateModel{"amr-1", 1}), 1);
+  EXPECT_EQ(need(store_->model("amr-1")).model_json, "[1]");
+  EXPECT_EQ(need(store_->model("amr-1", 3)).model_json, "[3]");
+  EXPECT_EQ(apply(AddModel{"amr-1", 2, ModelOrigin::diagnosis, "", "[4]", {}}), 4);
+  EXPECT_EQ(need(store_->model("amr-1")).parent_version, 1);
+}
+
+TEST_P(StoreConformance, RefusesAModelForAnOutdatedView) {
+  EXPECT_EQ(apply(AddModel{"amr-1", 1, ModelOrigin::http, "", "[1]", 0}), 1);
+  const Outcome stale = apply(AddModel{"amr-1", 2, ModelOrigin::http, "", "[2]", 0});
+  ASSERT_FALSE(stale);
+  EXPECT_EQ(stale.error().fault, Fault::conflict);
+  EXPECT_EQ(apply(AddModel{"amr-1", 2, ModelOrigin::http, "", "[2]", 1}), 2);
+}
+
+TEST_P(StoreConformance, ARefusedCommandLeavesNoTraceAndTheOthersStand) {
+  const std::vector<Command> commands = {
+      AppendEvent{{0, 1, "", "before", "{}"}},
+      AddModel{"ghost", 1, ModelOrigin::http, "", "not JSON", {}},
+      ActivateModel{"amr-1", 7},
+      AddModel{"", 1, ModelOrigin::http, "", "{}", {}},
+      AppendEvent{{0, 2, "", "after", "{}"}},
+  };
+  const auto outcomes = need(store_->apply(commands));
+  ASSERT_EQ(outcomes.size(), 5U);
+  EXPECT_TRUE(outcomes[0]);
+  EXPECT_EQ(outcomes[1].error().fault, Fault::invalid);
+  EXPECT_EQ(outcomes[2].error().fault, Fault::not_found);
+  EXPECT_EQ(outcomes[3].error().field, "robot_id");
+  EXPECT_TRUE(outcomes[4]);
+  EXPECT_TRUE(need(store_->robots()).empty());
+  EXPECT_EQ(need(store_->events(0, 10)).size(), 2U);
+}
+
+TEST_P(StoreConformance, NamesWhatIsAbsent) {
+  for (const Fault fault :
+       {store_->model("nobody").error().fault, store_->model_versions("nobody").error().fault,
+        store_->mission(7).error().fault, store_->trace(7, {}, 10).error().fault,
+        store_->telemetry(7, {}, {}).error().fault})
+    EXPECT_EQ(fault, Fault::not_found);
+  Mission unknown;
+  unknown.key = 7;
+  unknown.robot_id = "amr-1";
+  EXPECT_EQ(apply(CheckpointMission{unknown, {}, {}, {}}).error().fault, Fault::not_found);
+}
+
+// ---- missions
+
+TEST_P(StoreConformance, KeepsEveryNumberOfAMission) {
+  need(apply(AddModel{"amr-1", 1, ModelOrigin::file, "", "{}", {}}));
+  Mission m = start_mission(*store_, "amr-1", "tour \"7\"\n", 123'456'789);
+  m.end_utime_us = 223'456'789;
+  m.state = MissionState::aborted;
+  m.implicit = true;
+  m.incomplete = true;
+  m.incomplete_reason = "a gap of 12.5 s";
+  m.payload_kg = 12.25;
+  m.note = "größer";
+  m.model_version = 1;
+  m.samples = 1001;
+  m.sample_faults = {{"late", 3}, {"duplicate", 1}};
+  m.gap_count = 2;
+  m.gap_s = 12.75;
+  m.accounts = distinct_accounts();
+  need(apply(CheckpointMission{m, {}, {}, {}}));
+  expect_same_mission(need(store_->mission(m.key)), m);
+  reopen();
+  expect_same_mission(need(store_->mission(m.key)), m);
+}
+
+TEST_P(StoreConformance, KeepsNotMeasuredApartFromZero) {
+  Mission m = start_mission(*store_, "amr-1", "m", 0);
+  m.accounts = distinct_accounts();
+  m.accounts.measured_j = telemetry::unmeasured;
+  m.accounts.measured_motor_j = {telemetry::unmeasured, 0.0};
+  m.accounts.ledger[energy::Term::unexplained] = telemetry::unmeasured;
+  m.payload_kg = telemetry::unmeasured;
+  need(apply(CheckpointMission{m, {}, {}, {}}));
+  const Mission stored = need(store_->mission(m.key));
+  expect_same_mission(stored, m);
+  EXPECT_TRUE(std::isnan(stored.accounts.measured_j));
+  EXPECT_EQ(stored.accounts.measured_motor_j[1], 0.0);
+}
+
+TEST_P(StoreConformance, GivesOneKeyToOneMission) {
+  const MissionKey key = need(store_->mission_key("amr-1", "m", 5));
+  EXPECT_EQ(need(store_->mission_key("amr-1", "m", 5)), key);
+  std::set<MissionKey> others = {key, need(store_->mission_key("amr-1", "m", 6)),
+                                 need(store_->mission_key("amr-2", "m", 5)),
+                                 need(store_->mission_key("amr-1", "n", 5))};
+  EXPECT_EQ(others.size(), 4U);
+  start_mission(*store_, "amr-1", "m", 5);
+  EXPECT_EQ(need(store_->mission_key("amr-1", "m", 5)), key);
+  reopen();
+  EXPECT_EQ(need(store_->mission_key("amr-1", "m", 5)), key);
+  EXPECT_GT(need(store_->mission_key("amr-1", "new", 5)), key);
+}
+
+TEST_P(StoreConformance, RefusesAKeyOfAnotherMission) {
+  const Mission m = start_mission(*store_, "amr-1", "m", 5);
+  Mission other = m;
+  other.mission_id = "n";
+  EXPECT_EQ(apply(StartMission{other}).error().fault, Fault::conflict);
+  other = m;
+  other.key += 1;
+  EXPECT_EQ(apply(StartMission{other}).error().fault, Fault::conflict);
+}
+
+TEST_P(StoreConformance, StartingAnewReplacesAllThatWasStored) {
+  Mission m = start_mission(*store_, "amr-1", "m", 0);
+  m.state = MissionState::finished;
+  m.samples = 10;
+  TraceBucket bucket;
+  need(apply(CheckpointMission{m, {bucket}, some_samples(0, 0, 10), {}}));
+  EXPECT_EQ(all_samples(m.key).size(), 10U);
+
+  const Mission again = start_mission(*store_, "amr-1", "m", 0);
+  EXPECT_EQ(again.key, m.key);
+  EXPECT_EQ(need(store_->mission(m.key)).samples, 0);
+  EXPECT_TRUE(need(store_->trace(m.key, {}, 10)).buckets.empty());
+  EXPECT_TRUE(all_samples(m.key).empty());
+}
+
+TEST_P(StoreConformance, RefusesAMissionOfAModelVersionThatIsNot) {
+  Mission m = new_mission(*store_, "amr-1", "m", 0);
+  m.model_version = 3;
+  EXPECT_EQ(apply(StartMission{m}).error().fault, Fault::invalid);
+}
+
+TEST_P(StoreConformance, PagesNewestFirstWithoutLossOrRepeat) {
+  const auto missions = add_missions("amr-1", 25);
+  std::vector<MissionKey> expected;
+  for (auto m = missions.rbegin(); m != missions.rend(); ++m) expected.push_back(m->key);
+  for (const std::int64_t limit : {1, 7, 24, 25, 26}) EXPECT_EQ(walk({}, limit), expected) << limit;
+}
+
+TEST_P(StoreConformance, PagesMissionsOfTheSameStart) {
+  std::set<MissionKey> expected;
+  for (int i = 0; i < 9; ++i)
+    expected.insert(start_mission(*store_, "amr-" + std::to_string(i), "m", 77).key);
+  const auto keys = walk({}, 2);
+  EXPECT_EQ(keys.size(), 9U);
+  EXPECT_EQ(std::set<MissionKey>(keys.begin(), keys.end()), expected);
+}
+
+TEST_P(StoreConformance, PagesStayStableUnderInserts) {
+  const auto missions = add_missions("amr-1", 20);
+  std::vector<MissionKey> seen;
+  PageRequest page{3, {}};
+  int inserted = 0;
+  do {
+    const MissionPage got = need(store_->missions({}, page));
+    for (const Mission& m : got.missions) seen.push_back(m.key);
+    page.cursor = got.next_cursor;
+    // One newer than everything, at every page.
+    start_mission(*store_, "amr-2", "late", (5000 + inserted++) * 1'000'000LL);
+  } while (!page.cursor.empty());
+  std::vector<MissionKey> expected;
+  for (auto m = missions.rbegin(); m != missions.rend(); ++m) expected.push_back(m->key);
+  EXPECT_EQ(seen, expected);
+}
+
+TEST_P(StoreConformance, FiltersMissions) {
+  auto missions = add_missions("amr-1", 10);
+  add_missions("amr-2", 3);
+  missions[4].incomplete = true;
+  missions[4].state = MissionState::interrupted;
+  need(apply(CheckpointMission{missions[4], {}, {}, {}}));
+  const MissionKey undeclared = start_mission(*store_, "amr-1", "undeclared", 0).key;
+
+  MissionFilter f;
+  f.robot_id = "amr-2";
+  EXPECT_EQ(walk(f, 2).size(), 3U);
+  f.mission_id = "m1";
+  EXPECT_EQ(walk(f, 2).size(), 1U);
+
+  f = {};
+  f.robot_id = "amr-1";
+  f.start_from_utime_us = missions[2].start_utime_us;
+  f.start_to_utime_us = missions[5].start_utime_us;
+  EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[4].key, missions[3].key, missions[2].key));
+
+  f = {};
+  f.states = {MissionState::interrupted, MissionState::open};
+  EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[4].key, undeclared));
+
+  f = {};
+  f.incomplete = true;
+  EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[4].key));
+
+  f = {};
+  f.robot_id = "amr-1";
+  f.payload_max_kg = 1.0;
+  EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[1].key, missions[0].key));
+  f.payload_min_kg = 0.5;
+  EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[1].key));
+}
+
+TEST_P(StoreConformance, RefusesBadQueries) {
+  add_missions("amr-1", 3);
+  MissionFilter f;
+  const auto refuses = [&](const MissionFilter& filter, const PageRequest& page, const std::string& field) {
+    const auto got = store_->missions(filter, page);
+    ASSERT_FALSE(got) << field;
+    EXPECT_EQ(got.error().fault, Fault::invalid);
+    EXPECT_EQ(got.error().field, field);
+  };
+  refuses(f, {0, {}}, "limit");
+  refuses(f, {max_page_size + 1, {}}, "limit");
+  refuses(f, {1, "garbage"}, "cursor");
+  const std::string cursor = need(store_->missions(f, {1, {}})).next_cursor;
+  f.robot_id = "amr-1";
+  refuses(f, {1, cursor}, "cursor");
+  f.start_from_utime_us = 2;
+  f.start_to_utime_us = 1;
+  refuses(f, {1, {}}, "start_from");
+  f = {};
+  f.payload_min_kg = telemetry::unmeasured;
+  refuses(f, {1, {}}, "payload");
+  EXPECT_EQ(store_->trace(1, {}, 0).error().field, "points");
+  EXPECT_EQ(store_->telemetry(1, {5, 4}, {}).error().field, "from");
+  EXPECT_EQ(store_->events(0, 0).error().field, "limit");
+}
+
+TEST_P(StoreConformance, SumsOverMissions) {
+  auto missions = add_missions("amr-1", 4);  // measured 0, 10, 20, 30 J
+  missions[3].accounts.measured_j = telemetry::unmeasured;
+  missions[3].accounts.measured_s = 0;
+  missions[3].incomplete = true;
+  missions[3].gap_count = 2;
+  missions[3].gap_s = 1.5;
+  missions[3].samples = 9;
+  missions[3].accounts.ledger[energy::Term::drag] = 5;
+  need(apply(CheckpointMission{missions[3], {}, {}, {}}));
+  const Totals all = need(store_->totals({}));
+  EXPECT_EQ(all.missions, 4);
+  EXPECT_EQ(all.measured_missions, 3);
+  EXPECT_EQ(all.incomplete_missions, 1);
+  EXPECT_EQ(all.samples, 9);
+  EXPECT_EQ(all.gap_count, 2);
+  EXPECT_EQ(all.gap_s, 1.5);
+  EXPECT_EQ(all.accounts.measured_j, 30);
+  EXPECT_EQ(all.accounts.ledger[energy::Term::drag], 5);
+  MissionFilter nobody;
+  nobody.robot_id = "nobody";
+  EXPECT_EQ(need(store_->totals(nobody)).missions, 0);
+  EXPECT_TRUE(std::isnan(need(store_->totals(nobody)).accounts.measured_j));
+}
+
+TEST_P(StoreConformance, RecoversOpenMissionsWithTheirState) {
+  add_missions("amr-1", 2);
+  Mission open = start_mission(*store_, "amr-2", "left open", 900);
+  open.accounts = distinct_accounts();
+  open.samples = 3;
+  EnergyState state{"amr-2", 930, 17, 0.75, {41.5, telemetry::unmeasured}};
+  need(apply(CheckpointMission{open, {}, some_samples(900, 15, 3), state}));
+  reopen();
+
+  const auto left = need(store_->recover());
+  ASSERT_EQ(left.size(), 1U);
+  expect_same_mission(left[0], open);
+  const auto restored = need(store_->energy_state("amr-2"));
+  ASSERT_TRUE(restored);
+  EXPECT_EQ(restored->utime_us, 930);
+  EXPECT_EQ(restored->sequence, 17);
+  EXPECT_EQ(restored->state_of_charge, 0.75);
+  EXPECT_EQ(restored->winding_temperature_c[0], 41.5);
+  EXPECT_TRUE(std::isnan(restored->winding_temperature_c[1]));
+  EXPECT_FALSE(need(store_->energy_state("amr-1")));
+
+  // Resumed: it goes on where it was.
+  need(apply(CheckpointMission{left[0], {}, some_samples(1000, 18, 2), {}}));
+  EXPECT_THAT(sequences(all_samples(open.key)), testing::ElementsAre(15, 16, 17, 18, 19));
+  open.state = MissionState::interrupted;
+  need(apply(CheckpointMission{open, {}, {}, {}}));
+  EXPECT_TRUE(need(store_->recover()).empty());
+}
+
+TEST_P(StoreConformance, KeepsEnergyStateOutsideMissions) {
+  need(apply(PutEnergyState{{"amr-1", 5, 1, 0.9, {20, 21}}}));
+  need(apply(PutEnergyState{{"amr-1", 6, 2, telemetry::unmeasured, {20, 21}}}));
+  const auto state = need(store_->energy_state("amr-1"));
+  ASSERT_TRUE(state);
+  EXPECT_EQ(state->utime_us, 6);
+  EXPECT_TRUE(std::isnan(state->state_of_charge));
+}
+
+// ---- traces
+
+TEST_P(StoreConformance, ReplacesABucketAndReadsRanges) {
+  const Mission m = start_mission(*store_, "amr-1", "m", 0);
+  std::vector<TraceBucket> trace(10);
+  for (std::size_t i = 0; i < trace.size(); ++i) {
+    trace[i].start_utime_us = static_cast<std::int64_t>(i) * trace_bucket_us;
+    trace[i].covered_s = 1;
+    trace[i].speed_m_s = {0.5, 1, 1.5};
+    trace[i].measured_j = static_cast<double>(i);
+  }
+  need(apply(CheckpointMission{m, trace, {}, {}}));
+  trace[9].measured_power_w = {1, 2, 3};
+  trace[9].modelled_power_w = {4, 5, 6};
+  trace[9].state_of_charge = 0.25;
+  trace[9].modelled_j = 8;
+  trace[9].x_m = -1;
+  trace[9].y_m = -2;
+  need(apply(CheckpointMission{m, {trace[9]}, {}, {}}));
+
+  const Trace all = need(store_->trace(m.key, {}, 100));
+  EXPECT_EQ(all.width_us, trace_bucket_us);
+  ASSERT_EQ(all.buckets.size(), 10U);
+  const TraceBucket& last = all.buckets[9];
+  EXPECT_EQ(last.measured_power_w.min, 1);
+  EXPECT_EQ(last.measured_power_w.mean, 2);
+  EXPECT_EQ(last.measured_power_w.max, 3);
+  EXPECT_EQ(last.modelled_power_w.min, 4);
+  EXPECT_EQ(last.modelled_power_w.mean, 5);
+  EXPECT_EQ(last.modelled_power_w.max, 6);
+  EXPECT_EQ(last.speed_m_s.min, 0.5);
+  EXPECT_EQ(last.speed_m_s.mean, 1);
+  EXPECT_EQ(last.speed_m_s.max, 1.5);
+  EXPECT_EQ(last.state_of_charge, 0.25);
+  EXPECT_EQ(last.measured_j, 9);
+  EXPECT_EQ(last.modelled_j, 8);
+  EXPECT_EQ(last.x_m, -1);
+  EXPECT_EQ(last.y_m, -2);
+  EXPECT_TRUE(std::isnan(all.buckets[0].measured_power_w.mean));
+
+  const Trace some = need(store_->trace(m.key, {3 * trace_bucket_us, 5 * trace_bucket_us}, 100));
+  ASSERT_EQ(some.buckets.size(), 2U);
+  EXPECT_EQ(some.buckets[0].start_utime_us, 3 * trace_bucket_us);
+
+  const Trace few = need(store_->trace(m.key, {}, 3));
+  EXPECT_EQ(few.width_us, 4 * trace_bucket_us);
+  ASSERT_EQ(few.buckets.size(), 3U);
+  EXPECT_EQ(few.buckets[2].covered_s, 2);
+}
+
+TEST_P(StoreConformance, RefusesABucketOffTheGridWithAllOfItsCheckpoint) {
+  Mission m = start_mission(*store_, "amr-1", "m", 0);
+  m.samples = 5;
+  TraceBucket off;
+  off.start_utime_us = 1;
+  EXPECT_EQ(apply(CheckpointMission{m, {off}, some_samples(0, 0, 5), {}}).error().fault, Fault::invalid);
+  EXPECT_EQ(need(store_->mission(m.key)).samples, 0);
+  EXPECT_TRUE(all_samples(m.key).empty());
+}
+
+// ---- raw telemetry
+
+TEST_P(StoreConformance, ReturnsSamplesInOrderOfArrivalHoweverTheyCame) {
+  Mission m = start_mission(*store_, "amr-1", "m", 0);
+  // Sizes around and far above a chunk, so that tails are merged at every boundary.
+  std::vector<std::int64_t> expected;
+  for (const std::size_t size : {1U, 10U, 1012U, 1U, 1023U, 1024U, 1U, 5000U, 3U}) {
+    const auto first = static_cast<std::int64_t>(expected.size());
+    need(apply(CheckpointMission{m, {}, some_samples(10'000 * first, first, size), {}}));
+    for (std::size_t i = 0; i < size; ++i) expected.push_back(first + static_cast<std::int64_t>(i));
+    ASSERT_EQ(sequences(all_samples(m.key)), expected) << size;
+  }
+  m.state = MissionState::finished;
+  need(apply(CheckpointMission{m, {}, {}, {}}));
+  EXPECT_EQ(sequences(all_samples(m.key)), expected);
+  EXPECT_EQ(sequences(all_samples(m.key, {}, 777)), expected);
+  EXPECT_EQ(all_samples(m.key)[4321].battery_voltage_v, 24.0 + 0.001 * 4321);
+}
+
+TEST_P(StoreConformance, ReadsRangesOfSamplesEvenWhenTheyCameLate) {
+  const Mission m = start_mission(*store_, "amr-1", "m", 0);
+  need(apply(CheckpointMission{m, {}, some_samples(1'000'000, 100, 50), {}}));
+  need(apply(CheckpointMission{m, {}, some_samples(0, 0, 50), {}}));
+  EXPECT_THAT(sequences(all_samples(m.key, {1'000'000, 1'030'000})), testing::ElementsAre(100, 101, 102));
+  EXPECT_THAT(sequences(all_samples(m.key, {480'000, 1'010'001}, 2)), testing::ElementsAre(100, 101, 48, 49));
+  EXPECT_TRUE(all_samples(m.key, {5'000'000, 6'000'000}).empty());
+  const std::string cursor = need(store_->telemetry(m.key, {}, {10, {}})).next_cursor;
+  EXPECT_EQ(store_->telemetry(m.key, {0, 5}, {10, cursor}).error().field, "cursor");
+}
+
+TEST_P(StoreConformance, PrunesByAgeSinceStoring) {
+  Mission m = start_mission(*store_, "amr-1", "m", 0);
+  now_utime_us_ = 100'000'000;
+  need(apply(CheckpointMission{m, {}, some_samples(0, 0, 1024), {}}));
+  now_utime_us_ = 200'000'000;
+  need(apply(CheckpointMission{m, {TraceBucket{}}, some_samples(20'000'000, 1024, 1024), {}}));
+  Prune prune{{150'000'000, {}}, 1000};
+  EXPECT_EQ(apply(prune), 0);
+  now_utime_us_ = 260'000'000;
+  EXPECT_EQ(apply(prune), 1);
+  EXPECT_EQ(all_samples(m.key).front().sequence, 1024);
+  EXPECT_EQ(all_samples(m.key).size(), 1024U);
+  now_utime_us_ = 1'000'000'000;
+  EXPECT_EQ(apply(prune), 1);
+  EXPECT_TRUE(all_samples(m.key).empty());
+  EXPECT_EQ(need(store_->trace(m.key, {}, 10)).buckets.size(), 1U);
+  // What comes after pruning keeps counting: an old cursor never reads it twice.
+  need(apply(CheckpointMission{m, {}, some_samples(40'000'000, 2048, 5), {}}));
+  EXPECT_EQ(all_samples(m.key).size(), 5U);
+}
+
+TEST_P(StoreConformance, PrunesByBytesOldestFirstInMeasure) {
+  Mission m = start_mission(*store_, "amr-1", "m", 0);
+  for (int i = 0; i < 10; ++i) {
+    ++now_utime_us_;
+    need(apply(CheckpointMission{m, {}, some_samples(0, 1024 * i, 1024), {}}));
+  }
+  const std::int64_t full = need(store_->size()).telemetry_bytes;
+  ASSERT_GT(full, 0);
+  const Prune prune{{{}, full / 2}, 3};
+  EXPECT_EQ(apply(prune), 3);
+  std::int64_t dropped = 3;
+  while (need(store_->size()).telemetry_bytes > full / 2) {
+    const std::int64_t more = need(apply(prune));
+    ASSERT_GT(more, 0);
+    dropped += more;
+  }
+  EXPECT_EQ(apply(prune), 0);
+  const auto rest = all_samples(m.key);
+  EXPECT_EQ(rest.size(), 1024U * static_cast<std::size_t>(10 - dropped));
+  EXPECT_EQ(rest.front().sequence, 1024 * dropped);
+  // No more than needed: with one chunk more the bound would not hold. Chunks differ by far less than a half.
+  EXPECT_GT(need(store_->size()).telemetry_bytes, full / 2 - full / 7);
+}
+
+// ---- events
+
+TEST_P(StoreConformance, KeepsEventsInOrder) {
+  const Outcome first = apply(AppendEvent{{99, 10, "amr-1", "robot_seen", R"({"n": 1})"}});
+  const Outcome second = apply(AppendEvent{{0, 5, "", "started", "{}"}});
+  ASSERT_TRUE(first && second);
+  EXPECT_LT(*first, *second);
+  const auto all = need(store_->events(0, 10));
+  ASSERT_EQ(all.size(), 2U);
+  EXPECT_EQ(all[0].id, *first);
+  EXPECT_EQ(all[0].utime_us, 10);
+  EXPECT_EQ(all[0].robot_id, "amr-1");
+  EXPECT_EQ(all[0].kind, "robot_seen");
+  EXPECT_EQ(all[0].detail_json, R"({"n": 1})");
+  EXPECT_EQ(all[1].robot_id, "");
+  EXPECT_EQ(need(store_->events(*first, 10)).size(), 1U);
+  EXPECT_EQ(need(store_->events(0, 1)).size(), 1U);
+  EXPECT_EQ(need(store_->events(0, 10, "amr-1")).size(), 1U);
+  EXPECT_EQ(apply(AppendEvent{{0, 5, "", "bad", "{"}}).error().fault, Fault::invalid);
+}
+
+// ---- threads
+
+TEST_P(StoreConformance, ReadersSeeWholeTransactionsWhileOneWrites) {
+  Mission m = start_mission(*store_, "amr-1", "m", 0);
+  std::atomic<bool> done{false};
+  std::atomic<int> torn{0};
+  std::atomic<int> failed{0};
+  std::atomic<int> reads{0};
+  std::vector<std::thread> readers;
+  for (int k = 0; k < 6; ++k)  // more than the store has connections
+    readers.emplace_back([&] {
+      do {
+        const auto mission = store_->mission(m.key);
+        const auto page = store_->telemetry(m.key, {}, {100'000, {}});
+        if (!mission || !page) {
+          ++failed;
+          continue;
+        }
+        ++reads;
+        // A checkpoint brings ten samples and their count at once; the page is read after the count.
+        if (page->samples.size() % 10 != 0 ||
+            static_cast<std::int64_t>(page->samples.size()) < mission->samples)
+          ++torn;
+      } while (!done);
+    });
+  for (int i = 0; i < 300; ++i) {
+    m.samples += 10;
+    need(apply(CheckpointMission{m, {}, some_samples(100'000 * i, 10 * i, 10), {}}));
+  }
+  done = true;
+  for (auto& reader : readers) reader.join();
+  EXPECT_EQ(torn, 0);
+  EXPECT_EQ(failed, 0);
+  EXPECT_GE(reads, 6);
+}
+
+INSTANTIATE_TEST_SUITE_P(Stores, StoreConformance, testing::Values(sqlite),
+                         [](const auto& kind) { return kind.param.name; });
+
+}  // namespace
+}  // namespace joulecast::history
