@@ -3,7 +3,7 @@
 #include <span>
 #include <string_view>
 
-// Files of the source tree that are part of the program, written at build time by cmake/embed.cmake.
+// Files of the source tree that are part of the program, written at build time by server/embed.cmake.
 namespace joulecast {
 
 struct EmbeddedFile {

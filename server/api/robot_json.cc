@@ -8,24 +8,30 @@ namespace {
 
 constexpr double live_s = 5;
 
+double silence_s(const server::RobotSnapshot& s, std::int64_t now_utime_us) {
+  return s.received_utime_us > 0 ? static_cast<double>(now_utime_us - s.received_utime_us) * 1e-6
+                                 : telemetry::unmeasured;
+}
+
 void write_sides(JsonWriter& json, std::string_view name, const std::array<double, 2>& sides) {
   json.key(name).begin_array().value(sides[0]).value(sides[1]).end_array();
 }
 
 }  // namespace
 
+bool is_live(const server::RobotSnapshot& snapshot, std::int64_t now_utime_us) {
+  return silence_s(snapshot, now_utime_us) <= live_s;  // false for NaN
+}
+
 void write_state(JsonWriter& json, const server::RobotSnapshot& s, const robot::Battery* battery,
                  std::int64_t now_utime_us) {
-  const double silent_s = s.received_utime_us > 0
-                              ? static_cast<double>(now_utime_us - s.received_utime_us) * 1e-6
-                              : telemetry::unmeasured;
   json.begin_object();
   json.field("robot_id", s.robot_id);
   json.field("has_model", s.has_model);
   json.key("model_version");
   s.has_model ? json.value(s.model_version) : json.null();
-  json.field("live", silent_s <= live_s);
-  json.field("silent_s", silent_s);
+  json.field("live", is_live(s, now_utime_us));
+  json.field("silent_s", silence_s(s, now_utime_us));
   json.key("utime_us");
   s.sample.utime_us != 0 ? json.value(s.sample.utime_us) : json.null();
   json.field("measured_power_w", s.measured_power_w);

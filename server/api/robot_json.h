@@ -6,8 +6,11 @@
 
 namespace joulecast::api {
 
+// Heard of within the last seconds.
+bool is_live(const server::RobotSnapshot& snapshot, std::int64_t now_utime_us);
+
 // The live state of a robot: what GET /v1/robots/{id}/state answers and the fleet's event stream sends.
-// `battery` is null when the robot has no model. A robot not heard of for `live_s` is not live.
+// `battery` is null when the robot has no model.
 void write_state(JsonWriter& json, const server::RobotSnapshot& snapshot, const robot::Battery* battery,
                  std::int64_t now_utime_us);
 

@@ -6,7 +6,6 @@
 
 #include "history/store.h"
 #include "history/writer.h"
-#include "server/http/event_hub.h"
 #include "server/http/router.h"
 #include "server/ingest/fleet_view.h"
 #include "server/ingest/model_registry.h"
@@ -19,7 +18,6 @@ struct Services {
   history::Writer& writer;
   server::ModelRegistry& models;
   const server::FleetView& fleet;
-  http::EventHub& events;
   std::function<std::int64_t()> now_utime_us;  // host clock
 };
 
@@ -31,7 +29,6 @@ std::vector<http::Endpoint> robot_endpoints(Services& services);
 std::vector<http::Endpoint> mission_endpoints(Services& services);
 std::vector<http::Endpoint> planning_endpoints(Services& services);
 std::vector<http::Endpoint> autonomy_endpoints(Services& services);
-std::vector<http::Endpoint> event_endpoints(Services& services);
 
 // The model of a robot, or the error that says why there is none.
 Result<std::shared_ptr<const server::ModelInForce>> model_of(const Services& services,

@@ -1,0 +1,292 @@
+#include "server/application.h"
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <filesystem>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "history/sqlite_store.h"
+#include "history/writer.h"
+#include "server/api/services.h"
+#include "server/daemon_metrics.h"
+#include "server/embedded.h"
+#include "server/fleet_events.h"
+#include "server/http/event_hub.h"
+#include "server/http/http_metrics.h"
+#include "server/http/http_server.h"
+#include "server/http/openapi.h"
+#include "server/http/operations.h"
+#include "server/http/static_files.h"
+#include "server/ingest/ingest_service.h"
+#include "server/logging.h"
+#include "server/metrics.h"
+#include "server/model_loading.h"
+
+namespace joulecast {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr double seconds_per_day = 86400;
+
+std::int64_t host_utime_us() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+milliseconds seconds(double s) {
+  return milliseconds(static_cast<std::int64_t>(s * 1000));
+}
+std::int64_t microseconds(double s) {
+  return static_cast<std::int64_t>(s * 1e6);
+}
+
+history::WriterOptions writer_options(const Settings& settings) {
+  history::WriterOptions options;
+  if (const double days = settings.number("store.retention_days"); days > 0) {
+    options.retention.telemetry_max_age_us = microseconds(days * seconds_per_day);
+  }
+  if (const auto bytes = settings.integer("store.retention_bytes"); bytes > 0)
+    options.retention.telemetry_max_bytes = bytes;
+  options.on_error = [](const Error& error) { log_error("store", error); };
+  return options;
+}
+
+server::IngestOptions ingest_options(const Settings& settings) {
+  server::IngestOptions options;
+  options.lcm_url = settings.text("lcm.url");
+  options.queue_messages = static_cast<std::size_t>(settings.integer("ingest.queue_messages"));
+  options.energy_state_period = seconds(settings.number("energy_state.period_s"));
+  options.max_robots = static_cast<std::size_t>(settings.integer("ingest.max_robots"));
+  options.session.meter.tolerance = settings.number("meter.tolerance");
+  options.session.meter.gap_bridge_s = settings.number("ingest.gap_bridge_s");
+  options.session.sequence.gap_us = microseconds(settings.number("ingest.gap_bridge_s"));
+  options.session.mission.explicit_silence_us =
+      microseconds(settings.number("ingest.mission_idle_timeout_s"));
+  options.session.implicit_missions = settings.boolean("ingest.implicit_missions");
+  return options;
+}
+
+http::ServerOptions http_options(const Settings& settings) {
+  http::ServerOptions options;
+  options.address = settings.text("http.address");
+  options.port = static_cast<std::uint16_t>(settings.integer("http.port"));
+  options.worker_threads = static_cast<unsigned>(settings.integer("http.worker_threads"));
+  options.worker_queue = static_cast<std::size_t>(settings.integer("http.worker_queue"));
+  options.max_connections = static_cast<std::size_t>(settings.integer("http.max_connections"));
+  options.max_header_bytes = static_cast<std::uint32_t>(settings.integer("http.max_header_bytes"));
+  options.max_body_bytes = static_cast<std::uint64_t>(settings.integer("http.max_body_bytes"));
+  options.read_timeout = seconds(settings.number("http.read_timeout_s"));
+  options.write_timeout = seconds(settings.number("http.write_timeout_s"));
+  options.idle_timeout = seconds(settings.number("http.idle_timeout_s"));
+  return options;
+}
+
+http::EventHub::Options event_options(const Settings& settings) {
+  http::EventHub::Options options;
+  options.queue_bytes = static_cast<std::size_t>(settings.integer("http.event_queue_bytes"));
+  options.max_subscribers = static_cast<std::size_t>(settings.integer("http.event_streams"));
+  return options;
+}
+
+// Every documented endpoint and the page.
+Result<std::vector<http::Endpoint>> endpoint_table(api::Services& services, Metrics& metrics,
+                                                   http::EventHub& events,
+                                                   std::vector<http::ReadinessCheck> checks,
+                                                   const std::string& web_directory) {
+  std::vector<http::Endpoint> table = api::endpoints(services);
+  table.push_back(http::events_endpoint(events));
+  for (http::Endpoint& row : http::operations_endpoints(metrics, std::move(checks)))
+    table.push_back(std::move(row));
+  Result<std::vector<http::Endpoint>> documented = http::with_openapi(std::move(table), embedded_schemas());
+  if (!documented) return documented;
+  Result<std::vector<http::Endpoint>> page =
+      web_directory.empty() ? Result<std::vector<http::Endpoint>>(http::asset_endpoints(embedded_web()))
+                            : http::asset_endpoints_from(web_directory);
+  if (!page) return page;
+  for (http::Endpoint& row : *page) documented->push_back(std::move(row));
+  return documented;
+}
+
+}  // namespace
+
+// In the order of construction; destroyed in reverse.
+struct Application::Parts {
+  explicit Parts(const Settings& s)
+      : settings(s), events(event_options(s)), warn([](const std::string& robot, const std::string& text) {
+          log_warning(text, {{"robot_id", robot}});
+        }) {}
+
+  ~Parts() { stop(); }
+
+  void stop() {
+    if (stopped.exchange(true)) return;
+    if (ingest) ingest->stop();
+    {
+      const std::lock_guard lock(beat_mutex);
+      beating = false;
+    }
+    beat_wake.notify_all();
+    if (beat.joinable()) beat.join();
+    if (http && !http->stop(seconds(settings.number("http.stop_deadline_s"))))
+      log_warning("requests were cut off at the stop deadline");
+    if (writer) {
+      if (const Result<void> written = writer->stop(milliseconds(10'000)); !written)
+        log_error("stopping the writer", written.error());
+    }
+  }
+
+  void run_beat() {
+    server::FleetEvents fleet_events(fleet, models, *store, events);
+    std::unique_lock lock(beat_mutex);
+    while (beating) {
+      lock.unlock();
+      fleet_events.publish(host_utime_us());
+      lock.lock();
+      beat_wake.wait_for(lock, milliseconds(1000), [&] { return !beating; });
+    }
+  }
+
+  const Settings settings;
+  Metrics metrics;
+  http::EventHub events;
+  server::ModelRegistry models;
+  server::FleetView fleet;
+  server::IngestCounters counters;
+  std::function<void(const std::string&, const std::string&)> warn;
+  std::unique_ptr<history::Store> store;
+  std::unique_ptr<history::Writer> writer;
+  std::unique_ptr<server::IngestService> ingest;
+  std::unique_ptr<api::Services> services;
+  std::unique_ptr<http::Router> router;
+  std::unique_ptr<http::HttpMetrics> http_metrics;
+  std::unique_ptr<http::HttpServer> http;
+  std::mutex beat_mutex;
+  std::condition_variable beat_wake;
+  bool beating = true;
+  std::thread beat;
+  std::atomic<bool> stopped = false;
+  std::uint64_t last_receive = 0, last_account = 0, last_write = 0;
+};
+
+Application::Application(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+Application::~Application() = default;
+
+Result<std::unique_ptr<Application>> Application::start(const Settings& settings) {
+  auto parts = std::make_unique<Parts>(settings);
+  Parts& p = *parts;
+
+  history::SqliteOptions sqlite;
+  sqlite.path = settings.text("store.path");
+  Result<std::unique_ptr<history::Store>> store = history::open_sqlite_store(sqlite);
+  if (!store) return tl::unexpected(std::move(store.error()));
+  p.store = std::move(*store);
+  p.writer = std::make_unique<history::Writer>(*p.store, writer_options(settings));
+
+  if (const std::string& directory = settings.text("robots.directory"); !directory.empty()) {
+    const Result<int> loaded = server::load_robot_files(directory, *p.store, *p.writer, host_utime_us());
+    if (!loaded) return tl::unexpected(loaded.error());
+    log_info("robot files read", {{"directory", directory}, {"files", std::to_string(*loaded)}});
+  }
+  if (Result<void> models = server::load_stored_models(*p.store, p.models); !models)
+    return tl::unexpected(std::move(models.error()));
+
+  history::Writer& writer = *p.writer;
+  const server::SessionOutputs outputs{*p.store,
+                                       [&writer, warn = p.warn](history::Command command) {
+                                         if (const Result<void> posted = writer.post(std::move(command));
+                                             !posted)
+                                           warn("", describe(posted.error()));
+                                       },
+                                       p.fleet, p.counters, p.warn};
+  p.ingest = std::make_unique<server::IngestService>(ingest_options(settings), p.models, outputs);
+  if (Result<void> started = p.ingest->start(); !started) return tl::unexpected(std::move(started.error()));
+
+  p.services =
+      std::make_unique<api::Services>(api::Services{*p.store, *p.writer, p.models, p.fleet, host_utime_us});
+  std::vector<http::ReadinessCheck> checks;
+  checks.push_back({"ingest", [&p]() -> Result<void> {
+                      const server::IngestStatus status = p.ingest->status();
+                      if (!status.receiving)
+                        return fail(Fault::unavailable, "ingest",
+                                    "LCM is not being received: " + status.error);
+                      return {};
+                    }});
+  checks.push_back({"store", [&p]() -> Result<void> {
+                      const history::WriterStatus status = p.writer->status();
+                      if (!status.healthy) return fail(Fault::unavailable, "store", status.error);
+                      return {};
+                    }});
+  Result<std::vector<http::Endpoint>> table = endpoint_table(
+      *p.services, p.metrics, p.events, std::move(checks), settings.text("http.web_directory"));
+  if (!table) return tl::unexpected(std::move(table.error()));
+  p.router = std::make_unique<http::Router>(std::move(*table), [](const http::Endpoint& endpoint,
+                                                                  const http::Request& request,
+                                                                  const Error& error) {
+    log_error("request failed",
+              {{"operation", endpoint.operation_id}, {"request_id", request.id}, {"cause", describe(error)}});
+  });
+  p.http_metrics = std::make_unique<http::HttpMetrics>(p.metrics);
+  server::export_metrics(p.metrics, p.counters, *p.ingest, p.fleet, *p.writer, *p.store, p.events,
+                         host_utime_us);
+  Result<std::unique_ptr<http::HttpServer>> http =
+      http::HttpServer::start(http_options(settings), *p.router, p.http_metrics.get());
+  if (!http) return tl::unexpected(std::move(http.error()));
+  p.http = std::move(*http);
+  p.beat = std::thread([&p] { p.run_beat(); });
+  return std::unique_ptr<Application>(new Application(std::move(parts)));
+}
+
+std::uint16_t Application::http_port() const {
+  return parts_->http->port();
+}
+
+bool Application::alive() {
+  const server::IngestStatus ingest = parts_->ingest->status();
+  const std::uint64_t written = parts_->writer->status().ticks;
+  constexpr milliseconds longest_silence{5000};
+  const bool turning = ingest.receive_ticks != parts_->last_receive &&
+                       ingest.account_ticks != parts_->last_account && written != parts_->last_write &&
+                       parts_->http->silence() < longest_silence;
+  parts_->last_receive = ingest.receive_ticks;
+  parts_->last_account = ingest.account_ticks;
+  parts_->last_write = written;
+  return turning;
+}
+
+void Application::stop() {
+  parts_->stop();
+}
+
+Result<std::string> openapi_document() {
+  // The table needs parts to point at; the document reads none of them.
+  const std::string path =
+      (std::filesystem::temp_directory_path() / ("joulecast-openapi-" + std::to_string(host_utime_us())))
+          .string();
+  std::filesystem::create_directories(path);
+  const auto document = [&]() -> Result<std::string> {
+    history::SqliteOptions sqlite;
+    sqlite.path = path + "/empty.db";
+    Result<std::unique_ptr<history::Store>> store = history::open_sqlite_store(sqlite);
+    if (!store) return tl::unexpected(std::move(store.error()));
+    history::Writer writer(**store, {});
+    server::ModelRegistry models;
+    const server::FleetView fleet;
+    Metrics metrics;
+    http::EventHub events;
+    api::Services services{**store, writer, models, fleet, host_utime_us};
+    std::vector<http::Endpoint> table = api::endpoints(services);
+    table.push_back(http::events_endpoint(events));
+    for (http::Endpoint& row : http::operations_endpoints(metrics, {})) table.push_back(std::move(row));
+    return http::openapi_document(table, embedded_schemas());
+  }();
+  std::filesystem::remove_all(path);
+  return document;
+}
+
+}  // namespace joulecast

@@ -1,0 +1,94 @@
+#include "server/daemon_metrics.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/api/robot_json.h"
+
+namespace joulecast::server {
+
+void export_metrics(Metrics& metrics, const IngestCounters& counters, const IngestService& ingest,
+                    const FleetView& fleet, const history::Writer& writer, const history::Store& store,
+                    const http::EventHub& events, std::function<std::int64_t()> now_utime_us) {
+  const Counter messages = metrics.counter("joulecast_ingest_messages_total",
+                                           "Messages received on the telemetry and mission channels");
+  const Counter samples = metrics.counter("joulecast_ingest_samples_total", "Samples accounted for");
+  const Counter started =
+      metrics.counter("joulecast_missions_started_total", "Missions begun, implicit ones included");
+  const Counter ended =
+      metrics.counter("joulecast_missions_ended_total", "Missions ended, for whatever reason");
+  const std::vector<Counter> faults = metrics.counters(
+      "joulecast_ingest_faults_total", "Messages, samples and events turned away or repaired", "reason",
+      std::vector<std::string>(ingest_fault_names.begin(), ingest_fault_names.end()));
+  const Gauge queue = metrics.gauge("joulecast_ingest_queue_messages", "Messages waiting to be accounted");
+  const Gauge receiving = metrics.gauge("joulecast_ingest_receiving", "1 while LCM is being received");
+  const Gauge known = metrics.gauge("joulecast_robots_known", "Robots heard of since the daemon started");
+  const Gauge live = metrics.gauge("joulecast_robots_live", "Robots heard of within the last seconds");
+  const Gauge fleet_power =
+      metrics.gauge("joulecast_fleet_power_watts", "Measured battery power of all live robots");
+  const Gauge write_queue =
+      metrics.gauge("joulecast_store_queue_commands", "Commands waiting to be committed");
+  const Gauge write_wait =
+      metrics.gauge("joulecast_store_oldest_wait_seconds", "Age of the oldest command not yet committed");
+  const Gauge healthy = metrics.gauge("joulecast_store_healthy", "1 while commits succeed");
+  const Gauge database = metrics.gauge("joulecast_store_bytes", "Size of the database file");
+  const Gauge journal = metrics.gauge("joulecast_store_journal_bytes", "Size of the write-ahead log");
+  const Gauge telemetry = metrics.gauge("joulecast_store_telemetry_bytes", "Encoded raw telemetry kept");
+  const Counter commits = metrics.counter("joulecast_store_commits_total", "Transactions committed");
+  const Counter failed = metrics.counter("joulecast_store_failed_commits_total",
+                                         "Commit attempts that failed and were tried again");
+  const Counter refused = metrics.counter("joulecast_store_refused_total", "Commands that the store refused");
+  const Counter seconds = metrics.counter("joulecast_store_commit_seconds_total", "Time spent in commits");
+  const Counter pruned = metrics.counter("joulecast_store_pruned_chunks_total",
+                                         "Raw telemetry chunks that the retention dropped");
+  const Gauge streams = metrics.gauge("joulecast_event_streams", "Clients of the event stream");
+  const Counter dropped = metrics.counter("joulecast_event_streams_dropped_total",
+                                          "Clients of the event stream dropped for being slow");
+
+  metrics.before_scrape(
+      [=, &counters, &ingest, &fleet, &writer, &store, &events, now = std::move(now_utime_us)] {
+        messages.raise_to(static_cast<double>(counters.messages));
+        samples.raise_to(static_cast<double>(counters.samples));
+        started.raise_to(static_cast<double>(counters.missions_started));
+        ended.raise_to(static_cast<double>(counters.missions_ended));
+        for (std::size_t k = 0; k < faults.size(); ++k)
+          faults[k].raise_to(static_cast<double>(counters.faults[k]));
+        const IngestStatus ingesting = ingest.status();
+        queue.set(static_cast<double>(ingesting.queue_messages));
+        receiving.set(ingesting.receiving ? 1 : 0);
+
+        const auto robots = fleet.all();
+        double power = 0;
+        double alive = 0;
+        for (const auto& robot : robots) {
+          if (!api::is_live(*robot, now())) continue;
+          ++alive;
+          if (robot->measured_power_w == robot->measured_power_w) power += robot->measured_power_w;
+        }
+        known.set(static_cast<double>(robots.size()));
+        live.set(alive);
+        fleet_power.set(power);
+
+        const history::WriterStatus writing = writer.status();
+        write_queue.set(static_cast<double>(writing.queue_commands));
+        write_wait.set(writing.oldest_wait_s);
+        healthy.set(writing.healthy ? 1 : 0);
+        commits.raise_to(static_cast<double>(writing.commits));
+        failed.raise_to(static_cast<double>(writing.failed_commits));
+        refused.raise_to(static_cast<double>(writing.refused));
+        seconds.raise_to(writing.total_commit_s);
+        pruned.raise_to(static_cast<double>(writing.pruned_chunks));
+        if (const auto size = store.size()) {
+          database.set(static_cast<double>(size->database_bytes));
+          journal.set(static_cast<double>(size->journal_bytes));
+          telemetry.set(static_cast<double>(size->telemetry_bytes));
+        }
+        const http::EventHub::Counts counted = events.counts();
+        streams.set(static_cast<double>(counted.subscribers));
+        dropped.raise_to(static_cast<double>(counted.dropped_clients));
+      });
+}
+
+}  // namespace joulecast::server

@@ -1,0 +1,29 @@
+#include "server/fleet_events.h"
+
+#include "server/api/mission_json.h"
+#include "server/api/robot_json.h"
+
+namespace joulecast::server {
+
+void FleetEvents::publish(std::int64_t now_utime_us) {
+  for (const auto& snapshot : fleet_.all()) {
+    Told& told = told_[snapshot->robot_id];
+    const bool live = api::is_live(*snapshot, now_utime_us);
+    if (told.snapshot != nullptr && told.snapshot->mission_key > 0 &&
+        told.snapshot->mission_key != snapshot->mission_key) {
+      if (const auto mission = store_.mission(told.snapshot->mission_key)) {
+        api::JsonWriter json;
+        api::write_mission(json, *mission);
+        hub_.publish("mission", json.text(), snapshot->robot_id);
+      }
+    }
+    if (told.snapshot == snapshot && told.live == live) continue;
+    const auto model = models_.find(snapshot->robot_id);
+    api::JsonWriter json;
+    api::write_state(json, *snapshot, model != nullptr ? &model->robot.battery : nullptr, now_utime_us);
+    hub_.publish("state", json.text(), snapshot->robot_id);
+    told = {snapshot, live};
+  }
+}
+
+}  // namespace joulecast::server

@@ -1,0 +1,105 @@
+#include <systemd/sd-daemon.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "server/application.h"
+#include "server/logging.h"
+#include "server/settings.h"
+
+namespace {
+
+using joulecast::Invocation;
+
+joulecast::LogLevel log_level(const std::string& name) {
+  if (name == "debug") return joulecast::LogLevel::debug;
+  if (name == "warning") return joulecast::LogLevel::warning;
+  if (name == "error") return joulecast::LogLevel::error;
+  return joulecast::LogLevel::info;
+}
+
+// Waits for SIGINT or SIGTERM, feeding the watchdog while every loop turns.
+void run(joulecast::Application& application) {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  std::uint64_t watchdog_us = 0;
+  const bool watched = sd_watchdog_enabled(0, &watchdog_us) > 0;
+  const std::uint64_t period_us = watched ? watchdog_us / 3 : 10'000'000;
+  const timespec period{static_cast<time_t>(period_us / 1'000'000),
+                        static_cast<long>(period_us % 1'000'000 * 1000)};
+  while (sigtimedwait(&signals, nullptr, &period) < 0) {
+    if (application.alive() && watched) sd_notify(0, "WATCHDOG=1");
+  }
+}
+
+int serve(const joulecast::Settings& settings) {
+  joulecast::configure_logging(
+      settings.text("log.format") == "json" ? joulecast::LogFormat::json : joulecast::LogFormat::text,
+      log_level(settings.text("log.level")));
+  // Every thread inherits the mask, so that only run() sees these signals.
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  std::signal(SIGPIPE, SIG_IGN);
+
+  auto application = joulecast::Application::start(settings);
+  if (!application) {
+    joulecast::log_error("cannot start", application.error());
+    return 1;
+  }
+  joulecast::log_info("ready", {{"http", "http://" + settings.text("http.address") + ":" +
+                                             std::to_string((*application)->http_port())},
+                                {"lcm", settings.text("lcm.url")},
+                                {"store", settings.text("store.path")}});
+  sd_notify(0, "READY=1");
+  run(**application);
+  sd_notify(0, "STOPPING=1");
+  joulecast::log_info("stopping");
+  (*application)->stop();
+  joulecast::log_info("stopped");
+  joulecast::flush_log();
+  return 0;
+}
+
+int print(const joulecast::Result<std::string>& text) {
+  if (!text) {
+    std::fprintf(stderr, "joulecastd: %s\n", joulecast::describe(text.error()).c_str());
+    return 1;
+  }
+  std::fputs(text->c_str(), stdout);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto invocation = joulecast::read_settings({argv + 1, argv + argc}, joulecast::process_environment());
+  if (!invocation) {
+    std::fprintf(stderr, "joulecastd: %s\n", joulecast::describe(invocation.error()).c_str());
+    return 2;
+  }
+  switch (invocation->action) {
+    case Invocation::Action::help:
+      return print(joulecast::settings_help());
+    case Invocation::Action::version:
+      return print(std::string("joulecastd " JOULECAST_VERSION "\n"));
+    case Invocation::Action::check_config:
+      return print(std::string("the settings are valid\n"));
+    case Invocation::Action::print_config:
+      return print(invocation->settings.print());
+    case Invocation::Action::print_openapi:
+      return print(joulecast::openapi_document());
+    case Invocation::Action::print_config_schema:
+      return print(joulecast::settings_schema());
+    case Invocation::Action::run:
+      return serve(invocation->settings);
+  }
+  return 2;
+}

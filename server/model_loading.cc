@@ -1,0 +1,65 @@
+#include "server/model_loading.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+#include <vector>
+
+#include "robot/robot_file.h"
+
+namespace joulecast::server {
+
+Result<void> load_stored_models(const history::Store& store, ModelRegistry& models) {
+  Result<std::vector<history::RobotRecord>> robots = store.robots();
+  if (!robots) return tl::unexpected(std::move(robots.error()));
+  for (const history::RobotRecord& record : *robots) {
+    if (!record.active_version) continue;
+    Result<history::ModelVersion> version = store.model(record.robot_id);
+    if (!version) return tl::unexpected(std::move(version.error()));
+    const auto named = [&](Error error) {
+      error.message = "stored model of " + record.robot_id + ", version " + std::to_string(version->version) +
+                      ": " + error.message;
+      return tl::unexpected(std::move(error));
+    };
+    Result<robot::RobotModel> robot = robot::parse_robot(version->model_json);
+    if (!robot) return named(std::move(robot.error()));
+    if (Result<void> placed = models.put(std::move(*robot), version->version); !placed)
+      return named(std::move(placed.error()));
+  }
+  return {};
+}
+
+Result<int> load_robot_files(const std::string& directory, history::Store& store, history::Writer& writer,
+                             std::int64_t now_utime_us) {
+  std::error_code fault;
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(directory, fault)) {
+    if (entry.path().extension() == ".json") files.push_back(entry.path());
+  }
+  if (fault) return fail(Fault::not_found, "robots.directory", directory + ": " + fault.message());
+  std::ranges::sort(files);
+  for (const auto& file : files) {
+    Result<robot::RobotModel> robot = robot::load_robot(file.string());
+    if (!robot) return tl::unexpected(std::move(robot.error()));
+    if (auto effects = dynamics::active_effects(*robot); !effects) {
+      effects.error().message = file.string() + ": " + effects.error().message;
+      return tl::unexpected(std::move(effects.error()));
+    }
+    history::AddModel command;
+    command.robot_id = robot->robot_id;
+    command.utime_us = now_utime_us;
+    command.origin = history::ModelOrigin::file;
+    command.note = file.filename().string();
+    command.model_json = robot::to_json_text(*robot);
+    if (const auto versions = store.model_versions(robot->robot_id)) {
+      const auto last = std::ranges::find(*versions, history::ModelOrigin::file,
+                                          &history::ModelVersion::origin);  // newest first
+      if (last != versions->end() && last->model_json == command.model_json) continue;
+    }
+    if (history::Outcome added = writer.execute(std::move(command)); !added)
+      return tl::unexpected(std::move(added.error()));
+  }
+  return static_cast<int>(files.size());
+}
+
+}  // namespace joulecast::server
