@@ -12,7 +12,6 @@
 namespace joulecast::telemetry {
 namespace {
 
-constexpr std::size_t read_chunk = 1u << 20;
 constexpr std::array<std::uint8_t, 4> sync_bytes{0xED, 0xA1, 0xDA, 0x01};
 
 std::uint32_t read_u32(const std::uint8_t* at) noexcept {
@@ -88,7 +87,8 @@ std::span<const std::uint8_t> EventLogReader::peek(std::size_t wanted) {
       filled_ -= begin_;
       begin_ = 0;
     }
-    if (buffer_.size() < std::max(wanted, read_chunk)) buffer_.resize(std::max(wanted, read_chunk));
+    const std::size_t room = std::max(wanted, limits_.read_size);
+    if (buffer_.size() < room) buffer_.resize(room);
     while (filled_ < wanted && !exhausted_) {
       const std::ptrdiff_t got = source_(std::span(buffer_).subspan(filled_));
       failed_ = got < 0;
@@ -210,7 +210,7 @@ Result<void> EventLogWriter::write(std::int64_t timestamp_us, std::string_view c
   put(at, static_cast<std::uint32_t>(data.size()));
   if (std::fwrite(header.data(), 1, header.size(), file_.get()) != header.size() ||
       std::fwrite(channel.data(), 1, channel.size(), file_.get()) != channel.size() ||
-      std::fwrite(data.data(), 1, data.size(), file_.get()) != data.size()) {
+      (!data.empty() && std::fwrite(data.data(), 1, data.size(), file_.get()) != data.size())) {
     return fail(Fault::unavailable, path_, std::strerror(errno));
   }
   ++count_;

@@ -67,7 +67,7 @@ TEST(EventLog, WritesWhatLcmReads) {
 
 TEST(EventLog, ReadsWhatItWroteInPiecesOfAnySize) {
   for (const std::size_t piece : {std::size_t{1}, std::size_t{7}, std::size_t{4096}}) {
-    EventLogReader reader = reader_of(three_events(), piece);
+    EventLogReader reader = reader_of(three_events(), piece, {63, 1000, 50});
     for (std::size_t i = 0; i < 3; ++i) {
       const LogRead read = reader.next();
       ASSERT_EQ(read.status, LogStatus::event);
