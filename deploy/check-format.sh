@@ -1,0 +1,5 @@
+#!/usr/bin/env bash
+# Fails when a source file is not as clang-format 14 would write it.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+git ls-files -- '*.cc' '*.h' | xargs -r clang-format --dry-run --Werror

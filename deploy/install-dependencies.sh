@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# Installs what joulecast builds with and runs on, from Debian 12's own packages. Run as root or with sudo available.
+set -euo pipefail
+packages=(
+  g++ cmake ninja-build ccache pkg-config git ca-certificates
+  liblcm-dev liblcm-bin libglib2.0-dev libeigen3-dev libsundials-dev libsqlite3-dev nlohmann-json3-dev
+  libboost-dev libceres-dev libcli11-dev libspdlog-dev libfmt-dev prometheus-cpp-dev libexpected-dev
+  libssl-dev libsystemd-dev libzstd-dev zlib1g-dev
+  libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev
+  clang-format clang-tidy cppcheck iproute2 curl python3 python3-jsonschema
+)
+missing=()
+for package in "${packages[@]}"; do
+  [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null)" = installed ] || missing+=("$package")
+done
+[ ${#missing[@]} -eq 0 ] && exit 0
+sudo=()
+[ "$(id -u)" -eq 0 ] || sudo=(sudo)
+export DEBIAN_FRONTEND=noninteractive
+"${sudo[@]}" apt-get update -qq
+"${sudo[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}"
