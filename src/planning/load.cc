@@ -1,0 +1,128 @@
+#include "planning/load.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace joulecast::planning {
+
+using dynamics::Instant;
+
+Result<DriveLoads> DriveLoads::make(const robot::RobotModel& robot, std::optional<double> regeneration) {
+  if (regeneration && !(*regeneration >= 0 && *regeneration <= 1)) {
+    return invalid("regeneration", "is " + std::to_string(*regeneration) + ", must be from 0 to 1");
+  }
+  auto effects = dynamics::active_effects(robot);
+  if (!effects) return tl::unexpected(std::move(effects.error()));
+  if (regeneration) {
+    std::erase_if(*effects, [](const auto& e) { return e.effect->info().id == "no_regeneration"; });
+    auto blocked = dynamics::activate({"no_regeneration", {{"fraction", 1 - *regeneration}}});
+    if (!blocked) return tl::unexpected(std::move(blocked.error()));
+    effects->push_back(*blocked);
+  }
+  DriveLoads loads{dynamics::DriveModel(robot, *effects)};
+  const auto& p = loads.model_.parameters();
+  for (const dynamics::ActiveEffect& effect : *effects) {
+    loads.needs_position_ |= effect.effect->info().needs_position;
+    loads.needs_heading_ |= effect.effect->info().needs_heading;
+    if (effect.effect->info().id == "stribeck_friction") {
+      for (std::size_t s : {0u, 1u}) loads.stribeck_nm_[s] = effect.values[0] * p.friction_torque_nm[s];
+      loads.stribeck_speed_rad_s_ = effect.values[1];
+    }
+  }
+  Electric& e = loads.electric_;
+  e.torque_constant_nm_a = p.torque_constant_nm_a;
+  e.voltage_constant_v_s_rad = p.voltage_constant_v_s_rad;
+  e.back_emf = p.voltage_constant_v_s_rad / p.torque_constant_nm_a;
+  e.brush_w_nm = p.brush_drop_v / p.torque_constant_nm_a;
+  e.brush_width_nm = dynamics::brush_width_a * p.torque_constant_nm_a;
+  e.idle_w = p.idle_power_w + p.accessory_power_w;
+  e.up = 1 + p.driver_loss;
+  e.down = 1 - p.unreturned - p.driver_loss;
+  for (std::size_t s : {0u, 1u}) {
+    e.resistance_ohm[s] = p.resistance_ohm[s];
+    e.copper_w_n2_m2[s] = p.resistance_ohm[s] / (p.torque_constant_nm_a * p.torque_constant_nm_a);
+  }
+  return loads;
+}
+
+Instant DriveLoads::instant(const Run& run, const Knot& knot, double curvature_slope, double speed,
+                            double acceleration) const {
+  const auto& p = model_.parameters();
+  const double ahead = run.turn == 0 ? 1 : 0, turn = run.turn == 0 ? knot.curvature_1_m : run.turn;
+  const auto pace = dynamics::wheels_of_body(p, ahead, turn);
+  const auto bend = dynamics::wheels_of_body(p, 0, run.turn == 0 ? curvature_slope : 0);
+  Instant at;
+  for (std::size_t s : {0u, 1u}) {
+    at.wheel_speed_rad_s[s] = pace[s] * speed;
+    at.wheel_acceleration_rad_s2[s] = pace[s] * acceleration + bend[s] * speed * speed;
+  }
+  at.payload_kg = run.payload_kg;
+  at.x_m = knot.pose.x_m, at.y_m = knot.pose.y_m, at.heading_rad = knot.pose.heading_rad;
+  return at;
+}
+
+WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slope) const {
+  using Load = dynamics::Load;
+  struct Torques {
+    std::array<double, 2> through{}, inside{};
+  };
+  const auto torques = [&](double speed, double acceleration) {
+    const auto b = model_.balance(instant(run, knot, curvature_slope, speed, acceleration));
+    Torques t;
+    for (std::size_t s : {0u, 1u}) {
+      t.through[s] = b.inertial_nm[s];
+      t.inside[s] = b.friction_nm[s];
+      for (std::size_t k = 0; k < dynamics::load_count; ++k) {
+        (k == static_cast<std::size_t>(Load::internal) ? t.inside : t.through)[s] += b.loads.torque[k][s];
+      }
+    }
+    return t;
+  };
+  // Every load is a quadratic of the speed but for Stribeck friction, whose law is known: three speeds, well
+  // above the creep where dry friction fades, give the coefficients.
+  const Torques slow = torques(0.5, 0), middle = torques(1, 0), fast = torques(1.5, 0),
+                pushed = torques(1, 1);
+  const auto pace = instant(run, knot, 0, 1, 0).wheel_speed_rad_s;
+  const auto fit = [](double y0, double y1, double y2, double& c0, double& c1, double& c2) {
+    c2 = 2 * (y0 - 2 * y1 + y2);
+    c1 = y2 - y0 - 2 * c2;
+    c0 = y1 - c1 - c2;
+    const double noise = 1e-4 * (std::fabs(y0) + std::fabs(y1) + std::fabs(y2)) + 1e-12;
+    if (std::fabs(c2) < noise) c2 = 0, c1 = y2 - y0, c0 = y1 - c1;
+    if (std::fabs(c1) < 1e-9) c1 = 0;
+  };
+  WheelLoads loads;
+  for (std::size_t s : {0u, 1u}) {
+    WheelLoad& w = loads[s];
+    w.pace = pace[s];
+    w.inertia = pushed.through[s] - middle.through[s];
+    w.gear = model_.parameters().gear_loss * (pace[s] < 0 ? -1 : 1);
+    const double direction = pace[s] < 0 ? -1 : 1;
+    std::array<double, 3> inside{slow.inside[s], middle.inside[s], fast.inside[s]};
+    if (stribeck_nm_[s] != 0 && pace[s] != 0) {
+      w.stribeck = stribeck_nm_[s] * direction;
+      w.stribeck_speed = stribeck_speed_rad_s_ / std::fabs(pace[s]);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double x = 0.5 * static_cast<double>(k + 1) / w.stribeck_speed;
+        inside[k] -= w.stribeck * std::exp(-x * x);
+      }
+    }
+    fit(slow.through[s], middle.through[s], fast.through[s], w.t0, w.t1, w.t2);
+    fit(inside[0], inside[1], inside[2], w.f0, w.f1, w.f2);
+  }
+  return loads;
+}
+
+bool DriveLoads::uniform(const Run& run) const {
+  if (needs_position_) return false;
+  if (run.turn != 0) return !needs_heading_;
+  return run.constant_curvature() && !(needs_heading_ && run.knots[0].curvature_1_m != 0);
+}
+
+dynamics::QuadraticPower motor_power(const Electric& electric, std::size_t side, const WheelLoad& load) {
+  return dynamics::wheel_power(electric.copper_w_n2_m2[side], electric.back_emf * load.pace, load.inertia,
+                               load.f1, load.t0 + load.f0);
+}
+
+}  // namespace joulecast::planning

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "dynamics/drive_model.h"
+#include "dynamics/straight.h"
+#include "planning/path.h"
+
+namespace joulecast::planning {
+
+// What one wheel's motor must deliver at a place of a run, as a function of the speed v along the run's
+// coordinate and its acceleration q:
+//   through the gear  tau = inertia q + t0 + t1 v + t2 v^2
+//   inside the motor  f   = f0 + f1 v + f2 v^2 + stribeck exp(-(v/stribeck_speed)^2)
+//   torque            T   = tau + gear |tau| + f.
+// Its wheel turns at pace * v.
+struct WheelLoad {
+  double pace = 0;  // rad per unit of the coordinate
+  double inertia = 0;
+  double t0 = 0, t1 = 0, t2 = 0;
+  double f0 = 0, f1 = 0, f2 = 0;
+  double stribeck = 0, stribeck_speed = 1;
+  double gear = 0;  // signed by the wheel's direction
+
+  bool linear() const { return t1 == 0 && t2 == 0 && f2 == 0 && stribeck == 0 && gear == 0; }
+};
+using WheelLoads = std::array<WheelLoad, 2>;
+
+// Electrical constants of the drive. P = copper T^2 + back_emf w T + brush |T| for each motor; the battery
+// gives idle + sum of (up P where P > 0, down P where P < 0).
+struct Electric {
+  std::array<double, 2> copper_w_n2_m2{};
+  double back_emf = 0;  // K_w/K_t
+  double brush_w_nm = 0;
+  double brush_width_nm = 1;
+  double idle_w = 0;
+  double up = 1, down = 1;
+  double torque_constant_nm_a = 0;
+  double voltage_constant_v_s_rad = 0;
+  std::array<double, 2> resistance_ohm{};
+};
+
+// The drive model of a robot as the planner needs it.
+class DriveLoads {
+ public:
+  // `regeneration` replaces the returned fraction that the robot's effects give.
+  static Result<DriveLoads> make(const robot::RobotModel& robot, std::optional<double> regeneration);
+
+  const dynamics::DriveModel& model() const { return model_; }
+  const Electric& electric() const { return electric_; }
+
+  // Loads at a way of the run where the curvature changes by `curvature_slope` per metre.
+  WheelLoads at(const Run& run, const Knot& knot, double curvature_slope) const;
+
+  // Whether the loads are the same all along the run.
+  bool uniform(const Run& run) const;
+
+  // Motion at a knot of a run.
+  dynamics::Instant instant(const Run& run, const Knot& knot, double curvature_slope, double speed,
+                            double acceleration) const;
+
+ private:
+  explicit DriveLoads(dynamics::DriveModel model) : model_(std::move(model)) {}
+
+  dynamics::DriveModel model_;
+  Electric electric_;
+  bool needs_position_ = false, needs_heading_ = false;
+  std::array<double, 2> stribeck_nm_{};
+  double stribeck_speed_rad_s_ = 1;
+};
+
+// P of each motor where its load is linear: thesis (4-1) on any coordinate.
+dynamics::QuadraticPower motor_power(const Electric& electric, std::size_t side, const WheelLoad& load);
+
+}  // namespace joulecast::planning

@@ -1,0 +1,413 @@
+#include "planning/planner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "planning/run_planner.h"
+
+namespace joulecast::planning {
+namespace {
+
+// Everything that one request needs: its runs, each with its solver, and the dwells between them.
+class Request {
+ public:
+  static Result<Request> make(const robot::RobotModel& robot, const DriveLoads& loads, const Path& path,
+                              const Problem& problem) {
+    if (path.runs.empty() && path.dwell_s() == 0) return invalid("path", "has neither way nor dwell");
+    const auto& l = problem.limits;
+    for (auto [name, value] : {std::pair{"limits/speed_m_s", l.speed_m_s},
+                               {"limits/acceleration_m_s2", l.acceleration_m_s2},
+                               {"limits/yaw_rate_rad_s", l.yaw_rate_rad_s},
+                               {"limits/wheel_speed_rad_s", l.wheel_speed_rad_s},
+                               {"limits/current_a", l.current_a},
+                               {"limits/voltage_v", l.voltage_v}}) {
+      if (!(value > 0)) return invalid(name, "is " + std::to_string(value) + ", must be positive");
+    }
+    if (!(std::isfinite(problem.value_of_time_w) && problem.value_of_time_w >= 0)) {
+      return invalid("value_of_time_w", "must not be negative");
+    }
+    if (!(loads.electric().idle_w + problem.value_of_time_w >= 0)) {
+      return invalid("value_of_time_w", "plus the idle power must not be negative");
+    }
+    for (auto [name, value] :
+         {std::pair{"start_speed_m_s", problem.start_speed_m_s}, {"end_speed_m_s", problem.end_speed_m_s}}) {
+      if (!(std::isfinite(value) && value >= 0)) return invalid(name, "must not be negative");
+    }
+    if (problem.deadline_s && !(std::isfinite(*problem.deadline_s) && *problem.deadline_s > 0)) {
+      return invalid("deadline_s", "must be positive");
+    }
+    const bool moving_start = problem.start_speed_m_s > 0, moving_end = problem.end_speed_m_s > 0;
+    if (moving_start &&
+        (path.runs.empty() || path.runs.front().turn != 0 || path.runs.front().dwell_before_s > 0)) {
+      return invalid("start_speed_m_s", "must be 0 where the path begins with a stop or a turn in place");
+    }
+    if (moving_end && (path.runs.empty() || path.runs.back().turn != 0 || path.dwell_after_s > 0)) {
+      return invalid("end_speed_m_s", "must be 0 where the path ends with a stop or a turn in place");
+    }
+    Request request(loads, path, problem);
+    for (std::size_t k = 0; k < path.runs.size(); ++k) {
+      const Run& run = path.runs[k];
+      if (robot.limits.payload_kg > 0 && run.payload_kg > robot.limits.payload_kg) {
+        return fail(Fault::infeasible, "payload_kg",
+                    "is " + std::to_string(run.payload_kg) + ", this robot carries at most " +
+                        std::to_string(robot.limits.payload_kg));
+      }
+      auto planner = RunPlanner::make(robot, loads, run, problem, k == 0 ? problem.start_speed_m_s : 0,
+                                      k + 1 == path.runs.size() ? problem.end_speed_m_s : 0);
+      if (!planner) return tl::unexpected(std::move(planner.error()));
+      request.shortest_s_ += planner->shortest_s();
+      request.runs_.push_back(std::move(*planner));
+    }
+    request.dwell_s_ = path.dwell_s();
+    request.shortest_s_ += request.dwell_s_;
+    return request;
+  }
+
+  // Solves every run at one price of time.
+  Result<void> solve(double price_w) {
+    price_w_ = price_w;
+    answers_.clear();
+    for (RunPlanner& run : runs_) {
+      auto answer = run.solve(price_w);
+      if (!answer) return tl::unexpected(std::move(answer.error()));
+      answers_.push_back(std::move(*answer));
+    }
+    return {};
+  }
+
+  // Solves at the value of time, or at the price that meets the deadline.
+  Result<void> solve() {
+    if (auto ok = solve(problem_.value_of_time_w); !ok) return ok;
+    if (!problem_.deadline_s || duration_s() <= *problem_.deadline_s) return {};
+    return meet(*problem_.deadline_s);
+  }
+
+  Result<void> meet(double deadline) {
+    if (deadline < shortest_s_ * (1 + 1e-6)) {
+      return fail(Fault::infeasible, "deadline_s",
+                  "is " + std::to_string(deadline) + ", the limits allow no less than " +
+                      std::to_string(shortest_s_ * (1 + 1e-5)));
+    }
+    deadline_binds_ = true;
+    // log(T - T_min) falls nearly linearly in log(idle + price): regula falsi (Illinois) on those.
+    const double idle = std::max(loads_.electric().idle_w, 1e-3 * average_power_w());
+    const double target = std::log(deadline - shortest_s_);
+    const auto gap = [&] { return std::log(std::max(1e-12, duration_s() - shortest_s_)) - target; };
+    double x0 = std::log(idle + price_w_), y0 = gap(), x1 = x0, y1 = y0;
+    for (int k = 0; k < 40 && y1 > 0; ++k) {
+      x0 = x1, y0 = y1;
+      x1 += std::clamp(1.2 * y1, 0.7, 4.0);
+      if (auto ok = solve(std::exp(x1) - idle); !ok) return ok;
+      y1 = gap();
+    }
+    const double close = 1e-4 * deadline / (deadline - shortest_s_);
+    double held = 0;
+    for (int k = 0; k < 40; ++k) {
+      // Ends on the early side, within 1e-4 of the deadline.
+      if (y1 <= 0 && y1 > -close) return {};
+      if (std::fabs(x1 - x0) < 1e-12) break;
+      const double aim = 0.4 * close;  // a little early, so that one side is enough
+      double x = x1 - (y1 + aim) * (x1 - x0) / (y1 - y0);
+      if (!(x > std::min(x0, x1) && x < std::max(x0, x1))) x = 0.5 * (x0 + x1);
+      if (auto ok = solve(std::exp(x) - idle); !ok) return ok;
+      const double y = gap();
+      if ((y > 0) != (y1 > 0)) {
+        x0 = x1, y0 = y1, held = 0;
+      } else if (++held > 1) {
+        x = 0.5 * (x + x0);
+        if (auto ok = solve(std::exp(x) - idle); !ok) return ok;
+        const double again = gap();
+        if ((again > 0) != (y > 0)) {
+          x0 = x1, y0 = y1;
+        }
+        x1 = x, y1 = again, held = 0;
+        continue;
+      }
+      x1 = x, y1 = y;
+    }
+    if (duration_s() <= deadline) return {};
+    return fail(Fault::internal, "deadline_s", "the price of time that meets the deadline was not found");
+  }
+
+  double duration_s() const {
+    double sum = dwell_s_;
+    for (const RunAnswer& a : answers_) sum += a.duration_s;
+    return sum;
+  }
+  double energy_j() const {
+    double sum = dwell_s_ * loads_.electric().idle_w;
+    for (const RunAnswer& a : answers_) sum += a.energy_j;
+    return sum;
+  }
+  double average_power_w() const { return energy_j() / duration_s(); }
+  double shortest_s() const { return shortest_s_; }
+  PlanCost cost() const { return {energy_j(), duration_s(), price_w_}; }
+
+  Plan written() const;
+
+ private:
+  Request(const DriveLoads& loads, const Path& path, const Problem& problem)
+      : loads_(loads), path_(path), problem_(problem) {}
+
+  const DriveLoads& loads_;
+  const Path& path_;
+  const Problem& problem_;
+  std::vector<RunPlanner> runs_;
+  std::vector<RunAnswer> answers_;
+  double dwell_s_ = 0, shortest_s_ = 0, price_w_ = 0;
+  bool deadline_binds_ = false;
+};
+
+// Writes rows and integrates the drive model's power flow along them.
+class Writer {
+ public:
+  explicit Writer(const DriveLoads& loads) : loads_(loads) {}
+
+  struct State {
+    double way = 0, speed = 0, acceleration = 0;
+  };
+
+  // `at(row, fraction)` is the motion within the cell that begins at `row`; fractions are of its duration.
+  template <class At>
+  void run(const RunPlanner& planner, const std::vector<double>& times, At&& at) {
+    const Run& run = planner.run();
+    for (std::size_t k = 0; k < times.size(); ++k) {
+      const bool last = k + 1 == times.size();
+      const State s = last ? at(k - 1, 1.0) : at(k, 0.0);
+      row(planner, s, start_s_ + times[k]);
+      if (last) break;
+      const double span = times[k + 1] - times[k];
+      for (auto [node, weight] : gauss) {
+        const State g = at(k, 0.5 * (1 + node));
+        add(flow(planner, g), span * weight / 18);
+      }
+    }
+    if (run.turn == 0) driven_m_ += run.length();
+    start_s_ += times.back();
+  }
+
+  void dwell(double duration_s, const Pose& pose, double payload_kg) {
+    if (duration_s <= 0) return;
+    const double idle = loads_.electric().idle_w;
+    for (bool end : {false, true}) {
+      push(start_s_ + (end ? duration_s : 0), driven_m_, pose, 0, 0, 0, 0, payload_kg, idle);
+      if (!end) {
+        plan_.ledger[energy::Term::accessories] += idle * duration_s;
+        plan_.summary.energy_j += idle * duration_s;
+      }
+    }
+    start_s_ += duration_s;
+  }
+
+  Plan finish() { return std::move(plan_); }
+  Plan& plan() { return plan_; }
+
+ private:
+  static constexpr std::array<std::pair<double, double>, 3> gauss{
+      {{-0.7745966692414834, 5.0}, {0.0, 8.0}, {0.7745966692414834, 5.0}}};
+
+  dynamics::PowerFlow<double> flow(const RunPlanner& planner, const State& s) const {
+    const Run& run = planner.run();
+    const double slope = run.turn == 0 ? planner.curvature_slope(s.way) : 0;
+    return loads_.model().flow(loads_.instant(run, run.at(s.way), slope, s.speed, s.acceleration));
+  }
+
+  void add(const dynamics::PowerFlow<double>& f, double seconds) {
+    using energy::Term;
+    energy::Ledger& l = plan_.ledger;
+    for (auto [term, watts] : {std::pair{Term::accessories, f.accessories_w},
+                               {Term::driver, f.driver_w},
+                               {Term::copper, f.copper_w},
+                               {Term::brush, f.brush_w},
+                               {Term::friction_internal, f.friction_internal_w},
+                               {Term::friction_rolling, f.friction_rolling_w},
+                               {Term::friction_scrub, f.friction_scrub_w},
+                               {Term::friction_zone, f.friction_zone_w},
+                               {Term::friction_slip, f.friction_slip_w},
+                               {Term::drag, f.drag_w},
+                               {Term::kinetic, f.kinetic_w},
+                               {Term::potential, f.potential_w},
+                               {Term::braking, f.braking_w},
+                               {Term::recovered, f.recovered_w}}) {
+      l[term] += watts * seconds;
+    }
+    plan_.summary.energy_j += f.battery_power_w * seconds;
+    plan_.summary.braking_j += f.braking_w * seconds;
+    plan_.summary.recovered_j += f.recovered_w * seconds;
+  }
+
+  void row(const RunPlanner& planner, const State& s, double time_s) {
+    const Run& run = planner.run();
+    const Knot knot = run.at(s.way);
+    const double power = flow(planner, s).battery_power_w;
+    if (run.turn != 0) {
+      push(time_s, driven_m_, knot.pose, 0, run.turn * s.speed, 0, run.turn * s.acceleration, run.payload_kg,
+           power);
+    } else {
+      push(time_s, driven_m_ + s.way, knot.pose, s.speed, knot.curvature_1_m * s.speed, s.acceleration,
+           knot.curvature_1_m * s.acceleration + planner.curvature_slope(s.way) * s.speed * s.speed,
+           run.payload_kg, power);
+    }
+  }
+
+  void push(double time_s, double distance_m, const Pose& pose, double speed, double yaw, double acceleration,
+            double yaw_acceleration, double payload_kg, double power_w) {
+    Profile& p = plan_.profile;
+    p.time_s.push_back(time_s);
+    p.distance_m.push_back(distance_m);
+    p.x_m.push_back(pose.x_m), p.y_m.push_back(pose.y_m), p.heading_rad.push_back(pose.heading_rad);
+    p.speed_m_s.push_back(speed), p.yaw_rate_rad_s.push_back(yaw);
+    p.acceleration_m_s2.push_back(acceleration), p.yaw_acceleration_rad_s2.push_back(yaw_acceleration);
+    p.payload_kg.push_back(payload_kg);
+    p.power_w.push_back(power_w);
+    p.energy_j.push_back(plan_.summary.energy_j);
+    Summary& s = plan_.summary;
+    s.peak_speed_m_s = std::max(s.peak_speed_m_s, speed);
+    s.peak_yaw_rate_rad_s = std::max(s.peak_yaw_rate_rad_s, std::fabs(yaw));
+    s.peak_power_w = std::max(s.peak_power_w, power_w);
+  }
+
+  const DriveLoads& loads_;
+  Plan plan_;
+  double start_s_ = 0, driven_m_ = 0;
+};
+
+Plan Request::written() const {
+  Writer writer(loads_);
+  Certificate& c = writer.plan().certificate;
+  bool closed = false, numeric = false;
+  std::array<bool, bound_count> binding{};
+  Pose pose;
+  for (std::size_t k = 0; k < runs_.size(); ++k) {
+    const RunPlanner& planner = runs_[k];
+    const Run& run = planner.run();
+    const RunAnswer& answer = answers_[k];
+    writer.dwell(run.dwell_before_s, run.knots.front().pose, run.payload_kg);
+    pose = run.knots.back().pose;
+    std::vector<double> times;
+    if (answer.line) {
+      closed = true;
+      const LineProfile& line = *answer.line;
+      const std::size_t cells = std::max<std::size_t>(8, problem_.intervals_per_run);
+      for (std::size_t i = 0; i <= cells; ++i) {
+        times.push_back(line.duration_s() * static_cast<double>(i) / static_cast<double>(cells));
+      }
+      writer.run(planner, times, [&](std::size_t i, double f) {
+        const double t = times[i] + f * (times[i + 1] - times[i]);
+        return Writer::State{line.position(t), std::max(0.0, line.speed(t)), line.acceleration(t)};
+      });
+    } else {
+      numeric = true;
+      const auto& nodes = planner.nodes();
+      std::vector<double> speed(answer.z.size());
+      for (std::size_t i = 0; i < speed.size(); ++i) speed[i] = std::sqrt(answer.z[i]);
+      times.push_back(0);
+      for (std::size_t i = 0; i + 1 < nodes.size(); ++i) {
+        times.push_back(times.back() + 2 * (nodes[i + 1] - nodes[i]) / (speed[i] + speed[i + 1]));
+      }
+      writer.run(planner, times, [&](std::size_t i, double f) {
+        const double span = times[i + 1] - times[i], a = (speed[i + 1] - speed[i]) / span,
+                     v = speed[i] + f * span * a;
+        return Writer::State{nodes[i] + f * span * 0.5 * (speed[i] + v), v, a};
+      });
+      c.discretisation_j += answer.discretisation_j;
+    }
+    c.gap_j += answer.gap_j;
+    c.residual = std::max(c.residual, answer.residual);
+    c.convex = c.convex && answer.convex;
+    c.iterations += answer.iterations;
+    for (std::size_t b = 0; b < bound_count; ++b) binding[b] = binding[b] || answer.binding[b];
+  }
+  writer.dwell(path_.dwell_after_s, pose, path_.final_payload_kg);
+  c.method = closed && numeric ? Method::mixed : numeric ? Method::interior_point : Method::closed_form;
+  c.time_multiplier_w = price_w_;
+  binding[static_cast<std::size_t>(Bound::deadline)] = deadline_binds_;
+  for (std::size_t b = 0; b < bound_count; ++b) {
+    if (binding[b]) c.binding.push_back(static_cast<Bound>(b));
+  }
+  Summary& s = writer.plan().summary;
+  s.duration_s = duration_s();
+  s.distance_m = path_.distance_m();
+  s.turned_rad = path_.turned_rad();
+  return writer.finish();
+}
+
+}  // namespace
+
+Limits limits_of(const robot::RobotModel& robot) {
+  const auto given = [](double value) { return value > 0 ? value : unlimited; };
+  Limits limits;
+  limits.speed_m_s = given(robot.limits.speed_m_s);
+  limits.acceleration_m_s2 = given(robot.limits.acceleration_m_s2);
+  limits.yaw_rate_rad_s = given(robot.limits.yaw_rate_rad_s);
+  limits.current_a = given(robot.limits.current_a);
+  limits.voltage_v = given(robot.battery.nominal_voltage_v);
+  return limits;
+}
+
+std::string_view name_of(Method method) {
+  switch (method) {
+    case Method::closed_form:
+      return "closed_form";
+    case Method::interior_point:
+      return "interior_point";
+    case Method::mixed:
+      return "mixed";
+  }
+  return "";
+}
+
+std::string_view name_of(Bound bound) {
+  constexpr std::array<std::string_view, bound_count> names = {
+      "speed", "yaw_rate", "wheel_speed", "acceleration", "current", "voltage", "deadline"};
+  return names[static_cast<std::size_t>(bound)];
+}
+
+Result<Planner> Planner::make(const robot::RobotModel& robot, std::optional<double> regeneration) {
+  auto loads = DriveLoads::make(robot, regeneration);
+  if (!loads) return tl::unexpected(std::move(loads.error()));
+  return Planner(robot, std::move(*loads));
+}
+
+Result<Plan> Planner::plan(const Path& path, const Problem& problem) const {
+  auto request = Request::make(robot_, loads_, path, problem);
+  if (!request) return tl::unexpected(std::move(request.error()));
+  if (auto solved = request->solve(); !solved) return tl::unexpected(std::move(solved.error()));
+  return request->written();
+}
+
+Result<PlanCost> Planner::cost(const Path& path, const Problem& problem) const {
+  auto request = Request::make(robot_, loads_, path, problem);
+  if (!request) return tl::unexpected(std::move(request.error()));
+  if (auto solved = request->solve(); !solved) return tl::unexpected(std::move(solved.error()));
+  return request->cost();
+}
+
+Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& problem,
+                                              std::size_t count) const {
+  if (count < 2) return invalid("count", "must be at least 2");
+  auto request = Request::make(robot_, loads_, path, problem);
+  if (!request) return tl::unexpected(std::move(request.error()));
+  if (auto solved = request->solve(problem.value_of_time_w); !solved)
+    return tl::unexpected(std::move(solved.error()));
+  std::vector<PlanCost> front{request->cost()};
+  // The shortest time itself costs an unbounded price; the front ends a hundredth of the way before it.
+  const double slowest = request->duration_s(),
+               fastest = request->shortest_s() + 0.01 * (slowest - request->shortest_s());
+  for (std::size_t k = 1; k < count; ++k) {
+    const double f = static_cast<double>(k) / static_cast<double>(count - 1);
+    if (auto met = request->meet(slowest + f * (fastest - slowest)); !met)
+      return tl::unexpected(std::move(met.error()));
+    front.push_back(request->cost());
+  }
+  return front;
+}
+
+Result<Plan> plan(const robot::RobotModel& robot, const Path& path, const Problem& problem) {
+  auto planner = Planner::make(robot, problem.regeneration);
+  if (!planner) return tl::unexpected(std::move(planner.error()));
+  return planner->plan(path, problem);
+}
+
+}  // namespace joulecast::planning

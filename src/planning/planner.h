@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "planning/load.h"
+#include "planning/path.h"
+#include "planning/problem.h"
+#include "planning/profile.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::planning {
+
+// Energy and duration of the optimum, without its profile.
+struct PlanCost {
+  double energy_j = 0;
+  double duration_s = 0;
+  double time_multiplier_w = 0;
+};
+
+// Minimum-energy motion of one robot along paths. Each run between stops is solved in closed form where its
+// power is quadratic, no limit binds and no regeneration is lost; otherwise by SpeedSolver. Runs are joined
+// by one multiplier of time: the value of time, raised until the deadline is met.
+//
+// Infeasible requests are errors with Fault::infeasible that name the field and the nearest feasible value.
+class Planner {
+ public:
+  // `regeneration` replaces the fraction of braking power that the robot's adopted effects return.
+  static Result<Planner> make(const robot::RobotModel& robot, std::optional<double> regeneration = {});
+
+  // `problem.regeneration` is read by make and by the free function, not here.
+  Result<Plan> plan(const Path& path, const Problem& problem) const;
+  Result<PlanCost> cost(const Path& path, const Problem& problem) const;
+
+  // Energy against duration from the free optimum to near the shortest time: `count` >= 2 deadlines, evenly
+  // spaced.
+  Result<std::vector<PlanCost>> pareto(const Path& path, const Problem& problem, std::size_t count) const;
+
+ private:
+  Planner(const robot::RobotModel& robot, DriveLoads loads) : robot_(robot), loads_(std::move(loads)) {}
+
+  robot::RobotModel robot_;
+  DriveLoads loads_;
+};
+
+Result<Plan> plan(const robot::RobotModel& robot, const Path& path, const Problem& problem);
+
+}  // namespace joulecast::planning

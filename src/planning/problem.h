@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <optional>
+
+#include "robot/robot_model.h"
+
+namespace joulecast::planning {
+
+inline constexpr double unlimited = std::numeric_limits<double>::infinity();
+
+// Bounds on motion and motors, absolute values. The acceleration limit holds along the way; turning in place,
+// it holds for the wheels' rims. Current and voltage are of each armature.
+struct Limits {
+  double speed_m_s = unlimited;
+  double acceleration_m_s2 = unlimited;
+  double yaw_rate_rad_s = unlimited;
+  double wheel_speed_rad_s = unlimited;
+  double current_a = unlimited;
+  double voltage_v = unlimited;
+};
+
+// The limits of a robot file; the armature voltage is bounded by the battery's nominal voltage.
+Limits limits_of(const robot::RobotModel& robot);
+
+// What is asked of the planner. Minimised: battery energy + value_of_time_w * duration, the robot's own idle
+// power being part of its battery energy.
+struct Problem {
+  Limits limits;
+  double start_speed_m_s = 0;
+  double end_speed_m_s = 0;
+  double value_of_time_w = 0;
+  std::optional<double> deadline_s;  // latest arrival, dwells included
+  std::optional<double>
+      regeneration;  // fraction of braking power that returns, 0 to 1; else the robot's effects say
+  std::size_t intervals_per_run = 64;  // speed grid of a run whose power does not change along its way
+};
+
+}  // namespace joulecast::planning

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+#include <vector>
+
+#include "energy/ledger.h"
+
+namespace joulecast::planning {
+
+// A planned motion as columns of equal length. Between rows the acceleration along the way is constant, hence
+// the speed linear in time; `acceleration` and `power` of a row hold just after it (of the last: just
+// before).
+struct Profile {
+  std::vector<double> time_s;
+  std::vector<double> distance_m;  // driven since the start; turning in place adds none
+  std::vector<double> x_m, y_m, heading_rad;
+  std::vector<double> speed_m_s, yaw_rate_rad_s;
+  std::vector<double> acceleration_m_s2, yaw_acceleration_rad_s2;
+  std::vector<double> payload_kg;
+  std::vector<double> power_w;   // at the battery
+  std::vector<double> energy_j;  // from the battery since the start
+
+  std::size_t size() const { return time_s.size(); }
+};
+
+struct Summary {
+  double energy_j = 0;    // from the battery, dwells included
+  double duration_s = 0;  // dwells included
+  double distance_m = 0;
+  double turned_rad = 0;
+  double peak_speed_m_s = 0;
+  double peak_yaw_rate_rad_s = 0;
+  double peak_power_w = 0;
+  double braking_j = 0;    // electrical energy that the motors generated
+  double recovered_j = 0;  // of it, what reached the battery
+};
+
+enum class Method { closed_form, interior_point, mixed };
+std::string_view name_of(Method method);
+
+enum class Bound { speed, yaw_rate, wheel_speed, acceleration, current, voltage, deadline };
+inline constexpr std::size_t bound_count = 7;
+std::string_view name_of(Bound bound);
+
+// Why the answer may be believed.
+struct Certificate {
+  Method method = Method::closed_form;
+  // energy + price of time, less this, bounds the optimum over all speed profiles on the grid from below: the
+  // complementarity gap of the multipliers plus what smoothing the regeneration kink can hide. Holds globally
+  // when `convex`; otherwise near this answer.
+  double gap_j = 0;
+  // How far the grid's optimum may lie above the continuous one: Richardson's estimate from two grids; on the
+  // way's own knots, from none.
+  double discretisation_j = 0;
+  double residual = 0;  // largest stationarity residual over the cost, 0 for the closed form to rounding
+  bool convex = true;
+  double time_multiplier_w =
+      0;  // what a second less would cost; the deadline's multiplier plus the value of time
+  std::vector<Bound> binding;
+  int iterations = 0;
+};
+
+struct Plan {
+  Profile profile;
+  Summary summary;
+  energy::Ledger ledger;  // joules
+  Certificate certificate;
+};
+
+}  // namespace joulecast::planning

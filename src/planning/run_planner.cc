@@ -1,0 +1,357 @@
+#include "planning/run_planner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace joulecast::planning {
+namespace {
+
+constexpr std::size_t most_cells = 200'000;
+
+std::string number(double x) {
+  return std::to_string(x);
+}
+
+}  // namespace
+
+double RunPlanner::curvature_slope(double way) const {
+  const auto& knots = run_->knots;
+  const auto above = std::upper_bound(knots.begin() + 1, knots.end() - 1, way,
+                                      [](double w, const Knot& k) { return w < k.way; });
+  return (above->curvature_1_m - (above - 1)->curvature_1_m) / (above->way - (above - 1)->way);
+}
+
+// The squared speed that speed, yaw rate and wheel speed limits allow.
+double RunPlanner::ceiling_at(double way) const {
+  const Limits& l = problem_->limits;
+  const auto& p = loads_->model().parameters();
+  const double turn = run_->turn == 0 ? std::fabs(run_->at(way).curvature_1_m) : 1;
+  double v = run_->turn == 0 ? l.speed_m_s : unlimited;
+  if (turn > 0) v = std::min(v, l.yaw_rate_rad_s / turn);
+  if (std::isfinite(l.wheel_speed_rad_s)) {
+    const auto pace = dynamics::wheels_of_body(p, run_->turn == 0 ? 1 : 0, turn);
+    v = std::min(v, l.wheel_speed_rad_s / std::max(std::fabs(pace[0]), std::fabs(pace[1])));
+  }
+  if (!std::isfinite(v)) {
+    // The grid needs a bound: no motor turns faster than its voltage allows, here at most four times the
+    // battery's.
+    const auto pace = dynamics::wheels_of_body(p, run_->turn == 0 ? 1 : 0, turn);
+    const double volts =
+        std::isfinite(l.voltage_v) ? l.voltage_v : 4 * std::max(24.0, robot_->battery.nominal_voltage_v);
+    v = volts / (p.voltage_constant_v_s_rad * std::max(std::fabs(pace[0]), std::fabs(pace[1])));
+  }
+  return v * v;
+}
+
+Bound RunPlanner::ceiling_bound(double way) const {
+  const Limits& l = problem_->limits;
+  const double turn = run_->turn == 0 ? std::fabs(run_->at(way).curvature_1_m) : 1;
+  const double v = std::sqrt(ceiling_at(way));
+  if (run_->turn == 0 && v >= l.speed_m_s * (1 - 1e-9)) return Bound::speed;
+  if (turn * v >= l.yaw_rate_rad_s * (1 - 1e-9)) return Bound::yaw_rate;
+  return Bound::wheel_speed;
+}
+
+void RunPlanner::build(std::vector<double> nodes) {
+  nodes_ = std::move(nodes);
+  const std::size_t n = nodes_.size() - 1;
+  auto grid = std::make_unique<SpeedGrid>();
+  grid->step.resize(n);
+  grid->ceiling.resize(n + 1);
+  for (std::size_t k = 0; k < n; ++k) grid->step[k] = nodes_[k + 1] - nodes_[k];
+  for (std::size_t k = 0; k <= n; ++k) grid->ceiling[k] = ceiling_at(nodes_[k]);
+  const Limits& l = problem_->limits;
+  grid->start = start_ * start_;
+  grid->end = end_ * end_;
+  grid->acceleration_limit =
+      run_->turn == 0 ? l.acceleration_m_s2 : l.acceleration_m_s2 / robot_->kinematics.half_track_m;
+  grid->torque_limit_nm = l.current_a * loads_->electric().torque_constant_nm_a;
+  grid->voltage_limit_v = l.voltage_v;
+  grid->electric = loads_->electric();
+  if (uniform_) {
+    grid->loads = {loads_->at(*run_, run_->at(0.5 * run_->length()), 0)};
+  } else {
+    grid->loads.reserve(n);
+    for (std::size_t k = 0; k < n; ++k) {
+      const double middle = 0.5 * (nodes_[k] + nodes_[k + 1]);
+      grid->loads.push_back(loads_->at(*run_, run_->at(middle), curvature_slope(middle)));
+    }
+  }
+  solver_.reset();
+  grid_ = std::move(grid);
+  envelope_ = std::make_unique<SpeedEnvelope>(speed_envelope(*grid_));
+}
+
+Result<void> RunPlanner::check_feasible() const {
+  const auto& e = *envelope_;
+  const double top = std::sqrt(grid_->ceiling.front()), top_end = std::sqrt(grid_->ceiling.back());
+  if (start_ > top * (1 + 1e-9)) {
+    return fail(Fault::infeasible, "start_speed_m_s",
+                "is " + number(start_) + ", at most " + number(top) + " is allowed there");
+  }
+  if (end_ > top_end * (1 + 1e-9)) {
+    return fail(Fault::infeasible, "end_speed_m_s",
+                "is " + number(end_) + ", at most " + number(top_end) + " is allowed there");
+  }
+  for (std::size_t k = 0; k < grid_->cells(); ++k) {
+    for (std::size_t s : {0u, 1u}) {
+      const WheelLoad& w = grid_->load(k)[s];
+      const double standing = std::fabs(w.t0 + w.gear * std::fabs(w.t0) + w.f0 + w.stribeck);
+      if (standing >= grid_->torque_limit_nm) {
+        return fail(Fault::infeasible, "limits/current_a",
+                    "is " + number(problem_->limits.current_a) + ", friction and slope alone need " +
+                        number(standing / loads_->electric().torque_constant_nm_a));
+      }
+      const double volts =
+          grid_->electric.resistance_ohm[s] / grid_->electric.torque_constant_nm_a * standing;
+      if (volts >= grid_->voltage_limit_v) {
+        return fail(
+            Fault::infeasible, "limits/voltage_v",
+            "is " + number(problem_->limits.voltage_v) + ", friction and slope alone need " + number(volts));
+      }
+    }
+  }
+  if (e.feasible) return {};
+  // Which end speed would do: the one that the other end's speed can just reach.
+  SpeedGrid open = *grid_;
+  open.end = open.ceiling.back();
+  const SpeedEnvelope reach = speed_envelope(open);
+  if (reach.fastest.front() >= open.start * (1 - 1e-9)) {
+    const double most = std::sqrt(reach.fastest.back());
+    if (end_ > most) {
+      return fail(
+          Fault::infeasible, "end_speed_m_s",
+          "is " + number(end_) + ", the way is too short: at most " + number(most) + " can be reached");
+    }
+  }
+  const double least_end =
+      std::sqrt(std::max(0.0, grid_->start - 2 * grid_->acceleration_limit * run_->length()));
+  if (end_ < least_end) {
+    return fail(
+        Fault::infeasible, "end_speed_m_s",
+        "is " + number(end_) + ", the way is too short to brake: at least " + number(least_end) + " remains");
+  }
+  open.end = grid_->end;
+  open.start = 0;
+  const SpeedEnvelope back = speed_envelope(open);
+  SpeedGrid from_anywhere = *grid_;
+  from_anywhere.start = from_anywhere.ceiling.front();
+  const double most_start = std::sqrt(speed_envelope(from_anywhere).fastest.front());
+  if (start_ > most_start) {
+    return fail(Fault::infeasible, "start_speed_m_s",
+                "is " + number(start_) + ", the limits allow at most " + number(most_start) + " on this way");
+  }
+  const double where = nodes_[std::min(e.broken_at, nodes_.size() - 1)];
+  return fail(Fault::infeasible, "limits",
+              "no speed satisfies them " + number(where) + " along the way" +
+                  (back.feasible ? "; starting from rest would" : ""));
+}
+
+std::vector<double> RunPlanner::first_nodes(std::size_t cells) const {
+  const double length = run_->length();
+  std::vector<double> nodes;
+  if (uniform_) {
+    // Denser towards both ends, where the speed changes: s = L (3 x^2 - 2 x^3).
+    for (std::size_t k = 0; k <= cells; ++k) {
+      const double x = static_cast<double>(k) / static_cast<double>(cells);
+      nodes.push_back(length * x * x * (3 - 2 * x));
+    }
+    return nodes;
+  }
+  // The way's own knots; stretches of constant curvature are cut more coarsely.
+  nodes.push_back(0);
+  const auto& knots = run_->knots;
+  const double smallest = 1e-6 * length;
+  const double coarse = length / static_cast<double>(cells);
+  for (std::size_t k = 1; k < knots.size(); ++k) {
+    const double gap = knots[k].way - nodes.back();
+    if (gap < smallest && k + 1 < knots.size()) continue;
+    const double cuts = std::max(1.0, std::ceil(gap / coarse - 1e-9));
+    const double from = nodes.back();
+    for (double i = 1; i <= cuts; ++i) nodes.push_back(from + gap * i / cuts);
+  }
+  nodes.back() = length;
+  // From rest the speed grows with the root of the way: two short cells at each end.
+  const auto split = [&](bool front) {
+    const double h = front ? nodes[1] : length - nodes[nodes.size() - 2];
+    const std::array<double, 2> at = {h / 9, h * 4 / 9};
+    if (front) {
+      nodes.insert(nodes.begin() + 1, at.begin(), at.end());
+    } else {
+      nodes.insert(nodes.end() - 1, {length - at[1], length - at[0]});
+    }
+  };
+  if (start_ == 0) split(true);
+  if (end_ == 0) split(false);
+  return nodes;
+}
+
+// Nodes that share time and change of speed evenly.
+std::vector<double> RunPlanner::refined_nodes(const std::vector<double>& z, std::size_t cells) const {
+  const std::size_t n = nodes_.size() - 1;
+  double duration = 0, change = 1e-300, sway = 1e-300;
+  std::vector<double> times(n), changes(n), bends(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    const double v0 = std::sqrt(z[k]), v1 = std::sqrt(z[k + 1]);
+    times[k] = 2 * (nodes_[k + 1] - nodes_[k]) / (v0 + v1);
+    changes[k] = std::fabs(v1 - v0);
+    duration += times[k], change += changes[k];
+  }
+  // Where the acceleration itself changes, cells should be short.
+  for (std::size_t k = 0; k < n; ++k) {
+    const auto slope = [&](std::size_t i) { return (z[i + 1] - z[i]) / (nodes_[i + 1] - nodes_[i]); };
+    bends[k] = std::fabs(slope(std::min(k + 1, n - 1)) - slope(k > 0 ? k - 1 : 0));
+    sway += bends[k];
+  }
+  std::vector<double> reached(n + 1, 0);
+  for (std::size_t k = 0; k < n; ++k) {
+    reached[k + 1] =
+        reached[k] + 0.35 * times[k] / duration + 0.3 * changes[k] / change + 0.35 * bends[k] / sway;
+  }
+  std::vector<double> nodes{0};
+  std::size_t k = 0;
+  for (std::size_t i = 1; i < cells; ++i) {
+    const double target = reached[n] * static_cast<double>(i) / static_cast<double>(cells);
+    while (k + 1 < n && reached[k + 1] < target) ++k;
+    const double f = std::clamp((target - reached[k]) / (reached[k + 1] - reached[k]), 0.0, 1.0);
+    // Evenly in time within the old cell.
+    const double v0 = std::sqrt(z[k]), v1 = std::sqrt(z[k + 1]), v = v0 + f * (v1 - v0);
+    const double way = nodes_[k] + f * times[k] * 0.5 * (v0 + v);
+    if (way > nodes.back() + 1e-7 * run_->length()) nodes.push_back(way);
+  }
+  while (nodes.size() > 2 && nodes.back() > (1 - 1e-7) * run_->length()) nodes.pop_back();
+  nodes.push_back(run_->length());
+  return nodes;
+}
+
+std::vector<double> RunPlanner::resampled(const std::vector<double>& nodes, const std::vector<double>& z,
+                                          const std::vector<double>& onto) const {
+  std::vector<double> result;
+  result.reserve(onto.size());
+  std::size_t k = 0;
+  for (double way : onto) {
+    while (k + 2 < nodes.size() && nodes[k + 1] < way) ++k;
+    const double f = std::clamp((way - nodes[k]) / (nodes[k + 1] - nodes[k]), 0.0, 1.0);
+    result.push_back(z[k] + f * (z[k + 1] - z[k]));
+  }
+  return result;
+}
+
+Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveLoads& loads, const Run& run,
+                                    const Problem& problem, double start_speed, double end_speed) {
+  RunPlanner planner(robot, loads, run, problem);
+  planner.start_ = start_speed;
+  planner.end_ = end_speed;
+  planner.uniform_ = loads.uniform(run);
+  const std::size_t cells = std::max<std::size_t>(8, problem.intervals_per_run);
+  if (!planner.uniform_ && run.knots.size() > most_cells) {
+    return fail(Fault::too_large, "path", "a run has more than 200000 knots; give a coarser resolution_m");
+  }
+  planner.build(planner.first_nodes(planner.uniform_ ? cells / 2 : cells));
+  if (auto ok = planner.check_feasible(); !ok) return tl::unexpected(std::move(ok.error()));
+  return planner;
+}
+
+std::optional<RunAnswer> RunPlanner::closed_form(double price_w) const {
+  if (!uniform_) return {};
+  const Electric& e = loads_->electric();
+  const WheelLoads& w = grid_->loads[0];
+  if (!w[0].linear() || !w[1].linear() || e.brush_w_nm != 0) return {};
+  const std::array<dynamics::QuadraticPower, 2> motor{motor_power(e, 0, w[0]), motor_power(e, 1, w[1])};
+  LineTask task;
+  task.power = motor[0];
+  task.power += motor[1];
+  for (double* c :
+       {&task.power.c1, &task.power.cx, &task.power.ca, &task.power.c2, &task.power.c3, &task.power.c0}) {
+    *c *= e.up;
+  }
+  task.power.c0 += e.idle_w;
+  task.distance = run_->length();
+  task.start_speed = start_, task.end_speed = end_;
+  task.value_of_time_w = price_w;
+  const auto line = line_in_free_time(task);
+  if (!line) return {};
+  if (line->lowest_speed() < 0 || line->peak_speed() > std::sqrt(grid_->ceiling[0])) return {};
+  if (line->peak_acceleration() > grid_->acceleration_limit) return {};
+  const bool lossy = e.up != e.down;
+  const bool motors = std::isfinite(grid_->torque_limit_nm) || std::isfinite(grid_->voltage_limit_v);
+  // Torque and voltage are linear, power quadratic in speed and acceleration: the corners of the box that the
+  // profile stays in decide quickly, its samples where they do not.
+  const double top = line->peak_speed(), most = line->peak_acceleration();
+  const auto breaks = [&](double v, double q) {
+    for (std::size_t s : {0u, 1u}) {
+      const double t = w[s].inertia * q + w[s].t0 + w[s].f0 + w[s].f1 * v;
+      const double volts =
+          e.resistance_ohm[s] / e.torque_constant_nm_a * t + e.voltage_constant_v_s_rad * w[s].pace * v;
+      if (std::fabs(t) > grid_->torque_limit_nm || std::fabs(volts) > grid_->voltage_limit_v) return true;
+    }
+    return false;
+  };
+  const bool sure =
+      motors && !breaks(0, -most) && !breaks(0, most) && !breaks(top, -most) && !breaks(top, most);
+  if (lossy || (motors && !sure)) {
+    constexpr int samples = 128;
+    for (int k = 0; k <= samples; ++k) {
+      const double t = line->duration_s() * k / samples, v = line->speed(t), q = line->acceleration(t);
+      if (motors && !sure && breaks(v, q)) return {};
+      if (lossy && (motor[0].power_w(v, q) < 0 || motor[1].power_w(v, q) < 0)) return {};
+    }
+  }
+  RunAnswer answer;
+  answer.line = *line;
+  answer.energy_j = line->energy_j();
+  answer.duration_s = line->duration_s();
+  answer.residual = std::fabs(line->transversality_w()) / task.power.c0;
+  return answer;
+}
+
+Result<RunAnswer> RunPlanner::solve(double price_w) {
+  if (auto answer = closed_form(price_w)) return std::move(*answer);
+  const double idle = loads_->electric().idle_w;
+  if (!solver_) solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
+  SpeedSolution s;
+  int iterations = 0;
+  if (uniform_ && !refined_) {
+    // A coarse solution places the nodes of the fine one and, by Richardson, tells its error: order 2.
+    s = solver_->solve(price_w, 1e-5);
+    iterations = s.iterations;
+    if (s.converged) {
+      const std::vector<double> coarse_nodes = nodes_, coarse = s.z;
+      const double coarse_cost = s.cost_j;
+      build(refined_nodes(coarse, std::max<std::size_t>(8, problem_->intervals_per_run)));
+      solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
+      solver_->start_from(resampled(coarse_nodes, coarse, nodes_));
+      s = solver_->solve(price_w);
+      discretisation_j_ = std::fabs(coarse_cost - s.cost_j) / 3;
+      refined_ = true;
+    }
+  } else {
+    s = solver_->solve(price_w);
+  }
+  if (!s.converged) {
+    return fail(Fault::internal, "path", "the speed profile of a run did not converge");
+  }
+  RunAnswer answer;
+  answer.z = s.z;
+  answer.duration_s = s.duration_s;
+  answer.energy_j = s.cost_j - price_w * s.duration_s;
+  answer.gap_j = s.gap_j;
+  answer.discretisation_j = discretisation_j_;
+  answer.residual = s.residual;
+  answer.convex = s.convex && idle + price_w >= 0;
+  answer.iterations = iterations + s.iterations;
+  answer.binding = s.binding;
+  if (s.binding[static_cast<std::size_t>(Bound::speed)]) {
+    // Tell which of the limits behind the ceiling it was, where the profile is closest to it.
+    answer.binding[static_cast<std::size_t>(Bound::speed)] = false;
+    for (std::size_t k = 1; k + 1 < nodes_.size(); ++k) {
+      if (s.z[k] > (1 - 2e-3) * grid_->ceiling[k]) {
+        answer.binding[static_cast<std::size_t>(ceiling_bound(nodes_[k]))] = true;
+      }
+    }
+  }
+  return answer;
+}
+
+}  // namespace joulecast::planning

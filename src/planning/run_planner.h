@@ -1,0 +1,70 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "planning/line.h"
+#include "planning/load.h"
+#include "planning/path.h"
+#include "planning/problem.h"
+#include "planning/profile.h"
+#include "planning/speed_solver.h"
+
+namespace joulecast::planning {
+
+// The optimum of one run at one price of time.
+struct RunAnswer {
+  std::optional<LineProfile> line;  // closed form, over the run's coordinate
+  std::vector<double> z;            // else squared speeds at `nodes`
+  double energy_j = 0;              // on the solver's own quadrature, idle power included
+  double duration_s = 0;
+  double gap_j = 0, discretisation_j = 0, residual = 0;
+  bool convex = true;
+  int iterations = 0;
+  std::array<bool, bound_count> binding{};
+};
+
+// Solves one run for any price of time; keeps its grid and last solution between calls.
+class RunPlanner {
+ public:
+  // Ends at rest unless speeds are given. Errors as Planner says.
+  static Result<RunPlanner> make(const robot::RobotModel& robot, const DriveLoads& loads, const Run& run,
+                                 const Problem& problem, double start_speed, double end_speed);
+
+  Result<RunAnswer> solve(double price_w);
+
+  const Run& run() const { return *run_; }
+  const std::vector<double>& nodes() const { return nodes_; }
+  double shortest_s() const { return envelope_->shortest_s; }
+  const SpeedEnvelope& envelope() const { return *envelope_; }
+  double curvature_slope(double way) const;
+
+ private:
+  RunPlanner(const robot::RobotModel& robot, const DriveLoads& loads, const Run& run, const Problem& problem)
+      : robot_(&robot), loads_(&loads), run_(&run), problem_(&problem) {}
+
+  double ceiling_at(double way) const;
+  Bound ceiling_bound(double way) const;
+  void build(std::vector<double> nodes);
+  Result<void> check_feasible() const;
+  std::optional<RunAnswer> closed_form(double price_w) const;
+  std::vector<double> first_nodes(std::size_t cells) const;
+  std::vector<double> refined_nodes(const std::vector<double>& z, std::size_t cells) const;
+  std::vector<double> resampled(const std::vector<double>& nodes, const std::vector<double>& z,
+                                const std::vector<double>& onto) const;
+
+  const robot::RobotModel* robot_;
+  const DriveLoads* loads_;
+  const Run* run_;
+  const Problem* problem_;
+  double start_ = 0, end_ = 0;
+  bool uniform_ = false, refined_ = false;
+  double discretisation_j_ = 0;
+  std::vector<double> nodes_;
+  std::unique_ptr<SpeedGrid> grid_;  // the solver refers to them
+  std::unique_ptr<SpeedEnvelope> envelope_;
+  std::unique_ptr<SpeedSolver> solver_;
+};
+
+}  // namespace joulecast::planning
