@@ -3,6 +3,8 @@
 #include "history/sqlite_store.h"
 
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
 
 #include <chrono>
 #include <cmath>
@@ -104,6 +106,46 @@ TEST_F(SqliteStoreTest, ReportsPagesOverwrittenByOthers) {
   const auto page = (*store)->telemetry(key, {}, {100'000, {}});
   ASSERT_FALSE(page);
   EXPECT_EQ(page.error().fault, Fault::corrupt);
+}
+
+// While it lives, no file of this process grows beyond the size: what a full disk is to SQLite.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) {
+    handler_ = signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &before_);
+    rlimit limit = before_;
+    limit.rlim_cur = bytes;
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    signal(SIGXFSZ, handler_);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+ private:
+  rlimit before_{};
+  sighandler_t handler_ = nullptr;
+};
+
+TEST_F(SqliteStoreTest, AFullDiskFailsTheWholeBatchAndLaterTakesIt) {
+  auto store = need(open());
+  Mission m = start_mission(*store, "amr-1", "m", 0);
+  std::vector<Command> batch;
+  for (int i = 0; i < 50; ++i) batch.push_back(CheckpointMission{m, {}, some_samples(0, 1024 * i, 1024), {}});
+  {
+    // Room for a few of the batch's pages.
+    const FileSizeLimit full(std::filesystem::file_size(path_ + "-wal") + 20'000);
+    const auto outcomes = store->apply(batch);
+    ASSERT_FALSE(outcomes);
+    EXPECT_EQ(outcomes.error().fault, Fault::unavailable) << describe(outcomes.error());
+    EXPECT_TRUE(need(store->telemetry(m.key, {}, {})).samples.empty());
+  }
+  for (const Outcome& outcome : need(store->apply(batch))) EXPECT_TRUE(outcome);
+  EXPECT_EQ(need(store->telemetry(m.key, {}, {max_telemetry_samples, {}})).samples.size(), 50U * 1024);
+  EXPECT_EQ(Database(path_, OpenMode::read_only, 50).text("PRAGMA integrity_check"), "ok");
 }
 
 TEST_F(SqliteStoreTest, ADamagedTailDoesNotStopWhatStillComes) {
