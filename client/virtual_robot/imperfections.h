@@ -69,6 +69,7 @@ struct World {
   double slope_direction_rad = 0;  // heading in which the floor rises
   int weak_side = 0;               // 0 right, 1 left
   double stribeck_speed_m_s = 0.12;
+  double emf_loss_share = 1;  // of torque_constant_loss that K_w has too; in SI units magnets cost both alike
   double thermal_time_constant_s = 240;
   double period_s = 24;
   double burst_time_s = 20;

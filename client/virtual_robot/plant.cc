@@ -30,9 +30,10 @@ Plant::Plant(const RobotParameters& robot, const Imperfections& imperfections, c
   arm_m_ = {radius * (1 + 0.5 * effect_.wheel_radius_asymmetry) * (1 - slip),
             radius * (1 - 0.5 * effect_.wheel_radius_asymmetry) * (1 - slip)};
   half_track_m_ = robot_.half_track_m * (1 + effect_.track_error);
-  const double magnet = 1 - effect_.torque_constant_loss;
-  torque_per_a_ = robot_.torque_constant_nm_a * robot_.gear_ratio * magnet;
-  emf_per_rad_s_ = robot_.voltage_constant_v_s_rad * robot_.gear_ratio * magnet;
+  const double magnet_loss = effect_.torque_constant_loss;
+  torque_per_a_ = robot_.torque_constant_nm_a * robot_.gear_ratio * (1 - magnet_loss);
+  emf_per_rad_s_ =
+      robot_.voltage_constant_v_s_rad * robot_.gear_ratio * (1 - world_.emf_loss_share * magnet_loss);
   inductance_h_ =
       std::max(robot_.inductance_h, shortest_electrical_s * robot_.resistance_ohm) + effect_.inductance;
   const double friction_mean_nm = 0.5 * (robot_.friction_torque_nm[0] + robot_.friction_torque_nm[1]);

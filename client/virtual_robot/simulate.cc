@@ -52,6 +52,9 @@ double nominal_power_w(const RobotParameters& robot, const std::array<double, 2>
 
 namespace {
 
+constexpr double gap_tolerance = 2e-3;  // of the requested gap
+constexpr double largest_growth = 6;    // of the strength in one step of the search
+
 struct GapIntegrals {
   double absolute = 0;
   double measured = 0;
@@ -112,24 +115,48 @@ Result<double> strength_for_gap(const SimulationSpec& spec, std::uint64_t seed, 
     clean.imperfections.*(entry->strength) = strength;
     return absolute_gap(clean, seed);
   };
-  const double goal = gap_at(0) + added_gap;
-  // Bracket from below: a strength far beyond need may stall the robot, and then the gap means nothing.
+  const double base = gap_at(0);
+  const auto shortfall = [&](double strength) { return gap_at(sign * strength) - base - added_gap; };
+
+  // The gap grows nearly in proportion, so step by proportion and a little over, from below: a strength far
+  // beyond need may stall the robot, and then the gap means nothing.
   double low = 0;
+  double low_value = -added_gap;
   double high = entry->search_limit / 1024;
-  double reached = 0;
-  while ((reached = gap_at(sign * high)) < goal) {
+  double high_value = shortfall(high);
+  while (high_value < 0) {
     if (high >= entry->search_limit) {
       std::ostringstream message;
-      message << effect_id << " adds at most " << reached - (goal - added_gap) << " with " << sign * high
-              << " " << entry->unit;
+      message << effect_id << " adds at most " << high_value + added_gap << " with " << sign * high << " "
+              << entry->unit;
       return fail(Fault::infeasible, "added_gap", message.str());
     }
+    const double reached = high_value + added_gap;
+    const double growth =
+        reached > 0 ? std::clamp(1.2 * added_gap / reached, 1.5, largest_growth) : largest_growth;
     low = high;
-    high = std::min(2 * high, entry->search_limit);
+    low_value = high_value;
+    high = std::min(growth * high, entry->search_limit);
+    high_value = shortfall(high);
   }
-  for (int k = 0; k < 14 && high - low > 1e-3 * high; ++k) {
-    const double middle = 0.5 * (low + high);
-    (gap_at(sign * middle) < goal ? low : high) = middle;
+
+  // False position; the Illinois rule halves the value of an end that stays, so that both ends close in.
+  int stayed = 0;
+  for (int k = 0; k < 30; ++k) {
+    const double middle = low + (high - low) * low_value / (low_value - high_value);
+    const double value = shortfall(middle);
+    if (std::abs(value) <= gap_tolerance * added_gap || high - low <= 1e-6 * high) return sign * middle;
+    if (value < 0) {
+      low = middle;
+      low_value = value;
+      if (stayed < 0) high_value *= 0.5;
+      stayed = -1;
+    } else {
+      high = middle;
+      high_value = value;
+      if (stayed > 0) low_value *= 0.5;
+      stayed = 1;
+    }
   }
   return sign * 0.5 * (low + high);
 }

@@ -39,6 +39,7 @@ std::string truth_json(const std::vector<Truth>& truths) {
                         {"slope_direction_rad", w.slope_direction_rad},
                         {"weak_side", w.weak_side},
                         {"stribeck_speed_m_s", w.stribeck_speed_m_s},
+                        {"emf_loss_share", w.emf_loss_share},
                         {"thermal_time_constant_s", w.thermal_time_constant_s},
                         {"period_s", w.period_s},
                         {"burst_time_s", w.burst_time_s}}},

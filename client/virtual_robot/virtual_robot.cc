@@ -123,24 +123,22 @@ VirtualRobot::Electrical VirtualRobot::electrical() const {
   return {voltage_v_, plant_.state().current_a, battery.voltage_v, battery.current_a};
 }
 
-// History holds the ends of past control periods; voltages are held between them, the rest is nearly
-// straight.
+// History holds the beginnings of past control periods; motor voltage is held from there on, the rest is
+// nearly straight to the next.
 VirtualRobot::Electrical VirtualRobot::delayed(double delay_s) const {
-  const double now_periods = static_cast<double>(step_) / steps_per_period_;
-  const double at = std::max(0.0, now_periods - delay_s / SpeedController::period_s);
+  const double now = static_cast<double>(step_) / steps_per_period_;  // in control periods
+  const double at = std::max(0.0, now - delay_s / SpeedController::period_s);
   const auto index = static_cast<std::int64_t>(at);
-  const double share = at - static_cast<double>(index);
-  const auto entry = [&](std::int64_t k) {
-    return k >= period_ ? electrical() : history_[static_cast<std::size_t>(k) % history_length];
-  };
-  const Electrical a = entry(index);
-  const Electrical b = entry(index + 1);
+  const auto begun = [&](std::int64_t k) { return history_[static_cast<std::size_t>(k) % history_length]; };
+  const Electrical a = begun(index);
+  const bool complete = index < period_;
+  const Electrical b = complete ? begun(index + 1) : electrical();
+  const double span = (complete ? static_cast<double>(index + 1) : now) - static_cast<double>(index);
+  const double share = span > 0 ? (at - static_cast<double>(index)) / span : 0;
   const auto blend = [&](double x, double y) { return x + share * (y - x); };
   Electrical out;
-  for (std::size_t s : {0u, 1u}) {
-    out.motor_voltage_v[s] = blend(a.motor_voltage_v[s], b.motor_voltage_v[s]);
-    out.motor_current_a[s] = blend(a.motor_current_a[s], b.motor_current_a[s]);
-  }
+  out.motor_voltage_v = a.motor_voltage_v;
+  for (std::size_t s : {0u, 1u}) out.motor_current_a[s] = blend(a.motor_current_a[s], b.motor_current_a[s]);
   out.battery_voltage_v = blend(a.battery_voltage_v, b.battery_voltage_v);
   out.battery_current_a = blend(a.battery_current_a, b.battery_current_a);
   return out;
@@ -202,6 +200,8 @@ void VirtualRobot::run_period() {
       {quantised(s.wheel_speed_rad_s[0], encoder_step), quantised(s.wheel_speed_rad_s[1], encoder_step)},
       before.battery_voltage_v);
 
+  history_[static_cast<std::size_t>(period_) % history_length] = electrical();
+
   const double bus_before_j = plant_.accounts().bus;
   for (int k = 0; k < steps_per_period_; ++k) {
     if (step_s_ * static_cast<double>(step_) >= next_sample_s_ - 0.5 * step_s_) take_sample();
@@ -225,7 +225,6 @@ void VirtualRobot::run_period() {
   mission_.duration_s += SpeedController::period_s;
   mission_.distance_m += std::abs(plant_.speed_m_s()) * SpeedController::period_s;
   mission_.battery_energy_j += battery_w * SpeedController::period_s;
-  history_[static_cast<std::size_t>(period_) % history_length] = electrical();
   ++period_;
 }
 

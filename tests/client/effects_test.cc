@@ -1,0 +1,212 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <string_view>
+
+#include "client/virtual_robot/simulate.h"
+#include "tests/client/robots.h"
+
+namespace joulecast::virtual_robot {
+namespace {
+
+SimulationSpec quiet_spec(std::string_view kind) {
+  SimulationSpec spec;
+  spec.robot = shipped(kind);
+  spec.missions = 2;
+  spec.scatter = 0;
+  spec.sensors.noise = false;
+  return spec;
+}
+
+// A seed whose two missions carry loads.
+constexpr std::uint64_t loaded_seed = 7;
+
+struct Expected {
+  std::string_view id;
+  double strength;
+};
+
+// Effects that make the battery give more than the robot file expects for the same motion.
+class CostlyEffect : public testing::TestWithParam<Expected> {};
+INSTANTIATE_TEST_SUITE_P(
+    All, CostlyEffect,
+    testing::Values(
+        Expected{"coulomb_friction", 0.3}, Expected{"viscous_friction", 1}, Expected{"stribeck_friction", 2},
+        Expected{"friction_asymmetry", 0.6}, Expected{"load_rolling_resistance", 0.03},
+        Expected{"floor_resistance_zone", 0.03}, Expected{"aerodynamic_drag", 10},
+        Expected{"turning_scrub", 0.1}, Expected{"gear_efficiency", 0.2}, Expected{"chassis_mass_error", 1},
+        Expected{"payload_mass_error", 1}, Expected{"yaw_inertia_error", 3},
+        Expected{"linear_inertia_error", 1}, Expected{"resistance_error", 1},
+        Expected{"winding_temperature", 40}, Expected{"brush_drop", 0.3},
+        Expected{"torque_constant_loss", 0.2}, Expected{"accessory_load", 5}, Expected{"driver_loss", 0.1},
+        Expected{"no_regeneration", 1}, Expected{"wheel_slip", 0.1}, Expected{"current_sensor_gain", 0.05},
+        Expected{"current_sensor_bias", 0.1}, Expected{"voltage_sensor_gain", 0.05},
+        Expected{"x_radio_zone", 10}, Expected{"x_periodic_load", 10}, Expected{"x_cogging", 0.5},
+        Expected{"x_start_burst", 20}, Expected{"x_speed_cubed", 1}, Expected{"x_heading_load", 10},
+        Expected{"x_sag_load", 10}, Expected{"x_cold_bearing", 1}),
+    [](const auto& effect) { return std::string(effect.param.id); });
+
+TEST_P(CostlyEffect, CostsEnergyAndMoreOfItCostsMore) {
+  SimulationSpec spec = quiet_spec("amr");
+  const PowerGap none = power_gap(spec, loaded_seed);
+  const auto gap_at = [&](double strength) {
+    auto imperfections = make_imperfections({{std::string(GetParam().id), strength}});
+    EXPECT_TRUE(imperfections);
+    spec.imperfections = *imperfections;
+    return power_gap(spec, loaded_seed);
+  };
+  const PowerGap half = gap_at(0.5 * GetParam().strength);
+  const PowerGap whole = gap_at(GetParam().strength);
+  EXPECT_GT(half.energy, none.energy);
+  EXPECT_GT(whole.energy, half.energy);
+  EXPECT_GT(whole.added(), half.added());
+}
+
+TEST(Effects, EveryEffectOfTheTableIsCostlyOrHasATestOfItsOwn) {
+  constexpr std::array<std::string_view, 8> others{"slope",
+                                                   "com_offset",
+                                                   "inductance",
+                                                   "battery_resistance",
+                                                   "wheel_radius_error",
+                                                   "wheel_radius_asymmetry",
+                                                   "track_error",
+                                                   "sensor_delay"};
+  // 32 costly ones above.
+  EXPECT_EQ(effect_table().size(), 32 + others.size());
+  for (const auto id : others) {
+    EXPECT_TRUE(std::any_of(effect_table().begin(), effect_table().end(), [&](const auto& e) {
+      return e.id == id;
+    })) << id;
+  }
+}
+
+Simulation with(SimulationSpec spec, std::string_view id, double strength) {
+  auto imperfections = make_imperfections({{std::string(id), strength}});
+  EXPECT_TRUE(imperfections);
+  spec.imperfections = *imperfections;
+  return simulate_missions(spec, loaded_seed);
+}
+
+double path_length(const Simulation& run) {
+  double length = 0;
+  for (std::size_t k = 1; k < run.samples.size(); ++k) {
+    length += std::hypot(run.samples[k].pose[0] - run.samples[k - 1].pose[0],
+                         run.samples[k].pose[1] - run.samples[k - 1].pose[1]);
+  }
+  return length;
+}
+
+// Largest |yaw - c (w_r - w_l)| over all samples for c of the given geometry.
+double worst_yaw_mismatch(const Simulation& run, double right_m, double left_m, double half_track_m) {
+  double worst = 0;
+  for (const auto& s : run.samples) {
+    const double yaw =
+        (right_m * s.wheel_velocity_rad_s[0] - left_m * s.wheel_velocity_rad_s[1]) / (2 * half_track_m);
+    worst = std::max(worst, std::abs(s.yaw_rate_rad_s - yaw));
+  }
+  return worst;
+}
+
+TEST(Effects, GeometryErrorsShowBetweenGyroPoseAndWheels) {
+  const SimulationSpec spec = quiet_spec("amr");
+  const double r = spec.robot.wheel_radius_m;
+  const double l = spec.robot.half_track_m;
+  EXPECT_LT(worst_yaw_mismatch(with(spec, "accessory_load", 1), r, r, l), 1e-12);
+  EXPECT_LT(worst_yaw_mismatch(with(spec, "track_error", 0.1), r, r, 1.1 * l), 1e-12);
+  EXPECT_LT(worst_yaw_mismatch(with(spec, "wheel_radius_error", 0.04), 1.04 * r, 1.04 * r, l), 1e-12);
+  EXPECT_LT(worst_yaw_mismatch(with(spec, "wheel_radius_asymmetry", 0.04), 1.02 * r, 0.98 * r, l), 1e-12);
+  EXPECT_LT(worst_yaw_mismatch(with(spec, "wheel_slip", 0.04), 0.96 * r, 0.96 * r, l), 1e-12);
+
+  const auto travelled = [&](const Simulation& run) {
+    double by_wheels = 0;
+    for (const auto& s : run.samples) {
+      by_wheels += std::abs(r * (s.wheel_velocity_rad_s[0] + s.wheel_velocity_rad_s[1]) / 2) / spec.rate_hz;
+    }
+    return path_length(run) / by_wheels;
+  };
+  // Chords of 20 ms against arcs and the rectangle rule: a few parts in 1e5 at these speeds.
+  EXPECT_NEAR(travelled(with(spec, "wheel_radius_error", 0.04)), 1.04, 1e-3);
+  EXPECT_NEAR(travelled(with(spec, "wheel_slip", 0.04)), 0.96, 1e-3);
+}
+
+TEST(Effects, SlopeTakesAndGivesBackItsPotentialEnergy) {
+  SimulationSpec spec = quiet_spec("amr");
+  spec.world.slope_direction_rad = 0;
+  const Simulation run = with(spec, "slope", 0.02);
+  const auto& first = run.truth.missions.front();
+  const auto ends = [&] {
+    const auto last = std::find_if(run.samples.begin(), run.samples.end(),
+                                   [&](const auto& s) { return s.utime_us >= run.events[1].utime_us; });
+    return std::pair{run.samples.front().pose[0], (last - 1)->pose[0]};
+  }();
+  // m g sin(a) times the way up; the robot stands at either end, so samples 20 ms apart see the same place.
+  const double mass_kg = spec.robot.chassis_kg + 2 * spec.robot.wheel_kg + first.payload_kg;
+  EXPECT_NEAR(first.accounts.potential, mass_kg * 9.80665 * std::sin(0.02) * (ends.second - ends.first),
+              0.05);
+}
+
+TEST(Effects, DelayShiftsTheElectricalChannelsAlone) {
+  const SimulationSpec spec = quiet_spec("amr");
+  const Simulation prompt = with(spec, "sensor_delay", 0);
+  const Simulation late = with(spec, "sensor_delay", 0.1);
+  ASSERT_EQ(prompt.samples.size(), late.samples.size());
+  for (std::size_t k = 100; k < 4000; ++k) {
+    ASSERT_EQ(late.samples[k].wheel_velocity_rad_s, prompt.samples[k].wheel_velocity_rad_s);
+    // History is kept at the beginnings of control periods, of which samples at 50 Hz see every fourth.
+    ASSERT_NEAR(late.samples[k].motor_current_a[0], prompt.samples[k - 5].motor_current_a[0], 1e-9) << k;
+    ASSERT_NEAR(late.samples[k].motor_voltage_v[1], prompt.samples[k - 5].motor_voltage_v[1], 1e-9) << k;
+    ASSERT_NEAR(late.samples[k].battery_current_a, prompt.samples[k - 5].battery_current_a, 1e-9) << k;
+  }
+}
+
+TEST(Effects, BatteryResistanceSagsTheVoltageAndLeavesThePower) {
+  const SimulationSpec spec = quiet_spec("amr");
+  const Simulation plain = with(spec, "battery_resistance", 0);
+  const Simulation weak = with(spec, "battery_resistance", 5);
+  ASSERT_EQ(plain.samples.size(), weak.samples.size());
+  double sag = 0;
+  for (std::size_t k = 0; k < plain.samples.size(); ++k) {
+    const auto& a = plain.samples[k];
+    const auto& b = weak.samples[k];
+    ASSERT_NEAR(b.battery_voltage_v * b.battery_current_a, a.battery_voltage_v * a.battery_current_a, 1e-6);
+    sag += a.battery_voltage_v - b.battery_voltage_v;
+  }
+  EXPECT_GT(sag, 0);
+}
+
+TEST(Effects, InductanceAndOffsetChangeOnlyTransients) {
+  // Both vanish in the mean of a mission's work, to first order; both leave a mark on the absolute power.
+  SimulationSpec spec = quiet_spec("amr");
+  for (const auto& [id, strength] : {std::pair{"inductance", 0.02}, std::pair{"com_offset", 0.3}}) {
+    spec.imperfections = *make_imperfections({{id, strength}});
+    const PowerGap gap = power_gap(spec, loaded_seed);
+    EXPECT_GT(gap.added(), 0) << id;
+    EXPECT_LT(std::abs(gap.energy), gap.absolute) << id;
+  }
+}
+
+TEST(Effects, StrengthIsFoundForAGapAndItsAbsenceSaid) {
+  const SimulationSpec spec = quiet_spec("tug");
+  for (const char* id : {"coulomb_friction", "turning_scrub", "x_heading_load"}) {
+    const auto strength = strength_for_gap(spec, 3, id, 0.06);
+    ASSERT_TRUE(strength) << describe(strength.error());
+    SimulationSpec found = spec;
+    found.imperfections = *make_imperfections({{id, *strength}});
+    // The search stops within 2e-3 of the request.
+    EXPECT_NEAR(power_gap(found, 3).added(), 0.06, 2.1e-3 * 0.06) << id;
+  }
+  const auto none = strength_for_gap(spec, 3, "battery_resistance", 0.06);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().fault, Fault::infeasible);
+  EXPECT_EQ(strength_for_gap(spec, 3, "gravity", 0.06).error().fault, Fault::invalid);
+}
+
+TEST(Effects, UnknownIdsAndAbsurdStrengthsAreNamed) {
+  EXPECT_EQ(make_imperfections({{"coulomb_fricton", 0.1}}).error().field, "effect");
+  EXPECT_EQ(make_imperfections({{"slope", 3}}).error().field, "effect/slope");
+  EXPECT_EQ(make_imperfections({{"slope", std::nan("")}}).error().field, "effect/slope");
+}
+
+}  // namespace
+}  // namespace joulecast::virtual_robot

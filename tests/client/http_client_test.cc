@@ -1,0 +1,156 @@
+#include "client/http_client.h"
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <string>
+#include <thread>
+#include <utility>
+
+namespace joulecast::client {
+namespace {
+
+using namespace std::chrono_literals;
+
+// Accepts one connection, keeps what was sent and answers with given bytes; an empty answer means silence.
+class OneAnswer {
+ public:
+  explicit OneAnswer(std::string answer) : answer_(std::move(answer)) {
+    listener_ = ::socket(AF_INET, SOCK_STREAM, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t length = sizeof address;
+    EXPECT_EQ(::bind(listener_, reinterpret_cast<sockaddr*>(&address), length), 0);
+    EXPECT_EQ(::listen(listener_, 1), 0);
+    EXPECT_EQ(::getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &length), 0);
+    port_ = ntohs(address.sin_port);
+    thread_ = std::thread([this] { serve(); });
+  }
+  ~OneAnswer() {
+    if (thread_.joinable()) thread_.join();
+    ::close(listener_);
+  }
+
+  ServerAddress address() const { return {"127.0.0.1", std::to_string(port_), ""}; }
+  // What the client sent; waits until the exchange is over.
+  const std::string& request() {
+    thread_.join();
+    return request_;
+  }
+
+ private:
+  void serve() {
+    const int peer = ::accept(listener_, nullptr, nullptr);
+    char buffer[4096];
+    for (;;) {
+      const auto got = ::recv(peer, buffer, sizeof buffer, 0);
+      if (got <= 0) break;
+      request_.append(buffer, static_cast<std::size_t>(got));
+      if (!answer_.empty() && !answered_ && complete()) {
+        answered_ = true;
+        EXPECT_EQ(::send(peer, answer_.data(), answer_.size(), MSG_NOSIGNAL),
+                  static_cast<ssize_t>(answer_.size()));
+      }
+    }
+    ::close(peer);
+  }
+
+  bool complete() const {
+    const auto head = request_.find("\r\n\r\n");
+    if (head == std::string::npos) return false;
+    const auto field = request_.find("Content-Length: ");
+    const std::size_t body = field == std::string::npos ? 0 : std::stoul(request_.substr(field + 16));
+    return request_.size() >= head + 4 + body;
+  }
+
+  std::string answer_;
+  std::string request_;
+  std::thread thread_;
+  int listener_ = -1;
+  int port_ = 0;
+  bool answered_ = false;
+};
+
+TEST(ServerUrl, TakesHostPortAndPathApart) {
+  const auto full = parse_server_url("http://fleet.example:8080/joulecast/");
+  ASSERT_TRUE(full);
+  EXPECT_EQ(full->host, "fleet.example");
+  EXPECT_EQ(full->port, "8080");
+  EXPECT_EQ(full->base_path, "/joulecast");
+  const auto bare = parse_server_url("http://localhost");
+  ASSERT_TRUE(bare);
+  EXPECT_EQ(bare->port, "80");
+  EXPECT_EQ(bare->base_path, "");
+  const auto six = parse_server_url("http://[::1]:99");
+  ASSERT_TRUE(six);
+  EXPECT_EQ(six->host, "::1");
+  EXPECT_EQ(six->port, "99");
+  for (const char* wrong :
+       {"localhost:80", "ftp://x", "http://", "http://:80", "http://h:", "http://h:99999", "http://h:8o"}) {
+    EXPECT_FALSE(parse_server_url(wrong)) << wrong;
+  }
+}
+
+TEST(HttpClient, SendsTheBodyAndReadsTheReply) {
+  OneAnswer server(
+      "HTTP/1.1 201 Created\r\nContent-Type: application/json\r\nContent-Length: 8\r\n\r\n{\"a\": 1}");
+  const auto reply =
+      http_request(server.address(), HttpMethod::put, "/v1/robots/r1", "{\"robot_id\":\"r1\"}", 2s);
+  ASSERT_TRUE(reply) << describe(reply.error());
+  EXPECT_EQ(reply->status, 201u);
+  EXPECT_TRUE(reply->ok());
+  EXPECT_EQ(reply->content_type, "application/json");
+  EXPECT_EQ(reply->body, "{\"a\": 1}");
+  const std::string& sent = server.request();
+  EXPECT_EQ(sent.rfind("PUT /v1/robots/r1 HTTP/1.1\r\n", 0), 0u) << sent;
+  EXPECT_TRUE(sent.ends_with("\r\n\r\n{\"robot_id\":\"r1\"}")) << sent;
+}
+
+TEST(HttpClient, ProblemsKeepTheirFaultAndWords) {
+  OneAnswer server(
+      "HTTP/1.1 404 Not Found\r\nContent-Type: application/problem+json\r\nContent-Length: 47\r\n\r\n"
+      "{\"title\": \"no such robot\", \"detail\": \"r9 is none\"}");
+  const auto reply = http_request(server.address(), HttpMethod::get, "/v1/robots/r9", "", 2s);
+  ASSERT_TRUE(reply);
+  EXPECT_FALSE(reply->ok());
+  EXPECT_EQ(error_of(*reply).fault, Fault::not_found);
+}
+
+TEST(HttpClient, StatusesBecomeFaults) {
+  EXPECT_EQ(error_of({422, "", ""}).fault, Fault::invalid);
+  EXPECT_EQ(error_of({409, "", ""}).fault, Fault::conflict);
+  EXPECT_EQ(error_of({413, "", ""}).fault, Fault::too_large);
+  EXPECT_EQ(error_of({429, "", ""}).fault, Fault::unavailable);
+  EXPECT_EQ(error_of({503, "", ""}).fault, Fault::unavailable);
+  EXPECT_EQ(error_of({400, "", R"({"title":"bad","detail":"speed"})"}).message,
+            "the server answered 400: bad: speed");
+}
+
+TEST(HttpClient, SilenceAndAbsenceAreUnavailable) {
+  const auto before = std::chrono::steady_clock::now();
+  {
+    OneAnswer silent("");
+    const auto reply = http_request(silent.address(), HttpMethod::get, "/", "", 200ms);
+    ASSERT_FALSE(reply);
+    EXPECT_EQ(reply.error().fault, Fault::unavailable);
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - before, 5s);
+  ServerAddress closed;
+  {
+    OneAnswer gone("x");
+    closed = gone.address();
+    // Open and close the one connection so that the listener ends.
+    (void)http_request(closed, HttpMethod::get, "/", "", 200ms);
+  }
+  const auto refused = http_request(closed, HttpMethod::get, "/", "", 2s);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().fault, Fault::unavailable);
+}
+
+}  // namespace
+}  // namespace joulecast::client

@@ -1,0 +1,125 @@
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "client/commands/table.h"
+#include "telemetry/codec.h"
+#include "telemetry/event_log.h"
+
+namespace joulecast::client {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The outcome of a command line; empty when it does not parse.
+std::optional<Exit> run(std::vector<std::string> words) {
+  CLI::App program("joulecast");
+  program.require_subcommand(1);
+  Exit exit = Exit::ok;
+  for (const auto add : commands()) add(program, exit);
+  std::reverse(words.begin(), words.end());
+  try {
+    program.parse(words);
+  } catch (const CLI::ParseError&) {
+    return std::nullopt;
+  }
+  return exit;
+}
+
+class SimulateCommand : public testing::Test {
+ protected:
+  SimulateCommand() {
+    std::string name = (fs::temp_directory_path() / "joulecast-simulate-XXXXXX").string();
+    folder_ = mkdtemp(name.data());
+  }
+  ~SimulateCommand() override { fs::remove_all(folder_); }
+
+  std::string file(const char* name) const { return (folder_ / name).string(); }
+  static std::string text_of(const std::string& path) {
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(SimulateCommand, WritesALogThatReadsBackAndSealsTheTruthApart) {
+  ASSERT_EQ(run({"simulate", "--quiet", "--robots", "4", "--missions", "1", "--seed", "9", "--log",
+                 file("a.lcmlog"), "--truth", file("truth.json"), "--effect", "coulomb_friction=0.25"}),
+            Exit::ok);
+  auto reader = telemetry::EventLogReader::open(file("a.lcmlog"));
+  ASSERT_TRUE(reader);
+  std::set<std::string> robots;
+  std::size_t samples = 0;
+  std::size_t events = 0;
+  telemetry::LogRead read;
+  while ((read = reader->next()).status == telemetry::LogStatus::event) {
+    const auto channel = telemetry::parse_channel(read.event.channel);
+    ASSERT_TRUE(channel);
+    robots.emplace(channel->robot_id);
+    if (channel->subject == telemetry::Subject::telemetry) {
+      const auto decoded = telemetry::decode_telemetry(read.event.data);
+      ASSERT_TRUE(decoded);
+      ASSERT_EQ(decoded->robot_id, channel->robot_id);
+      ASSERT_EQ(decoded->sample.utime_us, read.event.timestamp_us);
+      ++samples;
+    } else {
+      ASSERT_TRUE(telemetry::decode_mission_event(read.event.data));
+      ++events;
+    }
+  }
+  EXPECT_EQ(read.status, telemetry::LogStatus::end);
+  EXPECT_EQ(robots, (std::set<std::string>{"amr-01", "nomad-02", "tug-03", "p3dx-04"}));
+  EXPECT_EQ(events, 8u);
+  EXPECT_GT(samples, 4u * 50 * 100);
+
+  const auto truth = nlohmann::json::parse(text_of(file("truth.json")));
+  ASSERT_EQ(truth["robots"].size(), 4u);
+  EXPECT_EQ(truth["robots"][2]["effects"]["coulomb_friction"], 0.25);
+  EXPECT_GT(truth["robots"][0]["missions"][0]["battery_energy_j"], 0);
+}
+
+TEST_F(SimulateCommand, RepeatsBitForBit) {
+  for (const char* name : {"a.lcmlog", "b.lcmlog"}) {
+    ASSERT_EQ(run({"simulate", "--quiet", "--robots", "2", "--duration", "30", "--log", file(name)}),
+              Exit::ok);
+  }
+  EXPECT_EQ(text_of(file("a.lcmlog")), text_of(file("b.lcmlog")));
+}
+
+TEST_F(SimulateCommand, SaysWhatIsWrong) {
+  EXPECT_EQ(run({"simulate", "--log", file("a.lcmlog")}), Exit::fault);  // without an end
+  EXPECT_EQ(run({"simulate", "--speed", "0", "--missions", "1"}), Exit::fault);
+  EXPECT_EQ(run({"simulate", "--robot", file("absent.json"), "--log", file("a.lcmlog"), "--duration", "1"}),
+            Exit::fault);
+  EXPECT_EQ(run({"simulate", "--effect", "slope", "--log", file("a.lcmlog"), "--duration", "1"}),
+            Exit::fault);
+  EXPECT_EQ(run({"simulate", "--log", "/no/such/folder/a.lcmlog", "--duration", "1"}), Exit::unreachable);
+  EXPECT_EQ(run({"simulate", "--rate", "0"}), std::nullopt);
+  EXPECT_EQ(run({"simulate", "--robots", "0"}), std::nullopt);
+  EXPECT_EQ(run({}), std::nullopt);
+}
+
+TEST_F(SimulateCommand, ReplaySendsTheWholeLogAndReportsDamage) {
+  ASSERT_EQ(run({"simulate", "--quiet", "--robots", "2", "--duration", "20", "--log", file("a.lcmlog")}),
+            Exit::ok);
+  const std::string replay_url = "memq://";
+  EXPECT_EQ(run({"replay", file("a.lcmlog"), "--speed", "0", "--lcm-url", replay_url}), Exit::ok);
+  const std::string whole = text_of(file("a.lcmlog"));
+  std::ofstream(file("cut.lcmlog"), std::ios::binary) << whole.substr(0, whole.size() - 5);
+  EXPECT_EQ(run({"replay", file("cut.lcmlog"), "--speed", "0", "--lcm-url", replay_url}), Exit::fault);
+  EXPECT_EQ(run({"replay", file("absent.lcmlog"), "--lcm-url", replay_url}), Exit::fault);
+}
+
+}  // namespace
+}  // namespace joulecast::client
