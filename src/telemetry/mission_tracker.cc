@@ -65,7 +65,6 @@ MissionActions MissionTracker::on_silence(std::int64_t silent_us) {
 }
 
 void MissionTracker::on_clock_step(std::int64_t utime_us) {
-  explicit_end_us_.reset();
   if (!current_) return;
   // The mission keeps the duration it had; the step itself is no time of it.
   begin_us_ += utime_us - current_->last_utime_us;

@@ -123,7 +123,9 @@ void expect_exact_size(const Bytes& whole, Decode decode) {
   }
   Bytes longer = whole;
   longer.push_back(0);
-  EXPECT_FALSE(decode(longer));
+  const auto decoded = decode(longer);
+  ASSERT_FALSE(decoded);
+  EXPECT_EQ(decoded.error().fault, Fault::corrupt);
 }
 
 TEST(Codec, RefusesEveryTruncation) {

@@ -73,6 +73,14 @@ TEST_F(SequenceTrackerTest, BootWithTheClockRunningOnIsARestartThatContinues) {
   EXPECT_EQ(tracker.counters().missing, 0u);
 }
 
+TEST_F(SequenceTrackerTest, NumbersOfTheBootBeforeAreForgotten) {
+  run_to(10);
+  tracker.place(0, at(20));
+  tracker.place(1, at(21));
+  tracker.place(3, at(23));
+  EXPECT_EQ(tracker.place(2, at(22)).arrival, Arrival::late);
+}
+
 TEST_F(SequenceTrackerTest, BootSoonAfterBootIsARestartThoughTheNumberWasSeen) {
   run_to(3);
   EXPECT_EQ(tracker.place(0, at(400)).arrival, Arrival::restart);
