@@ -43,7 +43,7 @@ Placement SequenceTracker::classify(std::int64_t sequence, std::int64_t utime_us
       return placement;
     }
   }
-  if (placement.elapsed_us > limits_.forward_jump_us) {
+  if (placement.elapsed_us > limits_.forward_jump_us && placement.arrival == Arrival::fresh) {
     placement.clock = ClockStep::forward;
   } else if (placement.elapsed_us > limits_.gap_us) {
     placement.gap = true;
