@@ -2,187 +2,249 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
 
-#include "planning/line.h"
-#include "planning/ramp.h"
+#include "energy/motion_estimate.h"
+#include "planning/baseline.h"
+#include "planning/planner.h"
 #include "server/api/fields.h"
 #include "server/api/json_writer.h"
+#include "server/api/mission_json.h"
+#include "server/api/path_request.h"
 #include "server/api/services.h"
 
 namespace joulecast::api {
 namespace {
 
-constexpr int max_samples = 2001;
+constexpr std::int64_t max_pareto_points = 200;
+constexpr std::size_t max_profile_points = 200'000;
 
-// The drive model's power along a straight line: exact where torque is affine in speed; a torque that is not
-// (drag, Stribeck) is taken by its chord between half and full speed.
-dynamics::QuadraticPower straight_power_of(const server::ModelInForce& model, double payload_kg) {
-  const dynamics::Parameters<double>& p = model.drive.parameters();
-  const double top = model.robot.limits.speed_m_s;
-  dynamics::Instant at;
-  at.payload_kg = payload_kg;
-  const auto torque = [&](double speed, double acceleration) {
-    at.wheel_speed_rad_s = dynamics::wheels_of_body(p, speed, 0);
-    at.wheel_acceleration_rad_s2 = dynamics::wheels_of_body(p, acceleration, 0);
-    return model.drive.balance(at).total_nm;
-  };
-  const auto half = torque(top / 2, 0), full = torque(top, 0), pushed = torque(top / 2, 1);
-  dynamics::QuadraticPower power;
-  for (std::size_t s : {0u, 1u}) {
-    const double wheel_per_metre = dynamics::wheels_of_body(p, 1, 0)[s];
-    const double damping = (full[s] - half[s]) / (top / 2);  // N m s/m
-    power += dynamics::wheel_power(
-                 model.drive.resistance(s, at) / (p.torque_constant_nm_a * p.torque_constant_nm_a),
-                 p.voltage_constant_v_s_rad / p.torque_constant_nm_a, (pushed[s] - half[s]) / wheel_per_metre,
-                 damping / wheel_per_metre, half[s] - damping * top / 2)
-                 .rescaled(1 / wheel_per_metre);
-  }
-  power.c0 += p.idle_power_w + p.accessory_power_w;
-  return power;
+void write_summary(JsonWriter& json, const planning::Summary& s) {
+  json.field("energy_j", s.energy_j)
+      .field("duration_s", s.duration_s)
+      .field("distance_m", s.distance_m)
+      .field("turned_rad", s.turned_rad);
+  json.field("peak_speed_m_s", s.peak_speed_m_s)
+      .field("peak_yaw_rate_rad_s", s.peak_yaw_rate_rad_s)
+      .field("peak_power_w", s.peak_power_w);
+  json.field("braking_j", s.braking_j).field("recovered_j", s.recovered_j);
 }
 
-bool within(const planning::LineProfile& profile, const robot::Limits& limits) {
-  constexpr double rounding = 1 + 1e-9;
-  return profile.peak_speed() <= limits.speed_m_s * rounding &&
-         profile.peak_acceleration() <= limits.acceleration_m_s2 * rounding &&
-         profile.lowest_speed() >= -1e-9;
+void write_certificate(JsonWriter& json, const planning::Certificate& c) {
+  json.key("certificate").begin_object();
+  json.field("method", planning::name_of(c.method))
+      .field("gap_j", c.gap_j)
+      .field("discretisation_j", c.discretisation_j);
+  json.field("residual", c.residual)
+      .field("convex", c.convex)
+      .field("time_multiplier_w", c.time_multiplier_w);
+  json.key("binding").begin_array();
+  for (const planning::Bound bound : c.binding) json.value(planning::name_of(bound));
+  json.end_array().field("iterations", c.iterations).end_object();
 }
 
-void write_samples(JsonWriter& json, const std::vector<planning::LineSample>& samples) {
-  std::vector<double> column(samples.size());
-  const auto write = [&](std::string_view name, double planning::LineSample::*member) {
-    for (std::size_t k = 0; k < column.size(); ++k) column[k] = samples[k].*member;
-    json.column(name, column);
-  };
+void write_columns(JsonWriter& json, const planning::Profile& p) {
   json.key("profile").begin_object();
-  write("time_s", &planning::LineSample::time_s);
-  write("distance_m", &planning::LineSample::distance);
-  write("speed_m_s", &planning::LineSample::speed);
-  write("acceleration_m_s2", &planning::LineSample::acceleration);
-  write("power_w", &planning::LineSample::power_w);
-  write("energy_j", &planning::LineSample::energy_j);
+  json.column("time_s", p.time_s).column("distance_m", p.distance_m);
+  json.column("x_m", p.x_m, 4).column("y_m", p.y_m, 4).column("heading_rad", p.heading_rad, 5);
+  json.column("speed_m_s", p.speed_m_s).column("yaw_rate_rad_s", p.yaw_rate_rad_s);
+  json.column("acceleration_m_s2", p.acceleration_m_s2)
+      .column("yaw_acceleration_rad_s2", p.yaw_acceleration_rad_s2);
+  json.column("payload_kg", p.payload_kg, 3)
+      .column("power_w", p.power_w, 4)
+      .column("energy_j", p.energy_j, 4);
   json.end_object();
+}
+
+// How long the best plan takes on each run between stops: what the baselines are given too. One run needs no
+// second solve; several are joined by the multiplier of time, which priced alone gives each run's share.
+Result<std::vector<double>> run_durations(const planning::Planner& planner, const DriveRequest& request,
+                                          const planning::Plan& plan) {
+  const auto& runs = request.path.runs;
+  if (runs.size() == 1) return std::vector<double>{plan.summary.duration_s - request.path.dwell_s()};
+  std::vector<double> durations;
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    planning::Path alone;
+    alone.runs = {runs[k]};
+    alone.runs[0].dwell_before_s = 0;
+    planning::Problem problem = request.problem;
+    problem.deadline_s.reset();
+    problem.value_of_time_w = plan.certificate.time_multiplier_w;
+    if (k > 0) problem.start_speed_m_s = 0;
+    if (k + 1 < runs.size()) problem.end_speed_m_s = 0;
+    const auto cost = planner.cost(alone, problem);
+    if (!cost) return tl::unexpected(cost.error());
+    durations.push_back(cost->duration_s);
+  }
+  return durations;
+}
+
+// The robot's drive, with the share of braking power that the request says returns.
+Result<dynamics::DriveModel> drive_of(const server::ModelInForce& model,
+                                      const std::optional<double>& regeneration) {
+  if (!regeneration) return model.drive;
+  robot::RobotModel robot = model.robot;
+  std::erase_if(robot.effects, [](const robot::AdoptedEffect& e) { return e.id == "no_regeneration"; });
+  robot.effects.push_back({"no_regeneration", {{"fraction", 1 - *regeneration}}});
+  return dynamics::drive_model(robot);
+}
+
+Result<void> write_baselines(JsonWriter& json, const planning::Planner& planner,
+                             const server::ModelInForce& model, const DriveRequest& request,
+                             const planning::Plan& plan) {
+  json.key("baselines").begin_object();
+  const Result<std::vector<double>> durations = run_durations(planner, request, plan);
+  if (!durations) return tl::unexpected(durations.error());
+  const Result<dynamics::DriveModel> drive = drive_of(model, request.problem.regeneration);
+  if (!drive) return tl::unexpected(drive.error());
+  for (const auto& [name, ramp_fraction] : {std::pair{"trapezoid", 1.0 / 3}, std::pair{"triangle", 0.5}}) {
+    json.key(name);
+    const auto baseline =
+        planning::ramp_baseline(*drive, request.path, *durations, request.problem.start_speed_m_s,
+                                request.problem.end_speed_m_s, ramp_fraction);
+    if (!baseline) {
+      json.null();
+      continue;
+    }
+    const planning::Limits& limits = request.problem.limits;
+    constexpr double rounding = 1 + 1e-9;
+    json.begin_object().field("energy_j", baseline->energy_j).field("duration_s", baseline->duration_s);
+    json.field("peak_speed_m_s", baseline->peak_speed_m_s);
+    json.field("within_limits", baseline->peak_speed_m_s <= limits.speed_m_s * rounding &&
+                                    baseline->peak_acceleration_m_s2 <= limits.acceleration_m_s2 * rounding);
+    json.field("saving_fraction", 1 - plan.summary.energy_j / baseline->energy_j).end_object();
+  }
+  json.end_object();
+  return {};
 }
 
 }  // namespace
 
-Result<ProfileRequest> parse_profile(const nlohmann::json& body, const robot::Limits& limits) {
+Result<std::string> profile_answer(const nlohmann::json& body, const server::ModelInForce& model) {
   Fields fields(body);
-  ProfileRequest request;
-  static const nlohmann::json nothing = nlohmann::json::object();
-  const nlohmann::json* path = fields.member("path");
-  if (path == nullptr || !path->is_array() || path->size() != 1) {
-    fields.fault("path", "must be an array of one segment");
-  } else {
-    Fields segment(path->front(), fields.pointer("path") + "/0");
-    segment.choice("kind", {"straight"});
-    request.length_m = segment.number("length_m", {.minimum = 1e-3, .maximum = 1e5});
-    if (Result<void> done = segment.finish(); !done) fields.fault(std::move(done.error()));
-  }
-  request.payload_kg = fields.number("payload_kg", {.minimum = 0, .maximum = limits.payload_kg}, 0);
-  request.start_speed_m_s = fields.number("start_speed_m_s", {.minimum = 0, .maximum = limits.speed_m_s}, 0);
-  request.end_speed_m_s = fields.number("end_speed_m_s", {.minimum = 0, .maximum = limits.speed_m_s}, 0);
-  request.duration_s = fields.optional_number("duration_s", positive);
-  request.value_of_time_w = fields.number("value_of_time_w", {.minimum = 0, .maximum = 1e6}, 0);
-  request.samples = static_cast<int>(fields.integer("samples", 2, max_samples, 101));
+  const DriveRequest request = read_drive(fields, model.robot);
+  const bool columns = fields.boolean("columns", true);
+  const std::int64_t pareto_points = fields.integer("pareto_points", 0, max_pareto_points, 0);
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
-  return request;
-}
 
-Result<std::string> profile_answer(const ProfileRequest& request, const server::ModelInForce& model) {
-  const robot::Limits& limits = model.robot.limits;
-  planning::LineTask task;
-  task.power = straight_power_of(model, request.payload_kg);
-  task.distance = request.length_m;
-  task.start_speed = request.start_speed_m_s;
-  task.end_speed = request.end_speed_m_s;
-  task.value_of_time_w = request.value_of_time_w;
-
-  Result<planning::LineProfile> best = request.duration_s ? planning::line_in_time(task, *request.duration_s)
-                                                          : planning::line_in_free_time(task);
-  if (!best) return tl::unexpected(std::move(best.error()));
-  std::string method = "closed_form";
-  if (!within(*best, limits)) {
-    // Slower profiles of the same family have lower peaks: the fastest of them that the limits allow.
-    double low = best->duration_s(), high = low;
-    Result<planning::LineProfile> slow = planning::line_in_time(task, high);
-    for (int k = 0; k < 60 && !(slow && within(*slow, limits)); ++k)
-      slow = planning::line_in_time(task, high *= 1.25);
-    if (!slow || !within(*slow, limits)) {
-      return fail(Fault::infeasible, "/path/0/length_m",
-                  fmt::format("is too short to change from {} to {} m/s within {} m/s^2",
-                              request.start_speed_m_s, request.end_speed_m_s, limits.acceleration_m_s2));
-    }
-    for (int k = 0; k < 60; ++k) {
-      const double middle = 0.5 * (low + high);
-      const auto tried = planning::line_in_time(task, middle);
-      (tried && within(*tried, limits) ? high : low) = middle;
-    }
-    if (request.duration_s) {
-      return fail(Fault::infeasible, "/duration_s",
-                  fmt::format("is {} s, too short for the robot's limits; the nearest feasible is {:.3f} s",
-                              *request.duration_s, high));
-    }
-    best = planning::line_in_time(task, high);
-    if (!best) return tl::unexpected(std::move(best.error()));
-    method = "closed_form_slowed_to_limits";
-  }
+  Result<planning::Planner> planner = planning::Planner::make(model.robot, request.problem.regeneration);
+  if (!planner) return tl::unexpected(std::move(planner.error()));
+  Result<planning::Plan> plan = planner->plan(request.path, request.problem);
+  if (!plan) return tl::unexpected(std::move(plan.error()));
 
   JsonWriter json;
   json.begin_object();
-  json.field("robot_id", model.robot.robot_id).field("model_version", model.version).field("method", method);
-  json.field("energy_j", best->energy_j())
-      .field("duration_s", best->duration_s())
-      .field("distance_m", best->distance());
-  json.field("peak_speed_m_s", best->peak_speed()).field("peak_acceleration_m_s2", best->peak_acceleration());
-  json.field("transversality_w", best->transversality_w());
-  json.key("baselines").begin_object();
-  const auto baseline = [&](std::string_view name, double ramp_fraction) {
-    json.key(name);
-    const Result<planning::RampProfile> ramp =
-        planning::ramp_in_time(task, best->duration_s(), ramp_fraction);
-    if (!ramp) {
-      json.null();
-      return;
-    }
-    json.begin_object()
-        .field("energy_j", ramp->energy_j())
-        .field("duration_s", ramp->duration_s())
-        .field("peak_speed_m_s", ramp->peak_speed());
-    json.field("saving_fraction", 1 - best->energy_j() / ramp->energy_j()).end_object();
-  };
-  baseline("trapezoid", 1.0 / 3);
-  baseline("triangle", 0.5);
+  json.field("robot_id", model.robot.robot_id).field("model_version", model.version);
+  write_summary(json, plan->summary);
+  write_certificate(json, plan->certificate);
+  json.key("ledger_j").begin_object();
+  for (std::size_t k = 0; k < energy::term_count; ++k)
+    json.field(energy::term_names[k], plan->ledger.value[k]);
   json.end_object();
-  write_samples(json, best->sample(static_cast<std::size_t>(request.samples)));
+  if (Result<void> done = write_baselines(json, *planner, model, request, *plan); !done)
+    return tl::unexpected(std::move(done.error()));
+  json.key("pareto").begin_array();
+  if (pareto_points >= 2) {
+    const auto front =
+        planner->pareto(request.path, request.problem, static_cast<std::size_t>(pareto_points));
+    if (!front) return tl::unexpected(front.error());
+    for (const planning::PlanCost& cost : *front) {
+      json.begin_object()
+          .field("duration_s", cost.duration_s)
+          .field("energy_j", cost.energy_j)
+          .field("time_multiplier_w", cost.time_multiplier_w)
+          .end_object();
+    }
+  }
+  json.end_array();
+  if (columns) write_columns(json, plan->profile);
+  json.end_object();
+  return json.take();
+}
+
+Result<std::string> estimate_answer(const nlohmann::json& body, const server::ModelInForce& model) {
+  Fields fields(body);
+  energy::Accounts accounts;
+  if (const nlohmann::json* given = fields.member("profile")) {
+    Fields profile(*given, fields.pointer("profile"));
+    constexpr Bounds time{.minimum = 0, .maximum = 1e7}, speed{.minimum = -100, .maximum = 100};
+    const std::vector<double> t = profile.numbers("time_s", 2, max_profile_points, time);
+    const std::vector<double> v = profile.numbers("speed_m_s", 2, max_profile_points, speed);
+    std::vector<double> yaw(t.size(), 0);
+    if (profile.has("yaw_rate_rad_s")) yaw = profile.numbers("yaw_rate_rad_s", 2, max_profile_points, speed);
+    if (profile.ok() && (v.size() != t.size() || yaw.size() != t.size()))
+      profile.fault("speed_m_s", "must have as many entries as time_s");
+    if (Result<void> done = profile.finish(); !done) fields.fault(std::move(done.error()));
+    const double payload =
+        fields.number("payload_kg", {.minimum = 0, .maximum = model.robot.limits.payload_kg}, 0);
+    std::optional<energy::StartPose> start;
+    if (const nlohmann::json* at = fields.member("start_pose")) {
+      Fields pose(*at, fields.pointer("start_pose"));
+      constexpr Bounds place{.minimum = -1e6, .maximum = 1e6};
+      start = energy::StartPose{pose.number("x_m", place), pose.number("y_m", place),
+                                pose.number("heading_rad", place)};
+      if (Result<void> done = pose.finish(); !done) fields.fault(std::move(done.error()));
+    }
+    if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+    std::vector<energy::MotionPoint> points(t.size());
+    for (std::size_t k = 0; k < t.size(); ++k) points[k] = {t[k], v[k], yaw[k]};
+    Result<energy::Accounts> priced = energy::estimate_motion(model.drive, points, payload, start);
+    if (!priced) return tl::unexpected(std::move(priced.error()));
+    accounts = *priced;
+  } else {
+    const DriveRequest request = read_drive(fields, model.robot);
+    if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+    Result<planning::Plan> plan = planning::plan(model.robot, request.path, request.problem);
+    if (!plan) return tl::unexpected(std::move(plan.error()));
+    accounts.battery_j = accounts.modelled_j = plan->summary.energy_j;
+    accounts.ledger = plan->ledger;
+    accounts.duration_s = plan->summary.duration_s;
+    accounts.distance_m = plan->summary.distance_m;
+    accounts.turned_rad = plan->summary.turned_rad;
+  }
+  JsonWriter json;
+  json.begin_object();
+  json.field("robot_id", model.robot.robot_id).field("model_version", model.version);
+  json.field("energy_j", accounts.battery_j).field("duration_s", accounts.duration_s);
+  json.field("distance_m", accounts.distance_m).field("turned_rad", accounts.turned_rad);
+  json.key("ledger");
+  write_ledger(json, accounts);
   json.end_object();
   return json.take();
 }
 
 std::vector<http::Endpoint> planning_endpoints(Services& services) {
+  const auto with_model =
+      [&services](Result<std::string> (*answer)(const nlohmann::json&, const server::ModelInForce&)) {
+        return [&services, answer](const http::Request& r) -> Result<http::Response> {
+          const auto model = model_of(services, r.param("id"));
+          if (!model) return tl::unexpected(model.error());
+          Result<std::string> text = answer(*r.json, **model);
+          if (!text) return tl::unexpected(std::move(text.error()));
+          return http::json_response(std::move(*text));
+        };
+      };
   std::vector<http::Endpoint> rows;
+  rows.push_back(
+      {.method = http::Method::post,
+       .path = "/v1/robots/{id}/profile",
+       .operation_id = "computeProfile",
+       .summary =
+           "The minimum-energy motion along a path, with its certificate, against trapezoid and triangle",
+       .request_schema = "profile-request",
+       .response_schema = "profile",
+       .error_statuses = {404, 422},
+       .handler = with_model(profile_answer)});
   rows.push_back({.method = http::Method::post,
-                  .path = "/v1/robots/{id}/profile",
-                  .operation_id = "computeProfile",
-                  .summary = "The minimum-energy velocity profile for a path, against trapezoid and triangle",
-                  .request_schema = "profile-request",
-                  .response_schema = "profile",
+                  .path = "/v1/robots/{id}/estimate",
+                  .operation_id = "estimateEnergy",
+                  .summary = "Energy and ledger of a given motion, or of the best one along a path",
+                  .request_schema = "estimate-request",
+                  .response_schema = "estimate",
                   .error_statuses = {404, 422},
-                  .run = http::Run::io,
-                  .handler = [&services](const http::Request& r) -> Result<http::Response> {
-                    const auto model = model_of(services, r.param("id"));
-                    if (!model) return tl::unexpected(model.error());
-                    const Result<ProfileRequest> request = parse_profile(*r.json, (*model)->robot.limits);
-                    if (!request) return tl::unexpected(request.error());
-                    Result<std::string> answer = profile_answer(*request, **model);
-                    if (!answer) return tl::unexpected(std::move(answer.error()));
-                    return http::json_response(std::move(*answer));
-                  }});
+                  .handler = with_model(estimate_answer)});
   return rows;
 }
 

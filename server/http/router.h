@@ -19,9 +19,9 @@ enum class Run : std::uint8_t { worker, io };
 // One query parameter. Values are checked before the handler runs; keys that are not declared are errors.
 struct Parameter {
   enum class Type : std::uint8_t { text, integer, number, boolean };
-  std::string name;
+  std::string name = {};
   Type type = Type::text;
-  std::string description;
+  std::string description = {};
   std::optional<double> minimum = std::nullopt;
   std::optional<double> maximum = std::nullopt;
   bool required = false;
@@ -32,9 +32,9 @@ struct Parameter {
 // GET implies HEAD; OPTIONS is answered by the router.
 struct Endpoint {
   Method method = Method::get;
-  std::string path;          // template, e.g. "/v1/robots/{id}/profile"
-  std::string operation_id;  // e.g. "computeProfile"; also the label of the request metrics
-  std::string summary;
+  std::string path = {};          // template, e.g. "/v1/robots/{id}/profile"
+  std::string operation_id = {};  // e.g. "computeProfile"; also the label of the request metrics
+  std::string summary = {};
   std::vector<Parameter> parameters = {};
   std::string request_schema = {};   // name of schemas/<name>.schema.json; empty when there is no body
   std::string response_schema = {};  // likewise; empty when the answer is not JSON

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "planning/path.h"
+#include "planning/problem.h"
+#include "server/api/fields.h"
+
+namespace joulecast::api {
+
+// A path with the way it is to be driven: what profile, estimate and matrix requests share.
+struct DriveRequest {
+  planning::Path path;
+  planning::Problem problem;
+};
+
+// Reads "path" (segments), "start_pose", "payload_kg", "start_speed_m_s", "end_speed_m_s", "deadline_s",
+// "value_of_time_w", "regeneration", and limits that tighten the robot's own, "limits". The fields' own
+// faults are left in `fields`; the caller finishes it.
+DriveRequest read_drive(Fields& fields, const robot::RobotModel& robot);
+
+}  // namespace joulecast::api

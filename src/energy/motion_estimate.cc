@@ -1,0 +1,116 @@
+#include "energy/motion_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "energy/cvode.h"
+#include "energy/rates.h"
+
+namespace joulecast::energy {
+namespace {
+
+constexpr std::size_t pose_index = account::count;  // x, y, heading
+constexpr std::size_t heat_index = pose_index + 3;  // two
+constexpr std::size_t state_size = heat_index + 2;
+constexpr double tolerance = 1e-8;
+
+// One span of constant acceleration, in time since its beginning.
+class Span final : public InitialValueProblem {
+ public:
+  Span(const dynamics::DriveModel& model, double payload_kg, bool pose_known)
+      : model_(model), payload_kg_(payload_kg), pose_known_(pose_known) {}
+
+  void begin(const MotionPoint& a, const MotionPoint& b) {
+    a_ = a;
+    duration_s_ = b.time_s - a.time_s;
+    acceleration_ = (b.speed_m_s - a.speed_m_s) / duration_s_;
+    yaw_acceleration_ = (b.yaw_rate_rad_s - a.yaw_rate_rad_s) / duration_s_;
+    wheel_acceleration_ = dynamics::wheels_of_body(model_.parameters(), acceleration_, yaw_acceleration_);
+    const double power = std::max(std::fabs(now(0, {}).front()), model_.parameters().idle_power_w);
+    scale_ = 1 / (tolerance * std::max(1.0, power) * duration_s_);
+  }
+
+  void rate(double t, std::span<const double> state, std::span<double> out) override {
+    const double speed = a_.speed_m_s + acceleration_ * t,
+                 yaw_rate = a_.yaw_rate_rad_s + yaw_acceleration_ * t;
+    std::array<double, 2> copper{};
+    const Rates rates = now(t, state, &copper);
+    std::ranges::copy(rates, out.begin());
+    out[pose_index] = speed * std::cos(state[pose_index + 2]);
+    out[pose_index + 1] = speed * std::sin(state[pose_index + 2]);
+    out[pose_index + 2] = yaw_rate;
+    for (std::size_t s : {0u, 1u})
+      out[heat_index + s] = (copper[s] - state[heat_index + s]) / model_.parameters().thermal_time_constant_s;
+  }
+
+  void weights(std::span<const double>, std::span<double> weight) const override {
+    std::ranges::fill(weight, scale_);
+    for (std::size_t k = pose_index; k < state_size; ++k) weight[k] = 1e6;
+  }
+
+ private:
+  Rates now(double t, std::span<const double> state, std::array<double, 2>* copper_w = nullptr) const {
+    Reading reading;
+    reading.motion.wheel_speed_rad_s = dynamics::wheels_of_body(
+        model_.parameters(), a_.speed_m_s + acceleration_ * t, a_.yaw_rate_rad_s + yaw_acceleration_ * t);
+    reading.motion.wheel_acceleration_rad_s2 = wheel_acceleration_;
+    reading.motion.payload_kg = payload_kg_;
+    if (!state.empty()) {
+      if (pose_known_) {
+        reading.motion.x_m = state[pose_index];
+        reading.motion.y_m = state[pose_index + 1];
+        reading.motion.heading_rad = state[pose_index + 2];
+      }
+      reading.motion.copper_heat_w = {state[heat_index], state[heat_index + 1]};
+    }
+    std::array<double, 2> copper{};
+    const Rates rates = rates_at(model_, reading, {}, copper);
+    if (copper_w != nullptr) *copper_w = copper;
+    return rates;
+  }
+
+  const dynamics::DriveModel& model_;
+  double payload_kg_;
+  bool pose_known_;
+  MotionPoint a_;
+  double duration_s_ = 0, acceleration_ = 0, yaw_acceleration_ = 0, scale_ = 1;
+  std::array<double, 2> wheel_acceleration_{};
+};
+
+}  // namespace
+
+Result<Accounts> estimate_motion(const dynamics::DriveModel& model, std::span<const MotionPoint> points,
+                                 double payload_kg, const std::optional<StartPose>& start) {
+  if (points.size() < 2) return invalid("/profile/time_s", "must have at least 2 points");
+  Span span(model, payload_kg, start.has_value());
+  Cvode cvode(state_size, Method::adams, span);
+  const std::span<double> y = cvode.state();
+  if (start) {
+    y[pose_index] = start->x_m;
+    y[pose_index + 1] = start->y_m;
+    y[pose_index + 2] = start->heading_rad;
+  }
+  for (std::size_t k = 1; k < points.size(); ++k) {
+    if (!(points[k].time_s > points[k - 1].time_s))
+      return invalid("/profile/time_s/" + std::to_string(k), "must be later than the one before");
+    span.begin(points[k - 1], points[k]);
+    const double duration = points[k].time_s - points[k - 1].time_s;
+    if (Result<void> done = cvode.advance(0, duration, 0); !done) return tl::unexpected(done.error());
+  }
+
+  Accounts a;
+  a.battery_j = y[account::battery];
+  a.modelled_j = y[account::modelled];
+  a.modelled_motor_j = {y[account::modelled_motor], y[account::modelled_motor + 1]};
+  a.drawn_j = y[account::drawn];
+  a.returned_j = y[account::returned];
+  a.charge_ah = y[account::charge_a] / 3600;
+  a.distance_m = y[account::distance];
+  a.turned_rad = y[account::turned];
+  a.duration_s = points.back().time_s - points.front().time_s;
+  for (std::size_t k = 0; k < term_count; ++k) a.ledger.value[k] = y[account::ledger + k];
+  return a;
+}
+
+}  // namespace joulecast::energy

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/error.h"
+#include "dynamics/drive_model.h"
+#include "energy/ledger.h"
+
+namespace joulecast::energy {
+
+// A motion to be priced: speeds at times, linear in between, so that acceleration is constant over each span.
+struct MotionPoint {
+  double time_s = 0;
+  double speed_m_s = 0;
+  double yaw_rate_rad_s = 0;
+};
+
+// Where the motion begins; needed only for effects tied to the floor.
+struct StartPose {
+  double x_m = 0, y_m = 0, heading_rad = 0;
+};
+
+// Energy accounts of a motion through the drive model, by CVODE over each span (relative tolerance 1e-8):
+// what a robot that drove it would be metered to spend. Nothing is measured: battery_j equals modelled_j and
+// nothing is unexplained. Times must increase and there must be at least two points; a jump in speed is
+// refused, since it costs infinite power.
+Result<Accounts> estimate_motion(const dynamics::DriveModel& model, std::span<const MotionPoint> points,
+                                 double payload_kg, const std::optional<StartPose>& start = std::nullopt);
+
+}  // namespace joulecast::energy

@@ -1,0 +1,67 @@
+#include "energy/motion_estimate.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "tests/support/sample_robots.h"
+
+namespace joulecast::energy {
+namespace {
+
+// The thesis's (4-1) with exact coefficients, integrated by Simpson's rule: exact over spans of constant
+// acceleration.
+TEST(MotionEstimate, AgreesWithTheClosedFormOnATrapezoid) {
+  const robot::RobotModel robot = testing::nomad();
+  const dynamics::DriveModel model(robot, {});
+  const std::vector<MotionPoint> points = {{0, 0, 0}, {4, 0.8, 0}, {9, 0.8, 0}, {13, 0, 0}};
+  const double payload = 5.7, kn = 0.069 * 24.9, rho = 2.74 / (kn * kn);
+  const double inertia = 0.028 + (21.2 + 2 * 1.39 + payload) * 0.01 / 2;
+  double expected = 0;
+  for (std::size_t k = 1; k < points.size(); ++k) {
+    const double h = points[k].time_s - points[k - 1].time_s;
+    const double a = (points[k].speed_m_s - points[k - 1].speed_m_s) / 0.1 / h;
+    const auto power = [&](double v) {
+      double sum = 14;
+      for (double friction : robot.motor.friction_torque_nm) {
+        const double torque = inertia * a + 0.0017 * v / 0.1 + friction;
+        sum += rho * torque * torque + v / 0.1 * torque;
+      }
+      return sum;
+    };
+    const double v0 = points[k - 1].speed_m_s, v1 = points[k].speed_m_s;
+    expected += h / 6 * (power(v0) + 4 * power((v0 + v1) / 2) + power(v1));
+  }
+  const auto accounts = estimate_motion(model, points, payload);
+  ASSERT_TRUE(accounts) << describe(accounts.error());
+  // Friction's smooth sign spares a little where the wheels hardly turn: width 0.005 rad/s of 8 rad/s.
+  EXPECT_NEAR(accounts->battery_j, expected, 1e-3 * expected);
+  EXPECT_NEAR(accounts->ledger.total(), accounts->battery_j, 1e-9 * expected);
+  EXPECT_NEAR(accounts->distance_m, 0.8 * 9, 1e-6);
+  EXPECT_NEAR(accounts->ledger[Term::kinetic], 0, 1e-4);
+}
+
+TEST(MotionEstimate, KnowsTheFloorOnlyFromAStartPose) {
+  robot::RobotModel robot = testing::nomad();
+  robot.effects.push_back({"floor_resistance_zone", {{"coefficient", 0.05}, {"x_m", 5}, {"radius_m", 1}}});
+  const auto model = *dynamics::drive_model(robot);
+  const std::vector<MotionPoint> points = {{0, 0, 0}, {2, 1, 0}, {10, 1, 0}, {12, 0, 0}};
+  const auto blind = estimate_motion(model, points, 0);
+  const auto placed = estimate_motion(model, points, 0, StartPose{});
+  ASSERT_TRUE(blind && placed);
+  EXPECT_EQ(blind->ledger[Term::friction_zone], 0);
+  // Coefficient times weight times the two metres of the zone's diameter.
+  const double weight = robot.total_mass_kg(0) * robot::standard_gravity_m_s2;
+  EXPECT_NEAR(placed->ledger[Term::friction_zone], 0.05 * weight * 2, 1e-3 * weight);
+}
+
+TEST(MotionEstimate, RefusesTimesThatDoNotIncrease) {
+  const dynamics::DriveModel model(testing::nomad(), {});
+  const auto refused = estimate_motion(model, std::vector<MotionPoint>{{0, 0, 0}, {1, 1, 0}, {1, 0, 0}}, 0);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().field, "/profile/time_s/2");
+}
+
+}  // namespace
+}  // namespace joulecast::energy
