@@ -60,7 +60,8 @@ struct SequenceCounters {
 // counts what the live run counted. A number that goes back while the clock goes on is a restart; one that
 // goes back with the clock is late, or a duplicate when that number and instant were seen among the last
 // `memory` samples; one that goes back with a clock further back than backward_jump_us is a restart with a
-// clock step. A clock that does not advance while the sequence does is a backward step.
+// clock step. A clock that does not advance while the sequence does is a backward step; one that leaps
+// while the robot stayed up is a forward step, but before a restart it is the time the robot was off: a gap.
 class SequenceTracker {
  public:
   static constexpr std::size_t memory = 64;

@@ -120,6 +120,14 @@ TEST_F(SequenceTrackerTest, GapAndForwardJumpExactlyOverTheirLimits) {
   EXPECT_FALSE(jump.continues());
 }
 
+TEST_F(SequenceTrackerTest, ARobotSwitchedOffForDaysLeavesAGapAndNoClockStep) {
+  run_to(10);
+  const Placement boot = tracker.place(0, at(10) + 3 * 24 * 3'600'000'000LL);
+  EXPECT_EQ(boot.arrival, Arrival::restart);
+  EXPECT_EQ(boot.clock, ClockStep::none);
+  EXPECT_TRUE(boot.gap);
+}
+
 TEST_F(SequenceTrackerTest, AnAbsurdLeapIsARestartAndNoLoss) {
   const SequenceLimits limits;
   run_to(0);
