@@ -7,8 +7,10 @@
 #include <sunmatrix/sunmatrix_dense.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <vector>
 
 namespace joulecast::energy {
 
@@ -34,6 +36,10 @@ struct Cvode::Impl {
     require(CVodeWFtolerances(memory, &Impl::weights) == CV_SUCCESS);
     require(CVodeSetErrHandlerFn(memory, &Impl::report, this) == CV_SUCCESS);
     require(CVodeSetMaxNumSteps(memory, 100000) == CV_SUCCESS);
+    if (problem.event_count() > 0) {
+      require(CVodeRootInit(memory, static_cast<int>(problem.event_count()), &Impl::events) == CV_SUCCESS);
+      require(CVodeSetNoInactiveRootWarn(memory) == CV_SUCCESS);
+    }
     if (method == Method::adams) {
       require((nonlinear = SUNNonlinSol_FixedPoint(y, 0, context)) != nullptr);
       require(CVodeSetNonlinearSolver(memory, nonlinear) == CV_SUCCESS);
@@ -80,6 +86,33 @@ struct Cvode::Impl {
     return 0;
   }
 
+  static int events(sunrealtype t, N_Vector y, sunrealtype* value, void* self) {
+    const InitialValueProblem& of = static_cast<Impl*>(self)->problem;
+    of.events(t, values(y), {value, of.event_count()});
+    return 0;
+  }
+
+  Result<void> check(int flag) const {
+    if (flag >= 0) return {};
+    return fail(Fault::internal, "cvode",
+                message.empty() ? "failed with flag " + std::to_string(flag) : message);
+  }
+
+  // Restarts at t0 and integrates towards t1; the flag tells an event from the end.
+  Result<int> run(double t0, double t1, double first_step, double& reached) {
+    if (!(t1 > t0)) return invalid("t1", "must be after t0");
+    message.clear();
+    if (Result<void> ok = check(CVodeReInit(memory, t0, y)); !ok) return tl::unexpected(ok.error());
+    if (Result<void> ok = check(CVodeSetInitStep(memory, first_step)); !ok) return tl::unexpected(ok.error());
+    if (Result<void> ok = check(CVodeSetStopTime(memory, t1)); !ok) return tl::unexpected(ok.error());
+    reached = t0;
+    const int flag = CVode(memory, t1, y, &reached, CV_NORMAL);
+    if (Result<void> ok = check(flag); !ok) return tl::unexpected(ok.error());
+    if (flag != CV_ROOT_RETURN && reached != t1)
+      return fail(Fault::internal, "cvode", "stopped at " + std::to_string(reached) + " s, short of its goal");
+    return flag;
+  }
+
   static void report(int, const char*, const char*, char* text, void* self) {
     static_cast<Impl*>(self)->message = text;
   }
@@ -96,22 +129,25 @@ std::span<double> Cvode::state() {
 }
 
 Result<void> Cvode::advance(double t0, double t1, double first_step) {
-  if (!(t1 > t0)) return invalid("t1", "must be after t0");
-  const auto check = [&](int flag) -> Result<void> {
-    if (flag >= 0) return {};
-    return fail(Fault::internal, "cvode",
-                impl_->message.empty() ? "failed with flag " + std::to_string(flag) : impl_->message);
-  };
-  impl_->message.clear();
-  if (Result<void> ok = check(CVodeReInit(impl_->memory, t0, impl_->y)); !ok) return ok;
-  if (Result<void> ok = check(CVodeSetInitStep(impl_->memory, first_step)); !ok) return ok;
-  if (Result<void> ok = check(CVodeSetStopTime(impl_->memory, t1)); !ok) return ok;
-  sunrealtype reached = t0;
-  const int flag = CVode(impl_->memory, t1, impl_->y, &reached, CV_NORMAL);
-  if (Result<void> ok = check(flag); !ok) return ok;
-  if (reached != t1)
-    return fail(Fault::internal, "cvode", "stopped at " + std::to_string(reached) + " s, short of its goal");
-  return {};
+  double from = t0;
+  for (;;) {  // events are passed over
+    double reached = from;
+    const Result<int> flag = impl_->run(from, t1, first_step, reached);
+    if (!flag) return tl::unexpected(flag.error());
+    if (*flag != CV_ROOT_RETURN || reached == t1) return {};
+    from = reached;
+  }
+}
+
+Result<Arrival> Cvode::advance_to_event(double t0, double t1, double first_step) {
+  double reached = t0;
+  const Result<int> flag = impl_->run(t0, t1, first_step, reached);
+  if (!flag) return tl::unexpected(flag.error());
+  if (*flag != CV_ROOT_RETURN) return Arrival{reached, std::nullopt};
+  std::vector<int> signs(impl_->problem.event_count());
+  CVodeGetRootInfo(impl_->memory, signs.data());
+  const auto changed = std::find_if(signs.begin(), signs.end(), [](int sign) { return sign != 0; });
+  return Arrival{reached, static_cast<std::size_t>(changed - signs.begin())};
 }
 
 long Cvode::steps() const {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -15,11 +17,19 @@ class InitialValueProblem {
   virtual void rate(double t, std::span<const double> state, std::span<double> rate) = 0;
   // Error weights 1/tolerance of each state; called at every step.
   virtual void weights(std::span<const double> state, std::span<double> weight) const = 0;
+  // Functions whose sign changes advance_to_event() stops at; their number is fixed at construction.
+  virtual std::size_t event_count() const { return 0; }
+  virtual void events(double /*t*/, std::span<const double> /*state*/, std::span<double> /*value*/) const {}
 };
 
 enum class Method {
   adams,  // Adams-Moulton with fixed-point iteration: smooth, non-stiff
   bdf     // BDF with a dense Newton iteration: stiff
+};
+
+struct Arrival {
+  double time_s = 0;
+  std::optional<std::size_t> event;  // the function that changed sign there; absent at the end of the interval
 };
 
 // One CVODE integrator of fixed size, restarted as often as wanted. Owns its SUNContext, so an instance
@@ -36,6 +46,10 @@ class Cvode {
   // Integrates from `t0` with the present state() to exactly `t1` > t0, restarting the method at t0;
   // `first_step` = 0 lets CVODE choose. The error carries CVODE's own message.
   Result<void> advance(double t0, double t1, double first_step = 0);
+
+  // As advance(), but stops where one of the problem's event functions first changes sign. A function that
+  // is zero at t0 counts from when it has left zero.
+  Result<Arrival> advance_to_event(double t0, double t1, double first_step = 0);
 
   long steps() const;        // since the last restart
   long evaluations() const;  // of the right-hand side, since the last restart

@@ -52,11 +52,18 @@ const Field table[] = {
     {"/battery/resistance_curve", JOULECAST_MEMBER(battery.resistance_curve), within(0, 100),
      Presence::optional, "resistance_ohm"},
     {"/battery/branches", JOULECAST_MEMBER(battery.branches), {}, Presence::optional},
+    {"/battery/charge_lags", JOULECAST_MEMBER(battery.charge_lags), {}, Presence::optional},
     {"/battery/cutoff_voltage_v", JOULECAST_MEMBER(battery.cutoff_voltage_v), above(0, 2e3),
      Presence::optional},
     {"/battery/coulombic_efficiency", JOULECAST_MEMBER(battery.coulombic_efficiency), above(0, 1),
      Presence::optional},
     {"/battery/ageing_factor", JOULECAST_MEMBER(battery.ageing_factor), above(0, 1.2), Presence::optional},
+
+    {"/battery/activation_k", JOULECAST_MEMBER(battery.activation_k), within(0, 1e4), Presence::optional},
+    {"/battery/thermal_resistance_k_w", JOULECAST_MEMBER(battery.thermal_resistance_k_w), within(0, 1e3),
+     Presence::optional},
+    {"/battery/thermal_time_constant_s", JOULECAST_MEMBER(battery.thermal_time_constant_s), above(0, 1e6),
+     Presence::optional},
 
     {"/idle_power_w", JOULECAST_MEMBER(idle_power_w), within(0, 1e5)},
 
@@ -71,9 +78,14 @@ const Field table[] = {
 
 #undef JOULECAST_MEMBER
 
-const BranchField branch_table[] = {
+const ElementField<BatteryBranch> branch_table[] = {
     {"resistance_ohm", &BatteryBranch::resistance_ohm, within(0, 100)},
     {"time_constant_s", &BatteryBranch::time_constant_s, above(0, 1e6)},
+};
+
+const ElementField<ChargeLag> lag_table[] = {
+    {"lag_s", &ChargeLag::lag_s, within(0, 1e5)},
+    {"time_constant_s", &ChargeLag::time_constant_s, above(0, 1e6)},
 };
 
 struct Unit {
@@ -90,6 +102,7 @@ constexpr Unit units[] = {
     {"_nm_a", "N m/A"},
     {"_m_s2", "m/s²"},
     {"_m_s", "m/s"},
+    {"_k_w", "K/W"},
     {"_ohm", "ohm"},
     {"_nm", "N m"},
     {"_kg", "kg"},
@@ -100,6 +113,7 @@ constexpr Unit units[] = {
     {"_w", "W"},
     {"_a", "A"},
     {"_s", "s"},
+    {"_k", "K"},
 };
 
 template <class Allowed>
@@ -123,8 +137,12 @@ std::span<const Field> fields() {
   return table;
 }
 
-std::span<const BranchField> branch_fields() {
+std::span<const ElementField<BatteryBranch>> branch_fields() {
   return branch_table;
+}
+
+std::span<const ElementField<ChargeLag>> lag_fields() {
+  return lag_table;
 }
 
 bool is_robot_id(std::string_view text) {

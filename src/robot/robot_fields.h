@@ -35,6 +35,7 @@ using Member = std::variant<std::string& (*)(RobotModel&),            // string
                             std::array<double, 2>& (*)(RobotModel&),  // [right, left]
                             Curve& (*)(RobotModel&),                  // {"charge": [...], value_key: [...]}
                             std::vector<BatteryBranch>& (*)(RobotModel&),  // [{branch_fields()}, ...]
+                            std::vector<ChargeLag>& (*)(RobotModel&),      // [{lag_fields()}, ...]
                             std::vector<AdoptedEffect>& (*)(RobotModel&)   // {id: {parameter: number}}
                             >;
 
@@ -51,14 +52,16 @@ struct Field {
   std::string_view key() const { return pointer.substr(pointer.rfind('/') + 1); }
 };
 
-struct BranchField {
+// One key of an element of an array of objects; all are required.
+template <class Element>
+struct ElementField {
   std::string_view key;
-  double BatteryBranch::*member;
+  double Element::*member;
   Bounds bounds;
 };
 
 inline constexpr std::size_t max_curve_points = 1001;
-inline constexpr std::size_t max_branches = 2;
+inline constexpr std::size_t max_branches = 2;  // and charge lags
 inline constexpr std::size_t max_effects = 64;
 inline constexpr std::size_t max_effect_parameters = 64;
 inline constexpr std::string_view robot_id_pattern = "^[A-Za-z0-9._-]{1,64}$";
@@ -68,8 +71,9 @@ inline constexpr Bounds charge_bounds{0.0, 1.0};
 // Every key of the robot file, once: parsing, validation, writing and the schema's test walk this table.
 std::span<const Field> fields();
 
-// The keys of one element of /battery/branches; all are required.
-std::span<const BranchField> branch_fields();
+// The keys of one element of /battery/branches and of /battery/charge_lags.
+std::span<const ElementField<BatteryBranch>> branch_fields();
+std::span<const ElementField<ChargeLag>> lag_fields();
 
 bool is_robot_id(std::string_view text);     // robot_id_pattern
 bool is_effect_name(std::string_view text);  // effect_name_pattern, for effect ids and their parameters

@@ -173,27 +173,39 @@ void read_curve(const json& value, const std::string& pointer, std::string_view 
   if (out.empty()) problems.add(pointer, "has no points, must have at least 2");
 }
 
-void read(const json& value, const std::string& pointer, std::vector<BatteryBranch>& out,
-          Problems& problems) {
+template <class Element>
+void read_elements(const json& value, const std::string& pointer,
+                   std::span<const ElementField<Element>> element_fields, std::vector<Element>& out,
+                   Problems& problems) {
   if (!value.is_array()) {
     problems.add(pointer, fmt::format("is {}, must be an array of objects", value.type_name()));
     return;
   }
   std::set<std::string_view> known;
-  for (const BranchField& field : branch_fields()) known.insert(field.key);
+  for (const auto& field : element_fields) known.insert(field.key);
   for (std::size_t i = 0; i < value.size(); ++i) {
-    const std::string element = fmt::format("{}/{}", pointer, i);
-    BatteryBranch& branch = out.emplace_back();
-    if (!object_of(value[i], element, known, problems)) continue;
-    for (const BranchField& field : branch_fields()) {
-      const std::string member = fmt::format("{}/{}", element, field.key);
+    const std::string element_pointer = fmt::format("{}/{}", pointer, i);
+    Element& element = out.emplace_back();
+    if (!object_of(value[i], element_pointer, known, problems)) continue;
+    for (const auto& field : element_fields) {
+      const std::string member = fmt::format("{}/{}", element_pointer, field.key);
       const auto found = value[i].find(field.key);
-      if (found == value[i].end())
+      if (found == value[i].end()) {
         problems.add(member, "is missing");
-      else
-        read(*found, member, branch.*field.member, problems);
+      } else {
+        read(*found, member, element.*field.member, problems);
+      }
     }
   }
+}
+
+void read(const json& value, const std::string& pointer, std::vector<BatteryBranch>& out,
+          Problems& problems) {
+  read_elements(value, pointer, branch_fields(), out, problems);
+}
+
+void read(const json& value, const std::string& pointer, std::vector<ChargeLag>& out, Problems& problems) {
+  read_elements(value, pointer, lag_fields(), out, problems);
 }
 
 void read(const json& value, const std::string& pointer, std::vector<AdoptedEffect>& out,
@@ -242,15 +254,20 @@ void check_curve(const Curve& curve, const Field& field, const std::string& poin
   }
 }
 
-void check_branches(const std::vector<BatteryBranch>& branches, const std::string& pointer,
+template <class Element>
+void check_elements(const std::vector<Element>& elements,
+                    std::span<const ElementField<Element>> element_fields, const std::string& pointer,
                     Problems& problems) {
-  if (branches.size() > max_branches)
+  if (elements.size() > max_branches) {
     problems.add(pointer,
-                 fmt::format("has {} branches, must have at most {}", branches.size(), max_branches));
-  for (std::size_t i = 0; i < branches.size(); ++i)
-    for (const BranchField& field : branch_fields())
-      check_bounds(branches[i].*field.member, field.bounds, fmt::format("{}/{}/{}", pointer, i, field.key),
+                 fmt::format("has {} elements, must have at most {}", elements.size(), max_branches));
+  }
+  for (std::size_t i = 0; i < elements.size(); ++i) {
+    for (const auto& field : element_fields) {
+      check_bounds(elements[i].*field.member, field.bounds, fmt::format("{}/{}/{}", pointer, i, field.key),
                    field.key, problems);
+    }
+  }
 }
 
 void check_effects(const std::vector<AdoptedEffect>& effects, const std::string& pointer,
@@ -301,7 +318,10 @@ void check_field(const Field& field, RobotModel& model, Problems& problems) {
                  },
                  [&](Curve& (*member)(RobotModel&)) { check_curve(member(model), field, pointer, problems); },
                  [&](std::vector<BatteryBranch>& (*member)(RobotModel&)) {
-                   check_branches(member(model), pointer, problems);
+                   check_elements(member(model), branch_fields(), pointer, problems);
+                 },
+                 [&](std::vector<ChargeLag>& (*member)(RobotModel&)) {
+                   check_elements(member(model), lag_fields(), pointer, problems);
                  },
                  [&](std::vector<AdoptedEffect>& (*member)(RobotModel&)) {
                    check_effects(member(model), pointer, problems);
@@ -492,11 +512,12 @@ json written(const Curve& curve, std::string_view value_key) {
   return {{"charge", std::move(charge)}, {std::string(value_key), std::move(values)}};
 }
 
-json written(const std::vector<BatteryBranch>& branches) {
+template <class Element>
+json written(const std::vector<Element>& elements, std::span<const ElementField<Element>> element_fields) {
   json out = json::array();
-  for (const BatteryBranch& branch : branches) {
-    json& element = out.emplace_back(json::object());
-    for (const BranchField& field : branch_fields()) element[std::string(field.key)] = branch.*field.member;
+  for (const Element& element : elements) {
+    json& object = out.emplace_back(json::object());
+    for (const auto& field : element_fields) object[std::string(field.key)] = element.*field.member;
   }
   return out;
 }
@@ -520,7 +541,12 @@ void write_field(const Field& field, RobotModel& model, json& document) {
                             document[pointer] = written(member(model), field.value_key);
                         },
                         [&](std::vector<BatteryBranch>& (*member)(RobotModel&)) {
-                          if (!member(model).empty()) document[pointer] = written(member(model));
+                          if (!member(model).empty())
+                            document[pointer] = written(member(model), branch_fields());
+                        },
+                        [&](std::vector<ChargeLag>& (*member)(RobotModel&)) {
+                          if (!member(model).empty())
+                            document[pointer] = written(member(model), lag_fields());
                         },
                         [&](std::vector<AdoptedEffect>& (*member)(RobotModel&)) {
                           if (!member(model).empty()) document[pointer] = written(member(model));

@@ -56,6 +56,15 @@ struct BatteryBranch {
   friend bool operator==(const BatteryBranch&, const BatteryBranch&) = default;
 };
 
+// The charge at the electrodes' surface runs ahead of the mean while current flows, as diffusion lets it: at
+// a steady current by as much as that current draws in lag_s.
+struct ChargeLag {
+  double lag_s = 0;
+  double time_constant_s = 0;
+
+  friend bool operator==(const ChargeLag&, const ChargeLag&) = default;
+};
+
 struct Battery {
   double nominal_voltage_v = 0;
   double capacity_ah = 0;
@@ -65,9 +74,15 @@ struct Battery {
   std::vector<std::pair<double, double>> open_circuit_voltage;  // (state of charge 0..1, V), charge ascending
   std::vector<std::pair<double, double>> resistance_curve;  // (state of charge 0..1, ohm), charge ascending
   std::vector<BatteryBranch> branches;                      // at most 2
+  std::vector<ChargeLag> charge_lags;                       // at most 2
   std::optional<double> cutoff_voltage_v;
   std::optional<double> coulombic_efficiency;  // charge returned over charge put in, (0, 1]
   std::optional<double> ageing_factor;         // present over rated capacity, (0, 1.2]
+  // Temperature: resistances and lags follow exp(activation_k (1/T - 1/298.15 K)); losses heat one lumped
+  // mass.
+  std::optional<double> activation_k;
+  std::optional<double> thermal_resistance_k_w;  // battery to surroundings
+  std::optional<double> thermal_time_constant_s;
 
   friend bool operator==(const Battery&, const Battery&) = default;
 };

@@ -37,9 +37,13 @@ RobotModel full_model() {
   model.battery.open_circuit_voltage = {{0, 18.1}, {0.1, 21}, {0.5, 21}, {1, 25.2}};
   model.battery.resistance_curve = {{0.1, 0.2}, {0.9, 0.1}};
   model.battery.branches = {{0.01, 20}, {0.02, 900}};
+  model.battery.charge_lags = {{70, 40}, {150, 1500}};
   model.battery.cutoff_voltage_v = 18;
   model.battery.coulombic_efficiency = 0.99;
   model.battery.ageing_factor = 0.9;
+  model.battery.activation_k = 2500;
+  model.battery.thermal_resistance_k_w = 1.5;
+  model.battery.thermal_time_constant_s = 3000;
   model.effects = {{"load_rolling", {{"c_rr", 0.01}}}, {"slope", {{"angle_rad", -0.02}, {"bias", 0}}}};
   return model;
 }
@@ -184,8 +188,9 @@ TEST(RobotFile, AllProblemsAreReportedTogether) {
 }
 
 TEST(RobotFile, UnknownKeysAreRefusedAtEveryLevel) {
-  for (const char* pointer : {"/x", "/kinematics/x", "/mass/x", "/motor/x", "/battery/x", "/limits/x",
-                              "/battery/open_circuit_voltage/x", "/battery/branches/0/x"}) {
+  for (const char* pointer :
+       {"/x", "/kinematics/x", "/mass/x", "/motor/x", "/battery/x", "/limits/x",
+        "/battery/open_circuit_voltage/x", "/battery/branches/0/x", "/battery/charge_lags/1/x"}) {
     json document = robot_to_json(full_model());
     document[json::json_pointer(pointer)] = 1;
     EXPECT_EQ(error_of(document), (Error{Fault::invalid, pointer, "is not a known key"}));

@@ -81,8 +81,10 @@ Statements from_table() {
       out[pointer + "/charge"] = {charge_bounds, true};
       out[pointer + "/" + std::string(field.value_key)] = {field.bounds, true};
     } else if (std::holds_alternative<std::vector<BatteryBranch>& (*)(RobotModel&)>(field.member)) {
-      for (const BranchField& branch : branch_fields())
+      for (const auto& branch : branch_fields())
         out[pointer + "/" + std::string(branch.key)] = {branch.bounds, true};
+    } else if (std::holds_alternative<std::vector<ChargeLag>& (*)(RobotModel&)>(field.member)) {
+      for (const auto& lag : lag_fields()) out[pointer + "/" + std::string(lag.key)] = {lag.bounds, true};
     } else {
       out[pointer] = {field.bounds, required};
     }
@@ -117,6 +119,7 @@ TEST(RobotSchema, SharesPatternsCountsAndDefaults) {
   EXPECT_EQ(effects["additionalProperties"]["maxProperties"], max_effect_parameters);
   const json& battery = document["$defs"]["battery"]["properties"];
   EXPECT_EQ(battery["branches"]["maxItems"], max_branches);
+  EXPECT_EQ(battery["charge_lags"]["maxItems"], max_branches);
   EXPECT_EQ(battery["open_circuit_voltage"]["properties"]["voltage_v"]["maxItems"], max_curve_points);
   EXPECT_EQ(battery["resistance_curve"]["properties"]["resistance_ohm"]["maxItems"], max_curve_points);
   EXPECT_EQ(document["$defs"]["charge"]["maxItems"], max_curve_points);

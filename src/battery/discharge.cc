@@ -1,0 +1,162 @@
+#include "battery/discharge.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "energy/cvode.h"
+
+namespace joulecast::battery {
+namespace {
+
+// State as CVODE carries it.
+enum : std::size_t {
+  charge_at,
+  branch_at,
+  lag_at = branch_at + 2,
+  temperature_at = lag_at + 2,
+  drawn_at,
+  energy_at,
+  size
+};
+
+enum : std::size_t { voltage_event, charge_event, power_event, event_count };
+
+constexpr Ending endings[event_count] = {Ending::voltage, Ending::charge, Ending::power};
+
+class Problem final : public energy::InitialValueProblem {
+ public:
+  Problem(const Circuit& circuit, const DischargeLimits& limits, Load::Kind kind)
+      : circuit_(circuit),
+        kind_(kind),
+        voltage_limit_v_(limits.voltage_v.value_or(circuit.cutoff_voltage_v())),
+        charge_limit_(limits.charge),
+        ambient_c_(limits.ambient_c) {}
+
+  void set_piece(const Load::Piece& piece, double began_s) {
+    piece_ = piece;
+    began_s_ = began_s;
+  }
+
+  static State unpacked(std::span<const double> y) {
+    return {y[charge_at], {y[branch_at], y[branch_at + 1]}, {y[lag_at], y[lag_at + 1]}, y[temperature_at]};
+  }
+
+  double asked(double t) const {
+    return piece_.begin + (piece_.end - piece_.begin) * ((t - began_s_) / piece_.duration_s);
+  }
+
+  // Beyond what the battery can give, CVODE may still probe on its way to the root: there the current of
+  // greatest power stands in.
+  double current_a(double t, const State& state) const {
+    if (kind_ == Load::Kind::current) return asked(t);
+    if (const auto current = circuit_.current_at_power_a(state, asked(t))) return *current;
+    return std::max(0.0, circuit_.inner_voltage_v(state)) / (2 * circuit_.ohmic_resistance_ohm(state));
+  }
+
+  void rate(double t, std::span<const double> y, std::span<double> out) override {
+    const State state = unpacked(y);
+    const double current = current_a(t, state);
+    const State change = circuit_.rate(state, current, ambient_c_);
+    out[charge_at] = change.charge;
+    out[branch_at] = change.branch_current_a[0];
+    out[branch_at + 1] = change.branch_current_a[1];
+    out[lag_at] = change.charge_lag[0];
+    out[lag_at + 1] = change.charge_lag[1];
+    out[temperature_at] = change.temperature_c;
+    out[drawn_at] = current / 3600;
+    out[energy_at] = current * circuit_.voltage_v(state, current);
+  }
+
+  // Relative 1e-7 with a floor far below what any of these quantities is known to.
+  void weights(std::span<const double> y, std::span<double> weight) const override {
+    static constexpr double floors[size] = {1e-8, 1e-6, 1e-6, 1e-8, 1e-8, 1e-4, 1e-7, 1e-3};
+    for (std::size_t i = 0; i < size; ++i) weight[i] = 1 / (1e-7 * std::abs(y[i]) + floors[i]);
+  }
+
+  std::size_t event_count() const override { return battery::event_count; }
+
+  void events(double t, std::span<const double> y, std::span<double> value) const override {
+    const State state = unpacked(y);
+    value[voltage_event] = circuit_.voltage_v(state, current_a(t, state)) - voltage_limit_v_;
+    value[charge_event] = charge_limit_ ? state.charge - *charge_limit_ : 1;
+    value[power_event] = 1;
+    if (kind_ == Load::Kind::power) {
+      const double most = circuit_.most_power_w(state);
+      value[power_event] = std::isinf(most) ? 1 : most - asked(t);
+    }
+  }
+
+  // An event that holds already, as after a jump of the load, which no sign change would show.
+  std::optional<std::size_t> event_at(double t, std::span<const double> y) const {
+    double values[battery::event_count];
+    events(t, y, values);
+    // A battery that cannot deliver says so, whatever its voltage would be.
+    for (const std::size_t event : {power_event, voltage_event, charge_event})
+      if (values[event] < 0) return event;
+    return std::nullopt;
+  }
+
+ private:
+  const Circuit& circuit_;
+  Load::Kind kind_;
+  double voltage_limit_v_;
+  std::optional<double> charge_limit_;
+  double ambient_c_;
+  Load::Piece piece_{1, 0, 0};
+  double began_s_ = 0;
+};
+
+bool finite(const State& state) {
+  return std::isfinite(state.charge) && std::isfinite(state.branch_current_a[0]) &&
+         std::isfinite(state.branch_current_a[1]) && std::isfinite(state.surface_charge()) &&
+         std::isfinite(state.temperature_c);
+}
+
+}  // namespace
+
+Result<Discharge> discharge(const Circuit& circuit, const State& start, const Load& load,
+                            const DischargeLimits& limits) {
+  if (!finite(start)) return invalid("start", "has a number that is not finite");
+  Problem problem(circuit, limits, load.kind);
+  energy::Cvode cvode(size, energy::Method::adams, problem);
+  const std::span<double> y = cvode.state();
+  std::fill(y.begin(), y.end(), 0.0);
+  y[charge_at] = start.charge;
+  y[branch_at] = start.branch_current_a[0];
+  y[branch_at + 1] = start.branch_current_a[1];
+  y[lag_at] = start.charge_lag[0];
+  y[lag_at + 1] = start.charge_lag[1];
+  y[temperature_at] = start.temperature_c;
+
+  Discharge out;
+  out.voltage_v = circuit.inner_voltage_v(start);
+  double now_s = 0;
+  std::optional<std::size_t> event;
+  for (const Load::Piece& piece : load.pieces) {
+    problem.set_piece(piece, now_s);
+    event = problem.event_at(now_s, y);
+    const bool at_once = event.has_value();
+    if (!at_once) {
+      const auto arrival = cvode.advance_to_event(now_s, now_s + piece.duration_s);
+      if (!arrival) return tl::unexpected(arrival.error());
+      now_s = arrival->time_s;
+      event = arrival->event;
+    }
+    const State state = Problem::unpacked(y);
+    out.voltage_v = circuit.voltage_v(state, problem.current_a(now_s, state));
+    if (!at_once) {
+      out.time_s.push_back(now_s);
+      out.terminal_v.push_back(out.voltage_v);
+    }
+    if (event) break;
+  }
+  out.duration_s = now_s;
+  if (event) out.ending = endings[*event];
+  out.state = Problem::unpacked(y);
+  out.charge_ah = y[drawn_at];
+  out.energy_j = y[energy_at];
+  return out;
+}
+
+}  // namespace joulecast::battery

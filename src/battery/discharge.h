@@ -1,0 +1,42 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "base/error.h"
+#include "battery/circuit.h"
+#include "battery/load.h"
+
+namespace joulecast::battery {
+
+// Where a discharge stops, besides the end of its load.
+struct DischargeLimits {
+  std::optional<double> voltage_v;  // default: the battery's cut-off
+  std::optional<double> charge;     // e.g. the reserve; default: none
+  double ambient_c = reference_temperature_c;
+};
+
+enum class Ending {
+  load_ended,
+  voltage,  // terminals fell to the voltage limit
+  charge,   // charge fell to its limit
+  power     // the battery cannot deliver the power asked for
+};
+
+struct Discharge {
+  double duration_s = 0;
+  Ending ending = Ending::load_ended;
+  State state;                     // at the end
+  double voltage_v = 0;            // terminals, at the end
+  double charge_ah = 0;            // that left the terminals
+  double energy_j = 0;             // that left the terminals
+  std::vector<double> time_s;      // ends of the load's pieces, the last one cut short by the end
+  std::vector<double> terminal_v;  // terminals there, just before the load changes
+};
+
+// Follows the circuit under the load with CVODE, restarted at each piece, and finds the end by its roots.
+// Time to cut-off or reserve is the duration when the ending says so. Errors: a non-finite start.
+Result<Discharge> discharge(const Circuit& circuit, const State& start, const Load& load,
+                            const DischargeLimits& limits = {});
+
+}  // namespace joulecast::battery

@@ -1,0 +1,95 @@
+#include "battery/prediction.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "battery/discharge.h"
+
+namespace joulecast::battery {
+namespace {
+
+// Linear interpolation between order statistics, share from 0 to 1.
+double quantile(std::vector<double> values, double share) {
+  std::sort(values.begin(), values.end());
+  const double at = share * static_cast<double>(values.size() - 1);
+  const auto below = static_cast<std::size_t>(at);
+  const std::size_t above = std::min(below + 1, values.size() - 1);
+  return values[below] + (at - static_cast<double>(below)) * (values[above] - values[below]);
+}
+
+}  // namespace
+
+Result<Load> recorded_load(const Recording& recording, Load::Kind kind) {
+  if (kind == Load::Kind::current) return held_load(kind, recording.time_s, recording.current_a);
+  std::vector<double> power(recording.size());
+  for (std::size_t row = 0; row < recording.size(); ++row)
+    power[row] = recording.current_a[row] * recording.voltage_v[row];
+  auto load = held_load(kind, recording.time_s, power);
+  if (!load) return load;
+  for (std::size_t row = 1; row < recording.size(); ++row)
+    if (std::abs(recording.current_a[row] - recording.current_a[row - 1]) <=
+        1e-3 * std::abs(recording.current_a[row]))
+      load->pieces[row - 1].begin = power[row - 1];
+  return load;
+}
+
+Result<Prediction> predict(const Circuit& circuit, const Recording& recording, Load::Kind from) {
+  if (!(recording.charge_ah() > 0)) return invalid(recording.name, "draws no charge");
+  const auto recorded = recorded_load(recording, from);
+  if (!recorded) return tl::unexpected(recorded.error());
+  const double first_c = recording.temperature_c.front();
+  const double ambient_c = std::isfinite(first_c) ? first_c : reference_temperature_c;
+  const State start = Circuit::rested(1, ambient_c);
+
+  Prediction out;
+  out.name = recording.name;
+  out.end_voltage_v = std::max(circuit.cutoff_voltage_v(), recording.voltage_v.back());
+  out.measured_s = recording.duration_s();
+  Load continued = *recorded;
+  const double last = continued.pieces.back().end;
+  continued.pieces.push_back({out.measured_s, last, last});
+  const auto to_end = discharge(circuit, start, continued, {out.end_voltage_v, std::nullopt, ambient_c});
+  if (!to_end) return tl::unexpected(to_end.error());
+  if (to_end->ending == Ending::load_ended)
+    return fail(Fault::infeasible, recording.name,
+                fmt::format("still at {:.3f} V after twice the recorded time; the recording ends at {:.3f} V",
+                            to_end->voltage_v, out.end_voltage_v));
+  out.predicted_s = to_end->duration_s;
+  out.time_error = out.predicted_s / out.measured_s - 1;
+
+  // Voltages go on below the end voltage, so that a discharge predicted too short is compared in full.
+  const auto through = discharge(circuit, start, *recorded, {0.0, std::nullopt, ambient_c});
+  if (!through) return tl::unexpected(through.error());
+  double drawn_ah = 0, sum = 0;
+  std::size_t rows = 0;
+  for (std::size_t row = 0; row < recording.size() && row <= through->terminal_v.size(); ++row) {
+    if (row > 0) drawn_ah += recording.current_a[row] * recording.duration_s(row) / 3600;
+    if (1 - drawn_ah / circuit.capacity_ah() <= least_charge) break;
+    const double predicted = row > 0 ? through->terminal_v[row - 1] : circuit.inner_voltage_v(start);
+    sum += std::pow(predicted - recording.voltage_v[row], 2);
+    ++rows;
+  }
+  out.voltage_rms_v = std::sqrt(sum / static_cast<double>(rows));
+  return out;
+}
+
+PredictionSummary summarise(const std::vector<Prediction>& predictions) {
+  PredictionSummary out;
+  out.count = predictions.size();
+  if (predictions.empty()) return out;
+  std::vector<double> errors;
+  double sum = 0;
+  for (const Prediction& prediction : predictions) {
+    errors.push_back(std::abs(prediction.time_error));
+    sum += prediction.voltage_rms_v * prediction.voltage_rms_v;
+    out.voltage_rms_worst_v = std::max(out.voltage_rms_worst_v, prediction.voltage_rms_v);
+  }
+  out.time_error_median = quantile(errors, 0.5);
+  out.time_error_p95 = quantile(errors, 0.95);
+  out.voltage_rms_v = std::sqrt(sum / static_cast<double>(predictions.size()));
+  return out;
+}
+
+}  // namespace joulecast::battery

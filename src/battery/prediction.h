@@ -1,0 +1,42 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "battery/circuit.h"
+#include "battery/load.h"
+#include "battery/recording.h"
+
+namespace joulecast::battery {
+
+// One recorded discharge against what the circuit says of it, knowing only the profile of current or power,
+// that the battery was full and rested at its start, and the temperature then.
+struct Prediction {
+  std::string name;
+  double end_voltage_v = 0;  // the cut-off, or the last recorded voltage where that is above it
+  double measured_s = 0;     // until the recording's end
+  double predicted_s = 0;    // until the circuit's terminals reach end_voltage_v; the last load goes on
+  double time_error = 0;     // predicted / measured - 1
+  double voltage_rms_v = 0;  // over the rows whose charge, counted from full, is above least_charge
+};
+
+struct PredictionSummary {
+  std::size_t count = 0;
+  double time_error_median = 0;  // of absolute values
+  double time_error_p95 = 0;
+  double voltage_rms_v = 0;  // root mean square of the discharges
+  double voltage_rms_worst_v = 0;
+};
+
+inline constexpr double least_charge = 0.1;
+
+// Errors: the recording draws nothing, or the circuit does not reach the end voltage in twice the time.
+Result<Prediction> predict(const Circuit& circuit, const Recording& recording, Load::Kind from);
+
+PredictionSummary summarise(const std::vector<Prediction>& predictions);
+
+// The recording as a load. Power runs straight between rows of the same current and is held elsewhere.
+Result<Load> recorded_load(const Recording& recording, Load::Kind kind);
+
+}  // namespace joulecast::battery

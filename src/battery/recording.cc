@@ -1,0 +1,160 @@
+#include "battery/recording.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <optional>
+
+namespace joulecast::battery {
+namespace {
+
+constexpr std::size_t max_file_bytes = std::size_t{256} << 20;
+constexpr std::string_view column_names[] = {"t_s", "I_A", "V_V", "T_C", "cycle"};
+enum : std::size_t { time_column, current_column, voltage_column, temperature_column, cycle_column, columns };
+constexpr std::size_t required_columns = 3;
+
+std::string_view next_line(std::string_view& text) {
+  const std::size_t end = text.find('\n');
+  std::string_view line = text.substr(0, end);
+  text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  return line;
+}
+
+std::vector<std::string_view> cells_of(std::string_view line) {
+  std::vector<std::string_view> cells;
+  for (;;) {
+    const std::size_t comma = line.find(',');
+    std::string_view cell = line.substr(0, comma);
+    while (cell.starts_with(' ')) cell.remove_prefix(1);
+    while (cell.ends_with(' ')) cell.remove_suffix(1);
+    cells.push_back(cell);
+    if (comma == std::string_view::npos) return cells;
+    line.remove_prefix(comma + 1);
+  }
+}
+
+std::optional<double> number(std::string_view cell) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  if (error != std::errc{} || end != cell.data() + cell.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+// Where each of our columns stands in the header.
+Result<std::vector<std::optional<std::size_t>>> positions(std::string_view header) {
+  if (header.starts_with("\xef\xbb\xbf")) header.remove_prefix(3);
+  const auto cells = cells_of(header);
+  std::vector<std::optional<std::size_t>> found(columns);
+  for (std::size_t c = 0; c < columns; ++c) {
+    const auto at = std::find(cells.begin(), cells.end(), column_names[c]);
+    if (at != cells.end())
+      found[c] = static_cast<std::size_t>(at - cells.begin());
+    else if (c < required_columns)
+      return invalid(std::string(column_names[c]), "is not among the columns that the first line names");
+  }
+  return found;
+}
+
+void drop_last_row(Recording& recording) {
+  recording.time_s.pop_back();
+  recording.current_a.pop_back();
+  recording.voltage_v.pop_back();
+  recording.temperature_c.pop_back();
+}
+
+}  // namespace
+
+double Recording::charge_ah() const {
+  double coulombs = 0;
+  for (std::size_t row = 1; row < size(); ++row) coulombs += current_a[row] * duration_s(row);
+  return coulombs / 3600;
+}
+
+Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std::string& name) {
+  const auto at = positions(next_line(csv));
+  if (!at) return tl::unexpected(at.error());
+  std::vector<Recording> out;
+  std::string_view cycle;
+  std::size_t line_number = 1;
+  while (!csv.empty()) {
+    ++line_number;
+    const std::string_view line = next_line(csv);
+    if (line.empty()) continue;
+    const auto cells = cells_of(line);
+    double value[columns] = {};
+    for (std::size_t c = 0; c < cycle_column; ++c) {
+      value[c] = std::numeric_limits<double>::quiet_NaN();
+      if (!(*at)[c]) continue;
+      const std::string_view cell = *(*at)[c] < cells.size() ? cells[*(*at)[c]] : std::string_view{};
+      if (cell.empty() && c == temperature_column) continue;
+      const auto read = number(cell);
+      if (!read)
+        return invalid(
+            std::string(column_names[c]),
+            fmt::format("is \"{}\" in line {}, must be a finite number", cell.substr(0, 40), line_number));
+      value[c] = *read;
+    }
+    std::string_view line_cycle;
+    if ((*at)[cycle_column] && *(*at)[cycle_column] < cells.size()) line_cycle = cells[*(*at)[cycle_column]];
+    if (out.empty() || line_cycle != cycle) {
+      cycle = line_cycle;
+      out.emplace_back().name = cycle.empty() ? name : fmt::format("{}#{}", name, cycle);
+    }
+    Recording& recording = out.back();
+    if (!recording.time_s.empty() && value[time_column] < recording.time_s.back())
+      return invalid("t_s", fmt::format("is {} s in line {}, must not be before the line before, {} s",
+                                        value[time_column], line_number, recording.time_s.back()));
+    // Loggers that round the time write an extra row at the end of a test in the same second.
+    if (!recording.time_s.empty() && value[time_column] == recording.time_s.back()) drop_last_row(recording);
+    recording.time_s.push_back(value[time_column]);
+    recording.current_a.push_back(value[current_column]);
+    recording.voltage_v.push_back(value[voltage_column]);
+    recording.temperature_c.push_back(value[temperature_column]);
+  }
+  if (out.empty()) return invalid("t_s", "has no rows");
+  for (const Recording& recording : out)
+    if (recording.size() < 2) return invalid("t_s", fmt::format("{} has a single row", recording.name));
+  return out;
+}
+
+Result<std::vector<Recording>> read_recordings(const std::filesystem::path& path) {
+  std::error_code ignored;
+  const auto bytes = std::filesystem::file_size(path, ignored);
+  if (!ignored && bytes > max_file_bytes)
+    return fail(Fault::too_large, path.string(),
+                fmt::format("is {} bytes, must be at most {}", bytes, max_file_bytes));
+  std::ifstream file(path, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file.is_open() || file.bad()) return fail(Fault::not_found, path.string(), "cannot be read");
+  return parse_recordings(text, path.filename().string()).map_error([&](Error error) {
+    error.message = fmt::format("{}: {}", path.string(), error.message);
+    return error;
+  });
+}
+
+Result<std::vector<std::filesystem::path>> identification_files(const std::string& file_or_prefix) {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  if (fs::is_regular_file(file_or_prefix, ignored)) return std::vector<fs::path>{file_or_prefix};
+  const fs::path prefix(file_or_prefix);
+  const fs::path folder = prefix.has_parent_path() ? prefix.parent_path() : fs::path(".");
+  const std::string start = prefix.filename().string() + "_";
+  std::vector<fs::path> found;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with(start) && name.ends_with("_data.csv")) found.push_back(entry.path());
+  }
+  if (found.empty() || prefix.filename().empty())
+    return fail(Fault::not_found, file_or_prefix,
+                "is no file and begins no file name that ends in _data.csv");
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+}  // namespace joulecast::battery
