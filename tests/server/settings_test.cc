@@ -1,0 +1,144 @@
+#include "server/settings.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+namespace joulecast {
+namespace {
+
+using Texts = std::vector<std::string>;
+
+class SettingsTest : public ::testing::Test {
+ protected:
+  ~SettingsTest() override { std::filesystem::remove(file_); }
+  std::string write(const std::string& text) {
+    std::ofstream(file_) << text;
+    return file_;
+  }
+  static Error fault(const Texts& arguments, const Texts& environment = {}) {
+    const auto result = read_settings(arguments, environment);
+    return result ? Error{} : result.error();
+  }
+  std::string file_ =
+      (std::filesystem::temp_directory_path() /
+       ("joulecast-settings-" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) + "-" +
+        std::to_string(reinterpret_cast<std::uintptr_t>(this)) + ".json"))
+          .string();
+};
+
+TEST_F(SettingsTest, DefaultsSatisfyTheirOwnTable) {
+  std::set<std::string> flags;
+  std::set<std::string> variables;
+  for (const Setting& setting : settings_table()) {
+    Settings settings;
+    const auto set = settings.set(setting.key, setting.default_value, Origin::flag, setting.key);
+    EXPECT_TRUE(set.has_value()) << (set ? "" : describe(set.error()));
+    EXPECT_FALSE(setting.help.empty()) << setting.key;
+    EXPECT_TRUE(flags.insert(setting.flag()).second) << setting.flag();
+    EXPECT_TRUE(variables.insert(setting.environment()).second) << setting.environment();
+  }
+}
+
+TEST_F(SettingsTest, FlagBeatsEnvironmentBeatsFileBeatsDefault) {
+  const std::string file = write(R"({"http": {"port": 1001, "worker_threads": 3, "address": "::1"}})");
+  const Texts variables{"JOULECAST_HTTP_PORT=1002", "JOULECAST_HTTP_WORKER_THREADS=4", "PATH=/bin"};
+  const auto all = read_settings({"--config", file, "--http-port=1003"}, variables);
+  ASSERT_TRUE(all.has_value()) << describe(all.error());
+  EXPECT_EQ(all->settings.integer("http.port"), 1003);
+  EXPECT_EQ(all->settings.origin("http.port"), Origin::flag);
+  EXPECT_EQ(all->settings.integer("http.worker_threads"), 4);
+  EXPECT_EQ(all->settings.origin("http.worker_threads"), Origin::environment);
+  EXPECT_EQ(all->settings.text("http.address"), "::1");
+  EXPECT_EQ(all->settings.origin("http.address"), Origin::file);
+  EXPECT_EQ(all->settings.text("store.path"), "joulecast.db");
+  EXPECT_EQ(all->settings.origin("store.path"), Origin::default_value);
+  EXPECT_EQ(all->action, Invocation::Action::run);
+}
+
+TEST_F(SettingsTest, FileCanBeNamedByEnvironmentButFlagWins) {
+  const std::string file = write(R"({"$schema": "config.schema.json", "log": {"format": "json"}})");
+  EXPECT_EQ(read_settings({}, {"JOULECAST_CONFIG=" + file}).value().settings.text("log.format"), "json");
+  EXPECT_EQ(fault({"--config", "/nonexistent/joulecastd.json"}, {"JOULECAST_CONFIG=" + file}).fault,
+            Fault::not_found);
+}
+
+TEST_F(SettingsTest, UnknownKeysAreErrorsThatSuggestTheNearest) {
+  EXPECT_EQ(fault({"--http-prot", "1"}).field, "--http-prot");
+  EXPECT_EQ(fault({"--http-prot", "1"}).message, "unknown flag; did you mean --http-port?");
+  EXPECT_EQ(fault({}, {"JOULECAST_HTTP_PROT=1"}).field, "JOULECAST_HTTP_PROT");
+  EXPECT_NE(fault({}, {"JOULECAST_HTTP_PROT=1"}).message.find("JOULECAST_HTTP_PORT"), std::string::npos);
+  const Error in_file = fault({"--config", write(R"({"http": {"prot": 1}})")});
+  EXPECT_NE(in_file.field.find("http.prot"), std::string::npos);
+  EXPECT_NE(in_file.message.find("http.port"), std::string::npos);
+  EXPECT_EQ(fault({"qqqqqqqqqqqqqqqqqqq"}).message, "unknown flag");  // nothing is near
+  EXPECT_NE(fault({"--config", write(R"({"htp": {"port": 1}})")}).message.find("unknown"), std::string::npos);
+}
+
+TEST_F(SettingsTest, ValuesAreCheckedAgainstTypeAndBounds) {
+  EXPECT_EQ(fault({"--http-port", "65536"}).message, "must lie in [0, 65535], is \"65536\"");
+  EXPECT_EQ(fault({"--http-port", "80x"}).message, "must be an integer, is \"80x\"");
+  EXPECT_EQ(fault({"--http-port", ""}).field, "--http-port");
+  EXPECT_EQ(fault({"--http-read-timeout-s", "nan"}).message, "must be a finite number, is \"nan\"");
+  EXPECT_EQ(fault({"--ingest-implicit-missions", "yes"}).message, "must be true or false, is \"yes\"");
+  EXPECT_EQ(fault({"--log-format", "xml"}).message, "must be one of text|json, is \"xml\"");
+  EXPECT_EQ(fault({}, {"JOULECAST_HTTP_READ_TIMEOUT_S=0"}).field, "JOULECAST_HTTP_READ_TIMEOUT_S");
+  EXPECT_EQ(fault({"--http-port"}).message, "needs a value");
+  EXPECT_EQ(fault({"--http-port", "1", "--http-port", "2"}).message, "is given more than once");
+  for (const char* text :
+       {R"({"http": {"port": "8080"}})", R"({"http": {"port": 80.5}})", R"({"http": {"port": 1e3}})",
+        R"({"http": 80})", R"([])", R"({"http": {"port": 1, "port": 2}})", R"({"http": )",
+        R"({"ingest": {"implicit_missions": 1}})", R"({"http": {"port": 99999999999999999999}})"}) {
+    EXPECT_EQ(fault({"--config", write(text)}).fault, Fault::invalid) << text;
+    EXPECT_FALSE(fault({"--config", write(text)}).message.empty()) << text;
+  }
+}
+
+TEST_F(SettingsTest, CommandsAreKnown) {
+  using Action = Invocation::Action;
+  EXPECT_EQ(read_settings({"--help"}, {}).value().action, Action::help);
+  EXPECT_EQ(read_settings({"--print-config", "--http-port", "9"}, {}).value().settings.integer("http.port"),
+            9);
+  EXPECT_EQ(read_settings({"--check-config"}, {}).value().action, Action::check_config);
+  EXPECT_EQ(fault({"--check-config", "--version"}).field, "--version");
+  EXPECT_EQ(fault({"--check-config", "--http-port", "70000"}).field, "--http-port");
+}
+
+TEST_F(SettingsTest, PrintsEveryEffectiveValueWithItsOrigin) {
+  const auto invocation = read_settings({"--http-port", "9"}, {"JOULECAST_LOG_LEVEL=debug"}).value();
+  std::istringstream lines(invocation.settings.print());
+  std::size_t count = 0;
+  for (std::string line; std::getline(lines, line); ++count) {
+    if (line.starts_with("http.port = 9 ")) {
+      EXPECT_NE(line.find("# flag"), std::string::npos);
+    }
+    if (line.starts_with("log.level = \"debug\" ")) {
+      EXPECT_NE(line.find("# environment"), std::string::npos);
+    }
+  }
+  EXPECT_EQ(count, settings_table().size());
+  for (const Setting& setting : settings_table()) {
+    EXPECT_NE(settings_help().find(setting.flag() + " "), std::string::npos) << setting.flag();
+  }
+}
+
+TEST_F(SettingsTest, CommittedSchemaIsTheTables) {
+  std::ifstream file(JOULECAST_SOURCE_DIR "/schemas/config.schema.json");
+  std::ostringstream committed;
+  committed << file.rdbuf();
+  EXPECT_EQ(committed.str(), settings_schema()) << "regenerate: joulecastd --print-config-schema";
+}
+
+TEST(SettingsDeathTest, AskingForWhatTheTableHasNotIsOurBug) {
+  const Settings settings;
+  EXPECT_DEATH((void)settings.integer("http.prot"), "no setting http.prot");
+  EXPECT_DEATH((void)settings.integer("http.address"), "of that type");
+}
+
+}  // namespace
+}  // namespace joulecast
