@@ -56,11 +56,9 @@ class Request {
       auto planner = RunPlanner::make(robot, loads, run, problem, k == 0 ? problem.start_speed_m_s : 0,
                                       k + 1 == path.runs.size() ? problem.end_speed_m_s : 0);
       if (!planner) return tl::unexpected(std::move(planner.error()));
-      request.shortest_s_ += planner->shortest_s();
       request.runs_.push_back(std::move(*planner));
     }
     request.dwell_s_ = path.dwell_s();
-    request.shortest_s_ += request.dwell_s_;
     return request;
   }
 
@@ -73,6 +71,8 @@ class Request {
       if (!answer) return tl::unexpected(std::move(answer.error()));
       answers_.push_back(std::move(*answer));
     }
+    shortest_s_ = dwell_s_;
+    for (const RunPlanner& run : runs_) shortest_s_ += run.shortest_s();
     return {};
   }
 

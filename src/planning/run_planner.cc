@@ -172,19 +172,35 @@ std::vector<double> RunPlanner::first_nodes(std::size_t cells) const {
     for (double i = 1; i <= cuts; ++i) nodes.push_back(from + gap * i / cuts);
   }
   nodes.back() = length;
-  // From rest the speed grows with the root of the way: two short cells at each end.
-  const auto split = [&](bool front) {
-    const double h = front ? nodes[1] : length - nodes[nodes.size() - 2];
-    const std::array<double, 2> at = {h / 9, h * 4 / 9};
-    if (front) {
-      nodes.insert(nodes.begin() + 1, at.begin(), at.end());
-    } else {
-      nodes.insert(nodes.end() - 1, {length - at[1], length - at[0]});
-    }
-  };
-  if (start_ == 0) split(true);
-  if (end_ == 0) split(false);
-  return nodes;
+  // From rest the speed grows with the root of the way: nodes even in time, s = L/2 (j/m)^2, until their
+  // spacing reaches the grid's.
+  std::vector<double> graded;
+  const double m = 0.5 * static_cast<double>(cells), half = 0.5 * length, widest = nodes[1] - nodes[0];
+  for (double j = 1; j < m; ++j) {
+    if (half * (2 * j + 1) / (m * m) > std::max(widest, nodes[nodes.size() - 1] - nodes[nodes.size() - 2]))
+      break;
+    const double way = half * (j / m) * (j / m);
+    if (start_ == 0) graded.push_back(way);
+    if (end_ == 0) graded.push_back(length - way);
+  }
+  nodes.insert(nodes.end(), graded.begin(), graded.end());
+  std::sort(nodes.begin(), nodes.end());
+  // Nodes of both families that nearly coincide are one.
+  std::vector<double> apart{0};
+  for (std::size_t k = 1; k + 1 < nodes.size(); ++k) {
+    const double next = nodes[k + 1] - nodes[k], before = nodes[k] - apart.back();
+    if (before > 0.2 * next && length - nodes[k] > smallest) apart.push_back(nodes[k]);
+  }
+  apart.push_back(length);
+  return apart;
+}
+
+// Every second node.
+std::vector<double> RunPlanner::thinned(const std::vector<double>& nodes) {
+  std::vector<double> coarse;
+  for (std::size_t k = 0; k + 1 < nodes.size(); k += 2) coarse.push_back(nodes[k]);
+  coarse.push_back(nodes.back());
+  return coarse;
 }
 
 // Nodes that share time and change of speed evenly.
@@ -248,7 +264,12 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
   if (!planner.uniform_ && run.knots.size() > most_cells) {
     return fail(Fault::too_large, "path", "a run has more than 200000 knots; give a coarser resolution_m");
   }
-  planner.build(planner.first_nodes(planner.uniform_ ? cells / 2 : cells));
+  if (planner.uniform_) {
+    planner.build(planner.first_nodes(cells / 2));
+  } else {
+    planner.fine_nodes_ = planner.first_nodes(cells);
+    planner.build(thinned(planner.fine_nodes_));
+  }
   if (auto ok = planner.check_feasible(); !ok) return tl::unexpected(std::move(ok.error()));
   return planner;
 }
@@ -312,14 +333,17 @@ Result<RunAnswer> RunPlanner::solve(double price_w) {
   if (!solver_) solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
   SpeedSolution s;
   int iterations = 0;
-  if (uniform_ && !refined_) {
-    // A coarse solution places the nodes of the fine one and, by Richardson, tells its error: order 2.
+  if (!refined_) {
+    // A coarse solution starts the fine one, places its nodes where they are free, and by Richardson tells
+    // its error: order 2.
     s = solver_->solve(price_w, 1e-5);
     iterations = s.iterations;
     if (s.converged) {
       const std::vector<double> coarse_nodes = nodes_, coarse = s.z;
       const double coarse_cost = s.cost_j;
-      build(refined_nodes(coarse, std::max<std::size_t>(8, problem_->intervals_per_run)));
+      build(uniform_ ? refined_nodes(coarse, std::max<std::size_t>(8, problem_->intervals_per_run))
+                     : std::move(fine_nodes_));
+      if (auto ok = check_feasible(); !ok) return tl::unexpected(std::move(ok.error()));
       solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
       solver_->start_from(resampled(coarse_nodes, coarse, nodes_));
       s = solver_->solve(price_w);

@@ -50,6 +50,7 @@ class RunPlanner {
   Result<void> check_feasible() const;
   std::optional<RunAnswer> closed_form(double price_w) const;
   std::vector<double> first_nodes(std::size_t cells) const;
+  static std::vector<double> thinned(const std::vector<double>& nodes);
   std::vector<double> refined_nodes(const std::vector<double>& z, std::size_t cells) const;
   std::vector<double> resampled(const std::vector<double>& nodes, const std::vector<double>& z,
                                 const std::vector<double>& onto) const;
@@ -62,6 +63,7 @@ class RunPlanner {
   bool uniform_ = false, refined_ = false;
   double discretisation_j_ = 0;
   std::vector<double> nodes_;
+  std::vector<double> fine_nodes_;   // of a run whose loads vary along the way, until the first solve
   std::unique_ptr<SpeedGrid> grid_;  // the solver refers to them
   std::unique_ptr<SpeedEnvelope> envelope_;
   std::unique_ptr<SpeedSolver> solver_;

@@ -33,6 +33,25 @@ bool motors_allow(const SpeedGrid& grid, std::size_t cell, double v, double q) {
   return true;
 }
 
+// The slowest profile whose acceleration stays within a bound; at rest in between where the way is long
+// enough.
+std::vector<double> slowest_profile(const SpeedGrid& grid, double acceleration) {
+  const std::size_t n = grid.cells();
+  std::vector<double> slowest(n + 1, 0);
+  if (!std::isfinite(acceleration)) return slowest;
+  double z = grid.start;
+  for (std::size_t k = 0; k <= n; ++k) {
+    slowest[k] = std::max(0.0, z);
+    if (k < n) z -= 2 * grid.step[k] * acceleration;
+  }
+  z = grid.end;
+  for (std::size_t k = n + 1; k-- > 0;) {
+    slowest[k] = std::max(slowest[k], z);
+    if (k > 0) z -= 2 * grid.step[k - 1] * acceleration;
+  }
+  return slowest;
+}
+
 }  // namespace
 
 double duration_of(const SpeedGrid& grid, const std::vector<double>& z) {
@@ -47,7 +66,6 @@ SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
   e.fastest = grid.ceiling;
   e.fastest.front() = grid.start;
   e.fastest.back() = grid.end;
-  e.slowest.assign(n + 1, 0);
 
   const bool motors = std::isfinite(grid.torque_limit_nm) || std::isfinite(grid.voltage_limit_v);
   const auto allowed = [&](std::size_t cell, double z0, double z1) {
@@ -80,7 +98,8 @@ SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
       return forward ? allowed(cell, near, far) : allowed(cell, far, near);
     };
     if (!motors || fits(top)) return top;
-    double low = fits(near) ? near : 0, high = low > 0 ? top : near;
+    const bool steady = fits(near);
+    double low = steady ? near : 0, high = steady ? top : near;
     for (int k = 0; k < 40; ++k) {
       const double middle = 0.5 * (low + high);
       (fits(middle) ? low : high) = middle;
@@ -91,18 +110,7 @@ SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
     for (std::size_t k = 0; k < n; ++k) e.fastest[k + 1] = reach(k, e.fastest[k], e.fastest[k + 1], true);
     for (std::size_t k = n; k-- > 0;) e.fastest[k] = reach(k, e.fastest[k + 1], e.fastest[k], false);
   }
-  if (std::isfinite(grid.acceleration_limit)) {
-    double z = grid.start;
-    for (std::size_t k = 0; k <= n; ++k) {
-      e.slowest[k] = std::max(0.0, z);
-      if (k < n) z -= 2 * grid.step[k] * grid.acceleration_limit;
-    }
-    z = grid.end;
-    for (std::size_t k = n + 1; k-- > 0;) {
-      e.slowest[k] = std::max(e.slowest[k], z);
-      if (k > 0) z -= 2 * grid.step[k - 1] * grid.acceleration_limit;
-    }
-  }
+  e.slowest = slowest_profile(grid, grid.acceleration_limit);
   const double slack = 1e-9;
   if (e.fastest.front() < grid.start * (1 - slack) || e.fastest.back() < grid.end * (1 - slack)) {
     e.feasible = false;
@@ -278,8 +286,10 @@ double SpeedSolver::merit(const std::vector<double>& z, double mu) const {
 
 void SpeedSolver::start_from(const std::vector<double>& z) {
   assert(z.size() == z_.size());
-  if (!inside(z)) return;
-  z_ = z;
+  trial_ = z;
+  for (std::size_t k = 1; k < grid_.cells(); ++k) trial_[k] = std::min(z[k], 0.9999 * grid_.ceiling[k]);
+  if (!inside(trial_)) return;
+  z_ = trial_;
   started_ = true;
 }
 
@@ -405,6 +415,17 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance) {
 
   const bool warm = started_;
   if (!started_) {
+    // Both profiles of the envelope may press against the same bound; the lower one is drawn with less
+    // acceleration.
+    std::vector<double> slowest = envelope_.slowest;
+    if (grid_.start > 0 || grid_.end > 0) {
+      for (double part : {0.3, 0.6, 0.8, 0.9, 0.97, 0.99, 0.999}) {
+        slowest = slowest_profile(grid_, part * grid_.acceleration_limit);
+        bool below = true;
+        for (std::size_t k = 1; k < n; ++k) below = below && slowest[k] < envelope_.fastest[k];
+        if (below) break;
+      }
+    }
     // Between the slowest and the fastest profile, near the cruising speed that balances idle power and
     // viscosity.
     double top = 0;
@@ -429,8 +450,8 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance) {
     double share = std::clamp(standing / viscous / top, 0.02, 0.85);
     for (int attempt = 0; attempt < 40; ++attempt) {
       for (std::size_t k = 1; k < n; ++k) {
-        const double top_here = std::min(envelope_.fastest[k], std::max(gentle[k], 2 * envelope_.slowest[k]));
-        trial_[k] = envelope_.slowest[k] + share * (top_here - envelope_.slowest[k]);
+        const double top_here = std::min(envelope_.fastest[k], std::max(gentle[k], 2 * slowest[k]));
+        trial_[k] = slowest[k] + share * (top_here - slowest[k]);
       }
       trial_[0] = grid_.start, trial_[n] = grid_.end;
       if (inside(trial_)) break;
