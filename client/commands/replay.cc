@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "client/commands/replay_into.h"
 #include "client/commands/table.h"
 #include "client/interrupt.h"
 #include "telemetry/event_log.h"
@@ -22,6 +23,9 @@ struct Options {
   std::string lcm_url = "udpm://239.255.76.67:7667?ttl=0";
   double speed = 1;
   double max_rate_hz = 15'000;
+  std::string into;
+  std::vector<std::string> robots;
+  bool json = false;
 };
 
 struct Tally {
@@ -104,6 +108,7 @@ Result<bool> replay_log(const std::string& path, telemetry::LcmLink& link, Pacer
 }
 
 Exit run(const Options& options) {
+  if (!options.into.empty()) return replay_into({options.logs, options.into, options.robots, options.json});
   InterruptGuard interrupt;
   auto link = telemetry::LcmLink::open(options.lcm_url);
   if (!link) return report(link.error());
@@ -127,7 +132,8 @@ Exit run(const Options& options) {
 
 void add_replay(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
-  auto* command = program.add_subcommand("replay", "Publish recorded LCM event logs again");
+  auto* command = program.add_subcommand(
+      "replay", "Publish recorded LCM event logs again, or run them straight into a history");
   command->add_option("log", options->logs, "LCM event logs, one after another")->required();
   command->add_option("--lcm-url", options->lcm_url, "LCM provider to publish on")->capture_default_str();
   command
@@ -138,6 +144,13 @@ void add_replay(CLI::App& program, Exit& exit) {
   command->add_option("--max-rate", options->max_rate_hz, "messages a second that the receivers can take")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  auto* into = command->add_option("--into", options->into,
+                                   "no LCM: account for the logs at once, into this history (SQLite file)");
+  command
+      ->add_option("--robot", options->robots,
+                   "with --into: robot file of a robot that the history does not know; may be repeated")
+      ->needs(into);
+  command->add_flag("--json", options->json, "with --into: print the missions as JSON")->needs(into);
   command->callback([options, &exit] { exit = run(*options); });
 }
 

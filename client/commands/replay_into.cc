@@ -1,0 +1,178 @@
+#include "client/commands/replay_into.h"
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "history/sqlite_store.h"
+#include "history/writer.h"
+#include "robot/robot_file.h"
+#include "server/api/mission_json.h"
+#include "server/ingest/pipeline.h"
+#include "telemetry/event_log.h"
+
+namespace joulecast::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct Tally {
+  std::uint64_t messages = 0;
+  std::uint64_t damaged_places = 0;
+  std::uint64_t skipped_bytes = 0;
+};
+
+std::int64_t now_utime_us() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+// Puts the models in force: those of the history, and those of the files, which become versions of it.
+Result<void> load_models(const std::vector<std::string>& files, history::Store& store,
+                         history::Writer& writer, server::ModelRegistry& models) {
+  for (const std::string& file : files) {
+    Result<robot::RobotModel> robot = robot::load_robot(file);
+    if (!robot) return tl::unexpected(std::move(robot.error()));
+    history::AddModel command;
+    command.robot_id = robot->robot_id;
+    command.utime_us = now_utime_us();
+    command.note = file;
+    command.model_json = robot::to_json_text(*robot);
+    if (history::Outcome added = writer.execute(std::move(command)); !added)
+      return tl::unexpected(std::move(added.error()));
+  }
+  const auto robots = store.robots();
+  if (!robots) return tl::unexpected(robots.error());
+  for (const history::RobotRecord& record : *robots) {
+    if (!record.active_version) continue;
+    const auto version = store.model(record.robot_id);
+    if (!version) return tl::unexpected(version.error());
+    Result<robot::RobotModel> robot = robot::parse_robot(version->model_json);
+    if (!robot) return tl::unexpected(std::move(robot.error()));
+    if (Result<void> placed = models.put(std::move(*robot), version->version); !placed) return placed;
+  }
+  return {};
+}
+
+Result<void> read_log(const std::string& path, server::Pipeline& pipeline, server::IngestCounters& counters,
+                      Tally& tally) {
+  auto reader = telemetry::EventLogReader::open(path);
+  if (!reader) return tl::unexpected(std::move(reader.error()));
+  for (;;) {
+    const telemetry::LogRead read = reader->next();
+    switch (read.status) {
+      case telemetry::LogStatus::event:
+        ++tally.messages;
+        if (const auto message = server::decode_message(read.event.channel, read.event.data,
+                                                        read.event.timestamp_us, counters)) {
+          pipeline.handle(*message);
+        }
+        break;
+      case telemetry::LogStatus::end:
+        return {};
+      case telemetry::LogStatus::truncated:
+      case telemetry::LogStatus::corrupt:
+        ++tally.damaged_places;
+        std::fprintf(stderr, "joulecast: %s: at byte %llu: %s\n", path.c_str(),
+                     static_cast<unsigned long long>(read.offset), read.message.c_str());
+        tally.skipped_bytes += reader->resync();
+        break;
+      case telemetry::LogStatus::failed:
+        return fail(Fault::unavailable, path, read.message);
+    }
+  }
+}
+
+void print_number(double value, const char* format) {
+  std::isfinite(value) ? std::printf(format, value) : std::printf("%12s", "-");
+}
+
+void print_table(const std::vector<history::Mission>& missions) {
+  std::printf("%-16s %-20s %-12s %9s %9s %12s %12s %12s\n", "robot", "mission", "state", "time s", "way m",
+              "measured J", "modelled J", "unexplained");
+  for (const history::Mission& m : missions) {
+    const energy::Accounts& a = m.accounts;
+    std::printf("%-16s %-20s %-12s %9.1f %9.1f ", m.robot_id.c_str(), m.mission_id.c_str(),
+                (std::string(history::name(m.state)) + (m.incomplete ? "*" : "")).c_str(), a.duration_s,
+                a.distance_m);
+    print_number(a.measured_s > 0 ? a.measured_j : NAN, "%12.2f");
+    print_number(a.modelled_j, " %12.2f");
+    print_number(a.measured_s > 0 ? a.ledger[energy::Term::unexplained] : NAN, " %12.2f");
+    std::printf("\n");
+  }
+}
+
+}  // namespace
+
+Exit replay_into(const ReplayInto& options) {
+  history::SqliteOptions sqlite;
+  sqlite.path = options.store_path;
+  auto store = history::open_sqlite_store(sqlite);
+  if (!store) return report(store.error());
+  history::Writer writer(**store, {});
+  server::ModelRegistry models;
+  if (Result<void> loaded = load_models(options.robot_files, **store, writer, models); !loaded)
+    return report(loaded.error());
+
+  server::FleetView fleet;
+  server::IngestCounters counters;
+  std::set<history::MissionKey> touched;
+  const server::SessionOutputs outputs{
+      **store,
+      [&](history::Command command) {
+        if (const auto* begun = std::get_if<history::StartMission>(&command))
+          touched.insert(begun->mission.key);
+        if (const Result<void> posted = writer.post(std::move(command)); !posted) report(posted.error());
+      },
+      fleet, counters,
+      [](const std::string& robot, const std::string& text) {
+        std::fprintf(stderr, "joulecast: %s: %s\n", robot.c_str(), text.c_str());
+      }};
+  constexpr std::size_t any_number_of_robots = 1'000'000;
+  server::Pipeline pipeline({}, any_number_of_robots, models, outputs);
+  Tally tally;
+  const auto began = Clock::now();
+  for (const std::string& log : options.logs) {
+    if (Result<void> read = read_log(log, pipeline, counters, tally); !read) return report(read.error());
+  }
+  pipeline.finish();
+  if (Result<void> flushed = writer.flush(); !flushed) return report(flushed.error());
+  const double wall_s = std::chrono::duration<double>(Clock::now() - began).count();
+
+  std::vector<history::Mission> missions;
+  for (const history::MissionKey key : touched) {
+    auto mission = (*store)->mission(key);
+    if (!mission) return report(mission.error());
+    missions.push_back(std::move(*mission));
+  }
+  if (options.json) {
+    api::JsonWriter json;
+    json.begin_object().field("messages", tally.messages).field("damaged_places", tally.damaged_places);
+    json.field("skipped_bytes", tally.skipped_bytes).key("faults").begin_object();
+    for (std::size_t k = 0; k < server::ingest_fault_count; ++k)
+      json.field(server::ingest_fault_names[k], counters.faults[k].load());
+    json.end_object().key("missions").begin_array();
+    for (const history::Mission& mission : missions) api::write_mission(json, mission);
+    json.end_array().end_object();
+    std::printf("%s\n", json.text().c_str());
+  } else {
+    print_table(missions);
+    std::printf("%llu messages in %.2f s (%.0f a second); * = incomplete\n",
+                static_cast<unsigned long long>(tally.messages), wall_s,
+                static_cast<double>(tally.messages) / std::max(wall_s, 1e-9));
+    for (std::size_t k = 0; k < server::ingest_fault_count; ++k) {
+      if (const auto count = counters.faults[k].load(); count > 0) {
+        std::printf("%s: %llu\n", std::string(server::ingest_fault_names[k]).c_str(),
+                    static_cast<unsigned long long>(count));
+      }
+    }
+  }
+  return tally.damaged_places == 0 ? Exit::ok : Exit::fault;
+}
+
+}  // namespace joulecast::client

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "client/commands/outcome.h"
+
+namespace joulecast::client {
+
+struct ReplayInto {
+  std::vector<std::string> logs;
+  std::string store_path;                // history that the missions go into; created when absent
+  std::vector<std::string> robot_files;  // models of the robots that the history does not know yet
+  bool json = false;
+};
+
+// Runs logs straight through the daemon's ingest pipeline into a history, as fast as it takes them, and
+// prints the missions that came of it. The same logs give the same bits in every account.
+Exit replay_into(const ReplayInto& options);
+
+}  // namespace joulecast::client
