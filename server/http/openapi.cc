@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <utility>
@@ -135,10 +136,28 @@ std::set<unsigned> errors_of(const Endpoint& endpoint) {
   return statuses;
 }
 
+// The endpoint that serves the document.
+Endpoint self_endpoint(std::shared_ptr<const std::string> text) {
+  Endpoint self;
+  self.path = "/openapi.json";
+  self.operation_id = "getOpenApi";
+  self.summary = "This description of the interface, OpenAPI 3.1";
+  self.run = Run::io;
+  self.response_schema = "openapi";
+  self.handler = [text = std::move(text)](const Request&) -> Result<Response> {
+    Response response;
+    response.shared_body = text;
+    response.headers.emplace_back("Cache-Control", "no-cache");
+    return response;
+  };
+  return self;
+}
+
 }  // namespace
 
-Result<std::string> openapi_document(std::span<const Endpoint> endpoints,
-                                     std::span<const EmbeddedFile> schemas) {
+Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<const EmbeddedFile> schemas) {
+  std::vector<Endpoint> endpoints(given.begin(), given.end());
+  endpoints.push_back(self_endpoint(nullptr));
   Components components(schemas);
   ordered_json paths = ordered_json::object();
   std::set<unsigned> statuses;
@@ -211,23 +230,9 @@ Result<std::string> openapi_document(std::span<const Endpoint> endpoints,
 
 Result<std::vector<Endpoint>> with_openapi(std::vector<Endpoint> endpoints,
                                            std::span<const EmbeddedFile> schemas) {
-  const auto text = std::make_shared<std::string>();
-  Endpoint self;
-  self.path = "/openapi.json";
-  self.operation_id = "getOpenApi";
-  self.summary = "This description of the interface, OpenAPI 3.1";
-  self.run = Run::io;
-  self.response_schema = "openapi";
-  self.handler = [text](const Request&) -> Result<Response> {
-    Response response;
-    response.shared_body = text;
-    response.headers.emplace_back("Cache-Control", "no-cache");
-    return response;
-  };
-  endpoints.insert(endpoints.begin(), std::move(self));
   auto document = openapi_document(endpoints, schemas);
   if (!document) return tl::unexpected<Error>(document.error());
-  *text = std::move(*document);
+  endpoints.push_back(self_endpoint(std::make_shared<const std::string>(std::move(*document))));
   return endpoints;
 }
 

@@ -130,6 +130,7 @@ TEST(OpenApi, TakesInWhatSchemasReferTo) {
       {"a.schema.json",
        R"({"$id": "x/a.schema.json", "properties": {"l": {"$ref": "#/$defs/l"}, "b": {"$ref": "b.schema.json#/$defs/c"}}, "$defs": {"l": {}}})"},
       {"b.schema.json", R"({"$defs": {"c": {"$ref": "https://x/y/a.schema.json"}}})"},
+      {"openapi.schema.json", "{}"},
       {"unused.schema.json", "{}"}};
   Endpoint endpoint;
   endpoint.method = Method::post;
