@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "battery/initial_charge.h"
 #include "telemetry/validation.h"
 
 namespace joulecast::server {
@@ -120,7 +121,7 @@ void RobotSession::on_sample(const telemetry::Sample& sample, std::int64_t host_
     flush_meter();
     meter_->interrupt();
     missions_.on_clock_step(sample.utime_us);
-    if (open_ != nullptr) {
+    if (open_ != nullptr && open_->record.samples > 0) {
       open_->record.incomplete = true;
       open_->record.incomplete_reason = "the robot's clock was set during the mission";
     }
@@ -131,6 +132,13 @@ void RobotSession::on_sample(const telemetry::Sample& sample, std::int64_t host_
   carry_out(step.actions);
   if (!step.belongs || open_ == nullptr) return on_fault(IngestFault::outside_mission);
 
+  if (!std::isfinite(snapshot_.state_of_charge) && std::isfinite(sample.battery_voltage_v) &&
+      std::isfinite(sample.battery_current_a)) {
+    const battery::Circuit circuit(model_->robot.battery);
+    meter_->set_state_of_charge(
+        battery::charge_at_rest(circuit, sample.battery_voltage_v, sample.battery_current_a));
+    snapshot_.state_of_charge = meter_->state_of_charge();
+  }
   if (open_->resumed_silent) {
     open_->resumed_silent = false;
     const double down_s = static_cast<double>(sample.utime_us - open_->record.end_utime_us) * 1e-6;

@@ -58,6 +58,7 @@ class Meter {
   Meter& operator=(const Meter&) = delete;
 
   void set_state_of_charge(double state_of_charge) { state_of_charge_ = state_of_charge; }
+  double state_of_charge() const { return state_of_charge_; }
 
   // Takes the next sample: later than the previous one, finite where measured (src/telemetry/validation
   // refuses others). A payload of NaN counts as the last declared one. An error is CVODE's; the interval's
