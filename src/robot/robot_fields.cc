@@ -117,8 +117,8 @@ constexpr Unit units[] = {
 };
 
 template <class Allowed>
-bool is_name(std::string_view text, Allowed allowed) {
-  return !text.empty() && text.size() <= 64 && std::all_of(text.begin(), text.end(), allowed);
+bool is_name(std::string_view text, std::size_t longest, Allowed allowed) {
+  return !text.empty() && text.size() <= longest && std::all_of(text.begin(), text.end(), allowed);
 }
 
 bool is_digit(char c) {
@@ -146,13 +146,13 @@ std::span<const ElementField<ChargeLag>> lag_fields() {
 }
 
 bool is_robot_id(std::string_view text) {
-  return is_name(text, [](char c) {
+  return is_name(text, 47, [](char c) {
     return is_digit(c) || is_lower(c) || is_upper(c) || c == '.' || c == '_' || c == '-';
   });
 }
 
 bool is_effect_name(std::string_view text) {
-  return is_name(text, [](char c) { return is_digit(c) || is_lower(c) || c == '_'; });
+  return is_name(text, 64, [](char c) { return is_digit(c) || is_lower(c) || c == '_'; });
 }
 
 std::string_view unit_of(std::string_view name) {

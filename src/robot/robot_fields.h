@@ -64,7 +64,8 @@ inline constexpr std::size_t max_curve_points = 1001;
 inline constexpr std::size_t max_branches = 2;  // and charge lags
 inline constexpr std::size_t max_effects = 64;
 inline constexpr std::size_t max_effect_parameters = 64;
-inline constexpr std::string_view robot_id_pattern = "^[A-Za-z0-9._-]{1,64}$";
+// LCM channels carry at most 63 characters, of which "ROBOT_TELEMETRY." takes 16.
+inline constexpr std::string_view robot_id_pattern = "^[A-Za-z0-9._-]{1,47}$";
 inline constexpr std::string_view effect_name_pattern = "^[a-z0-9_]{1,64}$";
 inline constexpr Bounds charge_bounds{0.0, 1.0};
 
