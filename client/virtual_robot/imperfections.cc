@@ -25,7 +25,7 @@ constexpr auto table = std::to_array<EffectEntry>({
     {"linear_inertia_error", &I::linear_inertia_error, "1", 3, false},
     {"com_offset", &I::com_offset, "m", 0.5, false},
     {"resistance_error", &I::resistance_error, "1", 5, false},
-    {"winding_temperature", &I::winding_temperature, "K/W", 60, false},
+    {"winding_temperature", &I::winding_temperature, "K/W", 100, false},
     {"brush_drop", &I::brush_drop, "V", 3, false},
     {"torque_constant_loss", &I::torque_constant_loss, "1", 0.5, false},
     {"inductance", &I::inductance, "H", 0.5, false},
