@@ -1,0 +1,163 @@
+// What one sample costs on its way from bytes to history, part by part, in one run: guard and decode,
+// metering with CVODE, the whole session without a store, the whole pipeline into SQLite. CPU time of the
+// process, so that the writer's work counts too.
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "history/sqlite_store.h"
+#include "history/writer.h"
+#include "server/ingest/pipeline.h"
+#include "telemetry/codec.h"
+#include "tests/support/sample_robots.h"
+
+namespace joulecast {
+namespace {
+
+constexpr std::int64_t samples_a_robot = 50'000;
+constexpr int robots = 4;
+
+struct Message {
+  std::string channel;
+  std::vector<std::uint8_t> bytes;
+};
+
+double cpu_s() {
+  timespec t{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+robot::RobotModel robot_named(const std::string& id) {
+  robot::RobotModel robot = testing::nomad();
+  robot.robot_id = id;
+  return robot;
+}
+
+// A drive with noise in every channel, so that no interval is trivially smooth.
+std::vector<Message> messages() {
+  std::vector<Message> all;
+  all.reserve(static_cast<std::size_t>(samples_a_robot) * robots);
+  std::uint64_t state = 1;
+  const auto noise = [&] {
+    state = state * 6364136223846793005ULL + 1442695040888963407ULL;
+    return static_cast<double>(state >> 11) * 0x1p-53 - 0.5;
+  };
+  for (std::int64_t k = 0; k < samples_a_robot; ++k) {
+    for (int r = 0; r < robots; ++r) {
+      const std::string id = "bench-" + std::to_string(r);
+      const double t = static_cast<double>(k) * 0.02;
+      telemetry::Sample s;
+      s.utime_us = 1'750'000'000'000'000 + k * 20'000;
+      s.sequence = k;
+      s.wheel_velocity_rad_s = {4 + 3 * std::sin(0.5 * t) + 0.02 * noise(),
+                                4 + 3 * std::sin(0.55 * t) + 0.02 * noise()};
+      s.motor_voltage_v = {8 + 5 * std::sin(0.5 * t) + 0.1 * noise(),
+                           8 + 5 * std::sin(0.55 * t) + 0.1 * noise()};
+      s.motor_current_a = {0.4 + std::cos(0.5 * t) + 0.2 * noise(), 0.4 + std::cos(0.55 * t) + 0.2 * noise()};
+      s.battery_voltage_v = 24 + 0.05 * noise();
+      s.battery_current_a = 1 + std::cos(0.5 * t) + 0.1 * noise();
+      s.yaw_rate_rad_s = 0.01 * noise();
+      s.pose = {std::sin(0.1 * t), std::cos(0.1 * t), 0.1 * t};
+      s.payload_kg = 5;
+      all.push_back(
+          {telemetry::channel_of(telemetry::Subject::telemetry, id), *telemetry::encode_telemetry(id, s)});
+    }
+  }
+  return all;
+}
+
+class Timer {
+ public:
+  Timer(const char* what, std::size_t count) : what_(what), count_(count), began_(cpu_s()) {}
+  double stop() const {
+    const double each = (cpu_s() - began_) / static_cast<double>(count_) * 1e6;
+    std::printf("%-46s %7.3f us a sample  %9.0f samples a core second\n", what_, each, 1e6 / each);
+    return each;
+  }
+
+ private:
+  const char* what_;
+  std::size_t count_;
+  double began_;
+};
+
+double decode_only(const std::vector<Message>& all) {
+  server::IngestCounters counters;
+  const Timer timer("guard and decode", all.size());
+  for (const Message& m : all) {
+    if (!server::decode_message(m.channel, m.bytes, 0, counters)) std::abort();
+  }
+  return timer.stop();
+}
+
+double meter_only(const std::vector<Message>& all) {
+  server::IngestCounters counters;
+  std::vector<telemetry::Sample> samples;
+  for (std::size_t k = 0; k < all.size(); k += robots) {
+    samples.push_back(std::get<telemetry::Sample>(
+        server::decode_message(all[k].channel, all[k].bytes, 0, counters)->content));
+  }
+  energy::Meter meter(*dynamics::drive_model(robot_named("bench-0")), 18, {},
+                      [](const energy::MeterPoint&) {});
+  const Timer timer("metering (CVODE, all accounts)", samples.size());
+  for (const telemetry::Sample& s : samples) {
+    if (!meter.add(s)) std::abort();
+  }
+  return timer.stop();
+}
+
+double pipeline(const std::vector<Message>& all, const char* what, bool store_samples,
+                const std::string& path) {
+  std::filesystem::remove(path);
+  history::SqliteOptions options;
+  options.path = path;
+  auto store = history::open_sqlite_store(options);
+  if (!store) std::abort();
+  history::Writer writer(**store, {});
+  server::ModelRegistry models;
+  for (int r = 0; r < robots; ++r) {
+    const std::string id = "bench-" + std::to_string(r);
+    if (!writer.execute(history::AddModel{id, 1, history::ModelOrigin::file, "", "{}", std::nullopt}))
+      std::abort();
+    if (!models.put(robot_named(id), 1)) std::abort();
+  }
+  server::FleetView fleet;
+  server::IngestCounters counters;
+  server::Pipeline ingest(
+      {}, 100, models,
+      {**store,
+       [&](history::Command command) {
+         if (store_samples) (void)writer.post(std::move(command));
+       },
+       fleet, counters, [](const std::string&, const std::string& text) { std::puts(text.c_str()); }});
+  const Timer timer(what, all.size());
+  for (const Message& m : all) {
+    if (const auto message = server::decode_message(m.channel, m.bytes, 0, counters)) ingest.handle(*message);
+  }
+  ingest.finish();
+  if (!writer.flush()) std::abort();
+  return timer.stop();
+}
+
+}  // namespace
+}  // namespace joulecast
+
+int main() {
+  using namespace joulecast;
+  const std::vector<Message> all = messages();
+  const std::string path = (std::filesystem::temp_directory_path() / "joulecast-ingest-cost.db").string();
+  const double decode = decode_only(all);
+  const double meter = meter_only(all);
+  const double session = pipeline(all, "decode, session, metering, trace; no store", false, path);
+  const double whole = pipeline(all, "all of it into SQLite", true, path);
+  std::printf(
+      "\nshares of the whole: decode %.0f %%, metering %.0f %%, session and trace %.0f %%, store %.0f %%\n",
+      100 * decode / whole, 100 * meter / whole, 100 * (session - decode - meter) / whole,
+      100 * (whole - session) / whole);
+  for (const char* suffix : {"", "-wal", "-shm", ".lock"}) std::filesystem::remove(path + suffix);
+}
