@@ -49,10 +49,14 @@ Result<Exploration> explore(const Map& map) {
   const DistBug bug(map);
   Exploration result;
   result.columns = grid.columns();
+  result.seen_in.assign(grid.size(), 0);
   Point at = map.start;
   double heading = wrapped(map.start_heading_rad);
   for (;;) {
     Round round{scan_round(grid, at, heading, result.motions), std::nullopt};
+    for (std::size_t n = 0; n < grid.size(); ++n)
+      if (grid.state(n) == NodeState::seen && result.seen_in[n] == 0)
+        result.seen_in[n] = result.rounds.size() + 1;
     const std::size_t unseen = round.scan.unseen_after;
     if (unseen > map.stop_unseen_nodes) round.next = next_best_view(map, grid, bug, at);
     if (round.next) {

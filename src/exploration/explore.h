@@ -44,7 +44,8 @@ enum class Outcome {
 struct Exploration {
   std::vector<Round> rounds;
   std::vector<Motion> motions;
-  std::vector<NodeState> nodes;  // at the end, row by row from y = 0
+  std::vector<NodeState> nodes;      // at the end, row by row from y = 0
+  std::vector<std::size_t> seen_in;  // by node: the round that first saw it, counted from 1; 0 = none
   std::size_t columns = 0;
   std::size_t unseen = 0;
   Outcome outcome = Outcome::explored;

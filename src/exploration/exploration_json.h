@@ -1,0 +1,14 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <span>
+
+#include "exploration/explore.h"
+#include "exploration/mission_energy.h"
+
+namespace joulecast::exploration {
+
+// The exploration log and what the mission costs, schemas/exploration.schema.json.
+nlohmann::json to_json(const Map& map, const Exploration& exploration, std::span<const MissionEnergy> energy);
+
+}  // namespace joulecast::exploration
