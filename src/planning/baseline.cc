@@ -1,46 +1,65 @@
 #include "planning/baseline.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <optional>
-#include <vector>
-
-#include "energy/motion_estimate.h"
 
 namespace joulecast::planning {
 namespace {
 
-constexpr int points_per_span = 24;
+constexpr int steps_per_span = 24;
 
-// The ramp of one run as a motion; empty when it would have to run backwards.
-std::vector<energy::MotionPoint> ramp(const Run& run, double duration_s, double start, double end,
-                                      double ramp_fraction) {
-  const double ramp_s = ramp_fraction * duration_s, hold_s = duration_s - 2 * ramp_s;
-  const double peak = (run.length() - 0.5 * (start + end) * ramp_s) / (duration_s - ramp_s);
-  if (!(peak > 0)) return {};
-  struct Span {
-    double duration_s, from, to;
-  };
-  std::vector<energy::MotionPoint> points;
-  double time = 0, way = 0;
-  for (const Span& span : {Span{ramp_s, start, peak}, Span{hold_s, peak, peak}, Span{ramp_s, peak, end}}) {
-    if (!(span.duration_s > 0)) continue;
-    for (int k = points.empty() ? 0 : 1; k <= points_per_span; ++k) {
-      const double t = span.duration_s * k / points_per_span;
-      const double speed = span.from + (span.to - span.from) * k / points_per_span;
-      const double at = way + 0.5 * (span.from + speed) * t;
-      if (run.turn != 0) {
-        points.push_back({time + t, 0, run.turn * speed});
-      } else {
-        points.push_back({time + t, speed, speed * run.at(std::min(at, run.length())).curvature_1_m});
-      }
-    }
-    time += span.duration_s;
-    way += 0.5 * (span.from + span.to) * span.duration_s;
+// A run driven as a ramp, step by step.
+class Ramp {
+ public:
+  Ramp(const dynamics::DriveModel& model, const Run& run) : model_(model), run_(run) {
+    at_.payload_kg = run.payload_kg;
   }
-  return points;
-}
+
+  // Simpson's rule over equal steps of a span of constant acceleration: exact where power is cubic in time.
+  void drive(double duration_s, double from, double to) {
+    if (!(duration_s > 0)) return;
+    const double acceleration = (to - from) / duration_s, h = duration_s / steps_per_span;
+    double before = power_w(0, from, acceleration);
+    for (int k = 0; k < steps_per_span; ++k) {
+      const double t = k * h;
+      const double middle = power_w(t + h / 2, from, acceleration),
+                   after = power_w(t + h, from, acceleration);
+      energy_j += h / 6 * (before + 4 * middle + after);
+      before = after;
+    }
+    way_ += 0.5 * (from + to) * duration_s;
+    if (run_.turn == 0) {
+      peak_speed = std::max({peak_speed, from, to});
+      peak_acceleration = std::max(peak_acceleration, std::fabs(acceleration));
+    }
+  }
+
+  double energy_j = 0, peak_speed = 0, peak_acceleration = 0;
+
+ private:
+  double power_w(double t, double from, double acceleration) {
+    const double speed = from + acceleration * t;
+    const Knot knot = run_.at(std::clamp(way_ + (from + 0.5 * acceleration * t) * t, 0.0, run_.length()));
+    const dynamics::Parameters<double>& p = model_.parameters();
+    if (run_.turn != 0) {
+      at_.wheel_speed_rad_s = dynamics::wheels_of_body(p, 0, run_.turn * speed);
+      at_.wheel_acceleration_rad_s2 = dynamics::wheels_of_body(p, 0, run_.turn * acceleration);
+    } else {
+      at_.wheel_speed_rad_s = dynamics::wheels_of_body(p, speed, speed * knot.curvature_1_m);
+      at_.wheel_acceleration_rad_s2 =
+          dynamics::wheels_of_body(p, acceleration, acceleration * knot.curvature_1_m);
+    }
+    at_.x_m = knot.pose.x_m;
+    at_.y_m = knot.pose.y_m;
+    at_.heading_rad = knot.pose.heading_rad;
+    return model_.flow(at_).battery_power_w;
+  }
+
+  const dynamics::DriveModel& model_;
+  const Run& run_;
+  dynamics::Instant at_;
+  double way_ = 0;
+};
 
 }  // namespace
 
@@ -52,17 +71,18 @@ Result<Baseline> ramp_baseline(const dynamics::DriveModel& model, const Path& pa
   for (std::size_t k = 0; k < path.runs.size(); ++k) {
     const Run& run = path.runs[k];
     const double start = k == 0 ? start_speed_m_s : 0, end = k + 1 == path.runs.size() ? end_speed_m_s : 0;
-    const auto points = ramp(run, run_duration_s[k], start, end, ramp_fraction);
-    if (points.empty())
+    const double ramp_s = ramp_fraction * run_duration_s[k], hold_s = run_duration_s[k] - 2 * ramp_s;
+    const double peak = (run.length() - 0.5 * (start + end) * ramp_s) / (run_duration_s[k] - ramp_s);
+    if (!(peak > 0))
       return fail(Fault::infeasible, "/path", "is too short for such a ramp between its end speeds");
-    const Pose& pose = run.knots.front().pose;
-    const auto spent = energy::estimate_motion(model, points, run.payload_kg,
-                                               energy::StartPose{pose.x_m, pose.y_m, pose.heading_rad});
-    if (!spent) return tl::unexpected(spent.error());
-    baseline.energy_j += spent->battery_j + standing_w * run.dwell_before_s;
+    Ramp ramp(model, run);
+    ramp.drive(ramp_s, start, peak);
+    ramp.drive(hold_s, peak, peak);
+    ramp.drive(ramp_s, peak, end);
+    baseline.energy_j += ramp.energy_j + standing_w * run.dwell_before_s;
     baseline.duration_s += run_duration_s[k] + run.dwell_before_s;
-    for (const energy::MotionPoint& point : points)
-      baseline.peak_speed_m_s = std::max(baseline.peak_speed_m_s, point.speed_m_s);
+    baseline.peak_speed_m_s = std::max(baseline.peak_speed_m_s, ramp.peak_speed);
+    baseline.peak_acceleration_m_s2 = std::max(baseline.peak_acceleration_m_s2, ramp.peak_acceleration);
   }
   baseline.energy_j += standing_w * path.dwell_after_s;
   baseline.duration_s += path.dwell_after_s;
