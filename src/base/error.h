@@ -8,14 +8,15 @@ namespace joulecast {
 
 // What kind of fault an error is; the HTTP layer maps each to one status, the command line to one exit code.
 enum class Fault {
-  invalid,       // the caller's input breaks a stated constraint
-  not_found,     // the named thing does not exist
-  conflict,      // the request contradicts the present state
-  infeasible,    // the input is well-formed but no solution satisfies it; the message gives the nearest feasible value
-  too_large,     // a stated limit on size or count is exceeded
-  unavailable,   // a resource is missing for now (disk, network, shutting down)
-  corrupt,       // stored or received bytes cannot be trusted
-  internal       // our bug
+  invalid,      // the caller's input breaks a stated constraint
+  not_found,    // the named thing does not exist
+  conflict,     // the request contradicts the present state
+  infeasible,   // the input is well-formed but no solution satisfies it; the message gives the nearest
+                // feasible value
+  too_large,    // a stated limit on size or count is exceeded
+  unavailable,  // a resource is missing for now (disk, network, shutting down)
+  corrupt,      // stored or received bytes cannot be trusted
+  internal      // our bug
 };
 
 struct Error {

@@ -109,7 +109,8 @@ struct Cvode::Impl {
     const int flag = CVode(memory, t1, y, &reached, CV_NORMAL);
     if (Result<void> ok = check(flag); !ok) return tl::unexpected(ok.error());
     if (flag != CV_ROOT_RETURN && reached != t1)
-      return fail(Fault::internal, "cvode", "stopped at " + std::to_string(reached) + " s, short of its goal");
+      return fail(Fault::internal, "cvode",
+                  "stopped at " + std::to_string(reached) + " s, short of its goal");
     return flag;
   }
 

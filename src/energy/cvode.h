@@ -29,7 +29,8 @@ enum class Method {
 
 struct Arrival {
   double time_s = 0;
-  std::optional<std::size_t> event;  // the function that changed sign there; absent at the end of the interval
+  std::optional<std::size_t>
+      event;  // the function that changed sign there; absent at the end of the interval
 };
 
 // One CVODE integrator of fixed size, restarted as often as wanted. Owns its SUNContext, so an instance

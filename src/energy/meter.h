@@ -74,8 +74,8 @@ class Meter {
   // Goes on with accounts from before a restart of the service; call before the first sample.
   void resume(const Accounts& accounts) { accounts_ = accounts; }
 
-  // Forgets the previous sample without ending the accounts: what lies between is not integrated. For a robot's clock that
-  // was set. flush() first.
+  // Forgets the previous sample without ending the accounts: what lies between is not integrated. For a
+  // robot's clock that was set. flush() first.
   void interrupt();
 
   const Accounts& accounts() const { return accounts_; }

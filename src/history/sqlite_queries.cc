@@ -214,10 +214,11 @@ Result<Totals> totals(Database& database, const MissionFilter& filter) {
     for (const char c : accounts_columns()) text += c == ',' ? std::string("), sum(") : std::string(1, c);
     return text + ")";
   }();
-  Rows rows(database.statement(
-      "SELECT count(*), coalesce(sum(measured_s > 0), 0), coalesce(sum(incomplete), 0), coalesce(sum(samples), 0), "
-      "coalesce(sum(gap_count), 0), coalesce(sum(gap_s), 0.0), " +
-      sums + " FROM mission" + where(filter)));
+  Rows rows(
+      database.statement("SELECT count(*), coalesce(sum(measured_s > 0), 0), coalesce(sum(incomplete), 0), "
+                         "coalesce(sum(samples), 0), "
+                         "coalesce(sum(gap_count), 0), coalesce(sum(gap_s), 0.0), " +
+                         sums + " FROM mission" + where(filter)));
   bind_filter(rows, filter);
   rows.next();
   Totals t;
