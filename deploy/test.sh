@@ -8,6 +8,7 @@ quick=false
 
 deploy/install-dependencies.sh
 deploy/check-format.sh
+deploy/check-lint.sh
 
 # Tests that speak UDP multicast get a network namespace of their own.
 isolated() {
