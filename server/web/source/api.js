@@ -1,0 +1,61 @@
+import { useEffect, useRef, useState } from 'preact/hooks';
+
+// What the service refused, or that it could not be reached (status 0).
+export class Problem extends Error {
+  constructor(status, title, detail, field) {
+    super(detail || title);
+    Object.assign(this, { status, title, detail, field });
+  }
+}
+
+async function answer(response) {
+  if (response.ok) return response.json();
+  const told = await response.json().catch(() => ({}));
+  throw new Problem(response.status, told.title ?? response.statusText, told.detail ?? '', told.field);
+}
+
+async function call(path, options) {
+  let response;
+  try {
+    response = await fetch(path, options);
+  } catch (error) {
+    if (error.name === 'AbortError') throw error;
+    throw new Problem(0, 'The service cannot be reached', 'It may be restarting, or the network is down.');
+  }
+  return answer(response);
+}
+
+export function get(path, signal) {
+  return call(path, { signal });
+}
+
+export function post(path, body, signal) {
+  return call(path, { method: 'POST', body: JSON.stringify(body), headers: { 'content-type': 'application/json' }, signal });
+}
+
+// Empty, null and undefined values are left out.
+export function query(values) {
+  const kept = Object.entries(values).filter(([, v]) => v !== undefined && v !== null && v !== '');
+  return kept.length === 0 ? '' : `?${new URLSearchParams(kept)}`;
+}
+
+export const id_path = (id) => encodeURIComponent(id);
+
+// {value, error, loading, reload}; asks again when `path` changes, keeps the last value while it does.
+// A null path asks nothing.
+export function useGet(path) {
+  const [told, set_told] = useState({ value: null, error: null, loading: path !== null, path });
+  const [turn, set_turn] = useState(0);
+  const shown = useRef(path);
+  useEffect(() => {
+    if (path === null) return undefined;
+    const abort = new AbortController();
+    shown.current = path;
+    set_told((before) => ({ ...before, loading: true }));
+    get(path, abort.signal).then(
+      (value) => set_told({ value, error: null, loading: false, path }),
+      (error) => error.name === 'AbortError' || set_told((before) => ({ ...before, error, loading: false, path })));
+    return () => abort.abort();
+  }, [path, turn]);
+  return { ...told, reload: () => set_turn((n) => n + 1) };
+}

@@ -1,0 +1,99 @@
+// Numbers as people read them: a few sensible digits, a unit, and a dash for what was not measured.
+
+const thin = '\u2009';
+const dash = '–';
+const minus = '−';
+
+function group(text) {
+  const [whole, part] = text.split('.');
+  const grouped = whole.length > 4 ? whole.replace(/\B(?=(\d{3})+(?!\d))/g, thin) : whole;
+  return part === undefined ? grouped : `${grouped}.${part}`;
+}
+
+export function known(value) {
+  return typeof value === 'number' && Number.isFinite(value);
+}
+
+// `places` digits after the point.
+export function fixed(value, places = 0) {
+  if (!known(value)) return dash;
+  const text = Math.abs(value).toFixed(places);
+  return (value < 0 && Number(text) !== 0 ? minus : '') + group(text);
+}
+
+// About `digits` significant digits, whole numbers never rounded away from the point.
+export function digits(value, count = 3) {
+  if (!known(value)) return dash;
+  if (value === 0) return '0';
+  const magnitude = Math.floor(Math.log10(Math.abs(value)));
+  return fixed(value, Math.max(0, Math.min(6, count - 1 - magnitude)));
+}
+
+export function signed(text) {
+  return text === dash || text.startsWith(minus) || text === '0' ? text : `+${text}`;
+}
+
+// {n, u}: the number and the unit, prefixed so that the number stays short.
+export function energy(joule) {
+  if (!known(joule)) return { n: dash, u: '' };
+  const size = Math.abs(joule);
+  if (size >= 999_500) return { n: digits(joule / 1e6, 4), u: 'MJ' };
+  if (size >= 999.5) return { n: digits(joule / 1e3, 4), u: 'kJ' };
+  return { n: size >= 0.05 ? digits(joule, 3) : fixed(joule, 2), u: 'J' };
+}
+
+export function power(watt) {
+  if (!known(watt)) return { n: dash, u: '' };
+  if (Math.abs(watt) >= 9995) return { n: digits(watt / 1e3, 3), u: 'kW' };
+  return { n: fixed(watt, 1), u: 'W' };
+}
+
+export function length(metre) {
+  if (!known(metre)) return { n: dash, u: '' };
+  if (Math.abs(metre) >= 9995) return { n: digits(metre / 1e3, 3), u: 'km' };
+  return { n: digits(metre, 3), u: 'm' };
+}
+
+export function percent(share, places = 0) {
+  return known(share) ? { n: fixed(share * 100, places), u: '%' } : { n: dash, u: '' };
+}
+
+export function unit(value, u, places) {
+  return known(value) ? { n: places === undefined ? digits(value) : fixed(value, places), u } : { n: dash, u: '' };
+}
+
+export function text(quantity) {
+  return quantity.u === '' ? quantity.n : `${quantity.n}\u00a0${quantity.u}`;
+}
+
+// A span as an operator says it: 8.4 s, 3 min 20 s, 5 h 07 min, 12 d.
+export function span(second) {
+  if (!known(second)) return dash;
+  const s = Math.abs(second), sign = second < 0 ? minus : '';
+  const two = (v) => String(Math.floor(v)).padStart(2, '0');
+  if (s < 60) return `${sign}${s < 10 ? s.toFixed(1) : s.toFixed(0)}\u00a0s`;
+  if (s < 3600) return `${sign}${Math.floor(s / 60)}\u00a0min ${two(s % 60)}\u00a0s`;
+  if (s < 172_800) return `${sign}${Math.floor(s / 3600)}\u00a0h ${two((s % 3600) / 60)}\u00a0min`;
+  return `${sign}${Math.round(s / 86_400)}\u00a0d`;
+}
+
+function parts(utime_us) {
+  const d = new Date(utime_us / 1000);
+  const two = (v) => String(v).padStart(2, '0');
+  return {
+    day: `${d.getFullYear()}-${two(d.getMonth() + 1)}-${two(d.getDate())}`,
+    clock: `${two(d.getHours())}:${two(d.getMinutes())}:${two(d.getSeconds())}`,
+  };
+}
+
+export function time(utime_us) {
+  if (!known(utime_us)) return dash;
+  const { day, clock } = parts(utime_us);
+  return `${day} ${clock}`;
+}
+
+export function clock(utime_us) {
+  return known(utime_us) ? parts(utime_us).clock : dash;
+}
+
+export const words = (name) => name.replaceAll('_', ' ');

@@ -1,0 +1,148 @@
+// The live fleet: the list once, then the event stream. Events change the map at once; components are told at
+// most once an animation frame and five times a second, however many robots report.
+import { useEffect, useState } from 'preact/hooks';
+import { get } from './api.js';
+
+const power_samples = 90;
+const path_samples = 600;
+const least_ms_between_draws = 200;
+const silence_before_check_ms = 20_000;
+
+class Track {
+  constructor(length) {
+    this.length = length;
+    this.rows = [];
+  }
+  push(row) {
+    this.rows.push(row);
+    if (this.rows.length > 2 * this.length) this.rows.splice(0, this.rows.length - this.length);
+  }
+  last() {
+    return this.rows.length > this.length ? this.rows.slice(-this.length) : this.rows;
+  }
+}
+
+const robots = new Map();
+const state = { link: 'connecting', since_ms: Date.now(), loaded: false, error: null, robots, revision: 0, events: 0 };
+const listeners = new Set();
+let source = null, drawn_ms = 0, scheduled = false, heard_ms = 0, retry_ms = 1000, ended_missions = new Set();
+
+function tell() {
+  scheduled = false;
+  drawn_ms = performance.now();
+  state.revision += 1;
+  for (const listener of listeners) listener(state.revision);
+}
+
+function changed() {
+  if (scheduled) return;
+  scheduled = true;
+  const wait = least_ms_between_draws - (performance.now() - drawn_ms);
+  if (wait > 0) setTimeout(() => requestAnimationFrame(tell), wait);
+  else requestAnimationFrame(tell);
+}
+
+function take(told) {
+  let entry = robots.get(told.robot_id);
+  if (entry === undefined) {
+    entry = { id: told.robot_id, revision: 0, power: new Track(power_samples), path: new Track(path_samples) };
+    robots.set(told.robot_id, entry);
+  }
+  const fresh = entry.state === undefined || entry.state.utime_us !== told.utime_us;
+  entry.state = told;
+  entry.revision += 1;
+  if (fresh && told.utime_us !== null) {
+    entry.power.push([told.utime_us, told.measured_power_w ?? NaN, told.modelled_power_w ?? NaN]);
+    const [x, y, heading] = told.pose;
+    if (x !== null && y !== null) entry.path.push([x, y, heading ?? 0, told.measured_power_w ?? told.modelled_power_w ?? NaN]);
+  }
+}
+
+function link(name) {
+  if (state.link === name) return;
+  state.link = name;
+  state.since_ms = Date.now();
+  changed();
+}
+
+async function load() {
+  try {
+    const { robots: list } = await get('/v1/robots');
+    const present = new Set(list.map((robot) => robot.robot_id));
+    for (const id of robots.keys()) if (!present.has(id)) robots.delete(id);
+    for (const robot of list) take(robot);
+    state.loaded = true;
+    state.error = null;
+  } catch (error) {
+    state.error = error;
+  }
+  changed();
+}
+
+function connect() {
+  source = new EventSource('/v1/events');
+  source.addEventListener('open', () => {
+    heard_ms = performance.now();
+    if (state.link === 'offline' || !state.loaded) load();
+    retry_ms = 1000;
+    link('live');
+  });
+  source.addEventListener('state', (event) => {
+    heard_ms = performance.now();
+    state.events += 1;
+    take(JSON.parse(event.data));
+    changed();
+  });
+  source.addEventListener('mission', (event) => {
+    heard_ms = performance.now();
+    const mission = JSON.parse(event.data);
+    for (const listener of ended_missions) listener(mission);
+  });
+  source.addEventListener('reset', load);
+  source.addEventListener('error', () => {
+    link('offline');
+    if (source.readyState === EventSource.CLOSED) again();  // the browser retries by itself otherwise
+  });
+}
+
+function again() {
+  source.close();
+  setTimeout(connect, retry_ms);
+  retry_ms = Math.min(2 * retry_ms, 15_000);
+}
+
+// A stream that died without a word looks like a quiet fleet: ask.
+async function check() {
+  if (state.link !== 'live' || performance.now() - heard_ms < silence_before_check_ms) return;
+  heard_ms = performance.now();
+  try {
+    await get('/healthz');
+  } catch {
+    link('offline');
+    again();
+  }
+}
+
+export function start_live() {
+  load();
+  connect();
+  setInterval(check, 5000);
+}
+
+export function useLive() {
+  const [, set_revision] = useState(0);
+  useEffect(() => {
+    listeners.add(set_revision);
+    set_revision(state.revision);
+    return () => listeners.delete(set_revision);
+  }, []);
+  return state;
+}
+
+// Calls `listener` with every mission that ends.
+export function useEndedMissions(listener) {
+  useEffect(() => {
+    ended_missions.add(listener);
+    return () => ended_missions.delete(listener);
+  }, [listener]);
+}

@@ -1,0 +1,199 @@
+import { useEffect, useMemo, useState } from 'preact/hooks';
+import { html } from '../html.js';
+import * as format from '../format.js';
+import { id_path, post, query, useGet } from '../api.js';
+import { Bars } from '../bars.js';
+import { Chart, axis, cursor_of, with_alpha } from '../chart.js';
+import { FloorPath } from '../floor.js';
+import { least_drive_request } from '../least_drive.js';
+import { robot_link } from '../route.js';
+import { palette } from '../theme.js';
+import { Answer, Choice, Empty, Failure, Loading, MissionState, Panel, Quantity, Readout, useTitleOf } from '../widgets.js';
+import { Waterfall } from '../waterfall.js';
+import { ratio_of } from './missions.js';
+
+const trace_points = 1200, group = 'mission';
+const run_clock = (_, splits) => splits.map((s) => {
+  if (s === null) return '';
+  const sign = s < 0 ? '−' : '', t = Math.abs(s);
+  return t < 60 && splits[splits.length - 1] < 60 ? `${sign}${t}` : `${sign}${Math.floor(t / 60)}:${String(Math.floor(t % 60)).padStart(2, '0')}`;
+});
+
+function seconds(trace, start_utime_us) {
+  return trace.start_utime_us.map((t) => (t - start_utime_us + trace.width_us / 2) / 1e6);
+}
+
+function Charts({ trace, mission, zoom, set_zoom, set_cursor }) {
+  const t = useMemo(() => seconds(trace, mission.start_utime_us), [trace]);
+  const power = useMemo(() => [t, trace.measured_power_w.max, trace.measured_power_w.min, trace.measured_power_w.mean,
+    trace.modelled_power_w.max, trace.modelled_power_w.min, trace.modelled_power_w.mean], [trace]);
+  const speed = useMemo(() => [t, trace.speed_m_s.max, trace.speed_m_s.min, trace.speed_m_s.mean], [trace]);
+  const hooks = {
+    setCursor: [(u) => set_cursor(u.cursor.idx ?? null)],
+    setSelect: [(u) => {
+      if (u.select.width < 6) return;
+      set_zoom([u.posToVal(u.select.left, 'x'), u.posToVal(u.select.left + u.select.width, 'x')]);
+      u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+    }],
+  };
+  const cursor = { ...cursor_of(group), drag: { x: true, y: false, setScale: false, dist: 6 }, bind: { dblclick: () => () => set_zoom(null) } };
+  const time_axis = (label) => axis(label, { size: 26, values: run_clock });
+  const make_power = () => {
+    const p = palette(), none = { show: true, stroke: 'transparent', points: { show: false } };
+    return {
+      cursor, hooks, scales: { x: { time: false } },
+      axes: [time_axis(''), axis('power, W')],
+      bands: [{ series: [1, 2], fill: with_alpha(p.measured, 0.2) }, { series: [4, 5], fill: with_alpha(p.modelled, 0.16) }],
+      series: [{}, none, none, { stroke: p.measured, width: 1.75, points: { show: false } }, none, none,
+        { stroke: p.modelled, width: 1.5, points: { show: false } }],
+    };
+  };
+  const make_speed = () => {
+    const p = palette(), none = { stroke: 'transparent', points: { show: false } };
+    return {
+      cursor, hooks, scales: { x: { time: false } },
+      axes: [time_axis('time since the start, min:s'), axis('speed, m/s')],
+      bands: [{ series: [1, 2], fill: with_alpha(p.ink, 0.12) }],
+      series: [{}, none, none, { stroke: p.ink, width: 1.5, points: { show: false } }],
+    };
+  };
+  return html`
+    <${Chart} make=${make_power} data=${power} height=${270} changes=${[mission.id]} label="Battery power over the mission, measured and modelled, with the least and greatest of each span" />
+    <${Chart} make=${make_speed} data=${speed} height=${150} changes=${[mission.id]} label="Speed over the mission" />`;
+}
+
+function AtCursor({ trace, mission, index }) {
+  const at = index !== null && index < trace.start_utime_us.length ? index : null;
+  const of = (column, f) => (at === null ? { n: '–', u: '' } : f(column[at]));
+  const measured = trace.measured_power_w, modelled = trace.modelled_power_w;
+  const gap = at === null || measured.mean[at] === null ? null : measured.mean[at] - modelled.mean[at];
+  return html`<dl class="readouts strip" aria-live="off">
+    <${Readout} label="Time" of=${at === null ? '–' : format.span((trace.start_utime_us[at] - mission.start_utime_us) / 1e6)} />
+    <${Readout} label="Measured" channel="measured" of=${of(measured.mean, format.power)} note=${at !== null && measured.mean[at] !== null ? `${format.fixed(measured.min[at], 0)} to ${format.fixed(measured.max[at], 0)}` : ''} />
+    <${Readout} label="Modelled" channel="modelled" of=${of(modelled.mean, format.power)} />
+    <${Readout} label="Gap" channel="gap" of=${(() => { const q = format.power(gap); return { n: format.signed(q.n), u: q.u }; })()} />
+    <${Readout} label="Speed" of=${of(trace.speed_m_s.mean, (v) => format.unit(v, 'm/s', 2))} />
+    <${Readout} label="Charge" of=${of(trace.state_of_charge, (v) => format.percent(v, 2))} />
+  </dl>`;
+}
+
+function TracePanels({ mission, whole }) {
+  const [zoom, set_zoom] = useState(null);
+  const [cursor, set_cursor] = useState(null);
+  const [colouring, set_colouring] = useState('power');
+  const utime = (second) => Math.round(mission.start_utime_us + second * 1e6);
+  const closer = useGet(zoom === null ? null : `/v1/missions/${mission.id}/trace${query({ points: trace_points, from_utime_us: utime(zoom[0]), to_utime_us: utime(zoom[1]) })}`);
+  const trace = zoom !== null && closer.value !== null && closer.value.start_utime_us.length > 1 ? closer.value : whole;
+  const measured = whole.measured_power_w.mean.some((v) => v !== null);
+  const path = useMemo(() => trace.x_m.map((x, k) => {
+    const m = trace.measured_power_w.mean[k], f = trace.modelled_power_w.mean[k];
+    return [x ?? NaN, trace.y_m[k] ?? NaN, colouring === 'gap' ? (m === null ? NaN : m - f) : m ?? f ?? NaN];
+  }), [trace, colouring]);
+  const placed = path.some(([x]) => Number.isFinite(x));
+  if (whole.start_utime_us.length === 0) return html`<${Panel} title="Power"><${Empty} title="No trace kept">The mission ended before its first sample was stored.<//><//>`;
+  return html`<div class="columns trace-columns">
+    <${Panel} class="screen" title="Power and speed" aside=${html`
+        <span class="key"><span class="swatch measured"></span>measured <span class="swatch modelled"></span>modelled <span class="swatch band"></span>least to greatest</span>
+        ${zoom === null ? html`<span class="note">drag to look closer</span>` : html`<button type="button" onClick=${() => set_zoom(null)}>Whole mission</button>`}`}>
+      <${Charts} trace=${trace} mission=${mission} zoom=${zoom} set_zoom=${set_zoom} set_cursor=${set_cursor} />
+      <${AtCursor} trace=${trace} mission=${mission} index=${cursor} />
+      <p class="note foot">Each point is ${format.span(trace.width_us / 1e6)}${zoom !== null ? ', closer view' : ''}.</p>
+    <//>
+    <${Panel} class="screen" title="On the floor" aside=${html`<${Choice} label="Colour by" value=${colouring} onChange=${set_colouring} options=${measured ? [['power', 'Power'], ['gap', 'Gap']] : [['power', 'Power']]} />`}>
+      ${placed ? html`<${FloorPath} points=${path} kind=${colouring} cursor=${cursor} height=${440} label=${`Path of the mission, coloured by ${colouring === 'gap' ? 'measured minus modelled power' : 'power'}; circle: start, square: end`} />
+        <p class="note foot">○ start  ■ end. Poses as the robot told them.</p>`
+      : html`<${Empty} title="No poses">This robot did not tell where it was.<//>`}
+    <//>
+  </div>`;
+}
+
+function LeastDrive({ mission, trace }) {
+  const request = useMemo(() => least_drive_request(mission, trace), [mission.id, mission.state]);
+  const robot = useGet(`/v1/robots/${id_path(mission.robot_id)}`);
+  const [told, set_told] = useState({ value: null, error: null });
+  useEffect(() => {
+    if (request === null) return undefined;
+    const abort = new AbortController();
+    post(`/v1/robots/${id_path(mission.robot_id)}/profile`, request, abort.signal)
+      .then((value) => set_told({ value, error: null }), (error) => error.name === 'AbortError' || set_told({ value: null, error }));
+    return () => abort.abort();
+  }, [request]);
+  if (request === null) return html`<${Empty} title="Nothing to compare">The robot did not drive.<//>`;
+  if (told.error !== null) return html`<${Failure} error=${told.error} />`;
+  if (told.value === null || robot.value === null) return robot.error !== null ? html`<${Failure} error=${robot.error} />` : html`<${Loading} what="the minimum-energy drive" />`;
+  const e = mission.energy, wait_s = Math.max(0, e.duration_s - told.value.duration_s);
+  const waiting_j = wait_s * robot.value.model.idle_power_w, least = told.value.energy_j + waiting_j;
+  const share = 1 - least / e.modelled_j;
+  const legs = request.path.filter((leg) => leg.kind === 'straight').length;
+  return html`
+    <p class="verdict">${share > 0.005 ? html`The same legs could have been driven for <b>${format.fixed(share * 100, 1)}${'\u00a0'}%</b> less.` : html`Driven about as cheaply as the model allows.`}</p>
+    <${Bars} label="Energy of the mission and of the minimum-energy drive" rows=${[
+      { name: 'Measured', value: e.measured_j, of: format.energy(e.measured_j), channel: 'measured', note: format.span(e.duration_s) },
+      { name: 'Modelled', value: e.modelled_j, of: format.energy(e.modelled_j), channel: 'modelled', note: format.span(e.duration_s) },
+      { name: 'Least energy', value: least, extra: waiting_j, of: format.energy(least), channel: 'least', note: `${format.span(told.value.duration_s)} driving` },
+    ]} />
+    <p class="note foot">${legs} ${legs === 1 ? 'leg' : 'legs'} of ${format.text(format.length(e.distance_m))} in all, ${format.fixed((Math.abs(e.turned_rad) * 180) / Math.PI)}° turned at the stops, payload ${format.text(format.unit(mission.payload_kg ?? 0, 'kg'))},
+      within ${format.span(e.duration_s)}; ${format.span(wait_s)} left over spent waiting at idle (hatched). Model version ${told.value.model_version}; the saving is against the modelled energy, so that a gap of the model does not count as one.</p>`;
+}
+
+function Facts({ mission }) {
+  const faults = Object.entries(mission.sample_faults);
+  const row = (name, value) => html`<tr><th scope="row">${name}</th><td>${value}</td></tr>`;
+  const e = mission.energy;
+  return html`<table class="facts"><tbody>
+    ${row('Robot', html`<a href=${robot_link(mission.robot_id)}>${mission.robot_id}</a>`)}
+    ${row('Started', format.time(mission.start_utime_us))}
+    ${row(mission.state === 'open' ? 'Last heard' : 'Ended', format.time(mission.end_utime_us))}
+    ${row('Announced', mission.implicit ? 'no: opened by its telemetry' : 'by the robot')}
+    ${row('Model', mission.model_version === null ? 'none' : `version ${mission.model_version}`)}
+    ${row('Samples', format.fixed(mission.samples))}
+    ${row('Gaps', mission.gap_count === 0 ? 'none' : `${mission.gap_count}, ${format.span(mission.gap_s)} in all`)}
+    ${row('Faulty samples', faults.length === 0 ? 'none' : faults.map(([reason, n]) => `${n} ${format.words(reason)}`).join(', '))}
+    ${row('Battery measured', `${format.span(e.measured_s)} of ${format.span(e.duration_s)}`)}
+    ${row('Drawn · returned', `${format.text(format.energy(e.drawn_j))} · ${format.text(format.energy(e.returned_j))}`)}
+    ${row('Charge', format.text(format.unit(e.charge_ah * 1000, 'mAh')))}
+    ${row('Motors measured', e.measured_motor_j[0] === null ? '–' : `right ${format.text(format.energy(e.measured_motor_j[0]))}, left ${format.text(format.energy(e.measured_motor_j[1]))}`)}
+    ${row('Motors modelled', `right ${format.text(format.energy(e.modelled_motor_j[0]))}, left ${format.text(format.energy(e.modelled_motor_j[1]))}`)}
+    ${mission.note && row('Note', mission.note)}
+  </tbody></table>`;
+}
+
+export function Mission({ id }) {
+  const mission = useGet(`/v1/missions/${id_path(id)}`);
+  const ledger = useGet(`/v1/missions/${id_path(id)}/ledger`);
+  const trace = useGet(`/v1/missions/${id_path(id)}/trace${query({ points: trace_points })}`);
+  useTitleOf(mission.value?.mission_id ?? 'Mission');
+  const open = mission.value?.state === 'open';
+  useEffect(() => {
+    if (!open) return undefined;
+    const timer = setInterval(() => [mission, ledger, trace].forEach((told) => told.reload()), 3000);
+    return () => clearInterval(timer);
+  }, [open]);
+  return html`<${Answer} of=${mission} what="the mission">${(m) => {
+    const e = m.energy, ratio = ratio_of(e);
+    return html`
+    <div class="heading"><p class="crumbs"><a href="#/missions">Missions</a> / <a href=${robot_link(m.robot_id)}>${m.robot_id}</a></p>
+      <h1>${m.mission_id}</h1><${MissionState} mission=${m} />
+      ${m.incomplete && html`<span class="flag">incomplete${m.incomplete_reason ? `: ${format.words(m.incomplete_reason)}` : ''}</span>`}
+      <span class="note">${format.time(m.start_utime_us)}</span></div>
+    <dl class="readouts">
+      <${Readout} large label=${e.measured_j === null ? 'From the battery (modelled)' : 'From the battery'} of=${format.energy(e.battery_j)} channel=${e.measured_j === null ? 'modelled' : 'measured'} />
+      <${Readout} large label="Modelled" of=${format.energy(e.modelled_j)} channel="modelled" />
+      <${Readout} large label="Unexplained" of=${(() => { const q = format.energy(e.unexplained_j); return { n: format.signed(q.n), u: q.u }; })()} channel="gap" note=${ratio === null ? '' : `ratio ${format.fixed(ratio, 3)}`} />
+      <${Readout} large label="Distance" of=${format.length(e.distance_m)} />
+      <${Readout} large label="Duration" of=${format.span(e.duration_s)} />
+      <${Readout} large label="Per metre" of=${format.unit(e.distance_m > 0.1 ? e.battery_j / e.distance_m : null, 'J/m')} />
+      <${Readout} large label="Payload" of=${format.unit(m.payload_kg, 'kg')} />
+    </dl>
+    <${Answer} of=${trace} what="the trace">${(value) => html`<${TracePanels} mission=${m} whole=${value} />`}<//>
+    <div class="columns">
+      <${Panel} title="Where the energy went"><${Answer} of=${ledger} what="the ledger">${({ ledger: l }) =>
+        html`<${Waterfall} terms_j=${l.terms_j} battery_j=${l.battery_j} closure=${l.closure_relative} />`}<//><//>
+      <div>
+        <${Panel} title="Against the minimum-energy drive">${m.model_version === null ? html`<${Empty} title="No model">The robot had no model on this mission.<//>` :
+          open ? html`<${Empty} title="Still driving">Compared when the mission ends.<//>` : trace.value && html`<${LeastDrive} mission=${m} trace=${trace.value} />`}<//>
+        <${Panel} title="Record"><${Facts} mission=${m} /><//>
+      </div>
+    </div>`;
+  }}<//>`;
+}
