@@ -90,42 +90,48 @@ class Request {
                       std::to_string(shortest_s_ * (1 + 1e-5)));
     }
     deadline_binds_ = true;
-    // log(T - T_min) falls nearly linearly in log(idle + price): regula falsi (Illinois) on those.
+    // log(T - T_min) falls nearly linearly in log(idle + price): a bracket there, drawn in by the secant
+    // through its ends (Illinois) or, where that stalls, by halving. Done a little early, within 1e-4 of the
+    // deadline.
     const double idle = std::max(loads_.electric().idle_w, 1e-3 * average_power_w());
-    const double target = std::log(deadline - shortest_s_);
-    const auto gap = [&] { return std::log(std::max(1e-12, duration_s() - shortest_s_)) - target; };
-    double x0 = std::log(idle + price_w_), y0 = gap(), x1 = x0, y1 = y0;
-    for (int k = 0; k < 40 && y1 > 0; ++k) {
-      x0 = x1, y0 = y1;
-      x1 += std::clamp(1.2 * y1, 0.7, 4.0);
-      if (auto ok = solve(std::exp(x1) - idle); !ok) return ok;
-      y1 = gap();
+    const auto late = [&] {
+      return std::log(std::max(1e-12, duration_s() - shortest_s_) / (deadline - shortest_s_));
+    };
+    const auto met = [&] { return duration_s() <= deadline && duration_s() > deadline * (1 - 1e-4); };
+    const auto at = [&](double x) { return solve(std::exp(x) - idle); };
+    double slow = std::log(idle + price_w_), late_slow = late(), fast = slow, late_fast = late_slow;
+    for (int k = 0; k < 40 && late_slow <= 0; ++k) {  // a Pareto front asks from the fast side
+      fast = slow, late_fast = late_slow;
+      slow = std::max(slow - 0.7, std::log(idle + problem_.value_of_time_w));
+      if (auto ok = at(slow); !ok) return ok;
+      late_slow = late();
     }
-    const double close = 1e-4 * deadline / (deadline - shortest_s_);
-    double held = 0;
-    for (int k = 0; k < 40; ++k) {
-      // Ends on the early side, within 1e-4 of the deadline.
-      if (y1 <= 0 && y1 > -close) return {};
-      if (std::fabs(x1 - x0) < 1e-12) break;
-      const double aim = 0.4 * close;  // a little early, so that one side is enough
-      double x = x1 - (y1 + aim) * (x1 - x0) / (y1 - y0);
-      if (!(x > std::min(x0, x1) && x < std::max(x0, x1))) x = 0.5 * (x0 + x1);
-      if (auto ok = solve(std::exp(x) - idle); !ok) return ok;
-      const double y = gap();
-      if ((y > 0) != (y1 > 0)) {
-        x0 = x1, y0 = y1, held = 0;
-      } else if (++held > 1) {
-        x = 0.5 * (x + x0);
-        if (auto ok = solve(std::exp(x) - idle); !ok) return ok;
-        const double again = gap();
-        if ((again > 0) != (y > 0)) {
-          x0 = x1, y0 = y1;
-        }
-        x1 = x, y1 = again, held = 0;
-        continue;
+    for (int k = 0; k < 40 && late_fast > 0; ++k) {
+      slow = fast, late_slow = late_fast;
+      fast += std::clamp(1.2 * late_fast, 0.3, 3.0);
+      if (auto ok = at(fast); !ok) return ok;
+      late_fast = late();
+    }
+    int side = 0;
+    for (int k = 0; k < 60 && !met(); ++k) {
+      const double aim = 0.5e-4 * deadline / (deadline - shortest_s_);
+      double x = slow + (fast - slow) * (late_slow + aim) / (late_slow - late_fast);
+      if (k % 4 == 3 || !(x > slow && x < fast)) x = 0.5 * (slow + fast);
+      if (auto ok = at(x); !ok) return ok;
+      const double y = late();
+      if (y > 0) {
+        slow = x, late_slow = y;
+        if (side == 1) late_fast *= 0.5;
+        side = 1;
+      } else {
+        fast = x, late_fast = y;
+        if (side == -1) late_slow *= 0.5;
+        side = -1;
       }
-      x1 = x, y1 = y;
+      if (fast - slow < 1e-9) break;
     }
+    if (met()) return {};
+    if (auto ok = at(fast); !ok) return ok;
     if (duration_s() <= deadline) return {};
     return fail(Fault::internal, "deadline_s", "the price of time that meets the deadline was not found");
   }

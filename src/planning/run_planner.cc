@@ -167,21 +167,24 @@ std::vector<double> RunPlanner::first_nodes(std::size_t cells) const {
   for (std::size_t k = 1; k < knots.size(); ++k) {
     const double gap = knots[k].way - nodes.back();
     if (gap < smallest && k + 1 < knots.size()) continue;
-    const double cuts = std::max(1.0, std::ceil(gap / coarse - 1e-9));
+    // Where the curvature changes quickly, torque does: such a stretch gets at least 8 cells.
+    const bool bends = std::fabs(knots[k].curvature_1_m - knots[k - 1].curvature_1_m) > 0.05;
+    const double cuts =
+        std::max(bends ? std::min(8.0, std::ceil(200 * gap)) : 1.0, std::ceil(gap / coarse - 1e-9));
     const double from = nodes.back();
     for (double i = 1; i <= cuts; ++i) nodes.push_back(from + gap * i / cuts);
   }
   nodes.back() = length;
-  // From rest the speed grows with the root of the way: nodes even in time, s = L/2 (j/m)^2, until their
-  // spacing reaches the grid's.
+  // Near the ends the speed changes with the root of the way: nodes even in time, s = L/2 (j/m)^2, until
+  // their spacing reaches the grid's.
   std::vector<double> graded;
   const double m = 0.5 * static_cast<double>(cells), half = 0.5 * length, widest = nodes[1] - nodes[0];
   for (double j = 1; j < m; ++j) {
     if (half * (2 * j + 1) / (m * m) > std::max(widest, nodes[nodes.size() - 1] - nodes[nodes.size() - 2]))
       break;
     const double way = half * (j / m) * (j / m);
-    if (start_ == 0) graded.push_back(way);
-    if (end_ == 0) graded.push_back(length - way);
+    graded.push_back(way);
+    graded.push_back(length - way);
   }
   nodes.insert(nodes.end(), graded.begin(), graded.end());
   std::sort(nodes.begin(), nodes.end());
@@ -327,6 +330,36 @@ std::optional<RunAnswer> RunPlanner::closed_form(double price_w) const {
   return answer;
 }
 
+// The solver holds the motors' limits at the middle of each cell. Where they are exceeded towards its ends,
+// the cell gets a smaller share of them; false when none needs it.
+bool RunPlanner::tighten(const std::vector<double>& z) {
+  const std::size_t n = nodes_.size() - 1;
+  bool any = false;
+  for (std::size_t k = 0; k < n; ++k) {
+    const double q = (z[k + 1] - z[k]) / (2 * grid_->step[k]);
+    double excess = 0;
+    for (double f : {0.001, 0.999}) {
+      const double way = nodes_[k] + f * grid_->step[k], v = std::sqrt(z[k] + f * (z[k + 1] - z[k]));
+      const double slope = run_->turn == 0 ? curvature_slope(way) : 0;
+      const auto flow = loads_->model().flow(loads_->instant(*run_, run_->at(way), slope, v, q));
+      for (std::size_t s : {0u, 1u}) {
+        excess = std::max(excess, std::fabs(flow.torque_nm[s]) / grid_->torque_limit_nm - 1);
+        excess = std::max(excess, std::fabs(flow.voltage_v[s]) / grid_->voltage_limit_v - 1);
+      }
+    }
+    if (excess > 1e-4) {
+      if (grid_->motor_share.empty()) grid_->motor_share.assign(n, 1);
+      grid_->motor_share[k] *= (1 - 1e-5) / (1 + excess);
+      any = true;
+    }
+  }
+  if (any) {
+    *envelope_ = speed_envelope(*grid_);
+    solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
+  }
+  return any;
+}
+
 Result<RunAnswer> RunPlanner::solve(double price_w) {
   if (auto answer = closed_form(price_w)) return std::move(*answer);
   const double idle = loads_->electric().idle_w;
@@ -351,6 +384,12 @@ Result<RunAnswer> RunPlanner::solve(double price_w) {
       refined_ = true;
     }
   } else {
+    s = solver_->solve(price_w);
+  }
+  for (int round = 0; round < 4 && s.converged; ++round) {
+    if (!solver_->bounds_motors() || !tighten(s.z)) break;
+    if (auto ok = check_feasible(); !ok) return tl::unexpected(std::move(ok.error()));
+    iterations += s.iterations;
     s = solver_->solve(price_w);
   }
   if (!s.converged) {

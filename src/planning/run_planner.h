@@ -49,6 +49,7 @@ class RunPlanner {
   void build(std::vector<double> nodes);
   Result<void> check_feasible() const;
   std::optional<RunAnswer> closed_form(double price_w) const;
+  bool tighten(const std::vector<double>& z);
   std::vector<double> first_nodes(std::size_t cells) const;
   static std::vector<double> thinned(const std::vector<double>& nodes);
   std::vector<double> refined_nodes(const std::vector<double>& z, std::size_t cells) const;

@@ -24,11 +24,11 @@ bool motors_allow(const SpeedGrid& grid, std::size_t cell, double v, double q) {
   for (std::size_t s : {0u, 1u}) {
     const WheelLoad& w = grid.load(cell)[s];
     const double t = torque_of(w, v, q);
-    if (std::fabs(t) > grid.torque_limit_nm) return false;
+    if (std::fabs(t) > grid.torque_limit_nm * grid.share(cell)) return false;
     const Electric& e = grid.electric;
     const double volts =
         e.resistance_ohm[s] / e.torque_constant_nm_a * t + e.voltage_constant_v_s_rad * w.pace * v;
-    if (std::fabs(volts) > grid.voltage_limit_v) return false;
+    if (std::fabs(volts) > grid.voltage_limit_v * grid.share(cell)) return false;
   }
   return true;
 }
@@ -156,14 +156,15 @@ SpeedSolver::SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope)
       const Electric& e = grid.electric;
       const double volts = e.resistance_ohm[s] / e.torque_constant_nm_a * most +
                            e.voltage_constant_v_s_rad * std::fabs(w.pace) * v;
-      if (std::isfinite(grid.torque_limit_nm) && !(most < 0.99 * grid.torque_limit_nm)) {
+      if (std::isfinite(grid.torque_limit_nm) && !(most < 0.99 * grid.share(k) * grid.torque_limit_nm)) {
         mask = static_cast<std::uint16_t>(mask | (3u << (2 + 2 * s)));
       }
-      if (std::isfinite(grid.voltage_limit_v) && !(volts < 0.99 * grid.voltage_limit_v)) {
+      if (std::isfinite(grid.voltage_limit_v) && !(volts < 0.99 * grid.share(k) * grid.voltage_limit_v)) {
         mask = static_cast<std::uint16_t>(mask | (3u << (6 + 2 * s)));
       }
     }
     bounds_[k] = mask;
+    bounds_motors_ = bounds_motors_ || mask > 3;
     bound_total_ += static_cast<std::size_t>(__builtin_popcount(mask));
   }
 }
@@ -227,7 +228,7 @@ void SpeedSolver::each_bound(std::size_t cell, double v, double q, Visit&& visit
     const Torque t = torque(w, v, q);
     if (mask & (3u << (2 + 2 * s))) {
       for (double sign : {1.0, -1.0}) {
-        const double a = sign / grid_.torque_limit_nm;
+        const double a = sign / (grid_.torque_limit_nm * grid_.share(cell));
         visit(2 + 2 * s + (sign < 0), a * t.t - 1, a * t.tv, a * t.tq, a * t.tvv, a * t.tvq, a * t.tqq);
       }
     }
@@ -236,7 +237,7 @@ void SpeedSolver::each_bound(std::size_t cell, double v, double q, Visit&& visit
       const double ohm = e.resistance_ohm[s] / e.torque_constant_nm_a,
                    emf = e.voltage_constant_v_s_rad * w.pace;
       for (double sign : {1.0, -1.0}) {
-        const double a = sign / grid_.voltage_limit_v;
+        const double a = sign / (grid_.voltage_limit_v * grid_.share(cell));
         visit(6 + 2 * s + (sign < 0), a * (ohm * t.t + emf * v) - 1, a * (ohm * t.tv + emf), a * ohm * t.tq,
               a * ohm * t.tvv, a * ohm * t.tvq, a * ohm * t.tqq);
       }
@@ -499,8 +500,8 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance) {
   for (int iteration = 0; iteration < 200; ++iteration) {
     solution.iterations = iteration + 1;
     assemble(mu);
-    // The start may cost far more than the optimum: tolerances follow the cost down.
-    if (cost_here_ < 0.5 * scale && cost_here_ > 0) {
+    // Tolerances follow the cost as it falls, so that the answer does not depend on where the search began.
+    if (mu > finest && cost_here_ > 0) {
       scale = cost_here_;
       finest = std::max(tolerance, 1e-9) * scale / count;
     }
@@ -527,7 +528,7 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance) {
         if (bounds_[k] >> j & 1u) gap += cells_[k].multiplier[j] * cells_[k].slack[j];
       }
     }
-    if (mu <= finest && gap < 3 * tolerance * scale && decrement < tolerance * scale) {
+    if (mu <= finest && gap < 3 * tolerance * scale && decrement < 1e-3 * tolerance * scale) {
       solution.converged = true;
       solution.gap_j = gap + kink_gap_;
       double worst = 0, range = 0;

@@ -19,8 +19,10 @@ struct SpeedGrid {
   double acceleration_limit = 0;  // of q; may be infinite
   double torque_limit_nm = 0;     // from the current limit
   double voltage_limit_v = 0;
+  std::vector<double> motor_share;  // of the torque and voltage limits that a cell may use; empty: all
   Electric electric;
 
+  double share(std::size_t cell) const { return motor_share.empty() ? 1 : motor_share[cell]; }
   std::size_t cells() const { return step.size(); }
   const WheelLoads& load(std::size_t cell) const { return loads.size() == 1 ? loads[0] : loads[cell]; }
 };
@@ -61,6 +63,9 @@ class SpeedSolver {
 
   // `price_w` is added to the idle power. Starts from the last solution where there is one.
   SpeedSolution solve(double price_w, double tolerance = 1e-6);
+
+  // Whether a current or voltage limit can bind anywhere.
+  bool bounds_motors() const { return bounds_motors_; }
 
   // Starts the next solve from this profile; ignored unless strictly inside the bounds.
   void start_from(const std::vector<double>& z);
@@ -104,7 +109,7 @@ class SpeedSolver {
   std::vector<double> gradient_, stationarity_, diagonal_, off_, magnitude_, pivot_, lower_, step_;
   double cost_here_ = 0;  // at z_, smoothed
   double kink_gap_ = 0;   // how far the dual slopes bound phi from below [J]
-  bool started_ = false;
+  bool started_ = false, bounds_motors_ = false;
 };
 
 }  // namespace joulecast::planning

@@ -1,0 +1,132 @@
+#include "planning/path.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace joulecast::planning {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+Path made(const std::vector<Segment>& segments, const PathOptions& options = {}) {
+  auto path = make_path(segments, options);
+  EXPECT_TRUE(path) << describe(path.error());
+  return *path;
+}
+
+TEST(Path, ArcEndsWhereGeometrySays) {
+  const Path path = made({Arc{2, pi / 2}});
+  ASSERT_EQ(path.runs.size(), 1u);
+  EXPECT_NEAR(path.distance_m(), pi, 1e-12);
+  EXPECT_NEAR(path.turned_rad(), pi / 2, 1e-12);
+  const Pose& end = path.runs[0].knots.back().pose;
+  EXPECT_NEAR(end.x_m, 2, 1e-9);
+  EXPECT_NEAR(end.y_m, 2, 1e-9);
+  EXPECT_NEAR(end.heading_rad, pi / 2, 1e-12);
+  EXPECT_TRUE(path.runs[0].constant_curvature());
+}
+
+TEST(Path, PolylineTurnsInPlaceAtItsCorners) {
+  const Path path = made({Polyline{{{3, 0}, {3, 4}, {0, 4}}}});
+  ASSERT_EQ(path.runs.size(), 5u);  // drive, turn, drive, turn, drive
+  EXPECT_EQ(path.runs[1].turn, 1);
+  EXPECT_NEAR(path.runs[1].length(), pi / 2, 1e-12);
+  EXPECT_NEAR(path.distance_m(), 10, 1e-12);
+  EXPECT_NEAR(path.turned_rad(), pi, 1e-12);
+}
+
+// A turn across +-pi takes the short way round.
+TEST(Path, TurnsTheShortWayAcrossPi) {
+  PathOptions options;
+  options.start.heading_rad = 3.0;
+  const Path path = made({Polyline{{{std::cos(-3.0), std::sin(-3.0)}}}}, options);
+  ASSERT_EQ(path.runs.size(), 2u);
+  EXPECT_EQ(path.runs[0].turn, 1);
+  EXPECT_NEAR(path.runs[0].length(), 2 * pi - 6, 1e-12);
+}
+
+TEST(Path, BezierHasTheLengthAndTurnOfItsCurve) {
+  const Bezier bezier{{4, 0}, {4, 6}, {8, 6}};
+  const Path path = made({bezier});
+  ASSERT_EQ(path.runs.size(), 1u);
+  // An independent quadrature: chords of 2 million points.
+  double length = 0, x0 = 0, y0 = 0;
+  for (int k = 1; k <= 200000; ++k) {
+    const double u = k / 200000.0, w = 1 - u;
+    const double x = 3 * w * w * u * 4 + 3 * w * u * u * 4 + u * u * u * 8,
+                 y = 3 * w * u * u * 6 + u * u * u * 6;
+    length += std::hypot(x - x0, y - y0);
+    x0 = x, y0 = y;
+  }
+  EXPECT_NEAR(path.distance_m(), length, 1e-6);
+  const planning::Run& run = path.runs[0];
+  // The curvature integrates to the change of heading: the trapezoid rule at 1 cm.
+  double turned = 0;
+  for (std::size_t k = 1; k < run.knots.size(); ++k) {
+    turned += 0.5 * (run.knots[k].way - run.knots[k - 1].way) *
+              (run.knots[k].curvature_1_m + run.knots[k - 1].curvature_1_m);
+    EXPECT_NEAR(turned, run.knots[k].pose.heading_rad, 1e-4);
+  }
+}
+
+TEST(Path, GaussianDetourPassesItsPeak) {
+  const Path path = made({GaussianDetour{8, 0.7, 4, 0.9}});
+  const planning::Run& run = path.runs.back();
+  double peak = 0;
+  for (const Knot& k : run.knots) peak = std::max(peak, k.pose.y_m);
+  EXPECT_NEAR(peak, 0.7 * (1 - std::exp(-16 / (2 * 0.81))), 1e-4);
+  EXPECT_NEAR(run.knots.back().pose.x_m, 8, 1e-9);
+}
+
+TEST(Path, JumpsOfCurvatureBecomeShortClothoids) {
+  PathOptions options;
+  options.transition_m = 0.2;
+  const Path path = made({Straight{3}, Arc{1, 1}, Straight{2}}, options);
+  ASSERT_EQ(path.runs.size(), 1u);
+  const planning::Run& run = path.runs[0];
+  EXPECT_NEAR(run.length(), 6, 1e-12);
+  EXPECT_NEAR(run.at(2.9).curvature_1_m, 0, 1e-9);
+  EXPECT_NEAR(run.at(3.0).curvature_1_m, 0.5, 1e-9);
+  EXPECT_NEAR(run.at(3.1).curvature_1_m, 1, 1e-9);
+  EXPECT_NEAR(run.at(4.0).curvature_1_m, 0.5, 1e-9);
+  // The whole turn stays.
+  double turned = 0;
+  for (std::size_t k = 1; k < run.knots.size(); ++k) {
+    turned += 0.5 * (run.knots[k].way - run.knots[k - 1].way) *
+              (run.knots[k].curvature_1_m + run.knots[k - 1].curvature_1_m);
+  }
+  EXPECT_NEAR(turned, 1, 1e-9);
+}
+
+TEST(Path, DwellsAndPayloadsStopTheRobot) {
+  const Path path = made({Dwell{2}, Straight{1}, PayloadChange{15}, Dwell{5}, Straight{2}, Dwell{1}},
+                         PathOptions{.start = {}, .payload_kg = 3});
+  ASSERT_EQ(path.runs.size(), 2u);
+  EXPECT_EQ(path.runs[0].payload_kg, 3);
+  EXPECT_EQ(path.runs[0].dwell_before_s, 2);
+  EXPECT_EQ(path.runs[1].payload_kg, 15);
+  EXPECT_EQ(path.runs[1].dwell_before_s, 5);
+  EXPECT_EQ(path.dwell_after_s, 1);
+  EXPECT_EQ(path.dwell_s(), 8);
+}
+
+TEST(Path, NamesWhatIsWrong) {
+  const auto error = [](std::vector<Segment> segments) { return make_path(segments).error(); };
+  EXPECT_EQ(error({}).field, "/segments");
+  EXPECT_EQ(error({Straight{1}, Straight{-1}}).field, "/segments/1/length_m");
+  EXPECT_EQ(error({Arc{0, 1}}).field, "/segments/0/radius_m");
+  EXPECT_EQ(error({Arc{1, 0}}).field, "/segments/0/angle_rad");
+  EXPECT_EQ(error({Polyline{}}).field, "/segments/0/points");
+  EXPECT_EQ(error({SampledCurvature{{0, 1, 1}, {0, 0, 0}}}).field, "/segments/0/way_m");
+  EXPECT_EQ(error({SampledCurvature{{0, 1}, {0, std::nan("")}}}).field, "/segments/0/curvature_1_m");
+  EXPECT_EQ(error({Dwell{-1}}).field, "/segments/0/duration_s");
+  EXPECT_EQ(error({PayloadChange{-1}}).field, "/segments/0/payload_kg");
+  EXPECT_EQ(error({Straight{std::nan("")}}).field, "/segments/0/length_m");
+  EXPECT_EQ(error({Bezier{{0, 0}, {0, 0}, {0, 0}}}).fault, Fault::invalid);
+  EXPECT_EQ(error({Clothoid{1e7, 0, 1}}).fault, Fault::too_large);
+}
+
+}  // namespace
+}  // namespace joulecast::planning

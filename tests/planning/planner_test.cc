@@ -1,0 +1,240 @@
+#include "planning/planner.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "planning/line.h"
+#include "tests/planning/robots.h"
+
+namespace joulecast::planning {
+namespace {
+
+Path made(const std::vector<Segment>& segments, double payload_kg = 0) {
+  auto path = make_path(segments, PathOptions{.start = {}, .payload_kg = payload_kg});
+  EXPECT_TRUE(path) << describe(path.error());
+  return *path;
+}
+
+Problem limited(const robot::RobotModel& robot, double regeneration = 1) {
+  Problem problem;
+  problem.limits = limits_of(robot);
+  problem.regeneration = regeneration;
+  return problem;
+}
+
+TEST(Planner, StraightWithoutLimitsIsTheThesisClosedForm) {
+  for (const robot::RobotModel& robot : test::all_robots()) {
+    const auto answer = plan(robot, made({Straight{4}}, 5), Problem{});
+    ASSERT_TRUE(answer) << describe(answer.error());
+    EXPECT_EQ(answer->certificate.method, Method::closed_form);
+    LineTask task{dynamics::straight_power(robot, 5).over_distance(), 4};
+    task.power.c0 += robot.idle_power_w;
+    const auto line = line_in_free_time(task);
+    ASSERT_TRUE(line);
+    // The drive model lets dry friction fade below 0.005 rad/s, which the closed form does not.
+    EXPECT_NEAR(answer->summary.energy_j, line->energy_j(), 1e-5 * line->energy_j());
+    EXPECT_NEAR(answer->summary.duration_s, line->duration_s(), 1e-6 * line->duration_s());
+  }
+}
+
+// The solver on a problem whose closed form is known: a regeneration of 1 - 1e-9 keeps the closed form out.
+TEST(Planner, SolverConvergesToTheClosedFormWithSecondOrder) {
+  const robot::RobotModel robot = test::amr();
+  const Path path = made({Straight{5}});
+  const double exact = plan(robot, path, Problem{})->summary.energy_j;
+  double last = 0;
+  for (std::size_t cells : {32u, 64u, 128u}) {
+    Problem problem;
+    problem.regeneration = 1 - 1e-9;
+    problem.intervals_per_run = cells;
+    const auto answer = plan(robot, path, problem);
+    ASSERT_TRUE(answer) << describe(answer.error());
+    EXPECT_EQ(answer->certificate.method, Method::interior_point);
+    const double error = answer->summary.energy_j - exact;
+    EXPECT_GT(error, -1e-6 * exact);
+    EXPECT_LT(error, 2e-4 * exact);
+    if (last > 0) {
+      EXPECT_LT(error, 0.4 * last);  // a quarter, and what the barrier leaves
+    }
+    last = error;
+  }
+}
+
+TEST(Planner, LessRegenerationCostsMoreAndCoasts) {
+  const robot::RobotModel robot = test::tug();
+  const Path path = made({Straight{8}}, 100);
+  double last = 0, returned = 1e300;
+  for (double fraction : {1.0, 0.7, 0.3, 0.0}) {
+    const auto answer = plan(robot, path, limited(robot, fraction));
+    ASSERT_TRUE(answer) << describe(answer.error());
+    EXPECT_GT(answer->summary.energy_j, last);
+    EXPECT_LE(answer->summary.braking_j, returned * (1 + 1e-6));
+    EXPECT_NEAR(answer->summary.recovered_j, fraction * answer->summary.braking_j,
+                1e-9 * answer->summary.energy_j);
+    last = answer->summary.energy_j, returned = answer->summary.braking_j;
+  }
+}
+
+TEST(Planner, TurnInPlaceCostsEnergyAndTheRightAngle) {
+  const robot::RobotModel robot = test::amr();
+  const auto left = plan(robot, made({TurnInPlace{1.5}}), limited(robot));
+  const auto right = plan(robot, made({TurnInPlace{-1.5}}), limited(robot));
+  ASSERT_TRUE(left && right);
+  EXPECT_GT(left->summary.energy_j, 0);
+  EXPECT_NEAR(left->summary.energy_j, right->summary.energy_j, 1e-6 * left->summary.energy_j);
+  EXPECT_NEAR(left->profile.heading_rad.back(), 1.5, 1e-9);
+  EXPECT_NEAR(right->profile.heading_rad.back(), -1.5, 1e-9);
+  EXPECT_EQ(left->summary.distance_m, 0);
+  EXPECT_LT(right->profile.yaw_rate_rad_s[right->profile.size() / 2], 0);
+}
+
+TEST(Planner, DeadlineIsMetByThePriceOfTime) {
+  for (const robot::RobotModel& robot : test::all_robots()) {
+    const Path path = made({Straight{4}, TurnInPlace{1}, Straight{3}, Dwell{2}}, 5);
+    for (double fraction : {1.0, 0.3}) {
+      Problem problem = limited(robot, fraction);
+      const auto relaxed = plan(robot, path, problem);
+      ASSERT_TRUE(relaxed) << describe(relaxed.error());
+      problem.deadline_s = 1;
+      const auto tooShort = plan(robot, path, problem);
+      ASSERT_FALSE(tooShort);
+      EXPECT_EQ(tooShort.error().fault, Fault::infeasible);
+      EXPECT_EQ(tooShort.error().field, "deadline_s");
+      const double shortest = std::stod(tooShort.error().message.substr(tooShort.error().message.rfind(' ')));
+      for (double share : {0.7, 0.3, 0.02}) {
+        problem.deadline_s = shortest + share * (relaxed->summary.duration_s - shortest);
+        const auto hurried = plan(robot, path, problem);
+        ASSERT_TRUE(hurried) << describe(hurried.error());
+        EXPECT_LE(hurried->summary.duration_s, *problem.deadline_s);
+        EXPECT_GT(hurried->summary.duration_s, *problem.deadline_s * (1 - 2e-4));
+        EXPECT_GT(hurried->summary.energy_j, relaxed->summary.energy_j);
+        EXPECT_GT(hurried->certificate.time_multiplier_w, 0);
+        // The same answer without the deadline, at its price of time.
+        Problem priced = limited(robot, fraction);
+        priced.value_of_time_w = hurried->certificate.time_multiplier_w;
+        const auto same = plan(robot, path, priced);
+        ASSERT_TRUE(same);
+        const double price = priced.value_of_time_w;
+        EXPECT_NEAR(same->summary.energy_j + price * same->summary.duration_s,
+                    hurried->summary.energy_j + price * hurried->summary.duration_s,
+                    1e-3 * (same->summary.energy_j + price * same->summary.duration_s));
+      }
+      // A deadline later than the free optimum changes nothing.
+      problem.deadline_s = 2 * relaxed->summary.duration_s;
+      EXPECT_NEAR(plan(robot, path, problem)->summary.energy_j, relaxed->summary.energy_j, 1e-9);
+    }
+  }
+}
+
+TEST(Planner, ParetoFrontIsConvexAndItsSlopeIsThePriceOfTime) {
+  const robot::RobotModel robot = test::amr();
+  const auto planner = Planner::make(robot, 0.3);
+  ASSERT_TRUE(planner);
+  const auto front =
+      planner->pareto(made({Straight{6}, TurnInPlace{1.2}, Straight{4}}, 20), limited(robot), 12);
+  ASSERT_TRUE(front) << describe(front.error());
+  ASSERT_EQ(front->size(), 12u);
+  for (std::size_t k = 1; k < front->size(); ++k) {
+    const PlanCost &a = (*front)[k - 1], &b = (*front)[k];
+    EXPECT_LT(b.duration_s, a.duration_s);
+    EXPECT_GT(b.energy_j, a.energy_j - 1e-6 * a.energy_j);
+    // The mean slope lies between the multipliers at both ends; solves are good to 1e-5 of the energy.
+    const double slope = (b.energy_j - a.energy_j) / (a.duration_s - b.duration_s);
+    const double noise = 4e-5 * a.energy_j / (a.duration_s - b.duration_s);
+    EXPECT_GT(slope, a.time_multiplier_w - noise);
+    EXPECT_LT(slope, b.time_multiplier_w + noise);
+  }
+}
+
+TEST(Planner, InfeasibleRequestsNameTheNearestFeasibleValue) {
+  const robot::RobotModel robot = test::amr();
+  Problem problem = limited(robot);
+  problem.start_speed_m_s = 1.4;
+  const auto brake = plan(robot, made({Straight{0.5}}), problem);
+  ASSERT_FALSE(brake);
+  EXPECT_EQ(brake.error().fault, Fault::infeasible);
+  EXPECT_EQ(brake.error().field, "end_speed_m_s");
+  // v^2 = 1.4^2 - 2 * 0.6 * 0.5.
+  EXPECT_NE(brake.error().message.find(std::to_string(std::sqrt(1.36))), std::string::npos)
+      << brake.error().message;
+  problem.end_speed_m_s = std::sqrt(1.36) + 0.01;
+  EXPECT_TRUE(plan(robot, made({Straight{0.5}}), problem));
+
+  const auto heavy = plan(robot, made({Straight{1}}, 61), limited(robot));
+  ASSERT_FALSE(heavy);
+  EXPECT_EQ(heavy.error().field, "payload_kg");
+  EXPECT_NE(heavy.error().message.find("60.0"), std::string::npos);
+
+  Problem weak = limited(robot);
+  weak.limits.current_a = 0.5;  // friction alone needs 0.92/(0.056 * 21) = 0.782 A
+  const auto stuck = plan(robot, made({Straight{1}}), weak);
+  ASSERT_FALSE(stuck);
+  EXPECT_EQ(stuck.error().field, "limits/current_a");
+  EXPECT_NE(stuck.error().message.find("0.72"), std::string::npos) << stuck.error().message;
+
+  Problem odd = limited(robot);
+  odd.start_speed_m_s = 0.1;
+  EXPECT_EQ(plan(robot, made({TurnInPlace{1}}), odd).error().field, "start_speed_m_s");
+  odd = limited(robot);
+  odd.regeneration = 1.5;
+  EXPECT_EQ(plan(robot, made({Straight{1}}), odd).error().field, "regeneration");
+  odd = limited(robot);
+  odd.limits.speed_m_s = 0;
+  EXPECT_EQ(plan(robot, made({Straight{1}}), odd).error().field, "limits/speed_m_s");
+}
+
+TEST(Planner, PayloadAndDwellAreCounted) {
+  const robot::RobotModel robot = test::amr();
+  const auto planner = Planner::make(robot);
+  ASSERT_TRUE(planner);
+  const Problem problem = limited(robot);
+  const auto empty = planner->cost(made({Straight{3}}), problem);
+  const auto loaded = planner->cost(made({Straight{3}}, 50), problem);
+  const auto both = planner->plan(made({Straight{3}, PayloadChange{50}, Dwell{10}, Straight{3}}), problem);
+  ASSERT_TRUE(empty && loaded && both);
+  EXPECT_GT(loaded->energy_j, empty->energy_j);
+  EXPECT_NEAR(both->summary.energy_j, empty->energy_j + loaded->energy_j + 10 * robot.idle_power_w,
+              2e-4 * both->summary.energy_j);
+  EXPECT_NEAR(both->summary.duration_s, empty->duration_s + loaded->duration_s + 10, 1e-6);
+  EXPECT_NEAR(both->profile.energy_j.back(), both->summary.energy_j, 1e-9 * both->summary.energy_j);
+}
+
+TEST(Planner, AdoptedEffectsChangeTheAnswer) {
+  const Path path = made({Straight{3}, TurnInPlace{1.5}, Straight{3}}, 20);
+  robot::RobotModel robot = test::amr();
+  const auto plain = plan(robot, path, limited(robot));
+  ASSERT_TRUE(plain);
+  robot.effects = {{"turning_scrub", {{"coefficient", 0.1}}}};
+  const auto scrubbing = plan(robot, path, limited(robot));
+  ASSERT_TRUE(scrubbing) << describe(scrubbing.error());
+  EXPECT_GT(scrubbing->ledger[energy::Term::friction_scrub], 0);
+  EXPECT_GT(scrubbing->summary.energy_j, plain->summary.energy_j);
+  robot.effects = {{"no_regeneration", {{"fraction", 0.6}}}};
+  Problem problem = limited(robot);
+  problem.regeneration.reset();
+  const auto burning = plan(robot, path, problem);
+  problem.regeneration = 0.4;
+  const auto told = plan(robot, path, problem);
+  ASSERT_TRUE(burning && told);
+  EXPECT_NEAR(burning->summary.energy_j, told->summary.energy_j, 1e-9 * told->summary.energy_j);
+}
+
+// Rows are kinematically exact: constant acceleration between them covers their distance.
+TEST(Planner, ProfileRowsIntegrate) {
+  const robot::RobotModel robot = test::nomad();
+  const auto answer = plan(robot, made({Straight{2}, Arc{1, 1.2}, Straight{2}}), limited(robot, 0.3));
+  ASSERT_TRUE(answer) << describe(answer.error());
+  const Profile& p = answer->profile;
+  double distance = 0;
+  for (std::size_t k = 1; k < p.size(); ++k) {
+    const double dt = p.time_s[k] - p.time_s[k - 1];
+    distance += 0.5 * dt * (p.speed_m_s[k] + p.speed_m_s[k - 1]);
+    EXPECT_NEAR(p.distance_m[k], distance, 1e-9);
+    EXPECT_NEAR(p.speed_m_s[k], p.speed_m_s[k - 1] + dt * p.acceleration_m_s2[k - 1], 1e-9);
+  }
+  EXPECT_NEAR(distance, 5.2, 1e-9);
+}
+
+}  // namespace
+}  // namespace joulecast::planning
