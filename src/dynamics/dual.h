@@ -42,6 +42,10 @@ inline Dual sin(Dual a) {
 inline Dual cos(Dual a) {
   return {std::cos(a.value), -std::sin(a.value) * a.slope};
 }
+inline Dual tanh(Dual a) {
+  const double t = std::tanh(a.value);
+  return {t, (1 - t * t) * a.slope};
+}
 inline Dual abs(Dual a) {
   return a.value < 0 ? -a : a;
 }
@@ -60,6 +64,7 @@ using std::cos;
 using std::exp;
 using std::sin;
 using std::sqrt;
+using std::tanh;
 
 // x / sqrt(x^2 + width^2): +1 or -1 for |x| >> width, smooth in between. Dry friction uses it for its
 // direction, so that friction vanishes at standstill and forward simulation stays differentiable.

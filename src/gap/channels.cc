@@ -1,0 +1,132 @@
+#include "gap/channels.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace joulecast::gap {
+namespace {
+
+using dynamics::Dual;
+
+// Copper heat for any time constant, between the ones that windows carry.
+std::array<double, 2> heat_at(const Window& w, double time_constant_s) {
+  const auto& grid = heat_time_constants_s;
+  const double tau = std::clamp(time_constant_s, grid.front(), grid.back());
+  std::size_t k = 0;
+  while (k + 2 < grid.size() && grid[k + 1] < tau) ++k;
+  const double part = std::log(tau / grid[k]) / std::log(grid[k + 1] / grid[k]);
+  std::array<double, 2> heat{};
+  for (std::size_t s : {0u, 1u}) {
+    heat[s] = (1 - part) * w.copper_heat_w[k][s] + part * w.copper_heat_w[k + 1][s];
+  }
+  return heat;
+}
+
+template <class S>
+dynamics::Instant instant_of(const dynamics::BasicDriveModel<S>& model, const Window& w) {
+  dynamics::Instant at;
+  at.wheel_speed_rad_s = w.speed_rad_s;
+  at.wheel_acceleration_rad_s2 = w.acceleration_rad_s2;
+  at.payload_kg = w.payload_kg;
+  at.x_m = w.x_m;
+  at.y_m = w.y_m;
+  at.heading_rad = w.heading_rad;
+  at.copper_heat_w = heat_at(w, model.parameters().thermal_time_constant_s);
+  for (std::size_t s : {0u, 1u}) {
+    // A wheel at rest bears what its friction holds; the drive asks nothing of its motor.
+    if (w.resting[s]) at.wheel_speed_rad_s[s] = at.wheel_acceleration_rad_s2[s] = 0;
+    at.current_slope_a_s[s] = std::isfinite(w.current_slope_a_s[s]) ? w.current_slope_a_s[s] : 0.0;
+  }
+  return at;
+}
+
+}  // namespace
+
+std::string_view name_of(Channel channel) {
+  switch (channel) {
+    case Channel::voltage_right:
+    case Channel::voltage_left:
+      return "motor_voltage";
+    case Channel::torque_right:
+    case Channel::torque_left:
+      return "wheel_torque";
+    case Channel::bus:
+      return "battery_power_from_motors";
+    case Channel::power:
+      return "battery_power_from_motion";
+    case Channel::battery_voltage:
+      return "battery_voltage";
+    case Channel::gyro:
+      return "yaw_rate";
+    case Channel::travel:
+      return "map_travel";
+    case Channel::turn:
+      return "map_turn";
+  }
+  return "";
+}
+
+template <class S>
+S metered_power(const dynamics::BasicDriveModel<S>& model, const Window& w) {
+  const dynamics::Instant at = instant_of(model, w);
+  if (w.resting[0] && w.resting[1]) {
+    return model.metered_battery_power(model.battery_power_for({S(0), S(0)}), w.battery_voltage_v);
+  }
+  const S power = model.flow(at).battery_power_w;
+  return model.metered_battery_power(power, w.battery_voltage_v) -
+         model.parameters().sensor_delay_s *
+             (std::isfinite(w.battery_power_slope_w_s) ? w.battery_power_slope_w_s : 0.0);
+}
+
+template <class S>
+ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w) {
+  const auto& p = model.parameters();
+  ChannelValues<S> r;
+  r.fill(S(missing));
+  const dynamics::Instant at = instant_of(model, w);
+  const auto balance = model.balance(at);
+  std::array<S, 2> motor_power{};
+  S motor_abs = 0, braking = 0;
+  for (std::size_t s : {0u, 1u}) {
+    // Readings against what the sensors would read of the model, so that no regressor carries their noise
+    // except the measured current in the voltage's.
+    const S reading = w.current_a[s] + p.sensor_delay_s * w.current_slope_a_s[s];
+    const S current = (reading - p.motor_current.bias) / (S(1) + p.motor_current.gain);
+    r[index_of(Channel::voltage_right) + s] =
+        w.voltage_v[s] + p.sensor_delay_s * w.voltage_slope_v_s[s] -
+        (S(1) + p.motor_voltage.gain) * model.voltage_for(s, current, at) - p.motor_voltage.bias;
+    if (w.moving[s]) {
+      r[index_of(Channel::torque_right) + s] =
+          reading - (S(1) + p.motor_current.gain) * model.current_for(balance.total_nm[s]) -
+          p.motor_current.bias;
+    }
+    const S gain = (S(1) + p.motor_current.gain) * (S(1) + p.motor_voltage.gain);
+    motor_power[s] = (S(w.motor_power_w[s]) - p.motor_current.bias * w.voltage_v[s]) / gain;
+    motor_abs += S(w.motor_power_abs_w[s]) / gain;
+    braking += S(w.braking_w[s]) / gain;
+  }
+  const S bus = p.idle_power_w + p.accessory_power_w + motor_power[0] + motor_power[1] +
+                p.driver_loss * motor_abs + p.unreturned * braking;
+  r[index_of(Channel::bus)] = S(w.battery_power_w) - model.metered_battery_power(bus, w.battery_voltage_v);
+  const auto settled = [&](std::size_t s) { return w.moving[s] || w.resting[s]; };
+  if (settled(0) && settled(1)) r[index_of(Channel::power)] = S(w.battery_power_w) - metered_power(model, w);
+  // How far the open-circuit voltage is from the nominal one is a nuisance of its own.
+  r[index_of(Channel::battery_voltage)] =
+      S(w.battery_voltage_v) - (S(1) + p.battery_voltage.gain) * p.battery_voltage_v +
+      p.battery_resistance_ohm * (S(w.battery_current_a) - p.battery_current.bias) /
+          (S(1) + p.battery_current.gain);
+  r[index_of(Channel::gyro)] = S(w.yaw_rate_rad_s) - balance.body.yaw_rate_rad_s;
+  const S grip = S(1) - p.slip;
+  const S right = p.wheel_radius_m[0] * grip * w.span_angle_rad[0],
+          left = p.wheel_radius_m[1] * grip * w.span_angle_rad[1];
+  r[index_of(Channel::travel)] = S(w.forward_m) - w.chord * 0.5 * (right + left);
+  r[index_of(Channel::turn)] = S(w.turn_rad) - (right - left) / (2.0 * p.half_track_m);
+  return r;
+}
+
+template double metered_power(const dynamics::BasicDriveModel<double>&, const Window&);
+template Dual metered_power(const dynamics::BasicDriveModel<Dual>&, const Window&);
+template ChannelValues<double> residuals(const dynamics::BasicDriveModel<double>&, const Window&);
+template ChannelValues<Dual> residuals(const dynamics::BasicDriveModel<Dual>&, const Window&);
+
+}  // namespace joulecast::gap

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+
+#include "dynamics/drive_model.h"
+#include "gap/windows.h"
+
+namespace joulecast::gap {
+
+// The equations in which an effect can show. Each is measured minus modelled.
+enum class Channel : std::size_t {
+  voltage_right,  // V - R i - K_w n w, given the measured current and speed [V]
+  voltage_left,
+  torque_right,  // motor current - the torque that the motion asks over K_t n [A]
+  torque_left,
+  bus,              // battery power - what the measured motor powers ask [W]
+  power,            // battery power - what the motion alone asks [W]; judges where bus cannot
+  battery_voltage,  // terminal voltage + R_b i [V]
+  gyro,             // yaw rate - the wheels' [rad/s]
+  travel,           // progress on the map over a span - the wheels' [m]
+  turn              // change of heading over a span - the wheels' [rad]
+};
+inline constexpr std::size_t channel_count = 10;
+
+constexpr std::size_t index_of(Channel channel) {
+  return static_cast<std::size_t>(channel);
+}
+
+// As named in answers; both sides of a pair share a name.
+std::string_view name_of(Channel channel);
+
+template <class S>
+using ChannelValues = std::array<S, channel_count>;
+
+// Residuals of one window. Value NaN: the channel does not speak here.
+template <class S>
+ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w);
+
+extern template ChannelValues<double> residuals(const dynamics::BasicDriveModel<double>&, const Window&);
+extern template ChannelValues<dynamics::Dual> residuals(const dynamics::BasicDriveModel<dynamics::Dual>&,
+                                                        const Window&);
+
+// The battery power that the motion asks, as the robot's meter would read it [W].
+template <class S>
+S metered_power(const dynamics::BasicDriveModel<S>& model, const Window& w);
+
+extern template double metered_power(const dynamics::BasicDriveModel<double>&, const Window&);
+extern template dynamics::Dual metered_power(const dynamics::BasicDriveModel<dynamics::Dual>&, const Window&);
+
+}  // namespace joulecast::gap

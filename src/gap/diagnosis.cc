@@ -1,0 +1,330 @@
+#include "gap/diagnosis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "gap/fit.h"
+#include "gap/next_drive.h"
+#include "gap/power_gap.h"
+#include "gap/where.h"
+
+namespace joulecast::gap {
+namespace {
+
+// An effect or an outside family that moves less than this share of the mean power is no finding.
+constexpr double least_effect_share = 0.007;
+constexpr double least_outside_share = 0.012;
+constexpr double alternative_odds = 0.04;
+constexpr std::size_t most_alternatives = 2;
+constexpr std::size_t fewest_windows = 40;
+constexpr double bootstrap_block_s = 10;
+constexpr int bootstrap_draws = 400;
+
+// How large a coefficient is beside what a robot as filed may have.
+bool beyond_tolerance(const ColumnSet& columns, const Evidence::Estimate& estimate, const Hypothesis& h) {
+  double size = 0;
+  for (const std::size_t j : h.columns) {
+    size = std::max(size,
+                    std::fabs(estimate.mean[static_cast<Eigen::Index>(j)]) / columns.columns()[j].tolerance);
+  }
+  return size > 2.5;
+}
+
+// Explanations with what does not matter taken out, and the odds of those that become the same added up.
+struct Posterior {
+  std::map<std::vector<std::size_t>, double> sets;  // probability
+  double none = 0, outside = 0;
+
+  double of_effect(const ColumnSet& columns, const dynamics::Effect* effect) const {
+    double p = 0;
+    for (const auto& [set, probability] : sets) {
+      if (std::ranges::any_of(
+              set, [&](std::size_t h) { return columns.hypotheses()[h].effect.effect == effect; })) {
+        p += probability;
+      }
+    }
+    return p;
+  }
+};
+
+constexpr double leading = 14;  // explanations this far below the best in log odds are let go
+
+Posterior posterior_of(const Fit& fit, const MovedShares& moved) {
+  Posterior posterior;
+  double total = 0;
+  std::size_t looked_at = 0;
+  for (const Explanation& e : fit.explanations) {
+    if (e.log_odds < fit.explanations.front().log_odds - leading || ++looked_at > 60) break;
+    const double weight = std::exp(e.log_odds - fit.explanations.front().log_odds);
+    std::vector<std::size_t> kept;
+    const Evidence::Estimate estimate = fit.evidence->estimate(e.hypotheses);
+    bool outside = false;
+    for (std::size_t k = 0; k < e.hypotheses.size(); ++k) {
+      const Hypothesis& h = fit.columns->hypotheses()[e.hypotheses[k]];
+      const double share = moved(h, estimate.mean);
+      const bool matters =
+          h.outside() ? share > least_outside_share
+                      : share > least_effect_share || (fit.columns->columns()[h.columns[0]].power_w <=
+                                                           0.05 * fit.columns->mean_power_w() / h.expected &&
+                                                       beyond_tolerance(*fit.columns, estimate, h));
+      if (!matters) continue;
+      kept.push_back(e.hypotheses[k]);
+      outside = outside || h.outside();
+    }
+    posterior.sets[kept] += weight;
+    total += weight;
+    if (kept.empty()) posterior.none += weight;
+    if (outside) posterior.outside += weight;
+  }
+  for (auto& [set, p] : posterior.sets) p /= total;
+  posterior.none /= total;
+  posterior.outside /= total;
+  return posterior;
+}
+
+struct Alternative {
+  const dynamics::Effect* effect;
+  double odds;
+};
+
+// Effects that would explain the data nearly as well in the place of one of the set.
+std::vector<Alternative> alternatives_to(const Fit& fit, const std::vector<std::size_t>& set,
+                                         std::size_t member) {
+  const auto& all = fit.columns->hypotheses();
+  const double reference = fit.evidence->log_odds(set);
+  std::map<const dynamics::Effect*, double> best;
+  for (std::size_t h = 0; h < all.size(); ++h) {
+    if (all[h].outside() || all[h].effect.effect == all[member].effect.effect) continue;
+    if (std::ranges::any_of(set, [&](std::size_t o) { return all[o].effect.effect == all[h].effect.effect; }))
+      continue;
+    std::vector<std::size_t> other = set;
+    std::ranges::replace(other, member, h);
+    std::ranges::sort(other);
+    const double odds = std::exp(std::min(50.0, fit.evidence->log_odds(other) - reference));
+    double& kept = best[all[h].effect.effect];
+    kept = std::max(kept, odds);
+  }
+  std::vector<Alternative> result;
+  for (const auto& [effect, odds] : best) {
+    if (odds > alternative_odds) result.push_back({effect, odds});
+  }
+  std::ranges::sort(result, std::greater{}, &Alternative::odds);
+  return result;
+}
+
+std::vector<Chosen> coefficients_of(const Fit& fit, const Information& total,
+                                    const std::vector<std::size_t>& set) {
+  const Evidence evidence(*fit.columns, total);
+  const Evidence::Estimate estimate = evidence.estimate(set);
+  std::vector<Chosen> chosen;
+  for (const std::size_t h : set) {
+    if (fit.columns->hypotheses()[h].outside()) continue;
+    Chosen c{h, {}};
+    for (const std::size_t j : fit.columns->hypotheses()[h].columns) {
+      c.coefficients.push_back(estimate.mean[static_cast<Eigen::Index>(j)]);
+    }
+    chosen.push_back(std::move(c));
+  }
+  return chosen;
+}
+
+std::vector<DiagnosedParameter> parameters_of(const ColumnSet& columns, const Chosen& chosen,
+                                              const Evidence::Estimate& estimate) {
+  const Hypothesis& h = columns.hypotheses()[chosen.hypothesis];
+  const dynamics::ActiveEffect active = columns.effects_of({&chosen, 1}).front();
+  std::vector<DiagnosedParameter> parameters;
+  const auto& info = active.effect->info().parameters;
+  for (std::size_t k = 0; k < info.size(); ++k) {
+    parameters.push_back({std::string(info[k].name), std::string(info[k].unit), active.values[k], missing});
+  }
+  const auto sd = [&](std::size_t j) { return estimate.sd[static_cast<Eigen::Index>(j)]; };
+  if (h.columns.size() == 2) {
+    const double a = sd(h.columns[0]), b = sd(h.columns[1]);
+    const double c = std::cos(active.values[1]), s = std::sin(active.values[1]);
+    parameters[0].deviation = std::hypot(c * a, s * b);
+    parameters[1].deviation = std::hypot(s * a, c * b) / std::max(active.values[0], 1e-9);
+  } else {
+    parameters[h.parameter].deviation = sd(h.columns[0]);
+  }
+  return parameters;
+}
+
+// Leave one mission out, fit the rest, predict it.
+Shrinkage held_out(const Fit& fit, const robot::RobotModel& robot, const std::vector<std::size_t>& set,
+                   std::span<const Window> windows, std::span<const double> measured,
+                   std::span<const double> nominal, double floor) {
+  std::vector<double> predicted(windows.size(), missing);
+  for (std::size_t m = 0; m < fit.missions.size(); ++m) {
+    Information rest;
+    for (std::size_t k = 0; k < fit.missions.size(); ++k) {
+      if (k != m) rest += fit.missions[k];
+    }
+    if (rest.xx.size() == 0) rest = fit.total;
+    const auto effects = fit.columns->effects_of(coefficients_of(fit, rest, set));
+    const dynamics::DriveModel model(robot, effects);
+    for (std::size_t k = 0; k < windows.size(); ++k) {
+      if (windows[k].mission == m) predicted[k] = metered_power(model, windows[k]);
+    }
+  }
+  struct Block {
+    double before = 0, after = 0, size = 0;
+  };
+  std::map<std::pair<std::size_t, int>, Block> by_time;
+  for (std::size_t k = 0; k < windows.size(); ++k) {
+    if (!std::isfinite(measured[k] + predicted[k])) continue;
+    Block& b = by_time[{windows[k].mission, static_cast<int>(windows[k].t_s / bootstrap_block_s)}];
+    b.before += std::fabs(measured[k] - nominal[k]);
+    b.after += std::fabs(measured[k] - predicted[k]);
+    b.size += std::fabs(measured[k]);
+  }
+  std::vector<Block> blocks;
+  Block sum;
+  for (const auto& [key, b] : by_time) {
+    blocks.push_back(b);
+    sum.before += b.before;
+    sum.after += b.after;
+    sum.size += b.size;
+  }
+  Shrinkage s;
+  if (blocks.empty() || sum.size <= 0 || sum.before <= 0) return s;
+  s.before = sum.before / sum.size;
+  s.after = sum.after / sum.size;
+  s.fraction = 1 - sum.after / sum.before;
+  s.remaining_over_noise_floor = floor > 0 ? s.after / floor : missing;
+  std::mt19937_64 random(20240229);
+  std::uniform_int_distribution<std::size_t> pick(0, blocks.size() - 1);
+  std::vector<double> fractions;
+  for (int draw = 0; draw < bootstrap_draws; ++draw) {
+    Block d;
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
+      const Block& b = blocks[pick(random)];
+      d.before += b.before;
+      d.after += b.after;
+    }
+    fractions.push_back(1 - d.after / d.before);
+  }
+  std::ranges::sort(fractions);
+  s.interval = {fractions[bootstrap_draws / 40], fractions[bootstrap_draws - 1 - bootstrap_draws / 40]};
+  return s;
+}
+
+}  // namespace
+
+std::string_view name_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::none:
+      return "none";
+    case Verdict::effects:
+      return "effects";
+    case Verdict::outside:
+      return "outside";
+    case Verdict::inconclusive:
+      return "inconclusive";
+  }
+  return "";
+}
+
+Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotModel& robot,
+                           const DiagnosisSettings& settings) {
+  Diagnosis d;
+  d.robot_id = recordings.robot_id;
+  d.missions = recordings.missions.size();
+  d.samples = recordings.samples;
+
+  const std::vector<Window> windows = make_windows(recordings, robot);
+  const std::vector<double> measured = measured_power(windows);
+  const auto with_battery = std::ranges::count_if(measured, [](double p) { return std::isfinite(p); });
+  if (windows.size() < fewest_windows) return invalid("log", "holds too little motion to judge");
+  d.motor_channels = !without_motor_channels(windows);
+  if (with_battery == 0 && !d.motor_channels)
+    return invalid("log", "measures neither battery power nor motor current");
+  const std::vector<double> modelled = modelled_power(robot, {}, windows);
+  const GapSize size = gap_size(measured, modelled);
+  d.energy_relative = size.energy_relative;
+  d.power_absolute_relative = size.absolute_relative;
+  d.noise_floor = noise_floor(windows, measured, modelled);
+  d.where = localise(windows, robot, modelled);
+
+  std::optional<FitResult> result = fit_windows(robot, windows, settings.progress);
+  if (!result) return fail(Fault::conflict, "", "diagnosis cancelled");
+  const Fit& fit = result->fit;
+  const ColumnSet& columns = *fit.columns;
+  const MovedShares moved(fit, windows);
+  const Posterior posterior = posterior_of(fit, moved);
+  const auto best =
+      std::ranges::max_element(posterior.sets, {}, [](const auto& entry) { return entry.second; });
+  const std::vector<std::size_t>& set = best->first;
+
+  std::vector<std::size_t> named, unknown;
+  for (const std::size_t h : set) (columns.hypotheses()[h].outside() ? unknown : named).push_back(h);
+  const Evidence::Estimate estimate = fit.evidence->estimate(set);
+  double unknown_share = 0, named_share = 0, largest = -1;
+  for (std::size_t k = 0; k < set.size(); ++k) {
+    const Hypothesis& h = columns.hypotheses()[set[k]];
+    const double share = moved(h, estimate.mean);
+    (h.outside() ? unknown_share : named_share) += share;
+    if (h.outside() && share > largest) {
+      largest = share;
+      d.outside.channel = h.channel;
+      d.outside.follows = h.variable;
+    }
+  }
+  d.outside.probability = posterior.outside;
+  if (d.outside.probability < settings.report_probability) d.outside.channel = d.outside.follows = "";
+
+  const std::vector<Chosen> chosen = coefficients_of(fit, fit.total, set);
+  const std::vector<dynamics::ActiveEffect> effects = columns.effects_of(chosen);
+  const std::vector<double> shapley = shapley_shares(robot, effects, windows, measured);
+  double weakest_group = 1;
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    const Hypothesis& h = columns.hypotheses()[chosen[k].hypothesis];
+    DiagnosedEffect effect;
+    effect.id = h.id();
+    effect.probability = posterior.of_effect(columns, h.effect.effect);
+    effect.parameters = parameters_of(columns, chosen[k], estimate);
+    effect.share = shapley[k];
+    double group = effect.probability;
+    const auto others = alternatives_to(fit, set, chosen[k].hypothesis);
+    for (const Alternative& other : others) {
+      if (effect.alternatives.size() >= most_alternatives) break;
+      effect.alternatives.emplace_back(other.effect->info().id);
+      group += posterior.of_effect(columns, other.effect);
+    }
+    weakest_group = std::min(weakest_group, group);
+    d.effects.push_back(std::move(effect));
+  }
+  if (!unknown.empty() && posterior.outside >= settings.report_probability) {
+    d.verdict = Verdict::outside;
+    d.verdict_probability = posterior.outside;
+    // What shares the data with something unknown is no sure finding.
+    const double trust = named_share / (named_share + unknown_share);
+    for (DiagnosedEffect& effect : d.effects) effect.probability *= trust;
+    std::erase_if(d.effects,
+                  [&](const DiagnosedEffect& e) { return e.probability < settings.report_probability; });
+  } else if (named.empty()) {
+    d.verdict = posterior.none >= settings.report_probability ? Verdict::none : Verdict::inconclusive;
+    d.verdict_probability = posterior.none;
+    d.effects.clear();
+  } else {
+    d.verdict = weakest_group >= settings.report_probability ? Verdict::effects : Verdict::inconclusive;
+    d.verdict_probability = weakest_group;
+  }
+  if (!d.effects.empty()) {
+    std::vector<std::size_t> kept;
+    for (const DiagnosedEffect& e : d.effects) {
+      for (std::size_t k = 0; k < chosen.size(); ++k) {
+        if (columns.hypotheses()[chosen[k].hypothesis].id() != e.id) continue;
+        kept.push_back(chosen[k].hypothesis);
+        d.adoptable.push_back(dynamics::adopt(effects[k]));
+      }
+    }
+    if (with_battery > 0) d.shrinkage = held_out(fit, robot, set, windows, measured, modelled, d.noise_floor);
+    std::ranges::stable_sort(d.effects, std::greater{}, &DiagnosedEffect::share);
+  }
+  d.next_drive = next_drives(fit, robot, d);
+  return d;
+}
+
+}  // namespace joulecast::gap

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <vector>
+
+#include "gap/diagnosis.h"
+#include "gap/fit.h"
+
+namespace joulecast::gap {
+
+// For each effect that has alternatives: of a list of manoeuvres, the ones that raise the expected log
+// evidence for the named effect over its best alternative most.
+std::vector<NextDrive> next_drives(const Fit& fit, const robot::RobotModel& robot,
+                                   const Diagnosis& diagnosis);
+
+}  // namespace joulecast::gap

@@ -1,0 +1,126 @@
+#include "gap/recordings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "telemetry/codec.h"
+#include "telemetry/event_log.h"
+#include "telemetry/mission_tracker.h"
+
+namespace joulecast::gap {
+namespace {
+
+// Missions of one robot as its messages arrive.
+class Collector {
+ public:
+  void add(const telemetry::Sample& sample) {
+    const telemetry::SampleStep step = tracker_.on_sample(sample.utime_us, sample.payload_kg);
+    carry_out(step.actions);
+    if (step.belongs && open_) open_->samples.push_back(sample);
+  }
+  void add(const telemetry::MissionEvent& event) { carry_out(tracker_.on_event(event)); }
+
+  std::vector<telemetry::Recording> finish() {
+    close();
+    return std::move(missions_);
+  }
+
+ private:
+  void carry_out(const telemetry::MissionActions& actions) {
+    for (const telemetry::MissionAction& action : actions) {
+      close();
+      if (action.kind != telemetry::MissionAction::Kind::open) continue;
+      open_.emplace();
+      open_->mission_id = action.mission_id;
+      open_->payload_kg = action.payload_kg;
+    }
+  }
+  void close() {
+    if (open_) missions_.push_back(std::move(*open_));
+    open_.reset();
+  }
+
+  telemetry::MissionTracker tracker_;
+  std::optional<telemetry::Recording> open_;
+  std::vector<telemetry::Recording> missions_;
+};
+
+bool usable(const telemetry::Sample& sample) {
+  return std::isfinite(sample.wheel_velocity_rad_s[0]) && std::isfinite(sample.wheel_velocity_rad_s[1]);
+}
+
+}  // namespace
+
+Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<telemetry::Recording> missions) {
+  RecordingSet set;
+  set.robot_id = std::move(robot_id);
+  for (telemetry::Recording& mission : missions) {
+    auto& samples = mission.samples;
+    std::erase_if(samples, [](const telemetry::Sample& s) { return !usable(s); });
+    std::ranges::stable_sort(samples, {}, &telemetry::Sample::utime_us);
+    const auto same = std::ranges::unique(samples, {}, &telemetry::Sample::utime_us);
+    samples.erase(same.begin(), same.end());
+    if (samples.size() < 2) continue;
+    const double length_s = 1e-6 * static_cast<double>(samples.back().utime_us - samples.front().utime_us);
+    if (length_s < shortest_mission_s) continue;
+    set.samples += samples.size();
+    set.missions.push_back(std::move(mission));
+  }
+  std::ranges::stable_sort(set.missions, {},
+                           [](const telemetry::Recording& m) { return m.samples.front().utime_us; });
+  if (set.missions.empty()) {
+    return invalid("log", "holds no mission of at least " + std::to_string(shortest_mission_s) + " s");
+  }
+  return set;
+}
+
+Result<RecordingSet> load_recordings(std::span<const std::string> paths, const std::string& robot_id) {
+  std::map<std::string, Collector, std::less<>> robots;
+  std::size_t unreadable = 0;
+  for (const std::string& path : paths) {
+    Result<telemetry::EventLogReader> reader = telemetry::EventLogReader::open(path);
+    if (!reader) return tl::unexpected(std::move(reader.error()));
+    for (;;) {
+      const telemetry::LogRead read = reader->next();
+      if (read.status == telemetry::LogStatus::event) {
+        const auto channel = telemetry::parse_channel(read.event.channel);
+        if (!channel || channel->subject == telemetry::Subject::energy_state) continue;
+        if (!robot_id.empty() && channel->robot_id != robot_id) continue;
+        Collector& robot = robots[std::string(channel->robot_id)];
+        if (channel->subject == telemetry::Subject::telemetry) {
+          if (const auto decoded = telemetry::decode_telemetry(read.event.data)) {
+            robot.add(decoded->sample);
+          } else {
+            ++unreadable;
+          }
+        } else if (const auto decoded = telemetry::decode_mission_event(read.event.data)) {
+          robot.add(decoded->event);
+        } else {
+          ++unreadable;
+        }
+        continue;
+      }
+      if (read.status == telemetry::LogStatus::corrupt) {
+        ++unreadable;
+        if (reader->resync() > 0) continue;
+        break;
+      }
+      if (read.status == telemetry::LogStatus::failed) return fail(Fault::corrupt, path, read.message);
+      if (read.status == telemetry::LogStatus::truncated) ++unreadable;
+      break;
+    }
+  }
+  if (robots.empty())
+    return invalid("log", "holds no telemetry" + (robot_id.empty() ? "" : " of " + robot_id));
+  if (robots.size() > 1) {
+    return invalid("log", "holds " + std::to_string(robots.size()) + " robots; name the one to diagnose");
+  }
+  auto& [id, collector] = *robots.begin();
+  Result<RecordingSet> set = make_recording_set(id, collector.finish());
+  if (set) set->unreadable = unreadable;
+  return set;
+}
+
+}  // namespace joulecast::gap

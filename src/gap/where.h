@@ -1,0 +1,17 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "gap/diagnosis.h"
+#include "gap/windows.h"
+
+namespace joulecast::gap {
+
+// Regions of every variable in which the mean residual of battery power is surely not zero (block standard
+// errors, Bonferroni over all regions looked at), largest share first. The residual is split by equation:
+// what the bus shows, what the motors' voltages show, and what the motion's torque shows.
+std::vector<WhereRegion> localise(std::span<const Window> windows, const robot::RobotModel& robot,
+                                  std::span<const double> modelled_w);
+
+}  // namespace joulecast::gap

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "gap/recordings.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::gap {
+
+inline constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+
+// Time constants on which the copper heat is low-passed [s].
+inline constexpr std::array<double, 6> heat_time_constants_s{30, 60, 120, 240, 480, 960};
+inline constexpr std::size_t wheel_harmonics = 3;
+
+// What one smooth window (a raised cosine) of a recording says: the averages of every channel under the
+// window, and slopes in weak form, so that linear equations between channels hold exactly and no noisy
+// derivative is taken. NaN: not measured. Sides [0] right, [1] left.
+struct Window {
+  std::size_t mission = 0;
+  bool continues = false;  // begins half a window after the previous one
+  double t_s = 0;          // since the mission began
+  double payload_kg = 0;
+  std::array<double, 2> speed_rad_s{}, acceleration_rad_s2{};
+  std::array<bool, 2> moving{}, resting{};  // throughout the window; neither: starting or stopping
+  std::array<double, 2> voltage_v{missing, missing}, current_a{missing, missing};
+  std::array<double, 2> voltage_slope_v_s{}, current_slope_a_s{};
+  std::array<double, 2> motor_power_w{missing, missing};
+  std::array<double, 2> motor_power_abs_w{}, braking_w{};  // mean |V i| and mean of -V i while negative
+  std::array<std::array<double, 2>, heat_time_constants_s.size()> copper_heat_w{};
+  double battery_voltage_v = missing, battery_current_a = missing, battery_power_w = missing;
+  double battery_power_slope_w_s = 0, battery_current_slope_a_s = 0;
+  double charge_as = 0;  // drawn since the mission began
+  double yaw_rate_rad_s = missing;
+  double x_m = missing, y_m = missing, heading_rad = missing;
+  // Mean cosine and sine of 1, 2, ... times the angle of each wheel.
+  std::array<std::array<double, 2>, wheel_harmonics> angle_cos{}, angle_sin{};
+  // Progress by the map over a span that starts here; NaN except once a span.
+  double forward_m = missing, turn_rad = missing;
+  double chord = 1;                        // straight distance over path length in that span
+  std::array<double, 2> span_angle_rad{};  // turned by each wheel in that span
+};
+
+struct WindowSettings {
+  double length_s = 0.4;
+  std::size_t fewest_samples = 8;   // in a window; slow recordings get longer windows
+  double longest_gap_s = 0.25;      // between samples inside a window
+  double span_s = 1.0;              // over which progress by the map is compared
+  double electrical_delay_s = 0;    // by which electrical channels lag; taken out before windowing
+  std::size_t most_windows = 8000;  // beyond it, blocks of windows are left out evenly
+};
+
+// A single mission is judged as this many, so that a part can be held out.
+inline constexpr double single_mission_parts = 4;
+
+// Windows of all missions, half overlapping.
+std::vector<Window> make_windows(const RecordingSet& set, const robot::RobotModel& robot,
+                                 const WindowSettings& settings = {});
+
+}  // namespace joulecast::gap

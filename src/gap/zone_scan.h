@@ -1,0 +1,18 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "gap/design.h"
+
+namespace joulecast::gap {
+
+// A zone that holds every place: its column, masked by position, is the column of any other zone.
+inline constexpr Zone everywhere{0, 0, 90};
+
+// The disc of the floor in which the column of the hypothesis `zone_everywhere` explains most of what other
+// coefficients cannot, by a grid over the visited floor, then by pattern search. Empty without positions.
+std::optional<Zone> find_zone(const ColumnSet& columns, const Design& design, std::span<const Window> windows,
+                              std::size_t zone_everywhere);
+
+}  // namespace joulecast::gap

@@ -1,0 +1,68 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+
+#include "gap/diagnosis.h"
+#include "robot/robot_file.h"
+
+namespace joulecast::gap {
+namespace {
+
+// The practice logs: another plant's recordings with their truths.
+class Practice : public testing::TestWithParam<const char*> {};
+
+TEST_P(Practice, GetsTheRightVerdict) {
+  const std::filesystem::path folder = std::filesystem::path(JOULECAST_SHARED) / "data/practice" / GetParam();
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no practice log " << folder;
+  const auto robot = robot::load_robot(folder / "robot.json");
+  ASSERT_TRUE(robot);
+  const std::string log = folder / "telemetry.lcmlog";
+  const auto recordings = load_recordings({&log, 1});
+  ASSERT_TRUE(recordings);
+  const auto diagnosis = diagnose(*recordings, *robot);
+  ASSERT_TRUE(diagnosis);
+
+  std::ifstream in(folder / "truth.json");
+  const auto truth = nlohmann::json::parse(in);
+  std::map<std::string, double> strengths = truth["effects"];
+  EXPECT_EQ(diagnosis->motor_channels, truth["motor_channels"].get<bool>());
+  if (strengths.empty()) {
+    EXPECT_EQ(name_of(diagnosis->verdict), "none");
+    return;
+  }
+  if (strengths.begin()->first.starts_with("x_")) {
+    EXPECT_EQ(name_of(diagnosis->verdict), "outside");
+    return;
+  }
+  EXPECT_EQ(name_of(diagnosis->verdict), "effects");
+  ASSERT_EQ(diagnosis->effects.size(), strengths.size());
+  for (const DiagnosedEffect& effect : diagnosis->effects) {
+    std::set<std::string> group(effect.alternatives.begin(), effect.alternatives.end());
+    group.insert(effect.id);
+    EXPECT_LE(group.size(), 3u);
+    const auto found =
+        std::ranges::find_if(strengths, [&](const auto& s) { return group.contains(s.first); });
+    ASSERT_NE(found, strengths.end()) << effect.id << " is not there";
+    if (found->first == effect.id) {
+      EXPECT_NEAR(effect.parameters.front().value, found->second, 0.1 * found->second) << effect.id;
+    }
+  }
+  // The effects take away most of what noise and sampling do not make.
+  ASSERT_TRUE(diagnosis->shrinkage);
+  EXPECT_GT(diagnosis->shrinkage->interval[0], 0.5);
+}
+
+INSTANTIATE_TEST_SUITE_P(Logs, Practice,
+                         testing::Values("01_load_rolling", "02_scrub", "03_no_regeneration", "04_accessory",
+                                         "05_zone", "06_two", "07_none", "08_outside"),
+                         [](const auto& log) { return std::string(log.param).substr(3); });
+
+}  // namespace
+}  // namespace joulecast::gap
