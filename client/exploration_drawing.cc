@@ -63,8 +63,8 @@ void draw_ground(Svg& svg, const Frame& frame, const Exploration& e, std::size_t
       const auto column = static_cast<double>(first - row), count = static_cast<double>(last - first + 1);
       const SvgPoint corner = frame.at(
           {(column - 0.5) * cell, (static_cast<double>(row) / static_cast<double>(e.columns) + 0.5) * cell});
-      // A hair of overlap hides the seams between cells.
-      svg.rect(corner.x, corner.y, count * cell * frame.scale + 0.3, cell * frame.scale + 0.3,
+      // A pixel of overlap hides the seams between cells.
+      svg.rect(corner.x, corner.y, count * cell * frame.scale + 1, cell * frame.scale + 1,
                {.fill = colour(first)});
       first = last + 1;
     }
@@ -74,6 +74,8 @@ void draw_ground(Svg& svg, const Frame& frame, const Exploration& e, std::size_t
     for (const Point& c : shape.corners()) points.push_back(frame.at(c));
     svg.polygon(points, style);
   };
+  for (const ConvexPolygon& o : frame.map.obstacles)
+    outline(o.grown(frame.map.safety_radius_m), {.fill = occupied_colour});
   for (const ConvexPolygon& o : frame.map.obstacles) outline(o, {.fill = obstacle_colour});
   for (const ConvexPolygon& o : frame.map.obstacles)
     outline(o.grown(frame.map.safety_radius_m),
@@ -85,6 +87,7 @@ void draw_ground(Svg& svg, const Frame& frame, const Exploration& e, std::size_t
 void draw_axes(Svg& svg, const Frame& frame) {
   const double longer = std::max(frame.map.width_m, frame.map.height_m);
   double step = std::pow(10.0, std::floor(std::log10(longer / 2)));
+  while (longer / step < 4) step /= 2;
   while (longer / step > 8) step *= 2;
   for (double v = 0; v <= longer * (1 + 1e-9); v += step) {
     if (v <= frame.map.width_m * (1 + 1e-9)) {
@@ -231,10 +234,14 @@ double draw_steps(Svg& svg, double x, double y, const Exploration& e) {
   }
   y += row_px;
   svg.text({x, y},
-           fmt::format("{}: {} of {} nodes unseen after {:.1f} m and {:.1f} turns on the spot",
-                       e.outcome == Outcome::explored ? "Explored" : "Stuck", e.unseen,
-                       grouped(e.nodes.size()), e.length_m(), e.turned_rad() / (2 * std::numbers::pi)),
+           fmt::format("{}: {} of {} nodes unseen", e.outcome == Outcome::explored ? "Explored" : "Stuck",
+                       e.unseen, grouped(e.nodes.size())),
            {.size = 12.5, .bold = true});
+  y += row_px;
+  svg.text({x, y},
+           fmt::format("{:.1f} m driven, {:.1f} full turns on the spot", e.length_m(),
+                       e.turned_rad() / (2 * std::numbers::pi)),
+           {.size = 12.5});
   return y;
 }
 
@@ -323,7 +330,7 @@ std::string draw_exploration(std::string_view title, const Map& map, const Explo
   const Frame whole(map, left, top, main_px);
   const double step_lines =
       static_cast<double>(std::min(steps(e).size(), most_step_lines) + 1 + energy.size()) * row_px;
-  const double side_height = step_lines + 290;
+  const double side_height = step_lines + 310;
   const double upper = std::max(whole.height() + 36, side_height);
   const Frame sample(map, 0, 0, panel_px);
   const std::size_t panels = e.rounds.size();
@@ -348,10 +355,10 @@ std::string draw_exploration(std::string_view title, const Map& map, const Explo
     const double px = left + static_cast<double>(k % panels_a_row) * (sample.width() + 22);
     const double py = panels_top + static_cast<double>(k / panels_a_row) * panel_height;
     const Round& round = e.rounds[k];
-    std::string caption = fmt::format("After look {}: {} unseen", k + 1, grouped(round.scan.unseen_after));
+    std::string caption = fmt::format("Look {}: {} unseen", k + 1, grouped(round.scan.unseen_after));
     if (round.next)
       caption +=
-          fmt::format("; best shows {}", grouped(round.next->candidates[round.next->winner].unseen_visible));
+          fmt::format(", next shows {}", grouped(round.next->candidates[round.next->winner].unseen_visible));
     svg.text({px, py - 6}, caption, {.size = 11.5});
     draw_round(svg, Frame(map, px, py, panel_px), e, k);
   }

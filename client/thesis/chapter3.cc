@@ -1,0 +1,60 @@
+#include <fmt/format.h>
+
+#include "client/thesis/tables.h"
+#include "dynamics/straight.h"
+#include "planning/ramp.h"
+
+namespace joulecast::client::thesis {
+namespace {
+
+constexpr double acceleration_time_s = 4;  // section 3.2.1
+constexpr double distance_m = 10;
+
+struct Printed {
+  double acceleration_m_s2;
+  double payload_kg;
+  double left_j, right_j;
+};
+constexpr Printed printed[] = {
+    {0.125, 0, 60.48, 57.6},    {0.15, 0, 60.99, 58.47},    {0.175, 0, 63.57, 60.28},
+    {0.2, 0, 64.9, 62.77},      {0.225, 0, 66.13, 64.18},   {0.255, 0, 65.14, 64.31},
+    {0.125, 8.25, 65.11, 62.2}, {0.15, 8.25, 67.16, 64.59}, {0.175, 8.25, 70.02, 67.7},
+    {0.2, 8.25, 72.97, 70.78},  {0.225, 8.25, 74.34, 72.4}, {0.255, 8.25, 78.06, 76.26}};
+
+// Accelerating for 4 s, braking for 4 s, cruising in between.
+planning::RampProfile run(const dynamics::QuadraticPower& power, double acceleration, double distance) {
+  const double peak = acceleration * acceleration_time_s;
+  const double cruise_s = distance / peak - acceleration_time_s;
+  return planning::RampProfile(power, {{{acceleration_time_s, 0, acceleration},
+                                        {cruise_s, peak, 0},
+                                        {acceleration_time_s, peak, -acceleration}}});
+}
+
+}  // namespace
+
+Table table_3_3(const robot::RobotModel& nomad) {
+  Table table{"3-3, 3-4",
+              "Nomad, 10 m with six accelerations: columns of the model",
+              "4 s of acceleration (3.2.1), cruise, 4 s of braking; the thesis does not print how it brakes",
+              {}};
+  for (const Printed& p : printed) {
+    const auto power = dynamics::straight_power(nomad, p.payload_kg);
+    // (3-2), which the thesis numbers wheel 1, has the larger friction torque, 0.3728; so has the printed
+    // left.
+    for (const bool left : {true, false}) {
+      const std::size_t side = left ? robot::right : robot::left;
+      const auto along = power.side[side].rescaled(power.wheel_radius_m);
+      const double ours = run(along, p.acceleration_m_s2, distance_m).energy_j();
+      const double value = left ? p.left_j : p.right_j;
+      const double cruise_j_m = along.power_w(4 * p.acceleration_m_s2, 0) / (4 * p.acceleration_m_s2);
+      table.rows.push_back({fmt::format("{:g} m/s^2, {:g} kg, {} motor", p.acceleration_m_s2, p.payload_kg,
+                                        left ? "left" : "right"),
+                            value, ours,
+                            fmt::format("(3-2)/(3-3) need {:.1f} m for the printed value, not 10 m",
+                                        distance_m + (value - ours) / cruise_j_m)});
+    }
+  }
+  return table;
+}
+
+}  // namespace joulecast::client::thesis
