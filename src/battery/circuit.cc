@@ -122,7 +122,7 @@ State Circuit::advanced(const State& state, double current_a, double duration_s,
     out.charge_lag[k] = state.charge_lag[k] + lag_gone * (settled - state.charge_lag[k]);
   }
   const double gone = -std::expm1(-duration_s / thermal_time_constant_s_);
-  const double settled_c = gone > 0 ? ambient_c + heating_k(state, current_a) : state.temperature_c;
+  const double settled_c = gone != 0 ? ambient_c + heating_k(state, current_a) : state.temperature_c;
   out.temperature_c = state.temperature_c + gone * (settled_c - state.temperature_c);
   return out;
 }

@@ -19,6 +19,20 @@ double quantile(std::vector<double> values, double share) {
   return values[below] + (at - static_cast<double>(below)) * (values[above] - values[below]);
 }
 
+// Over the rows before the discharge has drawn all but least_charge of `full_ah`.
+double rms_above_least_charge(const Recording& recording, const std::vector<double>& predicted_v,
+                              double full_ah) {
+  double drawn_ah = 0, sum = 0;
+  std::size_t rows = 0;
+  for (std::size_t row = 0; row < std::min(recording.size(), predicted_v.size()); ++row) {
+    if (row > 0) drawn_ah += recording.current_a[row] * recording.duration_s(row) / 3600;
+    if (drawn_ah >= (1 - least_charge) * full_ah) break;
+    sum += std::pow(predicted_v[row] - recording.voltage_v[row], 2);
+    ++rows;
+  }
+  return std::sqrt(sum / static_cast<double>(rows));
+}
+
 }  // namespace
 
 Result<Load> recorded_load(const Recording& recording, Load::Kind kind) {
@@ -62,16 +76,10 @@ Result<Prediction> predict(const Circuit& circuit, const Recording& recording, L
   // Voltages go on below the end voltage, so that a discharge predicted too short is compared in full.
   const auto through = discharge(circuit, start, *recorded, {0.0, std::nullopt, ambient_c});
   if (!through) return tl::unexpected(through.error());
-  double drawn_ah = 0, sum = 0;
-  std::size_t rows = 0;
-  for (std::size_t row = 0; row < recording.size() && row <= through->terminal_v.size(); ++row) {
-    if (row > 0) drawn_ah += recording.current_a[row] * recording.duration_s(row) / 3600;
-    if (1 - drawn_ah / circuit.capacity_ah() <= least_charge) break;
-    const double predicted = row > 0 ? through->terminal_v[row - 1] : circuit.inner_voltage_v(start);
-    sum += std::pow(predicted - recording.voltage_v[row], 2);
-    ++rows;
-  }
-  out.voltage_rms_v = std::sqrt(sum / static_cast<double>(rows));
+  std::vector<double> terminal_v{circuit.inner_voltage_v(start)};
+  terminal_v.insert(terminal_v.end(), through->terminal_v.begin(), through->terminal_v.end());
+  out.voltage_rms_v = rms_above_least_charge(recording, terminal_v, recording.charge_ah());
+  out.voltage_rms_by_capacity_v = rms_above_least_charge(recording, terminal_v, circuit.capacity_ah());
   return out;
 }
 
@@ -80,15 +88,18 @@ PredictionSummary summarise(const std::vector<Prediction>& predictions) {
   out.count = predictions.size();
   if (predictions.empty()) return out;
   std::vector<double> errors;
-  double sum = 0;
+  double sum = 0, sum_by_capacity = 0;
   for (const Prediction& prediction : predictions) {
     errors.push_back(std::abs(prediction.time_error));
-    sum += prediction.voltage_rms_v * prediction.voltage_rms_v;
+    sum += std::pow(prediction.voltage_rms_v, 2);
+    sum_by_capacity += std::pow(prediction.voltage_rms_by_capacity_v, 2);
     out.voltage_rms_worst_v = std::max(out.voltage_rms_worst_v, prediction.voltage_rms_v);
   }
   out.time_error_median = quantile(errors, 0.5);
   out.time_error_p95 = quantile(errors, 0.95);
-  out.voltage_rms_v = std::sqrt(sum / static_cast<double>(predictions.size()));
+  const auto count = static_cast<double>(predictions.size());
+  out.voltage_rms_v = std::sqrt(sum / count);
+  out.voltage_rms_by_capacity_v = std::sqrt(sum_by_capacity / count);
   return out;
 }
 

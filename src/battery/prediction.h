@@ -18,14 +18,18 @@ struct Prediction {
   double measured_s = 0;     // until the recording's end
   double predicted_s = 0;    // until the circuit's terminals reach end_voltage_v; the last load goes on
   double time_error = 0;     // predicted / measured - 1
-  double voltage_rms_v = 0;  // over the rows whose charge, counted from full, is above least_charge
+  // Over the rows above least_charge: of the charge that this discharge delivered, and of the battery's
+  // capacity, which a fast discharge leaves in part (so that it reaches further into the steep end).
+  double voltage_rms_v = 0;
+  double voltage_rms_by_capacity_v = 0;
 };
 
 struct PredictionSummary {
   std::size_t count = 0;
   double time_error_median = 0;  // of absolute values
   double time_error_p95 = 0;
-  double voltage_rms_v = 0;  // root mean square of the discharges
+  double voltage_rms_v = 0;  // root mean square of the discharges' own, here and below
+  double voltage_rms_by_capacity_v = 0;
   double voltage_rms_worst_v = 0;
 };
 

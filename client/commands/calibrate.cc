@@ -1,0 +1,124 @@
+#include "battery/calibrate.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "battery/recording.h"
+#include "client/commands/table.h"
+#include "robot/robot_file.h"
+
+namespace joulecast::client {
+namespace {
+
+struct Options {
+  std::vector<std::string> sources;
+  std::optional<double> rated_capacity_ah;
+  double reserve_fraction = battery::CalibrationOptions{}.reserve_fraction;
+  std::string out;
+  bool json = false;
+};
+
+Result<std::vector<battery::Recording>> read_all(const std::vector<std::string>& sources) {
+  std::vector<battery::Recording> all;
+  for (const std::string& source : sources) {
+    const auto files = battery::identification_files(source);
+    if (!files) return tl::unexpected(files.error());
+    for (const auto& file : *files) {
+      auto recordings = battery::read_recordings(file);
+      if (!recordings) return tl::unexpected(recordings.error());
+      for (auto& recording : *recordings) all.push_back(std::move(recording));
+    }
+  }
+  return all;
+}
+
+Result<void> write(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text << '\n';
+  file.close();
+  if (!file) return fail(Fault::unavailable, path, "cannot be written");
+  return {};
+}
+
+void print_json(const battery::Calibration& calibration) {
+  nlohmann::json document{{"battery", robot::battery_to_json(calibration.battery)},
+                          {"iterations", calibration.iterations},
+                          {"recordings", nlohmann::json::array()}};
+  for (const battery::RecordingFit& fit : calibration.recordings)
+    document["recordings"].push_back(
+        {{"name", fit.name}, {"open_circuit", fit.open_circuit}, {"voltage_rms_v", fit.voltage_rms_v}});
+  std::puts(document.dump(2).c_str());
+}
+
+void print_text(const battery::Calibration& calibration) {
+  const robot::Battery& battery = calibration.battery;
+  fmt::print("capacity            {:.4f} Ah\n", battery.capacity_ah * battery.ageing_factor.value_or(1));
+  if (battery.ageing_factor) fmt::print("ageing factor       {:.4f}\n", *battery.ageing_factor);
+  fmt::print("nominal voltage     {:.3f} V, cut-off {:.3f} V\n", battery.nominal_voltage_v,
+             *battery.cutoff_voltage_v);
+  fmt::print("ohmic resistance    {:.4f} ohm at half charge\n", battery.internal_resistance_ohm);
+  for (const robot::BatteryBranch& branch : battery.branches)
+    fmt::print("branch              {:.4f} ohm, {:.1f} s\n", branch.resistance_ohm, branch.time_constant_s);
+  for (const robot::ChargeLag& lag : battery.charge_lags)
+    fmt::print("charge lag          {:.1f} s, {:.1f} s\n", lag.lag_s, lag.time_constant_s);
+  if (battery.activation_k) fmt::print("activation          {:.0f} K\n", *battery.activation_k);
+  if (battery.thermal_resistance_k_w)
+    fmt::print("to surroundings     {:.2f} K/W, {:.0f} s\n", *battery.thermal_resistance_k_w,
+               *battery.thermal_time_constant_s);
+  for (const battery::RecordingFit& fit : calibration.recordings)
+    fmt::print("{:<32} voltage rms {:5.1f} mV{}\n", fit.name, 1e3 * fit.voltage_rms_v,
+               fit.open_circuit ? ", gives the open-circuit voltage" : "");
+}
+
+Exit run(const Options& options) {
+  const auto recordings = read_all(options.sources);
+  if (!recordings) return report(recordings.error());
+  const auto calibration =
+      battery::calibrate(*recordings, {options.rated_capacity_ah, options.reserve_fraction});
+  if (!calibration) return report(calibration.error());
+  const std::string text = robot::to_json_text(calibration->battery);
+  // What is written must be readable again, whatever was measured.
+  if (const auto checked = robot::parse_battery(text); !checked) return report(checked.error());
+  if (const auto written = write(options.out, text); !written) return report(written.error());
+  if (options.json) {
+    print_json(*calibration);
+  } else {
+    print_text(*calibration);
+  }
+  return Exit::ok;
+}
+
+}  // namespace
+
+void add_calibrate(CLI::App& program, Exit& exit) {
+  auto* calibrate = program.add_subcommand("calibrate", "Identify parameters from recordings");
+  calibrate->require_subcommand(1);
+  add_calibrate_drive(*calibrate, exit);
+  auto options = std::make_shared<Options>();
+  auto* command = calibrate->add_subcommand("battery",
+                                            "Identify a battery from CSV recordings (columns t_s, I_A "
+                                            "discharging positive, V_V, T_C) of a slow full "
+                                            "discharge, pulses and constant currents");
+  command
+      ->add_option("recordings", options->sources,
+                   "CSV files, or the common beginning of <beginning>_*_data.csv")
+      ->required();
+  command->add_option("--capacity-ah", options->rated_capacity_ah, "rated capacity; gives an ageing factor")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--reserve", options->reserve_fraction, "share of the charge that planning leaves")
+      ->check(CLI::Range(0.0, 0.99))
+      ->capture_default_str();
+  command->add_option("--out", options->out, "file for the battery object of a robot file")->required();
+  command->add_flag("--json", options->json, "print the result as JSON");
+  command->callback([options, &exit] { exit = run(*options); });
+}
+
+}  // namespace joulecast::client

@@ -1,0 +1,132 @@
+#include "battery/calibrate.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "battery/prediction.h"
+#include "robot/robot_file.h"
+#include "support.h"
+
+namespace joulecast::battery {
+namespace {
+
+// What a logger would write of `truth` drawn empty by repeating `currents_a`, each for `hold_s`.
+Recording simulated(const Circuit& truth, const std::string& name, const std::vector<double>& currents_a,
+                    double hold_s, double row_s) {
+  Recording out{name, {0}, {0}, {truth.open_circuit_voltage_v(1)}, {25}};
+  State state = Circuit::rested(1);
+  double now_s = 0;
+  for (std::size_t step = 0;; ++step) {
+    const double current_a = currents_a[step % currents_a.size()];
+    for (double held = 0; held < hold_s; held += row_s) {
+      for (int i = 0; i < 10; ++i) state = truth.advanced(state, current_a, row_s / 10, 25);
+      now_s += row_s;
+      out.time_s.push_back(now_s);
+      out.current_a.push_back(current_a);
+      out.voltage_v.push_back(truth.voltage_v(state, current_a));
+      out.temperature_c.push_back(state.temperature_c);
+      if (out.voltage_v.back() <= truth.cutoff_voltage_v()) return out;
+    }
+  }
+}
+
+std::vector<Recording> identification(const Circuit& truth) {
+  const double c = truth.capacity_ah();
+  return {simulated(truth, "slow", {c / 20}, 1e6, 60), simulated(truth, "half", {c / 2}, 1e6, 10),
+          simulated(truth, "one", {c}, 1e6, 10), simulated(truth, "two", {2 * c}, 1e6, 10),
+          simulated(truth, "pulses", {c / 2, 0, 0}, 600, 10)};
+}
+
+TEST(Calibrate, FindsTheBatteryThatMadeTheRecordings) {
+  robot::Battery true_battery = full_battery();
+  true_battery.branches.resize(1);
+  const Circuit truth(true_battery);
+  const auto calibration = calibrate(identification(truth), {2.5, 0.2});
+  ASSERT_TRUE(calibration) << describe(calibration.error());
+  const robot::Battery& found = calibration->battery;
+  EXPECT_TRUE(robot::parse_battery(robot::to_json_text(found)));
+  // The slow test ends at the cut-off, a little before the true charge is gone.
+  EXPECT_NEAR(found.capacity_ah * *found.ageing_factor, 2.25, 0.01 * 2.25);
+  EXPECT_EQ(found.capacity_ah, 2.5);
+  EXPECT_EQ(found.reserve_fraction, 0.2);
+  EXPECT_NEAR(*found.cutoff_voltage_v, 2.5, 0.01);
+  // A discharge that the fit did not see: its time to 0.5 %, its voltage to twice the error of 0.135 % of the
+  // nominal voltage that the fit grants each row (its knots are not those of the truth).
+  const Recording unseen = simulated(truth, "unseen", {3.1, 0.4, 1.7, 4.2}, 170, 10);
+  for (const auto kind : {Load::Kind::current, Load::Kind::power}) {
+    const auto prediction = predict(Circuit(found), unseen, kind);
+    ASSERT_TRUE(prediction) << describe(prediction.error());
+    EXPECT_LT(std::abs(prediction->time_error), 0.005);
+    EXPECT_LT(prediction->voltage_rms_v, 2 * 0.00135 * 3.7);
+  }
+}
+
+TEST(Calibrate, SaysWhichTestIsMissing) {
+  const Circuit truth(full_battery());
+  const auto all = identification(truth);
+  EXPECT_THAT(calibrate({all[1], all[2]}).error().message, testing::HasSubstr("without pause"));
+  EXPECT_THAT(calibrate({all[0]}).error().message, testing::HasSubstr("besides the slow one"));
+  EXPECT_FALSE(calibrate({}));
+  Recording rest = all[1];
+  std::fill(rest.current_a.begin(), rest.current_a.end(), 0.0);
+  EXPECT_THAT(calibrate({all[0], rest}).error().message, testing::HasSubstr("half draws 0 Ah"));
+}
+
+TEST(Predict, TheTrueBatteryPredictsItself) {
+  const Circuit truth(full_battery());
+  const Recording recording = simulated(truth, "own", {2, 0, 4}, 120, 10);
+  const auto prediction = predict(truth, recording, Load::Kind::current);
+  ASSERT_TRUE(prediction) << describe(prediction.error());
+  // The recording ends with the row after the crossing: within one row.
+  EXPECT_NEAR(prediction->predicted_s, prediction->measured_s, 10);
+  EXPECT_LT(prediction->voltage_rms_v, 1e-4);  // the recording's steps hold the heat for a second
+  const PredictionSummary summary = summarise({*prediction, *prediction});
+  EXPECT_EQ(summary.count, 2u);
+  EXPECT_DOUBLE_EQ(summary.time_error_p95, std::abs(prediction->time_error));
+}
+
+// The yardstick: identified on slow, pulse and constant-current tests of a real cell, the circuit predicts
+// its random discharges, which the fit has not seen.
+class RealCell : public testing::TestWithParam<const char*> {};
+
+TEST_P(RealCell, RandomDischargesArePredicted) {
+  const std::filesystem::path folder =
+      std::filesystem::path(JOULECAST_SHARED) / "data/real/battery_dmegc18650";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "the battery recordings are not beside the project";
+  const std::string prefix = (folder / GetParam()).string();
+  std::vector<Recording> recordings;
+  const auto files = identification_files(prefix);
+  ASSERT_TRUE(files);
+  ASSERT_EQ(files->size(), 5u);
+  for (const auto& file : *files) {
+    auto read = read_recordings(file);
+    ASSERT_TRUE(read) << describe(read.error());
+    recordings.insert(recordings.end(), read->begin(), read->end());
+  }
+  const auto calibration = calibrate(recordings);
+  ASSERT_TRUE(calibration) << describe(calibration.error());
+  const Circuit circuit(calibration->battery);
+  const auto discharges = read_recordings(prefix + "_rw.csv");
+  ASSERT_TRUE(discharges) << describe(discharges.error());
+  ASSERT_EQ(discharges->size(), 50u);
+  for (const auto kind : {Load::Kind::current, Load::Kind::power}) {
+    std::vector<Prediction> predictions;
+    for (const Recording& recording : *discharges) {
+      const auto prediction = predict(circuit, recording, kind);
+      ASSERT_TRUE(prediction) << describe(prediction.error());
+      predictions.push_back(*prediction);
+    }
+    const PredictionSummary summary = summarise(predictions);
+    EXPECT_LE(summary.time_error_median, 0.015);
+    EXPECT_LE(summary.time_error_p95, 0.04);
+    EXPECT_LE(summary.voltage_rms_worst_v, 0.025);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Cells, RealCell, testing::Values("R1", "R2", "R3"));
+
+}  // namespace
+}  // namespace joulecast::battery

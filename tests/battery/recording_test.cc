@@ -1,0 +1,62 @@
+#include "battery/recording.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace joulecast::battery {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+TEST(Recording, ReadsColumnsByNameAndSplitsCycles) {
+  const auto recordings = parse_recordings(
+      "V_V,cycle,extra,t_s,I_A,T_C\r\n4.1,0,x,0,-0,25\r\n4.0,0,x,10,2,\r\n4.2,1,,0,0,26\r\n4.1,1,,5,1,27\r\n",
+      "rw.csv");
+  ASSERT_TRUE(recordings) << describe(recordings.error());
+  ASSERT_EQ(recordings->size(), 2u);
+  const Recording& first = recordings->front();
+  EXPECT_EQ(first.name, "rw.csv#0");
+  EXPECT_THAT(first.time_s, ElementsAre(0, 10));
+  EXPECT_THAT(first.current_a, ElementsAre(0, 2));
+  EXPECT_THAT(first.voltage_v, ElementsAre(4.1, 4.0));
+  EXPECT_TRUE(std::isnan(first.temperature_c[1]));
+  EXPECT_DOUBLE_EQ(first.charge_ah(), 20.0 / 3600);
+  EXPECT_EQ((*recordings)[1].name, "rw.csv#1");
+}
+
+TEST(Recording, OfRowsInTheSameSecondTheLastCounts) {
+  const auto recordings = parse_recordings("t_s,I_A,V_V\n0,0,4\n10,1,3.9\n10,1,3.8\n", "x");
+  ASSERT_TRUE(recordings);
+  EXPECT_THAT(recordings->front().voltage_v, ElementsAre(4, 3.8));
+}
+
+TEST(Recording, DamagedTextIsRefusedWithLineAndColumn) {
+  struct Case {
+    const char* text;
+    const char* field;
+    const char* message;
+  };
+  for (const Case& item :
+       {Case{"t_s,I_A\n0,0\n", "V_V", "first line"}, Case{"t_s,I_A,V_V\n", "t_s", "no rows"},
+        Case{"t_s,I_A,V_V\n0,0,4\n", "t_s", "single row"},
+        Case{"t_s,I_A,V_V\n0,0,4\n1,x,4\n", "I_A", "line 3"},
+        Case{"t_s,I_A,V_V\n0,0,4\n1,nan,4\n", "I_A", "line 3"},
+        Case{"t_s,I_A,V_V\n0,0,4\n1,0\n", "V_V", "line 3"},
+        Case{"t_s,I_A,V_V\n5,0,4\n1,0,4\n", "t_s", "line 3"}, Case{"", "t_s", "first line"}}) {
+    const auto recordings = parse_recordings(item.text, "x");
+    ASSERT_FALSE(recordings) << item.text;
+    EXPECT_EQ(recordings.error().field, item.field);
+    EXPECT_THAT(recordings.error().message, HasSubstr(item.message));
+  }
+}
+
+TEST(Recording, APrefixThatNamesNothingIsNotFound) {
+  EXPECT_EQ(identification_files("/nowhere/R1").error().fault, Fault::not_found);
+  EXPECT_EQ(read_recordings("/nowhere/R1.csv").error().fault, Fault::not_found);
+}
+
+}  // namespace
+}  // namespace joulecast::battery
