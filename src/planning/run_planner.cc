@@ -167,10 +167,10 @@ std::vector<double> RunPlanner::first_nodes(std::size_t cells) const {
   for (std::size_t k = 1; k < knots.size(); ++k) {
     const double gap = knots[k].way - nodes.back();
     if (gap < smallest && k + 1 < knots.size()) continue;
-    // Where the curvature changes quickly, torque does: such a stretch gets at least 8 cells.
+    // Where the curvature changes quickly, torque does: such a stretch gets up to 16 cells.
     const bool bends = std::fabs(knots[k].curvature_1_m - knots[k - 1].curvature_1_m) > 0.05;
     const double cuts =
-        std::max(bends ? std::min(8.0, std::ceil(200 * gap)) : 1.0, std::ceil(gap / coarse - 1e-9));
+        std::max(bends ? std::min(16.0, std::ceil(400 * gap)) : 1.0, std::ceil(gap / coarse - 1e-9));
     const double from = nodes.back();
     for (double i = 1; i <= cuts; ++i) nodes.push_back(from + gap * i / cuts);
   }
@@ -270,7 +270,7 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
   if (planner.uniform_) {
     planner.build(planner.first_nodes(cells / 2));
   } else {
-    planner.fine_nodes_ = planner.first_nodes(cells);
+    planner.fine_nodes_ = planner.first_nodes(2 * cells);
     planner.build(thinned(planner.fine_nodes_));
   }
   if (auto ok = planner.check_feasible(); !ok) return tl::unexpected(std::move(ok.error()));
