@@ -130,14 +130,26 @@ function draw_ends(c, view, points) {
   c.fillRect(ex - 4.5, ey - 4.5, 9, 9);
 }
 
-// `points`: rows [x m, y m, value]. `cursor`: index of the row to mark, or null.
-export function FloorPath({ points, kind = 'power', height = 380, label, cursor = null, robot = null, legend = true, ends = true }) {
+function draw_under(c, view, points) {
+  c.strokeStyle = palette().muted;
+  c.lineWidth = 1.25;
+  c.setLineDash([5, 4]);
+  c.beginPath();
+  points.forEach(([x, y], k) => c[k === 0 ? 'moveTo' : 'lineTo'](...view.to(x, y)));
+  c.stroke();
+  c.setLineDash([]);
+}
+
+// `points`: rows [x m, y m, value]. `cursor`: index of the row to mark, or null. `under`: a path drawn dashed
+// below it.
+export function FloorPath({ points, kind = 'power', height = 380, label, cursor = null, robot = null, legend = true, ends = true, under = null }) {
   const shown = points.filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y));
   const dark = useTheme();
   const scale = scale_for(kind, shown.map((row) => row[2]));
   const draw = (c, width, tall) => {
-    const view = fit(robot ? [...shown, robot] : shown, width, tall, 34);
+    const view = fit([...shown, ...(robot ? [robot] : []), ...(under ?? [])], width, tall, 34);
     draw_grid(c, view);
+    if (under !== null) draw_under(c, view, under);
     c.lineWidth = 3.2;
     c.lineCap = 'round';
     for (let k = 1; k < shown.length; ++k) {
@@ -170,7 +182,7 @@ export function FloorPath({ points, kind = 'power', height = 380, label, cursor 
     draw_scale_bar(c, view);
   };
   return html`<div class="floor-box">
-    <${Canvas} draw=${draw} height=${height} label=${label} changes=${[points, kind, cursor, robot]} />
+    <${Canvas} draw=${draw} height=${height} label=${label} changes=${[points, kind, cursor, robot, under]} />
     ${legend && html`<${Legend} scale=${scale} dark=${dark} title=${kind === 'gap' ? 'measured − modelled' : 'power'} />`}
   </div>`;
 }

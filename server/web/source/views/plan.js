@@ -139,6 +139,9 @@ export function Plan({ given }) {
   const running = useRef(null);
   const chosen = able.includes(robot) ? robot : able[0] ?? '';
 
+  const preview = useMemo(() => (way === 'legs' ? points_of_legs(legs).filter(([x, y]) => Number.isFinite(x + y)) : points), [way, legs, points]);
+  const driven = useMemo(() => told.answer?.profile.x_m.map((x, k) => [x, told.answer.profile.y_m[k], told.answer.profile.power_w[k]]), [told.answer]);
+
   const compute = async (more = {}) => {
     const asked = { ...terms, ...more }, number = (text) => (text === '' ? undefined : Number(text));
     if (way === 'draw' && points.length < 2) {
@@ -159,7 +162,7 @@ export function Plan({ given }) {
       .then((value) => ({ value, error: null }), (error) => ({ value: null, error }));
     try {
       const answer = await post(`${url}/profile`, body, abort.signal);
-      set_told({ answer, error: null, busy: false, autonomy: await autonomy, straight: body.path.length === 1 && body.path[0].kind === 'straight' });
+      set_told({ answer, of: preview, error: null, busy: false, autonomy: await autonomy, straight: body.path.length === 1 && body.path[0].kind === 'straight' });
     } catch (error) {
       if (error.name !== 'AbortError') set_told((before) => ({ ...before, error, busy: false }));
     }
@@ -174,8 +177,6 @@ export function Plan({ given }) {
   const term = (key, label, unit, more) => html`<label class="field"><span>${label}</span><span class="with-unit"><input type="number" step="any" min="0" value=${terms[key]} onInput=${(e) => set_terms({ ...terms, [key]: e.currentTarget.value })} ...${more} /><span class="unit">${unit}</span></span></label>`;
   const answer = told.answer;
   const faulty = /^\/path\/(\d+)/.exec(told.error?.field ?? '');
-  const preview = way === 'legs' ? points_of_legs(legs) : points;
-  const driven = answer && answer.profile.x_m.map((x, k) => [x, answer.profile.y_m[k], answer.profile.power_w[k]]);
   const take = ({ duration_s }) => {
     const deadline = String(Math.ceil(duration_s * 100) / 100);
     set_terms({ ...terms, deadline });
@@ -194,7 +195,7 @@ export function Plan({ given }) {
         ${term('value', 'Value of time', 'W', { placeholder: '0' })}
         ${term('charge', 'Charge now', '%', { placeholder: 'live', max: 100 })}
       </div>
-      <button type="submit" class="primary" disabled=${told.busy || chosen === ''}>${told.busy ? 'Computing …' : 'Compute'}</button>
+      <button type="submit" class="primary" disabled=${chosen === ''}>${told.busy ? 'Computing …' : 'Compute'}</button>
     </form>
     <div class="plan-result" aria-live="polite" aria-busy=${String(told.busy)}>
       ${told.error && html`<${Failure} error=${told.error} />`}
@@ -210,7 +211,7 @@ export function Plan({ given }) {
         </dl>
         <div class="columns">
           <${Panel} class="screen" title="Speed and power"><${SpeedChart} answer=${answer} straight=${told.straight} /><//>
-          <${Panel} class="screen" title="On the floor"><${FloorPath} points=${driven} height=${340} label="The planned path, coloured by power; circle: start, square: end" /><//>
+          <${Panel} class="screen" title="On the floor"><${FloorPath} points=${driven} under=${told.of === preview ? null : preview} height=${340} label="The planned path, coloured by power; circle: start, square: end" /><//>
         </div>
         <div class="columns">
           <${Panel} title="Against the usual profiles">

@@ -1,0 +1,421 @@
+// The operator page in headless Chromium against a running daemon with live robots.
+// node operator_page_test.mjs --daemon joulecastd --client joulecast --page server/web --out directory [--chromium /usr/bin/chromium]
+// Screenshots and figures.json go to --out. Leaves with 1 when a check fails.
+import { readFile, mkdir, rm, writeFile } from 'node:fs/promises';
+import { createRequire } from 'node:module';
+import path from 'node:path';
+import { parseArgs } from 'node:util';
+import { gzipSync } from 'node:zlib';
+import { chromium } from 'playwright-core';
+import { free_port, run, start_until, stop } from './daemon.mjs';
+import { serve_many_robots } from './many_robots_server.mjs';
+
+const { values: given } = parseArgs({ options: {
+  daemon: { type: 'string' }, client: { type: 'string' }, page: { type: 'string' }, out: { type: 'string' },
+  chromium: { type: 'string', default: '/usr/bin/chromium' } } });
+for (const name of ['daemon', 'client', 'page', 'out']) {
+  if (given[name] === undefined) throw new Error(`--${name} is missing`);
+}
+const axe = await readFile(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
+const sizes = { laptop: { width: 1440, height: 900 }, tablet: { width: 820, height: 1180 } };
+const first_view_limit_ms = 1000, mission_limit_ms = 1000, bundle_limit_bytes = 60_000, tries = 5;
+const figures = {};
+let failed = 0, passed = 0;
+
+async function check(name, body) {
+  const began = Date.now();
+  try {
+    await body();
+    passed += 1;
+    console.log(`ok    ${name} (${Date.now() - began} ms)`);
+  } catch (error) {
+    failed += 1;
+    console.log(`FAIL  ${name}\n      ${String(error.stack).split('\n').slice(0, 6).join('\n      ')}`);
+  }
+}
+function expect(holds, what) {
+  if (!holds) throw new Error(what);
+}
+function equal(got, wanted, what) {
+  expect(got === wanted, `${what}: got ${JSON.stringify(got)}, wanted ${JSON.stringify(wanted)}`);
+}
+async function until(what, ask, seconds = 20) {
+  const end = Date.now() + seconds * 1000;
+  for (;;) {
+    const told = await ask();
+    if (told) return told;
+    if (Date.now() > end) throw new Error(`waited ${seconds} s for ${what}`);
+    await new Promise((wait) => setTimeout(wait, 100));
+  }
+}
+const number = (text) => Number(text.replace('−', '-').replace(/[^\d.\-+e]/g, ''));
+
+await rm(given.out, { recursive: true, force: true });
+await mkdir(path.join(given.out, 'screenshots'), { recursive: true });
+
+const port = await free_port(), base = `http://127.0.0.1:${port}`;
+const lcm_url = `udpm://239.255.76.67:${await free_port()}?ttl=0`;
+const store = path.join(given.out, 'history.db');
+const get = async (at) => (await fetch(base + at)).json();
+
+// One hour at 50 Hz, accounted for into the history that the daemon then serves.
+const hour_log = path.join(given.out, 'hour.lcmlog');
+const hour_robot = path.join(given.out, 'hour-robot.json');
+const daemon_args = ['--store-path', store, '--http-port', String(port), '--http-web-directory', given.page, '--lcm-url', lcm_url];
+const ready = (child) => child.exitCode === null && fetch(`${base}/readyz`).then((r) => r.ok, () => false);
+let daemon = await start_until(given.daemon, daemon_args, ready);
+const fleet = await start_until(given.client, ['simulate', '--robots', '4', '--seed', '3', '--server', base, '--mission-duration', '14', '--lcm-url', lcm_url],
+  async () => (await get('/v1/robots')).robots.filter((robot) => robot.live).length === 4);
+await writeFile(hour_robot, JSON.stringify({ ...(await get('/v1/robots/amr-01')).model, robot_id: 'hour-01' }));
+await stop(daemon);
+await run(given.client, ['simulate', '--robot', hour_robot, '--robots', '1', '--seed', '11', '--log', hour_log, '--speed', '0', '--missions', '1', '--mission-duration', '3600', '--duration', '4200', '--quiet']);
+await run(given.client, ['replay', hour_log, '--into', store, '--robot', hour_robot]);
+await rm(hour_log);
+daemon = await start_until(given.daemon, daemon_args, ready);
+
+const browser = await chromium.launch({ executablePath: given.chromium, args: ['--headless', '--no-sandbox', '--disable-gpu', '--disable-quic',
+  '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync'] });
+const faults = [];
+let faults_wanted = false;
+async function open_page(options = {}) {
+  const context = await browser.newContext({ viewport: sizes.laptop, colorScheme: 'light', acceptDownloads: true, ...options });
+  const page = await context.newPage();
+  page.setDefaultTimeout(15_000);
+  page.on('console', (said) => ['error', 'warning'].includes(said.type()) && !faults_wanted && faults.push(said.text()));
+  page.on('pageerror', (error) => faults.push(error.stack));
+  return page;
+}
+const go = (page, hash) => page.goto(`${base}/${hash}`);
+
+const finished = await until('four missions that ended', async () => {
+  const { missions } = await get('/v1/missions?limit=200');
+  const ended = missions.filter((m) => m.state === 'finished' && m.energy.duration_s < 600);
+  return ended.length >= 4 ? ended : null;
+}, 90);
+const mission = finished[0], robot = mission.robot_id;
+const hour = (await get('/v1/missions?limit=200')).missions.reduce((a, b) => (a.energy.duration_s > b.energy.duration_s ? a : b));
+const page = await open_page();
+
+await check('the fleet is live', async () => {
+  await go(page, '#/fleet');
+  await page.waitForSelector('.fleet tbody th a');
+  equal(await page.locator('.fleet tbody tr:not(.spacer)').count(), 5, 'rows');
+  const row = page.locator('.fleet tbody tr', { hasText: robot });
+  const before = await row.locator('td.power .number').textContent();
+  await until('another power', async () => (await row.locator('td.power .number').textContent()) !== before);
+  await page.getByText('Live', { exact: true }).first().waitFor();
+});
+
+await check('the fleet is found, chosen and ordered', async () => {
+  await page.getByPlaceholder('Find a robot or mission').fill(robot);
+  await until('one row', async () => (await page.locator('.fleet tbody tr:not(.spacer)').count()) === 1);
+  await page.getByPlaceholder('Find a robot or mission').fill('');
+  await page.getByRole('button', { name: 'Silent' }).click();
+  await page.getByText('No robot matches').waitFor();
+  await page.getByRole('button', { name: 'All', exact: true }).click();
+  const names = () => page.locator('.fleet tbody th a').allTextContents();
+  const rising = await names();
+  await page.getByRole('button', { name: 'Robot' }).click();
+  await until('the other order', async () => JSON.stringify(await names()) === JSON.stringify([...rising].reverse()));
+  equal(await page.locator('th.robot[aria-sort]').getAttribute('aria-sort'), 'descending', 'aria-sort');
+});
+
+await check('the keyboard reaches a robot and comes back', async () => {
+  await go(page, '#/fleet');
+  const link = page.locator('.fleet tbody th a').first();
+  await link.waitFor();
+  const name = await link.textContent();
+  for (let k = 0; k < 40 && !(await link.evaluate((a) => a === document.activeElement)); ++k) await page.keyboard.press('Tab');
+  expect(await link.evaluate((a) => a === document.activeElement), 'Tab does not reach the first robot');
+  await page.keyboard.press('Enter');
+  await page.getByRole('heading', { level: 1, name }).waitFor();
+  equal(await page.evaluate(() => document.activeElement.id), 'main', 'focus after a change of view');
+  await page.goBack();
+  await page.locator('.fleet').waitFor();
+});
+
+await check('a robot shows its history, versions and place', async () => {
+  await go(page, `#/robots/${robot}`);
+  await page.getByText('Version 1').waitFor();
+  await page.locator('.screen .uplot').first().waitFor();
+  expect((await page.locator('.missions tbody tr').count()) > 0, 'recent missions');
+  await page.getByText('Parameters in force').click();
+  await page.getByText('idle_power_w').waitFor();
+});
+
+await check('missions are filtered, summed and kept in the address', async () => {
+  await go(page, '#/missions');
+  await page.locator('.missions tbody tr').first().waitFor();
+  await page.getByLabel('Robot', { exact: true }).selectOption(robot);
+  await until('only that robot', async () => (await page.locator('.missions tbody td:nth-child(2)').allTextContents()).every((t) => t === robot));
+  await page.getByLabel('State').selectOption('finished');
+  expect(page.url().includes(`robot=${robot}`) && page.url().includes('state=finished'), `address ${page.url()}`);
+  const totals = await get(`/v1/mission-totals?robot_id=${robot}&state=finished`);
+  await until('the totals', async () => number(await page.locator('.readouts dd .number').first().textContent()) >= totals.missions);
+  await page.getByLabel('Payload from, kg').fill('100000');
+  await page.getByText('No mission matches').waitFor();
+  await page.getByRole('button', { name: 'Clear' }).click();
+  await page.locator('.missions tbody tr').first().waitFor();
+});
+
+for (const kind of ['CSV', 'JSON']) {
+  await check(`the filtered missions leave as ${kind}`, async () => {
+    await go(page, `#/missions?robot=${robot}&state=finished`);
+    await page.locator('.missions tbody tr').first().waitFor();
+    const button = page.getByRole('button', { name: `Export ${kind}` });
+    await until('the button', () => button.isEnabled());
+    const [download] = await Promise.all([page.waitForEvent('download'), button.click()]);
+    const text = await readFile(await download.path(), 'utf8');
+    const { missions } = await get(`/v1/missions?robot_id=${robot}&state=finished&limit=1000`);
+    let rows;
+    if (kind === 'JSON') rows = JSON.parse(text).map((m) => [m.id, m.energy.battery_j]);
+    else {
+      const [head, ...lines] = text.trim().split('\r\n').map((line) => line.split(','));
+      rows = lines.map((line) => [Number(line[head.indexOf('id')]), Number(line[head.indexOf('battery_j')])]);
+    }
+    expect(rows.length > 0 && rows.length <= missions.length, `${rows.length} rows of ${missions.length}`);
+    const known = new Map(missions.map((m) => [m.id, m.energy.battery_j]));
+    for (const [id, battery_j] of rows) equal(battery_j, known.get(id), `battery_j of mission ${id}`);
+  });
+}
+
+await check('a mission shows where its energy went, and it closes', async () => {
+  await go(page, `#/missions/${mission.id}`);
+  await page.locator('.waterfall tr.battery').waitFor();
+  const { ledger } = await get(`/v1/missions/${mission.id}/ledger`);
+  const [sum, battery] = (await page.locator('.closing b').allTextContents()).map(number);
+  expect(Math.abs(sum - ledger.battery_j) < 0.006 && Math.abs(battery - ledger.battery_j) < 0.006, `${sum}, ${battery} against ${ledger.battery_j}`);
+  await page.getByText('Closes: difference').waitFor();
+  const bars = await page.locator('.waterfall rect.account').evaluateAll((all) => all.map((r) => [parseFloat(r.getAttribute('x')), parseFloat(r.getAttribute('width')), r.getAttribute('class')]));
+  const odd = bars.findIndex(([, , name]) => name.includes('unexplained')), end = ([x, w]) => x + w;
+  const [model, unexplained, total] = [bars[odd - 1], bars[odd], bars[bars.length - 1]];
+  const reached = ledger.terms_j.unexplained < 0 ? unexplained[0] : end(unexplained);
+  expect(Math.abs(reached - end(total)) < 0.2, 'unexplained does not end where the battery does');
+  expect(Math.abs((ledger.terms_j.unexplained < 0 ? end(unexplained) : unexplained[0]) - end(model)) < 0.2, 'unexplained does not start where the model ends');
+});
+
+await check('a mission is compared with the minimum-energy drive', async () => {
+  await page.locator('.bars tr').nth(2).waitFor();
+  const least = await page.locator('.bars tr').nth(2).locator('.number').textContent();
+  expect(number(least) > 0, `least energy ${least}`);
+});
+
+await check('the trace is read at the cursor, and closer', async () => {
+  const plot = page.locator('.uplot .u-over').first(), box = await plot.boundingBox();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  await until('a reading', async () => (await page.locator('.strip dd').nth(1).textContent()).includes('W'));
+  await page.mouse.move(box.x + box.width * 0.3, box.y + 40);
+  await page.mouse.down();
+  await page.mouse.move(box.x + box.width * 0.6, box.y + 60, { steps: 6 });
+  await page.mouse.up();
+  await page.getByRole('button', { name: 'Whole mission' }).click();
+  await page.getByRole('button', { name: 'Gap', exact: true }).click();
+  await page.getByText('measured − modelled').waitFor();
+});
+
+await check('a plan gives what the service computes', async () => {
+  const asked = page.waitForResponse((r) => r.url().endsWith(`/v1/robots/${robot}/profile`) && r.request().method() === 'POST');
+  await go(page, `#/plan?robot=${robot}`);
+  const answer = await (await asked).json();
+  await page.getByText('Least energy', { exact: true }).first().waitFor();
+  const shown = await page.locator('.plan-result .readout.accent dd').textContent();
+  const joule = number(shown) * (shown.includes('kJ') ? 1000 : 1);
+  expect(Math.abs(joule - answer.energy_j) <= 0.006 * answer.energy_j, `${shown} against ${answer.energy_j} J`);
+  expect(answer.pareto.length > 2, 'a front');
+});
+
+await check('a deadline from the front is met, and the charge decides', async () => {
+  await page.getByLabel('Walk the front').focus();
+  await page.keyboard.press('Home');
+  await page.keyboard.press('ArrowRight');
+  const again = page.waitForResponse((r) => r.url().endsWith('/profile'));
+  await page.getByRole('button', { name: 'Take as deadline' }).click();
+  const answer = await (await again).json();
+  const deadline = Number(await page.getByLabel('Deadline').inputValue());
+  expect(answer.duration_s <= deadline * (1 + 1e-6), `${answer.duration_s} s after ${deadline} s`);
+  await page.getByLabel('Charge now').fill('90');
+  await page.keyboard.press('Enter');
+  await page.getByText('The robot makes it').waitFor();
+  await page.getByLabel('Charge now').fill('1');
+  await page.keyboard.press('Enter');
+  await page.getByText('The robot does not make it').waitFor();
+});
+
+await check('legs are changed, and a path is drawn by keys', async () => {
+  await page.getByLabel('Deadline').fill('');
+  await page.getByRole('button', { name: 'Add a leg' }).click();
+  await page.getByLabel('Kind of leg 4').selectOption('arc');
+  let asked = page.waitForRequest((r) => r.url().endsWith('/profile'));
+  await page.getByRole('button', { name: 'Compute' }).click();
+  equal((await asked).postDataJSON().path[3].kind, 'arc', 'fourth segment');
+  await page.getByRole('button', { name: 'Draw' }).click();
+  await page.getByRole('button', { name: 'Clear' }).click();
+  const canvas = page.locator('.draw canvas');
+  await canvas.focus();
+  await page.keyboard.press('Enter');
+  for (let k = 0; k < 4; ++k) await page.keyboard.press('Shift+ArrowRight');
+  await page.keyboard.press('Enter');
+  const box = await canvas.boundingBox();
+  await page.mouse.click(box.x + box.width * 0.8, box.y + box.height * 0.3);
+  asked = page.waitForRequest((r) => r.url().endsWith('/profile'));
+  await page.getByRole('button', { name: 'Compute' }).click();
+  const body = (await asked).postDataJSON();
+  equal(body.path[0].points.length, 2, 'points after the first');
+  equal(body.path[0].points[0].x_m, 4, 'x of the second point');
+});
+
+await check('what is not there is said', async () => {
+  faults_wanted = true;  // the browser reports the 404 that this asks for
+  await go(page, '#/missions/999999');
+  await page.getByRole('alert').waitFor();
+  await go(page, '#/robots/nobody');
+  await page.getByText('There is no robot nobody').waitFor();
+  await go(page, '#/nowhere');
+  await page.getByText('There is no such page').waitFor();
+  faults_wanted = false;
+});
+
+await check('every link of every view leads somewhere', async () => {
+  const seen = new Set();
+  for (const hash of ['#/fleet', `#/robots/${robot}`, '#/missions', `#/missions/${mission.id}`, '#/plan']) {
+    await go(page, hash);
+    await page.waitForTimeout(600);
+    for (const to of await page.locator('a[href]').evaluateAll((all) => all.map((a) => a.getAttribute('href')))) seen.add(to);
+  }
+  for (const to of [...seen].filter((to, k, all) => to !== '#main' && all.findIndex((o) => o.replace(/[\d]+/g, '') === to.replace(/[\d]+/g, '')) === k)) {
+    await go(page, to);
+    await page.locator('main h1, main .empty').first().waitFor({ state: 'attached' });
+    equal(await page.getByText('There is no such page').count(), 0, `link ${to}`);
+  }
+});
+
+const views = { fleet: '#/fleet', robot: `#/robots/${robot}`, missions: '#/missions', mission: `#/missions/${mission.id}`, hour: `#/missions/${hour.id}`, plan: `#/plan?robot=${robot}` };
+for (const [size, viewport] of Object.entries(sizes)) {
+  for (const colorScheme of ['light', 'dark']) {
+    const shown = await open_page({ viewport, colorScheme });
+    for (const [name, hash] of Object.entries(views)) {
+      await check(`${name}, ${size}, ${colorScheme}: no serious accessibility fault, nothing wider than the window`, async () => {
+        await go(shown, hash);
+        await shown.locator('main .readouts, main .plan-result').first().waitFor();
+        await until('an end of loading', async () => (await shown.locator('.loading').count()) === 0);
+        await shown.waitForTimeout(400);
+        if (name === 'mission' || name === 'hour') {
+          const box = await shown.locator('.uplot .u-over').first().boundingBox();
+          await shown.mouse.move(box.x + box.width * 0.4, box.y + 30);
+          await shown.waitForTimeout(150);
+        }
+        await shown.screenshot({ path: path.join(given.out, 'screenshots', `${name}-${size}-${colorScheme}.png`), fullPage: true });
+        const wide = await shown.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+        expect(wide <= 0, `${wide} px wider than the window`);
+        await shown.evaluate(axe);
+        const told = await shown.evaluate(() => globalThis.axe.run(document, { resultTypes: ['violations'] }));
+        const serious = told.violations.filter((v) => ['serious', 'critical'].includes(v.impact));
+        equal(serious.map((v) => `${v.id}: ${v.nodes.slice(0, 3).map((n) => n.target.join(' ')).join(', ')}`).join('; '), '', 'axe');
+      });
+    }
+    await shown.context().close();
+  }
+}
+
+await check('the theme is chosen and kept', async () => {
+  await go(page, '#/fleet');
+  await page.getByRole('button', { name: 'Dark theme' }).click();
+  equal(await page.evaluate(() => document.documentElement.dataset.theme), 'dark', 'theme');
+  await page.reload();
+  equal(await page.evaluate(() => document.documentElement.dataset.theme), 'dark', 'theme after a reload');
+});
+
+await check('a mission of one hour at 50 Hz opens in time', async () => {
+  expect(hour.samples > 150_000, `${hour.samples} samples`);
+  const times = [];
+  for (let k = 0; k < tries; ++k) {
+    const fresh = await open_page();
+    await fresh.goto(`${base}/#/missions/${hour.id}`, { waitUntil: 'commit' });
+    times.push(await fresh.evaluate(() => new Promise((shown) => {
+      const look = () => (document.querySelectorAll('.uplot canvas').length >= 2 && document.querySelector('.waterfall tr.battery') && document.querySelector('canvas.floor')
+        ? requestAnimationFrame(() => shown(performance.now())) : requestAnimationFrame(look));
+      look();
+    })));
+    await fresh.context().close();
+  }
+  figures.one_hour_mission_ms = times.sort((a, b) => a - b).map(Math.round);
+  figures.one_hour_samples = hour.samples;
+  // Other work on the machine only adds: the least of the tries is the page's and the daemon's own time.
+  expect(times[0] < mission_limit_ms, `opens in ${figures.one_hour_mission_ms} ms`);
+});
+
+await check('a lost service is told, and found again', async () => {
+  await go(page, '#/fleet');
+  await page.locator('.fleet tbody th a').first().waitFor();
+  faults_wanted = true;
+  await stop(daemon);
+  await page.getByText('No connection to the service since').waitFor();
+  await page.screenshot({ path: path.join(given.out, 'screenshots', 'offline-laptop.png') });
+  daemon = await start_until(given.daemon, daemon_args, ready);
+  await until('the banner to go', async () => (await page.getByText('No connection to the service since').count()) === 0, 40);
+  faults_wanted = false;
+});
+
+await page.context().close();
+await stop(fleet);
+await stop(daemon);
+
+const many = await serve_many_robots(given.page, 500);
+await check('first view of 500 live robots in time', async () => {
+  const times = [];
+  for (let k = 0; k < tries; ++k) {
+    const fresh = await open_page();
+    await fresh.goto(many.url, { waitUntil: 'commit' });
+    times.push(await fresh.evaluate(() => new Promise((shown) => {
+      const look = () => (document.querySelector('.fleet tbody tr .sparkline') && document.body.textContent.includes('of 500')
+        ? requestAnimationFrame(() => shown(performance.now())) : requestAnimationFrame(look));
+      look();
+    })));
+    await fresh.context().close();
+  }
+  figures.first_view_500_robots_ms = times.sort((a, b) => a - b).map(Math.round);
+  expect(times[0] < first_view_limit_ms, `first view after ${figures.first_view_500_robots_ms} ms`);
+});
+
+await check('500 live robots leave the page free', async () => {
+  const busy = await open_page();
+  await busy.goto(many.url);
+  await busy.locator('.fleet tbody th a').first().waitFor();
+  const rows = await busy.locator('.fleet tbody tr').count();
+  expect(rows < 60, `${rows} rows drawn`);
+  const session = await busy.context().newCDPSession(busy);
+  await session.send('Performance.enable');
+  const used = async () => Object.fromEntries((await session.send('Performance.getMetrics')).metrics.map((m) => [m.name, m.value]));
+  await busy.waitForTimeout(1500);
+  const before = await used();
+  await busy.evaluate(() => {
+    globalThis.long_ms = 0;
+    new PerformanceObserver((list) => list.getEntries().forEach((e) => (globalThis.long_ms = Math.max(globalThis.long_ms, e.duration)))).observe({ type: 'longtask' });
+  });
+  await busy.waitForTimeout(6000);
+  const after = await used();
+  const wall_s = after.Timestamp - before.Timestamp;
+  figures.main_thread_share_500_robots = Number(((after.TaskDuration - before.TaskDuration) / wall_s).toFixed(3));
+  figures.longest_task_500_robots_ms = Math.round(await busy.evaluate(() => globalThis.long_ms));
+  figures.heap_500_robots_mb = Number((after.JSHeapUsedSize / 1e6).toFixed(1));
+  await busy.evaluate(() => scrollTo(0, 12_000));
+  await until('rows further down', async () => (await busy.locator('.fleet tbody tr[aria-rowindex]').first().getAttribute('aria-rowindex')) > 100);
+  await busy.screenshot({ path: path.join(given.out, 'screenshots', 'fleet-500-laptop.png') });
+  expect(figures.main_thread_share_500_robots < 0.5, `main thread busy ${figures.main_thread_share_500_robots}`);
+});
+await many.close();
+await browser.close();
+
+await check('the bundle is small', async () => {
+  let total = 0;
+  for (const name of ['index.html', 'app.js', 'app.css', 'favicon.svg']) total += gzipSync(await readFile(path.join(given.page, name)), { level: 9 }).length;
+  figures.bundle_gzipped_bytes = total;
+  expect(total < bundle_limit_bytes, `${total} bytes`);
+});
+await check('nothing was reported on the console', async () => equal([...new Set(faults)].join('\n'), '', 'console'));
+
+await rm(store, { force: true });
+await writeFile(path.join(given.out, 'figures.json'), `${JSON.stringify(figures, null, 2)}\n`);
+console.log(JSON.stringify(figures, null, 2));
+console.log(`${passed} passed, ${failed} failed; screenshots in ${path.join(given.out, 'screenshots')}`);
+process.exit(failed === 0 ? 0 : 1);
