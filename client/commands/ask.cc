@@ -1,0 +1,268 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/commands/table.h"
+#include "client/files.h"
+#include "client/http_client.h"
+#include "robot/robot_file.h"
+#include "server/api/autonomy.h"
+#include "server/api/profile.h"
+
+// What a scheduler asks of one robot: profile, estimate, autonomy. Answered here from a robot file, or by a
+// daemon; both answers come from the same functions.
+namespace joulecast::client {
+namespace {
+
+using nlohmann::json;
+
+// A file on its own has no history of versions: it counts as the first.
+constexpr std::int64_t file_version = 1;
+
+struct Options {
+  std::string robot_file;
+  std::string server;
+  std::string robot_id;
+  std::string request_file;
+  double timeout_s = 60;
+  bool json = false;
+  // Members of the request, by flag.
+  std::vector<std::pair<std::string, std::optional<double>>> numbers;
+  std::optional<double> length_m;
+  std::optional<double> turn_rad;
+};
+
+struct Question {
+  const char* name;
+  const char* what;
+  Result<std::string> (*offline)(const json& request, const server::ModelInForce& model);
+  void (*print)(json answer);
+};
+
+Result<std::string> autonomy_offline(const json& body, const server::ModelInForce& model) {
+  const auto request = api::parse_autonomy(body);
+  if (!request) return tl::unexpected(request.error());
+  return api::autonomy_answer(*request, model, nullptr, {});
+}
+
+// The request file with the flags' members put over it.
+Result<json> request_of(const Options& options) {
+  json request = json::object();
+  if (!options.request_file.empty()) {
+    const auto text = read_file(options.request_file);
+    if (!text) return tl::unexpected(text.error());
+    request = json::parse(*text, nullptr, false);
+    if (!request.is_object()) return invalid(options.request_file, "is not a JSON object");
+  }
+  if (options.length_m || options.turn_rad) {
+    json path = json::array();
+    if (options.turn_rad) path.push_back({{"kind", "turn"}, {"angle_rad", *options.turn_rad}});
+    if (options.length_m) path.push_back({{"kind", "straight"}, {"length_m", *options.length_m}});
+    request["path"] = std::move(path);
+  }
+  for (const auto& [name, value] : options.numbers)
+    if (value) request[name] = *value;
+  // Counts are whole numbers in the request.
+  if (const auto points = request.find("pareto_points"); points != request.end() && points->is_number_float())
+    *points = static_cast<std::int64_t>(points->get<double>());
+  return request;
+}
+
+Result<std::string> ask_server(const Options& options, const Question& question, const json& request) {
+  const auto server = parse_server_url(options.server);
+  if (!server) return tl::unexpected(server.error());
+  const auto timeout = std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * options.timeout_s));
+  auto reply = http_request(*server, HttpMethod::post, "/v1/robots/" + options.robot_id + "/" + question.name,
+                            request.dump(), timeout);
+  if (!reply) return tl::unexpected(reply.error());
+  if (!reply->ok()) return tl::unexpected(error_of(*reply));
+  return std::move(reply->body);
+}
+
+Result<std::string> answer(const Options& options, const Question& question) {
+  const auto request = request_of(options);
+  if (!request) return tl::unexpected(request.error());
+  if (!options.server.empty()) return ask_server(options, question, *request);
+  auto robot = robot::load_robot(options.robot_file);
+  if (!robot) return tl::unexpected(robot.error());
+  auto drive = dynamics::drive_model(*robot);
+  if (!drive) return tl::unexpected(drive.error());
+  return question.offline(*request, {std::move(*robot), std::move(*drive), file_version});
+}
+
+Exit run(const Options& options, const Question& question) {
+  const auto text = answer(options, question);
+  if (!text) return report(text.error());
+  if (options.json) {
+    std::puts(text->c_str());
+    return Exit::ok;
+  }
+  json document = json::parse(*text, nullptr, false);
+  if (!document.is_object())
+    return report({Fault::corrupt, options.server, "did not answer with a JSON object"});
+  question.print(std::move(document));
+  return Exit::ok;
+}
+
+double number(const json& object, const char* name) {
+  const auto found = object.find(name);
+  return found != object.end() && found->is_number() ? found->get<double>() : std::nan("");
+}
+
+void print_head(const json& a) {
+  fmt::print("{} (model version {}): {:.2f} J, {:.2f} s, {:.2f} m, {:.2f} rad turned\n",
+             a.value("robot_id", ""), a.value("model_version", 0), number(a, "energy_j"),
+             number(a, "duration_s"), number(a, "distance_m"), number(a, "turned_rad"));
+}
+
+void print_ledger(const json& ledger) {
+  for (const auto& [term, joules] : ledger.items())
+    if (joules.is_number() && joules.get<double>() != 0)
+      fmt::print("  {:<20} {:>12.3f} J\n", term, joules.get<double>());
+}
+
+void print_profile(json a) {
+  print_head(a);
+  fmt::print("peak {:.3f} m/s, {:.1f} W; braking {:.2f} J, recovered {:.2f} J\n", number(a, "peak_speed_m_s"),
+             number(a, "peak_power_w"), number(a, "braking_j"), number(a, "recovered_j"));
+  const json& c = a["certificate"];
+  fmt::print("{}: at most {:.3g} J above the optimum; a second less would cost {:.3g} J\n",
+             c.value("method", ""), number(c, "gap_j"), number(c, "time_multiplier_w"));
+  for (const auto& [shape, baseline] : a["baselines"].items()) {
+    if (baseline.is_null()) continue;
+    fmt::print("against a {:<10} {:>10.2f} J, {:.1f} % saved{}\n", shape, number(baseline, "energy_j"),
+               1e2 * number(baseline, "saving_fraction"),
+               baseline.value("within_limits", true) ? "" : " (it would break the robot's limits)");
+  }
+  print_ledger(a["ledger_j"]);
+  for (const json& point : a["pareto"])
+    fmt::print("  {:>10.2f} s {:>12.2f} J\n", number(point, "duration_s"), number(point, "energy_j"));
+  const auto profile = a.find("profile");
+  if (profile == a.end()) return;
+  const json &t = (*profile)["time_s"], &way = (*profile)["distance_m"], &v = (*profile)["speed_m_s"],
+             &yaw = (*profile)["yaw_rate_rad_s"], &power = (*profile)["power_w"];
+  fmt::print("{:>10} {:>10} {:>10} {:>10} {:>10}\n", "time s", "way m", "speed m/s", "yaw rad/s", "power W");
+  constexpr std::size_t rows = 20;
+  const std::size_t step = t.size() / rows + 1;
+  for (std::size_t k = 0; k < t.size(); k = k + 1 == t.size() ? k + 1 : std::min(k + step, t.size() - 1)) {
+    const auto at = [k](const json& column) {
+      return column[k].is_number() ? column[k].get<double>() : std::nan("");
+    };
+    fmt::print("{:>10.2f} {:>10.3f} {:>10.3f} {:>10.3f} {:>10.2f}\n", at(t), at(way), at(v), at(yaw),
+               at(power));
+  }
+}
+
+void print_estimate(json a) {
+  print_head(a);
+  print_ledger(a["ledger"]);
+}
+
+void print_autonomy(json a) {
+  fmt::print("{} (model version {}): charge {:.1f} %, reserve {:.1f} %, {:.0f} J to spend\n",
+             a.value("robot_id", ""), a.value("model_version", 0), 1e2 * number(a, "state_of_charge"),
+             1e2 * number(a, "reserve_fraction"), number(a, "usable_energy_j"));
+  if (const auto c = a.find("consumption"); c != a.end())
+    fmt::print("spends {:.2f} J/m, {:.1f} W (by {})\n", number(*c, "energy_per_m_j"),
+               number(*c, "mean_power_w"), c->value("basis", ""));
+  fmt::print("range {:.0f} m, run time {:.0f} s\n", number(a, "range_m"), number(a, "run_time_s"));
+  // Newer servers say more; what this program does not know is shown as it came.
+  for (const char* known : {"robot_id", "model_version", "state_of_charge", "reserve_fraction",
+                            "usable_energy_j", "consumption", "range_m", "run_time_s"})
+    a.erase(known);
+  if (!a.empty()) std::puts(a.dump(2).c_str());
+}
+
+constexpr Question profile{"profile", "Plan the minimum-energy motion along a path", api::profile_answer,
+                           print_profile};
+constexpr Question estimate{"estimate", "Price a motion, or the best one along a path", api::estimate_answer,
+                            print_estimate};
+constexpr Question autonomy{"autonomy", "Ask how far and how long a robot still goes", autonomy_offline,
+                            print_autonomy};
+
+std::pair<CLI::App*, std::shared_ptr<Options>> add(CLI::App& program, Exit& exit, const Question& question) {
+  auto options = std::make_shared<Options>();
+  auto* command = program.add_subcommand(question.name, question.what);
+  auto* file =
+      command->add_option("--robot", options->robot_file, "robot file: answer here, without a server");
+  auto* server = command->add_option("--server", options->server, "joulecastd to ask, http://host:port");
+  auto* id = command->add_option("--robot-id", options->robot_id, "which robot of the server");
+  server->needs(id)->excludes(file);
+  id->needs(server);
+  command->add_option(
+      "--request", options->request_file,
+      "request as JSON (schemas/*-request.schema.json), - for standard input; flags go over it");
+  command->add_option("--timeout", options->timeout_s, "seconds to wait for the server")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "print the answer as the server sends it");
+  command->callback([options, &question, &exit] {
+    if (options->robot_file.empty() && options->server.empty())
+      throw CLI::RequiredError("--robot or --server");
+    exit = run(*options, question);
+  });
+  return {command, options};
+}
+
+void add_numbers(CLI::App& command, Options& options,
+                 std::initializer_list<std::array<const char*, 3>> flag_member_help) {
+  options.numbers.reserve(flag_member_help.size());
+  for (const auto& [flag, member, help] : flag_member_help) {
+    options.numbers.emplace_back(member, std::nullopt);
+    command.add_option(flag, options.numbers.back().second, help);
+  }
+}
+
+void add_drive_flags(CLI::App& command, Options& options, bool pareto) {
+  command.add_option("--turn", options.turn_rad,
+                     "turn in place by so many rad (to the left), before --length");
+  command.add_option("--length", options.length_m, "drive straight for so many m");
+  if (pareto) {
+    add_numbers(command, options,
+                {{"--payload", "payload_kg", "kg"},
+                 {"--deadline", "deadline_s", "s"},
+                 {"--value-of-time", "value_of_time_w", "J that a second is worth"},
+                 {"--start-speed", "start_speed_m_s", "m/s"},
+                 {"--end-speed", "end_speed_m_s", "m/s"},
+                 {"--regeneration", "regeneration", "share of braking power that returns, 0 to 1"},
+                 {"--pareto", "pareto_points", "points of the front of energy against time"}});
+  } else {
+    add_numbers(command, options,
+                {{"--payload", "payload_kg", "kg"},
+                 {"--deadline", "deadline_s", "s"},
+                 {"--value-of-time", "value_of_time_w", "J that a second is worth"},
+                 {"--start-speed", "start_speed_m_s", "m/s"},
+                 {"--end-speed", "end_speed_m_s", "m/s"},
+                 {"--regeneration", "regeneration", "share of braking power that returns, 0 to 1"}});
+  }
+}
+
+}  // namespace
+
+void add_profile(CLI::App& program, Exit& exit) {
+  auto [command, options] = add(program, exit, profile);
+  add_drive_flags(*command, *options, true);
+}
+
+void add_estimate(CLI::App& program, Exit& exit) {
+  auto [command, options] = add(program, exit, estimate);
+  add_drive_flags(*command, *options, false);
+}
+
+void add_autonomy(CLI::App& program, Exit& exit) {
+  auto [command, options] = add(program, exit, autonomy);
+  add_numbers(*command, *options,
+              {{"--charge", "state_of_charge", "state of charge instead of the live one, 0 to 1"},
+               {"--reserve", "reserve_fraction", "charge to keep instead of the robot file's, 0 to 1"},
+               {"--payload", "payload_kg", "kg"}});
+}
+
+}  // namespace joulecast::client

@@ -1,0 +1,122 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/commands/table.h"
+#include "client/http_client.h"
+
+namespace joulecast::client {
+namespace {
+
+using nlohmann::json;
+
+struct Options {
+  std::string server;
+  // Query parameters of GET /v1/missions, by flag.
+  std::vector<std::pair<std::string, std::optional<std::string>>> query;
+  bool json = false;
+};
+
+std::string percent_encoded(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                       std::string_view("-._~").find(c) != std::string_view::npos;
+    plain ? out.push_back(c) : static_cast<void>(out += fmt::format("%{:02X}", byte));
+  }
+  return out;
+}
+
+std::string text_of(const json& value) {
+  return value.is_string() ? value.get<std::string>() : value.is_null() ? "-" : value.dump();
+}
+
+std::string utc(const json& utime_us) {
+  if (!utime_us.is_number_integer()) return "-";
+  const std::time_t seconds = utime_us.get<std::int64_t>() / 1'000'000;
+  std::tm parts{};
+  gmtime_r(&seconds, &parts);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S", &parts);
+  return text;
+}
+
+std::string joules(const json& energy, const char* name) {
+  const auto found = energy.find(name);
+  return found != energy.end() && found->is_number() ? fmt::format("{:.2f}", found->get<double>()) : "-";
+}
+
+void print_table(const json& page) {
+  fmt::print("{:>6} {:<20} {:<28} {:<12} {:<19} {:>9} {:>9} {:>12} {:>12}\n", "id", "robot", "mission",
+             "state", "start (UTC)", "time s", "way m", "battery J", "modelled J");
+  for (const json& m : page["missions"]) {
+    const json& energy = m["energy"];
+    fmt::print("{:>6} {:<20} {:<28} {:<12} {:<19} {:>9} {:>9} {:>12} {:>12}\n", text_of(m["id"]),
+               text_of(m["robot_id"]), text_of(m["mission_id"]),
+               text_of(m["state"]) + (m.value("incomplete", false) ? "*" : ""), utc(m["start_utime_us"]),
+               joules(energy, "duration_s"), joules(energy, "distance_m"), joules(energy, "battery_j"),
+               joules(energy, "modelled_j"));
+  }
+  if (const auto next = page.find("next_cursor"); next != page.end() && next->is_string())
+    fmt::print("more: --cursor {}\n", next->get<std::string>());
+}
+
+Exit run(const Options& options) {
+  const auto server = parse_server_url(options.server);
+  if (!server) return report(server.error());
+  std::string target = "/v1/missions";
+  for (const auto& [name, value] : options.query)
+    if (value)
+      target += (target.find('?') == std::string::npos ? '?' : '&') + name + '=' + percent_encoded(*value);
+  const auto reply = http_request(*server, HttpMethod::get, target, {}, std::chrono::seconds(30));
+  if (!reply) return report(reply.error());
+  if (!reply->ok()) return report(error_of(*reply));
+  if (options.json) {
+    std::puts(reply->body.c_str());
+    return Exit::ok;
+  }
+  const json page = json::parse(reply->body, nullptr, false);
+  if (!page.is_object() || !page.contains("missions"))
+    return report({Fault::corrupt, options.server, "did not answer with missions"});
+  print_table(page);
+  return Exit::ok;
+}
+
+}  // namespace
+
+void add_missions(CLI::App& program, Exit& exit) {
+  auto options = std::make_shared<Options>();
+  auto* command = program.add_subcommand("missions", "List what robots did and what it cost, newest first");
+  command->add_option("--server", options->server, "joulecastd to ask, http://host:port")->required();
+  constexpr std::array<std::array<const char*, 3>, 10> filters{{
+      {"--robot-id", "robot_id", "only this robot's"},
+      {"--mission-id", "mission_id", "only those that the robot called so"},
+      {"--state", "state", "open, finished, aborted, unfinished, superseded or interrupted"},
+      {"--incomplete", "incomplete", "true: only those with unmeasured parts; false: only those without"},
+      {"--from", "from_utime_us", "started at or after, microseconds since 1970"},
+      {"--to", "to_utime_us", "started before, microseconds since 1970"},
+      {"--payload-min", "payload_min_kg", "kg"},
+      {"--payload-max", "payload_max_kg", "kg"},
+      {"--limit", "limit", "missions on the page"},
+      {"--cursor", "cursor", "goes on where an earlier page ended"},
+  }};
+  options->query.reserve(filters.size());
+  for (const auto& [flag, name, help] : filters) {
+    options->query.emplace_back(name, std::nullopt);
+    command->add_option(flag, options->query.back().second, help);
+  }
+  command->add_flag("--json", options->json, "print the page as the server sends it");
+  command->callback([options, &exit] { exit = run(*options); });
+}
+
+}  // namespace joulecast::client

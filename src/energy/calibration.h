@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "energy/ledger.h"
+#include "energy/meter.h"
+#include "robot/robot_model.h"
+#include "telemetry/sample.h"
+
+namespace joulecast::energy {
+
+// Parameters of a drive from recorded runs: motor voltages and currents [V, A] and wheel speeds [rad/s].
+//
+//   electrical   V = R i + K_w n w
+//   torque       K_t n i = T_m sgn(w) + nu w + J_f a_mean +- J_t a_diff + known
+//   a_mean, a_diff = (a_right +- a_left)/2;  J_f = m r^2/2 + I_w + I_s;  J_t = 2 I c^2 + I_w + I_s, c =
+//   r/(2l)
+//
+// `known` is what the robot file's model says of payload, centre of mass and adopted effects. What no set of
+// such runs can tell apart: mass from rotor inertia (only J_f is seen), and the scale of all torques from
+// K_t. The file's ratio K_t/K_w (1 for an ideal machine) ties K_t to the K_w that the voltages show.
+
+// steady: thesis (3-1) on stretches of constant speed; i = b1 + b2 w and V = c1 + c2 w by least squares, with
+// b1 = T_m/(K_t n), b2 = nu/(K_t n), c1 = R b1, c2 = R b2 + K_w n. Sees no inertia; what a slow ramp still
+// accelerates is taken off with the file's.
+// whole: both equations above on every moving sample, with accelerations from the meter's filter.
+enum class CalibrationMethod { steady, whole };
+
+struct CalibrationOptions {
+  CalibrationMethod method = CalibrationMethod::steady;
+  // Taken from the robot file instead of being fitted.
+  bool resistance_known = false;
+  bool constants_known = false;
+  double moving_fraction =
+      0.03;  // of the fastest wheel speed: slower samples tell of stiction and are left out
+  // Constant speed: both wheels' accelerations below this share of the fastest wheel speed a second, ...
+  double steady_fraction_1_s = 0.1;
+  // ... for at least this long; longer stretches are cut into pieces of it.
+  double segment_s = 0.5;
+  // ... and going straight: wheel speeds differ by less than this share of their mean.
+  double straight_fraction = 0.2;
+};
+
+struct DriveRun {
+  std::string name;
+  std::span<const telemetry::Sample> samples;  // in order of time
+  double payload_kg = 0;
+};
+
+struct ParameterEstimate {
+  std::string_view name;  // as in the robot file, or what only their combination tells
+  std::string_view unit;
+  double value = 0;
+  double standard_error =
+      0;                  // delete-a-block jackknife over stretches of a second: allows for correlated errors
+  bool fitted = false;    // false: held at `value`
+  std::string_view note;  // why it was held, or what it stands for
+};
+
+struct DriveCalibration {
+  robot::RobotModel robot;  // the file with the fitted parameters in it
+  std::vector<ParameterEstimate> estimates;
+  std::size_t blocks = 0;   // steady stretches, or seconds of motion
+  std::size_t samples = 0;  // that took part
+  double slowest_rad_s = 0, fastest_rad_s = 0;
+  double voltage_rms_v = 0;  // residual of the electrical equation (NaN: voltage not measured)
+  double torque_rms_nm = 0;  // residual of the torque equation
+};
+
+// Fault::invalid when current is not measured, or nothing moves steadily (names what was missing).
+Result<DriveCalibration> calibrate_drive(const robot::RobotModel& robot, std::span<const DriveRun> runs,
+                                         const CalibrationOptions& options);
+
+// The filter window [s] on each side that sees at least two neighbours at the runs' median interval.
+double half_window_for(std::span<const DriveRun> runs);
+
+// The accounts of a run by the online meter with a robot's model.
+Result<Accounts> metered(const robot::RobotModel& robot, const DriveRun& run, const MeterSettings& settings);
+
+}  // namespace joulecast::energy

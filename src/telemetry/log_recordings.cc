@@ -1,0 +1,84 @@
+#include "telemetry/log_recordings.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "telemetry/codec.h"
+#include "telemetry/event_log.h"
+#include "telemetry/validation.h"
+
+namespace joulecast::telemetry {
+namespace {
+
+class Collector {
+ public:
+  void take(const LogEvent& event) {
+    const auto channel = parse_channel(event.channel);
+    if (!channel) return;
+    if (channel->subject == Subject::telemetry) {
+      const auto decoded = decode_telemetry(event.data);
+      decoded ? add(decoded->robot_id, decoded->sample) : refuse();
+    } else if (channel->subject == Subject::mission_event) {
+      const auto decoded = decode_mission_event(event.data);
+      decoded ? follow(decoded->robot_id, decoded->event) : refuse();
+    }
+  }
+
+  LogRecordings finish(std::uint64_t skipped_bytes) {
+    std::erase_if(result_.recordings, [](const Recording& r) { return r.samples.empty(); });
+    result_.skipped_bytes = skipped_bytes;
+    return std::move(result_);
+  }
+
+ private:
+  void refuse() { ++result_.unreadable; }
+
+  void follow(const std::string& robot_id, const MissionEvent& event) {
+    open_.erase(robot_id);
+    if (event.phase != MissionPhase::started) return;
+    open_[robot_id] = result_.recordings.size();
+    result_.recordings.push_back({robot_id, event.mission_id, event.payload_kg, {}});
+  }
+
+  void add(const std::string& robot_id, const Sample& sample) {
+    const auto open = open_.find(robot_id);
+    if (open == open_.end()) {
+      ++result_.samples_outside;
+      return;
+    }
+    std::vector<Sample>& samples = result_.recordings[open->second].samples;
+    if (check_plausible(sample) || (!samples.empty() && sample.utime_us <= samples.back().utime_us))
+      return refuse();
+    samples.push_back(sample);
+  }
+
+  LogRecordings result_;
+  std::map<std::string, std::size_t> open_;  // robot -> its open mission among the recordings
+};
+
+}  // namespace
+
+Result<LogRecordings> read_recordings(const std::string& log_path) {
+  auto reader = EventLogReader::open(log_path);
+  if (!reader) return tl::unexpected<Error>(std::move(reader.error()));
+  Collector collector;
+  for (;;) {
+    const LogRead read = reader->next();
+    switch (read.status) {
+      case LogStatus::event:
+        collector.take(read.event);
+        break;
+      case LogStatus::end:
+        return collector.finish(reader->skipped_bytes());
+      case LogStatus::truncated:
+      case LogStatus::corrupt:
+        reader->resync();
+        break;
+      case LogStatus::failed:
+        return fail(Fault::unavailable, log_path, read.message);
+    }
+  }
+}
+
+}  // namespace joulecast::telemetry
