@@ -509,7 +509,7 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance) {
     if (damping > 0) {
       for (std::size_t k = 1; k < n; ++k) diagonal_[k] += damping * magnitude_[k];
     }
-    for (double add = std::max(1e-3, damping); !factorise(); add *= 4) {
+    for (double add = std::max(1e-9, damping); !factorise(); add *= 8) {
       corrected = true;
       for (std::size_t k = 1; k < n; ++k) diagonal_[k] += add * magnitude_[k];
       if (add > 1e12) return solution;
@@ -528,7 +528,8 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance) {
         if (bounds_[k] >> j & 1u) gap += cells_[k].multiplier[j] * cells_[k].slack[j];
       }
     }
-    if (mu <= finest && gap < 3 * tolerance * scale && decrement < 1e-3 * tolerance * scale) {
+    if (mu <= finest && gap < 3 * tolerance * scale &&
+        decrement < (iteration < 60 ? 1e-3 : 0.3) * tolerance * scale) {
       solution.converged = true;
       solution.gap_j = gap + kink_gap_;
       double worst = 0, range = 0;
