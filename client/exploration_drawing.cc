@@ -359,7 +359,7 @@ std::string draw_exploration(std::string_view title, const Map& map, const Explo
     if (round.next)
       caption +=
           fmt::format(", next shows {}", grouped(round.next->candidates[round.next->winner].unseen_visible));
-    svg.text({px, py - 6}, caption, {.size = 11.5});
+    svg.text({px, py + sample.height() + 17}, caption, {.size = 11.5});
     draw_round(svg, Frame(map, px, py, panel_px), e, k);
   }
   return svg.str();

@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "exploration/explore.h"
+
 namespace joulecast::exploration {
 namespace {
 
@@ -98,6 +100,14 @@ TEST(MapFile, RefusesBrokenTextAndMissingFiles) {
   EXPECT_EQ(parse_map("{").error().fault, Fault::invalid);
   EXPECT_EQ(parse_map("[]").error().fault, Fault::invalid);
   EXPECT_EQ(load_map("no/such/map.json").error().fault, Fault::not_found);
+}
+
+TEST(MapFile, ShippedMapIsExplored) {
+  const auto map = load_map(std::string(JOULECAST_SOURCE_DIR) + "/deploy/maps/yard.json");
+  ASSERT_TRUE(map) << describe(map.error());
+  const auto explored = explore(*map);
+  ASSERT_TRUE(explored);
+  EXPECT_EQ(explored->outcome, Outcome::explored);
 }
 
 TEST(MapFile, SchemaKnowsTheSameKeysBoundsAndDefaults) {
