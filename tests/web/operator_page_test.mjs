@@ -107,13 +107,15 @@ await check('the fleet is live', async () => {
 });
 
 await check('the fleet is found, chosen and ordered', async () => {
+  const names = () => page.locator('.fleet tbody th a').allTextContents();
   await page.getByPlaceholder('Find a robot or mission').fill(robot);
   await until('one row', async () => (await page.locator('.fleet tbody tr:not(.spacer)').count()) === 1);
   await page.getByPlaceholder('Find a robot or mission').fill('');
   await page.getByRole('button', { name: 'Silent' }).click();
+  await until('the robot that is silent', async () => JSON.stringify(await names()) === '["hour-01"]');
+  await page.getByRole('button', { name: 'Low charge' }).click();
   await page.getByText('No robot matches').waitFor();
   await page.getByRole('button', { name: 'All', exact: true }).click();
-  const names = () => page.locator('.fleet tbody th a').allTextContents();
   const rising = await names();
   await page.getByRole('button', { name: 'Robot' }).click();
   await until('the other order', async () => JSON.stringify(await names()) === JSON.stringify([...rising].reverse()));
@@ -146,13 +148,14 @@ await check('a robot shows its history, versions and place', async () => {
 await check('missions are filtered, summed and kept in the address', async () => {
   await go(page, '#/missions');
   await page.locator('.missions tbody tr').first().waitFor();
-  await page.getByLabel('Robot', { exact: true }).selectOption(robot);
+  await page.getByRole('combobox', { name: 'Robot', exact: true }).selectOption(robot);
   await until('only that robot', async () => (await page.locator('.missions tbody td:nth-child(2)').allTextContents()).every((t) => t === robot));
-  await page.getByLabel('State').selectOption('finished');
+  await page.getByRole('combobox', { name: 'State', exact: true }).selectOption('finished');
   expect(page.url().includes(`robot=${robot}`) && page.url().includes('state=finished'), `address ${page.url()}`);
   const totals = await get(`/v1/mission-totals?robot_id=${robot}&state=finished`);
   await until('the totals', async () => number(await page.locator('.readouts dd .number').first().textContent()) >= totals.missions);
   await page.getByLabel('Payload from, kg').fill('100000');
+  await page.keyboard.press('Enter');
   await page.getByText('No mission matches').waitFor();
   await page.getByRole('button', { name: 'Clear' }).click();
   await page.locator('.missions tbody tr').first().waitFor();

@@ -152,14 +152,19 @@ export function FloorPath({ points, kind = 'power', height = 380, label, cursor 
     if (under !== null) draw_under(c, view, under);
     c.lineWidth = 3.2;
     c.lineCap = 'round';
-    for (let k = 1; k < shown.length; ++k) {
-      const value = shown[k][2];
-      c.strokeStyle = Number.isFinite(value) ? scale.colour_of(value) : palette().line;
-      c.beginPath();
-      c.moveTo(...view.to(shown[k - 1][0], shown[k - 1][1]));
+    c.lineJoin = 'round';
+    let colour = null;
+    for (let k = 1; k < shown.length; ++k) {  // stretches of one colour are one stroke
+      const value = shown[k][2], own = Number.isFinite(value) ? scale.colour_of(value) : palette().line;
+      if (own !== colour) {
+        if (colour !== null) c.stroke();
+        c.strokeStyle = colour = own;
+        c.beginPath();
+        c.moveTo(...view.to(shown[k - 1][0], shown[k - 1][1]));
+      }
       c.lineTo(...view.to(shown[k][0], shown[k][1]));
-      c.stroke();
     }
+    if (colour !== null) c.stroke();
     if (shown.length > 1 && ends) draw_ends(c, view, shown);
     if (robot) draw_robot(c, view, robot[0], robot[1], robot[2] ?? 0, palette().ink);
     const at = cursor === null ? null : points[cursor];

@@ -12,7 +12,7 @@ import { Answer, Choice, Empty, Failure, Loading, MissionState, Panel, Quantity,
 import { Waterfall } from '../waterfall.js';
 import { ratio_of } from './missions.js';
 
-const trace_points = 1200, group = 'mission';
+const trace_points = 700, fine_points = 6000, group = 'mission';
 const run_clock = (_, splits) => splits.map((s) => {
   if (s === null) return '';
   const sign = s < 0 ? '−' : '', t = Math.abs(s);
@@ -77,7 +77,14 @@ function AtCursor({ trace, mission, index }) {
   </dl>`;
 }
 
-function TracePanels({ mission, whole }) {
+function index_at(trace, utime_us) {
+  const k = Math.floor((utime_us - trace.start_utime_us[0]) / trace.width_us);
+  let at = Math.max(0, Math.min(k, trace.start_utime_us.length - 1));
+  while (at > 0 && trace.start_utime_us[at] > utime_us) at -= 1;
+  return at;
+}
+
+function TracePanels({ mission, whole, fine }) {
   const [zoom, set_zoom] = useState(null);
   const [cursor, set_cursor] = useState(null);
   const [colouring, set_colouring] = useState('power');
@@ -85,10 +92,12 @@ function TracePanels({ mission, whole }) {
   const closer = useGet(zoom === null ? null : `/v1/missions/${mission.id}/trace${query({ points: trace_points, from_utime_us: utime(zoom[0]), to_utime_us: utime(zoom[1]) })}`);
   const trace = zoom !== null && closer.value !== null && closer.value.start_utime_us.length > 1 ? closer.value : whole;
   const measured = whole.measured_power_w.mean.some((v) => v !== null);
-  const path = useMemo(() => trace.x_m.map((x, k) => {
-    const m = trace.measured_power_w.mean[k], f = trace.modelled_power_w.mean[k];
-    return [x ?? NaN, trace.y_m[k] ?? NaN, colouring === 'gap' ? (m === null ? NaN : m - f) : m ?? f ?? NaN];
-  }), [trace, colouring]);
+  const way = trace === whole ? fine : trace;
+  const path = useMemo(() => way.x_m.map((x, k) => {
+    const m = way.measured_power_w.mean[k], f = way.modelled_power_w.mean[k];
+    return [x ?? NaN, way.y_m[k] ?? NaN, colouring === 'gap' ? (m === null ? NaN : m - f) : m ?? f ?? NaN];
+  }), [way, colouring]);
+  const here = cursor === null || cursor >= trace.start_utime_us.length ? null : index_at(way, trace.start_utime_us[cursor] + trace.width_us / 2);
   const placed = path.some(([x]) => Number.isFinite(x));
   if (whole.start_utime_us.length === 0) return html`<${Panel} title="Power"><${Empty} title="No trace kept">The mission ended before its first sample was stored.<//><//>`;
   return html`<div class="columns trace-columns">
@@ -100,7 +109,7 @@ function TracePanels({ mission, whole }) {
       <p class="note foot">Each point is ${format.span(trace.width_us / 1e6)}${zoom !== null ? ', closer view' : ''}.</p>
     <//>
     <${Panel} class="screen" title="On the floor" aside=${html`<${Choice} label="Colour by" value=${colouring} onChange=${set_colouring} options=${measured ? [['power', 'Power'], ['gap', 'Gap']] : [['power', 'Power']]} />`}>
-      ${placed ? html`<${FloorPath} points=${path} kind=${colouring} cursor=${cursor} height=${440} label=${`Path of the mission, coloured by ${colouring === 'gap' ? 'measured minus modelled power' : 'power'}; circle: start, square: end`} />
+      ${placed ? html`<${FloorPath} points=${path} kind=${colouring} cursor=${here} height=${440} label=${`Path of the mission, coloured by ${colouring === 'gap' ? 'measured minus modelled power' : 'power'}; circle: start, square: end`} />
         <p class="note foot">○ start  ■ end. Poses as the robot told them.</p>`
       : html`<${Empty} title="No poses">This robot did not tell where it was.<//>`}
     <//>
@@ -118,21 +127,22 @@ function LeastDrive({ mission, trace }) {
       .then((value) => set_told({ value, error: null }), (error) => error.name === 'AbortError' || set_told({ value: null, error }));
     return () => abort.abort();
   }, [request]);
-  if (request === null) return html`<${Empty} title="Nothing to compare">The robot did not drive.<//>`;
+  if (request === null) return html`<${Empty} title="Nothing to compare">The robot did not drive, or in too many short runs.<//>`;
   if (told.error !== null) return html`<${Failure} error=${told.error} />`;
   if (told.value === null || robot.value === null) return robot.error !== null ? html`<${Failure} error=${robot.error} />` : html`<${Loading} what="the minimum-energy drive" />`;
   const e = mission.energy, wait_s = Math.max(0, e.duration_s - told.value.duration_s);
   const waiting_j = wait_s * robot.value.model.idle_power_w, least = told.value.energy_j + waiting_j;
   const share = 1 - least / e.modelled_j;
+  const turned = request.path.reduce((sum, leg) => sum + Math.abs(leg.angle_rad ?? 0), 0);
   const legs = request.path.filter((leg) => leg.kind === 'straight').length;
   return html`
-    <p class="verdict">${share > 0.005 ? html`The same legs could have been driven for <b>${format.fixed(share * 100, 1)}${'\u00a0'}%</b> less.` : html`Driven about as cheaply as the model allows.`}</p>
+    <p class="verdict">${share > 0.005 ? html`The same legs could have been driven for <b>${format.fixed(share * 100, 1)}${'\u00a0'}%</b> less.` : share > -0.005 ? 'Driven about as cheaply as the model allows.' : 'Driven for less than these legs cost from stop to stop: the robot turned while it drove.'}</p>
     <${Bars} label="Energy of the mission and of the minimum-energy drive" rows=${[
       { name: 'Measured', value: e.measured_j, of: format.energy(e.measured_j), channel: 'measured', note: format.span(e.duration_s) },
       { name: 'Modelled', value: e.modelled_j, of: format.energy(e.modelled_j), channel: 'modelled', note: format.span(e.duration_s) },
       { name: 'Least energy', value: least, extra: waiting_j, of: format.energy(least), channel: 'least', note: `${format.span(told.value.duration_s)} driving` },
     ]} />
-    <p class="note foot">${legs} ${legs === 1 ? 'leg' : 'legs'} of ${format.text(format.length(e.distance_m))} in all, ${format.fixed((Math.abs(e.turned_rad) * 180) / Math.PI)}° turned at the stops, payload ${format.text(format.unit(mission.payload_kg ?? 0, 'kg'))},
+    <p class="note foot">${legs} ${legs === 1 ? 'leg' : 'legs'} between stops, ${format.text(format.length(e.distance_m))} in all, ${format.fixed((turned * 180) / Math.PI)}° turned at the stops, payload ${format.text(format.unit(mission.payload_kg ?? 0, 'kg'))},
       within ${format.span(e.duration_s)}; ${format.span(wait_s)} left over spent waiting at idle (hatched). Model version ${told.value.model_version}; the saving is against the modelled energy, so that a gap of the model does not count as one.</p>`;
 }
 
@@ -162,6 +172,10 @@ export function Mission({ id }) {
   const mission = useGet(`/v1/missions/${id_path(id)}`);
   const ledger = useGet(`/v1/missions/${id_path(id)}/ledger`);
   const trace = useGet(`/v1/missions/${id_path(id)}/trace${query({ points: trace_points })}`);
+  // A long mission's path and stops need more than a chart does.
+  const merged = trace.value !== null && trace.value.start_utime_us.length >= trace_points / 2;
+  const finer = useGet(merged ? `/v1/missions/${id_path(id)}/trace${query({ points: fine_points })}` : null);
+  const fine = merged ? finer.value : trace.value;
   useTitleOf(mission.value?.mission_id ?? 'Mission');
   const open = mission.value?.state === 'open';
   useEffect(() => {
@@ -185,13 +199,13 @@ export function Mission({ id }) {
       <${Readout} large label="Per metre" of=${format.unit(e.distance_m > 0.1 ? e.battery_j / e.distance_m : null, 'J/m')} />
       <${Readout} large label="Payload" of=${format.unit(m.payload_kg, 'kg')} />
     </dl>
-    <${Answer} of=${trace} what="the trace">${(value) => html`<${TracePanels} mission=${m} whole=${value} />`}<//>
+    <${Answer} of=${trace} what="the trace">${(value) => html`<${TracePanels} mission=${m} whole=${value} fine=${fine ?? value} />`}<//>
     <div class="columns">
       <${Panel} title="Where the energy went"><${Answer} of=${ledger} what="the ledger">${({ ledger: l }) =>
         html`<${Waterfall} terms_j=${l.terms_j} battery_j=${l.battery_j} closure=${l.closure_relative} />`}<//><//>
       <div>
         <${Panel} title="Against the minimum-energy drive">${m.model_version === null ? html`<${Empty} title="No model">The robot had no model on this mission.<//>` :
-          open ? html`<${Empty} title="Still driving">Compared when the mission ends.<//>` : trace.value && html`<${LeastDrive} mission=${m} trace=${trace.value} />`}<//>
+          open ? html`<${Empty} title="Still driving">Compared when the mission ends.<//>` : fine && html`<${LeastDrive} mission=${m} trace=${fine} />`}<//>
         <${Panel} title="Record"><${Facts} mission=${m} /><//>
       </div>
     </div>`;

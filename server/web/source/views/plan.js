@@ -62,7 +62,7 @@ function SpeedChart({ answer, straight }) {
   };
   const make_power = () => {
     const c = palette();
-    return { cursor, scales: { x: { time: false } }, axes: [axis('time, s', { size: 26 }), axis('power, W'), ...(turns ? [axis('', { scale: 'y', side: 1, grid: { show: false }, ticks: { show: false }, values: () => [] })] : [])],
+    return { cursor, scales: { x: { time: false } }, axes: [axis('time, s', { size: 26 }), axis('power, W'), ...(turns ? [axis(' ', { scale: 'y', side: 1, grid: { show: false }, ticks: { show: false }, values: () => [] })] : [])],
       series: [{}, { stroke: c.accent, width: 1.75, fill: with_alpha(c.accent, 0.12), points: { show: false } }] };
   };
   return html`
