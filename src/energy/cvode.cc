@@ -151,6 +151,10 @@ Result<Arrival> Cvode::advance_to_event(double t0, double t1, double first_step)
   return Arrival{reached, static_cast<std::size_t>(changed - signs.begin())};
 }
 
+void Cvode::limit_step(double longest) {
+  Impl::require(CVodeSetMaxStep(impl_->memory, longest) == CV_SUCCESS);
+}
+
 long Cvode::steps() const {
   long count = 0;
   CVodeGetNumSteps(impl_->memory, &count);

@@ -52,6 +52,10 @@ class Cvode {
   // is zero at t0 counts from when it has left zero.
   Result<Arrival> advance_to_event(double t0, double t1, double first_step = 0);
 
+  // Bounds every step from now on, for right-hand sides with features that error control could step over;
+  // 0 lifts the bound.
+  void limit_step(double longest);
+
   long steps() const;        // since the last restart
   long evaluations() const;  // of the right-hand side, since the last restart
 

@@ -14,6 +14,7 @@ constexpr std::size_t pose_index = account::count;  // x, y, heading
 constexpr std::size_t heat_index = pose_index + 3;  // two
 constexpr std::size_t state_size = heat_index + 2;
 constexpr double tolerance = 1e-8;
+constexpr double finest_floor_m = 0.05;  // regions of the floor are resolved to this length
 
 // One span of constant acceleration, in time since its beginning.
 class Span final : public InitialValueProblem {
@@ -96,6 +97,8 @@ Result<Accounts> estimate_motion(const dynamics::DriveModel& model, std::span<co
       return invalid("/profile/time_s/" + std::to_string(k), "must be later than the one before");
     span.begin(points[k - 1], points[k]);
     const double duration = points[k].time_s - points[k - 1].time_s;
+    const double fastest = std::max(std::fabs(points[k].speed_m_s), std::fabs(points[k - 1].speed_m_s));
+    cvode.limit_step(start && fastest > 0 ? finest_floor_m / fastest : 0);
     if (Result<void> done = cvode.advance(0, duration, 0); !done) return tl::unexpected(done.error());
   }
 

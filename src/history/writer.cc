@@ -221,8 +221,10 @@ class Writer::Impl {
   }
 
   void settle(Batch& batch, std::vector<Outcome>& outcomes, double duration_s) {
+    // Before flush() can return: who waits for it may look for what was refused.
+    for (std::size_t k = 0; k < outcomes.size(); ++k)
+      if (!outcomes[k] && !batch.answers[k]) tell(outcomes[k].error());
     bool recovered = false;
-    std::vector<Error> unheard;
     {
       std::lock_guard lock(mutex_);
       recovered = !status_.healthy;
@@ -236,17 +238,13 @@ class Writer::Impl {
       queued_bytes_ -= batch.bytes;
       in_flight_ = 0;
       oldest_ = queue_.empty() ? std::nullopt : std::optional(queue_.front().since);
-      for (std::size_t k = 0; k < outcomes.size(); ++k) {
-        ++(outcomes[k] ? status_.applied : status_.refused);
-        if (!outcomes[k] && !batch.answers[k]) unheard.push_back(outcomes[k].error());
-      }
+      for (const Outcome& outcome : outcomes) ++(outcome ? status_.applied : status_.refused);
     }
     room_.notify_all();
     committed_.notify_all();
     for (std::size_t k = 0; k < outcomes.size(); ++k)
       if (batch.answers[k]) batch.answers[k]->set_value(std::move(outcomes[k]));
     if (recovered) tell({Fault::unavailable, "store", "commits succeed again"});
-    for (const Error& error : unheard) tell(error);
   }
 
   void prune_when_due() {
