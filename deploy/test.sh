@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Installs, checks the formatting, builds without a warning, passes the tests; then the same tests under the address and
-# undefined-behaviour sanitizers. --quick leaves the sanitizers out.
+# Installs, checks formatting and lint, builds without a warning and passes the tests. With --sanitize the tests also run
+# under the address and undefined-behaviour sanitizers, in a build of their own.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-quick=false
-[ "${1:-}" = --quick ] && quick=true
+sanitize=false
+[ "${1:-}" = --sanitize ] && sanitize=true
 
 deploy/install-dependencies.sh
 deploy/check-format.sh
@@ -19,7 +19,7 @@ isolated() {
   fi
 }
 
-if ! $quick; then
+if $sanitize; then
   cmake --preset sanitize
   cmake --build --preset sanitize
   isolated ctest --preset sanitize -j 2
