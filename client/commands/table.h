@@ -22,6 +22,7 @@ void add_battery(CLI::App& program, Exit& exit);
 void add_calibrate(CLI::App& program, Exit& exit);
 void add_estimate(CLI::App& program, Exit& exit);
 void add_explore(CLI::App& program, Exit& exit);
+void add_gap(CLI::App& program, Exit& exit);
 void add_import(CLI::App& program, Exit& exit);
 void add_missions(CLI::App& program, Exit& exit);
 void add_profile(CLI::App& program, Exit& exit);

@@ -74,13 +74,14 @@ S metered_power(const dynamics::BasicDriveModel<S>& model, const Window& w) {
   }
   const S power = model.flow(at).battery_power_w;
   return model.metered_battery_power(power, w.battery_voltage_v) -
-         model.parameters().sensor_delay_s *
+         (model.parameters().sensor_delay_s - w.electrical_shift_s) *
              (std::isfinite(w.battery_power_slope_w_s) ? w.battery_power_slope_w_s : 0.0);
 }
 
 template <class S>
 ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w) {
   const auto& p = model.parameters();
+  const S delay = p.sensor_delay_s - w.electrical_shift_s;  // that the windows still carry
   ChannelValues<S> r;
   r.fill(S(missing));
   const dynamics::Instant at = instant_of(model, w);
@@ -90,10 +91,10 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
   for (std::size_t s : {0u, 1u}) {
     // Readings against what the sensors would read of the model, so that no regressor carries their noise
     // except the measured current in the voltage's.
-    const S reading = w.current_a[s] + p.sensor_delay_s * w.current_slope_a_s[s];
+    const S reading = w.current_a[s] + delay * w.current_slope_a_s[s];
     const S current = (reading - p.motor_current.bias) / (S(1) + p.motor_current.gain);
     r[index_of(Channel::voltage_right) + s] =
-        w.voltage_v[s] + p.sensor_delay_s * w.voltage_slope_v_s[s] -
+        w.voltage_v[s] + delay * w.voltage_slope_v_s[s] -
         (S(1) + p.motor_voltage.gain) * model.voltage_for(s, current, at) - p.motor_voltage.bias;
     if (w.moving[s]) {
       r[index_of(Channel::torque_right) + s] =

@@ -30,7 +30,7 @@ constexpr auto expectations = std::to_array<Expectation>({
     {"yaw_inertia_error", 0.02, 0, 3},
     {"linear_inertia_error", 0.006, 0, 1},
     {"com_offset", 0.003, 0, 0.2},
-    {"resistance_error", 0.010, 0.008, 1},
+    {"resistance_error", 0.015, 0.010, 1},
     {"torque_constant_loss", 0.004, 0, 0.3},
     {"battery_resistance", 0.15, 0, 1},
     {"no_regeneration", 0.02, 0, 0.6},
@@ -88,7 +88,10 @@ void Shapes::narrow(const ActiveEffect& effect, double wheel_radius_m, double fa
 
 ColumnSet::ColumnSet(const robot::RobotModel& robot, std::span<const Window> windows, bool power,
                      const Shapes& shapes)
-    : robot_(robot), ranges_(ranges_of(windows, robot)), power_(power) {
+    : robot_(robot),
+      adopted_(dynamics::active_effects(robot).value_or(std::vector<ActiveEffect>{})),
+      ranges_(ranges_of(windows, robot)),
+      power_(power) {
   for (const Effect* effect : dynamics::catalogue()) {
     const std::string_view id = effect->info().id;
     EffectValues<double> v = dynamics::initial(*effect).values;
@@ -242,12 +245,13 @@ std::optional<Chosen> ColumnSet::coordinates_of(const ActiveEffect& effect) cons
 }
 
 void ColumnSet::linearise_around(std::span<const Chosen> chosen) {
-  std::vector<ActiveEffect> effects = effects_of(chosen);
+  std::vector<ActiveEffect> effects = adopted_;
+  for (const ActiveEffect& effect : effects_of(chosen)) effects.push_back(effect);
   base_.assign(1, dynamics::DriveModel(robot_, effects));
   offset_.assign(columns_.size(), 0.0);
   derivatives_.clear();
   std::vector<std::size_t> seeded(columns_.size(), effects.size());
-  std::size_t at = 0;
+  std::size_t at = adopted_.size();
   for (const Chosen& c : chosen) {
     const Hypothesis& h = hypotheses_[c.hypothesis];
     for (std::size_t k = 0; k < h.columns.size(); ++k) offset_[h.columns[k]] = c.coefficients[k];

@@ -95,6 +95,7 @@ class ColumnSet {
   void scale(std::span<const Window> windows);
 
   robot::RobotModel robot_;
+  std::vector<dynamics::ActiveEffect> adopted_;  // of the robot file, always in force
   Ranges ranges_;
   bool power_;
   double mean_power_w_ = 0;

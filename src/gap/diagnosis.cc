@@ -14,13 +14,15 @@ namespace joulecast::gap {
 namespace {
 
 // An effect or an outside family that moves less than this share of the mean power is no finding.
-constexpr double least_effect_share = 0.007;
+constexpr double least_effect_share = 0.011;
 constexpr double least_outside_share = 0.012;
 constexpr double alternative_odds = 0.04;
 constexpr std::size_t most_alternatives = 2;
 constexpr std::size_t fewest_windows = 40;
 constexpr double bootstrap_block_s = 10;
 constexpr int bootstrap_draws = 400;
+constexpr double settled_delay_s = 0.006;
+constexpr int most_delay_rounds = 4;
 
 // How large a coefficient is beside what a robot as filed may have.
 bool beyond_tolerance(const ColumnSet& columns, const Evidence::Estimate& estimate, const Hypothesis& h) {
@@ -151,10 +153,11 @@ std::vector<DiagnosedParameter> parameters_of(const ColumnSet& columns, const Ch
   return parameters;
 }
 
-// Leave one mission out, fit the rest, predict it.
+// Leave one mission out, fit the rest, predict it. `measured` is of these windows, `plain` and `nominal` of
+// the ones without any delay taken out.
 Shrinkage held_out(const Fit& fit, const robot::RobotModel& robot, const std::vector<std::size_t>& set,
                    std::span<const Window> windows, std::span<const double> measured,
-                   std::span<const double> nominal, double floor) {
+                   std::span<const double> plain, std::span<const double> nominal, double floor) {
   std::vector<double> predicted(windows.size(), missing);
   for (std::size_t m = 0; m < fit.missions.size(); ++m) {
     Information rest;
@@ -163,7 +166,7 @@ Shrinkage held_out(const Fit& fit, const robot::RobotModel& robot, const std::ve
     }
     if (rest.xx.size() == 0) rest = fit.total;
     const auto effects = fit.columns->effects_of(coefficients_of(fit, rest, set));
-    const dynamics::DriveModel model(robot, effects);
+    const dynamics::DriveModel model = extended_model(robot, effects);
     for (std::size_t k = 0; k < windows.size(); ++k) {
       if (windows[k].mission == m) predicted[k] = metered_power(model, windows[k]);
     }
@@ -175,7 +178,7 @@ Shrinkage held_out(const Fit& fit, const robot::RobotModel& robot, const std::ve
   for (std::size_t k = 0; k < windows.size(); ++k) {
     if (!std::isfinite(measured[k] + predicted[k])) continue;
     Block& b = by_time[{windows[k].mission, static_cast<int>(windows[k].t_s / bootstrap_block_s)}];
-    b.before += std::fabs(measured[k] - nominal[k]);
+    b.before += std::fabs(plain[k] - nominal[k]);
     b.after += std::fabs(measured[k] - predicted[k]);
     b.size += std::fabs(measured[k]);
   }
@@ -210,6 +213,13 @@ Shrinkage held_out(const Fit& fit, const robot::RobotModel& robot, const std::ve
   return s;
 }
 
+double found_delay(const FitResult& result) {
+  for (const dynamics::ActiveEffect& effect : result.fit.columns->effects_of(result.chosen)) {
+    if (effect.effect->info().id == "sensor_delay") return effect.values[0];
+  }
+  return 0;
+}
+
 }  // namespace
 
 std::string_view name_of(Verdict verdict) {
@@ -232,7 +242,7 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
   d.robot_id = recordings.robot_id;
   d.missions = recordings.missions.size();
   d.samples = recordings.samples;
-
+  if (const auto adopted = dynamics::active_effects(robot); !adopted) return tl::unexpected(adopted.error());
   const std::vector<Window> windows = make_windows(recordings, robot);
   const std::vector<double> measured = measured_power(windows);
   const auto with_battery = std::ranges::count_if(measured, [](double p) { return std::isfinite(p); });
@@ -247,11 +257,22 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
   d.noise_floor = noise_floor(windows, measured, modelled);
   d.where = localise(windows, robot, modelled);
 
-  std::optional<FitResult> result = fit_windows(robot, windows, settings.progress);
-  if (!result) return fail(Fault::conflict, "", "diagnosis cancelled");
+  // A delay is linear only while it is short beside the window: what is found is taken out and fitted again.
+  std::vector<Window> judged = windows;
+  std::optional<FitResult> result;
+  for (int round = 0;; ++round) {
+    result = fit_windows(robot, judged, settings.progress);
+    if (!result) return fail(Fault::conflict, "", "diagnosis cancelled");
+    const double shift = judged.front().electrical_shift_s, delay = found_delay(*result);
+    if (std::fabs(delay - shift) < settled_delay_s || round >= most_delay_rounds) break;
+    WindowSettings moved;
+    moved.electrical_delay_s = delay;
+    judged = make_windows(recordings, robot, moved);
+  }
+  const std::vector<double> judged_power = measured_power(judged);
   const Fit& fit = result->fit;
   const ColumnSet& columns = *fit.columns;
-  const MovedShares moved(fit, windows);
+  const MovedShares moved(fit, judged);
   const Posterior posterior = posterior_of(fit, moved);
   const auto best =
       std::ranges::max_element(posterior.sets, {}, [](const auto& entry) { return entry.second; });
@@ -320,7 +341,8 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
         d.adoptable.push_back(dynamics::adopt(effects[k]));
       }
     }
-    if (with_battery > 0) d.shrinkage = held_out(fit, robot, set, windows, measured, modelled, d.noise_floor);
+    if (with_battery > 0)
+      d.shrinkage = held_out(fit, robot, set, judged, judged_power, measured, modelled, d.noise_floor);
     std::ranges::stable_sort(d.effects, std::greater{}, &DiagnosedEffect::share);
   }
   d.next_drive = next_drives(fit, robot, d);

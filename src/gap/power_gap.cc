@@ -13,10 +13,17 @@ std::vector<double> measured_power(std::span<const Window> windows) {
   return power;
 }
 
+dynamics::DriveModel extended_model(const robot::RobotModel& robot,
+                                    std::span<const dynamics::ActiveEffect> effects) {
+  auto all = dynamics::active_effects(robot).value_or(std::vector<dynamics::ActiveEffect>{});
+  all.insert(all.end(), effects.begin(), effects.end());
+  return {robot, all};
+}
+
 std::vector<double> modelled_power(const robot::RobotModel& robot,
                                    std::span<const dynamics::ActiveEffect> effects,
                                    std::span<const Window> windows) {
-  const dynamics::DriveModel model(robot, effects);
+  const dynamics::DriveModel model = extended_model(robot, effects);
   std::vector<double> power(windows.size());
   std::ranges::transform(windows, power.begin(), [&](const Window& w) { return metered_power(model, w); });
   return power;

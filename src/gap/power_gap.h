@@ -7,15 +7,16 @@
 
 namespace joulecast::gap {
 
-// Measured and modelled battery power of every window [W]; NaN where the battery is not measured.
-struct PowerSeries {
-  std::vector<double> measured_w, modelled_w;
-};
-
+// Battery power of every window [W]; NaN where the battery is not measured.
 std::vector<double> measured_power(std::span<const Window> windows);
+// By the robot file, its adopted effects and these, as the robot's meter would read it.
 std::vector<double> modelled_power(const robot::RobotModel& robot,
                                    std::span<const dynamics::ActiveEffect> effects,
                                    std::span<const Window> windows);
+
+// The drive model of the robot file, its adopted effects (none where the catalogue rejects one) and these.
+dynamics::DriveModel extended_model(const robot::RobotModel& robot,
+                                    std::span<const dynamics::ActiveEffect> effects);
 
 struct GapSize {
   double energy_relative = 0;

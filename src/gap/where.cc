@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "gap/channels.h"
+#include "gap/power_gap.h"
 
 namespace joulecast::gap {
 namespace {
@@ -29,7 +30,7 @@ std::vector<Part> parts_of(std::span<const Window> windows, const robot::RobotMo
                            std::span<const double> modelled_w) {
   const std::size_t n = windows.size();
   std::vector<Part> parts{{"battery_power", std::vector<double>(n)}};
-  const dynamics::DriveModel model(robot, {});
+  const dynamics::DriveModel model = extended_model(robot, {});
   Part bus{std::string(name_of(Channel::bus)), std::vector<double>(n, 0.0)};
   Part voltage{std::string(name_of(Channel::voltage_right)), std::vector<double>(n, 0.0)};
   Part torque{std::string(name_of(Channel::torque_right)), std::vector<double>(n, 0.0)};

@@ -328,6 +328,7 @@ std::vector<Window> make_windows(const RecordingSet& set, const robot::RobotMode
       }
       Window w = window_at(c, heat, first, last, from + 0.5 * length, length);
       w.mission = m;
+      w.electrical_shift_s = settings.electrical_delay_s;
       w.continues = continues;
       if (k % windows_a_span == 0) add_span(c, settings, robot, w);
       windows.push_back(w);

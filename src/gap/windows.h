@@ -34,7 +34,8 @@ struct Window {
   std::array<std::array<double, 2>, heat_time_constants_s.size()> copper_heat_w{};
   double battery_voltage_v = missing, battery_current_a = missing, battery_power_w = missing;
   double battery_power_slope_w_s = 0, battery_current_slope_a_s = 0;
-  double charge_as = 0;  // drawn since the mission began
+  double electrical_shift_s = 0;  // by which electrical readings were moved back before windowing
+  double charge_as = 0;           // drawn since the mission began
   double yaw_rate_rad_s = missing;
   double x_m = missing, y_m = missing, heading_rad = missing;
   // Mean cosine and sine of 1, 2, ... times the angle of each wheel.
