@@ -7,8 +7,10 @@ packages=(
   libboost-dev libceres-dev libcli11-dev libspdlog-dev libfmt-dev prometheus-cpp-dev libexpected-dev
   libssl-dev libsystemd-dev libzstd-dev zlib1g-dev
   libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev
-  clang-format clang-tidy cppcheck iproute2 curl python3 python3-jsonschema
+  clang-format clang-tidy cppcheck iproute2 curl python3 python3-jsonschema chromium
 )
+# The page's tests run on whatever node there is.
+command -v node >/dev/null && command -v npm >/dev/null || packages+=(nodejs npm)
 missing=()
 for package in "${packages[@]}"; do
   [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null)" = installed ] || missing+=("$package")
