@@ -1,0 +1,66 @@
+#include <gtest/gtest.h>
+
+#include "client/virtual_robot/fleet.h"
+#include "client/virtual_robot/simulate.h"
+#include "gap/diagnosis.h"
+#include "robot/robot_file.h"
+
+namespace joulecast::gap {
+namespace {
+
+namespace vr = virtual_robot;
+
+// Diagnoses missions of the project's own plant, which shares no physics with the model.
+Diagnosis diagnose_virtual(const std::vector<vr::EffectStrength>& effects, std::uint64_t seed, bool motors,
+                           int missions = 5) {
+  const auto text = vr::shipped_robots()[1].json_text;
+  vr::SimulationSpec spec;
+  spec.robot = *vr::parse_robot(std::string(text));
+  spec.imperfections = *vr::make_imperfections(effects);
+  spec.missions = missions;
+  spec.sensors.motor_channels = motors;
+  const vr::Simulation run = vr::simulate_missions(spec, seed);
+  std::vector<telemetry::Recording> recordings;
+  std::size_t next = 0;
+  for (const telemetry::MissionEvent& event : run.events) {
+    if (event.phase == telemetry::MissionPhase::started) {
+      recordings.emplace_back();
+      recordings.back().mission_id = event.mission_id;
+      recordings.back().payload_kg = event.payload_kg;
+      continue;
+    }
+    while (next < run.samples.size() && run.samples[next].utime_us <= event.utime_us) {
+      recordings.back().samples.push_back(run.samples[next++]);
+    }
+  }
+  return *diagnose(*make_recording_set(spec.robot.robot_id, std::move(recordings)),
+                   *robot::parse_robot(text));
+}
+
+TEST(VirtualRobot, WithoutImperfectionsShowsNoGap) {
+  for (const bool motors : {true, false}) {
+    const Diagnosis d = diagnose_virtual({}, 11, motors);
+    EXPECT_EQ(name_of(d.verdict), "none");
+    EXPECT_TRUE(d.effects.empty());
+    EXPECT_TRUE(d.adoptable.empty());
+  }
+}
+
+TEST(VirtualRobot, ASingleMissionSufficesForAStrongEffect) {
+  const Diagnosis d = diagnose_virtual({{"coulomb_friction", 0.6}}, 12, true, 1);
+  ASSERT_EQ(d.effects.size(), 1u);
+  EXPECT_EQ(d.effects[0].id, "coulomb_friction");
+  EXPECT_EQ(d.missions, 1u);
+  ASSERT_TRUE(d.shrinkage);
+  EXPECT_GT(d.shrinkage->fraction, 0.5);
+}
+
+TEST(VirtualRobot, AnUnknownLoadIsOutside) {
+  const Diagnosis d = diagnose_virtual({{"x_heading_load", 12}}, 13, true);
+  EXPECT_EQ(name_of(d.verdict), "outside");
+  EXPECT_EQ(d.outside.follows, "heading");
+  EXPECT_TRUE(d.effects.empty());
+}
+
+}  // namespace
+}  // namespace joulecast::gap

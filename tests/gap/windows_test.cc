@@ -1,0 +1,81 @@
+#include "gap/windows.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "gap/channels.h"
+#include "tests/support/sample_robots.h"
+
+namespace joulecast::gap {
+namespace {
+
+// A mission in which both wheels speed up steadily and the drive obeys the nominal model.
+RecordingSet steady_ramp(const robot::RobotModel& robot, double rate_hz, bool motors) {
+  const dynamics::DriveModel model(robot, {});
+  telemetry::Recording mission;
+  mission.mission_id = "ramp";
+  mission.payload_kg = 2;
+  for (int k = 0; k < static_cast<int>(20 * rate_hz); ++k) {
+    const double t = k / rate_hz;
+    dynamics::Instant at;
+    at.wheel_speed_rad_s = {1 + 0.2 * t, 1 + 0.15 * t};
+    at.wheel_acceleration_rad_s2 = {0.2, 0.15};
+    at.payload_kg = 2;
+    const auto flow = model.flow(at);
+    telemetry::Sample s;
+    s.utime_us = 1'000'000 + static_cast<std::int64_t>(std::llround(1e6 * t));
+    s.sequence = k;
+    s.wheel_velocity_rad_s = at.wheel_speed_rad_s;
+    if (motors) {
+      s.motor_voltage_v = flow.voltage_v;
+      s.motor_current_a = flow.current_a;
+    }
+    s.battery_voltage_v = robot.battery.nominal_voltage_v;
+    s.battery_current_a = flow.battery_power_w / robot.battery.nominal_voltage_v;
+    s.payload_kg = 2;
+    mission.samples.push_back(s);
+  }
+  return *make_recording_set(robot.robot_id, {mission});
+}
+
+class AnyRate : public ::testing::TestWithParam<double> {};
+
+TEST_P(AnyRate, AveragesAndSlopesAreExactOnStraightLines) {
+  const auto robot = testing::nomad();
+  const auto windows = make_windows(steady_ramp(robot, GetParam(), true), robot);
+  ASSERT_GT(windows.size(), 10u);
+  for (const Window& w : windows) {
+    EXPECT_NEAR(w.acceleration_rad_s2[0], 0.2, 1e-9);
+    EXPECT_NEAR(w.acceleration_rad_s2[1], 0.15, 1e-9);
+    EXPECT_TRUE(w.moving[0] && w.moving[1]);
+    EXPECT_TRUE(std::isnan(w.yaw_rate_rad_s));
+  }
+}
+
+TEST_P(AnyRate, TheModelLeavesNoResidualOfItself) {
+  const auto robot = testing::nomad();
+  const dynamics::DriveModel model(robot, {});
+  for (const bool motors : {true, false}) {
+    for (const Window& w : make_windows(steady_ramp(robot, GetParam(), motors), robot)) {
+      const auto r = residuals(model, w);
+      for (const Channel c : {Channel::voltage_right, Channel::torque_left}) {
+        if (motors) {
+          // Dry friction fades as (width/speed)^2/2; its curvature over a window leaves below 1e-8.
+          EXPECT_NEAR(r[index_of(c)], 0, 1e-8);
+        } else {
+          EXPECT_TRUE(std::isnan(r[index_of(c)]));
+        }
+      }
+      // Power is quadratic in a speed that changes by 0.2 x 0.4 s (longer for slow recordings) over a window:
+      // its mean differs from the power of the mean by less than its curvature times that squared.
+      EXPECT_NEAR(r[index_of(Channel::power)], 0, 0.05);
+      EXPECT_TRUE(std::isnan(r[index_of(Channel::gyro)]));
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Rates, AnyRate, ::testing::Values(10.0, 50.0, 200.0));
+
+}  // namespace
+}  // namespace joulecast::gap
