@@ -20,10 +20,10 @@ export function axis(label, more = {}) {
 }
 
 // Local times, with the day where it changes.
-export function clock_values(_, splits) {
+export function clock_values(_, splits, index, space, step) {
   let day = '';
   return splits.map((second) => {
-    const d = new Date(second * 1000), today = `${d.getMonth() + 1}-${String(d.getDate()).padStart(2, '0')}`, hour = clock(second * 1e6).slice(0, 5);
+    const d = new Date(second * 1000), today = `${d.getMonth() + 1}-${String(d.getDate()).padStart(2, '0')}`, hour = clock(second * 1e6).slice(0, step < 60 ? 8 : 5);
     const text = today === day ? hour : `${hour}\n${d.getFullYear()}-${today.padStart(5, '0')}`;
     day = today;
     return text;

@@ -1,6 +1,7 @@
 import { render } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import './style.css';
+import { clock } from './format.js';
 import { html } from './html.js';
 import { start_live, useLive } from './live.js';
 import { toggle_theme, useTheme } from './theme.js';
@@ -30,7 +31,7 @@ function OfflineBanner() {
     return () => clearTimeout(timer);
   }, [live.link]);
   if (!late) return null;
-  const since = new Date(live.since_ms).toLocaleTimeString();
+  const since = clock(live.since_ms * 1000);
   return html`<div class="banner" role="alert">No connection to the service since ${since}. What is shown is as of then; trying again.</div>`;
 }
 

@@ -13,21 +13,27 @@ const names = {
 };
 const row_px = 30;
 
-export function rows_of(terms_j) {
+const next_to_nothing = 1e-5;  // of the whole
+
+export function rows_of(terms_j, battery_j) {
+  const empty = (value) => Math.abs(value) <= next_to_nothing * Math.abs(battery_j);
   const rows = [];
   let at = 0;
   for (const [term, value] of Object.entries(terms_j)) {
     const change = term === 'recovered' ? -value : value;
     if (term === 'unexplained') rows.push({ key: 'modelled', name: 'Modelled', from: 0, to: at, total: true });
-    if (value === 0 && term !== 'unexplained') continue;
+    if (empty(value) && term !== 'unexplained') {
+      at += change;
+      continue;
+    }
     rows.push({ key: term, name: names[term] ?? format.words(term), from: at, to: at + change, change });
     at += change;
   }
-  return { rows, sum: at, absent: Object.entries(terms_j).filter(([t, v]) => v === 0 && t !== 'unexplained').map(([t]) => (names[t] ?? t).toLowerCase()) };
+  return { rows, sum: at, absent: Object.entries(terms_j).filter(([t, v]) => empty(v) && t !== 'unexplained').map(([t]) => (names[t] ?? t).toLowerCase()) };
 }
 
 export function Waterfall({ terms_j, battery_j, closure, measured = true }) {
-  const { rows, sum, absent } = rows_of(terms_j);
+  const { rows, sum, absent } = rows_of(terms_j, battery_j);
   const shown = measured ? rows : rows.filter((row) => row.key !== 'unexplained' && row.key !== 'modelled');
   const ends = shown.flatMap((row) => [row.from, row.to]).concat(battery_j, 0);
   const low = Math.min(...ends), high = Math.max(...ends), wide = Math.max(high - low, 1e-9);
@@ -62,7 +68,7 @@ export function Waterfall({ terms_j, battery_j, closure, measured = true }) {
     <p class="closing">
       Accounts add up to <b>${format.fixed(sum, 2)}${'\u00a0'}J</b>; the battery gave <b>${format.fixed(battery_j, 2)}${'\u00a0'}J</b>.
       ${closure !== undefined && html` ${closure < 1e-9 ? 'Closes' : 'Does not close'}: difference ${closure === 0 ? 'none' : closure.toExponential(1)} of the whole.`}
-      ${absent.length > 0 && html` <span class="note">Nothing in: ${absent.join(', ')}.</span>`}
+      ${absent.length > 0 && html` <span class="note">Next to nothing in: ${absent.join(', ')}.</span>`}
     </p>
   </div>`;
 }

@@ -19,7 +19,7 @@ const names = new Intl.Collator('en', { numeric: true });
 const columns = [
   { key: 'robot', title: 'Robot', sort: (a, b) => names.compare(a.id, b.id), class: 'robot' },
   { key: 'health', title: 'Telemetry', sort: by((s) => (s.live ? 0 : s.silent_s === null ? Infinity : 1 + s.silent_s)), class: 'health' },
-  { key: 'power', title: 'Power', sort: by((s) => s.measured_power_w ?? s.modelled_power_w), class: 'figure' },
+  { key: 'power', title: 'Power', sort: by((s) => s.measured_power_w ?? s.modelled_power_w), class: 'figure power' },
   { key: 'trace', title: 'Last 90 s', class: 'spark' },
   { key: 'charge', title: 'Charge', sort: by((s) => s.state_of_charge), class: 'charge' },
   { key: 'range', title: 'Range', sort: by((s) => s.range_m), class: 'figure' },

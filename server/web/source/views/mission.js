@@ -1,4 +1,4 @@
-import { useEffect, useMemo, useState } from 'preact/hooks';
+import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import { html } from '../html.js';
 import * as format from '../format.js';
 import { id_path, post, query, useGet } from '../api.js';
@@ -16,20 +16,38 @@ const trace_points = 700, fine_points = 6000, group = 'mission';
 const run_clock = (_, splits) => splits.map((s) => {
   if (s === null) return '';
   const sign = s < 0 ? '−' : '', t = Math.abs(s);
-  return t < 60 && splits[splits.length - 1] < 60 ? `${sign}${t}` : `${sign}${Math.floor(t / 60)}:${String(Math.floor(t % 60)).padStart(2, '0')}`;
+  return `${sign}${Math.floor(t / 60)}:${String(Math.floor(t % 60)).padStart(2, '0')}`;
 });
 
 function seconds(trace, start_utime_us) {
   return trace.start_utime_us.map((t) => (t - start_utime_us + trace.width_us / 2) / 1e6);
 }
 
+// Columns for the chart, with an empty row where the trace pauses, so that no line bridges it.
+function with_pauses(trace, start_utime_us, columns) {
+  const t = seconds(trace, start_utime_us), pauses = [];
+  for (let k = 1; k < t.length; ++k) if (trace.start_utime_us[k] - trace.start_utime_us[k - 1] > 1.9 * trace.width_us) pauses.push(k);
+  if (pauses.length === 0) return [t, ...columns];
+  const open = (column, at) => {
+    const rows = [];
+    column.forEach((v, k) => {
+      if (pauses.includes(k)) rows.push(at === undefined ? (column[k - 1] + v) / 2 : at);
+      rows.push(v);
+    });
+    return rows;
+  };
+  return [open(t), ...columns.map((column) => open(column, null))];
+}
+
 function Charts({ trace, mission, zoom, set_zoom, set_cursor }) {
-  const t = useMemo(() => seconds(trace, mission.start_utime_us), [trace]);
-  const power = useMemo(() => [t, trace.measured_power_w.max, trace.measured_power_w.min, trace.measured_power_w.mean,
-    trace.modelled_power_w.max, trace.modelled_power_w.min, trace.modelled_power_w.mean], [trace]);
-  const speed = useMemo(() => [t, trace.speed_m_s.max, trace.speed_m_s.min, trace.speed_m_s.mean], [trace]);
+  const [power, speed] = useMemo(() => {
+    const bands = (...of) => with_pauses(trace, mission.start_utime_us, of.flatMap((band) => [band.max, band.min, band.mean]));
+    return [bands(trace.measured_power_w, trace.modelled_power_w), bands(trace.speed_m_s)];
+  }, [trace]);
+  const trace_now = useRef(trace);
+  trace_now.current = trace;
   const hooks = {
-    setCursor: [(u) => set_cursor(u.cursor.idx ?? null)],
+    setCursor: [(u) => set_cursor(u.cursor.idx === null || u.cursor.idx === undefined ? null : index_at(trace_now.current, mission.start_utime_us + u.data[0][u.cursor.idx] * 1e6))],
     setSelect: [(u) => {
       if (u.select.width < 6) return;
       set_zoom([u.posToVal(u.select.left, 'x'), u.posToVal(u.select.left + u.select.width, 'x')]);
@@ -117,8 +135,9 @@ function TracePanels({ mission, whole, fine }) {
 }
 
 function LeastDrive({ mission, trace }) {
-  const request = useMemo(() => least_drive_request(mission, trace), [mission.id, mission.state]);
   const robot = useGet(`/v1/robots/${id_path(mission.robot_id)}`);
+  const idle_power_w = robot.value?.model.idle_power_w;
+  const request = useMemo(() => (idle_power_w === undefined ? null : least_drive_request(mission, trace, idle_power_w)), [mission.id, mission.state, idle_power_w]);
   const [told, set_told] = useState({ value: null, error: null });
   useEffect(() => {
     if (request === null) return undefined;
@@ -127,23 +146,24 @@ function LeastDrive({ mission, trace }) {
       .then((value) => set_told({ value, error: null }), (error) => error.name === 'AbortError' || set_told({ value: null, error }));
     return () => abort.abort();
   }, [request]);
-  if (request === null) return html`<${Empty} title="Nothing to compare">The robot did not drive, or in too many short runs.<//>`;
-  if (told.error !== null) return html`<${Failure} error=${told.error} />`;
-  if (told.value === null || robot.value === null) return robot.error !== null ? html`<${Failure} error=${robot.error} />` : html`<${Loading} what="the minimum-energy drive" />`;
-  const e = mission.energy, wait_s = Math.max(0, e.duration_s - told.value.duration_s);
-  const waiting_j = wait_s * robot.value.model.idle_power_w, least = told.value.energy_j + waiting_j;
-  const share = 1 - least / e.modelled_j;
+  const error = robot.value === null ? robot.error : told.error;
+  if (error !== null) return html`<${Failure} error=${error} />`;
+  if (robot.value !== null && request === null) return html`<${Empty} title="Nothing to compare">The robot did not drive, or in too many short runs.<//>`;
+  if (told.value === null) return html`<${Loading} what="the minimum-energy drive" />`;
+  const e = mission.energy, least = told.value, share = 1 - least.energy_j / e.modelled_j;
   const turned = request.path.reduce((sum, leg) => sum + Math.abs(leg.angle_rad ?? 0), 0);
+  const stood_s = request.path.reduce((sum, leg) => sum + (leg.duration_s ?? 0), 0);
   const legs = request.path.filter((leg) => leg.kind === 'straight').length;
   return html`
     <p class="verdict">${share > 0.005 ? html`The same legs could have been driven for <b>${format.fixed(share * 100, 1)}${'\u00a0'}%</b> less.` : share > -0.005 ? 'Driven about as cheaply as the model allows.' : 'Driven for less than these legs cost from stop to stop: the robot turned while it drove.'}</p>
     <${Bars} label="Energy of the mission and of the minimum-energy drive" rows=${[
       { name: 'Measured', value: e.measured_j, of: format.energy(e.measured_j), channel: 'measured', note: format.span(e.duration_s) },
       { name: 'Modelled', value: e.modelled_j, of: format.energy(e.modelled_j), channel: 'modelled', note: format.span(e.duration_s) },
-      { name: 'Least energy', value: least, extra: waiting_j, of: format.energy(least), channel: 'least', note: `${format.span(told.value.duration_s)} driving` },
+      { name: 'Least energy', value: least.energy_j, of: format.energy(least.energy_j), channel: 'least', note: format.span(least.duration_s) },
     ]} />
-    <p class="note foot">${legs} ${legs === 1 ? 'leg' : 'legs'} between stops, ${format.text(format.length(e.distance_m))} in all, ${format.fixed((turned * 180) / Math.PI)}° turned at the stops, payload ${format.text(format.unit(mission.payload_kg ?? 0, 'kg'))},
-      within ${format.span(e.duration_s)}; ${format.span(wait_s)} left over spent waiting at idle (hatched). Model version ${told.value.model_version}; the saving is against the modelled energy, so that a gap of the model does not count as one.</p>`;
+    <p class="note foot">${legs} ${legs === 1 ? 'leg' : 'legs'} between stops, ${format.text(format.length(e.distance_m))} in all, ${format.fixed((turned * 180) / Math.PI)}° turned at the stops,
+      ${stood_s > 0 ? `${format.span(stood_s)} standing as the mission did, ` : ''}payload ${format.text(format.unit(mission.payload_kg ?? 0, 'kg'))}, arriving no later. Model version ${least.model_version};
+      the saving is against the modelled energy, so that a gap of the model does not count as one.</p>`;
 }
 
 function Facts({ mission }) {
@@ -205,7 +225,7 @@ export function Mission({ id }) {
         html`<${Waterfall} terms_j=${l.terms_j} battery_j=${l.battery_j} closure=${l.closure_relative} />`}<//><//>
       <div>
         <${Panel} title="Against the minimum-energy drive">${m.model_version === null ? html`<${Empty} title="No model">The robot had no model on this mission.<//>` :
-          open ? html`<${Empty} title="Still driving">Compared when the mission ends.<//>` : fine && html`<${LeastDrive} mission=${m} trace=${fine} />`}<//>
+          open ? html`<${Empty} title="Still driving">Compared when the mission ends.<//>` : m.gap_s > 0 ? html`<${Empty} title="Not compared">For ${format.span(m.gap_s)} of the mission nothing is known.<//>` : fine && html`<${LeastDrive} mission=${m} trace=${fine} />`}<//>
         <${Panel} title="Record"><${Facts} mission=${m} /><//>
       </div>
     </div>`;

@@ -54,8 +54,8 @@ function RatioChart({ missions, versions }) {
   const make = () => {
     const p = palette(), dot = (colour, fill) => ({ stroke: 'transparent', width: 0, points: { show: true, size: 7, width: 1.5, stroke: colour, fill } });
     return {
-      scales: { x: { time: true }, y: { range: () => [1 - spread, 1 + spread] } },
-      axes: [axis('', { size: 36, values: clock_values }), axis('measured / modelled', { size: 56 })],
+      scales: { x: { time: true, range: (_, low, high) => { const pad = Math.max(60, 0.02 * (high - low)); return [low - pad, high + pad]; } }, y: { range: () => [1 - spread, 1 + spread] } },
+      axes: [axis('', { size: 36, space: 84, values: clock_values }), axis('measured / modelled', { size: 56 })],
       series: [{}, { ...dot(p.measured, p.measured), paths: () => null }, { ...dot(p.measured, p.screen), paths: () => null }, { stroke: p.gap, width: 2, points: { show: false }, spanGaps: true }],
       cursor: { show: false }, hooks: { drawAxes: [draw_marks] },
     };
