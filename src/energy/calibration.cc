@@ -172,7 +172,9 @@ class Calibrator {
       const std::array<double, 2> acceleration = fitted_acceleration(window, k - first);
       const double length = options_.method == CalibrationMethod::steady ? options_.segment_s : block_s;
       const bool gap = !stretch.empty() && seconds(k) - stretch.back().t_s > 2 * half_window_s_;
-      const bool fit = usable(run.samples[k], acceleration);
+      // At the ends of a record the filter has only a line to offer.
+      const bool inside = k > first && k + 1 < first + window.size();
+      const bool fit = inside && usable(run.samples[k], acceleration);
       if (gap || !fit || (!stretch.empty() && seconds(k) - stretch.front().t_s >= length))
         close(stretch, seconds(k) - (stretch.empty() ? 0 : stretch.front().t_s));
       if (fit) stretch.push_back(observe(run.samples[k], acceleration, seconds(k), run.payload_kg));
@@ -207,7 +209,8 @@ class Calibrator {
     for (std::size_t side : {0u, 1u}) {
       const double w = s.wheel_velocity_rad_s[side], sign = side == robot::right ? 1 : -1;
       Observation& o = moment.sides[side];
-      o.row[side == robot::right ? friction_right : friction_left] = std::copysign(1.0, w);
+      o.row[side == robot::right ? friction_right : friction_left] =
+          dynamics::smooth_sign(w, dynamics::friction_width_rad_s);
       o.row[viscous] = w;
       o.row[straight] = mean;
       o.row[turning] = sign * difference;
@@ -252,9 +255,10 @@ class Calibrator {
     data_.has_voltage &= std::isfinite(o.voltage_v);
   }
 
-  // A column that the others explain to rounding, or that is zero, cannot be fitted at all.
+  // A column that the others explain to rounding, or that is zero, cannot be fitted at all; dry friction is
+  // the last to be given up.
   void drop_unmoved_columns() {
-    for (Eigen::Index k = 0; k < column_count; ++k) {
+    for (Eigen::Index k = column_count; k-- > 0;) {
       if (!fitted_[static_cast<std::size_t>(k)]) continue;
       Row others = Row::Zero();
       const double own = total_.normal(k, k);
@@ -302,13 +306,13 @@ class Calibrator {
   Solution solve(const Block& sums) const {
     Solution s = file_;
     const bool resistance = fit_electrical_ && !options_.resistance_known && !resistance_held_;
-    const bool constant = fit_electrical_ && !options_.constants_known;
-    if (options_.method == CalibrationMethod::steady && fit_electrical_) {
+    const bool constant = fit_electrical_ && !options_.constants_known && !constant_held_;
+    if (resistance && constant && options_.method == CalibrationMethod::steady) {
       constexpr Fitted line{true, true, true, false, false};
       const Row b = fit(sums, sums.by_current, Row::Zero(), line);
       const Row c = fit(sums, sums.by_voltage, Row::Zero(), line);
-      if (resistance) s.resistance_ohm = (c[0] * b[0] + c[1] * b[1]) / (b[0] * b[0] + b[1] * b[1]);
-      if (constant) s.constant_v_s_rad = c[viscous] - s.resistance_ohm * b[viscous];
+      s.resistance_ohm = (c[0] * b[0] + c[1] * b[1]) / (b[0] * b[0] + b[1] * b[1]);
+      s.constant_v_s_rad = c[viscous] - s.resistance_ohm * b[viscous];
     } else if (resistance && constant) {
       const double determinant = sums.ii * sums.ww - sums.iw * sums.iw;
       s.resistance_ohm = (sums.vi * sums.ww - sums.vw * sums.iw) / determinant;
@@ -341,9 +345,11 @@ class Calibrator {
   }
 
   bool drop_weakest(const Solution& s, const Flat& error) {
+    // Where the voltages do not tell R from K_w, the file's K_w is the surer of the two: it follows from
+    // geometry and the motor's speed constant.
     if (fit_electrical_ && !options_.resistance_known && !resistance_held_ &&
         !(s.resistance_ohm > least_significance * error[0])) {
-      resistance_held_ = true;
+      (options_.constants_known || constant_held_ ? resistance_held_ : constant_held_) = true;
       return true;
     }
     // Friction cannot drive: a negative estimate gives way to zero. Inertia that motion hardly shows is
@@ -376,14 +382,14 @@ class Calibrator {
     const auto electrical = [&](bool known, bool held) -> std::string_view {
       if (!data_.has_voltage) return "voltage is not measured; the file's";
       if (known) return "given as known";
-      return held ? "not told from zero; held at the file's" : "";
+      return held ? "the voltages do not tell R from K_w; held at the file's" : "";
     };
     const auto add = [&](std::string_view name, std::string_view unit, double value, double standard_error,
                          bool fitted, std::string_view note) {
       result.estimates.push_back({name, unit, value, fitted ? standard_error : 0, fitted, note});
     };
     const std::string_view r_note = electrical(options_.resistance_known, resistance_held_);
-    const std::string_view k_note = electrical(options_.constants_known, false);
+    const std::string_view k_note = electrical(options_.constants_known, constant_held_);
     add("resistance_ohm", "ohm", s.resistance_ohm, error[0], r_note.empty(), r_note);
     add("voltage_constant_v_s_rad", "V s/rad", s.constant_v_s_rad / gear, error[1] / gear, k_note.empty(),
         k_note);
@@ -452,7 +458,7 @@ class Calibrator {
   Fitted fitted_{};
   std::array<std::string_view, column_count> notes_{};
   bool fit_electrical_ = true;
-  bool resistance_held_ = false;
+  bool resistance_held_ = false, constant_held_ = false;
   Data data_;
   Block total_;
   std::size_t samples_ = 0;

@@ -1,0 +1,53 @@
+#!/usr/bin/env python3
+"""joulecast answers the same JSON from a robot file as through a daemon that holds it; faults have their exit codes."""
+import json
+import subprocess
+
+from harness import Programs, arguments, check
+
+
+def main():
+    options = arguments()
+    programs = Programs(options)
+    programs.lcm_url = "memq://"
+    programs.start()
+    robot = f"{options.source}/deploy/robots/amr.json"
+    with open(robot) as file:
+        programs.put("/v1/robots/amr", json.load(file))
+    with open(programs.path("motion.json"), "w") as file:
+        json.dump({"profile": {"time_s": [0, 2, 6, 8], "speed_m_s": [0, 1, 1, 0]}, "payload_kg": 3}, file)
+    questions = [
+        ["profile", "--length", "8", "--payload", "5"],
+        ["profile", "--length", "8", "--deadline", "14", "--pareto", "3"],
+        ["profile", "--turn", "1.57", "--length", "3", "--value-of-time", "20", "--regeneration", "0.5"],
+        ["estimate", "--length", "12", "--start-speed", "0.2", "--end-speed", "0.1"],
+        ["estimate", "--request", programs.path("motion.json")],
+        ["autonomy", "--charge", "0.6", "--payload", "10"],
+    ]
+    for question in questions:
+        here = programs.run(*question, "--robot", robot, "--json")
+        there = programs.run(*question, "--server", programs.url, "--robot-id", "amr", "--json")
+        check(here.strip() == there.strip(), f"{question}: from the file\n{here}\nby the daemon\n{there}")
+        table = programs.run(*question, "--robot", robot)
+        check("amr (model version 1)" in table, f"{question} prints\n{table}")
+    page = json.loads(programs.run("missions", "--server", programs.url, "--robot-id", "amr", "--json"))
+    check(page == {"missions": [], "next_cursor": None}, f"a fresh daemon knows missions: {page}")
+
+    faults = {
+        2: [["profile", "--length", "8"], ["autonomy", "--server", programs.url], ["profile", "--length", "many"]],
+        1: [["profile", "--robot", programs.path("no-such-file.json"), "--length", "8"],
+            ["profile", "--robot", robot, "--length", "-8"],
+            ["profile", "--server", programs.url, "--robot-id", "nobody", "--length", "8"],
+            ["missions", "--server", programs.url, "--state", "lost"]],
+        3: [["profile", "--server", "http://127.0.0.1:1", "--robot-id", "amr", "--length", "8"]],
+        4: [["profile", "--robot", robot, "--length", "80", "--deadline", "1"], ["autonomy", "--robot", robot]],
+    }
+    for code, commands in faults.items():
+        for command in commands:
+            done = subprocess.run([options.client, *command], capture_output=True, text=True)
+            check(done.returncode == code, f"{command} ends with {done.returncode}, not {code}: {done.stderr}")
+            check(done.stderr, f"{command} fails without a word")
+    check(programs.stop() == 0, "the daemon did not stop in order")
+
+
+main()

@@ -1,0 +1,180 @@
+"""A joulecastd of the test's own, the command line, and LCM's wire format in a few lines."""
+import argparse
+import atexit
+import json
+import os
+import pathlib
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+
+SKIP = 77
+GROUP = "239.255.76.68"
+
+
+def skip(why):
+    print("skipped:", why)
+    sys.exit(SKIP)
+
+
+def check(truth, text):
+    if not truth:
+        print("FAILED:", text[:3000])
+        sys.exit(1)
+
+
+def close_to(value, expected, relative, text):
+    check(abs(value - expected) <= relative * abs(expected), f"{text}: {value} against {expected}, tolerance {relative}")
+
+
+def arguments():
+    parser = argparse.ArgumentParser()
+    for name in ("daemon", "client", "source", "shared"):
+        parser.add_argument("--" + name, required=True)
+    return parser.parse_args()
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("", 0))
+        return probe.getsockname()[1]
+
+
+class Listener:
+    """Hears LCM messages of a multicast port, whole ones only (ours are small)."""
+
+    def __init__(self, port):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        self.socket.bind(("", port))
+        member = struct.pack("4sl", socket.inet_aton(GROUP), socket.INADDR_ANY)
+        self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
+
+    def messages(self, seconds):
+        """(time of arrival, channel, payload) of what comes within that time."""
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0:
+            self.socket.settimeout(left)
+            try:
+                datagram = self.socket.recv(65536)
+            except socket.timeout:
+                return
+            if datagram[:4] == b"LC02":
+                channel, payload = datagram[8:].split(b"\0", 1)
+                yield time.monotonic(), channel.decode(), payload
+
+
+def need_multicast():
+    """Skips where a multicast message does not come back."""
+    port = free_port()
+    try:
+        listener = Listener(port)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+            sender.sendto(b"LC02\0\0\0\0PROBE\0", (GROUP, port))
+        heard = any(channel == "PROBE" for _, channel, _ in listener.messages(2))
+    except OSError as error:
+        skip(f"no multicast route ({error}); deploy/test.sh makes one")
+    if not heard:
+        skip("multicast does not come back; deploy/test.sh makes a namespace where it does")
+
+
+class Programs:
+    """The daemon on a store and an LCM port of its own, and the command line."""
+
+    def __init__(self, options):
+        self.options = options
+        self.folder = tempfile.TemporaryDirectory()
+        self.lcm_port = free_port()
+        # The largest receive buffer that an unprivileged process usually gets: the tests' machines are busy.
+        self.lcm_url = f"udpm://{GROUP}:{self.lcm_port}?ttl=0&recv_buf_size=4194304"
+        self.store = self.path("history.db")
+        self.process = None
+        atexit.register(self.end)
+
+    def end(self):
+        """Whatever the test comes to, its daemon ends with it."""
+        if self.process and self.process.poll() is None:
+            self.kill()
+
+    def path(self, name):
+        return os.path.join(self.folder.name, name)
+
+    def start(self):
+        self.log = open(self.path("daemon.log"), "a+")
+        begin = self.log.seek(0, os.SEEK_END)
+        self.process = subprocess.Popen(
+            [self.options.daemon, "--http-port", "0", "--store-path", self.store, "--log-format", "json",
+             "--lcm-url", self.lcm_url], stderr=self.log)
+        until = time.monotonic() + 30
+        while time.monotonic() < until and self.process.poll() is None:
+            self.log.seek(begin)
+            for line in self.log:
+                if line.endswith("\n") and (event := json.loads(line)).get("message") == "ready":
+                    self.url = event["http"]
+                    return
+            time.sleep(0.02)
+        self.log.seek(begin)
+        sys.exit("the daemon did not become ready:\n" + self.log.read())
+
+    def kill(self):
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait()
+
+    def stop(self):
+        self.process.terminate()
+        return self.process.wait(timeout=30)
+
+    def get(self, path):
+        with urllib.request.urlopen(self.url + path, timeout=30) as reply:
+            return json.load(reply)
+
+    def put(self, path, document):
+        request = urllib.request.Request(self.url + path, method="PUT", data=json.dumps(document).encode(),
+                                         headers={"Content-Type": "application/json"})
+        with urllib.request.urlopen(request, timeout=30) as reply:
+            return json.load(reply)
+
+    def run(self, *arguments):
+        done = subprocess.run([self.options.client, *map(str, arguments)], capture_output=True, text=True)
+        check(done.returncode == 0, f"joulecast {' '.join(map(str, arguments))}: {done.stdout}{done.stderr}")
+        return done.stdout
+
+    def missions(self, robot_id):
+        return self.get(f"/v1/missions?limit=500&robot_id={robot_id}")["missions"]
+
+    def wait_for(self, robot_id, count, seconds=60):
+        """The robot's missions, once so many have ended."""
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            missions = self.missions(robot_id)
+            if sum(m["state"] != "open" for m in missions) >= count:
+                return missions
+            time.sleep(0.2)
+        check(False, f"{robot_id}: {count} missions did not end within {seconds} s, only "
+                     f"{[(m['mission_id'], m['state']) for m in missions]}")
+
+
+def shared_folder(options, *parts):
+    folder = pathlib.Path(options.shared, "data", *parts)
+    if not folder.is_dir():
+        skip(f"{folder} is not beside the project")
+    return folder
+
+
+def accounts_twice(programs, logs, robots):
+    """`replay --into` two stores: every account of every mission must be the same to the last bit."""
+    answers = []
+    for k in range(2):
+        arguments = ["replay", *logs, "--into", programs.path(f"again-{k}-{os.path.basename(str(logs[0]))}.db")]
+        for robot in robots:
+            arguments += ["--robot", robot]
+        answers.append(json.loads(programs.run(*arguments, "--json")))
+    check(answers[0]["missions"] == answers[1]["missions"], "a second replay gives other accounts")
+    return answers[0]["missions"]

@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""A daemon killed while robots drive: at most a second is lost, nothing is corrupt, the mission goes on. Then its live
+side: the energy state on LCM at 1 Hz, the event stream, an orderly stop."""
+import sqlite3
+import subprocess
+import time
+import urllib.request
+
+from harness import Listener, Programs, arguments, check, need_multicast
+
+RATE_HZ = 50
+LOST_S = 1.0  # what a crash may cost
+SLACK_S = 0.3  # a tick of the session, and the meter's look ahead
+
+
+def open_missions(programs):
+    return {m["mission_id"]: m for m in programs.get("/v1/missions?state=open")["missions"]}
+
+
+def live_duration(programs, robot):
+    return programs.get(f"/v1/robots/{robot}/state")["mission"]["energy"]["duration_s"]
+
+
+def main():
+    options = arguments()
+    need_multicast()
+    programs = Programs(options)
+    programs.start()
+    fleet = subprocess.Popen(
+        [options.client, "simulate", "--robots", "2", "--lcm-url", programs.lcm_url, "--server", programs.url,
+         "--rate", str(RATE_HZ), "--missions", "1", "--mission-duration", "25", "--quiet"])
+    try:
+        time.sleep(8)
+        robots = sorted({m["robot_id"] for m in open_missions(programs).values()})
+        check(len(robots) == 2, f"two robots drive, heard: {robots}")
+        started = {m["robot_id"]: m["start_utime_us"] for m in open_missions(programs).values()}
+        killed_utime_us = time.time() * 1e6
+        programs.kill()
+        with sqlite3.connect(f"file:{programs.store}?mode=ro", uri=True) as store:
+            check(store.execute("PRAGMA integrity_check").fetchone()[0] == "ok", "the history is damaged")
+            rows = store.execute("SELECT robot_id, end_utime_us FROM mission WHERE state = 'open'").fetchall()
+        for robot, last_utime_us in rows:
+            lost_s = (killed_utime_us - last_utime_us) * 1e-6
+            print(f"{robot}: {lost_s:.2f} s of {(killed_utime_us - started[robot]) * 1e-6:.1f} s lost by SIGKILL")
+            check(lost_s <= LOST_S + SLACK_S, f"{robot} lost {lost_s} s")
+        check(len(rows) == 2, f"both missions are stored: {rows}")
+
+        began = time.monotonic()
+        programs.start()
+        print(f"restarted within {time.monotonic() - began:.2f} s")
+        check(len(open_missions(programs)) == 2, "the missions go on after the restart")
+
+        # Energy state on LCM: one a second and robot.
+        states = {}
+        for at, channel, _ in Listener(programs.lcm_port).messages(6):
+            if channel.startswith("ENERGY_STATE."):
+                states.setdefault(channel.split(".", 1)[1], []).append(at)
+        check(sorted(states) == robots, f"energy states heard of {sorted(states)}")
+        for robot, times in states.items():
+            check(5 <= len(times) <= 7, f"{len(times)} energy states of {robot} in 6 s")
+
+        # Live events of both robots.
+        heard = set()
+        with urllib.request.urlopen(programs.url + "/v1/events", timeout=10) as stream:
+            check(stream.headers.get_content_type() == "text/event-stream", "events are no event stream")
+            until = time.monotonic() + 10
+            while time.monotonic() < until and len(heard) < 2:
+                line = stream.readline().decode()
+                heard |= {robot for robot in robots if f'"{robot}"' in line}
+        check(len(heard) == 2, f"live events of {heard}")
+
+        for robot in robots:
+            mission, = programs.wait_for(robot, 1, 60)
+            energy = mission["energy"]
+            print(f"{robot}: {mission['state']}, {energy['duration_s']:.1f} s, {mission['gap_count']} gaps of "
+                  f"{mission['gap_s']:.2f} s, {mission['samples']} samples, {energy['battery_j']:.0f} J")
+            check(mission["state"] == "finished", f"{robot}: the mission ended {mission['state']}")
+            span_s = (mission["end_utime_us"] - mission["start_utime_us"]) * 1e-6
+            # What was not heard is a gap or was bridged; nothing is counted twice.
+            check(energy["duration_s"] <= span_s + 1e-3, f"{robot}: accounts {energy['duration_s']} s of {span_s} s")
+            check(energy["duration_s"] + mission["gap_s"] >= span_s - LOST_S - SLACK_S,
+                  f"{robot}: {energy['duration_s']} s and gaps of {mission['gap_s']} s do not make {span_s} s")
+    finally:
+        fleet.terminate()
+        fleet.wait()
+    began = time.monotonic()
+    check(programs.stop() == 0, "the daemon did not stop in order")
+    print(f"stopped within {time.monotonic() - began:.2f} s")
+    with sqlite3.connect(f"file:{programs.store}?mode=ro", uri=True) as store:
+        check(store.execute("PRAGMA integrity_check").fetchone()[0] == "ok", "the history is damaged after the stop")
+
+
+main()

@@ -1,0 +1,193 @@
+// Calibration against runs whose parameters are known: prescribed motions through the inverse model, and
+// forward simulation with sensor noise.
+#include "energy/calibration.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "dynamics/forward.h"
+#include "robot/robot_file.h"
+
+namespace joulecast::energy {
+namespace {
+
+using telemetry::Sample;
+
+robot::RobotModel nomad() {
+  auto robot = robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/nomad.json");
+  EXPECT_TRUE(robot) << describe(robot.error());
+  return *robot;
+}
+
+// What a calibration begins with: geometry and masses right, the drive's parameters wrong.
+robot::RobotModel misjudged(robot::RobotModel robot) {
+  robot.motor.resistance_ohm *= 1.7;
+  robot.motor.torque_constant_nm_a *= 0.8;
+  robot.motor.voltage_constant_v_s_rad *= 0.8;
+  robot.motor.friction_torque_nm = {0.1, 0.1};
+  robot.motor.viscous_friction_nm_s_rad = 0.02;
+  return robot;
+}
+
+// Samples at 50 Hz of the wheel speeds a + b t + c t^2 of each side, powered as the model says: quadratic
+// speeds have exact accelerations from the filter.
+std::vector<Sample> prescribed(const robot::RobotModel& robot, std::array<double, 3> right,
+                               std::array<double, 3> left, double payload_kg) {
+  const auto model = *dynamics::drive_model(robot);
+  std::vector<Sample> samples;
+  for (int k = 0; k <= 300; ++k) {
+    const double t = 0.02 * k;
+    dynamics::Instant at;
+    const std::array<const std::array<double, 3>*, 2> sides{&right, &left};
+    for (std::size_t s : {0u, 1u}) {
+      const auto& c = *sides[s];
+      at.wheel_speed_rad_s[s] = c[0] + c[1] * t + c[2] * t * t;
+      at.wheel_acceleration_rad_s2[s] = c[1] + 2 * c[2] * t;
+    }
+    at.payload_kg = payload_kg;
+    const auto flow = model.flow(at);
+    Sample sample;
+    sample.utime_us = 20'000LL * k;
+    sample.wheel_velocity_rad_s = at.wheel_speed_rad_s;
+    sample.motor_current_a = flow.current_a;
+    sample.motor_voltage_v = flow.voltage_v;
+    sample.payload_kg = payload_kg;
+    samples.push_back(sample);
+  }
+  return samples;
+}
+
+// No noise: least squares returns the parameters to rounding, which the normal equations' condition (below
+// 1e6 here) lets grow to below 1e-9.
+constexpr double rounding = 1e-9;
+
+TEST(CalibrateDrive, SteadySpeedsGiveTheNomadsFrictionBack) {
+  const robot::RobotModel robot = nomad();
+  std::vector<std::vector<Sample>> samples;
+  for (double speed_m_s = 0.1; speed_m_s < 0.95; speed_m_s += 0.1) {
+    const double w = speed_m_s / robot.kinematics.wheel_radius_m;
+    samples.push_back(prescribed(robot, {w, 0, 0}, {w, 0, 0}, 0));
+  }
+  std::vector<DriveRun> runs;
+  for (const auto& s : samples) runs.push_back({"", s, 0});
+  const auto fit = calibrate_drive(misjudged(robot), runs, {});
+  ASSERT_TRUE(fit) << describe(fit.error());
+  const robot::Motor &found = fit->robot.motor, &truth = robot.motor;
+  EXPECT_NEAR(found.friction_torque_nm[0], 0.3728, 0.3728 * rounding);
+  EXPECT_NEAR(found.friction_torque_nm[1], 0.346, 0.346 * rounding);
+  EXPECT_NEAR(found.viscous_friction_nm_s_rad, truth.viscous_friction_nm_s_rad,
+              rounding * truth.friction_torque_nm[0]);
+  EXPECT_NEAR(found.resistance_ohm, truth.resistance_ohm, truth.resistance_ohm * rounding);
+  EXPECT_NEAR(found.torque_constant_nm_a, truth.torque_constant_nm_a, truth.torque_constant_nm_a * rounding);
+  // Constant speed tells no inertia.
+  EXPECT_EQ(found.rotor_inertia_kg_m2, misjudged(robot).motor.rotor_inertia_kg_m2);
+}
+
+TEST(CalibrateDrive, WholeRunsGiveEveryParameterBack) {
+  const robot::RobotModel robot = nomad();
+  const std::vector<std::vector<Sample>> samples{prescribed(robot, {1, 1.5, -0.1}, {1.2, 1.1, -0.05}, 0),
+                                                 prescribed(robot, {9, -2, 0.12}, {4, 0.5, 0.05}, 5),
+                                                 prescribed(robot, {-1, -1, 0}, {-2, -0.7, -0.02}, 0),
+                                                 prescribed(robot, {-5, -0.3, 0.02}, {6, 0.2, -0.1}, 0)};
+  std::vector<DriveRun> runs;
+  for (const auto& s : samples) runs.push_back({"", s, 0});
+  robot::RobotModel start = misjudged(robot);
+  start.motor.rotor_inertia_kg_m2 = 0.05;
+  start.mass.yaw_inertia_kg_m2 = 0.5;
+  const auto fit = calibrate_drive(start, runs, {.method = CalibrationMethod::whole});
+  ASSERT_TRUE(fit) << describe(fit.error());
+  const robot::Motor &found = fit->robot.motor, &truth = robot.motor;
+  for (std::size_t s : {0u, 1u})
+    EXPECT_NEAR(found.friction_torque_nm[s], truth.friction_torque_nm[s],
+                truth.friction_torque_nm[s] * rounding);
+  EXPECT_NEAR(found.viscous_friction_nm_s_rad, truth.viscous_friction_nm_s_rad,
+              rounding * truth.friction_torque_nm[0]);
+  EXPECT_NEAR(found.resistance_ohm, truth.resistance_ohm, truth.resistance_ohm * rounding);
+  EXPECT_NEAR(found.voltage_constant_v_s_rad, truth.voltage_constant_v_s_rad, rounding);
+  EXPECT_NEAR(found.rotor_inertia_kg_m2, truth.rotor_inertia_kg_m2, rounding);
+  EXPECT_NEAR(fit->robot.mass.yaw_inertia_kg_m2, robot.mass.yaw_inertia_kg_m2,
+              robot.mass.yaw_inertia_kg_m2 * 10 * rounding);
+}
+
+// Voltage staircases driven through (2-43) by Runge-Kutta steps of 1 ms, sampled at 50 Hz.
+std::vector<Sample> simulated(const robot::RobotModel& robot, double direction, std::mt19937& random) {
+  const auto model = *dynamics::drive_model(robot);
+  std::normal_distribution<double> unit;
+  dynamics::DriveState state;
+  std::vector<Sample> samples;
+  constexpr double step_s = 1e-3;
+  for (int k = 0; k < 45'000; ++k) {
+    const double volts = direction * (2 + 1.5 * (k / 5'000));
+    const std::array<double, 2> voltage{volts, volts};
+    if (k % 20 == 0) {
+      const auto current = dynamics::algebraic_current(model, state, voltage);
+      Sample sample;
+      sample.utime_us = 1'000LL * k;
+      for (std::size_t s : {0u, 1u}) {
+        sample.wheel_velocity_rad_s[s] = state.wheel_speed_rad_s[s] + 0.005 * unit(random);
+        sample.motor_current_a[s] = current[s] + 0.02 * unit(random);
+        sample.motor_voltage_v[s] = volts + 0.05 * unit(random);
+      }
+      samples.push_back(sample);
+    }
+    const auto moved = [&](const dynamics::DriveState& by, double h) {
+      dynamics::DriveState next = state;
+      next.heading_rad += h * by.heading_rad;
+      for (std::size_t s : {0u, 1u}) next.wheel_speed_rad_s[s] += h * by.wheel_speed_rad_s[s];
+      return next;
+    };
+    const auto k1 = dynamics::derivative(model, state, 0, 0, voltage);
+    const auto k2 = dynamics::derivative(model, moved(k1, step_s / 2), 0, 0, voltage);
+    state = moved(k2, step_s);
+  }
+  return samples;
+}
+
+TEST(CalibrateDrive, NoisySimulatedRunsGiveTheNomadsFrictionWithinItsStatedError) {
+  const robot::RobotModel robot = nomad();
+  std::mt19937 random(20240718);
+  const auto forward = simulated(robot, 1, random), backward = simulated(robot, -1, random);
+  const std::vector<DriveRun> runs{{"forward", forward, 0}, {"backward", backward, 0}};
+  for (const CalibrationMethod method : {CalibrationMethod::steady, CalibrationMethod::whole}) {
+    SCOPED_TRACE(method == CalibrationMethod::steady ? "steady" : "whole");
+    // The thesis measured R and K apart from the friction, and so does this.
+    robot::RobotModel start = robot;
+    start.motor.friction_torque_nm = {0.1, 0.1};
+    start.motor.viscous_friction_nm_s_rad = 0.02;
+    const auto fit =
+        calibrate_drive(start, runs, {.method = method, .resistance_known = true, .constants_known = true});
+    ASSERT_TRUE(fit) << describe(fit.error());
+    const std::array<double, 2> truth{0.3728, 0.346};
+    for (std::size_t s : {0u, 1u}) {
+      const ParameterEstimate& estimate = fit->estimates[3 + s];
+      ASSERT_TRUE(estimate.fitted);
+      // Four standard errors: one run in 16,000 would miss them; and they must be small enough to mean
+      // something.
+      EXPECT_NEAR(estimate.value, truth[s], 4 * estimate.standard_error) << estimate.name;
+      EXPECT_LT(estimate.standard_error, 0.02 * truth[s]);
+      EXPECT_EQ(fit->robot.motor.friction_torque_nm[s], estimate.value);
+    }
+  }
+}
+
+TEST(CalibrateDrive, SaysWhatIsMissing) {
+  const robot::RobotModel robot = nomad();
+  std::vector<Sample> samples = prescribed(robot, {5, 0, 0}, {5, 0, 0}, 0);
+  for (Sample& s : samples) s.motor_current_a = {telemetry::unmeasured, telemetry::unmeasured};
+  const std::vector<DriveRun> runs{{"", samples, 0}};
+  const auto fit = calibrate_drive(robot, runs, {});
+  ASSERT_FALSE(fit);
+  EXPECT_EQ(fit.error().field, "motor_current");
+  // One speed alone cannot tell T_m from nu: nu stays as it was.
+  const auto steady = prescribed(robot, {5, 0, 0}, {5, 0, 0}, 0);
+  const std::vector<DriveRun> one_speed{{"", steady, 0}};
+  const auto held = calibrate_drive(robot, one_speed, {.resistance_known = true, .constants_known = true});
+  ASSERT_TRUE(held) << describe(held.error());
+  EXPECT_EQ(held->robot.motor.viscous_friction_nm_s_rad, robot.motor.viscous_friction_nm_s_rad);
+}
+
+}  // namespace
+}  // namespace joulecast::energy
