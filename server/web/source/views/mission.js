@@ -161,9 +161,7 @@ function LeastDrive({ mission, trace }) {
       { name: 'Modelled', value: e.modelled_j, of: format.energy(e.modelled_j), channel: 'modelled', note: format.span(e.duration_s) },
       { name: 'Least energy', value: least.energy_j, of: format.energy(least.energy_j), channel: 'least', note: format.span(least.duration_s) },
     ]} />
-    <p class="note foot">${legs} ${legs === 1 ? 'leg' : 'legs'} between stops, ${format.text(format.length(e.distance_m))} in all, ${format.fixed((turned * 180) / Math.PI)}° turned at the stops,
-      ${stood_s > 0 ? `${format.span(stood_s)} standing as the mission did, ` : ''}payload ${format.text(format.unit(mission.payload_kg ?? 0, 'kg'))}, arriving no later. Model version ${least.model_version};
-      the saving is against the modelled energy, so that a gap of the model does not count as one.</p>`;
+    <p class="note foot">${legs} ${legs === 1 ? 'leg' : 'legs'} between stops, ${format.text(format.length(e.distance_m))} in all, ${format.fixed((turned * 180) / Math.PI)}° turned at the stops,${stood_s > 0 ? ` ${format.span(stood_s)} standing as the mission did,` : ''}${' '}payload ${format.text(format.unit(mission.payload_kg ?? 0, 'kg'))}, arriving no later. Model version ${least.model_version}; the saving is against the modelled energy, so that a gap of the model does not count as one.</p>`;
 }
 
 function Facts({ mission }) {
