@@ -51,7 +51,7 @@ def main():
         robot = log.parent / "robot.json"
         model = json.loads(robot.read_text())
         programs.put("/v1/robots/" + model["robot_id"], model)
-        programs.run("replay", log, "--lcm-url", programs.lcm_url, "--speed", 0, "--max-rate", 5000)
+        programs.run("replay", log, "--lcm-url", programs.lcm_url, "--speed", 0, "--max-rate", 4000)
         expected = energies(log)
         missions = programs.wait_for(model["robot_id"], len(expected))
         check({m["mission_id"] for m in missions} == set(expected), f"{log}: other missions than in the log")
@@ -59,18 +59,18 @@ def main():
         worst, lost = 0.0, 0
         for mission in missions:
             name, energy = mission["mission_id"], mission["energy"]
-            joules, samples = expected[name]
+            joules, _ = expected[name]
             check(mission["state"] == "finished" and not mission["incomplete"], f"{log}: {name} is {mission}")
-            # A busy machine may drop datagrams; every one of them must have been noticed.
             missing = mission["sample_faults"].get("missing", 0)
-            check(mission["samples"] + missing == samples,
-                  f"{log}: {name} has {mission['samples']} of {samples} samples and misses {missing}")
             lost += missing
             close_to(energy["measured_j"], joules, 1e-3, f"{log}: {name}")
             check(missing > 0 or direct[name]["energy"] == energy,
                   f"{log}: {name}: over LCM and directly the accounts differ")
             worst = max(worst, abs(energy["measured_j"] / joules - 1))
-        print(f"{log.parent.name:<22} {len(missions):>8} {sum(m['samples'] for m in missions):>9} "
+        # A busy machine may drop datagrams; every one of them must have been noticed.
+        heard, sent = sum(m["samples"] for m in missions), sum(samples for _, samples in expected.values())
+        check(heard + lost == sent, f"{log}: {heard} of {sent} samples are accounted for, {lost} are known to be lost")
+        print(f"{log.parent.name:<22} {len(missions):>8} {heard:>9} "
               f"{sum(m['energy']['measured_j'] for m in missions):>12.1f} {worst:>17.2e} {lost:>6}")
     check(programs.stop() == 0, "the daemon did not stop in order")
 
