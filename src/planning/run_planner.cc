@@ -192,9 +192,26 @@ std::vector<double> RunPlanner::first_nodes(std::size_t cells) const {
   std::vector<double> apart{0};
   for (std::size_t k = 1; k + 1 < nodes.size(); ++k) {
     const double next = nodes[k + 1] - nodes[k], before = nodes[k] - apart.back();
-    if (before > 0.2 * next && length - nodes[k] > smallest) apart.push_back(nodes[k]);
+    if (before > 0.3 * next && length - nodes[k] > smallest) apart.push_back(nodes[k]);
   }
   apart.push_back(length);
+  // Neighbouring cells differ by a factor of two at most, so that a fast change does not end in a coarse
+  // cell.
+  for (bool split = true; split && apart.size() < most_cells;) {
+    split = false;
+    std::vector<double> smooth{0};
+    for (std::size_t k = 1; k < apart.size(); ++k) {
+      const double h = apart[k] - apart[k - 1];
+      const double before = k > 1 ? apart[k - 1] - apart[k - 2] : h;
+      const double after = k + 1 < apart.size() ? apart[k + 1] - apart[k] : h;
+      if (h > 2.1 * std::min(before, after)) {
+        smooth.push_back(apart[k - 1] + h / 2);
+        split = true;
+      }
+      smooth.push_back(apart[k]);
+    }
+    apart = std::move(smooth);
+  }
   return apart;
 }
 

@@ -22,18 +22,17 @@ class Table {
       const double x = static_cast<double>(k) / stations, ends = 0.5 * (1 - std::cos(std::numbers::pi * x));
       way_.push_back(run.length() * (curved ? 0.5 * x + 0.5 * ends : ends));
     }
-    if (!run.constant_curvature()) {
-      for (const Knot& k : run.knots) {
-        // Corners of the curvature become stations.
-        if (run.knots.size() < 60) way_.push_back(k.way);
-      }
-      std::sort(way_.begin(), way_.end());
-      std::vector<double> apart{0};
-      for (double w : way_) {
-        if (w > apart.back() + 1e-4 * run.length()) apart.push_back(w);
-      }
-      apart.back() = run.length();
-      way_ = apart;
+    // Sharp corners of the curvature are stations: torque jumps there, and acceleration with it.
+    for (std::size_t k = 1; k + 1 < run.knots.size(); ++k) {
+      const auto slope = [&](std::size_t i) {
+        return (run.knots[i].curvature_1_m - run.knots[i - 1].curvature_1_m) /
+               (run.knots[i].way - run.knots[i - 1].way);
+      };
+      if (std::fabs(slope(k + 1) - slope(k)) < 1) continue;
+      const auto near = std::min_element(way_.begin() + 1, way_.end() - 1, [&](double a, double b) {
+        return std::fabs(a - run.knots[k].way) < std::fabs(b - run.knots[k].way);
+      });
+      *near = run.knots[k].way;
     }
   }
 
@@ -100,70 +99,91 @@ class Table {
   std::vector<double> way_;
 };
 
+// One round: the best profile through `levels` speeds round `centre` at every station. Says how far it moved,
+// in widths.
+double improve(const Table& table, std::vector<double>& centre, const std::vector<double>& width, int levels,
+               double penalty_w) {
+  const int n = table.cells();
+  const auto level = [&](int k, int j) {
+    const auto i = static_cast<std::size_t>(k);
+    if (k == 0 || k == n) return centre[i];
+    const double v = centre[i] + width[i] * (2.0 * j / (levels - 1) - 1);
+    return std::clamp(v, 1e-3 * table.top_speed(k), table.top_speed(k));
+  };
+  std::vector<std::vector<int>> from(centre.size(), std::vector<int>(static_cast<std::size_t>(levels), 0));
+  std::vector<double> value{0}, next;
+  for (int k = 0; k < n; ++k) {
+    const int here = k == 0 ? 1 : levels, there = k + 1 == n ? 1 : levels;
+    next.assign(static_cast<std::size_t>(there), never);
+    for (int j = 0; j < there; ++j) {
+      const auto to = static_cast<std::size_t>(j);
+      for (int i = 0; i < here; ++i) {
+        const double c =
+            value[static_cast<std::size_t>(i)] + table.cost(k, level(k, i), level(k + 1, j), penalty_w);
+        if (c < next[to]) next[to] = c, from[static_cast<std::size_t>(k) + 1][to] = i;
+      }
+    }
+    value = next;
+  }
+  double moved = 0;
+  std::vector<double> best(centre.size());
+  for (int k = n, j = 0; k >= 0; --k) {
+    const auto i = static_cast<std::size_t>(k);
+    best[i] = level(k, j);
+    if (k > 0) j = from[i][static_cast<std::size_t>(j)];
+    if (k > 0 && k < n) moved = std::max(moved, std::fabs(best[i] - centre[i]) / width[i]);
+  }
+  centre = best;
+  return moved;
+}
+
 }  // namespace
 
 ReferenceAnswer reference(const robot::RobotModel& robot, const dynamics::DriveModel& model, const Run& run,
                           const Limits& limits, double start_speed, double end_speed, double price_w,
                           int stations) {
-  // Varying curvature needs more of them.
-  const bool varies = !run.constant_curvature();
-  const Table table(robot, model, run, limits, price_w, varies ? 2 * stations : stations);
-  const int n = table.cells();
-  const auto size = static_cast<std::size_t>(n) + 1;
-  std::vector<double> centre(size), width(size), best(size);
-  for (int k = 0; k <= n; ++k) {
-    const auto i = static_cast<std::size_t>(k);
-    width[i] = table.top_speed(k) / 2;
-    centre[i] = width[i];
-  }
-  double penalty = 200 * (price_w + model.parameters().idle_power_w + 100);
-  for (int round = 0; round < 60; ++round) {
-    const int levels = round == 0 ? 33 : round < 6 ? 13 : 7;
-    const auto level = [&](int k, int j) {
-      if (k == 0) return start_speed;
-      if (k == n) return end_speed;
-      const auto i = static_cast<std::size_t>(k);
-      const double v = centre[i] + width[i] * (2.0 * j / (levels - 1) - 1);
-      return std::clamp(v, 1e-3 * table.top_speed(k), table.top_speed(k));
-    };
-    std::vector<std::vector<int>> from(size, std::vector<int>(static_cast<std::size_t>(levels), 0));
-    std::vector<double> value{0}, next;
-    for (int k = 0; k < n; ++k) {
-      const int here = k == 0 ? 1 : levels, there = k + 1 == n ? 1 : levels;
-      next.assign(static_cast<std::size_t>(there), never);
-      for (int j = 0; j < there; ++j) {
-        for (int i = 0; i < here; ++i) {
-          const double c =
-              value[static_cast<std::size_t>(i)] + table.cost(k, level(k, i), level(k + 1, j), penalty);
-          if (c < next[static_cast<std::size_t>(j)]) {
-            next[static_cast<std::size_t>(j)] = c;
-            from[static_cast<std::size_t>(k) + 1][static_cast<std::size_t>(j)] = i;
-          }
-        }
-      }
-      value = next;
-    }
-    int j = 0;
-    for (int k = n; k >= 0; --k) {
-      best[static_cast<std::size_t>(k)] = level(k, j);
-      if (k > 0) j = from[static_cast<std::size_t>(k)][static_cast<std::size_t>(j)];
-    }
-    double moved = 0;
-    for (std::size_t k = 1; k + 1 < size; ++k)
-      moved = std::max(moved, std::fabs(best[k] - centre[k]) / width[k]);
-    centre = best;
-    // Draw in only where the best profile left the edges alone.
-    const double shrink = round == 0 ? 0.35 : moved > 0.9 ? 0.92 : 0.72;
-    for (double& w : width) w *= shrink;
-  }
+  const double penalty_w = 200 * (price_w + model.parameters().idle_power_w + 100);
+  // Nested tables: each starts from the coarser one's profile. Varying curvature needs one more.
+  const int tables = run.constant_curvature() ? 2 : 3;
+  std::vector<double> centre, way;
   ReferenceAnswer answer;
-  for (int k = 0; k < n; ++k) {
-    const auto p = table.price(k, best[static_cast<std::size_t>(k)], best[static_cast<std::size_t>(k) + 1]);
-    answer.energy_j += p.energy;
-    answer.duration_s += p.time;
-    answer.excess = std::max(answer.excess, p.excess);
+  for (int t = 0; t < tables; ++t) {
+    const Table table(robot, model, run, limits, price_w, stations << t);
+    const int n = table.cells();
+    std::vector<double> speed, width, here;
+    for (int k = 0; k <= n; ++k) {
+      here.push_back(table.way(k));
+      const double top = table.top_speed(k);
+      width.push_back((t == 0 ? 0.5 : 0.06) * top);
+      if (t == 0) {
+        speed.push_back(0.5 * top);
+      } else {
+        const auto above = std::upper_bound(way.begin() + 1, way.end() - 1, here.back()) - way.begin();
+        const auto b = static_cast<std::size_t>(above), a = b - 1;
+        const double f = (here.back() - way[a]) / (way[b] - way[a]);
+        speed.push_back(
+            std::sqrt(std::max(0.0, (1 - f) * centre[a] * centre[a] + f * centre[b] * centre[b])));
+      }
+    }
+    speed.front() = start_speed, speed.back() = end_speed;
+    for (int round = 0; round < (t == 0 ? 60 : 40); ++round) {
+      const int levels = round == 0 && t == 0 ? 33 : round < 5 ? 13 : 7;
+      const double moved = improve(table, speed, width, levels, penalty_w);
+      // Draw in only where the best profile left the edges alone.
+      const double shrink = round == 0 && t == 0 ? 0.35 : moved > 0.9 ? 0.93 : 0.75;
+      for (double& w : width) w *= shrink;
+    }
+    centre = speed, way = here;
+    answer = {};
+    for (int k = 0; k < n; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      const auto p = table.price(k, centre[i], centre[i + 1]);
+      answer.energy_j += p.energy;
+      answer.duration_s += p.time;
+      answer.excess = std::max(answer.excess, p.excess);
+    }
+    answer.cost_j = answer.energy_j + price_w * answer.duration_s;
   }
-  answer.cost_j = answer.energy_j + price_w * answer.duration_s;
   return answer;
 }
 

@@ -18,6 +18,6 @@ struct ReferenceAnswer {
 // again and again. It shares nothing with the planner but the drive model and the path.
 ReferenceAnswer reference(const robot::RobotModel& robot, const dynamics::DriveModel& model, const Run& run,
                           const Limits& limits, double start_speed, double end_speed, double price_w,
-                          int stations = 72);
+                          int stations = 48);
 
 }  // namespace joulecast::planning::test

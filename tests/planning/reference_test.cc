@@ -33,7 +33,7 @@ TEST_P(AgainstReference, CostsTheSameAndKeepsTheLimits) {
     // A finer table where the coarse one is not good enough to judge by.
     test::ReferenceAnswer best;
     best.cost_j = std::numeric_limits<double>::infinity();
-    for (int stations : {72, 110, 200}) {
+    for (int stations : {48, 80, 128}) {
       const auto found =
           test::reference(p.robot, loads->model(), run.runs[0], p.problem.limits, p.problem.start_speed_m_s,
                           p.problem.end_speed_m_s, p.problem.value_of_time_w, stations);
