@@ -4,7 +4,7 @@
 # them.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-port="${JOULECAST_DEMO_PORT:-8080}"
+port="${DEMO_PORT:-8080}"
 url="http://127.0.0.1:$port"
 home="build/demo"
 
