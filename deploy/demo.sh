@@ -63,7 +63,7 @@ lines=24 ask "Operator: what is $robot doing?" curl -sf "$url/v1/robots/$robot/s
 lines=40 ask "Operator: what did the last finished mission spend?" curl -sf "$url/v1/missions/$mission"
 lines=30 ask "Operator: where did that energy go?" curl -sf "$url/v1/missions/$mission/ledger"
 lines=24 ask "Scheduler: the cheapest way for $robot to drive 10 m?" curl -sf -X POST "$url/v1/robots/$robot/profile" \
-  -H 'Content-Type: application/json' -d '{"path": [{"kind": "straight", "length_m": 10}], "samples": 2}'
+  -H 'Content-Type: application/json' -d '{"path": [{"kind": "straight", "length_m": 10}], "columns": false}'
 lines=24 ask "Scheduler: how far can $robot still go?" curl -sf -X POST "$url/v1/robots/$robot/autonomy" -H 'Content-Type: application/json' -d '{}'
 echo
 echo "Running on:     $url/   (API: $url/openapi.json, live fleet: $url/v1/events)"
