@@ -1,4 +1,4 @@
--- The history of a fleet, schema version 1 (user_version; src/history/schema.cc lists the migrations to it).
+-- The history of a fleet, schema version 2 (user_version; src/history/schema.cc lists the migrations to it).
 -- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a REAL column: not measured.
 -- Energy leaving the battery is positive. Sides: right, left.
 
@@ -141,4 +141,14 @@ CREATE TABLE energy_state (
   state_of_charge REAL,
   winding_temperature_right_c REAL,
   winding_temperature_left_c REAL
+) STRICT;
+
+-- What the service has learned of a robot by watching it, and would lose with a restart: one document a topic,
+-- replaced as it grows.
+CREATE TABLE learned (
+  robot_id TEXT NOT NULL REFERENCES robot (robot_id),
+  topic TEXT NOT NULL CHECK (topic <> ''),
+  utime_us INTEGER NOT NULL,
+  body_json TEXT NOT NULL CHECK (json_valid(body_json)),
+  PRIMARY KEY (robot_id, topic)
 ) STRICT;

@@ -30,6 +30,9 @@ std::size_t content_bytes(const CheckpointMission& c) {
 std::size_t content_bytes(const PutEnergyState& c) {
   return c.state.robot_id.size();
 }
+std::size_t content_bytes(const PutLearned& c) {
+  return c.learned.robot_id.size() + c.learned.topic.size() + c.learned.body_json.size();
+}
 std::size_t content_bytes(const AppendEvent& c) {
   return c.event.robot_id.size() + c.event.kind.size() + c.event.detail_json.size();
 }

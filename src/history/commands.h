@@ -52,6 +52,11 @@ struct PutEnergyState {
   EnergyState state;
 };
 
+// Replaces what was learned of the robot under the topic. The robot is created when new. Outcome: 0.
+struct PutLearned {
+  Learned learned;
+};
+
 // Outcome: the event's id; `event.id` is ignored.
 struct AppendEvent {
   Event event;
@@ -72,7 +77,7 @@ struct Prune {
 };
 
 using Command = std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutEnergyState,
-                             AppendEvent, Prune>;
+                             PutLearned, AppendEvent, Prune>;
 
 // Approximate memory that a queued command holds, in bytes.
 std::size_t weight_bytes(const Command& command);

@@ -111,6 +111,14 @@ struct EnergyState {
   std::array<double, 2> winding_temperature_c{telemetry::unmeasured, telemetry::unmeasured};
 };
 
+// What the service has learned of a robot under one topic.
+struct Learned {
+  std::string robot_id;
+  std::string topic;  // e.g. "charge"
+  std::int64_t utime_us = 0;
+  std::string body_json = "{}";
+};
+
 // An entry of the audit log.
 struct Event {
   std::int64_t id = 0;  // increasing in order of commit; given by the store

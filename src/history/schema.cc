@@ -8,8 +8,18 @@ extern const std::string_view store_sql;  // schemas/store.sql, embedded at buil
 
 namespace {
 
-constexpr std::int64_t store_version = 1;
-constexpr std::span<const Migration> store_migrations{};
+constexpr std::int64_t store_version = 2;
+constexpr Migration store_migrations[] = {
+    {1, R"(
+CREATE TABLE learned (
+  robot_id TEXT NOT NULL REFERENCES robot (robot_id),
+  topic TEXT NOT NULL CHECK (topic <> ''),
+  utime_us INTEGER NOT NULL,
+  body_json TEXT NOT NULL CHECK (json_valid(body_json)),
+  PRIMARY KEY (robot_id, topic)
+) STRICT;
+)"},
+};
 
 Result<void> migrate(Database& database, const Schema& schema, std::int64_t version) {
   for (const Migration& migration : schema.migrations) {

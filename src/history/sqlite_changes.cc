@@ -274,6 +274,17 @@ Outcome SqliteChanges::run(const PutEnergyState& c) {
   return 0;
 }
 
+Outcome SqliteChanges::run(const PutLearned& c) {
+  if (auto ok = check_robot_id(c.learned.robot_id); !ok) return tl::unexpected(ok.error());
+  make_robot(c.learned.robot_id);
+  Rows rows(
+      database_.statement("INSERT OR REPLACE INTO learned (robot_id, topic, utime_us, body_json) "
+                          "VALUES (?, ?, ?, ?)"));
+  rows.bind(c.learned.robot_id).bind(c.learned.topic).bind(c.learned.utime_us).bind(c.learned.body_json);
+  rows.run();
+  return 0;
+}
+
 Outcome SqliteChanges::run(const AppendEvent& c) {
   Rows rows(
       database_.statement("INSERT INTO event (utime_us, robot_id, kind, detail_json) VALUES (?, nullif(?, "

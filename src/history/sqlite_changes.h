@@ -32,6 +32,7 @@ class SqliteChanges {
   Outcome run(const StartMission& command);
   Outcome run(const CheckpointMission& command);
   Outcome run(const PutEnergyState& command);
+  Outcome run(const PutLearned& command);
   Outcome run(const AppendEvent& command);
   Outcome run(const Prune& command);
 

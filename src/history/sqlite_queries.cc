@@ -353,4 +353,14 @@ Result<std::optional<EnergyState>> energy_state(Database& database, std::string_
   return read_energy_state(rows);
 }
 
+Result<std::optional<Learned>> learned(Database& database, std::string_view robot_id,
+                                       std::string_view topic) {
+  Rows rows(database.statement("SELECT utime_us, body_json FROM learned WHERE robot_id = ? AND topic = ?"));
+  rows.bind(robot_id).bind(topic);
+  if (!rows.next()) return std::nullopt;
+  Learned found{std::string(robot_id), std::string(topic), rows.integer(), {}};
+  found.body_json = rows.text();
+  return found;
+}
+
 }  // namespace joulecast::history::queries

@@ -34,5 +34,6 @@ std::int64_t telemetry_bytes(Database& database);
 Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std::int64_t limit,
                                   const std::optional<std::string>& robot_id);
 Result<std::optional<EnergyState>> energy_state(Database& database, std::string_view robot_id);
+Result<std::optional<Learned>> learned(Database& database, std::string_view robot_id, std::string_view topic);
 
 }  // namespace joulecast::history::queries

@@ -184,6 +184,9 @@ class SqliteStore final : public Store {
     return read([&](Database& database) { return queries::events(database, after_id, limit, robot_id); });
   }
 
+  Result<std::optional<Learned>> learned(std::string_view robot_id, std::string_view topic) const override {
+    return read([&](Database& database) { return queries::learned(database, robot_id, topic); });
+  }
   Result<std::optional<EnergyState>> energy_state(std::string_view robot_id) const override {
     return read([&](Database& database) { return queries::energy_state(database, robot_id); });
   }

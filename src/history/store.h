@@ -127,6 +127,9 @@ class Store {
   // Absent when none was ever put.
   virtual Result<std::optional<EnergyState>> energy_state(std::string_view robot_id) const = 0;
 
+  // What was learned of the robot under the topic; absent when nothing was.
+  virtual Result<std::optional<Learned>> learned(std::string_view robot_id, std::string_view topic) const = 0;
+
   // At start: the missions that were open when the last daemon ended, oldest first. Each is to be resumed
   // (just go on checkpointing it) or ended by a checkpoint with MissionState::interrupted.
   virtual Result<std::vector<Mission>> recover() const = 0;

@@ -452,6 +452,18 @@ TEST_P(StoreConformance, RecoversOpenMissionsWithTheirState) {
   EXPECT_TRUE(need(store_->recover()).empty());
 }
 
+TEST_P(StoreConformance, KeepsTheLatestOfWhatWasLearnedUnderEachTopic) {
+  need(apply(PutLearned{{"amr-1", "charge", 5, R"({"a":1})"}}));
+  need(apply(PutLearned{{"amr-1", "taper", 6, R"({"b":2})"}}));
+  need(apply(PutLearned{{"amr-1", "charge", 7, R"({"a":3})"}}));
+  const auto charge = need(store_->learned("amr-1", "charge"));
+  ASSERT_TRUE(charge);
+  EXPECT_EQ(charge->utime_us, 7);
+  EXPECT_EQ(charge->body_json, R"({"a":3})");
+  EXPECT_EQ(need(store_->learned("amr-1", "taper"))->body_json, R"({"b":2})");
+  EXPECT_FALSE(need(store_->learned("amr-2", "charge")));
+}
+
 TEST_P(StoreConformance, KeepsEnergyStateOutsideMissions) {
   need(apply(PutEnergyState{{"amr-1", 5, 1, 0.9, {20, 21}}}));
   need(apply(PutEnergyState{{"amr-1", 6, 2, telemetry::unmeasured, {20, 21}}}));

@@ -60,6 +60,9 @@ class FailingStore final : public Store {
                                     std::optional<std::string> r) const override {
     return store_->events(a, n, r);
   }
+  Result<std::optional<Learned>> learned(std::string_view r, std::string_view topic) const override {
+    return store_->learned(r, topic);
+  }
   Result<std::optional<EnergyState>> energy_state(std::string_view r) const override {
     return store_->energy_state(r);
   }
