@@ -1,4 +1,4 @@
--- The history of a fleet, schema version 2 (user_version; src/history/schema.cc lists the migrations to it).
+-- The history of a fleet, schema version 3 (user_version; src/history/schema.cc lists the migrations to it).
 -- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a REAL column: not measured.
 -- Energy leaving the battery is positive. Sides: right, left.
 
@@ -17,6 +17,7 @@ CREATE TABLE model (
   note TEXT NOT NULL,
   parent_version INTEGER,
   model_json TEXT NOT NULL CHECK (json_valid(model_json)),
+  evidence_json TEXT CHECK (evidence_json IS NULL OR json_valid(evidence_json)),  -- why it was adopted: its back-test and what it came from
   PRIMARY KEY (robot_id, version),
   FOREIGN KEY (robot_id, parent_version) REFERENCES model (robot_id, version)
 ) STRICT;
@@ -152,3 +153,49 @@ CREATE TABLE learned (
   body_json TEXT NOT NULL CHECK (json_valid(body_json)),
   PRIMARY KEY (robot_id, topic)
 ) STRICT;
+
+-- Diagnoses of the gap, as jobs and as results.
+CREATE TABLE diagnosis (
+  diagnosis_id INTEGER NOT NULL PRIMARY KEY AUTOINCREMENT,
+  robot_id TEXT NOT NULL REFERENCES robot (robot_id),
+  created_utime_us INTEGER NOT NULL,
+  started_utime_us INTEGER,
+  finished_utime_us INTEGER,
+  state TEXT NOT NULL CHECK (state IN ('queued', 'running', 'done', 'failed', 'cancelled', 'interrupted')),
+  cause TEXT NOT NULL CHECK (cause IN ('request', 'watch')),
+  request_json TEXT NOT NULL CHECK (json_valid(request_json)),
+  model_version INTEGER,  -- the model that was diagnosed
+  fitted_on TEXT NOT NULL CHECK (json_valid(fitted_on)),  -- [mission_key, ...]
+  held_back TEXT NOT NULL CHECK (json_valid(held_back)),  -- [mission_key, ...]: left for a back-test
+  result_json TEXT CHECK (result_json IS NULL OR json_valid(result_json)),
+  model_json TEXT CHECK (model_json IS NULL OR json_valid(model_json)),  -- the robot file with the effects found; NULL: nothing to adopt
+  error TEXT NOT NULL,
+  FOREIGN KEY (robot_id, model_version) REFERENCES model (robot_id, version)
+) STRICT;
+
+CREATE INDEX diagnosis_by_robot ON diagnosis (robot_id, diagnosis_id);
+CREATE INDEX diagnosis_by_state ON diagnosis (state) WHERE state IN ('queued', 'running');
+
+CREATE TABLE diagnosis_report (
+  diagnosis_id INTEGER NOT NULL PRIMARY KEY REFERENCES diagnosis (diagnosis_id) ON DELETE CASCADE,
+  html TEXT NOT NULL
+) STRICT;
+
+-- Models that something suggests and nobody adopted yet.
+CREATE TABLE proposal (
+  proposal_id INTEGER NOT NULL PRIMARY KEY AUTOINCREMENT,
+  robot_id TEXT NOT NULL REFERENCES robot (robot_id),
+  created_utime_us INTEGER NOT NULL,
+  kind TEXT NOT NULL CHECK (kind <> ''),
+  state TEXT NOT NULL CHECK (state IN ('open', 'adopted', 'dismissed', 'superseded')),
+  note TEXT NOT NULL,
+  base_version INTEGER,     -- the model that it changes
+  adopted_version INTEGER,  -- what it became
+  fitted_on TEXT NOT NULL CHECK (json_valid(fitted_on)),  -- [mission_key, ...]
+  model_json TEXT NOT NULL CHECK (json_valid(model_json)),
+  detail_json TEXT NOT NULL CHECK (json_valid(detail_json)),
+  FOREIGN KEY (robot_id, base_version) REFERENCES model (robot_id, version),
+  FOREIGN KEY (robot_id, adopted_version) REFERENCES model (robot_id, version)
+) STRICT;
+
+CREATE INDEX proposal_by_robot ON proposal (robot_id, proposal_id);

@@ -4,7 +4,7 @@ namespace joulecast::history {
 namespace {
 
 std::size_t content_bytes(const AddModel& c) {
-  return c.robot_id.size() + c.note.size() + c.model_json.size();
+  return c.robot_id.size() + c.note.size() + c.model_json.size() + c.evidence_json.size();
 }
 std::size_t content_bytes(const ActivateModel& c) {
   return c.robot_id.size();
@@ -37,6 +37,27 @@ std::size_t content_bytes(const AppendEvent& c) {
   return c.event.robot_id.size() + c.event.kind.size() + c.event.detail_json.size();
 }
 std::size_t content_bytes(const Prune&) {
+  return 0;
+}
+std::size_t content_bytes(const DiagnosisRecord& d) {
+  return d.robot_id.size() + d.request_json.size() + d.result_json.size() + d.model_json.size() +
+         d.error.size() + (d.fitted_on.capacity() + d.held_back.capacity()) * sizeof(MissionKey);
+}
+std::size_t content_bytes(const AddDiagnosis& c) {
+  return content_bytes(c.diagnosis);
+}
+std::size_t content_bytes(const UpdateDiagnosis& c) {
+  return content_bytes(c.diagnosis) + c.report_html.size();
+}
+std::size_t content_bytes(const InterruptDiagnoses&) {
+  return 0;
+}
+std::size_t content_bytes(const AddProposal& c) {
+  const Proposal& p = c.proposal;
+  return p.robot_id.size() + p.kind.size() + p.note.size() + p.model_json.size() + p.detail_json.size() +
+         p.fitted_on.capacity() * sizeof(MissionKey);
+}
+std::size_t content_bytes(const CloseProposal&) {
   return 0;
 }
 

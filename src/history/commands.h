@@ -22,6 +22,7 @@ struct AddModel {
   std::string model_json;
   // When set, the active version that the caller has seen (0: none); another one is a Fault::conflict.
   std::optional<std::int64_t> expected_active;
+  std::string evidence_json = {};
 };
 
 // Makes an existing version the active one (roll back, roll forward). Outcome: the version.
@@ -76,8 +77,42 @@ struct Prune {
   std::int64_t max_chunks = 1000;
 };
 
+// Diagnoses kept of one robot; older ones that have ended go when a new one is added.
+inline constexpr std::int64_t kept_diagnoses = 200;
+
+// Outcome: the diagnosis's id; `diagnosis.id` is ignored.
+struct AddDiagnosis {
+  DiagnosisRecord diagnosis;
+};
+
+// Replaces a stored diagnosis but for its identity (id, robot, creation, cause, request). A report that is
+// not empty replaces the stored one. Outcome: the id.
+struct UpdateDiagnosis {
+  DiagnosisRecord diagnosis;
+  std::string report_html;
+};
+
+// At start: marks the diagnoses that the last daemon left queued or running. Outcome: how many.
+struct InterruptDiagnoses {
+  std::int64_t utime_us = 0;
+};
+
+// Supersedes the robot's open proposals of the same kind. Outcome: the proposal's id; `proposal.id` is
+// ignored.
+struct AddProposal {
+  Proposal proposal;
+};
+
+// Fault::conflict unless the proposal is open. Outcome: its id.
+struct CloseProposal {
+  std::int64_t id = 0;
+  ProposalState state = ProposalState::dismissed;
+  std::optional<std::int64_t> adopted_version;
+};
+
 using Command = std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutEnergyState,
-                             PutLearned, AppendEvent, Prune>;
+                             PutLearned, AppendEvent, Prune, AddDiagnosis, UpdateDiagnosis,
+                             InterruptDiagnoses, AddProposal, CloseProposal>;
 
 // Approximate memory that a queued command holds, in bytes.
 std::size_t weight_bytes(const Command& command);

@@ -9,6 +9,12 @@ constexpr std::array<std::string_view, 4> origin_names = {"file", "http", "calib
 constexpr std::array<std::string_view, mission_state_count> state_names = {
     "open", "finished", "aborted", "unfinished", "superseded", "interrupted"};
 
+constexpr std::array<std::string_view, 6> diagnosis_state_names = {"queued", "running",   "done",
+                                                                   "failed", "cancelled", "interrupted"};
+constexpr std::array<std::string_view, 2> diagnosis_cause_names = {"request", "watch"};
+constexpr std::array<std::string_view, 4> proposal_state_names = {"open", "adopted", "dismissed",
+                                                                  "superseded"};
+
 template <class Enum, std::size_t N>
 std::optional<Enum> from(const std::array<std::string_view, N>& names, std::string_view text) {
   const auto found = std::find(names.begin(), names.end(), text);
@@ -32,6 +38,30 @@ std::optional<ModelOrigin> model_origin_from(std::string_view text) {
 
 std::optional<MissionState> mission_state_from(std::string_view text) {
   return from<MissionState>(state_names, text);
+}
+
+std::string_view name(DiagnosisState state) {
+  return diagnosis_state_names.at(static_cast<std::size_t>(state));
+}
+
+std::optional<DiagnosisState> diagnosis_state_from(std::string_view text) {
+  return from<DiagnosisState>(diagnosis_state_names, text);
+}
+
+std::string_view name(DiagnosisCause cause) {
+  return diagnosis_cause_names.at(static_cast<std::size_t>(cause));
+}
+
+std::optional<DiagnosisCause> diagnosis_cause_from(std::string_view text) {
+  return from<DiagnosisCause>(diagnosis_cause_names, text);
+}
+
+std::string_view name(ProposalState state) {
+  return proposal_state_names.at(static_cast<std::size_t>(state));
+}
+
+std::optional<ProposalState> proposal_state_from(std::string_view text) {
+  return from<ProposalState>(proposal_state_names, text);
 }
 
 }  // namespace joulecast::history

@@ -32,7 +32,8 @@ struct ModelVersion {
   std::string note;
   std::optional<std::int64_t> parent_version;  // the version that was active when this one was added
   bool active = false;
-  std::string model_json;  // the robot file's text, byte for byte as added
+  std::string model_json;     // the robot file's text, byte for byte as added
+  std::string evidence_json;  // why it was adopted: its back-test and what it came from; empty: none given
 };
 
 struct RobotRecord {
@@ -126,6 +127,54 @@ struct Event {
   std::string robot_id;  // empty: concerns no single robot
   std::string kind;      // e.g. "mission_finished", "model_added"
   std::string detail_json = "{}";
+};
+
+enum class DiagnosisState { queued, running, done, failed, cancelled, interrupted };
+std::string_view name(DiagnosisState state);
+std::optional<DiagnosisState> diagnosis_state_from(std::string_view text);
+constexpr bool has_ended(DiagnosisState state) {
+  return state != DiagnosisState::queued && state != DiagnosisState::running;
+}
+
+enum class DiagnosisCause { request, watch };
+std::string_view name(DiagnosisCause cause);
+std::optional<DiagnosisCause> diagnosis_cause_from(std::string_view text);
+
+// A diagnosis of a robot's gap: the job and, when done, its result.
+struct DiagnosisRecord {
+  std::int64_t id = 0;  // increasing; given by the store
+  std::string robot_id;
+  std::int64_t created_utime_us = 0;
+  std::optional<std::int64_t> started_utime_us;
+  std::optional<std::int64_t> finished_utime_us;
+  DiagnosisState state = DiagnosisState::queued;
+  DiagnosisCause cause = DiagnosisCause::request;
+  std::string request_json = "{}";
+  std::optional<std::int64_t> model_version;  // the model that was diagnosed
+  std::vector<MissionKey> fitted_on;
+  std::vector<MissionKey> held_back;  // left for a back-test
+  std::string result_json;            // empty: none
+  std::string model_json;             // the robot file with the effects found; empty: nothing to adopt
+  std::string error;                  // of a failed one
+};
+
+enum class ProposalState { open, adopted, dismissed, superseded };
+std::string_view name(ProposalState state);
+std::optional<ProposalState> proposal_state_from(std::string_view text);
+
+// A model that something suggests, to be adopted or dismissed by somebody.
+struct Proposal {
+  std::int64_t id = 0;  // increasing; given by the store
+  std::string robot_id;
+  std::int64_t created_utime_us = 0;
+  std::string kind;  // e.g. "calibration"
+  ProposalState state = ProposalState::open;
+  std::string note;
+  std::optional<std::int64_t> base_version;     // the model that it changes
+  std::optional<std::int64_t> adopted_version;  // what it became
+  std::vector<MissionKey> fitted_on;            // missions that a back-test must leave out
+  std::string model_json;
+  std::string detail_json = "{}";  // what its maker says of it
 };
 
 }  // namespace joulecast::history

@@ -95,8 +95,9 @@ Outcome SqliteChanges::run(const AddModel& c) {
     rows.bind(c.robot_id);
     if (rows.next()) version = rows.integer();
   }
-  Rows(database_.statement("INSERT INTO model (robot_id, version, created_utime_us, origin, note, "
-                           "parent_version, model_json) VALUES (?, ?, ?, ?, ?, ?, ?)"))
+  Rows(database_.statement(
+           "INSERT INTO model (robot_id, version, created_utime_us, origin, note, "
+           "parent_version, model_json, evidence_json) VALUES (?, ?, ?, ?, ?, ?, ?, nullif(?, ''))"))
       .bind(c.robot_id)
       .bind(version)
       .bind(c.utime_us)
@@ -104,6 +105,7 @@ Outcome SqliteChanges::run(const AddModel& c) {
       .bind(c.note)
       .bind(active)
       .bind(c.model_json)
+      .bind(c.evidence_json)
       .run();
   return run(ActivateModel{c.robot_id, version});
 }

@@ -35,6 +35,11 @@ class SqliteChanges {
   Outcome run(const PutLearned& command);
   Outcome run(const AppendEvent& command);
   Outcome run(const Prune& command);
+  Outcome run(const AddDiagnosis& command);
+  Outcome run(const UpdateDiagnosis& command);
+  Outcome run(const InterruptDiagnoses& command);
+  Outcome run(const AddProposal& command);
+  Outcome run(const CloseProposal& command);
 
   void make_robot(const std::string& robot_id);
   void put(const EnergyState& state);

@@ -32,7 +32,8 @@ bool has_robot(Database& database, std::string_view robot_id) {
 
 constexpr std::string_view select_model =
     "SELECT model.robot_id, version, model.created_utime_us, origin, note, parent_version, "
-    "version IS active_version, model_json FROM model JOIN robot USING (robot_id) WHERE model.robot_id = ?";
+    "version IS active_version, model_json, coalesce(evidence_json, '') FROM model JOIN robot USING "
+    "(robot_id) WHERE model.robot_id = ?";
 
 Result<ModelVersion> read_model(Rows& rows) {
   ModelVersion m;
@@ -47,18 +48,8 @@ Result<ModelVersion> read_model(Rows& rows) {
   m.parent_version = rows.optional_integer();
   m.active = rows.boolean();
   m.model_json = rows.text();
+  m.evidence_json = rows.text();
   return m;
-}
-
-template <class T, class Read>
-Result<std::vector<T>> read_all(Rows& rows, Read read) {
-  std::vector<T> all;
-  while (rows.next()) {
-    Result<T> one = read(rows);
-    if (!one) return tl::unexpected(one.error());
-    all.push_back(std::move(*one));
-  }
-  return all;
 }
 
 // The WHERE clause of a filter, which also tells filters apart for cursors when its values are added.
@@ -120,11 +111,6 @@ Result<void> check_filter(const MissionFilter& f) {
   return {};
 }
 
-Result<void> check_limit(std::string_view field, std::int64_t limit, std::int64_t greatest) {
-  if (limit >= 1 && limit <= greatest) return {};
-  return invalid(std::string(field), std::to_string(limit) + " is outside 1 to " + std::to_string(greatest));
-}
-
 Result<void> check_range(TimeRange range) {
   if (range.from_utime_us <= range.to_utime_us) return {};
   return invalid("from", "must not be later than to");
@@ -136,6 +122,11 @@ std::string select_missions() {
 }
 
 }  // namespace
+
+Result<void> check_limit(std::string_view field, std::int64_t limit, std::int64_t greatest) {
+  if (limit >= 1 && limit <= greatest) return {};
+  return invalid(std::string(field), std::to_string(limit) + " is outside 1 to " + std::to_string(greatest));
+}
 
 Result<std::vector<RobotRecord>> robots(Database& database) {
   Rows rows(

@@ -13,6 +13,21 @@
 // Store's queries as SQL, each on a connection within a read transaction. They throw SqliteError.
 namespace joulecast::history::queries {
 
+// All rows, each through `read`, up to the first error.
+template <class T, class Read>
+Result<std::vector<T>> read_all(Rows& rows, Read read) {
+  std::vector<T> all;
+  while (rows.next()) {
+    Result<T> one = read(rows);
+    if (!one) return tl::unexpected(one.error());
+    all.push_back(std::move(*one));
+  }
+  return all;
+}
+
+// Fault::invalid on `field` unless 1 <= limit <= greatest.
+Result<void> check_limit(std::string_view field, std::int64_t limit, std::int64_t greatest);
+
 Result<std::vector<RobotRecord>> robots(Database& database);
 Result<ModelVersion> model(Database& database, std::string_view robot_id,
                            std::optional<std::int64_t> version);
@@ -35,5 +50,13 @@ Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std
                                   const std::optional<std::string>& robot_id);
 Result<std::optional<EnergyState>> energy_state(Database& database, std::string_view robot_id);
 Result<std::optional<Learned>> learned(Database& database, std::string_view robot_id, std::string_view topic);
+
+Result<DiagnosisRecord> diagnosis(Database& database, std::int64_t id);
+Result<std::vector<DiagnosisRecord>> diagnoses(Database& database, const std::optional<std::string>& robot_id,
+                                               std::int64_t before_id, std::int64_t limit);
+Result<std::string> diagnosis_report(Database& database, std::int64_t id);
+Result<Proposal> proposal(Database& database, std::int64_t id);
+Result<std::vector<Proposal>> proposals(Database& database, const std::optional<std::string>& robot_id,
+                                        std::int64_t before_id, std::int64_t limit);
 
 }  // namespace joulecast::history::queries

@@ -191,6 +191,28 @@ class SqliteStore final : public Store {
     return read([&](Database& database) { return queries::energy_state(database, robot_id); });
   }
 
+  Result<DiagnosisRecord> diagnosis(std::int64_t id) const override {
+    return read([&](Database& database) { return queries::diagnosis(database, id); });
+  }
+
+  Result<std::vector<DiagnosisRecord>> diagnoses(std::optional<std::string> robot_id, std::int64_t before_id,
+                                                 std::int64_t limit) const override {
+    return read([&](Database& database) { return queries::diagnoses(database, robot_id, before_id, limit); });
+  }
+
+  Result<std::string> diagnosis_report(std::int64_t id) const override {
+    return read([&](Database& database) { return queries::diagnosis_report(database, id); });
+  }
+
+  Result<Proposal> proposal(std::int64_t id) const override {
+    return read([&](Database& database) { return queries::proposal(database, id); });
+  }
+
+  Result<std::vector<Proposal>> proposals(std::optional<std::string> robot_id, std::int64_t before_id,
+                                          std::int64_t limit) const override {
+    return read([&](Database& database) { return queries::proposals(database, robot_id, before_id, limit); });
+  }
+
   Result<std::vector<Mission>> recover() const override { return read(queries::open_missions); }
 
   Result<StoreSize> size() const override {

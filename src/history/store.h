@@ -129,6 +129,18 @@ class Store {
 
   // What was learned of the robot under the topic; absent when nothing was.
   virtual Result<std::optional<Learned>> learned(std::string_view robot_id, std::string_view topic) const = 0;
+  virtual Result<DiagnosisRecord> diagnosis(std::int64_t id) const = 0;
+  // Newest first, with id < before_id, at most `limit` (1 to max_page_size); of one robot when given. Lists
+  // leave out model_json.
+  virtual Result<std::vector<DiagnosisRecord>> diagnoses(std::optional<std::string> robot_id,
+                                                         std::int64_t before_id,
+                                                         std::int64_t limit) const = 0;
+  // The report of a diagnosis as HTML; not_found when it has none.
+  virtual Result<std::string> diagnosis_report(std::int64_t id) const = 0;
+  virtual Result<Proposal> proposal(std::int64_t id) const = 0;
+  // As diagnoses().
+  virtual Result<std::vector<Proposal>> proposals(std::optional<std::string> robot_id, std::int64_t before_id,
+                                                  std::int64_t limit) const = 0;
 
   // At start: the missions that were open when the last daemon ended, oldest first. Each is to be resumed
   // (just go on checkpointing it) or ended by a checkpoint with MissionState::interrupted.

@@ -102,6 +102,36 @@ TEST_F(SchemaTest, TheStoresMigrationsReachItsVersion) {
   EXPECT_EQ(next, store_schema().version);
 }
 
+std::string column_list(Database& database) {
+  return database.text(
+      "SELECT group_concat(line, '; ') FROM (SELECT t.name || '.' || c.name || ' ' || c.type || ' ' || "
+      "c.\"notnull\" || ' ' || c.pk AS line FROM pragma_table_list t JOIN pragma_table_info(t.name) c WHERE "
+      "t.schema = 'main' AND t.name NOT LIKE 'sqlite_%' ORDER BY t.name, c.name)");
+}
+
+TEST_F(SchemaTest, AStoreOfVersionOneBecomesWhatAFreshOneIs) {
+  std::ifstream file(JOULECAST_SOURCE_DIR "/tests/history/store_v1.sql");
+  std::stringstream text;
+  text << file.rdbuf();
+  Database old = open();
+  old.execute(text.str());
+  old.execute(
+      "INSERT INTO robot VALUES ('amr-1', 1, NULL); INSERT INTO model VALUES ('amr-1', 1, 1, 'file', '', "
+      "NULL, '{}'); UPDATE robot SET active_version = 1;");
+  old.execute("PRAGMA application_id = " + std::to_string(store_application_id));
+  old.execute("PRAGMA user_version = 1");
+  const auto brought = bring_to_schema(old, store_schema());
+  ASSERT_TRUE(brought) << describe(brought.error());
+  Database fresh(folder_.file("fresh.db"), OpenMode::read_write_create, 100);
+  ASSERT_TRUE(bring_to_schema(fresh, store_schema()));
+  EXPECT_EQ(column_list(old), column_list(fresh));
+  EXPECT_EQ(old.text("SELECT group_concat(name) FROM (SELECT name FROM sqlite_schema WHERE type <> 'table' "
+                     "ORDER BY name)"),
+            fresh.text("SELECT group_concat(name) FROM (SELECT name FROM sqlite_schema WHERE type <> 'table' "
+                       "ORDER BY name)"));
+  EXPECT_EQ(old.integer("SELECT evidence_json IS NULL FROM model"), 1);
+}
+
 TEST_F(SchemaTest, EmbedsTheSchemaFile) {
   std::ifstream file(JOULECAST_SOURCE_DIR "/schemas/store.sql");
   std::stringstream text;

@@ -220,6 +220,115 @@ TEST_P(StoreConformance, NamesWhatIsAbsent) {
   EXPECT_EQ(apply(CheckpointMission{unknown, {}, {}, {}}).error().fault, Fault::not_found);
 }
 
+// ---- diagnoses and proposals
+
+DiagnosisRecord some_diagnosis(const std::string& robot_id, std::int64_t utime_us) {
+  DiagnosisRecord d;
+  d.robot_id = robot_id;
+  d.created_utime_us = utime_us;
+  d.cause = DiagnosisCause::watch;
+  d.request_json = R"({"missions": 3})";
+  d.model_version = 1;
+  d.fitted_on = {4, 9};
+  d.held_back = {7};
+  return d;
+}
+
+TEST_P(StoreConformance, KeepsADiagnosisFromItsRequestToItsReport) {
+  need(apply(AddModel{"amr-1", 1, ModelOrigin::file, "", "{}", {}, R"({"why": 1})"}));
+  EXPECT_EQ(need(store_->model("amr-1")).evidence_json, R"({"why": 1})");
+  DiagnosisRecord d = some_diagnosis("amr-1", 5);
+  d.id = need(apply(AddDiagnosis{d}));
+  EXPECT_EQ(need(store_->diagnosis(d.id)).state, DiagnosisState::queued);
+  EXPECT_EQ(store_->diagnosis_report(d.id).error().fault, Fault::not_found);
+  d.state = DiagnosisState::done;
+  d.started_utime_us = 6;
+  d.finished_utime_us = 8;
+  d.result_json = R"({"verdict": "none"})";
+  d.model_json = R"({"effects": {}})";
+  EXPECT_EQ(apply(UpdateDiagnosis{d, "<html>"}), d.id);
+  reopen();
+  const DiagnosisRecord read = need(store_->diagnosis(d.id));
+  EXPECT_EQ(read.state, DiagnosisState::done);
+  EXPECT_EQ(read.cause, DiagnosisCause::watch);
+  EXPECT_EQ(read.request_json, d.request_json);
+  EXPECT_EQ(read.fitted_on, d.fitted_on);
+  EXPECT_EQ(read.held_back, d.held_back);
+  EXPECT_EQ(read.result_json, d.result_json);
+  EXPECT_EQ(read.model_json, d.model_json);
+  EXPECT_EQ(read.started_utime_us, 6);
+  EXPECT_EQ(read.finished_utime_us, 8);
+  EXPECT_EQ(need(store_->diagnosis_report(d.id)), "<html>");
+  EXPECT_EQ(store_->diagnosis(99).error().fault, Fault::not_found);
+  EXPECT_EQ(apply(UpdateDiagnosis{some_diagnosis("amr-1", 1), ""}).error().fault, Fault::not_found);
+}
+
+TEST_P(StoreConformance, ListsTheNewestDiagnosesAndKeepsSoMany) {
+  need(apply(AddModel{"amr-1", 1, ModelOrigin::file, "", "{}", {}}));
+  need(apply(AddModel{"amr-2", 1, ModelOrigin::file, "", "{}", {}}));
+  const std::int64_t other = need(apply(AddDiagnosis{some_diagnosis("amr-2", 1)}));
+  std::int64_t first = 0, last = 0;
+  for (std::int64_t k = 0; k < kept_diagnoses + 3; ++k) {
+    DiagnosisRecord d = some_diagnosis("amr-1", 10 + k);
+    d.id = last = need(apply(AddDiagnosis{d}));
+    if (k == 0) first = last;
+    d.state = k == 1 ? DiagnosisState::running : DiagnosisState::done;
+    need(apply(UpdateDiagnosis{d, "<html>"}));
+  }
+  // One that runs is never dropped.
+  EXPECT_EQ(store_->diagnosis(first).error().fault, Fault::not_found);
+  EXPECT_TRUE(store_->diagnosis(first + 1));
+  EXPECT_TRUE(store_->diagnosis(other));
+  const auto newest = need(store_->diagnoses("amr-1", last + 1, 2));
+  ASSERT_EQ(newest.size(), 2U);
+  EXPECT_EQ(newest[0].id, last);
+  EXPECT_EQ(need(store_->diagnoses("amr-1", last, 1)).at(0).id, last - 1);
+  EXPECT_EQ(need(store_->diagnoses(std::nullopt, whole_future, max_page_size)).back().id, other);
+}
+
+TEST_P(StoreConformance, MarksDiagnosesThatTheLastDaemonLeft) {
+  need(apply(AddModel{"amr-1", 1, ModelOrigin::file, "", "{}", {}}));
+  std::vector<std::int64_t> ids;
+  for (const auto state : {DiagnosisState::queued, DiagnosisState::running, DiagnosisState::done}) {
+    DiagnosisRecord d = some_diagnosis("amr-1", 1);
+    ids.push_back(d.id = need(apply(AddDiagnosis{d})));
+    d.state = state;
+    need(apply(UpdateDiagnosis{d, ""}));
+  }
+  EXPECT_EQ(apply(InterruptDiagnoses{77}), 2);
+  EXPECT_EQ(need(store_->diagnosis(ids[0])).state, DiagnosisState::interrupted);
+  EXPECT_EQ(need(store_->diagnosis(ids[1])).finished_utime_us, 77);
+  EXPECT_EQ(need(store_->diagnosis(ids[2])).state, DiagnosisState::done);
+}
+
+TEST_P(StoreConformance, AProposalIsClosedOnceAndSupersededByTheNext) {
+  need(apply(AddModel{"amr-1", 1, ModelOrigin::file, "", "{}", {}}));
+  Proposal p;
+  p.robot_id = "amr-1";
+  p.created_utime_us = 3;
+  p.kind = "calibration";
+  p.note = "slow drift";
+  p.base_version = 1;
+  p.fitted_on = {1, 2};
+  p.model_json = R"({"a": 1})";
+  p.detail_json = R"({"b": 2})";
+  const std::int64_t first = need(apply(AddProposal{p}));
+  const std::int64_t second = need(apply(AddProposal{p}));
+  EXPECT_EQ(need(store_->proposal(first)).state, ProposalState::superseded);
+  const Proposal read = need(store_->proposal(second));
+  EXPECT_EQ(read.state, ProposalState::open);
+  EXPECT_EQ(read.note, p.note);
+  EXPECT_EQ(read.base_version, 1);
+  EXPECT_EQ(read.fitted_on, p.fitted_on);
+  EXPECT_EQ(read.model_json, p.model_json);
+  EXPECT_EQ(read.detail_json, p.detail_json);
+  EXPECT_EQ(apply(CloseProposal{second, ProposalState::adopted, 1}), second);
+  EXPECT_EQ(need(store_->proposal(second)).adopted_version, 1);
+  EXPECT_EQ(apply(CloseProposal{second, ProposalState::dismissed, {}}).error().fault, Fault::conflict);
+  EXPECT_EQ(apply(CloseProposal{99, ProposalState::dismissed, {}}).error().fault, Fault::not_found);
+  EXPECT_EQ(need(store_->proposals("amr-1", whole_future, 10)).size(), 2U);
+}
+
 // ---- missions
 
 TEST_P(StoreConformance, KeepsEveryNumberOfAMission) {

@@ -66,6 +66,19 @@ class FailingStore final : public Store {
   Result<std::optional<EnergyState>> energy_state(std::string_view r) const override {
     return store_->energy_state(r);
   }
+  Result<DiagnosisRecord> diagnosis(std::int64_t id) const override { return store_->diagnosis(id); }
+  Result<std::vector<DiagnosisRecord>> diagnoses(std::optional<std::string> r, std::int64_t b,
+                                                 std::int64_t n) const override {
+    return store_->diagnoses(r, b, n);
+  }
+  Result<std::string> diagnosis_report(std::int64_t id) const override {
+    return store_->diagnosis_report(id);
+  }
+  Result<Proposal> proposal(std::int64_t id) const override { return store_->proposal(id); }
+  Result<std::vector<Proposal>> proposals(std::optional<std::string> r, std::int64_t b,
+                                          std::int64_t n) const override {
+    return store_->proposals(r, b, n);
+  }
   Result<std::vector<Mission>> recover() const override { return store_->recover(); }
   Result<StoreSize> size() const override { return store_->size(); }
 

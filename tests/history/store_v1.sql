@@ -1,0 +1,144 @@
+-- The history of a fleet, schema version 1 (user_version; src/history/schema.cc lists the migrations to it).
+-- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a REAL column: not measured.
+-- Energy leaving the battery is positive. Sides: right, left.
+
+CREATE TABLE robot (
+  robot_id TEXT NOT NULL PRIMARY KEY CHECK (robot_id <> ''),
+  created_utime_us INTEGER NOT NULL,
+  active_version INTEGER,  -- NULL: nobody gave this robot's model yet
+  FOREIGN KEY (robot_id, active_version) REFERENCES model (robot_id, version)
+) STRICT;
+
+CREATE TABLE model (
+  robot_id TEXT NOT NULL REFERENCES robot (robot_id),
+  version INTEGER NOT NULL CHECK (version >= 1),
+  created_utime_us INTEGER NOT NULL,
+  origin TEXT NOT NULL CHECK (origin IN ('file', 'http', 'calibration', 'diagnosis')),
+  note TEXT NOT NULL,
+  parent_version INTEGER,
+  model_json TEXT NOT NULL CHECK (json_valid(model_json)),
+  PRIMARY KEY (robot_id, version),
+  FOREIGN KEY (robot_id, parent_version) REFERENCES model (robot_id, version)
+) STRICT;
+
+CREATE TRIGGER model_is_immutable BEFORE UPDATE ON model
+BEGIN
+  SELECT RAISE(ABORT, 'a model version never changes');
+END;
+
+CREATE TABLE mission (
+  mission_key INTEGER NOT NULL PRIMARY KEY CHECK (mission_key > 0),
+  robot_id TEXT NOT NULL REFERENCES robot (robot_id),
+  mission_id TEXT NOT NULL,
+  start_utime_us INTEGER NOT NULL,
+  end_utime_us INTEGER NOT NULL,
+  state TEXT NOT NULL
+    CHECK (state IN ('open', 'finished', 'aborted', 'unfinished', 'superseded', 'interrupted')),
+  implicit INTEGER NOT NULL CHECK (implicit IN (0, 1)),
+  incomplete INTEGER NOT NULL CHECK (incomplete IN (0, 1)),
+  incomplete_reason TEXT NOT NULL,
+  payload_kg REAL,
+  note TEXT NOT NULL,
+  model_version INTEGER,
+  samples INTEGER NOT NULL,
+  sample_faults TEXT NOT NULL CHECK (json_valid(sample_faults)),  -- {"reason": count}
+  gap_count INTEGER NOT NULL,
+  gap_s REAL,
+  battery_j REAL,
+  measured_j REAL,
+  measured_s REAL,
+  measured_motor_right_j REAL,
+  measured_motor_left_j REAL,
+  motor_measured_s REAL,
+  modelled_j REAL,
+  modelled_motor_right_j REAL,
+  modelled_motor_left_j REAL,
+  drawn_j REAL,
+  returned_j REAL,
+  charge_ah REAL,
+  distance_m REAL,
+  turned_rad REAL,
+  duration_s REAL,
+  ledger_accessories_j REAL,
+  ledger_driver_j REAL,
+  ledger_copper_j REAL,
+  ledger_brush_j REAL,
+  ledger_friction_internal_j REAL,
+  ledger_friction_rolling_j REAL,
+  ledger_friction_scrub_j REAL,
+  ledger_friction_zone_j REAL,
+  ledger_friction_slip_j REAL,
+  ledger_drag_j REAL,
+  ledger_kinetic_j REAL,
+  ledger_potential_j REAL,
+  ledger_braking_j REAL,
+  ledger_recovered_j REAL,
+  ledger_sensor_j REAL,
+  ledger_unexplained_j REAL,
+  telemetry_samples INTEGER NOT NULL DEFAULT 0,  -- raw samples ever stored; the next one's ordinal
+  UNIQUE (robot_id, mission_id, start_utime_us),
+  FOREIGN KEY (robot_id, model_version) REFERENCES model (robot_id, version)
+) STRICT;
+
+CREATE INDEX mission_by_start ON mission (start_utime_us, mission_key);
+CREATE INDEX mission_by_robot ON mission (robot_id, start_utime_us, mission_key);
+CREATE INDEX mission_by_model ON mission (robot_id, model_version);
+CREATE INDEX mission_open ON mission (start_utime_us) WHERE state = 'open';
+
+CREATE TABLE trace (
+  mission_key INTEGER NOT NULL REFERENCES mission (mission_key) ON DELETE CASCADE,
+  start_utime_us INTEGER NOT NULL,
+  covered_s REAL,
+  measured_power_min_w REAL,
+  measured_power_mean_w REAL,
+  measured_power_max_w REAL,
+  modelled_power_min_w REAL,
+  modelled_power_mean_w REAL,
+  modelled_power_max_w REAL,
+  speed_min_m_s REAL,
+  speed_mean_m_s REAL,
+  speed_max_m_s REAL,
+  state_of_charge REAL,
+  measured_j REAL,
+  modelled_j REAL,
+  x_m REAL,
+  y_m REAL,
+  PRIMARY KEY (mission_key, start_utime_us)
+) STRICT, WITHOUT ROWID;
+
+-- Raw samples in order of arrival. Small chunks come each second; they are merged into sealed ones as they add up.
+CREATE TABLE telemetry_chunk (
+  chunk_key INTEGER NOT NULL PRIMARY KEY,
+  mission_key INTEGER NOT NULL REFERENCES mission (mission_key) ON DELETE CASCADE,
+  first_ordinal INTEGER NOT NULL,
+  samples INTEGER NOT NULL CHECK (samples > 0),
+  start_utime_us INTEGER NOT NULL,  -- least of its samples
+  end_utime_us INTEGER NOT NULL,    -- greatest of its samples
+  stored_utime_us INTEGER NOT NULL,  -- the daemon's clock
+  sealed INTEGER NOT NULL CHECK (sealed IN (0, 1)),
+  bytes INTEGER NOT NULL CHECK (bytes = length(body)),
+  body BLOB NOT NULL,  -- src/history/telemetry_chunk.h
+  UNIQUE (mission_key, first_ordinal)
+) STRICT;
+
+CREATE INDEX telemetry_chunk_by_age ON telemetry_chunk (stored_utime_us, sealed, bytes);
+CREATE INDEX telemetry_chunk_tail ON telemetry_chunk (mission_key, first_ordinal) WHERE sealed = 0;
+
+CREATE TABLE event (
+  event_id INTEGER NOT NULL PRIMARY KEY,
+  utime_us INTEGER NOT NULL,
+  robot_id TEXT,  -- NULL: concerns no single robot; not a reference, for unknown robots have events too
+  kind TEXT NOT NULL CHECK (kind <> ''),
+  detail_json TEXT NOT NULL CHECK (json_valid(detail_json))
+) STRICT;
+
+CREATE INDEX event_by_robot ON event (robot_id, event_id);
+
+CREATE TABLE energy_state (
+  robot_id TEXT NOT NULL PRIMARY KEY REFERENCES robot (robot_id),
+  utime_us INTEGER NOT NULL,
+  sequence INTEGER NOT NULL,
+  state_of_charge REAL,
+  winding_temperature_right_c REAL,
+  winding_temperature_left_c REAL
+) STRICT;
