@@ -24,6 +24,7 @@ void add_estimate(CLI::App& program, Exit& exit);
 void add_explore(CLI::App& program, Exit& exit);
 void add_gap(CLI::App& program, Exit& exit);
 void add_import(CLI::App& program, Exit& exit);
+void add_matrix(CLI::App& program, Exit& exit);
 void add_missions(CLI::App& program, Exit& exit);
 void add_profile(CLI::App& program, Exit& exit);
 void add_replay(CLI::App& program, Exit& exit);

@@ -28,6 +28,7 @@ std::vector<http::Endpoint> endpoints(Services& services);
 std::vector<http::Endpoint> robot_endpoints(Services& services);
 std::vector<http::Endpoint> mission_endpoints(Services& services);
 std::vector<http::Endpoint> planning_endpoints(Services& services);
+std::vector<http::Endpoint> matrix_endpoints(Services& services);
 std::vector<http::Endpoint> autonomy_endpoints(Services& services);
 
 // The model of a robot, or the error that says why there is none.

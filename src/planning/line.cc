@@ -6,6 +6,8 @@
 #include <limits>
 #include <string>
 
+#include "planning/root.h"
+
 namespace joulecast::planning {
 namespace {
 
@@ -73,32 +75,6 @@ double time_from_rest(double rate, double swing, double above) {
     if (std::fabs(step) < 1e-7 * x) break;  // quadratic: the next one would be below 1e-14
   }
   return x / rate;
-}
-
-// A zero of `f` between `low` (f < 0) and `high` (f > 0): bisection on the logarithm, hastened by inverse
-// quadratic steps (Chandrupatla 1997).
-template <class F>
-double zero_between(F&& f, double low, double f_low, double high, double f_high) {
-  double a = high, fa = f_high, b = low, fb = f_low, c = a, fc = fa, t = 0.5;
-  for (int k = 0; k < 100; ++k) {
-    const double x = a + t * (b - a), fx = f(x);
-    if ((fx < 0) == (fa < 0)) {
-      c = a, fc = fa;
-    } else {
-      c = b, b = a, fc = fb, fb = fa;
-    }
-    a = x, fa = fx;
-    const double best = std::fabs(fa) < std::fabs(fb) ? a : b;
-    const double tolerance = 1e-14 * std::fabs(best);
-    const double edge = tolerance / std::fabs(b - c);
-    if (edge > 0.5 || fa == 0) return best;
-    const double xi = (a - b) / (c - b), phi = (fa - fb) / (fc - fb);
-    const bool quadratic = phi * phi < xi && (1 - phi) * (1 - phi) < 1 - xi;
-    t = quadratic ? fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
-                  : 0.5;
-    t = std::clamp(t, edge, 1 - edge);
-  }
-  return a;
 }
 
 Result<void> validate(const LineTask& task) {

@@ -83,12 +83,17 @@ class Request {
     return meet(*problem_.deadline_s);
   }
 
+  // The shortest time is known as finely as the grids are, which become finer while solving: a deadline found
+  // to be beyond reach on the way is refused as one that was known to be.
+  Result<void> within_reach(double deadline) const {
+    if (deadline >= shortest_s_ * (1 + 1e-6)) return {};
+    return fail(Fault::infeasible, "deadline_s",
+                "is " + std::to_string(deadline) + ", the limits allow no less than " +
+                    std::to_string(shortest_s_ * (1 + 1e-5)));
+  }
+
   Result<void> meet(double deadline) {
-    if (deadline < shortest_s_ * (1 + 1e-6)) {
-      return fail(Fault::infeasible, "deadline_s",
-                  "is " + std::to_string(deadline) + ", the limits allow no less than " +
-                      std::to_string(shortest_s_ * (1 + 1e-5)));
-    }
+    if (auto ok = within_reach(deadline); !ok) return ok;
     deadline_binds_ = true;
     // log(T - T_min) falls nearly linearly in log(idle + price): a bracket there, drawn in by the secant
     // through its ends (Illinois) or, where that stalls, by halving. Done a little early, within 1e-4 of the
@@ -98,7 +103,10 @@ class Request {
       return std::log(std::max(1e-12, duration_s() - shortest_s_) / (deadline - shortest_s_));
     };
     const auto met = [&] { return duration_s() <= deadline && duration_s() > deadline * (1 - 1e-4); };
-    const auto at = [&](double x) { return solve(std::exp(x) - idle); };
+    const auto at = [&](double x) -> Result<void> {
+      if (auto ok = solve(std::exp(x) - idle); !ok) return ok;
+      return within_reach(deadline);
+    };
     double slow = std::log(idle + price_w_), late_slow = late(), fast = slow, late_fast = late_slow;
     for (int k = 0; k < 40 && late_slow <= 0; ++k) {  // a Pareto front asks from the fast side
       fast = slow, late_fast = late_slow;
@@ -294,11 +302,8 @@ Plan Request::written() const {
     std::vector<double> times;
     if (answer.line) {
       closed = true;
-      const LineProfile& line = *answer.line;
-      const std::size_t cells = std::max<std::size_t>(8, problem_.intervals_per_run);
-      for (std::size_t i = 0; i <= cells; ++i) {
-        times.push_back(line.duration_s() * static_cast<double>(i) / static_cast<double>(cells));
-      }
+      const LineMotion& line = *answer.line;
+      times = line.times(std::max<std::size_t>(8, problem_.intervals_per_run));
       writer.run(planner, times, [&](std::size_t i, double f) {
         const double t = times[i] + f * (times[i + 1] - times[i]);
         return Writer::State{line.position(t), std::max(0.0, line.speed(t)), line.acceleration(t)};
@@ -397,15 +402,20 @@ Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& p
   if (!request) return tl::unexpected(std::move(request.error()));
   if (auto solved = request->solve(problem.value_of_time_w); !solved)
     return tl::unexpected(std::move(solved.error()));
-  std::vector<PlanCost> front{request->cost()};
-  // The shortest time itself costs an unbounded price; the front ends a hundredth of the way before it.
-  const double slowest = request->duration_s(),
-               fastest = request->shortest_s() + 0.01 * (slowest - request->shortest_s());
-  for (std::size_t k = 1; k < count; ++k) {
-    const double f = static_cast<double>(k) / static_cast<double>(count - 1);
-    if (auto met = request->meet(slowest + f * (fastest - slowest)); !met)
-      return tl::unexpected(std::move(met.error()));
-    front.push_back(request->cost());
+  const PlanCost free = request->cost();
+  std::vector<PlanCost> front{free};
+  for (int attempt = 0; front.size() < count; ++attempt) {
+    front.resize(1);
+    // The shortest time itself costs an unbounded price; the front ends a hundredth of the way before it.
+    const double fastest = request->shortest_s() + 0.01 * (free.duration_s - request->shortest_s());
+    for (std::size_t k = 1; k < count; ++k) {
+      const double f = static_cast<double>(k) / static_cast<double>(count - 1);
+      auto met = request->meet(free.duration_s + f * (fastest - free.duration_s));
+      // Finer grids on the way may have moved the shortest time: again, towards the new one.
+      if (!met && met.error().fault == Fault::infeasible && attempt < 8) break;
+      if (!met) return tl::unexpected(std::move(met.error()));
+      front.push_back(request->cost());
+    }
   }
   return front;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 namespace joulecast::planning {
@@ -53,6 +54,54 @@ Bound RunPlanner::ceiling_bound(double way) const {
   return Bound::wheel_speed;
 }
 
+double RunPlanner::acceleration_limit() const {
+  const double limit = problem_->limits.acceleration_m_s2;
+  return run_->turn == 0 ? limit : limit / robot_->kinematics.half_track_m;
+}
+
+// Whether a uniform run's motors would exceed their current or voltage limit.
+bool RunPlanner::motors_break(double v, double q) const {
+  const Electric& e = loads_->electric();
+  const double torque_limit = problem_->limits.current_a * e.torque_constant_nm_a;
+  for (std::size_t s : {0u, 1u}) {
+    const WheelLoad& w = loads_here_[s];
+    const double t = w.inertia * q + w.t0 + w.f0 + w.f1 * v;
+    const double volts =
+        e.resistance_ohm[s] / e.torque_constant_nm_a * t + e.voltage_constant_v_s_rad * w.pace * v;
+    if (std::fabs(t) > torque_limit || std::fabs(volts) > problem_->limits.voltage_v) return true;
+  }
+  return false;
+}
+
+// Prepares the closed form where power is quadratic.
+void RunPlanner::find_line() {
+  const Electric& e = loads_->electric();
+  const WheelLoads& w = loads_here_;
+  if (!w[0].linear() || !w[1].linear() || e.brush_w_nm != 0) return;
+  motor_power_ = {motor_power(e, 0, w[0]), motor_power(e, 1, w[1])};
+  LineTask task;
+  task.power = motor_power_[0];
+  task.power += motor_power_[1];
+  for (double* c :
+       {&task.power.c1, &task.power.cx, &task.power.ca, &task.power.c2, &task.power.c3, &task.power.c0}) {
+    *c *= e.up;
+  }
+  task.power.c0 += e.idle_w;
+  task.distance = run_->length();
+  task.start_speed = start_, task.end_speed = end_;
+  line_ = task;
+  // Torque and voltage are linear in speed and acceleration: within the corners' values.
+  const Limits& l = problem_->limits;
+  const double top = std::sqrt(ceiling_at(0)), most = acceleration_limit();
+  motors_never_break_ = (!std::isfinite(l.current_a) && !std::isfinite(l.voltage_v)) ||
+                        (std::isfinite(most) && !motors_break(0, -most) && !motors_break(0, most) &&
+                         !motors_break(top, -most) && !motors_break(top, most));
+  shortest_s_ = std::max(start_, end_) <= top ? shortest_time_within(task, top, most)
+                                              : std::numeric_limits<double>::infinity();
+  if (std::fabs(start_ * start_ - end_ * end_) > 2 * most * task.distance)
+    shortest_s_ = std::numeric_limits<double>::infinity();
+}
+
 void RunPlanner::build(std::vector<double> nodes) {
   nodes_ = std::move(nodes);
   const std::size_t n = nodes_.size() - 1;
@@ -64,13 +113,12 @@ void RunPlanner::build(std::vector<double> nodes) {
   const Limits& l = problem_->limits;
   grid->start = start_ * start_;
   grid->end = end_ * end_;
-  grid->acceleration_limit =
-      run_->turn == 0 ? l.acceleration_m_s2 : l.acceleration_m_s2 / robot_->kinematics.half_track_m;
+  grid->acceleration_limit = acceleration_limit();
   grid->torque_limit_nm = l.current_a * loads_->electric().torque_constant_nm_a;
   grid->voltage_limit_v = l.voltage_v;
   grid->electric = loads_->electric();
   if (uniform_) {
-    grid->loads = {loads_->at(*run_, run_->at(0.5 * run_->length()), 0)};
+    grid->loads = {loads_here_};
   } else {
     grid->loads.reserve(n);
     for (std::size_t k = 0; k < n; ++k) {
@@ -280,70 +328,57 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
   planner.start_ = start_speed;
   planner.end_ = end_speed;
   planner.uniform_ = loads.uniform(run);
-  const std::size_t cells = std::max<std::size_t>(8, problem.intervals_per_run);
   if (!planner.uniform_ && run.knots.size() > most_cells) {
     return fail(Fault::too_large, "path", "a run has more than 200000 knots; give a coarser resolution_m");
   }
   if (planner.uniform_) {
-    planner.build(planner.first_nodes(cells / 2));
-  } else {
-    planner.fine_nodes_ = planner.first_nodes(2 * cells);
-    planner.build(thinned(planner.fine_nodes_));
+    planner.loads_here_ = loads.at(run, run.at(0.5 * run.length()), 0);
+    planner.find_line();
+    // Without motors to mind, the closed form knows what is feasible; the grid waits until it is needed.
+    if (planner.line_ && planner.motors_never_break_ && std::isfinite(planner.shortest_s_)) return planner;
   }
-  if (auto ok = planner.check_feasible(); !ok) return tl::unexpected(std::move(ok.error()));
+  if (auto ok = planner.build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
   return planner;
 }
 
-std::optional<RunAnswer> RunPlanner::closed_form(double price_w) const {
-  if (!uniform_) return {};
-  const Electric& e = loads_->electric();
-  const WheelLoads& w = grid_->loads[0];
-  if (!w[0].linear() || !w[1].linear() || e.brush_w_nm != 0) return {};
-  const std::array<dynamics::QuadraticPower, 2> motor{motor_power(e, 0, w[0]), motor_power(e, 1, w[1])};
-  LineTask task;
-  task.power = motor[0];
-  task.power += motor[1];
-  for (double* c :
-       {&task.power.c1, &task.power.cx, &task.power.ca, &task.power.c2, &task.power.c3, &task.power.c0}) {
-    *c *= e.up;
+Result<void> RunPlanner::build_grid() {
+  const std::size_t cells = std::max<std::size_t>(8, problem_->intervals_per_run);
+  if (uniform_) {
+    build(first_nodes(cells / 2));
+  } else {
+    fine_nodes_ = first_nodes(2 * cells);
+    build(thinned(fine_nodes_));
   }
-  task.power.c0 += e.idle_w;
-  task.distance = run_->length();
-  task.start_speed = start_, task.end_speed = end_;
+  return check_feasible();
+}
+
+std::optional<RunAnswer> RunPlanner::closed_form(double price_w) const {
+  if (!line_) return {};
+  const Electric& e = loads_->electric();
+  LineTask task = *line_;
   task.value_of_time_w = price_w;
-  const auto line = line_in_free_time(task);
+  const double ceiling = std::sqrt(ceiling_at(0));
+  const auto line = line_within(task, ceiling, acceleration_limit());
   if (!line) return {};
-  if (line->lowest_speed() < 0 || line->peak_speed() > std::sqrt(grid_->ceiling[0])) return {};
-  if (line->peak_acceleration() > grid_->acceleration_limit) return {};
-  const bool lossy = e.up != e.down;
-  const bool motors = std::isfinite(grid_->torque_limit_nm) || std::isfinite(grid_->voltage_limit_v);
-  // Torque and voltage are linear, power quadratic in speed and acceleration: the corners of the box that the
-  // profile stays in decide quickly, its samples where they do not.
   const double top = line->peak_speed(), most = line->peak_acceleration();
-  const auto breaks = [&](double v, double q) {
-    for (std::size_t s : {0u, 1u}) {
-      const double t = w[s].inertia * q + w[s].t0 + w[s].f0 + w[s].f1 * v;
-      const double volts =
-          e.resistance_ohm[s] / e.torque_constant_nm_a * t + e.voltage_constant_v_s_rad * w[s].pace * v;
-      if (std::fabs(t) > grid_->torque_limit_nm || std::fabs(volts) > grid_->voltage_limit_v) return true;
-    }
-    return false;
-  };
-  const bool sure =
-      motors && !breaks(0, -most) && !breaks(0, most) && !breaks(top, -most) && !breaks(top, most);
-  if (lossy || (motors && !sure)) {
-    constexpr int samples = 128;
-    for (int k = 0; k <= samples; ++k) {
-      const double t = line->duration_s() * k / samples, v = line->speed(t), q = line->acceleration(t);
-      if (motors && !sure && breaks(v, q)) return {};
-      if (lossy && (motor[0].power_w(v, q) < 0 || motor[1].power_w(v, q) < 0)) return {};
+  const bool lossy = e.up != e.down;
+  // The corners of the box that the profile stays in decide quickly, its samples where they do not.
+  const bool sure = motors_never_break_ || (!motors_break(0, -most) && !motors_break(0, most) &&
+                                            !motors_break(top, -most) && !motors_break(top, most));
+  if (lossy || !sure) {
+    for (const double t : line->times(128)) {
+      const double v = line->speed(t), q = line->acceleration(t);
+      if (!sure && motors_break(v, q)) return {};
+      if (lossy && (motor_power_[0].power_w(v, q) < 0 || motor_power_[1].power_w(v, q) < 0)) return {};
     }
   }
   RunAnswer answer;
-  answer.line = *line;
   answer.energy_j = line->energy_j();
   answer.duration_s = line->duration_s();
-  answer.residual = std::fabs(line->transversality_w()) / task.power.c0;
+  answer.residual = line->residual_w() / (task.power.c0 + price_w);
+  answer.binding[static_cast<std::size_t>(Bound::acceleration)] = line->holds_acceleration();
+  if (top >= ceiling * (1 - 1e-9)) answer.binding[static_cast<std::size_t>(ceiling_bound(0))] = true;
+  answer.line = *line;
   return answer;
 }
 
@@ -380,6 +415,9 @@ bool RunPlanner::tighten(const std::vector<double>& z) {
 Result<RunAnswer> RunPlanner::solve(double price_w) {
   if (auto answer = closed_form(price_w)) return std::move(*answer);
   const double idle = loads_->electric().idle_w;
+  if (!grid_) {
+    if (auto ok = build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
+  }
   if (!solver_) solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
   SpeedSolution s;
   int iterations = 0;

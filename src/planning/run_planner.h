@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "planning/line.h"
+#include "planning/limited_line.h"
 #include "planning/load.h"
 #include "planning/path.h"
 #include "planning/problem.h"
@@ -15,9 +15,9 @@ namespace joulecast::planning {
 
 // The optimum of one run at one price of time.
 struct RunAnswer {
-  std::optional<LineProfile> line;  // closed form, over the run's coordinate
-  std::vector<double> z;            // else squared speeds at `nodes`
-  double energy_j = 0;              // on the solver's own quadrature, idle power included
+  std::optional<LineMotion> line;  // closed form, over the run's coordinate
+  std::vector<double> z;           // else squared speeds at `nodes`
+  double energy_j = 0;             // on the solver's own quadrature, idle power included
   double duration_s = 0;
   double gap_j = 0, discretisation_j = 0, residual = 0;
   bool convex = true;
@@ -36,8 +36,8 @@ class RunPlanner {
 
   const Run& run() const { return *run_; }
   const std::vector<double>& nodes() const { return nodes_; }
-  double shortest_s() const { return envelope_->shortest_s; }
-  const SpeedEnvelope& envelope() const { return *envelope_; }
+  // Of the grid once there is one, which may lengthen it by its coarseness.
+  double shortest_s() const { return envelope_ ? envelope_->shortest_s : shortest_s_; }
   double curvature_slope(double way) const;
 
  private:
@@ -46,6 +46,10 @@ class RunPlanner {
 
   double ceiling_at(double way) const;
   Bound ceiling_bound(double way) const;
+  double acceleration_limit() const;
+  void find_line();
+  bool motors_break(double speed, double acceleration) const;
+  Result<void> build_grid();
   void build(std::vector<double> nodes);
   Result<void> check_feasible() const;
   std::optional<RunAnswer> closed_form(double price_w) const;
@@ -62,6 +66,11 @@ class RunPlanner {
   const Problem* problem_;
   double start_ = 0, end_ = 0;
   bool uniform_ = false, refined_ = false;
+  std::optional<LineTask> line_;  // where power is quadratic: what the closed form solves
+  std::array<dynamics::QuadraticPower, 2> motor_power_{};
+  WheelLoads loads_here_{};          // of a uniform run
+  bool motors_never_break_ = false;  // at any speed and acceleration within the other limits
+  double shortest_s_ = 0;
   double discretisation_j_ = 0;
   std::vector<double> nodes_;
   std::vector<double> fine_nodes_;   // of a run whose loads vary along the way, until the first solve

@@ -30,6 +30,18 @@ def main():
         check(here.strip() == there.strip(), f"{question}: from the file\n{here}\nby the daemon\n{there}")
         table = programs.run(*question, "--robot", robot)
         check("amr (model version 1)" in table, f"{question} prints\n{table}")
+    with open(programs.path("errands.json"), "w") as file:
+        json.dump({"robots": [{"robot_id": "amr", "pose": {"x_m": 1, "y_m": 2, "heading_rad": 3}}],
+                   "tasks": [{"task_id": "near", "payload_kg": 10, "pickup": {"x_m": 3, "y_m": 4}, "dropoff": {"x_m": 9, "y_m": 4}},
+                             {"task_id": "heavy", "payload_kg": 1000, "empty": {"distance_m": 3}, "loaded": {"distance_m": 3}}]}, file)
+    matrix = ["matrix", programs.path("errands.json")]
+    here = programs.run(*matrix, "--robot", robot, "--json")
+    check(here.strip() == programs.run(*matrix, "--server", programs.url, "--json").strip(), f"{matrix}: {here}")
+    row = json.loads(here)["rows"][0]
+    check(row["energy_j"][0] > 0 and row["energy_j"][1] is None and row["infeasible"][0]["tasks"] == [1], row)
+    table = programs.run(*matrix, "--robot", robot)
+    check("near" in table and "none can do it" in table, f"{matrix} prints\n{table}")
+
     page = json.loads(programs.run("missions", "--server", programs.url, "--robot-id", "amr", "--json"))
     check(page == {"missions": [], "next_cursor": None}, f"a fresh daemon knows missions: {page}")
 

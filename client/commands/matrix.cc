@@ -1,0 +1,150 @@
+#include "server/api/matrix.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/commands/table.h"
+#include "client/files.h"
+#include "client/http_client.h"
+#include "robot/robot_file.h"
+
+namespace joulecast::client {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::int64_t file_version = 1;
+constexpr std::size_t most_columns = 8;  // of the printed table
+
+struct Options {
+  std::string request_file;
+  std::vector<std::string> robot_files;
+  std::string server;
+  double timeout_s = 60;
+  bool json = false;
+};
+
+Result<std::string> ask_server(const Options& options, std::string request) {
+  const auto server = parse_server_url(options.server);
+  if (!server) return tl::unexpected(server.error());
+  const auto timeout = std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * options.timeout_s));
+  auto reply = http_request(*server, HttpMethod::post, "/v1/energy-matrix", std::move(request), timeout);
+  if (!reply) return tl::unexpected(reply.error());
+  if (!reply->ok()) return tl::unexpected(error_of(*reply));
+  return std::move(reply->body);
+}
+
+Result<std::string> answer_here(const Options& options, const std::string& text) {
+  const json request = json::parse(text, nullptr, false);
+  if (!request.is_object()) return invalid(options.request_file, "is not a JSON object");
+  std::map<std::string, std::shared_ptr<const server::ModelInForce>> models;
+  for (const std::string& file : options.robot_files) {
+    auto robot = robot::load_robot(file);
+    if (!robot) return tl::unexpected(robot.error());
+    auto drive = dynamics::drive_model(*robot);
+    if (!drive) return tl::unexpected(drive.error());
+    std::string id = robot->robot_id;
+    models[std::move(id)] = std::make_shared<const server::ModelInForce>(
+        server::ModelInForce{std::move(*robot), std::move(*drive), file_version});
+  }
+  api::MatrixFleet fleet;
+  fleet.model = [&](const std::string& id) -> Result<std::shared_ptr<const server::ModelInForce>> {
+    if (const auto found = models.find(id); found != models.end()) return found->second;
+    return fail(Fault::not_found, "robot_id", "no --robot file describes " + id);
+  };
+  fleet.pose = [](const std::string&) { return std::nullopt; };
+  auto answer = api::MatrixAnswer::make(request, fleet, std::make_shared<planning::CostTableCache>());
+  if (!answer) return tl::unexpected(std::move(answer.error()));
+  std::string out;
+  while ((*answer)->next(out, {})) {
+  }
+  return out;
+}
+
+void print(const json& answer) {
+  const json& tasks = answer["tasks"];
+  const json& rows = answer["rows"];
+  const std::size_t columns = std::min(tasks.size(), most_columns);
+  fmt::print("{:<20}", "energy J (time s)");
+  for (std::size_t t = 0; t < columns; ++t) fmt::print(" {:>20}", tasks[t].get<std::string>());
+  std::puts("");
+  for (const json& row : rows) {
+    fmt::print("{:<20}", row["robot_id"].get<std::string>());
+    for (std::size_t t = 0; t < columns; ++t) {
+      const json& energy = row["energy_j"][t];
+      fmt::print(" {:>20}", energy.is_number() ? fmt::format("{:.1f} ({:.1f})", energy.get<double>(),
+                                                             row["duration_s"][t].get<double>())
+                                               : std::string("-"));
+    }
+    std::puts("");
+    for (const json& why : row["infeasible"])
+      fmt::print("  {} of {} tasks: {}\n", why["tasks"].size(), tasks.size(),
+                 why["detail"].get<std::string>());
+  }
+  if (tasks.size() > columns)
+    fmt::print("... and {} tasks more: --json has them all\n", tasks.size() - columns);
+  std::puts("cheapest robot for each task:");
+  for (std::size_t t = 0; t < std::min<std::size_t>(tasks.size(), 50); ++t) {
+    const json* best = nullptr;
+    for (const json& row : rows) {
+      const json& energy = row["energy_j"][t];
+      if (energy.is_number() && (best == nullptr || energy < (*best)["energy_j"][t])) best = &row;
+    }
+    fmt::print("  {:<20} {}\n", tasks[t].get<std::string>(),
+               best == nullptr ? std::string("none can do it")
+                               : fmt::format("{} {:.1f} J", (*best)["robot_id"].get<std::string>(),
+                                             (*best)["energy_j"][t].get<double>()));
+  }
+}
+
+Exit run(const Options& options) {
+  const auto request = read_file(options.request_file);
+  if (!request) return report(request.error());
+  const auto text = options.server.empty() ? answer_here(options, *request) : ask_server(options, *request);
+  if (!text) return report(text.error());
+  if (options.json) {
+    std::puts(text->c_str());
+    return Exit::ok;
+  }
+  const json document = json::parse(*text, nullptr, false);
+  if (!document.is_object() || !document.contains("rows") || !document.contains("tasks"))
+    return report({Fault::corrupt, options.server, "did not answer with an energy matrix"});
+  print(document);
+  return Exit::ok;
+}
+
+}  // namespace
+
+void add_matrix(CLI::App& program, Exit& exit) {
+  auto options = std::make_shared<Options>();
+  auto* command = program.add_subcommand("matrix", "Price every robot on every task");
+  command
+      ->add_option("request", options->request_file,
+                   "request as JSON (schemas/energy-matrix-request.schema.json), - for standard input")
+      ->required();
+  auto* files = command->add_option("--robot", options->robot_files,
+                                    "robot file, once a robot: answer here, without a server");
+  auto* server = command->add_option("--server", options->server, "joulecastd to ask, http://host:port");
+  server->excludes(files);
+  command->add_option("--timeout", options->timeout_s, "seconds to wait for the server")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "print the answer as the server sends it");
+  command->callback([options, &exit] {
+    if (options->robot_files.empty() && options->server.empty())
+      throw CLI::RequiredError("--robot or --server");
+    exit = run(*options);
+  });
+}
+
+}  // namespace joulecast::client

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "planning/cost_table.h"
+#include "planning/path.h"
+
+namespace joulecast::planning {
+
+// A way between two stops as a router knows it: straight stretches and turns in place, each from rest to
+// rest.
+struct Leg {
+  std::vector<double> distances_m;
+  std::vector<double> turns_rad;
+};
+
+// Where something is fetched or brought; the robot turns to `heading_rad` when there is one.
+struct Station {
+  double x_m = 0, y_m = 0;
+  std::optional<double> heading_rad;
+};
+
+struct MatrixRobot {
+  std::shared_ptr<const CostTable> table;
+  double payload_limit_kg = 0;
+  std::optional<Pose> pose;  // where it stands; needed by tasks whose empty leg is not given
+};
+
+// Fetch at the pick-up, bring to the drop-off. A leg that is given goes before the stations.
+struct MatrixTask {
+  double payload_kg = 0;
+  std::optional<Station> pickup, dropoff;
+  std::vector<Leg> empty;  // none, one for all robots, or one a robot
+  std::optional<Leg> loaded;
+  double pickup_dwell_s = 0, dropoff_dwell_s = 0;
+};
+
+enum class Obstacle : unsigned char {
+  none,
+  payload,  // heavier than the robot may carry
+  limits    // no motion within the robot's limits with this payload
+};
+std::string_view name_of(Obstacle obstacle);
+
+// One robot doing one task. NaN where an obstacle stands.
+struct Cell {
+  double energy_j = std::numeric_limits<double>::quiet_NaN();
+  double duration_s = std::numeric_limits<double>::quiet_NaN();
+  Obstacle obstacle = Obstacle::none;
+};
+
+// Robots x tasks. Rows may be asked for from several threads at once.
+class CostMatrix {
+ public:
+  // Each task has stations or legs for both ways, each robot a pose where a task needs one: the caller has
+  // checked.
+  CostMatrix(std::vector<MatrixRobot> robots, std::vector<MatrixTask> tasks);
+
+  std::size_t robots() const { return robots_.size(); }
+  std::size_t tasks() const { return tasks_.size(); }
+  const MatrixRobot& robot(std::size_t row) const { return robots_[row]; }
+
+  // The robot's cells, one a task.
+  void row(std::size_t robot, std::vector<Cell>& cells) const;
+
+ private:
+  // Loaded legs depend on the robot's table only.
+  struct Loaded {
+    std::once_flag once;
+    std::vector<LegCost> legs;
+  };
+  const std::vector<LegCost>& loaded_legs(std::size_t table, const CostTable& costs) const;
+
+  std::vector<MatrixRobot> robots_;
+  std::vector<MatrixTask> tasks_;
+  std::vector<std::size_t> table_of_;  // robot -> place in loaded_
+  mutable std::vector<std::unique_ptr<Loaded>> loaded_;
+};
+
+}  // namespace joulecast::planning

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "planning/problem.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::planning {
+
+// What the best motion costs. NaN where none exists.
+struct LegCost {
+  double energy_j = 0;
+  double duration_s = 0;
+
+  LegCost& operator+=(const LegCost& b) {
+    energy_j += b.energy_j, duration_s += b.duration_s;
+    return *this;
+  }
+};
+
+// The way in which legs are driven; a table belongs to one robot model and one of these.
+struct CostOptions {
+  double value_of_time_w = 0;
+  std::optional<double> regeneration;  // as Problem's
+
+  friend bool operator==(const CostOptions&, const CostOptions&) = default;
+};
+
+inline constexpr double longest_leg_m = 1e4;
+inline constexpr double widest_turn_rad = 314.16;
+
+// Energy and duration of best motions from rest to rest in free time, over length and payload: solved at
+// nodes, interpolated by cubics in between, in the logarithm of the length and in the payload. For
+// schedulers, who ask for millions. Immutable, any thread.
+class CostTable {
+ public:
+  // Effects tied to places or headings of the floor are left out, since a leg here has no place; see
+  // neglected(). Limits are those of the robot file.
+  static Result<CostTable> make(const robot::RobotModel& robot, const CostOptions& options);
+
+  // 0 <= distance_m <= longest_leg_m, 0 <= payload_kg <= the robot's limit.
+  LegCost straight(double distance_m, double payload_kg) const;
+  // Turning in place by that angle, either way; |angle_rad| <= widest_turn_rad.
+  LegCost turn(double angle_rad, double payload_kg) const;
+
+  double idle_power_w() const { return idle_power_w_; }
+  // Largest departure from the planner's own energy or duration, as a fraction, at lengths and payloads
+  // midway between the nodes.
+  double interpolation_error() const { return interpolation_error_; }
+  const std::vector<std::string>& neglected() const { return neglected_; }
+  // Why the planner found no motion at some payload, when it found none.
+  const std::optional<Error>& obstacle() const { return obstacle_; }
+  std::size_t solves() const { return solves_; }  // planner calls that it took
+
+ private:
+  // One kind of motion over a grid of payloads and logarithms of length.
+  class Grid {
+   public:
+    using Solve = std::function<Result<LegCost>(double length, double payload_kg)>;
+    void build(const Solve& solve, double shortest, double longest, double payload_limit_kg,
+               CostTable& table);
+    LegCost at(double length, double payload_kg) const;
+
+   private:
+    struct Node {
+      double energy_per_length = 0, duration_per_length = 0;
+    };
+    void fill(const Solve& solve, std::size_t payloads, std::size_t lengths, CostTable& table);
+    double error_against(const Solve& solve, CostTable& table) const;
+    Node along(std::size_t payload, std::size_t first, const std::array<double, 4>& weight) const;
+
+    double shortest_ = 1, log_shortest_ = 0, per_log_ = 1, payload_limit_kg_ = 0;
+    std::size_t payloads_ = 1, lengths_ = 0;
+    std::vector<Node> nodes_;  // payload by payload
+  };
+
+  Grid straight_, turn_;
+  double idle_power_w_ = 0, interpolation_error_ = 0;
+  std::vector<std::string> neglected_;
+  std::optional<Error> obstacle_;
+  std::size_t solves_ = 0;
+};
+
+}  // namespace joulecast::planning

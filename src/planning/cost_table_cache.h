@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <mutex>
+
+#include "planning/cost_table.h"
+
+namespace joulecast::planning {
+
+// Cost tables in use lately, one for each different robot model and way of driving: robots that differ only
+// in name and battery share one. Any thread; a table is built outside the lock, by each who wants it first.
+class CostTableCache {
+ public:
+  explicit CostTableCache(std::size_t capacity = 4096) : capacity_(capacity) {}
+
+  Result<std::shared_ptr<const CostTable>> get(const robot::RobotModel& robot, const CostOptions& options);
+  std::size_t size() const;
+
+ private:
+  struct Entry {
+    robot::RobotModel robot;  // without name and battery, but for the voltage
+    CostOptions options;
+    std::shared_ptr<const CostTable> table;
+  };
+  std::shared_ptr<const CostTable> find(const robot::RobotModel& robot, const CostOptions& options);
+
+  const std::size_t capacity_;
+  mutable std::mutex mutex_;
+  std::list<std::pair<std::size_t, Entry>> entries_;  // hash and entry, the latest used first
+};
+
+}  // namespace joulecast::planning

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+namespace joulecast::planning {
+
+// A zero of `f` between `low` (f < 0) and `high` (f > 0): bisection hastened by inverse quadratic steps
+// (Chandrupatla 1997), until the bracket is within `relative` of the argument plus `absolute`.
+template <class F>
+double zero_between(F&& f, double low, double f_low, double high, double f_high, double relative = 1e-14,
+                    double absolute = 0) {
+  double a = high, fa = f_high, b = low, fb = f_low, c = a, fc = fa, t = 0.5;
+  for (int k = 0; k < 100; ++k) {
+    const double x = a + t * (b - a), fx = f(x);
+    if ((fx < 0) == (fa < 0)) {
+      c = a, fc = fa;
+    } else {
+      c = b, b = a, fc = fb, fb = fa;
+    }
+    a = x, fa = fx;
+    const double best = std::fabs(fa) < std::fabs(fb) ? a : b;
+    const double tolerance = relative * std::fabs(best) + absolute;
+    const double edge = tolerance / std::fabs(b - c);
+    if (edge > 0.5 || fa == 0) return best;
+    const double xi = (a - b) / (c - b), phi = (fa - fb) / (fc - fb);
+    const bool quadratic = phi * phi < xi && (1 - phi) * (1 - phi) < 1 - xi;
+    t = quadratic ? fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+                  : 0.5;
+    t = std::clamp(t, edge, 1 - edge);
+  }
+  return a;
+}
+
+}  // namespace joulecast::planning

@@ -1,0 +1,155 @@
+#include "server/api/matrix.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "planning/cost_matrix.h"
+#include "tests/support/sample_robots.h"
+
+namespace joulecast::api {
+namespace {
+
+using nlohmann::json;
+
+class Matrix : public ::testing::Test {
+ protected:
+  Matrix() {
+    add("a", 10.5);
+    add("b", 4);
+    fleet_.model = [this](const std::string& id) -> Result<std::shared_ptr<const server::ModelInForce>> {
+      if (const auto found = models_.find(id); found != models_.end()) return found->second;
+      return fail(Fault::not_found, "id", "no robot " + id);
+    };
+    fleet_.pose = [](const std::string& id) -> std::optional<planning::Pose> {
+      if (id == "a") return planning::Pose{0, 0, 0};
+      return std::nullopt;
+    };
+  }
+
+  void add(const std::string& id, double payload_limit_kg) {
+    robot::RobotModel robot = testing::nomad();
+    robot.robot_id = id;
+    robot.limits.payload_kg = payload_limit_kg;
+    auto drive = dynamics::drive_model(robot);
+    models_[id] = std::make_shared<const server::ModelInForce>(
+        server::ModelInForce{robot, std::move(*drive), static_cast<std::int64_t>(models_.size() + 1)});
+  }
+
+  Error error_of(const json& request) {
+    const auto answer = MatrixAnswer::make(request, fleet_, tables_);
+    EXPECT_FALSE(answer) << request;
+    return answer ? Error{} : answer.error();
+  }
+
+  std::map<std::string, std::shared_ptr<const server::ModelInForce>> models_;
+  MatrixFleet fleet_;
+  std::shared_ptr<planning::CostTableCache> tables_ = std::make_shared<planning::CostTableCache>();
+  const json stations_ = {{"task_id", "t1"},
+                          {"payload_kg", 5},
+                          {"pickup", {{"x_m", 3}, {"y_m", 0}}},
+                          {"dropoff", {{"x_m", 3}, {"y_m", 4}, {"heading_rad", 0}}}};
+  const json legs_ = {{"task_id", "t2"},
+                      {"empty", {{"distance_m", 4}}},
+                      {"loaded", {{"distances_m", {1, 2}}, {"turns_rad", {1.5}}}},
+                      {"pickup_dwell_s", 10}};
+};
+
+TEST_F(Matrix, AnswersARowForEachRobot) {
+  json request = {{"robots", json::array({"a"})}, {"tasks", {stations_, legs_}}};
+  for (int k = 0; k < 40; ++k)
+    request["robots"].push_back({{"robot_id", k % 2 ? "a" : "b"}, {"pose", {{"x_m", k}, {"y_m", 0}}}});
+  const auto answer = MatrixAnswer::make(request, fleet_, tables_);
+  ASSERT_TRUE(answer) << describe(answer.error());
+  std::string text;
+  int pieces = 1;
+  while ((*answer)->next(text, {})) ++pieces;
+  EXPECT_GT(pieces, 3);
+  const json all = json::parse(text);
+  EXPECT_EQ(all["tasks"], json({"t1", "t2"}));
+  ASSERT_EQ(all["rows"].size(), 41u);
+  EXPECT_EQ(tables_->size(), 2u);
+  for (std::size_t r = 0; r < 41; ++r) {
+    const json& row = all["rows"][r];
+    const bool strong = row["robot_id"] == "a";
+    EXPECT_EQ(row["robot_id"], r == 0 || r % 2 == 0 ? "a" : "b");
+    EXPECT_EQ(row["model_version"], strong ? 1 : 2);
+    EXPECT_LT(row["interpolation_error"].get<double>(), 2e-3);
+    EXPECT_EQ(row["energy_j"][0].is_null(), !strong);
+    EXPECT_EQ(row["duration_s"][0].is_null(), !strong);
+    EXPECT_TRUE(row["energy_j"][1].is_number());
+    if (strong) {
+      EXPECT_TRUE(row["infeasible"].empty());
+    } else {
+      EXPECT_EQ(row["infeasible"][0]["reason"], "payload");
+      EXPECT_EQ(row["infeasible"][0]["tasks"], json({0}));
+      EXPECT_NE(row["infeasible"][0]["detail"].get<std::string>().find("4 kg"), std::string::npos);
+    }
+    // Legs that are given do not depend on where the robot stands.
+    EXPECT_EQ(row["energy_j"][1], all["rows"][strong ? 0 : 1]["energy_j"][1]);
+  }
+  // Farther away costs more.
+  EXPECT_GT(all["rows"][40]["energy_j"][0].get<double>(), all["rows"][0]["energy_j"][0].get<double>());
+}
+
+TEST_F(Matrix, StopsWhenTheClientHasLeft) {
+  json request = {{"robots", json::array()}, {"tasks", {stations_}}};
+  for (int k = 0; k < 100; ++k) request["robots"].push_back("a");
+  const auto answer = MatrixAnswer::make(request, fleet_, tables_);
+  ASSERT_TRUE(answer);
+  std::stop_source client;
+  std::string text;
+  ASSERT_TRUE((*answer)->next(text, client.get_token()));
+  ASSERT_TRUE((*answer)->next(text, client.get_token()));
+  const std::string so_far = text;
+  client.request_stop();
+  EXPECT_FALSE((*answer)->next(text, client.get_token()));
+  EXPECT_EQ(text, so_far);
+}
+
+TEST_F(Matrix, NamesTheFieldAtFault) {
+  const json a = {"a"};
+  const auto with = [](json object, const char* name, json value) {
+    object[name] = std::move(value);
+    return object;
+  };
+  struct Case {
+    json request;
+    const char* field;
+    Fault fault = Fault::invalid;
+  };
+  json far = stations_;
+  far["dropoff"]["x_m"] = 50'000;
+  json leg = legs_;
+  leg["loaded"]["turns_rad"] = {1, "left"};
+  json rows = json::array();
+  for (int k = 0; k < 2000; ++k) rows.push_back("a");
+  json columns = json::array();
+  for (int k = 0; k < 2001; ++k) columns.push_back(legs_);
+  for (const Case& c : std::vector<Case>{
+           {json::array(), ""},
+           {{{"tasks", {legs_}}}, "/robots"},
+           {{{"robots", a}}, "/tasks"},
+           {{{"robots", json::array()}, {"tasks", {legs_}}}, "/robots"},
+           {{{"robots", {"a", "nobody"}}, {"tasks", {legs_}}}, "/robots/1", Fault::not_found},
+           {{{"robots", {"a", "b"}}, {"tasks", {stations_}}}, "/robots/1/pose"},
+           {{{"robots", a}, {"tasks", {legs_, with(legs_, "payload_kg", -1)}}}, "/tasks/1/payload_kg"},
+           {{{"robots", a}, {"tasks", {with(legs_, "colour", 1)}}}, "/tasks/0/colour"},
+           {{{"robots", a},
+             {"tasks", {with(legs_, "empty", json::array({{{"distance_m", 1}}, {{"distance_m", 2}}}))}}},
+            "/tasks/0/empty"},
+           {{{"robots", a}, {"tasks", {with(stations_, "pickup", nullptr)}}}, "/tasks/0/pickup"},
+           {{{"robots", a}, {"tasks", {with(stations_, "dropoff", nullptr)}}}, "/tasks/0/dropoff"},
+           {{{"robots", a}, {"tasks", {far}}}, "/tasks/0/dropoff"},
+           {{{"robots", a}, {"tasks", {leg}}}, "/tasks/0/loaded/turns_rad/1"},
+           {{{"robots", a}, {"tasks", {legs_}}, {"regeneration", 1.5}}, "/regeneration"},
+           {{{"robots", rows}, {"tasks", columns}}, "/tasks", Fault::too_large}}) {
+    const Error error = error_of(c.request);
+    EXPECT_EQ(error.field, c.field) << describe(error);
+    EXPECT_EQ(error.fault, c.fault) << describe(error);
+  }
+}
+
+}  // namespace
+}  // namespace joulecast::api
