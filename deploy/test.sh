@@ -22,8 +22,9 @@ isolated() {
 if $sanitize; then
   cmake --preset sanitize
   cmake --build --preset sanitize
-  isolated ctest --preset sanitize -j 2
+  isolated ctest --preset sanitize -j 2 -LE web
 fi
 cmake --preset release -DJOULECAST_WERROR=ON
 cmake --build --preset release
+cmake --build --preset release --target web_test_packages
 isolated ctest --preset release -j 2

@@ -1,4 +1,5 @@
-# Runs a test of the page on copies in the build folder, so that nothing is installed into the tree.
+# Runs a test of the page on copies in the build folder, so that nothing is installed into the tree. TEST=packages only
+# brings what the tests need from the npm registry, for tests that then run without a network.
 function(prepare folder)
   set(place ${BINARY}/${folder})
   file(COPY ${SOURCE}/${folder}/ DESTINATION ${place} PATTERN node_modules EXCLUDE)
@@ -19,7 +20,11 @@ function(prepare folder)
   endif()
 endfunction()
 
-if(TEST STREQUAL bundle)
+if(TEST STREQUAL packages)
+  prepare(server/web)
+  prepare(tests/web)
+  return()
+elseif(TEST STREQUAL bundle)
   prepare(server/web)
   set(command ${NODE} build.mjs --check)
   set(folder ${BINARY}/server/web)
