@@ -1,4 +1,5 @@
 #include "server/settings.h"
+#include "telemetry/lcm_link.h"
 
 namespace joulecast {
 namespace {
@@ -10,8 +11,10 @@ constexpr double megabyte = 1024.0 * 1024.0;
 
 // key, type, default, minimum, maximum, unit, help
 constexpr Setting table[] = {
-    {"lcm.url", Type::text, "udpm://239.255.76.67:7667?ttl=0", 0, 0, "",
-     "LCM provider; ttl=0 keeps the unauthenticated messages on this machine"},
+    {"lcm.url", Type::text, telemetry::default_lcm_url, 0, 0, "",
+     "LCM provider; ttl=0 keeps the unauthenticated messages on this machine, recv_buf_size asks the kernel "
+     "for a "
+     "receive buffer of so many bytes, at most net.core.rmem_max"},
 
     {"http.address", Type::text, "127.0.0.1", 0, 0, "", "IP address to listen on"},
     {"http.port", Type::integer, "8080", 0, 65535, "", "port to listen on; 0 lets the system choose"},

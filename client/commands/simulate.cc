@@ -13,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "base/host_clock.h"
 #include "client/commands/table.h"
 #include "client/http_client.h"
 #include "client/interrupt.h"
@@ -33,7 +34,7 @@ constexpr std::int64_t batch_start_us = 1'700'000'000'000'000;  // logs made wit
 struct Options {
   std::size_t robots = 4;
   std::uint64_t seed = 1;
-  std::string lcm_url = "udpm://239.255.76.67:7667?ttl=0";
+  std::string lcm_url{telemetry::default_lcm_url};
   double rate_hz = 50;
   double speed = 1;
   double duration_s = 0;
@@ -244,10 +245,7 @@ Exit run(const Options& options, bool lcm_asked) {
     if (auto known = introduce(*members, options.server); !known) return report(known.error());
   }
 
-  const std::int64_t start_us = over_lcm ? std::chrono::duration_cast<std::chrono::microseconds>(
-                                               std::chrono::system_clock::now().time_since_epoch())
-                                               .count()
-                                         : batch_start_us;
+  const std::int64_t start_us = over_lcm ? host_utime_us() : batch_start_us;
   std::vector<vr::SimulationSpec> specs;
   for (auto& member : *members) {
     member.spec.start_utime_us = start_us;

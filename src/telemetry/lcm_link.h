@@ -12,6 +12,12 @@
 
 namespace joulecast::telemetry {
 
+// The group and port that LCM programs share unless told; ttl=0 keeps messages on this machine. The kernel's
+// usual receive buffer holds some 30 ms of 6,000 messages a second, less than a busy machine may keep the
+// receiver waiting, and drops the rest unseen; 4 MiB hold more than a second of them, where net.core.rmem_max
+// allows so much.
+inline constexpr std::string_view default_lcm_url = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
+
 struct Received {
   std::string_view channel;
   std::span<const std::uint8_t> data;
