@@ -25,7 +25,7 @@ std::array<double, 2> fitted_acceleration(std::span<const SpeedSample> window, s
     }
   }
   const double count = static_cast<double>(n);
-  const bool two_sided = at > 0 && at + 1 < n && n >= 4;
+  const bool two_sided = at > 0 && at + 1 < n;
   std::array<double, 2> slope{};
   if (!two_sided) {
     const double spread = count * s2 - s1 * s1;

@@ -107,6 +107,7 @@ Meter::~Meter() = default;
 void Meter::interrupt() {
   waiting_.clear();
   next_ = 0;
+  usual_interval_s_ = 0;
   last_.reset();
 }
 
@@ -117,18 +118,33 @@ void Meter::begin() {
   gap_seconds_ = 0;
 }
 
+bool Meter::window_complete(std::size_t index) const {
+  const std::size_t later = waiting_.size() - 1 - index;
+  if (later == 0) return false;
+  const double usual = std::max(1.0, std::round(settings_.half_window_s / usual_interval_s_));
+  return static_cast<double>(later) >= usual ||
+         static_cast<double>(waiting_.back().utime_us - waiting_[index].utime_us) * microseconds > reach_s();
+}
+
 Result<void> Meter::add(const telemetry::Sample& sample) {
+  if (!waiting_.empty()) {
+    const double interval_s = static_cast<double>(sample.utime_us - waiting_.back().utime_us) * microseconds;
+    // A missing sample or a silence is not the robot's rate.
+    if (usual_interval_s_ == 0) {
+      usual_interval_s_ = std::min(interval_s, settings_.gap_bridge_s);
+    } else {
+      usual_interval_s_ += (std::min(interval_s, 2 * usual_interval_s_) - usual_interval_s_) / 16;
+    }
+  }
   waiting_.push_back(sample);
-  const double latest = static_cast<double>(sample.utime_us);
   Result<void> outcome;
-  while (next_ < waiting_.size() &&
-         latest - static_cast<double>(waiting_[next_].utime_us) >= settings_.half_window_s / microseconds) {
+  while (next_ < waiting_.size() && window_complete(next_)) {
     if (Result<void> settled = settle(next_++); !settled) outcome = settled;
   }
-  // History older than the window of the next sample to settle is done with.
-  const auto keep_from = static_cast<double>(waiting_[std::min(next_, waiting_.size() - 1)].utime_us) -
-                         settings_.half_window_s / microseconds;
-  while (next_ > 0 && static_cast<double>(waiting_.front().utime_us) < keep_from) {
+  // Done with: history older than the window of the next sample to settle, but for the neighbour before it.
+  const auto keep_from =
+      static_cast<double>(waiting_[std::min(next_, waiting_.size() - 1)].utime_us) - reach_s() / microseconds;
+  while (next_ > 1 && static_cast<double>(waiting_.front().utime_us) < keep_from) {
     waiting_.pop_front();
     --next_;
   }
@@ -145,17 +161,18 @@ Result<void> Meter::flush() {
 
 Result<void> Meter::settle(std::size_t index) {
   const telemetry::Sample& sample = waiting_[index];
-  const double half_us = settings_.half_window_s / microseconds * (1 + 1e-9);
-  const double bridge_us = settings_.gap_bridge_s / microseconds;
-  const auto time_of = [&](std::size_t k) { return static_cast<double>(waiting_[k].utime_us); };
+  const double reach_us = reach_s() / microseconds, bridge_us = settings_.gap_bridge_s / microseconds;
+  const auto span_us = [&](std::size_t from, std::size_t to) {
+    return static_cast<double>(waiting_[to].utime_us - waiting_[from].utime_us);
+  };
 
-  // The filter's window: samples within reach, not across a gap.
+  // The filter's window: samples within reach and the neighbours, not across a gap.
   std::size_t first = index, last = index;
-  while (first > 0 && time_of(index) - time_of(first - 1) <= half_us &&
-         time_of(first) - time_of(first - 1) <= bridge_us)
+  while (first > 0 && (first == index || span_us(first - 1, index) <= reach_us) &&
+         span_us(first - 1, first) <= bridge_us)
     --first;
-  while (last + 1 < waiting_.size() && time_of(last + 1) - time_of(index) <= half_us &&
-         time_of(last + 1) - time_of(last) <= bridge_us)
+  while (last + 1 < waiting_.size() && (last == index || span_us(index, last + 1) <= reach_us) &&
+         span_us(last, last + 1) <= bridge_us)
     ++last;
   window_.clear();
   for (std::size_t k = first; k <= last; ++k) {

@@ -19,7 +19,7 @@ struct MeterSettings {
   // CVODE's local error a sample interval, as a fraction of the energy (power scale times interval) at stake
   // in it. The power scale is the larger of the idle power and the absolute battery power at either end.
   double tolerance = 1e-4;
-  double half_window_s = default_half_window_s;  // of the acceleration filter, and so the meter's latency
+  double half_window_s = default_half_window_s;  // of the acceleration filter
   double gap_bridge_s = 1.0;                     // longer silences are not integrated
   double winding_reference_c = 25;
 };
@@ -49,8 +49,8 @@ struct MeterPoint {
 // Not thread-safe; deterministic: the same samples give the same bits.
 class Meter {
  public:
-  // `emit` receives every point in time order, `half_window_s` late. State of charge starts at
-  // `state_of_charge` (NaN = unknown, and stays so).
+  // `emit` receives every point in time order, late by what the acceleration filter looks ahead:
+  // half_window_s, or one sample interval where that is longer. State of charge is unknown until set.
   Meter(dynamics::DriveModel model, double capacity_ah, MeterSettings settings,
         std::function<void(const MeterPoint&)> emit);
   ~Meter();
@@ -87,6 +87,11 @@ class Meter {
   class Segment;
   struct Node;
 
+  // How far the filter's window reaches to each side: half_window_s and half a usual interval, so that a
+  // shaking clock does not push samples out of it.
+  double reach_s() const { return settings_.half_window_s + 0.5 * usual_interval_s_; }
+  // Everything that the window of waiting_[index] may hold has come.
+  bool window_complete(std::size_t index) const;
   Result<void> settle(std::size_t index);
 
   dynamics::DriveModel model_;
@@ -98,6 +103,7 @@ class Meter {
   std::unique_ptr<Node> last_;
   std::unique_ptr<Segment> segment_;
   std::vector<SpeedSample> window_;
+  double usual_interval_s_ = 0;  // running mean of the sample intervals
   Accounts accounts_;
   std::array<double, 2> copper_heat_w_{};
   double state_of_charge_ = telemetry::unmeasured;

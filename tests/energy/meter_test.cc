@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <random>
 #include <vector>
@@ -100,6 +101,62 @@ TEST(Meter, LedgerClosesAndExplainsWhatTheModelKnows) {
   EXPECT_NEAR(a.ledger[Term::accessories], 14 * a.duration_s, 1e-9 * a.battery_j);
   EXPECT_GT(a.ledger[Term::braking], 0);
   EXPECT_EQ(a.ledger[Term::braking], a.ledger[Term::recovered]);  // the nominal model returns all of it
+}
+
+// The bias and the latency that acceleration_filter.h states, of a robot whose clock shakes by a tenth of its
+// interval.
+TEST(Meter, SeesAccelerationAtEveryRateAsStated) {
+  struct Rate {
+    double hz;
+    int n;
+  };
+  const robot::RobotModel robot = testing::nomad();
+  for (const auto [hz, n] : {Rate{10, 1}, Rate{25, 3}, Rate{50, 5}, Rate{200, 20}}) {
+    for (const double frequency : {0.5, 1.0, 2.0}) {
+      const double omega = 2 * std::numbers::pi * frequency, x = omega / hz;
+      std::mt19937 random(11);
+      std::uniform_real_distribution<double> shake(-0.1, 0.1);
+      double product = 0, square = 0, latest_s = 0, latency_s = 0;
+      Meter meter(*dynamics::drive_model(robot), robot.battery.capacity_ah, {}, [&](const MeterPoint& point) {
+        if (point.t_s < 1 || point.t_s > 39) return;  // whole windows only
+        const double truth = 2 * omega * std::cos(omega * 1e-6 * static_cast<double>(point.sample.utime_us));
+        product += point.wheel_acceleration_rad_s2[0] * truth;
+        square += truth * truth;
+        latency_s = std::max(latency_s, latest_s - 1e-6 * static_cast<double>(point.sample.utime_us));
+      });
+      for (int k = 1; k <= static_cast<int>(40 * hz); ++k) {
+        Sample s;
+        s.utime_us = std::llround(1e6 * (k + shake(random)) / hz);
+        s.sequence = k;
+        latest_s = 1e-6 * static_cast<double>(s.utime_us);
+        s.wheel_velocity_rad_s = {2 * std::sin(omega * latest_s), 0};
+        ASSERT_TRUE(meter.add(s));
+      }
+      double stated = 0;
+      for (int k = 1; k <= n; ++k) stated += 3 * k * std::sin(k * x) / (x * n * (n + 1) * (n + 0.5));
+      // Shaken spacings change the bias by their variance, (0.1^2 / 3) (h / window)^2 of it at most.
+      EXPECT_NEAR(product / square, stated, 0.02 * (1 - stated)) << hz << " Hz, " << frequency << " Hz";
+      EXPECT_LE(latency_s, (n + 0.2) / hz + 1e-6) << hz;
+    }
+  }
+}
+
+TEST(Meter, SeesAccelerationRoundMissingSamples) {
+  const robot::RobotModel robot = testing::nomad();
+  double worst = 0;
+  Meter meter(*dynamics::drive_model(robot), robot.battery.capacity_ah, {}, [&](const MeterPoint& point) {
+    worst = std::max(worst, std::fabs(point.wheel_acceleration_rad_s2[0] - 2));
+  });
+  for (int k = 0; k < 300; ++k) {
+    if (k % 7 == 3 || (k > 100 && k < 106)) continue;
+    Sample s;
+    s.utime_us = 100'000 * k;
+    s.sequence = k;
+    s.wheel_velocity_rad_s = {0.2 * k, 0};
+    ASSERT_TRUE(meter.add(s));
+  }
+  ASSERT_TRUE(meter.flush());
+  EXPECT_LT(worst, 1e-9);  // exact on straight lines however the samples lie
 }
 
 TEST(Meter, IsDeterministicToTheBit) {
