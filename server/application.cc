@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/host_clock.h"
 #include "history/sqlite_store.h"
 #include "history/writer.h"
 #include "server/api/services.h"
@@ -22,9 +23,9 @@
 #include "server/http/operations.h"
 #include "server/http/static_files.h"
 #include "server/ingest/ingest_service.h"
+#include "server/ingest/model_loading.h"
 #include "server/logging.h"
 #include "server/metrics.h"
-#include "server/model_loading.h"
 
 namespace joulecast {
 namespace {
@@ -32,12 +33,6 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr double seconds_per_day = 86400;
-
-std::int64_t host_utime_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 milliseconds seconds(double s) {
   return milliseconds(static_cast<std::int64_t>(s * 1000));

@@ -4,9 +4,10 @@
 #include <spdlog/spdlog.h>
 
 #include <atomic>
-#include <chrono>
 #include <ctime>
 #include <memory>
+
+#include "base/host_clock.h"
 
 namespace joulecast {
 namespace {
@@ -119,9 +120,7 @@ bool log_enabled(LogLevel level) {
 
 void log(LogLevel level, std::string_view message, const LogFields& fields) {
   if (!log_enabled(level)) return;
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  const auto utime_us = std::chrono::duration_cast<std::chrono::microseconds>(now).count();
-  const std::string line = format_log_line(chosen_format, level, message, fields, utime_us);
+  const std::string line = format_log_line(chosen_format, level, message, fields, host_utime_us());
   logger().log(level_of(level), spdlog::string_view_t(line.data(), line.size()));
 }
 

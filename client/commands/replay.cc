@@ -20,18 +20,12 @@ using Clock = std::chrono::steady_clock;
 
 struct Options {
   std::vector<std::string> logs;
-  std::string lcm_url = "udpm://239.255.76.67:7667?ttl=0";
+  std::string lcm_url{telemetry::default_lcm_url};
   double speed = 1;
   double max_rate_hz = 15'000;
   std::string into;
   std::vector<std::string> robots;
   bool json = false;
-};
-
-struct Tally {
-  std::uint64_t messages = 0;
-  std::uint64_t damaged_places = 0;
-  std::uint64_t skipped_bytes = 0;
 };
 
 // When each message may go: by the log's own clock, and never faster than the ceiling. LCM has no flow
@@ -72,39 +66,23 @@ class Pacer {
   Clock::time_point earliest_;
 };
 
+// Publishes the log; false when interrupted.
 Result<bool> replay_log(const std::string& path, telemetry::LcmLink& link, Pacer& pacer,
-                        InterruptGuard& interrupt, Tally& tally) {
-  auto reader = telemetry::EventLogReader::open(path);
-  if (!reader) return tl::unexpected<Error>(reader.error());
+                        InterruptGuard& interrupt, telemetry::LogTally& tally) {
   pacer.begin_log();
-  for (;;) {
-    const telemetry::LogRead read = reader->next();
-    switch (read.status) {
-      case telemetry::LogStatus::event: {
-        // Waits shorter than the scheduler's grain are left to add up.
-        const auto due = pacer.due(read.event.timestamp_us);
-        if (due > Clock::now() + std::chrono::microseconds(200) || tally.messages % 64 == 0) {
-          if (interrupt.wait_until(due)) return true;
-        }
-        if (auto sent = link.publish(std::string(read.event.channel), read.event.data); !sent) {
-          return tl::unexpected<Error>(sent.error());
-        }
-        ++tally.messages;
-        break;
-      }
-      case telemetry::LogStatus::end:
-        return false;
-      case telemetry::LogStatus::truncated:
-      case telemetry::LogStatus::corrupt:
-        ++tally.damaged_places;
-        std::fprintf(stderr, "joulecast: %s: at byte %llu: %s\n", path.c_str(),
-                     static_cast<unsigned long long>(read.offset), read.message.c_str());
-        tally.skipped_bytes += reader->resync();
-        break;
-      case telemetry::LogStatus::failed:
-        return fail(Fault::unavailable, path, read.message);
+  const auto publish = [&](const telemetry::LogEvent& event) -> Result<bool> {
+    // Waits shorter than the scheduler's grain are left to add up.
+    const auto due = pacer.due(event.timestamp_us);
+    if (due > Clock::now() + std::chrono::microseconds(200) || tally.events % 64 == 0) {
+      if (interrupt.wait_until(due)) return false;
     }
-  }
+    if (auto sent = link.publish(std::string(event.channel), event.data); !sent) {
+      return tl::unexpected(std::move(sent.error()));
+    }
+    return true;
+  };
+  return telemetry::read_events(path, publish, tally,
+                                [&](const telemetry::LogRead& place) { tell_damage(path, place); });
 }
 
 Exit run(const Options& options) {
@@ -113,16 +91,16 @@ Exit run(const Options& options) {
   auto link = telemetry::LcmLink::open(options.lcm_url);
   if (!link) return report(link.error());
   Pacer pacer(options.speed, options.max_rate_hz);
-  Tally tally;
+  telemetry::LogTally tally;
   const auto began = Clock::now();
   for (const auto& path : options.logs) {
-    const auto stopped = replay_log(path, *link, pacer, interrupt, tally);
-    if (!stopped) return report(stopped.error());
-    if (*stopped) break;
+    const auto finished = replay_log(path, *link, pacer, interrupt, tally);
+    if (!finished) return report(finished.error());
+    if (!*finished) break;
   }
   const double wall_s = std::chrono::duration<double>(Clock::now() - began).count();
   std::printf("replayed %llu messages in %.1f s; %llu damaged places, %llu bytes skipped\n",
-              static_cast<unsigned long long>(tally.messages), wall_s,
+              static_cast<unsigned long long>(tally.events), wall_s,
               static_cast<unsigned long long>(tally.damaged_places),
               static_cast<unsigned long long>(tally.skipped_bytes));
   return tally.damaged_places == 0 ? Exit::ok : Exit::fault;

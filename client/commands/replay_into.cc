@@ -8,10 +8,11 @@
 #include <set>
 #include <utility>
 
+#include "base/host_clock.h"
 #include "history/sqlite_store.h"
 #include "history/writer.h"
-#include "robot/robot_file.h"
 #include "server/api/mission_json.h"
+#include "server/ingest/model_loading.h"
 #include "server/ingest/pipeline.h"
 #include "telemetry/event_log.h"
 
@@ -20,72 +21,15 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-struct Tally {
-  std::uint64_t messages = 0;
-  std::uint64_t damaged_places = 0;
-  std::uint64_t skipped_bytes = 0;
-};
-
-std::int64_t now_utime_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
-// Puts the models in force: those of the history, and those of the files, which become versions of it.
-Result<void> load_models(const std::vector<std::string>& files, history::Store& store,
-                         history::Writer& writer, server::ModelRegistry& models) {
-  for (const std::string& file : files) {
-    Result<robot::RobotModel> robot = robot::load_robot(file);
-    if (!robot) return tl::unexpected(std::move(robot.error()));
-    history::AddModel command;
-    command.robot_id = robot->robot_id;
-    command.utime_us = now_utime_us();
-    command.note = file;
-    command.model_json = robot::to_json_text(*robot);
-    if (history::Outcome added = writer.execute(std::move(command)); !added)
-      return tl::unexpected(std::move(added.error()));
-  }
-  const auto robots = store.robots();
-  if (!robots) return tl::unexpected(robots.error());
-  for (const history::RobotRecord& record : *robots) {
-    if (!record.active_version) continue;
-    const auto version = store.model(record.robot_id);
-    if (!version) return tl::unexpected(version.error());
-    Result<robot::RobotModel> robot = robot::parse_robot(version->model_json);
-    if (!robot) return tl::unexpected(std::move(robot.error()));
-    if (Result<void> placed = models.put(std::move(*robot), version->version); !placed) return placed;
-  }
-  return {};
-}
-
-Result<void> read_log(const std::string& path, server::Pipeline& pipeline, server::IngestCounters& counters,
-                      Tally& tally) {
-  auto reader = telemetry::EventLogReader::open(path);
-  if (!reader) return tl::unexpected(std::move(reader.error()));
-  for (;;) {
-    const telemetry::LogRead read = reader->next();
-    switch (read.status) {
-      case telemetry::LogStatus::event:
-        ++tally.messages;
-        if (const auto message = server::decode_message(read.event.channel, read.event.data,
-                                                        read.event.timestamp_us, counters)) {
-          pipeline.handle(*message);
-        }
-        break;
-      case telemetry::LogStatus::end:
-        return {};
-      case telemetry::LogStatus::truncated:
-      case telemetry::LogStatus::corrupt:
-        ++tally.damaged_places;
-        std::fprintf(stderr, "joulecast: %s: at byte %llu: %s\n", path.c_str(),
-                     static_cast<unsigned long long>(read.offset), read.message.c_str());
-        tally.skipped_bytes += reader->resync();
-        break;
-      case telemetry::LogStatus::failed:
-        return fail(Fault::unavailable, path, read.message);
-    }
-  }
+Result<bool> read_log(const std::string& path, server::Pipeline& pipeline, server::IngestCounters& counters,
+                      telemetry::LogTally& tally) {
+  const auto take = [&](const telemetry::LogEvent& event) -> Result<bool> {
+    if (const auto message = server::decode_message(event.channel, event.data, event.timestamp_us, counters))
+      pipeline.handle(*message);
+    return true;
+  };
+  return telemetry::read_events(path, take, tally,
+                                [&](const telemetry::LogRead& place) { tell_damage(path, place); });
 }
 
 void print_number(double value, const char* format) {
@@ -109,6 +53,11 @@ void print_table(const std::vector<history::Mission>& missions) {
 
 }  // namespace
 
+void tell_damage(const std::string& path, const telemetry::LogRead& place) {
+  std::fprintf(stderr, "joulecast: %s: at byte %llu: %s\n", path.c_str(),
+               static_cast<unsigned long long>(place.offset), place.message.c_str());
+}
+
 Exit replay_into(const ReplayInto& options) {
   history::SqliteOptions sqlite;
   sqlite.path = options.store_path;
@@ -116,7 +65,11 @@ Exit replay_into(const ReplayInto& options) {
   if (!store) return report(store.error());
   history::Writer writer(**store, {});
   server::ModelRegistry models;
-  if (Result<void> loaded = load_models(options.robot_files, **store, writer, models); !loaded)
+  for (const std::string& file : options.robot_files) {
+    if (Result<void> loaded = server::load_robot_file(file, **store, writer, host_utime_us()); !loaded)
+      return report(loaded.error());
+  }
+  if (Result<void> loaded = server::load_stored_models(**store, models); !loaded)
     return report(loaded.error());
 
   server::FleetView fleet;
@@ -135,10 +88,10 @@ Exit replay_into(const ReplayInto& options) {
       }};
   constexpr std::size_t any_number_of_robots = 1'000'000;
   server::Pipeline pipeline({}, any_number_of_robots, models, outputs);
-  Tally tally;
+  telemetry::LogTally tally;
   const auto began = Clock::now();
   for (const std::string& log : options.logs) {
-    if (Result<void> read = read_log(log, pipeline, counters, tally); !read) return report(read.error());
+    if (Result<bool> read = read_log(log, pipeline, counters, tally); !read) return report(read.error());
   }
   pipeline.finish();
   if (Result<void> flushed = writer.flush(); !flushed) return report(flushed.error());
@@ -152,7 +105,7 @@ Exit replay_into(const ReplayInto& options) {
   }
   if (options.json) {
     api::JsonWriter json;
-    json.begin_object().field("messages", tally.messages).field("damaged_places", tally.damaged_places);
+    json.begin_object().field("messages", tally.events).field("damaged_places", tally.damaged_places);
     json.field("skipped_bytes", tally.skipped_bytes).key("faults").begin_object();
     for (std::size_t k = 0; k < server::ingest_fault_count; ++k)
       json.field(server::ingest_fault_names[k], counters.faults[k].load());
@@ -163,8 +116,8 @@ Exit replay_into(const ReplayInto& options) {
   } else {
     print_table(missions);
     std::printf("%llu messages in %.2f s (%.0f a second); * = incomplete\n",
-                static_cast<unsigned long long>(tally.messages), wall_s,
-                static_cast<double>(tally.messages) / std::max(wall_s, 1e-9));
+                static_cast<unsigned long long>(tally.events), wall_s,
+                static_cast<double>(tally.events) / std::max(wall_s, 1e-9));
     for (std::size_t k = 0; k < server::ingest_fault_count; ++k) {
       if (const auto count = counters.faults[k].load(); count > 0) {
         std::printf("%s: %llu\n", std::string(server::ingest_fault_names[k]).c_str(),

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "client/commands/outcome.h"
+#include "telemetry/event_log.h"
 
 namespace joulecast::client {
 
@@ -17,5 +18,8 @@ struct ReplayInto {
 // Runs logs straight through the daemon's ingest pipeline into a history, as fast as it takes them, and
 // prints the missions that came of it. The same logs give the same bits in every account.
 Exit replay_into(const ReplayInto& options);
+
+// Says on standard error where and how a log is damaged.
+void tell_damage(const std::string& path, const telemetry::LogRead& place);
 
 }  // namespace joulecast::client

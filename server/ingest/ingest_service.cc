@@ -8,18 +8,13 @@
 #include <utility>
 #include <vector>
 
+#include "base/host_clock.h"
 #include "telemetry/lcm_link.h"
 
 namespace joulecast::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-std::int64_t host_utime_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 constexpr std::int64_t live_us = 5'000'000;  // a robot not heard of for longer publishes no energy state
 

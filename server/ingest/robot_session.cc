@@ -92,11 +92,11 @@ void RobotSession::resume(const history::Mission& mission) {
   changed_ = true;
 }
 
-void RobotSession::on_fault(IngestFault fault) {
+void RobotSession::on_fault(IngestFault fault, std::uint64_t count) {
   const std::string name(ingest_fault_names[static_cast<std::size_t>(fault)]);
-  outputs_.counters.add(fault);
-  ++snapshot_.faults[name];
-  if (open_ != nullptr) ++open_->record.sample_faults[name];
+  outputs_.counters.add(fault, count);
+  snapshot_.faults[name] += count;
+  if (open_ != nullptr) open_->record.sample_faults[name] += static_cast<std::int64_t>(count);
   changed_ = true;
 }
 
@@ -106,12 +106,7 @@ void RobotSession::on_sample(const telemetry::Sample& sample, std::int64_t host_
   if (telemetry::check_plausible(sample)) return on_fault(IngestFault::implausible);
 
   const telemetry::Placement place = sequence_.place(sample.sequence, sample.utime_us);
-  for (std::int64_t k = 0; k < std::min<std::int64_t>(place.missing, 1); ++k) {
-    const std::string name(ingest_fault_names[static_cast<std::size_t>(IngestFault::missing)]);
-    outputs_.counters.add(IngestFault::missing, static_cast<std::uint64_t>(place.missing));
-    snapshot_.faults[name] += static_cast<std::uint64_t>(place.missing);
-    if (open_ != nullptr) open_->record.sample_faults[name] += place.missing;
-  }
+  if (place.missing > 0) on_fault(IngestFault::missing, static_cast<std::uint64_t>(place.missing));
   if (place.arrival == telemetry::Arrival::duplicate) return on_fault(IngestFault::duplicate);
   if (place.arrival == telemetry::Arrival::late) return on_fault(IngestFault::late);
   if (place.arrival == telemetry::Arrival::restart) on_fault(IngestFault::restart);
@@ -221,7 +216,9 @@ void RobotSession::close(const telemetry::MissionAction& action) {
                                 : "the robot fell silent before the end";
     }
   }
-  if (!action.note.empty()) record.note += (record.note.empty() ? "" : "; ") + action.note;
+  // Robots tend to say the same of a mission at its start and its end.
+  if (!action.note.empty() && action.note != record.note)
+    record.note += (record.note.empty() ? "" : "; ") + action.note;
   record.end_utime_us = std::max(record.end_utime_us, action.utime_us);
   checkpoint();
   open_.reset();

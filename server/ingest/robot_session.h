@@ -55,7 +55,7 @@ class RobotSession {
 
   void on_sample(const telemetry::Sample& sample, std::int64_t host_utime_us);
   void on_event(const telemetry::MissionEvent& event, std::int64_t host_utime_us);
-  void on_fault(IngestFault fault);
+  void on_fault(IngestFault fault, std::uint64_t count = 1);
 
   // Call about once a second: ends missions that fell silent, checkpoints the open one, publishes what
   // changed.

@@ -79,39 +79,30 @@ Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<teleme
 Result<RecordingSet> load_recordings(std::span<const std::string> paths, const std::string& robot_id) {
   std::map<std::string, Collector, std::less<>> robots;
   std::size_t unreadable = 0;
-  for (const std::string& path : paths) {
-    Result<telemetry::EventLogReader> reader = telemetry::EventLogReader::open(path);
-    if (!reader) return tl::unexpected(std::move(reader.error()));
-    for (;;) {
-      const telemetry::LogRead read = reader->next();
-      if (read.status == telemetry::LogStatus::event) {
-        const auto channel = telemetry::parse_channel(read.event.channel);
-        if (!channel || channel->subject == telemetry::Subject::energy_state) continue;
-        if (!robot_id.empty() && channel->robot_id != robot_id) continue;
-        Collector& robot = robots[std::string(channel->robot_id)];
-        if (channel->subject == telemetry::Subject::telemetry) {
-          if (const auto decoded = telemetry::decode_telemetry(read.event.data)) {
-            robot.add(decoded->sample);
-          } else {
-            ++unreadable;
-          }
-        } else if (const auto decoded = telemetry::decode_mission_event(read.event.data)) {
-          robot.add(decoded->event);
-        } else {
-          ++unreadable;
-        }
-        continue;
-      }
-      if (read.status == telemetry::LogStatus::corrupt) {
+  const auto take = [&](const telemetry::LogEvent& event) -> Result<bool> {
+    const auto channel = telemetry::parse_channel(event.channel);
+    if (!channel || channel->subject == telemetry::Subject::energy_state) return true;
+    if (!robot_id.empty() && channel->robot_id != robot_id) return true;
+    Collector& robot = robots[std::string(channel->robot_id)];
+    if (channel->subject == telemetry::Subject::telemetry) {
+      if (const auto decoded = telemetry::decode_telemetry(event.data)) {
+        robot.add(decoded->sample);
+      } else {
         ++unreadable;
-        if (reader->resync() > 0) continue;
-        break;
       }
-      if (read.status == telemetry::LogStatus::failed) return fail(Fault::corrupt, path, read.message);
-      if (read.status == telemetry::LogStatus::truncated) ++unreadable;
-      break;
+    } else if (const auto decoded = telemetry::decode_mission_event(event.data)) {
+      robot.add(decoded->event);
+    } else {
+      ++unreadable;
     }
+    return true;
+  };
+  telemetry::LogTally tally;
+  for (const std::string& path : paths) {
+    if (Result<bool> read = telemetry::read_events(path, take, tally); !read)
+      return tl::unexpected(std::move(read.error()));
   }
+  unreadable += tally.damaged_places;
   if (robots.empty())
     return invalid("log", "holds no telemetry" + (robot_id.empty() ? "" : " of " + robot_id));
   if (robots.size() > 1) {

@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <condition_variable>
 #include <cstring>
 #include <filesystem>
@@ -14,6 +13,7 @@
 #include <tuple>
 #include <utility>
 
+#include "base/host_clock.h"
 #include "history/schema.h"
 #include "history/sqlite.h"
 #include "history/sqlite_changes.h"
@@ -114,19 +114,13 @@ void configure_writer(Database& database) {
   database.execute("PRAGMA journal_size_limit = 67108864");
 }
 
-std::int64_t system_utime_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
 class SqliteStore final : public Store {
  public:
   SqliteStore(const SqliteOptions& options, std::unique_ptr<FileLock> lock, std::unique_ptr<Database> writer)
       : path_(options.path),
         lock_(std::move(lock)),
         writer_(std::move(writer)),
-        changes_(*writer_, options.now_utime_us ? options.now_utime_us : system_utime_us),
+        changes_(*writer_, options.now_utime_us ? options.now_utime_us : host_utime_us),
         readers_(options.path, options.readers, options.busy_timeout_ms),
         last_key_(queries::greatest_key(*writer_)) {}
 

@@ -186,6 +186,31 @@ std::uint64_t EventLogReader::resync() {
   return offset_ - from;
 }
 
+Result<bool> read_events(const std::string& path, const std::function<Result<bool>(const LogEvent&)>& take,
+                         LogTally& tally, const std::function<void(const LogRead&)>& damaged) {
+  auto reader = EventLogReader::open(path);
+  if (!reader) return tl::unexpected(std::move(reader.error()));
+  for (;;) {
+    const LogRead read = reader->next();
+    switch (read.status) {
+      case LogStatus::event:
+        if (const Result<bool> taken = take(read.event); !taken || !*taken) return taken;
+        ++tally.events;
+        break;
+      case LogStatus::end:
+        return true;
+      case LogStatus::truncated:
+      case LogStatus::corrupt:
+        ++tally.damaged_places;
+        if (damaged) damaged(read);
+        tally.skipped_bytes += reader->resync();
+        break;
+      case LogStatus::failed:
+        return fail(Fault::unavailable, path, read.message);
+    }
+  }
+}
+
 Result<EventLogWriter> EventLogWriter::create(const std::string& path) {
   std::FILE* file = std::fopen(path.c_str(), "wbe");
   if (file == nullptr) return fail(Fault::unavailable, path, std::strerror(errno));

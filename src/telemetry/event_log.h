@@ -85,6 +85,19 @@ class EventLogReader {
   bool failed_ = false;
 };
 
+// What reading a whole log met.
+struct LogTally {
+  std::uint64_t events = 0;
+  std::uint64_t damaged_places = 0;
+  std::uint64_t skipped_bytes = 0;
+};
+
+// Hands every event of a log to `take` until it answers false, skipping damaged places after telling
+// `damaged` of them. Adds to `tally`. Returns whether the log was read to its end; errors are those of
+// `take`, of opening and of reading.
+Result<bool> read_events(const std::string& path, const std::function<Result<bool>(const LogEvent&)>& take,
+                         LogTally& tally, const std::function<void(const LogRead&)>& damaged = {});
+
 // Writes what lcm-logger writes; numbers count from 0.
 class EventLogWriter {
  public:

@@ -60,25 +60,15 @@ class Collector {
 }  // namespace
 
 Result<LogRecordings> read_recordings(const std::string& log_path) {
-  auto reader = EventLogReader::open(log_path);
-  if (!reader) return tl::unexpected<Error>(std::move(reader.error()));
   Collector collector;
-  for (;;) {
-    const LogRead read = reader->next();
-    switch (read.status) {
-      case LogStatus::event:
-        collector.take(read.event);
-        break;
-      case LogStatus::end:
-        return collector.finish(reader->skipped_bytes());
-      case LogStatus::truncated:
-      case LogStatus::corrupt:
-        reader->resync();
-        break;
-      case LogStatus::failed:
-        return fail(Fault::unavailable, log_path, read.message);
-    }
-  }
+  LogTally tally;
+  const auto take = [&](const LogEvent& event) -> Result<bool> {
+    collector.take(event);
+    return true;
+  };
+  if (const Result<bool> read = read_events(log_path, take, tally); !read)
+    return tl::unexpected(read.error());
+  return collector.finish(tally.skipped_bytes);
 }
 
 }  // namespace joulecast::telemetry

@@ -1,4 +1,4 @@
-#include "server/model_loading.h"
+#include "server/ingest/model_loading.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -29,6 +29,30 @@ Result<void> load_stored_models(const history::Store& store, ModelRegistry& mode
   return {};
 }
 
+Result<void> load_robot_file(const std::string& path, history::Store& store, history::Writer& writer,
+                             std::int64_t now_utime_us) {
+  Result<robot::RobotModel> robot = robot::load_robot(path);
+  if (!robot) return tl::unexpected(std::move(robot.error()));
+  if (auto effects = dynamics::active_effects(*robot); !effects) {
+    effects.error().message = path + ": " + effects.error().message;
+    return tl::unexpected(std::move(effects.error()));
+  }
+  history::AddModel command;
+  command.robot_id = robot->robot_id;
+  command.utime_us = now_utime_us;
+  command.origin = history::ModelOrigin::file;
+  command.note = std::filesystem::path(path).filename().string();
+  command.model_json = robot::to_json_text(*robot);
+  if (const auto versions = store.model_versions(robot->robot_id)) {
+    const auto last = std::ranges::find(*versions, history::ModelOrigin::file,
+                                        &history::ModelVersion::origin);  // newest first
+    if (last != versions->end() && last->model_json == command.model_json) return {};
+  }
+  if (history::Outcome added = writer.execute(std::move(command)); !added)
+    return tl::unexpected(std::move(added.error()));
+  return {};
+}
+
 Result<int> load_robot_files(const std::string& directory, history::Store& store, history::Writer& writer,
                              std::int64_t now_utime_us) {
   std::error_code fault;
@@ -39,25 +63,8 @@ Result<int> load_robot_files(const std::string& directory, history::Store& store
   if (fault) return fail(Fault::not_found, "robots.directory", directory + ": " + fault.message());
   std::ranges::sort(files);
   for (const auto& file : files) {
-    Result<robot::RobotModel> robot = robot::load_robot(file.string());
-    if (!robot) return tl::unexpected(std::move(robot.error()));
-    if (auto effects = dynamics::active_effects(*robot); !effects) {
-      effects.error().message = file.string() + ": " + effects.error().message;
-      return tl::unexpected(std::move(effects.error()));
-    }
-    history::AddModel command;
-    command.robot_id = robot->robot_id;
-    command.utime_us = now_utime_us;
-    command.origin = history::ModelOrigin::file;
-    command.note = file.filename().string();
-    command.model_json = robot::to_json_text(*robot);
-    if (const auto versions = store.model_versions(robot->robot_id)) {
-      const auto last = std::ranges::find(*versions, history::ModelOrigin::file,
-                                          &history::ModelVersion::origin);  // newest first
-      if (last != versions->end() && last->model_json == command.model_json) continue;
-    }
-    if (history::Outcome added = writer.execute(std::move(command)); !added)
-      return tl::unexpected(std::move(added.error()));
+    if (Result<void> loaded = load_robot_file(file.string(), store, writer, now_utime_us); !loaded)
+      return tl::unexpected(std::move(loaded.error()));
   }
   return static_cast<int>(files.size());
 }

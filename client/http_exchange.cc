@@ -1,0 +1,105 @@
+// http_request() of http_client.h on Beast, which appears in no other file of the client.
+#include "client/http_client.h"
+#include "server/http/asio.h"
+// asio.h stays first of Boost.
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http.hpp>
+#include <memory>
+#include <optional>
+#include <utility>
+
+namespace joulecast::client {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using asio::ip::tcp;
+
+constexpr std::uint64_t body_limit_bytes = 256u << 20;
+
+// Beast has no timeouts for blocking calls, so the exchange runs as a chain of asynchronous steps on a loop
+// of its own under one deadline.
+class Exchange {
+ public:
+  Exchange(const ServerAddress& server, http::request<http::string_body> request,
+           std::chrono::milliseconds timeout)
+      : server_(server), request_(std::move(request)), resolver_(loop_), stream_(loop_), timeout_(timeout) {
+    parser_.body_limit(body_limit_bytes);
+  }
+
+  Result<HttpReply> run() {
+    resolver_.async_resolve(server_.host, server_.port, [this](beast::error_code error, const auto& found) {
+      if (settle(error, "resolve")) return;
+      stream_.expires_after(timeout_);
+      stream_.async_connect(found, [this](beast::error_code failed, const tcp::endpoint&) { send(failed); });
+    });
+    loop_.run_for(timeout_ + std::chrono::milliseconds(200));
+    if (!outcome_) return failure("no answer within the timeout");
+    return std::move(*outcome_);
+  }
+
+ private:
+  tl::unexpected<Error> failure(const std::string& why) const {
+    return fail(Fault::unavailable, "http://" + server_.host + ":" + server_.port, why);
+  }
+
+  bool settle(beast::error_code error, const char* step) {
+    if (!error) return false;
+    outcome_ = failure(std::string("cannot ") + step + ": " + error.message());
+    return true;
+  }
+
+  void send(beast::error_code error) {
+    if (settle(error, "connect")) return;
+    http::async_write(stream_, request_, [this](beast::error_code failed, std::size_t) { receive(failed); });
+  }
+
+  void receive(beast::error_code error) {
+    if (settle(error, "send")) return;
+    http::async_read(stream_, buffer_, parser_, [this](beast::error_code failed, std::size_t) {
+      if (settle(failed, "receive")) return;
+      auto message = parser_.release();
+      HttpReply reply;
+      reply.status = message.result_int();
+      reply.content_type = std::string(message[http::field::content_type]);
+      reply.body = std::move(message.body());
+      outcome_ = std::move(reply);
+      beast::error_code ignored;
+      stream_.socket().shutdown(tcp::socket::shutdown_both, ignored);
+    });
+  }
+
+  ServerAddress server_;
+  http::request<http::string_body> request_;
+  asio::io_context loop_{1};
+  tcp::resolver resolver_;
+  beast::tcp_stream stream_;
+  beast::flat_buffer buffer_;
+  http::response_parser<http::string_body> parser_;
+  std::chrono::milliseconds timeout_;
+  std::optional<Result<HttpReply>> outcome_;
+};
+
+}  // namespace
+
+Result<HttpReply> http_request(const ServerAddress& server, HttpMethod method, std::string_view target,
+                               std::string json_body, std::chrono::milliseconds timeout) {
+  const http::verb verb = method == HttpMethod::get    ? http::verb::get
+                          : method == HttpMethod::post ? http::verb::post
+                                                       : http::verb::put;
+  http::request<http::string_body> request(verb, server.base_path + std::string(target), 11);
+  const bool bracketed = server.host.find(':') != std::string::npos;
+  request.set(http::field::host, (bracketed ? "[" + server.host + "]" : server.host) + ":" + server.port);
+  request.set(http::field::user_agent, "joulecast/" JOULECAST_VERSION);
+  request.set(http::field::accept, "application/json, application/problem+json");
+  request.keep_alive(false);
+  if (method != HttpMethod::get) {
+    request.set(http::field::content_type, "application/json");
+    request.body() = std::move(json_body);
+  }
+  request.prepare_payload();
+  return Exchange(server, std::move(request), timeout).run();
+}
+
+}  // namespace joulecast::client
