@@ -1,7 +1,6 @@
 // What one sample costs on its way from bytes to history, part by part, in one run: guard and decode,
 // metering with CVODE, the whole session without a store, the whole pipeline into SQLite. CPU time of the
 // process, so that the writer's work counts too.
-#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
@@ -13,7 +12,7 @@
 #include "history/writer.h"
 #include "server/ingest/pipeline.h"
 #include "telemetry/codec.h"
-#include "tests/support/sample_robots.h"
+#include "tests/benchmarks/noisy_drive.h"
 
 namespace joulecast {
 namespace {
@@ -32,38 +31,16 @@ double cpu_s() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-robot::RobotModel robot_named(const std::string& id) {
-  robot::RobotModel robot = testing::nomad();
-  robot.robot_id = id;
-  return robot;
-}
-
-// A drive with noise in every channel, so that no interval is trivially smooth.
 std::vector<Message> messages() {
   std::vector<Message> all;
   all.reserve(static_cast<std::size_t>(samples_a_robot) * robots);
-  std::uint64_t state = 1;
-  const auto noise = [&] {
-    state = state * 6364136223846793005ULL + 1442695040888963407ULL;
-    return static_cast<double>(state >> 11) * 0x1p-53 - 0.5;
-  };
+  benchmarks::NoisyDrive drive;
   for (std::int64_t k = 0; k < samples_a_robot; ++k) {
     for (int r = 0; r < robots; ++r) {
       const std::string id = "bench-" + std::to_string(r);
-      const double t = static_cast<double>(k) * 0.02;
-      telemetry::Sample s;
+      telemetry::Sample s = drive.at(static_cast<double>(k) * 0.02);
       s.utime_us = 1'750'000'000'000'000 + k * 20'000;
       s.sequence = k;
-      s.wheel_velocity_rad_s = {4 + 3 * std::sin(0.5 * t) + 0.02 * noise(),
-                                4 + 3 * std::sin(0.55 * t) + 0.02 * noise()};
-      s.motor_voltage_v = {8 + 5 * std::sin(0.5 * t) + 0.1 * noise(),
-                           8 + 5 * std::sin(0.55 * t) + 0.1 * noise()};
-      s.motor_current_a = {0.4 + std::cos(0.5 * t) + 0.2 * noise(), 0.4 + std::cos(0.55 * t) + 0.2 * noise()};
-      s.battery_voltage_v = 24 + 0.05 * noise();
-      s.battery_current_a = 1 + std::cos(0.5 * t) + 0.1 * noise();
-      s.yaw_rate_rad_s = 0.01 * noise();
-      s.pose = {std::sin(0.1 * t), std::cos(0.1 * t), 0.1 * t};
-      s.payload_kg = 5;
       all.push_back(
           {telemetry::channel_of(telemetry::Subject::telemetry, id), *telemetry::encode_telemetry(id, s)});
     }
@@ -102,7 +79,7 @@ double meter_only(const std::vector<Message>& all) {
     samples.push_back(std::get<telemetry::Sample>(
         server::decode_message(all[k].channel, all[k].bytes, 0, counters)->content));
   }
-  energy::Meter meter(*dynamics::drive_model(robot_named("bench-0")), 18, {},
+  energy::Meter meter(*dynamics::drive_model(benchmarks::robot_named("bench-0")), 18, {},
                       [](const energy::MeterPoint&) {});
   const Timer timer("metering (CVODE, all accounts)", samples.size());
   for (const telemetry::Sample& s : samples) {
@@ -124,7 +101,7 @@ double pipeline(const std::vector<Message>& all, const char* what, bool store_sa
     const std::string id = "bench-" + std::to_string(r);
     if (!writer.execute(history::AddModel{id, 1, history::ModelOrigin::file, "", "{}", std::nullopt}))
       std::abort();
-    if (!models.put(robot_named(id), 1)) std::abort();
+    if (!models.put(benchmarks::robot_named(id), 1)) std::abort();
   }
   server::FleetView fleet;
   server::IngestCounters counters;
