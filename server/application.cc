@@ -67,6 +67,15 @@ server::IngestOptions ingest_options(const Settings& settings) {
   return options;
 }
 
+server::AdoptionOptions adoption_options(const Settings& settings) {
+  server::AdoptionOptions options;
+  options.max_missions = static_cast<std::size_t>(settings.integer("adoption.max_missions"));
+  options.max_samples = static_cast<std::size_t>(settings.integer("adoption.max_samples"));
+  options.meter.tolerance = settings.number("meter.tolerance");
+  options.meter.gap_bridge_s = settings.number("ingest.gap_bridge_s");
+  return options;
+}
+
 http::ServerOptions http_options(const Settings& settings) {
   http::ServerOptions options;
   options.address = settings.text("http.address");
@@ -157,6 +166,7 @@ struct Application::Parts {
   std::unique_ptr<history::Store> store;
   std::unique_ptr<history::Writer> writer;
   std::unique_ptr<server::IngestService> ingest;
+  std::unique_ptr<server::ModelAdoption> adoption;
   std::unique_ptr<api::Services> services;
   std::unique_ptr<http::Router> router;
   std::unique_ptr<http::HttpMetrics> http_metrics;
@@ -202,8 +212,10 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   p.ingest = std::make_unique<server::IngestService>(ingest_options(settings), p.models, outputs);
   if (Result<void> started = p.ingest->start(); !started) return tl::unexpected(std::move(started.error()));
 
-  p.services =
-      std::make_unique<api::Services>(api::Services{*p.store, *p.writer, p.models, p.fleet, host_utime_us});
+  p.adoption = std::make_unique<server::ModelAdoption>(*p.store, *p.writer, p.models, host_utime_us,
+                                                       adoption_options(settings));
+  p.services = std::make_unique<api::Services>(
+      api::Services{*p.store, *p.writer, p.models, p.fleet, *p.adoption, host_utime_us});
   std::vector<http::ReadinessCheck> checks;
   checks.push_back({"ingest", [&p]() -> Result<void> {
                       const server::IngestStatus status = p.ingest->status();
@@ -274,7 +286,8 @@ Result<std::string> openapi_document() {
     const server::FleetView fleet;
     Metrics metrics;
     http::EventHub events;
-    api::Services services{**store, writer, models, fleet, host_utime_us};
+    server::ModelAdoption adoption(**store, writer, models, host_utime_us, {});
+    api::Services services{**store, writer, models, fleet, adoption, host_utime_us};
     std::vector<http::Endpoint> table = api::endpoints(services);
     table.push_back(http::events_endpoint(events));
     for (http::Endpoint& row : http::operations_endpoints(metrics, {})) table.push_back(std::move(row));

@@ -60,6 +60,11 @@ constexpr Setting table[] = {
     {"meter.tolerance", Type::number, "1e-4", 1e-9, 1e-2, "",
      "local error of the energy integration, as a fraction of the energy between two samples"},
 
+    {"adoption.max_missions", Type::integer, "50", 1, 1000, "",
+     "missions that the back-test of a new model replays at most, newest first"},
+    {"adoption.max_samples", Type::integer, "400000", 1000, 1e7, "",
+     "samples that the back-test of a new model replays at most: some seconds"},
+
     {"log.format", Type::choice, "text", 0, 0, "", "one JSON object a line, or text for a terminal",
      log_formats},
     {"log.level", Type::choice, "info", 0, 0, "", "least level that is written", log_levels},

@@ -98,6 +98,8 @@ Result<Response> versions(const Services& services, const Request& request) {
     json.key("parent_version");
     v.parent_version ? json.value(*v.parent_version) : json.null();
     json.key("model").raw(v.model_json);
+    json.key("evidence");
+    v.evidence_json.empty() ? json.null() : json.raw(v.evidence_json);
     json.end_object();
   }
   json.end_array().end_object();

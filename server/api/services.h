@@ -6,6 +6,7 @@
 
 #include "history/store.h"
 #include "history/writer.h"
+#include "server/diagnosis/model_adoption.h"
 #include "server/http/router.h"
 #include "server/ingest/fleet_view.h"
 #include "server/ingest/model_registry.h"
@@ -18,6 +19,7 @@ struct Services {
   history::Writer& writer;
   server::ModelRegistry& models;
   const server::FleetView& fleet;
+  server::ModelAdoption& adoption;
   std::function<std::int64_t()> now_utime_us;  // host clock
 };
 
@@ -26,6 +28,7 @@ std::vector<http::Endpoint> endpoints(Services& services);
 
 // One function an endpoint file, each returning its rows.
 std::vector<http::Endpoint> robot_endpoints(Services& services);
+std::vector<http::Endpoint> model_endpoints(Services& services);
 std::vector<http::Endpoint> mission_endpoints(Services& services);
 std::vector<http::Endpoint> planning_endpoints(Services& services);
 std::vector<http::Endpoint> matrix_endpoints(Services& services);

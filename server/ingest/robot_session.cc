@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "battery/initial_charge.h"
+#include "robot/robot_file.h"
 #include "telemetry/validation.h"
 
 namespace joulecast::server {
@@ -23,6 +24,17 @@ history::MissionState state_of(telemetry::MissionEnd end) {
       return history::MissionState::unfinished;
   }
   return history::MissionState::unfinished;
+}
+
+Result<std::shared_ptr<const ModelInForce>> stored_model(const history::Store& store,
+                                                         const std::string& robot_id, std::int64_t version) {
+  const Result<history::ModelVersion> stored = store.model(robot_id, version);
+  if (!stored) return tl::unexpected(stored.error());
+  Result<robot::RobotModel> robot = robot::parse_robot(stored->model_json);
+  if (!robot) return tl::unexpected(std::move(robot.error()));
+  Result<dynamics::DriveModel> drive = dynamics::drive_model(*robot);
+  if (!drive) return tl::unexpected(std::move(drive.error()));
+  return std::make_shared<const ModelInForce>(ModelInForce{std::move(*robot), std::move(*drive), version});
 }
 
 }  // namespace
@@ -54,7 +66,16 @@ RobotSession::RobotSession(std::string robot_id, const SessionSettings& settings
 RobotSession::~RobotSession() = default;
 
 void RobotSession::set_model(std::shared_ptr<const ModelInForce> model) {
+  next_.reset();
   if (model == model_) return;
+  if (model != nullptr && model_ != nullptr && open_ != nullptr && !open_->record.implicit) {
+    next_ = std::move(model);
+    return;
+  }
+  meter_with(std::move(model));
+}
+
+void RobotSession::meter_with(std::shared_ptr<const ModelInForce> model) {
   flush_meter();
   const energy::Accounts accounts = meter_ != nullptr ? meter_->accounts() : energy::Accounts{};
   model_ = std::move(model);
@@ -77,6 +98,16 @@ void RobotSession::set_model(std::shared_ptr<const ModelInForce> model) {
 }
 
 void RobotSession::resume(const history::Mission& mission) {
+  if (!mission.implicit && model_ != nullptr && mission.model_version &&
+      *mission.model_version != model_->version) {
+    auto earlier = stored_model(outputs_.store, robot_id_, *mission.model_version);
+    if (earlier) {
+      next_ = model_;
+      meter_with(std::move(*earlier));
+    } else {
+      outputs_.warn(robot_id_, describe(earlier.error()));
+    }
+  }
   open_ = std::make_unique<OpenMission>();
   open_->record = mission;
   open_->earlier_gaps = mission.gap_count;
@@ -226,6 +257,7 @@ void RobotSession::close(const telemetry::MissionAction& action) {
   snapshot_.mission_key = 0;
   outputs_.counters.missions_ended.fetch_add(1, std::memory_order_relaxed);
   changed_ = true;
+  if (next_ != nullptr) meter_with(std::exchange(next_, nullptr));
 }
 
 void RobotSession::flush_meter() {

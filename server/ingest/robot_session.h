@@ -46,8 +46,9 @@ class RobotSession {
   RobotSession(std::string robot_id, const SessionSettings& settings, SessionOutputs outputs);
   ~RobotSession();
 
-  // Null: the model is not known; samples are counted out until it is. A change takes effect at the next
-  // sample.
+  // Null: the model is not known; samples are counted out until it is. A declared mission goes on with the
+  // model that it began with, so that its accounts are one model's, and the change takes effect when it ends;
+  // else, and in missions that nobody declared, which may last for days, at the next sample.
   void set_model(std::shared_ptr<const ModelInForce> model);
 
   // Goes on with a mission that was open when the last daemon stopped.
@@ -76,13 +77,16 @@ class RobotSession {
   void close(const telemetry::MissionAction& action);
   void checkpoint();
   void on_point(const energy::MeterPoint& point);
+  void meter_with(std::shared_ptr<const ModelInForce> model);
   void flush_meter();
   void refresh_record();
 
   std::string robot_id_;
   SessionSettings settings_;
   SessionOutputs outputs_;
-  std::shared_ptr<const ModelInForce> model_;
+  std::shared_ptr<const ModelInForce> model_;  // the meter's
+  std::shared_ptr<const ModelInForce>
+      next_;  // in force, and the meter's when the open mission has ended; else null
   telemetry::SequenceTracker sequence_;
   telemetry::MissionTracker missions_;
   std::unique_ptr<energy::Meter> meter_;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "history/sqlite_store.h"
+#include "robot/robot_file.h"
 #include "server/ingest/pipeline.h"
 
 namespace joulecast::testing {
@@ -56,9 +57,11 @@ class PipelineHarness {
       throw std::runtime_error(describe(recovered.error()));
   }
 
-  void add_robot(const robot::RobotModel& robot) {
-    apply(history::AddModel{robot.robot_id, 1, history::ModelOrigin::file, "", "{}", std::nullopt});
-    ASSERT_TRUE(models.put(robot, 1));
+  void add_robot(const robot::RobotModel& robot) { add_version(robot, 1); }
+  void add_version(const robot::RobotModel& robot, std::int64_t version) {
+    apply(history::AddModel{robot.robot_id, 1, history::ModelOrigin::file, "", robot::to_json_text(robot),
+                            std::nullopt});
+    ASSERT_TRUE(models.put(robot, version));
   }
 
   std::vector<history::Mission> missions() {

@@ -229,6 +229,55 @@ TEST_F(PipelineTest, AMissionWhoseRobotDoesNotComeBackIsInterrupted) {
   EXPECT_GT(mission.accounts.measured_j, 0);
 }
 
+robot::RobotModel thirstier() {
+  robot::RobotModel robot = testing::nomad();
+  robot.idle_power_w += 10;
+  return robot;
+}
+
+TEST_F(PipelineTest, ADeclaredMissionIsMeteredByTheModelItBeganWith) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 50);
+  harness.add_version(thirstier(), 2);
+  send_range(50, 101);
+  send(event(MissionPhase::finished, 102));
+  send(event(MissionPhase::started, 110, "m2"));
+  send_range(110, 211);
+  send(event(MissionPhase::finished, 212, "m2"));
+  const auto missions = harness.missions();
+  ASSERT_EQ(missions.size(), 2u);
+  EXPECT_EQ(missions[0].model_version, 1);
+  EXPECT_EQ(missions[1].model_version, 2);
+  EXPECT_NEAR(missions[1].accounts.modelled_j - missions[0].accounts.modelled_j, 10 * 2.0, 1e-6);
+}
+
+TEST_F(PipelineTest, ADeclaredMissionKeepsItsModelOverARestart) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 50);
+  harness.pipeline->tick(start_us);
+  harness.add_version(thirstier(), 2);
+  harness.restart();
+  send_range(50, 101);
+  send(event(MissionPhase::finished, 102));
+  const auto mission = harness.missions().at(0);
+  EXPECT_EQ(mission.model_version, 1);
+  const double per_s = mission.accounts.ledger[energy::Term::accessories] / mission.accounts.duration_s;
+  EXPECT_NEAR(per_s, testing::nomad().idle_power_w, 1e-9);
+  EXPECT_TRUE(harness.warnings.empty());
+}
+
+TEST_F(PipelineTest, AMissionThatNobodyDeclaredChangesOverAtOnce) {
+  send_range(0, 51);
+  harness.add_version(thirstier(), 2);
+  send_range(51, 101);
+  harness.pipeline->finish();
+  const auto mission = harness.missions().at(0);
+  EXPECT_TRUE(mission.implicit);
+  EXPECT_EQ(mission.model_version, 2);
+  EXPECT_GT(mission.accounts.ledger[energy::Term::accessories] / mission.accounts.duration_s,
+            testing::nomad().idle_power_w + 4);
+}
+
 TEST_F(PipelineTest, TheSameMessagesGiveTheSameBits) {
   const auto run = [] {
     PipelineHarness h;

@@ -1,0 +1,288 @@
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "robot/robot_file.h"
+#include "server/api/fields.h"
+#include "server/api/json_writer.h"
+#include "server/api/services.h"
+#include "server/diagnosis/model_adoption.h"
+#include "server/http/problem.h"
+
+// Adopting models, comparing their versions, and rolling back.
+namespace joulecast::api {
+namespace {
+
+using http::Endpoint;
+using http::Method;
+using http::Parameter;
+using http::Request;
+using http::Response;
+using nlohmann::json;
+
+constexpr std::int64_t greatest_id = std::int64_t{1} << 53;  // what JSON numbers hold exactly
+constexpr std::size_t longest_note = 1000;
+
+// The body of POST /v1/robots/{id}/model: what to adopt, one of four, and how.
+struct ModelRequest {
+  const json* model = nullptr;
+  std::optional<std::int64_t> diagnosis_id, proposal_id, version;
+  std::optional<std::string> note;
+  std::optional<std::int64_t> since_utime_us, expected_version;
+  bool force = false, dry_run = false;
+};
+
+std::optional<std::int64_t> optional_integer(Fields& fields, std::string_view name, std::int64_t minimum) {
+  if (!fields.has(name)) return (void)fields.member(name), std::nullopt;
+  return fields.integer(name, minimum, greatest_id);
+}
+
+Result<ModelRequest> read_request(const json& body) {
+  Fields fields(body);
+  ModelRequest r;
+  r.model = fields.member("model");
+  r.diagnosis_id = optional_integer(fields, "diagnosis_id", 1);
+  r.proposal_id = optional_integer(fields, "proposal_id", 1);
+  r.version = optional_integer(fields, "version", 1);
+  r.since_utime_us = optional_integer(fields, "since_utime_us", 0);
+  r.expected_version = optional_integer(fields, "expected_version", 1);
+  if (fields.has("note")) r.note = fields.text("note", longest_note);
+  r.force = fields.boolean("force", false);
+  r.dry_run = fields.boolean("dry_run", false);
+  const int given =
+      (r.model != nullptr) + r.diagnosis_id.has_value() + r.proposal_id.has_value() + r.version.has_value();
+  if (fields.ok() && given != 1)
+    fields.fault("model", "exactly one of model, diagnosis_id, proposal_id and version must be given, not " +
+                              std::to_string(given));
+  if (fields.ok() && r.version && (r.force || r.dry_run || r.since_utime_us))
+    fields.fault("version",
+                 "is put in force without a back-test: leave out force, dry_run and since_utime_us");
+  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  return r;
+}
+
+Result<robot::RobotModel> candidate_of(const std::string& model_json, const std::string& robot_id,
+                                       const std::string& owner, std::string_view field) {
+  if (owner != robot_id)
+    return invalid("/" + std::string(field), "belongs to robot " + owner + ", not to " + robot_id);
+  if (model_json.empty()) return fail(Fault::conflict, "/" + std::string(field), "holds nothing to adopt");
+  return robot::parse_robot(model_json);
+}
+
+Result<server::AdoptionRequest> adoption_of(const Services& services, const std::string& robot_id,
+                                            const ModelRequest& r) {
+  server::AdoptionRequest adoption;
+  adoption.force = r.force;
+  adoption.dry_run = r.dry_run;
+  adoption.since_utime_us = r.since_utime_us;
+  adoption.expected_version = r.expected_version;
+  adoption.diagnosis_id = r.diagnosis_id;
+  adoption.proposal_id = r.proposal_id;
+  std::vector<history::MissionKey> fitted_on;
+  Result<robot::RobotModel> model = invalid("/model", "is missing");
+  if (r.model != nullptr) {
+    model = robot::read_robot(*r.model);
+    if (!model) model.error().field = "/model" + model.error().field;
+    if (model && model->robot_id != robot_id)
+      return invalid("/model/robot_id",
+                     "is \"" + model->robot_id + "\", must equal the id in the path, \"" + robot_id + "\"");
+    adoption.note = r.note.value_or("");
+  } else if (r.diagnosis_id) {
+    Result<history::DiagnosisRecord> diagnosis = services.store.diagnosis(*r.diagnosis_id);
+    if (!diagnosis) return tl::unexpected(std::move(diagnosis.error()));
+    model = candidate_of(diagnosis->model_json, robot_id, diagnosis->robot_id, "diagnosis_id");
+    adoption.origin = history::ModelOrigin::diagnosis;
+    adoption.note = r.note.value_or("diagnosis " + std::to_string(*r.diagnosis_id));
+    fitted_on = std::move(diagnosis->fitted_on);
+    // The effects found change the model that was diagnosed; another one may hold some of them already.
+    if (!adoption.expected_version && !r.force) adoption.expected_version = diagnosis->model_version;
+  } else {
+    Result<history::Proposal> proposal = services.store.proposal(*r.proposal_id);
+    if (!proposal) return tl::unexpected(std::move(proposal.error()));
+    if (proposal->state != history::ProposalState::open)
+      return fail(Fault::conflict, "/proposal_id",
+                  "the proposal is " + std::string(history::name(proposal->state)) + " already");
+    model = candidate_of(proposal->model_json, robot_id, proposal->robot_id, "proposal_id");
+    adoption.origin = history::ModelOrigin::calibration;
+    adoption.note = r.note.value_or(proposal->note);
+    fitted_on = std::move(proposal->fitted_on);
+    if (!adoption.expected_version && !r.force) adoption.expected_version = proposal->base_version;
+  }
+  if (!model) return tl::unexpected(std::move(model.error()));
+  if (auto effects = dynamics::active_effects(*model); !effects) {
+    effects.error().field = "/model" + effects.error().field;
+    return tl::unexpected(std::move(effects.error()));
+  }
+  adoption.model = std::move(*model);
+  // What was fitted describes the robot as it was then: missions long before are no test of it.
+  if (!adoption.since_utime_us) {
+    for (const history::MissionKey key : fitted_on) {
+      const Result<history::Mission> mission = services.store.mission(key);
+      if (!mission) continue;
+      adoption.since_utime_us =
+          std::min(adoption.since_utime_us.value_or(mission->start_utime_us), mission->start_utime_us);
+    }
+  }
+  adoption.fitted_on = std::move(fitted_on);
+  return adoption;
+}
+
+Response refused(const Request& request, const server::Adoption& adoption) {
+  Response response = http::problem(
+      409, "no-improvement", "Not adopted: " + adoption.refusal + ". To adopt it all the same, set force.",
+      request.id, "/force", adoption.refusal);
+  json document = json::parse(response.body);
+  document["back_test"] = json::parse(adoption.back_test_json);
+  response.body = document.dump();
+  return response;
+}
+
+Result<Response> roll(Services& services, const Request& request, const ModelRequest& r) {
+  const std::string& id = request.param("id");
+  if (r.expected_version) {
+    const auto now = services.models.find(id);
+    if (now == nullptr || now->version != *r.expected_version)
+      return fail(Fault::conflict, "/expected_version",
+                  "version " + std::to_string(now == nullptr ? 0 : now->version) + " is in force, not " +
+                      std::to_string(*r.expected_version));
+  }
+  Result<std::int64_t> previous = services.adoption.activate(id, *r.version, r.note.value_or(""));
+  if (!previous) {
+    if (previous.error().fault == Fault::not_found) previous.error().field = "/version";
+    return tl::unexpected(std::move(previous.error()));
+  }
+  JsonWriter out;
+  out.begin_object().field("robot_id", id).field("adopted", true).field("model_version", *r.version);
+  out.key("previous_version");
+  *previous > 0 ? out.value(*previous) : out.null();
+  out.key("back_test").null().end_object();
+  return http::json_response(out.take());
+}
+
+Result<Response> post_model(Services& services, const Request& request) {
+  const std::string& id = request.param("id");
+  if (auto known = model_of(services, id); !known) return tl::unexpected(std::move(known.error()));
+  const Result<ModelRequest> read = read_request(*request.json);
+  if (!read) return tl::unexpected(read.error());
+  if (read->version) return roll(services, request, *read);
+  const Result<server::AdoptionRequest> wanted = adoption_of(services, id, *read);
+  if (!wanted) return tl::unexpected(wanted.error());
+  const Result<server::Adoption> adoption =
+      services.adoption.adopt(*wanted, [&request] { return !request.stop.stop_requested(); });
+  if (!adoption) return tl::unexpected(adoption.error());
+  if (!adoption->adopted && !read->dry_run) return refused(request, *adoption);
+  JsonWriter out;
+  out.begin_object().field("robot_id", id).field("adopted", adoption->adopted);
+  out.field("model_version", adoption->version).field("previous_version", adoption->previous_version);
+  out.key("back_test").raw(adoption->back_test_json).end_object();
+  return http::json_response(out.take());
+}
+
+// Both documents' differences by JSON pointer; numbers of equal value are equal.
+void compare(const json& from, const json& to, const std::string& at, json& changes) {
+  if (from == to) return;
+  if (from.is_object() && to.is_object()) {
+    for (const auto& [name, value] : from.items())
+      compare(value, to.contains(name) ? to[name] : json(nullptr), at + "/" + name, changes);
+    for (const auto& [name, value] : to.items())
+      if (!from.contains(name)) compare(json(nullptr), value, at + "/" + name, changes);
+    return;
+  }
+  changes.push_back({{"path", at}, {"from", from}, {"to", to}});
+}
+
+Result<Response> diff(const Services& services, const Request& request) {
+  const std::string& id = request.param("id");
+  const Result<history::ModelVersion> to = services.store.model(id, request.query_integer("to"));
+  if (!to) return tl::unexpected(to.error());
+  const std::optional<std::int64_t> before =
+      request.query_value("from") ? request.query_integer("from") : to->parent_version;
+  const Result<history::ModelVersion> from = before ? services.store.model(id, before) : to;
+  if (!from) return tl::unexpected(from.error());
+  json changes = json::array();
+  compare(json::parse(from->model_json), json::parse(to->model_json), "", changes);
+  JsonWriter out;
+  out.begin_object().field("robot_id", id).field("from", from->version).field("to", to->version);
+  out.key("changes").raw(changes.dump()).end_object();
+  return http::json_response(out.take());
+}
+
+void write_proposal(JsonWriter& out, const history::Proposal& p) {
+  out.begin_object()
+      .field("id", p.id)
+      .field("robot_id", p.robot_id)
+      .field("created_utime_us", p.created_utime_us);
+  out.field("kind", p.kind).field("state", history::name(p.state)).field("note", p.note);
+  out.key("base_version");
+  p.base_version ? out.value(*p.base_version) : out.null();
+  out.key("adopted_version");
+  p.adopted_version ? out.value(*p.adopted_version) : out.null();
+  out.key("fitted_on").begin_array();
+  for (const history::MissionKey key : p.fitted_on) out.value(key);
+  out.end_array();
+  out.key("model").raw(p.model_json).key("detail").raw(p.detail_json).end_object();
+}
+
+Result<Response> proposals(const Services& services, const Request& request) {
+  const std::string& id = request.param("id");
+  if (auto known = model_of(services, id); !known) return tl::unexpected(std::move(known.error()));
+  const auto found =
+      services.store.proposals(id, request.query_integer("before").value_or(history::whole_future),
+                               request.query_integer("limit").value_or(50));
+  if (!found) return tl::unexpected(found.error());
+  JsonWriter out;
+  out.begin_object().field("robot_id", id).key("proposals").begin_array();
+  for (const history::Proposal& proposal : *found) write_proposal(out, proposal);
+  out.end_array().end_object();
+  return http::json_response(out.take());
+}
+
+}  // namespace
+
+std::vector<Endpoint> model_endpoints(Services& services) {
+  using Type = Parameter::Type;
+  std::vector<Endpoint> rows;
+  rows.push_back({.method = Method::post,
+                  .path = "/v1/robots/{id}/model",
+                  .operation_id = "adoptModel",
+                  .summary =
+                      "Adopts a robot file, a diagnosis or a proposal as the next model version, after a "
+                      "back-test on missions that it was not fitted on; or puts an earlier version in force",
+                  .request_schema = "model-request",
+                  .response_schema = "model-adoption",
+                  .error_statuses = {404, 409, 422},
+                  .handler = [&services](const Request& r) { return post_model(services, r); }});
+  rows.push_back({.method = Method::get,
+                  .path = "/v1/robots/{id}/versions/diff",
+                  .operation_id = "compareRobotVersions",
+                  .summary = "What two versions of a robot's model differ in",
+                  .parameters = {{.name = "from",
+                                  .type = Type::integer,
+                                  .description = "version before; default: the one that `to` was made from",
+                                  .minimum = 1},
+                                 {.name = "to",
+                                  .type = Type::integer,
+                                  .description = "version after; default: the one in force",
+                                  .minimum = 1}},
+                  .response_schema = "version-diff",
+                  .error_statuses = {404},
+                  .handler = [&services](const Request& r) { return diff(services, r); }});
+  rows.push_back({.method = Method::get,
+                  .path = "/v1/robots/{id}/proposals",
+                  .operation_id = "listProposals",
+                  .summary = "Models that were suggested for a robot, newest first",
+                  .parameters = {{.name = "limit",
+                                  .type = Type::integer,
+                                  .description = "proposals a page",
+                                  .minimum = 1,
+                                  .maximum = static_cast<double>(history::max_page_size)},
+                                 {.name = "before",
+                                  .type = Type::integer,
+                                  .description = "only proposals with a smaller id",
+                                  .minimum = 1}},
+                  .response_schema = "proposal-list",
+                  .error_statuses = {404},
+                  .handler = [&services](const Request& r) { return proposals(services, r); }});
+  return rows;
+}
+
+}  // namespace joulecast::api

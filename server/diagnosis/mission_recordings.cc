@@ -1,0 +1,95 @@
+#include "server/diagnosis/mission_recordings.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace joulecast::server {
+namespace {
+
+Result<std::vector<telemetry::Sample>> samples_of(const history::Store& store, history::MissionKey key) {
+  std::vector<telemetry::Sample> samples;
+  history::PageRequest page;
+  page.limit = history::max_telemetry_samples;
+  do {
+    Result<history::TelemetryPage> got = store.telemetry(key, {}, page);
+    if (!got) return tl::unexpected(std::move(got.error()));
+    if (samples.empty()) {
+      samples = std::move(got->samples);
+    } else {
+      samples.insert(samples.end(), got->samples.begin(), got->samples.end());
+    }
+    page.cursor = std::move(got->next_cursor);
+  } while (!page.cursor.empty());
+  std::ranges::stable_sort(samples, {}, &telemetry::Sample::utime_us);
+  const auto same = std::ranges::unique(samples, {}, &telemetry::Sample::utime_us);
+  samples.erase(same.begin(), same.end());
+  return samples;
+}
+
+class Reader {
+ public:
+  Reader(const history::Store& store, const RecordingsWanted& wanted) : store_(store), wanted_(wanted) {}
+
+  bool full() const { return result_.missions.size() >= wanted_.max_missions; }
+
+  Result<void> take(const history::Mission& mission) {
+    LeftOut& out = result_.left_out;
+    if (wanted_.except.contains(mission.key)) return ++out.excepted, Result<void>{};
+    if (mission.state == history::MissionState::open) return ++out.open, Result<void>{};
+    if (full() || result_.samples + static_cast<std::size_t>(std::max<std::int64_t>(mission.samples, 0)) >
+                      wanted_.max_samples)
+      return ++out.too_many, Result<void>{};
+    Result<std::vector<telemetry::Sample>> samples = samples_of(store_, mission.key);
+    if (!samples) return tl::unexpected(std::move(samples.error()));
+    // A mission of which the retention has dropped a part is not what its accounts say.
+    if (static_cast<std::int64_t>(samples->size()) * 10 < mission.samples * 9 || samples->size() < 2)
+      return ++out.no_telemetry, Result<void>{};
+    result_.samples += samples->size();
+    result_.missions.push_back(
+        {mission.key,
+         mission.start_utime_us,
+         {mission.robot_id, mission.mission_id, mission.payload_kg, std::move(*samples)}});
+    return {};
+  }
+
+  StoredRecordings finish() {
+    std::ranges::stable_sort(result_.missions, {}, &StoredRecording::start_utime_us);
+    return std::move(result_);
+  }
+
+ private:
+  const history::Store& store_;
+  const RecordingsWanted& wanted_;
+  StoredRecordings result_;
+};
+
+}  // namespace
+
+Result<StoredRecordings> read_recordings(const history::Store& store, const RecordingsWanted& wanted) {
+  Reader reader(store, wanted);
+  for (const history::MissionKey key : wanted.only) {
+    const Result<history::Mission> mission = store.mission(key);
+    if (!mission) return tl::unexpected(mission.error());
+    if (mission->robot_id != wanted.robot_id)
+      return fail(Fault::not_found, "missions",
+                  "mission " + std::to_string(key) + " is not one of robot " + wanted.robot_id);
+    if (Result<void> taken = reader.take(*mission); !taken) return tl::unexpected(std::move(taken.error()));
+  }
+  if (!wanted.only.empty()) return reader.finish();
+
+  history::MissionFilter filter;
+  filter.robot_id = wanted.robot_id;
+  filter.start_from_utime_us = wanted.since_utime_us;
+  history::PageRequest page;
+  do {
+    Result<history::MissionPage> found = store.missions(filter, page);
+    if (!found) return tl::unexpected(std::move(found.error()));
+    for (const history::Mission& mission : found->missions) {
+      if (Result<void> taken = reader.take(mission); !taken) return tl::unexpected(std::move(taken.error()));
+    }
+    page.cursor = std::move(found->next_cursor);
+  } while (!page.cursor.empty() && !reader.full());
+  return reader.finish();
+}
+
+}  // namespace joulecast::server

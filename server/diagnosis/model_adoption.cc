@@ -1,0 +1,177 @@
+#include "server/diagnosis/model_adoption.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
+
+#include "energy/back_test_json.h"
+#include "robot/robot_file.h"
+
+namespace joulecast::server {
+namespace {
+
+using nlohmann::json;
+
+json report_of(const Adoption& adoption) {
+  json report = energy::back_test_to_json(adoption.test);
+  for (std::size_t k = 0; k < adoption.tested_on.size(); ++k)
+    report["missions"][k]["id"] = adoption.tested_on[k];
+  const LeftOut& out = adoption.left_out;
+  report["left_out"] = {{"fitted_on", out.excepted},
+                        {"open", out.open},
+                        {"no_telemetry", out.no_telemetry},
+                        {"beyond_limits", out.too_many}};
+  report["tested_against"] = adoption.previous_version;
+  return report;
+}
+
+std::string percent(double share) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f %%", 100 * share);
+  return text;
+}
+
+std::string refusal_of(const energy::BackTest& test) {
+  if (test.runs.empty())
+    return "there is no mission to test it on: none with stored telemetry and measured energy that it was "
+           "not "
+           "fitted on";
+  if (test.improves()) return {};
+  const std::string errors = "energy error " + percent(test.error_before) + " before, " +
+                             percent(test.error_after) + " after, on " + std::to_string(test.runs.size()) +
+                             " missions";
+  if (test.power_gap_after > test.power_gap_before)
+    return "power is further off with it than without: " + percent(test.power_gap_before) + " before, " +
+           percent(test.power_gap_after) + " after (" + errors + ")";
+  return "no improvement is shown: " + errors + "; the improvement's 95 % interval is " +
+         percent(test.improvement_interval[0]) + " to " + percent(test.improvement_interval[1]);
+}
+
+}  // namespace
+
+ModelAdoption::ModelAdoption(const history::Store& store, history::Writer& writer, ModelRegistry& models,
+                             std::function<std::int64_t()> now_utime_us, const AdoptionOptions& options)
+    : store_(store),
+      writer_(writer),
+      models_(models),
+      now_utime_us_(std::move(now_utime_us)),
+      options_(options) {}
+
+Result<void> ModelAdoption::record(const std::string& robot_id, const std::string& kind,
+                                   std::string detail_json) {
+  return writer_.post(history::AppendEvent{{0, now_utime_us_(), robot_id, kind, std::move(detail_json)}});
+}
+
+Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std::function<bool()>& go_on) {
+  const std::string& robot_id = request.model.robot_id;
+  const std::shared_ptr<const ModelInForce> before = models_.find(robot_id);
+  if (before == nullptr)
+    return fail(Fault::not_found, "id",
+                "robot " + robot_id + " has no model to test a new one against: PUT /v1/robots/" + robot_id);
+  if (request.expected_version && *request.expected_version != before->version)
+    return fail(Fault::conflict, "/expected_version",
+                "version " + std::to_string(before->version) + " is in force, not " +
+                    std::to_string(*request.expected_version));
+  if (const Result<void> valid = robot::validate(request.model); !valid) return tl::unexpected(valid.error());
+
+  Adoption adoption;
+  adoption.previous_version = adoption.version = before->version;
+  {
+    const std::unique_lock lock(testing_, std::try_to_lock);
+    if (!lock)
+      return fail(Fault::unavailable, "", "another model is being tested; try again in some seconds");
+    RecordingsWanted wanted;
+    wanted.robot_id = robot_id;
+    wanted.since_utime_us = request.since_utime_us;
+    wanted.except = {request.fitted_on.begin(), request.fitted_on.end()};
+    wanted.max_missions = options_.max_missions;
+    wanted.max_samples = options_.max_samples;
+    const Result<StoredRecordings> history = read_recordings(store_, wanted);
+    if (!history) return tl::unexpected(history.error());
+    adoption.left_out = history->left_out;
+    std::vector<energy::DriveRun> runs;
+    for (const StoredRecording& mission : history->missions) {
+      const double payload_kg = mission.recording.payload_kg;
+      // The key names the run: mission ids may repeat.
+      runs.push_back({std::to_string(mission.key), mission.recording.samples,
+                      std::isfinite(payload_kg) ? payload_kg : 0});
+    }
+    energy::BackTestSettings settings;
+    settings.meter = options_.meter;
+    settings.go_on = go_on;
+    Result<energy::BackTest> test = energy::back_test(runs, before->robot, request.model, settings);
+    if (!test) return tl::unexpected(std::move(test.error()));
+    adoption.test = std::move(*test);
+    for (energy::RunComparison& run : adoption.test.runs) {
+      const history::MissionKey key = std::stoll(run.name);
+      adoption.tested_on.push_back(key);
+      for (const StoredRecording& mission : history->missions)
+        if (mission.key == key) run.name = mission.recording.mission_id;
+    }
+  }
+  const json report = report_of(adoption);
+  adoption.back_test_json = report.dump();
+  adoption.refusal = refusal_of(adoption.test);
+  if (request.dry_run || (!adoption.refusal.empty() && !request.force)) return adoption;
+
+  json evidence = {{"back_test", report}, {"forced", !adoption.refusal.empty()}};
+  if (request.diagnosis_id) evidence["diagnosis_id"] = *request.diagnosis_id;
+  if (request.proposal_id) evidence["proposal_id"] = *request.proposal_id;
+  history::AddModel command;
+  command.robot_id = robot_id;
+  command.utime_us = now_utime_us_();
+  command.origin = request.origin;
+  command.note = request.note;
+  command.model_json = robot::to_json_text(request.model);
+  command.expected_active = before->version;
+  command.evidence_json = evidence.dump();
+  {
+    const std::lock_guard lock(putting_);
+    const history::Outcome version = writer_.execute(std::move(command));
+    if (!version) return tl::unexpected(version.error());
+    if (Result<void> placed = models_.put(request.model, *version); !placed)
+      return tl::unexpected(std::move(placed.error()));
+    adoption.version = *version;
+  }
+  adoption.adopted = true;
+  evidence.erase("back_test");
+  evidence.update({{"model_version", adoption.version},
+                   {"previous_version", adoption.previous_version},
+                   {"origin", history::name(request.origin)},
+                   {"tested_on_missions", adoption.tested_on.size()},
+                   {"error_before", report["error_before"]},
+                   {"error_after", report["error_after"]}});
+  if (Result<void> told = record(robot_id, "model_adopted", evidence.dump()); !told)
+    return tl::unexpected(std::move(told.error()));
+  if (request.proposal_id) {
+    const history::Outcome closed = writer_.execute(
+        history::CloseProposal{*request.proposal_id, history::ProposalState::adopted, adoption.version});
+    if (!closed && closed.error().fault != Fault::conflict) return tl::unexpected(closed.error());
+  }
+  return adoption;
+}
+
+Result<std::int64_t> ModelAdoption::activate(const std::string& robot_id, std::int64_t version,
+                                             const std::string& note) {
+  Result<history::ModelVersion> stored = store_.model(robot_id, version);
+  if (!stored) return tl::unexpected(std::move(stored.error()));
+  Result<robot::RobotModel> robot = robot::parse_robot(stored->model_json);
+  if (!robot) return tl::unexpected(std::move(robot.error()));
+  const std::lock_guard lock(putting_);
+  const std::shared_ptr<const ModelInForce> before = models_.find(robot_id);
+  const std::int64_t previous = before != nullptr ? before->version : 0;
+  if (previous == version) return previous;
+  if (const history::Outcome done = writer_.execute(history::ActivateModel{robot_id, version}); !done)
+    return tl::unexpected(done.error());
+  if (Result<void> placed = models_.put(std::move(*robot), version); !placed)
+    return tl::unexpected(std::move(placed.error()));
+  const json detail = {{"model_version", version}, {"previous_version", previous}, {"note", note}};
+  if (Result<void> told =
+          record(robot_id, "model_activated", detail.dump(-1, ' ', false, json::error_handler_t::replace));
+      !told)
+    return tl::unexpected(std::move(told.error()));
+  return previous;
+}
+
+}  // namespace joulecast::server

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "energy/back_test.h"
+#include "history/store.h"
+#include "history/writer.h"
+#include "robot/robot_model.h"
+#include "server/diagnosis/mission_recordings.h"
+#include "server/ingest/model_registry.h"
+
+namespace joulecast::server {
+
+struct AdoptionRequest {
+  robot::RobotModel model;  // the candidate; its robot_id says whose
+  history::ModelOrigin origin = history::ModelOrigin::http;
+  std::string note;
+  std::vector<history::MissionKey> fitted_on;    // left out of the back-test
+  std::optional<std::int64_t> since_utime_us;    // missions that started earlier are not tested on
+  std::optional<std::int64_t> expected_version;  // conflict when another one is in force
+  std::optional<std::int64_t> diagnosis_id,
+      proposal_id;       // where it comes from; an adopted proposal is closed
+  bool force = false;    // adopt even when the back-test does not show that it improves
+  bool dry_run = false;  // back-test only
+};
+
+struct Adoption {
+  bool adopted = false;
+  std::int64_t version = 0;           // adopted, or the one that stays in force
+  std::int64_t previous_version = 0;  // what the candidate was tested against
+  energy::BackTest test;
+  std::vector<history::MissionKey> tested_on;  // in the order of test.runs
+  LeftOut left_out;
+  std::string refusal;  // why it was not adopted; empty when it was, or on a dry run of one that would be
+  std::string back_test_json;  // all of the above as schemas/back-test.schema.json
+};
+
+struct AdoptionOptions {
+  std::size_t max_missions = 50;
+  std::size_t max_samples = 400'000;
+  energy::MeterSettings meter;
+};
+
+// Adopts models as new versions after a back-test on the robot's own history: missions that the candidate was
+// not fitted on are replayed from their stored telemetry through the meter, with the model in force and with
+// the candidate. One back-test runs at a time.
+//
+// Planner and autonomy use an adopted model from the next request on. The meter changes over at the end of
+// the open mission where the robot declares its missions, so that each mission's accounts are one model's;
+// telemetry without declared missions may run for days and changes over at once.
+class ModelAdoption {
+ public:
+  ModelAdoption(const history::Store& store, history::Writer& writer, ModelRegistry& models,
+                std::function<std::int64_t()> now_utime_us, const AdoptionOptions& options);
+
+  // Fault::not_found: the robot has no model to test against; ::invalid: the candidate is no valid model;
+  // ::conflict: another model came in force meanwhile; ::unavailable: another back-test is running, or the
+  // store fails. A candidate that does not improve is no error: see Adoption::adopted.
+  Result<Adoption> adopt(const AdoptionRequest& request, const std::function<bool()>& go_on = {});
+
+  // Puts a stored version in force without a back-test. Outcome: the version that was in force before.
+  Result<std::int64_t> activate(const std::string& robot_id, std::int64_t version, const std::string& note);
+
+ private:
+  Result<void> record(const std::string& robot_id, const std::string& kind, std::string detail_json);
+
+  const history::Store& store_;
+  history::Writer& writer_;
+  ModelRegistry& models_;
+  std::function<std::int64_t()> now_utime_us_;
+  AdoptionOptions options_;
+  std::mutex testing_;  // one back-test at a time
+  std::mutex putting_;  // a version and the registry change together
+};
+
+}  // namespace joulecast::server

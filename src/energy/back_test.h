@@ -1,0 +1,67 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "energy/calibration.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::energy {
+
+// What a model predicts of recorded runs against what was measured, for two models at once: the meter replays
+// every run with both. Energies are those at the battery where the battery was measured, at the motors else.
+
+// One model on one run.
+struct ModelError {
+  double energy_j = 0;                 // modelled where measured
+  double relative = 0;                 // energy_j / measured_j - 1
+  double power_absolute_relative = 0;  // |modelled - measured| energy of each half second, over that measured
+  std::array<double, 2> interval{unknown, unknown};  // of `relative`, 95 %, by the blocks of the run
+
+  static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+};
+
+struct RunComparison {
+  std::string name;
+  bool at_battery = true;
+  double measured_j = 0;
+  double duration_s = 0;  // measured
+  ModelError before, after;
+};
+
+// Over all runs, weighted by measured energy: sum |energy error| / sum measured energy.
+struct BackTest {
+  std::vector<RunComparison> runs;
+  double error_before = 0;
+  double error_after = 0;
+  // error_before - error_after, 95 %: runs drawn with replacement and blocks within each. NaN without runs.
+  std::array<double, 2> improvement_interval{};
+  double power_gap_before = 0;  // power_absolute_relative over all runs
+  double power_gap_after = 0;
+
+  double improvement() const { return error_before - error_after; }
+  // The whole interval lies above zero, and the power gap does not grow. False without runs.
+  bool improves() const;
+};
+
+struct BackTestSettings {
+  MeterSettings meter;
+  double block_s = 10;          // of the bootstrap; errors within it belong together
+  int draws = 1000;             // of the bootstrap
+  double least_duration_s = 5;  // measured; shorter runs say nothing
+  double least_energy_j = 10;   // measured; below, a relative error means nothing
+  std::function<bool()> go_on;  // asked before each run; false stops with Fault::conflict
+};
+
+// Replays the runs with both models; runs that measure too little are left out of the result. Fault::invalid
+// for a model that the catalogue of effects rejects.
+Result<BackTest> back_test(std::span<const DriveRun> runs, const robot::RobotModel& before,
+                           const robot::RobotModel& after, const BackTestSettings& settings = {});
+
+}  // namespace joulecast::energy
