@@ -102,12 +102,20 @@ void add_gap(CLI::App& program, Exit& exit) {
   auto* command = program.add_subcommand(
       "gap",
       "Say where measured power departs from the robot's model, which effects cause it and what remains");
-  command->add_option("log", options->logs, "LCM event logs of one robot")->required();
-  command->add_option("--robot", options->robot_file, "robot file: the model")->required();
+  auto* logs = command->add_option("log", options->logs, "LCM event logs of one robot");
+  auto* robot = command->add_option("--robot", options->robot_file, "robot file: the model");
   command->add_option("--robot-id", options->robot_id, "which robot, where the logs hold several");
   command->add_flag("--json", options->json, "print the diagnosis as JSON");
   command->add_option("--apply", options->apply, "write the robot file with the effects found");
-  command->callback([options, &exit] { exit = run(*options); });
+  add_gap_trial(*command, exit);
+  command->callback([options, command, logs, robot, &exit] {
+    if (!command->get_subcommands().empty()) return;
+    // Not required() by the parser, which would ask for them of the subcommands too.
+    for (const CLI::Option* needed : {logs, robot}) {
+      if (needed->empty()) throw CLI::RequiredError(needed->get_name());
+    }
+    exit = run(*options);
+  });
 }
 
 }  // namespace joulecast::client

@@ -20,6 +20,7 @@ using AddCommand = void (*)(CLI::App& program, Exit& exit);
 void add_autonomy(CLI::App& program, Exit& exit);
 void add_battery(CLI::App& program, Exit& exit);
 void add_calibrate(CLI::App& program, Exit& exit);
+void add_effects(CLI::App& program, Exit& exit);
 void add_estimate(CLI::App& program, Exit& exit);
 void add_explore(CLI::App& program, Exit& exit);
 void add_gap(CLI::App& program, Exit& exit);
@@ -33,5 +34,7 @@ void add_thesis(CLI::App& program, Exit& exit);
 
 // Subcommands of calibrate.
 void add_calibrate_drive(CLI::App& calibrate, Exit& exit);
+// Subcommands of gap.
+void add_gap_trial(CLI::App& gap, Exit& exit);
 
 }  // namespace joulecast::client

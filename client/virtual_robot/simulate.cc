@@ -94,6 +94,10 @@ double absolute_gap(const SimulationSpec& spec, std::uint64_t seed) {
 
 }  // namespace
 
+double absolute_power_gap(const SimulationSpec& spec, std::uint64_t seed) {
+  return absolute_gap(without_chance(spec), seed);
+}
+
 PowerGap power_gap(const SimulationSpec& spec, std::uint64_t seed) {
   SimulationSpec clean = without_chance(spec);
   const GapIntegrals with = integrate(clean, seed);

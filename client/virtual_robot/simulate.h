@@ -45,6 +45,8 @@ struct Simulation {
                                      double payload_kg);
 
 [[nodiscard]] PowerGap power_gap(const SimulationSpec& spec, std::uint64_t seed);
+// PowerGap::absolute alone, at half the work.
+[[nodiscard]] double absolute_power_gap(const SimulationSpec& spec, std::uint64_t seed);
 
 // The strength of one effect, given a sign (+1, -1), for which the spec's other imperfections and this one
 // together add `added_gap` more than without it. Fault::infeasible, naming the most that it reaches, when the

@@ -1,0 +1,88 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "client/commands/table.h"
+#include "client/trial/run.h"
+#include "client/trial/score_text.h"
+#include "client/virtual_robot/imperfections.h"
+
+namespace joulecast::client {
+namespace {
+
+struct Options {
+  trial::RunSettings run;
+  std::string only;
+  std::string channels = "mixed";
+  std::string keep;
+  bool json = false;
+  bool usual_plant = false;
+};
+
+// One line a case on a terminal or in a log; nothing of it on standard output, which holds the answer.
+void show(const trial::CaseOutcome& outcome, std::size_t finished, std::size_t count) {
+  std::fprintf(stderr, "[%zu/%zu] %s\n", finished, count, trial::case_text(outcome).c_str());
+}
+
+Exit run(Options& options) {
+  trial::TrialSettings& t = options.run.trial;
+  if (!options.only.empty()) {
+    t.only = trial::kind_of(options.only == "double" ? "pair" : options.only);
+    const auto known = virtual_robot::effect_table();
+    if (!t.only && std::ranges::find(known, options.only, &virtual_robot::EffectEntry::id) == known.end()) {
+      return report({Fault::invalid, "only", options.only + " is neither a kind of case nor an effect"});
+    }
+    if (!t.only) t.only_effect = options.only;
+  }
+  t.channels = options.channels == "full"      ? trial::ChannelChoice::full
+               : options.channels == "battery" ? trial::ChannelChoice::battery
+                                               : trial::ChannelChoice::mixed;
+  t.vary_plant = !options.usual_plant;
+  options.run.keep = options.keep;
+  std::size_t finished = 0;
+  options.run.done = [&](const trial::CaseOutcome& outcome) { show(outcome, ++finished, t.count); };
+
+  const auto outcomes = trial::run_trial(options.run);
+  if (!outcomes) return report(outcomes.error());
+  const trial::Score score = trial::score_of(*outcomes);
+  if (options.json) {
+    nlohmann::json cases = nlohmann::json::array();
+    for (const auto& outcome : *outcomes) cases.push_back(trial::case_json(outcome));
+    const nlohmann::json answer{
+        {"seed", t.seed}, {"count", t.count}, {"score", trial::score_json(score)}, {"cases", cases}};
+    std::printf("%s\n", answer.dump(2).c_str());
+  } else {
+    std::printf("%s", trial::score_text(score).c_str());
+  }
+  return Exit::ok;
+}
+
+}  // namespace
+
+void add_gap_trial(CLI::App& gap, Exit& exit) {
+  auto options = std::make_shared<Options>();
+  auto* command = gap.add_subcommand(
+      "trial", "Put known effects into virtual robots, diagnose their logs blindly and score the answers");
+  command->add_option("--count", options->run.trial.count, "cases")
+      ->check(CLI::Range(1, 100'000))
+      ->capture_default_str();
+  command->add_option("--seed", options->run.trial.seed, "the same seed gives the same cases, bit for bit")
+      ->capture_default_str();
+  command->add_option("--jobs", options->run.jobs, "cases at work at once")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  command->add_option("--only", options->only, "none, single, double, outside, or the id of one effect");
+  command->add_option("--channels", options->channels, "full, battery (no motor channels) or mixed")
+      ->check(CLI::IsMember({"full", "battery", "mixed"}))
+      ->capture_default_str();
+  command->add_flag("--usual-plant", options->usual_plant,
+                    "leave out the sensors, drives and missions unlike the usual");
+  command->add_option("--keep", options->keep, "folder that keeps robot files, logs and truths of all cases");
+  command->add_flag("--json", options->json, "print scores and cases as JSON");
+  command->callback([options, &exit] { exit = run(*options); });
+}
+
+}  // namespace joulecast::client

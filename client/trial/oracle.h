@@ -1,0 +1,19 @@
+#pragma once
+
+#include <optional>
+
+#include "client/trial/case_files.h"
+#include "gap/recordings.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::trial {
+
+// Fraction of the held-out absolute power gap that goes away when the true effects are known, with their
+// shapes, and only their strengths are fitted to the other missions (least absolute deviations). What a
+// diagnosis can at best reach. Empty without an effect of the catalogue, with fewer than two missions, or
+// without battery power.
+[[nodiscard]] std::optional<double> oracle_shrinkage(const gap::RecordingSet& recordings,
+                                                     const robot::RobotModel& robot,
+                                                     const SealedTruth& truth);
+
+}  // namespace joulecast::trial

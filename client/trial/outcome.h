@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/trial/case_files.h"
+#include "gap/diagnosis.h"
+
+namespace joulecast::trial {
+
+// What the diagnosis said of one case, and the truth that was opened afterwards.
+struct CaseOutcome {
+  std::size_t index = 0;
+  std::uint64_t digest = 0;  // of the files of the case
+  SealedTruth truth;
+  gap::Diagnosis diagnosis;
+  std::optional<double> oracle;  // shrinkage that knowing the truth would reach
+  double diagnosis_s = 0;        // processor time
+};
+
+// The reported effect whose id, or whose inseparable group of at most three, holds this id; null: none does.
+[[nodiscard]] const gap::DiagnosedEffect* reported_as(const gap::Diagnosis& diagnosis, std::string_view id);
+
+[[nodiscard]] bool holds(const SealedTruth& truth, std::string_view id);
+
+// The verdict that the truth asks for, with every effect named (or in the named group) and none more.
+[[nodiscard]] bool exactly_right(const CaseOutcome& outcome);
+// Single effects: what is named first is it, or its group holds it.
+[[nodiscard]] bool first_right(const CaseOutcome& outcome);
+
+}  // namespace joulecast::trial

@@ -1,0 +1,70 @@
+#include "client/trial/plant_variants.h"
+
+#include <array>
+#include <string_view>
+
+namespace joulecast::trial {
+namespace {
+
+using virtual_robot::Rng;
+using virtual_robot::SimulationSpec;
+
+constexpr double variant_share = 0.2;
+
+struct Variant {
+  std::string_view name;
+  void (*apply)(Rng&, SimulationSpec&);
+};
+
+constexpr auto variants = std::to_array<Variant>({
+    {"slow rate", [](Rng& rng, SimulationSpec& s) { s.rate_hz = rng.chance(0.5) ? 10 : 20; }},
+    {"fast rate", [](Rng& rng, SimulationSpec& s) { s.rate_hz = rng.chance(0.5) ? 100 : 200; }},
+    {"no gyro", [](Rng&, SimulationSpec& s) { s.sensors.gyro = false; }},
+    {"no pose", [](Rng&, SimulationSpec& s) { s.sensors.pose = false; }},
+    {"temperature", [](Rng&, SimulationSpec& s) { s.sensors.temperature = true; }},
+    {"noise",
+     [](Rng& rng, SimulationSpec& s) {
+       const double by = rng.uniform(1.5, 3);
+       s.sensors.encoder_noise_rad_s *= by;
+       s.sensors.motor_voltage_noise *= by;
+       s.sensors.motor_current_noise_a *= by;
+       s.sensors.motor_current_noise *= by;
+       s.sensors.battery_voltage_noise_v *= by;
+       s.sensors.battery_current_noise_a *= by;
+       s.sensors.gyro_noise_rad_s *= by;
+       s.sensors.pose_noise_m *= by;
+       s.sensors.heading_noise_rad *= by;
+     }},
+    {"lossy network",
+     [](Rng& rng, SimulationSpec& s) {
+       s.sensors.sampling_jitter = rng.uniform(0.05, 0.3);
+       s.sensors.loss_probability = rng.uniform(0.002, 0.03);
+     }},
+    {"scatter", [](Rng& rng, SimulationSpec& s) { s.scatter = rng.uniform(1.3, 1.8); }},
+    {"loads change", [](Rng&, SimulationSpec& s) { s.script.pickup_share = 0.5; }},
+    {"short missions", [](Rng& rng, SimulationSpec& s) { s.script.duration_s = rng.uniform(45, 70); }},
+    {"no arcs", [](Rng&, SimulationSpec& s) { s.script.arc_share = 0; }},
+});
+
+}  // namespace
+
+std::vector<std::string> variant_names() {
+  std::vector<std::string> names;
+  for (const Variant& v : variants) names.emplace_back(v.name);
+  return names;
+}
+
+std::vector<std::string> vary_plant(Rng& rng, SimulationSpec& spec) {
+  std::vector<std::string> names;
+  while (names.empty()) {
+    for (const Variant& v : variants) {
+      if (!rng.chance(variant_share)) continue;
+      if (v.name == "fast rate" && !names.empty() && names.front() == "slow rate") continue;
+      v.apply(rng, spec);
+      names.emplace_back(v.name);
+    }
+  }
+  return names;
+}
+
+}  // namespace joulecast::trial

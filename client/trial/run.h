@@ -1,0 +1,25 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <vector>
+
+#include "base/error.h"
+#include "client/trial/outcome.h"
+#include "client/trial/trial_case.h"
+
+namespace joulecast::trial {
+
+struct RunSettings {
+  TrialSettings trial;
+  std::size_t jobs = 1;
+  std::filesystem::path keep;        // folder that takes robot files, logs and truths; empty: all are removed
+  gap::DiagnosisSettings diagnosis;  // for trials of the method with a part left out
+  std::function<void(const CaseOutcome&)> done;  // called after each case, by one thread at a time
+};
+
+// Draws, drives, diagnoses from the log and the robot file alone, then opens the truth. The outcomes are in
+// order of the cases and do not depend on `jobs`.
+[[nodiscard]] Result<std::vector<CaseOutcome>> run_trial(const RunSettings& settings);
+
+}  // namespace joulecast::trial

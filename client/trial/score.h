@@ -1,0 +1,73 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "client/trial/outcome.h"
+
+namespace joulecast::trial {
+
+// Hits of a number of tries.
+struct Rate {
+  std::size_t hits = 0, tries = 0;
+
+  void count(bool hit) {
+    hits += hit ? 1 : 0;
+    ++tries;
+  }
+  double value() const { return tries > 0 ? static_cast<double>(hits) / static_cast<double>(tries) : 0; }
+  // 95 % interval (Wilson 1927); [0, 1] without a try.
+  std::array<double, 2> interval() const;
+};
+
+inline constexpr std::size_t strength_classes = 4;
+
+// How held-out shrinkage compares with that of the true effects: sum over sum, and how many cases reach the
+// share that the yardstick asks of their strength.
+struct ShrinkageScore {
+  double diagnosed = 0, oracle = 0;
+  Rate reached;
+  double ratio() const { return oracle > 0 ? diagnosed / oracle : 0; }
+};
+
+// The yardsticks, by strength of the weakest effect in a case.
+struct StrengthRow {
+  Rate single_first, single_exact;
+  Rate pair_exact, pair_first;
+  Rate strength_close;   // named effects whose strength is within 10 % or whose 95 % interval holds the truth
+  Rate strength_within;  // within 10 %
+  Rate interval_covers;  // 95 % interval holds the truth
+  ShrinkageScore shrinkage;
+};
+
+struct ReliabilityBin {
+  double sum = 0;  // of the probabilities stated
+  Rate right;
+  double mean() const { return right.tries > 0 ? sum / static_cast<double>(right.tries) : 0; }
+};
+
+struct VariantRow {
+  Rate with, without;  // exactly right, in cases with that variant and in cases without any
+};
+
+struct Score {
+  // [0] with motor channels, [1] without
+  std::array<std::array<StrengthRow, strength_classes>, 2> rows;
+  Rate none_alarm;  // verdict "effects" or "outside"
+  Rate none_inconclusive;
+  Rate outside_called;                                 // "outside" or "inconclusive"
+  Rate outside_misled;                                 // a name with a probability above 0.9
+  std::array<ReliabilityBin, 10> effect_reliability;   // probability of a named effect; right: it is there
+  std::array<ReliabilityBin, 10> verdict_reliability;  // probability of a verdict; right: as exactly_right
+  std::map<std::string, std::map<std::string, std::size_t>> confusion;  // truth -> answer -> cases
+  std::map<std::string, VariantRow> variants;
+  double median_s = 0, longest_s = 0;
+};
+
+[[nodiscard]] Score score_of(std::span<const CaseOutcome> outcomes);
+
+}  // namespace joulecast::trial

@@ -1,0 +1,31 @@
+#include "dynamics/catalogue_text.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "dynamics/catalogue.h"
+
+namespace joulecast::dynamics {
+namespace {
+
+TEST(CatalogueText, IsWhatTheDocumentHolds) {
+  std::ifstream in(JOULECAST_SOURCE_DIR "/docs/effects.md", std::ios::binary);
+  const std::string document{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  EXPECT_EQ(document, catalogue_markdown()) << "joulecast effects --markdown > docs/effects.md";
+}
+
+TEST(CatalogueText, HasAnEntryForEveryEffectAndParameter) {
+  const std::string document = catalogue_markdown(), listing = catalogue_listing();
+  for (const Effect* effect : catalogue()) {
+    EXPECT_NE(document.find("### `" + std::string(effect->info().id) + "`\n"), std::string::npos);
+    EXPECT_NE(listing.find("  " + std::string(effect->info().id) + ": "), std::string::npos);
+    for (const EffectParameter& p : effect->info().parameters) {
+      EXPECT_NE(document.find("`" + std::string(p.name) + "`"), std::string::npos) << p.name;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace joulecast::dynamics
