@@ -142,9 +142,12 @@ void print_profile(json a) {
                1e2 * number(baseline, "saving_fraction"),
                baseline.value("within_limits", true) ? "" : " (it would break the robot's limits)");
   }
+  if (const double speed = number(a, "needed_speed_m_s"); std::isfinite(speed))
+    fmt::print("the deadline needs a speed limit of {:.3f} m/s at least\n", speed);
   print_ledger(a["ledger_j"]);
   for (const json& point : a["pareto"])
-    fmt::print("  {:>10.2f} s {:>12.2f} J\n", number(point, "duration_s"), number(point, "energy_j"));
+    fmt::print("  {:>10.2f} s {:>12.2f} J {:>8.3f} m/s at most\n", number(point, "duration_s"),
+               number(point, "energy_j"), number(point, "peak_speed_m_s"));
   const auto profile = a.find("profile");
   if (profile == a.end()) return;
   const json &t = (*profile)["time_s"], &way = (*profile)["distance_m"], &v = (*profile)["speed_m_s"],

@@ -145,6 +145,14 @@ Result<std::string> profile_answer(const nlohmann::json& body, const server::Mod
   json.end_object();
   if (Result<void> done = write_baselines(json, *planner, model, request, *plan); !done)
     return tl::unexpected(std::move(done.error()));
+  json.key("needed_speed_m_s");
+  if (request.problem.deadline_s) {
+    const auto speed = planner->needed_speed(request.path, request.problem);
+    if (!speed) return tl::unexpected(speed.error());
+    json.value(*speed);
+  } else {
+    json.null();
+  }
   json.key("pareto").begin_array();
   if (pareto_points >= 2) {
     const auto front =
@@ -155,6 +163,7 @@ Result<std::string> profile_answer(const nlohmann::json& body, const server::Mod
           .field("duration_s", cost.duration_s)
           .field("energy_j", cost.energy_j)
           .field("time_multiplier_w", cost.time_multiplier_w)
+          .field("peak_speed_m_s", cost.peak_speed_m_s)
           .end_object();
     }
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "planning/root.h"
 #include "planning/run_planner.h"
 
 namespace joulecast::planning {
@@ -71,9 +72,15 @@ class Request {
       if (!answer) return tl::unexpected(std::move(answer.error()));
       answers_.push_back(std::move(*answer));
     }
-    shortest_s_ = dwell_s_;
-    for (const RunPlanner& run : runs_) shortest_s_ += run.shortest_s();
+    shortest_s_ = least_time_s();
     return {};
+  }
+
+  // Of the fastest motion that the limits allow.
+  double least_time_s() const {
+    double sum = dwell_s_;
+    for (const RunPlanner& run : runs_) sum += run.shortest_s();
+    return sum;
   }
 
   // Solves at the value of time, or at the price that meets the deadline.
@@ -156,7 +163,14 @@ class Request {
   }
   double average_power_w() const { return energy_j() / duration_s(); }
   double shortest_s() const { return shortest_s_; }
-  PlanCost cost() const { return {energy_j(), duration_s(), price_w_}; }
+  PlanCost cost() const {
+    PlanCost cost{energy_j(), duration_s(), price_w_, 0};
+    for (std::size_t k = 0; k < runs_.size(); ++k) {
+      if (runs_[k].run().turn == 0)
+        cost.peak_speed_m_s = std::max(cost.peak_speed_m_s, answers_[k].peak_speed());
+    }
+    return cost;
+  }
 
   Plan written() const;
 
@@ -393,6 +407,52 @@ Result<PlanCost> Planner::cost(const Path& path, const Problem& problem) const {
   if (!request) return tl::unexpected(std::move(request.error()));
   if (auto solved = request->solve(); !solved) return tl::unexpected(std::move(solved.error()));
   return request->cost();
+}
+
+Result<double> Planner::needed_speed(const Path& path, const Problem& problem) const {
+  if (!problem.deadline_s) return invalid("deadline_s", "is required");
+  const double deadline = *problem.deadline_s;
+  Problem limited = problem;
+  // Seconds late under a speed limit; the end speeds must remain allowed.
+  const auto late = [&](double speed) -> Result<double> {
+    limited.limits.speed_m_s = speed;
+    const auto request = Request::make(robot_, loads_, path, limited);
+    if (!request) return tl::unexpected(request.error());
+    return request->least_time_s() - deadline;
+  };
+  const auto fastest = late(problem.limits.speed_m_s);
+  if (!fastest) return fastest;
+  if (*fastest > 1e-6 * deadline) {
+    return fail(Fault::infeasible, "deadline_s",
+                "is " + std::to_string(deadline) + ", the limits allow no less than " +
+                    std::to_string(deadline + *fastest));
+  }
+  const double ends = std::max(problem.start_speed_m_s, problem.end_speed_m_s);
+  if (path.distance_m() == 0) return 0.0;
+  // No slower than the distance over the whole time.
+  double low = std::max({ends, path.distance_m() / deadline, 1e-9}), late_low = 0;
+  if (const auto at = late(low); at)
+    late_low = *at;
+  else
+    return at;
+  if (late_low <= 0) return low;
+  double high = low;
+  double late_high = late_low;
+  while (late_high > 0) {
+    high *= 2;
+    if (high >= problem.limits.speed_m_s) {
+      high = problem.limits.speed_m_s, late_high = std::min(*fastest, 0.0);
+      break;
+    }
+    const auto at = late(high);
+    if (!at) return at;
+    late_high = *at;
+  }
+  if (!std::isfinite(high)) return high;
+  // Time falls as a distance over the speed: nearly linear in its inverse.
+  const double pace = zero_between([&](double p) { return late(1 / p).value_or(0); }, 1 / high, late_high,
+                                   1 / low, late_low, 1e-4);
+  return 1 / pace;
 }
 
 Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& problem,

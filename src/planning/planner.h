@@ -16,6 +16,7 @@ struct PlanCost {
   double energy_j = 0;
   double duration_s = 0;
   double time_multiplier_w = 0;
+  double peak_speed_m_s = 0;
 };
 
 // Minimum-energy motion of one robot along paths. Each run between stops is solved in closed form where its
@@ -31,6 +32,10 @@ class Planner {
   // `problem.regeneration` is read by make and by the free function, not here.
   Result<Plan> plan(const Path& path, const Problem& problem) const;
   Result<PlanCost> cost(const Path& path, const Problem& problem) const;
+
+  // The speed that the deadline needs: the least speed limit under which the path can still be driven in
+  // time, to 1e-4. Needs a deadline; infeasible when it cannot be met at all.
+  Result<double> needed_speed(const Path& path, const Problem& problem) const;
 
   // Energy against duration from the free optimum to near the shortest time: `count` >= 2 deadlines, evenly
   // spaced.

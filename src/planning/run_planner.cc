@@ -16,6 +16,11 @@ std::string number(double x) {
 
 }  // namespace
 
+double RunAnswer::peak_speed() const {
+  if (line) return line->peak_speed();
+  return z.empty() ? 0 : std::sqrt(*std::max_element(z.begin(), z.end()));
+}
+
 double RunPlanner::curvature_slope(double way) const {
   const auto& knots = run_->knots;
   const auto above = std::upper_bound(knots.begin() + 1, knots.end() - 1, way,

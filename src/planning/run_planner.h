@@ -23,6 +23,8 @@ struct RunAnswer {
   bool convex = true;
   int iterations = 0;
   std::array<bool, bound_count> binding{};
+
+  double peak_speed() const;  // along the run's coordinate
 };
 
 // Solves one run for any price of time; keeps its grid and last solution between calls.

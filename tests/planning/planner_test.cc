@@ -147,6 +147,57 @@ TEST(Planner, ParetoFrontIsConvexAndItsSlopeIsThePriceOfTime) {
   }
 }
 
+// Grids grow finer while the front is drawn, which moves the shortest time that its fast end is measured
+// from.
+TEST(Planner, ParetoFrontsStayWithinReach) {
+  for (const robot::RobotModel& robot : test::all_robots()) {
+    for (const double regeneration : {1.0, 0.3, 0.0}) {
+      for (const bool weak : {false, true}) {
+        Problem problem = limited(robot, regeneration);
+        if (weak) problem.limits.current_a *= 0.25;
+        for (const auto& segments : {std::vector<Segment>{Straight{8}},
+                                     std::vector<Segment>{Straight{2}, TurnInPlace{1.57}, Straight{0.3}},
+                                     std::vector<Segment>{Straight{1}, Arc{0.8, 1.5}, Straight{2}}}) {
+          const auto planner = Planner::make(robot, regeneration);
+          ASSERT_TRUE(planner);
+          const Path path = made(segments);
+          if (!planner->cost(path, problem)) continue;  // friction alone needs more current
+          const auto front = planner->pareto(path, problem, 9);
+          ASSERT_TRUE(front) << robot.robot_id << " " << regeneration << ": " << describe(front.error());
+          for (std::size_t k = 1; k < front->size(); ++k) {
+            EXPECT_LT((*front)[k].duration_s, (*front)[k - 1].duration_s);
+            EXPECT_GT((*front)[k].energy_j, (*front)[k - 1].energy_j * (1 - 1e-5));
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Planner, TellsTheSpeedThatADeadlineNeeds) {
+  const robot::RobotModel robot = test::amr();
+  const auto planner = Planner::make(robot);
+  ASSERT_TRUE(planner);
+  Problem problem = limited(robot);
+  problem.deadline_s = 14;
+  // Full acceleration a to v, braking alike: D = v T - v^2/a.
+  const double a = robot.limits.acceleration_m_s2, d = 10, t = 14;
+  const double exact = 0.5 * a * t - std::sqrt(0.25 * a * a * t * t - a * d);
+  const auto straight = planner->needed_speed(made({Straight{d}}), problem);
+  ASSERT_TRUE(straight) << describe(straight.error());
+  EXPECT_NEAR(*straight, exact, 2e-4 * exact);
+  // At that speed limit the deadline can be met, at a little less it cannot.
+  const Path path = made({Straight{3}, Arc{1.5, 1.5}, TurnInPlace{1}, Straight{3}}, 30);
+  problem.deadline_s = 16;
+  const auto speed = planner->needed_speed(path, problem);
+  ASSERT_TRUE(speed) << describe(speed.error());
+  problem.limits.speed_m_s = 1.01 * *speed;
+  EXPECT_TRUE(planner->plan(path, problem));
+  problem.limits.speed_m_s = 0.99 * *speed;
+  EXPECT_FALSE(planner->plan(path, problem));
+  EXPECT_EQ(planner->needed_speed(path, problem).error().fault, Fault::infeasible);
+}
+
 TEST(Planner, InfeasibleRequestsNameTheNearestFeasibleValue) {
   const robot::RobotModel robot = test::amr();
   Problem problem = limited(robot);
