@@ -108,12 +108,9 @@ Result<void> write_baselines(JsonWriter& json, const planning::Planner& planner,
       json.null();
       continue;
     }
-    const planning::Limits& limits = request.problem.limits;
-    constexpr double rounding = 1 + 1e-9;
     json.begin_object().field("energy_j", baseline->energy_j).field("duration_s", baseline->duration_s);
     json.field("peak_speed_m_s", baseline->peak_speed_m_s);
-    json.field("within_limits", baseline->peak_speed_m_s <= limits.speed_m_s * rounding &&
-                                    baseline->peak_acceleration_m_s2 <= limits.acceleration_m_s2 * rounding);
+    json.field("within_limits", baseline->keeps(request.problem.limits));
     json.field("saving_fraction", 1 - plan.summary.energy_j / baseline->energy_j).end_object();
   }
   json.end_object();

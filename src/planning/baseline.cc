@@ -28,13 +28,13 @@ class Ramp {
       before = after;
     }
     way_ += 0.5 * (from + to) * duration_s;
-    if (run_.turn == 0) {
-      peak_speed = std::max({peak_speed, from, to});
-      peak_acceleration = std::max(peak_acceleration, std::fabs(acceleration));
-    }
+    if (run_.turn == 0) peaks.peak_speed_m_s = std::max({peaks.peak_speed_m_s, from, to});
+    const double rim = run_.turn == 0 ? 1 : model_.parameters().half_track_m;
+    peaks.peak_acceleration_m_s2 = std::max(peaks.peak_acceleration_m_s2, rim * std::fabs(acceleration));
   }
 
-  double energy_j = 0, peak_speed = 0, peak_acceleration = 0;
+  double energy_j = 0;
+  Baseline peaks;  // of this run
 
  private:
   double power_w(double t, double from, double acceleration) {
@@ -46,13 +46,23 @@ class Ramp {
       at_.wheel_acceleration_rad_s2 = dynamics::wheels_of_body(p, 0, run_.turn * acceleration);
     } else {
       at_.wheel_speed_rad_s = dynamics::wheels_of_body(p, speed, speed * knot.curvature_1_m);
+      const double bend = run_.curvature_slope(knot.way);
       at_.wheel_acceleration_rad_s2 =
-          dynamics::wheels_of_body(p, acceleration, acceleration * knot.curvature_1_m);
+          dynamics::wheels_of_body(p, acceleration, acceleration * knot.curvature_1_m + bend * speed * speed);
     }
     at_.x_m = knot.pose.x_m;
     at_.y_m = knot.pose.y_m;
     at_.heading_rad = knot.pose.heading_rad;
-    return model_.flow(at_).battery_power_w;
+    const auto flow = model_.flow(at_);
+    const double yaw = run_.turn != 0 ? speed : speed * std::fabs(knot.curvature_1_m);
+    peaks.peak_yaw_rate_rad_s = std::max(peaks.peak_yaw_rate_rad_s, yaw);
+    for (std::size_t s : {0u, 1u}) {
+      peaks.peak_wheel_speed_rad_s =
+          std::max(peaks.peak_wheel_speed_rad_s, std::fabs(at_.wheel_speed_rad_s[s]));
+      peaks.peak_current_a = std::max(peaks.peak_current_a, std::fabs(flow.current_a[s]));
+      peaks.peak_voltage_v = std::max(peaks.peak_voltage_v, std::fabs(flow.voltage_v[s]));
+    }
+    return flow.battery_power_w;
   }
 
   const dynamics::DriveModel& model_;
@@ -63,6 +73,15 @@ class Ramp {
 
 }  // namespace
 
+bool Baseline::keeps(const Limits& l) const {
+  constexpr double rounding = 1 + 1e-6;
+  return peak_speed_m_s <= l.speed_m_s * rounding &&
+         peak_acceleration_m_s2 <= l.acceleration_m_s2 * rounding &&
+         peak_yaw_rate_rad_s <= l.yaw_rate_rad_s * rounding &&
+         peak_wheel_speed_rad_s <= l.wheel_speed_rad_s * rounding &&
+         peak_current_a <= l.current_a * rounding && peak_voltage_v <= l.voltage_v * rounding;
+}
+
 Result<Baseline> ramp_baseline(const dynamics::DriveModel& model, const Path& path,
                                std::span<const double> run_duration_s, double start_speed_m_s,
                                double end_speed_m_s, double ramp_fraction) {
@@ -72,17 +91,20 @@ Result<Baseline> ramp_baseline(const dynamics::DriveModel& model, const Path& pa
     const Run& run = path.runs[k];
     const double start = k == 0 ? start_speed_m_s : 0, end = k + 1 == path.runs.size() ? end_speed_m_s : 0;
     const double ramp_s = ramp_fraction * run_duration_s[k], hold_s = run_duration_s[k] - 2 * ramp_s;
-    const double peak = (run.length() - 0.5 * (start + end) * ramp_s) / (run_duration_s[k] - ramp_s);
-    if (!(peak > 0))
+    const double top = (run.length() - 0.5 * (start + end) * ramp_s) / (run_duration_s[k] - ramp_s);
+    if (!(top > 0))
       return fail(Fault::infeasible, "/path", "is too short for such a ramp between its end speeds");
     Ramp ramp(model, run);
-    ramp.drive(ramp_s, start, peak);
-    ramp.drive(hold_s, peak, peak);
-    ramp.drive(ramp_s, peak, end);
+    ramp.drive(ramp_s, start, top);
+    ramp.drive(hold_s, top, top);
+    ramp.drive(ramp_s, top, end);
     baseline.energy_j += ramp.energy_j + standing_w * run.dwell_before_s;
     baseline.duration_s += run_duration_s[k] + run.dwell_before_s;
-    baseline.peak_speed_m_s = std::max(baseline.peak_speed_m_s, ramp.peak_speed);
-    baseline.peak_acceleration_m_s2 = std::max(baseline.peak_acceleration_m_s2, ramp.peak_acceleration);
+    for (double Baseline::*peak :
+         {&Baseline::peak_speed_m_s, &Baseline::peak_acceleration_m_s2, &Baseline::peak_yaw_rate_rad_s,
+          &Baseline::peak_wheel_speed_rad_s, &Baseline::peak_current_a, &Baseline::peak_voltage_v}) {
+      baseline.*peak = std::max(baseline.*peak, ramp.peaks.*peak);
+    }
   }
   baseline.energy_j += standing_w * path.dwell_after_s;
   baseline.duration_s += path.dwell_after_s;

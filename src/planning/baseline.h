@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "dynamics/drive_model.h"
 #include "planning/path.h"
+#include "planning/problem.h"
 
 namespace joulecast::planning {
 
@@ -14,7 +15,13 @@ struct Baseline {
   double energy_j = 0;  // from the battery, dwells included
   double duration_s = 0;
   double peak_speed_m_s = 0;
-  double peak_acceleration_m_s2 = 0;  // absolute, along the way
+  double peak_acceleration_m_s2 = 0;  // along the way; turning in place, of the wheels' rims
+  double peak_yaw_rate_rad_s = 0;
+  double peak_wheel_speed_rad_s = 0;
+  double peak_current_a = 0, peak_voltage_v = 0;  // of the armatures
+
+  // To within rounding.
+  bool keeps(const Limits& limits) const;
 };
 
 // Each run takes `run_duration_s`, accelerating for `ramp_fraction` of it and braking for as long: 1/3 is the

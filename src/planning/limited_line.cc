@@ -183,24 +183,28 @@ std::optional<LineMotion> line_within(const LineTask& task, double speed_limit, 
   double peak = to_limit ? speed_limit : shape.peak(g);
   if (!(peak > fastest_end)) return {};
   const auto distance = [&](double x) {
-    const double slope = std::exp(x), top = shape.peak(slope);
-    return std::log((shape.flank(v0, top, slope).distance() + shape.flank(v1, top, slope).distance()) /
-                    task.distance);
+    const double slope = std::exp(x), top = shape.peak(slope), first = shape.flank(v0, top, slope).distance();
+    return std::log((first + (v0 == v1 ? first : shape.flank(v1, top, slope).distance())) / task.distance);
   };
-  Flank up = shape.flank(v0, peak, g), down = shape.flank(v1, peak, g);
+  Flank up = shape.flank(v0, peak, g), down = v0 == v1 ? up : shape.flank(v1, peak, g);
   double cruise = task.distance - up.distance() - down.distance();
   if (cruise < 0) {
-    const double low = std::log(g), at_low = std::log(1 - cruise / task.distance);
-    double high = low, at_high = at_low;
+    double low = std::log(g), at_low = std::log(1 - cruise / task.distance), high = low, at_high = at_low;
     if (fastest_end > 0) {
       high = std::log(shape.slope(fastest_end * (1 + 1e-12)));
       at_high = distance(high);
       if (!(at_high < 0)) return {};
     } else {
-      while (at_high > 0) at_high = distance(high += 2.5);
+      // No peak is higher than the triangle's at full acceleration, nor in general much lower.
+      const double triangle = std::sqrt(acceleration_limit * task.distance);
+      if (triangle < peak) {
+        const double x = std::log(shape.slope(triangle));
+        if (const double y = distance(x); y > 0) low = x, at_low = y, high = x;
+      }
+      for (double step = 1; at_high > 0; step *= 2) at_high = distance(high += step);
     }
     const double x =
-        zero_between([&](double y) { return -distance(y); }, low, -at_low, high, -at_high, 0, 1e-13);
+        zero_between([&](double y) { return -distance(y); }, low, -at_low, high, -at_high, 0, 1e-12);
     g = std::exp(x);
     peak = shape.peak(g);
     up = shape.flank(v0, peak, g), down = shape.flank(v1, peak, g);

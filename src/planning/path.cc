@@ -345,6 +345,12 @@ Knot Run::at(double way) const {
            mix(a.pose.heading_rad, b.pose.heading_rad)}};
 }
 
+double Run::curvature_slope(double way) const {
+  const auto above = std::upper_bound(knots.begin() + 1, knots.end() - 1, way,
+                                      [](double w, const Knot& k) { return w < k.way; });
+  return (above->curvature_1_m - (above - 1)->curvature_1_m) / (above->way - (above - 1)->way);
+}
+
 double Path::distance_m() const {
   double sum = 0;
   for (const Run& run : runs) sum += run.turn == 0 ? run.length() : 0;

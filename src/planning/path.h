@@ -78,6 +78,7 @@ struct Run {
   double length() const { return knots.back().way; }
   bool constant_curvature() const;
   Knot at(double way) const;
+  double curvature_slope(double way) const;  // 1/m^2
 };
 
 struct Path {

@@ -87,7 +87,7 @@ class Request {
   Result<void> solve() {
     if (auto ok = solve(problem_.value_of_time_w); !ok) return ok;
     if (!problem_.deadline_s || duration_s() <= *problem_.deadline_s) return {};
-    return meet(*problem_.deadline_s);
+    return meet(*problem_.deadline_s, 1e-4 * *problem_.deadline_s);
   }
 
   // The shortest time is known as finely as the grids are, which become finer while solving: a deadline found
@@ -99,17 +99,18 @@ class Request {
                     std::to_string(shortest_s_ * (1 + 1e-5)));
   }
 
-  Result<void> meet(double deadline) {
+  // Ends at most `early_s` before the deadline.
+  Result<void> meet(double deadline, double early_s) {
     if (auto ok = within_reach(deadline); !ok) return ok;
     deadline_binds_ = true;
     // log(T - T_min) falls nearly linearly in log(idle + price): a bracket there, drawn in by the secant
-    // through its ends (Illinois) or, where that stalls, by halving. Done a little early, within 1e-4 of the
-    // deadline.
+    // through its ends (Illinois) or, where that stalls, by halving. Done a little
+    // early.
     const double idle = std::max(loads_.electric().idle_w, 1e-3 * average_power_w());
     const auto late = [&] {
       return std::log(std::max(1e-12, duration_s() - shortest_s_) / (deadline - shortest_s_));
     };
-    const auto met = [&] { return duration_s() <= deadline && duration_s() > deadline * (1 - 1e-4); };
+    const auto met = [&] { return duration_s() <= deadline && duration_s() > deadline - early_s; };
     const auto at = [&](double x) -> Result<void> {
       if (auto ok = solve(std::exp(x) - idle); !ok) return ok;
       return within_reach(deadline);
@@ -129,7 +130,7 @@ class Request {
     }
     int side = 0;
     for (int k = 0; k < 60 && !met(); ++k) {
-      const double aim = 0.5e-4 * deadline / (deadline - shortest_s_);
+      const double aim = 0.5 * early_s / (deadline - shortest_s_);
       double x = slow + (fast - slow) * (late_slow + aim) / (late_slow - late_fast);
       if (k % 4 == 3 || !(x > slow && x < fast)) x = 0.5 * (slow + fast);
       if (auto ok = at(x); !ok) return ok;
@@ -237,7 +238,7 @@ class Writer {
 
   dynamics::PowerFlow<double> flow(const RunPlanner& planner, const State& s) const {
     const Run& run = planner.run();
-    const double slope = run.turn == 0 ? planner.curvature_slope(s.way) : 0;
+    const double slope = run.turn == 0 ? run.curvature_slope(s.way) : 0;
     return loads_.model().flow(loads_.instant(run, run.at(s.way), slope, s.speed, s.acceleration));
   }
 
@@ -274,7 +275,7 @@ class Writer {
            power);
     } else {
       push(time_s, driven_m_ + s.way, knot.pose, s.speed, knot.curvature_1_m * s.speed, s.acceleration,
-           knot.curvature_1_m * s.acceleration + planner.curvature_slope(s.way) * s.speed * s.speed,
+           knot.curvature_1_m * s.acceleration + run.curvature_slope(s.way) * s.speed * s.speed,
            run.payload_kg, power);
     }
   }
@@ -470,7 +471,9 @@ Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& p
     const double fastest = request->shortest_s() + 0.01 * (free.duration_s - request->shortest_s());
     for (std::size_t k = 1; k < count; ++k) {
       const double f = static_cast<double>(k) / static_cast<double>(count - 1);
-      auto met = request->meet(free.duration_s + f * (fastest - free.duration_s));
+      const double deadline = free.duration_s + f * (fastest - free.duration_s);
+      const double spacing = (free.duration_s - fastest) / static_cast<double>(count - 1);
+      auto met = request->meet(deadline, std::min(1e-4 * deadline, 0.1 * spacing));
       // Finer grids on the way may have moved the shortest time: again, towards the new one.
       if (!met && met.error().fault == Fault::infeasible && attempt < 8) break;
       if (!met) return tl::unexpected(std::move(met.error()));

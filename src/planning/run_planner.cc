@@ -21,13 +21,6 @@ double RunAnswer::peak_speed() const {
   return z.empty() ? 0 : std::sqrt(*std::max_element(z.begin(), z.end()));
 }
 
-double RunPlanner::curvature_slope(double way) const {
-  const auto& knots = run_->knots;
-  const auto above = std::upper_bound(knots.begin() + 1, knots.end() - 1, way,
-                                      [](double w, const Knot& k) { return w < k.way; });
-  return (above->curvature_1_m - (above - 1)->curvature_1_m) / (above->way - (above - 1)->way);
-}
-
 // The squared speed that speed, yaw rate and wheel speed limits allow.
 double RunPlanner::ceiling_at(double way) const {
   const Limits& l = problem_->limits;
@@ -128,7 +121,7 @@ void RunPlanner::build(std::vector<double> nodes) {
     grid->loads.reserve(n);
     for (std::size_t k = 0; k < n; ++k) {
       const double middle = 0.5 * (nodes_[k] + nodes_[k + 1]);
-      grid->loads.push_back(loads_->at(*run_, run_->at(middle), curvature_slope(middle)));
+      grid->loads.push_back(loads_->at(*run_, run_->at(middle), run_->curvature_slope(middle)));
     }
   }
   solver_.reset();
@@ -397,7 +390,7 @@ bool RunPlanner::tighten(const std::vector<double>& z) {
     double excess = 0;
     for (double f : {0.001, 0.999}) {
       const double way = nodes_[k] + f * grid_->step[k], v = std::sqrt(z[k] + f * (z[k + 1] - z[k]));
-      const double slope = run_->turn == 0 ? curvature_slope(way) : 0;
+      const double slope = run_->turn == 0 ? run_->curvature_slope(way) : 0;
       const auto flow = loads_->model().flow(loads_->instant(*run_, run_->at(way), slope, v, q));
       for (std::size_t s : {0u, 1u}) {
         excess = std::max(excess, std::fabs(flow.torque_nm[s]) / grid_->torque_limit_nm - 1);

@@ -40,7 +40,6 @@ class RunPlanner {
   const std::vector<double>& nodes() const { return nodes_; }
   // Of the grid once there is one, which may lengthen it by its coarseness.
   double shortest_s() const { return envelope_ ? envelope_->shortest_s : shortest_s_; }
-  double curvature_slope(double way) const;
 
  private:
   RunPlanner(const robot::RobotModel& robot, const DriveLoads& loads, const Run& run, const Problem& problem)
