@@ -49,6 +49,11 @@ struct Options {
   double jitter = 0.05;
   double loss = 0;
   double pickups = 0.3;
+  double undeclared = 0;
+  double charge_below = 0;
+  double charge_rate_per_h = 0.5;
+  double initial_charge = 0.8;
+  bool manoeuvre = false;
   bool no_motor_channels = false;
   bool no_gyro = false;
   bool no_pose = false;
@@ -146,6 +151,11 @@ Result<std::vector<Member>> assemble(const Options& options) {
     spec.scatter = options.scatter;
     spec.script.duration_s = options.mission_duration_s;
     spec.script.pickup_share = options.pickups;
+    spec.script.undeclared_share = options.undeclared;
+    spec.script.manoeuvre = options.manoeuvre;
+    spec.charger.below = options.charge_below;
+    spec.charger.rate_per_h = options.charge_rate_per_h;
+    spec.initial_charge = options.initial_charge;
     spec.sensors.motor_channels = !options.no_motor_channels;
     spec.sensors.gyro = !options.no_gyro;
     spec.sensors.pose = !options.no_pose;
@@ -350,6 +360,25 @@ void add_simulate(CLI::App& program, Exit& exit) {
   command->add_option("--pickups", options->pickups, "part of the halts at which the payload changes")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
+  command
+      ->add_option("--undeclared", options->undeclared,
+                   "part of the missions that carry more than they declare")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command
+      ->add_option("--charge-below", options->charge_below,
+                   "charge, 0 to 1, under which a robot charges between missions; 0 = packs are exchanged")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command
+      ->add_option("--charge-rate", options->charge_rate_per_h, "of chargers, part of the capacity an hour")
+      ->check(CLI::Range(0.05, 10.0))
+      ->capture_default_str();
+  command->add_option("--initial-charge", options->initial_charge, "charge at the beginning, 0 to 1")
+      ->check(CLI::Range(0.05, 1.0))
+      ->capture_default_str();
+  command->add_flag("--manoeuvre", options->manoeuvre,
+                    "every mission is the calibration drive: straight, at nine constant speeds");
   command->add_flag("--no-motor-channels", options->no_motor_channels,
                     "robots without motor voltage and current");
   command->add_flag("--no-gyro", options->no_gyro, "robots without gyro");

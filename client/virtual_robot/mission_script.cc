@@ -35,10 +35,40 @@ Pace draw_pace(const RobotParameters& robot, const ScriptOptions& options, Rng& 
 
 }  // namespace
 
+MissionScript plan_manoeuvre(const RobotParameters& robot, const ScriptOptions& options, ScriptPose& pose) {
+  MissionScript script;
+  const double reach_m = options.map_half_width_m - options.clearance_m;
+  const double corner_x = pose.x_m > 0 ? -reach_m : reach_m;
+  const double corner_y = pose.y_m > 0 ? -reach_m : reach_m;
+  const double whole_m = std::hypot(corner_x - pose.x_m, corner_y - pose.y_m);
+  const double rate = 0.6 * robot.yaw_rate_limit_rad_s;
+  const double turning = 0.6 * robot.acceleration_limit_m_s2 / robot.half_track_m;
+  const double acceleration = 0.6 * robot.acceleration_limit_m_s2;
+  const double start_x = pose.x_m, start_y = pose.y_m;
+  constexpr int steps = 9;
+  constexpr double held_s = 2;
+  for (int k = 1; k <= steps; ++k) {
+    const double speed = 0.1 * k * robot.speed_limit_m_s;
+    const double share = std::min(1.0, (speed * speed / acceleration + held_s * speed) / whole_m);
+    const double x = start_x + share * (corner_x - start_x), y = start_y + share * (corner_y - start_y);
+    script.legs.emplace_back(TurnTo{corner_x, corner_y, rate, turning});
+    script.legs.emplace_back(GoTo{x, y, speed, acceleration});
+    script.legs.emplace_back(Dwell{1});
+    script.legs.emplace_back(TurnTo{start_x, start_y, rate, turning});
+    script.legs.emplace_back(GoTo{start_x, start_y, speed, acceleration});
+    script.legs.emplace_back(Dwell{1});
+  }
+  pose.heading_rad = std::atan2(start_y - corner_y, start_x - corner_x);
+  return script;
+}
+
 MissionScript plan_mission(const RobotParameters& robot, const ScriptOptions& options, ScriptPose& pose,
                            Rng& rng) {
+  if (options.manoeuvre) return plan_manoeuvre(robot, options, pose);
   MissionScript script;
   script.payload_kg = draw_payload(robot, rng);
+  if (options.undeclared_share > 0 && rng.chance(options.undeclared_share))
+    script.undeclared_kg = robot.payload_limit_kg * options.undeclared_most * rng.uniform(0.25, 1);
   const double reach_m = options.map_half_width_m - options.clearance_m;
   const auto inside = [&](double x, double y) { return std::abs(x) <= reach_m && std::abs(y) <= reach_m; };
   double duration_s = 0;

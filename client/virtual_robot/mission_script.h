@@ -35,7 +35,8 @@ struct Load {
 using Leg = std::variant<GoTo, TurnTo, Arc, Dwell, Load>;
 
 struct MissionScript {
-  double payload_kg = 0;  // at the start
+  double payload_kg = 0;     // declared at the start
+  double undeclared_kg = 0;  // carried besides, all the way
   std::vector<Leg> legs;
 };
 
@@ -47,12 +48,21 @@ struct ScriptOptions {
   double arc_share = 0.2;         // of the legs
   double dwell_share = 0.25;      // of the legs are followed by a halt
   double pickup_share = 0;        // of the halts change the payload
+  double undeclared_share = 0;    // of the missions carry more than they declare ...
+  double undeclared_most = 0.6;   // ... by a quarter of this to all of it, of the payload limit
+  bool manoeuvre = false;         // every mission is the calibration drive
 };
 
 // Where a script begins and, after planning, where it ends.
 struct ScriptPose {
   double x_m = 0, y_m = 0, heading_rad = 0;
 };
+
+// The drive of thesis (3-1): empty, straight there and back at constant speeds from a tenth to nine tenths of
+// the limit, each held for two seconds or as long as the floor allows. Begins and ends at `pose`, facing the
+// farthest wall's corner.
+[[nodiscard]] MissionScript plan_manoeuvre(const RobotParameters& robot, const ScriptOptions& options,
+                                           ScriptPose& pose);
 
 // A mission that stays within the walls, planned from `pose`, which moves on to its end.
 [[nodiscard]] MissionScript plan_mission(const RobotParameters& robot, const ScriptOptions& options,

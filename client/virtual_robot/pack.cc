@@ -46,6 +46,13 @@ Pack::Terminals Pack::terminals(double power_w) const {
   return {source_v - resistance_ohm_ * current_a, current_a};
 }
 
+double Pack::charging_power_w(double most_current_a, double most_voltage_v) const {
+  const double source_v = open_circuit_voltage_v() - branch_v_;
+  const double resistance_ohm = std::max(resistance_ohm_, 1e-6);
+  const double current_a = std::clamp((most_voltage_v - source_v) / resistance_ohm, 0.0, most_current_a);
+  return -current_a * (source_v + resistance_ohm_ * current_a);
+}
+
 void Pack::advance(double power_w, double step_s) {
   const double current_a = terminals(power_w).current_a;
   charge_ = std::clamp(charge_ - current_a * step_s / capacity_c_, 0.0, 1.0);

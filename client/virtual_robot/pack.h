@@ -25,7 +25,12 @@ class Pack {
   };
   Terminals terminals(double power_w) const;
 
+  // The power (negative) with which a charger of this greatest current and terminal voltage charges.
+  double charging_power_w(double most_current_a, double most_voltage_v) const;
+
   double open_circuit_voltage_v() const;
+  double full_voltage_v() const { return curve_.back().second; }  // at rest
+  double capacity_ah() const { return capacity_c_ / 3600; }
   double state_of_charge() const { return charge_; }
   void exchange() { charge_ = exchanged_charge, branch_v_ = 0; }
 

@@ -46,10 +46,11 @@ Plant::Plant(const RobotParameters& robot, const Imperfections& imperfections, c
                                  inductance_h_;
   const double bristle_rate = fastest_wheel_rad_s / Bristle::bend_angle_rad;
   longest_step_s_ = std::min({5e-4, 2.2 / electrical_rate, 2.2 / bristle_rate});
-  begin_mission(0, {});
+  begin_mission(0, 0, {});
 }
 
-void Plant::begin_mission(double payload_kg, const MissionScatter& scatter) {
+void Plant::begin_mission(double payload_kg, double undeclared_kg, const MissionScatter& scatter) {
+  undeclared_kg_ = undeclared_kg;
   scatter_ = scatter;
   time_since_start_s_ = 0;
   for (std::size_t s : {0u, 1u}) {
@@ -66,7 +67,7 @@ void Plant::begin_mission(double payload_kg, const MissionScatter& scatter) {
 }
 
 void Plant::set_payload(double declared_kg) {
-  payload_kg_ = declared_kg * (1 + effect_.payload_mass_error);
+  payload_kg_ = declared_kg * (1 + effect_.payload_mass_error) + undeclared_kg_;
   update_inertia();
 }
 

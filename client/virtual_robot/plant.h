@@ -54,7 +54,7 @@ class Plant {
   Plant(const RobotParameters& robot, const Imperfections& imperfections, const World& world);
 
   // Take a load and the scatter of a mission; time_since_start_s counts from here.
-  void begin_mission(double payload_kg, const MissionScatter& scatter);
+  void begin_mission(double payload_kg, double undeclared_kg, const MissionScatter& scatter);
   void set_payload(double declared_kg);
   void set_winding_rise(const std::array<double, 2>& kelvin);
 
@@ -92,7 +92,8 @@ class Plant {
   PlantAccounts accounts_;
   Bristle bristle_;
 
-  double payload_kg_ = 0;  // true one
+  double payload_kg_ = 0;     // true one
+  double undeclared_kg_ = 0;  // of it, on this mission
   double time_since_start_s_ = 0;
   std::array<double, 2> arm_m_{};  // travel of the body per wheel angle, slip included
   double half_track_m_ = 0;

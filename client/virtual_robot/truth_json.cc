@@ -15,6 +15,7 @@ std::string truth_json(const std::vector<Truth>& truths) {
       const PlantAccounts& a = m.accounts;
       missions.push_back({{"mission_id", m.mission_id},
                           {"payload_kg", m.payload_kg},
+                          {"undeclared_kg", m.undeclared_kg},
                           {"duration_s", m.duration_s},
                           {"distance_m", m.distance_m},
                           {"battery_energy_j", m.battery_energy_j},

@@ -73,7 +73,7 @@ double VirtualRobot::sample_time_s(std::int64_t index) {
 void VirtualRobot::start_mission() {
   ++missions_begun_;
   under_way_ = true;
-  if (pack_.state_of_charge() < exchange_below) pack_.exchange();
+  if (spec_.charger.below <= 0 && pack_.state_of_charge() < exchange_below) pack_.exchange();
   MissionScatter scatter;
   const auto factor = [&](double deviation) { return 1 + spec_.scatter * deviation * scatter_rng_.normal(); };
   const double common = factor(scatter_friction);
@@ -86,9 +86,10 @@ void VirtualRobot::start_mission() {
   mission_ = {};
   mission_.mission_id = spec_.robot.robot_id + "-m" + std::to_string(missions_begun_);
   mission_.payload_kg = script.payload_kg;
+  mission_.undeclared_kg = script.undeclared_kg;
   mission_.scatter = scatter;
   accounts_at_start_ = plant_.accounts();
-  plant_.begin_mission(script.payload_kg, scatter);
+  plant_.begin_mission(script.payload_kg, script.undeclared_kg, scatter);
   plant_.set_winding_rise(spec_.imperfections.winding_temperature != 0 ? winding_rise_k_
                                                                        : std::array<double, 2>{});
   controller_.set_payload(script.payload_kg);
@@ -118,8 +119,33 @@ double VirtualRobot::load_power_w() const {
   return load_w;
 }
 
+double VirtualRobot::battery_power_w() const {
+  // A charger carries the robot's own loads besides.
+  if (charging_)
+    return pack_.charging_power_w(spec_.charger.rate_per_h * pack_.capacity_ah(), pack_.full_voltage_v());
+  return plant_.bus_power_w(voltage_v_) + load_power_w();
+}
+
+bool VirtualRobot::wants_charging() const {
+  return spec_.charger.below > 0 && pack_.state_of_charge() < spec_.charger.below;
+}
+
+// One control period at the charger.
+void VirtualRobot::run_charger() {
+  const double end_w = spec_.charger.end_per_h * pack_.capacity_ah() * pack_.full_voltage_v();
+  if (rested_s_ == 0 && -battery_power_w() < end_w) charging_ = false;
+  if (!charging_) rested_s_ += SpeedController::period_s;
+  history_[static_cast<std::size_t>(period_) % history_length] = electrical();
+  for (int k = 0; k < steps_per_period_; ++k) {
+    if (step_s_ * static_cast<double>(step_) >= next_sample_s_ - 0.5 * step_s_) take_sample();
+    ++step_;
+  }
+  pack_.advance(battery_power_w(), SpeedController::period_s);
+  ++period_;
+}
+
 VirtualRobot::Electrical VirtualRobot::electrical() const {
-  const auto battery = pack_.terminals(plant_.bus_power_w(voltage_v_) + load_power_w());
+  const auto battery = pack_.terminals(battery_power_w());
   return {voltage_v_, plant_.state().current_a, battery.voltage_v, battery.current_a};
 }
 
@@ -178,6 +204,12 @@ void VirtualRobot::take_sample() {
 }
 
 void VirtualRobot::run_period() {
+  if (charging_ || rested_s_ > 0) {
+    run_charger();
+    if (rested_s_ < spec_.charger.rest_after_s) return;
+    rested_s_ = 0;
+    start_mission();
+  }
   if (!under_way_) start_mission();
   const PlantState& s = plant_.state();
   const double payload_before_kg = pilot_.payload_kg();
@@ -186,6 +218,11 @@ void VirtualRobot::run_period() {
     // The command is at rest and the leg before the end was a halt: the mission ends here.
     finish_mission();
     if (spec_.missions != 0 && missions_begun_ >= spec_.missions) return;
+    if (wants_charging()) {
+      charging_ = true;
+      voltage_v_ = {};
+      return;
+    }
     start_mission();
     command_ = pilot_.update(s.x_m, s.y_m, s.heading_rad);
   } else if (pilot_.payload_kg() != payload_before_kg) {

@@ -19,12 +19,22 @@
 
 namespace joulecast::virtual_robot {
 
+// A charger between missions: constant current, then the voltage of the full pack, until the current has died
+// away. The robot stands at it, without a mission, and goes on publishing.
+struct Charger {
+  double below = 0;         // charge under which a robot goes there; 0: packs are exchanged instead
+  double rate_per_h = 0.5;  // of the capacity: the constant current
+  double end_per_h = 0.04;  // of the capacity: the current at which it ends
+  double rest_after_s = 5;  // at the charger when it has ended
+};
+
 struct SimulationSpec {
   RobotParameters robot;
   Imperfections imperfections;
   World world;
   SensorSuite sensors;
   ScriptOptions script;
+  Charger charger;
   double rate_hz = 50;  // of telemetry
   int missions = 5;     // 0: one after another without end
   double scatter = 1;   // size of the differences between missions; 0: none, 1: 1 to 2 % of energy
@@ -35,7 +45,8 @@ struct SimulationSpec {
 // What happened on the way of one mission, in truth, without sensors.
 struct MissionTruth {
   std::string mission_id;
-  double payload_kg = 0;  // declared at the start
+  double payload_kg = 0;     // declared at the start
+  double undeclared_kg = 0;  // carried besides what is declared
   double duration_s = 0;
   double distance_m = 0;
   double battery_energy_j = 0;
@@ -87,6 +98,9 @@ class VirtualRobot {
   void finish_mission();
   void take_sample();
   double load_power_w() const;
+  double battery_power_w() const;  // out of the pack
+  bool wants_charging() const;
+  void run_charger();
   Electrical electrical() const;
   Electrical delayed(double delay_s) const;
   Reading reading() const;
@@ -119,6 +133,8 @@ class VirtualRobot {
   double next_sample_s_ = 0;
   int missions_begun_ = 0;
   bool under_way_ = false;
+  bool charging_ = false;  // at the charger
+  double rested_s_ = 0;    // there, after it has ended
 };
 
 }  // namespace joulecast::virtual_robot

@@ -19,6 +19,31 @@ void write_sides(JsonWriter& json, std::string_view name, const std::array<doubl
 
 }  // namespace
 
+void write_charge(JsonWriter& json, const server::ChargeView& charge) {
+  const battery::ChargeEstimate& estimate = charge.estimate;
+  json.key("charge").begin_object();
+  json.field("source", battery::name(estimate.source));
+  json.field("default_curve", estimate.default_curve);
+  json.field("flat_curve", estimate.flat_curve);
+  json.field("current_bias_a", estimate.current_bias_a);
+  json.field("current_bias_sd_a", estimate.current_bias_sd_a);
+  json.end_object();
+  json.key("charging");
+  using battery::ChargingPhase;
+  if (charge.phase == ChargingPhase::none || charge.phase == ChargingPhase::suspected) {
+    json.null();
+    return;
+  }
+  json.begin_object();
+  json.field("phase", battery::name(charge.phase));
+  json.field("since_utime_us", charge.stay.start_utime_us);
+  json.field("charged_ah", charge.stay.charged_ah);
+  json.field("charged_j", charge.stay.charged_j);
+  json.field("time_to_charged_s", charge.remaining.duration_s);
+  json.field("time_to_charged_sd_s", charge.remaining.sd_s);
+  json.end_object();
+}
+
 bool is_live(const server::RobotSnapshot& snapshot, std::int64_t now_utime_us) {
   return silence_s(snapshot, now_utime_us) <= live_s;  // false for NaN
 }
@@ -45,6 +70,8 @@ void write_state(JsonWriter& json, const server::RobotSnapshot& s, const robot::
   json.field("battery_voltage_v", s.sample.battery_voltage_v);
   json.field("battery_current_a", s.sample.battery_current_a);
   json.field("state_of_charge", s.state_of_charge);
+  json.field("state_of_charge_sd", s.charge.estimate.sd);
+  write_charge(json, s.charge);
   const server::Endurance left =
       battery != nullptr ? server::recent_endurance(s, *battery) : server::Endurance{};
   json.field("range_m", left.range_m);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "energy/ledger.h"
+#include "server/ingest/charge_watch.h"
 #include "telemetry/sample.h"
 
 namespace joulecast::server {
@@ -33,7 +34,8 @@ struct RobotSnapshot {
   double modelled_power_w = telemetry::unmeasured;
   double speed_m_s = telemetry::unmeasured;
   double yaw_rate_rad_s = telemetry::unmeasured;
-  double state_of_charge = telemetry::unmeasured;
+  double state_of_charge = telemetry::unmeasured;  // of charge.estimate
+  ChargeView charge;
   std::array<double, 2> winding_temperature_c{telemetry::unmeasured, telemetry::unmeasured};
   std::string mission_id;  // empty: no mission open
   std::int64_t mission_key = 0;

@@ -1,14 +1,17 @@
 #include "server/ingest/robot_session.h"
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <utility>
 
-#include "battery/initial_charge.h"
 #include "robot/robot_file.h"
 #include "telemetry/validation.h"
 
 namespace joulecast::server {
 namespace {
+
+constexpr std::string_view charge_topic = "charge";      // of what is learned of the battery
+constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
 
 history::MissionState state_of(telemetry::MissionEnd end) {
   switch (end) {
@@ -59,7 +62,10 @@ RobotSession::RobotSession(std::string robot_id, const SessionSettings& settings
   snapshot_.robot_id = robot_id_;
   if (const auto stored = outputs_.store.energy_state(robot_id_); stored && stored->has_value()) {
     snapshot_.state_of_charge = (*stored)->state_of_charge;
+    stored_charge_utime_us_ = (*stored)->utime_us;
   }
+  if (const auto learned = outputs_.store.learned(robot_id_, charge_topic); learned && learned->has_value())
+    charge_memory_ = (*learned)->body_json;
   changed_ = true;
 }
 
@@ -86,7 +92,15 @@ void RobotSession::meter_with(std::shared_ptr<const ModelInForce> model) {
     meter_ =
         std::make_unique<energy::Meter>(model_->drive, model_->robot.battery.capacity_ah, settings_.meter,
                                         [this](const energy::MeterPoint& point) { on_point(point); });
-    meter_->set_state_of_charge(snapshot_.state_of_charge);
+    auto charge = std::make_unique<ChargeWatch>(model_->robot);
+    if (charge_ != nullptr) {
+      charge->take_over(*charge_);
+    } else {
+      charge->recall(charge_memory_);
+      charge->recall(stored_charge_utime_us_, snapshot_.state_of_charge);
+    }
+    charge_ = std::move(charge);
+    snapshot_.state_of_charge = charge_->estimate().charge;
     if (open_ != nullptr) {
       open_->earlier_gaps = open_->record.gap_count;
       open_->earlier_gap_s = open_->record.gap_s;
@@ -144,6 +158,8 @@ void RobotSession::on_sample(const telemetry::Sample& sample, std::int64_t host_
   if (place.clock != telemetry::ClockStep::none) {
     on_fault(place.clock == telemetry::ClockStep::backward ? IngestFault::clock_backward
                                                            : IngestFault::clock_forward);
+    release_held();
+    charge_->interrupt();
     flush_meter();
     meter_->interrupt();
     missions_.on_clock_step(sample.utime_us);
@@ -154,17 +170,96 @@ void RobotSession::on_sample(const telemetry::Sample& sample, std::int64_t host_
   }
   last_sequence_ = sample.sequence;
 
+  const double modelled_power_w = open_ != nullptr ? snapshot_.modelled_power_w : telemetry::unmeasured;
+  const ChargeWatch::Share share = charge_->add(sample, modelled_power_w);
+  snapshot_.state_of_charge = charge_->estimate().charge;
+  changed_ = true;
+  switch (share) {
+    case ChargeWatch::Share::undecided:
+      held_.push_back(sample);
+      break;
+    case ChargeWatch::Share::charger:
+      if (!at_charger_) {
+        at_charger_ = true;
+        flush_meter();
+        meter_->interrupt();
+      }
+      for (; !held_.empty(); held_.pop_front()) on_charger_sample(held_.front());
+      on_charger_sample(sample);
+      break;
+    case ChargeWatch::Share::robot:
+      if (at_charger_) leave_charger();
+      release_held();
+      on_own_sample(sample);
+      break;
+  }
+  if (charge_->utime_us() - remembered_utime_us_ >= remember_charge_us) remember_charge();
+}
+
+void RobotSession::release_held() {
+  while (!held_.empty()) {
+    const telemetry::Sample sample = held_.front();
+    held_.pop_front();
+    on_own_sample(sample);
+  }
+}
+
+// What flows while a charger feeds the robot is no cost of its motion: it stays out of the mission's
+// accounts, and does not open a mission.
+void RobotSession::on_charger_sample(const telemetry::Sample& sample) {
+  snapshot_.sample = sample;
+  snapshot_.measured_power_w = sample.battery_voltage_v * sample.battery_current_a;
+  snapshot_.modelled_power_w = telemetry::unmeasured;
+  snapshot_.speed_m_s = snapshot_.yaw_rate_rad_s = 0;
+  ++snapshot_.samples;
+  outputs_.counters.samples.fetch_add(1, std::memory_order_relaxed);
+  if (open_ == nullptr || open_->record.implicit) return;
+  const telemetry::SampleStep step = missions_.on_sample(sample.utime_us, sample.payload_kg);
+  carry_out(step.actions);
+  if (!step.belongs || open_ == nullptr || open_->record.implicit) return;
+  open_->resumed_silent = false;
+  open_->record.end_utime_us = sample.utime_us;
+  ++open_->record.sample_faults["charging"];
+  keep(sample);
+}
+
+void RobotSession::leave_charger() {
+  at_charger_ = false;
+  const std::optional<battery::ChargingStay> stay = charge_->take_ended();
+  if (!stay) return;
+  nlohmann::json detail{{"start_utime_us", stay->start_utime_us},
+                        {"end_utime_us", stay->end_utime_us},
+                        {"charged_ah", stay->charged_ah},
+                        {"charged_j", stay->charged_j},
+                        {"complete", stay->complete},
+                        {"mission", nullptr}};
+  const auto number = [](double v) { return std::isfinite(v) ? nlohmann::json(v) : nlohmann::json(); };
+  detail["start_charge"] = number(stay->start_charge);
+  detail["end_charge"] = number(charge_->estimate().charge);
+  if (open_ != nullptr) detail["mission"] = open_->record.key;
+  outputs_.post(history::AppendEvent{{0, snapshot_.received_utime_us, robot_id_, "charged", detail.dump()}});
+  remember_charge();
+}
+
+void RobotSession::remember_charge() {
+  if (charge_ == nullptr || charge_->utime_us() == 0) return;
+  remembered_utime_us_ = charge_->utime_us();
+  outputs_.post(history::PutLearned{
+      {robot_id_, std::string(charge_topic), remembered_utime_us_, charge_->memory_json()}});
+}
+
+void RobotSession::keep(const telemetry::Sample& sample) {
+  ++open_->record.samples;
+  ++open_->unsaved;
+  open_->samples.push_back(sample);
+  if (open_->samples.size() >= settings_.checkpoint_samples) checkpoint();
+}
+
+void RobotSession::on_own_sample(const telemetry::Sample& sample) {
   const telemetry::SampleStep step = missions_.on_sample(sample.utime_us, sample.payload_kg);
   carry_out(step.actions);
   if (!step.belongs || open_ == nullptr) return on_fault(IngestFault::outside_mission);
 
-  if (!std::isfinite(snapshot_.state_of_charge) && std::isfinite(sample.battery_voltage_v) &&
-      std::isfinite(sample.battery_current_a)) {
-    const battery::Circuit circuit(model_->robot.battery);
-    meter_->set_state_of_charge(
-        battery::charge_at_rest(circuit, sample.battery_voltage_v, sample.battery_current_a));
-    snapshot_.state_of_charge = meter_->state_of_charge();
-  }
   if (open_->resumed_silent) {
     open_->resumed_silent = false;
     const double down_s = static_cast<double>(sample.utime_us - open_->record.end_utime_us) * 1e-6;
@@ -175,22 +270,20 @@ void RobotSession::on_sample(const telemetry::Sample& sample, std::int64_t host_
       open_->record.incomplete_reason = "the service was down during the mission";
     }
   }
-  ++open_->record.samples;
-  ++open_->unsaved;
   ++snapshot_.samples;
   outputs_.counters.samples.fetch_add(1, std::memory_order_relaxed);
-  open_->samples.push_back(sample);
   if (const Result<void> metered = meter_->add(sample); !metered) {
     on_fault(IngestFault::solver);
     outputs_.warn(robot_id_, describe(metered.error()));
   }
-  if (open_->samples.size() >= settings_.checkpoint_samples) checkpoint();
+  keep(sample);
   changed_ = true;
 }
 
 void RobotSession::on_event(const telemetry::MissionEvent& event, std::int64_t host_utime_us) {
   snapshot_.received_utime_us = host_utime_us;
   if (model_ == nullptr) return on_fault(IngestFault::unknown_robot);
+  release_held();
   const auto refused = [&] {
     const telemetry::MissionCounters& c = missions_.counters();
     return c.duplicate_events + c.out_of_order_events + c.unknown_missions;
@@ -252,6 +345,7 @@ void RobotSession::close(const telemetry::MissionAction& action) {
     record.note += (record.note.empty() ? "" : "; ") + action.note;
   record.end_utime_us = std::max(record.end_utime_us, action.utime_us);
   checkpoint();
+  remember_charge();
   open_.reset();
   snapshot_.mission_id.clear();
   snapshot_.mission_key = 0;
@@ -297,14 +391,15 @@ void RobotSession::checkpoint() {
 
 void RobotSession::on_point(const energy::MeterPoint& point) {
   const energy::Accounts& accounts = meter_->accounts();
-  trace_.add(point, accounts);
+  energy::MeterPoint shown = point;
+  shown.state_of_charge = snapshot_.state_of_charge;
+  trace_.add(shown, accounts);
   if (open_ != nullptr) open_->record.end_utime_us = point.sample.utime_us;
   snapshot_.sample = point.sample;
   snapshot_.measured_power_w = point.measured_power_w;
   snapshot_.modelled_power_w = point.modelled_power_w;
   snapshot_.speed_m_s = point.speed_m_s;
   snapshot_.yaw_rate_rad_s = point.yaw_rate_rad_s;
-  snapshot_.state_of_charge = point.state_of_charge;
   snapshot_.winding_temperature_c = point.winding_temperature_c;
   if (point.bridged && point.interval_s > 0) {
     RecentConsumption& recent = snapshot_.recent;
@@ -329,7 +424,9 @@ void RobotSession::on_tick(std::int64_t host_utime_us) {
 }
 
 void RobotSession::suspend() {
+  release_held();
   flush_meter();
+  remember_charge();
   if (open_ != nullptr) checkpoint();
   publish();
 }
@@ -337,6 +434,7 @@ void RobotSession::suspend() {
 void RobotSession::publish() {
   if (!changed_) return;
   changed_ = false;
+  if (charge_ != nullptr) snapshot_.charge = charge_->view();
   outputs_.fleet.publish(std::make_shared<const RobotSnapshot>(snapshot_));
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "energy/meter.h"
 #include "history/commands.h"
 #include "history/store.h"
+#include "server/ingest/charge_watch.h"
 #include "server/ingest/counters.h"
 #include "server/ingest/fleet_view.h"
 #include "server/ingest/model_registry.h"
@@ -72,6 +74,13 @@ class RobotSession {
  private:
   struct OpenMission;
 
+  // A sample in its place that is the robot's own, or that came while a charger fed it.
+  void on_own_sample(const telemetry::Sample& sample);
+  void on_charger_sample(const telemetry::Sample& sample);
+  void release_held();
+  void leave_charger();
+  void remember_charge();
+  void keep(const telemetry::Sample& sample);
   void carry_out(const telemetry::MissionActions& actions);
   void open(const telemetry::MissionAction& action);
   void close(const telemetry::MissionAction& action);
@@ -90,6 +99,12 @@ class RobotSession {
   telemetry::SequenceTracker sequence_;
   telemetry::MissionTracker missions_;
   std::unique_ptr<energy::Meter> meter_;
+  std::unique_ptr<ChargeWatch> charge_;
+  std::string charge_memory_;                // as stored by the last daemon
+  std::int64_t stored_charge_utime_us_ = 0;  // of the charge that the last daemon stored
+  std::int64_t remembered_utime_us_ = 0;
+  std::deque<telemetry::Sample> held_;  // until it is clear whether a charger feeds the robot
+  bool at_charger_ = false;
   TraceBuilder trace_;
   std::unique_ptr<OpenMission> open_;
   RobotSnapshot snapshot_;

@@ -76,7 +76,7 @@ TEST_P(PlantOfKind, ElectricalWorkIsLossesPlusStoredEnergy) {
   World world;
   world.emf_loss_share = 0.5;
   Plant plant(robot, every, world);
-  plant.begin_mission(0.5 * robot.payload_limit_kg, {});
+  plant.begin_mission(0.5 * robot.payload_limit_kg, 0, {});
   drive(plant, robot, 20, 1.25e-4);
   const PlantAccounts& a = plant.accounts();
   // Runge-Kutta loses orders where signs turn over, about thirty times in this run, each for one step; a

@@ -1,0 +1,124 @@
+#include "server/ingest/charge_watch.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace joulecast::server {
+namespace {
+
+using nlohmann::json;
+
+constexpr double standing_rad_s = 0.05;  // encoders of a standing robot show less
+
+bool moves(const telemetry::Sample& sample) {
+  return std::fabs(sample.wheel_velocity_rad_s[0]) > standing_rad_s ||
+         std::fabs(sample.wheel_velocity_rad_s[1]) > standing_rad_s;
+}
+
+json seen_json(const battery::Seen& seen) {
+  return {seen.count, seen.mean, seen.variance};
+}
+
+battery::Seen seen_from(const json& document) {
+  return {document.at(0).get<double>(), document.at(1).get<double>(), document.at(2).get<double>()};
+}
+
+}  // namespace
+
+ChargeWatch::ChargeWatch(const robot::RobotModel& robot)
+    : tracker_(robot.battery, robot.idle_power_w),
+      charging_(robot.battery.capacity_ah * robot.battery.ageing_factor.value_or(1)) {}
+
+ChargeWatch::Share ChargeWatch::add(const telemetry::Sample& sample, double modelled_power_w) {
+  utime_us_ = sample.utime_us;
+  tracker_.add({sample.utime_us, sample.battery_voltage_v, sample.battery_current_a, modelled_power_w});
+  const bool was_full = charging_.phase() == battery::ChargingPhase::full;
+  const battery::ChargingPhase phase =
+      charging_.add({sample.utime_us, sample.battery_voltage_v, sample.battery_current_a, moves(sample),
+                     tracker_.estimate().charge});
+  if (phase == battery::ChargingPhase::full && !was_full) tracker_.observe_full();
+  if (phase == battery::ChargingPhase::suspected) return Share::undecided;
+  return charging_.charging() ? Share::charger : Share::robot;
+}
+
+void ChargeWatch::interrupt() {
+  tracker_.interrupt();
+}
+
+ChargeView ChargeWatch::view() const {
+  ChargeView out;
+  out.estimate = tracker_.estimate();
+  out.phase = charging_.phase();
+  out.stay = charging_.stay();
+  out.remaining = charging_.remaining(out.estimate.charge, out.estimate.sd);
+  out.habit = charging_.habit();
+  return out;
+}
+
+std::string ChargeWatch::memory_json() const {
+  json document;
+  if (const auto memory = tracker_.memory()) {
+    constexpr std::size_t n = battery::ChargeFilter::size;
+    json lower = json::array();
+    for (std::size_t row = 0; row < n; ++row)
+      for (std::size_t column = 0; column <= row; ++column)
+        lower.push_back(memory->filter.covariance[row * n + column]);
+    document["filter"] = {{"utime_us", memory->utime_us},
+                          {"known", memory->filter.known},
+                          {"mean", memory->filter.mean},
+                          {"covariance", std::move(lower)}};
+  }
+  const battery::ChargingHabit& habit = charging_.habit();
+  document["habit"] = {{"current_a", seen_json(habit.current_a)},
+                       {"taper_charge", seen_json(habit.taper_charge)},
+                       {"taper_time_s", seen_json(habit.taper_time_s)},
+                       {"end_current_a", seen_json(habit.end_current_a)}};
+  return document.dump();
+}
+
+void ChargeWatch::recall(const std::string& text) {
+  const json document = json::parse(text, nullptr, false);
+  if (!document.is_object()) return;
+  try {
+    const json& habit = document.at("habit");
+    charging_.recall({seen_from(habit.at("current_a")), seen_from(habit.at("taper_charge")),
+                      seen_from(habit.at("taper_time_s")), seen_from(habit.at("end_current_a"))});
+    if (!document.contains("filter")) return;
+    const json& filter = document.at("filter");
+    constexpr std::size_t n = battery::ChargeFilter::size;
+    battery::ChargeTracker::Memory memory;
+    memory.utime_us = filter.at("utime_us").get<std::int64_t>();
+    memory.filter.known = filter.at("known").get<bool>();
+    memory.filter.mean = filter.at("mean").get<battery::ChargeFilter::Vector>();
+    std::size_t k = 0;
+    for (std::size_t row = 0; row < n; ++row)
+      for (std::size_t column = 0; column <= row; ++column, ++k)
+        memory.filter.covariance[row * n + column] = memory.filter.covariance[column * n + row] =
+            filter.at("covariance").at(k).get<double>();
+    if (tracker_.recall(memory)) utime_us_ = memory.utime_us;
+  } catch (const json::exception&) {
+    // Written by another version: the charge is found anew from the voltage.
+  }
+}
+
+void ChargeWatch::recall(std::int64_t utime_us, double charge) {
+  auto memory = tracker_.memory();
+  if (!std::isfinite(charge)) return;
+  if (!memory) {
+    memory = battery::ChargeTracker::Memory{tracker_.filter().memory(), utime_us};
+  } else if (memory->utime_us >= utime_us) {
+    return;
+  }
+  memory->filter.mean[0] = charge;
+  memory->filter.known = true;
+  memory->utime_us = utime_us;
+  if (tracker_.recall(*memory)) utime_us_ = utime_us;
+}
+
+void ChargeWatch::take_over(const ChargeWatch& old) {
+  if (const auto memory = old.tracker_.memory()) tracker_.recall(*memory);
+  charging_.recall(old.charging_.habit());
+  utime_us_ = old.utime_us_;
+}
+
+}  // namespace joulecast::server

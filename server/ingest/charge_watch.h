@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "battery/charge_tracker.h"
+#include "battery/charging.h"
+#include "robot/robot_model.h"
+#include "telemetry/sample.h"
+
+namespace joulecast::server {
+
+// What is known of a robot's battery at one moment.
+struct ChargeView {
+  battery::ChargeEstimate estimate;
+  battery::ChargingPhase phase = battery::ChargingPhase::none;
+  battery::ChargingStay stay;       // the present or the last one
+  battery::ChargingTime remaining;  // until the charger's end, while charging
+  battery::ChargingHabit habit;
+};
+
+// Follows one robot's state of charge and its stays at chargers, in missions and outside, and keeps what it
+// has learned over restarts.
+class ChargeWatch {
+ public:
+  explicit ChargeWatch(const robot::RobotModel& robot);
+
+  // To whom a sample belongs. A robot at rest with current into its battery may be charging: its samples wait
+  // until that is clear, two seconds at most.
+  enum class Share { robot, undecided, charger };
+
+  // Samples in order of time; `modelled_power_w` stands in for an unmeasured current (NaN: unknown).
+  Share add(const telemetry::Sample& sample, double modelled_power_w);
+  void interrupt();
+
+  ChargeView view() const;
+  const battery::ChargeEstimate& estimate() const { return tracker_.estimate(); }
+  std::optional<battery::ChargingStay> take_ended() { return charging_.take_ended(); }
+
+  // What a restart must bring back, and its return. `text` that is no memory changes nothing.
+  std::string memory_json() const;
+  void recall(const std::string& text);
+  // The charge as last stored, where that is newer than the memory.
+  void recall(std::int64_t utime_us, double charge);
+  // Where the memory stands in the robot's time; 0 before the first sample.
+  std::int64_t utime_us() const { return utime_us_; }
+
+  // Goes on under another model of the same robot.
+  void take_over(const ChargeWatch& old);
+
+ private:
+  battery::ChargeTracker tracker_;
+  battery::ChargingObserver charging_;
+  std::int64_t utime_us_ = 0;
+};
+
+}  // namespace joulecast::server

@@ -1,0 +1,376 @@
+#include "battery/charge_filter.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace joulecast::battery {
+namespace {
+
+enum : Eigen::Index {
+  at_charge,
+  at_branch,
+  at_lag = at_branch + 2,
+  at_bias = at_lag + 2,
+  at_factor,
+  at_error
+};
+
+constexpr auto n = static_cast<Eigen::Index>(ChargeFilter::size);
+using Vec = Eigen::Matrix<double, n, 1>;
+using Mat = Eigen::Matrix<double, n, n>;
+
+constexpr double seconds_per_hour = 3600;
+constexpr double bias_memory_s = 6 * 3600;         // over which the sensor's offset wanders
+constexpr double resistance_memory_s = 12 * 3600;  // over which the resistance does, with temperature
+constexpr double contradiction_sd = 3;
+constexpr double strained_sd = 3;
+constexpr int contradictions_to_restart = 5;
+constexpr int most_iterations = 6;
+constexpr double shift_updates = 3600;  // over which readings on a displaced curve count as one
+constexpr double first_spread = 0.05;   // of charge, over which the first line is drawn when nothing is known
+
+// Gauss-Hermite, five points, for a standard normal variable.
+constexpr std::array<double, 5> nodes{-2.856970013872806, -1.355626179974266, 0, 1.355626179974266,
+                                      2.856970013872806};
+constexpr std::array<double, 5> weights{0.011257411327721, 0.222075922005613, 0.533333333333333,
+                                        0.222075922005613, 0.011257411327721};
+
+Eigen::Map<Vec> map(ChargeFilter::Vector& v) {
+  return Eigen::Map<Vec>(v.data());
+}
+Eigen::Map<const Vec> map(const ChargeFilter::Vector& v) {
+  return Eigen::Map<const Vec>(v.data());
+}
+Eigen::Map<Mat> map(ChargeFilter::Matrix& m) {
+  return Eigen::Map<Mat>(m.data());
+}
+Eigen::Map<const Mat> map(const ChargeFilter::Matrix& m) {
+  return Eigen::Map<const Mat>(m.data());
+}
+
+State state_of(const Vec& x, double temperature_c) {
+  return {x[at_charge], {x[at_branch], x[at_branch + 1]}, {x[at_lag], x[at_lag + 1]}, temperature_c};
+}
+
+// One state apart: forgets what the others say of it.
+void isolate(Eigen::Map<Mat> p, Eigen::Index k, double variance) {
+  p.row(k).setZero();
+  p.col(k).setZero();
+  p(k, k) = variance;
+}
+
+}  // namespace
+
+ChargeFilter::ChargeFilter(const robot::Battery& battery, const ChargeTrust& trust)
+    : circuit_(battery),
+      trust_(trust),
+      nominal_voltage_v_(battery.nominal_voltage_v),
+      curve_sd_v_(battery.nominal_voltage_v *
+                  (battery.open_circuit_voltage.empty() ? trust.default_curve_sd : trust.open_circuit_sd)),
+      shift_sd_(battery.open_circuit_voltage.empty() ? trust.default_shift_sd : trust.curve_shift_sd),
+      shift_stays_(battery.open_circuit_voltage.empty()),
+      resistance_sd_(battery.resistance_curve.empty() && battery.branches.empty()
+                         ? trust.default_resistance_sd
+                         : trust.resistance_sd),
+      bias_sd_a_(trust.bias_per_h * circuit_.capacity_ah()) {
+  forget();
+}
+
+void ChargeFilter::forget() {
+  auto x = map(mean_);
+  auto p = map(covariance_);
+  x.setZero();
+  p.setZero();
+  x[at_charge] = 0.5;
+  const auto spread = [&](Eigen::Index k, double sd) { p(k, k) = sd * sd; };
+  spread(at_charge, trust_.unknown_charge_sd);
+  spread(at_bias, bias_sd_a_);
+  spread(at_factor, resistance_sd_);
+  spread(at_error, curve_sd_v_);
+  begin(0);
+  known_ = false;
+  contradictions_ = 0;
+}
+
+void ChargeFilter::observe_charge(double value, double sd) {
+  auto x = map(mean_);
+  auto p = map(covariance_);
+  const Vec gain = p.col(at_charge) / (p(at_charge, at_charge) + sd * sd);
+  x += gain * (value - x[at_charge]);
+  const Mat taken = gain * p.row(at_charge);
+  p -= taken;
+  p = (0.5 * (p + p.transpose())).eval();
+  known_ = true;
+}
+
+void ChargeFilter::advance(double current_a, double duration_s, double current_sd_a) {
+  if (!(duration_s > 0)) return;
+  auto x = map(mean_);
+  auto p = map(covariance_);
+  const double true_a = current_a - x[at_bias];
+  const State before = state();
+  const State after = circuit_.advanced(before, true_a, duration_s, temperature_c_);
+  // All moves are linear in state and current; differences of one ampere give the derivatives exactly but for
+  // the coulombic efficiency, which changes where the current turns.
+  const State one = circuit_.advanced(before, true_a + 1, duration_s, temperature_c_);
+  const State kept = circuit_.advanced({0, {1, 1}, {1, 1}, temperature_c_}, 0, duration_s, temperature_c_);
+
+  Mat f = Mat::Identity();
+  Vec by_current = Vec::Zero();
+  by_current[at_charge] = one.charge - after.charge;
+  for (Eigen::Index k = 0; k < 2; ++k) {
+    const auto b = static_cast<std::size_t>(k);
+    f(at_branch + k, at_branch + k) = kept.branch_current_a[b];
+    f(at_lag + k, at_lag + k) = kept.charge_lag[b];
+    by_current[at_branch + k] = one.branch_current_a[b] - after.branch_current_a[b];
+    by_current[at_lag + k] = one.charge_lag[b] - after.charge_lag[b];
+  }
+  const double moved = std::abs(after.charge - before.charge);
+  const double keep_bias = std::exp(-duration_s / bias_memory_s);
+  const double keep_factor = std::exp(-duration_s / resistance_memory_s);
+  const double keep_error = std::exp(-moved / trust_.correlation_charge - duration_s / trust_.correlation_s);
+  f.col(at_bias) = -by_current;
+  f(at_bias, at_bias) = keep_bias;
+  f(at_factor, at_factor) = keep_factor;
+  f(at_error, at_error) = keep_error;
+
+  x[at_charge] = std::clamp(after.charge, -0.05, 1.05);
+  for (Eigen::Index k = 0; k < 2; ++k) {
+    const auto b = static_cast<std::size_t>(k);
+    x[at_branch + k] = after.branch_current_a[b];
+    x[at_lag + k] = after.charge_lag[b];
+  }
+  x[at_bias] *= keep_bias;
+  x[at_factor] *= keep_factor;
+  x[at_error] *= keep_error;
+  p = (f * p * f.transpose()).eval();
+  const auto wander = [&](Eigen::Index k, double sd, double keep) { p(k, k) += sd * sd * (1 - keep * keep); };
+  wander(at_bias, bias_sd_a_, keep_bias);
+  wander(at_factor, resistance_sd_, keep_factor);
+  wander(at_error, curve_sd_v_, keep_error);
+  p(at_charge, at_charge) += trust_.gain_sd * trust_.gain_sd * trust_.correlation_charge * moved;
+  if (current_sd_a > 0) {
+    const double blocks = std::max(1.0, trust_.modelled_current_s / duration_s);
+    p += current_sd_a * current_sd_a * blocks * by_current * by_current.transpose();
+  }
+}
+
+State ChargeFilter::state() const {
+  return state_of(map(mean_), temperature_c_);
+}
+
+double ChargeFilter::drop_v(const State& at, double current_a, double factor) const {
+  double ohmic = circuit_.ohmic_resistance_ohm(at) * current_a;
+  for (std::size_t k = 0; k < 2; ++k) ohmic += circuit_.branch_resistance_ohm(k, at) * at.branch_current_a[k];
+  return factor * ohmic;
+}
+
+ChargeFilter::Linear ChargeFilter::linearise(const Vector& mean, const Matrix& covariance,
+                                             double current_a) const {
+  const auto x = map(mean);
+  const auto p = map(covariance);
+  Vec surface = Vec::Zero();
+  surface[at_charge] = 1;
+  surface[at_lag] = surface[at_lag + 1] = -1;
+  const double spread = std::sqrt(std::max(1e-12, surface.dot(p * surface)));
+  const double true_a = current_a - x[at_bias];
+  const double factor = std::exp(x[at_factor]);
+  const State at = state_of(x, temperature_c_);
+
+  std::array<double, nodes.size()> volts{};
+  double mean_v = 0, slope = 0;
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    State there = at;
+    there.charge += spread * nodes[k];
+    volts[k] = circuit_.open_circuit_voltage_v(there.surface_charge()) - drop_v(there, true_a, factor);
+    mean_v += weights[k] * volts[k];
+    slope += weights[k] * nodes[k] * volts[k] / spread;
+  }
+  double variance = 0;
+  for (std::size_t k = 0; k < nodes.size(); ++k)
+    variance += weights[k] * std::pow(volts[k] - mean_v - slope * spread * nodes[k], 2);
+
+  Linear out{mean_v + x[at_error], {}, variance};
+  Eigen::Map<Vec> h(out.h.data());
+  h = slope * surface;
+  for (Eigen::Index k = 0; k < 2; ++k)
+    h[at_branch + k] = -factor * circuit_.branch_resistance_ohm(static_cast<std::size_t>(k), at);
+  h[at_bias] = factor * circuit_.ohmic_resistance_ohm(at);
+  h[at_factor] = -drop_v(at, true_a, factor);
+  h[at_error] = 1;
+  return out;
+}
+
+// Where along the curve the voltage would be met by the rest of the state.
+double ChargeFilter::charge_at(double voltage_v, double current_a) const {
+  const auto x = map(mean_);
+  constexpr int steps = 100;
+  double best = x[at_charge], least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k <= steps; ++k) {
+    State there = state();
+    there.charge = static_cast<double>(k) / steps;
+    const double expected = circuit_.open_circuit_voltage_v(there.surface_charge()) -
+                            drop_v(there, current_a - x[at_bias], std::exp(x[at_factor]));
+    if (std::abs(expected - voltage_v) < least) {
+      least = std::abs(expected - voltage_v);
+      best = there.charge;
+    }
+  }
+  return best;
+}
+
+// What flowed before the first reading is not known; likely something of its kind.
+void ChargeFilter::begin(double current_a) {
+  auto x = map(mean_);
+  auto p = map(covariance_);
+  const double sd_a = 0.5 * std::abs(current_a) + trust_.unknown_current_per_h * circuit_.capacity_ah();
+  const State mean = circuit_.advanced({}, 0.5 * current_a, seconds_per_hour, temperature_c_);
+  const State spread = circuit_.advanced({}, sd_a, seconds_per_hour, temperature_c_);
+  for (Eigen::Index k = 0; k < 2; ++k) {
+    const auto b = static_cast<std::size_t>(k);
+    x[at_branch + k] = mean.branch_current_a[b];
+    x[at_lag + k] = mean.charge_lag[b];
+    isolate(p, at_branch + k, std::pow(spread.branch_current_a[b], 2));
+    isolate(p, at_lag + k, std::pow(spread.charge_lag[b], 2));
+  }
+}
+
+void ChargeFilter::correct(double voltage_v, double current_a, double more_noise_v) {
+  if (!known_) begin(current_a);
+  const Vector prior_mean = mean_;
+  const Matrix prior_covariance = covariance_;
+  const auto x0 = map(prior_mean);
+  const auto p0 = map(prior_covariance);
+  const double noise_v = std::hypot(trust_.voltage_noise * nominal_voltage_v_, more_noise_v,
+                                    trust_.drop_sd * drop_v(state(), current_a - x0[at_bias], 1));
+  auto x = map(mean_);
+  auto p = map(covariance_);
+  // A displaced curve is displaced in every reading: together they tell as much as the first one did.
+  const bool repeated = shift_stays_ && known_;
+  if (!known_) {
+    // The first line is drawn where the voltage points to.
+    x[at_charge] = charge_at(voltage_v, current_a);
+    isolate(p, at_charge, first_spread * first_spread);
+  }
+  for (int iteration = 0; iteration < most_iterations; ++iteration) {
+    const Linear linear = linearise(mean_, covariance_, current_a);
+    const Eigen::Map<const Vec> h(linear.h.data());
+    // The line through the expansion point, applied to the prior.
+    const double expected = linear.mean_v + h.dot(x0 - x);
+    const Vec ph = p0 * h;
+    const double shift_v = shift_sd_ * (repeated ? std::sqrt(shift_updates) : 1) * h[at_charge];
+    const double innovation_variance = h.dot(ph) + linear.variance_v2 + noise_v * noise_v + shift_v * shift_v;
+    const double innovation = voltage_v - expected;
+    if (iteration == 0 && known_) {
+      double surprise = innovation / std::sqrt(innovation_variance);
+      // A charge far off the voltage's, on a steep piece of the curve, hides in the curve's error.
+      if (std::abs(x[at_error]) > strained_sd * curve_sd_v_)
+        surprise = std::copysign(contradiction_sd, x[at_error]);
+      if (std::abs(surprise) < contradiction_sd) {
+        contradictions_ = 0;
+      } else {
+        const int way = surprise > 0 ? 1 : -1;
+        contradictions_ = contradictions_ * way > 0 ? contradictions_ + way : way;
+      }
+      if (std::abs(contradictions_) >= contradictions_to_restart) {
+        const double offset_a = x[at_bias], offset_variance = p(at_bias, at_bias);
+        forget();
+        x[at_bias] = offset_a;
+        p(at_bias, at_bias) = offset_variance;
+        ++restarts_;
+        return correct(voltage_v, current_a, more_noise_v);
+      }
+      // A single contradiction may be a glitch: wait for more.
+      if (contradictions_ != 0) return;
+    }
+    const double before = x[at_charge], sd = std::sqrt(p(at_charge, at_charge));
+    const Vec gain = ph / innovation_variance;
+    x = x0 + gain * innovation;
+    p = p0 - gain * ph.transpose();
+    p = (0.5 * (p + p.transpose())).eval();
+    if (iteration > 0 && std::abs(x[at_charge] - before) < 0.02 * sd &&
+        std::abs(std::sqrt(p(at_charge, at_charge)) - sd) < 0.02 * sd)
+      break;
+  }
+  x[at_charge] = std::clamp(x[at_charge], -0.05, 1.05);
+  known_ = true;
+}
+
+void ChargeFilter::gap(double duration_s) {
+  auto x = map(mean_);
+  auto p = map(covariance_);
+  const double current_sd_a = trust_.unknown_current_per_h * circuit_.capacity_ah();
+  const State after = circuit_.advanced({0, {1, 1}, {1, 1}, temperature_c_}, 0, duration_s, temperature_c_);
+  const State driven = circuit_.advanced({}, current_sd_a, duration_s, temperature_c_);
+  for (Eigen::Index k = 0; k < 2; ++k) {
+    const auto b = static_cast<std::size_t>(k);
+    const auto relax = [&](Eigen::Index at, double keep, double sd) {
+      x[at] *= keep;
+      p.row(at) *= keep;
+      p.col(at) *= keep;
+      p(at, at) += sd * sd;
+    };
+    relax(at_branch + k, after.branch_current_a[b], driven.branch_current_a[b]);
+    relax(at_lag + k, after.charge_lag[b], driven.charge_lag[b]);
+  }
+  const double lost = trust_.unknown_current_per_h * duration_s / seconds_per_hour;
+  const double most = trust_.unknown_charge_sd * trust_.unknown_charge_sd;
+  p(at_charge, at_charge) =
+      std::max(p(at_charge, at_charge), std::min(most, p(at_charge, at_charge) + lost * lost));
+  // The rest wanders as in advance(), without its charge.
+  const auto wander = [&](Eigen::Index k, double sd, double memory_s) {
+    const double keep = std::exp(-duration_s / memory_s);
+    x[k] *= keep;
+    p.row(k) *= keep;
+    p.col(k) *= keep;
+    p(k, k) += sd * sd * (1 - keep * keep);
+  };
+  wander(at_bias, bias_sd_a_, bias_memory_s);
+  wander(at_factor, resistance_sd_, resistance_memory_s);
+  wander(at_error, curve_sd_v_, trust_.correlation_s);
+}
+
+double ChargeFilter::charge() const {
+  return std::clamp(mean_[static_cast<std::size_t>(at_charge)], 0.0, 1.0);
+}
+
+double ChargeFilter::charge_sd() const {
+  return std::sqrt(map(covariance_)(at_charge, at_charge));
+}
+
+double ChargeFilter::current_bias_a() const {
+  return map(mean_)[at_bias];
+}
+
+double ChargeFilter::current_bias_sd_a() const {
+  return std::sqrt(map(covariance_)(at_bias, at_bias));
+}
+
+double ChargeFilter::resistance_factor() const {
+  return std::exp(map(mean_)[at_factor]);
+}
+
+double ChargeFilter::voltage_only_sd() const {
+  Matrix wide = covariance_;
+  // Over a tenth of the capacity: single points of a measured curve are noisy.
+  isolate(map(wide), at_charge, 0.05 * 0.05);
+  const Linear linear = linearise(mean_, wide, 0);
+  const double slope = linear.h[static_cast<std::size_t>(at_charge)];
+  return std::hypot(curve_sd_v_, trust_.voltage_noise * nominal_voltage_v_) / std::max(slope, 1e-9);
+}
+
+bool ChargeFilter::recall(const Memory& memory) {
+  const auto p = map(memory.covariance);
+  if (!map(memory.mean).allFinite() || !p.allFinite() || !(p.diagonal().minCoeff() >= 0) ||
+      !(p(at_charge, at_charge) > 0))
+    return false;
+  mean_ = memory.mean;
+  covariance_ = memory.covariance;
+  known_ = memory.known;
+  contradictions_ = 0;
+  return true;
+}
+
+}  // namespace joulecast::battery

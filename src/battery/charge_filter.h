@@ -1,0 +1,115 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "battery/circuit.h"
+
+namespace joulecast::battery {
+
+// How far the filter trusts model and sensors. Shares of the nominal voltage or of the capacity, so that
+// cells and packs are judged alike.
+struct ChargeTrust {
+  double open_circuit_sd =
+      0.003;  // of the nominal voltage: error of the curve and of the circuit's slow part
+  double default_curve_sd = 0.015;   // the same where the robot file has no curve
+  double correlation_charge = 0.08;  // charge drawn over which that error stays the same ...
+  double correlation_s = 12 * 3600;  // ... and time
+  double voltage_noise = 0.0005;     // of the nominal voltage, of one averaged reading
+  double drop_sd = 0.1;              // of the voltage dropped inside the battery, uncorrelated
+  double curve_shift_sd = 0.01;   // of the charge by which the curve is displaced; counts where it is steep
+  double default_shift_sd = 0.1;  // the same where the file has no curve: the same error all along
+  double resistance_sd = 0.15;    // of the file's resistance, constant for hours
+  double default_resistance_sd = 0.4;   // the same where the file has a single resistance
+  double bias_per_h = 0.01;             // of the capacity an hour: offset of the current sensor
+  double gain_sd = 0.02;                // of current or capacity, over correlation_charge
+  double modelled_current_sd = 0.15;    // of a current that was not measured but follows from the model
+  double modelled_current_s = 600;      // over which that error stays the same
+  double unknown_current_per_h = 0.25;  // of the capacity an hour: what may flow while nobody looks
+  double unknown_charge_sd = 0.3;
+};
+
+// State of charge by a Kalman filter on the circuit of the robot file. States: charge, the currents of both
+// branches, both charge lags, offset of the current sensor [A], logarithm of the resistance's factor, and a
+// slowly wandering error of the open-circuit voltage [V], without which the voltage would be believed too
+// much. All but the open-circuit curve is linear; that is linearised statistically over the charge's own
+// uncertainty, and again over what the voltage leaves of it (iterated posterior linearisation,
+// Garcia-Fernandez et al. 2015), so that a start that is wrong by half the capacity converges at the first
+// voltage where the curve is steep, and a flat curve is not mistaken for knowledge.
+//
+// A voltage that contradicts the charge for some updates on end (a pack was exchanged, the stored charge was
+// wrong) makes the filter start over from the voltage.
+class ChargeFilter {
+ public:
+  static constexpr std::size_t size = 8;
+  using Vector = std::array<double, size>;
+  using Matrix = std::array<double, size * size>;  // symmetric
+
+  explicit ChargeFilter(const robot::Battery& battery, const ChargeTrust& trust = {});
+
+  // The charge is unknown from here on.
+  void forget();
+  // The charge is known from elsewhere, e.g. full at the end of charging.
+  void observe_charge(double charge, double sd);
+
+  // A time of constant current, by the sensor. `current_sd_a` is what is not known of it, constant over
+  // modelled_current_s; zero for a measured one.
+  void advance(double current_a, double duration_s, double current_sd_a = 0);
+  // The voltage at the end of it, while `current_a` (by the sensor) flows. `more_noise_v` adds to the
+  // trust's.
+  void correct(double voltage_v, double current_a, double more_noise_v = 0);
+  // A time in which nothing was measured: what flowed is not known, nor was it metered.
+  void gap(double duration_s);
+
+  void set_temperature_c(double temperature_c) { temperature_c_ = temperature_c; }
+
+  bool known() const { return known_; }  // a voltage or an observation came since it was forgotten
+  double charge() const;                 // 0 to 1, of the present capacity
+  double charge_sd() const;
+  double current_bias_a() const;
+  double current_bias_sd_a() const;
+  double resistance_factor() const;
+  // The standard deviation of the charge that one voltage would give here by itself; large on a flat curve.
+  double voltage_only_sd() const;
+  std::size_t restarts() const { return restarts_; }  // times that the voltage contradicted the charge
+  const Circuit& circuit() const { return circuit_; }
+
+  // What a restart must bring back.
+  struct Memory {
+    Vector mean{};
+    Matrix covariance{};
+    bool known = false;
+  };
+  Memory memory() const { return {mean_, covariance_, known_}; }
+  // False, and nothing changes, when the memory is not one (not finite, variance not positive).
+  bool recall(const Memory& memory);
+
+ private:
+  struct Linear {
+    double mean_v;               // expected voltage
+    std::array<double, size> h;  // its derivatives
+    double variance_v2;          // of what is not linear
+  };
+  State state() const;
+  void begin(double current_a);
+  double charge_at(double voltage_v, double current_a) const;
+  Linear linearise(const Vector& mean, const Matrix& covariance, double current_a) const;
+  double drop_v(const State& state, double current_a, double resistance_factor) const;
+
+  Circuit circuit_;
+  ChargeTrust trust_;
+  double nominal_voltage_v_;
+  double curve_sd_v_;
+  double shift_sd_;
+  bool shift_stays_;
+  double resistance_sd_;
+  double bias_sd_a_;
+  double temperature_c_ = reference_temperature_c;
+  Vector mean_{};
+  Matrix covariance_{};
+  bool known_ = false;
+  int contradictions_ = 0;  // on end, of one sign
+  std::size_t restarts_ = 0;
+};
+
+}  // namespace joulecast::battery

@@ -1,0 +1,136 @@
+#include "battery/charge_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace joulecast::battery {
+namespace {
+
+constexpr double microseconds = 1e-6;
+constexpr double full_sd = 0.02;  // chargers end at different small currents
+
+}  // namespace
+
+std::string_view name(ChargeSource source) {
+  switch (source) {
+    case ChargeSource::unknown:
+      return "unknown";
+    case ChargeSource::voltage_and_current:
+      return "voltage_and_current";
+    case ChargeSource::voltage_and_model:
+      return "voltage_and_model";
+    case ChargeSource::current:
+      return "current";
+    case ChargeSource::model:
+      return "model";
+  }
+  return "unknown";
+}
+
+ChargeTracker::ChargeTracker(const robot::Battery& battery, double idle_power_w,
+                             const ChargeTrackerSettings& settings, const ChargeTrust& trust)
+    : filter_(battery, trust),
+      settings_(settings),
+      idle_power_w_(idle_power_w),
+      modelled_sd_(trust.modelled_current_sd),
+      default_curve_(battery.open_circuit_voltage.empty()) {
+  refresh();
+}
+
+void ChargeTracker::add(const ChargeReading& reading) {
+  if (!last_) {
+    // Between a remembered time and the first reading nobody looked.
+    if (counted_utime_us_ != 0 && reading.utime_us > counted_utime_us_)
+      filter_.gap(static_cast<double>(reading.utime_us - counted_utime_us_) * microseconds);
+    last_ = reading;
+    counted_utime_us_ = reading.utime_us;
+    duration_s_ = charge_as_ = modelled_as_ = voltage_vs_ = voltage_s_ = 0;
+    if (!filter_.known() && std::isfinite(reading.voltage_v) && std::isfinite(reading.current_a)) {
+      filter_.correct(reading.voltage_v, reading.current_a);
+      source_ = ChargeSource::voltage_and_current;
+    }
+    refresh();
+    return;
+  }
+  const double interval_s = static_cast<double>(reading.utime_us - last_->utime_us) * microseconds;
+  if (!(interval_s > 0)) return;
+  if (interval_s > settings_.gap_s) {
+    update();
+    filter_.gap(interval_s);
+    refresh();
+    counted_utime_us_ = reading.utime_us;
+    last_ = reading;
+    return;
+  }
+  double current_a = 0.5 * (last_->current_a + reading.current_a);
+  const double voltage_v = 0.5 * (last_->voltage_v + reading.voltage_v);
+  if (std::isfinite(voltage_v)) {
+    voltage_vs_ += voltage_v * interval_s;
+    voltage_s_ += interval_s;
+  }
+  if (!std::isfinite(current_a)) {
+    const double power_w = std::isfinite(reading.modelled_power_w) ? reading.modelled_power_w : idle_power_w_;
+    const double at_v =
+        std::isfinite(voltage_v) ? voltage_v : filter_.circuit().open_circuit_voltage_v(filter_.charge());
+    current_a = power_w / at_v;
+    modelled_as_ += std::abs(current_a) * interval_s;
+  }
+  charge_as_ += current_a * interval_s;
+  duration_s_ += interval_s;
+  last_ = reading;
+  if (duration_s_ >= settings_.update_s) update();
+}
+
+void ChargeTracker::update() {
+  if (!(duration_s_ > 0)) return;
+  const double current_a = charge_as_ / duration_s_;
+  const double current_sd_a = modelled_sd_ * modelled_as_ / duration_s_;
+  filter_.advance(current_a, duration_s_, current_sd_a);
+  const bool voltage = voltage_s_ >= 0.5 * duration_s_;
+  if (voltage) {
+    const double noise_v =
+        current_sd_a * filter_.circuit().ohmic_resistance_ohm(Circuit::rested(filter_.charge()));
+    filter_.correct(voltage_vs_ / voltage_s_, current_a, noise_v);
+  }
+  const bool modelled = modelled_as_ > 0;
+  if (filter_.known())
+    source_ = voltage ? (modelled ? ChargeSource::voltage_and_model : ChargeSource::voltage_and_current)
+                      : (modelled ? ChargeSource::model : ChargeSource::current);
+  counted_utime_us_ = last_->utime_us;
+  duration_s_ = charge_as_ = modelled_as_ = voltage_vs_ = voltage_s_ = 0;
+  refresh();
+}
+
+void ChargeTracker::observe_full() {
+  filter_.observe_charge(1, full_sd);
+  refresh();
+}
+
+void ChargeTracker::refresh() {
+  ChargeEstimate& out = estimate_;
+  out = {};
+  out.default_curve = default_curve_;
+  if (!filter_.known()) return;
+  out.charge = filter_.charge();
+  out.sd = filter_.charge_sd();
+  out.source = source_;
+  out.flat_curve = filter_.voltage_only_sd() > settings_.flat_sd;
+  out.current_bias_a = filter_.current_bias_a();
+  out.current_bias_sd_a = filter_.current_bias_sd_a();
+}
+
+std::optional<ChargeTracker::Memory> ChargeTracker::memory() const {
+  if (counted_utime_us_ == 0) return std::nullopt;
+  return Memory{filter_.memory(), counted_utime_us_};
+}
+
+bool ChargeTracker::recall(const Memory& memory) {
+  if (memory.utime_us <= 0 || !filter_.recall(memory.filter)) return false;
+  counted_utime_us_ = memory.utime_us;
+  // Until the next reading the charge stands as it was remembered.
+  source_ = memory.filter.known ? ChargeSource::current : ChargeSource::unknown;
+  refresh();
+  return true;
+}
+
+}  // namespace joulecast::battery

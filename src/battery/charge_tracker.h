@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string_view>
+
+#include "battery/charge_filter.h"
+
+namespace joulecast::battery {
+
+// One robot's battery at one instant; NaN = not measured or not known.
+struct ChargeReading {
+  std::int64_t utime_us = 0;
+  double voltage_v = std::numeric_limits<double>::quiet_NaN();
+  double current_a = std::numeric_limits<double>::quiet_NaN();
+  double modelled_power_w = std::numeric_limits<double>::quiet_NaN();  // stands in for the current
+};
+
+// What the charge is known from at present.
+enum class ChargeSource { unknown, voltage_and_current, voltage_and_model, current, model };
+std::string_view name(ChargeSource source);
+
+struct ChargeEstimate {
+  double charge = std::numeric_limits<double>::quiet_NaN();
+  double sd = std::numeric_limits<double>::quiet_NaN();
+  ChargeSource source = ChargeSource::unknown;
+  bool default_curve = false;  // the robot file has no open-circuit curve: a typical one stands in
+  bool flat_curve = false;     // here the voltage tells next to nothing: the charge is only counted
+  double current_bias_a = 0;
+  double current_bias_sd_a = std::numeric_limits<double>::quiet_NaN();
+};
+
+struct ChargeTrackerSettings {
+  double update_s = 1;    // readings are averaged over this
+  double gap_s = 15;      // longer silences count as unknown current
+  double flat_sd = 0.15;  // of the charge from one voltage: from here on the curve counts as flat
+};
+
+// The charge filter in time: takes a robot's readings as they come, averages them, and bridges what is
+// missing (current by the model's power, voltage by counting on, silence by doubt). Depends on the readings'
+// clock alone.
+class ChargeTracker {
+ public:
+  ChargeTracker(const robot::Battery& battery, double idle_power_w,
+                const ChargeTrackerSettings& settings = {}, const ChargeTrust& trust = {});
+
+  // Readings in order of time.
+  void add(const ChargeReading& reading);
+  // The clock was set: what lies between the last reading and the next is not known.
+  void interrupt() { last_.reset(); }
+  // The charger has ended: the battery is full.
+  void observe_full();
+
+  const ChargeEstimate& estimate() const { return estimate_; }
+  const ChargeFilter& filter() const { return filter_; }
+
+  struct Memory {
+    ChargeFilter::Memory filter;
+    std::int64_t utime_us = 0;  // of the last reading in it
+  };
+  std::optional<Memory> memory() const;  // absent before the first reading
+  // To be called before the first reading. False when the memory is not one.
+  bool recall(const Memory& memory);
+
+ private:
+  void update();
+  void refresh();
+
+  ChargeFilter filter_;
+  ChargeTrackerSettings settings_;
+  double idle_power_w_;
+  double modelled_sd_;
+  bool default_curve_;
+  ChargeSource source_ = ChargeSource::unknown;
+  ChargeEstimate estimate_;
+  std::optional<ChargeReading> last_;
+  std::int64_t counted_utime_us_ = 0;  // up to which the filter has come
+  // Sums since then.
+  double duration_s_ = 0, charge_as_ = 0, modelled_as_ = 0, voltage_vs_ = 0, voltage_s_ = 0;
+};
+
+}  // namespace joulecast::battery
