@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 
+#include "client/commands/examples.h"
 #include "client/commands/table.h"
 
 int main(int argc, char** argv) {
@@ -10,6 +11,7 @@ int main(int argc, char** argv) {
   program.require_subcommand(1);
   Exit exit = Exit::ok;
   for (const auto add : joulecast::client::commands()) add(program, exit);
+  joulecast::client::add_examples(program);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

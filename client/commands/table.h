@@ -20,6 +20,7 @@ using AddCommand = void (*)(CLI::App& program, Exit& exit);
 void add_autonomy(CLI::App& program, Exit& exit);
 void add_battery(CLI::App& program, Exit& exit);
 void add_calibrate(CLI::App& program, Exit& exit);
+void add_completion(CLI::App& program, Exit& exit);
 void add_effects(CLI::App& program, Exit& exit);
 void add_estimate(CLI::App& program, Exit& exit);
 void add_explore(CLI::App& program, Exit& exit);

@@ -1,0 +1,69 @@
+#include "client/commands/examples.h"
+
+#include <CLI/CLI.hpp>
+#include <sstream>
+#include <string>
+
+namespace joulecast::client {
+namespace {
+
+struct Examples {
+  const char* command;
+  const char* text;  // one command a line
+};
+
+// amr.lcmlog, amr.json, history.db and the like stand for the reader's own files; tests/documents makes such
+// files and runs every line.
+constexpr Examples table[] = {
+    {"profile",
+     "joulecast profile --robot amr.json --length 10 --payload 20\n"
+     "joulecast profile --robot amr.json --length 10 --deadline 14 --json\n"
+     "joulecast profile --server http://127.0.0.1:8080 --robot-id amr --turn 1.57 --length 10 --pareto 5"},
+    {"estimate", "joulecast estimate --robot amr.json --length 10 --payload 20"},
+    {"autonomy",
+     "joulecast autonomy --robot amr.json --charge 0.6 --payload 20\n"
+     "joulecast autonomy --server http://127.0.0.1:8080 --robot-id amr"},
+    {"missions", "joulecast missions --server http://127.0.0.1:8080 --robot-id amr --limit 20"},
+    {"import",
+     "joulecast import runs.csv --mapping mapping.json --start 2026-03-01T08:00:00Z --out imported.lcmlog"},
+    {"replay",
+     "joulecast replay amr.lcmlog --speed 20\n"
+     "joulecast replay amr.lcmlog --into history.db --robot amr.json"},
+    {"simulate",
+     "joulecast simulate --robots 4 --mission-duration 20 --duration 3 --server http://127.0.0.1:8080\n"
+     "joulecast simulate --robot amr.json --robots 1 --missions 3 --speed 0 --log simulated.lcmlog\n"
+     "joulecast simulate --list-effects"},
+    {"gap",
+     "joulecast gap amr.lcmlog --robot amr.json\n"
+     "joulecast gap amr.lcmlog --robot amr.json --apply amr-adopted.json --json"},
+    {"explore",
+     "joulecast explore --case 1 --svg case1.svg\n"
+     "joulecast explore --map yard.json --robot amr.json --payload 0 --payload 20"},
+    {"thesis", "joulecast thesis\njoulecast thesis --table 4-1 --json\njoulecast thesis --figure 4-2a --csv"},
+    {"completion", "source <(joulecast completion bash)"},
+    {"calibrate drive", "joulecast calibrate drive amr.lcmlog --robot amr.json --out amr-calibrated.json"},
+    {"calibrate battery", "joulecast calibrate battery cell_*_data.csv --capacity-ah 2.6 --out cell.json"},
+    {"battery predict", "joulecast battery predict cell_random_data.csv --battery cell.json"},
+};
+
+// The command "calibrate drive" names: a subcommand of a subcommand.
+CLI::App* find(CLI::App& program, const std::string& path) {
+  std::istringstream names(path);
+  CLI::App* app = &program;
+  for (std::string name; names >> name;) app = app->get_subcommand(name);
+  return app;
+}
+
+}  // namespace
+
+void add_examples(CLI::App& program) {
+  for (const auto& [command, text] : table) {
+    CLI::App* app = find(program, command);
+    std::string footer = "Examples:\n  ";
+    for (const char* c = text; *c != '\0'; ++c)
+      footer += *c == '\n' ? std::string("\n  ") : std::string(1, *c);
+    app->footer(footer + "\n\n" + program.get_footer());
+  }
+}
+
+}  // namespace joulecast::client

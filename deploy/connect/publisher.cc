@@ -1,0 +1,87 @@
+// A robot's side of joulecast in C++: publishes its telemetry and announces one mission.
+//   lcm-gen -x --cpp-hpath generated lcmtypes/*.lcm
+//   g++ -std=c++20 -Igenerated deploy/connect/publisher.cc -o publisher -llcm
+//   ./publisher amr 5          (robot_id, seconds)
+// The drive below is made up; put your own readings in its place.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <lcm/lcm-cpp.hpp>
+#include <limits>
+#include <string>
+#include <thread>
+
+#include "joulecast/mission_event_t.hpp"
+#include "joulecast/robot_telemetry_t.hpp"
+
+namespace {
+
+constexpr double not_measured = std::numeric_limits<double>::quiet_NaN();
+constexpr int rate_hz = 50;
+
+std::int64_t now_us() {
+  using namespace std::chrono;
+  return duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
+}
+
+joulecast::mission_event_t mission_event(const std::string& robot_id, const std::string& mission_id,
+                                         std::int8_t event) {
+  joulecast::mission_event_t m{};
+  m.utime = now_us();
+  m.robot_id = robot_id;
+  m.mission_id = mission_id;
+  m.event = event;
+  m.payload_mass = 20;  // kg, what the robot believes it carries
+  m.note = "first mission";
+  return m;
+}
+
+joulecast::robot_telemetry_t read_sensors(const std::string& robot_id, std::int64_t sequence) {
+  const double t_s = static_cast<double>(sequence) / rate_hz;
+  joulecast::robot_telemetry_t s{};
+  s.utime = now_us();     // the instant of sampling, not of sending
+  s.sequence = sequence;  // +1 a message, so that losses can be counted
+  s.robot_id = robot_id;
+  const double speed_m_s = std::min(0.5 * t_s, 1.0);
+  for (int side = 0; side < 2; ++side) {  // [0] right, [1] left
+    s.wheel_velocity[side] = speed_m_s / 0.08;
+    s.motor_voltage[side] = not_measured;
+    s.motor_current[side] = not_measured;
+    s.motor_temperature[side] = not_measured;
+  }
+  s.battery_voltage = 26.0;
+  s.battery_current = 1.0 + 2.0 * speed_m_s;  // positive while discharging
+  s.velocity_command[0] = speed_m_s;
+  s.velocity_command[1] = 0;
+  s.yaw_rate = 0;
+  s.pitch = not_measured;
+  s.pose[0] = s.pose[1] = s.pose[2] = not_measured;
+  s.payload_mass = 20;
+  return s;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string robot_id = argc > 1 ? argv[1] : "amr";
+  const int duration_s = argc > 2 ? std::atoi(argv[2]) : 5;
+  lcm::LCM lcm;  // the provider of LCM_DEFAULT_URL
+  if (!lcm.good()) {
+    std::fprintf(stderr, "LCM is not reachable; set LCM_DEFAULT_URL\n");
+    return 1;
+  }
+  using joulecast::mission_event_t;
+  const std::string mission_id = "tour-" + std::to_string(now_us());
+  const auto started = mission_event(robot_id, mission_id, mission_event_t::STARTED);
+  lcm.publish("MISSION_EVENT." + robot_id, &started);
+  auto next = std::chrono::steady_clock::now();
+  for (std::int64_t sequence = 0; sequence < std::int64_t{rate_hz} * duration_s; ++sequence) {
+    const auto sample = read_sensors(robot_id, sequence);
+    lcm.publish("ROBOT_TELEMETRY." + robot_id, &sample);
+    std::this_thread::sleep_until(next += std::chrono::milliseconds(1000 / rate_hz));
+  }
+  const auto finished = mission_event(robot_id, mission_id, mission_event_t::FINISHED);
+  lcm.publish("MISSION_EVENT." + robot_id, &finished);
+  std::printf("%s drove mission %s\n", robot_id.c_str(), mission_id.c_str());
+}

@@ -1,0 +1,71 @@
+"""A robot's side of joulecast in Python: publishes its telemetry and announces one mission.
+
+    lcm-gen -p --ppath generated lcmtypes/*.lcm
+    PYTHONPATH=generated python3 deploy/connect/publisher.py amr 5      (robot_id, seconds)
+
+The drive below is made up; put your own readings in its place.
+"""
+
+import math
+import sys
+import time
+
+from joulecast import mission_event_t, robot_telemetry_t
+from lcm_udp import Publisher
+
+NOT_MEASURED = math.nan
+RATE_HZ = 50
+
+
+def now_us():
+    return time.time_ns() // 1000
+
+
+def mission_event(robot_id, mission_id, event):
+    message = mission_event_t()
+    message.utime = now_us()
+    message.robot_id = robot_id
+    message.mission_id = mission_id
+    message.event = event
+    message.payload_mass = 20.0  # kg, what the robot believes it carries
+    message.note = "first mission"
+    return message.encode()
+
+
+def sample(robot_id, sequence):
+    t_s = sequence / RATE_HZ
+    speed_m_s = min(0.5 * t_s, 1.0)
+    message = robot_telemetry_t()
+    message.utime = now_us()  # the instant of sampling, not of sending
+    message.sequence = sequence  # +1 a message, so that losses can be counted
+    message.robot_id = robot_id
+    message.wheel_velocity = [speed_m_s / 0.08] * 2  # [right, left], rad/s, positive forward
+    message.motor_voltage = [NOT_MEASURED] * 2
+    message.motor_current = [NOT_MEASURED] * 2
+    message.motor_temperature = [NOT_MEASURED] * 2
+    message.battery_voltage = 26.0
+    message.battery_current = 1.0 + 2.0 * speed_m_s  # positive while discharging
+    message.velocity_command = [speed_m_s, 0.0]
+    message.yaw_rate = 0.0
+    message.pitch = NOT_MEASURED
+    message.pose = [NOT_MEASURED] * 3
+    message.payload_mass = 20.0
+    return message.encode()
+
+
+def main():
+    robot_id = sys.argv[1] if len(sys.argv) > 1 else "amr"
+    duration_s = int(sys.argv[2]) if len(sys.argv) > 2 else 5
+    lcm = Publisher()
+    mission_id = f"tour-{now_us()}"
+    lcm.publish(f"MISSION_EVENT.{robot_id}", mission_event(robot_id, mission_id, mission_event_t.STARTED))
+    begin = time.monotonic()
+    for sequence in range(RATE_HZ * duration_s):
+        lcm.publish(f"ROBOT_TELEMETRY.{robot_id}", sample(robot_id, sequence))
+        time.sleep(max(0.0, begin + (sequence + 1) / RATE_HZ - time.monotonic()))
+    lcm.publish(f"MISSION_EVENT.{robot_id}", mission_event(robot_id, mission_id, mission_event_t.FINISHED))
+    print(f"{robot_id} drove mission {mission_id}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,117 @@
+"""Writes the HTTP reference (http.md) from schemas/openapi.json:
+
+    python3 deploy/documents/http_reference.py > deploy/documents/http.md
+"""
+
+import json
+import re
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def resolve(document, schema):
+    while "$ref" in schema:
+        node = document
+        for part in schema["$ref"].lstrip("#/").split("/"):
+            node = node[part.replace("~1", "/").replace("~0", "~")]
+        schema = node
+    return schema
+
+
+def kind(document, schema):
+    name = schema["$ref"].rsplit("/", 1)[-1] if "$ref" in schema else None
+    schema = resolve(document, schema)
+    if "enum" in schema:
+        return " \\| ".join(f"`{value}`" for value in schema["enum"])
+    if "const" in schema:
+        return f"`{json.dumps(schema['const'])}`"
+    for word in ("oneOf", "anyOf"):
+        if word in schema:
+            return " or ".join(dict.fromkeys(kind(document, option) for option in schema[word]))
+    types = schema.get("type", "any")
+    types = types if isinstance(types, list) else [types]
+    text = " or ".join(types)
+    if "array" in types and "items" in schema:
+        text = text.replace("array", f"array of {kind(document, schema['items'])}")
+    return f"{name} ({text})" if name and "object" in types else text
+
+
+def bounds(schema):
+    parts = []
+    for key, sign in (("minimum", "≥"), ("exclusiveMinimum", ">"), ("maximum", "≤"), ("exclusiveMaximum", "<")):
+        if key in schema:
+            parts.append(f"{sign} {schema[key]:g}")
+    for key, word in (("minItems", "at least {} items"), ("maxItems", "at most {} items"),
+                      ("maxLength", "at most {} characters")):
+        if key in schema:
+            parts.append(word.format(schema[key]))
+    if "default" in schema:
+        parts.append(f"default {json.dumps(schema['default'])}")
+    return ", ".join(parts)
+
+
+def cell(text):
+    return re.sub(r"\s+", " ", text).replace("|", "\\|").replace("\\\\|", "\\|")
+
+
+def fields(document, schema, prefix="", depth=3):
+    """Rows of a table of an object's fields, those of objects within it after theirs; nothing for what is no object."""
+    schema = resolve(document, schema)
+    required = set(schema.get("required", ()))
+    rows = []
+    for name, field in schema.get("properties", {}).items():
+        full = {**resolve(document, field), **{k: v for k, v in field.items() if k != "$ref"}}
+        description = cell(full.get("description", "")).rstrip(".")
+        limits = bounds(full)
+        rows.append(f"| `{prefix}{name}`{'' if name in required else ' (optional)'} | {kind(document, field)} | "
+                    f"{description}{'; ' if description and limits else ''}{limits} |")
+        inner = resolve(document, full["items"]) if "items" in full else full
+        if depth > 1:
+            rows += fields(document, inner, f"{prefix}{name}{'[]' if 'items' in full else ''}.", depth - 1)
+    return rows
+
+
+def table(title, rows):
+    return [title, "", "| field | type | meaning |", "|---|---|---|", *rows, ""] if rows else []
+
+
+def render(document):
+    lines = ["# HTTP reference", "", "Made from `schemas/openapi.json` by `http_reference.py`, which a test repeats. "
+             "Errors are RFC 9457 problem documents that name the field and the constraint.", ""]
+    for path, item in document["paths"].items():
+        for method in ("get", "put", "post", "delete"):
+            if method not in item:
+                continue
+            operation = item[method]
+            lines += [f"## {method.upper()} {path}", "", operation.get("summary", ""), ""]
+            if operation.get("description"):
+                lines += [operation["description"], ""]
+            parameters = [resolve(document, p) for p in operation.get("parameters", item.get("parameters", []))]
+            lines += table("Parameters:", [
+                f"| `{p['name']}` ({p['in']}{'' if p.get('required') else ', optional'}) | {kind(document, p['schema'])} | "
+                f"{cell(p.get('description', ''))}{'; ' if p.get('description') and bounds(p['schema']) else ''}"
+                f"{bounds(resolve(document, p['schema']))} |" for p in parameters])
+            body = resolve(document, operation.get("requestBody", {})).get("content", {})
+            for media, content in body.items():
+                lines += table(f"Body, `{media}`:", fields(document, content.get("schema", {})))
+            problems = [status for status in operation["responses"] if not status.startswith("2")]
+            for status, response in operation["responses"].items():
+                if status in problems:
+                    continue
+                response = resolve(document, response)
+                media = ", ".join(f"`{m}`" for m in response.get("content", {})) or "no body"
+                note = response.get("description", "")
+                lines.append(f"Answers {status} with {media}{'' if note in ('', 'OK') else ': ' + note}.")
+            lines += [f"Problems: {', '.join(problems)}." if problems else "", ""]
+            for status, response in operation["responses"].items():
+                if not status.startswith("2"):
+                    continue
+                content = resolve(document, response).get("content", {}).get("application/json", {})
+                lines += table(f"Fields of {status}:", fields(document, content.get("schema", {})))
+    return "\n".join(lines).rstrip() + "\n"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(render(json.loads((ROOT / "schemas/openapi.json").read_text())))
