@@ -32,7 +32,7 @@ class Sandbox:
         self.ports = {"8080": free_port(socket.SOCK_STREAM), "7667": free_port(socket.SOCK_DGRAM)}
         lcm_url = f"udpm://239.255.76.67:{self.ports['7667']}?ttl=0"
         environment = {"PATH": f"{daemon.resolve().parent}:{client.resolve().parent}:{os.environ['PATH']}",
-                       "HOME": str(self.home), "LANG": "C.UTF-8", "TERM": "dumb",
+                       "HOME": str(self.home), "LANG": "C.UTF-8", "TERM": "dumb", "PYTHONDONTWRITEBYTECODE": "1",
                        "JOULECAST_HTTP_PORT": self.ports["8080"], "JOULECAST_LCM_URL": lcm_url,
                        "LCM_DEFAULT_URL": lcm_url}
         self.shell = subprocess.Popen(["bash", "--noprofile", "--norc"], cwd=self.home, env=environment, text=True,
