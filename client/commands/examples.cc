@@ -23,6 +23,7 @@ constexpr Examples table[] = {
     {"autonomy",
      "joulecast autonomy --robot amr.json --charge 0.6 --payload 20\n"
      "joulecast autonomy --server http://127.0.0.1:8080 --robot-id amr"},
+    {"matrix", "joulecast matrix tasks.json --robot amr.json"},
     {"missions", "joulecast missions --server http://127.0.0.1:8080 --robot-id amr --limit 20"},
     {"import",
      "joulecast import runs.csv --mapping mapping.json --start 2026-03-01T08:00:00Z --out imported.lcmlog"},

@@ -68,7 +68,15 @@ def foreign_table(home):
                    "battery_voltage": {"column": "volt"}, "battery_current": {"column": "ampere"}}}))
 
 
+def tasks(home):
+    stations = [{"task_id": f"t{k}", "pickup": {"x_m": 5.0 * k, "y_m": 2.0}, "dropoff": {"x_m": 3.0, "y_m": 9.0},
+                 "payload_kg": 10.0 * k} for k in range(1, 4)]
+    (home / "tasks.json").write_text(json.dumps(
+        {"robots": [{"robot_id": "amr", "pose": {"x_m": 0.0, "y_m": 0.0}}], "tasks": stations}))
+
+
 def prepare(sandbox):
+    tasks(sandbox.home)
     battery_recordings(sandbox.home)
     foreign_table(sandbox.home)
     for command in (
