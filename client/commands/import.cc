@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <charconv>
@@ -13,6 +12,7 @@
 
 #include "client/commands/table.h"
 #include "client/files.h"
+#include "client/progress.h"
 #include "telemetry/csv_import.h"
 #include "telemetry/event_log.h"
 #include "telemetry/recording.h"
@@ -77,10 +77,9 @@ Result<std::vector<Imported>> import_all(const Options& options) {
     how.start_utime_us = *start;
   }
   std::vector<Imported> all;
+  Progress progress("importing", "tables", options.tables.size());
   for (const std::string& table : options.tables) {
-    if (isatty(STDERR_FILENO) != 0)
-      std::fprintf(stderr, "\r\x1b[Kimporting %zu of %zu: %s", all.size() + 1, options.tables.size(),
-                   table.c_str());
+    progress.reach(all.size());
     const auto text = read_file(table);
     if (!text) return tl::unexpected(text.error());
     how.source_name = table;
@@ -95,7 +94,6 @@ Result<std::vector<Imported>> import_all(const Options& options) {
       how.start_utime_us = samples.back().utime_us + static_cast<std::int64_t>(options.pause_s * 1e6);
     all.push_back({table, std::move(*import)});
   }
-  if (isatty(STDERR_FILENO) != 0) std::fprintf(stderr, "\r\x1b[K");
   return all;
 }
 

@@ -10,6 +10,8 @@
 #include "client/commands/replay_into.h"
 #include "client/commands/table.h"
 #include "client/interrupt.h"
+#include "client/lcm_url.h"
+#include "client/log_progress.h"
 #include "telemetry/event_log.h"
 #include "telemetry/lcm_link.h"
 
@@ -20,7 +22,7 @@ using Clock = std::chrono::steady_clock;
 
 struct Options {
   std::vector<std::string> logs;
-  std::string lcm_url{telemetry::default_lcm_url};
+  std::string lcm_url = usual_lcm_url();
   double speed = 1;
   double max_rate_hz = 15'000;
   std::string into;
@@ -68,7 +70,7 @@ class Pacer {
 
 // Publishes the log; false when interrupted.
 Result<bool> replay_log(const std::string& path, telemetry::LcmLink& link, Pacer& pacer,
-                        InterruptGuard& interrupt, telemetry::LogTally& tally) {
+                        InterruptGuard& interrupt, LogProgress& progress, telemetry::LogTally& tally) {
   pacer.begin_log();
   const auto publish = [&](const telemetry::LogEvent& event) -> Result<bool> {
     // Waits shorter than the scheduler's grain are left to add up.
@@ -79,6 +81,7 @@ Result<bool> replay_log(const std::string& path, telemetry::LcmLink& link, Pacer
     if (auto sent = link.publish(std::string(event.channel), event.data); !sent) {
       return tl::unexpected(std::move(sent.error()));
     }
+    progress.passed(event);
     return true;
   };
   return telemetry::read_events(path, publish, tally,
@@ -92,9 +95,10 @@ Exit run(const Options& options) {
   if (!link) return report(link.error());
   Pacer pacer(options.speed, options.max_rate_hz);
   telemetry::LogTally tally;
+  LogProgress progress("replaying", options.logs);
   const auto began = Clock::now();
   for (const auto& path : options.logs) {
-    const auto finished = replay_log(path, *link, pacer, interrupt, tally);
+    const auto finished = replay_log(path, *link, pacer, interrupt, progress, tally);
     if (!finished) return report(finished.error());
     if (!*finished) break;
   }
@@ -113,7 +117,9 @@ void add_replay(CLI::App& program, Exit& exit) {
   auto* command = program.add_subcommand(
       "replay", "Publish recorded LCM event logs again, or run them straight into a history");
   command->add_option("log", options->logs, "LCM event logs, one after another")->required();
-  command->add_option("--lcm-url", options->lcm_url, "LCM provider to publish on")->capture_default_str();
+  command
+      ->add_option("--lcm-url", options->lcm_url, "LCM provider to publish on; JOULECAST_LCM_URL without it")
+      ->capture_default_str();
   command
       ->add_option("--speed", options->speed,
                    "1 = as recorded, 10 = ten times faster, 0 = as fast as --max-rate lets")

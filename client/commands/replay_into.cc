@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/host_clock.h"
+#include "client/log_progress.h"
 #include "history/sqlite_store.h"
 #include "history/writer.h"
 #include "server/api/mission_json.h"
@@ -22,10 +23,11 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 Result<bool> read_log(const std::string& path, server::Pipeline& pipeline, server::IngestCounters& counters,
-                      telemetry::LogTally& tally) {
+                      LogProgress& progress, telemetry::LogTally& tally) {
   const auto take = [&](const telemetry::LogEvent& event) -> Result<bool> {
     if (const auto message = server::decode_message(event.channel, event.data, event.timestamp_us, counters))
       pipeline.handle(*message);
+    progress.passed(event);
     return true;
   };
   return telemetry::read_events(path, take, tally,
@@ -89,9 +91,11 @@ Exit replay_into(const ReplayInto& options) {
   constexpr std::size_t any_number_of_robots = 1'000'000;
   server::Pipeline pipeline({}, any_number_of_robots, models, outputs);
   telemetry::LogTally tally;
+  LogProgress progress("accounting", options.logs);
   const auto began = Clock::now();
   for (const std::string& log : options.logs) {
-    if (Result<bool> read = read_log(log, pipeline, counters, tally); !read) return report(read.error());
+    if (Result<bool> read = read_log(log, pipeline, counters, progress, tally); !read)
+      return report(read.error());
   }
   pipeline.finish();
   if (Result<void> flushed = writer.flush(); !flushed) return report(flushed.error());

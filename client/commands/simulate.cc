@@ -17,6 +17,7 @@
 #include "client/commands/table.h"
 #include "client/http_client.h"
 #include "client/interrupt.h"
+#include "client/lcm_url.h"
 #include "client/virtual_robot/fleet.h"
 #include "client/virtual_robot/truth_json.h"
 #include "telemetry/codec.h"
@@ -34,7 +35,7 @@ constexpr std::int64_t batch_start_us = 1'700'000'000'000'000;  // logs made wit
 struct Options {
   std::size_t robots = 4;
   std::uint64_t seed = 1;
-  std::string lcm_url{telemetry::default_lcm_url};
+  std::string lcm_url = usual_lcm_url();
   double rate_hz = 50;
   double speed = 1;
   double duration_s = 0;
@@ -322,8 +323,10 @@ void add_simulate(CLI::App& program, Exit& exit) {
                                     "robot file, may be repeated; without it the shipped kinds take turns");
   command->add_option("--seed", options->seed, "the same seed gives the same robots, missions and noise")
       ->capture_default_str();
-  auto* url =
-      command->add_option("--lcm-url", options->lcm_url, "LCM provider to publish on")->capture_default_str();
+  auto* url = command
+                  ->add_option("--lcm-url", options->lcm_url,
+                               "LCM provider to publish on; JOULECAST_LCM_URL without it")
+                  ->capture_default_str();
   command->add_option("--log", options->log,
                       "write an LCM event log; without --lcm-url nothing is published");
   command->add_option("--truth", options->truth,

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "client/progress.h"
+#include "telemetry/event_log.h"
+
+namespace joulecast::client {
+
+// How far the reading of event logs has come, in bytes of the files.
+class LogProgress {
+ public:
+  LogProgress(const std::string& work, const std::vector<std::string>& logs);
+  void passed(const telemetry::LogEvent& event);
+
+ private:
+  std::uint64_t bytes_ = 0;
+  Progress progress_;
+};
+
+}  // namespace joulecast::client
