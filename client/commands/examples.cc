@@ -37,6 +37,8 @@ constexpr Examples table[] = {
     {"gap",
      "joulecast gap amr.lcmlog --robot amr.json\n"
      "joulecast gap amr.lcmlog --robot amr.json --apply amr-adopted.json --json"},
+    {"gap trial", "joulecast gap trial --count 2 --seed 1"},
+    {"effects", "joulecast effects"},
     {"explore",
      "joulecast explore --case 1 --svg case1.svg\n"
      "joulecast explore --map yard.json --robot amr.json --payload 0 --payload 20"},

@@ -11,9 +11,9 @@ namespace joulecast::dynamics {
 namespace {
 
 TEST(CatalogueText, IsWhatTheDocumentHolds) {
-  std::ifstream in(JOULECAST_SOURCE_DIR "/docs/effects.md", std::ios::binary);
+  std::ifstream in(JOULECAST_SOURCE_DIR "/deploy/documents/effects.md", std::ios::binary);
   const std::string document{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  EXPECT_EQ(document, catalogue_markdown()) << "joulecast effects --markdown > docs/effects.md";
+  EXPECT_EQ(document, catalogue_markdown()) << "joulecast effects --markdown > deploy/documents/effects.md";
 }
 
 TEST(CatalogueText, HasAnEntryForEveryEffectAndParameter) {
