@@ -69,6 +69,9 @@ json catalogue_values(const std::string& id, double strength, const vr::Simulati
     add("speed_rad_s", w.stribeck_speed_m_s / spec.robot.wheel_radius_m);
   } else if (id == "torque_constant_loss") {
     add("voltage_share", w.emf_loss_share);
+  } else if (id == "current_sensor_gain" || id == "current_sensor_bias" || id == "voltage_sensor_gain") {
+    add("motors", w.motor_sensor_share);
+    add("battery", w.battery_sensor_share);
   } else if (id == "winding_temperature") {
     add("time_constant_s", w.thermal_time_constant_s);
   }

@@ -1,5 +1,6 @@
 #include "client/trial/plant_variants.h"
 
+#include <algorithm>
 #include <array>
 #include <string_view>
 
@@ -9,7 +10,7 @@ namespace {
 using virtual_robot::Rng;
 using virtual_robot::SimulationSpec;
 
-constexpr double variant_share = 0.2;
+constexpr double variant_share = 0.12;
 
 struct Variant {
   std::string_view name;
@@ -41,10 +42,38 @@ constexpr auto variants = std::to_array<Variant>({
        s.sensors.loss_probability = rng.uniform(0.002, 0.03);
      }},
     {"scatter", [](Rng& rng, SimulationSpec& s) { s.scatter = rng.uniform(1.3, 1.8); }},
+    {"quick controller",
+     [](Rng& rng, SimulationSpec& s) { s.controller.natural_rad_s = rng.uniform(10, 16); }},
+    {"slow controller",
+     [](Rng& rng, SimulationSpec& s) {
+       s.controller.natural_rad_s = rng.uniform(3, 5);
+       s.controller.feed_forward = rng.chance(0.5) ? 0.0 : 0.8;
+     }},
+    {"soft friction", [](Rng& rng, SimulationSpec& s) { s.world.bristle_rad = rng.uniform(0.015, 0.05); }},
+    {"Gaussian Stribeck", [](Rng&, SimulationSpec& s) { s.world.stribeck_power = 2; }},
+    {"coarse converters",
+     [](Rng& rng, SimulationSpec& s) {
+       s.sensors.motor_current_step_a = 0.002 * s.robot.current_limit_a * rng.uniform(0.5, 2);
+       s.sensors.battery_current_step_a = 0.1 * rng.uniform(0.5, 2);
+       s.sensors.voltage_step_v = 0.002 * s.robot.nominal_voltage_v * rng.uniform(0.5, 2);
+     }},
+    {"drifting currents",
+     [](Rng& rng, SimulationSpec& s) {
+       s.sensors.current_drift_a = 0.0004 * s.robot.current_limit_a * rng.uniform(0.5, 1.5);
+     }},
+    {"latency", [](Rng& rng, SimulationSpec& s) { s.latency_s = rng.uniform(0.001, 0.004); }},
+    {"battery sensor alone", [](Rng&, SimulationSpec& s) { s.world.motor_sensor_share = 0; }},
+    {"smooth ramps", [](Rng&, SimulationSpec& s) { s.smooth_ramps = true; }},
     {"loads change", [](Rng&, SimulationSpec& s) { s.script.pickup_share = 0.5; }},
     {"short missions", [](Rng& rng, SimulationSpec& s) { s.script.duration_s = rng.uniform(45, 70); }},
     {"no arcs", [](Rng&, SimulationSpec& s) { s.script.arc_share = 0; }},
 });
+
+// Two of a kind.
+bool excluded(std::string_view name, const std::vector<std::string>& names) {
+  const auto has = [&](std::string_view other) { return std::ranges::find(names, other) != names.end(); };
+  return (name == "fast rate" && has("slow rate")) || (name == "slow controller" && has("quick controller"));
+}
 
 }  // namespace
 
@@ -59,7 +88,7 @@ std::vector<std::string> vary_plant(Rng& rng, SimulationSpec& spec) {
   while (names.empty()) {
     for (const Variant& v : variants) {
       if (!rng.chance(variant_share)) continue;
-      if (v.name == "fast rate" && !names.empty() && names.front() == "slow rate") continue;
+      if (excluded(v.name, names)) continue;
       v.apply(rng, spec);
       names.emplace_back(v.name);
     }

@@ -6,15 +6,15 @@
 namespace joulecast::virtual_robot {
 namespace {
 
-constexpr double natural_rad_s = 7;  // of the closed speed loop, critically damped
 constexpr double duty_limit = 0.97;
 constexpr double friction_ramp_rad_s = 0.05;
 constexpr double rest_rad_s = 0.03;  // slower than this and commanded to rest: the brake releases the motors
 
 }  // namespace
 
-SpeedController::SpeedController(const RobotParameters& robot)
+SpeedController::SpeedController(const RobotParameters& robot, const ControllerTuning& tuning)
     : robot_(robot),
+      tuning_(tuning),
       torque_per_a_(robot.torque_constant_nm_a * robot.gear_ratio),
       emf_per_rad_s_(robot.voltage_constant_v_s_rad * robot.gear_ratio) {
   set_payload(0);
@@ -28,13 +28,13 @@ void SpeedController::set_payload(double declared_kg) {
       robot_.wheel_inertia_kg_m2 + 0.5 * mass_kg * robot_.wheel_radius_m * robot_.wheel_radius_m;
   turning_inertia_ = robot_.wheel_inertia_kg_m2 + 0.5 * yaw_kg_m2 * lever * lever;
 
-  // The loop is w' = -a w + b V about a steady speed; poles twice at natural_rad_s where V makes that
+  // The loop is w' = -a w + b V about a steady speed; poles twice at the natural frequency where V makes that
   // possible.
   const double inertia = std::min(straight_inertia_, turning_inertia_);
   const double a = torque_per_a_ * emf_per_rad_s_ / (robot_.resistance_ohm * inertia);
   const double b = torque_per_a_ / (robot_.resistance_ohm * inertia);
-  proportional_v_s_ = std::max((2 * natural_rad_s - a) / b, 0.3 * emf_per_rad_s_);
-  integral_v_ = natural_rad_s * natural_rad_s / b;
+  proportional_v_s_ = std::max((2 * tuning_.natural_rad_s - a) / b, 0.3 * emf_per_rad_s_);
+  integral_v_ = tuning_.natural_rad_s * tuning_.natural_rad_s / b;
 }
 
 std::array<double, 2> SpeedController::update(const BodyCommand& command,
@@ -55,7 +55,8 @@ std::array<double, 2> SpeedController::update(const BodyCommand& command,
             robot_.wheel_radius_m +
         robot_.viscous_friction_nm_s_rad * target +
         robot_.friction_torque_nm[s] * std::tanh(target / friction_ramp_rad_s);
-    const double forward_v = robot_.resistance_ohm * torque_nm / torque_per_a_ + emf_per_rad_s_ * target;
+    const double forward_v =
+        tuning_.feed_forward * (robot_.resistance_ohm * torque_nm / torque_per_a_ + emf_per_rad_s_ * target);
     const double error = target - encoder_rad_s[s];
     const double wanted_v = forward_v + proportional_v_s_ * error + trim_v_[s];
 

@@ -14,13 +14,19 @@ struct BodyCommand {
   double yaw_acceleration_rad_s2 = 0;
 };
 
+// How a drive is tuned.
+struct ControllerTuning {
+  double natural_rad_s = 7;  // of the closed speed loop, critically damped
+  double feed_forward = 1;   // share of the model's voltage that is applied ahead of any error
+};
+
 // Wheel speed control as robots have it: feed-forward from the robot file's parameters, PI on the encoder
 // speed, current limit, battery limit with anti-windup. Knows nothing of the plant's imperfections.
 class SpeedController {
  public:
   static constexpr double period_s = 0.005;
 
-  explicit SpeedController(const RobotParameters& robot);
+  explicit SpeedController(const RobotParameters& robot, const ControllerTuning& tuning = {});
 
   void set_payload(double declared_kg);
   // Armature voltages for the next period.
@@ -29,6 +35,7 @@ class SpeedController {
 
  private:
   RobotParameters robot_;
+  ControllerTuning tuning_;
   double torque_per_a_;
   double emf_per_rad_s_;
   double straight_inertia_ = 0;  // at one wheel, both accelerating alike

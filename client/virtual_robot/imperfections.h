@@ -69,10 +69,13 @@ struct World {
   double slope_direction_rad = 0;  // heading in which the floor rises
   int weak_side = 0;               // 0 right, 1 left
   double stribeck_speed_m_s = 0.12;
+  double stribeck_power = 1;   // of the speed in the exponential
+  double bristle_rad = 0.006;  // wheel angle over which dry friction builds up
   double emf_loss_share = 1;  // of torque_constant_loss that K_w has too; in SI units magnets cost both alike
   double thermal_time_constant_s = 240;
   double period_s = 24;
   double burst_time_s = 20;
+  double motor_sensor_share = 1, battery_sensor_share = 1;  // of gains and biases of electrical sensors
 };
 
 struct EffectEntry {

@@ -26,8 +26,10 @@ double wrapped(double angle_rad) {
 
 }  // namespace
 
-Trapezoid::Trapezoid(double distance, double speed, double acceleration)
-    : speed_(std::min(speed, std::sqrt(distance * acceleration))), acceleration_(acceleration) {
+Trapezoid::Trapezoid(double distance, double speed, double acceleration, bool smooth)
+    : speed_(std::min(speed, std::sqrt(distance * acceleration))),
+      acceleration_(acceleration),
+      smooth_(smooth) {
   if (distance <= 0) return;
   ramp_s_ = speed_ / acceleration_;
   duration_s_ = distance / speed_ + ramp_s_;
@@ -35,13 +37,21 @@ Trapezoid::Trapezoid(double distance, double speed, double acceleration)
 
 double Trapezoid::speed(double time_s) const {
   if (time_s <= 0 || time_s >= duration_s_) return 0;
+  if (smooth_) {
+    const double into_s = std::min({time_s, duration_s_ - time_s, ramp_s_});
+    return 0.5 * speed_ * (1 - std::cos(std::numbers::pi * into_s / ramp_s_));
+  }
   return std::min({speed_, acceleration_ * time_s, acceleration_ * (duration_s_ - time_s)});
 }
 
 double Trapezoid::acceleration(double time_s) const {
   if (time_s < 0 || time_s >= duration_s_) return 0;
-  if (time_s < ramp_s_) return acceleration_;
-  return time_s > duration_s_ - ramp_s_ ? -acceleration_ : 0;
+  const bool up = time_s < ramp_s_;
+  if (!up && time_s <= duration_s_ - ramp_s_) return 0;
+  const double sign = up ? 1 : -1;
+  if (!smooth_) return sign * acceleration_;
+  const double into_s = up ? time_s : duration_s_ - time_s;
+  return sign * acceleration_ * 0.5 * std::numbers::pi * std::sin(std::numbers::pi * into_s / ramp_s_);
 }
 
 void Pilot::begin(MissionScript script) {
@@ -57,27 +67,28 @@ void Pilot::begin_leg(double x_m, double y_m, double heading_rad) {
   profile_ = {};
   const double settled = settle_s;
   duration_s_ = std::visit(
-      Overloaded{
-          [&](const GoTo& leg) {
-            profile_ = {std::hypot(leg.x_m - x_m, leg.y_m - y_m), leg.speed_m_s, leg.acceleration_m_s2};
-            return profile_.duration_s() + settled;
-          },
-          [&](const TurnTo& leg) {
-            const double turn = wrapped(std::atan2(leg.y_m - y_m, leg.x_m - x_m) - heading_rad);
-            turn_sign_ = turn < 0 ? -1 : 1;
-            profile_ = {std::abs(turn), leg.rate_rad_s, leg.acceleration_rad_s2};
-            return profile_.duration_s() + settled;
-          },
-          [&](const Arc& leg) {
-            turn_sign_ = leg.angle_rad < 0 ? -1 : 1;
-            profile_ = {leg.radius_m * std::abs(leg.angle_rad), leg.speed_m_s, leg.acceleration_m_s2};
-            return profile_.duration_s() + settled;
-          },
-          [&](const Dwell& leg) { return leg.duration_s; },
-          [&](const Load& leg) {
-            payload_kg_ = leg.payload_kg;
-            return 0.0;
-          }},
+      Overloaded{[&](const GoTo& leg) {
+                   profile_ = {std::hypot(leg.x_m - x_m, leg.y_m - y_m), leg.speed_m_s, leg.acceleration_m_s2,
+                               smooth_ramps_};
+                   return profile_.duration_s() + settled;
+                 },
+                 [&](const TurnTo& leg) {
+                   const double turn = wrapped(std::atan2(leg.y_m - y_m, leg.x_m - x_m) - heading_rad);
+                   turn_sign_ = turn < 0 ? -1 : 1;
+                   profile_ = {std::abs(turn), leg.rate_rad_s, leg.acceleration_rad_s2, smooth_ramps_};
+                   return profile_.duration_s() + settled;
+                 },
+                 [&](const Arc& leg) {
+                   turn_sign_ = leg.angle_rad < 0 ? -1 : 1;
+                   profile_ = {leg.radius_m * std::abs(leg.angle_rad), leg.speed_m_s, leg.acceleration_m_s2,
+                               smooth_ramps_};
+                   return profile_.duration_s() + settled;
+                 },
+                 [&](const Dwell& leg) { return leg.duration_s; },
+                 [&](const Load& leg) {
+                   payload_kg_ = leg.payload_kg;
+                   return 0.0;
+                 }},
       script_.legs[leg_]);
 }
 

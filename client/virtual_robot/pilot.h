@@ -8,11 +8,12 @@
 
 namespace joulecast::virtual_robot {
 
-// Distance travelled by ramps of one acceleration and a cruise; starts and ends at rest.
+// Distance travelled by ramps of one mean acceleration and a cruise; starts and ends at rest. Smooth ramps
+// are half waves of a cosine, without the jerk of straight ones.
 class Trapezoid {
  public:
   Trapezoid() = default;
-  Trapezoid(double distance, double speed, double acceleration);
+  Trapezoid(double distance, double speed, double acceleration, bool smooth = false);
 
   double duration_s() const { return duration_s_; }
   double speed(double time_s) const;
@@ -20,13 +21,15 @@ class Trapezoid {
 
  private:
   double speed_ = 0, acceleration_ = 0, ramp_s_ = 0, duration_s_ = 0;
+  bool smooth_ = false;
 };
 
 // Drives a script: each leg is aimed from where the robot truly is when the leg begins (it localises itself),
 // so errors of wheels and track do not grow over a mission.
 class Pilot {
  public:
-  explicit Pilot(const RobotParameters& robot) : robot_(robot) {}
+  explicit Pilot(const RobotParameters& robot, bool smooth_ramps = false)
+      : robot_(robot), smooth_ramps_(smooth_ramps) {}
 
   void begin(MissionScript script);
   bool done() const { return leg_ >= script_.legs.size(); }
@@ -40,6 +43,7 @@ class Pilot {
   BodyCommand follow(double x_m, double y_m, double heading_rad) const;
 
   RobotParameters robot_;
+  bool smooth_ramps_;
   MissionScript script_;
   std::size_t leg_ = 0;
   bool begun_ = false;

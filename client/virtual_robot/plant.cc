@@ -38,13 +38,14 @@ Plant::Plant(const RobotParameters& robot, const Imperfections& imperfections, c
       std::max(robot_.inductance_h, shortest_electrical_s * robot_.resistance_ohm) + effect_.inductance;
   const double friction_mean_nm = 0.5 * (robot_.friction_torque_nm[0] + robot_.friction_torque_nm[1]);
   brush_scale_a_ = std::max(0.004 * robot_.current_limit_a, 0.1 * friction_mean_nm / torque_per_a_);
-  bristle_ = {effect_.stribeck_friction, world_.stribeck_speed_m_s / robot_.wheel_radius_m};
+  bristle_ = {world_.bristle_rad, effect_.stribeck_friction,
+              world_.stribeck_speed_m_s / robot_.wheel_radius_m, world_.stribeck_power};
 
   const double fastest_wheel_rad_s = 1.3 * robot_.speed_limit_m_s / robot_.wheel_radius_m;
   const double electrical_rate = (2 * robot_.resistance_ohm * (1 + std::max(0.0, effect_.resistance_error)) +
                                   std::abs(effect_.brush_drop) / brush_scale_a_) /
                                  inductance_h_;
-  const double bristle_rate = fastest_wheel_rad_s / Bristle::bend_angle_rad;
+  const double bristle_rate = fastest_wheel_rad_s / bristle_.bend_angle_rad;
   longest_step_s_ = std::min({5e-4, 2.2 / electrical_rate, 2.2 / bristle_rate});
   begin_mission(0, 0, {});
 }

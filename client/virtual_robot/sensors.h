@@ -26,6 +26,10 @@ struct SensorSuite {
   double motor_current_noise = 0.0018;   // of the current limit
   double battery_voltage_noise_v = 0.020;
   double battery_current_noise_a = 0.050;
+  double motor_current_step_a = 0;  // of the converter
+  double battery_current_step_a = 0;
+  double voltage_step_v = 0;   // of motors and battery
+  double current_drift_a = 0;  // amplitude of a slow wander of the currents' zero, per sensor
   double gyro_noise_rad_s = 0.004;
   double gyro_bias_rad_s = 0.002;  // standard deviation between robots
   double pose_noise_m = 0.010;
@@ -51,14 +55,15 @@ struct Reading {
   std::array<double, 3> pose{};
   std::array<double, 2> winding_c{};
   double declared_payload_kg = 0;
+  double time_s = 0;  // since the robot was made
 };
 
 [[nodiscard]] double quantised(double value, double step);
 
 class Sensors {
  public:
-  Sensors(const SensorSuite& suite, const Imperfections& imperfections, const RobotParameters& robot,
-          Rng rng);
+  Sensors(const SensorSuite& suite, const Imperfections& imperfections, const World& world,
+          const RobotParameters& robot, Rng rng);
 
   // Gains and biases of the electrical sensors applied; what a noiseless logger would write.
   Reading systematic(Reading truth) const;
@@ -69,14 +74,18 @@ class Sensors {
   Rng& rng() { return rng_; }
 
  private:
+  double drift_a(std::size_t sensor, double time_s) const;
+  double read(double value, double deviation, double step);
   double noise(double deviation) { return suite_.noise ? deviation * rng_.normal() : 0; }
 
   SensorSuite suite_;
   Imperfections effect_;
+  World world_;
   double motor_voltage_noise_v_;
   double motor_current_noise_a_;
   Rng rng_;
   double gyro_bias_rad_s_;
+  std::array<double, 3> drift_phase_{};  // right, left, battery
 };
 
 }  // namespace joulecast::virtual_robot

@@ -34,9 +34,9 @@ VirtualRobot::VirtualRobot(const SimulationSpec& spec, std::uint64_t seed)
       scatter_rng_(Rng::stream(seed, scatter_stream)),
       plant_(spec.robot, spec.imperfections, spec.world),
       pack_(spec.robot, spec.imperfections.battery_resistance, spec.initial_charge),
-      controller_(spec.robot),
-      pilot_(spec.robot),
-      sensors_(spec.sensors, spec.imperfections, spec.robot, Rng::stream(seed, sensors_stream)) {
+      controller_(spec.robot, spec.controller),
+      pilot_(spec.robot, spec.smooth_ramps),
+      sensors_(spec.sensors, spec.imperfections, spec.world, spec.robot, Rng::stream(seed, sensors_stream)) {
   steps_per_period_ = static_cast<int>(std::ceil(SpeedController::period_s / plant_.longest_step_s()));
   step_s_ = SpeedController::period_s / steps_per_period_;
   const double reach_m = spec_.script.map_half_width_m - spec_.script.clearance_m;
@@ -171,7 +171,7 @@ VirtualRobot::Electrical VirtualRobot::delayed(double delay_s) const {
 }
 
 Reading VirtualRobot::reading() const {
-  const double delay_s = spec_.imperfections.sensor_delay;
+  const double delay_s = spec_.imperfections.sensor_delay + spec_.latency_s;
   const Electrical e = delay_s > 0 ? delayed(delay_s) : electrical();
   const PlantState& s = plant_.state();
   Reading r;
@@ -186,6 +186,7 @@ Reading VirtualRobot::reading() const {
   r.pose = {s.x_m, s.y_m, s.heading_rad};
   r.winding_c = {ambient_c + winding_rise_k_[0], ambient_c + winding_rise_k_[1]};
   r.declared_payload_kg = pilot_.payload_kg();
+  r.time_s = step_s_ * static_cast<double>(step_);
   return r;
 }
 

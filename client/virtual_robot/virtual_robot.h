@@ -33,11 +33,14 @@ struct SimulationSpec {
   Imperfections imperfections;
   World world;
   SensorSuite sensors;
+  ControllerTuning controller;
   ScriptOptions script;
   Charger charger;
-  double rate_hz = 50;  // of telemetry
-  int missions = 5;     // 0: one after another without end
-  double scatter = 1;   // size of the differences between missions; 0: none, 1: 1 to 2 % of energy
+  bool smooth_ramps = false;  // commands without jumps of acceleration
+  double latency_s = 0;       // of every electrical channel, beside the effect sensor_delay
+  double rate_hz = 50;        // of telemetry
+  int missions = 5;           // 0: one after another without end
+  double scatter = 1;         // size of the differences between missions; 0: none, 1: 1 to 2 % of energy
   double initial_charge = 0.8;
   std::int64_t start_utime_us = 1'700'000'000'000'000;
 };
