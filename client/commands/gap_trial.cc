@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "client/commands/table.h"
 #include "client/trial/run.h"
@@ -48,14 +49,17 @@ Exit run(Options& options) {
   const auto outcomes = trial::run_trial(options.run);
   if (!outcomes) return report(outcomes.error());
   const trial::Score score = trial::score_of(*outcomes);
+  const auto rows = options.run.compare ? trial::compare(*outcomes) : std::vector<trial::ComparisonRow>{};
   if (options.json) {
     nlohmann::json cases = nlohmann::json::array();
     for (const auto& outcome : *outcomes) cases.push_back(trial::case_json(outcome));
-    const nlohmann::json answer{
+    nlohmann::json answer{
         {"seed", t.seed}, {"count", t.count}, {"score", trial::score_json(score)}, {"cases", cases}};
+    if (!rows.empty()) answer["comparison"] = trial::comparison_json(rows);
     std::printf("%s\n", answer.dump(2).c_str());
   } else {
     std::printf("%s", trial::score_text(score).c_str());
+    if (!rows.empty()) std::printf("\n%s", trial::comparison_text(rows).c_str());
   }
   return Exit::ok;
 }
@@ -80,6 +84,8 @@ void add_gap_trial(CLI::App& gap, Exit& exit) {
       ->capture_default_str();
   command->add_flag("--usual-plant", options->usual_plant,
                     "leave out the sensors, drives and missions unlike the usual");
+  command->add_flag("--compare", options->run.compare,
+                    "judge every log by simpler methods too, and with each part of the method left out");
   command->add_option("--keep", options->keep, "folder that keeps robot files, logs and truths of all cases");
   command->add_flag("--json", options->json, "print scores and cases as JSON");
   command->callback([options, &exit] { exit = run(*options); });

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/trial/case_files.h"
@@ -18,6 +19,8 @@ struct CaseOutcome {
   gap::Diagnosis diagnosis;
   std::optional<double> oracle;  // shrinkage that knowing the truth would reach
   double diagnosis_s = 0;        // processor time
+  // What other ways of judging the same log said, by name.
+  std::vector<std::pair<std::string, gap::Diagnosis>> others;
 };
 
 // The reported effect whose id, or whose inseparable group of at most three, holds this id; null: none does.

@@ -10,6 +10,8 @@
 #include <system_error>
 #include <thread>
 
+#include "client/trial/ablations.h"
+#include "client/trial/baselines.h"
 #include "client/trial/oracle.h"
 #include "robot/robot_file.h"
 
@@ -58,10 +60,21 @@ Result<CaseOutcome> run_case(const RunSettings& settings, const std::filesystem:
   const std::string log = files.log().string();
   const auto recordings = gap::load_recordings({&log, 1});
   if (!recordings) return tl::unexpected<Error>(recordings.error());
-  auto diagnosis = gap::diagnose(*recordings, *robot, settings.diagnosis);
+  auto diagnosis = gap::diagnose(*recordings, *robot);
   if (!diagnosis) return tl::unexpected<Error>(diagnosis.error());
   outcome.diagnosis = std::move(*diagnosis);
   outcome.diagnosis_s = thread_cpu_s() - began_s;
+
+  if (settings.compare) {
+    for (const Baseline baseline : baselines) {
+      outcome.others.emplace_back(name_of(baseline), diagnose_by(baseline, *recordings, *robot));
+    }
+    for (const Ablation ablation : ablations) {
+      auto without = diagnose_without(ablation, *recordings, *robot);
+      if (!without) return tl::unexpected<Error>(without.error());
+      outcome.others.emplace_back(name_of(ablation), std::move(*without));
+    }
+  }
 
   auto truth = open_truth(files.truth());
   if (!truth) return tl::unexpected<Error>(truth.error());

@@ -13,8 +13,8 @@ namespace joulecast::trial {
 struct RunSettings {
   TrialSettings trial;
   std::size_t jobs = 1;
-  std::filesystem::path keep;        // folder that takes robot files, logs and truths; empty: all are removed
-  gap::DiagnosisSettings diagnosis;  // for trials of the method with a part left out
+  std::filesystem::path keep;  // folder that takes robot files, logs and truths; empty: all are removed
+  bool compare = false;        // judge every log by the baselines and with each part of the method left out
   std::function<void(const CaseOutcome&)> done;  // called after each case, by one thread at a time
 };
 

@@ -67,6 +67,38 @@ std::array<double, 2> Rate::interval() const {
   return {std::max(0.0, middle - half), std::min(1.0, middle + half)};
 }
 
+std::vector<ComparisonRow> compare(std::span<const CaseOutcome> outcomes) {
+  std::vector<ComparisonRow> rows;
+  const std::size_t others = outcomes.empty() ? 0 : outcomes.front().others.size();
+  for (std::size_t way = 0; way <= others; ++way) {
+    std::vector<CaseOutcome> judged(outcomes.begin(), outcomes.end());
+    ComparisonRow row;
+    row.name = way == 0 ? "the method" : outcomes.front().others[way - 1].first;
+    ShrinkageScore shrinkage;
+    for (CaseOutcome& o : judged) {
+      if (way > 0) o.diagnosis = o.others[way - 1].second;
+      const bool right = exactly_right(o);
+      const bool counts = o.truth.strength != Strength::slight;
+      if (o.truth.kind == Kind::none) row.none_clear.count(right);
+      if (o.truth.kind == Kind::outside && counts) row.outside_called.count(right);
+      if (o.truth.kind == Kind::pair && counts) row.pair_exact.count(right);
+      if (o.truth.kind == Kind::single && counts) {
+        row.single_exact.count(right);
+        row.single_first.count(first_right(o));
+      }
+      StrengthRow unused;
+      if (counts && (o.truth.kind == Kind::single || o.truth.kind == Kind::pair)) {
+        count_shrinkage(o, unused);
+        shrinkage.diagnosed += unused.shrinkage.diagnosed;
+        shrinkage.oracle += unused.shrinkage.oracle;
+      }
+    }
+    row.shrinkage_over_oracle = shrinkage.ratio();
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
 Score score_of(std::span<const CaseOutcome> outcomes) {
   Score score;
   std::vector<double> seconds;

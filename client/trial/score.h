@@ -68,6 +68,17 @@ struct Score {
   double median_s = 0, longest_s = 0;
 };
 
+// One way of judging, over the cases with effects of 2 % of the gap and more.
+struct ComparisonRow {
+  std::string name;
+  Rate none_clear;  // no gap: nothing reported
+  Rate single_exact, single_first, pair_exact, outside_called;
+  double shrinkage_over_oracle = 0;
+};
+
+// The method first, then what else the cases were judged by.
+[[nodiscard]] std::vector<ComparisonRow> compare(std::span<const CaseOutcome> outcomes);
+
 [[nodiscard]] Score score_of(std::span<const CaseOutcome> outcomes);
 
 }  // namespace joulecast::trial

@@ -138,6 +138,32 @@ std::string score_text(const Score& score) {
   return out;
 }
 
+std::string comparison_text(const std::vector<ComparisonRow>& rows) {
+  std::string out = fmt::format("{:<44} {:>9} {:>13} {:>13} {:>11} {:>9} {:>10}\n", "judged by", "none clear",
+                                "single exact", "single first", "pair exact", "outside", "shrinkage");
+  const auto part = [](const Rate& r) { return fmt::format("{}/{}", r.hits, r.tries); };
+  for (const ComparisonRow& r : rows) {
+    fmt::format_to(std::back_inserter(out), "{:<44} {:>10} {:>13} {:>13} {:>11} {:>9} {:>10.2f}\n", r.name,
+                   part(r.none_clear), part(r.single_exact), part(r.single_first), part(r.pair_exact),
+                   part(r.outside_called), r.shrinkage_over_oracle);
+  }
+  return out;
+}
+
+json comparison_json(const std::vector<ComparisonRow>& rows) {
+  json out = json::array();
+  for (const ComparisonRow& r : rows) {
+    out.push_back({{"name", r.name},
+                   {"none_clear", rate_json(r.none_clear)},
+                   {"single_exact", rate_json(r.single_exact)},
+                   {"single_first", rate_json(r.single_first)},
+                   {"pair_exact", rate_json(r.pair_exact)},
+                   {"outside_called", rate_json(r.outside_called)},
+                   {"shrinkage_over_oracle", r.shrinkage_over_oracle}});
+  }
+  return out;
+}
+
 std::string case_text(const CaseOutcome& o) {
   std::string truth;
   for (const auto& effect : o.truth.effects) {

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "client/trial/outcome.h"
 #include "client/trial/score.h"
@@ -10,6 +11,8 @@ namespace joulecast::trial {
 
 // The score table, confusions, reliability and variants for people.
 [[nodiscard]] std::string score_text(const Score& score);
+[[nodiscard]] std::string comparison_text(const std::vector<ComparisonRow>& rows);
+[[nodiscard]] nlohmann::json comparison_json(const std::vector<ComparisonRow>& rows);
 // One line of a case: right or not, truth, answer.
 [[nodiscard]] std::string case_text(const CaseOutcome& outcome);
 

@@ -204,6 +204,20 @@ void ColumnSet::add_effect(const Effect& effect, EffectValues<double> values, st
   hypotheses_.push_back(std::move(h));
 }
 
+void ColumnSet::leave_out(const MethodParts& parts) {
+  for (Column& c : columns_) {
+    if (!parts.scatter) c.scatter = 0;
+    if (!parts.tolerances) c.tolerance = 0;
+  }
+  if (!parts.open_set) {
+    for (const Hypothesis& h : hypotheses_) {
+      if (!h.outside()) continue;
+      for (const std::size_t k : h.columns) columns_[k].tolerance = 0;
+    }
+    std::erase_if(hypotheses_, [](const Hypothesis& h) { return h.outside(); });
+  }
+}
+
 std::vector<ActiveEffect> ColumnSet::effects_of(std::span<const Chosen> chosen) const {
   std::vector<ActiveEffect> effects;
   for (const Chosen& c : chosen) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynamics/catalogue.h"
+#include "gap/method_parts.h"
 #include "gap/outside.h"
 #include "robot/robot_model.h"
 
@@ -66,6 +67,9 @@ class ColumnSet {
 
   // Differentiates around these effects from now on; at first around none.
   void linearise_around(std::span<const Chosen> chosen);
+
+  // Leaves out what a trial of the method is to do without.
+  void leave_out(const MethodParts& parts);
 
   std::size_t size() const { return columns_.size(); }
   const std::vector<Column>& columns() const { return columns_; }

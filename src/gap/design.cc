@@ -32,7 +32,8 @@ Eigen::VectorXd left_over(const Eigen::MatrixXd& x, const Eigen::VectorXd& y, co
   return y - x * solution;
 }
 
-void whiten(ChannelDesign& d, const std::vector<bool>& continues, const Eigen::VectorXd& prior_precision) {
+void whiten(ChannelDesign& d, const std::vector<bool>& continues, const Eigen::VectorXd& prior_precision,
+            bool whitening) {
   const Eigen::Index n = d.y.size();
   Eigen::VectorXd weight = Eigen::VectorXd::Ones(n);
   Eigen::VectorXd e = left_over(d.x, d.y, weight, prior_precision,
@@ -45,6 +46,11 @@ void whiten(ChannelDesign& d, const std::vector<bool>& continues, const Eigen::V
     sigma = std::max(spread_of(e), 1e-9);
   }
   d.sigma = sigma;
+  if (!whitening) {
+    d.x /= sigma;
+    d.y /= sigma;
+    return;
+  }
   // Yule-Walker of order two from clipped leftovers within unbroken runs.
   const auto clipped = [&](Eigen::Index k) { return std::clamp(e[k], -outlier * sigma, outlier * sigma); };
   std::array<double, 3> product{};
@@ -111,7 +117,7 @@ void whiten(ChannelDesign& d, const std::vector<bool>& continues, const Eigen::V
 
 }  // namespace
 
-Design make_design(const ColumnSet& columns, std::span<const Window> windows) {
+Design make_design(const ColumnSet& columns, std::span<const Window> windows, bool whitening) {
   Design design;
   const std::size_t p = columns.size();
   std::vector<double> rows(p * channel_count);
@@ -176,7 +182,7 @@ Design make_design(const ColumnSet& columns, std::span<const Window> windows) {
     for (std::size_t j = 0; j < d.columns.size(); ++j) {
       precision[static_cast<Eigen::Index>(j)] = 1 / (expected[d.columns[j]] * expected[d.columns[j]]);
     }
-    whiten(d, continues[c], precision);
+    whiten(d, continues[c], precision, whitening);
   }
   return design;
 }

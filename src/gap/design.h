@@ -28,7 +28,8 @@ struct Design {
 // Evaluates all windows and whitens each channel: a second-order autoregression and a robust spread from what
 // a fit of everything leaves over, weights that bound the say of outliers, and a variance inflation for what
 // stays correlated over seconds.
-Design make_design(const ColumnSet& columns, std::span<const Window> windows);
+// Without whitening, the spread alone is divided out.
+Design make_design(const ColumnSet& columns, std::span<const Window> windows, bool whitening = true);
 
 // What data say about the coefficients: y'y, X'y, X'X in whitened units.
 struct Information {

@@ -243,7 +243,7 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
   d.missions = recordings.missions.size();
   d.samples = recordings.samples;
   if (const auto adopted = dynamics::active_effects(robot); !adopted) return tl::unexpected(adopted.error());
-  const std::vector<Window> windows = make_windows(recordings, robot);
+  const std::vector<Window> windows = make_windows(recordings, robot, settings.parts.windows);
   const std::vector<double> measured = measured_power(windows);
   const auto with_battery = std::ranges::count_if(measured, [](double p) { return std::isfinite(p); });
   if (windows.size() < fewest_windows) return invalid("log", "holds too little motion to judge");
@@ -261,11 +261,11 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
   std::vector<Window> judged = windows;
   std::optional<FitResult> result;
   for (int round = 0;; ++round) {
-    result = fit_windows(robot, judged, settings.progress);
+    result = fit_windows(robot, judged, settings.progress, settings.parts);
     if (!result) return fail(Fault::conflict, "", "diagnosis cancelled");
     const double shift = judged.front().electrical_shift_s, delay = found_delay(*result);
     if (std::fabs(delay - shift) < settled_delay_s || round >= most_delay_rounds) break;
-    WindowSettings moved;
+    WindowSettings moved = settings.parts.windows;
     moved.electrical_delay_s = delay;
     judged = make_windows(recordings, robot, moved);
   }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "gap/method_parts.h"
 #include "gap/recordings.h"
 #include "robot/robot_model.h"
 
@@ -78,6 +79,7 @@ struct Diagnosis {
 struct DiagnosisSettings {
   double report_probability = 0.5;       // effects from this posterior probability on are named
   std::function<bool(double)> progress;  // called with 0..1; false cancels
+  MethodParts parts;
 };
 
 // Fault::invalid for unusable recordings, Fault::conflict when cancelled.

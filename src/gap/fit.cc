@@ -12,15 +12,16 @@ constexpr int most_rounds = 4;
 constexpr double settled = 0.01;  // relative change of every coefficient
 
 Fit make_fit(const robot::RobotModel& robot, std::span<const Window> windows, bool power,
-             const Shapes& shapes, std::span<const dynamics::ActiveEffect> around) {
+             const Shapes& shapes, std::span<const dynamics::ActiveEffect> around, const MethodParts& parts) {
   Fit fit;
   fit.columns = std::make_unique<ColumnSet>(robot, windows, power, shapes);
+  fit.columns->leave_out(parts);
   std::vector<Chosen> chosen;
   for (const dynamics::ActiveEffect& effect : around) {
     if (auto c = fit.columns->coordinates_of(effect)) chosen.push_back(std::move(*c));
   }
   if (!chosen.empty()) fit.columns->linearise_around(chosen);
-  fit.design = make_design(*fit.columns, windows);
+  fit.design = make_design(*fit.columns, windows, parts.whitening);
   fit.missions = mission_information(*fit.columns, fit.design);
   for (const Information& mission : fit.missions) fit.total += mission;
   fit.evidence = std::make_unique<Evidence>(*fit.columns, fit.total);
@@ -86,17 +87,18 @@ double MovedShares::operator()(const Hypothesis& hypothesis, const Eigen::Vector
 }
 
 std::optional<FitResult> fit_windows(const robot::RobotModel& robot, std::span<const Window> windows,
-                                     const std::function<bool(double)>& goes_on) {
+                                     const std::function<bool(double)>& goes_on, const MethodParts& parts) {
   const auto cancelled = [&](double part) { return goes_on && !goes_on(part); };
   const bool power = without_motor_channels(windows);
   FitResult result;
   if (ranges_of(windows, robot).position) {
     Shapes scan;
     scan.zones = {everywhere};
-    const ColumnSet columns(robot, windows, power, scan);
+    ColumnSet columns(robot, windows, power, scan);
+    columns.leave_out(parts);
     const auto zone = std::ranges::find_if(
         columns.hypotheses(), [](const Hypothesis& h) { return h.id() == "floor_resistance_zone"; });
-    const Design design = make_design(columns, windows);
+    const Design design = make_design(columns, windows, parts.whitening);
     if (cancelled(0.2)) return std::nullopt;
     const auto found =
         find_zone(columns, design, windows, static_cast<std::size_t>(zone - columns.hypotheses().begin()));
@@ -106,7 +108,7 @@ std::optional<FitResult> fit_windows(const robot::RobotModel& robot, std::span<c
   std::vector<dynamics::ActiveEffect> around;
   double factor = 1.5;
   for (int round = 0; round < most_rounds; ++round) {
-    result.fit = make_fit(robot, windows, power, result.shapes, around);
+    result.fit = make_fit(robot, windows, power, result.shapes, around, parts);
     if (cancelled(0.35 + 0.12 * (round + 1))) return std::nullopt;
     const Fit& fit = result.fit;
     const Explanation& best = fit.explanations.front();
