@@ -13,6 +13,7 @@
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/http_client.h"
+#include "client/profile_drawing.h"
 #include "robot/robot_file.h"
 #include "server/api/autonomy.h"
 #include "server/api/profile.h"
@@ -34,6 +35,7 @@ struct Options {
   std::string request_file;
   double timeout_s = 60;
   bool json = false;
+  std::string plot_file;
   // Members of the request, by flag.
   std::vector<std::pair<std::string, std::optional<double>>> numbers;
   std::optional<double> length_m;
@@ -87,20 +89,39 @@ Result<std::string> ask_server(const Options& options, const Question& question,
   return std::move(reply->body);
 }
 
-Result<std::string> answer(const Options& options, const Question& question) {
-  const auto request = request_of(options);
-  if (!request) return tl::unexpected(request.error());
-  if (!options.server.empty()) return ask_server(options, question, *request);
+Result<std::string> answer(const Options& options, const Question& question, const json& request) {
+  if (!options.server.empty()) return ask_server(options, question, request);
   auto robot = robot::load_robot(options.robot_file);
   if (!robot) return tl::unexpected(robot.error());
   auto drive = dynamics::drive_model(*robot);
   if (!drive) return tl::unexpected(drive.error());
-  return question.offline(*request, {std::move(*robot), std::move(*drive), file_version});
+  return question.offline(request, {std::move(*robot), std::move(*drive), file_version});
+}
+
+extern const Question profile;
+
+// Draws the motion that the request is about: of a path, the plan against its baselines.
+Result<void> plot(const Options& options, const Question& question, json request) {
+  request["columns"] = true;
+  const bool given = request.contains("profile");
+  if (!given) request["baseline_columns"] = true;
+  const auto text = answer(options, given ? question : profile, request);
+  if (!text) return tl::unexpected(text.error());
+  const json document = json::parse(*text, nullptr, false);
+  if (!document.is_object()) return fail(Fault::corrupt, options.server, "did not answer with a JSON object");
+  const auto drawing = draw_profile(document);
+  if (!drawing) return tl::unexpected(drawing.error());
+  return write_file(options.plot_file, *drawing);
 }
 
 Exit run(const Options& options, const Question& question) {
-  const auto text = answer(options, question);
+  const auto request = request_of(options);
+  if (!request) return report(request.error());
+  const auto text = answer(options, question, *request);
   if (!text) return report(text.error());
+  if (!options.plot_file.empty()) {
+    if (const auto drawn = plot(options, question, *request); !drawn) return report(drawn.error());
+  }
   if (options.json) {
     std::puts(text->c_str());
     return Exit::ok;
@@ -148,10 +169,10 @@ void print_profile(json a) {
   for (const json& point : a["pareto"])
     fmt::print("  {:>10.2f} s {:>12.2f} J {:>8.3f} m/s at most\n", number(point, "duration_s"),
                number(point, "energy_j"), number(point, "peak_speed_m_s"));
-  const auto profile = a.find("profile");
-  if (profile == a.end()) return;
-  const json &t = (*profile)["time_s"], &way = (*profile)["distance_m"], &v = (*profile)["speed_m_s"],
-             &yaw = (*profile)["yaw_rate_rad_s"], &power = (*profile)["power_w"];
+  const auto series = a.find("profile");
+  if (series == a.end()) return;
+  const json &t = (*series)["time_s"], &way = (*series)["distance_m"], &v = (*series)["speed_m_s"],
+             &yaw = (*series)["yaw_rate_rad_s"], &power = (*series)["power_w"];
   fmt::print("{:>10} {:>10} {:>10} {:>10} {:>10}\n", "time s", "way m", "speed m/s", "yaw rad/s", "power W");
   constexpr std::size_t rows = 20;
   const std::size_t step = t.size() / rows + 1;
@@ -166,7 +187,7 @@ void print_profile(json a) {
 
 void print_estimate(json a) {
   print_head(a);
-  print_ledger(a["ledger"]);
+  print_ledger(a["ledger"]["terms_j"]);
 }
 
 void print_autonomy(json a) {
@@ -184,8 +205,8 @@ void print_autonomy(json a) {
   if (!a.empty()) std::puts(a.dump(2).c_str());
 }
 
-constexpr Question profile{"profile", "Plan the minimum-energy motion along a path", api::profile_answer,
-                           print_profile};
+const Question profile{"profile", "Plan the minimum-energy motion along a path", api::profile_answer,
+                       print_profile};
 constexpr Question estimate{"estimate", "Price a motion, or the best one along a path", api::estimate_answer,
                             print_estimate};
 constexpr Question autonomy{"autonomy", "Ask how far and how long a robot still goes", autonomy_offline,
@@ -225,6 +246,8 @@ void add_numbers(CLI::App& command, Options& options,
 }
 
 void add_drive_flags(CLI::App& command, Options& options, bool pareto) {
+  command.add_option("--plot", options.plot_file,
+                     "draw speed, power and energy over time into this SVG, against the baselines");
   command.add_option("--turn", options.turn_rad,
                      "turn in place by so many rad (to the left), before --length");
   command.add_option("--length", options.length_m, "drive straight for so many m");

@@ -46,6 +46,8 @@ Table table_4_2(const robot::RobotModel& nomad);  // optimum and triangle
 Table table_4_3(const robot::RobotModel& nomad);  // the same to an end speed
 Table table_4_4(const robot::RobotModel& nomad);  // optimum in the triangle's time and in its own
 Table table_5_4(const robot::RobotModel& nomad);  // exploration missions
+// Table 5-4's savings under other assumptions than the thesis's equations, each labelled.
+Table table_5_4_readings(const robot::RobotModel& nomad);
 
 // All of the above in this order.
 std::vector<Table> all_tables(const Robots& robots);

@@ -93,6 +93,16 @@ void tighten(Fields& fields, planning::Limits& limits) {
 
 }  // namespace
 
+std::optional<planning::Pose> read_start_pose(Fields& fields) {
+  const json* start = fields.member("start_pose");
+  if (start == nullptr) return std::nullopt;
+  Fields pose(*start, fields.pointer("start_pose"));
+  const planning::Pose read{pose.number("x_m", place), pose.number("y_m", place),
+                            pose.number("heading_rad", {.minimum = -1e3, .maximum = 1e3})};
+  if (Result<void> done = pose.finish(); !done) fields.fault(std::move(done.error()));
+  return read;
+}
+
 DriveRequest read_drive(Fields& fields, const robot::RobotModel& robot) {
   DriveRequest request;
   request.problem.limits = planning::limits_of(robot);
@@ -106,12 +116,7 @@ DriveRequest read_drive(Fields& fields, const robot::RobotModel& robot) {
 
   planning::PathOptions options;
   options.payload_kg = fields.number("payload_kg", {.minimum = 0, .maximum = robot.limits.payload_kg}, 0);
-  if (const json* start = fields.member("start_pose")) {
-    Fields pose(*start, fields.pointer("start_pose"));
-    options.start = {pose.number("x_m", place), pose.number("y_m", place),
-                     pose.number("heading_rad", {.minimum = -1e3, .maximum = 1e3})};
-    if (Result<void> done = pose.finish(); !done) fields.fault(std::move(done.error()));
-  }
+  options.start = read_start_pose(fields).value_or(planning::Pose{});
 
   const json* path = fields.member("path");
   std::vector<planning::Segment> segments;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 
 #include "planning/path.h"
@@ -14,6 +15,9 @@ struct DriveRequest {
   planning::Path path;
   planning::Problem problem;
 };
+
+// Reads "start_pose"; nothing where it is absent.
+std::optional<planning::Pose> read_start_pose(Fields& fields);
 
 // Reads "path" (segments), "start_pose", "payload_kg", "start_speed_m_s", "end_speed_m_s", "deadline_s",
 // "value_of_time_w", "regeneration", and limits that tighten the robot's own, "limits". The fields' own

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
@@ -58,29 +61,6 @@ void write_columns(JsonWriter& json, const planning::Profile& p) {
   json.end_object();
 }
 
-// How long the best plan takes on each run between stops: what the baselines are given too. One run needs no
-// second solve; several are joined by the multiplier of time, which priced alone gives each run's share.
-Result<std::vector<double>> run_durations(const planning::Planner& planner, const DriveRequest& request,
-                                          const planning::Plan& plan) {
-  const auto& runs = request.path.runs;
-  if (runs.size() == 1) return std::vector<double>{plan.summary.duration_s - request.path.dwell_s()};
-  std::vector<double> durations;
-  for (std::size_t k = 0; k < runs.size(); ++k) {
-    planning::Path alone;
-    alone.runs = {runs[k]};
-    alone.runs[0].dwell_before_s = 0;
-    planning::Problem problem = request.problem;
-    problem.deadline_s.reset();
-    problem.value_of_time_w = plan.certificate.time_multiplier_w;
-    if (k > 0) problem.start_speed_m_s = 0;
-    if (k + 1 < runs.size()) problem.end_speed_m_s = 0;
-    const auto cost = planner.cost(alone, problem);
-    if (!cost) return tl::unexpected(cost.error());
-    durations.push_back(cost->duration_s);
-  }
-  return durations;
-}
-
 // The robot's drive, with the share of braking power that the request says returns.
 Result<dynamics::DriveModel> drive_of(const server::ModelInForce& model,
                                       const std::optional<double>& regeneration) {
@@ -91,19 +71,16 @@ Result<dynamics::DriveModel> drive_of(const server::ModelInForce& model,
   return dynamics::drive_model(robot);
 }
 
-Result<void> write_baselines(JsonWriter& json, const planning::Planner& planner,
-                             const server::ModelInForce& model, const DriveRequest& request,
-                             const planning::Plan& plan) {
+Result<void> write_baselines(JsonWriter& json, const server::ModelInForce& model, const DriveRequest& request,
+                             const planning::Plan& plan, bool columns) {
   json.key("baselines").begin_object();
-  const Result<std::vector<double>> durations = run_durations(planner, request, plan);
-  if (!durations) return tl::unexpected(durations.error());
   const Result<dynamics::DriveModel> drive = drive_of(model, request.problem.regeneration);
   if (!drive) return tl::unexpected(drive.error());
   for (const auto& [name, ramp_fraction] : {std::pair{"trapezoid", 1.0 / 3}, std::pair{"triangle", 0.5}}) {
     json.key(name);
     const auto baseline =
-        planning::ramp_baseline(*drive, request.path, *durations, request.problem.start_speed_m_s,
-                                request.problem.end_speed_m_s, ramp_fraction);
+        planning::ramp_baseline(*drive, request.path, plan.run_duration_s, request.problem.start_speed_m_s,
+                                request.problem.end_speed_m_s, ramp_fraction, columns);
     if (!baseline) {
       json.null();
       continue;
@@ -111,10 +88,65 @@ Result<void> write_baselines(JsonWriter& json, const planning::Planner& planner,
     json.begin_object().field("energy_j", baseline->energy_j).field("duration_s", baseline->duration_s);
     json.field("peak_speed_m_s", baseline->peak_speed_m_s);
     json.field("within_limits", baseline->keeps(request.problem.limits));
-    json.field("saving_fraction", 1 - plan.summary.energy_j / baseline->energy_j).end_object();
+    json.field("saving_fraction", 1 - plan.summary.energy_j / baseline->energy_j);
+    if (columns) {
+      json.key("profile").begin_object();
+      json.column("time_s", baseline->time_s).column("speed_m_s", baseline->speed_m_s);
+      json.column("yaw_rate_rad_s", baseline->yaw_rate_rad_s).column("power_w", baseline->power_w, 4);
+      json.column("energy_j", baseline->energy_column_j, 4).end_object();
+    }
+    json.end_object();
   }
   json.end_object();
   return {};
+}
+
+// A given motion as columns: power at its points and in between, energy by Gauss's rule over each span.
+planning::Profile series_of(const dynamics::DriveModel& drive, const std::vector<energy::MotionPoint>& points,
+                            double payload_kg, const std::optional<energy::StartPose>& start) {
+  constexpr std::array<std::pair<double, double>, 3> gauss{
+      {{0.1127016653792583, 5.0 / 18}, {0.5, 8.0 / 18}, {0.8872983346207417, 5.0 / 18}}};
+  constexpr int cuts = 4;  // of a span, so that power's bow shows
+  planning::Profile p;
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  planning::Pose pose =
+      start ? planning::Pose{start->x_m, start->y_m, start->heading_rad} : planning::Pose{nan, nan, nan};
+  double distance = 0, energy = 0;
+  for (std::size_t k = 0; k + 1 < points.size(); ++k) {
+    const energy::MotionPoint &a = points[k], &b = points[k + 1];
+    const double span = b.time_s - a.time_s;
+    const double slope = (b.speed_m_s - a.speed_m_s) / span,
+                 bend = (b.yaw_rate_rad_s - a.yaw_rate_rad_s) / span;
+    const auto power = [&](double t) {
+      dynamics::Instant at;
+      at.wheel_speed_rad_s =
+          dynamics::wheels_of_body(drive.parameters(), a.speed_m_s + slope * t, a.yaw_rate_rad_s + bend * t);
+      at.wheel_acceleration_rad_s2 = dynamics::wheels_of_body(drive.parameters(), slope, bend);
+      at.payload_kg = payload_kg;
+      at.x_m = pose.x_m, at.y_m = pose.y_m, at.heading_rad = pose.heading_rad;
+      return drive.flow(at).battery_power_w;
+    };
+    for (int cut = 0; cut <= cuts; ++cut) {
+      const double t = span * cut / cuts, h = span / cuts;
+      const double v = a.speed_m_s + slope * t, yaw = a.yaw_rate_rad_s + bend * t;
+      p.time_s.push_back(a.time_s + t);
+      p.distance_m.push_back(distance);
+      p.x_m.push_back(pose.x_m), p.y_m.push_back(pose.y_m), p.heading_rad.push_back(pose.heading_rad);
+      p.speed_m_s.push_back(v), p.yaw_rate_rad_s.push_back(yaw);
+      p.acceleration_m_s2.push_back(slope), p.yaw_acceleration_rad_s2.push_back(bend);
+      p.payload_kg.push_back(payload_kg);
+      p.power_w.push_back(power(t));
+      p.energy_j.push_back(energy);
+      if (cut == cuts) break;
+      for (const auto& [node, weight] : gauss) energy += weight * h * power(t + node * h);
+      const double way = (v + 0.5 * slope * h) * h, turned = (yaw + 0.5 * bend * h) * h;
+      const double heading = pose.heading_rad + 0.5 * turned;
+      pose.x_m += way * std::cos(heading), pose.y_m += way * std::sin(heading);
+      pose.heading_rad += turned;
+      distance += std::fabs(way);
+    }
+  }
+  return p;
 }
 
 }  // namespace
@@ -123,6 +155,7 @@ Result<std::string> profile_answer(const nlohmann::json& body, const server::Mod
   Fields fields(body);
   const DriveRequest request = read_drive(fields, model.robot);
   const bool columns = fields.boolean("columns", true);
+  const bool baseline_columns = fields.boolean("baseline_columns", false);
   const std::int64_t pareto_points = fields.integer("pareto_points", 0, max_pareto_points, 0);
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
 
@@ -140,7 +173,7 @@ Result<std::string> profile_answer(const nlohmann::json& body, const server::Mod
   for (std::size_t k = 0; k < energy::term_count; ++k)
     json.field(energy::term_names[k], plan->ledger.value[k]);
   json.end_object();
-  if (Result<void> done = write_baselines(json, *planner, model, request, *plan); !done)
+  if (Result<void> done = write_baselines(json, model, request, *plan, baseline_columns); !done)
     return tl::unexpected(std::move(done.error()));
   json.key("needed_speed_m_s");
   if (request.problem.deadline_s) {
@@ -173,6 +206,8 @@ Result<std::string> profile_answer(const nlohmann::json& body, const server::Mod
 Result<std::string> estimate_answer(const nlohmann::json& body, const server::ModelInForce& model) {
   Fields fields(body);
   energy::Accounts accounts;
+  const bool columns = fields.boolean("columns", false);
+  planning::Profile series;
   if (const nlohmann::json* given = fields.member("profile")) {
     Fields profile(*given, fields.pointer("profile"));
     constexpr Bounds time{.minimum = 0, .maximum = 1e7}, speed{.minimum = -100, .maximum = 100};
@@ -186,19 +221,14 @@ Result<std::string> estimate_answer(const nlohmann::json& body, const server::Mo
     const double payload =
         fields.number("payload_kg", {.minimum = 0, .maximum = model.robot.limits.payload_kg}, 0);
     std::optional<energy::StartPose> start;
-    if (const nlohmann::json* at = fields.member("start_pose")) {
-      Fields pose(*at, fields.pointer("start_pose"));
-      constexpr Bounds place{.minimum = -1e6, .maximum = 1e6};
-      start = energy::StartPose{pose.number("x_m", place), pose.number("y_m", place),
-                                pose.number("heading_rad", place)};
-      if (Result<void> done = pose.finish(); !done) fields.fault(std::move(done.error()));
-    }
+    if (const auto pose = read_start_pose(fields)) start = {pose->x_m, pose->y_m, pose->heading_rad};
     if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
     std::vector<energy::MotionPoint> points(t.size());
     for (std::size_t k = 0; k < t.size(); ++k) points[k] = {t[k], v[k], yaw[k]};
     Result<energy::Accounts> priced = energy::estimate_motion(model.drive, points, payload, start);
     if (!priced) return tl::unexpected(std::move(priced.error()));
     accounts = *priced;
+    if (columns) series = series_of(model.drive, points, payload, start);
   } else {
     const DriveRequest request = read_drive(fields, model.robot);
     if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
@@ -209,6 +239,7 @@ Result<std::string> estimate_answer(const nlohmann::json& body, const server::Mo
     accounts.duration_s = plan->summary.duration_s;
     accounts.distance_m = plan->summary.distance_m;
     accounts.turned_rad = plan->summary.turned_rad;
+    if (columns) series = std::move(plan->profile);
   }
   JsonWriter json;
   json.begin_object();
@@ -217,6 +248,7 @@ Result<std::string> estimate_answer(const nlohmann::json& body, const server::Mo
   json.field("distance_m", accounts.distance_m).field("turned_rad", accounts.turned_rad);
   json.key("ledger");
   write_ledger(json, accounts);
+  if (columns) write_columns(json, series);
   json.end_object();
   return json.take();
 }

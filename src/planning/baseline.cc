@@ -11,7 +11,9 @@ constexpr int steps_per_span = 24;
 // A run driven as a ramp, step by step.
 class Ramp {
  public:
-  Ramp(const dynamics::DriveModel& model, const Run& run) : model_(model), run_(run) {
+  // Appends to the columns of `into` unless that is null; its time and energy are where the run begins.
+  Ramp(const dynamics::DriveModel& model, const Run& run, Baseline* into)
+      : model_(model), run_(run), into_(into) {
     at_.payload_kg = run.payload_kg;
   }
 
@@ -20,13 +22,16 @@ class Ramp {
     if (!(duration_s > 0)) return;
     const double acceleration = (to - from) / duration_s, h = duration_s / steps_per_span;
     double before = power_w(0, from, acceleration);
+    write(0, from, before);
     for (int k = 0; k < steps_per_span; ++k) {
       const double t = k * h;
       const double middle = power_w(t + h / 2, from, acceleration),
                    after = power_w(t + h, from, acceleration);
       energy_j += h / 6 * (before + 4 * middle + after);
       before = after;
+      write(t + h, from + acceleration * (t + h), after);
     }
+    driven_s_ += duration_s;
     way_ += 0.5 * (from + to) * duration_s;
     if (run_.turn == 0) peaks.peak_speed_m_s = std::max({peaks.peak_speed_m_s, from, to});
     const double rim = run_.turn == 0 ? 1 : model_.parameters().half_track_m;
@@ -37,10 +42,20 @@ class Ramp {
   Baseline peaks;  // of this run
 
  private:
+  void write(double t, double speed, double power_w) {
+    if (into_ == nullptr) return;
+    into_->time_s.push_back(into_->duration_s + driven_s_ + t);
+    into_->speed_m_s.push_back(run_.turn == 0 ? speed : 0);
+    into_->yaw_rate_rad_s.push_back(turn_ * speed);
+    into_->power_w.push_back(power_w);
+    into_->energy_column_j.push_back(into_->energy_j + energy_j);
+  }
+
   double power_w(double t, double from, double acceleration) {
     const double speed = from + acceleration * t;
     const Knot knot = run_.at(std::clamp(way_ + (from + 0.5 * acceleration * t) * t, 0.0, run_.length()));
     const dynamics::Parameters<double>& p = model_.parameters();
+    turn_ = run_.turn != 0 ? run_.turn : knot.curvature_1_m;
     if (run_.turn != 0) {
       at_.wheel_speed_rad_s = dynamics::wheels_of_body(p, 0, run_.turn * speed);
       at_.wheel_acceleration_rad_s2 = dynamics::wheels_of_body(p, 0, run_.turn * acceleration);
@@ -67,8 +82,10 @@ class Ramp {
 
   const dynamics::DriveModel& model_;
   const Run& run_;
+  Baseline* into_;
   dynamics::Instant at_;
-  double way_ = 0;
+  double way_ = 0, driven_s_ = 0;
+  double turn_ = 0;  // heading per unit of the run's coordinate, where power was last asked for
 };
 
 }  // namespace
@@ -84,9 +101,20 @@ bool Baseline::keeps(const Limits& l) const {
 
 Result<Baseline> ramp_baseline(const dynamics::DriveModel& model, const Path& path,
                                std::span<const double> run_duration_s, double start_speed_m_s,
-                               double end_speed_m_s, double ramp_fraction) {
+                               double end_speed_m_s, double ramp_fraction, bool columns) {
   Baseline baseline;
   const double standing_w = model.battery_power_for({0, 0});
+  const auto stand = [&](double duration_s) {
+    if (!(duration_s > 0)) return;
+    for (const bool end : {false, true}) {
+      if (end) baseline.energy_j += standing_w * duration_s, baseline.duration_s += duration_s;
+      if (!columns) continue;
+      baseline.time_s.push_back(baseline.duration_s);
+      baseline.speed_m_s.push_back(0), baseline.yaw_rate_rad_s.push_back(0);
+      baseline.power_w.push_back(standing_w);
+      baseline.energy_column_j.push_back(baseline.energy_j);
+    }
+  };
   for (std::size_t k = 0; k < path.runs.size(); ++k) {
     const Run& run = path.runs[k];
     const double start = k == 0 ? start_speed_m_s : 0, end = k + 1 == path.runs.size() ? end_speed_m_s : 0;
@@ -94,20 +122,20 @@ Result<Baseline> ramp_baseline(const dynamics::DriveModel& model, const Path& pa
     const double top = (run.length() - 0.5 * (start + end) * ramp_s) / (run_duration_s[k] - ramp_s);
     if (!(top > 0))
       return fail(Fault::infeasible, "/path", "is too short for such a ramp between its end speeds");
-    Ramp ramp(model, run);
+    stand(run.dwell_before_s);
+    Ramp ramp(model, run, columns ? &baseline : nullptr);
     ramp.drive(ramp_s, start, top);
     ramp.drive(hold_s, top, top);
     ramp.drive(ramp_s, top, end);
-    baseline.energy_j += ramp.energy_j + standing_w * run.dwell_before_s;
-    baseline.duration_s += run_duration_s[k] + run.dwell_before_s;
+    baseline.energy_j += ramp.energy_j;
+    baseline.duration_s += run_duration_s[k];
     for (double Baseline::*peak :
          {&Baseline::peak_speed_m_s, &Baseline::peak_acceleration_m_s2, &Baseline::peak_yaw_rate_rad_s,
           &Baseline::peak_wheel_speed_rad_s, &Baseline::peak_current_a, &Baseline::peak_voltage_v}) {
       baseline.*peak = std::max(baseline.*peak, ramp.peaks.*peak);
     }
   }
-  baseline.energy_j += standing_w * path.dwell_after_s;
-  baseline.duration_s += path.dwell_after_s;
+  stand(path.dwell_after_s);
   return baseline;
 }
 

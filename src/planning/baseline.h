@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "base/error.h"
 #include "dynamics/drive_model.h"
@@ -20,6 +21,9 @@ struct Baseline {
   double peak_wheel_speed_rad_s = 0;
   double peak_current_a = 0, peak_voltage_v = 0;  // of the armatures
 
+  // The motion over time, where it was asked for; columns of equal length. Energy since the start.
+  std::vector<double> time_s, speed_m_s, yaw_rate_rad_s, power_w, energy_column_j;
+
   // To within rounding.
   bool keeps(const Limits& limits) const;
 };
@@ -29,6 +33,6 @@ struct Baseline {
 // time.
 Result<Baseline> ramp_baseline(const dynamics::DriveModel& model, const Path& path,
                                std::span<const double> run_duration_s, double start_speed_m_s,
-                               double end_speed_m_s, double ramp_fraction);
+                               double end_speed_m_s, double ramp_fraction, bool columns = false);
 
 }  // namespace joulecast::planning

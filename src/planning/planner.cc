@@ -312,6 +312,7 @@ Plan Request::written() const {
     const RunPlanner& planner = runs_[k];
     const Run& run = planner.run();
     const RunAnswer& answer = answers_[k];
+    writer.plan().run_duration_s.push_back(answer.duration_s);
     writer.dwell(run.dwell_before_s, run.knots.front().pose, run.payload_kg);
     pose = run.knots.back().pose;
     std::vector<double> times;
@@ -468,7 +469,9 @@ Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& p
   for (int attempt = 0; front.size() < count; ++attempt) {
     front.resize(1);
     // The shortest time itself costs an unbounded price; the front ends a hundredth of the way before it.
-    const double fastest = request->shortest_s() + 0.01 * (free.duration_s - request->shortest_s());
+    const double shortest = request->shortest_s();
+    if (free.duration_s < shortest * (1 + 1e-5)) return std::vector<PlanCost>{free};
+    const double fastest = std::max(shortest * (1 + 2e-6), shortest + 0.01 * (free.duration_s - shortest));
     for (std::size_t k = 1; k < count; ++k) {
       const double f = static_cast<double>(k) / static_cast<double>(count - 1);
       const double deadline = free.duration_s + f * (fastest - free.duration_s);

@@ -38,7 +38,7 @@ class Planner {
   Result<double> needed_speed(const Path& path, const Problem& problem) const;
 
   // Energy against duration from the free optimum to near the shortest time: `count` >= 2 deadlines, evenly
-  // spaced.
+  // spaced; only the free optimum where that is the shortest time already.
   Result<std::vector<PlanCost>> pareto(const Path& path, const Problem& problem, std::size_t count) const;
 
  private:

@@ -63,6 +63,7 @@ struct Certificate {
 
 struct Plan {
   Profile profile;
+  std::vector<double> run_duration_s;  // of each run between stops, dwells left out
   Summary summary;
   energy::Ledger ledger;  // joules
   Certificate certificate;

@@ -2,6 +2,7 @@
 """joulecast answers the same JSON from a robot file as through a daemon that holds it; faults have their exit codes."""
 import json
 import subprocess
+import xml.etree.ElementTree
 
 from harness import Programs, arguments, check
 
@@ -41,6 +42,12 @@ def main():
     check(row["energy_j"][0] > 0 and row["energy_j"][1] is None and row["infeasible"][0]["tasks"] == [1], row)
     table = programs.run(*matrix, "--robot", robot)
     check("near" in table and "none can do it" in table, f"{matrix} prints\n{table}")
+
+    for question in (questions[0], questions[4]):
+        picture = programs.path("plot.svg")
+        programs.run(*question, "--robot", robot, "--plot", picture)
+        lines = xml.etree.ElementTree.parse(picture).getroot().findall(".//{http://www.w3.org/2000/svg}polyline")
+        check(len(lines) >= 3, f"{question} draws {len(lines)} lines")
 
     page = json.loads(programs.run("missions", "--server", programs.url, "--robot-id", "amr", "--json"))
     check(page == {"missions": [], "next_cursor": None}, f"a fresh daemon knows missions: {page}")

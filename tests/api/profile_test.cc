@@ -1,0 +1,144 @@
+#include "server/api/profile.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "client/profile_drawing.h"
+#include "tests/support/sample_robots.h"
+
+namespace joulecast::api {
+namespace {
+
+using nlohmann::json;
+
+server::ModelInForce model() {
+  const robot::RobotModel robot = testing::nomad();
+  return {robot, *dynamics::drive_model(robot), 3};
+}
+
+json answer(Result<std::string> (*question)(const json&, const server::ModelInForce&), const json& request) {
+  const auto text = question(request, model());
+  EXPECT_TRUE(text) << describe(text.error());
+  return text ? json::parse(*text) : json();
+}
+
+Error fault(Result<std::string> (*question)(const json&, const server::ModelInForce&), const json& request) {
+  const auto text = question(request, model());
+  EXPECT_FALSE(text) << *text;
+  return text ? Error{} : text.error();
+}
+
+// Out empty, loaded after a stop, back: payload and dwell are segments like any other, and profile and
+// estimate price them alike.
+TEST(Profile, PayloadChangesAndDwellsBetweenLegs) {
+  const auto straight = [](double m) { return json{{"kind", "straight"}, {"length_m", m}}; };
+  const json errand = {
+      straight(3), {{"kind", "dwell"}, {"duration_s", 12}},  {{"kind", "payload"}, {"payload_kg", 8}},
+      straight(4), {{"kind", "payload"}, {"payload_kg", 0}}, {{"kind", "dwell"}, {"duration_s", 5}}};
+  const json whole = answer(profile_answer, {{"path", errand}});
+  const json out = answer(profile_answer, {{"path", {straight(3)}}});
+  const json back = answer(profile_answer, {{"path", {straight(4)}}, {"payload_kg", 8}});
+  const double idle_j = 17 * testing::nomad().idle_power_w;
+  const double sum = out["energy_j"].get<double>() + back["energy_j"].get<double>() + idle_j;
+  EXPECT_NEAR(whole["energy_j"].get<double>(), sum, 1e-9 * sum);
+  EXPECT_NEAR(whole["duration_s"].get<double>(),
+              out["duration_s"].get<double>() + back["duration_s"].get<double>() + 17, 1e-9);
+  const auto payloads = whole["profile"]["payload_kg"].get<std::vector<double>>();
+  EXPECT_EQ(payloads.front(), 0);
+  EXPECT_EQ(*std::max_element(payloads.begin(), payloads.end()), 8);
+  EXPECT_EQ(payloads.back(), 0);
+  const json estimate = answer(estimate_answer, {{"path", errand}});
+  EXPECT_EQ(estimate["energy_j"], whole["energy_j"]);
+  EXPECT_FALSE(estimate.contains("profile"));
+}
+
+TEST(Profile, ColumnsEndAtTheirTotals) {
+  const json request = {{"path",
+                         {{{"kind", "straight"}, {"length_m", 3}},
+                          {{"kind", "turn"}, {"angle_rad", 1}},
+                          {{"kind", "dwell"}, {"duration_s", 2}},
+                          {{"kind", "arc"}, {"radius_m", 1}, {"angle_rad", -1}}}},
+                        {"regeneration", 0.4},
+                        {"baseline_columns", true}};
+  const json a = answer(profile_answer, request);
+  for (const json& motion : {a, a["baselines"]["trapezoid"], a["baselines"]["triangle"]}) {
+    const json& columns = motion["profile"];
+    EXPECT_NEAR(columns["energy_j"].back().get<double>(), motion["energy_j"].get<double>(), 1e-3);
+    EXPECT_NEAR(columns["time_s"].back().get<double>(), motion["duration_s"].get<double>(), 1e-5);
+    const auto times = columns["time_s"].get<std::vector<double>>();
+    EXPECT_TRUE(std::is_sorted(times.begin(), times.end()));
+    for (const char* name : {"speed_m_s", "yaw_rate_rad_s", "power_w", "energy_j"})
+      EXPECT_EQ(columns[name].size(), times.size()) << name;
+  }
+  // A baseline is as long on every run, so as long in all.
+  EXPECT_NEAR(a["baselines"]["triangle"]["duration_s"].get<double>(), a["duration_s"].get<double>(), 1e-9);
+  const json plain = answer(profile_answer, {{"path", request["path"]}});
+  EXPECT_FALSE(plain["baselines"]["triangle"].contains("profile"));
+
+  // A given motion: its columns are integrated by another rule than its energy.
+  const json motion = {
+      {"time_s", {0, 2, 6, 8}}, {"speed_m_s", {0, 0.6, 0.6, 0}}, {"yaw_rate_rad_s", {0, 0, 0.4, 0}}};
+  const json e = answer(estimate_answer, {{"profile", motion}, {"columns", true}, {"payload_kg", 4}});
+  const double energy = e["energy_j"].get<double>();
+  EXPECT_NEAR(e["profile"]["energy_j"].back().get<double>(), energy, 1e-4 * energy);
+  EXPECT_NEAR(e["profile"]["distance_m"].back().get<double>(), e["distance_m"].get<double>(), 1e-6);
+  EXPECT_TRUE(e["profile"]["x_m"][0].is_null());
+  const json placed = answer(
+      estimate_answer,
+      {{"profile", motion}, {"columns", true}, {"start_pose", {{"x_m", 1}, {"y_m", 2}, {"heading_rad", 0}}}});
+  EXPECT_EQ(placed["profile"]["x_m"][0], 1);
+}
+
+TEST(Profile, StartPosesAreReadAlikeEverywhere) {
+  const json path = {{{"kind", "straight"}, {"length_m", 3}}};
+  const json motion = {{"time_s", {0, 2, 4}}, {"speed_m_s", {0, 1, 0}}};
+  for (const json& pose : {json{{"x_m", 1}, {"y_m", 2}}, json{{"x_m", 1}, {"y_m", 2}, {"heading_rad", 1e5}},
+                           json{{"x_m", 1}, {"y_m", "left"}, {"heading_rad", 0}}}) {
+    const Error planned = fault(profile_answer, {{"path", path}, {"start_pose", pose}});
+    EXPECT_EQ(planned, fault(estimate_answer, {{"path", path}, {"start_pose", pose}}));
+    EXPECT_EQ(planned, fault(estimate_answer, {{"profile", motion}, {"start_pose", pose}}));
+    EXPECT_TRUE(planned.field.starts_with("/start_pose/")) << planned.field;
+  }
+}
+
+TEST(Profile, TellsTheSpeedThatADeadlineNeeds) {
+  const json path = {{{"kind", "straight"}, {"length_m", 10}}};
+  EXPECT_TRUE(answer(profile_answer, {{"path", path}})["needed_speed_m_s"].is_null());
+  // In free time the Nomad drives 10 m as fast as it can: nothing to trade.
+  EXPECT_EQ(answer(profile_answer, {{"path", path}, {"pareto_points", 4}})["pareto"].size(), 1u);
+  const json a = answer(
+      profile_answer,
+      {{"path", path}, {"deadline_s", 20}, {"pareto_points", 4}, {"limits", {{"acceleration_m_s2", 0.3}}}});
+  const double needed = a["needed_speed_m_s"].get<double>();
+  EXPECT_GT(needed, 10.0 / 20);
+  EXPECT_LE(needed, a["peak_speed_m_s"].get<double>() * (1 + 1e-9));
+  EXPECT_GT(a["pareto"][0]["peak_speed_m_s"].get<double>(), needed);
+}
+
+TEST(ProfileDrawing, ShowsPlanAndBaselines) {
+  const json request = {
+      {"path", {{{"kind", "straight"}, {"length_m", 3}}, {{"kind", "turn"}, {"angle_rad", 1}}}},
+      {"baseline_columns", true}};
+  const auto count = [](const std::string& text, const std::string& part) {
+    std::size_t n = 0;
+    for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
+    return n;
+  };
+  const auto drawing = client::draw_profile(answer(profile_answer, request));
+  ASSERT_TRUE(drawing) << describe(drawing.error());
+  EXPECT_EQ(count(*drawing, "<polyline"), 3u * 4u);
+  for (const char* words :
+       {"speed [m/s]", "yaw rate", "power from the battery [W]", "energy from the battery [J]",
+        "least energy", "trapezoid", "triangle", "time [s]"})
+    EXPECT_EQ(count(*drawing, words) > 0, true) << words;
+  EXPECT_EQ(drawing->find("nan"), std::string::npos);
+  const auto bare =
+      client::draw_profile(answer(profile_answer, {{"path", request["path"]}, {"columns", false}}));
+  ASSERT_FALSE(bare);
+  EXPECT_EQ(bare.error().fault, Fault::corrupt);
+}
+
+}  // namespace
+}  // namespace joulecast::api
