@@ -1,11 +1,13 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "client/commands/gap_missions.h"
+#include "client/commands/gap_output.h"
 #include "client/commands/table.h"
+#include "client/files.h"
 #include "gap/diagnosis.h"
 #include "gap/diagnosis_json.h"
 #include "robot/robot_file.h"
@@ -18,7 +20,9 @@ struct Options {
   std::string robot_file;
   std::string robot_id;
   std::string apply;
+  std::string report;
   bool json = false;
+  GapMissionsOptions missions;
 };
 
 void print(const gap::Diagnosis& d) {
@@ -29,19 +33,7 @@ void print(const gap::Diagnosis& d) {
   const auto verdict = gap::name_of(d.verdict);
   std::printf("verdict: %.*s (probability %.2f)\n", static_cast<int>(verdict.size()), verdict.data(),
               d.verdict_probability);
-  for (const auto& e : d.effects) {
-    std::printf("  %s: probability %.2f, closes %.0f %% of the gap\n", e.id.c_str(), e.probability,
-                100 * e.share);
-    for (const auto& p : e.parameters) {
-      const std::string unit = p.unit == "1" ? "" : " " + p.unit;
-      if (p.deviation >= 0) {
-        std::printf("    %s = %.4g +- %.2g%s\n", p.name.c_str(), p.value, p.deviation, unit.c_str());
-      } else {
-        std::printf("    %s = %.4g%s\n", p.name.c_str(), p.value, unit.c_str());
-      }
-    }
-    for (const auto& other : e.alternatives) std::printf("    cannot be told from %s\n", other.c_str());
-  }
+  for (const auto& e : d.effects) print_effect(e);
   if (!d.outside.channel.empty()) {
     std::printf("  outside the catalogue: in %s, follows %s (probability %.2f)\n", d.outside.channel.c_str(),
                 d.outside.follows.c_str(), d.outside.probability);
@@ -67,22 +59,17 @@ void print(const gap::Diagnosis& d) {
   }
 }
 
-// The robot file with the effects found, next to those it has.
-Exit apply(const gap::Diagnosis& d, robot::RobotModel robot, const std::string& path) {
-  for (const auto& effect : d.adoptable) {
-    std::erase_if(robot.effects, [&](const robot::AdoptedEffect& e) { return e.id == effect.id; });
-    robot.effects.push_back(effect);
-  }
-  std::ofstream out(path, std::ios::binary);
-  out << robot::to_json_text(robot) << '\n';
-  out.close();
-  if (!out) return report({Fault::unavailable, path, "cannot be written"});
-  return Exit::ok;
-}
-
 Exit run(const Options& options) {
   const auto robot = robot::load_robot(options.robot_file);
   if (!robot) return report(robot.error());
+  if (!options.missions.runs.empty()) {
+    GapMissionsOptions missions = options.missions;
+    missions.robot_file = options.robot_file;
+    missions.json = options.json;
+    missions.report = options.report;
+    missions.apply = options.apply;
+    return gap_from_missions(missions, *robot);
+  }
   const auto recordings = gap::load_recordings(options.logs, options.robot_id);
   if (!recordings) return report(recordings.error());
   const auto diagnosis = gap::diagnose(*recordings, *robot);
@@ -92,7 +79,12 @@ Exit run(const Options& options) {
   } else {
     print(*diagnosis);
   }
-  return options.apply.empty() ? Exit::ok : apply(*diagnosis, *robot, options.apply);
+  if (!options.report.empty()) {
+    const auto page =
+        gap::report_html(*diagnosis, *recordings, *robot, report_origin(options.logs, options.robot_file));
+    if (const auto written = write_file(options.report, page); !written) return report(written.error());
+  }
+  return options.apply.empty() ? Exit::ok : write_adopted(diagnosis->adoptable, *robot, options.apply);
 }
 
 }  // namespace
@@ -103,17 +95,28 @@ void add_gap(CLI::App& program, Exit& exit) {
       "gap",
       "Say where measured power departs from the robot's model, which effects cause it and what remains");
   auto* logs = command->add_option("log", options->logs, "LCM event logs of one robot");
+  auto* missions = command
+                       ->add_option("--missions", options->missions.runs,
+                                    "instead of logs a CSV table of runs of which only energies are known. "
+                                    "Its columns: " +
+                                        run_columns_help())
+                       ->excludes(logs);
+  command
+      ->add_flag("--robot-model", options->missions.robot_model,
+                 "with --missions: judge the robot file even where the table brings a model's energies")
+      ->needs(missions);
   auto* robot = command->add_option("--robot", options->robot_file, "robot file: the model");
   command->add_option("--robot-id", options->robot_id, "which robot, where the logs hold several");
   command->add_flag("--json", options->json, "print the diagnosis as JSON");
+  command->add_option("--report", options->report,
+                      "write the diagnosis as one HTML page with its maps and plots");
   command->add_option("--apply", options->apply, "write the robot file with the effects found");
   add_gap_trial(*command, exit);
-  command->callback([options, command, logs, robot, &exit] {
+  command->callback([options, command, logs, missions, robot, &exit] {
     if (!command->get_subcommands().empty()) return;
     // Not required() by the parser, which would ask for them of the subcommands too.
-    for (const CLI::Option* needed : {logs, robot}) {
-      if (needed->empty()) throw CLI::RequiredError(needed->get_name());
-    }
+    if (logs->empty() && missions->empty()) throw CLI::RequiredError("log or --missions");
+    if (robot->empty()) throw CLI::RequiredError(robot->get_name());
     exit = run(*options);
   });
 }

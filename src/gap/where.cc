@@ -78,24 +78,12 @@ void add_bins(std::vector<Region>& regions, std::span<const Window> windows, con
   }
 }
 
-std::string phase_of(const Window& w, double radius) {
-  const double speed = 0.5 * radius * (w.speed_rad_s[0] + w.speed_rad_s[1]);
-  const double acceleration = 0.5 * radius * (w.acceleration_rad_s2[0] + w.acceleration_rad_s2[1]);
-  const double rim = 0.5 * radius * std::fabs(w.speed_rad_s[0] - w.speed_rad_s[1]);
-  if (w.resting[0] && w.resting[1]) return "standstill";
-  if (rim > 0.3 * std::max(std::fabs(speed), 0.02)) return "turning";
-  const double along = speed >= 0 ? acceleration : -acceleration;
-  if (along > 0.08) return "acceleration";
-  if (along < -0.08) return "braking";
-  return "cruise";
-}
-
 std::vector<Region> regions_of(std::span<const Window> windows, const robot::RobotModel& robot) {
   const double r = robot.kinematics.wheel_radius_m, l = robot.kinematics.half_track_m;
   std::vector<Region> regions;
   std::map<std::string, Region> phases;
   for (std::size_t k = 0; k < windows.size(); ++k) {
-    const std::string phase = phase_of(windows[k], r);
+    const std::string phase(phase_of(windows[k], r));
     Region& region = phases[phase];
     region.variable = "phase";
     region.label = phase;
@@ -120,6 +108,18 @@ std::vector<Region> regions_of(std::span<const Window> windows, const robot::Rob
 }
 
 }  // namespace
+
+std::string_view phase_of(const Window& w, double radius) {
+  const double speed = 0.5 * radius * (w.speed_rad_s[0] + w.speed_rad_s[1]);
+  const double acceleration = 0.5 * radius * (w.acceleration_rad_s2[0] + w.acceleration_rad_s2[1]);
+  const double rim = 0.5 * radius * std::fabs(w.speed_rad_s[0] - w.speed_rad_s[1]);
+  if (w.resting[0] && w.resting[1]) return "standstill";
+  if (rim > 0.3 * std::max(std::fabs(speed), 0.02)) return "turning";
+  const double along = speed >= 0 ? acceleration : -acceleration;
+  if (along > 0.08) return "acceleration";
+  if (along < -0.08) return "braking";
+  return "cruise";
+}
 
 std::vector<WhereRegion> localise(std::span<const Window> windows, const robot::RobotModel& robot,
                                   std::span<const double> modelled_w) {

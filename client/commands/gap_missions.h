@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+
+#include "client/commands/outcome.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::client {
+
+struct GapMissionsOptions {
+  std::string runs;  // CSV file
+  std::string robot_file;
+  bool robot_model = false;  // judge the robot file, not the energies of a model in the table
+  bool json = false;
+  std::string report;  // HTML file to write; empty: none
+  std::string apply;   // robot file to write; empty: none
+};
+
+// The gap judged from energies of whole runs.
+Exit gap_from_missions(const GapMissionsOptions& options, const robot::RobotModel& robot);
+
+// The columns of the CSV file, for the help.
+std::string run_columns_help();
+
+}  // namespace joulecast::client

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "client/commands/outcome.h"
+#include "gap/diagnosis.h"
+#include "gap/report.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::client {
+
+// One effect with its strength and what it cannot be told from.
+void print_effect(const gap::DiagnosedEffect& effect);
+
+// Writes the robot file with the effects found next to those it has.
+Exit write_adopted(std::span<const robot::AdoptedEffect> found, robot::RobotModel robot,
+                   const std::string& path);
+
+// What a report says of where it comes from: names of files without their folders, and now.
+gap::ReportOrigin report_origin(const std::vector<std::string>& sources, const std::string& robot_file);
+
+}  // namespace joulecast::client

@@ -1,0 +1,243 @@
+#include "gap/chart.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+namespace joulecast::gap {
+namespace {
+
+constexpr double left_px = 52, right_px = 12, top_px = 10, bottom_px = 40;
+
+std::string px_text(double v) {
+  return fmt::format("{:.1f}", v);
+}
+
+std::string title(std::string_view hint) {
+  return hint.empty() ? std::string() : "<title>" + escaped(hint) + "</title>";
+}
+
+}  // namespace
+
+std::string escaped(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        if (static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\t') out += c;
+    }
+  }
+  return out;
+}
+
+std::string brief(double value, int digits) {
+  if (!std::isfinite(value)) return "–";
+  const double size = std::fabs(value);
+  if (size != 0 && (size < 1e-4 || size >= 1e7)) return fmt::format("{:.{}e}", value, digits - 1);
+  const int before = size < 1e-12 ? 1 : static_cast<int>(std::floor(std::log10(size))) + 1;
+  std::string text = fmt::format("{:.{}f}", value, std::clamp(digits - before, 0, 8));
+  if (text.find('.') != std::string::npos) {
+    text.erase(text.find_last_not_of('0') + 1);
+    if (text.back() == '.') text.pop_back();
+  }
+  if (text == "-0") text = "0";
+  if (text.front() == '-') text.replace(0, 1, "−");
+  return text;
+}
+
+std::vector<double> ticks_of(double low, double high, int about) {
+  const double raw = (high - low) / about;
+  const double power = std::pow(10, std::floor(std::log10(raw)));
+  double step = 10 * power;
+  for (const double m : {1.0, 2.0, 2.5, 5.0}) {
+    if (raw <= m * power) {
+      step = m * power;
+      break;
+    }
+  }
+  std::vector<double> ticks;
+  for (double k = std::ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k)
+    ticks.push_back(k * step);
+  return ticks;
+}
+
+Chart::Chart(double width, double height, Axis x, Axis y, std::string_view name)
+    : width_(width), height_(height), x_(std::move(x)), y_(std::move(y)) {
+  if (!(x_.high > x_.low)) x_.high = x_.low + 1;
+  if (!(y_.high > y_.low)) y_.high = y_.low + 1;
+  auto out = std::back_inserter(body_);
+  fmt::format_to(out, "<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">", width, height,
+                 escaped(name));
+  for (const double y_tick : ticks_of(y_.low, y_.high, 4)) {
+    fmt::format_to(out, "<line class=\"grid\" x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\"/>", left_px,
+                   px_text(width - right_px), px_text(py(y_tick)));
+    fmt::format_to(out, "<text class=\"tick end\" x=\"{}\" y=\"{}\">{}</text>", left_px - 6,
+                   px_text(py(y_tick) + 3.5), brief(y_tick));
+  }
+  if (x_.ticks) {
+    for (const double x_tick : ticks_of(x_.low, x_.high, static_cast<int>(width / 75))) {
+      fmt::format_to(out, "<text class=\"tick mid\" x=\"{}\" y=\"{}\">{}</text>", px_text(px(x_tick)),
+                     px_text(height - bottom_px + 15), brief(x_tick));
+    }
+  }
+  fmt::format_to(out, "<text class=\"axis mid\" x=\"{}\" y=\"{}\">{}</text>",
+                 px_text((left_px + width - right_px) / 2), px_text(height - 6), escaped(x_.label));
+  fmt::format_to(out, "<text class=\"axis mid\" transform=\"translate(12 {}) rotate(-90)\">{}</text>",
+                 px_text((top_px + height - bottom_px) / 2), escaped(y_.label));
+}
+
+double Chart::px(double x) const {
+  return left_px + (x - x_.low) / (x_.high - x_.low) * (width_ - left_px - right_px);
+}
+
+double Chart::py(double y) const {
+  return height_ - bottom_px - (y - y_.low) / (y_.high - y_.low) * (height_ - top_px - bottom_px);
+}
+
+void Chart::bar(double from, double to, double base, double value, std::string_view style,
+                std::string_view hint) {
+  const double a = py(std::clamp(base, y_.low, y_.high)), b = py(std::clamp(value, y_.low, y_.high));
+  fmt::format_to(
+      std::back_inserter(body_), "<rect class=\"{}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\">{}</rect>",
+      style, px_text(px(from) + 1), px_text(std::min(a, b)), px_text(std::max(0.5, px(to) - px(from) - 2)),
+      px_text(std::max(0.8, std::fabs(a - b))), title(hint));
+}
+
+void Chart::line(std::span<const ChartPoint> points, std::string_view style) {
+  auto out = std::back_inserter(body_);
+  bool open = false;
+  for (const ChartPoint& p : points) {
+    if (!std::isfinite(p.y)) {
+      if (open) body_ += "\"/>";
+      open = false;
+      continue;
+    }
+    if (!open) fmt::format_to(out, "<polyline class=\"{}\" points=\"", style);
+    open = true;
+    fmt::format_to(out, "{},{} ", px_text(px(p.x)), px_text(py(std::clamp(p.y, y_.low, y_.high))));
+  }
+  if (open) body_ += "\"/>";
+}
+
+void Chart::dot(ChartPoint at, std::string_view style, std::string_view hint, double radius) {
+  if (!std::isfinite(at.y)) return;
+  fmt::format_to(std::back_inserter(body_), "<circle class=\"{}\" cx=\"{}\" cy=\"{}\" r=\"{}\">{}</circle>",
+                 style, px_text(px(at.x)), px_text(py(std::clamp(at.y, y_.low, y_.high))), radius,
+                 title(hint));
+}
+
+void Chart::segment(ChartPoint from, ChartPoint to, std::string_view style) {
+  fmt::format_to(std::back_inserter(body_), "<line class=\"{}\" x1=\"{}\" y1=\"{}\" x2=\"{}\" y2=\"{}\"/>",
+                 style, px_text(px(from.x)), px_text(py(std::clamp(from.y, y_.low, y_.high))),
+                 px_text(px(to.x)), px_text(py(std::clamp(to.y, y_.low, y_.high))));
+}
+
+void Chart::cell(ChartPoint low, ChartPoint high, std::string_view style, double opacity,
+                 std::string_view hint) {
+  fmt::format_to(
+      std::back_inserter(body_),
+      "<rect class=\"{}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill-opacity=\"{:.2f}\">{}</rect>",
+      style, px_text(px(low.x)), px_text(py(high.y)), px_text(px(high.x) - px(low.x)),
+      px_text(py(low.y) - py(high.y)), opacity, title(hint));
+}
+
+void Chart::level(double y, std::string_view style) {
+  segment({x_.low, y}, {x_.high, y}, style);
+}
+
+void Chart::category(double x, std::string_view text) {
+  fmt::format_to(std::back_inserter(body_), "<text class=\"tick mid\" x=\"{}\" y=\"{}\">{}</text>",
+                 px_text(px(x)), px_text(height_ - bottom_px + 15), escaped(text));
+}
+
+std::string Chart::str() const {
+  return body_ + "</svg>";
+}
+
+std::string bars(std::span<const BarRow> rows, std::string_view unit, std::string_view name) {
+  constexpr double width = 720, label = 190, row_px = 26, value_px = 120;
+  double low = 0, high = 0;
+  for (const BarRow& r : rows) {
+    low = std::min({low, r.value, r.interval[0]});
+    high = std::max({high, r.value, r.interval[1]});
+  }
+  if (!(high > low)) high = low + 1;
+  const auto px = [&](double v) { return label + (v - low) / (high - low) * (width - label - value_px); };
+  std::string out = fmt::format("<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">", width,
+                                row_px * static_cast<double>(rows.size()) + 6, escaped(name));
+  auto to = std::back_inserter(out);
+  double y = 3;
+  for (const BarRow& r : rows) {
+    const double a = px(std::min(0.0, r.value)), b = px(std::max(0.0, r.value));
+    fmt::format_to(to, "<text class=\"row end\" x=\"{}\" y=\"{}\">{}</text>", label - 8, px_text(y + 16),
+                   escaped(r.label));
+    fmt::format_to(to, "<rect class=\"{}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"16\">{}</rect>", r.style,
+                   px_text(a), px_text(y + 3), px_text(std::max(1.0, b - a)), title(r.hint));
+    double end = b;
+    if (r.interval[1] > r.interval[0]) {
+      fmt::format_to(to, "<line class=\"whisker\" x1=\"{}\" x2=\"{}\" y1=\"{}\" y2=\"{}\"/>",
+                     px_text(px(r.interval[0])), px_text(px(r.interval[1])), px_text(y + 11),
+                     px_text(y + 11));
+      end = std::max(end, px(r.interval[1]));
+    }
+    fmt::format_to(to, "<text class=\"row\" x=\"{}\" y=\"{}\">{}{}</text>", px_text(end + 8), px_text(y + 16),
+                   brief(r.value), escaped(unit));
+    y += row_px;
+  }
+  return out + "</svg>";
+}
+
+std::string changes(std::span<const ChangeRow> rows, std::string_view axis, std::string_view name) {
+  constexpr double width = 720, label = 210, row_px = 20, end_px = 24;
+  double low = 0, high = 0;
+  for (const ChangeRow& r : rows) {
+    low = std::min({low, r.before, r.after});
+    high = std::max({high, r.before, r.after});
+  }
+  if (!(high > low)) high = low + 1;
+  const double margin = 0.04 * (high - low);
+  low -= margin, high += margin;
+  const auto px = [&](double v) { return label + (v - low) / (high - low) * (width - label - end_px); };
+  const double height = row_px * static_cast<double>(rows.size()) + 44;
+  std::string out = fmt::format("<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">", width,
+                                height, escaped(name));
+  auto to = std::back_inserter(out);
+  for (const double tick : ticks_of(low, high, 6)) {
+    fmt::format_to(to, "<line class=\"{0}\" x1=\"{1}\" x2=\"{1}\" y1=\"4\" y2=\"{2}\"/>",
+                   std::fabs(tick) < 1e-12 ? "zero" : "grid", px_text(px(tick)), px_text(height - 38));
+    fmt::format_to(to, "<text class=\"tick mid\" x=\"{}\" y=\"{}\">{}</text>", px_text(px(tick)),
+                   px_text(height - 24), brief(tick));
+  }
+  double y = 4;
+  for (const ChangeRow& r : rows) {
+    const double middle = y + row_px / 2;
+    fmt::format_to(to, "<text class=\"tick end\" x=\"{}\" y=\"{}\">{}</text>", label - 8, px_text(middle + 4),
+                   escaped(r.label));
+    fmt::format_to(to, "<line class=\"whisker\" x1=\"{}\" x2=\"{}\" y1=\"{}\" y2=\"{}\"/>",
+                   px_text(px(r.before)), px_text(px(r.after)), px_text(middle), px_text(middle));
+    for (const auto& [value, style] : {std::pair{r.before, "before"}, {r.after, "after"}}) {
+      fmt::format_to(to, "<circle class=\"{}\" cx=\"{}\" cy=\"{}\" r=\"4.5\">{}</circle>", style,
+                     px_text(px(value)), px_text(middle), title(r.label + ": " + brief(value)));
+    }
+    y += row_px;
+  }
+  fmt::format_to(to, "<text class=\"axis mid\" x=\"{}\" y=\"{}\">{}</text>", px_text((label + width) / 2),
+                 px_text(height - 6), escaped(axis));
+  return out + "</svg>";
+}
+
+}  // namespace joulecast::gap

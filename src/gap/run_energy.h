@@ -1,0 +1,33 @@
+#pragma once
+
+#include <array>
+
+#include "base/error.h"
+#include "dynamics/drive_model.h"
+
+namespace joulecast::gap {
+
+// The conditions of one run, driven from rest to rest: straight, or with an arc in the middle of the way.
+struct RunConditions {
+  double distance_m = 0;
+  double speed_m_s = 0;          // reached at the end of the acceleration, if the distance allows it
+  double acceleration_m_s2 = 0;  // of starting and of braking
+  double payload_kg = 0;         // declared
+  double turn_rad = 0;           // change of heading, positive to the left; 0: straight
+  double turn_radius_m = 0;      // mean radius of the arc; of no meaning without a turn
+  double standstill_s = 0;       // with the robot on, before or after
+};
+
+struct RunEnergy {
+  std::array<double, 2> motor_j{};  // integral of V i as the motors' sensors read it, [0] right, [1] left
+  double battery_j = 0;             // as the battery's sensor reads it, idle power included
+  double duration_s = 0;
+};
+
+// Energy of a run by a drive model, by a quadrature of its power over trapezoidal speed. The arc's curvature
+// rises and falls linearly over a tenth of its length, so that the yaw acceleration stays finite.
+// `turning_factor` scales the yaw term of the wheel speeds, w = (v +- factor l yaw)/r: one is right, a half
+// is what thesis (3-6) gives with l half the track.
+RunEnergy run_energy(const dynamics::DriveModel& model, const RunConditions& run, double turning_factor = 1);
+
+}  // namespace joulecast::gap
