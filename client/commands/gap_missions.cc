@@ -31,8 +31,13 @@ void print(const gap::MissionDiagnosis& d) {
   }
   std::printf("mean absolute error of runs left out, everything fitted without them:\n");
   print_left_out(d.left_out);
-  std::printf("    the same effects were named without %zu of %zu runs\n", d.folds_agreeing, d.runs.size());
-  for (const gap::LeftOut& l : d.conditions) print_left_out(l);
+  std::printf("    the same effects were named in %zu of %zu fits\n", d.folds_agreeing, d.folds);
+  for (const gap::LeftOut& l : d.conditions) {
+    print_left_out(l);
+    std::printf("    named:");
+    for (const std::string& id : l.effects) std::printf(" %s", id.c_str());
+    std::printf("%s\n", l.effects.empty() ? " nothing" : "");
+  }
   if (d.turning) {
     const gap::TurningTerm& t = *d.turning;
     std::printf(

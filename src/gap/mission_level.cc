@@ -20,6 +20,9 @@ constexpr double same_answer = 0.95;  // cosine from which what two effects do t
 constexpr double leading = 14;        // explanations this far below the best in log odds are let go
 constexpr double report_probability = 0.5;
 constexpr int bootstrap_draws = 400;
+constexpr int most_refits = 8;
+constexpr double settled = 0.005;       // relative change of the strengths
+constexpr std::size_t most_folds = 60;  // more runs than this are left out in groups
 constexpr std::size_t most_levels = 8;  // of a condition to be left out one by one
 
 std::string text(const char* format, auto... values) {
@@ -169,6 +172,28 @@ RunSums sums_of(const RunColumns& columns, const std::vector<bool>& left_out) {
   return sums;
 }
 
+// The strengths of a set, fitted again around themselves: energies are linear in them only nearby.
+struct Refit {
+  RunEstimate estimate;
+  std::vector<dynamics::ActiveEffect> effects;
+};
+
+Refit refit(const RunColumns& columns, const std::vector<std::size_t>& set, RunEstimate estimate,
+            const std::vector<bool>& left_out) {
+  Refit fit{std::move(estimate), {}};
+  fit.effects = columns.effects_of(set, fit.estimate.mean);
+  if (fit.effects.empty()) return fit;
+  RunColumns around = columns;
+  for (int round = 0; round < most_refits; ++round) {
+    const Eigen::VectorXd before = fit.estimate.mean;
+    around.linearise_around(fit.effects, set);
+    fit.estimate = RunEvidence(around.candidates(), sums_of(around, left_out), set).estimate(set);
+    fit.effects = columns.effects_of(set, fit.estimate.mean);
+    if ((fit.estimate.mean - before).norm() <= settled * before.norm()) break;
+  }
+  return fit;
+}
+
 struct Fold {
   std::vector<std::string> effects;
   std::vector<std::string> groups;  // of each, its alternatives too
@@ -176,22 +201,18 @@ struct Fold {
 };
 
 Fold predict_without(const RunColumns& columns, const std::vector<bool>& left_out) {
-  const std::size_t kept = static_cast<std::size_t>(std::ranges::count(left_out, false));
-  const RunSums sums = sums_of(columns, left_out);
-  const Judge judge(columns, sums);
+  const auto kept = static_cast<std::size_t>(std::ranges::count(left_out, false));
+  const Judge judge(columns, sums_of(columns, left_out));
   const Judgement judgement = judge.judge(effects_allowed(kept));
   Fold fold;
-  std::vector<dynamics::ActiveEffect> effects;
-  if (!judgement.set.empty()) {
-    effects = columns.effects_of(judgement.set, judge.evidence().estimate(judgement.set).mean);
-    for (std::size_t k = 0; k < judgement.set.size(); ++k) {
-      fold.effects.push_back(columns.candidates()[judgement.set[k]].id());
-      fold.groups.push_back(fold.effects.back());
-      for (const std::string& other : judgement.alternatives[k]) fold.groups.push_back(other);
-    }
+  for (std::size_t k = 0; k < judgement.set.size(); ++k) {
+    fold.effects.push_back(columns.candidates()[judgement.set[k]].id());
+    fold.groups.push_back(fold.effects.back());
+    for (const std::string& other : judgement.alternatives[k]) fold.groups.push_back(other);
   }
+  const Refit fit = refit(columns, judgement.set, judge.evidence().estimate(judgement.set), left_out);
   for (std::size_t k = 0; k < left_out.size(); ++k) {
-    if (left_out[k]) fold.energies.push_back(columns.modelled(k, effects).sum_j);
+    if (left_out[k]) fold.energies.push_back(columns.modelled(k, fit.effects).sum_j);
   }
   return fold;
 }
@@ -330,6 +351,12 @@ std::vector<std::string> limits_of(const MissionDiagnosis& d, std::span<const Mi
              d.model_ratio));
   }
   for (const DiagnosedEffect& e : d.effects) {
+    const auto stands_for = [&](std::string_view id) {
+      return e.id == id || std::ranges::find(e.alternatives, id) != e.alternatives.end();
+    };
+    if (stands_for("wheel_slip") || stands_for("wheel_radius_error")) {
+      limits.push_back(text("Distances that are not what the table says would look like %s.", e.id.c_str()));
+    }
     if (e.alternatives.size() < 2) continue;
     limits.push_back(text("%s stands for a group of %zu that these runs do not tell apart.", e.id.c_str(),
                           e.alternatives.size() + 1));
@@ -359,22 +386,11 @@ Result<MissionDiagnosis> diagnose_runs(std::span<const MissionRun> given, const 
   d.model_ratio = columns.model_ratio();
   d.not_visible = columns.not_visible();
 
-  // Energies are linear in strengths only nearby: the search is repeated around what it found.
-  std::vector<dynamics::ActiveEffect> effects;
-  std::optional<Judge> judge;
-  Judgement judgement;
-  RunEstimate estimate;
-  for (int round = 0; round < 3; ++round) {
-    judge.emplace(columns, sums_of(columns, {}));
-    judgement = judge->judge(effects_allowed(runs.size()));
-    estimate = judge->evidence().estimate(judgement.set);
-    if (cancelled(0.1 * (round + 1))) return fail(Fault::conflict, "", "diagnosis cancelled");
-    auto next = columns.effects_of(judgement.set, estimate.mean);
-    if (next.empty() || round == 2) break;
-    effects = std::move(next);
-    columns.linearise_around(effects);
-  }
-  effects = columns.effects_of(judgement.set, estimate.mean);
+  const Judge judge(columns, sums_of(columns, {}));
+  const Judgement judgement = judge.judge(effects_allowed(runs.size()));
+  const auto [estimate, effects] =
+      refit(columns, judgement.set, judge.evidence().estimate(judgement.set), std::vector<bool>(runs.size()));
+  if (cancelled(0.3)) return fail(Fault::conflict, "", "diagnosis cancelled");
   d.scatters = estimate.scatter;
   d.scatter = std::sqrt(2 / std::numbers::pi) * estimate.scatter.run;
 
@@ -431,26 +447,29 @@ Result<MissionDiagnosis> diagnose_runs(std::span<const MissionRun> given, const 
     d.adoptable.push_back(dynamics::adopt(effects[k]));
   }
 
-  // Everything, the search included, is done again without the runs that are then predicted. The columns are
-  // those of the untouched model, so that nothing of the runs left out is in them.
-  columns.linearise_around({});
+  // Everything, the search included, is done again without the runs that are then predicted.
   Errors all;
-  for (std::size_t k = 0; k < runs.size(); ++k) {
+  const std::size_t folds = std::min(runs.size(), most_folds);
+  for (std::size_t f = 0; f < folds; ++f) {
     std::vector<bool> out(runs.size(), false);
-    out[k] = true;
+    for (std::size_t k = f; k < runs.size(); k += folds) out[k] = true;
     const Fold fold = predict_without(columns, out);
-    d.runs[k].held_out_j = fold.energies.front();
-    all.before.push_back(error_of(runs[k].measured_j(), d.runs[k].model_j));
-    all.after.push_back(error_of(runs[k].measured_j(), d.runs[k].held_out_j));
+    std::size_t next = 0;
+    for (std::size_t k = f; k < runs.size(); k += folds) {
+      d.runs[k].held_out_j = fold.energies[next++];
+      all.before.push_back(error_of(runs[k].measured_j(), d.runs[k].model_j));
+      all.after.push_back(error_of(runs[k].measured_j(), d.runs[k].held_out_j));
+    }
     const bool same = fold.effects.size() == judgement.set.size() &&
                       std::ranges::all_of(d.effects, [&](const DiagnosedEffect& e) {
                         return std::ranges::find(fold.groups, e.id) != fold.groups.end();
                       });
     d.folds_agreeing += same ? 1 : 0;
-    if (cancelled(0.3 + 0.5 * static_cast<double>(k + 1) / static_cast<double>(runs.size())))
+    if (cancelled(0.3 + 0.5 * static_cast<double>(f + 1) / static_cast<double>(folds)))
       return fail(Fault::conflict, "", "diagnosis cancelled");
   }
-  d.left_out = summary("each run", all);
+  d.folds = folds;
+  d.left_out = summary(folds == runs.size() ? "each run" : "each fold", all);
   for (const auto& [what, out] : levels_of(runs)) {
     const Fold fold = predict_without(columns, out);
     Errors errors;

@@ -16,7 +16,8 @@ namespace joulecast::gap {
 
 // Runs that were predicted by a diagnosis made without them.
 struct LeftOut {
-  std::string what;  // "each run", or the condition whose runs are left out together: "payload_kg 8.25"
+  std::string what;  // "each run" (or "each fold" of many runs), or the condition whose runs are left out
+                     // together: "payload_kg 8.25"
   std::size_t runs = 0;
   double before = 0, after = 0;      // mean absolute error of the run energy, relative to the measured one
   std::array<double, 2> interval{};  // of the fall 1 - after/before, 95 %, bootstrap over runs
@@ -55,7 +56,8 @@ struct MissionDiagnosis {
   std::vector<DiagnosedEffect> effects;
   std::string outside;  // condition that something outside the catalogue follows
   double outside_probability = 0;
-  LeftOut left_out;                 // run by run
+  LeftOut left_out;  // run by run
+  std::size_t folds = 0;
   std::size_t folds_agreeing = 0;   // of those, with the same effects named, up to what cannot be told apart
   std::vector<LeftOut> conditions;  // condition by condition, and table by table
   std::optional<TurningTerm> turning;

@@ -55,6 +55,7 @@ json to_json(const MissionDiagnosis& d) {
   out["outside"] = {{"probability", number(d.outside_probability)},
                     {"follows", d.outside.empty() ? json(nullptr) : json(d.outside)}};
   out["shrinkage"] = left_out(d.left_out);
+  out["shrinkage"]["folds"] = d.folds;
   out["shrinkage"]["folds_with_the_same_effects"] = d.folds_agreeing;
   out["left_out_conditions"] = json::array();
   for (const LeftOut& l : d.conditions) {

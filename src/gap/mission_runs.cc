@@ -11,7 +11,7 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr std::size_t fewest_runs = 3, most_runs = 5000;
+constexpr std::size_t fewest_runs = 3, most_runs = 1000;
 
 enum Place : std::size_t {
   run_label,

@@ -39,7 +39,7 @@ struct RunColumn {
 std::vector<RunColumn> run_columns();
 
 // Reads runs from CSV. An error's field is "<name>: line N" and its message names the column. The robot's
-// limit stands in for an acceleration that is not given. At least 3 runs, at most 5000.
+// limit stands in for an acceleration that is not given. At least 3 runs, at most 1000.
 Result<std::vector<MissionRun>> read_mission_runs(std::string_view csv, const std::string& name,
                                                   const robot::RobotModel& robot);
 

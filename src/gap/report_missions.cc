@@ -16,10 +16,11 @@ std::string sentence_of(const MissionDiagnosis& d) {
                   percent(d.left_out.before), percent(d.left_out.after));
   std::vector<std::string> names;
   for (const DiagnosedEffect& e : d.effects) {
-    names.push_back(words_of(e.id) + (e.alternatives.empty()
-                                          ? ""
-                                          : fmt::format(" (or one of {} effects that do the same here)",
-                                                        e.alternatives.size())));
+    std::string other;
+    if (e.alternatives.size() == 1) other = fmt::format(" (or {})", words_of(e.alternatives.front()));
+    if (e.alternatives.size() > 1)
+      other = fmt::format(" (or one of {} others that do the same here)", e.alternatives.size());
+    names.push_back(words_of(e.id) + other);
   }
   switch (d.verdict) {
     case Verdict::effects:
@@ -40,11 +41,21 @@ std::string sentence_of(const MissionDiagnosis& d) {
                      names.empty() ? "" : "; likeliest: " + enumerate(names));
 }
 
-std::vector<std::string> row_of(const LeftOut& l) {
-  return {escaped(l.what), std::to_string(l.runs), percent(l.before), percent(l.after),
+std::vector<std::string> row_of(const LeftOut& l, const std::string& named) {
+  return {escaped(l.what),
+          std::to_string(l.runs),
+          percent(l.before),
+          percent(l.after),
           l.before > 0 ? fmt::format("{} [{}, {}]", percent(1 - l.after / l.before, 2),
                                      percent(l.interval[0], 2), percent(l.interval[1], 2))
-                       : "–"};
+                       : "–",
+          escaped(named)};
+}
+
+std::string names_of(const std::vector<std::string>& ids) {
+  std::vector<std::string> names;
+  for (const std::string& id : ids) names.push_back(words_of(id));
+  return names.empty() ? "nothing" : enumerate(names);
 }
 
 }  // namespace
@@ -83,12 +94,12 @@ std::string report_html(const MissionDiagnosis& d, const robot::RobotModel& robo
       "How far the error falls on runs left out",
       "Everything, the choice of effects included, is done again without the runs that are then predicted. "
       "Intervals: 95 %, bootstrap over runs.");
-  std::vector<std::vector<std::string>> left{row_of(d.left_out)};
-  for (const LeftOut& l : d.conditions) left.push_back(row_of(l));
-  const std::vector<std::string> header{"Left out", "runs", "error before", "after", "falls by"};
+  std::vector<std::vector<std::string>> left{
+      row_of(d.left_out, fmt::format("the same in {} of {} fits", d.folds_agreeing, d.folds))};
+  for (const LeftOut& l : d.conditions) left.push_back(row_of(l, names_of(l.effects)));
+  const std::vector<std::string> header{"Left out", "runs",     "error before",
+                                        "after",    "falls by", "named without them"};
   page.table(header, left, 1);
-  page.paragraph(
-      fmt::format("The same effects were named without {} of the {} runs.", d.folds_agreeing, d.runs.size()));
   if (d.turning) {
     const TurningTerm& t = *d.turning;
     page.section(

@@ -147,6 +147,8 @@ std::string Page::str() const {
 }
 
 std::string words_of(std::string_view id) {
+  constexpr std::string_view outside = "outside:";
+  if (id.starts_with(outside)) return "something unknown that follows " + words_of(id.substr(outside.size()));
   std::string words(id);
   std::ranges::replace(words, '_', ' ');
   return words;

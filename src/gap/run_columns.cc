@@ -12,8 +12,8 @@ namespace {
 using dynamics::ActiveEffect;
 
 // As in the diagnosis of recordings: a finding moves the energy by this share, and costs this log
-// probability.
-constexpr double expected_share = 0.07;
+// probability. Tables also hold models that are far off, hence the second scale.
+constexpr std::array expected_shares{0.07, 0.3};
 constexpr double effect_log_prior = -4.0;
 constexpr double outside_log_prior = -6.0;
 constexpr double unnoticed_share = 0.002;
@@ -130,10 +130,13 @@ void RunColumns::add_effects() {
       c.columns = {column_size_.size()};
       c.least = info.minimum;
       c.most = info.maximum;
-      c.expected = std::min(expected_share / mean, 0.5 * bound);
-      c.log_prior = effect_log_prior - std::log(static_cast<double>(variants.size()));
+      c.log_prior =
+          effect_log_prior - std::log(static_cast<double>(variants.size() * expected_shares.size()));
       column_size_.push_back(0);
-      candidates_.push_back(std::move(c));
+      for (const double share : expected_shares) {
+        c.expected = std::min(share / mean, 0.5 * bound);
+        candidates_.push_back(c);
+      }
     }
   }
   for (const std::string& id : unseen) {
@@ -149,21 +152,23 @@ void RunColumns::add_trends() {
     RunCandidate c;
     c.variable = trend.name;
     c.columns = {column_size_.size()};
-    c.expected = expected_share;
     c.least = -std::numeric_limits<double>::infinity();
     c.most = std::numeric_limits<double>::infinity();
-    c.log_prior = outside_log_prior;
+    c.log_prior = outside_log_prior - std::log(static_cast<double>(expected_shares.size()));
     column_size_.push_back(0);
     // Several levels also allow a bend.
     if (levels.size() > 2) {
       c.columns.push_back(column_size_.size());
       column_size_.push_back(0);
     }
-    candidates_.push_back(std::move(c));
+    for (const double share : expected_shares) {
+      c.expected = share;
+      candidates_.push_back(c);
+    }
   }
 }
 
-void RunColumns::linearise_around(std::span<const ActiveEffect> effects) {
+void RunColumns::linearise_around(std::span<const ActiveEffect> effects, std::span<const std::size_t> only) {
   const auto n = static_cast<Eigen::Index>(column_size_.size());
   sum_.assign(runs_.size(), Eigen::VectorXd::Zero(n + 2));
   difference_.assign(runs_.size(), Eigen::VectorXd::Zero(n + 2));
@@ -181,7 +186,12 @@ void RunColumns::linearise_around(std::span<const ActiveEffect> effects) {
   const auto scaled = [](double value, double low, double high) {
     return 2 * (value - low) / (high - low) - 1;
   };
-  for (const RunCandidate& c : candidates_) {
+  std::vector<bool> done(column_size_.size(), false);
+  for (std::size_t number = 0; number < candidates_.size(); ++number) {
+    const RunCandidate& c = candidates_[number];
+    // Candidates may share columns; with `only`, the others' stay empty.
+    if (done[c.columns.front()] || (!only.empty() && std::ranges::find(only, number) == only.end())) continue;
+    done[c.columns.front()] = true;
     const auto column = static_cast<Eigen::Index>(c.columns.front());
     if (c.outside()) {
       const auto value = std::ranges::find(trends, c.variable, &Trend::name)->value;

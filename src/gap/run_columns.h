@@ -17,8 +17,11 @@ class RunColumns {
  public:
   RunColumns(std::span<const MissionRun> runs, const robot::RobotModel& robot);
 
-  // Differentiates around these effects from now on; at first around none.
-  void linearise_around(std::span<const dynamics::ActiveEffect> effects);
+  // Differentiates around these effects from now on; at first around none. `only`: just the columns of these
+  // candidates, the others' become zero; empty: all. Sets are compared around no effect, since effects that
+  // act through others (payload errors through rolling resistance, say) would otherwise be taken for them.
+  void linearise_around(std::span<const dynamics::ActiveEffect> effects,
+                        std::span<const std::size_t> only = {});
 
   std::span<const MissionRun> runs() const { return runs_; }
   std::span<const RunCandidate> candidates() const { return candidates_; }

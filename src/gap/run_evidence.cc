@@ -78,10 +78,20 @@ RunSums::Products RunSums::products(const RunScatter& scatter) const {
   return p;
 }
 
-RunEvidence::RunEvidence(std::span<const RunCandidate> candidates, const RunSums& sums)
+bool RunSums::with_differences() const {
+  for (std::size_t k = 1; k < parts_.size(); k += 2) {
+    if (parts_[k].count > 0.5) return true;
+  }
+  return false;
+}
+
+RunEvidence::RunEvidence(std::span<const RunCandidate> candidates, const RunSums& sums,
+                         std::span<const std::size_t> sought)
     : candidates_(candidates) {
+  const std::span<const double> differences =
+      std::span(run_scatters).first(sums.with_differences() ? run_scatters.size() : 1);
   for (const double run : run_scatters) {
-    for (const double difference : run_scatters) {
+    for (const double difference : differences) {
       for (const double table : table_scatters) {
         const RunScatter scatter{run, difference, table};
         points_.push_back({scatter, sums.products(scatter)});
@@ -89,7 +99,7 @@ RunEvidence::RunEvidence(std::span<const RunCandidate> candidates, const RunSums
       }
     }
   }
-  // Scatters that neither the plain model nor any single candidate needs are implausible.
+  // Scatters that neither the plain model nor what is sought needs are implausible.
   std::vector<double> best(points_.size(), impossible);
   const auto look = [&](std::span<const std::size_t> set) {
     std::vector<double> logs;
@@ -98,7 +108,11 @@ RunEvidence::RunEvidence(std::span<const RunCandidate> candidates, const RunSums
     for (std::size_t k = 0; k < logs.size(); ++k) best[k] = std::max(best[k], logs[k] - top);
   };
   look({});
-  for (std::size_t c = 0; c < candidates_.size(); ++c) look({&c, 1});
+  if (!sought.empty()) {
+    look(sought);
+  } else {
+    for (std::size_t c = 0; c < candidates_.size(); ++c) look({&c, 1});
+  }
   std::vector<Point> kept;
   for (std::size_t k = 0; k < points_.size(); ++k) {
     if (best[k] > std::log(plausible)) kept.push_back(std::move(points_[k]));

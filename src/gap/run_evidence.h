@@ -42,7 +42,7 @@ class RunSums {
  public:
   RunSums(std::size_t tables, std::size_t columns);
   void add(const RunEquation& equation, double sign = 1);
-  std::size_t columns() const { return columns_; }
+  bool with_differences() const;  // between the motors
 
   // Precision-weighted products of columns, response last, with the table's shifts and the common scale
   // integrated out, and the log of the density's normalisation.
@@ -76,7 +76,9 @@ struct RunEstimate {
 // scatters that the data leave plausible.
 class RunEvidence {
  public:
-  RunEvidence(std::span<const RunCandidate> candidates, const RunSums& sums);
+  // `sought`: the scatters that these need are looked at; empty: those that any single candidate needs.
+  RunEvidence(std::span<const RunCandidate> candidates, const RunSums& sums,
+              std::span<const std::size_t> sought = {});
 
   double log_evidence(std::span<const std::size_t> set) const;
   RunEstimate estimate(std::span<const std::size_t> set) const;
