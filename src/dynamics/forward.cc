@@ -1,9 +1,12 @@
 #include "dynamics/forward.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace joulecast::dynamics {
 namespace {
+
+constexpr int most_newton_steps = 40;
 
 Instant instant_of(const DriveState& state, double payload_kg) {
   Instant at;
@@ -56,9 +59,16 @@ std::array<double, 2> algebraic_current(const DriveModel& model, const DriveStat
     const double driving =
         voltage_v[s] - model.parameters().voltage_constant_v_s_rad * state.wheel_speed_rad_s[s];
     const double ohm = model.resistance(s, at), drop = model.parameters().brush_drop_v;
-    // R i + drop sgn(i) = driving: monotone in i; the drop blocks what does not overcome it.
-    const double i = (std::fabs(driving) - drop) / ohm;
-    current[s] = i > 0 ? std::copysign(i, driving) : 0;
+    // R i + drop sgn(i) = driving with the smooth sign of voltage_for: concave for i > 0, so that Newton's
+    // method climbs to the root from the current that a full drop would leave.
+    Dual i{std::max(0.0, (std::fabs(driving) - drop) / ohm), 1};
+    for (int step = 0; drop > 0 && step < most_newton_steps; ++step) {
+      const Dual excess = ohm * i + drop * smooth_sign(i, brush_width_a) - std::fabs(driving);
+      const double change = -excess.value / excess.slope;
+      i.value += change;
+      if (std::fabs(change) <= 1e-14 * (1 + i.value)) break;
+    }
+    current[s] = std::copysign(i.value, driving);
   }
   return current;
 }
