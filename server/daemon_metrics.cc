@@ -15,10 +15,13 @@ void export_metrics(Metrics& metrics, const IngestCounters& counters, const Inge
   const Counter messages = metrics.counter("joulecast_ingest_messages_total",
                                            "Messages received on the telemetry and mission channels");
   const Counter samples = metrics.counter("joulecast_ingest_samples_total", "Samples accounted for");
-  const Counter started =
-      metrics.counter("joulecast_missions_started_total", "Missions begun, implicit ones included");
-  const Counter ended =
-      metrics.counter("joulecast_missions_ended_total", "Missions ended, for whatever reason");
+  const std::vector<Counter> started = metrics.counters("joulecast_missions_started_total", "Missions begun",
+                                                        "kind", {"announced", "implicit"});
+  std::vector<std::string> states;
+  for (std::size_t k = 0; k < history::mission_state_count; ++k)
+    states.emplace_back(history::name(static_cast<history::MissionState>(k)));
+  const std::vector<Counter> ended =
+      metrics.counters("joulecast_missions_ended_total", "Missions ended", "state", states);
   const std::vector<Counter> faults = metrics.counters(
       "joulecast_ingest_faults_total", "Messages, samples and events turned away or repaired", "reason",
       std::vector<std::string>(ingest_fault_names.begin(), ingest_fault_names.end()));
@@ -51,8 +54,10 @@ void export_metrics(Metrics& metrics, const IngestCounters& counters, const Inge
       [=, &counters, &ingest, &fleet, &writer, &store, &events, now = std::move(now_utime_us)] {
         messages.raise_to(static_cast<double>(counters.messages));
         samples.raise_to(static_cast<double>(counters.samples));
-        started.raise_to(static_cast<double>(counters.missions_started));
-        ended.raise_to(static_cast<double>(counters.missions_ended));
+        for (std::size_t k = 0; k < started.size(); ++k)
+          started[k].raise_to(static_cast<double>(counters.missions_started[k]));
+        for (std::size_t k = 0; k < ended.size(); ++k)
+          ended[k].raise_to(static_cast<double>(counters.missions_ended[k]));
         for (std::size_t k = 0; k < faults.size(); ++k)
           faults[k].raise_to(static_cast<double>(counters.faults[k]));
         const IngestStatus ingesting = ingest.status();

@@ -51,11 +51,9 @@ Result<std::string> answer_here(const Options& options, const std::string& text)
   for (const std::string& file : options.robot_files) {
     auto robot = robot::load_robot(file);
     if (!robot) return tl::unexpected(robot.error());
-    auto drive = dynamics::drive_model(*robot);
-    if (!drive) return tl::unexpected(drive.error());
-    std::string id = robot->robot_id;
-    models[std::move(id)] = std::make_shared<const server::ModelInForce>(
-        server::ModelInForce{std::move(*robot), std::move(*drive), file_version});
+    auto model = server::model_in_force(std::move(*robot), file_version);
+    if (!model) return tl::unexpected(std::move(model.error()));
+    models[(*model)->robot.robot_id] = *model;
   }
   api::MatrixFleet fleet;
   fleet.model = [&](const std::string& id) -> Result<std::shared_ptr<const server::ModelInForce>> {

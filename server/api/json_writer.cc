@@ -1,5 +1,6 @@
 #include "server/api/json_writer.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -15,6 +16,38 @@ void append_number(std::string& text, Number number) {
   std::array<char, 32> buffer{};
   const auto [end, fault] = std::to_chars(buffer.data(), buffer.data() + buffer.size(), number);
   text.append(buffer.data(), end);
+}
+
+// Writes `number` with at most `places` digits after the point and returns the end; at most 31 characters.
+char* put_rounded(char* at, double number, double scale, int places) {
+  const double scaled = number * scale;
+  constexpr double exact = 9e15;  // integers below are exact doubles
+  if (!(std::fabs(scaled) < exact)) {
+    if (std::isfinite(number)) return std::to_chars(at, at + 31, number).ptr;
+    return std::copy_n("null", 4, at);
+  }
+  auto integer = static_cast<std::int64_t>(std::nearbyint(scaled));
+  if (integer == 0) {
+    *at++ = '0';
+    return at;
+  }
+  if (integer < 0) {
+    *at++ = '-';
+    integer = -integer;
+  }
+  for (; places > 0 && integer % 10 == 0; --places) integer /= 10;
+  std::array<char, 24> digits;
+  char* end = std::to_chars(digits.data(), digits.data() + digits.size(), integer).ptr;
+  const auto count = static_cast<int>(end - digits.data()), whole = count - places;
+  if (whole > 0) {
+    at = std::copy_n(digits.data(), whole, at);
+    if (places > 0) *at++ = '.';
+    return std::copy(digits.data() + whole, end, at);
+  }
+  *at++ = '0';
+  *at++ = '.';
+  at = std::fill_n(at, -whole, '0');
+  return std::copy(digits.data(), end, at);
 }
 
 }  // namespace
@@ -115,45 +148,20 @@ JsonWriter& JsonWriter::value(std::string_view text) {
   return *this;
 }
 
-void JsonWriter::rounded(double number, double scale, int places) {
-  const double scaled = number * scale;
-  constexpr double exact = 9e15;  // integers below are exact doubles
-  if (!(std::fabs(scaled) < exact)) {
-    std::isfinite(number) ? value(number) : null();
-    return;
-  }
-  separate();
-  auto integer = static_cast<std::int64_t>(std::nearbyint(scaled));
-  if (integer < 0) {
-    text_ += '-';
-    integer = -integer;
-  }
-  std::array<char, 24> digits{};
-  const auto [end, fault] = std::to_chars(digits.data(), digits.data() + digits.size(), integer);
-  const auto count = static_cast<int>(end - digits.data());
-  const int whole = count - places;
-  if (whole <= 0) {
-    text_ += '0';
-  } else {
-    text_.append(digits.data(), static_cast<std::size_t>(whole));
-  }
-  std::array<char, 24> fraction{};
-  int length = places;
-  for (int k = 0; k < places; ++k)
-    fraction[static_cast<std::size_t>(k)] = whole + k < 0 ? '0' : digits[static_cast<std::size_t>(whole + k)];
-  while (length > 0 && fraction[static_cast<std::size_t>(length - 1)] == '0') --length;
-  if (length > 0) {
-    text_ += '.';
-    text_.append(fraction.data(), static_cast<std::size_t>(length));
-  }
-}
-
 JsonWriter& JsonWriter::column(std::string_view name, std::span<const double> numbers, int places) {
   key(name);
   begin_array();
-  text_.reserve(text_.size() + numbers.size() * 10);
   const double scale = powers[static_cast<std::size_t>(places)];
-  for (const double number : numbers) rounded(number, scale, places);
+  constexpr std::size_t longest = 32;  // of one number and its comma
+  const std::size_t before = text_.size();
+  text_.resize(before + numbers.size() * longest);
+  char* at = text_.data() + before;
+  for (const double number : numbers) {
+    if (comma_) *at++ = ',';
+    comma_ = true;
+    at = put_rounded(at, number, scale, places);
+  }
+  text_.resize(static_cast<std::size_t>(at - text_.data()));
   return end_array();
 }
 

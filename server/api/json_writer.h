@@ -44,7 +44,6 @@ class JsonWriter {
 
  private:
   void separate();
-  void rounded(double number, double scale, int places);
 
   std::string text_;
   bool comma_ = false;

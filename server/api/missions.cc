@@ -1,5 +1,9 @@
 #include <charconv>
 #include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <unordered_map>
 #include <utility>
 
 #include "server/api/mission_json.h"
@@ -123,13 +127,50 @@ Result<history::Mission> mission_of(const Services& services, const Request& req
   return services.store.mission(*key);
 }
 
-Result<Response> detail(const Services& services, const Request& request) {
-  const Result<history::Mission> mission = mission_of(services, request);
-  if (!mission) return tl::unexpected(mission.error());
-  JsonWriter json;
-  write_mission(json, *mission);
-  return http::json_response(json.take());
-}
+// Summaries asked for since the last commit: what is asked again before the store changes need not be read
+// again. The stamp is the number of commits before the store was read, so that a summary never outlives the
+// next one.
+class MissionSummaries {
+ public:
+  explicit MissionSummaries(const Services& services) : services_(services) {}
+
+  std::optional<Response> find(const Request& request) {
+    const Result<history::MissionKey> key = mission_key(request);
+    if (!key) return std::nullopt;
+    const std::uint64_t commits = services_.writer.status().commits;
+    const std::lock_guard lock(mutex_);
+    if (commits_ != commits) return std::nullopt;
+    const auto found = texts_.find(*key);
+    if (found == texts_.end()) return std::nullopt;
+    Response response;
+    response.shared_body = found->second;
+    return response;
+  }
+
+  Result<Response> read(const Request& request) {
+    const std::uint64_t commits = services_.writer.status().commits;
+    const Result<history::Mission> mission = mission_of(services_, request);
+    if (!mission) return tl::unexpected(mission.error());
+    JsonWriter json;
+    write_mission(json, *mission);
+    Response response;
+    response.shared_body = std::make_shared<const std::string>(json.take());
+    const std::lock_guard lock(mutex_);
+    if (commits > commits_ || texts_.size() >= most_texts) texts_.clear();
+    if (commits >= commits_) {
+      commits_ = commits;
+      texts_.insert_or_assign(mission->key, response.shared_body);
+    }
+    return response;
+  }
+
+ private:
+  static constexpr std::size_t most_texts = 1000;
+  const Services& services_;
+  std::mutex mutex_;
+  std::uint64_t commits_ = 0;
+  std::unordered_map<history::MissionKey, std::shared_ptr<const std::string>> texts_;
+};
 
 Result<Response> ledger(const Services& services, const Request& request) {
   const Result<history::Mission> mission = mission_of(services, request);
@@ -257,6 +298,7 @@ std::vector<Endpoint> mission_endpoints(Services& services) {
   const auto bound = [&services](Result<Response> (*answer)(const Services&, const Request&)) {
     return [&services, answer](const Request& request) { return answer(services, request); };
   };
+  const auto summaries = std::make_shared<MissionSummaries>(services);
   const Parameter cursor{
       .name = "cursor", .type = Type::text, .description = "the next_cursor of the page before"};
   const std::vector<Parameter> span = {
@@ -290,7 +332,8 @@ std::vector<Endpoint> mission_endpoints(Services& services) {
                   .summary = "One mission: its energy, measured and modelled",
                   .response_schema = "mission",
                   .error_statuses = {404},
-                  .handler = bound(detail)});
+                  .brief = [summaries](const Request& request) { return summaries->find(request); },
+                  .handler = [summaries](const Request& request) { return summaries->read(request); }});
   rows.push_back({.method = Method::get,
                   .path = "/v1/missions/{id}/ledger",
                   .operation_id = "getMissionLedger",

@@ -61,26 +61,14 @@ void write_columns(JsonWriter& json, const planning::Profile& p) {
   json.end_object();
 }
 
-// The robot's drive, with the share of braking power that the request says returns.
-Result<dynamics::DriveModel> drive_of(const server::ModelInForce& model,
-                                      const std::optional<double>& regeneration) {
-  if (!regeneration) return model.drive;
-  robot::RobotModel robot = model.robot;
-  std::erase_if(robot.effects, [](const robot::AdoptedEffect& e) { return e.id == "no_regeneration"; });
-  robot.effects.push_back({"no_regeneration", {{"fraction", 1 - *regeneration}}});
-  return dynamics::drive_model(robot);
-}
-
-Result<void> write_baselines(JsonWriter& json, const server::ModelInForce& model, const DriveRequest& request,
+Result<void> write_baselines(JsonWriter& json, const planning::Planner& planner, const DriveRequest& request,
                              const planning::Plan& plan, bool columns) {
   json.key("baselines").begin_object();
-  const Result<dynamics::DriveModel> drive = drive_of(model, request.problem.regeneration);
-  if (!drive) return tl::unexpected(drive.error());
   for (const auto& [name, ramp_fraction] : {std::pair{"trapezoid", 1.0 / 3}, std::pair{"triangle", 0.5}}) {
     json.key(name);
-    const auto baseline =
-        planning::ramp_baseline(*drive, request.path, plan.run_duration_s, request.problem.start_speed_m_s,
-                                request.problem.end_speed_m_s, ramp_fraction, columns);
+    const auto baseline = planning::ramp_baseline(planner.loads(), request.path, plan.run_duration_s,
+                                                  request.problem.start_speed_m_s,
+                                                  request.problem.end_speed_m_s, ramp_fraction, columns);
     if (!baseline) {
       json.null();
       continue;
@@ -149,44 +137,50 @@ planning::Profile series_of(const dynamics::DriveModel& drive, const std::vector
   return p;
 }
 
-}  // namespace
+struct Question {
+  DriveRequest drive;
+  bool columns = true;
+  bool baseline_columns = false;
+  std::int64_t pareto_points = 0;
+};
 
-Result<std::string> profile_answer(const nlohmann::json& body, const server::ModelInForce& model) {
+Result<Question> read_question(const nlohmann::json& body, const server::ModelInForce& model) {
   Fields fields(body);
-  const DriveRequest request = read_drive(fields, model.robot);
-  const bool columns = fields.boolean("columns", true);
-  const bool baseline_columns = fields.boolean("baseline_columns", false);
-  const std::int64_t pareto_points = fields.integer("pareto_points", 0, max_pareto_points, 0);
+  Question question;
+  question.drive = read_drive(fields, model.robot);
+  question.columns = fields.boolean("columns", true);
+  question.baseline_columns = fields.boolean("baseline_columns", false);
+  question.pareto_points = fields.integer("pareto_points", 0, max_pareto_points, 0);
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  return question;
+}
 
-  Result<planning::Planner> planner = planning::Planner::make(model.robot, request.problem.regeneration);
-  if (!planner) return tl::unexpected(std::move(planner.error()));
-  Result<planning::Plan> plan = planner->plan(request.path, request.problem);
-  if (!plan) return tl::unexpected(std::move(plan.error()));
-
+Result<std::string> write_answer(const server::ModelInForce& model, const planning::Planner& planner,
+                                 const Question& question, const planning::Plan& plan) {
+  const DriveRequest& request = question.drive;
   JsonWriter json;
   json.begin_object();
   json.field("robot_id", model.robot.robot_id).field("model_version", model.version);
-  write_summary(json, plan->summary);
-  write_certificate(json, plan->certificate);
+  write_summary(json, plan.summary);
+  write_certificate(json, plan.certificate);
   json.key("ledger_j").begin_object();
   for (std::size_t k = 0; k < energy::term_count; ++k)
-    json.field(energy::term_names[k], plan->ledger.value[k]);
+    json.field(energy::term_names[k], plan.ledger.value[k]);
   json.end_object();
-  if (Result<void> done = write_baselines(json, model, request, *plan, baseline_columns); !done)
+  if (Result<void> done = write_baselines(json, planner, request, plan, question.baseline_columns); !done)
     return tl::unexpected(std::move(done.error()));
   json.key("needed_speed_m_s");
   if (request.problem.deadline_s) {
-    const auto speed = planner->needed_speed(request.path, request.problem);
+    const auto speed = planner.needed_speed(request.path, request.problem);
     if (!speed) return tl::unexpected(speed.error());
     json.value(*speed);
   } else {
     json.null();
   }
   json.key("pareto").begin_array();
-  if (pareto_points >= 2) {
+  if (question.pareto_points >= 2) {
     const auto front =
-        planner->pareto(request.path, request.problem, static_cast<std::size_t>(pareto_points));
+        planner.pareto(request.path, request.problem, static_cast<std::size_t>(question.pareto_points));
     if (!front) return tl::unexpected(front.error());
     for (const planning::PlanCost& cost : *front) {
       json.begin_object()
@@ -198,9 +192,38 @@ Result<std::string> profile_answer(const nlohmann::json& body, const server::Mod
     }
   }
   json.end_array();
-  if (columns) write_columns(json, plan->profile);
+  if (question.columns) write_columns(json, plan.profile);
   json.end_object();
   return json.take();
+}
+
+}  // namespace
+
+Result<std::string> profile_answer(const nlohmann::json& body, const server::ModelInForce& model) {
+  const Result<Question> asked = read_question(body, model);
+  if (!asked) return tl::unexpected(asked.error());
+  const DriveRequest& request = asked->drive;
+  std::optional<planning::Planner> own;
+  if (request.problem.regeneration) {
+    Result<planning::Planner> made = planning::Planner::make(model.robot, request.problem.regeneration);
+    if (!made) return tl::unexpected(std::move(made.error()));
+    own = std::move(*made);
+  }
+  const planning::Planner& planner = own ? *own : model.planner;
+  const Result<planning::Plan> plan = planner.plan(request.path, request.problem);
+  if (!plan) return tl::unexpected(plan.error());
+  return write_answer(model, planner, *asked, *plan);
+}
+
+std::optional<std::string> brief_profile_answer(const nlohmann::json& body,
+                                                const server::ModelInForce& model) {
+  const Result<Question> asked = read_question(body, model);
+  if (!asked || asked->pareto_points > 0 || asked->drive.problem.regeneration) return std::nullopt;
+  const auto plan = model.planner.plan_at_once(asked->drive.path, asked->drive.problem);
+  if (!plan) return std::nullopt;
+  Result<std::string> text = write_answer(model, model.planner, *asked, *plan);
+  if (!text) return std::nullopt;
+  return std::move(*text);
 }
 
 Result<std::string> estimate_answer(const nlohmann::json& body, const server::ModelInForce& model) {
@@ -274,6 +297,13 @@ std::vector<http::Endpoint> planning_endpoints(Services& services) {
        .request_schema = "profile-request",
        .response_schema = "profile",
        .error_statuses = {404, 422},
+       .brief = [&services](const http::Request& r) -> std::optional<http::Response> {
+         const auto model = services.models.find(r.param("id"));
+         if (!model) return std::nullopt;
+         std::optional<std::string> text = brief_profile_answer(*r.json, *model);
+         if (!text) return std::nullopt;
+         return http::json_response(std::move(*text));
+       },
        .handler = with_model(profile_answer)});
   rows.push_back({.method = http::Method::post,
                   .path = "/v1/robots/{id}/estimate",

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 
 #include "base/error.h"
@@ -12,6 +13,11 @@ namespace joulecast::api {
 // certificate, against a trapezoid and a triangle that take as long on every run between stops; with
 // "pareto_points", the front of energy against time.
 Result<std::string> profile_answer(const nlohmann::json& request, const server::ModelInForce& model);
+
+// The same text where it takes no more than some tens of microseconds; nothing for longer ones and for
+// errors.
+std::optional<std::string> brief_profile_answer(const nlohmann::json& request,
+                                                const server::ModelInForce& model);
 
 // JSON: energy and ledger of a motion: of the profile that the request gives, or of the best one along its
 // path.

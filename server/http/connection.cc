@@ -238,6 +238,10 @@ void Connection::dispatch() {
     response_ = core_->router.run(*endpoint_, request_);
     return respond();
   }
+  if (auto answer = core_->router.run_brief(*endpoint_, request_)) {
+    response_ = std::move(*answer);
+    return respond();
+  }
   // While the worker has the request the I/O thread touches neither request_ nor response_.
   const bool taken = core_->workers->submit([self = shared_from_this()] {
     self->response_ = self->core_->router.run(*self->endpoint_, self->request_);

@@ -179,6 +179,7 @@ const Node* descend(const Node& node, const std::vector<std::string>& segments, 
 Router::Match Router::match(Request& request) const {
   request.path_params.clear();
   request.query.clear();
+  request.json.reset();
   request.path.clear();
   auto target = parse_target(request.target);
   if (!target) {
@@ -252,21 +253,33 @@ Router::Match Router::match(Request& request) const {
 
 Response Router::run(const Endpoint& endpoint, Request& request) const {
   try {
-    if (!endpoint.request_schema.empty()) {
+    if (!endpoint.request_schema.empty() && !request.json) {
       auto body = parse_json(request.body);
       if (!body) {
         return problem(400, "malformed-json", describe(body.error()), request.id, body.error().field,
                        body.error().message);
       }
       request.json = std::make_shared<const nlohmann::json>(std::move(*body));
-    } else {
-      request.json.reset();
     }
     auto response = endpoint.handler(request);
     if (!response) return fault(endpoint, request, response.error());
     return std::move(*response);
   } catch (const std::exception& cause) {
     return fault(endpoint, request, Error{Fault::internal, "", cause.what()});
+  }
+}
+
+std::optional<Response> Router::run_brief(const Endpoint& endpoint, Request& request) const {
+  if (!endpoint.brief || request.body.size() > brief_body_bytes) return std::nullopt;
+  try {
+    if (!endpoint.request_schema.empty()) {
+      auto body = parse_json(request.body);
+      if (!body) return std::nullopt;
+      request.json = std::make_shared<const nlohmann::json>(std::move(*body));
+    }
+    return endpoint.brief(request);
+  } catch (const std::exception&) {
+    return std::nullopt;  // to be met again, and told of, by the handler
   }
 }
 

@@ -42,12 +42,17 @@ struct Endpoint {
   unsigned success_status = 200;
   std::vector<unsigned> error_statuses = {};  // beyond those the frame itself can answer
   Run run = Run::worker;
+  // Of a worker's endpoint, when set: tried first, on the I/O thread and under its rules. It answers the
+  // requests that are quickly answered and declines the others, which then go to `handler`.
+  std::function<std::optional<Response>(const Request&)> brief = {};
   bool documented = true;  // false: left out of the OpenAPI document (assets)
   Handler handler = {};
 };
 
 class Router {
  public:
+  static constexpr std::size_t brief_body_bytes = 4096;
+
   // Told of every fault of ours (answered with status 500), since the client gets only the request id.
   using FaultSink = std::function<void(const Endpoint&, const Request&, const Error&)>;
 
@@ -68,6 +73,9 @@ class Router {
 
   // Checks and parses the body, calls the handler, turns errors into problem documents. Never throws.
   Response run(const Endpoint& endpoint, Request& request) const;
+
+  // What the endpoint's `brief` answers, if it does. For bodies of at most `brief_body_bytes`.
+  std::optional<Response> run_brief(const Endpoint& endpoint, Request& request) const;
 
   // match() and run() in one: what the tests and in-process callers use.
   Response handle(Request& request) const;

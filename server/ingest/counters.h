@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "history/records.h"
+
 namespace joulecast::server {
 
 // Why a message, a sample or an event was turned away or repaired. Each has one counter for the daemon and
@@ -22,23 +24,25 @@ enum class IngestFault : std::size_t {
   restart,  // the robot's sequence began anew
   clock_backward,
   clock_forward,
+  gap,              // a silence too long to be bridged
   outside_mission,  // belongs to no mission: just after an end, or before a start
   bad_event,        // duplicate, out-of-order or unknown mission event
   solver            // CVODE failed on an interval; its chord stood in
 };
-inline constexpr std::size_t ingest_fault_count = 15;
+inline constexpr std::size_t ingest_fault_count = 16;
 
 inline constexpr std::array<std::string_view, ingest_fault_count> ingest_fault_names = {
-    "undecodable",     "wrong_channel", "queue_full", "too_many_robots", "unknown_robot",  "implausible",
-    "duplicate",       "late",          "missing",    "restart",         "clock_backward", "clock_forward",
-    "outside_mission", "bad_event",     "solver"};
+    "undecodable",   "wrong_channel",   "queue_full",     "too_many_robots",
+    "unknown_robot", "implausible",     "duplicate",      "late",
+    "missing",       "restart",         "clock_backward", "clock_forward",
+    "gap",           "outside_mission", "bad_event",      "solver"};
 
 // Written by the ingest threads, read by the metrics.
 struct IngestCounters {
-  std::atomic<std::uint64_t> messages = 0;  // received on our channels
-  std::atomic<std::uint64_t> samples = 0;   // accounted for
-  std::atomic<std::uint64_t> missions_started = 0;
-  std::atomic<std::uint64_t> missions_ended = 0;
+  std::atomic<std::uint64_t> messages = 0;                       // received on our channels
+  std::atomic<std::uint64_t> samples = 0;                        // accounted for
+  std::array<std::atomic<std::uint64_t>, 2> missions_started{};  // announced, implicit
+  std::array<std::atomic<std::uint64_t>, history::mission_state_count> missions_ended{};  // by state
   std::array<std::atomic<std::uint64_t>, ingest_fault_count> faults{};
 
   void add(IngestFault fault, std::uint64_t count = 1) {

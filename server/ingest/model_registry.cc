@@ -5,14 +5,20 @@
 
 namespace joulecast::server {
 
-Result<void> ModelRegistry::put(robot::RobotModel robot, std::int64_t version) {
+Result<std::shared_ptr<const ModelInForce>> model_in_force(robot::RobotModel robot, std::int64_t version) {
   Result<dynamics::DriveModel> drive = dynamics::drive_model(robot);
   if (!drive) return tl::unexpected(std::move(drive.error()));
-  std::string id = robot.robot_id;
-  auto model =
-      std::make_shared<const ModelInForce>(ModelInForce{std::move(robot), std::move(*drive), version});
+  Result<planning::Planner> planner = planning::Planner::make(robot);
+  if (!planner) return tl::unexpected(std::move(planner.error()));
+  return std::make_shared<const ModelInForce>(
+      ModelInForce{std::move(robot), std::move(*drive), version, std::move(*planner)});
+}
+
+Result<void> ModelRegistry::put(robot::RobotModel robot, std::int64_t version) {
+  Result<std::shared_ptr<const ModelInForce>> model = model_in_force(std::move(robot), version);
+  if (!model) return tl::unexpected(std::move(model.error()));
   const std::unique_lock lock(mutex_);
-  models_.insert_or_assign(std::move(id), std::move(model));
+  models_.insert_or_assign((*model)->robot.robot_id, *model);
   epoch_.fetch_add(1, std::memory_order_release);
   return {};
 }

@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "dynamics/drive_model.h"
+#include "planning/planner.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::server {
@@ -20,7 +21,11 @@ struct ModelInForce {
   robot::RobotModel robot;
   dynamics::DriveModel drive;
   std::int64_t version = 0;
+  planning::Planner planner;
 };
+
+// An effect that the catalogue rejects is an error.
+Result<std::shared_ptr<const ModelInForce>> model_in_force(robot::RobotModel robot, std::int64_t version);
 
 // The models in force, by robot. Any thread.
 class ModelRegistry {

@@ -35,9 +35,7 @@ Result<std::shared_ptr<const ModelInForce>> stored_model(const history::Store& s
   if (!stored) return tl::unexpected(stored.error());
   Result<robot::RobotModel> robot = robot::parse_robot(stored->model_json);
   if (!robot) return tl::unexpected(std::move(robot.error()));
-  Result<dynamics::DriveModel> drive = dynamics::drive_model(*robot);
-  if (!drive) return tl::unexpected(std::move(drive.error()));
-  return std::make_shared<const ModelInForce>(ModelInForce{std::move(*robot), std::move(*drive), version});
+  return model_in_force(std::move(*robot), version);
 }
 
 }  // namespace
@@ -155,6 +153,7 @@ void RobotSession::on_sample(const telemetry::Sample& sample, std::int64_t host_
   if (place.arrival == telemetry::Arrival::duplicate) return on_fault(IngestFault::duplicate);
   if (place.arrival == telemetry::Arrival::late) return on_fault(IngestFault::late);
   if (place.arrival == telemetry::Arrival::restart) on_fault(IngestFault::restart);
+  if (place.gap) on_fault(IngestFault::gap);
   if (place.clock != telemetry::ClockStep::none) {
     on_fault(place.clock == telemetry::ClockStep::backward ? IngestFault::clock_backward
                                                            : IngestFault::clock_forward);
@@ -323,7 +322,7 @@ void RobotSession::open(const telemetry::MissionAction& action) {
   snapshot_.mission_key = record.key;
   snapshot_.mission_start_utime_us = record.start_utime_us;
   snapshot_.accounts = {};
-  outputs_.counters.missions_started.fetch_add(1, std::memory_order_relaxed);
+  outputs_.counters.missions_started[action.implicit ? 1 : 0].fetch_add(1, std::memory_order_relaxed);
 }
 
 void RobotSession::close(const telemetry::MissionAction& action) {
@@ -344,12 +343,13 @@ void RobotSession::close(const telemetry::MissionAction& action) {
   if (!action.note.empty() && action.note != record.note)
     record.note += (record.note.empty() ? "" : "; ") + action.note;
   record.end_utime_us = std::max(record.end_utime_us, action.utime_us);
+  outputs_.counters.missions_ended[static_cast<std::size_t>(record.state)].fetch_add(
+      1, std::memory_order_relaxed);
   checkpoint();
   remember_charge();
   open_.reset();
   snapshot_.mission_id.clear();
   snapshot_.mission_key = 0;
-  outputs_.counters.missions_ended.fetch_add(1, std::memory_order_relaxed);
   changed_ = true;
   if (next_ != nullptr) meter_with(std::exchange(next_, nullptr));
 }

@@ -68,7 +68,7 @@ TorqueBalance<S> BasicDriveModel<S>::balance(const Instant& at) const {
     b.inertial_nm[s] = ground[s] + p.wheel_inertia_kg_m2 * at.wheel_acceleration_rad_s2[s];
     S transmitted = b.inertial_nm[s];
     S inside = 0;
-    for (std::size_t k = 0; k < load_count; ++k) {
+    for (std::size_t k = 0; k < load_count && !loads_.empty(); ++k) {
       (k == static_cast<std::size_t>(Load::internal) ? inside : transmitted) += b.loads.torque[k][s];
     }
     b.friction_nm[s] = p.friction_torque_nm[s] * context.direction[s] +
@@ -91,8 +91,15 @@ template <class S>
 S BasicDriveModel<S>::voltage_for(std::size_t side, S current_a, const Instant& at) const {
   const Parameters<S>& p = parameters_;
   return resistance(side, at) * current_a + p.inductance_h * at.current_slope_a_s[side] +
-         p.voltage_constant_v_s_rad * at.wheel_speed_rad_s[side] +
-         p.brush_drop_v * smooth_sign(current_a, brush_width_a);
+         p.voltage_constant_v_s_rad * at.wheel_speed_rad_s[side] + brush_voltage(current_a);
+}
+
+template <class S>
+S BasicDriveModel<S>::brush_voltage(S current_a) const {
+  if constexpr (std::is_same_v<S, double>) {
+    if (parameters_.brush_drop_v == 0) return 0;  // no derivative to keep
+  }
+  return parameters_.brush_drop_v * smooth_sign(current_a, brush_width_a);
 }
 
 template <class S>
@@ -121,7 +128,7 @@ PowerFlow<S> BasicDriveModel<S>::flow(const Instant& at) const {
     f.motor_power_w[s] = f.voltage_v[s] * f.current_a[s];
 
     f.copper_w += resistance(s, at) * f.current_a[s] * f.current_a[s];
-    f.brush_w += p.brush_drop_v * smooth_sign(f.current_a[s], brush_width_a) * f.current_a[s];
+    f.brush_w += brush_voltage(f.current_a[s]) * f.current_a[s];
     // Field energy of the winding, and what unequal SI values of K_t and K_w leave over, are stored or lost
     // in the motor.
     f.kinetic_w += p.inductance_h * at.current_slope_a_s[s] * f.current_a[s];

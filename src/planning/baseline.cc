@@ -6,31 +6,19 @@
 namespace joulecast::planning {
 namespace {
 
-constexpr int steps_per_span = 24;
-
-// A run driven as a ramp, step by step.
+// A run driven as a ramp, span by span of constant acceleration.
 class Ramp {
  public:
   // Appends to the columns of `into` unless that is null; its time and energy are where the run begins.
-  Ramp(const dynamics::DriveModel& model, const Run& run, Baseline* into)
-      : model_(model), run_(run), into_(into) {
+  Ramp(const DriveLoads& loads, const Run& run, Baseline* into)
+      : model_(loads.model()), run_(run), uniform_(loads.uniform(run)), into_(into) {
     at_.payload_kg = run.payload_kg;
   }
 
-  // Simpson's rule over equal steps of a span of constant acceleration: exact where power is cubic in time.
   void drive(double duration_s, double from, double to) {
     if (!(duration_s > 0)) return;
-    const double acceleration = (to - from) / duration_s, h = duration_s / steps_per_span;
-    double before = power_w(0, from, acceleration);
-    write(0, from, before);
-    for (int k = 0; k < steps_per_span; ++k) {
-      const double t = k * h;
-      const double middle = power_w(t + h / 2, from, acceleration),
-                   after = power_w(t + h, from, acceleration);
-      energy_j += h / 6 * (before + 4 * middle + after);
-      before = after;
-      write(t + h, from + acceleration * (t + h), after);
-    }
+    const double acceleration = (to - from) / duration_s;
+    integrate({duration_s, from, acceleration});
     driven_s_ += duration_s;
     way_ += 0.5 * (from + to) * duration_s;
     if (run_.turn == 0) peaks.peak_speed_m_s = std::max({peaks.peak_speed_m_s, from, to});
@@ -42,13 +30,50 @@ class Ramp {
   Baseline peaks;  // of this run
 
  private:
-  void write(double t, double speed, double power_w) {
+  struct Span {
+    double duration_s = 0, from = 0, acceleration = 0;
+  };
+
+  void write(const Span& span, double t) {
+    const double speed = span.from + span.acceleration * t, watts = power_w(t, span.from, span.acceleration);
     if (into_ == nullptr) return;
     into_->time_s.push_back(into_->duration_s + driven_s_ + t);
     into_->speed_m_s.push_back(run_.turn == 0 ? speed : 0);
     into_->yaw_rate_rad_s.push_back(turn_ * speed);
-    into_->power_w.push_back(power_w);
+    into_->power_w.push_back(watts);
     into_->energy_column_j.push_back(into_->energy_j + energy_j);
+  }
+
+  // Gauss's three points are exact where power is a polynomial in time, as it is where nothing changes along
+  // the way and no motor turns into a generator; where halving the span tells otherwise, many steps find what
+  // there is.
+  void integrate(const Span& span) {
+    const double half = span.duration_s / 2;
+    if (uniform_ && into_ == nullptr) {
+      const double whole = gauss_j(span, 0, span.duration_s);
+      const double halves = gauss_j(span, 0, half) + gauss_j(span, half, half);
+      if (std::fabs(whole - halves) <= 1e-5 * std::fabs(halves)) {
+        for (const double end : {0.0, span.duration_s})
+          power_w(end, span.from, span.acceleration);  // for the peaks
+        energy_j += halves;
+        return;
+      }
+    }
+    constexpr int steps = 24;
+    const double step = span.duration_s / steps;
+    write(span, 0);
+    for (int k = 0; k < steps; ++k) {
+      energy_j += gauss_j(span, k * step, step);
+      write(span, (k + 1) * step);
+    }
+  }
+
+  double gauss_j(const Span& span, double begin_s, double length_s) {
+    constexpr double node = 0.7745966692414834;
+    const auto at = [&](double x) {
+      return power_w(begin_s + 0.5 * (1 + x) * length_s, span.from, span.acceleration);
+    };
+    return length_s / 18 * (5 * at(-node) + 8 * at(0) + 5 * at(node));
   }
 
   double power_w(double t, double from, double acceleration) {
@@ -82,6 +107,7 @@ class Ramp {
 
   const dynamics::DriveModel& model_;
   const Run& run_;
+  bool uniform_;
   Baseline* into_;
   dynamics::Instant at_;
   double way_ = 0, driven_s_ = 0;
@@ -99,11 +125,11 @@ bool Baseline::keeps(const Limits& l) const {
          peak_current_a <= l.current_a * rounding && peak_voltage_v <= l.voltage_v * rounding;
 }
 
-Result<Baseline> ramp_baseline(const dynamics::DriveModel& model, const Path& path,
+Result<Baseline> ramp_baseline(const DriveLoads& loads, const Path& path,
                                std::span<const double> run_duration_s, double start_speed_m_s,
                                double end_speed_m_s, double ramp_fraction, bool columns) {
   Baseline baseline;
-  const double standing_w = model.battery_power_for({0, 0});
+  const double standing_w = loads.model().battery_power_for({0, 0});
   const auto stand = [&](double duration_s) {
     if (!(duration_s > 0)) return;
     for (const bool end : {false, true}) {
@@ -123,7 +149,7 @@ Result<Baseline> ramp_baseline(const dynamics::DriveModel& model, const Path& pa
     if (!(top > 0))
       return fail(Fault::infeasible, "/path", "is too short for such a ramp between its end speeds");
     stand(run.dwell_before_s);
-    Ramp ramp(model, run, columns ? &baseline : nullptr);
+    Ramp ramp(loads, run, columns ? &baseline : nullptr);
     ramp.drive(ramp_s, start, top);
     ramp.drive(hold_s, top, top);
     ramp.drive(ramp_s, top, end);

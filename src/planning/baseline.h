@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "dynamics/drive_model.h"
+#include "planning/load.h"
 #include "planning/path.h"
 #include "planning/problem.h"
 
@@ -31,7 +31,7 @@ struct Baseline {
 // Each run takes `run_duration_s`, accelerating for `ramp_fraction` of it and braking for as long: 1/3 is the
 // trapezoid of thesis 4.3.1, 1/2 the triangle. Infeasible when a run is too short for its end speeds in that
 // time.
-Result<Baseline> ramp_baseline(const dynamics::DriveModel& model, const Path& path,
+Result<Baseline> ramp_baseline(const DriveLoads& loads, const Path& path,
                                std::span<const double> run_duration_s, double start_speed_m_s,
                                double end_speed_m_s, double ramp_fraction, bool columns = false);
 

@@ -142,27 +142,25 @@ std::vector<double> LineMotion::times(std::size_t cells) const {
     const double to =
         piece.free ? piece.free->speed(piece.duration_s) : from + piece.acceleration * piece.duration_s;
     const double share = std::max(piece.duration_s / duration_, 0.5 * std::fabs(to - from) / peak_speed_);
-    const double count = std::max(1.0, std::ceil(static_cast<double>(cells) * share));
+    // At constant acceleration a row says all that there is to say until the next; a few more show how power
+    // changes.
+    const double wanted = piece.free ? share : piece.acceleration != 0 ? 0.25 * share : 0;
+    const double count = std::max(1.0, std::ceil(static_cast<double>(cells) * wanted));
     for (double i = 1; i <= count; ++i) times.push_back(piece.start_s + piece.duration_s * i / count);
   }
   times.back() = duration_;
   return times;
 }
 
-double LineMotion::speed(double t) const {
+LineState LineMotion::state(double t) const {
   const Piece& piece = at(t);
-  return piece.free ? piece.free->speed(t) : piece.speed + piece.acceleration * t;
-}
-
-double LineMotion::acceleration(double t) const {
-  const Piece& piece = at(t);
-  return piece.free ? piece.free->acceleration(t) : piece.acceleration;
-}
-
-double LineMotion::position(double t) const {
-  const Piece& piece = at(t);
-  return piece.start +
-         (piece.free ? piece.free->position(t) : (piece.speed + 0.5 * piece.acceleration * t) * t);
+  if (!piece.free) {
+    return {piece.start + (piece.speed + 0.5 * piece.acceleration * t) * t,
+            piece.speed + piece.acceleration * t, piece.acceleration};
+  }
+  LineState s = piece.free->state(t);
+  s.position += piece.start;
+  return s;
 }
 
 std::optional<LineMotion> line_within(const LineTask& task, double speed_limit, double acceleration_limit) {

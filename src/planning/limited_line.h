@@ -23,14 +23,17 @@ class LineMotion {
   double duration_s() const { return duration_; }
   double distance() const { return distance_; }
   double energy_j() const { return energy_; }
-  double speed(double time_s) const;
-  double acceleration(double time_s) const;
-  double position(double time_s) const;
+  LineState state(double time_s) const;
+  double speed(double time_s) const { return state(time_s).speed; }
+  double acceleration(double time_s) const { return state(time_s).acceleration; }
+  double position(double time_s) const { return state(time_s).position; }
   double peak_speed() const { return peak_speed_; }
   double peak_acceleration() const { return peak_acceleration_; }
   double lowest_speed() const { return lowest_speed_; }
-  // Times from 0 to the duration, the joints of the pieces among them; each cell takes about 1/`cells` of the
-  // duration or of the changes of speed, whichever is shorter.
+  // Times from 0 to the duration, the joints of the pieces among them; each cell of an extremal
+  // takes about 1/`cells` of the duration or of the changes of speed, whichever is shorter; pieces of
+  // constant acceleration, between whose rows nothing is unknown, are cut four times as coarsely or not at
+  // all.
   std::vector<double> times(std::size_t cells) const;
   bool holds_acceleration() const { return holds_acceleration_; }  // somewhere at a constant one but 0
   bool holds_speed() const { return holds_speed_; }                // somewhere at a constant one

@@ -104,6 +104,8 @@ LineProfile::LineProfile(const LineTask& task, double duration_s)
       end_(task.end_speed),
       duration_(duration_s),
       rate_(std::sqrt(task.power.c2 / task.power.c1)),
+      left_(std::exp(-rate_ * duration_s)),
+      less_twice_(std::expm1(-2 * rate_ * duration_s)),
       thrust_(thrust_of(task, rate_, duration_s)),
       start_acceleration_(start_acceleration_of(task, rate_, thrust_, duration_s)) {
   assert(duration_s > 0);
@@ -112,46 +114,31 @@ LineProfile::LineProfile(const LineTask& task, double duration_s)
       -thrust_ * duration_ * half_tanh(x) + (end_ * times_coth(x) - start_ * over_sinh(x)) / duration_;
 }
 
-double LineProfile::speed(double t) const {
-  const double x = rate_ * duration_, a = rate_ * t, b = rate_ * (duration_ - t);
+LineState LineProfile::state(double t) const {
+  const double x = rate_ * duration_, a = rate_ * t, b = rate_ * (duration_ - t), square = rate_ * rate_;
+  LineState s;
   if (x < series_below) {
     const double y = a * a;
-    const double bend = t * t / 2 * (1 + y / 12 * (1 + y / 30));  // (cosh a - 1)/k^2
-    return start_ * (1 + rate_ * rate_ * bend) +
-           start_acceleration_ * t * (1 + y / 6 * (1 + y / 20 * (1 + y / 42))) - thrust_ * bend;
-  }
-  const double whole = std::expm1(-2 * x);
-  const double rise = std::exp(-b) * std::expm1(-2 * a) / whole,
-               fall = std::exp(-a) * std::expm1(-2 * b) / whole;
-  const double hump = std::expm1(-a) * std::expm1(-b) / ((1 + std::exp(-x)) * rate_ * rate_);
-  return thrust_ * hump + start_ * fall + end_ * rise;
-}
-
-double LineProfile::acceleration(double t) const {
-  const double x = rate_ * duration_, a = rate_ * t, b = rate_ * (duration_ - t);
-  if (x < series_below) {
-    const double y = a * a;
-    const double sinh_over = t * (1 + y / 6 * (1 + y / 20));  // sinh(a)/k
-    return start_acceleration_ * (1 + y / 2 * (1 + y / 12 * (1 + y / 30))) +
-           (rate_ * rate_ * start_ - thrust_) * sinh_over;
-  }
-  const double whole = -std::expm1(-2 * x);
-  const double rise = rate_ * std::exp(-b) * (1 + std::exp(-2 * a)) / whole;
-  const double fall = rate_ * std::exp(-a) * (1 + std::exp(-2 * b)) / whole;
-  const double hump = (a < b ? -std::exp(-a) * std::expm1(a - b) : std::exp(-b) * std::expm1(b - a)) /
-                      (rate_ * (1 + std::exp(-x)));
-  return thrust_ * hump - start_ * fall + end_ * rise;
-}
-
-double LineProfile::position(double t) const {
-  const double x = rate_ * duration_, a = rate_ * t;
-  if (x < series_below) {
-    const double y = a * a;
-    const double bend = t * t / 2 * (1 + y / 12 * (1 + y / 30));
+    const double bend = t * t / 2 * (1 + y / 12 * (1 + y / 30));       // (cosh a - 1)/k^2
     const double cubic = t * t * t / 6 * (1 + y / 20 * (1 + y / 42));  // (sinh a - a)/k^3
-    return start_ * (t + rate_ * rate_ * cubic) + start_acceleration_ * bend - thrust_ * cubic;
+    const double jerk = square * start_ - thrust_;
+    s.speed = start_ + start_acceleration_ * (t + square * cubic) + jerk * bend;
+    s.acceleration = start_acceleration_ * (1 + square * bend) + jerk * (t + square * cubic);
+    s.position = start_ * t + start_acceleration_ * bend + jerk * cubic;
+    return s;
   }
-  return (acceleration(t) - start_acceleration_ + thrust_ * t) / (rate_ * rate_);
+  const double less_a = std::expm1(-a), less_b = std::expm1(-b), left_a = 1 + less_a, left_b = 1 + less_b;
+  // sinh(a)/sinh(x), sinh(b)/sinh(x) and their slopes; 1 - cosh(x/2 - a)/cosh(x/2) and its slope.
+  const double rise = left_b * less_a * (2 + less_a) / less_twice_,
+               fall = left_a * less_b * (2 + less_b) / less_twice_;
+  const double hump = less_a * less_b / (1 + left_);
+  const double rising = -rate_ * left_b * (1 + left_a * left_a) / less_twice_,
+               falling = rate_ * left_a * (1 + left_b * left_b) / less_twice_;
+  const double humping = rate_ * (left_a - left_b) / (1 + left_);
+  s.speed = thrust_ / square * hump + start_ * fall + end_ * rise;
+  s.acceleration = thrust_ / square * humping + start_ * falling + end_ * rising;
+  s.position = (s.acceleration - start_acceleration_ + thrust_ * t) / square;
+  return s;
 }
 
 double LineProfile::energy_j() const {
@@ -162,9 +149,9 @@ double LineProfile::energy_j() const {
 }
 
 double LineProfile::energy_j(double t) const {
-  const double v = speed(t), x = position(t);
+  const auto [x, v, a] = state(t);
   // c2 v^2 + c1 a^2 = c1 ((v a)' + B v), since a' = k^2 v - B.
-  const double core = power_.c1 * (v * acceleration(t) - start_ * start_acceleration_ + thrust_ * x);
+  const double core = power_.c1 * (v * a - start_ * start_acceleration_ + thrust_ * x);
   return core + (power_.cx / 2 * (v + start_) + power_.ca) * (v - start_) + power_.c3 * x + power_.c0 * t;
 }
 
@@ -197,8 +184,8 @@ double LineProfile::distance_multiplier() const {
 }
 
 LineSample LineProfile::at(double t) const {
-  const double v = speed(t), a = acceleration(t);
-  return {t, position(t), v, a, power_.power_w(v, a), energy_j(t)};
+  const auto [x, v, a] = state(t);
+  return {t, x, v, a, power_.power_w(v, a), energy_j(t)};
 }
 
 std::vector<LineSample> LineProfile::sample(std::size_t count) const {

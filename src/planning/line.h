@@ -17,6 +17,12 @@ struct LineTask {
   double value_of_time_w = 0;  // what a second is worth beside its energy; only the end time depends on it
 };
 
+struct LineState {
+  double position = 0;
+  double speed = 0;
+  double acceleration = 0;
+};
+
 struct LineSample {
   double time_s = 0;
   double distance = 0;
@@ -38,9 +44,10 @@ class LineProfile {
   double distance() const { return distance_; }
   double energy_j() const;
   double energy_j(double time_s) const;
-  double speed(double time_s) const;
-  double acceleration(double time_s) const;
-  double position(double time_s) const;
+  LineState state(double time_s) const;
+  double speed(double time_s) const { return state(time_s).speed; }
+  double acceleration(double time_s) const { return state(time_s).acceleration; }
+  double position(double time_s) const { return state(time_s).position; }
   double peak_speed() const;
   double lowest_speed() const;       // negative when the profile runs backwards
   double peak_acceleration() const;  // largest absolute value; at an end, since |a| is convex
@@ -63,8 +70,10 @@ class LineProfile {
 
   dynamics::QuadraticPower power_;
   double value_of_time_, distance_, start_, end_, duration_;
-  double rate_;    // k
-  double thrust_;  // B
+  double rate_;        // k
+  double left_;        // exp(-k T)
+  double less_twice_;  // exp(-2 k T) - 1
+  double thrust_;      // B
   double start_acceleration_, end_acceleration_;
 };
 

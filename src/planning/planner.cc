@@ -99,6 +99,19 @@ class Request {
                     std::to_string(shortest_s_ * (1 + 1e-5)));
   }
 
+  // Whether closed forms answer every run at the value of time, and no deadline asks for more; then solved.
+  bool solve_at_once() {
+    if (problem_.deadline_s) return false;
+    price_w_ = problem_.value_of_time_w;
+    answers_.clear();
+    for (const RunPlanner& run : runs_) {
+      auto answer = run.closed_form(price_w_);
+      if (!answer) return false;
+      answers_.push_back(std::move(*answer));
+    }
+    return true;
+  }
+
   // Ends at most `early_s` before the deadline.
   Result<void> meet(double deadline, double early_s) {
     if (auto ok = within_reach(deadline); !ok) return ok;
@@ -201,15 +214,21 @@ class Writer {
   template <class At>
   void run(const RunPlanner& planner, const std::vector<double>& times, At&& at) {
     const Run& run = planner.run();
+    uniform_ = loads_.uniform(run);
+    if (uniform_) {
+      here_ = loads_.instant(run, run.at(0), 0, 1, 1);
+      pace_ = here_.wheel_speed_rad_s;
+    }
+    reserve(plan_.profile.size() + times.size());
     for (std::size_t k = 0; k < times.size(); ++k) {
       const bool last = k + 1 == times.size();
       const State s = last ? at(k - 1, 1.0) : at(k, 0.0);
       row(planner, s, start_s_ + times[k]);
       if (last) break;
       const double span = times[k + 1] - times[k];
-      for (auto [node, weight] : gauss) {
+      for (const double node : gauss) {
         const State g = at(k, 0.5 * (1 + node));
-        add(flow(planner, g), span * weight / 18);
+        add(flow(planner, g), 0.5 * span);
       }
     }
     if (run.turn == 0) driven_m_ += run.length();
@@ -233,10 +252,17 @@ class Writer {
   Plan& plan() { return plan_; }
 
  private:
-  static constexpr std::array<std::pair<double, double>, 3> gauss{
-      {{-0.7745966692414834, 5.0}, {0.0, 8.0}, {0.7745966692414834, 5.0}}};
+  // Exact for power that is cubic in time: a quadratic of the speed, and drag, at constant acceleration.
+  static constexpr std::array<double, 2> gauss{-0.5773502691896258, 0.5773502691896258};
 
-  dynamics::PowerFlow<double> flow(const RunPlanner& planner, const State& s) const {
+  dynamics::PowerFlow<double> flow(const RunPlanner& planner, const State& s) {
+    if (uniform_) {
+      for (std::size_t side : {0u, 1u}) {
+        here_.wheel_speed_rad_s[side] = pace_[side] * s.speed;
+        here_.wheel_acceleration_rad_s2[side] = pace_[side] * s.acceleration;
+      }
+      return loads_.model().flow(here_);
+    }
     const Run& run = planner.run();
     const double slope = run.turn == 0 ? run.curvature_slope(s.way) : 0;
     return loads_.model().flow(loads_.instant(run, run.at(s.way), slope, s.speed, s.acceleration));
@@ -244,26 +270,33 @@ class Writer {
 
   void add(const dynamics::PowerFlow<double>& f, double seconds) {
     using energy::Term;
-    energy::Ledger& l = plan_.ledger;
-    for (auto [term, watts] : {std::pair{Term::accessories, f.accessories_w},
-                               {Term::driver, f.driver_w},
-                               {Term::copper, f.copper_w},
-                               {Term::brush, f.brush_w},
-                               {Term::friction_internal, f.friction_internal_w},
-                               {Term::friction_rolling, f.friction_rolling_w},
-                               {Term::friction_scrub, f.friction_scrub_w},
-                               {Term::friction_zone, f.friction_zone_w},
-                               {Term::friction_slip, f.friction_slip_w},
-                               {Term::drag, f.drag_w},
-                               {Term::kinetic, f.kinetic_w},
-                               {Term::potential, f.potential_w},
-                               {Term::braking, f.braking_w},
-                               {Term::recovered, f.recovered_w}}) {
-      l[term] += watts * seconds;
-    }
+    const auto put = [&](Term term, double watts) { plan_.ledger[term] += watts * seconds; };
+    put(Term::accessories, f.accessories_w);
+    put(Term::driver, f.driver_w);
+    put(Term::copper, f.copper_w);
+    put(Term::brush, f.brush_w);
+    put(Term::friction_internal, f.friction_internal_w);
+    put(Term::friction_rolling, f.friction_rolling_w);
+    put(Term::friction_scrub, f.friction_scrub_w);
+    put(Term::friction_zone, f.friction_zone_w);
+    put(Term::friction_slip, f.friction_slip_w);
+    put(Term::drag, f.drag_w);
+    put(Term::kinetic, f.kinetic_w);
+    put(Term::potential, f.potential_w);
+    put(Term::braking, f.braking_w);
+    put(Term::recovered, f.recovered_w);
     plan_.summary.energy_j += f.battery_power_w * seconds;
     plan_.summary.braking_j += f.braking_w * seconds;
     plan_.summary.recovered_j += f.recovered_w * seconds;
+  }
+
+  void reserve(std::size_t rows) {
+    Profile& p = plan_.profile;
+    for (std::vector<double>* column :
+         {&p.time_s, &p.distance_m, &p.x_m, &p.y_m, &p.heading_rad, &p.speed_m_s, &p.yaw_rate_rad_s,
+          &p.acceleration_m_s2, &p.yaw_acceleration_rad_s2, &p.payload_kg, &p.power_w, &p.energy_j}) {
+      if (rows > column->capacity()) column->reserve(std::max(rows, 2 * column->size()));
+    }
   }
 
   void row(const RunPlanner& planner, const State& s, double time_s) {
@@ -299,6 +332,11 @@ class Writer {
 
   const DriveLoads& loads_;
   Plan plan_;
+  // Of a run whose loads are the same all along: its instant but for the motion, and the wheels' turning a
+  // unit of way.
+  bool uniform_ = false;
+  dynamics::Instant here_;
+  std::array<double, 2> pace_{};
   double start_s_ = 0, driven_m_ = 0;
 };
 
@@ -322,7 +360,8 @@ Plan Request::written() const {
       times = line.times(std::max<std::size_t>(8, problem_.intervals_per_run));
       writer.run(planner, times, [&](std::size_t i, double f) {
         const double t = times[i] + f * (times[i + 1] - times[i]);
-        return Writer::State{line.position(t), std::max(0.0, line.speed(t)), line.acceleration(t)};
+        const LineState s = line.state(t);
+        return Writer::State{s.position, std::max(0.0, s.speed), s.acceleration};
       });
     } else {
       numeric = true;
@@ -401,6 +440,13 @@ Result<Plan> Planner::plan(const Path& path, const Problem& problem) const {
   auto request = Request::make(robot_, loads_, path, problem);
   if (!request) return tl::unexpected(std::move(request.error()));
   if (auto solved = request->solve(); !solved) return tl::unexpected(std::move(solved.error()));
+  return request->written();
+}
+
+std::optional<Plan> Planner::plan_at_once(const Path& path, const Problem& problem) const {
+  if (path.runs.size() != 1 || !loads_.uniform(path.runs[0])) return std::nullopt;
+  auto request = Request::make(robot_, loads_, path, problem);
+  if (!request || !request->solve_at_once()) return std::nullopt;
   return request->written();
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "planning/load.h"
@@ -31,6 +32,9 @@ class Planner {
 
   // `problem.regeneration` is read by make and by the free function, not here.
   Result<Plan> plan(const Path& path, const Problem& problem) const;
+  // The same where closed forms answer it, in some tens of microseconds; nothing where it takes more, or is
+  // an error.
+  std::optional<Plan> plan_at_once(const Path& path, const Problem& problem) const;
   Result<PlanCost> cost(const Path& path, const Problem& problem) const;
 
   // The speed that the deadline needs: the least speed limit under which the path can still be driven in
@@ -40,6 +44,9 @@ class Planner {
   // Energy against duration from the free optimum to near the shortest time: `count` >= 2 deadlines, evenly
   // spaced; only the free optimum where that is the shortest time already.
   Result<std::vector<PlanCost>> pareto(const Path& path, const Problem& problem, std::size_t count) const;
+
+  // What the robot's drive asks for, with that regeneration.
+  const DriveLoads& loads() const { return loads_; }
 
  private:
   Planner(const robot::RobotModel& robot, DriveLoads loads) : robot_(robot), loads_(std::move(loads)) {}

@@ -365,7 +365,7 @@ std::optional<RunAnswer> RunPlanner::closed_form(double price_w) const {
                                             !motors_break(top, -most) && !motors_break(top, most));
   if (lossy || !sure) {
     for (const double t : line->times(128)) {
-      const double v = line->speed(t), q = line->acceleration(t);
+      const auto [way, v, q] = line->state(t);
       if (!sure && motors_break(v, q)) return {};
       if (lossy && (motor_power_[0].power_w(v, q) < 0 || motor_power_[1].power_w(v, q) < 0)) return {};
     }

@@ -35,6 +35,8 @@ class RunPlanner {
                                  const Problem& problem, double start_speed, double end_speed);
 
   Result<RunAnswer> solve(double price_w);
+  // The same where the closed form answers.
+  std::optional<RunAnswer> closed_form(double price_w) const;
 
   const Run& run() const { return *run_; }
   const std::vector<double>& nodes() const { return nodes_; }
@@ -53,7 +55,6 @@ class RunPlanner {
   Result<void> build_grid();
   void build(std::vector<double> nodes);
   Result<void> check_feasible() const;
-  std::optional<RunAnswer> closed_form(double price_w) const;
   bool tighten(const std::vector<double>& z);
   std::vector<double> first_nodes(std::size_t cells) const;
   static std::vector<double> thinned(const std::vector<double>& nodes);

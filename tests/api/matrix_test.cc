@@ -32,9 +32,7 @@ class Matrix : public ::testing::Test {
     robot::RobotModel robot = testing::nomad();
     robot.robot_id = id;
     robot.limits.payload_kg = payload_limit_kg;
-    auto drive = dynamics::drive_model(robot);
-    models_[id] = std::make_shared<const server::ModelInForce>(
-        server::ModelInForce{robot, std::move(*drive), static_cast<std::int64_t>(models_.size() + 1)});
+    models_[id] = *server::model_in_force(robot, static_cast<std::int64_t>(models_.size() + 1));
   }
 
   Error error_of(const json& request) {

@@ -157,7 +157,6 @@ void against_the_peer() {
   const double payload = 20;
   const PeerRobot peer{robot.total_mass_kg(payload), robot.mass.yaw_inertia_kg_m2 + 0.02 * payload, 0.02};
   const auto planner = Planner::make(robot);
-  const auto drive = dynamics::drive_model(robot);
   const auto table = CostTable::make(robot, {});
   Problem problem;
   problem.limits = limits_of(robot);
@@ -184,7 +183,8 @@ void against_the_peer() {
                                 PathOptions{.start = {0, 0, start}, .payload_kg = payload});
     const double ramp_s = omega / alpha;
     const double whole_s = angle / omega + ramp_s;
-    const auto driven = ramp_baseline(*drive, *path, std::vector<double>{whole_s}, 0, 0, ramp_s / whole_s);
+    const auto driven =
+        ramp_baseline(planner->loads(), *path, std::vector<double>{whole_s}, 0, 0, ramp_s / whole_s);
     std::printf(
         "  %s: peer %.1f J; ours %.1f J for the same motion, %.1f J for the best one, %.3f us from the "
         "table\n",
@@ -205,10 +205,10 @@ void quantiles(const char* name, std::vector<double> values) {
 
 // The ramp's own best within the limits: the duration by golden section between the shortest that keeps them
 // and ten times the optimum's.
-std::optional<double> best_ramp_cost(const dynamics::DriveModel& model, const Path& run,
-                                     const Problem& problem, double optimum_s, double fraction) {
+std::optional<double> best_ramp_cost(const DriveLoads& loads, const Path& run, const Problem& problem,
+                                     double optimum_s, double fraction) {
   const auto cost = [&](double duration) -> double {
-    const auto b = ramp_baseline(model, run, std::vector<double>{duration}, problem.start_speed_m_s,
+    const auto b = ramp_baseline(loads, run, std::vector<double>{duration}, problem.start_speed_m_s,
                                  problem.end_speed_m_s, fraction);
     if (!b) return 1e300;
     if (!b->keeps(problem.limits)) return 1e300;
@@ -244,13 +244,13 @@ void savings() {
     const double cost = energy + p.problem.value_of_time_w * duration;
     for (int shape : {0, 1}) {
       const double fraction = shape == 0 ? 1.0 / 3 : 0.5;
-      const auto same = ramp_baseline(loads->model(), run, std::vector<double>{duration},
-                                      p.problem.start_speed_m_s, p.problem.end_speed_m_s, fraction);
+      const auto same = ramp_baseline(*loads, run, std::vector<double>{duration}, p.problem.start_speed_m_s,
+                                      p.problem.end_speed_m_s, fraction);
       if (same) {
         equal[shape].push_back(1 - energy / same->energy_j);
         if (same->keeps(p.problem.limits)) driveable[shape].push_back(equal[shape].back());
       }
-      if (const auto best = best_ramp_cost(loads->model(), run, p.problem, duration, fraction))
+      if (const auto best = best_ramp_cost(*loads, run, p.problem, duration, fraction))
         free_time[shape].push_back(1 - cost / *best);
     }
   }

@@ -124,6 +124,7 @@ TEST_F(PipelineTest, ALongSilenceMakesTheMissionIncomplete) {
   EXPECT_TRUE(mission.incomplete);
   EXPECT_EQ(mission.gap_count, 1);
   EXPECT_NEAR(mission.gap_s, 101 * 0.02, 1e-9);
+  EXPECT_EQ(harness.faults(IngestFault::gap), 1u);
 }
 
 TEST_F(PipelineTest, ARobotThatBootsGoesOnWithItsMission) {
@@ -188,6 +189,8 @@ TEST_F(PipelineTest, AMissionNeverFinishedIsMarked) {
   const auto mission = harness.missions().at(0);
   EXPECT_EQ(mission.state, history::MissionState::unfinished);
   EXPECT_TRUE(mission.incomplete);
+  EXPECT_EQ(harness.counters.missions_started[0], 1u);
+  EXPECT_EQ(harness.counters.missions_ended[static_cast<std::size_t>(history::MissionState::unfinished)], 1u);
 }
 
 TEST_F(PipelineTest, AStartSupersedesTheOpenMission) {

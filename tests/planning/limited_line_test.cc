@@ -94,8 +94,9 @@ TEST(LimitedLine, CostsWhatTheNumericalSolverFinds) {
     const double w = problem.value_of_time_w;
     const double ours = closed->summary.energy_j + w * closed->summary.duration_s,
                  theirs = numeric->summary.energy_j + w * numeric->summary.duration_s;
-    // Both are integrated along their own rows, through friction that fades below 0.005 rad/s.
-    EXPECT_LT(ours, theirs * (1 + 2e-5));
+    // Both are integrated along their own rows, through friction that fades below 0.005 rad/s. The solver's
+    // many rows see that, a ramp's few do not: some milliseconds of dry friction at each end.
+    EXPECT_LT(ours, theirs * (1 + 1e-4));
     EXPECT_GT(ours, theirs * (1 - 3e-4)) << robot.robot_id << " " << distance;
   }
 }

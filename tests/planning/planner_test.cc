@@ -38,6 +38,26 @@ TEST(Planner, StraightWithoutLimitsIsTheThesisClosedForm) {
   }
 }
 
+TEST(Planner, AnswersAtOnceWhatClosedFormsAnswer) {
+  const auto planner = Planner::make(test::nomad());
+  Problem problem;
+  problem.limits = limits_of(test::nomad());
+  const Path line = made({Straight{10}});
+  const auto at_once = planner->plan_at_once(line, problem);
+  const auto answer = planner->plan(line, problem);
+  ASSERT_TRUE(at_once && answer);
+  EXPECT_EQ(at_once->profile.energy_j, answer->profile.energy_j);
+  EXPECT_EQ(at_once->ledger.value, answer->ledger.value);
+  EXPECT_EQ(at_once->certificate.binding, answer->certificate.binding);
+  EXPECT_FALSE(planner->plan_at_once(made({Arc{2, 1}, Straight{3}}), problem));
+  EXPECT_FALSE(planner->plan_at_once(made({Straight{10}, TurnInPlace{1}, Straight{1}}), problem));
+  problem.deadline_s = 100;
+  EXPECT_FALSE(planner->plan_at_once(line, problem));
+  problem.deadline_s.reset();
+  problem.start_speed_m_s = 5;  // over the limit: an error
+  EXPECT_FALSE(planner->plan_at_once(line, problem));
+}
+
 // The solver on a problem whose closed form is known: a regeneration of 1 - 1e-9 keeps the closed form out.
 TEST(Planner, SolverConvergesToTheClosedFormWithSecondOrder) {
   const robot::RobotModel robot = test::amr();

@@ -69,8 +69,10 @@ TEST(StraightPower, OverDistanceIsTheSamePower) {
 }
 
 // Tables 2-3 and 2-4: a trapezoid of 10 m whose acceleration and braking take a quarter of the time each.
-// FACTS: nu = 0.039 and not the printed 0.035. One digit more, 0.0393, comes from the first row's motor
-// column alone; all other rows are predictions. I_w is the disc m_w r^2/2, which the thesis does not print.
+// FACTS: nu = 0.039 and not the printed 0.035. With exactly 0.039 the motor column holds to 1.4 % and the
+// combined one to 2.5 %; but a nu of two digits is known to 0.0005 only, which moves every row by 1.3 %.
+// 0.0393, which rounds to it and comes from the first row's motor column alone, holds 2 % in every row. I_w
+// is the disc m_w r^2/2, which the thesis does not print.
 TEST(StraightPower, ReproducesTables23And24) {
   struct Row {
     double duration_s, payload_kg, motor_j, combined_j;
@@ -80,21 +82,29 @@ TEST(StraightPower, ReproducesTables23And24) {
                       {11, 3.76, 98.85, 102.9},
                       {15, 0, 71.9, 73.15},
                       {15, 7.6, 71.88, 74.25}};
-  robot::RobotModel robot = test::p3dx();
-  robot.motor.viscous_friction_nm_s_rad = 0.0393;
-  robot.mass.wheel_inertia_kg_m2 = 1.48 * 0.095 * 0.095 / 2;
-  const double rho = 0.7 / (0.88 * 0.88);
-  QuadraticPower motor = dynamics::wheel_power(rho, 1, 0.0713, 0.0393, 0);
-  motor += motor;
-  for (const Row& row : rows) {
+  struct Energies {
+    double motor_j, combined_j;
+  };
+  const auto energies = [](const Row& row, double nu) {
+    robot::RobotModel robot = test::p3dx();
+    robot.motor.viscous_friction_nm_s_rad = nu;
+    robot.mass.wheel_inertia_kg_m2 = 1.48 * 0.095 * 0.095 / 2;
+    QuadraticPower motor = dynamics::wheel_power(0.7 / (0.88 * 0.88), 1, 0.0713, nu, 0);
+    motor += motor;
     LineTask task{dynamics::straight_power(robot, row.payload_kg).over_distance(), 10};
-    const auto combined = ramp_in_time(task, row.duration_s, 0.25);
-    ASSERT_TRUE(combined);
-    EXPECT_NEAR(combined->energy_j(), row.combined_j, 0.02 * row.combined_j) << row.duration_s;
+    const double combined_j = ramp_in_time(task, row.duration_s, 0.25)->energy_j();
     task.power = motor.rescaled(0.095);
-    const auto alone = ramp_in_time(task, row.duration_s, 0.25);
-    ASSERT_TRUE(alone);
-    EXPECT_NEAR(alone->energy_j(), row.motor_j, 0.02 * row.motor_j) << row.duration_s;
+    return Energies{ramp_in_time(task, row.duration_s, 0.25)->energy_j(), combined_j};
+  };
+  for (const Row& row : rows) {
+    const Energies fitted = energies(row, 0.0393);
+    EXPECT_NEAR(fitted.motor_j, row.motor_j, 0.02 * row.motor_j) << row.duration_s;
+    EXPECT_NEAR(fitted.combined_j, row.combined_j, 0.02 * row.combined_j) << row.duration_s;
+    const Energies rounded = energies(row, 0.039), above = energies(row, 0.0395);
+    EXPECT_NEAR(rounded.motor_j, row.motor_j, 0.02 * row.motor_j) << row.duration_s;
+    EXPECT_NEAR(rounded.combined_j, row.combined_j,
+                0.02 * row.combined_j + above.combined_j - rounded.combined_j)
+        << row.duration_s;
   }
 }
 

@@ -109,6 +109,13 @@ class HttpServerTest : public ::testing::Test {
       alive_ = response.stream;
       return response;
     });
+    row(Method::post, "/sometimes-brief", http::Run::worker,
+        [](const Request&) -> Result<Response> { return json_response("\"worker\""); });
+    rows.back().request_schema = "any";
+    rows.back().brief = [](const Request& request) -> std::optional<Response> {
+      if (!request.json->at("quick").get<bool>()) return std::nullopt;
+      return json_response("\"brief\"");
+    };
     row(Method::get, "/fault", http::Run::io,
         [](const Request&) -> Result<Response> { return fail(Fault::internal, "", "secret cause"); });
     row(Method::get, "/throws", http::Run::worker,
@@ -347,6 +354,26 @@ TEST_F(HttpServerTest, RefusesWorkBeyondTheQueue) {
   io.send(get_text("/echo/still-alive"));
   EXPECT_EQ(io.reply().status, 200U);
   EXPECT_GE(recorder_.count(Refusal::worker_queue), 1);
+}
+
+TEST_F(HttpServerTest, AnswersBriefRequestsWithoutAWorker) {
+  start({.worker_threads = 1, .worker_queue = 1});
+  const auto ask = [](RawClient& client, const std::string& body) {
+    client.send(post_text("/sometimes-brief", body, "Content-Type: application/json\r\n"));
+    return client.reply();
+  };
+  RawClient client(port());
+  EXPECT_EQ(ask(client, R"({"quick": true})").body, "\"brief\"");
+  EXPECT_EQ(ask(client, R"({"quick": false})").body, "\"worker\"");
+  EXPECT_EQ(ask(client, R"({"quick": 1})").body, "\"worker\"");  // what throws is the handler's to tell
+  EXPECT_EQ(ask(client, R"({"quick": tr)").status, 400U);
+  const std::string much =
+      R"({"quick": true, "padding": ")" + std::string(Router::brief_body_bytes, 'x') + "\"}";
+  EXPECT_EQ(ask(client, much).body, "\"worker\"");
+  RawClient running(port());
+  running.send(get_text("/blocked"));
+  ASSERT_TRUE(soon([&] { return blocked_ == 1; }));
+  EXPECT_EQ(ask(client, R"({"quick": true})").body, "\"brief\"");
 }
 
 TEST_F(HttpServerTest, NamesTheRequestAndKeepsItsOwnFaultsToItself) {

@@ -1,4 +1,4 @@
-# Runs a test of the page on copies in the build folder, so that nothing is installed into the tree. TEST=packages only
+# Runs a test of the page on copies in the build folder, so that nothing is installed into the tree. RUN=packages only
 # brings what the tests need from the npm registry, for tests that then run without a network.
 function(prepare folder)
   set(place ${BINARY}/${folder})
@@ -20,11 +20,11 @@ function(prepare folder)
   endif()
 endfunction()
 
-if(TEST STREQUAL packages)
+if(RUN STREQUAL packages)
   prepare(server/web)
   prepare(tests/web)
   return()
-elseif(TEST STREQUAL bundle)
+elseif(RUN STREQUAL bundle)
   prepare(server/web)
   set(command ${NODE} build.mjs --check)
   set(folder ${BINARY}/server/web)
