@@ -4,6 +4,17 @@
 #include <utility>
 
 namespace joulecast::dynamics {
+namespace {
+
+template <class S>
+S brush_voltage(const Parameters<S>& p, S current_a) {
+  if constexpr (std::is_same_v<S, double>) {
+    if (p.brush_drop_v == 0) return 0;  // no derivative to keep
+  }
+  return p.brush_drop_v * smooth_sign(current_a, brush_width_a);
+}
+
+}  // namespace
 
 template <class S>
 template <class Values>
@@ -91,15 +102,7 @@ template <class S>
 S BasicDriveModel<S>::voltage_for(std::size_t side, S current_a, const Instant& at) const {
   const Parameters<S>& p = parameters_;
   return resistance(side, at) * current_a + p.inductance_h * at.current_slope_a_s[side] +
-         p.voltage_constant_v_s_rad * at.wheel_speed_rad_s[side] + brush_voltage(current_a);
-}
-
-template <class S>
-S BasicDriveModel<S>::brush_voltage(S current_a) const {
-  if constexpr (std::is_same_v<S, double>) {
-    if (parameters_.brush_drop_v == 0) return 0;  // no derivative to keep
-  }
-  return parameters_.brush_drop_v * smooth_sign(current_a, brush_width_a);
+         p.voltage_constant_v_s_rad * at.wheel_speed_rad_s[side] + brush_voltage(p, current_a);
 }
 
 template <class S>
@@ -128,7 +131,7 @@ PowerFlow<S> BasicDriveModel<S>::flow(const Instant& at) const {
     f.motor_power_w[s] = f.voltage_v[s] * f.current_a[s];
 
     f.copper_w += resistance(s, at) * f.current_a[s] * f.current_a[s];
-    f.brush_w += brush_voltage(f.current_a[s]) * f.current_a[s];
+    f.brush_w += brush_voltage(p, f.current_a[s]) * f.current_a[s];
     // Field energy of the winding, and what unequal SI values of K_t and K_w leave over, are stored or lost
     // in the motor.
     f.kinetic_w += p.inductance_h * at.current_slope_a_s[s] * f.current_a[s];

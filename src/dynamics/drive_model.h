@@ -76,7 +76,6 @@ class BasicDriveModel {
   S metered_battery_power(S power_w, double battery_voltage_v) const;
 
  private:
-  S brush_voltage(S current_a) const;
   template <class Values>
   void apply(std::span<const ActiveEffect> effects, Values&& values_of);
 
