@@ -14,8 +14,7 @@ namespace {
 using nlohmann::json;
 
 server::ModelInForce model() {
-  const robot::RobotModel robot = testing::nomad();
-  return {robot, *dynamics::drive_model(robot), 3};
+  return **server::model_in_force(testing::nomad(), 3);
 }
 
 json answer(Result<std::string> (*question)(const json&, const server::ModelInForce&), const json& request) {
