@@ -1,6 +1,7 @@
 #include "planning/cost_table.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -14,8 +15,10 @@ constexpr double shortest_leg_m = 1e-3;
 constexpr double smallest_turn_rad = 1e-3;
 // Tables are refined until their error is below this, or their nodes number the most.
 constexpr double wanted_error = 2e-4;
-constexpr std::size_t first_lengths_per_decade = 8, most_lengths_per_decade = 32;
+constexpr double first_lengths_per_decade = 8, most_lengths_per_decade = 32;
 constexpr std::size_t first_payloads = 5, most_payloads = 17;
+// How closely cost must follow its line beyond the knee: the numerical solver's own noise.
+constexpr double straightness = 1e-5;
 
 // Weights of the cubic through four equally spaced points, `x` of a step beyond the second.
 std::array<double, 4> cubic(double x) {
@@ -23,46 +26,86 @@ std::array<double, 4> cubic(double x) {
   return {-x * b * c / 6, a * b * c / 2, -a * x * c / 2, a * x * b / 6};
 }
 
+// The first of the four nodes about a place among `count`, and their weights.
+std::pair<std::size_t, std::array<double, 4>> place(double at, std::size_t count) {
+  const auto cell = std::min(static_cast<std::size_t>(at), count - 2);
+  const std::size_t first = std::min(cell > 0 ? cell - 1 : 0, count - 4);
+  return {first, cubic(at - static_cast<double>(first) - 1)};
+}
+
 }  // namespace
 
-void CostTable::Grid::fill(const Solve& solve, std::size_t payloads, std::size_t lengths, CostTable& table) {
-  payloads_ = payloads;
-  lengths_ = lengths;
-  nodes_.clear();
-  nodes_.reserve(payloads * lengths);
-  for (std::size_t p = 0; p < payloads; ++p) {
-    const double payload =
-        payloads > 1 ? payload_limit_kg_ * static_cast<double>(p) / static_cast<double>(payloads - 1) : 0;
-    for (std::size_t k = 0; k < lengths; ++k) {
-      const double length = std::exp(log_shortest_ + static_cast<double>(k) / per_log_);
-      const auto cost = solve(length, payload);
-      ++table.solves_;
-      if (cost) {
-        nodes_.push_back({cost->energy_j / length, cost->duration_s / length});
-      } else {
-        nodes_.push_back({std::nan(""), std::nan("")});
-        if (!table.obstacle_) table.obstacle_ = cost.error();
-      }
-    }
+double CostTable::Grid::payload_of(double row) const {
+  return rows_.size() > 1 ? payload_limit_kg_ * row / static_cast<double>(rows_.size() - 1) : 0;
+}
+
+// Finds the knee: beyond it the cost follows the line through two long motions.
+CostTable::Grid::Row CostTable::Grid::row(const Solve& solve, double payload_kg, double longest,
+                                          CostTable& table) const {
+  Row row;
+  row.knee = longest;
+  const auto far = solve(longest, payload_kg), near = solve(0.5 * longest, payload_kg);
+  table.solves_ += 2;
+  if (!far || !near) {
+    if (!table.obstacle_) table.obstacle_ = far ? near.error() : far.error();
+    row.at_knee = row.per_length = {std::nan(""), std::nan("")};
+    return row;
+  }
+  row.per_length = {(far->energy_j - near->energy_j) / (0.5 * longest),
+                    (far->duration_s - near->duration_s) / (0.5 * longest)};
+  row.at_knee = *far;
+  const auto on_line = [&](double length) {
+    const auto cost = solve(length, payload_kg);
+    ++table.solves_;
+    if (!cost) return false;
+    const double rest = longest - length;
+    return std::fabs(far->energy_j - rest * row.per_length.energy_j - cost->energy_j) <=
+               straightness * cost->energy_j &&
+           std::fabs(far->duration_s - rest * row.per_length.duration_s - cost->duration_s) <=
+               straightness * cost->duration_s;
+  };
+  double low = log_shortest_, high = std::log(0.25 * longest);
+  if (!on_line(std::exp(high))) return row;
+  while (high - low > 0.02) {
+    const double middle = 0.5 * (low + high);
+    (on_line(std::exp(middle)) ? high : low) = middle;
+  }
+  row.knee = std::exp(high);
+  row.at_knee = *solve(row.knee, payload_kg);
+  return row;
+}
+
+void CostTable::Grid::fill(const Solve& solve, Row& row, double payload_kg, std::size_t lengths,
+                           CostTable& table) const {
+  row.per_log = static_cast<double>(lengths - 1) / (std::log(row.knee) - log_shortest_);
+  row.nodes.clear();
+  for (std::size_t k = 0; k < lengths; ++k) {
+    const double length = std::exp(log_shortest_ + static_cast<double>(k) / row.per_log);
+    const auto cost = solve(length, payload_kg);
+    ++table.solves_;
+    if (!cost && !table.obstacle_) table.obstacle_ = cost.error();
+    row.nodes.push_back(cost ? Node{cost->energy_j / length, cost->duration_s / length}
+                             : Node{std::nan(""), std::nan("")});
   }
 }
 
-double CostTable::Grid::error_against(const Solve& solve, CostTable& table) const {
+double CostTable::Grid::error_against(const Solve& solve, double longest, CostTable& table) const {
   double worst = 0;
-  for (std::size_t p = 0; p + 1 < std::max<std::size_t>(payloads_, 2); ++p) {
-    const double payload = payloads_ > 1 ? payload_limit_kg_ * (static_cast<double>(p) + 0.5) /
-                                               static_cast<double>(payloads_ - 1)
-                                         : 0;
-    for (std::size_t k = 0; k + 1 < lengths_; ++k) {
-      const double length = std::exp(log_shortest_ + (static_cast<double>(k) + 0.5) / per_log_);
-      const auto exact = solve(length, payload);
-      ++table.solves_;
-      if (!exact) continue;
-      const LegCost ours = at(length, payload);
-      if (!std::isfinite(ours.energy_j)) continue;
-      worst = std::max({worst, std::fabs(ours.energy_j / exact->energy_j - 1),
-                        std::fabs(ours.duration_s / exact->duration_s - 1)});
-    }
+  const auto compare = [&](double length, double payload) {
+    const auto exact = solve(length, payload);
+    ++table.solves_;
+    const LegCost ours = at(length, payload);
+    if (!exact || !std::isfinite(ours.energy_j)) return;
+    worst = std::max({worst, std::fabs(ours.energy_j / exact->energy_j - 1),
+                      std::fabs(ours.duration_s / exact->duration_s - 1)});
+  };
+  for (std::size_t p = 0; p + 1 < std::max<std::size_t>(rows_.size(), 2); ++p) {
+    const double payload = payload_of(static_cast<double>(p) + 0.5);
+    const Row& row = rows_[p];
+    for (std::size_t k = 0; k + 1 < row.nodes.size(); ++k)
+      compare(std::exp(log_shortest_ + (static_cast<double>(k) + 0.5) / row.per_log), payload);
+    for (const double beyond : {1.1, 1.5, 4.0})
+      if (beyond * row.knee < longest) compare(beyond * row.knee, payload);
   }
   return worst;
 }
@@ -72,57 +115,56 @@ void CostTable::Grid::build(const Solve& solve, double shortest, double longest,
   shortest_ = shortest;
   log_shortest_ = std::log(shortest);
   payload_limit_kg_ = payload_limit_kg;
-  const double range = std::log(longest / shortest);
   std::size_t payloads = payload_limit_kg > 0 ? first_payloads : 1;
   double error = 0;
-  for (std::size_t per_decade = first_lengths_per_decade; per_decade <= most_lengths_per_decade;
-       per_decade *= 2) {
-    const auto lengths =
-        static_cast<std::size_t>(std::ceil(range / std::log(10.0) * static_cast<double>(per_decade)) + 1);
-    per_log_ = static_cast<double>(lengths - 1) / range;
-    fill(solve, payloads, lengths, table);
-    error = error_against(solve, table);
+  for (double per_decade = first_lengths_per_decade; per_decade <= most_lengths_per_decade; per_decade *= 2) {
+    rows_.assign(payloads, Row());
+    double decades = 0;
+    for (std::size_t p = 0; p < payloads; ++p) {
+      rows_[p] = row(solve, payload_of(static_cast<double>(p)), longest, table);
+      decades = std::max(decades, std::log10(rows_[p].knee / shortest));
+    }
+    const auto lengths = static_cast<std::size_t>(std::max(4.0, std::ceil(decades * per_decade) + 1));
+    for (std::size_t p = 0; p < payloads; ++p)
+      fill(solve, rows_[p], payload_of(static_cast<double>(p)), lengths, table);
+    error = error_against(solve, longest, table);
     if (error <= wanted_error) break;
     if (payloads > 1 && payloads < most_payloads) payloads = 2 * payloads - 1;
   }
   table.interpolation_error_ = std::max(table.interpolation_error_, error);
 }
 
-CostTable::Grid::Node CostTable::Grid::along(std::size_t payload, std::size_t first,
-                                             const std::array<double, 4>& weight) const {
-  const Node* node = &nodes_[payload * lengths_ + first];
+LegCost CostTable::Grid::along(const Row& row, double length, double log_length) const {
+  if (length >= row.knee) {
+    const double more = length - row.knee;
+    return {row.at_knee.energy_j + more * row.per_length.energy_j,
+            row.at_knee.duration_s + more * row.per_length.duration_s};
+  }
+  const auto [first, weight] =
+      place(std::max(0.0, (log_length - log_shortest_) * row.per_log), row.nodes.size());
   Node sum;
   for (std::size_t i = 0; i < 4; ++i) {
-    sum.energy_per_length += weight[i] * node[i].energy_per_length;
-    sum.duration_per_length += weight[i] * node[i].duration_per_length;
+    sum.energy_per_length += weight[i] * row.nodes[first + i].energy_per_length;
+    sum.duration_per_length += weight[i] * row.nodes[first + i].duration_per_length;
   }
-  return sum;
+  // Below the first node distance and time are those of a motion without speed worth mentioning: as its root.
+  const double scale = length < shortest_ ? std::sqrt(length * shortest_) : length;
+  return {sum.energy_per_length * scale, sum.duration_per_length * scale};
 }
 
 LegCost CostTable::Grid::at(double length, double payload_kg) const {
   if (!(length > 0)) return {};
-  // Below the first node distance and time are those of a motion without speed worth mentioning: as its root.
-  const double scale = length < shortest_ ? std::sqrt(length * shortest_) : length;
-  const double x = std::max(0.0, (std::log(length) - log_shortest_) * per_log_);
-  const auto place = [](double at, std::size_t count) {
-    const auto cell = std::min(static_cast<std::size_t>(at), count - 2);
-    const std::size_t first = std::min(cell > 0 ? cell - 1 : 0, count - 4);
-    return std::pair(first, cubic(at - static_cast<double>(first) - 1));
-  };
-  const auto [first, weight] = place(x, lengths_);
-  Node node;
-  if (payloads_ == 1 || payload_kg == 0) {
-    node = along(0, first, weight);
-  } else {
-    const auto [row, share] =
-        place(payload_kg / payload_limit_kg_ * static_cast<double>(payloads_ - 1), payloads_);
-    for (std::size_t i = 0; i < 4; ++i) {
-      const Node part = along(row + i, first, weight);
-      node.energy_per_length += share[i] * part.energy_per_length;
-      node.duration_per_length += share[i] * part.duration_per_length;
-    }
+  const double log_length = std::log(length);
+  if (rows_.size() == 1 || payload_kg == 0) return along(rows_[0], length, log_length);
+  const auto [first, share] =
+      place(payload_kg / payload_limit_kg_ * static_cast<double>(rows_.size() - 1), rows_.size());
+  LegCost sum;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const LegCost part = along(rows_[first + i], length, log_length);
+    sum.energy_j += share[i] * part.energy_j;
+    sum.duration_s += share[i] * part.duration_s;
   }
-  return {node.energy_per_length * scale, node.duration_per_length * scale};
+  return sum;
 }
 
 Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOptions& options) {

@@ -60,7 +60,8 @@ class CostTable {
   std::size_t solves() const { return solves_; }  // planner calls that it took
 
  private:
-  // One kind of motion over a grid of payloads and logarithms of length.
+  // One kind of motion over a grid of payloads and logarithms of length. Beyond a knee, where a motion
+  // reaches its cruising speed, cost is linear in the length.
   class Grid {
    public:
     using Solve = std::function<Result<LegCost>(double length, double payload_kg)>;
@@ -72,13 +73,20 @@ class CostTable {
     struct Node {
       double energy_per_length = 0, duration_per_length = 0;
     };
-    void fill(const Solve& solve, std::size_t payloads, std::size_t lengths, CostTable& table);
-    double error_against(const Solve& solve, CostTable& table) const;
-    Node along(std::size_t payload, std::size_t first, const std::array<double, 4>& weight) const;
+    // One payload.
+    struct Row {
+      double knee = 0, per_log = 1;
+      LegCost at_knee, per_length;  // cost there, and what a unit of length more costs
+      std::vector<Node> nodes;      // from the shortest length to the knee
+    };
+    double payload_of(double row) const;
+    Row row(const Solve& solve, double payload_kg, double longest, CostTable& table) const;
+    void fill(const Solve& solve, Row& row, double payload_kg, std::size_t lengths, CostTable& table) const;
+    LegCost along(const Row& row, double length, double log_length) const;
+    double error_against(const Solve& solve, double longest, CostTable& table) const;
 
-    double shortest_ = 1, log_shortest_ = 0, per_log_ = 1, payload_limit_kg_ = 0;
-    std::size_t payloads_ = 1, lengths_ = 0;
-    std::vector<Node> nodes_;  // payload by payload
+    double shortest_ = 1, log_shortest_ = 0, payload_limit_kg_ = 0;
+    std::vector<Row> rows_;  // payloads from none to the limit
   };
 
   Grid straight_, turn_;
