@@ -15,10 +15,11 @@ constexpr double shortest_leg_m = 1e-3;
 constexpr double smallest_turn_rad = 1e-3;
 // Tables are refined until their error is below this, or their nodes number the most.
 constexpr double wanted_error = 2e-4;
+constexpr double wanted_of_numerical = 2e-3;  // whose solves cost two hundred times as much
 constexpr double first_lengths_per_decade = 8, most_lengths_per_decade = 32;
 constexpr std::size_t first_payloads = 5, most_payloads = 17;
-// How closely cost must follow its line beyond the knee: the numerical solver's own noise.
-constexpr double straightness = 1e-5;
+// How closely cost must follow its line beyond the knee. The numerical solver's own noise is above the first.
+constexpr double straightness = 1e-5, straightness_of_numerical = 4e-4;
 
 // Weights of the cubic through four equally spaced points, `x` of a step beyond the second.
 std::array<double, 4> cubic(double x) {
@@ -58,11 +59,11 @@ CostTable::Grid::Row CostTable::Grid::row(const Solve& solve, double payload_kg,
     const auto cost = solve(length, payload_kg);
     ++table.solves_;
     if (!cost) return false;
-    const double rest = longest - length;
+    const double rest = longest - length, bound = table.numerical_ ? straightness_of_numerical : straightness;
     return std::fabs(far->energy_j - rest * row.per_length.energy_j - cost->energy_j) <=
-               straightness * cost->energy_j &&
+               bound * cost->energy_j &&
            std::fabs(far->duration_s - rest * row.per_length.duration_s - cost->duration_s) <=
-               straightness * cost->duration_s;
+               bound * cost->duration_s;
   };
   double low = log_shortest_, high = std::log(0.25 * longest);
   if (!on_line(std::exp(high))) return row;
@@ -128,7 +129,7 @@ void CostTable::Grid::build(const Solve& solve, double shortest, double longest,
     for (std::size_t p = 0; p < payloads; ++p)
       fill(solve, rows_[p], payload_of(static_cast<double>(p)), lengths, table);
     error = error_against(solve, longest, table);
-    if (error <= wanted_error) break;
+    if (error <= (table.numerical_ ? wanted_of_numerical : wanted_error)) break;
     if (payloads > 1 && payloads < most_payloads) payloads = 2 * payloads - 1;
   }
   table.interpolation_error_ = std::max(table.interpolation_error_, error);
@@ -184,7 +185,7 @@ Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOpti
   problem.limits = limits_of(placeless);
   problem.value_of_time_w = options.value_of_time_w;
   const auto solver = [&](int turn) {
-    return [&planner, &problem, turn](double length, double payload_kg) -> Result<LegCost> {
+    return [&planner, &problem, &table, turn](double length, double payload_kg) -> Result<LegCost> {
       Path path;
       Run run;
       run.turn = turn;
@@ -194,6 +195,7 @@ Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOpti
       path.final_payload_kg = payload_kg;
       const auto cost = planner->cost(path, problem);
       if (!cost) return tl::unexpected(cost.error());
+      table.numerical_ = table.numerical_ || !cost->closed_form;
       return LegCost{cost->energy_j, cost->duration_s};
     };
   };

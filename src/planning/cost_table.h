@@ -94,6 +94,7 @@ class CostTable {
   std::vector<std::string> neglected_;
   std::optional<Error> obstacle_;
   std::size_t solves_ = 0;
+  bool numerical_ = false;  // some of them by the numerical solver
 };
 
 }  // namespace joulecast::planning

@@ -178,8 +178,9 @@ class Request {
   double average_power_w() const { return energy_j() / duration_s(); }
   double shortest_s() const { return shortest_s_; }
   PlanCost cost() const {
-    PlanCost cost{energy_j(), duration_s(), price_w_, 0};
+    PlanCost cost{energy_j(), duration_s(), price_w_, 0, true};
     for (std::size_t k = 0; k < runs_.size(); ++k) {
+      cost.closed_form = cost.closed_form && answers_[k].line.has_value();
       if (runs_[k].run().turn == 0)
         cost.peak_speed_m_s = std::max(cost.peak_speed_m_s, answers_[k].peak_speed());
     }

@@ -18,6 +18,7 @@ struct PlanCost {
   double duration_s = 0;
   double time_multiplier_w = 0;
   double peak_speed_m_s = 0;
+  bool closed_form = true;  // of every run
 };
 
 // Minimum-energy motion of one robot along paths. Each run between stops is solved in closed form where its

@@ -104,11 +104,18 @@ void single_solves() {
     std::printf("  %-43s  %8.3f us\n", name,
                 1e6 * cost_s([&] { sink += planner->cost(*path, problem)->energy_j; }));
   }
-  const auto table = CostTable::make(test::amr(), {});
-  std::printf("  cost table: %zu planner calls, %.1f ms; a look-up %.3f us; interpolation error %.1e\n",
-              table->solves(),
-              1e3 * cost_s([] { sink += CostTable::make(test::amr(), {})->interpolation_error(); }),
-              1e6 * cost_s([&] { sink += table->straight(10, 20).energy_j; }), table->interpolation_error());
+  for (const robot::RobotModel& robot : test::all_robots()) {
+    for (const double regeneration : {1.0, 0.3}) {
+      const double began = cpu_now_s();
+      const auto table = CostTable::make(robot, {.value_of_time_w = 0, .regeneration = regeneration});
+      const double took = cpu_now_s() - began;
+      std::printf(
+          "  cost table of %-5s regeneration %.1f: %6zu planner calls, %7.1f ms; a look-up %.3f us; error "
+          "%.1e\n",
+          robot.robot_id.c_str(), regeneration, table->solves(), 1e3 * took,
+          1e6 * cost_s([&] { sink += table->straight(10, 5).energy_j; }), table->interpolation_error());
+    }
+  }
 }
 
 void paths() {
