@@ -93,9 +93,9 @@ Result<std::string> answer(const Options& options, const Question& question, con
   if (!options.server.empty()) return ask_server(options, question, request);
   auto robot = robot::load_robot(options.robot_file);
   if (!robot) return tl::unexpected(robot.error());
-  auto drive = dynamics::drive_model(*robot);
-  if (!drive) return tl::unexpected(drive.error());
-  return question.offline(request, {std::move(*robot), std::move(*drive), file_version});
+  const auto model = server::model_in_force(std::move(*robot), file_version);
+  if (!model) return tl::unexpected(model.error());
+  return question.offline(request, **model);
 }
 
 extern const Question profile;
