@@ -296,8 +296,8 @@ int main(int argc, char** argv) {
   }
   const std::string program = argv[1];
   const std::string lcm_url = argc > 2 ? argv[2] : "udpm://239.255.76.67:7701?ttl=0&recv_buf_size=4194304";
-  const double seconds = argc > 3 ? std::atof(argv[3]) : 3;
-  const int rounds = argc > 4 ? std::atoi(argv[4]) : 5;
+  const double seconds = argc > 3 ? std::atof(argv[3]) : 1;
+  const int rounds = argc > 4 ? std::atoi(argv[4]) : 11;
   const std::uint16_t port = free_port();
   const std::string folder =
       (std::filesystem::temp_directory_path() / ("joulecast-service-benchmark-" + std::to_string(::getpid())))
