@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "client/commands/gap_compare.h"
 #include "client/commands/gap_missions.h"
 #include "client/commands/gap_output.h"
 #include "client/commands/table.h"
@@ -21,6 +22,7 @@ struct Options {
   std::string robot_id;
   std::string apply;
   std::string report;
+  std::string compare_by;
   bool json = false;
   GapMissionsOptions missions;
 };
@@ -28,8 +30,14 @@ struct Options {
 void print(const gap::Diagnosis& d) {
   std::printf("%s: %zu missions, %zu samples%s\n", d.robot_id.c_str(), d.missions, d.samples,
               d.motor_channels ? "" : " (no motor channels: judged from battery power and motion alone)");
-  std::printf("gap: energy %+.1f %%, absolute power %.1f %% (noise floor %.1f %%)\n", 100 * d.energy_relative,
-              100 * d.power_absolute_relative, 100 * d.noise_floor);
+  if (d.power == gap::PowerSource::none) {
+    std::printf("gap: no power was recorded; judged from torques\n");
+  } else {
+    std::printf(
+        "gap: energy %+.1f %%, absolute power %.1f %% (noise floor %.1f %%)%s\n", 100 * d.energy_relative,
+        100 * d.power_absolute_relative, 100 * d.noise_floor,
+        d.power == gap::PowerSource::motors ? ", of the motors' power with the file's idle power" : "");
+  }
   const auto verdict = gap::name_of(d.verdict);
   std::printf("verdict: %.*s (probability %.2f)\n", static_cast<int>(verdict.size()), verdict.data(),
               d.verdict_probability);
@@ -72,6 +80,9 @@ Exit run(const Options& options) {
   }
   const auto recordings = gap::load_recordings(options.logs, options.robot_id);
   if (!recordings) return report(recordings.error());
+  if (!options.compare_by.empty())
+    return gap_between_groups(*recordings, *robot, options.compare_by, options.json, options.report,
+                              report_origin(options.logs, options.robot_file));
   const auto diagnosis = gap::diagnose(*recordings, *robot);
   if (!diagnosis) return report(diagnosis.error());
   if (options.json) {
@@ -110,6 +121,13 @@ void add_gap(CLI::App& program, Exit& exit) {
   command->add_flag("--json", options->json, "print the diagnosis as JSON");
   command->add_option("--report", options->report,
                       "write the diagnosis as one HTML page with its maps and plots");
+  command
+      ->add_option(
+          "--compare-by", options->compare_by,
+          "instead of one diagnosis say what changes between groups of missions: those of one prefix of "
+          "the mission id, up to its first '-', or of one suffix, from its last '_'")
+      ->check(CLI::IsMember({"prefix", "suffix"}))
+      ->excludes(missions);
   command->add_option("--apply", options->apply, "write the robot file with the effects found");
   add_gap_trial(*command, exit);
   command->callback([options, command, logs, missions, robot, &exit] {

@@ -213,6 +213,15 @@ Shrinkage held_out(const Fit& fit, const robot::RobotModel& robot, const std::ve
   return s;
 }
 
+// Where the battery is not measured: the motors' power and the idle power of the robot file.
+std::vector<double> power_of_motors(std::span<const Window> windows, const robot::RobotModel& robot) {
+  std::vector<double> power(windows.size());
+  std::ranges::transform(windows, power.begin(), [&](const Window& w) {
+    return robot.idle_power_w + w.motor_power_w[0] + w.motor_power_w[1];
+  });
+  return power;
+}
+
 double found_delay(const FitResult& result) {
   for (const dynamics::ActiveEffect& effect : result.fit.columns->effects_of(result.chosen)) {
     if (effect.effect->info().id == "sensor_delay") return effect.values[0];
@@ -221,6 +230,18 @@ double found_delay(const FitResult& result) {
 }
 
 }  // namespace
+
+std::string_view name_of(PowerSource source) {
+  switch (source) {
+    case PowerSource::battery:
+      return "battery";
+    case PowerSource::motors:
+      return "motors";
+    case PowerSource::none:
+      return "none";
+  }
+  return "";
+}
 
 std::string_view name_of(Verdict verdict) {
   switch (verdict) {
@@ -244,17 +265,23 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
   d.samples = recordings.samples;
   if (const auto adopted = dynamics::active_effects(robot); !adopted) return tl::unexpected(adopted.error());
   const std::vector<Window> windows = make_windows(recordings, robot, settings.parts.windows);
-  const std::vector<double> measured = measured_power(windows);
-  const auto with_battery = std::ranges::count_if(measured, [](double p) { return std::isfinite(p); });
+  std::vector<double> measured = measured_power(windows);
+  const auto known = [](double p) { return std::isfinite(p); };
+  const auto with_battery = std::ranges::count_if(measured, known);
+  if (with_battery == 0) measured = power_of_motors(windows, robot);
+  const auto with_power = std::ranges::count_if(measured, known);
+  d.power = with_battery > 0 ? PowerSource::battery
+            : with_power > 0 ? PowerSource::motors
+                             : PowerSource::none;
   if (windows.size() < fewest_windows) return invalid("log", "holds too little motion to judge");
   d.motor_channels = !without_motor_channels(windows);
   if (with_battery == 0 && !d.motor_channels)
     return invalid("log", "measures neither battery power nor motor current");
   const std::vector<double> modelled = modelled_power(robot, {}, windows);
   const GapSize size = gap_size(measured, modelled);
-  d.energy_relative = size.energy_relative;
-  d.power_absolute_relative = size.absolute_relative;
-  d.noise_floor = noise_floor(windows, measured, modelled);
+  d.energy_relative = with_power > 0 ? size.energy_relative : missing;
+  d.power_absolute_relative = with_power > 0 ? size.absolute_relative : missing;
+  d.noise_floor = with_power > 0 ? noise_floor(windows, measured, modelled) : missing;
   d.where = localise(windows, robot, modelled);
 
   // A delay is linear only while it is short beside the window: what is found is taken out and fitted again.
@@ -269,7 +296,8 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
     moved.electrical_delay_s = delay;
     judged = make_windows(recordings, robot, moved);
   }
-  const std::vector<double> judged_power = measured_power(judged);
+  const std::vector<double> judged_power =
+      d.power == PowerSource::motors ? power_of_motors(judged, robot) : measured_power(judged);
   const Fit& fit = result->fit;
   const ColumnSet& columns = *fit.columns;
   const MovedShares moved(fit, judged);
@@ -341,9 +369,14 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
         d.adoptable.push_back(dynamics::adopt(effects[k]));
       }
     }
-    if (with_battery > 0)
+    if (with_power > 0)
       d.shrinkage = held_out(fit, robot, set, judged, judged_power, measured, modelled, d.noise_floor);
     std::ranges::stable_sort(d.effects, std::greater{}, &DiagnosedEffect::share);
+  }
+  if (d.shrinkage && d.shrinkage->interval[1] < 0) {
+    // What makes missions that it was not fitted to worse is no explanation.
+    d.verdict = Verdict::inconclusive;
+    d.adoptable.clear();
   }
   d.next_drive = next_drives(fit, robot, d);
   return d;

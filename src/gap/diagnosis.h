@@ -55,6 +55,10 @@ struct NextDrive {
   double expected_log_evidence = 0;  // that it adds for telling them apart
 };
 
+// Where the power of the gap comes from; `motors`: their V i, with the idle power of the robot file.
+enum class PowerSource { battery, motors, none };
+std::string_view name_of(PowerSource source);
+
 enum class Verdict { none, effects, outside, inconclusive };
 std::string_view name_of(Verdict verdict);
 
@@ -62,7 +66,8 @@ std::string_view name_of(Verdict verdict);
 struct Diagnosis {
   std::string robot_id;
   std::size_t missions = 0, samples = 0;
-  bool motor_channels = true;          // false: judged from battery power and motion alone
+  bool motor_channels = true;  // false: judged from battery power and motion alone
+  PowerSource power = PowerSource::battery;
   double energy_relative = 0;          // (E_measured - E_model) / E_measured
   double power_absolute_relative = 0;  // integral of |P_measured - P_model| over that of |P_measured|
   double noise_floor = 0;              // the part of it that measurement noise makes

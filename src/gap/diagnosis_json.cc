@@ -25,6 +25,7 @@ json diagnosis_to_json(const Diagnosis& d) {
   out["missions"] = d.missions;
   out["samples"] = d.samples;
   out["motor_channels"] = d.motor_channels;
+  out["power"] = name_of(d.power);
   out["gap"] = {{"energy_relative", number(d.energy_relative)},
                 {"power_absolute_relative", number(d.power_absolute_relative)},
                 {"noise_floor", number(d.noise_floor)}};

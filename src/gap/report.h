@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "gap/compare.h"
 #include "gap/diagnosis.h"
 #include "gap/mission_level.h"
 
@@ -23,6 +24,10 @@ std::string report_html(const Diagnosis& diagnosis, const RecordingSet& recordin
 
 // The same for a diagnosis from energies of runs.
 std::string report_html(const MissionDiagnosis& diagnosis, const robot::RobotModel& robot,
+                        const ReportOrigin& origin);
+
+// The same for a comparison of groups of recordings.
+std::string report_html(const Comparison& comparison, const robot::RobotModel& robot,
                         const ReportOrigin& origin);
 
 }  // namespace joulecast::gap

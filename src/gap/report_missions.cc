@@ -68,7 +68,7 @@ std::string report_html(const MissionDiagnosis& d, const robot::RobotModel& robo
       {percent(d.left_out.before), "mean error of a run, model as it is"},
       {percent(d.left_out.after), "with the effects, on runs left out"},
       {percent(d.scatter), "that scatter from run to run alone makes"},
-      {brief(d.verdict_probability, 2),
+      {probability_text(d.verdict_probability),
        "probability of the verdict \"" + std::string(name_of(d.verdict)) + "\""}};
   page.figures(figures);
   effects_section(page, d.effects, {});

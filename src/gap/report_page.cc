@@ -169,7 +169,13 @@ std::string with_deviation(double value, double deviation, std::string_view unit
 }
 
 std::string percent(double fraction, int digits) {
-  return brief(100 * fraction, digits) + " %";
+  return brief(100 * fraction, digits) + "\u00a0%";
+}
+
+std::string probability_text(double p) {
+  if (p > 0.995) return "above 0.99";
+  if (p < 0.005) return "below 0.01";
+  return fmt::format("{:.2f}", p);
 }
 
 std::string enumerate(std::span<const std::string> items) {
@@ -207,7 +213,7 @@ void effects_section(Page& page, std::span<const DiagnosedEffect> effects,
                             escaped(with_deviation(p.value, p.deviation, p.unit)));
       }
     }
-    card += fmt::format("<p>Probability {}; it closes {} of the gap{}.</p>", brief(e.probability, 2),
+    card += fmt::format("<p>Probability {}; it closes {} of the gap{}.</p>", probability_text(e.probability),
                         percent(e.share), k < costs.size() && !costs[k].empty() ? "; " + costs[k] : "");
     if (known != nullptr) {
       card += fmt::format("<p class=\"quiet\">Formula: {}. Valid for: {}. Source: {}.</p>",

@@ -29,6 +29,7 @@ struct Powers {
   double mean = 0;           // |measured|
   bool from_battery = true;  // otherwise the motors' with the idle power
 
+  bool any_known() const { return mean > 0; }
   bool known(std::size_t k) const { return std::isfinite(measured[k] - before[k]); }
   double gap(std::size_t k) const { return measured[k] - before[k]; }
   double rest(std::size_t k) const { return measured[k] - after[k]; }
@@ -71,6 +72,19 @@ Powers powers_of(const Diagnosis& d, const RecordingSet& recordings, const robot
   return p;
 }
 
+std::string variable_words(const std::string& variable) {
+  static const std::map<std::string, std::string> words{{"speed_m_s", "speed, m/s"},
+                                                        {"acceleration_m_s2", "acceleration, m/s²"},
+                                                        {"yaw_rate_rad_s", "yaw rate, rad/s"},
+                                                        {"payload_kg", "payload, kg"},
+                                                        {"time_s", "time, s"},
+                                                        {"heading_rad", "heading, rad"},
+                                                        {"x_m", "x, m"},
+                                                        {"y_m", "y, m"}};
+  const auto found = words.find(variable);
+  return found == words.end() ? words_of(variable) : found->second;
+}
+
 std::string effect_names(const Diagnosis& d) {
   std::vector<std::string> names;
   for (const DiagnosedEffect& e : d.effects) {
@@ -86,8 +100,11 @@ std::string effect_names(const Diagnosis& d) {
 }
 
 std::string sentence_of(const Diagnosis& d) {
-  const std::string gap = fmt::format("measured battery power and the model's differ by {} of the power",
-                                      percent(d.power_absolute_relative));
+  const std::string gap =
+      std::isfinite(d.power_absolute_relative)
+          ? fmt::format("measured battery power and the model's differ by {} of the power",
+                        percent(d.power_absolute_relative))
+          : std::string("the motors' currents were recorded but no power");
   switch (d.verdict) {
     case Verdict::effects: {
       std::string text = fmt::format("On {} missions {}. {} {} it", d.missions, gap, effect_names(d),
@@ -113,8 +130,11 @@ std::string sentence_of(const Diagnosis& d) {
     case Verdict::inconclusive:
       break;
   }
-  return fmt::format("On {} missions {}. These data do not decide what causes it{}.", d.missions, gap,
-                     d.effects.empty() ? "" : "; likeliest: " + effect_names(d));
+  const bool worse = d.shrinkage && d.shrinkage->interval[1] < 0;
+  return fmt::format(
+      "On {} missions {}. These data do not decide what causes it{}{}.", d.missions, gap,
+      d.effects.empty() ? "" : "; likeliest: " + effect_names(d),
+      worse ? "; but that makes missions left out of the fit worse, so that it is no explanation" : "");
 }
 
 void shrinkage_section(Page& page, const Diagnosis& d) {
@@ -136,13 +156,13 @@ void shrinkage_section(Page& page, const Diagnosis& d) {
       fmt::format("It falls by {} (95 % interval {} to {}, bootstrap over blocks of time). What remains is "
                   "{} times what measurement noise alone makes.",
                   percent(s.fraction), percent(s.interval[0]), percent(s.interval[1]),
-                  brief(s.remaining_over_noise_floor, 2)));
+                  fmt::format("{:.1f}", s.remaining_over_noise_floor)));
   if (d.effects.size() > 1) {
     std::vector<BarRow> shares;
     for (const DiagnosedEffect& e : d.effects)
       shares.push_back({words_of(e.id), "", 100 * e.share, {}, "after"});
     page.chart(
-        bars(shares, " % of the gap", "share of each effect"),
+        bars(shares, " %", "share of the gap that each effect explains"),
         "What each effect takes off the gap, averaged over the orders of adding them (Shapley shares).");
   }
 }
@@ -380,7 +400,7 @@ void where_section(Page& page, const Diagnosis& d, const Powers& p, const robot:
   std::vector<std::vector<std::string>> rows;
   for (const WhereRegion& w : d.where) {
     rows.push_back(
-        {escaped(words_of(w.channel)), escaped(words_of(w.variable)),
+        {escaped(words_of(w.channel)), escaped(variable_words(w.variable)),
          w.label.empty() ? brief(w.from) + " to " + brief(w.to) : escaped(w.label),
          fmt::format("{} [{}, {}]", percent(w.share), percent(w.interval[0], 2), percent(w.interval[1], 2))});
     if (rows.size() >= 12) break;
@@ -440,7 +460,7 @@ std::vector<std::string> limits_of(const Diagnosis& d, const Powers& p) {
         "alone, "
         "so that effects in the motors, the drivers and friction are harder to tell apart.");
   }
-  if (!p.from_battery)
+  if (!p.from_battery && p.any_known())
     limits.emplace_back(
         "The battery was not recorded; power is that of the motors with the file's idle power.");
   const auto any = [&](auto&& measured) { return std::ranges::any_of(p.windows, measured); };
@@ -488,11 +508,12 @@ std::string report_html(const Diagnosis& d, const RecordingSet& recordings, cons
   }
   figures.push_back(
       {percent(d.energy_relative), "of the energy is missed: positive is more than the model says"});
-  figures.push_back({brief(d.verdict_probability, 2),
+  figures.push_back({probability_text(d.verdict_probability),
                      "probability of the verdict \"" + std::string(name_of(d.verdict)) + "\""});
   page.figures(figures);
   std::vector<std::string> costs;
   for (const double w : p.cost) {
+    if (!p.any_known()) break;
     costs.push_back(fmt::format("it changes the power by {} W on average, {} of {} W", brief(w),
                                 percent(w / p.mean), brief(p.mean)));
   }
@@ -502,15 +523,21 @@ std::string report_html(const Diagnosis& d, const RecordingSet& recordings, cons
         "<h3>Outside the catalogue</h3><p>Something shows in {} and follows {}; probability {}. No "
         "effect of the catalogue does that.</p>",
         escaped(words_of(d.outside.channel)), escaped(words_of(d.outside.follows)),
-        brief(d.outside.probability, 2)));
+        probability_text(d.outside.probability)));
   } else {
     page.paragraph(fmt::format("Probability that something outside the catalogue is at work: {}.",
-                               brief(d.outside.probability, 2)));
+                               probability_text(d.outside.probability)));
   }
   shrinkage_section(page, d);
-  where_section(page, d, p, robot);
-  floor_map(page, p);
-  power_section(page, p, recordings);
+  if (p.any_known()) {
+    where_section(page, d, p, robot);
+    floor_map(page, p);
+    power_section(page, p, recordings);
+  } else {
+    page.section("Where the model misses");
+    page.paragraph(
+        "No power was recorded, so that there is no missed power to draw; effects were named from torques.");
+  }
   page.section("What to drive next", "Manoeuvres that would tell apart what these data cannot.");
   if (d.next_drive.empty()) page.paragraph("Nothing is left to tell apart.");
   std::vector<std::vector<std::string>> drives;
@@ -542,7 +569,7 @@ std::string report_html(const Diagnosis& d, const RecordingSet& recordings, cons
                              recordings.unreadable > 0
                                  ? fmt::format("; {} messages could not be read", recordings.unreadable)
                                  : ""));
-  missions_table(page, p, recordings);
+  if (p.any_known()) missions_table(page, p, recordings);
   return page.str();
 }
 

@@ -1,0 +1,95 @@
+#!/usr/bin/env python3
+"""Diagnoses of public recordings, as a user runs them. What they pin follows from the intervals that are printed."""
+import json
+import math
+import os
+
+from harness import Programs, arguments, check, shared_folder, skip
+
+
+def page(path):
+    """A report that needs nothing from outside and says nothing of this machine."""
+    with open(path, encoding="utf-8") as file:
+        text = file.read()
+    check(text.startswith("<!doctype html>") and text.rstrip().endswith("</html>"), f"{path} is a whole page")
+    for foreign in ("http://", "https://", "<script", "<link", os.path.dirname(path)):
+        check(foreign not in text, f"{path} holds {foreign}")
+    for number in ("nan", "inf "):
+        check(f">{number}" not in text and f" {number} " not in text, f"{path} shows {number}")
+    return text
+
+
+def husky(programs, options):
+    """Grip against ice: the resistance to turning changes with the ground, by its own interval."""
+    folder = shared_folder(options, "real", "borealtc_husky")
+    logs = []
+    for day, ground in enumerate(("FLOORING", "ASPHALT", "ICE", "SANDY_LOAM", "SNOW"), start=1):
+        tables = sorted((folder / ground).glob("pro_*.csv"))
+        check(tables, f"no tables of {ground}")
+        logs.append(programs.path(ground + ".lcmlog"))
+        programs.run("import", *tables, "--mapping", f"{options.source}/deploy/import/borealtc_husky.json",
+                     "--start", f"2024-01-0{day}T10:00:00Z", "--out", logs[-1])
+    report = programs.path("husky.html")
+    answer = json.loads(programs.run("gap", *logs, "--robot", f"{options.source}/deploy/robots/borealtc-husky.json",
+                                     "--compare-by", "prefix", "--json", "--report", report))
+    check("Turning scrub" in page(report) or "turning scrub" in page(report), "the report names what changes")
+    check(answer["motor_currents"] and not answer["power_known"], "currents are known, power is not")
+    first = answer["effects"][0]
+    check(first["id"] == "turning_scrub" and first["differs"], f"what changes most is {first['id']}")
+    strengths = first["strengths"]
+    for ground, s in strengths.items():
+        print(f"turning_scrub on {ground:<11} {s['value']:.2f} +- {s['sd']:.2f}")
+    for grip in ("FLOORING", "ASPHALT", "SANDY_LOAM"):
+        # Independent groups: their difference has the sum of their variances; 2 sd one-sided.
+        spread = math.hypot(strengths[grip]["sd"], strengths["ICE"]["sd"])
+        check(strengths[grip]["value"] - strengths["ICE"]["value"] > 2 * spread,
+              f"scrub on {grip} is above that on ice")
+    # A floor grips with 0.7 to 1.2 of the weight.
+    s = strengths["FLOORING"]
+    check(s["value"] + 2 * s["sd"] > 0.7 and s["value"] - 2 * s["sd"] < 1.2, "scrub on flooring is a friction coefficient")
+
+
+def warthog(programs, options):
+    """Currents held for a second, one sign in doubt, a guessed motor: no name may be sure."""
+    folder = shared_folder(options, "real", "warthog_grass")
+    log, report = programs.path("warthog.lcmlog"), programs.path("warthog.html")
+    programs.run("import", *sorted(folder.glob("*.csv")), "--mapping",
+                 f"{options.source}/deploy/import/warthog_grass.json", "--out", log)
+    answer = json.loads(programs.run("gap", log, "--robot", f"{options.source}/deploy/robots/warthog-grass.json",
+                                     "--json", "--report", report))
+    print("warthog:", answer["verdict"], [e["id"] for e in answer["effects"]], "gap", answer["gap"])
+    page(report)
+    check(answer["verdict"] in ("inconclusive", "outside"), f"warthog: {answer['verdict']} is too sure")
+
+
+def gears(programs, options):
+    """The competition robot: whatever is named is judged on runs left out, with the motors' own power."""
+    folder = shared_folder(options, "real", "frc3314_drivetrain")
+    for gear in ("low", "high"):
+        log, robot = programs.path(gear + ".lcmlog"), programs.path(f"fitted-{gear}.json")
+        programs.run("import", *sorted(folder.glob(f"*_{gear}.csv")), "--mapping",
+                     f"{options.source}/deploy/import/frc3314_{gear}.json", "--start", "2019-02-16T10:00:00Z",
+                     "--out", log)
+        programs.run("calibrate", "drive", log, "--method", "whole", "--robot",
+                     f"{options.source}/deploy/robots/frc3314-{gear}.json", "--out", robot)
+        report = programs.path(gear + ".html")
+        answer = json.loads(programs.run("gap", log, "--robot", robot, "--json", "--report", report))
+        page(report)
+        print(f"{gear} gear, fitted:", answer["verdict"], [(e["id"], e["parameters"]) for e in answer["effects"]],
+              "outside", answer["outside"], "shrinkage", answer["shrinkage"])
+        check(answer["power"] == "motors", f"{gear}: power is {answer['power']}")
+        check(answer["gap"]["power_absolute_relative"] > 0.05, f"{gear}: the fitted model still misses power")
+        check(answer["verdict"] != "none", f"{gear}: the gap is there, so that none is wrong")
+
+
+def main():
+    options = arguments()
+    if not os.path.isdir(options.shared):
+        skip("no recordings beside the project")
+    programs = Programs(options)
+    husky(programs, options)
+    warthog(programs, options)
+    gears(programs, options)
+
+
+main()
