@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -47,11 +48,16 @@ void print(const gap::Diagnosis& d) {
                 d.outside.follows.c_str(), d.outside.probability);
   }
   if (d.shrinkage) {
-    std::printf(
-        "held-out gap: %.1f %% -> %.1f %%, shrinks by %.0f %% [%.0f, %.0f]; remaining is %.1f noise floors\n",
-        100 * d.shrinkage->before, 100 * d.shrinkage->after, 100 * d.shrinkage->fraction,
-        100 * d.shrinkage->interval[0], 100 * d.shrinkage->interval[1],
-        d.shrinkage->remaining_over_noise_floor);
+    std::printf("held-out gap: %.1f %% -> %.1f %%, shrinks by %.0f %% [%.0f, %.0f]",
+                100 * d.shrinkage->before, 100 * d.shrinkage->after, 100 * d.shrinkage->fraction,
+                100 * d.shrinkage->interval[0], 100 * d.shrinkage->interval[1]);
+    if (std::isfinite(d.shrinkage->remaining_over_noise_floor))
+      std::printf("; remaining is %.1f noise floors", d.shrinkage->remaining_over_noise_floor);
+    std::printf("\n");
+    if (d.shrinkage->interval[1] < 0)
+      std::printf("  it grows on missions left out: these effects are no explanation\n");
+    else if (d.shrinkage->interval[0] < 0)
+      std::printf("  that the effects help on missions left out is not sure\n");
   }
   if (!d.where.empty()) std::printf("where:\n");
   for (std::size_t k = 0; k < d.where.size() && k < 8; ++k) {

@@ -29,6 +29,8 @@ void print(const gap::Comparison& c) {
       if (std::isfinite(e.groups[g].deviation)) std::printf(" +- %.2g", e.groups[g].deviation);
       std::printf("%s\n", unit.c_str());
     }
+    if (!e.possible)
+      std::printf("  beyond what this effect can be: it stands for something else of the same kind\n");
     std::printf("  log odds %+.1f of strengths of their own; chance that equal ones differ so %.2g\n", e.gain,
                 e.chance);
   }

@@ -238,7 +238,7 @@ Result<Comparison> compare_groups(const RecordingSet& recordings,
   for (std::size_t k = 0; k < shown.size(); ++k) {
     const Hypothesis& h = columns.hypotheses()[shown[k]];
     const auto& info = h.effect.effect->info().parameters[h.parameter];
-    ComparedEffect e{h.id(), std::string(info.name), std::string(info.unit), {}, 0, 1, false};
+    ComparedEffect e{h.id(), std::string(info.name), std::string(info.unit), {}, 0, 1, false, true};
     for (std::size_t g = 0; g < c.groups.size(); ++g) {
       GroupStrength s{whole.strength(h.columns.front(), g), missing};
       double square = 0, n = static_cast<double>(c.groups[g].missions);
@@ -249,6 +249,10 @@ Result<Comparison> compare_groups(const RecordingSet& recordings,
       e.groups.push_back(s);
     }
     if (k < differing.size()) e.gain = gains[k];
+    e.possible = std::ranges::all_of(e.groups, [&](const GroupStrength& s) {
+      const double room = std::isfinite(s.deviation) ? 2 * s.deviation : 0;
+      return s.value > info.minimum - room && s.value < info.maximum + room;
+    });
     e.chance = chance_of(e.groups);
     e.differs = k < differing.size() && e.gain > 0 && e.chance < likely_chance;
     c.effects.push_back(std::move(e));
@@ -289,6 +293,7 @@ nlohmann::json to_json(const Comparison& c) {
                               {"parameter", e.parameter},
                               {"unit", e.unit},
                               {"differs", e.differs},
+                              {"possible", e.possible},
                               {"log_evidence", number(e.gain)},
                               {"chance", number(e.chance)},
                               {"strengths", std::move(strengths)}});

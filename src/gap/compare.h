@@ -24,6 +24,7 @@ struct ComparedEffect {
   double gain = 0;       // log evidence for strengths of their own over one for all, the others held common
   double chance = 1;     // that groups of equal strength differ as much (chi-square over the deviations)
   bool differs = false;  // evidence and chance both say so
+  bool possible = true;  // within the effect's bounds in every group; otherwise it stands for something else
 };
 
 struct ComparedGroup {

@@ -13,7 +13,7 @@ std::string sentence_of(const Comparison& c) {
   std::vector<std::string> names, differing;
   for (const ComparedGroup& g : c.groups) names.push_back(g.name);
   for (const ComparedEffect& e : c.effects) {
-    if (!e.differs) continue;
+    if (!e.differs || !e.possible) continue;
     std::size_t least = 0, most = 0;
     for (std::size_t g = 0; g < e.groups.size(); ++g) {
       if (e.groups[g].value < e.groups[least].value) least = g;
@@ -54,14 +54,17 @@ std::string report_html(const Comparison& c, const robot::RobotModel& robot, con
       }
     }
     page.card(fmt::format(
-        "<h3>{} <code>{}</code></h3><p>{}: {}{}.</p>", escaped(words_of(e.id)), escaped(e.id),
+        "<h3>{} <code>{}</code></h3><p>{}: {}{}.{}</p>", escaped(words_of(e.id)), escaped(e.id),
         escaped(meaning),
         e.differs ? "differs between the groups" : "no difference that these data make sure",
         e.gain > 0
             ? fmt::format(" (log odds {} of strengths of their own; equal strengths would differ so with "
                           "probability {})",
                           brief(e.gain), e.chance < 1e-4 ? "below 0.0001" : brief(e.chance, 2))
-            : std::string()));
+            : std::string(),
+        e.possible
+            ? ""
+            : " <b>Its strengths are beyond what this effect can be</b>: it stands for something else."));
     page.chart(bars(rows, e.unit == "1" ? "" : " " + e.unit, e.id + " by group"));
   }
   page.section("What these recordings cannot tell");

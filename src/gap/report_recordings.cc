@@ -151,12 +151,17 @@ void shrinkage_section(Page& page, const Diagnosis& d) {
        {100 * s.before * (1 - s.interval[1]), 100 * s.before * (1 - s.interval[0])},
        "after"},
       {"noise alone", "", 100 * d.noise_floor, {}, "floor"}};
-  page.chart(
-      bars(rows, " %", "gap before and after"),
-      fmt::format("It falls by {} (95 % interval {} to {}, bootstrap over blocks of time). What remains is "
-                  "{} times what measurement noise alone makes.",
-                  percent(s.fraction), percent(s.interval[0]), percent(s.interval[1]),
-                  fmt::format("{:.1f}", s.remaining_over_noise_floor)));
+  std::string caption = fmt::format("It falls by {} (95 % interval {} to {}, bootstrap over blocks of time).",
+                                    percent(s.fraction), percent(s.interval[0]), percent(s.interval[1]));
+  if (s.interval[1] < 0) {
+    caption += " It grows: these effects are no explanation.";
+  } else if (s.interval[0] < 0) {
+    caption += " The interval holds zero: that the effects help on missions left out is not sure.";
+  }
+  if (std::isfinite(s.remaining_over_noise_floor))
+    caption += fmt::format(" What remains is {:.1f} times what measurement noise alone makes.",
+                           s.remaining_over_noise_floor);
+  page.chart(bars(rows, " %", "gap before and after"), caption);
   if (d.effects.size() > 1) {
     std::vector<BarRow> shares;
     for (const DiagnosedEffect& e : d.effects)
