@@ -1,4 +1,4 @@
--- The history of a fleet, schema version 3 (user_version; src/history/schema.cc lists the migrations to it).
+-- The history of a fleet, schema version 4 (user_version; src/history/schema.cc lists the migrations to it).
 -- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a REAL column: not measured.
 -- Energy leaving the battery is positive. Sides: right, left.
 
@@ -77,6 +77,7 @@ CREATE TABLE mission (
   ledger_sensor_j REAL,
   ledger_unexplained_j REAL,
   telemetry_samples INTEGER NOT NULL DEFAULT 0,  -- raw samples ever stored; the next one's ordinal
+  findings_json TEXT CHECK (findings_json IS NULL OR json_valid(findings_json)),  -- of payload and friction
   UNIQUE (robot_id, mission_id, start_utime_us),
   FOREIGN KEY (robot_id, model_version) REFERENCES model (robot_id, version)
 ) STRICT;

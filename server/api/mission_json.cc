@@ -68,6 +68,8 @@ void write_mission(JsonWriter& json, const history::Mission& m) {
   json.end_object();
   json.field("gap_count", m.gap_count);
   json.field("gap_s", m.gap_s);
+  json.key("findings");
+  m.findings_json.empty() ? json.null() : json.raw(m.findings_json);
   json.end_object();
 }
 

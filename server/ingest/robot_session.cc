@@ -10,8 +10,9 @@
 namespace joulecast::server {
 namespace {
 
-constexpr std::string_view charge_topic = "charge";      // of what is learned of the battery
-constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
+constexpr std::string_view charge_topic = "charge";          // of what is learned of the battery
+constexpr std::string_view refinement_topic = "refinement";  // of what is learned of the drive
+constexpr std::int64_t remember_charge_us = 10'000'000;      // by the robot's clock
 
 history::MissionState state_of(telemetry::MissionEnd end) {
   switch (end) {
@@ -64,6 +65,9 @@ RobotSession::RobotSession(std::string robot_id, const SessionSettings& settings
   }
   if (const auto learned = outputs_.store.learned(robot_id_, charge_topic); learned && learned->has_value())
     charge_memory_ = (*learned)->body_json;
+  if (const auto learned = outputs_.store.learned(robot_id_, refinement_topic);
+      learned && learned->has_value())
+    refinement_memory_ = (*learned)->body_json;
   changed_ = true;
 }
 
@@ -98,6 +102,12 @@ void RobotSession::meter_with(std::shared_ptr<const ModelInForce> model) {
       charge->recall(stored_charge_utime_us_, snapshot_.state_of_charge);
     }
     charge_ = std::move(charge);
+    if (refinement_ != nullptr) {
+      refinement_->use(model_->robot, model_->version);
+    } else {
+      refinement_ = std::make_unique<RefinementWatch>(model_->robot, model_->version);
+      refinement_->recall(refinement_memory_);
+    }
     snapshot_.state_of_charge = charge_->estimate().charge;
     if (open_ != nullptr) {
       open_->earlier_gaps = open_->record.gap_count;
@@ -159,6 +169,7 @@ void RobotSession::on_sample(const telemetry::Sample& sample, std::int64_t host_
                                                            : IngestFault::clock_forward);
     release_held();
     charge_->interrupt();
+    refinement_->interrupt();
     flush_meter();
     meter_->interrupt();
     missions_.on_clock_step(sample.utime_us);
@@ -182,6 +193,7 @@ void RobotSession::on_sample(const telemetry::Sample& sample, std::int64_t host_
         at_charger_ = true;
         flush_meter();
         meter_->interrupt();
+        refinement_->interrupt();
       }
       for (; !held_.empty(); held_.pop_front()) on_charger_sample(held_.front());
       on_charger_sample(sample);
@@ -240,6 +252,22 @@ void RobotSession::leave_charger() {
   remember_charge();
 }
 
+void RobotSession::judge_mission() {
+  history::Mission& record = open_->record;
+  RefinementWatch::Judgement judged = refinement_->end_mission(record);
+  if (judged.findings_json.empty()) return;
+  record.findings_json = std::move(judged.findings_json);
+  if (!judged.payload_event_json.empty())
+    outputs_.post(history::AppendEvent{{0, snapshot_.received_utime_us, robot_id_, "undeclared_payload",
+                                        std::move(judged.payload_event_json)}});
+  if (judged.proposal) {
+    judged.proposal->created_utime_us = snapshot_.received_utime_us;
+    outputs_.post(history::AddProposal{std::move(*judged.proposal)});
+  }
+  outputs_.post(history::PutLearned{
+      {robot_id_, std::string(refinement_topic), record.end_utime_us, refinement_->memory_json()}});
+}
+
 void RobotSession::remember_charge() {
   if (charge_ == nullptr || charge_->utime_us() == 0) return;
   remembered_utime_us_ = charge_->utime_us();
@@ -275,6 +303,7 @@ void RobotSession::on_own_sample(const telemetry::Sample& sample) {
     on_fault(IngestFault::solver);
     outputs_.warn(robot_id_, describe(metered.error()));
   }
+  refinement_->add(sample);
   keep(sample);
   changed_ = true;
 }
@@ -303,6 +332,7 @@ void RobotSession::open(const telemetry::MissionAction& action) {
   if (action.implicit && !settings_.implicit_missions) return;
   flush_meter();
   meter_->begin();
+  refinement_->begin_mission();
   trace_.begin();
   open_ = std::make_unique<OpenMission>();
   history::Mission& record = open_->record;
@@ -345,6 +375,7 @@ void RobotSession::close(const telemetry::MissionAction& action) {
   record.end_utime_us = std::max(record.end_utime_us, action.utime_us);
   outputs_.counters.missions_ended[static_cast<std::size_t>(record.state)].fetch_add(
       1, std::memory_order_relaxed);
+  judge_mission();
   checkpoint();
   remember_charge();
   open_.reset();

@@ -15,6 +15,7 @@
 #include "server/ingest/counters.h"
 #include "server/ingest/fleet_view.h"
 #include "server/ingest/model_registry.h"
+#include "server/ingest/refinement_watch.h"
 #include "server/ingest/trace_builder.h"
 #include "telemetry/mission_tracker.h"
 #include "telemetry/sample.h"
@@ -80,6 +81,7 @@ class RobotSession {
   void release_held();
   void leave_charger();
   void remember_charge();
+  void judge_mission();
   void keep(const telemetry::Sample& sample);
   void carry_out(const telemetry::MissionActions& actions);
   void open(const telemetry::MissionAction& action);
@@ -100,6 +102,8 @@ class RobotSession {
   telemetry::MissionTracker missions_;
   std::unique_ptr<energy::Meter> meter_;
   std::unique_ptr<ChargeWatch> charge_;
+  std::unique_ptr<RefinementWatch> refinement_;
+  std::string refinement_memory_;            // as stored by the last daemon
   std::string charge_memory_;                // as stored by the last daemon
   std::int64_t stored_charge_utime_us_ = 0;  // of the charge that the last daemon stored
   std::int64_t remembered_utime_us_ = 0;

@@ -71,7 +71,8 @@ struct Mission {
   std::int64_t samples = 0;                           // accepted and accounted for
   std::map<std::string, std::int64_t> sample_faults;  // reason -> samples counted out or repaired
   std::int64_t gap_count = 0;
-  double gap_s = 0;  // time without samples, bridged or not
+  double gap_s = 0;           // time without samples, bridged or not
+  std::string findings_json;  // what its motion says of payload and friction; empty: nothing
 };
 
 // Least, mean and greatest of a quantity; all NaN when it was not measured.

@@ -8,7 +8,7 @@ extern const std::string_view store_sql;  // schemas/store.sql, embedded at buil
 
 namespace {
 
-constexpr std::int64_t store_version = 3;
+constexpr std::int64_t store_version = 4;
 constexpr Migration store_migrations[] = {
     {1, R"(
 CREATE TABLE learned (
@@ -67,6 +67,9 @@ CREATE TABLE proposal (
 
 CREATE INDEX proposal_by_robot ON proposal (robot_id, proposal_id);
 )sql"},
+    {3,
+     "ALTER TABLE mission ADD COLUMN findings_json TEXT CHECK (findings_json IS NULL OR "
+     "json_valid(findings_json));"},
 };
 
 Result<void> migrate(Database& database, const Schema& schema, std::int64_t version) {

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::string_view plain_content_columns =
     "end_utime_us, state, implicit, incomplete, incomplete_reason, payload_kg, note, model_version, samples, "
-    "sample_faults, gap_count, gap_s";
+    "sample_faults, gap_count, gap_s, findings_json";
 
 // Visits the doubles of the accounts in the order of accounts_columns().
 template <class A, class Visit>
@@ -79,6 +79,7 @@ void bind_mission_content(Rows& rows, const Mission& m, const std::string& fault
   rows.bind(m.end_utime_us).bind(name(m.state)).bind(m.implicit).bind(m.incomplete).bind(m.incomplete_reason);
   rows.bind(m.payload_kg).bind(m.note).bind(m.model_version).bind(m.samples).bind(faults_json);
   rows.bind(m.gap_count).bind(m.gap_s);
+  m.findings_json.empty() ? rows.bind_null() : rows.bind(m.findings_json);
   visit_accounts(m.accounts, [&](double value) { rows.bind(value); });
 }
 
@@ -109,6 +110,7 @@ Result<Mission> read_mission(Rows& rows) {
     return fail(Fault::corrupt, "mission.sample_faults", "not an object of counts");
   m.gap_count = rows.integer();
   m.gap_s = rows.real();
+  m.findings_json = rows.text();
   m.accounts = read_accounts(rows);
   return m;
 }

@@ -127,6 +127,7 @@ void expect_same_mission(const Mission& a, const Mission& b) {
   EXPECT_EQ(a.sample_faults, b.sample_faults);
   EXPECT_EQ(a.gap_count, b.gap_count);
   EXPECT_PRED2(same_bits, a.gap_s, b.gap_s);
+  EXPECT_EQ(a.findings_json, b.findings_json);
   expect_same_accounts(a.accounts, b.accounts);
 }
 
@@ -346,6 +347,7 @@ TEST_P(StoreConformance, KeepsEveryNumberOfAMission) {
   m.sample_faults = {{"late", 3}, {"duplicate", 1}};
   m.gap_count = 2;
   m.gap_s = 12.75;
+  m.findings_json = R"({"payload":{"verdict":"as_declared"}})";
   m.accounts = distinct_accounts();
   need(apply(CheckpointMission{m, {}, {}, {}}));
   expect_same_mission(need(store_->mission(m.key)), m);

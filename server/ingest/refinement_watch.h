@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "energy/refinement.h"
+#include "history/records.h"
+#include "robot/robot_model.h"
+#include "telemetry/sample.h"
+
+namespace joulecast::server {
+
+// Refines one robot's friction and idle power from its missions as they come, tells payloads that were not
+// declared, and proposes a new model version when the refined one departs from that in force.
+class RefinementWatch {
+ public:
+  // The model must be one that the catalogue of effects accepts.
+  RefinementWatch(const robot::RobotModel& robot, std::int64_t version);
+
+  // Another version of the robot's model came in force; between missions.
+  void use(const robot::RobotModel& robot, std::int64_t version);
+
+  void begin_mission();
+  // Samples of the mission in order of time, without those at a charger.
+  void add(const telemetry::Sample& sample) { windows_.add(sample); }
+  void interrupt() { windows_.interrupt(); }
+
+  struct Judgement {
+    std::string findings_json;       // for the mission's record; empty: its motion says nothing
+    std::string payload_event_json;  // empty: the payload was as declared, or is not told from the rest
+    std::optional<history::Proposal> proposal;  // its time is the caller's to set
+  };
+  // Every third mission is judged but not learned from, so that a back-test has missions to go by.
+  Judgement end_mission(const history::Mission& mission);
+
+  std::string memory_json() const;
+  void recall(const std::string& text);  // text that is no memory changes nothing
+
+ private:
+  bool worth_proposing() const;
+  history::Proposal proposal() const;
+
+  robot::RobotModel robot_;
+  std::int64_t version_;
+  energy::DriveWindows windows_;
+  energy::Refinement refinement_;
+  std::int64_t judged_ = 0;
+  std::size_t proposed_at_ = 0;  // missions learned from at the last proposal
+  std::vector<history::MissionKey> learned_from_;
+};
+
+}  // namespace joulecast::server

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <deque>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "dynamics/drive_model.h"
+#include "robot/robot_model.h"
+#include "telemetry/sample.h"
+
+namespace joulecast::energy {
+
+// What a mission is asked about: the parameters that are refined, the mass, and what else could pass for
+// them.
+enum class Unknown : std::size_t {
+  friction_right,  // N m at the wheel
+  friction_left,
+  viscous,       // N m s/rad at the wheel
+  idle_power,    // W
+  mass,          // kg of the chassis, beyond the robot file's
+  payload,       // kg carried beyond the declared
+  slope_cos,     // rad: tilt of the floor along the map's x axis
+  slope_sin,     // rad: ... along y
+  scrub,         // 1: friction coefficient of turning contacts
+  yaw_inertia,   // 1: error of the yaw inertia
+  current_bias,  // A: offset of the motor current sensors
+  driver_loss    // 1: share of the motors' power lost in the drivers
+};
+inline constexpr std::size_t unknown_count = 12;
+inline constexpr std::size_t refined_count = 5;  // friction_right to mass: kept from mission to mission
+
+inline constexpr std::array<std::string_view, unknown_count> unknown_names = {"friction_torque_right_nm",
+                                                                              "friction_torque_left_nm",
+                                                                              "viscous_friction_nm_s_rad",
+                                                                              "idle_power_w",
+                                                                              "mass_kg",
+                                                                              "payload_kg",
+                                                                              "slope_cos_rad",
+                                                                              "slope_sin_rad",
+                                                                              "scrub",
+                                                                              "yaw_inertia",
+                                                                              "current_bias_a",
+                                                                              "driver_loss"};
+
+// Linear equations of one mission: reading - model = row . (unknowns - the model's).
+struct DriveEquation {
+  enum class Kind { torque, idle, power };  // N m of one wheel; W of the battery beside the motors; W of all
+  Kind kind = Kind::torque;
+  double value = 0;
+  std::array<double, unknown_count> row{};
+};
+
+// Turns a mission's samples into equations in weak form: means under smooth windows of 0.4 s (a raised
+// cosine, half overlapping; longer where samples are sparse) and, for accelerations, the speed under the
+// window's derivative, so that no noisy derivative is taken and noise does not bias the masses. The rows are
+// differences of the robot's own drive model, so that payloads and effects count as they do there.
+//
+// With motor currents: the torque balance of each moving wheel, K_t n i against the model's torque, and the
+// battery's power less the motors'. With battery power alone: all of it against the model's. Windows in which
+// a wheel starts, stops or reverses, the payload changes, or samples miss, are left out.
+class DriveWindows {
+ public:
+  // Fault::invalid when the catalogue rejects an effect of the robot file.
+  static Result<DriveWindows> make(const robot::RobotModel& robot);
+
+  // In order of time.
+  void add(const telemetry::Sample& sample);
+  // Forgets the samples of an unfinished window: the robot's time or what it did is interrupted.
+  void interrupt() { buffer_.clear(); }
+
+  const std::vector<DriveEquation>& equations() const { return equations_; }
+  std::vector<DriveEquation> take();
+  double mean_payload_kg() const { return windows_ > 0 ? payload_sum_kg_ / windows_ : 0; }  // declared
+  double torque_per_a() const { return torque_per_a_; }
+
+ private:
+  struct Varied {
+    std::size_t unknown;
+    double step;
+    dynamics::DriveModel model;
+  };
+
+  DriveWindows(const robot::RobotModel& robot, dynamics::DriveModel model);
+  void close_window(std::size_t count);
+  void torque_equations(const dynamics::Instant& at, const std::array<double, 2>& current_a,
+                        const std::array<bool, 2>& moving);
+  void power_equation(const dynamics::Instant& at, double power_w);
+
+  dynamics::DriveModel model_;
+  std::vector<Varied> varied_;
+  double torque_per_a_ = 1;
+  double moving_rad_s_ = 0;
+  double last_payload_kg_ = 0;
+  double payload_sum_kg_ = 0, windows_ = 0;  // since the last take()
+  std::deque<telemetry::Sample> buffer_;
+  std::vector<DriveEquation> equations_;
+};
+
+}  // namespace joulecast::energy

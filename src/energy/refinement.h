@@ -1,0 +1,103 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "energy/drive_windows.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::energy {
+
+// How sure the robot file is, how missions scatter, and how fast a robot changes; standard deviations.
+struct RefinementTrust {
+  double file_friction = 0.15;  // of the friction torque
+  double file_viscous = 0.5;    // of the viscous friction, and at least that of the dry one at top speed / 10
+  double file_idle = 0.1;       // of the idle power
+  double file_mass = 0.03;     // of the total mass
+  // Between missions of an unchanged robot (floor, grease, temperature).
+  double scatter_common = 0.03;  // of the friction torque, both sides alike
+  double scatter_side = 0.015;   // ... each side on its own
+  double scatter_viscous = 0.05;
+  double scatter_idle = 0.015;
+  double scatter_mass = 0.003;  // of the total mass: what is never declared, such as cables and dirt
+  double memory_missions = 50;  // over which a robot drifts by one scatter
+  // What else a mission may hold.
+  double slope_rad = 0.004;
+  double scrub = 0.01;
+  double yaw_inertia = 0.05;
+  double current_bias = 0.002;  // of the current limit
+  double driver_loss = 0.03;
+  // Payload.
+  double payload_wide = 1.5;     // of the payload limit: what may be carried undeclared
+  double payload_least = 0.05;   // of the payload limit: less is not worth an event
+  double payload_scale = 0.02;   // of all that is carried: error of the torque constant, load-borne friction
+  double payload_certain = 3.3;  // standard deviations at which a payload counts as undeclared
+};
+
+struct Estimate {
+  double value = 0;
+  double sd = 0;
+};
+
+// What one mission says.
+struct MissionFinding {
+  std::size_t equations = 0;
+  bool enough = false;  // to say anything
+  // Carried beyond what was declared; the deviation holds what friction, slope, the robot's own mass and the
+  // sensors leave open.
+  Estimate undeclared_kg;
+  bool undeclared = false;  // a deviation beyond doubt and worth telling
+  bool inseparable =
+      false;  // the mission's motion does not tell payload from the rest: sd above half the limit
+  std::array<Estimate, refined_count>
+      parameters;            // from this mission alone, absolute (mass: beyond the file's)
+  double torque_rms_nm = 0;  // residual, NaN without motor currents
+  double surprise = 0;       // squared distance from what was expected over its dimension; 1 is usual
+};
+
+// What many missions say of one robot's friction, idle power and mass: a Kalman filter over missions, each of
+// which enters as one measurement with its own covariance plus the scatter between missions, under a slow
+// drift of the robot. Values are absolute, so that a new model version does not disturb them.
+class Refinement {
+ public:
+  explicit Refinement(const robot::RobotModel& robot, const RefinementTrust& trust = {});
+
+  // A model version with other parameters came in force; what was learned stays.
+  void rebase(const robot::RobotModel& robot);
+
+  // Judges a mission (its equations were made with the model in force) on which `declared_kg` were declared
+  // on the average. With `learn` its parameters enter the estimate; without they are left for tests of it.
+  MissionFinding judge(std::span<const DriveEquation> equations, double declared_kg, bool learn);
+
+  std::size_t missions() const { return missions_; }  // learned from
+  // Absolute values: friction right and left, viscous, idle power, and mass beyond the file's.
+  std::array<Estimate, refined_count> estimates() const;
+  double scatter_factor() const { return scatter_factor_; }  // of the trust's scatter, as missions show it
+
+  // The robot with the refined friction and idle power in it.
+  robot::RobotModel refined() const;
+  // The greatest departure from the model in force, in standard deviations.
+  double significance() const;
+
+  struct Memory {
+    std::array<double, refined_count> mean{};
+    std::array<double, refined_count * refined_count> covariance{};
+    double scatter_factor = 1;
+    std::size_t missions = 0;
+  };
+  Memory memory() const;
+  bool recall(const Memory& memory);  // false when it is none
+
+ private:
+  robot::RobotModel robot_;
+  RefinementTrust trust_;
+  std::array<double, refined_count> mean_{};
+  std::array<double, refined_count * refined_count> covariance_{};
+  double scatter_factor_ = 1;
+  std::size_t missions_ = 0;
+};
+
+}  // namespace joulecast::energy

@@ -1,0 +1,100 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "client/virtual_robot/fleet.h"
+#include "robot/robot_file.h"
+#include "server/diagnosis/model_adoption.h"
+#include "tests/ingest/harness.h"
+
+namespace joulecast::server {
+namespace {
+
+using nlohmann::json;
+
+// From a robot's ordinary missions to a model in force: proposed by the session, adopted after its back-test.
+TEST(RefinedModel, IsProposedFromMissionsAndAdoptedAfterItsBackTest) {
+  const auto shipped = virtual_robot::shipped_robots()[0];
+  const robot::RobotModel robot = robot::parse_robot(shipped.json_text).value();
+  testing::PipelineHarness harness;
+  harness.add_version(robot, 1);
+  virtual_robot::SimulationSpec spec;
+  spec.robot = virtual_robot::parse_robot(std::string(shipped.json_text)).value();
+  spec.missions = 16;
+  spec.script.undeclared_share = 0.2;
+  spec.imperfections.coulomb_friction = 0.3;
+  spec.imperfections.accessory_load = 3;
+  virtual_robot::VirtualRobot machine(spec, 4);
+  virtual_robot::Emission emission;
+  int ended = 0;
+  while (machine.next(emission)) {
+    std::visit(
+        [&](auto& message) {
+          harness.pipeline->handle({robot.robot_id, message, emission.utime_us});
+        },
+        emission.message);
+    if (const auto* event = std::get_if<telemetry::MissionEvent>(&emission.message))
+      if (event->phase != telemetry::MissionPhase::started && ++ended == 5) {
+        // What was learned outlives the daemon.
+        harness.restart();
+      }
+  }
+
+  // Each mission says what its motion tells of the payload, and an undeclared one is an event.
+  const auto missions = harness.missions();
+  ASSERT_EQ(missions.size(), 16u);
+  std::size_t carried = 0, flagged = 0;
+  for (std::size_t k = 0; k < missions.size(); ++k) {
+    const json findings = json::parse(missions[k].findings_json);
+    const double truth_kg = machine.finished()[k].undeclared_kg;
+    const std::string verdict = findings["payload"]["verdict"];
+    carried += truth_kg > 0;
+    flagged += verdict == "undeclared";
+    EXPECT_EQ(verdict == "undeclared", truth_kg > 0) << k;
+    EXPECT_NEAR(findings["payload"]["undeclared_kg"].get<double>(), truth_kg,
+                4 * findings["payload"]["undeclared_sd_kg"].get<double>());
+  }
+  EXPECT_GT(carried, 0u);
+  std::size_t told = 0;
+  const auto events = harness.store->events(0, 100, robot.robot_id).value();
+  for (const history::Event& event : events)
+    told += event.kind == "undeclared_payload";
+  EXPECT_EQ(told, flagged);
+
+  const auto proposals = harness.store->proposals(robot.robot_id, 1'000'000, 10).value();
+  ASSERT_FALSE(proposals.empty());
+  EXPECT_EQ(proposals[0].state, history::ProposalState::open);
+  EXPECT_EQ(proposals[0].kind, "calibration");
+  const history::Proposal newest = harness.store->proposal(proposals[0].id).value();
+  const auto refined = robot::parse_robot(newest.model_json);
+  ASSERT_TRUE(refined) << describe(refined.error());
+  for (std::size_t side : {0u, 1u})
+    EXPECT_NEAR(refined->motor.friction_torque_nm[side], 1.3 * robot.motor.friction_torque_nm[side],
+                0.03 * robot.motor.friction_torque_nm[side]);
+  EXPECT_NEAR(refined->idle_power_w, robot.idle_power_w + 3, 0.5);
+  EXPECT_EQ(json::parse(newest.detail_json)["parameters"].size(), 4u);
+
+  history::Writer writer(*harness.store, history::WriterOptions{});
+  ModelAdoption adoption(
+      *harness.store, writer, harness.models, [] { return 42; }, AdoptionOptions{});
+  AdoptionRequest request;
+  request.model = *refined;
+  request.origin = history::ModelOrigin::calibration;
+  request.fitted_on = newest.fitted_on;
+  request.proposal_id = newest.id;
+  request.expected_version = newest.base_version;
+  const auto adopted = adoption.adopt(request);
+  ASSERT_TRUE(adopted) << describe(adopted.error());
+  EXPECT_TRUE(adopted->adopted) << adopted->refusal;
+  // Missions left out of the fit show it: a third of them.
+  EXPECT_GE(adopted->tested_on.size(), 4u);
+  std::printf("energy error on %zu missions not fitted: %.1f %% before, %.1f %% after\n",
+              adopted->tested_on.size(), 1e2 * adopted->test.error_before, 1e2 * adopted->test.error_after);
+  EXPECT_LT(adopted->test.error_after, 0.5 * adopted->test.error_before);
+  EXPECT_EQ(harness.store->proposal(newest.id)->state, history::ProposalState::adopted);
+}
+
+}  // namespace
+}  // namespace joulecast::server
