@@ -14,6 +14,7 @@
 #include "history/writer.h"
 #include "server/api/services.h"
 #include "server/daemon_metrics.h"
+#include "server/diagnosis/proposal_acceptor.h"
 #include "server/embedded.h"
 #include "server/fleet_events.h"
 #include "server/http/event_hub.h"
@@ -130,6 +131,7 @@ struct Application::Parts {
 
   void stop() {
     if (stopped.exchange(true)) return;
+    if (acceptor) acceptor->stop();
     if (ingest) ingest->stop();
     {
       const std::lock_guard lock(beat_mutex);
@@ -167,6 +169,7 @@ struct Application::Parts {
   std::unique_ptr<history::Writer> writer;
   std::unique_ptr<server::IngestService> ingest;
   std::unique_ptr<server::ModelAdoption> adoption;
+  std::unique_ptr<server::ProposalAcceptor> acceptor;  // null: a person adopts
   std::unique_ptr<api::Services> services;
   std::unique_ptr<http::Router> router;
   std::unique_ptr<http::HttpMetrics> http_metrics;
@@ -214,6 +217,10 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
 
   p.adoption = std::make_unique<server::ModelAdoption>(*p.store, *p.writer, p.models, host_utime_us,
                                                        adoption_options(settings));
+  if (settings.boolean("adoption.automatic")) {
+    p.acceptor = std::make_unique<server::ProposalAcceptor>(*p.store, *p.adoption, p.warn);
+    p.acceptor->start(milliseconds(10'000));
+  }
   p.services = std::make_unique<api::Services>(
       api::Services{*p.store, *p.writer, p.models, p.fleet, *p.adoption, host_utime_us});
   std::vector<http::ReadinessCheck> checks;

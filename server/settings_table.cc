@@ -64,6 +64,8 @@ constexpr Setting table[] = {
      "missions that the back-test of a new model replays at most, newest first"},
     {"adoption.max_samples", Type::integer, "400000", 1000, 1e7, "",
      "samples that the back-test of a new model replays at most: some seconds"},
+    {"adoption.automatic", Type::boolean, "false", 0, 0, "",
+     "adopt models that missions propose when their back-test improves, without waiting for a person"},
 
     {"log.format", Type::choice, "text", 0, 0, "", "one JSON object a line, or text for a terminal",
      log_formats},

@@ -27,24 +27,34 @@ struct Options {
 
 const std::map<std::string, Load::Kind> kinds{{"current", Load::Kind::current}, {"power", Load::Kind::power}};
 
-Result<std::vector<battery::Prediction>> predict_all(const Options& options) {
+struct Predicted {
+  std::vector<battery::Prediction> done;
+  std::vector<std::pair<std::string, Error>> failed;  // recording, why
+};
+
+Result<Predicted> predict_all(const Options& options) {
   const auto parameters = robot::load_battery(options.battery);
   if (!parameters) return tl::unexpected(parameters.error());
   const battery::Circuit circuit(*parameters);
-  std::vector<battery::Prediction> predictions;
+  Predicted predictions;
   for (const std::string& file : options.recordings) {
     const auto recordings = battery::read_recordings(file);
     if (!recordings) return tl::unexpected(recordings.error());
     for (const battery::Recording& recording : *recordings) {
       const auto prediction = battery::predict(circuit, recording, options.from);
-      if (!prediction) return tl::unexpected(prediction.error());
-      predictions.push_back(*prediction);
+      if (prediction) {
+        predictions.done.push_back(*prediction);
+      } else {
+        predictions.failed.emplace_back(recording.name, prediction.error());
+      }
     }
   }
+  if (predictions.done.empty()) return tl::unexpected(predictions.failed.front().second);
   return predictions;
 }
 
-void print_json(const Options& options, const std::vector<battery::Prediction>& predictions) {
+void print_json(const Options& options, const Predicted& predicted) {
+  const std::vector<battery::Prediction>& predictions = predicted.done;
   const battery::PredictionSummary summary = battery::summarise(predictions);
   nlohmann::json document{{"from", options.from == Load::Kind::current ? "current" : "power"},
                           {"discharges", nlohmann::json::array()},
@@ -63,10 +73,14 @@ void print_json(const Options& options, const std::vector<battery::Prediction>& 
                                       {"time_error", p.time_error},
                                       {"voltage_rms_v", p.voltage_rms_v},
                                       {"voltage_rms_by_capacity_v", p.voltage_rms_by_capacity_v}});
+  document["failed"] = nlohmann::json::array();
+  for (const auto& [name, error] : predicted.failed)
+    document["failed"].push_back({{"name", name}, {"reason", describe(error)}});
   std::puts(document.dump(2).c_str());
 }
 
-void print_text(const std::vector<battery::Prediction>& predictions) {
+void print_text(const Predicted& predicted) {
+  const std::vector<battery::Prediction>& predictions = predicted.done;
   fmt::print("{:<24} {:>7} {:>11} {:>12} {:>7} {:>10}\n", "discharge", "end V", "measured s", "predicted s",
              "error", "rms mV");
   for (const battery::Prediction& p : predictions)
@@ -79,6 +93,8 @@ void print_text(const std::vector<battery::Prediction>& predictions) {
       summary.count, 1e2 * summary.time_error_median, 1e2 * summary.time_error_p95,
       1e2 * battery::least_charge, 1e3 * summary.voltage_rms_v, 1e3 * summary.voltage_rms_worst_v,
       1e3 * summary.voltage_rms_by_capacity_v);
+  for (const auto& [name, error] : predicted.failed)
+    fmt::print("not predicted: {}: {}\n", name, describe(error));
 }
 
 Exit run(const Options& options) {

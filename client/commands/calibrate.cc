@@ -108,8 +108,9 @@ void add_calibrate(CLI::App& program, Exit& exit) {
                                             "discharging positive, V_V, T_C) of a slow full "
                                             "discharge, pulses and constant currents");
   command
-      ->add_option("recordings", options->sources,
-                   "CSV files, or the common beginning of <beginning>_*_data.csv")
+      ->add_option(
+          "recordings", options->sources,
+          "CSV files, a folder of one battery's tests, or the common beginning of <beginning>_*_data.csv")
       ->required();
   command->add_option("--capacity-ah", options->rated_capacity_ah, "rated capacity; gives an ageing factor")
       ->check(CLI::PositiveNumber);

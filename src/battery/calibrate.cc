@@ -23,6 +23,34 @@ constexpr double activation_unit_k = 1000;  // the fit's parameters are all of o
 
 // ---- the slow discharge ----
 
+// The first stretch without charging; a test that was recharged in the same file ends there.
+Recording without_charging(const Recording& recording) {
+  const double flowing_a = 1e-3 * *std::max_element(recording.current_a.begin(), recording.current_a.end());
+  const auto charges = [&](double current_a) { return current_a < -flowing_a; };
+  const auto begin = std::find_if_not(recording.current_a.begin(), recording.current_a.end(), charges);
+  const auto end = std::find_if(begin, recording.current_a.end(), charges);
+  const auto first = begin - recording.current_a.begin(), last = end - recording.current_a.begin();
+  const auto part = [&](const std::vector<double>& column) {
+    return std::vector<double>(column.begin() + first, column.begin() + last);
+  };
+  return {recording.name, part(recording.time_s), part(recording.current_a), part(recording.voltage_v),
+          part(recording.temperature_c)};
+}
+
+// Without the rest before and after, but for one row before.
+Recording without_rests(const Recording& recording) {
+  const double flowing_a = 1e-3 * *std::max_element(recording.current_a.begin(), recording.current_a.end());
+  std::size_t first = 1, last = recording.size();
+  while (first + 1 < last && !(recording.current_a[first] > flowing_a)) ++first;
+  while (last > first + 1 && !(recording.current_a[last - 1] > flowing_a)) --last;
+  const auto part = [&](const std::vector<double>& column) {
+    return std::vector<double>(column.begin() + static_cast<std::ptrdiff_t>(first) - 1,
+                               column.begin() + static_cast<std::ptrdiff_t>(last));
+  };
+  return {recording.name, part(recording.time_s), part(recording.current_a), part(recording.voltage_v),
+          part(recording.temperature_c)};
+}
+
 struct SlowTest {
   double capacity_ah = 0;
   double current_a = 0;
@@ -275,19 +303,37 @@ std::optional<Thermal> thermal_fit(const std::vector<Target>& targets, const Cur
 
 }  // namespace
 
-Result<Calibration> calibrate(const std::vector<Recording>& recordings, const CalibrationOptions& options) {
+Result<Calibration> calibrate(const std::vector<Recording>& given, const CalibrationOptions& options) {
+  std::vector<Recording> recordings;
+  for (const Recording& recording : given) {
+    Recording part = without_charging(recording);
+    if (part.size() < 2 || !(part.charge_ah() > 0))
+      return invalid(
+          "recordings",
+          recording.name + " draws no charge; current must be positive while the battery discharges");
+    recordings.push_back(std::move(part));
+  }
   const Recording* slowest = nullptr;
   std::vector<Target> targets;
-  for (const Recording& recording : recordings)
-    if (recording.charge_ah() > 0 && recording.duration_s() > slow_hours * 3600 &&
-        *std::min_element(recording.current_a.begin() + 1, recording.current_a.end()) > 0 &&
-        (slowest == nullptr || recording.duration_s() > slowest->duration_s()))
-      slowest = &recording;
-  if (slowest == nullptr)
+  for (Recording& recording : recordings) {
+    const Recording core = without_rests(recording);
+    if (core.duration_s() <= slow_hours * 3600 ||
+        !(*std::min_element(core.current_a.begin() + 1, core.current_a.end()) > 0) ||
+        (slowest != nullptr && core.duration_s() <= slowest->duration_s()))
+      continue;
+    recording = core;
+    slowest = &recording;
+  }
+  if (slowest == nullptr) {
+    std::string seen;
+    for (const Recording& recording : recordings)
+      seen += fmt::format("{}{} ({:.1f} h, {:.2f} Ah)", seen.empty() ? "" : ", ", recording.name,
+                          recording.duration_s() / 3600, recording.charge_ah());
     return invalid("recordings",
                    fmt::format("need a full discharge without pause over more than {} h for the "
-                               "open-circuit voltage; none of the {} is one",
-                               slow_hours, recordings.size()));
+                               "open-circuit voltage; none of these is one: {}",
+                               slow_hours, seen));
+  }
   const SlowTest slow = slow_test(*slowest);
   robot::Battery known;
   known.nominal_voltage_v = Curve(slow.voltage).mean();

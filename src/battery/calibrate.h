@@ -36,7 +36,6 @@ struct Calibration {
 // fitted by least squares on the voltage, each sample's error weighed as 0.135 % of the nominal voltage plus
 // 0.2 % of the capacity along the curve, so that the steep end counts by its time rather than its volts.
 // Thermal parameters follow from measured losses and temperatures. Errors: no slow discharge, no other test.
-Result<Calibration> calibrate(const std::vector<Recording>& recordings,
-                              const CalibrationOptions& options = {});
+Result<Calibration> calibrate(const std::vector<Recording>& given, const CalibrationOptions& options = {});
 
 }  // namespace joulecast::battery

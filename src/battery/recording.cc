@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <fstream>
@@ -14,7 +16,13 @@ namespace joulecast::battery {
 namespace {
 
 constexpr std::size_t max_file_bytes = std::size_t{256} << 20;
-constexpr std::string_view column_names[] = {"t_s", "I_A", "V_V", "T_C", "cycle"};
+// Each column's name, then what else loggers call it; letters of either case count alike.
+constexpr std::array<std::string_view, 5> column_names[] = {
+    {"t_s", "time_s", "t", "time"},
+    {"I_A", "current_a", "I", "current"},
+    {"V_V", "voltage_v", "V", "voltage", "U_V"},
+    {"T_C", "temperature_c", "T_degC", "temp_c", "temperature"},
+    {"cycle", "cycle_index", "cycle_number"}};
 enum : std::size_t { time_column, current_column, voltage_column, temperature_column, cycle_column, columns };
 constexpr std::size_t required_columns = 3;
 
@@ -46,17 +54,29 @@ std::optional<double> number(std::string_view cell) {
   return value;
 }
 
+bool same_name(std::string_view a, std::string_view b) {
+  return !a.empty() &&
+         std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+}
+
 // Where each of our columns stands in the header.
 Result<std::vector<std::optional<std::size_t>>> positions(std::string_view header) {
   if (header.starts_with("\xef\xbb\xbf")) header.remove_prefix(3);
   const auto cells = cells_of(header);
   std::vector<std::optional<std::size_t>> found(columns);
   for (std::size_t c = 0; c < columns; ++c) {
-    const auto at = std::find(cells.begin(), cells.end(), column_names[c]);
-    if (at != cells.end())
+    for (const std::string_view name : column_names[c]) {
+      const auto at = std::find_if(cells.begin(), cells.end(),
+                                   [&](std::string_view cell) { return same_name(cell, name); });
+      if (at == cells.end()) continue;
       found[c] = static_cast<std::size_t>(at - cells.begin());
-    else if (c < required_columns)
-      return invalid(std::string(column_names[c]), "is not among the columns that the first line names");
+      break;
+    }
+    if (!found[c] && c < required_columns)
+      return invalid(std::string(column_names[c][0]),
+                     "is not among the columns that the first line names: \"" +
+                         std::string(header.substr(0, 80)) + "\"");
   }
   return found;
 }
@@ -96,7 +116,7 @@ Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std:
       const auto read = number(cell);
       if (!read)
         return invalid(
-            std::string(column_names[c]),
+            std::string(column_names[c][0]),
             fmt::format("is \"{}\" in line {}, must be a finite number", cell.substr(0, 40), line_number));
       value[c] = *read;
     }
@@ -142,17 +162,23 @@ Result<std::vector<std::filesystem::path>> identification_files(const std::strin
   namespace fs = std::filesystem;
   std::error_code ignored;
   if (fs::is_regular_file(file_or_prefix, ignored)) return std::vector<fs::path>{file_or_prefix};
+  const bool whole_folder = fs::is_directory(file_or_prefix, ignored);
   const fs::path prefix(file_or_prefix);
-  const fs::path folder = prefix.has_parent_path() ? prefix.parent_path() : fs::path(".");
-  const std::string start = prefix.filename().string() + "_";
-  std::vector<fs::path> found;
+  const fs::path folder = whole_folder               ? prefix
+                          : prefix.has_parent_path() ? prefix.parent_path()
+                                                     : fs::path(".");
+  std::string start = whole_folder ? "" : prefix.filename().string();
+  if (!whole_folder && !start.ends_with('_')) start += '_';
+  std::vector<fs::path> tests, others;
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
     const std::string name = entry.path().filename().string();
-    if (name.starts_with(start) && name.ends_with("_data.csv")) found.push_back(entry.path());
+    if (!name.starts_with(start) || !name.ends_with(".csv") || name.ends_with("_rw.csv")) continue;
+    (name.ends_with("_data.csv") ? tests : others).push_back(entry.path());
   }
-  if (found.empty() || prefix.filename().empty())
+  std::vector<fs::path>& found = tests.empty() ? others : tests;
+  if (found.empty() || (!whole_folder && start == "_"))
     return fail(Fault::not_found, file_or_prefix,
-                "is no file and begins no file name that ends in _data.csv");
+                "is no file, no folder with CSV files, and begins no name of the form <beginning>_*.csv");
   std::sort(found.begin(), found.end());
   return found;
 }

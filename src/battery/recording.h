@@ -24,17 +24,18 @@ struct Recording {
   double charge_ah() const;                                                           // drawn in all
 };
 
-// Reads CSV with a header line that names t_s, I_A and V_V and may name T_C (empty: not measured) and cycle
-// (each value a recording of its own); other columns are passed over. Of rows
-// with the same time the last counts. `name` begins the recordings' names.
-// Errors name the line and the column.
+// Reads CSV with a header line that names t_s, I_A and V_V (or time_s, current_a, voltage_v and the like) and
+// may name T_C (empty: not measured) and cycle (each value a recording of its own); other columns are passed
+// over. Of rows with the same time the last counts. `name` begins the recordings' names. Errors name the line
+// and the column.
 Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std::string& name);
 
 // As parse_recordings; an unreadable file is Fault::not_found.
 Result<std::vector<Recording>> read_recordings(const std::filesystem::path& path);
 
-// A file stands for itself; anything else is the beginning of the names <prefix>_*_data.csv of one battery's
-// identification tests, sorted.
+// A file stands for itself; a folder for the tests in it; anything else is the beginning of the names of one
+// battery's identification tests, <prefix>_*_data.csv, or where there are none <prefix>_*.csv but for the
+// random discharges <prefix>_rw.csv. Sorted.
 Result<std::vector<std::filesystem::path>> identification_files(const std::string& file_or_prefix);
 
 }  // namespace joulecast::battery

@@ -64,6 +64,34 @@ TEST(Calibrate, FindsTheBatteryThatMadeTheRecordings) {
   }
 }
 
+TEST(Calibrate, DoesNotMindRestsAroundTheSlowTestNorARechargeAfterIt) {
+  robot::Battery true_battery = full_battery();
+  true_battery.branches.resize(1);
+  const Circuit truth(true_battery);
+  std::vector<Recording> plain = identification(truth), dressed = plain;
+  Recording& slow = dressed[0];
+  const auto row = [](Recording& r, std::size_t at, double time_s, double current_a, double voltage_v) {
+    const auto i = static_cast<std::ptrdiff_t>(at);
+    r.time_s.insert(r.time_s.begin() + i, time_s);
+    r.current_a.insert(r.current_a.begin() + i, current_a);
+    r.voltage_v.insert(r.voltage_v.begin() + i, voltage_v);
+    r.temperature_c.insert(r.temperature_c.begin() + i, 25);
+  };
+  for (int k = 1; k <= 30; ++k) row(slow, 0, -60.0 * k, 0, truth.open_circuit_voltage_v(1));
+  const double end_s = slow.time_s.back(), end_v = slow.voltage_v.back();
+  for (int k = 1; k <= 30; ++k) row(slow, slow.size(), end_s + 60 * k, 0, end_v + 0.1);
+  for (int k = 31; k <= 90; ++k) row(slow, slow.size(), end_s + 60 * k, -1, end_v + 0.3);
+  const auto expected = calibrate(plain), found = calibrate(dressed);
+  ASSERT_TRUE(found) << describe(found.error());
+  EXPECT_NEAR(found->battery.capacity_ah, expected->battery.capacity_ah, 1e-9);
+  EXPECT_NEAR(found->battery.internal_resistance_ohm, expected->battery.internal_resistance_ohm, 1e-6);
+
+  for (double& current : dressed[1].current_a) current = -current;
+  const auto reversed = calibrate(dressed);
+  ASSERT_FALSE(reversed);
+  EXPECT_NE(reversed.error().message.find("positive while"), std::string::npos);
+}
+
 TEST(Calibrate, SaysWhichTestIsMissing) {
   const Circuit truth(full_battery());
   const auto all = identification(truth);

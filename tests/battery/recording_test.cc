@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <random>
 
 namespace joulecast::battery {
 namespace {
@@ -51,6 +54,35 @@ TEST(Recording, DamagedTextIsRefusedWithLineAndColumn) {
     EXPECT_EQ(recordings.error().field, item.field);
     EXPECT_THAT(recordings.error().message, HasSubstr(item.message));
   }
+}
+
+TEST(Recording, OtherNamesOfTheColumnsAreUnderstood) {
+  const auto recordings = parse_recordings("Time_s,Current_A,Voltage_V\n0,0,4\n10,1,3.9\n", "x");
+  ASSERT_TRUE(recordings) << describe(recordings.error());
+  EXPECT_THAT(recordings->front().current_a, ElementsAre(0, 1));
+  EXPECT_TRUE(std::isnan(recordings->front().temperature_c[0]));
+}
+
+TEST(Recording, FindsTheTestsOfABatteryByFolderAndByBeginning) {
+  namespace fs = std::filesystem;
+  const fs::path folder =
+      fs::temp_directory_path() / ("joulecast-cells-" + std::to_string(std::random_device{}()));
+  fs::create_directories(folder);
+  const auto names = [&](const std::string& given) {
+    std::vector<std::string> out;
+    const auto files = identification_files(given);
+    if (!files) return out;
+    for (const fs::path& file : *files) out.push_back(file.filename().string());
+    return out;
+  };
+  const auto put = [&](const char* name) { std::ofstream(folder / name) << "t_s,I_A,V_V\n"; };
+  for (const char* name : {"X_slow.csv", "X_pulse.csv", "X_rw.csv", "Y_slow.csv"}) put(name);
+  EXPECT_THAT(names((folder / "X").string()), ElementsAre("X_pulse.csv", "X_slow.csv"));
+  EXPECT_THAT(names((folder / "X_").string()), ElementsAre("X_pulse.csv", "X_slow.csv"));
+  put("X_ocv_data.csv");
+  EXPECT_THAT(names((folder / "X").string()), ElementsAre("X_ocv_data.csv"));
+  EXPECT_THAT(names(folder.string()), ElementsAre("X_ocv_data.csv"));
+  fs::remove_all(folder);
 }
 
 TEST(Recording, APrefixThatNamesNothingIsNotFound) {

@@ -6,7 +6,7 @@
 
 #include "client/virtual_robot/fleet.h"
 #include "robot/robot_file.h"
-#include "server/diagnosis/model_adoption.h"
+#include "server/diagnosis/proposal_acceptor.h"
 #include "tests/ingest/harness.h"
 
 namespace joulecast::server {
@@ -59,8 +59,7 @@ TEST(RefinedModel, IsProposedFromMissionsAndAdoptedAfterItsBackTest) {
   EXPECT_GT(carried, 0u);
   std::size_t told = 0;
   const auto events = harness.store->events(0, 100, robot.robot_id).value();
-  for (const history::Event& event : events)
-    told += event.kind == "undeclared_payload";
+  for (const history::Event& event : events) told += event.kind == "undeclared_payload";
   EXPECT_EQ(told, flagged);
 
   const auto proposals = harness.store->proposals(robot.robot_id, 1'000'000, 10).value();
@@ -79,21 +78,20 @@ TEST(RefinedModel, IsProposedFromMissionsAndAdoptedAfterItsBackTest) {
   history::Writer writer(*harness.store, history::WriterOptions{});
   ModelAdoption adoption(
       *harness.store, writer, harness.models, [] { return 42; }, AdoptionOptions{});
-  AdoptionRequest request;
-  request.model = *refined;
-  request.origin = history::ModelOrigin::calibration;
-  request.fitted_on = newest.fitted_on;
-  request.proposal_id = newest.id;
-  request.expected_version = newest.base_version;
-  const auto adopted = adoption.adopt(request);
-  ASSERT_TRUE(adopted) << describe(adopted.error());
-  EXPECT_TRUE(adopted->adopted) << adopted->refusal;
-  // Missions left out of the fit show it: a third of them.
-  EXPECT_GE(adopted->tested_on.size(), 4u);
-  std::printf("energy error on %zu missions not fitted: %.1f %% before, %.1f %% after\n",
-              adopted->tested_on.size(), 1e2 * adopted->test.error_before, 1e2 * adopted->test.error_after);
-  EXPECT_LT(adopted->test.error_after, 0.5 * adopted->test.error_before);
+  std::vector<std::string> told_of;
+  ProposalAcceptor acceptor(*harness.store, adoption,
+                            [&](const std::string&, const std::string& text) { told_of.push_back(text); });
+  EXPECT_EQ(acceptor.look(), 1) << (told_of.empty() ? "" : told_of.front());
+  EXPECT_EQ(acceptor.look(), 0);
   EXPECT_EQ(harness.store->proposal(newest.id)->state, history::ProposalState::adopted);
+  // Missions left out of the fit show it: a third of them.
+  const json evidence = json::parse(harness.store->model(robot.robot_id)->evidence_json)["back_test"];
+  EXPECT_GE(evidence["missions"].size(), 4u);
+  const double before = evidence["error_before"], after = evidence["error_after"];
+  std::printf("energy error on %zu missions not fitted: %.1f %% before, %.1f %% after\n",
+              evidence["missions"].size(), 1e2 * before, 1e2 * after);
+  EXPECT_LT(after, 0.5 * before);
+  EXPECT_EQ(harness.models.find(robot.robot_id)->version, 2);
 }
 
 }  // namespace
