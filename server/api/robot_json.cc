@@ -27,6 +27,8 @@ void write_charge(JsonWriter& json, const server::ChargeView& charge) {
   json.field("flat_curve", estimate.flat_curve);
   json.field("current_bias_a", estimate.current_bias_a);
   json.field("current_bias_sd_a", estimate.current_bias_sd_a);
+  json.field("time_to_charged_s", charge.to_full.duration_s);
+  json.field("time_to_charged_sd_s", charge.to_full.sd_s);
   json.end_object();
   json.key("charging");
   using battery::ChargingPhase;
@@ -39,8 +41,6 @@ void write_charge(JsonWriter& json, const server::ChargeView& charge) {
   json.field("since_utime_us", charge.stay.start_utime_us);
   json.field("charged_ah", charge.stay.charged_ah);
   json.field("charged_j", charge.stay.charged_j);
-  json.field("time_to_charged_s", charge.remaining.duration_s);
-  json.field("time_to_charged_sd_s", charge.remaining.sd_s);
   json.end_object();
 }
 

@@ -50,8 +50,11 @@ ChargeView ChargeWatch::view() const {
   out.estimate = tracker_.estimate();
   out.phase = charging_.phase();
   out.stay = charging_.stay();
-  out.remaining = charging_.remaining(out.estimate.charge, out.estimate.sd);
   out.habit = charging_.habit();
+  out.to_full = charging_.charging()
+                    ? charging_.remaining(out.estimate.charge, out.estimate.sd)
+                    : battery::time_to_full(out.habit, tracker_.filter().circuit().capacity_ah(),
+                                            out.estimate.charge, out.estimate.sd);
   return out;
 }
 

@@ -15,8 +15,8 @@ namespace joulecast::server {
 struct ChargeView {
   battery::ChargeEstimate estimate;
   battery::ChargingPhase phase = battery::ChargingPhase::none;
-  battery::ChargingStay stay;       // the present or the last one
-  battery::ChargingTime remaining;  // until the charger's end, while charging
+  battery::ChargingStay stay;     // the present or the last one
+  battery::ChargingTime to_full;  // until the charger's end; away from it, if the robot went there now
   battery::ChargingHabit habit;
 };
 

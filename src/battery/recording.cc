@@ -180,6 +180,18 @@ Result<std::vector<std::filesystem::path>> identification_files(const std::strin
     return fail(Fault::not_found, file_or_prefix,
                 "is no file, no folder with CSV files, and begins no name of the form <beginning>_*.csv");
   std::sort(found.begin(), found.end());
+  if (whole_folder) {
+    const auto battery = [](const fs::path& file) {
+      const std::string name = file.filename().string();
+      return name.substr(0, name.find('_'));
+    };
+    if (battery(found.front()) != battery(found.back()))
+      return invalid(file_or_prefix,
+                     fmt::format("holds tests of several batteries, {} to {}: name one by the "
+                                 "beginning of its files, as {}",
+                                 battery(found.front()), battery(found.back()),
+                                 (prefix / battery(found.front())).string()));
+  }
   return found;
 }
 

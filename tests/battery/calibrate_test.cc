@@ -100,7 +100,7 @@ TEST(Calibrate, SaysWhichTestIsMissing) {
   EXPECT_FALSE(calibrate({}));
   Recording rest = all[1];
   std::fill(rest.current_a.begin(), rest.current_a.end(), 0.0);
-  EXPECT_THAT(calibrate({all[0], rest}).error().message, testing::HasSubstr("half draws 0 Ah"));
+  EXPECT_THAT(calibrate({all[0], rest}).error().message, testing::HasSubstr("half draws no charge"));
 }
 
 TEST(Predict, TheTrueBatteryPredictsItself) {

@@ -82,6 +82,8 @@ TEST(Recording, FindsTheTestsOfABatteryByFolderAndByBeginning) {
   put("X_ocv_data.csv");
   EXPECT_THAT(names((folder / "X").string()), ElementsAre("X_ocv_data.csv"));
   EXPECT_THAT(names(folder.string()), ElementsAre("X_ocv_data.csv"));
+  put("Y_ocv_data.csv");
+  EXPECT_THAT(identification_files(folder.string()).error().message, HasSubstr("several batteries, X to Y"));
   fs::remove_all(folder);
 }
 

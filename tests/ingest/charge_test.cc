@@ -157,9 +157,9 @@ TEST(ChargingOfVirtualRobots, IsAccountedApartAndForecast) {
     if (snapshot == nullptr) continue;
     const bool charging = snapshot->charge.phase == battery::ChargingPhase::constant_current ||
                           snapshot->charge.phase == battery::ChargingPhase::taper;
-    if (charging && std::isfinite(snapshot->charge.remaining.duration_s))
-      forecasts.push_back({emission.utime_us, snapshot->charge.remaining.duration_s,
-                           snapshot->charge.remaining.sd_s, robot.state_of_charge()});
+    if (charging && std::isfinite(snapshot->charge.to_full.duration_s))
+      forecasts.push_back({emission.utime_us, snapshot->charge.to_full.duration_s,
+                           snapshot->charge.to_full.sd_s, robot.state_of_charge()});
     if (was_charging && !charging && !forecasts.empty()) {
       const std::int64_t end_us = forecasts.back().utime_us;
       for (const double share : {0.1, 0.5, 0.8}) {
