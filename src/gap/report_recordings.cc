@@ -453,6 +453,7 @@ void missions_table(Page& page, const Powers& p, const RecordingSet& set) {
                                         "payload kg",   "energy missed", "with effects",
                                         "power missed", "with effects"};
   page.table(header, rows, 2);
+  page.paragraph("Missed energy and power by mission; with effects: as fitted to all of these missions.");
   if (totals.size() > rows.size())
     page.paragraph(fmt::format("The first {} of {} missions.", rows.size(), totals.size()));
 }
