@@ -16,7 +16,7 @@ struct RefinementTrust {
   double file_friction = 0.15;  // of the friction torque
   double file_viscous = 0.5;    // of the viscous friction, and at least that of the dry one at top speed / 10
   double file_idle = 0.1;       // of the idle power
-  double file_mass = 0.03;     // of the total mass
+  double file_mass = 0.03;      // of the total mass
   // Between missions of an unchanged robot (floor, grease, temperature).
   double scatter_common = 0.03;  // of the friction torque, both sides alike
   double scatter_side = 0.015;   // ... each side on its own
