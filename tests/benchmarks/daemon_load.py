@@ -72,7 +72,7 @@ def main():
     arguments.add_argument("--seconds", type=int, default=60)
     arguments.add_argument("--robots", type=int, default=40)
     options = arguments.parse_args()
-    lcm = f"udpm://239.255.76.67:{free_port()}?ttl=0"
+    lcm = f"udpm://239.255.76.67:{free_port()}?ttl=0&recv_buf_size=4194304"
     with tempfile.TemporaryDirectory() as folder:
         log = f"{folder}/load.lcmlog"
         messages = options.rate * options.seconds
