@@ -217,12 +217,13 @@ history::MissionKey fill(const std::string& path, const std::vector<std::string>
   return key;
 }
 
-// Rounds of the bare server and of the daemon in turn; the median of the ratios of each round counts.
+// Rounds of the bare server and of the daemon in turn. Other programs on the machine only take away, so the
+// best round of each tells of it.
 void compare(const char* what, std::uint16_t port, const std::string& request, double seconds, int rounds,
              double least_ratio, double most_p99_ms) {
   const std::string body(HttpConnection(port).exchange(request));
   const BareServer bare(body);
-  std::vector<double> ratios, p99;
+  std::vector<double> bare_1_s, ours_1_s, p99;
   for (int round = 0; round < rounds; ++round) {
     const LoadFigures yardstick = load_http(bare.port(), request, seconds);
     const LoadFigures ours = load_http(port, request, seconds);
@@ -230,16 +231,17 @@ void compare(const char* what, std::uint16_t port, const std::string& request, d
         "  %s, %zu bytes: bare %.0f/s (p99 %.2f ms), ours %.0f/s (median %.2f ms, p99 %.2f ms), ratio %.2f\n",
         what, body.size(), yardstick.rate_1_s, yardstick.p99_ms, ours.rate_1_s, ours.median_ms, ours.p99_ms,
         ours.rate_1_s / yardstick.rate_1_s);
-    ratios.push_back(ours.rate_1_s / yardstick.rate_1_s);
+    bare_1_s.push_back(yardstick.rate_1_s);
+    ours_1_s.push_back(ours.rate_1_s);
     p99.push_back(ours.p99_ms);
   }
   char promise[64];
   std::snprintf(promise, sizeof promise, "at least %.2f", least_ratio);
-  judge((std::string(what) + ": rate over bare Beast's, median of the rounds").c_str(), quantile(ratios, 0.5),
-        "", quantile(ratios, 0.5) >= least_ratio, promise);
+  const double ratio = quantile(ours_1_s, 1) / quantile(bare_1_s, 1);
+  judge((std::string(what) + ": rate over bare Beast's, best rounds").c_str(), ratio, "",
+        ratio >= least_ratio, promise);
   if (most_p99_ms > 0) {
     std::snprintf(promise, sizeof promise, "below %.0f ms", most_p99_ms);
-    // Other programs on the machine only add: the quietest round tells of this one.
     judge((std::string(what) + ": p99 under eight clients, least of the rounds").c_str(), quantile(p99, 0),
           "ms", quantile(p99, 0) < most_p99_ms, promise);
   }
