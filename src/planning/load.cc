@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 namespace joulecast::planning {
 
@@ -110,6 +111,8 @@ WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slo
     }
     fit(slow.through[s], middle.through[s], fast.through[s], w.t0, w.t1, w.t2);
     fit(inside[0], inside[1], inside[2], w.f0, w.f1, w.f2);
+    // Without gear loss it is all one where a torque acts; inside, it leaves the load linear.
+    if (w.gear == 0) w.f1 += std::exchange(w.t1, 0);
   }
   return loads;
 }

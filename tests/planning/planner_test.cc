@@ -291,6 +291,21 @@ TEST(Planner, AdoptedEffectsChangeTheAnswer) {
   EXPECT_NEAR(burning->summary.energy_j, told->summary.energy_j, 1e-9 * told->summary.energy_j);
 }
 
+TEST(Planner, LoadsThatAreLinearInTheSpeedKeepTheClosedForm) {
+  robot::RobotModel robot = test::amr();
+  robot.effects = {{"load_rolling_resistance", {{"coefficient", 0.02}}}};
+  Problem problem = limited(robot);
+  const auto closed = plan(robot, made({Straight{10}}, 40), problem);
+  ASSERT_TRUE(closed) << describe(closed.error());
+  EXPECT_EQ(closed->certificate.method, Method::closed_form);
+  EXPECT_GT(closed->ledger[energy::Term::friction_rolling], 0);
+  problem.regeneration = 1 - 1e-9;
+  const auto numeric = plan(robot, made({Straight{10}}, 40), problem);
+  ASSERT_TRUE(numeric);
+  EXPECT_EQ(numeric->certificate.method, Method::interior_point);
+  EXPECT_NEAR(closed->summary.energy_j, numeric->summary.energy_j, 3e-4 * numeric->summary.energy_j);
+}
+
 // Rows are kinematically exact: constant acceleration between them covers their distance.
 TEST(Planner, ProfileRowsIntegrate) {
   const robot::RobotModel robot = test::nomad();
