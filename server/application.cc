@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <filesystem>
 #include <mutex>
+#include <sstream>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "server/diagnosis/proposal_acceptor.h"
 #include "server/embedded.h"
 #include "server/fleet_events.h"
+#include "server/gap_metrics.h"
 #include "server/http/event_hub.h"
 #include "server/http/http_metrics.h"
 #include "server/http/http_server.h"
@@ -77,6 +79,25 @@ server::AdoptionOptions adoption_options(const Settings& settings) {
   return options;
 }
 
+server::DiagnosisOptions diagnosis_options(const Settings& settings) {
+  server::DiagnosisOptions options;
+  options.queue = static_cast<std::size_t>(settings.integer("diagnosis.queue"));
+  options.max_missions = static_cast<std::size_t>(settings.integer("diagnosis.max_missions"));
+  options.max_samples = static_cast<std::size_t>(settings.integer("diagnosis.max_samples"));
+  return options;
+}
+
+server::WatchOptions watch_options(const Settings& settings) {
+  server::WatchOptions options;
+  options.period_s = settings.number("watch.period_s");
+  options.drift.least_change = settings.number("watch.least_change");
+  options.diagnose = settings.boolean("watch.diagnose");
+  std::istringstream robots(settings.text("watch.robots"));
+  for (std::string id; std::getline(robots, id, ',');)
+    if (!id.empty()) options.robots.insert(id);
+  return options;
+}
+
 http::ServerOptions http_options(const Settings& settings) {
   http::ServerOptions options;
   options.address = settings.text("http.address");
@@ -132,6 +153,8 @@ struct Application::Parts {
   void stop() {
     if (stopped.exchange(true)) return;
     if (acceptor) acceptor->stop();
+    if (watch) watch->stop();
+    if (diagnoses) diagnoses->stop();
     if (ingest) ingest->stop();
     {
       const std::lock_guard lock(beat_mutex);
@@ -170,6 +193,8 @@ struct Application::Parts {
   std::unique_ptr<server::IngestService> ingest;
   std::unique_ptr<server::ModelAdoption> adoption;
   std::unique_ptr<server::ProposalAcceptor> acceptor;  // null: a person adopts
+  std::unique_ptr<server::DiagnosisService> diagnoses;
+  std::unique_ptr<server::GapWatch> watch;
   std::unique_ptr<api::Services> services;
   std::unique_ptr<http::Router> router;
   std::unique_ptr<http::HttpMetrics> http_metrics;
@@ -221,8 +246,17 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
     p.acceptor = std::make_unique<server::ProposalAcceptor>(*p.store, *p.adoption, p.warn);
     p.acceptor->start(milliseconds(10'000));
   }
+  const auto warn_of = [](const Error& error) { log_error("diagnosis", error); };
+  p.diagnoses = std::make_unique<server::DiagnosisService>(
+      *p.store, *p.writer, p.models, host_utime_us, diagnosis_options(settings), warn_of,
+      [&p](const history::DiagnosisRecord& diagnosis) { p.watch->on_diagnosis(diagnosis); });
+  p.watch = std::make_unique<server::GapWatch>(*p.store, *p.writer, p.models, *p.diagnoses, host_utime_us,
+                                               watch_options(settings), warn_of);
+  if (Result<void> started = p.diagnoses->start(); !started)
+    return tl::unexpected(std::move(started.error()));
+  p.watch->start();
   p.services = std::make_unique<api::Services>(
-      api::Services{*p.store, *p.writer, p.models, p.fleet, *p.adoption, host_utime_us});
+      api::Services{*p.store, *p.writer, p.models, p.fleet, *p.adoption, *p.diagnoses, host_utime_us});
   std::vector<http::ReadinessCheck> checks;
   checks.push_back({"ingest", [&p]() -> Result<void> {
                       const server::IngestStatus status = p.ingest->status();
@@ -248,6 +282,7 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   p.http_metrics = std::make_unique<http::HttpMetrics>(p.metrics);
   server::export_metrics(p.metrics, p.counters, *p.ingest, p.fleet, *p.writer, *p.store, p.events,
                          host_utime_us);
+  server::export_gap_metrics(p.metrics, *p.diagnoses, *p.watch, *p.adoption);
   Result<std::unique_ptr<http::HttpServer>> http =
       http::HttpServer::start(http_options(settings), *p.router, p.http_metrics.get());
   if (!http) return tl::unexpected(std::move(http.error()));
@@ -294,7 +329,8 @@ Result<std::string> openapi_document() {
     Metrics metrics;
     http::EventHub events;
     server::ModelAdoption adoption(**store, writer, models, host_utime_us, {});
-    api::Services services{**store, writer, models, fleet, adoption, host_utime_us};
+    server::DiagnosisService diagnoses(**store, writer, models, host_utime_us, {}, [](const Error&) {});
+    api::Services services{**store, writer, models, fleet, adoption, diagnoses, host_utime_us};
     std::vector<http::Endpoint> table = api::endpoints(services);
     table.push_back(http::events_endpoint(events));
     for (http::Endpoint& row : http::operations_endpoints(metrics, {})) table.push_back(std::move(row));

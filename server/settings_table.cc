@@ -67,6 +67,18 @@ constexpr Setting table[] = {
     {"adoption.automatic", Type::boolean, "false", 0, 0, "",
      "adopt models that missions propose when their back-test improves, without waiting for a person"},
 
+    {"diagnosis.queue", Type::integer, "32", 1, 10000, "", "diagnoses that may wait; beyond: 503"},
+    {"diagnosis.max_missions", Type::integer, "200", 1, 1000, "",
+     "missions that one diagnosis reads at most, newest first"},
+    {"diagnosis.max_samples", Type::integer, "500000", 1000, 1e7, "",
+     "samples that one diagnosis reads at most: bounds its memory (about 0.5 kB each) and time"},
+    {"watch.period_s", Type::number, "3600", 0, 31536000, "s",
+     "how often every robot's missions are looked at for a drift of the gap; 0: never"},
+    {"watch.robots", Type::text, "", 0, 0, "", "robots to watch, separated by commas; empty: all"},
+    {"watch.least_change", Type::number, "0.01", 0.001, 1, "",
+     "change of measured over modelled energy that counts as drift"},
+    {"watch.diagnose", Type::boolean, "true", 0, 0, "", "start a diagnosis when a drift is found"},
+
     {"log.format", Type::choice, "text", 0, 0, "", "one JSON object a line, or text for a terminal",
      log_formats},
     {"log.level", Type::choice, "info", 0, 0, "", "least level that is written", log_levels},

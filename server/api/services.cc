@@ -7,8 +7,8 @@ namespace joulecast::api {
 
 std::vector<http::Endpoint> endpoints(Services& services) {
   std::vector<http::Endpoint> all;
-  for (const auto part : {robot_endpoints, model_endpoints, mission_endpoints, planning_endpoints,
-                          matrix_endpoints, autonomy_endpoints}) {
+  for (const auto part : {robot_endpoints, model_endpoints, diagnosis_endpoints, gap_history_endpoints,
+                          mission_endpoints, planning_endpoints, matrix_endpoints, autonomy_endpoints}) {
     std::vector<http::Endpoint> rows = part(services);
     all.insert(all.end(), std::make_move_iterator(rows.begin()), std::make_move_iterator(rows.end()));
   }

@@ -6,6 +6,7 @@
 
 #include "history/store.h"
 #include "history/writer.h"
+#include "server/diagnosis/diagnosis_service.h"
 #include "server/diagnosis/model_adoption.h"
 #include "server/http/router.h"
 #include "server/ingest/fleet_view.h"
@@ -20,6 +21,7 @@ struct Services {
   server::ModelRegistry& models;
   const server::FleetView& fleet;
   server::ModelAdoption& adoption;
+  server::DiagnosisService& diagnoses;
   std::function<std::int64_t()> now_utime_us;  // host clock
 };
 
@@ -29,6 +31,8 @@ std::vector<http::Endpoint> endpoints(Services& services);
 // One function an endpoint file, each returning its rows.
 std::vector<http::Endpoint> robot_endpoints(Services& services);
 std::vector<http::Endpoint> model_endpoints(Services& services);
+std::vector<http::Endpoint> diagnosis_endpoints(Services& services);
+std::vector<http::Endpoint> gap_history_endpoints(Services& services);
 std::vector<http::Endpoint> mission_endpoints(Services& services);
 std::vector<http::Endpoint> planning_endpoints(Services& services);
 std::vector<http::Endpoint> matrix_endpoints(Services& services);

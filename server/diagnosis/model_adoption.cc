@@ -113,7 +113,8 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
   const json report = report_of(adoption);
   adoption.back_test_json = report.dump();
   adoption.refusal = refusal_of(adoption.test);
-  if (request.dry_run || (!adoption.refusal.empty() && !request.force)) return adoption;
+  if (request.dry_run) return adoption;
+  if (!adoption.refusal.empty() && !request.force) return ++refused_, adoption;
 
   json evidence = {{"back_test", report}, {"forced", !adoption.refusal.empty()}};
   if (request.diagnosis_id) evidence["diagnosis_id"] = *request.diagnosis_id;
@@ -135,6 +136,7 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
     adoption.version = *version;
   }
   adoption.adopted = true;
+  ++(adoption.refusal.empty() ? adopted_ : forced_);
   evidence.erase("back_test");
   evidence.update({{"model_version", adoption.version},
                    {"previous_version", adoption.previous_version},

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <mutex>
@@ -41,6 +42,12 @@ struct Adoption {
   std::string back_test_json;  // all of the above as schemas/back-test.schema.json
 };
 
+struct AdoptionCounts {
+  std::uint64_t adopted = 0;  // after a back-test that showed an improvement
+  std::uint64_t forced = 0;   // without one
+  std::uint64_t refused = 0;
+};
+
 struct AdoptionOptions {
   std::size_t max_missions = 50;
   std::size_t max_samples = 400'000;
@@ -67,6 +74,8 @@ class ModelAdoption {
   // Puts a stored version in force without a back-test. Outcome: the version that was in force before.
   Result<std::int64_t> activate(const std::string& robot_id, std::int64_t version, const std::string& note);
 
+  AdoptionCounts counts() const { return {adopted_, forced_, refused_}; }
+
  private:
   Result<void> record(const std::string& robot_id, const std::string& kind, std::string detail_json);
 
@@ -75,6 +84,7 @@ class ModelAdoption {
   ModelRegistry& models_;
   std::function<std::int64_t()> now_utime_us_;
   AdoptionOptions options_;
+  std::atomic<std::uint64_t> adopted_ = 0, forced_ = 0, refused_ = 0;
   std::mutex testing_;  // one back-test at a time
   std::mutex putting_;  // a version and the registry change together
 };

@@ -1,0 +1,290 @@
+#include <charconv>
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "server/api/fields.h"
+#include "server/api/json_writer.h"
+#include "server/api/services.h"
+#include "server/diagnosis/diagnosis_service.h"
+
+// Diagnoses of the gap as jobs: start, follow, cancel, read.
+namespace joulecast::api {
+namespace {
+
+using http::Endpoint;
+using http::Method;
+using http::Parameter;
+using http::Request;
+using http::Response;
+using nlohmann::json;
+
+constexpr std::size_t most_missions = 1000;  // of one request
+constexpr double most_held_back = 0.9;
+
+Result<std::int64_t> diagnosis_id(const Request& request) {
+  const std::string& text = request.param("id");
+  std::int64_t id = 0;
+  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), id);
+  if (fault != std::errc() || end != text.data() + text.size() || id <= 0)
+    return fail(Fault::not_found, "id", "\"" + text + "\" names no diagnosis: ids are positive integers");
+  return id;
+}
+
+void write_keys(JsonWriter& out, std::string_view name, const std::vector<history::MissionKey>& keys) {
+  out.key(name).begin_array();
+  for (const history::MissionKey key : keys) out.value(key);
+  out.end_array();
+}
+
+template <class T>
+void write_optional(JsonWriter& out, std::string_view name, const std::optional<T>& value) {
+  out.key(name);
+  value ? out.value(*value) : out.null();
+}
+
+// What lists show of a result: the verdict, the effects and how far the gap shrinks.
+std::string summary_of(const std::string& result_json) {
+  const json result = json::parse(result_json, nullptr, false);
+  if (!result.is_object()) return "null";
+  json effects = json::array();
+  for (const json& effect : result.value("effects", json::array()))
+    effects.push_back(
+        {{"id", effect["id"]}, {"probability", effect["probability"]}, {"share", effect["share"]}});
+  return json{{"verdict", result["verdict"]},
+              {"gap", result["gap"]},
+              {"effects", effects},
+              {"shrinkage", result["shrinkage"]}}
+      .dump();
+}
+
+enum class Detail { list, whole };
+
+void write_diagnosis(JsonWriter& out, const Services& services, const history::DiagnosisRecord& d,
+                     Detail detail) {
+  const auto progress = services.diagnoses.progress(d.id);
+  out.begin_object().field("id", d.id).field("robot_id", d.robot_id);
+  out.field("state", history::name(progress ? progress->state : d.state))
+      .field("cause", history::name(d.cause));
+  out.field("progress", progress ? progress->fraction : d.state == history::DiagnosisState::done ? 1.0 : 0.0);
+  out.field("ahead", static_cast<std::int64_t>(progress ? progress->ahead : 0));
+  out.field("created_utime_us", d.created_utime_us);
+  write_optional(out, "started_utime_us", d.started_utime_us);
+  write_optional(out, "finished_utime_us", d.finished_utime_us);
+  write_optional(out, "model_version", d.model_version);
+  write_keys(out, "fitted_on", d.fitted_on);
+  write_keys(out, "held_back", d.held_back);
+  out.key("error");
+  d.error.empty() ? out.null() : out.value(d.error);
+  out.key("request").raw(d.request_json);
+  if (detail == Detail::list) {
+    out.key("summary");
+    d.result_json.empty() ? out.null() : out.raw(summary_of(d.result_json));
+  } else {
+    out.key("result");
+    d.result_json.empty() ? out.null() : out.raw(d.result_json);
+    out.key("model");
+    d.model_json.empty() ? out.null() : out.raw(d.model_json);
+  }
+  out.end_object();
+}
+
+Result<Response> answer(const Services& services, std::int64_t id, unsigned status) {
+  const Result<history::DiagnosisRecord> stored = services.store.diagnosis(id);
+  if (!stored) return tl::unexpected(stored.error());
+  JsonWriter out;
+  write_diagnosis(out, services, *stored, Detail::whole);
+  Response response = http::json_response(out.take());
+  response.status = status;
+  if (status == 202) response.headers.emplace_back("Location", "/v1/diagnoses/" + std::to_string(id));
+  return response;
+}
+
+Result<Response> start(Services& services, const Request& request) {
+  Fields fields(*request.json);
+  server::DiagnosisRequest wanted;
+  wanted.robot_id = fields.text("robot_id", 64);
+  if (const json* missions = fields.member("missions")) {
+    if (!missions->is_array() || missions->empty() || missions->size() > most_missions)
+      fields.fault("missions", "must be an array of 1 to " + std::to_string(most_missions) + " mission ids");
+    for (std::size_t k = 0; fields.ok() && k < missions->size(); ++k) {
+      if (!(*missions)[k].is_number_integer() || (*missions)[k] < 1) {
+        fields.fault("missions/" + std::to_string(k), "must be a positive integer, the id of a mission");
+      } else {
+        wanted.missions.push_back((*missions)[k].get<std::int64_t>());
+      }
+    }
+  }
+  if (fields.has("since_utime_us"))
+    wanted.since_utime_us = fields.integer("since_utime_us", 0, std::int64_t{1} << 53);
+  else
+    (void)fields.member("since_utime_us");
+  wanted.max_missions = static_cast<std::size_t>(
+      fields.integer("max_missions", 1, static_cast<std::int64_t>(most_missions), 200));
+  wanted.hold_back = fields.number("hold_back", {0, most_held_back}, wanted.hold_back);
+  if (Result<void> read = fields.finish(); !read) return tl::unexpected(std::move(read.error()));
+  const Result<std::int64_t> id = services.diagnoses.submit(wanted);
+  if (!id) return tl::unexpected(id.error());
+  return answer(services, *id, 202);
+}
+
+Result<Response> get(const Services& services, const Request& request) {
+  const Result<std::int64_t> id = diagnosis_id(request);
+  if (!id) return tl::unexpected(id.error());
+  return answer(services, *id, 200);
+}
+
+Result<Response> cancel(Services& services, const Request& request) {
+  const Result<std::int64_t> id = diagnosis_id(request);
+  if (!id) return tl::unexpected(id.error());
+  if (Result<void> done = services.diagnoses.cancel(*id); !done)
+    return tl::unexpected(std::move(done.error()));
+  return answer(services, *id, 200);
+}
+
+Result<Response> list(const Services& services, const Request& request) {
+  std::optional<std::string> robot;
+  if (const auto id = request.query_value("robot_id")) robot = std::string(*id);
+  const std::int64_t limit = request.query_integer("limit").value_or(50);
+  const auto found =
+      services.store.diagnoses(robot, request.query_integer("before").value_or(history::whole_future), limit);
+  if (!found) return tl::unexpected(found.error());
+  JsonWriter out;
+  out.begin_object().key("diagnoses").begin_array();
+  for (const history::DiagnosisRecord& d : *found) write_diagnosis(out, services, d, Detail::list);
+  out.end_array().key("next_before");
+  static_cast<std::int64_t>(found->size()) < limit ? out.null() : out.value(found->back().id);
+  out.end_object();
+  return http::json_response(out.take());
+}
+
+Result<Response> report(const Services& services, const Request& request) {
+  const Result<std::int64_t> id = diagnosis_id(request);
+  if (!id) return tl::unexpected(id.error());
+  Result<std::string> html = services.store.diagnosis_report(*id);
+  if (!html) return tl::unexpected(std::move(html.error()));
+  Response response;
+  response.content_type = "text/html; charset=utf-8";
+  response.body = std::move(*html);
+  // The report brings its own style and drawings, and nothing that runs.
+  response.headers.emplace_back("Content-Security-Policy",
+                                "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox");
+  return response;
+}
+
+// The progress of one job as events "progress", and its end as one event "ended" that carries what
+// GET /v1/diagnoses/{id} answers, after which the stream ends.
+class ProgressStream final : public http::StreamSource {
+ public:
+  ProgressStream(const Services& services, std::int64_t id) : services_(services), id_(id) {}
+
+  Next pull(std::string& out) override {
+    const auto now = std::chrono::steady_clock::now();
+    if (const auto progress = services_.diagnoses.progress(id_)) {
+      JsonWriter text;
+      text.begin_object().field("id", id_).field("state", history::name(progress->state));
+      text.field("progress", progress->fraction).field("ahead", static_cast<std::int64_t>(progress->ahead));
+      text.end_object();
+      if (text.text() != last_) {
+        last_ = text.take();
+        out += "event: progress\ndata: " + last_ + "\n\n";
+        sent_ = now;
+      } else if (now - sent_ >= heartbeat) {
+        out += ": still here\n\n";
+        sent_ = now;
+      }
+      return Next::wait;
+    }
+    const Result<history::DiagnosisRecord> stored = services_.store.diagnosis(id_);
+    if (!stored) return Next::abort;
+    JsonWriter text;
+    write_diagnosis(text, services_, *stored, Detail::list);
+    out += "event: ended\ndata: " + text.take() + "\n\n";
+    return Next::end;
+  }
+  bool endless() const override { return true; }
+
+ private:
+  static constexpr std::chrono::seconds heartbeat{15};
+  const Services& services_;
+  std::int64_t id_;
+  std::string last_;
+  std::chrono::steady_clock::time_point sent_ = std::chrono::steady_clock::now();
+};
+
+Result<Response> events(const Services& services, const Request& request) {
+  const Result<std::int64_t> id = diagnosis_id(request);
+  if (!id) return tl::unexpected(id.error());
+  if (const auto stored = services.store.diagnosis(*id); !stored) return tl::unexpected(stored.error());
+  Response response;
+  response.content_type = "text/event-stream";
+  response.headers.emplace_back("Cache-Control", "no-cache");
+  response.stream = std::make_shared<ProgressStream>(services, *id);
+  return response;
+}
+
+}  // namespace
+
+std::vector<Endpoint> diagnosis_endpoints(Services& services) {
+  using Type = Parameter::Type;
+  std::vector<Endpoint> rows;
+  rows.push_back({.method = Method::post,
+                  .path = "/v1/diagnoses",
+                  .operation_id = "startDiagnosis",
+                  .summary =
+                      "Starts a diagnosis of the gap between a robot and its model over its stored missions, "
+                      "some of which are held back for a back-test",
+                  .request_schema = "diagnosis-request",
+                  .response_schema = "diagnosis",
+                  .success_status = 202,
+                  .error_statuses = {404, 422},
+                  .handler = [&services](const Request& r) { return start(services, r); }});
+  rows.push_back(
+      {.method = Method::get,
+       .path = "/v1/diagnoses",
+       .operation_id = "listDiagnoses",
+       .summary = "Diagnoses, newest first, without their whole results",
+       .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},
+                      {.name = "limit",
+                       .type = Type::integer,
+                       .description = "diagnoses a page",
+                       .minimum = 1,
+                       .maximum = static_cast<double>(history::max_page_size)},
+                      {.name = "before",
+                       .type = Type::integer,
+                       .description = "the next_before of the page before",
+                       .minimum = 1}},
+       .response_schema = "diagnosis-list",
+       .handler = [&services](const Request& r) { return list(services, r); }});
+  rows.push_back({.method = Method::get,
+                  .path = "/v1/diagnoses/{id}",
+                  .operation_id = "getDiagnosis",
+                  .summary = "A diagnosis: where it stands, and its result",
+                  .response_schema = "diagnosis",
+                  .error_statuses = {404},
+                  .handler = [&services](const Request& r) { return get(services, r); }});
+  rows.push_back({.method = Method::del,
+                  .path = "/v1/diagnoses/{id}",
+                  .operation_id = "cancelDiagnosis",
+                  .summary = "Cancels a diagnosis that waits or runs",
+                  .response_schema = "diagnosis",
+                  .error_statuses = {404, 409},
+                  .handler = [&services](const Request& r) { return cancel(services, r); }});
+  rows.push_back({.method = Method::get,
+                  .path = "/v1/diagnoses/{id}/events",
+                  .operation_id = "streamDiagnosis",
+                  .summary = "The progress of a diagnosis as server-sent events, until it has ended",
+                  .response_type = "text/event-stream",
+                  .error_statuses = {404},
+                  .handler = [&services](const Request& r) { return events(services, r); }});
+  rows.push_back({.method = Method::get,
+                  .path = "/v1/diagnoses/{id}/report",
+                  .operation_id = "getDiagnosisReport",
+                  .summary = "The report of a diagnosis as one self-contained page",
+                  .response_type = "text/html",
+                  .error_statuses = {404},
+                  .handler = [&services](const Request& r) { return report(services, r); }});
+  return rows;
+}
+
+}  // namespace joulecast::api

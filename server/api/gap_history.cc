@@ -1,0 +1,160 @@
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "server/api/json_writer.h"
+#include "server/api/services.h"
+#include "server/diagnosis/gap_watch.h"
+
+// How a robot's gap moved over its missions, what was adopted meanwhile, and how robots of its kind do.
+namespace joulecast::api {
+namespace {
+
+using http::Endpoint;
+using http::Method;
+using http::Parameter;
+using http::Request;
+using http::Response;
+using nlohmann::json;
+
+constexpr std::int64_t most_missions = 5000;
+constexpr std::size_t sibling_missions = 10;  // newest ones, that tell how a robot does now
+
+void write_interval(JsonWriter& out, std::string_view name, const std::array<double, 2>& ends) {
+  out.key(name).begin_array().value(ends[0]).value(ends[1]).end_array();
+}
+
+void write_ratios(JsonWriter& out, const std::vector<gap::MissionRatio>& missions) {
+  out.key("missions").begin_array();
+  for (const gap::MissionRatio& m : missions) {
+    out.begin_object().field("id", m.mission_key).field("start_utime_us", m.utime_us);
+    out.field("model_version", m.model_version).field("measured_j", m.measured_j);
+    out.field("modelled_j", m.modelled_j).field("ratio", m.ratio()).end_object();
+  }
+  out.end_array();
+}
+
+void write_marks(JsonWriter& out, const std::vector<gap::DriftMark>& marks) {
+  out.key("drift").begin_array();
+  for (const gap::DriftMark& m : marks) {
+    out.begin_object().field("id", m.mission_key).field("start_utime_us", m.utime_us);
+    out.field("model_version", m.model_version).field("ratio_before", m.before).field("ratio_after", m.after);
+    write_interval(out, "change_ci", m.interval);
+    out.field("missions", static_cast<std::int64_t>(m.missions)).end_object();
+  }
+  out.end_array();
+}
+
+void write_versions(JsonWriter& out, const std::vector<history::ModelVersion>& versions) {
+  out.key("versions").begin_array();
+  for (const history::ModelVersion& v : versions) {
+    out.begin_object().field("model_version", v.version).field("created_utime_us", v.created_utime_us);
+    out.field("origin", history::name(v.origin)).field("note", v.note).field("active", v.active);
+    const json evidence = json::parse(v.evidence_json, nullptr, false);
+    const json test = evidence.is_object() ? evidence.value("back_test", json::object()) : json::object();
+    for (const char* name : {"error_before", "error_after"}) {
+      out.key(name);
+      const auto found = test.find(name);
+      found != test.end() && found->is_number() ? out.value(found->get<double>()) : out.null();
+    }
+    out.key("forced");
+    evidence.is_object() ? out.value(evidence.value("forced", false)) : out.null();
+    out.end_object();
+  }
+  out.end_array();
+}
+
+Result<Response> gap_history(const Services& services, const Request& request) {
+  const std::string& id = request.param("id");
+  const auto model = model_of(services, id);
+  if (!model) return tl::unexpected(model.error());
+  const auto missions = server::mission_ratios(
+      services.store, id, static_cast<std::size_t>(request.query_integer("limit").value_or(500)));
+  if (!missions) return tl::unexpected(missions.error());
+  const auto versions = services.store.model_versions(id);
+  if (!versions) return tl::unexpected(versions.error());
+
+  std::vector<gap::RobotRatios> kind;
+  for (const std::string& sibling : server::robots_of_kind(services.models, id)) {
+    const auto in_force = services.models.find(sibling);
+    auto ratios = server::mission_ratios(services.store, sibling, 4 * sibling_missions);
+    if (!ratios) return tl::unexpected(std::move(ratios.error()));
+    std::erase_if(*ratios, [&](const auto& m) { return m.model_version != in_force->version; });
+    if (ratios->size() > sibling_missions) ratios->erase(ratios->begin(), ratios->end() - sibling_missions);
+    kind.push_back({sibling, std::move(*ratios)});
+  }
+
+  JsonWriter out;
+  out.begin_object().field("robot_id", id).field("model_version", (*model)->version);
+  write_ratios(out, *missions);
+  write_marks(out, gap::drift_marks(*missions));
+  write_versions(out, *versions);
+  out.key("siblings").begin_array();
+  for (const gap::SiblingRatio& s : gap::compare_siblings(kind)) {
+    out.begin_object().field("robot_id", s.robot_id).field("missions", static_cast<std::int64_t>(s.missions));
+    out.field("ratio", s.ratio);
+    write_interval(out, "ci", s.interval);
+    out.field("deviation", s.deviation).field("stands_out", s.stands_out).end_object();
+  }
+  out.end_array().end_object();
+  return http::json_response(out.take());
+}
+
+// The audit log: adoptions, drifts, diagnoses.
+Result<Response> audit(const Services& services, const Request& request) {
+  std::optional<std::string> robot;
+  if (const auto id = request.query_value("robot_id")) robot = std::string(*id);
+  const auto found = services.store.events(request.query_integer("after").value_or(0),
+                                           request.query_integer("limit").value_or(100), robot);
+  if (!found) return tl::unexpected(found.error());
+  JsonWriter out;
+  out.begin_object().key("events").begin_array();
+  for (const history::Event& e : *found) {
+    out.begin_object().field("id", e.id).field("utime_us", e.utime_us).key("robot_id");
+    e.robot_id.empty() ? out.null() : out.value(e.robot_id);
+    out.field("kind", e.kind).key("detail").raw(e.detail_json).end_object();
+  }
+  out.end_array().end_object();
+  return http::json_response(out.take());
+}
+
+}  // namespace
+
+std::vector<Endpoint> gap_history_endpoints(Services& services) {
+  using Type = Parameter::Type;
+  std::vector<Endpoint> rows;
+  rows.push_back({.method = Method::get,
+                  .path = "/v1/robots/{id}/gap-history",
+                  .operation_id = "getGapHistory",
+                  .summary =
+                      "Measured over modelled energy of a robot's missions with marks where it drifted, the "
+                      "models adopted, and the robots of its kind",
+                  .parameters = {{.name = "limit",
+                                  .type = Type::integer,
+                                  .description = "missions, newest first",
+                                  .minimum = 1,
+                                  .maximum = static_cast<double>(most_missions)}},
+                  .response_schema = "gap-history",
+                  .error_statuses = {404},
+                  .handler = [&services](const Request& r) { return gap_history(services, r); }});
+  rows.push_back(
+      {.method = Method::get,
+       .path = "/v1/audit-log",
+       .operation_id = "listAuditLog",
+       .summary = "What happened to robots and their models: adoptions, drifts, diagnoses, in order",
+       .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},
+                      {.name = "after",
+                       .type = Type::integer,
+                       .description = "only entries with a greater id",
+                       .minimum = 0},
+                      {.name = "limit",
+                       .type = Type::integer,
+                       .description = "entries a page",
+                       .minimum = 1,
+                       .maximum = static_cast<double>(history::max_page_size)}},
+       .response_schema = "audit-log",
+       .handler = [&services](const Request& r) { return audit(services, r); }});
+  return rows;
+}
+
+}  // namespace joulecast::api

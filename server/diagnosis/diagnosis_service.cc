@@ -1,0 +1,336 @@
+#include "server/diagnosis/diagnosis_service.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <thread>
+#include <utility>
+
+#include "gap/adopt.h"
+#include "gap/diagnosis.h"
+#include "gap/diagnosis_json.h"
+#include "robot/robot_file.h"
+#include "server/diagnosis/mission_recordings.h"
+
+namespace joulecast::server {
+namespace {
+
+using history::DiagnosisRecord;
+using history::DiagnosisState;
+using nlohmann::json;
+
+// Nice level of the working thread: everything that answers somebody goes first.
+constexpr int low_priority = 10;
+
+struct Job {
+  DiagnosisRecord record;
+  DiagnosisRequest request;
+  std::atomic<double> fraction = 0;
+  std::atomic<bool> cancelled = false;
+  std::atomic<bool> running = false;
+};
+
+json request_json(const DiagnosisRequest& request) {
+  json text = {{"max_missions", request.max_missions}, {"hold_back", request.hold_back}};
+  if (!request.missions.empty()) text["missions"] = request.missions;
+  if (request.since_utime_us) text["since_utime_us"] = *request.since_utime_us;
+  return text;
+}
+
+// Spread evenly over the missions: every 1/share-th, one at least of three or more.
+bool is_held_back(std::size_t index, std::size_t count, double share) {
+  if (!(share > 0) || count < 2) return false;
+  const double n = static_cast<double>(count);
+  if (count >= 3 && share * n < 1) return index == count / 2;
+  const double k = static_cast<double>(index);
+  return std::floor((k + 1) * share + 1e-9) > std::floor(k * share + 1e-9);
+}
+
+}  // namespace
+
+class DiagnosisService::Impl {
+ public:
+  Impl(const history::Store& store, history::Writer& writer, const ModelRegistry& models,
+       std::function<std::int64_t()> now_utime_us, const DiagnosisOptions& options,
+       std::function<void(const Error&)> on_error, Ended on_ended)
+      : store_(store),
+        writer_(writer),
+        models_(models),
+        now_utime_us_(std::move(now_utime_us)),
+        options_(options),
+        on_error_(std::move(on_error)),
+        on_ended_(std::move(on_ended)) {}
+
+  ~Impl() { stop(); }
+
+  Result<void> start() {
+    if (const auto marked = writer_.execute(history::InterruptDiagnoses{now_utime_us_()}); !marked)
+      return tl::unexpected(marked.error());
+    thread_ = std::thread([this] { work(); });
+    return {};
+  }
+
+  void stop() {
+    {
+      const std::lock_guard lock(mutex_);
+      stopping_ = true;
+      if (running_) running_->cancelled = true;
+    }
+    wake_.notify_all();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  Result<std::int64_t> submit(const DiagnosisRequest& request) {
+    const auto model = models_.find(request.robot_id);
+    if (model == nullptr)
+      return fail(Fault::not_found, "/robot_id", "no robot " + request.robot_id + " with a model");
+    for (std::size_t k = 0; k < request.missions.size(); ++k) {
+      const auto mission = store_.mission(request.missions[k]);
+      const std::string field = "/missions/" + std::to_string(k);
+      if (!mission) return fail(mission.error().fault, field, mission.error().message);
+      if (mission->robot_id != request.robot_id)
+        return fail(
+            Fault::not_found, field,
+            "mission " + std::to_string(request.missions[k]) + " is one of robot " + mission->robot_id);
+    }
+    auto job = std::make_shared<Job>();
+    job->request = request;
+    DiagnosisRecord& record = job->record;
+    record.robot_id = request.robot_id;
+    record.created_utime_us = now_utime_us_();
+    record.cause = request.cause;
+    record.request_json = request_json(request).dump();
+    const std::lock_guard submitting(submitting_);
+    {
+      const std::lock_guard lock(mutex_);
+      if (stopping_) return fail(Fault::unavailable, "", "the service is stopping");
+      if (waiting_.size() >= options_.queue)
+        return fail(Fault::unavailable, "",
+                    std::to_string(waiting_.size()) + " diagnoses wait already; try again later");
+    }
+    const history::Outcome id = writer_.execute(history::AddDiagnosis{record});
+    if (!id) return tl::unexpected(id.error());
+    record.id = *id;
+    {
+      const std::lock_guard lock(mutex_);
+      waiting_.push_back(std::move(job));
+    }
+    wake_.notify_all();
+    return *id;
+  }
+
+  Result<void> cancel(std::int64_t id) {
+    std::shared_ptr<Job> taken;
+    {
+      const std::lock_guard lock(mutex_);
+      if (running_ && running_->record.id == id) {
+        running_->cancelled = true;
+        return {};
+      }
+      const auto found =
+          std::ranges::find_if(waiting_, [id](const auto& job) { return job->record.id == id; });
+      if (found != waiting_.end()) {
+        taken = *found;
+        waiting_.erase(found);
+      }
+    }
+    if (taken) {
+      finish(*taken, DiagnosisState::cancelled, "cancelled before it began", {});
+      return {};
+    }
+    const auto stored = store_.diagnosis(id);
+    if (!stored) return tl::unexpected(stored.error());
+    return fail(
+        Fault::conflict, "id",
+        "diagnosis " + std::to_string(id) + " is " + std::string(history::name(stored->state)) + " already");
+  }
+
+  std::optional<DiagnosisProgress> progress(std::int64_t id) const {
+    const std::lock_guard lock(mutex_);
+    if (running_ && running_->record.id == id)
+      return DiagnosisProgress{id, DiagnosisState::running, running_->fraction, 0};
+    for (std::size_t k = 0; k < waiting_.size(); ++k) {
+      if (waiting_[k]->record.id == id)
+        return DiagnosisProgress{id, DiagnosisState::queued, 0, k + (running_ ? 1 : 0)};
+    }
+    return std::nullopt;
+  }
+
+  bool waits_or_runs(const std::string& robot_id) const {
+    const std::lock_guard lock(mutex_);
+    return (running_ && running_->record.robot_id == robot_id) ||
+           std::ranges::any_of(waiting_, [&](const auto& job) { return job->record.robot_id == robot_id; });
+  }
+
+  DiagnosisCounts counts() const {
+    const std::lock_guard lock(mutex_);
+    DiagnosisCounts counts = counts_;
+    counts.waiting = waiting_.size();
+    counts.running = running_ != nullptr;
+    return counts;
+  }
+
+ private:
+  void work() {
+    setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), low_priority);
+    for (;;) {
+      std::shared_ptr<Job> job;
+      {
+        std::unique_lock lock(mutex_);
+        wake_.wait(lock, [this] { return stopping_ || !waiting_.empty(); });
+        if (stopping_) return;  // what waits is marked as interrupted by the next start
+        job = running_ = waiting_.front();
+        waiting_.pop_front();
+      }
+      const auto began = std::chrono::steady_clock::now();
+      run(*job);
+      const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+      const std::lock_guard lock(mutex_);
+      counts_.seconds += seconds;
+    }
+  }
+
+  void run(Job& job) {
+    DiagnosisRecord& record = job.record;
+    record.state = DiagnosisState::running;
+    record.started_utime_us = now_utime_us_();
+    if (const auto stored = writer_.execute(history::UpdateDiagnosis{record, {}}); !stored)
+      on_error_(stored.error());
+    const Result<void> judged = judge(job);
+    const bool stopping = [&] {
+      const std::lock_guard lock(mutex_);
+      return stopping_;
+    }();
+    if (judged) return finish(job, DiagnosisState::done, {}, std::move(report_));
+    if (job.cancelled && stopping)
+      return finish(job, DiagnosisState::interrupted, "the service stopped before it was done", {});
+    if (job.cancelled) return finish(job, DiagnosisState::cancelled, "cancelled", {});
+    finish(job, DiagnosisState::failed, judged.error().message, {});
+  }
+
+  Result<void> judge(Job& job) {
+    DiagnosisRecord& record = job.record;
+    const DiagnosisRequest& request = job.request;
+    const auto model = models_.find(record.robot_id);
+    if (model == nullptr) return fail(Fault::not_found, "robot_id", "the robot has no model any more");
+    record.model_version = model->version;
+    RecordingsWanted wanted;
+    wanted.robot_id = record.robot_id;
+    wanted.only = request.missions;
+    wanted.since_utime_us = request.since_utime_us;
+    wanted.max_missions = std::min(request.max_missions, options_.max_missions);
+    wanted.max_samples = options_.max_samples;
+    Result<StoredRecordings> history = read_recordings(store_, wanted);
+    if (!history) return tl::unexpected(std::move(history.error()));
+    if (history->missions.empty())
+      return invalid("missions", "none of the robot's missions has its telemetry stored (" +
+                                     std::to_string(history->left_out.no_telemetry) + " without, " +
+                                     std::to_string(history->left_out.open) + " still open)");
+    std::vector<telemetry::Recording> recordings;
+    for (std::size_t k = 0; k < history->missions.size(); ++k) {
+      StoredRecording& mission = history->missions[k];
+      if (is_held_back(k, history->missions.size(), request.hold_back)) {
+        record.held_back.push_back(mission.key);
+      } else {
+        record.fitted_on.push_back(mission.key);
+        recordings.push_back(std::move(mission.recording));
+      }
+    }
+    history->missions.clear();
+    Result<gap::RecordingSet> set = gap::make_recording_set(record.robot_id, std::move(recordings));
+    if (!set) return tl::unexpected(std::move(set.error()));
+    gap::DiagnosisSettings settings;
+    settings.progress = [&job](double fraction) {
+      job.fraction = fraction;
+      return !job.cancelled.load();
+    };
+    Result<gap::Diagnosis> diagnosis = gap::diagnose(*set, model->robot, settings);
+    if (!diagnosis) return tl::unexpected(std::move(diagnosis.error()));
+    json result = gap::diagnosis_to_json(*diagnosis);
+    result["model_version"] = model->version;
+    record.result_json = result.dump();
+    if (!diagnosis->adoptable.empty()) {
+      Result<robot::RobotModel> extended = gap::with_effects(model->robot, diagnosis->adoptable);
+      if (extended) {
+        record.model_json = robot::to_json_text(*extended);
+      } else {
+        on_error_(extended.error());
+      }
+    }
+    return {};
+  }
+
+  void finish(Job& job, DiagnosisState state, std::string error, std::string report) {
+    DiagnosisRecord& record = job.record;
+    record.state = state;
+    record.error = std::move(error);
+    record.finished_utime_us = now_utime_us_();
+    // The result is in the store before the job leaves the queue, so that whoever looks finds it in one of
+    // them.
+    if (const auto stored = writer_.execute(history::UpdateDiagnosis{record, std::move(report)}); !stored)
+      on_error_(stored.error());
+    {
+      const std::lock_guard lock(mutex_);
+      if (running_.get() == &job) running_.reset();
+      (state == DiagnosisState::done        ? counts_.done
+       : state == DiagnosisState::cancelled ? counts_.cancelled
+                                            : counts_.failed)++;
+    }
+    if (on_ended_) on_ended_(record);
+  }
+
+  const history::Store& store_;
+  history::Writer& writer_;
+  const ModelRegistry& models_;
+  std::function<std::int64_t()> now_utime_us_;
+  DiagnosisOptions options_;
+  std::function<void(const Error&)> on_error_;
+  Ended on_ended_;
+  std::string report_;     // of the job that runs
+  std::mutex submitting_;  // between looking at the queue and entering it
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<std::shared_ptr<Job>> waiting_;
+  std::shared_ptr<Job> running_;
+  DiagnosisCounts counts_;
+  bool stopping_ = false;
+  std::thread thread_;
+};
+
+DiagnosisService::DiagnosisService(const history::Store& store, history::Writer& writer,
+                                   const ModelRegistry& models, std::function<std::int64_t()> now_utime_us,
+                                   const DiagnosisOptions& options,
+                                   std::function<void(const Error&)> on_error, Ended on_ended)
+    : impl_(std::make_unique<Impl>(store, writer, models, std::move(now_utime_us), options,
+                                   std::move(on_error), std::move(on_ended))) {}
+DiagnosisService::~DiagnosisService() = default;
+Result<void> DiagnosisService::start() {
+  return impl_->start();
+}
+void DiagnosisService::stop() {
+  impl_->stop();
+}
+Result<std::int64_t> DiagnosisService::submit(const DiagnosisRequest& request) {
+  return impl_->submit(request);
+}
+Result<void> DiagnosisService::cancel(std::int64_t id) {
+  return impl_->cancel(id);
+}
+std::optional<DiagnosisProgress> DiagnosisService::progress(std::int64_t id) const {
+  return impl_->progress(id);
+}
+bool DiagnosisService::waits_or_runs(const std::string& robot_id) const {
+  return impl_->waits_or_runs(robot_id);
+}
+DiagnosisCounts DiagnosisService::counts() const {
+  return impl_->counts();
+}
+
+}  // namespace joulecast::server

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "history/store.h"
+#include "history/writer.h"
+#include "server/ingest/model_registry.h"
+
+namespace joulecast::server {
+
+struct DiagnosisOptions {
+  std::size_t queue = 32;             // jobs that may wait; beyond: Fault::unavailable
+  std::size_t max_missions = 200;     // of one job, newest first
+  std::size_t max_samples = 500'000;  // of one job: bounds its memory and time
+};
+
+struct DiagnosisRequest {
+  std::string robot_id;
+  std::vector<history::MissionKey> missions;   // empty: the newest
+  std::optional<std::int64_t> since_utime_us;  // of the newest, those that started from then on
+  std::size_t max_missions = 200;
+  double hold_back = 0.25;  // share of the missions left for a back-test; one at least of three or more
+  history::DiagnosisCause cause = history::DiagnosisCause::request;
+};
+
+// Where a job stands.
+struct DiagnosisProgress {
+  std::int64_t id = 0;
+  history::DiagnosisState state = history::DiagnosisState::queued;
+  double fraction = 0;    // of the work, 0 to 1
+  std::size_t ahead = 0;  // jobs before it in the queue
+};
+
+struct DiagnosisCounts {
+  std::uint64_t done = 0, failed = 0, cancelled = 0;
+  std::size_t waiting = 0;
+  bool running = false;
+  double seconds = 0;  // spent on jobs
+};
+
+// Diagnoses as jobs: a bounded queue and one thread of low priority. Jobs and results are kept in the store;
+// those that a stop of the service cuts off are marked so when it starts again.
+class DiagnosisService {
+ public:
+  using Ended = std::function<void(const history::DiagnosisRecord&)>;
+
+  // `on_ended` is told of every job that has ended and is stored; called on the service's thread.
+  DiagnosisService(const history::Store& store, history::Writer& writer, const ModelRegistry& models,
+                   std::function<std::int64_t()> now_utime_us, const DiagnosisOptions& options,
+                   std::function<void(const Error&)> on_error, Ended on_ended = {});
+  ~DiagnosisService();  // cancels what runs
+  DiagnosisService(const DiagnosisService&) = delete;
+  DiagnosisService& operator=(const DiagnosisService&) = delete;
+
+  // Marks what the last daemon left behind, then begins to work.
+  Result<void> start();
+  void stop();
+
+  // Queues a job and answers its id. Fault::not_found: no such robot or mission; ::unavailable: the queue is
+  // full.
+  Result<std::int64_t> submit(const DiagnosisRequest& request);
+  // Fault::not_found, or ::conflict when it has ended.
+  Result<void> cancel(std::int64_t id);
+
+  // Absent when the job has ended or never was: ask the store.
+  std::optional<DiagnosisProgress> progress(std::int64_t id) const;
+
+  bool waits_or_runs(const std::string& robot_id) const;
+  DiagnosisCounts counts() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace joulecast::server

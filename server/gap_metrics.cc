@@ -1,0 +1,53 @@
+#include "server/gap_metrics.h"
+
+#include <string>
+#include <vector>
+
+namespace joulecast::server {
+
+void export_gap_metrics(Metrics& metrics, const DiagnosisService& diagnoses, const GapWatch& watch,
+                        const ModelAdoption& adoption) {
+  const std::vector<Counter> ended =
+      metrics.counters("joulecast_diagnoses_ended_total", "Diagnoses that ended since the start", "state",
+                       std::vector<std::string>{"done", "failed", "cancelled"});
+  const Counter spent = metrics.counter("joulecast_diagnosis_seconds_total", "Time spent on diagnoses");
+  const Gauge waiting = metrics.gauge("joulecast_diagnoses_waiting", "Diagnoses that wait for their turn");
+  const Gauge running = metrics.gauge("joulecast_diagnosis_running", "1 while a diagnosis runs");
+  const Counter rounds = metrics.counter("joulecast_gap_watch_rounds_total", "Looks at all robots' missions");
+  const Counter drifts = metrics.counter("joulecast_gap_drifts_total", "Drifts of the gap found");
+  const Gauge drifting = metrics.gauge("joulecast_gap_drifting_robots",
+                                       "Robots whose gap drifted under the model that is in force");
+  const Gauge standing =
+      metrics.gauge("joulecast_gap_outlying_robots", "Robots that stand out among their kind");
+  const std::vector<Gauge> ratios = {
+      metrics.gauge("joulecast_gap_ratio_min",
+                    "Least of the robots' measured over modelled energy, newest missions"),
+      metrics.gauge("joulecast_gap_ratio_median", "Median of the robots' measured over modelled energy"),
+      metrics.gauge("joulecast_gap_ratio_max", "Greatest of the robots' measured over modelled energy")};
+  const std::vector<Counter> adoptions =
+      metrics.counters("joulecast_models_tested_total", "Models that were back-tested to be adopted",
+                       "outcome", std::vector<std::string>{"adopted", "forced", "refused"});
+  metrics.before_scrape([=, &diagnoses, &watch, &adoption] {
+    const DiagnosisCounts jobs = diagnoses.counts();
+    ended[0].raise_to(static_cast<double>(jobs.done));
+    ended[1].raise_to(static_cast<double>(jobs.failed));
+    ended[2].raise_to(static_cast<double>(jobs.cancelled));
+    spent.raise_to(jobs.seconds);
+    waiting.set(static_cast<double>(jobs.waiting));
+    running.set(jobs.running ? 1 : 0);
+    const WatchCounts seen = watch.counts();
+    rounds.raise_to(static_cast<double>(seen.rounds));
+    drifts.raise_to(static_cast<double>(seen.drifts));
+    drifting.set(static_cast<double>(seen.drifting));
+    standing.set(static_cast<double>(seen.standing_out));
+    ratios[0].set(seen.ratio_min);
+    ratios[1].set(seen.ratio_median);
+    ratios[2].set(seen.ratio_max);
+    const AdoptionCounts models = adoption.counts();
+    adoptions[0].raise_to(static_cast<double>(models.adopted));
+    adoptions[1].raise_to(static_cast<double>(models.forced));
+    adoptions[2].raise_to(static_cast<double>(models.refused));
+  });
+}
+
+}  // namespace joulecast::server

@@ -1,0 +1,14 @@
+#pragma once
+
+#include "server/diagnosis/diagnosis_service.h"
+#include "server/diagnosis/gap_watch.h"
+#include "server/diagnosis/model_adoption.h"
+#include "server/metrics.h"
+
+namespace joulecast::server {
+
+// What diagnoses, the watch over the gap and adoptions count, brought up to date before every scrape.
+void export_gap_metrics(Metrics& metrics, const DiagnosisService& diagnoses, const GapWatch& watch,
+                        const ModelAdoption& adoption);
+
+}  // namespace joulecast::server
