@@ -276,6 +276,7 @@ class DiagnosisService::Impl {
     // them.
     if (const auto stored = writer_.execute(history::UpdateDiagnosis{record, std::move(report)}); !stored)
       on_error_(stored.error());
+    if (on_ended_) on_ended_(record);
     {
       const std::lock_guard lock(mutex_);
       if (running_.get() == &job) running_.reset();
@@ -283,7 +284,6 @@ class DiagnosisService::Impl {
        : state == DiagnosisState::cancelled ? counts_.cancelled
                                             : counts_.failed)++;
     }
-    if (on_ended_) on_ended_(record);
   }
 
   const history::Store& store_;

@@ -4,6 +4,8 @@
 #include <random>
 #include <string>
 
+#include "client/virtual_robot/fleet.h"
+#include "client/virtual_robot/simulate.h"
 #include "dynamics/drive_model.h"
 #include "history/writer.h"
 #include "tests/ingest/harness.h"
@@ -18,7 +20,7 @@ inline robot::RobotModel nomad_with_friction(double factor) {
 }
 
 // Puts a declared mission of `samples` samples at 50 Hz into the harness's history, driven by a robot that
-// behaves as `truth` says, with noise on the battery current. Returns its key.
+// behaves as `truth` says, with noise on speeds, currents and voltages. Returns its key.
 inline history::MissionKey drive(PipelineHarness& harness, const robot::RobotModel& truth, int number,
                                  int samples = 1500) {
   const auto model = *dynamics::drive_model(truth);
@@ -43,8 +45,11 @@ inline history::MissionKey drive(PipelineHarness& harness, const robot::RobotMod
     s.utime_us = start_us + 20'000LL * k;
     s.sequence = number * 1'000'000LL + k;
     s.wheel_velocity_rad_s = at.wheel_speed_rad_s;
-    s.motor_current_a = flow.current_a;
-    s.motor_voltage_v = flow.voltage_v;
+    for (std::size_t side : {0u, 1u}) {
+      s.wheel_velocity_rad_s[side] += 0.1 * noise(random);
+      s.motor_current_a[side] = flow.current_a[side] + noise(random);
+      s.motor_voltage_v[side] = flow.voltage_v[side] + noise(random);
+    }
     s.battery_voltage_v = 24;
     s.battery_current_a = flow.battery_power_w / 24 + noise(random);
     s.payload_kg = 0;
@@ -52,6 +57,32 @@ inline history::MissionKey drive(PipelineHarness& harness, const robot::RobotMod
   }
   event(telemetry::MissionPhase::finished, start_us + 20'000LL * samples);
   return harness.missions().back().key;
+}
+
+// Missions of the project's plant, which shares no physics with the model, as the robot would have published
+// them from `start_us` on.
+inline void play(PipelineHarness& harness, std::string_view robot_json,
+                 const std::vector<virtual_robot::EffectStrength>& effects, int missions, std::uint64_t seed,
+                 std::int64_t start_us) {
+  virtual_robot::SimulationSpec spec;
+  spec.robot = *virtual_robot::parse_robot(std::string(robot_json));
+  spec.imperfections = *virtual_robot::make_imperfections(effects);
+  spec.missions = missions;
+  const virtual_robot::Simulation run = virtual_robot::simulate_missions(spec, seed);
+  const std::int64_t shift = start_us - run.events.front().utime_us;
+  std::size_t next = 0;
+  for (telemetry::MissionEvent event : run.events) {
+    if (event.phase != telemetry::MissionPhase::started) {
+      for (; next < run.samples.size() && run.samples[next].utime_us <= event.utime_us; ++next) {
+        telemetry::Sample sample = run.samples[next];
+        sample.utime_us += shift;
+        harness.pipeline->handle({spec.robot.robot_id, sample, sample.utime_us});
+      }
+    }
+    event.utime_us += shift;
+    event.mission_id += "-" + std::to_string(seed);
+    harness.pipeline->handle({spec.robot.robot_id, event, event.utime_us});
+  }
 }
 
 }  // namespace joulecast::testing

@@ -1,0 +1,212 @@
+#include "server/diagnosis/diagnosis_service.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "server/diagnosis/gap_watch.h"
+#include "server/diagnosis/model_adoption.h"
+#include "tests/diagnosis/history_of.h"
+
+namespace joulecast::server {
+namespace {
+
+using history::DiagnosisState;
+using nlohmann::json;
+using testing::drive;
+using testing::nomad_with_friction;
+
+constexpr std::int64_t start_us = 1'750'000'000'000'000;
+
+class DiagnosisServiceTest : public ::testing::Test {
+ protected:
+  void SetUp() override { harness_.add_version(testing::nomad(), 1); }
+
+  void serve(DiagnosisOptions options = {}) {
+    writer_ = std::make_unique<history::Writer>(*harness_.store, history::WriterOptions{});
+    service_ = std::make_unique<DiagnosisService>(
+        *harness_.store, *writer_, harness_.models, [] { return 42; }, options,
+        [this](const Error& error) { errors_.push_back(describe(error)); },
+        [this](const history::DiagnosisRecord& d) {
+          if (watch_) watch_->on_diagnosis(d);
+        });
+  }
+
+  history::DiagnosisRecord wait_for(std::int64_t id) {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(120);
+    while (std::chrono::steady_clock::now() < until) {
+      const auto stored = harness_.store->diagnosis(id);
+      if (stored && history::has_ended(stored->state) && !service_->progress(id)) return *stored;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    ADD_FAILURE() << "diagnosis " << id << " did not end";
+    return {};
+  }
+
+  DiagnosisRequest request() const {
+    DiagnosisRequest r;
+    r.robot_id = "nomad";
+    return r;
+  }
+
+  testing::PipelineHarness harness_;
+  std::vector<std::string> errors_;
+  std::unique_ptr<history::Writer> writer_;
+  std::unique_ptr<GapWatch> watch_;
+  std::unique_ptr<DiagnosisService> service_;
+};
+
+TEST_F(DiagnosisServiceTest, FindsTheEffectAndWhatItFoundCanBeAdopted) {
+  const std::string_view file = virtual_robot::shipped_robots()[1].json_text;
+  const auto robot = *robot::parse_robot(file);
+  harness_.add_version(robot, 1);
+  testing::play(harness_, file, {{"coulomb_friction", 0.6}}, 8, 21, start_us);
+  std::vector<history::MissionKey> keys;
+  for (const history::Mission& mission : harness_.missions()) keys.push_back(mission.key);
+  ASSERT_EQ(keys.size(), 8U);
+  serve();
+  ASSERT_TRUE(service_->start());
+  DiagnosisRequest wanted;
+  wanted.robot_id = robot.robot_id;
+  const auto id = service_->submit(wanted);
+  ASSERT_TRUE(id) << describe(id.error());
+  const auto d = wait_for(*id);
+  ASSERT_EQ(d.state, DiagnosisState::done) << d.error;
+  EXPECT_EQ(d.fitted_on.size(), 6U);
+  EXPECT_EQ(d.held_back, (std::vector<history::MissionKey>{keys[3], keys[7]}));
+  EXPECT_EQ(d.model_version, 1);
+  const json result = json::parse(d.result_json);
+  EXPECT_EQ(result["verdict"], "effects") << d.result_json;
+  EXPECT_EQ(result["effects"][0]["id"], "coulomb_friction") << d.result_json;
+  EXPECT_EQ(result["model_version"], 1);
+
+  ModelAdoption adoption(*harness_.store, *writer_, harness_.models, [] { return 43; }, {});
+  AdoptionRequest adopt;
+  adopt.model = *robot::parse_robot(d.model_json);
+  adopt.fitted_on = d.fitted_on;
+  const auto adopted = adoption.adopt(adopt);
+  ASSERT_TRUE(adopted) << describe(adopted.error());
+  EXPECT_TRUE(adopted->adopted) << adopted->refusal;
+  EXPECT_EQ(adopted->tested_on, d.held_back);
+  EXPECT_LT(adopted->test.error_after, 0.2 * adopted->test.error_before);
+  EXPECT_EQ(service_->counts().done, 1U);
+  EXPECT_TRUE(errors_.empty());
+}
+
+TEST_F(DiagnosisServiceTest, BoundsItsQueueAndCancelsWhatWaits) {
+  drive(harness_, testing::nomad(), 0);
+  DiagnosisOptions options;
+  options.queue = 2;
+  serve(options);  // not started: jobs only wait
+  const auto first = service_->submit(request()), second = service_->submit(request());
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(service_->submit(request()).error().fault, Fault::unavailable);
+  EXPECT_EQ(service_->progress(*second)->ahead, 1U);
+  EXPECT_TRUE(service_->cancel(*first));
+  EXPECT_EQ(harness_.store->diagnosis(*first)->state, DiagnosisState::cancelled);
+  EXPECT_EQ(service_->progress(*second)->ahead, 0U);
+  EXPECT_EQ(service_->cancel(*first).error().fault, Fault::conflict);
+  EXPECT_EQ(service_->cancel(99).error().fault, Fault::not_found);
+  EXPECT_TRUE(service_->submit(request()));
+}
+
+TEST_F(DiagnosisServiceTest, AJobThatAStopCutsOffIsMarkedByTheNextStart) {
+  drive(harness_, testing::nomad(), 0);
+  serve();
+  const auto id = service_->submit(request());
+  ASSERT_TRUE(id);
+  service_.reset();
+  EXPECT_EQ(harness_.store->diagnosis(*id)->state, DiagnosisState::queued);
+  serve();
+  ASSERT_TRUE(service_->start());
+  const auto d = harness_.store->diagnosis(*id);
+  EXPECT_EQ(d->state, DiagnosisState::interrupted);
+  EXPECT_FALSE(d->error.empty());
+}
+
+TEST_F(DiagnosisServiceTest, SaysWhyItFailed) {
+  serve();
+  ASSERT_TRUE(service_->start());
+  const auto id = service_->submit(request());
+  ASSERT_TRUE(id) << describe(id.error());
+  const auto d = wait_for(*id);
+  EXPECT_EQ(d.state, DiagnosisState::failed);
+  EXPECT_NE(d.error.find("none of the robot's missions"), std::string::npos) << d.error;
+  DiagnosisRequest unknown = request();
+  unknown.robot_id = "nobody";
+  EXPECT_EQ(service_->submit(unknown).error().field, "/robot_id");
+  unknown = request();
+  unknown.missions = {77};
+  EXPECT_EQ(service_->submit(unknown).error().field, "/missions/0");
+}
+
+class GapWatchTest : public DiagnosisServiceTest {
+ protected:
+  void watch(bool diagnose) {
+    serve();
+    WatchOptions options;
+    options.diagnose = diagnose;
+    watch_ = std::make_unique<GapWatch>(
+        *harness_.store, *writer_, harness_.models, *service_, [] { return 44; }, options,
+        [this](const Error& error) { errors_.push_back(describe(error)); });
+  }
+
+  std::vector<history::Event> events(const std::string& kind) {
+    EXPECT_TRUE(writer_->flush());
+    auto all = *harness_.store->events(0, 100);
+    std::erase_if(all, [&](const history::Event& e) { return e.kind != kind; });
+    return all;
+  }
+};
+
+TEST_F(GapWatchTest, TellsOfADriftOnceAndOfWhatTheDiagnosisBlames) {
+  const std::string_view file = virtual_robot::shipped_robots()[1].json_text;
+  const auto robot = *robot::parse_robot(file);
+  harness_.add_version(robot, 1);
+  testing::play(harness_, file, {}, 8, 31, start_us);
+  testing::play(harness_, file, {{"coulomb_friction", 0.6}}, 6, 32, start_us + 86'400'000'000);
+  watch(true);
+  ASSERT_TRUE(service_->start());
+  watch_->look();
+  const auto told = events("gap_drift");
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].robot_id, robot.robot_id);
+  const json detail = json::parse(told[0].detail_json);
+  EXPECT_EQ(detail["missions"], 6);
+  EXPECT_GT(detail["ratio_after"].get<double>(), detail["ratio_before"].get<double>() + 0.03);
+  const auto d = wait_for(detail["diagnosis_id"]);
+  ASSERT_EQ(d.state, DiagnosisState::done) << d.error;
+  EXPECT_EQ(d.cause, history::DiagnosisCause::watch);
+  const auto diagnosed = events("gap_diagnosed");
+  ASSERT_EQ(diagnosed.size(), 1U);
+  EXPECT_EQ(json::parse(diagnosed[0].detail_json)["blames"], "wear") << diagnosed[0].detail_json;
+  EXPECT_EQ(watch_->counts().drifting, 1U);
+  watch_->look();
+  EXPECT_EQ(events("gap_drift").size(), 1U);
+  EXPECT_EQ(watch_->counts().rounds, 2U);
+  service_.reset();
+}
+
+TEST_F(GapWatchTest, TellsOfASiblingThatStandsOut) {
+  for (const char* id : {"a", "b", "c", "d"}) {
+    robot::RobotModel model = testing::nomad(), truth = nomad_with_friction(*id == 'c' ? 1.6 : 1.0);
+    model.robot_id = truth.robot_id = id;
+    harness_.add_version(model, 1);
+    for (int number = 0; number < 5; ++number) drive(harness_, truth, number);
+  }
+  watch(false);
+  watch_->look();
+  const auto told = events("gap_sibling");
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].robot_id, "c");
+  EXPECT_EQ(robots_of_kind(harness_.models, "a").size(), 5U);  // and the nomad itself
+  watch_->look();
+  EXPECT_EQ(events("gap_sibling").size(), 1U);
+  EXPECT_EQ(watch_->counts().standing_out, 1U);
+}
+
+}  // namespace
+}  // namespace joulecast::server
