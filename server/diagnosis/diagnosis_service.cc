@@ -17,6 +17,7 @@
 #include "gap/diagnosis.h"
 #include "gap/diagnosis_json.h"
 #include "robot/robot_file.h"
+#include "server/diagnosis/gap_watch.h"
 #include "server/diagnosis/mission_recordings.h"
 
 namespace joulecast::server {
@@ -225,6 +226,9 @@ class DiagnosisService::Impl {
     wanted.robot_id = record.robot_id;
     wanted.only = request.missions;
     wanted.since_utime_us = request.since_utime_us;
+    // A robot that changed is two robots to the diagnosis: it is asked for the one that it is now.
+    if (request.missions.empty() && !request.since_utime_us)
+      wanted.since_utime_us = last_drift(record.robot_id, model->version);
     wanted.max_missions = std::min(request.max_missions, options_.max_missions);
     wanted.max_samples = options_.max_samples;
     Result<StoredRecordings> history = read_recordings(store_, wanted);
@@ -255,6 +259,7 @@ class DiagnosisService::Impl {
     if (!diagnosis) return tl::unexpected(std::move(diagnosis.error()));
     json result = gap::diagnosis_to_json(*diagnosis);
     result["model_version"] = model->version;
+    result["since_utime_us"] = wanted.since_utime_us ? json(*wanted.since_utime_us) : json(nullptr);
     record.result_json = result.dump();
     if (!diagnosis->adoptable.empty()) {
       Result<robot::RobotModel> extended = gap::with_effects(model->robot, diagnosis->adoptable);
@@ -265,6 +270,14 @@ class DiagnosisService::Impl {
       }
     }
     return {};
+  }
+
+  std::optional<std::int64_t> last_drift(const std::string& robot_id, std::int64_t version) const {
+    const auto missions = mission_ratios(store_, robot_id, options_.max_missions);
+    if (!missions) return std::nullopt;
+    const std::vector<gap::DriftMark> marks = gap::drift_marks(*missions);
+    if (marks.empty() || marks.back().model_version != version) return std::nullopt;
+    return marks.back().utime_us;
   }
 
   void finish(Job& job, DiagnosisState state, std::string error, std::string report) {

@@ -23,8 +23,9 @@ struct DiagnosisOptions {
 
 struct DiagnosisRequest {
   std::string robot_id;
-  std::vector<history::MissionKey> missions;   // empty: the newest
-  std::optional<std::int64_t> since_utime_us;  // of the newest, those that started from then on
+  std::vector<history::MissionKey> missions;  // empty: the newest
+  // Of the newest, those that started from then on; absent: from the robot's last drift on, where it had one.
+  std::optional<std::int64_t> since_utime_us;
   std::size_t max_missions = 200;
   double hold_back = 0.25;  // share of the missions left for a back-test; one at least of three or more
   history::DiagnosisCause cause = history::DiagnosisCause::request;

@@ -78,6 +78,13 @@ await stop(daemon);
 await run(given.client, ['simulate', '--robot', hour_robot, '--robots', '1', '--seed', '11', '--log', hour_log, '--speed', '0', '--missions', '1', '--mission-duration', '3600', '--duration', '4200', '--quiet']);
 await run(given.client, ['replay', hour_log, '--into', store, '--robot', hour_robot]);
 await rm(hour_log);
+// A robot with more friction than its file says, for the diagnosis.
+const worn_log = path.join(given.out, 'worn.lcmlog');
+const worn_robot = path.join(given.out, 'worn-robot.json');
+await writeFile(worn_robot, JSON.stringify({ ...JSON.parse(await readFile(hour_robot, 'utf8')), robot_id: 'worn-01' }));
+await run(given.client, ['simulate', '--robot', worn_robot, '--robots', '1', '--seed', '12', '--effect', 'coulomb_friction=0.6', '--log', worn_log, '--speed', '0', '--missions', '8', '--quiet']);
+await run(given.client, ['replay', worn_log, '--into', store, '--robot', worn_robot]);
+await rm(worn_log);
 daemon = await start_until(given.daemon, daemon_args, ready);
 
 const browser = await chromium.launch({ executablePath: given.chromium, args: ['--headless', '--no-sandbox', '--disable-gpu', '--disable-quic',
@@ -106,7 +113,7 @@ const page = await open_page();
 await check('the fleet is live', async () => {
   await go(page, '#/fleet');
   await page.waitForSelector('.fleet tbody th a');
-  equal(await page.locator('.fleet tbody tr:not(.spacer)').count(), 5, 'rows');
+  equal(await page.locator('.fleet tbody tr:not(.spacer)').count(), 6, 'rows');
   const row = page.locator('.fleet tbody tr', { hasText: robot });
   const before = await row.locator('td.power .number').textContent();
   await until('another power', async () => (await row.locator('td.power .number').textContent()) !== before);
@@ -119,11 +126,11 @@ await check('the fleet is found, chosen and ordered', async () => {
   await until('one row', async () => (await page.locator('.fleet tbody tr:not(.spacer)').count()) === 1);
   await page.getByPlaceholder('Find a robot or mission').fill('');
   await page.getByRole('button', { name: 'Silent' }).click();
-  await until('the robot that is silent', async () => JSON.stringify(await names()) === '["hour-01"]');
+  await until('the robots that are silent', async () => JSON.stringify(await names()) === '["hour-01","worn-01"]');
   await page.getByRole('button', { name: 'Low charge' }).click();
   await page.getByText('No robot matches').waitFor();
   await page.getByRole('button', { name: 'All', exact: true }).click();
-  await until('all rows', async () => (await names()).length === 5);
+  await until('all rows', async () => (await names()).length === 6);
   const rising = await names();
   await page.getByRole('button', { name: 'Robot' }).click();
   await until('the other order', async () => JSON.stringify(await names()) === JSON.stringify([...rising].reverse()));
@@ -302,14 +309,95 @@ await check('every link of every view leads somewhere', async () => {
   }
 });
 
-const views = { fleet: '#/fleet', robot: `#/robots/${robot}`, missions: '#/missions', mission: `#/missions/${mission.id}`, hour: `#/missions/${hour.id}`, plan: `#/plan?robot=${robot}` };
+let diagnosis = 0;
+await check('the gap view comes when asked for, and says when it cannot', async () => {
+  const fresh = await open_page();
+  await fresh.goto(`${base}/#/fleet`);
+  await fresh.locator('.fleet tbody th a').first().waitFor();
+  expect(!(await fresh.evaluate(() => performance.getEntriesByType('resource').some((r) => r.name.endsWith('/gap.js')))), 'gap.js is part of the first view');
+  faults_wanted = true;
+  await fresh.route('**/gap.js', (route) => route.abort());
+  await fresh.getByRole('link', { name: 'Gap', exact: true }).click();
+  await fresh.getByText('This part of the page could not be loaded').waitFor();
+  await fresh.screenshot({ path: path.join(given.out, 'screenshots', 'gap-not-loaded-laptop.png') });
+  await fresh.context().close();
+  faults_wanted = false;
+});
+
+await check('a diagnosis is started by keyboard, followed and read', async () => {
+  await go(page, '#/gap');
+  await page.getByText('No diagnosis yet').waitFor();
+  await page.screenshot({ path: path.join(given.out, 'screenshots', 'gap-empty-laptop.png') });
+  await page.getByRole('combobox', { name: 'Robot', exact: true }).selectOption('worn-01');
+  await page.getByRole('combobox', { name: 'Robot', exact: true }).focus();
+  for (const wanted of ['INPUT', 'BUTTON']) {
+    await page.keyboard.press('Tab');
+    equal(await page.evaluate(() => document.activeElement.tagName), wanted, 'focus');
+  }
+  await page.keyboard.press('Enter');
+  await page.getByRole('heading', { level: 1, name: /^Diagnosis \d+$/ }).waitFor();
+  diagnosis = Number((await page.getByRole('heading', { level: 1 }).textContent()).match(/\d+/)[0]);
+  await page.screenshot({ path: path.join(given.out, 'screenshots', 'gap-running-laptop.png') });
+  await page.getByText('Effects found').waitFor({ timeout: 120_000 });
+  const { result, held_back } = await get(`/v1/diagnoses/${diagnosis}`);
+  equal(result.effects[0].id, 'coulomb_friction', 'the effect');
+  equal(held_back.length, 2, 'missions held back');
+  const row = page.locator('.effects tbody tr').first();
+  await row.getByText('coulomb friction').waitFor();
+  equal(number((await row.locator('td.figure').last().textContent())), Math.round(100 * result.effects[0].share), 'what it closes');
+  expect((await page.locator('.where tbody tr').count()) >= 5, 'regions');
+});
+
+await check('what was found is tested on other missions, adopted and rolled back', async () => {
+  await go(page, `#/gap/${diagnosis}`);
+  await page.getByRole('button', { name: 'Test on other missions' }).click();
+  await page.locator('.test tbody tr').first().waitFor();
+  equal(await page.locator('.test tbody tr').count(), 2, 'missions tested on');
+  equal((await get('/v1/robots/worn-01')).model_version, 1, 'a test alone adopts nothing');
+  const [before, after] = (await page.locator('.verdict-box .verdict b').allTextContents()).slice(-2).map(number);
+  expect(after < before / 3, `energy error ${before} % before, ${after} % after`);
+  figures.adoption_error_percent = [before, after];
+  await page.getByRole('button', { name: 'Adopt', exact: true }).click();
+  await page.getByText('Version 2 is in force').waitFor();
+  await page.screenshot({ path: path.join(given.out, 'screenshots', 'gap-adopted-laptop.png'), fullPage: true });
+  const adopted = await get('/v1/robots/worn-01');
+  equal(adopted.model_version, 2, 'version');
+  equal(Object.keys(adopted.model.effects)[0], 'coulomb_friction', 'adopted effect');
+  await go(page, '#/robots/worn-01');
+  await page.getByText(`diagnosis ${diagnosis}`).waitFor();
+  await page.getByRole('button', { name: 'Put version 1 in force again' }).click();
+  await page.getByRole('button', { name: 'Put version 2 in force again' }).click();
+  await until('version 2', async () => (await get('/v1/robots/worn-01')).model_version === 2);
+  const { events } = await get('/v1/audit-log?robot_id=worn-01');
+  equal(events.map((e) => e.kind).join(' '), 'model_adopted model_activated model_activated', 'audit log');
+});
+
+await check('what does not improve is refused with its figures', async () => {
+  await page.route(`**/v1/robots/worn-01/model`, async (route) => {
+    // As if the model had been made worse: the adopted effect undone again.
+    const { model } = (await get('/v1/robots/worn-01/versions')).versions.find((v) => v.model_version === 1);
+    await route.continue({ postData: JSON.stringify({ model }) });
+  });
+  await go(page, `#/gap/${diagnosis}`);
+  faults_wanted = true;
+  await page.getByRole('button', { name: 'Adopt', exact: true }).click();
+  await page.getByText('Not adopted').waitFor();
+  await page.getByRole('button', { name: 'Adopt all the same' }).waitFor();
+  expect((await page.locator('.test tbody tr').count()) >= 2, 'the figures of the refusal');
+  await page.screenshot({ path: path.join(given.out, 'screenshots', 'gap-refused-laptop.png'), fullPage: true });
+  faults_wanted = false;
+  await page.unroute(`**/v1/robots/worn-01/model`);
+});
+
+const views = { fleet: '#/fleet', robot: `#/robots/${robot}`, missions: '#/missions', mission: `#/missions/${mission.id}`, hour: `#/missions/${hour.id}`, plan: `#/plan?robot=${robot}`,
+  gap: '#/gap', diagnosis: `#/gap/${diagnosis}`, worn: '#/robots/worn-01' };
 for (const [size, viewport] of Object.entries(sizes)) {
   for (const colorScheme of ['light', 'dark']) {
     const shown = await open_page({ viewport, colorScheme });
     for (const [name, hash] of Object.entries(views)) {
       await check(`${name}, ${size}, ${colorScheme}: no serious accessibility fault, nothing wider than the window`, async () => {
         await go(shown, hash);
-        await shown.locator('main .readouts, main .plan-result').first().waitFor();
+        await shown.locator('main .readouts, main .plan-result, main .jobs').first().waitFor();
         await until('an end of loading', async () => (await shown.locator('.loading').count()) === 0);
         await shown.waitForTimeout(400);
         if (name === 'mission' || name === 'hour') {
@@ -418,7 +506,7 @@ await browser.close();
 
 await check('the bundle is small', async () => {
   let total = 0;
-  for (const name of ['index.html', 'app.js', 'app.css', 'favicon.svg']) total += gzipSync(await readFile(path.join(given.page, name)), { level: 9 }).length;
+  for (const name of ['index.html', 'app.js', 'base.js', 'app.css', 'favicon.svg']) total += gzipSync(await readFile(path.join(given.page, name)), { level: 9 }).length;
   figures.bundle_gzipped_bytes = total;
   expect(total < bundle_limit_bytes, `${total} bytes`);
 });

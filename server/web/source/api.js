@@ -11,7 +11,7 @@ export class Problem extends Error {
 async function answer(response) {
   if (response.ok) return response.json();
   const told = await response.json().catch(() => ({}));
-  throw new Problem(response.status, told.title ?? response.statusText, told.detail ?? '', told.field);
+  throw Object.assign(new Problem(response.status, told.title ?? response.statusText, told.detail ?? '', told.field), { told });
 }
 
 async function call(path, options) {
@@ -31,6 +31,10 @@ export function get(path, signal) {
 
 export function post(path, body, signal) {
   return call(path, { method: 'POST', body: JSON.stringify(body), headers: { 'content-type': 'application/json' }, signal });
+}
+
+export function del(path) {
+  return call(path, { method: 'DELETE' });
 }
 
 // Empty, null and undefined values are left out.

@@ -8,12 +8,13 @@ import { toggle_theme, useTheme } from './theme.js';
 import { route_of } from './route.js';
 import { Empty, Guard } from './widgets.js';
 import { Fleet } from './views/fleet.js';
+import { Gap } from './views/later.js';
 import { Robot } from './views/robot.js';
 import { Missions } from './views/missions.js';
 import { Mission } from './views/mission.js';
 import { Plan } from './views/plan.js';
 
-const views = { fleet: Fleet, robots: Robot, missions: Missions, mission: Mission, plan: Plan };
+const views = { fleet: Fleet, robots: Robot, missions: Missions, mission: Mission, plan: Plan, gap: Gap };
 
 function Link() {
   const live = useLive();
@@ -63,7 +64,7 @@ function App() {
     <header class="top">
       <a class="mark" href="#/fleet" aria-label="joulecast, fleet">
         <svg viewBox="0 0 32 20" width="38" height="24" aria-hidden="true"><path d="M1 14h6l4-12 6 17 4-10 2 5h8" /></svg>joulecast</a>
-      <nav aria-label="Views">${tab('fleet', 'Fleet')}${tab('missions', 'Missions')}${tab('plan', 'Plan')}</nav>
+      <nav aria-label="Views">${tab('fleet', 'Fleet')}${tab('missions', 'Missions')}${tab('plan', 'Plan')}${tab('gap', 'Gap')}</nav>
       <${Link} />
       <button type="button" class="theme" onClick=${toggle_theme} aria-label=${dark ? 'Light theme' : 'Dark theme'} title=${dark ? 'Light theme' : 'Dark theme'}>
         <svg viewBox="0 0 20 20" width="18" height="18" aria-hidden="true"><circle cx="10" cy="10" r="7.5" class="ring" /><path d="M10 2.5a7.5 7.5 0 0 1 0 15z" /></svg></button>

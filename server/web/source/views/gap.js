@@ -1,0 +1,215 @@
+// Diagnoses of the gap: start one, follow it, read what it found, adopt it. Loaded when first asked for.
+import { useEffect, useState } from 'preact/hooks';
+import { html } from '../html.js';
+import * as format from '../format.js';
+import { del, post, query, useGet } from '../api.js';
+import { useLive } from '../live.js';
+import { keep_in_address, mission_link, robot_link } from '../route.js';
+import { Answer, Empty, Failure, Panel, Quantity, Readout, useTitleOf } from '../widgets.js';
+
+export { RobotHistory } from './robot_history.js';
+
+const state_notes = { queued: 'waiting', running: 'running', done: 'done', failed: 'failed', cancelled: 'cancelled', interrupted: 'cut off by a restart' };
+const ended = (d) => d.state !== 'queued' && d.state !== 'running';
+export const share = (value, places = 1) => format.text(format.percent(value, places));
+const range_of = (ci, places = 1) => (ci && format.known(ci[0]) ? `${share(ci[0], places)} to ${share(ci[1], places)}` : '–');
+
+const verdicts = {
+  none: ['No gap', 'What is measured agrees with the model, as far as these missions tell.'],
+  effects: ['Effects found', 'The model leaves out what is listed here.'],
+  outside: ['Outside the catalogue', 'Something is at work that no known effect describes.'],
+  inconclusive: ['Inconclusive', 'These missions do not tell causes apart. What to drive next would.'],
+};
+
+function State({ of }) {
+  return html`<span class=${`job job-${of.state}`}>${state_notes[of.state]}</span>`;
+}
+
+// Follows a job that waits or runs; `onEnd` when it has ended.
+function useProgress(job, onEnd) {
+  const [told, set_told] = useState(null);
+  const id = job && !ended(job) ? job.id : null;
+  useEffect(() => {
+    if (id === null) return undefined;
+    const source = new EventSource(`/v1/diagnoses/${id}/events`);
+    source.addEventListener('progress', (event) => set_told(JSON.parse(event.data)));
+    source.addEventListener('ended', () => {
+      source.close();
+      onEnd();
+    });
+    return () => source.close();
+  }, [id]);
+  return told !== null && told.id === id ? told : job;
+}
+
+function Progress({ job, onEnd }) {
+  const now = useProgress(job, onEnd);
+  const [error, set_error] = useState(null);
+  const part = Math.round(100 * now.progress);
+  const words = now.state === 'queued' ? (now.ahead > 0 ? `${now.ahead} before it` : 'about to begin') : `${part} %`;
+  return html`<div class="progress"><label for="progress">Diagnosis ${job.id} of ${job.robot_id}: ${state_notes[now.state]}, ${words}</label>
+    <progress id="progress" max="100" value=${now.state === 'queued' ? undefined : part}></progress>
+    <button type="button" onClick=${() => del(`/v1/diagnoses/${job.id}`).catch(set_error)}>Cancel</button>
+    ${error && html`<${Failure} error=${error} />`}</div>`;
+}
+
+function found_words(summary) {
+  if (!summary) return '–';
+  if (summary.effects.length === 0) return verdicts[summary.verdict][0].toLowerCase();
+  return summary.effects.map((e) => format.words(e.id)).join(', ');
+}
+
+export function JobRows({ jobs, with_robot = true }) {
+  return html`<table class="grid jobs"><thead><tr><th scope="col">Diagnosis</th>${with_robot && html`<th scope="col">Robot</th>`}<th scope="col">Begun</th><th scope="col">State</th><th scope="col">Found</th>
+    <th scope="col" class="figure">Gap</th>${with_robot && html`<th scope="col" class="figure">Left, held out</th><th scope="col" class="figure">Missions</th>`}</tr></thead>
+    <tbody>${jobs.map((d) => html`<tr key=${d.id}>
+      <th scope="row"><a href=${`#/gap/${d.id}`}>${d.id}</a>${d.cause === 'watch' && html` <span class="note">by the watch</span>`}</th>
+      ${with_robot && html`<td><a href=${robot_link(d.robot_id)}>${d.robot_id}</a></td>`}
+      <td class="when">${format.time(d.created_utime_us)}</td><td><${State} of=${d} /></td>
+      <td>${d.error ? html`<span class="note">${d.error}</span>` : found_words(d.summary)}</td>
+      <td class="figure">${share(d.summary?.gap.power_absolute_relative)}</td>${with_robot && html`<td class="figure">${share(d.summary?.shrinkage.held_out_after)}</td>
+      <td class="figure">${d.fitted_on.length || '–'}</td>`}</tr>`)}</tbody></table>`;
+}
+
+function Start({ given, onStart }) {
+  const live = useLive();
+  const robots = [...live.robots.values()].filter((r) => r.state.has_model).map((r) => r.id).sort();
+  const [robot, set_robot] = useState(given.robot ?? '');
+  const [missions, set_missions] = useState('50');
+  const [busy, set_busy] = useState(false);
+  const [error, set_error] = useState(null);
+  const chosen = robot || robots[0] || '';
+  const start = async (event) => {
+    event.preventDefault();
+    set_busy(true);
+    set_error(null);
+    try {
+      const job = await post('/v1/diagnoses', { robot_id: chosen, max_missions: Number(missions) });
+      onStart(job);
+    } catch (problem) {
+      set_error(problem);
+    }
+    set_busy(false);
+  };
+  if (live.loaded && robots.length === 0) return html`<${Empty} title="No robot has a model yet">A gap is what is measured against a model: put a robot file to <code>/v1/robots/…</code>.<//>`;
+  return html`<form class="filters" onSubmit=${start}>
+    <label class="field"><span>Robot</span><select value=${chosen} onChange=${(e) => set_robot(e.currentTarget.value)}>${robots.map((id) => html`<option key=${id} value=${id}>${id}</option>`)}</select></label>
+    <label class="field"><span>Missions, newest</span><input class="short" type="number" min="1" max="1000" required value=${missions} onInput=${(e) => set_missions(e.currentTarget.value)} /></label>
+    <button type="submit" class="primary" disabled=${busy || chosen === ''}>Diagnose</button>
+    <p class="note">Every fourth mission is held back to test what is found.</p>
+    ${error && html`<${Failure} error=${error} />`}</form>`;
+}
+
+function All({ given }) {
+  useTitleOf('Gap');
+  const jobs = useGet(`/v1/diagnoses${query({ robot_id: given.robot, limit: 50 })}`);
+  const running = jobs.value?.diagnoses.find((d) => d.state === 'running') ?? jobs.value?.diagnoses.findLast?.((d) => d.state === 'queued');
+  return html`<div class="heading"><h1>Gap between robot and model</h1></div>
+    <${Start} given=${given} onStart=${(job) => { location.hash = `#/gap/${job.id}`; }} />
+    ${running && html`<${Progress} key=${running.id} job=${running} onEnd=${jobs.reload} />`}
+    <${Panel} title=${given.robot ? `Diagnoses of ${given.robot}` : 'Diagnoses'} aside=${given.robot && html`<a href="#/gap">All robots</a>`}><${Answer} of=${jobs} what="diagnoses">${(told) =>
+      told.diagnoses.length === 0 ? html`<${Empty} title="No diagnosis yet">Choose a robot and press Diagnose: it says where measured power leaves the model, and which effect is missing.<//>`
+        : html`<div class="scroll"><${JobRows} jobs=${told.diagnoses} /></div>`}<//><//>`;
+}
+
+const channels = { battery_power: 'battery power', wheel_torque: 'wheel torque', motor_voltage: 'motor voltage', battery_voltage: 'battery voltage' };
+const suffixes = [['_m_s2', 'm/s²'], ['_rad_s', 'rad/s'], ['_m_s', 'm/s'], ['_kg', 'kg'], ['_rad', 'rad'], ['_s', 's'], ['_m', 'm'], ['_w', 'W']];
+
+// "speed_m_s" from 0.2 to 0.4 -> ["speed", "0.2 to 0.4 m/s"]
+function region(w) {
+  const [suffix, unit] = suffixes.find(([s]) => w.variable.endsWith(s)) ?? ['', ''];
+  const name = format.words(w.variable.slice(0, w.variable.length - suffix.length));
+  return [name, typeof w.from === 'string' ? w.from : `${format.digits(w.from)} to ${format.digits(w.to)}${unit && ` ${unit}`}`];
+}
+
+function Where({ regions }) {
+  if (regions.length === 0) return html`<${Empty} title="Nowhere in particular" />`;
+  const shown = regions.slice(0, 12), most = Math.max(...shown.map((w) => Math.max(Math.abs(w.share), Math.abs(w.ci[1] ?? 0))));
+  return html`<table class="bars where"><thead class="hidden"><tr><th>Where</th><th>Share</th><th></th></tr></thead><tbody>${shown.map((w, k) => html`<tr key=${k}>
+    <th scope="row">${channels[w.channel] ?? format.words(w.channel)} <span class="note">${region(w)[0]}</span> ${region(w)[1]}</th>
+    <td class="bar-cell"><svg width="100%" height="16" aria-hidden="true"><rect x="0" y="3" height="10" width=${`${Math.max(0.5, 100 * Math.abs(w.share) / most)}%`} class=${`account ${w.share < 0 ? 'back' : 'unexplained-plain'}`} />
+      <line x1=${`${100 * Math.max(0, Math.min(Math.abs(w.ci[0]), Math.abs(w.ci[1]))) / most}%`} x2=${`${Math.min(100, 100 * Math.max(Math.abs(w.ci[0]), Math.abs(w.ci[1])) / most)}%`} y1="8" y2="8" class="whisker" /></svg></td>
+    <td class="figure">${format.signed(share(w.share, 0))}</td></tr>`)}</tbody></table>
+    <p class="note foot">Share of the integral of |measured − modelled| power; line: 95 % interval, widened for the number of regions looked at. Regions overlap.</p>`;
+}
+
+function Effects({ effects }) {
+  return html`<table class="grid effects"><thead><tr><th scope="col">Effect</th><th scope="col" class="figure">Probability</th><th scope="col">Strength</th><th scope="col" class="figure">Closes of the gap</th><th scope="col">Cannot be told from</th></tr></thead>
+    <tbody>${effects.map((e) => html`<tr key=${e.id}><th scope="row">${format.words(e.id)}</th><td class="figure">${share(e.probability, 0)}</td>
+      <td>${Object.entries(e.parameters).map(([name, p]) => html`<div key=${name}><span class="note">${format.words(name)}</span> ${format.digits(p.value)}${format.known(p.sd) ? ` ± ${format.digits(p.sd, 2)}` : ''}${p.unit === '1' ? '' : ` ${p.unit}`}</div>`)}</td>
+      <td class="figure">${share(e.share, 0)}</td><td>${e.alternatives.map(format.words).join(', ') || '–'}</td></tr>`)}</tbody></table>`;
+}
+
+function TestTable({ test }) {
+  const most = Math.max(0.01, ...test.missions.flatMap((m) => [Math.abs(m.before.relative), Math.abs(m.after.relative)]));
+  const bar = (error, name) => html`<svg width="100%" height="12" aria-hidden="true"><rect height="8" y="2" width=${`${Math.max(0.5, 100 * Math.abs(error.relative) / most)}%`} class=${`account ${name}`} /></svg>`;
+  return html`<table class="grid test"><thead><tr><th scope="col">Mission</th><th scope="col" class="figure">Measured</th><th scope="col" class="figure">Error before</th><th scope="col" class="wide"></th><th scope="col" class="figure">Error after</th><th scope="col" class="wide"></th></tr></thead>
+    <tbody>${test.missions.map((m) => html`<tr key=${m.id}><th scope="row"><a href=${mission_link(m.id)}>${m.mission_id}</a>${m.basis === 'motors' && html` <span class="note">at the motors</span>`}</th>
+      <td class="figure"><${Quantity} of=${format.energy(m.measured_j)} /></td>
+      <td class="figure" title=${range_of(m.before.ci)}>${format.signed(share(m.before.relative))}</td><td class="wide bar-cell">${bar(m.before, 'plain')}</td>
+      <td class="figure" title=${range_of(m.after.ci)}>${format.signed(share(m.after.relative))}</td><td class="wide bar-cell">${bar(m.after, 'modelled')}</td></tr>`)}</tbody></table>`;
+}
+
+export function BackTest({ test }) {
+  if (test.missions.length === 0) return html`<p>There is no mission to test it on: none with stored telemetry and measured energy that it was not fitted on.</p>`;
+  const left = [[test.left_out.fitted_on, 'it was found on'], [test.left_out.open, 'still running'], [test.left_out.no_telemetry, 'without telemetry'], [test.left_out.beyond_limits, 'beyond the limits']].filter(([n]) => n > 0).map(([n, why]) => `${n} ${why}`).join(', ');
+  return html`<div class=${`verdict-box ${test.improves ? 'makes' : 'fails'}`}><p class="verdict">On ${test.missions.length} missions that it was not found on, the energy error ${test.improves ? 'falls' : 'goes'} from <b>${share(test.error_before, 2)}</b> to <b>${share(test.error_after, 2)}</b>.</p>
+    <p class="note">Improvement ${range_of(test.improvement_ci, 2)} (95 %); power gap ${share(test.power_gap_before)} to ${share(test.power_gap_after)}; against model version ${test.tested_against}.${left && ` Left out: ${left}.`}</p></div>
+    <div class="scroll"><${TestTable} test=${test} /></div>`;
+}
+
+function Adopt({ job }) {
+  const [told, set_told] = useState({ test: null, error: null, busy: '', adopted: null });
+  const ask = async (doing, body) => {
+    set_told((t) => ({ ...t, busy: doing, error: null }));
+    try {
+      const answer = await post(`/v1/robots/${encodeURIComponent(job.robot_id)}/model`, { diagnosis_id: job.id, ...body });
+      set_told((t) => ({ test: answer.back_test, error: null, busy: '', adopted: answer.adopted ? answer.model_version : t.adopted }));
+    } catch (error) {
+      set_told((t) => ({ ...t, test: error.told?.back_test ?? t.test, error, busy: '' }));
+    }
+  };
+  const { test, error, busy, adopted } = told;
+  return html`${adopted !== null && html`<p class="adopted" role="status">Version ${adopted} is in force for <a href=${robot_link(job.robot_id)}>${job.robot_id}</a>: planning and autonomy use it now, the meter from the next mission on.</p>`}
+    ${test && html`<${BackTest} test=${test} />`}
+    ${error && html`<${Failure} error=${error} />`}
+    ${adopted === null && html`<div class="tools adopt">
+      <button type="button" disabled=${busy !== ''} onClick=${() => ask('test', { dry_run: true })}>${busy === 'test' ? 'Testing …' : test ? 'Test again' : 'Test on other missions'}</button>
+      <button type="button" class="primary" disabled=${busy !== ''} onClick=${() => ask('adopt', {})}>${busy === 'adopt' ? 'Testing and adopting …' : 'Adopt'}</button>
+      ${error?.status === 409 && test && html`<button type="button" disabled=${busy !== ''} onClick=${() => ask('adopt', { force: true })}>Adopt all the same</button>`}
+      <span class="note">Adopting makes the next model version, after a test on missions that this was not found on.</span></div>`}`;
+}
+
+function Result({ job }) {
+  const r = job.result, [name, words] = verdicts[r.verdict] ?? [r.verdict, ''];
+  const s = r.shrinkage;
+  return html`<div class=${`verdict-box ${r.verdict === 'none' || r.verdict === 'effects' ? '' : 'fails'}`}><p class="verdict"><b>${name}</b>${r.effects.length > 0 && html`: ${r.effects.map((e) => format.words(e.id)).join(', ')}`}</p><p class="note">${words}${r.outside.channel && ` It shows in ${format.words(r.outside.channel)} and follows ${format.words(r.outside.follows)}.`}</p></div>
+    <dl class="readouts">
+      <${Readout} large label="Gap in power" of=${format.percent(r.gap.power_absolute_relative, 1)} note=${`noise ${share(r.gap.noise_floor)}`} />
+      <${Readout} large label="Gap in energy" of=${format.percent(r.gap.energy_relative, 1)} />
+      <${Readout} large label="Held out, with it" of=${format.percent(s.held_out_after, 1)} note=${`from ${share(s.held_out_before)}`} />
+      <${Readout} large label="Gap shrinks by" of=${format.percent(s.fraction, 0)} note=${r.effects.length > 0 ? range_of(s.ci, 0) : ''} />
+      <${Readout} large label="Missions" of=${`${r.missions}`} note=${`${format.fixed(r.samples)} samples`} />
+    </dl>
+    ${r.effects.length > 0 && html`<${Panel} title="Which effect"><div class="scroll"><${Effects} effects=${r.effects} /></div><//>`}
+    <div class="columns"><${Panel} title="Where measured power leaves the model"><${Where} regions=${r.where} /><//>
+      <${Panel} title="What to drive next">${r.next_drive.length === 0 ? html`<${Empty} title=${r.verdict === 'outside' ? 'No drive is suggested' : 'Nothing more is needed'} />`
+        : html`<ol class="next">${r.next_drive.map((n, k) => html`<li key=${k}><b>${n.manoeuvre}</b> <span class="note">to tell ${format.words(n.separates)}</span></li>`)}</ol>`}<//></div>
+    <${Panel} title="Adopt">${job.model === null ? html`<${Empty} title="Nothing to adopt" />` : html`<${Adopt} job=${job} />`}<//>`;
+}
+
+function One({ id }) {
+  useTitleOf(`Diagnosis ${id}`);
+  const job = useGet(`/v1/diagnoses/${encodeURIComponent(id)}`);
+  return html`<${Answer} of=${job} what="the diagnosis">${(d) => html`
+    <div class="heading"><p class="crumbs"><a href="#/gap">Gap</a></p><h1>Diagnosis ${d.id}</h1><span><a href=${robot_link(d.robot_id)}>${d.robot_id}</a></span> <${State} of=${d} />
+      <span class="note">${format.time(d.created_utime_us)}${d.model_version !== null && ` · model version ${d.model_version}`}</span><span class="spring"></span>
+      ${d.state === 'done' && html`<a class="button" href=${`/v1/diagnoses/${d.id}/report`} target="_blank" rel="noopener">Whole report</a>`}</div>
+    ${!ended(d) && html`<${Progress} key=${d.id} job=${d} onEnd=${job.reload} />`}
+    ${d.error && html`<div class="failure" role="alert"><p class="empty-title">${state_notes[d.state]}</p><p>${d.error}</p></div>`}
+    ${d.result && html`<${Result} job=${d} />`}`}<//>`;
+}
+
+export function Gap({ id, given }) {
+  return id ? html`<${One} id=${id} />` : html`<${All} given=${given} />`;
+}
