@@ -1,0 +1,198 @@
+#!/usr/bin/env python3
+"""What adopting a diagnosis is worth, on virtual robots with an effect that their files leave out.
+
+Each robot drives a history; the daemon diagnoses it, back-tests what it found on missions that it was not found on,
+and adopts it. Then the robot drives missions that nobody has seen, and the energy error of three kinds of answers is
+told before and after the adoption:
+  profile    the motion as it was driven, through the meter
+  estimate   the motion as it was commanded, known before the robot sets off, by `joulecast estimate`
+  autonomy   energy a metre over all new missions, by `joulecast autonomy`
+The diagnosis sees telemetry only. Effects and strengths are drawn from the seed.
+
+  closing_the_loop.py --daemon ... --client ... --source ... --shared ... [--robots N] [--seed S]
+
+Fails when the median energy error of profile or estimate does not fall to a half, or when a back-test promised an
+improvement that new missions do not show.
+"""
+import argparse
+import json
+import random
+import statistics
+import struct
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+
+from harness import Programs, check
+
+# Effects that change energy, with strengths that add about 4 to 12 % of it on the shipped robots.
+EFFECTS = {
+    "coulomb_friction": (0.4, 0.9), "viscous_friction": (4, 10), "load_rolling_resistance": (0.015, 0.035),
+    "turning_scrub": (0.1, 0.25), "gear_efficiency": (0.08, 0.2), "chassis_mass_error": (0.5, 1.0),
+    "accessory_load": (1.5, 3.5), "driver_loss": (0.1, 0.25), "resistance_error": (0.8, 2.0), "torque_constant_loss": (0.08, 0.16),
+}
+KINDS = ["nomad", "amr", "tug"]
+HISTORY_MISSIONS, NEW_MISSIONS = 12, 6
+
+
+def options():
+    parser = argparse.ArgumentParser()
+    for name in ("daemon", "client", "source", "shared"):
+        parser.add_argument("--" + name, required=True)
+    parser.add_argument("--robots", type=int, default=3)
+    parser.add_argument("--seed", type=int, default=1)
+    return parser.parse_args()
+
+
+def ask(url, method, path, body=None):
+    request = urllib.request.Request(url + path, method=method, headers={"Content-Type": "application/json"},
+                                     data=None if body is None else json.dumps(body).encode())
+    try:
+        with urllib.request.urlopen(request, timeout=120) as reply:
+            return reply.status, json.load(reply)
+    except urllib.error.HTTPError as error:
+        return error.code, json.load(error)
+
+
+def commanded(log):
+    """Each mission's commanded speed and yaw rate over time [s, m/s, rad/s] and its payload [kg], from the log."""
+    data = open(log, "rb").read()
+    missions, place = [], 0
+    while place < len(data):
+        channel_size, size = struct.unpack_from(">ii", data, place + 20)
+        channel = data[place + 28:place + 28 + channel_size]
+        body = data[place + 28 + channel_size:place + 28 + channel_size + size]
+        place += 28 + channel_size + size
+        utime_us, = struct.unpack_from(">q", body, 8)
+        if channel.startswith(b"MISSION_EVENT."):
+            at = 16
+            texts = []
+            for _ in range(2):
+                length, = struct.unpack_from(">i", body, at)
+                texts.append(body[at + 4:at + 3 + length].decode())
+                at += 4 + length
+            if body[at] == 1:
+                missions.append({"mission_id": texts[1], "time_s": [], "speed_m_s": [], "yaw_rate_rad_s": [], "payload_kg": []})
+            else:
+                missions.append(None)
+        elif missions and missions[-1]:
+            length, = struct.unpack_from(">i", body, 24)
+            values = struct.unpack_from(">18d", body, 28 + length)
+            m = missions[-1]
+            if not m["time_s"]:
+                m["start_us"] = utime_us
+            m["time_s"].append((utime_us - m["start_us"]) * 1e-6)
+            m["speed_m_s"].append(values[8])
+            m["yaw_rate_rad_s"].append(values[9])
+            m["payload_kg"].append(values[17])
+    return [m for m in missions if m]
+
+
+def estimates(programs, robot_file, missions):
+    energies = []
+    for mission in missions:
+        keep = range(0, len(mission["time_s"]), 5)  # 10 Hz: a plan's resolution
+        profile = {name: [mission[name][k] for k in keep] for name in ("time_s", "speed_m_s", "yaw_rate_rad_s")}
+        profile["speed_m_s"][0] = profile["speed_m_s"][-1] = 0.0
+        profile["yaw_rate_rad_s"][0] = profile["yaw_rate_rad_s"][-1] = 0.0
+        with open(programs.path("motion.json"), "w") as file:
+            json.dump({"profile": profile, "payload_kg": statistics.median(mission["payload_kg"])}, file)
+        answer = json.loads(programs.run("estimate", "--robot", robot_file, "--request", programs.path("motion.json"), "--json"))
+        energies.append(answer["energy_j"])
+    return energies
+
+
+def metered(programs, robot_file, log, name):
+    answer = json.loads(programs.run("replay", log, "--into", programs.path(name), "--robot", robot_file, "--json"))
+    return [m["energy"] for m in answer["missions"]]
+
+
+def per_metre(programs, robot_file, payload_kg):
+    answer = json.loads(programs.run("autonomy", "--robot", robot_file, "--charge", 0.9, "--payload", payload_kg, "--json"))
+    return answer["consumption"]["energy_per_m_j"]
+
+
+def mean_error(predicted, measured):
+    return statistics.mean(abs(p / m - 1) for p, m in zip(predicted, measured))
+
+
+def one_robot(given, draw, number):
+    programs = Programs(given)
+    programs.lcm_url = "memq://"
+    kind = draw.choice(KINDS)
+    effect = draw.choice(sorted(EFFECTS))
+    strength = round(draw.uniform(*EFFECTS[effect]), 4)
+    seed = draw.randrange(1, 10**6)
+    before_file, after_file = programs.path("before.json"), programs.path("after.json")
+    with open(f"{given.source}/deploy/robots/{kind}.json") as file:
+        robot = json.load(file)
+    robot["robot_id"] = f"{kind}-{number}"
+    with open(before_file, "w") as file:
+        json.dump(robot, file)
+    simulate = ["simulate", "--robots", 1, "--robot", before_file, "--speed", 0, "--effect", f"{effect}={strength}", "--quiet"]
+    history, new = programs.path("history.lcmlog"), programs.path("new.lcmlog")
+    programs.run(*simulate, "--missions", HISTORY_MISSIONS, "--seed", seed, "--log", history)
+    programs.run(*simulate, "--missions", NEW_MISSIONS, "--seed", seed + 1, "--pickups", 0, "--log", new)
+    programs.run("replay", history, "--into", programs.store, "--robot", before_file, "--json")
+
+    programs.start()
+    status, job = ask(programs.url, "POST", "/v1/diagnoses", {"robot_id": robot["robot_id"]})
+    check(status == 202, f"the diagnosis did not start: {job}")
+    with urllib.request.urlopen(programs.url + f"/v1/diagnoses/{job['id']}/events", timeout=300) as events:
+        while not events.readline().startswith(b"event: ended"):
+            pass
+    _, job = ask(programs.url, "GET", f"/v1/diagnoses/{job['id']}")
+    check(job["state"] == "done", f"the diagnosis did not end well: {job}")
+    row = {"robot": robot["robot_id"], "effect": effect, "strength": strength, "verdict": job["result"]["verdict"],
+           "named": [e["id"] for e in job["result"]["effects"]], "adopted": False}
+    if job["model"] is not None:
+        status, answer = ask(programs.url, "POST", f"/v1/robots/{robot['robot_id']}/model", {"diagnosis_id": job["id"]})
+        check(status in (200, 409), f"adopting: {status} {answer}")
+        row["adopted"] = status == 200
+        row["back_test"] = [answer["back_test"]["error_before"], answer["back_test"]["error_after"]]
+    _, detail = ask(programs.url, "GET", f"/v1/robots/{robot['robot_id']}")
+    check(detail["model_version"] == (2 if row["adopted"] else 1), "the version in force")
+    with open(after_file, "w") as file:
+        json.dump(detail["model"], file)
+    check(programs.stop() == 0, "the daemon did not stop in order")
+
+    missions = commanded(new)
+    accounts = [metered(programs, file, new, name) for file, name in ((before_file, "b.db"), (after_file, "a.db"))]
+    measured = [a["measured_j"] for a in accounts[0]]
+    check(len(missions) == len(measured) == NEW_MISSIONS, f"{len(missions)} missions in the log, {len(measured)} accounted for")
+    payload_kg = statistics.median(p for m in missions for p in m["payload_kg"])
+    measured_per_m = sum(measured) / sum(a["distance_m"] for a in accounts[0])
+    row["profile"] = [mean_error([a["modelled_j"] for a in both], measured) for both in accounts]
+    row["estimate"] = [mean_error(estimates(programs, file, missions), measured) for file in (before_file, after_file)]
+    row["autonomy"] = [abs(per_metre(programs, file, payload_kg) / measured_per_m - 1) for file in (before_file, after_file)]
+    programs.folder.cleanup()
+    return row
+
+
+def main():
+    given = options()
+    draw = random.Random(given.seed)
+    rows = []
+    print(f"{'robot':<9} {'hidden effect':<34} {'named':<46} {'back-test':>15} {'profile':>15} {'estimate':>15} {'autonomy':>15}   energy error, % before > after")
+    for number in range(given.robots):
+        row = one_robot(given, draw, number)
+        rows.append(row)
+        pair = lambda name: f"{100 * row[name][0]:6.2f} > {100 * row[name][1]:5.2f}" if name in row else "-"
+        named = f"{row['verdict']}: {', '.join(row['named'])}" + ("" if row["adopted"] else " (not adopted)")
+        print(f"{row['robot']:<9} {row['effect'] + ' ' + str(row['strength']):<34} {named:<46} {pair('back_test'):>15} {pair('profile'):>15} "
+              f"{pair('estimate'):>15} {pair('autonomy'):>15}", flush=True)
+    medians = {}
+    for name in ("profile", "estimate", "autonomy"):
+        medians[name] = [statistics.median(row[name][k] for row in rows) for k in (0, 1)]
+        fall = 1 - medians[name][1] / medians[name][0]
+        print(f"{name}: median error {100 * medians[name][0]:.2f} % before, {100 * medians[name][1]:.2f} % after adoption ({100 * fall:.0f} % less)")
+    print(f"{sum(r['adopted'] for r in rows)} of {len(rows)} adopted; hidden effect named in {sum(r['effect'] in r['named'] for r in rows)}")
+    for name in ("profile", "estimate"):
+        check(medians[name][1] < 0.5 * medians[name][0], f"{name}: the error does not fall to a half")
+    for row in rows:
+        if row["adopted"]:
+            check(row["profile"][1] < row["profile"][0], f"{row['robot']}: adopted, and worse on new missions: {row}")
+
+
+main()
