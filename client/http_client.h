@@ -25,9 +25,9 @@ struct HttpReply {
   bool ok() const { return status >= 200 && status < 300; }
 };
 
-enum class HttpMethod { get, post, put };
+enum class HttpMethod { get, post, put, del };
 
-// One request on its own connection. `target` begins with a slash; `json_body` is sent with GET not at all.
+// One request on its own connection. `target` begins with a slash; `json_body` is sent with GET and DELETE not at all.
 // Fault::unavailable when the server cannot be reached or does not answer within `timeout` (for the whole
 // exchange); a reply of any status is a success here.
 [[nodiscard]] Result<HttpReply> http_request(const ServerAddress& server, HttpMethod method,

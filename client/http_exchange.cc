@@ -87,14 +87,15 @@ Result<HttpReply> http_request(const ServerAddress& server, HttpMethod method, s
                                std::string json_body, std::chrono::milliseconds timeout) {
   const http::verb verb = method == HttpMethod::get    ? http::verb::get
                           : method == HttpMethod::post ? http::verb::post
-                                                       : http::verb::put;
+                          : method == HttpMethod::put  ? http::verb::put
+                                                       : http::verb::delete_;
   http::request<http::string_body> request(verb, server.base_path + std::string(target), 11);
   const bool bracketed = server.host.find(':') != std::string::npos;
   request.set(http::field::host, (bracketed ? "[" + server.host + "]" : server.host) + ":" + server.port);
   request.set(http::field::user_agent, "joulecast/" JOULECAST_VERSION);
   request.set(http::field::accept, "application/json, application/problem+json");
   request.keep_alive(false);
-  if (method != HttpMethod::get) {
+  if (method != HttpMethod::get && method != HttpMethod::del) {
     request.set(http::field::content_type, "application/json");
     request.body() = std::move(json_body);
   }

@@ -36,7 +36,8 @@ constexpr Examples table[] = {
      "joulecast simulate --list-effects"},
     {"gap",
      "joulecast gap amr.lcmlog --robot amr.json\n"
-     "joulecast gap amr.lcmlog --robot amr.json --apply amr-adopted.json --json"},
+     "joulecast gap amr.lcmlog --robot amr.json --apply amr-adopted.json --json\n"
+     "joulecast gap amr.lcmlog --robot amr.json --test fresh.lcmlog"},
     {"gap trial", "joulecast gap trial --count 2 --seed 1"},
     {"effects", "joulecast effects"},
     {"explore",

@@ -2,14 +2,20 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "client/commands/gap_compare.h"
 #include "client/commands/gap_missions.h"
 #include "client/commands/gap_output.h"
+#include "client/commands/gap_server.h"
 #include "client/commands/table.h"
 #include "client/files.h"
+#include "energy/back_test.h"
+#include "energy/back_test_json.h"
+#include "gap/adopt.h"
 #include "gap/diagnosis.h"
 #include "gap/diagnosis_json.h"
 #include "robot/robot_file.h"
@@ -24,6 +30,11 @@ struct Options {
   std::string apply;
   std::string report;
   std::string compare_by;
+  std::vector<std::string> test;
+  std::string server;
+  std::size_t max_missions = 200;
+  bool adopt = false;
+  bool force = false;
   bool json = false;
   GapMissionsOptions missions;
 };
@@ -73,7 +84,34 @@ void print(const gap::Diagnosis& d) {
   }
 }
 
+void print(const energy::BackTest& test) {
+  std::printf("%-24s %12s %14s %14s\n", "tested on mission", "measured J", "error before", "error after");
+  for (const energy::RunComparison& run : test.runs)
+    std::printf("%-24s %12.2f %12.2f %% %12.2f %%\n", run.name.c_str(), run.measured_j,
+                100 * run.before.relative, 100 * run.after.relative);
+  std::printf("energy error %.2f %% -> %.2f %%, improvement %.2f %% [%.2f, %.2f]: %s\n",
+              100 * test.error_before, 100 * test.error_after, 100 * test.improvement(),
+              100 * test.improvement_interval[0], 100 * test.improvement_interval[1],
+              test.improves() ? "it improves" : "no improvement is shown");
+}
+
+// The robot file and the one with the effects found, on missions of other logs.
+Result<energy::BackTest> test_of(const Options& options, const robot::RobotModel& robot,
+                                 const robot::RobotModel& extended) {
+  const auto recordings = gap::load_recordings(options.test, options.robot_id);
+  if (!recordings) return tl::unexpected(recordings.error());
+  std::vector<energy::DriveRun> runs;
+  for (const telemetry::Recording& mission : recordings->missions)
+    runs.push_back(
+        {mission.mission_id, mission.samples, std::isfinite(mission.payload_kg) ? mission.payload_kg : 0});
+  return energy::back_test(runs, robot, extended);
+}
+
 Exit run(const Options& options) {
+  if (!options.server.empty()) {
+    return gap_from_server({options.server, options.robot_id, options.max_missions, options.report,
+                            options.apply, options.json, options.adopt, options.force});
+  }
   const auto robot = robot::load_robot(options.robot_file);
   if (!robot) return report(robot.error());
   if (!options.missions.runs.empty()) {
@@ -91,17 +129,32 @@ Exit run(const Options& options) {
                               report_origin(options.logs, options.robot_file));
   const auto diagnosis = gap::diagnose(*recordings, *robot);
   if (!diagnosis) return report(diagnosis.error());
+  const auto extended = gap::with_effects(*robot, diagnosis->adoptable);
+  if (!extended) return report(extended.error());
+  std::optional<energy::BackTest> test;
+  if (!options.test.empty()) {
+    auto tested = test_of(options, *robot, *extended);
+    if (!tested) return report(tested.error());
+    test = std::move(*tested);
+  }
   if (options.json) {
-    std::printf("%s\n", gap::to_json_text(*diagnosis).c_str());
+    nlohmann::json document = gap::diagnosis_to_json(*diagnosis);
+    if (test) document["back_test"] = energy::back_test_to_json(*test);
+    std::printf("%s\n", document.dump(2).c_str());
   } else {
     print(*diagnosis);
+    if (test) print(*test);
   }
   if (!options.report.empty()) {
     const auto page =
         gap::report_html(*diagnosis, *recordings, *robot, report_origin(options.logs, options.robot_file));
     if (const auto written = write_file(options.report, page); !written) return report(written.error());
   }
-  return options.apply.empty() ? Exit::ok : write_adopted(diagnosis->adoptable, *robot, options.apply);
+  if (options.apply.empty()) return Exit::ok;
+  if (test && !test->improves() && !options.force)
+    return report(
+        {Fault::infeasible, "--apply", "the back-test shows no improvement; --force writes it all the same"});
+  return write_robot(*extended, options.apply);
 }
 
 }  // namespace
@@ -135,12 +188,34 @@ void add_gap(CLI::App& program, Exit& exit) {
       ->check(CLI::IsMember({"prefix", "suffix"}))
       ->excludes(missions);
   command->add_option("--apply", options->apply, "write the robot file with the effects found");
+  command
+      ->add_option(
+          "--test", options->test,
+          "logs of other missions: replay them with and without the effects found; --apply is refused "
+          "where they show no improvement")
+      ->excludes(missions);
+  auto* server = command
+                     ->add_option("--server", options->server,
+                                  "daemon that diagnoses its own history of --robot-id, instead of logs")
+                     ->excludes(logs)
+                     ->excludes(missions)
+                     ->excludes(robot);
+  command->add_option("--max-missions", options->max_missions, "with --server: newest missions to judge by")
+      ->needs(server)
+      ->check(CLI::Range(1, 1000));
+  command
+      ->add_flag("--adopt", options->adopt,
+                 "with --server: adopt what is found, after the daemon's back-test")
+      ->needs(server);
+  command->add_flag("--force", options->force, "adopt or apply even when the back-test shows no improvement");
   add_gap_trial(*command, exit);
-  command->callback([options, command, logs, missions, robot, &exit] {
+  command->callback([options, command, logs, missions, robot, server, &exit] {
     if (!command->get_subcommands().empty()) return;
     // Not required() by the parser, which would ask for them of the subcommands too.
-    if (logs->empty() && missions->empty()) throw CLI::RequiredError("log or --missions");
-    if (robot->empty()) throw CLI::RequiredError(robot->get_name());
+    if (!server->empty() && options->robot_id.empty()) throw CLI::RequiredError("--robot-id");
+    if (logs->empty() && missions->empty() && server->empty())
+      throw CLI::RequiredError("log, --missions or --server");
+    if (robot->empty() && server->empty()) throw CLI::RequiredError(robot->get_name());
     exit = run(*options);
   });
 }

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "client/files.h"
+#include "gap/adopt.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::client {
@@ -27,10 +28,11 @@ void print_effect(const gap::DiagnosedEffect& e) {
 
 Exit write_adopted(std::span<const robot::AdoptedEffect> found, robot::RobotModel robot,
                    const std::string& path) {
-  for (const robot::AdoptedEffect& effect : found) {
-    std::erase_if(robot.effects, [&](const robot::AdoptedEffect& e) { return e.id == effect.id; });
-    robot.effects.push_back(effect);
-  }
+  const auto extended = gap::with_effects(std::move(robot), found);
+  return extended ? write_robot(*extended, path) : report(extended.error());
+}
+
+Exit write_robot(const robot::RobotModel& robot, const std::string& path) {
   const auto written = write_file(path, robot::to_json_text(robot) + '\n');
   return written ? Exit::ok : report(written.error());
 }

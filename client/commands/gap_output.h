@@ -18,6 +18,8 @@ void print_effect(const gap::DiagnosedEffect& effect);
 Exit write_adopted(std::span<const robot::AdoptedEffect> found, robot::RobotModel robot,
                    const std::string& path);
 
+Exit write_robot(const robot::RobotModel& robot, const std::string& path);
+
 // What a report says of where it comes from: names of files without their folders, and now.
 gap::ReportOrigin report_origin(const std::vector<std::string>& sources, const std::string& robot_file);
 

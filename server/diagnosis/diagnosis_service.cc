@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
+#include <ctime>
 #include <deque>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -16,6 +17,7 @@
 #include "gap/adopt.h"
 #include "gap/diagnosis.h"
 #include "gap/diagnosis_json.h"
+#include "gap/report.h"
 #include "robot/robot_file.h"
 #include "server/diagnosis/gap_watch.h"
 #include "server/diagnosis/mission_recordings.h"
@@ -43,6 +45,15 @@ json request_json(const DiagnosisRequest& request) {
   if (!request.missions.empty()) text["missions"] = request.missions;
   if (request.since_utime_us) text["since_utime_us"] = *request.since_utime_us;
   return text;
+}
+
+// As "2026-01-31 12:00".
+std::string utc_text(std::int64_t utime_us) {
+  const std::time_t seconds = utime_us / 1'000'000;
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  char text[32];
+  return {text, std::strftime(text, sizeof text, "%Y-%m-%d %H:%M", &utc)};
 }
 
 // Spread evenly over the missions: every 1/share-th, one at least of three or more.
@@ -261,6 +272,12 @@ class DiagnosisService::Impl {
     result["model_version"] = model->version;
     result["since_utime_us"] = wanted.since_utime_us ? json(*wanted.since_utime_us) : json(nullptr);
     record.result_json = result.dump();
+    gap::ReportOrigin origin;
+    for (const telemetry::Recording& mission : set->missions) origin.sources.push_back(mission.mission_id);
+    origin.model = "version " + std::to_string(model->version) + " of " + record.robot_id;
+    origin.made_at = utc_text(now_utime_us_());
+    origin.software = "joulecastd " JOULECAST_VERSION;
+    report_ = gap::report_html(*diagnosis, *set, model->robot, origin);
     if (!diagnosis->adoptable.empty()) {
       Result<robot::RobotModel> extended = gap::with_effects(model->robot, diagnosis->adoptable);
       if (extended) {
@@ -306,7 +323,7 @@ class DiagnosisService::Impl {
   DiagnosisOptions options_;
   std::function<void(const Error&)> on_error_;
   Ended on_ended_;
-  std::string report_;     // of the job that runs
+  std::string report_;     // of the job that runs, as HTML
   std::mutex submitting_;  // between looking at the queue and entering it
   mutable std::mutex mutex_;
   std::condition_variable wake_;

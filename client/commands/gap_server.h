@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "client/commands/outcome.h"
+
+namespace joulecast::client {
+
+struct GapServerOptions {
+  std::string server;
+  std::string robot_id;
+  std::size_t max_missions = 200;
+  std::string report;  // file for the HTML report; empty: none
+  std::string apply;   // file for the robot file with the effects found; empty: none
+  bool json = false;
+  bool adopt = false;  // in the daemon, after a back-test
+  bool force = false;  // adopt even when the back-test shows no improvement
+};
+
+// Has a daemon diagnose its own history of a robot, follows the job and tells what came of it. An interrupt
+// cancels the job.
+Exit gap_from_server(const GapServerOptions& options);
+
+}  // namespace joulecast::client
