@@ -50,6 +50,7 @@ constexpr auto variants = std::to_array<Variant>({
        s.controller.feed_forward = rng.chance(0.5) ? 0.0 : 0.8;
      }},
     {"soft friction", [](Rng& rng, SimulationSpec& s) { s.world.bristle_rad = rng.uniform(0.015, 0.05); }},
+    {"hard brushes", [](Rng&, SimulationSpec& s) { s.world.brush_softness = 0.2; }},
     {"Gaussian Stribeck", [](Rng&, SimulationSpec& s) { s.world.stribeck_power = 2; }},
     {"coarse converters",
      [](Rng& rng, SimulationSpec& s) {

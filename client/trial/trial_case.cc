@@ -56,6 +56,11 @@ struct Upward {
   double most;
 };
 constexpr auto upward = std::to_array<Upward>({{"resistance_error", 2.5},
+                                               {"stribeck_friction", 5},
+                                               {"coulomb_friction", 4},
+                                               {"friction_asymmetry", 5},
+                                               {"current_sensor_gain", 0.2},
+                                               {"voltage_sensor_gain", 0.2},
                                                {"sensor_delay", 0.2},
                                                {"wheel_radius_error", 0.15},
                                                {"track_error", 0.25},

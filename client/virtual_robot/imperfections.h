@@ -75,6 +75,7 @@ struct World {
   double thermal_time_constant_s = 240;
   double period_s = 24;
   double burst_time_s = 20;
+  double brush_softness = 1;  // of the current over which the brush drop builds up
   double motor_sensor_share = 1, battery_sensor_share = 1;  // of gains and biases of electrical sensors
 };
 

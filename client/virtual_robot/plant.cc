@@ -37,7 +37,8 @@ Plant::Plant(const RobotParameters& robot, const Imperfections& imperfections, c
   inductance_h_ =
       std::max(robot_.inductance_h, shortest_electrical_s * robot_.resistance_ohm) + effect_.inductance;
   const double friction_mean_nm = 0.5 * (robot_.friction_torque_nm[0] + robot_.friction_torque_nm[1]);
-  brush_scale_a_ = std::max(0.004 * robot_.current_limit_a, 0.1 * friction_mean_nm / torque_per_a_);
+  brush_scale_a_ = world_.brush_softness *
+                   std::max(0.004 * robot_.current_limit_a, 0.1 * friction_mean_nm / torque_per_a_);
   bristle_ = {world_.bristle_rad, effect_.stribeck_friction,
               world_.stribeck_speed_m_s / robot_.wheel_radius_m, world_.stribeck_power};
 
@@ -168,8 +169,8 @@ Plant::Rates Plant::rates(const PlantState& s, const std::array<double, 2>& volt
       const double direction = std::tanh(w / gear_speed_rad_s);
       const double a = effect_.gear_efficiency;
       mesh_nm = a * std::abs(passed_nm) / (passed_nm * w > 0 ? 1 + a : 1 - a) * direction;
-      // The slipping contact turns part of the rim's force into heat, whichever way the force acts.
-      slip_nm = std::abs(effect_.wheel_slip * passed_nm) * direction;
+      // A contact that slips while it drives turns part of the rim's force into heat.
+      if (passed_nm * w > 0) slip_nm = std::abs(effect_.wheel_slip * passed_nm) * direction;
     }
     net_nm[side] = motor_nm - internal_nm - floor_nm * ratio - mesh_nm - slip_nm -
                    0.5 * arm_m_[side] * (force_n + sides[side] * moment_nm / half_track_m_);

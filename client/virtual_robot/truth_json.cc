@@ -42,6 +42,7 @@ std::string truth_json(const std::vector<Truth>& truths) {
                         {"stribeck_speed_m_s", w.stribeck_speed_m_s},
                         {"stribeck_power", w.stribeck_power},
                         {"bristle_rad", w.bristle_rad},
+                        {"brush_softness", w.brush_softness},
                         {"motor_sensor_share", w.motor_sensor_share},
                         {"battery_sensor_share", w.battery_sensor_share},
                         {"emf_loss_share", w.emf_loss_share},
