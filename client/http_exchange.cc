@@ -93,7 +93,7 @@ Result<HttpReply> http_request(const ServerAddress& server, HttpMethod method, s
   const bool bracketed = server.host.find(':') != std::string::npos;
   request.set(http::field::host, (bracketed ? "[" + server.host + "]" : server.host) + ":" + server.port);
   request.set(http::field::user_agent, "joulecast/" JOULECAST_VERSION);
-  request.set(http::field::accept, "application/json, application/problem+json");
+  request.set(http::field::accept, "application/json, application/problem+json, text/html;q=0.5");
   request.keep_alive(false);
   if (method != HttpMethod::get && method != HttpMethod::del) {
     request.set(http::field::content_type, "application/json");

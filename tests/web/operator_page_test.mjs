@@ -368,8 +368,8 @@ await check('what was found is tested on other missions, adopted and rolled back
   await page.getByRole('button', { name: 'Put version 1 in force again' }).click();
   await page.getByRole('button', { name: 'Put version 2 in force again' }).click();
   await until('version 2', async () => (await get('/v1/robots/worn-01')).model_version === 2);
-  const { events } = await get('/v1/audit-log?robot_id=worn-01');
-  equal(events.map((e) => e.kind).join(' '), 'model_adopted model_activated model_activated', 'audit log');
+  const told = async () => (await get('/v1/audit-log?robot_id=worn-01')).events.map((e) => e.kind).join(' ');
+  await until('the audit log', async () => (await told()) === 'model_adopted model_activated model_activated');
 });
 
 await check('what does not improve is refused with its figures', async () => {
