@@ -82,8 +82,11 @@ void VirtualRobot::start_mission() {
   scatter.resistance = factor(scatter_resistance);
   scatter.idle_power = factor(scatter_idle);
 
-  MissionScript script = plan_mission(spec_.robot, spec_.script, planned_pose_, mission_rng_);
   mission_ = {};
+  mission_.start = planned_pose_;
+  MissionScript script = plan_mission(spec_.robot, spec_.script, planned_pose_, mission_rng_);
+  mission_.script = script;
+  mission_.charge_at_start = pack_.state_of_charge();
   mission_.mission_id = spec_.robot.robot_id + "-m" + std::to_string(missions_begun_);
   mission_.payload_kg = script.payload_kg;
   mission_.undeclared_kg = script.undeclared_kg;
@@ -102,6 +105,7 @@ void VirtualRobot::start_mission() {
 void VirtualRobot::finish_mission() {
   under_way_ = false;
   mission_.accounts = difference(plant_.accounts(), accounts_at_start_);
+  mission_.charge_at_end = pack_.state_of_charge();
   outbox_.push_back(
       {now_us(), telemetry::MissionEvent{now_us(), mission_.mission_id, telemetry::MissionPhase::finished,
                                          mission_.payload_kg, "virtual robot"}});

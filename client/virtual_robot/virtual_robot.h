@@ -55,6 +55,9 @@ struct MissionTruth {
   double battery_energy_j = 0;
   PlantAccounts accounts;  // of this mission
   MissionScatter scatter;
+  ScriptPose start;      // planned, where the script begins
+  MissionScript script;  // as planned
+  double charge_at_start = 0, charge_at_end = 0;
 };
 
 struct Emission {
