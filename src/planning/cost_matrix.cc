@@ -118,6 +118,7 @@ void CostMatrix::row(std::size_t r, std::vector<Cell>& cells) const {
     if (std::isfinite(sum.energy_j)) {
       cell.energy_j = sum.energy_j;
       cell.duration_s = sum.duration_s;
+      cell.loaded = loaded[t];
     } else {
       cell.obstacle = Obstacle::limits;
     }

@@ -52,6 +52,7 @@ std::string_view name_of(Obstacle obstacle);
 struct Cell {
   double energy_j = std::numeric_limits<double>::quiet_NaN();
   double duration_s = std::numeric_limits<double>::quiet_NaN();
+  LegCost loaded;  // of both, from pick-up to drop-off
   Obstacle obstacle = Obstacle::none;
 };
 

@@ -1,0 +1,91 @@
+#include "forecast/correction.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+namespace joulecast::forecast {
+namespace {
+
+constexpr Eigen::Index n = static_cast<Eigen::Index>(feature_count);
+using Column = Eigen::Matrix<double, n, 1>;
+using Square = Eigen::Matrix<double, n, n, Eigen::RowMajor>;
+using ColumnMap = Eigen::Map<Column>;
+using SquareMap = Eigen::Map<Square>;
+
+constexpr double middle_speed = 0.6;
+constexpr double huber = 3;  // deviations beyond which a leg counts less
+
+Eigen::Map<const Column> column(const Features& x) {
+  return Eigen::Map<const Column>(x.data());
+}
+Eigen::Map<const Square> square(const std::array<Features, feature_count>& m) {
+  return Eigen::Map<const Square>(m.front().data());
+}
+
+}  // namespace
+
+Features features_of(Motion motion, double payload_fraction, const LegCost& cost) {
+  Features x{};
+  x[0] = cost.standing_j;
+  if (motion == Motion::turn) x[2] = cost.motor_j;
+  if (motion == Motion::drive) {
+    x[1] = cost.motor_j;
+    x[3] = cost.motor_j * payload_fraction;
+    x[4] = cost.motor_j * (cost.speed_fraction - middle_speed);
+  }
+  return x;
+}
+
+double Correction::energy_j(const Features& x) const {
+  return column(mean).dot(column(x));
+}
+
+double Correction::variance_j2(const Features& x) const {
+  return column(x).dot(square(covariance) * column(x));
+}
+
+Correction untried() {
+  Correction prior;
+  constexpr Features deviation{0.15, 0.15, 0.15, 0.1, 0.1};
+  for (std::size_t k = 0; k < feature_count; ++k) prior.covariance[k][k] = deviation[k] * deviation[k];
+  return prior;
+}
+
+void CorrectionFit::forget(double keep) {
+  SquareMap(information_.front().data()) *= keep;
+  ColumnMap(weighted_.data()) *= keep;
+}
+
+void CorrectionFit::add(std::span<const Evidence> mission, double common, const Correction& now) {
+  Square information = Square::Zero();
+  Column weighted = Column::Zero(), across = Column::Zero();
+  double shared = 0, across_y = 0;
+  for (const Evidence& leg : mission) {
+    const auto x = column(leg.features);
+    const double expected = now.energy_j(leg.features);
+    const double off = std::fabs(leg.battery_j - expected) / leg.deviation_j;
+    const double w = (off > huber ? huber / off : 1) / (leg.deviation_j * leg.deviation_j);
+    information.noalias() += w * x * x.transpose();
+    weighted.noalias() += w * leg.battery_j * x;
+    across.noalias() += w * expected * x;
+    shared += w * expected * expected;
+    across_y += w * expected * leg.battery_j;
+  }
+  // Sherman and Morrison, for the covariance D + common^2 y y^T of the mission's legs.
+  const double share = common * common / (1 + common * common * shared);
+  SquareMap(information_.front().data()) += information - share * across * across.transpose();
+  ColumnMap(weighted_.data()) += weighted - share * across_y * across;
+}
+
+Correction CorrectionFit::posterior(const Correction& prior) const {
+  const Square before = square(prior.covariance).inverse();
+  const Square precision = before + square(information_);
+  const Eigen::LDLT<Square> solved(precision);
+  Correction after;
+  ColumnMap(after.mean.data()) = solved.solve(before * column(prior.mean) + column(weighted_));
+  SquareMap(after.covariance.front().data()) = solved.solve(Square::Identity());
+  return after;
+}
+
+}  // namespace joulecast::forecast

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include "forecast/leg_cost.h"
+
+namespace joulecast::forecast {
+
+// What a robot's energy is made of, in joules of its model: standing, driving, turning in place, driving
+// weighted by payload over its limit, driving weighted by speed over its limit less 0.6.
+inline constexpr std::size_t feature_count = 5;
+using Features = std::array<double, feature_count>;
+
+Features features_of(Motion motion, double payload_fraction, const LegCost& cost);
+
+// The robot against its model: energy = sum of mean[k] * features[k]. (1, 1, 1, 0, 0) is the model itself.
+struct Correction {
+  Features mean{1, 1, 1, 0, 0};
+  std::array<Features, feature_count> covariance{};
+
+  double energy_j(const Features& x) const;
+  double variance_j2(const Features& x) const;
+};
+
+// How far a model is trusted before anything was measured: each factor to 15 %, those of payload and speed to
+// 10 %.
+Correction untried();
+
+// One leg's evidence.
+struct Evidence {
+  Features features{};
+  double battery_j = 0;
+  double deviation_j = 0;  // standard deviation of the leg's own scatter, > 0
+};
+
+// Bayesian least squares for the correction, in information form. Old evidence fades by forget().
+class CorrectionFit {
+ public:
+  void forget(double keep);
+  // The legs of one mission: each with its own scatter, and one factor of standard deviation `common` that
+  // all share (generalised least squares: a mission tells the common level once, however many legs it has).
+  void add(std::span<const Evidence> mission, double common, const Correction& now);
+  Correction posterior(const Correction& prior) const;
+
+ private:
+  std::array<Features, feature_count> information_{};
+  Features weighted_{};  // information times estimate
+};
+
+}  // namespace joulecast::forecast

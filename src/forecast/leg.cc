@@ -1,0 +1,117 @@
+#include "forecast/leg.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace joulecast::forecast {
+namespace {
+
+// A trapezoid of cruise v, duration T and way d has integral of speed^2 Q = (4 d v - T v^2) / 3: a rectangle
+// at v = d/T, a triangle at v = 2 d/T.
+double cruise_of(double way, double square, double duration_s) {
+  const double root = std::sqrt(std::max(0.0, 4 * way * way - 3 * duration_s * square));
+  return (2 * way - root) / duration_s;
+}
+
+}  // namespace
+
+double still_speed_m_s(const robot::RobotModel& robot) {
+  return 0.01 * robot.limits.speed_m_s;
+}
+
+void LegTracker::Piece::join(const Piece& other) {
+  duration_s += other.duration_s;
+  way_m += other.way_m;
+  way_rad += other.way_rad;
+  heading_rad += other.heading_rad;
+  square_m2_s += other.square_m2_s;
+  square_rad2_s += other.square_rad2_s;
+  battery_j += other.battery_j;
+}
+
+void LegTracker::begin() {
+  last_.reset();
+  current_.reset();
+  pending_.reset();
+  legs_.clear();
+}
+
+Motion LegTracker::motion_of(double speed_m_s, double yaw_rate_rad_s) const {
+  const double rim_m_s = std::fabs(yaw_rate_rad_s) * half_track_m_;
+  if (std::max(std::fabs(speed_m_s), rim_m_s) < still_m_s_) return Motion::stand;
+  return std::fabs(speed_m_s) < 0.5 * rim_m_s ? Motion::turn : Motion::drive;
+}
+
+void LegTracker::add(const LegSample& sample) {
+  const std::optional<LegSample> before = std::exchange(last_, sample);
+  if (!before || !(sample.interval_s > 0)) return;
+  const double h = sample.interval_s;
+  const double speed = 0.5 * (before->speed_m_s + sample.speed_m_s);
+  const double yaw = 0.5 * (before->yaw_rate_rad_s + sample.yaw_rate_rad_s);
+  Piece piece;
+  piece.motion = motion_of(speed, yaw);
+  piece.duration_s = h;
+  piece.way_m = std::fabs(speed) * h;
+  piece.way_rad = std::fabs(yaw) * h;
+  piece.heading_rad = yaw * h;
+  piece.square_m2_s = speed * speed * h;
+  piece.square_rad2_s = yaw * yaw * h;
+  piece.payload_kg = std::isfinite(sample.payload_kg) ? sample.payload_kg : 0;
+  piece.battery_j = 0.5 * (before->power_w + sample.power_w) * h;
+
+  if (current_ && piece.payload_kg != current_->payload_kg) {
+    if (pending_) current_->join(*pending_);
+    close(*current_);
+    current_.reset();
+    pending_.reset();
+  }
+  if (!current_) {
+    current_ = piece;
+  } else if (piece.motion == current_->motion) {
+    if (pending_) current_->join(*pending_);
+    pending_.reset();
+    current_->join(piece);
+  } else {
+    if (pending_ && pending_->motion == piece.motion) {
+      pending_->join(piece);
+    } else {
+      if (pending_) current_->join(*pending_);
+      pending_ = piece;
+    }
+    if (pending_->duration_s >= settle_s) {
+      close(*current_);
+      current_ = std::exchange(pending_, std::nullopt);
+    }
+  }
+}
+
+void LegTracker::close(const Piece& piece) {
+  if (legs_.size() >= most_legs) return;
+  Leg leg;
+  leg.motion = piece.motion;
+  leg.duration_s = piece.duration_s;
+  leg.payload_kg = piece.payload_kg;
+  leg.battery_j = piece.battery_j;
+  if (piece.motion == Motion::drive) {
+    leg.way = piece.way_m;
+    leg.speed = cruise_of(piece.way_m, piece.square_m2_s, piece.duration_s);
+    leg.curvature_1_m = std::fabs(piece.heading_rad) / piece.way_m;
+  } else if (piece.motion == Motion::turn) {
+    leg.way = piece.way_rad;
+    leg.speed = cruise_of(piece.way_rad, piece.square_rad2_s, piece.duration_s);
+  }
+  legs_.push_back(leg);
+}
+
+std::vector<Leg> LegTracker::take() {
+  if (current_) {
+    if (pending_) current_->join(*pending_);
+    close(*current_);
+  }
+  std::vector<Leg> legs = std::exchange(legs_, {});
+  begin();
+  return legs;
+}
+
+}  // namespace joulecast::forecast

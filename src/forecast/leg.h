@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "robot/robot_model.h"
+
+namespace joulecast::forecast {
+
+// Kinds of motion that cost differently: standing, driving (straight or on curves), turning in place.
+enum class Motion { stand, drive, turn };
+inline constexpr std::size_t motion_count = 3;
+
+// One stretch of a past mission without change of its kind of motion: from stop to stop, or a halt.
+struct Leg {
+  Motion motion = Motion::stand;
+  double duration_s = 0;
+  double way = 0;    // driven [m] or turned in place [rad], >= 0
+  double speed = 0;  // cruise [m/s, rad/s] of the trapezoid with this duration, way and integral of speed^2
+  double curvature_1_m = 0;  // net heading change over the way, >= 0; 0 unless driving
+  double payload_kg = 0;
+  double battery_j = 0;  // measured at the terminals; NaN where a part of it was not measured
+};
+
+// Slower than this, of body and wheel rims, a robot stands: 1 % of its speed limit.
+double still_speed_m_s(const robot::RobotModel& robot);
+
+// What the tracker is told of one sample.
+struct LegSample {
+  double interval_s = 0;  // since the previous sample; 0: nothing is known between them
+  double speed_m_s = 0;
+  double yaw_rate_rad_s = 0;
+  double power_w = 0;  // measured at the battery, positive discharging; NaN: not measured
+  double payload_kg = 0;
+};
+
+// Cuts a mission into legs as its samples come. A change of motion counts once it has lasted `settle_s`;
+// shorter ones stay with the leg they interrupt.
+class LegTracker {
+ public:
+  static constexpr double settle_s = 0.15;
+  static constexpr std::size_t most_legs = 1000;  // of one mission; what follows is not recorded
+
+  explicit LegTracker(const robot::RobotModel& robot)
+      : half_track_m_(robot.kinematics.half_track_m), still_m_s_(still_speed_m_s(robot)) {}
+
+  // Starts a new mission; legs not taken are forgotten.
+  void begin();
+  void add(const LegSample& sample);
+  // The legs so far, the last one closed.
+  std::vector<Leg> take();
+
+ private:
+  struct Piece {
+    Motion motion = Motion::stand;
+    double duration_s = 0, way_m = 0, way_rad = 0, heading_rad = 0, square_m2_s = 0, square_rad2_s = 0;
+    double payload_kg = 0, battery_j = 0;
+
+    void join(const Piece& other);
+  };
+
+  Motion motion_of(double speed_m_s, double yaw_rate_rad_s) const;
+  void close(const Piece& piece);
+
+  double half_track_m_;
+  double still_m_s_;
+  std::optional<LegSample> last_;
+  std::optional<Piece> current_, pending_;
+  std::vector<Leg> legs_;
+};
+
+}  // namespace joulecast::forecast

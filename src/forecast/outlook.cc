@@ -1,0 +1,225 @@
+#include "forecast/outlook.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace joulecast::forecast {
+namespace {
+
+constexpr double normal_95 = 1.6448536269514722;
+constexpr std::array<double, 3> normal_quantile{-normal_95, 0, normal_95};
+constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
+
+// What a plan may take from the battery, and how well that is known.
+struct Budget {
+  double energy_j = 0;
+  double deviation_j = 0;
+};
+
+double mean_power(const PlanSum& sum, double energy_j) {
+  return sum.duration_s > 0 ? energy_j / sum.duration_s : 0;
+}
+
+double lowest_charge(const ChargeMap& battery, const Charge& charge, double power_w) {
+  return std::max(charge.reserve, battery.cutoff_charge(power_w));
+}
+
+Budget budget(const ChargeMap& battery, const Charge& charge, double lowest, double power_w) {
+  return {battery.energy_j(charge.fraction, lowest, power_w),
+          charge.deviation * battery.slope_j(charge.fraction, power_w)};
+}
+
+// Quantiles of a difference of independent parts, from each one's own: exact for normals, and close where one
+// dominates.
+double joined(double middle, double offset_a, double offset_b, double sign) {
+  return middle + sign * std::sqrt(offset_a * offset_a + offset_b * offset_b);
+}
+
+TaskOutlook stage(const Forecaster& forecaster, Driving driving, const ChargeMap& battery,
+                  const Charge& charge, double lowest, const PlanSum& sum) {
+  const Prediction p = forecaster.predict(sum, driving);
+  const double power = mean_power(sum, p.expected_j);
+  const Budget spend = budget(battery, charge, lowest, power);
+  TaskOutlook out;
+  out.duration_s = sum.duration_s;
+  out.probability = p.probability_below(spend.energy_j, spend.deviation_j);
+  for (std::size_t k = 0; k < told_quantiles.size(); ++k) {
+    out.energy_j[k] = p.quantile_j(told_quantiles[k]);
+    out.charge[k] = battery.charge_after(charge.fraction, p.quantile_j(1 - told_quantiles[k]), power);
+  }
+  const double middle = out.charge[1];
+  for (std::size_t k = 0; k < told_quantiles.size(); ++k)
+    out.charge[k] = joined(middle, out.charge[k] - middle, normal_quantile[k] * charge.deviation,
+                           told_quantiles[k] < 0.5 ? -1 : 1);
+  for (double& c : out.charge) c = std::clamp(c, 0.0, 1.0);
+  return out;
+}
+
+// The longest stand after which the plan still holds with the confidence.
+double longest_wait(const Forecaster& forecaster, Driving driving, const ChargeMap& battery,
+                    const Charge& charge, double lowest, const PlanSum& plan, double standing_w,
+                    double confidence) {
+  const auto holds = [&](double wait_s) {
+    PlanSum waited = plan;
+    forecaster.extend(waited, driving, Motion::stand, 0, {wait_s, standing_w * wait_s, 0, 0}, 0);
+    const Prediction p = forecaster.predict(waited, driving);
+    const Budget spend = budget(battery, charge, lowest, mean_power(waited, p.expected_j));
+    return p.probability_below(spend.energy_j, spend.deviation_j) >= confidence;
+  };
+  if (!(standing_w > 0)) return std::numeric_limits<double>::infinity();
+  double low = 0, high = 1.2 * battery.energy_j(1, 0, standing_w) / standing_w;
+  constexpr int halvings = 16;
+  for (int k = 0; k < halvings; ++k) {
+    const double middle = 0.5 * (low + high);
+    (holds(middle) ? low : high) = middle;
+  }
+  return low;
+}
+
+}  // namespace
+
+void extend(PlanSum& sum, const Forecaster& forecaster, Driving driving, std::span<const PricedLeg> legs) {
+  for (const PricedLeg& leg : legs)
+    forecaster.extend(sum, driving, leg.motion, leg.payload_kg, leg.cost, leg.way_m);
+}
+
+std::vector<PricedLeg> price(const LegPricer& pricer, std::span<const PlannedLeg> legs, const Pace& pace) {
+  std::vector<PricedLeg> priced;
+  priced.reserve(2 * legs.size());
+  for (const PlannedLeg& leg : legs) {
+    priced.push_back(
+        {leg.motion, leg.payload_kg, leg.motion == Motion::drive ? leg.way : 0, pricer.paced(leg, pace)});
+    if (leg.motion != Motion::stand && pace.pause_s > 0)
+      priced.push_back({Motion::stand, leg.payload_kg, 0, pricer.standing(pace.pause_s)});
+  }
+  return priced;
+}
+
+double probability_of_reserve(const Forecaster& forecaster, Driving driving, const ChargeMap& battery,
+                              const Charge& charge, const PlanSum& plan) {
+  const Prediction p = forecaster.predict(plan, driving);
+  const double power = mean_power(plan, p.expected_j);
+  const Budget spend = budget(battery, charge, lowest_charge(battery, charge, power), power);
+  return p.probability_below(spend.energy_j, spend.deviation_j);
+}
+
+QuickSuccess::QuickSuccess(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
+                           double standing_w, double mean_power_w)
+    : forecaster_(&forecaster), standing_w_(standing_w) {
+  const Budget spend = budget(battery, charge, lowest_charge(battery, charge, mean_power_w), mean_power_w);
+  budget_j_ = spend.energy_j;
+  deviation_j_ = spend.deviation_j;
+}
+
+double QuickSuccess::probability(double energy_j, double duration_s, double loaded_j, double loaded_s,
+                                 double payload_kg) const {
+  constexpr double legs = 4;
+  const LegCost stand{duration_s, standing_w_ * duration_s, 0, 0};
+  LegCost empty, loaded;
+  loaded.motor_j = loaded_j - standing_w_ * loaded_s;
+  empty.motor_j = energy_j - stand.standing_j - loaded.motor_j;
+  constexpr double usual_speed = 0.6;  // of the limit, where the correction's part for speed is zero
+  empty.speed_fraction = loaded.speed_fraction = usual_speed;
+  PlanSum sum;
+  forecaster_->extend(sum, Driving::stated, Motion::stand, 0, stand, 0);
+  for (const auto& [part, payload] : {std::pair{&empty, 0.0}, std::pair{&loaded, payload_kg}}) {
+    part->motor_j /= legs / 2;
+    forecaster_->extend(sum, Driving::stated, Motion::drive, payload, *part, 0, legs / 2);
+  }
+  return forecaster_->predict(sum, Driving::stated).probability_below(budget_j_, deviation_j_);
+}
+
+Outlook look_ahead(const Forecaster& forecaster, Driving driving, const ChargeMap& battery,
+                   const Charge& charge, std::span<const PricedTask> tasks,
+                   std::span<const PricedLeg> from_here, double standing_w, double confidence) {
+  Outlook out;
+  out.charger_given = !from_here.empty() || (!tasks.empty() && !tasks.front().to_charger.empty());
+  std::vector<PlanSum> sums(tasks.size() + 1);  // after so many tasks
+  for (std::size_t k = 0; k < tasks.size(); ++k) {
+    sums[k + 1] = sums[k];
+    extend(sums[k + 1], forecaster, driving, tasks[k].legs);
+  }
+  PlanSum whole = sums.back();
+  if (out.charger_given)
+    extend(whole, forecaster, driving, tasks.empty() ? from_here : tasks.back().to_charger);
+  const Prediction all = forecaster.predict(whole, driving);
+  const double lowest = lowest_charge(battery, charge, mean_power(whole, all.expected_j));
+
+  double expected_before = 0, probability_before = 1, worst = 0;
+  const auto note = [&](TaskOutlook& stage_outlook, const PlanSum& sum, std::size_t index) {
+    stage_outlook = stage(forecaster, driving, battery, charge, lowest, sum);
+    const double expected = forecaster.predict(sum, driving).expected_j;
+    stage_outlook.expected_j = expected - expected_before;
+    expected_before = expected;
+    // Energy only grows along the way, so a reserve once broken stays broken.
+    stage_outlook.probability = std::min(stage_outlook.probability, probability_before);
+    if (const double lost = probability_before - stage_outlook.probability; lost > worst) {
+      worst = lost;
+      out.likeliest_failure = index;
+    }
+    if (stage_outlook.probability < 0.5 && !out.fails_at) out.fails_at = index;
+    probability_before = stage_outlook.probability;
+  };
+  out.tasks.resize(tasks.size());
+  for (std::size_t k = 0; k < tasks.size(); ++k) note(out.tasks[k], sums[k + 1], k);
+  if (out.charger_given) note(out.charger.emplace(), whole, tasks.size());
+  out.expected_j = all.expected_j;
+  for (std::size_t k = 0; k < told_quantiles.size(); ++k) out.energy_j[k] = all.quantile_j(told_quantiles[k]);
+  out.duration_s = whole.duration_s;
+  out.probability = probability_before;
+  if (tasks.empty() && !out.charger_given)
+    out.probability = probability_of_reserve(forecaster, driving, battery, charge, whole);
+
+  if (!out.charger_given) return out;
+  std::optional<PlanSum> leaving;
+  for (std::size_t k = 0; k <= tasks.size(); ++k) {
+    PlanSum plan = sums[k];
+    extend(plan, forecaster, driving, k == 0 ? from_here : tasks[k - 1].to_charger);
+    const Prediction p = forecaster.predict(plan, driving);
+    const Budget spend = budget(battery, charge, lowest, mean_power(plan, p.expected_j));
+    const double probability = p.probability_below(spend.energy_j, spend.deviation_j);
+    if (probability < confidence) break;
+    out.latest_departure = Departure{k, sums[k].duration_s, 0, probability};
+    leaving = plan;
+  }
+  if (leaving)
+    out.latest_departure->wait_s =
+        longest_wait(forecaster, driving, battery, charge, lowest, *leaving, standing_w, confidence);
+  return out;
+}
+
+Reach reach(const Forecaster& forecaster, Driving driving, const ChargeMap& battery, const Charge& charge,
+            std::span<const PricedLeg> typical, bool from_typical_legs) {
+  PlanSum once;
+  extend(once, forecaster, driving, typical);
+  Prediction p = forecaster.predict(once, driving);
+  Reach out;
+  out.from_typical_legs = from_typical_legs;
+  out.mean_power_w = mean_power(once, p.expected_j);
+  out.energy_per_m_j = once.way_m > 0 ? p.expected_j / once.way_m : nowhere;
+  const Budget spend =
+      budget(battery, charge, lowest_charge(battery, charge, out.mean_power_w), out.mean_power_w);
+  out.usable_j = std::max(0.0, spend.energy_j);
+  out.usable_deviation_j = spend.deviation_j;
+  if (!(p.expected_j > 0)) return out;
+  // As often as the charge lasts: what the legs scatter averages out, what they share does not.
+  const double copies = std::max(1.0, out.usable_j / p.expected_j);
+  PlanSum often = once;
+  for (double& x : often.features) x *= copies;
+  for (double& x : often.square_j2) x *= copies;
+  p = forecaster.predict(often, driving);
+  const double middle = out.usable_j / p.quantile_j(0.5);
+  for (std::size_t k = 0; k < told_quantiles.size(); ++k) {
+    const double by_energy = out.usable_j / p.quantile_j(1 - told_quantiles[k]) - middle;
+    const double by_charge = normal_quantile[k] * out.usable_deviation_j / p.quantile_j(0.5);
+    const double times =
+        copies * std::max(0.0, joined(middle, by_energy, by_charge, told_quantiles[k] < 0.5 ? -1 : 1));
+    out.range_m[k] = once.way_m > 0 ? times * once.way_m : nowhere;
+    out.run_time_s[k] = times * once.duration_s;
+  }
+  return out;
+}
+
+}  // namespace joulecast::forecast

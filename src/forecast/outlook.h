@@ -1,0 +1,112 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "forecast/charge_map.h"
+#include "forecast/leg_cost.h"
+#include "forecast/robot_forecast.h"
+
+namespace joulecast::forecast {
+
+inline constexpr std::array<double, 3> told_quantiles{0.05, 0.5, 0.95};
+
+// A leg whose model cost is known.
+struct PricedLeg {
+  Motion motion = Motion::stand;
+  double payload_kg = 0;
+  double way_m = 0;  // driven
+  LegCost cost;
+};
+
+struct PricedTask {
+  std::vector<PricedLeg> legs;
+  std::vector<PricedLeg> to_charger;  // from where this task ends
+};
+
+// What there is to spend.
+struct Charge {
+  double fraction = 0;
+  double deviation = 0;  // standard deviation of `fraction`; 0: taken as exact
+  double reserve = 0;    // to be left at the end
+};
+
+struct TaskOutlook {
+  double expected_j = 0;             // of this task alone
+  double duration_s = 0;             // from now to its end
+  double probability = 0;            // of holding the reserve to its end
+  std::array<double, 3> energy_j{};  // from now, at told_quantiles
+  std::array<double, 3> charge{};    // on arrival, at told_quantiles
+};
+
+// The last moment at which leaving for the charger still holds the reserve with the confidence asked for.
+struct Departure {
+  std::size_t after_tasks = 0;  // how many tasks are done first; 0: leave from here
+  double at_s = 0;              // expected time from now at which they are done
+  double wait_s = 0;            // that it may stand there before it leaves
+  double probability = 0;       // of reaching the charger with the reserve when it leaves at `at_s`
+};
+
+struct Outlook {
+  std::vector<TaskOutlook> tasks;
+  std::optional<TaskOutlook> charger;  // the way to the charger after the last task
+  double expected_j = 0;               // of everything, the way to the charger included
+  std::array<double, 3> energy_j{};
+  double duration_s = 0;
+  double probability = 0;               // of finishing everything with the reserve
+  std::optional<std::size_t> fails_at;  // first task (tasks.size(): the way to the charger) likelier to break
+                                        // the reserve than not
+  std::optional<std::size_t> likeliest_failure;  // where the reserve is likeliest to be broken first
+  std::optional<Departure> latest_departure;     // absent: not even from here, or no charger given
+  bool charger_given = false;
+};
+
+// `from_here` are the legs to the charger from where the robot is, empty when no charger is given; every task
+// then has its own.
+Outlook look_ahead(const Forecaster& forecaster, Driving driving, const ChargeMap& battery,
+                   const Charge& charge, std::span<const PricedTask> tasks,
+                   std::span<const PricedLeg> from_here, double standing_w, double confidence);
+
+// How far and how long a robot still goes when it goes on as in its typical legs.
+struct Reach {
+  double usable_j = 0;
+  double usable_deviation_j = 0;
+  double energy_per_m_j = 0;  // NaN: its legs cover no way
+  double mean_power_w = 0;
+  std::array<double, 3> range_m{};  // at told_quantiles: the first is nearly always exceeded
+  std::array<double, 3> run_time_s{};
+  bool from_typical_legs = false;  // false: a straight drive stands for legs not known yet
+};
+Reach reach(const Forecaster& forecaster, Driving driving, const ChargeMap& battery, const Charge& charge,
+            std::span<const PricedLeg> typical, bool from_typical_legs);
+
+// That a plan ends with the reserve.
+double probability_of_reserve(const Forecaster& forecaster, Driving driving, const ChargeMap& battery,
+                              const Charge& charge, const PlanSum& plan);
+
+// The same for many short plans of one robot, given by sums alone: model energies and durations of
+// minimum-energy drives, split into with and without payload. The legs of a plan count as four of equal size.
+class QuickSuccess {
+ public:
+  // `mean_power_w` is of such drives, for the cut-off.
+  QuickSuccess(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
+               double standing_w, double mean_power_w);
+  double probability(double energy_j, double duration_s, double loaded_j, double loaded_s,
+                     double payload_kg) const;
+
+ private:
+  const Forecaster* forecaster_;
+  double standing_w_;
+  double budget_j_, deviation_j_;
+};
+
+// Adds the legs of a plan.
+void extend(PlanSum& sum, const Forecaster& forecaster, Driving driving, std::span<const PricedLeg> legs);
+
+// Legs priced at a pace, each stop followed by the pace's pause.
+std::vector<PricedLeg> price(const LegPricer& pricer, std::span<const PlannedLeg> legs, const Pace& pace);
+
+}  // namespace joulecast::forecast

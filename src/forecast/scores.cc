@@ -1,0 +1,99 @@
+#include "forecast/scores.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace joulecast::forecast {
+namespace {
+
+// Student's t of 5 degrees of freedom at 1/2 + (k + 1/2)/40, scaled to unit variance by sqrt(3/5).
+constexpr double unit_variance = 0.7745966692414834;
+constexpr std::array<double, 20> upper_half_t5{0.0329, 0.0990, 0.1655, 0.2330, 0.3017, 0.3722, 0.4449,
+                                               0.5204, 0.5994, 0.6829, 0.7720, 0.8682, 0.9735, 1.0911,
+                                               1.2254, 1.3838, 1.5798, 1.8409, 2.2423, 3.1634};
+
+std::vector<Scores::Entry> reference() {
+  std::vector<Scores::Entry> entries;
+  for (const double t : upper_half_t5) {
+    for (const double sign : {-1.0, 1.0})
+      entries.push_back(
+          {sign * t * unit_variance, reference_weight / (2 * static_cast<double>(upper_half_t5.size()))});
+  }
+  return entries;
+}
+
+std::array<double, ScoreDistribution::count> quantiles_of(std::vector<Scores::Entry> entries) {
+  std::ranges::sort(entries, {}, &Scores::Entry::score);
+  const double total = std::accumulate(entries.begin(), entries.end(), 0.0,
+                                       [](double sum, const Scores::Entry& e) { return sum + e.weight; });
+  std::array<double, ScoreDistribution::count> atoms{};
+  // Each entry sits at the middle of its weight; straight lines in between, the outermost hold beyond.
+  std::size_t k = 0;
+  double below = 0;
+  for (std::size_t a = 0; a < atoms.size(); ++a) {
+    const double wanted =
+        (static_cast<double>(a) + 0.5) / static_cast<double>(ScoreDistribution::count) * total;
+    while (k + 1 < entries.size() && below + entries[k].weight + 0.5 * entries[k + 1].weight < wanted)
+      below += entries[k++].weight;
+    const double here = below + 0.5 * entries[k].weight;
+    if (wanted <= here || k + 1 == entries.size()) {
+      atoms[a] = entries[k].score;
+      continue;
+    }
+    const double next = below + entries[k].weight + 0.5 * entries[k + 1].weight;
+    atoms[a] = std::lerp(entries[k].score, entries[k + 1].score, (wanted - here) / (next - here));
+  }
+  return atoms;
+}
+
+}  // namespace
+
+ScoreDistribution::ScoreDistribution() : atoms_(quantiles_of(reference())) {}
+
+double ScoreDistribution::quantile(double probability) const {
+  const double at = std::clamp(probability, 0.0, 1.0) * static_cast<double>(count) - 0.5;
+  if (at <= 0) return atoms_.front();
+  const auto k = static_cast<std::size_t>(at);
+  if (k + 1 >= count) return atoms_.back();
+  return std::lerp(atoms_[k], atoms_[k + 1], at - static_cast<double>(k));
+}
+
+double ScoreDistribution::probability(double z) const {
+  constexpr double beyond = 0.5 / static_cast<double>(count), fade = 0.5;
+  if (z <= atoms_.front()) return beyond * std::exp((z - atoms_.front()) / fade);
+  if (z >= atoms_.back()) return 1 - beyond * std::exp((atoms_.back() - z) / fade);
+  const auto above = static_cast<std::size_t>(std::ranges::upper_bound(atoms_, z) - atoms_.begin());
+  const double low = atoms_[above - 1], high = atoms_[above];
+  const double at = static_cast<double>(above - 1) + (z - low) / (high - low);
+  return (at + 0.5) / static_cast<double>(count);
+}
+
+void Scores::add(double score) {
+  discount(keep);
+  if (entries_.size() == most) entries_.erase(entries_.begin());
+  entries_.push_back({score, 1});
+}
+
+void Scores::discount(double share) {
+  for (Entry& entry : entries_) entry.weight *= share;
+}
+
+double Scores::weight() const {
+  return std::accumulate(entries_.begin(), entries_.end(), 0.0,
+                         [](double sum, const Entry& e) { return sum + e.weight; });
+}
+
+ScoreDistribution pooled_scores(const Scores& own, std::span<const Scores::Entry> siblings) {
+  std::vector<Scores::Entry> entries = reference();
+  entries.insert(entries.end(), own.entries().begin(), own.entries().end());
+  double offered = 0;
+  for (const Scores::Entry& entry : siblings) offered += entry.weight;
+  if (const double wanted = std::min(offered, own_enough - own.weight()); wanted > 0) {
+    for (const Scores::Entry& entry : siblings)
+      entries.push_back({entry.score, entry.weight * wanted / offered});
+  }
+  return ScoreDistribution(quantiles_of(std::move(entries)));
+}
+
+}  // namespace joulecast::forecast

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace joulecast::forecast {
+
+// The predictive distribution of one standardised score z = log(measured / expected) / spread, as atoms of
+// equal weight at its quantiles (k + 1/2) / count, ascending.
+class ScoreDistribution {
+ public:
+  static constexpr std::size_t count = 96;
+
+  ScoreDistribution();  // the reference alone
+  explicit ScoreDistribution(const std::array<double, count>& atoms) : atoms_(atoms) {}
+
+  double quantile(double probability) const;
+  // Of a score at or below `z`: straight between atoms; beyond the outermost, which leave 1/192 on either
+  // side, the rest fades by a factor e each half deviation.
+  double probability(double z) const;
+  std::span<const double, count> atoms() const { return atoms_; }
+
+ private:
+  std::array<double, count> atoms_;
+};
+
+// The scores of one robot's past missions, each made before the mission was learnt from: what split conformal
+// prediction calibrates with. Newer ones weigh more (exchangeability fails slowly; Barber, Candes, Ramdas and
+// Tibshirani 2023).
+class Scores {
+ public:
+  static constexpr double keep = 0.99;  // of a score's weight when a newer one comes
+  static constexpr std::size_t most = 300;
+
+  void add(double score);
+  void discount(double share);  // of all weights so far: a change made them doubtful
+  double weight() const;        // sum of weights
+
+  struct Entry {
+    double score = 0, weight = 0;
+  };
+  const std::vector<Entry>& entries() const { return entries_; }
+
+ private:
+  std::vector<Entry> entries_;
+};
+
+// Own scores, filled up to `own_enough` by siblings' (Mondrian by robot, widened to the kind while own scores
+// are few), and a reference of weight `reference_weight`: Student's t of 5 degrees of freedom, which stands
+// for the n + 1st point of conformal prediction and gives small samples a tail.
+inline constexpr double own_enough = 30;
+inline constexpr double reference_weight = 2;
+ScoreDistribution pooled_scores(const Scores& own, std::span<const Scores::Entry> siblings);
+
+}  // namespace joulecast::forecast

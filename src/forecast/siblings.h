@@ -1,0 +1,41 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "forecast/correction.h"
+#include "forecast/scores.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::forecast {
+
+// Whether the plan says how fast legs are driven, or leaves it to the robot's habit.
+enum class Driving { stated, usual };
+inline constexpr std::size_t driving_count = 2;
+
+// What one robot found out by itself.
+struct OwnFinding {
+  Correction correction;  // with the untried prior
+  std::vector<Scores::Entry> scores;
+  std::int64_t missions = 0;
+};
+
+// What the other robots of one kind tell a robot.
+struct Siblings {
+  Correction prior = untried();
+  std::vector<Scores::Entry> scores;
+  std::int64_t robots = 0;
+};
+
+// Hierarchical shrinkage: the kind's factors are the robots' means, weighted by 1 / (own variance + variance
+// between robots) and drawn to the untried prior; the variance between robots is that of the findings beyond
+// what their own variances explain, never less than what 5 % with the weight of three robots would give.
+Siblings pool(std::span<const OwnFinding* const> others);
+
+// Robots that share this text are siblings: same body and motors, whatever was calibrated since.
+std::string kind_of(const robot::RobotModel& robot);
+
+}  // namespace joulecast::forecast

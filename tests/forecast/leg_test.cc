@@ -1,0 +1,121 @@
+#include "forecast/leg.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "robots.h"
+
+namespace joulecast::forecast {
+namespace {
+
+constexpr double h = 0.01;
+
+// Drives a trapezoid along the way or in place, sample by sample; speeds are linear between samples where
+// ramps and cruise take whole steps, so that integrals are exact but for the corners.
+class Drive {
+ public:
+  explicit Drive(LegTracker& tracker) : tracker_(tracker) { sample(0, 0); }
+
+  void trapezoid(double speed, double ramp_s, double cruise_s, bool turning, double curvature_1_m = 0) {
+    const int count = static_cast<int>(std::lround((2 * ramp_s + cruise_s) / h));
+    for (int k = 1; k <= count; ++k) {
+      const double t = k * h, left = 2 * ramp_s + cruise_s - t;
+      const double v = speed * std::min({1.0, t / ramp_s, left / ramp_s});
+      turning ? sample(0, v) : sample(v, v * curvature_1_m);
+    }
+  }
+  void stand(double duration_s) {
+    for (int k = 0; k < std::lround(duration_s / h); ++k) sample(0, 0);
+  }
+  void sample(double speed, double yaw) {
+    tracker_.add({started_ ? h : 0, speed, yaw, 20 + 30 * std::fabs(speed), payload_kg});
+    started_ = true;
+  }
+  double payload_kg = 5;
+
+ private:
+  LegTracker& tracker_;
+  bool started_ = false;
+};
+
+TEST(LegTracker, CutsAtStopsAndKeepsWayDurationCruiseAndEnergy) {
+  LegTracker tracker(shipped("amr"));
+  tracker.begin();
+  Drive drive(tracker);
+  drive.stand(1);
+  drive.trapezoid(0.8, 2, 3, true);
+  drive.stand(0.5);
+  drive.trapezoid(1.2, 2, 4, false, 0.25);
+  drive.stand(2);
+  const std::vector<Leg> legs = tracker.take();
+  ASSERT_EQ(legs.size(), 5u);
+  const Motion expected[] = {Motion::stand, Motion::turn, Motion::stand, Motion::drive, Motion::stand};
+  for (std::size_t k = 0; k < 5; ++k) EXPECT_EQ(legs[k].motion, expected[k]) << k;
+  // A leg lacks what is slower than the still speed, at most still^2 / a of way.
+  const double still = still_speed_m_s(shipped("amr"));
+  EXPECT_NEAR(legs[3].way, 1.2 * 6, still * still / 0.6 + still * h);
+  EXPECT_NEAR(legs[3].duration_s, 8, 2 * still / 0.6 + 2 * h);
+  EXPECT_NEAR(legs[3].speed, 1.2, 1.2 * 2 * (2 * still / 0.6 + 2 * h) / 8);
+  EXPECT_NEAR(legs[3].curvature_1_m, 0.25, 1e-12);
+  // Turning, the rims creep: the same way of theirs is rad at half the track.
+  const double rim_still = still / shipped("amr").kinematics.half_track_m;
+  EXPECT_NEAR(legs[1].way, 0.8 * 5, rim_still * rim_still / 0.4 + rim_still * h);
+  EXPECT_NEAR(legs[1].duration_s, 7, 2 * rim_still / 0.4 + 2 * h);
+  // The cruise is read from way, duration and integral of speed^2: an error of a share e of the duration is
+  // one of at most 2 e, as v = (2 d - sqrt(4 d^2 - 3 T Q)) / T.
+  EXPECT_NEAR(legs[1].speed, 0.8, 0.8 * 2 * (2 * rim_still / 0.4 + 2 * h) / 7);
+  EXPECT_EQ(legs[3].payload_kg, 5);
+  double energy = 0, duration = 0;
+  for (const Leg& leg : legs) energy += leg.battery_j, duration += leg.duration_s;
+  EXPECT_NEAR(duration, 1 + 7 + 0.5 + 8 + 2, 1e-9);
+  EXPECT_NEAR(energy, 20 * duration + 30 * 1.2 * 6, 1e-9);
+}
+
+TEST(LegTracker, ATwitchBelongsToTheLegItInterrupts) {
+  LegTracker tracker(shipped("amr"));
+  Drive drive(tracker);
+  drive.stand(2);
+  for (int k = 0; k < 5; ++k) drive.sample(0.3, 0);  // 50 ms, shorter than settle_s
+  drive.stand(2);
+  const std::vector<Leg> legs = tracker.take();
+  ASSERT_EQ(legs.size(), 1u);
+  EXPECT_EQ(legs[0].motion, Motion::stand);
+}
+
+TEST(LegTracker, ChangesOfPayloadAndUnmeasuredPowerShow) {
+  LegTracker tracker(shipped("amr"));
+  Drive drive(tracker);
+  drive.stand(1);
+  drive.payload_kg = 9;
+  drive.stand(1);
+  tracker.add({h, 0, 0, std::nan(""), 9});
+  const std::vector<Leg> legs = tracker.take();
+  ASSERT_EQ(legs.size(), 2u);
+  EXPECT_EQ(legs[0].payload_kg, 5);
+  EXPECT_EQ(legs[1].payload_kg, 9);
+  EXPECT_TRUE(std::isfinite(legs[0].battery_j));
+  EXPECT_TRUE(std::isnan(legs[1].battery_j));
+}
+
+TEST(LegTracker, NothingIsKnownAcrossAGap) {
+  LegTracker tracker(shipped("amr"));
+  Drive drive(tracker);
+  drive.stand(1);
+  tracker.add({0, 0, 0, 20, 5});
+  drive.stand(1);
+  double duration = 0;
+  for (const Leg& leg : tracker.take()) duration += leg.duration_s;
+  EXPECT_NEAR(duration, 2, 1e-9);
+}
+
+TEST(LegTracker, TakeStartsAnew) {
+  LegTracker tracker(shipped("amr"));
+  Drive drive(tracker);
+  drive.stand(1);
+  EXPECT_EQ(tracker.take().size(), 1u);
+  EXPECT_TRUE(tracker.take().empty());
+}
+
+}  // namespace
+}  // namespace joulecast::forecast

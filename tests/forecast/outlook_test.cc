@@ -1,0 +1,178 @@
+#include "forecast/outlook.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "client/virtual_robot/rng.h"
+#include "robots.h"
+
+namespace joulecast::forecast {
+namespace {
+
+using virtual_robot::Rng;
+
+constexpr double standing_w = 20;
+
+// A robot whose model is exact but for what its mission and legs scatter.
+Forecaster forecaster(double common, double leg) {
+  Forecaster f;
+  for (Forecaster::Track& track : f.tracks) {
+    track.common = common;
+    track.scatter = {leg, leg, leg};
+  }
+  f.payload_limit_kg = 10;
+  return f;
+}
+
+PricedLeg drive(double energy_j, double way_m = 10) {
+  return {Motion::drive, 0, way_m, {energy_j / 100, 0.2 * energy_j, 0.8 * energy_j, 0.6}};
+}
+
+ChargeMap battery() {
+  return ChargeMap{battery::Circuit(shipped("amr").battery)};
+}
+
+TEST(Prediction, WhatLegsScatterAveragesOutAndWhatTheyShareDoesNot) {
+  const Forecaster f = forecaster(0.03, 0.2);
+  for (const int count : {1, 4, 25, 100}) {
+    PlanSum sum;
+    for (int k = 0; k < count; ++k) f.extend(sum, Driving::usual, Motion::drive, 0, drive(500).cost, 10);
+    const Prediction p = f.predict(sum, Driving::usual);
+    EXPECT_NEAR(p.expected_j, 500 * count, 1e-9 * p.expected_j);
+    EXPECT_NEAR(p.spread, std::sqrt(0.03 * 0.03 + 0.2 * 0.2 / count), 1e-12);
+  }
+}
+
+// Missions drawn from the predictive distribution: the probability of staying within a budget is the share of
+// those that do. Where the budget is uncertain too, its part is taken into the width, which is exact for
+// normals.
+TEST(Prediction, ProbabilityIsTheShareOfDraws) {
+  const Forecaster f = forecaster(0.05, 0.1);
+  PlanSum sum;
+  for (int k = 0; k < 6; ++k) f.extend(sum, Driving::stated, Motion::drive, 0, drive(800).cost, 10);
+  const Prediction p = f.predict(sum, Driving::stated);
+  Rng rng(9);
+  for (const double deviation_j : {0.0, 150.0}) {
+    for (const double factor : {0.93, 0.98, 1.0, 1.04, 1.1}) {
+      const double budget = factor * p.expected_j;
+      int within = 0;
+      constexpr int draws = 20'000;
+      for (int k = 0; k < draws; ++k) {
+        const double energy = p.expected_j * std::exp(p.spread * p.scores->quantile(rng.uniform()));
+        within += energy <= budget + deviation_j * rng.normal();
+      }
+      const double shape = deviation_j > 0 ? 0.02 : 0.5 / static_cast<double>(ScoreDistribution::count);
+      EXPECT_NEAR(p.probability_below(budget, deviation_j), static_cast<double>(within) / draws,
+                  4 * std::sqrt(0.25 / draws) + shape)
+          << factor;
+    }
+  }
+}
+
+TEST(Outlook, TellsEachLegAndWhereItFails) {
+  const Forecaster f = forecaster(0.03, 0.05);
+  const ChargeMap map = battery();
+  const double usable = map.energy_j(0.5, 0.15, 100);
+  std::vector<PricedTask> tasks(5);
+  for (PricedTask& task : tasks) task.legs = {drive(0.3 * usable, 100)};
+  const Outlook out = look_ahead(f, Driving::usual, map, {0.5, 0, 0.15}, tasks, {}, standing_w, 0.95);
+  ASSERT_EQ(out.tasks.size(), 5u);
+  ASSERT_TRUE(out.fails_at);
+  EXPECT_EQ(*out.fails_at, 3u);  // 0.9 of the usable energy after three, 1.2 after four
+  EXPECT_EQ(*out.likeliest_failure, 3u);
+  EXPECT_GT(out.tasks[2].probability, 0.9);
+  EXPECT_LT(out.tasks[3].probability, 0.01);
+  EXPECT_FALSE(out.charger);
+  EXPECT_FALSE(out.latest_departure);
+  for (std::size_t k = 1; k < 5; ++k) {
+    EXPECT_LE(out.tasks[k].probability, out.tasks[k - 1].probability);
+    for (std::size_t q = 0; q < 3; ++q) EXPECT_LE(out.tasks[k].charge[q], out.tasks[k - 1].charge[q]);
+  }
+  for (const TaskOutlook& task : out.tasks) {
+    EXPECT_LE(task.charge[0], task.charge[1]);
+    EXPECT_LE(task.charge[1], task.charge[2]);
+    EXPECT_LE(task.energy_j[0], task.energy_j[1]);
+  }
+  EXPECT_NEAR(out.expected_j, 1.5 * usable, 1e-6 * usable);
+  EXPECT_EQ(out.probability, out.tasks.back().probability);
+}
+
+TEST(Outlook, LatestDepartureKeepsTheConfidence) {
+  const Forecaster f = forecaster(0.03, 0.05);
+  const ChargeMap map = battery();
+  const double usable = map.energy_j(0.5, 0.15, 100);
+  std::vector<PricedTask> tasks(5);
+  for (PricedTask& task : tasks) {
+    task.legs = {drive(0.2 * usable, 100)};
+    task.to_charger = {drive(0.1 * usable, 50)};
+  }
+  const std::vector<PricedLeg> from_here{drive(0.1 * usable, 50)};
+  const Outlook out = look_ahead(f, Driving::usual, map, {0.5, 0, 0.15}, tasks, from_here, standing_w, 0.95);
+  ASSERT_TRUE(out.latest_departure);
+  EXPECT_EQ(out.latest_departure->after_tasks, 4u);  // 0.8 + 0.1 fits, 1.0 + 0.1 does not
+  EXPECT_GE(out.latest_departure->probability, 0.95);
+  EXPECT_NEAR(out.latest_departure->at_s, out.tasks[3].duration_s, 1e-9);
+  EXPECT_GT(out.latest_departure->wait_s, 0);
+  ASSERT_TRUE(out.charger);
+  EXPECT_LT(out.probability, 0.05);
+
+  // Standing for as long as it may wait uses the confidence up.
+  tasks.resize(4);
+  tasks.back().legs.push_back(
+      {Motion::stand, 0, 0, {out.latest_departure->wait_s, standing_w * out.latest_departure->wait_s, 0, 0}});
+  const Outlook waited =
+      look_ahead(f, Driving::usual, map, {0.5, 0, 0.15}, tasks, from_here, standing_w, 0.95);
+  EXPECT_NEAR(waited.probability, 0.95, 0.01);
+}
+
+TEST(Outlook, TooLateEvenFromHere) {
+  const Forecaster f = forecaster(0.03, 0.05);
+  const ChargeMap map = battery();
+  const std::vector<PricedLeg> from_here{drive(map.energy_j(0.2, 0.1, 100), 50)};
+  const Outlook out = look_ahead(f, Driving::usual, map, {0.2, 0, 0.15}, {}, from_here, standing_w, 0.95);
+  EXPECT_FALSE(out.latest_departure);
+  EXPECT_LT(out.probability, 0.01);
+  ASSERT_TRUE(out.fails_at);
+  EXPECT_EQ(*out.fails_at, 0u);  // the way to the charger
+}
+
+TEST(Outlook, AnUncertainChargeWidensArrivalAndLowersSureThings) {
+  const Forecaster f = forecaster(0.03, 0.05);
+  const ChargeMap map = battery();
+  std::vector<PricedTask> tasks(1);
+  tasks[0].legs = {drive(0.9 * map.energy_j(0.5, 0.15, 100), 100)};
+  const Outlook sure = look_ahead(f, Driving::usual, map, {0.5, 0, 0.15}, tasks, {}, standing_w, 0.95);
+  const Outlook vague = look_ahead(f, Driving::usual, map, {0.5, 0.05, 0.15}, tasks, {}, standing_w, 0.95);
+  EXPECT_LT(vague.probability, sure.probability);
+  EXPECT_LT(vague.tasks[0].charge[0], sure.tasks[0].charge[0]);
+  EXPECT_GT(vague.tasks[0].charge[2], sure.tasks[0].charge[2]);
+  EXPECT_NEAR(vague.tasks[0].charge[1], sure.tasks[0].charge[1], 1e-12);
+}
+
+TEST(Reach, GoesAsFarAsTheChargeLastsAndIsOrdered) {
+  const Forecaster f = forecaster(0.04, 0.2);
+  const ChargeMap map = battery();
+  const std::vector<PricedLeg> typical{drive(500, 10), {Motion::stand, 0, 0, {5, 100, 0, 0}}};
+  const Reach r = reach(f, Driving::usual, map, {0.6, 0, 0.15}, typical, true);
+  EXPECT_NEAR(r.energy_per_m_j, 60, 1e-9);
+  EXPECT_NEAR(r.mean_power_w, 60, 1e-9);
+  EXPECT_NEAR(r.usable_j, map.energy_j(0.6, 0.15, 60), 1e-6);
+  EXPECT_NEAR(r.range_m[1], r.usable_j / 60, 1e-6 * r.range_m[1]);
+  EXPECT_NEAR(r.run_time_s[1], r.usable_j / 60, 1e-6 * r.run_time_s[1]);
+  EXPECT_LT(r.range_m[0], r.range_m[1]);
+  EXPECT_LT(r.range_m[1], r.range_m[2]);
+  // Hundreds of legs: their own scatter is gone, the common 4 % stays.
+  const double quantile = f.tracks[0].scores.quantile(0.95);
+  EXPECT_NEAR(r.range_m[0] / r.range_m[1], std::exp(-0.04 * quantile), 0.003);
+}
+
+TEST(Reach, NothingAboveTheReserveIsNoRange) {
+  const Reach r = reach(forecaster(0.04, 0.2), Driving::usual, battery(), {0.1, 0, 0.15},
+                        std::vector<PricedLeg>{drive(500)}, true);
+  EXPECT_EQ(r.usable_j, 0);
+  EXPECT_EQ(r.range_m[2], 0);
+}
+
+}  // namespace
+}  // namespace joulecast::forecast

@@ -1,0 +1,202 @@
+#include "forecast/robot_forecast.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "client/virtual_robot/rng.h"
+#include "robots.h"
+#include "virtual_missions.h"
+
+namespace joulecast::forecast {
+namespace {
+
+using virtual_robot::Rng;
+
+// Missions made of the model's own costs, off by factors that the test sets.
+class MadeMissions {
+ public:
+  explicit MadeMissions(std::uint64_t seed)
+      : robot(shipped("amr")), drive(*dynamics::drive_model(robot)), pricer_(robot, drive), rng_(seed) {}
+
+  PastMission next(double factor, double common, double scatter) {
+    PastMission mission{start_ += 1'000'000'000, {}};
+    const double level = factor * (1 + common * rng_.normal());
+    for (int k = 0; k < 10; ++k) {
+      Pace pace = default_pace(robot);
+      const PlannedLeg planned[] = {{Motion::turn, rng_.uniform(0.5, 3), 0, 0, 0},
+                                    {Motion::stand, 0, 0, 0, rng_.uniform(1, 4)},
+                                    {Motion::drive, rng_.uniform(2, 9), 0, 0, 0}};
+      for (const PlannedLeg& p : planned) {
+        const LegCost cost = pricer_.paced(p, pace);
+        const double expected = cost.standing_j + cost.motor_j;
+        mission.legs.push_back({p.motion, cost.duration_s, p.way,
+                                p.motion == Motion::turn ? pace.yaw_rate_rad_s : pace.speed_m_s, 0, 0,
+                                expected * level * (1 + scatter * rng_.normal())});
+        if (p.motion != Motion::stand && p.way < 2 * pace.speed_m_s) mission.legs.pop_back();
+      }
+    }
+    return mission;
+  }
+
+  robot::RobotModel robot;
+  dynamics::DriveModel drive;
+
+ private:
+  LegPricer pricer_;
+  Rng rng_;
+  std::int64_t start_ = 1'700'000'000'000'000;
+};
+
+PlanSum plan_of(const Forecaster& f, const MadeMissions& made) {
+  const LegPricer pricer(made.robot, made.drive);
+  PlanSum sum;
+  for (int k = 0; k < 20; ++k)
+    f.extend(sum, Driving::stated, Motion::drive, 0,
+             pricer.paced(PlannedLeg{Motion::drive, 6, 0, 0, 0}, default_pace(made.robot)), 6);
+  return sum;
+}
+
+TEST(RobotForecast, WithoutPastIsTheModelWithinFifteenPercent) {
+  MadeMissions made(1);
+  const RobotForecast forecast(made.robot, made.drive);
+  const auto f = forecast.forecaster();
+  const PlanSum sum = plan_of(*f, made);
+  double model = 0;
+  for (std::size_t k = 0; k < 3; ++k) model += sum.features[k];
+  const Prediction p = f->predict(sum, Driving::stated);
+  EXPECT_NEAR(p.expected_j, model, 1e-9 * model);
+  EXPECT_GT(p.spread, 0.08);
+  EXPECT_LT(p.spread, 0.2);
+  EXPECT_EQ(f->missions, 0);
+}
+
+TEST(RobotForecast, LearnsARobotThatSpendsMore) {
+  MadeMissions made(2);
+  RobotForecast forecast(made.robot, made.drive);
+  const double before =
+      forecast.forecaster()->predict(plan_of(*forecast.forecaster(), made), Driving::stated).expected_j;
+  for (int k = 0; k < 20; ++k) forecast.learn(made.next(1.3, 0.02, 0.05));
+  const auto f = forecast.forecaster();
+  const Prediction p = f->predict(plan_of(*f, made), Driving::stated);
+  // Twenty missions of 2 % tell the level to 0.5 %; four of those.
+  EXPECT_NEAR(p.expected_j / before, 1.3, 1.3 * 4 * 0.02 / std::sqrt(20.0) + 0.01);
+  EXPECT_LT(p.spread, 0.05);
+  EXPECT_EQ(f->missions, 20);
+  EXPECT_FALSE(f->drift);
+}
+
+TEST(RobotForecast, SaysWhenTheRobotChangesAndFollows) {
+  MadeMissions made(3);
+  RobotForecast forecast(made.robot, made.drive);
+  for (int k = 0; k < 30; ++k) EXPECT_FALSE(forecast.learn(made.next(1.0, 0.02, 0.05))) << k;
+  std::optional<Drift> drift;
+  int missions = 0;
+  std::int64_t changed_at = 0;
+  while (!drift && missions < 15) {
+    PastMission mission = made.next(1.15, 0.02, 0.05);
+    if (missions == 0) changed_at = mission.start_utime_us;
+    drift = forecast.learn(std::move(mission));
+    ++missions;
+  }
+  ASSERT_TRUE(drift);
+  // 15 % are five or more of the spread: each mission adds at least 3.5 to the sum that alarms at 8.
+  EXPECT_LE(missions, 5);
+  EXPECT_EQ(drift->since_utime_us, changed_at);
+  EXPECT_GT(drift->ratio, 1.03);
+  EXPECT_TRUE(forecast.forecaster()->drift);
+  for (int k = 0; k < 6; ++k) forecast.learn(made.next(1.15, 0.02, 0.05));
+  const auto f = forecast.forecaster();
+  const PlanSum sum = plan_of(*f, made);
+  double model = 0;
+  for (std::size_t k = 0; k < 3; ++k) model += sum.features[k];
+  // What came before the change keeps a twentieth of its weight: 1.5 missions against some ten.
+  EXPECT_NEAR(f->predict(sum, Driving::stated).expected_j / model, 1.15,
+              0.15 * 0.2 + 4 * 0.02 / std::sqrt(8.0));
+  // Twenty missions after the last news of it, it is none any more.
+  for (int k = 0; k < 45; ++k) forecast.learn(made.next(1.15, 0.02, 0.05));
+  EXPECT_FALSE(forecast.forecaster()->drift);
+}
+
+TEST(RobotForecast, SiblingsSpareANewcomerTheLearning) {
+  MadeMissions made(4);
+  std::array<std::vector<OwnFinding>, driving_count> found;
+  for (int r = 0; r < 3; ++r) {
+    RobotForecast forecast(made.robot, made.drive);
+    for (int k = 0; k < 20; ++k) forecast.learn(made.next(1.25, 0.02, 0.05));
+    const auto own = forecast.findings();
+    for (std::size_t d = 0; d < driving_count; ++d) found[d].push_back(own[d]);
+  }
+  RobotForecast newcomer(made.robot, made.drive);
+  const double alone =
+      newcomer.forecaster()->predict(plan_of(*newcomer.forecaster(), made), Driving::stated).expected_j;
+  std::array<Siblings, driving_count> siblings;
+  for (std::size_t d = 0; d < driving_count; ++d) {
+    std::vector<const OwnFinding*> others;
+    for (const OwnFinding& f : found[d]) others.push_back(&f);
+    siblings[d] = pool(others);
+  }
+  newcomer.set_siblings(std::move(siblings));
+  const auto f = newcomer.forecaster();
+  const Prediction p = f->predict(plan_of(*f, made), Driving::stated);
+  EXPECT_EQ(f->siblings, 3);
+  EXPECT_NEAR(p.expected_j / alone, 1.25, 0.05);
+}
+
+TEST(RobotForecast, AnotherModelIsLearntAgainstAnew) {
+  MadeMissions made(5);
+  RobotForecast forecast(made.robot, made.drive);
+  for (int k = 0; k < 15; ++k) forecast.learn(made.next(1.2, 0.01, 0.03));
+  const auto before = forecast.forecaster();
+  // The new version knows of the load that made the difference.
+  robot::RobotModel better = made.robot;
+  better.idle_power_w *= 1.2;
+  for (double& t : better.motor.friction_torque_nm) t *= 1.2;
+  better.motor.viscous_friction_nm_s_rad *= 1.2;
+  forecast.set_model(better, *dynamics::drive_model(better));
+  const auto after = forecast.forecaster();
+  EXPECT_EQ(after->missions, before->missions);
+  EXPECT_NEAR(after->tracks[0].correction.mean[0], 1, 0.03);
+  EXPECT_NEAR(before->tracks[0].correction.mean[0], 1.2, 0.03);
+}
+
+TEST(RobotForecast, MissionsWithoutMeasurementTeachNothing) {
+  MadeMissions made(6);
+  RobotForecast forecast(made.robot, made.drive);
+  PastMission mission = made.next(1, 0, 0);
+  for (Leg& leg : mission.legs) leg.battery_j = std::nan("");
+  EXPECT_FALSE(forecast.learn(mission));
+  EXPECT_EQ(forecast.forecaster()->missions, 0);
+}
+
+// The project's plant, which shares no physics with the model, with errors that the service does not know.
+// Each mission is forecast from those before it. 3 robots, 25 missions after 15 of warming up: the number
+// inside the 90 % interval is binomial, four deviations allowed; half of the missions must be within 3 %.
+TEST(VirtualRobots, AreForecastWithHonestIntervals) {
+  int inside = 0, missions = 0;
+  std::vector<double> errors;
+  for (const auto& [kind, seed] : {std::pair{"amr", 501u}, {"nomad", 502u}, {"tug", 503u}}) {
+    const VirtualRobotRun run = run_virtual_robot(kind, 40, seed);
+    RobotForecast forecast(run.robot, run.drive);
+    for (std::size_t k = 0; k < run.missions.size(); ++k) {
+      const VirtualMission& mission = run.missions[k];
+      const auto f = forecast.forecaster();
+      if (k >= 15) {
+        PlanSum sum;
+        extend(sum, *f, Driving::stated, price_plan(run, mission, *f, Driving::stated));
+        const Prediction p = f->predict(sum, Driving::stated);
+        inside += mission.true_j >= p.quantile_j(0.05) && mission.true_j <= p.quantile_j(0.95);
+        errors.push_back(std::fabs(p.quantile_j(0.5) / mission.true_j - 1));
+        ++missions;
+      }
+      forecast.learn(mission.past);
+    }
+  }
+  std::ranges::sort(errors);
+  EXPECT_LT(errors[errors.size() / 2], 0.03);
+  EXPECT_NEAR(static_cast<double>(inside) / missions, 0.9, 4 * std::sqrt(0.9 * 0.1 / missions));
+}
+
+}  // namespace
+}  // namespace joulecast::forecast

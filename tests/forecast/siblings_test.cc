@@ -1,0 +1,62 @@
+#include "forecast/siblings.h"
+
+#include <gtest/gtest.h>
+
+#include "robots.h"
+
+namespace joulecast::forecast {
+namespace {
+
+OwnFinding finding(double friction, double deviation, std::int64_t missions) {
+  OwnFinding f;
+  f.correction = untried();
+  f.correction.mean[1] = friction;
+  f.correction.covariance[1][1] = deviation * deviation;
+  f.missions = missions;
+  f.scores = {{0.5, 1}};
+  return f;
+}
+
+TEST(Siblings, NobodyToAskLeavesThePrior) {
+  const Siblings alone = pool({});
+  EXPECT_EQ(alone.robots, 0);
+  EXPECT_EQ(alone.prior.mean, untried().mean);
+  const OwnFinding newcomer = finding(1.5, 0.1, 1);
+  const OwnFinding* const one[] = {&newcomer};
+  EXPECT_EQ(pool(one).robots, 0);
+}
+
+TEST(Siblings, LikeOnesAgreeAndNarrowThePrior) {
+  const std::vector<OwnFinding> found{finding(1.30, 0.02, 20), finding(1.32, 0.02, 20),
+                                      finding(1.28, 0.02, 20), finding(1.31, 0.02, 20)};
+  std::vector<const OwnFinding*> others;
+  for (const OwnFinding& f : found) others.push_back(&f);
+  const Siblings pooled = pool(others);
+  EXPECT_EQ(pooled.robots, 4);
+  EXPECT_NEAR(pooled.prior.mean[1], 1.30, 0.02);  // shrunk to 1 by the weight of (0.05 / 0.15)^2 / 4
+  EXPECT_LT(pooled.prior.covariance[1][1], untried().covariance[1][1]);
+  EXPECT_EQ(pooled.scores.size(), 4u);
+}
+
+TEST(Siblings, UnlikeOnesLendLess) {
+  const std::vector<OwnFinding> like{finding(1.3, 0.02, 9), finding(1.3, 0.02, 9), finding(1.3, 0.02, 9)};
+  const std::vector<OwnFinding> unlike{finding(1.1, 0.02, 9), finding(1.3, 0.02, 9), finding(1.5, 0.02, 9)};
+  const auto spread = [](const std::vector<OwnFinding>& found) {
+    std::vector<const OwnFinding*> others;
+    for (const OwnFinding& f : found) others.push_back(&f);
+    return pool(others).prior.covariance[1][1];
+  };
+  EXPECT_GT(spread(unlike), 2 * spread(like));
+}
+
+TEST(Siblings, AreRobotsOfOneBodyWhateverWasCalibrated) {
+  robot::RobotModel a = shipped("amr"), b = a;
+  b.robot_id = "other";
+  b.motor.friction_torque_nm = {1.1, 1.2};
+  b.idle_power_w = 30;
+  EXPECT_EQ(kind_of(a), kind_of(b));
+  EXPECT_NE(kind_of(a), kind_of(shipped("tug")));
+}
+
+}  // namespace
+}  // namespace joulecast::forecast
