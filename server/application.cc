@@ -162,11 +162,28 @@ struct Application::Parts {
     }
     beat_wake.notify_all();
     if (beat.joinable()) beat.join();
+    if (warming.joinable()) warming.join();
     if (http && !http->stop(seconds(settings.number("http.stop_deadline_s"))))
       log_warning("requests were cut off at the stop deadline");
     if (writer) {
       if (const Result<void> written = writer->stop(milliseconds(10'000)); !written)
         log_error("stopping the writer", written.error());
+    }
+  }
+
+  void report_drift(const std::string& robot_id, const forecast::Drift& drift,
+                    const std::function<void(history::Command)>& post) {
+    std::string detail = server::drift_json(drift);
+    log_warning("consumption has changed", {{"robot_id", robot_id}, {"drift", detail}});
+    events.publish("drift", detail, robot_id);
+    post(history::AppendEvent{{0, host_utime_us(), robot_id, "consumption_drift", std::move(detail)}});
+  }
+
+  // Learns from what the store kept, so that the first answers need not wait for it.
+  void warm_forecasts() {
+    for (const auto& model : models.all()) {
+      if (stopped) return;
+      forecasts->of(model);
     }
   }
 
@@ -186,6 +203,8 @@ struct Application::Parts {
   http::EventHub events;
   server::ModelRegistry models;
   server::FleetView fleet;
+  std::unique_ptr<server::Forecasts> forecasts;
+  planning::CostTableCache cost_tables;
   server::IngestCounters counters;
   std::function<void(const std::string&, const std::string&)> warn;
   std::unique_ptr<history::Store> store;
@@ -202,7 +221,7 @@ struct Application::Parts {
   std::mutex beat_mutex;
   std::condition_variable beat_wake;
   bool beating = true;
-  std::thread beat;
+  std::thread beat, warming;
   std::atomic<bool> stopped = false;
   std::uint64_t last_receive = 0, last_account = 0, last_write = 0;
 };
@@ -229,14 +248,22 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   if (Result<void> models = server::load_stored_models(*p.store, p.models); !models)
     return tl::unexpected(std::move(models.error()));
 
+  p.forecasts = std::make_unique<server::Forecasts>(*p.store);
   history::Writer& writer = *p.writer;
-  const server::SessionOutputs outputs{*p.store,
-                                       [&writer, warn = p.warn](history::Command command) {
-                                         if (const Result<void> posted = writer.post(std::move(command));
-                                             !posted)
-                                           warn("", describe(posted.error()));
-                                       },
-                                       p.fleet, p.counters, p.warn};
+  const auto post = [&writer, warn = p.warn](history::Command command) {
+    if (const Result<void> posted = writer.post(std::move(command)); !posted)
+      warn("", describe(posted.error()));
+  };
+  server::SessionOutputs outputs{*p.store, post, p.fleet, p.counters, p.warn};
+  outputs.mission_ended = [&p, post](const std::shared_ptr<const server::ModelInForce>& model,
+                                     forecast::PastMission mission) {
+    // A mission that ran into a new version is learnt against the one in force now.
+    const auto in_force = p.models.find(model->robot.robot_id);
+    server::Forecasts::Learnt learnt =
+        p.forecasts->learn(in_force != nullptr ? in_force : model, std::move(mission));
+    post(history::PutLearned{std::move(learnt.document)});
+    if (learnt.drift) p.report_drift(model->robot.robot_id, *learnt.drift, post);
+  };
   p.ingest = std::make_unique<server::IngestService>(ingest_options(settings), p.models, outputs);
   if (Result<void> started = p.ingest->start(); !started) return tl::unexpected(std::move(started.error()));
 
@@ -255,8 +282,9 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   if (Result<void> started = p.diagnoses->start(); !started)
     return tl::unexpected(std::move(started.error()));
   p.watch->start();
-  p.services = std::make_unique<api::Services>(
-      api::Services{*p.store, *p.writer, p.models, p.fleet, *p.adoption, *p.diagnoses, host_utime_us});
+  p.services =
+      std::make_unique<api::Services>(api::Services{*p.store, *p.writer, p.models, p.fleet, *p.forecasts,
+                                                    p.cost_tables, *p.adoption, *p.diagnoses, host_utime_us});
   std::vector<http::ReadinessCheck> checks;
   checks.push_back({"ingest", [&p]() -> Result<void> {
                       const server::IngestStatus status = p.ingest->status();
@@ -288,6 +316,7 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   if (!http) return tl::unexpected(std::move(http.error()));
   p.http = std::move(*http);
   p.beat = std::thread([&p] { p.run_beat(); });
+  p.warming = std::thread([&p] { p.warm_forecasts(); });
   return std::unique_ptr<Application>(new Application(std::move(parts)));
 }
 
@@ -328,9 +357,12 @@ Result<std::string> openapi_document() {
     const server::FleetView fleet;
     Metrics metrics;
     http::EventHub events;
+    server::Forecasts forecasts(**store);
+    planning::CostTableCache cost_tables;
     server::ModelAdoption adoption(**store, writer, models, host_utime_us, {});
     server::DiagnosisService diagnoses(**store, writer, models, host_utime_us, {}, [](const Error&) {});
-    api::Services services{**store, writer, models, fleet, adoption, diagnoses, host_utime_us};
+    api::Services services{**store,     writer,   models,    fleet,        forecasts,
+                           cost_tables, adoption, diagnoses, host_utime_us};
     std::vector<http::Endpoint> table = api::endpoints(services);
     table.push_back(http::events_endpoint(events));
     for (http::Endpoint& row : http::operations_endpoints(metrics, {})) table.push_back(std::move(row));

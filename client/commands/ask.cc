@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/commands/print_autonomy.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/http_client.h"
@@ -38,6 +39,7 @@ struct Options {
   std::string plot_file;
   // Members of the request, by flag.
   std::vector<std::pair<std::string, std::optional<double>>> numbers;
+  std::vector<std::pair<std::string, std::optional<std::string>>> texts;
   std::optional<double> length_m;
   std::optional<double> turn_rad;
 };
@@ -47,12 +49,13 @@ struct Question {
   const char* what;
   Result<std::string> (*offline)(const json& request, const server::ModelInForce& model);
   void (*print)(json answer);
+  bool fleet = false;  // may be asked for all robots of a server at once
 };
 
 Result<std::string> autonomy_offline(const json& body, const server::ModelInForce& model) {
-  const auto request = api::parse_autonomy(body);
-  if (!request) return tl::unexpected(request.error());
-  return api::autonomy_answer(*request, model, nullptr, {});
+  const auto shared = std::make_shared<const server::ModelInForce>(model);
+  planning::CostTableCache tables;
+  return api::autonomy_answer(body, server::Forecasts::untried(shared), nullptr, tables);
 }
 
 // The request file with the flags' members put over it.
@@ -72,6 +75,8 @@ Result<json> request_of(const Options& options) {
   }
   for (const auto& [name, value] : options.numbers)
     if (value) request[name] = *value;
+  for (const auto& [name, value] : options.texts)
+    if (value) request[name] = *value;
   // Counts are whole numbers in the request.
   if (const auto points = request.find("pareto_points"); points != request.end() && points->is_number_float())
     *points = static_cast<std::int64_t>(points->get<double>());
@@ -82,8 +87,12 @@ Result<std::string> ask_server(const Options& options, const Question& question,
   const auto server = parse_server_url(options.server);
   if (!server) return tl::unexpected(server.error());
   const auto timeout = std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * options.timeout_s));
-  auto reply = http_request(*server, HttpMethod::post, "/v1/robots/" + options.robot_id + "/" + question.name,
-                            request.dump(), timeout);
+  // Without a robot's name the whole fleet is asked.
+  const bool fleet = options.robot_id.empty();
+  const std::string path =
+      fleet ? std::string("/v1/") + question.name : "/v1/robots/" + options.robot_id + "/" + question.name;
+  const json body = fleet ? json{{"request", request}} : request;
+  auto reply = http_request(*server, HttpMethod::post, path, body.dump(), timeout);
   if (!reply) return tl::unexpected(reply.error());
   if (!reply->ok()) return tl::unexpected(error_of(*reply));
   return std::move(reply->body);
@@ -93,9 +102,9 @@ Result<std::string> answer(const Options& options, const Question& question, con
   if (!options.server.empty()) return ask_server(options, question, request);
   auto robot = robot::load_robot(options.robot_file);
   if (!robot) return tl::unexpected(robot.error());
-  const auto model = server::model_in_force(std::move(*robot), file_version);
-  if (!model) return tl::unexpected(model.error());
-  return question.offline(request, **model);
+  auto drive = dynamics::drive_model(*robot);
+  if (!drive) return tl::unexpected(drive.error());
+  return question.offline(request, {std::move(*robot), std::move(*drive), file_version});
 }
 
 extern const Question profile;
@@ -190,27 +199,13 @@ void print_estimate(json a) {
   print_ledger(a["ledger"]["terms_j"]);
 }
 
-void print_autonomy(json a) {
-  fmt::print("{} (model version {}): charge {:.1f} %, reserve {:.1f} %, {:.0f} J to spend\n",
-             a.value("robot_id", ""), a.value("model_version", 0), 1e2 * number(a, "state_of_charge"),
-             1e2 * number(a, "reserve_fraction"), number(a, "usable_energy_j"));
-  if (const auto c = a.find("consumption"); c != a.end())
-    fmt::print("spends {:.2f} J/m, {:.1f} W (by {})\n", number(*c, "energy_per_m_j"),
-               number(*c, "mean_power_w"), c->value("basis", ""));
-  fmt::print("range {:.0f} m, run time {:.0f} s\n", number(a, "range_m"), number(a, "run_time_s"));
-  // Newer servers say more; what this program does not know is shown as it came.
-  for (const char* known : {"robot_id", "model_version", "state_of_charge", "reserve_fraction",
-                            "usable_energy_j", "consumption", "range_m", "run_time_s"})
-    a.erase(known);
-  if (!a.empty()) std::puts(a.dump(2).c_str());
-}
-
 const Question profile{"profile", "Plan the minimum-energy motion along a path", api::profile_answer,
                        print_profile};
 constexpr Question estimate{"estimate", "Price a motion, or the best one along a path", api::estimate_answer,
                             print_estimate};
-constexpr Question autonomy{"autonomy", "Ask how far and how long a robot still goes", autonomy_offline,
-                            print_autonomy};
+constexpr Question autonomy{
+    "autonomy", "Ask how far and how long a robot still goes, and whether it can do a list of tasks",
+    autonomy_offline, [](json answer) { print_autonomy(answer); }, true};
 
 std::pair<CLI::App*, std::shared_ptr<Options>> add(CLI::App& program, Exit& exit, const Question& question) {
   auto options = std::make_shared<Options>();
@@ -219,7 +214,8 @@ std::pair<CLI::App*, std::shared_ptr<Options>> add(CLI::App& program, Exit& exit
       command->add_option("--robot", options->robot_file, "robot file: answer here, without a server");
   auto* server = command->add_option("--server", options->server, "joulecastd to ask, http://host:port");
   auto* id = command->add_option("--robot-id", options->robot_id, "which robot of the server");
-  server->needs(id)->excludes(file);
+  server->excludes(file);
+  if (!question.fleet) server->needs(id);
   id->needs(server);
   command->add_option(
       "--request", options->request_file,
@@ -287,8 +283,22 @@ void add_autonomy(CLI::App& program, Exit& exit) {
   auto [command, options] = add(program, exit, autonomy);
   add_numbers(*command, *options,
               {{"--charge", "state_of_charge", "state of charge instead of the live one, 0 to 1"},
+               {"--charge-sd", "state_of_charge_sd", "its standard deviation"},
                {"--reserve", "reserve_fraction", "charge to keep instead of the robot file's, 0 to 1"},
-               {"--payload", "payload_kg", "kg"}});
+               {"--payload", "payload_kg", "kg carried now"},
+               {"--speed", "speed_m_s", "m/s that the plan states, instead of the robot's habit"},
+               {"--confidence", "confidence", "of the latest departure to the charger, 0.01 to 0.999"}});
+  options->texts = {{"driving", std::nullopt}, {"dialect", std::nullopt}};
+  command->add_option("--driving", options->texts[0].second, "usual, or by minimum-energy profiles")
+      ->check(CLI::IsMember({"usual", "minimum_energy"}));
+  command->add_option("--dialect", options->texts[1].second, "answer as another standard's battery message")
+      ->check(CLI::IsMember(
+          std::vector<std::string>(std::begin(api::dialect_names), std::end(api::dialect_names))));
+  command->footer(
+      "Without --robot-id all robots of the server are asked. A list of tasks comes with --request, e.g.\n"
+      R"(  {"tasks": [{"name": "fetch", "distance_m": 40, "payload_kg": 20, "dwell_s": 30}],)"
+      "\n"
+      R"(   "charger": {"x_m": 0, "y_m": 0}, "reserve_fraction": 0.2, "confidence": 0.95})");
 }
 
 }  // namespace joulecast::client

@@ -17,6 +17,7 @@
 #include "client/files.h"
 #include "client/http_client.h"
 #include "robot/robot_file.h"
+#include "server/api/autonomy.h"
 
 namespace joulecast::client {
 namespace {
@@ -61,7 +62,16 @@ Result<std::string> answer_here(const Options& options, const std::string& text)
     return fail(Fault::not_found, "robot_id", "no --robot file describes " + id);
   };
   fleet.pose = [](const std::string&) { return std::nullopt; };
-  auto answer = api::MatrixAnswer::make(request, fleet, std::make_shared<planning::CostTableCache>());
+  fleet.outlook = [](const std::shared_ptr<const server::ModelInForce>& model) {
+    return server::Forecasts::untried(model);
+  };
+  fleet.charge = [](const server::ModelInForce& model, const std::optional<double>& given,
+                    const std::optional<double>& reserve) {
+    return api::charge_of(given, {}, reserve, model.robot.battery, nullptr)
+        .value_or(forecast::Charge{std::nan(""), 0, 0});
+  };
+  planning::CostTableCache tables;
+  auto answer = api::MatrixAnswer::make(request, fleet, tables);
   if (!answer) return tl::unexpected(std::move(answer.error()));
   std::string out;
   while ((*answer)->next(out, {})) {
@@ -73,16 +83,21 @@ void print(const json& answer) {
   const json& tasks = answer["tasks"];
   const json& rows = answer["rows"];
   const std::size_t columns = std::min(tasks.size(), most_columns);
-  fmt::print("{:<20}", "energy J (time s)");
-  for (std::size_t t = 0; t < columns; ++t) fmt::print(" {:>20}", tasks[t].get<std::string>());
+  fmt::print("{:<20}", "energy J (s, chance)");
+  for (std::size_t t = 0; t < columns; ++t) fmt::print(" {:>24}", tasks[t].get<std::string>());
   std::puts("");
   for (const json& row : rows) {
     fmt::print("{:<20}", row["robot_id"].get<std::string>());
     for (std::size_t t = 0; t < columns; ++t) {
       const json& energy = row["energy_j"][t];
-      fmt::print(" {:>20}", energy.is_number() ? fmt::format("{:.1f} ({:.1f})", energy.get<double>(),
-                                                             row["duration_s"][t].get<double>())
-                                               : std::string("-"));
+      std::string cell = "-";
+      if (energy.is_number()) {
+        cell = fmt::format("{:.1f} ({:.1f}", energy.get<double>(), row["duration_s"][t].get<double>());
+        if (const auto chance = row.find("success_probability"); chance != row.end() && chance->is_array())
+          cell += fmt::format(", {:.0f} %", std::floor(1e2 * (*chance)[t].get<double>()));
+        cell += ")";
+      }
+      fmt::print(" {:>24}", cell);
     }
     std::puts("");
     for (const json& why : row["infeasible"])

@@ -13,6 +13,7 @@
 #include "history/sqlite_store.h"
 #include "history/writer.h"
 #include "server/api/mission_json.h"
+#include "server/ingest/forecasts.h"
 #include "server/ingest/model_loading.h"
 #include "server/ingest/pipeline.h"
 #include "telemetry/event_log.h"
@@ -77,17 +78,24 @@ Exit replay_into(const ReplayInto& options) {
   server::FleetView fleet;
   server::IngestCounters counters;
   std::set<history::MissionKey> touched;
-  const server::SessionOutputs outputs{
-      **store,
-      [&](history::Command command) {
-        if (const auto* begun = std::get_if<history::StartMission>(&command))
-          touched.insert(begun->mission.key);
-        if (const Result<void> posted = writer.post(std::move(command)); !posted) report(posted.error());
-      },
-      fleet, counters,
-      [](const std::string& robot, const std::string& text) {
-        std::fprintf(stderr, "joulecast: %s: %s\n", robot.c_str(), text.c_str());
-      }};
+  server::SessionOutputs outputs{**store,
+                                 [&](history::Command command) {
+                                   if (const auto* begun = std::get_if<history::StartMission>(&command))
+                                     touched.insert(begun->mission.key);
+                                   if (const Result<void> posted = writer.post(std::move(command)); !posted)
+                                     report(posted.error());
+                                 },
+                                 fleet, counters,
+                                 [](const std::string& robot, const std::string& text) {
+                                   std::fprintf(stderr, "joulecast: %s: %s\n", robot.c_str(), text.c_str());
+                                 }};
+  server::Forecasts forecasts(**store);
+  outputs.mission_ended = [&](const std::shared_ptr<const server::ModelInForce>& model,
+                              forecast::PastMission mission) {
+    server::Forecasts::Learnt learnt = forecasts.learn(model, std::move(mission));
+    if (const Result<void> posted = writer.post(history::PutLearned{std::move(learnt.document)}); !posted)
+      report(posted.error());
+  };
   constexpr std::size_t any_number_of_robots = 1'000'000;
   server::Pipeline pipeline({}, any_number_of_robots, models, outputs);
   telemetry::LogTally tally;

@@ -3,35 +3,51 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "base/error.h"
-#include "history/records.h"
+#include "forecast/outlook.h"
+#include "planning/cost_table_cache.h"
+#include "server/api/autonomy_request.h"
 #include "server/ingest/fleet_view.h"
-#include "server/ingest/model_registry.h"
+#include "server/ingest/forecasts.h"
 
 namespace joulecast::api {
 
-struct AutonomyRequest {
-  std::optional<double> state_of_charge;   // instead of the live one
-  std::optional<double> reserve_fraction;  // instead of the robot file's
-  std::optional<double> payload_kg;        // for the model's consumption, when no mission tells it
+// What an autonomy answer says, before it is written in one dialect or another.
+struct Autonomy {
+  forecast::Charge charge;
+  bool charge_is_live = false;
+  double payload_kg = 0;
+  forecast::Driving driving = forecast::Driving::usual;
+  bool minimum_energy = false;
+  forecast::Pace pace;
+  forecast::Reach reach;
+  std::optional<forecast::Outlook> outlook;                 // with a task list or a charger
+  std::optional<forecast::Outlook> minimum_energy_outlook;  // the same, driven as the planner would
 };
-Result<AutonomyRequest> parse_autonomy(const nlohmann::json& body);
 
-// What a robot spends: from its recent missions, or, where it has none, from the model at steady speed.
-struct Consumption {
-  std::string basis;  // "recent_missions" or "model"
-  std::int64_t missions = 0;
-  double energy_j = 0, distance_m = 0, duration_s = 0;
-};
-Consumption consumption_of(const std::vector<history::Mission>& recent, const server::ModelInForce& model,
-                           double payload_kg);
+// infeasible when the charge is known from nowhere; invalid for a payload beyond the robot's limit.
+Result<Autonomy> autonomy_of(const AutonomyRequest& request, const server::RobotOutlook& robot,
+                             const server::RobotSnapshot* live, planning::CostTableCache& tables);
 
-// JSON of state of charge, usable energy, range and run time. infeasible when the charge is known from
-// nowhere.
-Result<std::string> autonomy_answer(const AutonomyRequest& request, const server::ModelInForce& model,
-                                    const server::RobotSnapshot* live,
-                                    const std::vector<history::Mission>& recent);
+// JSON in the request's dialect.
+std::string autonomy_json(const Autonomy& autonomy, const AutonomyRequest& request,
+                          const server::RobotOutlook& robot, const server::RobotSnapshot* live);
+
+// Both in one, from the JSON of a request.
+Result<std::string> autonomy_answer(const nlohmann::json& body, const server::RobotOutlook& robot,
+                                    const server::RobotSnapshot* live, planning::CostTableCache& tables);
+
+// Where the robot is and what it declares to carry, as far as it is heard.
+Whereabouts whereabouts(const server::RobotSnapshot* live);
+
+// What is known of the charge: the request's, else the live one.
+Result<forecast::Charge> charge_of(const std::optional<double>& given, const std::optional<double>& given_sd,
+                                   const std::optional<double>& reserve, const robot::Battery& battery,
+                                   const server::RobotSnapshot* live);
+
+struct Services;
+// The fleet call: {"robots": [...], "request": {...}}; a row a robot, in the order asked for or by id.
+Result<std::string> fleet_autonomy_answer(const nlohmann::json& body, Services& services);
 
 }  // namespace joulecast::api

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "planning/cost_matrix.h"
+#include "server/api/autonomy.h"
 #include "server/api/fields.h"
 #include "server/api/json_writer.h"
 #include "server/api/services.h"
@@ -80,6 +81,9 @@ struct RobotRow {
   std::string robot_id;
   std::shared_ptr<const server::ModelInForce> model;
   std::optional<planning::Pose> pose;
+  std::optional<double> state_of_charge;
+  server::RobotOutlook outlook;
+  forecast::Charge charge;  // NaN: not known
 };
 
 RobotRow read_robot(const json& value, std::string at, const MatrixFleet& fleet, Fields& outer) {
@@ -96,6 +100,7 @@ RobotRow read_robot(const json& value, std::string at, const MatrixFleet& fleet,
                   own.number("heading_rad", {.minimum = -1e3, .maximum = 1e3}, 0)};
       finish(own, fields);
     }
+    row.state_of_charge = fields.optional_number("state_of_charge", fraction);
     finish(fields, outer);
   }
   if (!outer.ok()) return row;
@@ -168,8 +173,9 @@ void on_two_threads(std::size_t count, Work&& work) {
 struct MatrixAnswer::State {
   std::vector<RobotRow> robots;
   std::vector<TaskColumn> columns;
+  std::vector<double> payload_kg;  // of the columns
   planning::CostOptions options;
-  std::shared_ptr<planning::CostTableCache> cache;
+  planning::CostTableCache* cache = nullptr;
 
   // Tables still to be had, one for each different model; then the matrix.
   std::vector<const server::ModelInForce*> models;
@@ -181,6 +187,9 @@ struct MatrixAnswer::State {
   void collect_tables();
   void assemble();
   void write_row(std::size_t robot, JsonWriter& json) const;
+  // That the robot ends each task with its reserve, driving by minimum-energy profiles.
+  void write_success(const RobotRow& robot, const std::vector<Cell>& cells, std::vector<double>& numbers,
+                     JsonWriter& json) const;
 };
 
 void MatrixAnswer::State::collect_tables() {
@@ -202,8 +211,31 @@ void MatrixAnswer::State::assemble() {
   }
   std::vector<planning::MatrixTask> tasks;
   tasks.reserve(columns.size());
+  for (const TaskColumn& column : columns) payload_kg.push_back(column.task.payload_kg);
   for (TaskColumn& column : columns) tasks.push_back(std::move(column.task));
   matrix = std::make_unique<planning::CostMatrix>(std::move(rows), std::move(tasks));
+}
+
+void MatrixAnswer::State::write_success(const RobotRow& robot, const std::vector<Cell>& cells,
+                                        std::vector<double>& numbers, JsonWriter& json) const {
+  const auto possible = std::ranges::find_if(cells, [](const Cell& c) { return c.duration_s > 0; });
+  if (robot.outlook.forecaster == nullptr || !std::isfinite(robot.charge.fraction)) {
+    json.key("success_probability").null();
+    return;
+  }
+  const double standing_w = robot.model->drive.battery_power_for({0, 0});
+  const double power_w = possible != cells.end() ? possible->energy_j / possible->duration_s : standing_w;
+  const forecast::QuickSuccess success(*robot.outlook.forecaster, *robot.outlook.battery, robot.charge,
+                                       standing_w, power_w);
+  for (std::size_t t = 0; t < cells.size(); ++t) {
+    const Cell& cell = cells[t];
+    numbers[t] = std::isfinite(cell.energy_j)
+                     ? success.probability(cell.energy_j, cell.duration_s, cell.loaded.energy_j,
+                                           cell.loaded.duration_s, payload_kg[t])
+                     : cell.energy_j;
+  }
+  constexpr int probability_places = 4;
+  json.column("success_probability", numbers, probability_places);
 }
 
 void MatrixAnswer::State::write_row(std::size_t r, JsonWriter& json) const {
@@ -221,6 +253,7 @@ void MatrixAnswer::State::write_row(std::size_t r, JsonWriter& json) const {
   json.column("energy_j", numbers, places);
   for (std::size_t t = 0; t < cells.size(); ++t) numbers[t] = cells[t].duration_s;
   json.column("duration_s", numbers, places);
+  write_success(robots[r], cells, numbers, json);
   json.key("infeasible").begin_array();
   for (const Obstacle obstacle : {Obstacle::payload, Obstacle::limits}) {
     const auto is = [&](const Cell& cell) { return cell.obstacle == obstacle; };
@@ -242,12 +275,13 @@ MatrixAnswer::MatrixAnswer(std::unique_ptr<State> state) : state_(std::move(stat
 MatrixAnswer::~MatrixAnswer() = default;
 
 Result<std::shared_ptr<MatrixAnswer>> MatrixAnswer::make(const json& request, const MatrixFleet& fleet,
-                                                         std::shared_ptr<planning::CostTableCache> tables) {
+                                                         planning::CostTableCache& tables) {
   Fields fields(request);
   auto state = std::make_unique<State>();
-  state->cache = std::move(tables);
+  state->cache = &tables;
   state->options.value_of_time_w = fields.number("value_of_time_w", {.minimum = 0, .maximum = 1e6}, 0);
   state->options.regeneration = fields.optional_number("regeneration", fraction);
+  const std::optional<double> reserve = fields.optional_number("reserve_fraction", fraction);
   const json* robots = read_array(fields, "robots", max_robots);
   const json* tasks = read_array(fields, "tasks", max_tasks);
   if (fields.ok() && robots->size() * tasks->size() > max_cells) {
@@ -270,6 +304,11 @@ Result<std::shared_ptr<MatrixAnswer>> MatrixAnswer::make(const json& request, co
     }
   }
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  for (RobotRow& robot : state->robots) {
+    if (!fleet.outlook || !fleet.charge) break;
+    robot.charge = fleet.charge(*robot.model, robot.state_of_charge, reserve);
+    if (std::isfinite(robot.charge.fraction)) robot.outlook = fleet.outlook(robot.model);
+  }
   std::unordered_map<const server::ModelInForce*, bool> seen;
   for (const RobotRow& robot : state->robots)
     if (seen.emplace(robot.model.get(), true).second) state->models.push_back(robot.model.get());
@@ -315,7 +354,6 @@ bool MatrixAnswer::next(std::string& out, const std::stop_token& left) {
 }
 
 std::vector<http::Endpoint> matrix_endpoints(Services& services) {
-  auto tables = std::make_shared<planning::CostTableCache>();
   std::vector<http::Endpoint> rows;
   rows.push_back(
       {.method = http::Method::post,
@@ -325,7 +363,7 @@ std::vector<http::Endpoint> matrix_endpoints(Services& services) {
        .request_schema = "energy-matrix-request",
        .response_schema = "energy-matrix",
        .error_statuses = {404, 413, 422},
-       .handler = [&services, tables](const http::Request& r) -> Result<http::Response> {
+       .handler = [&services](const http::Request& r) -> Result<http::Response> {
          MatrixFleet fleet;
          fleet.model = [&services](const std::string& id) { return model_of(services, id); };
          fleet.pose = [&services](const std::string& id) -> std::optional<planning::Pose> {
@@ -334,7 +372,16 @@ std::vector<http::Endpoint> matrix_endpoints(Services& services) {
              return std::nullopt;
            return planning::Pose{live->sample.pose[0], live->sample.pose[1], live->sample.pose[2]};
          };
-         auto answer = MatrixAnswer::make(*r.json, fleet, tables);
+         fleet.outlook = [&services](const std::shared_ptr<const server::ModelInForce>& model) {
+           return services.forecasts.of(model);
+         };
+         fleet.charge = [&services](const server::ModelInForce& model, const std::optional<double>& given,
+                                    const std::optional<double>& reserve) {
+           const auto live = services.fleet.find(model.robot.robot_id);
+           return charge_of(given, {}, reserve, model.robot.battery, live.get())
+               .value_or(forecast::Charge{telemetry::unmeasured, 0, 0});
+         };
+         auto answer = MatrixAnswer::make(*r.json, fleet, services.cost_tables);
          if (!answer) return tl::unexpected(std::move(answer.error()));
          http::Response response;
          response.stream = http::generate([answer = *answer](std::string& out, const std::stop_token& left) {

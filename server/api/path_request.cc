@@ -103,6 +103,30 @@ std::optional<planning::Pose> read_start_pose(Fields& fields) {
   return read;
 }
 
+std::optional<planning::Path> read_path(Fields& fields, const planning::PathOptions& options,
+                                        double payload_limit_kg) {
+  const json* path = fields.member("path");
+  std::vector<planning::Segment> segments;
+  if (path == nullptr || !path->is_array() || path->empty() || path->size() > max_segments) {
+    fields.fault("path", fmt::format("must be an array of 1 to {} segments", max_segments));
+  } else {
+    for (std::size_t k = 0; k < path->size() && fields.ok(); ++k) {
+      Fields segment((*path)[k], fmt::format("{}/{}", fields.pointer("path"), k));
+      segments.push_back(read_segment(segment, payload_limit_kg));
+      if (Result<void> done = segment.finish(); !done) fields.fault(std::move(done.error()));
+    }
+  }
+  if (!fields.ok()) return std::nullopt;
+  Result<planning::Path> made = planning::make_path(segments, options);
+  if (made) return std::move(*made);
+  // The room speaks of "/segments/3/..."; the request calls them "/path/3/...".
+  Error error = std::move(made.error());
+  constexpr std::string_view room = "/segments";
+  if (error.field.starts_with(room)) error.field = fields.pointer("path") + error.field.substr(room.size());
+  fields.fault(std::move(error));
+  return std::nullopt;
+}
+
 DriveRequest read_drive(Fields& fields, const robot::RobotModel& robot) {
   DriveRequest request;
   request.problem.limits = planning::limits_of(robot);
@@ -118,28 +142,7 @@ DriveRequest read_drive(Fields& fields, const robot::RobotModel& robot) {
   options.payload_kg = fields.number("payload_kg", {.minimum = 0, .maximum = robot.limits.payload_kg}, 0);
   options.start = read_start_pose(fields).value_or(planning::Pose{});
 
-  const json* path = fields.member("path");
-  std::vector<planning::Segment> segments;
-  if (path == nullptr || !path->is_array() || path->empty() || path->size() > max_segments) {
-    fields.fault("path", fmt::format("must be an array of 1 to {} segments", max_segments));
-  } else {
-    for (std::size_t k = 0; k < path->size() && fields.ok(); ++k) {
-      Fields segment((*path)[k], fmt::format("{}/{}", fields.pointer("path"), k));
-      segments.push_back(read_segment(segment, robot.limits.payload_kg));
-      if (Result<void> done = segment.finish(); !done) fields.fault(std::move(done.error()));
-    }
-  }
-  if (!fields.ok()) return request;
-  Result<planning::Path> made = planning::make_path(segments, options);
-  if (made) {
-    request.path = std::move(*made);
-  } else {
-    // The room speaks of "/segments/3/..."; the request calls them "/path/3/...".
-    Error error = std::move(made.error());
-    constexpr std::string_view room = "/segments";
-    if (error.field.starts_with(room)) error.field = fields.pointer("path") + error.field.substr(room.size());
-    fields.fault(std::move(error));
-  }
+  if (auto path = read_path(fields, options, robot.limits.payload_kg)) request.path = std::move(*path);
   return request;
 }
 

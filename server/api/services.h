@@ -6,10 +6,12 @@
 
 #include "history/store.h"
 #include "history/writer.h"
+#include "planning/cost_table_cache.h"
 #include "server/diagnosis/diagnosis_service.h"
 #include "server/diagnosis/model_adoption.h"
 #include "server/http/router.h"
 #include "server/ingest/fleet_view.h"
+#include "server/ingest/forecasts.h"
 #include "server/ingest/model_registry.h"
 
 namespace joulecast::api {
@@ -20,6 +22,8 @@ struct Services {
   history::Writer& writer;
   server::ModelRegistry& models;
   const server::FleetView& fleet;
+  server::Forecasts& forecasts;
+  planning::CostTableCache& cost_tables;
   server::ModelAdoption& adoption;
   server::DiagnosisService& diagnoses;
   std::function<std::int64_t()> now_utime_us;  // host clock

@@ -91,6 +91,7 @@ void RobotSession::meter_with(std::shared_ptr<const ModelInForce> model) {
   snapshot_.has_model = model_ != nullptr;
   snapshot_.model_version = model_ != nullptr ? model_->version : 0;
   if (model_ != nullptr) {
+    legs_.emplace(model_->robot);
     meter_ =
         std::make_unique<energy::Meter>(model_->drive, model_->robot.battery.capacity_ah, settings_.meter,
                                         [this](const energy::MeterPoint& point) { on_point(point); });
@@ -334,6 +335,7 @@ void RobotSession::open(const telemetry::MissionAction& action) {
   meter_->begin();
   refinement_->begin_mission();
   trace_.begin();
+  legs_->begin();
   open_ = std::make_unique<OpenMission>();
   history::Mission& record = open_->record;
   record.robot_id = robot_id_;
@@ -378,6 +380,8 @@ void RobotSession::close(const telemetry::MissionAction& action) {
   judge_mission();
   checkpoint();
   remember_charge();
+  if (outputs_.mission_ended && model_ != nullptr)
+    outputs_.mission_ended(model_, {record.start_utime_us, legs_->take()});
   open_.reset();
   snapshot_.mission_id.clear();
   snapshot_.mission_key = 0;
@@ -425,6 +429,8 @@ void RobotSession::on_point(const energy::MeterPoint& point) {
   energy::MeterPoint shown = point;
   shown.state_of_charge = snapshot_.state_of_charge;
   trace_.add(shown, accounts);
+  legs_->add({point.bridged ? point.interval_s : 0, point.speed_m_s, point.yaw_rate_rad_s,
+              point.measured_power_w, point.sample.payload_kg});
   if (open_ != nullptr) open_->record.end_utime_us = point.sample.utime_us;
   snapshot_.sample = point.sample;
   snapshot_.measured_power_w = point.measured_power_w;

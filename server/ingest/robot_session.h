@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "energy/meter.h"
+#include "forecast/robot_forecast.h"
 #include "history/commands.h"
 #include "history/store.h"
 #include "server/ingest/charge_watch.h"
@@ -38,6 +39,9 @@ struct SessionOutputs {
   FleetView& fleet;
   IngestCounters& counters;
   std::function<void(const std::string& robot_id, const std::string& text)> warn;
+  // Told of each mission that ended, with its legs; may be empty.
+  std::function<void(const std::shared_ptr<const ModelInForce>& model, forecast::PastMission mission)>
+      mission_ended = {};
 };
 
 // Everything between one robot's decoded messages and its history: plausibility, order, mission tracking,
@@ -110,6 +114,7 @@ class RobotSession {
   std::deque<telemetry::Sample> held_;  // until it is clear whether a charger feeds the robot
   bool at_charger_ = false;
   TraceBuilder trace_;
+  std::optional<forecast::LegTracker> legs_;
   std::unique_ptr<OpenMission> open_;
   RobotSnapshot snapshot_;
   std::int64_t last_sequence_ = 0;

@@ -53,7 +53,7 @@ def main():
     check(page == {"missions": [], "next_cursor": None}, f"a fresh daemon knows missions: {page}")
 
     faults = {
-        2: [["profile", "--length", "8"], ["autonomy", "--server", programs.url], ["profile", "--length", "many"]],
+        2: [["profile", "--length", "8"], ["estimate", "--server", programs.url], ["profile", "--length", "many"]],
         1: [["profile", "--robot", programs.path("no-such-file.json"), "--length", "8"],
             ["profile", "--robot", robot, "--length", "-8"],
             ["profile", "--server", programs.url, "--robot-id", "nobody", "--length", "8"],

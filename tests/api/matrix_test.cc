@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -43,7 +44,7 @@ class Matrix : public ::testing::Test {
 
   std::map<std::string, std::shared_ptr<const server::ModelInForce>> models_;
   MatrixFleet fleet_;
-  std::shared_ptr<planning::CostTableCache> tables_ = std::make_shared<planning::CostTableCache>();
+  planning::CostTableCache tables_;
   const json stations_ = {{"task_id", "t1"},
                           {"payload_kg", 5},
                           {"pickup", {{"x_m", 3}, {"y_m", 0}}},
@@ -53,6 +54,36 @@ class Matrix : public ::testing::Test {
                       {"loaded", {{"distances_m", {1, 2}}, {"turns_rad", {1.5}}}},
                       {"pickup_dwell_s", 10}};
 };
+
+TEST_F(Matrix, TellsTheChanceOfEachTaskWhereTheChargeIsKnown) {
+  fleet_.outlook = [](const std::shared_ptr<const server::ModelInForce>& model) {
+    return server::Forecasts::untried(model);
+  };
+  fleet_.charge = [](const server::ModelInForce&, const std::optional<double>& given,
+                     const std::optional<double>& reserve) {
+    return forecast::Charge{given.value_or(std::nan("")), 0, reserve.value_or(0.15)};
+  };
+  json far = stations_;
+  far["task_id"] = "far";
+  far["dropoff"] = {{"x_m", 3}, {"y_m", 9000}};
+  const json request = {{"robots",
+                         {{{"robot_id", "a"}, {"state_of_charge", 0.8}},
+                          {{"robot_id", "a"}, {"state_of_charge", 0.16}},
+                          {{"robot_id", "b"}, {"state_of_charge", 0.8}, {"pose", {{"x_m", 0}, {"y_m", 0}}}},
+                          "a"}},
+                        {"tasks", {stations_, far}}};
+  const auto answer = MatrixAnswer::make(request, fleet_, tables_);
+  ASSERT_TRUE(answer) << describe(answer.error());
+  std::string text;
+  while ((*answer)->next(text, {})) {
+  }
+  const json rows = json::parse(text)["rows"];
+  EXPECT_GT(rows[0]["success_probability"][0], 0.99);
+  EXPECT_LT(rows[1]["success_probability"][1], 0.01);
+  EXPECT_GT(rows[1]["success_probability"][0], rows[1]["success_probability"][1]);
+  EXPECT_TRUE(rows[2]["success_probability"][0].is_null());  // too heavy for it
+  EXPECT_TRUE(rows[3]["success_probability"].is_null());     // charge not known
+}
 
 TEST_F(Matrix, AnswersARowForEachRobot) {
   json request = {{"robots", json::array({"a"})}, {"tasks", {stations_, legs_}}};
@@ -67,7 +98,7 @@ TEST_F(Matrix, AnswersARowForEachRobot) {
   const json all = json::parse(text);
   EXPECT_EQ(all["tasks"], json({"t1", "t2"}));
   ASSERT_EQ(all["rows"].size(), 41u);
-  EXPECT_EQ(tables_->size(), 2u);
+  EXPECT_EQ(tables_.size(), 2u);
   for (std::size_t r = 0; r < 41; ++r) {
     const json& row = all["rows"][r];
     const bool strong = row["robot_id"] == "a";

@@ -1,0 +1,153 @@
+#include "client/commands/print_autonomy.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace joulecast::client {
+namespace {
+
+using nlohmann::json;
+
+double number(const json& object, const char* name) {
+  const auto found = object.find(name);
+  return found != object.end() && found->is_number() ? found->get<double>() : std::nan("");
+}
+
+std::string figure(double value, int places = 0) {
+  return std::isfinite(value) ? fmt::format("{:.{}f}", value, places) : "-";
+}
+
+std::string percent(double fraction, int places = 1) {
+  return std::isfinite(fraction) ? fmt::format("{:.{}f} %", 100 * fraction, places) : "-";
+}
+
+std::string span(double s) {
+  if (!std::isfinite(s)) return "-";
+  const auto minutes = static_cast<long>(std::lround(s / 60));
+  if (s < 60) return fmt::format("{:.0f} s", s);
+  return minutes < 60 ? fmt::format("{} min", minutes)
+                      : fmt::format("{} h {:02} min", minutes / 60, minutes % 60);
+}
+
+// Never rounds up to certainty.
+std::string probability(double p) {
+  if (!std::isfinite(p)) return "-";
+  if (p > 0.9995) return "> 99.9 %";
+  if (p < 0.0005) return "< 0.1 %";
+  return fmt::format("{:.1f} %", 100 * p);
+}
+
+std::string where(const json& place) {
+  if (!place.is_object()) return "";
+  if (!place["task"].is_number()) return "on the way to the charger";
+  const std::string name = place.value("name", "");
+  return fmt::format("in leg {}{}", place["task"].get<int>() + 1, name.empty() ? "" : " (" + name + ")");
+}
+
+void print_stage(const std::string& title, const json& stage) {
+  const json& charge = stage["arrival_charge"];
+  fmt::print("  {:<24} {:>10} {:>9} {:>8} {:>8} {:>8} {:>10}\n", title.substr(0, 24),
+             figure(number(stage, "expected_energy_j")), span(number(stage, "ends_after_s")),
+             percent(number(charge, "p05")), percent(number(charge, "p50")), percent(number(charge, "p95")),
+             probability(number(stage, "success_probability")));
+}
+
+void print_plan(const json& plan) {
+  fmt::print("\nPlan: {} to finish with the reserve; {} J expected ({} to {} J at 5 and 95 %), {}\n",
+             probability(number(plan, "success_probability")), figure(number(plan, "expected_energy_j")),
+             figure(number(plan["energy_j"], "p05")), figure(number(plan["energy_j"], "p95")),
+             span(number(plan, "duration_s")));
+  fmt::print("  {:<24} {:>10} {:>9} {:>8} {:>8} {:>8} {:>10}\n", "leg", "energy J", "ends", "5 %", "charge",
+             "95 %", "reserve");
+  int index = 0;
+  for (const json& leg : plan["legs"]) {
+    const std::string name = leg.value("name", "");
+    print_stage(fmt::format("{:>3} {}", ++index, name), leg);
+  }
+  if (plan["charger"].is_object()) print_stage("    to the charger", plan["charger"]);
+  if (plan["fails_at"].is_object()) fmt::print("Fails {} more often than not.\n", where(plan["fails_at"]));
+  if (!plan["fails_at"].is_object() && plan["likeliest_failure"].is_object() &&
+      number(plan, "success_probability") < 0.999)
+    fmt::print("If it fails, then most likely {}.\n", where(plan["likeliest_failure"]));
+  if (const json& leave = plan["latest_departure"]; leave.is_object()) {
+    const int after = leave["after_tasks"].get<int>();
+    fmt::print("Latest safe departure to the charger ({} sure): {}, at {}, or up to {} later.\n",
+               percent(number(leave, "confidence"), 0),
+               after == 0 ? "now" : fmt::format("after leg {}", after), span(number(leave, "at_s")),
+               span(number(leave, "wait_s")));
+  } else if (plan["charger"].is_object()) {
+    fmt::print("No departure to the charger is safe any more, not even now.\n");
+  }
+}
+
+void print_one(const json& a) {
+  const json& driving = a["driving"];
+  fmt::print("{} (model version {}): charge {}", a.value("robot_id", ""), a.value("model_version", 0),
+             percent(number(a, "state_of_charge")));
+  if (const double sd = number(a, "state_of_charge_sd"); sd > 0) fmt::print(" +- {}", percent(sd));
+  fmt::print(", reserve {}, {} J to spend\n", percent(number(a, "reserve_fraction")),
+             figure(number(a, "usable_energy_j")));
+  const json& c = a["consumption"];
+  const std::string basis = c.value("basis", "");
+  fmt::print("Driving {} at {} m/s with {} kg: {} J/m, {} W; ", driving.value("kind", ""),
+             figure(number(driving, "speed_m_s"), 2), figure(number(a, "payload_kg"), 1),
+             figure(number(c, "energy_per_m_j"), 1), figure(number(c, "mean_power_w"), 1));
+  if (basis == "recent_missions")
+    fmt::print("by {} missions of its own", c.value("missions", 0));
+  else
+    fmt::print("by its {}", basis == "model" ? "model, never tried" : "siblings");
+  fmt::print("\n  {:<10} {:>12} {:>12} {:>12}\n", "", "5 %", "median", "95 %");
+  const json &range = a["range_quantiles_m"], &time = a["run_time_quantiles_s"];
+  fmt::print("  {:<10} {:>10} m {:>10} m {:>10} m\n", "range", figure(number(range, "p05")),
+             figure(number(range, "p50")), figure(number(range, "p95")));
+  fmt::print("  {:<10} {:>12} {:>12} {:>12}\n", "run time", span(number(time, "p05")),
+             span(number(time, "p50")), span(number(time, "p95")));
+  if (const json& drift = a["drift"]; drift.is_object())
+    fmt::print("It has spent {} of what was expected for {} missions now.\n",
+               percent(number(drift, "ratio"), 0), drift.value("missions", 0));
+  if (a["plan"].is_object()) print_plan(a["plan"]);
+  if (const json& best = a["minimum_energy"]; best.is_object()) {
+    const double saved_s = number(best, "saved_s");
+    fmt::print("By minimum-energy profiles: {} to finish, {} J ({} J less), {} {}; {} left at the end.\n",
+               probability(number(best, "success_probability")), figure(number(best, "expected_energy_j")),
+               figure(number(best, "saved_j")), span(std::fabs(saved_s)), saved_s < 0 ? "longer" : "sooner",
+               percent(number(best["arrival_charge"], "p50")));
+  }
+}
+
+void print_fleet(const json& rows) {
+  fmt::print("{:<20} {:>8} {:>12} {:>12} {:>11} {:>11} {:>10}\n", "robot", "charge", "range 5 %", "range",
+             "time 5 %", "time", "plan");
+  for (const json& row : rows) {
+    const std::string id = row.value("robot_id", "");
+    if (row.contains("problem")) {
+      fmt::print("{:<20} {}\n", id, row["problem"].value("message", ""));
+    } else if (row.contains("battery")) {
+      fmt::print("{:<20} {}\n", id, row["battery"].dump());
+    } else {
+      const json &range = row["range_quantiles_m"], &time = row["run_time_quantiles_s"];
+      fmt::print("{:<20} {:>8} {:>10} m {:>10} m {:>11} {:>11} {:>10}\n", id,
+                 percent(number(row, "state_of_charge")), figure(number(range, "p05")),
+                 figure(number(range, "p50")), span(number(time, "p05")), span(number(time, "p50")),
+                 row["plan"].is_object() ? probability(number(row["plan"], "success_probability")) : "-");
+    }
+  }
+}
+
+}  // namespace
+
+void print_autonomy(const json& answer) {
+  if (const auto rows = answer.find("robots"); rows != answer.end()) {
+    print_fleet(*rows);
+  } else if (answer.contains("range_quantiles_m")) {
+    print_one(answer);
+  } else {
+    std::puts(answer.dump(2).c_str());
+  }
+}
+
+}  // namespace joulecast::client

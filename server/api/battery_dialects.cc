@@ -1,0 +1,115 @@
+#include "server/api/battery_dialects.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "battery/cell_shapes.h"
+#include "server/api/json_writer.h"
+
+namespace joulecast::api {
+namespace {
+
+// Constants of sensor_msgs/BatteryState.
+enum RosStatus { ros_unknown = 0, ros_charging = 1, ros_discharging = 2, ros_not_charging = 3, ros_full = 4 };
+constexpr int ros_health_unknown = 0, ros_health_good = 1;
+constexpr int ros_lithium_ion = 2, ros_iron_phosphate = 4;
+
+constexpr double least_current_share = 0.01;  // of the capacity, an hour: weaker currents are no charging
+constexpr double good_health = 0.7;
+
+void known(JsonWriter& json, std::string_view name, double value) {
+  if (std::isfinite(value)) json.field(name, value);
+}
+
+double percent(double fraction) {
+  return std::clamp(100 * fraction, 0.0, 100.0);
+}
+
+}  // namespace
+
+BatteryStatus battery_status(const robot::Battery& battery, const forecast::ChargeMap& map,
+                             const forecast::Charge& charge, const forecast::Reach& reach,
+                             const server::RobotSnapshot* live) {
+  BatteryStatus s;
+  s.charge = charge.fraction;
+  s.health = battery.ageing_factor.value_or(telemetry::unmeasured);
+  s.rated_capacity_ah = battery.capacity_ah;
+  s.voltage_v = s.current_a = telemetry::unmeasured;
+  if (live != nullptr && live->sample.utime_us != 0) {
+    s.voltage_v = live->sample.battery_voltage_v;
+    s.current_a = live->sample.battery_current_a;
+  }
+  // Regeneration is no charging: what the service has recognised counts, before it has seen enough the
+  // current.
+  const battery::ChargingPhase phase = live != nullptr ? live->charge.phase : battery::ChargingPhase::none;
+  const double weak_a = least_current_share * battery.capacity_ah;
+  const bool standing = live == nullptr || !(std::fabs(live->speed_m_s) > 0);
+  s.full = phase == battery::ChargingPhase::full;
+  s.charging = phase == battery::ChargingPhase::constant_current || phase == battery::ChargingPhase::taper ||
+               (phase != battery::ChargingPhase::full && standing && s.current_a < -weak_a);
+  if (!std::isfinite(s.voltage_v))
+    s.voltage_v = map.circuit().inner_voltage_v(battery::Circuit::rested(s.charge));
+  s.range_m = reach.range_m[0];
+  s.run_time_s = reach.run_time_s[0];
+  const std::string_view chemistry = battery::detect_pack(battery.nominal_voltage_v).cell->chemistry;
+  if (chemistry.find("phosphate") != std::string_view::npos) {
+    s.ros_technology = ros_iron_phosphate;
+  } else if (chemistry.find("lithium") != std::string_view::npos) {
+    s.ros_technology = ros_lithium_ion;
+  }
+  return s;
+}
+
+std::string battery_dialect(Dialect dialect, const BatteryStatus& s) {
+  JsonWriter json;
+  json.begin_object();
+  switch (dialect) {
+    case Dialect::joulecast:
+      break;
+    case Dialect::vda5050_3_0:
+      json.key("powerSupply").begin_object().field("stateOfCharge", percent(s.charge));
+      known(json, "batteryVoltage", s.voltage_v);
+      known(json, "batteryCurrent", -s.current_a);
+      if (std::isfinite(s.health)) json.field("batteryHealth", percent(s.health));
+      json.field("charging", s.charging);
+      known(json, "range", s.range_m);
+      json.end_object();
+      break;
+    case Dialect::vda5050_2_1:
+      json.key("batteryState").begin_object().field("batteryCharge", percent(s.charge));
+      known(json, "batteryVoltage", s.voltage_v);
+      if (std::isfinite(s.health))
+        json.field("batteryHealth", static_cast<std::int64_t>(std::floor(percent(s.health))));
+      json.field("charging", s.charging);
+      if (std::isfinite(s.range_m)) json.field("reach", static_cast<std::int64_t>(std::floor(s.range_m)));
+      json.end_object();
+      break;
+    case Dialect::massrobotics:
+      json.field("batteryPercentage", percent(s.charge));
+      known(json, "remainingRunTime", s.run_time_s / 3600);
+      break;
+    case Dialect::ros: {
+      const double capacity_ah = s.rated_capacity_ah * (std::isfinite(s.health) ? s.health : 1);
+      const int status = s.full                        ? ros_full
+                         : s.charging                  ? ros_charging
+                         : !std::isfinite(s.current_a) ? ros_unknown
+                         : s.current_a > 0             ? ros_discharging
+                                                       : ros_not_charging;
+      json.field("voltage", s.voltage_v).field("temperature", telemetry::unmeasured);
+      json.field("current", -s.current_a).field("charge", s.charge * capacity_ah);
+      json.field("capacity", capacity_ah).field("design_capacity", s.rated_capacity_ah);
+      json.field("percentage", s.charge).field("power_supply_status", status);
+      json.field("power_supply_health",
+                 std::isfinite(s.health) && s.health >= good_health ? ros_health_good : ros_health_unknown);
+      json.field("power_supply_technology", s.ros_technology).field("present", true);
+      json.key("cell_voltage").begin_array().end_array();
+      json.key("cell_temperature").begin_array().end_array();
+      json.field("location", "").field("serial_number", "");
+      break;
+    }
+  }
+  json.end_object();
+  return json.take();
+}
+
+}  // namespace joulecast::api

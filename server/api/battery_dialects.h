@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string>
+
+#include "forecast/outlook.h"
+#include "robot/robot_model.h"
+#include "server/api/autonomy_request.h"
+#include "server/ingest/fleet_view.h"
+
+namespace joulecast::api {
+
+// What the standards' battery messages are made of, in this project's units and signs. NaN: not known.
+struct BatteryStatus {
+  double charge = 0;     // 0 to 1
+  double health = 1;     // present over rated capacity
+  double voltage_v = 0;  // terminals; the model's where it is not measured
+  double current_a = 0;  // positive while discharging
+  double rated_capacity_ah = 0;
+  double range_m = 0;     // that nineteen of twenty such drives exceed
+  double run_time_s = 0;  // likewise
+  bool charging = false;
+  bool full = false;
+  int ros_technology = 0;  // POWER_SUPPLY_TECHNOLOGY_* of sensor_msgs/BatteryState
+};
+
+BatteryStatus battery_status(const robot::Battery& battery, const forecast::ChargeMap& map,
+                             const forecast::Charge& charge, const forecast::Reach& reach,
+                             const server::RobotSnapshot* live);
+
+// The status as another standard has it, JSON. What is not known is left out, in ROS null (its NaN).
+//   VDA 5050 3.0  {"powerSupply": {...}}: percent, V, A (negative while discharging), m
+//   VDA 5050 2.1  {"batteryState": {...}}: percent, V, whole percent of health, whole metres
+//   MassRobotics  percent and hours, members of the status report
+//   ROS           fields of sensor_msgs/BatteryState: fraction, A negative while discharging, Ah
+std::string battery_dialect(Dialect dialect, const BatteryStatus& status);
+
+}  // namespace joulecast::api

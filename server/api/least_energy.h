@@ -1,0 +1,38 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "forecast/outlook.h"
+#include "planning/cost_table_cache.h"
+#include "server/ingest/model_registry.h"
+
+namespace joulecast::api {
+
+// Prices legs driven as the planner would: minimum energy from stop to stop in free time, within the robot's
+// limits. Straight legs and turns come from the robot's cost table, which is made once for its model (some
+// tenths of a second) and kept; curves are solved one by one, equal ones once. Not thread-safe.
+class LeastEnergy {
+ public:
+  static Result<LeastEnergy> make(const server::ModelInForce& model, planning::CostTableCache& tables);
+
+  // Each stop is followed by the pause. Error: a leg that cannot be driven within the limits.
+  Result<std::vector<forecast::PricedLeg>> price(const std::vector<forecast::PlannedLeg>& legs,
+                                                 double pause_s);
+
+ private:
+  struct Curve {
+    forecast::PlannedLeg leg;
+    planning::LegCost cost;
+  };
+  LeastEnergy(std::shared_ptr<const planning::CostTable> table, const server::ModelInForce& model);
+  Result<forecast::LegCost> cost(const forecast::PlannedLeg& leg);
+  Result<planning::LegCost> curve(const forecast::PlannedLeg& leg);
+
+  std::shared_ptr<const planning::CostTable> table_;
+  const server::ModelInForce* model_;
+  double standing_w_;
+  std::vector<Curve> curves_;
+};
+
+}  // namespace joulecast::api

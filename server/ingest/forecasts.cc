@@ -1,0 +1,192 @@
+#include "server/ingest/forecasts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
+
+#include "forecast/siblings.h"
+
+namespace joulecast::server {
+namespace {
+
+using forecast::driving_count;
+using nlohmann::json;
+
+constexpr std::string_view topic = "legs";
+constexpr std::size_t most_lenders = 20;
+
+// Digits beyond the fifth are noise, and cost space.
+double shortened(double value) {
+  if (value == 0 || !std::isfinite(value)) return value;
+  const double scale = std::pow(10.0, 4 - std::floor(std::log10(std::fabs(value))));
+  return std::round(value * scale) / scale;
+}
+
+std::shared_ptr<const forecast::ChargeMap> charge_map(const robot::Battery& battery) {
+  return std::make_shared<const forecast::ChargeMap>(battery::Circuit(battery));
+}
+
+}  // namespace
+
+struct Forecasts::Entry {
+  std::mutex mutex;
+  std::string robot_id;
+  std::string kind;
+  std::shared_ptr<const ModelInForce> model;
+  std::unique_ptr<forecast::RobotForecast> forecast;
+  std::deque<forecast::PastMission> kept;
+  std::int64_t borrowed_at = -1;  // the kind's missions when its findings were pooled
+  RobotOutlook outlook;
+};
+
+Forecasts::Forecasts(const history::Store& store) : store_(store) {}
+Forecasts::~Forecasts() = default;
+
+std::string legs_json(const std::deque<forecast::PastMission>& missions) {
+  json document = json::array();
+  for (const forecast::PastMission& mission : missions) {
+    json legs = json::array();
+    for (const forecast::Leg& leg : mission.legs) {
+      legs.push_back({static_cast<int>(leg.motion), shortened(leg.duration_s), shortened(leg.way),
+                      shortened(leg.speed), shortened(leg.curvature_1_m), shortened(leg.payload_kg),
+                      shortened(leg.battery_j)});
+    }
+    document.push_back({mission.start_utime_us, std::move(legs)});
+  }
+  return document.dump();
+}
+
+std::optional<std::deque<forecast::PastMission>> legs_from_json(const std::string& text) {
+  const json document = json::parse(text, nullptr, false);
+  if (!document.is_array()) return std::nullopt;
+  std::deque<forecast::PastMission> missions;
+  try {
+    for (const json& entry : document) {
+      forecast::PastMission mission{entry.at(0).get<std::int64_t>(), {}};
+      for (const json& leg : entry.at(1)) {
+        const int motion = leg.at(0).get<int>();
+        if (motion < 0 || motion >= static_cast<int>(forecast::motion_count)) return std::nullopt;
+        mission.legs.push_back({static_cast<forecast::Motion>(motion), leg.at(1).get<double>(),
+                                leg.at(2).get<double>(), leg.at(3).get<double>(), leg.at(4).get<double>(),
+                                leg.at(5).get<double>(), leg.at(6).get<double>()});
+      }
+      missions.push_back(std::move(mission));
+    }
+  } catch (const json::exception&) {
+    return std::nullopt;
+  }
+  return missions;
+}
+
+std::string drift_json(const forecast::Drift& drift) {
+  return json{{"since_utime_us", drift.since_utime_us},
+              {"detected_utime_us", drift.detected_utime_us},
+              {"ratio", drift.ratio},
+              {"missions", drift.missions}}
+      .dump();
+}
+
+Forecasts::Entry& Forecasts::entry(const ModelInForce& model) {
+  const std::lock_guard lock(mutex_);
+  auto& slot = entries_[model.robot.robot_id];
+  if (slot == nullptr) {
+    slot = std::make_unique<Entry>();
+    slot->robot_id = model.robot.robot_id;
+  }
+  return *slot;
+}
+
+// With the entry's lock held: its forecast stands on this model, what the store kept learnt.
+void Forecasts::bring_up(Entry& entry, const std::shared_ptr<const ModelInForce>& model) {
+  if (entry.model == model) return;
+  const bool first = entry.forecast == nullptr;
+  entry.model = model;
+  entry.kind = forecast::kind_of(model->robot);
+  entry.outlook.model = model;
+  entry.outlook.battery = charge_map(model->robot.battery);
+  if (first) {
+    entry.forecast = std::make_unique<forecast::RobotForecast>(model->robot, model->drive);
+    borrow(entry);
+    if (const auto stored = store_.learned(entry.robot_id, topic); stored && stored->has_value()) {
+      if (auto missions = legs_from_json((*stored)->body_json)) entry.kept = std::move(*missions);
+    }
+    for (const forecast::PastMission& mission : entry.kept) entry.forecast->learn(mission);
+  } else {
+    entry.forecast->set_model(model->robot, model->drive);
+  }
+  lend(entry);
+  borrow(entry);
+  entry.outlook.forecaster = entry.forecast->forecaster();
+}
+
+void Forecasts::lend(Entry& entry) {
+  auto found =
+      std::make_shared<const std::array<forecast::OwnFinding, driving_count>>(entry.forecast->findings());
+  const std::lock_guard lock(mutex_);
+  Kind& kind = kinds_[entry.kind];
+  auto& slot = kind.findings[entry.robot_id];
+  kind.missions += (*found)[0].missions - (slot != nullptr ? (*slot)[0].missions : 0);
+  slot = std::move(found);
+}
+
+void Forecasts::borrow(Entry& entry) {
+  std::vector<std::shared_ptr<const std::array<forecast::OwnFinding, driving_count>>> lenders;
+  {
+    const std::lock_guard lock(mutex_);
+    Kind& kind = kinds_[entry.kind];
+    // A tenth more experience is worth pooling anew.
+    const std::int64_t news = kind.missions - entry.borrowed_at;
+    if (entry.borrowed_at >= 0 && 10 * news <= entry.borrowed_at) return;
+    entry.borrowed_at = kind.missions;
+    for (const auto& [id, finding] : kind.findings)
+      if (id != entry.robot_id && (*finding)[0].missions > 0) lenders.push_back(finding);
+  }
+  const std::size_t count = std::min(lenders.size(), most_lenders);
+  std::ranges::partial_sort(lenders, lenders.begin() + static_cast<std::ptrdiff_t>(count),
+                            std::ranges::greater{}, [](const auto& l) { return (*l)[0].missions; });
+  lenders.resize(count);
+  std::array<forecast::Siblings, driving_count> siblings;
+  for (std::size_t k = 0; k < driving_count; ++k) {
+    std::vector<const forecast::OwnFinding*> others;
+    for (const auto& lender : lenders) others.push_back(&(*lender)[k]);
+    siblings[k] = forecast::pool(others);
+  }
+  entry.forecast->set_siblings(std::move(siblings));
+  entry.outlook.forecaster = entry.forecast->forecaster();
+}
+
+RobotOutlook Forecasts::of(std::shared_ptr<const ModelInForce> model) {
+  Entry& slot = entry(*model);
+  const std::lock_guard lock(slot.mutex);
+  bring_up(slot, model);
+  borrow(slot);
+  return slot.outlook;
+}
+
+Forecasts::Learnt Forecasts::learn(const std::shared_ptr<const ModelInForce>& model,
+                                   forecast::PastMission mission) {
+  Entry& slot = entry(*model);
+  const std::lock_guard lock(slot.mutex);
+  bring_up(slot, model);
+  borrow(slot);
+  std::erase_if(mission.legs, [](const forecast::Leg& leg) { return !std::isfinite(leg.battery_j); });
+  Learnt learnt;
+  learnt.drift = slot.forecast->learn(mission);
+  if (!mission.legs.empty()) slot.kept.push_back(std::move(mission));
+  while (slot.kept.size() > kept_missions) slot.kept.pop_front();
+  lend(slot);
+  slot.outlook.forecaster = slot.forecast->forecaster();
+  learnt.document = {slot.robot_id, std::string(topic),
+                     slot.kept.empty() ? 0 : slot.kept.back().start_utime_us, legs_json(slot.kept)};
+  return learnt;
+}
+
+RobotOutlook Forecasts::untried(std::shared_ptr<const ModelInForce> model) {
+  const forecast::RobotForecast forecast(model->robot, model->drive);
+  auto battery = charge_map(model->robot.battery);
+  return {std::move(model), forecast.forecaster(), std::move(battery)};
+}
+
+}  // namespace joulecast::server

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "forecast/charge_map.h"
+#include "forecast/robot_forecast.h"
+#include "history/store.h"
+#include "server/ingest/model_registry.h"
+
+namespace joulecast::server {
+
+// What answers about a robot's future need, at one moment.
+struct RobotOutlook {
+  std::shared_ptr<const ModelInForce> model;
+  std::shared_ptr<const forecast::Forecaster> forecaster;
+  std::shared_ptr<const forecast::ChargeMap> battery;
+};
+
+// The forecasts of all robots: each learns from its missions as they end, lends to its siblings (robots of
+// equal body and motors) and borrows from them. The legs of the latest missions are kept in the store under
+// the topic "legs", from which a restarted daemon learns again. Any thread.
+class Forecasts {
+ public:
+  static constexpr std::size_t kept_missions = 40;  // in the store
+
+  explicit Forecasts(const history::Store& store);
+  ~Forecasts();
+
+  RobotOutlook of(std::shared_ptr<const ModelInForce> model);
+
+  // A mission ended.
+  struct Learnt {
+    history::Learned document;  // to be stored
+    std::optional<forecast::Drift> drift;
+  };
+  Learnt learn(const std::shared_ptr<const ModelInForce>& model, forecast::PastMission mission);
+
+  // The outlook of a robot without any past: for answers from a robot file alone.
+  static RobotOutlook untried(std::shared_ptr<const ModelInForce> model);
+
+ private:
+  struct Entry;
+  struct Kind {
+    std::map<std::string, std::shared_ptr<const std::array<forecast::OwnFinding, forecast::driving_count>>>
+        findings;
+    std::int64_t missions = 0;  // learnt by all
+  };
+
+  Entry& entry(const ModelInForce& model);
+  void bring_up(Entry& entry, const std::shared_ptr<const ModelInForce>& model);
+  void borrow(Entry& entry);
+  void lend(Entry& entry);
+
+  const history::Store& store_;
+  std::mutex mutex_;  // of the maps; taken after an entry's own
+  std::map<std::string, std::unique_ptr<Entry>, std::less<>> entries_;
+  std::map<std::string, Kind, std::less<>> kinds_;
+};
+
+// Stored form of past missions, and back; nothing when the text is not of that form.
+std::string legs_json(const std::deque<forecast::PastMission>& missions);
+std::optional<std::deque<forecast::PastMission>> legs_from_json(const std::string& text);
+
+// The audit log's entry of a drift.
+std::string drift_json(const forecast::Drift& drift);
+
+}  // namespace joulecast::server

@@ -1,0 +1,218 @@
+#include "server/api/autonomy.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+
+#include "server/api/battery_dialects.h"
+#include "tests/support/sample_robots.h"
+
+namespace joulecast::api {
+namespace {
+
+using nlohmann::json;
+
+class AutonomyAnswer : public ::testing::Test {
+ protected:
+  AutonomyAnswer() {
+    robot_ = server::Forecasts::untried(*server::model_in_force(testing::nomad(), 3));
+    live_.robot_id = "nomad";
+    live_.state_of_charge = 0.62;
+    live_.sample.utime_us = 1;
+    live_.sample.battery_voltage_v = 24.7;
+    live_.sample.battery_current_a = 1.5;
+    live_.sample.pose = {1, 2, 0};
+    live_.sample.payload_kg = 2;
+  }
+
+  json ask(const json& request) {
+    const auto text = autonomy_answer(request, robot_, &live_, tables_);
+    EXPECT_TRUE(text) << (text ? "" : describe(text.error())) << request;
+    return text ? json::parse(*text) : json::object();
+  }
+  Error fault(const json& request, const server::RobotSnapshot* live) {
+    const auto text = autonomy_answer(request, robot_, live, tables_);
+    EXPECT_FALSE(text) << request;
+    return text ? Error{} : text.error();
+  }
+
+  planning::CostTableCache tables_;
+  server::RobotOutlook robot_;
+  server::RobotSnapshot live_;
+};
+
+TEST_F(AutonomyAnswer, OfARobotAsItIs) {
+  const json a = ask(json::object());
+  EXPECT_EQ(a["model_version"], 3);
+  EXPECT_EQ(a["state_of_charge"], 0.62);
+  EXPECT_EQ(a["payload_kg"], 2);
+  EXPECT_EQ(a["consumption"]["basis"], "model");
+  EXPECT_TRUE(a["plan"].is_null());
+  EXPECT_LT(a["range_quantiles_m"]["p05"], a["range_m"]);
+  EXPECT_LT(a["range_m"], a["range_quantiles_m"]["p95"]);
+  EXPECT_NEAR(a["range_m"].get<double>(),
+              a["usable_energy_j"].get<double>() / a["consumption"]["energy_per_m_j"].get<double>(),
+              1e-6 * a["range_m"].get<double>());
+  // A heavier robot goes less far, a slower one at this idle power too.
+  EXPECT_LT(ask({{"payload_kg", 10}})["range_m"], a["range_m"]);
+  EXPECT_LT(ask({{"speed_m_s", 0.2}})["range_m"], a["range_m"]);
+  EXPECT_GT(ask({{"driving", "minimum_energy"}})["range_m"], ask({{"speed_m_s", 0.3}})["range_m"]);
+}
+
+TEST_F(AutonomyAnswer, OfATaskListEndsAtTheCharger) {
+  json tasks = json::array();
+  for (int k = 0; k < 4; ++k)
+    tasks.push_back({{"name", "t" + std::to_string(k)},
+                     {"turn_rad", 1.57},
+                     {"distance_m", 2000},
+                     {"payload_kg", 2.5 * k},
+                     {"dwell_s", 60}});
+  const json a = ask({{"state_of_charge", 0.5},
+                      {"reserve_fraction", 0.2},
+                      {"tasks", tasks},
+                      {"charger", {{"x_m", 0}, {"y_m", 0}}},
+                      {"confidence", 0.9}});
+  const json& plan = a["plan"];
+  ASSERT_EQ(plan["legs"].size(), 4u);
+  ASSERT_TRUE(plan["charger"].is_object());
+  double before = 0, summed = 0;
+  for (const json& leg : plan["legs"]) {
+    EXPECT_GT(leg["ends_after_s"], before);
+    before = leg["ends_after_s"];
+    summed += leg["expected_energy_j"].get<double>();
+    EXPECT_LE(leg["arrival_charge"]["p05"], leg["arrival_charge"]["p95"]);
+  }
+  summed += plan["charger"]["expected_energy_j"].get<double>();
+  EXPECT_NEAR(summed, plan["expected_energy_j"].get<double>(), 1e-6 * summed);
+  EXPECT_EQ(plan["success_probability"], plan["charger"]["success_probability"]);
+  // Heavier loads cost more.
+  EXPECT_GT(plan["legs"][3]["expected_energy_j"], plan["legs"][0]["expected_energy_j"]);
+  ASSERT_TRUE(plan["latest_departure"].is_object());
+  EXPECT_GE(plan["latest_departure"]["probability"], 0.9);
+  const json& best = a["minimum_energy"];
+  ASSERT_TRUE(best.is_object());
+  EXPECT_GT(best["saved_j"], 0);
+  EXPECT_GE(best["success_probability"], plan["success_probability"]);
+}
+
+TEST_F(AutonomyAnswer, TheFiltersUncertaintyOfTheChargeCounts) {
+  live_.charge.estimate.sd = 0.03;
+  const json a = ask(json::object());
+  EXPECT_EQ(a["state_of_charge_sd"], 0.03);
+  EXPECT_GT(a["usable_energy_sd_j"], 0);
+  EXPECT_EQ(ask({{"state_of_charge", 0.62}})["state_of_charge_sd"], 0);
+}
+
+TEST_F(AutonomyAnswer, PathAndDistanceAreOneTask) {
+  const json by_path =
+      ask({{"state_of_charge", 0.5}, {"tasks", {{{"path", {{{"kind", "straight"}, {"length_m", 30}}}}}}}});
+  const json by_distance = ask({{"state_of_charge", 0.5}, {"tasks", {{{"distance_m", 30}}}}});
+  EXPECT_NEAR(by_path["plan"]["expected_energy_j"].get<double>(),
+              by_distance["plan"]["expected_energy_j"].get<double>(), 1e-6);
+}
+
+TEST_F(AutonomyAnswer, FaultsNameTheField) {
+  EXPECT_EQ(fault(json::object(), nullptr).field, "/state_of_charge");
+  EXPECT_EQ(fault(json::object(), nullptr).fault, Fault::infeasible);
+  EXPECT_EQ(fault({{"tasks", {{{"distance_m", 5}, {"payload_kg", 99}}}}}, &live_).field,
+            "/tasks/0/payload_kg");
+  EXPECT_EQ(fault({{"tasks", {{{"distance_m", -5}}}}}, &live_).field, "/tasks/0/distance_m");
+  EXPECT_EQ(fault({{"tasks", {{{"no", 1}}}}}, &live_).field, "/tasks/0/no");
+  EXPECT_EQ(fault({{"tasks", {{{"path", json::array()}}}}}, &live_).field, "/tasks/0/path");
+  EXPECT_EQ(fault({{"dialect", "klingon"}}, &live_).field, "/dialect");
+  EXPECT_EQ(fault({{"confidence", 1}}, &live_).field, "/confidence");
+  EXPECT_EQ(fault({{"to_charger_m", 5}, {"tasks", {{{"distance_m", 5}}}}}, &live_).field,
+            "/tasks/0/to_charger_m");
+  EXPECT_EQ(fault({{"charger", {{"x_m", 0}}}}, &live_).field, "/charger/y_m");
+}
+
+// The rules below are those of the standards' published schemas: VDA 5050 3.0 state.powerSupply, VDA 5050 2.1
+// state.batteryState, MassRobotics AMR Interoperability 1.0 statusReport, ROS 2 sensor_msgs/msg/BatteryState.
+class BatteryDialect : public AutonomyAnswer {
+ protected:
+  json in(const char* dialect) { return ask({{"dialect", dialect}}); }
+};
+
+TEST_F(BatteryDialect, Vda5050Version3HasPercentMetresAndNegativeDischarge) {
+  const json d = in("vda5050-3.0");
+  ASSERT_EQ(d.size(), 1u);
+  const json& s = d["powerSupply"];
+  EXPECT_NEAR(s["stateOfCharge"].get<double>(), 62, 1e-12);
+  EXPECT_EQ(s["batteryVoltage"], 24.7);
+  EXPECT_EQ(s["batteryCurrent"], -1.5);
+  EXPECT_EQ(s["charging"], false);
+  EXPECT_EQ(s["range"], ask(json::object())["range_quantiles_m"]["p05"]);
+  EXPECT_FALSE(s.contains("batteryHealth"));  // not known: left out, never 0
+  for (const auto& [key, value] : s.items())
+    EXPECT_TRUE(std::set<std::string>({"stateOfCharge", "batteryVoltage", "batteryCurrent", "batteryHealth",
+                                       "charging", "range"})
+                    .contains(key))
+        << key;
+}
+
+TEST_F(BatteryDialect, Vda5050Version2HasWholeMetresOfReach) {
+  const json d = in("vda5050-2.1");
+  ASSERT_EQ(d.size(), 1u);
+  const json& s = d["batteryState"];
+  EXPECT_NEAR(s["batteryCharge"].get<double>(), 62, 1e-12);
+  EXPECT_EQ(s["charging"], false);
+  ASSERT_TRUE(s["reach"].is_number_integer());  // uint32
+  EXPECT_EQ(s["reach"].get<double>(),
+            std::floor(ask(json::object())["range_quantiles_m"]["p05"].get<double>()));
+  EXPECT_FALSE(s.contains("stateOfCharge"));
+  EXPECT_FALSE(s.contains("range"));
+}
+
+TEST_F(BatteryDialect, MassRoboticsHasPercentAndHours) {
+  const json d = in("massrobotics");
+  EXPECT_EQ(d.size(), 2u);
+  EXPECT_NEAR(d["batteryPercentage"].get<double>(), 62, 1e-12);
+  EXPECT_NEAR(d["remainingRunTime"].get<double>() * 3600,
+              ask(json::object())["run_time_quantiles_s"]["p05"].get<double>(), 1e-6);
+}
+
+TEST_F(BatteryDialect, RosHasAFractionAndNegativeDischarge) {
+  const json d = in("ros");
+  for (const char* field :
+       {"voltage", "temperature", "current", "charge", "capacity", "design_capacity", "percentage",
+        "power_supply_status", "power_supply_health", "power_supply_technology", "present", "cell_voltage",
+        "cell_temperature", "location", "serial_number"})
+    EXPECT_TRUE(d.contains(field)) << field;
+  EXPECT_EQ(d.size(), 15u);
+  EXPECT_EQ(d["percentage"], 0.62);
+  EXPECT_EQ(d["current"], -1.5);
+  EXPECT_NEAR(d["charge"].get<double>(), 0.62 * 18, 1e-12);
+  EXPECT_EQ(d["design_capacity"], 18);
+  EXPECT_EQ(d["power_supply_status"], 2);   // DISCHARGING
+  EXPECT_TRUE(d["temperature"].is_null());  // NaN
+}
+
+TEST_F(BatteryDialect, ChargingTurnsSignAndStatus) {
+  live_.sample.battery_current_a = -4;
+  EXPECT_EQ(in("vda5050-3.0")["powerSupply"]["charging"], true);
+  EXPECT_EQ(in("vda5050-3.0")["powerSupply"]["batteryCurrent"], 4);
+  EXPECT_EQ(in("vda5050-2.1")["batteryState"]["charging"], true);
+  EXPECT_EQ(in("ros")["power_supply_status"], 1);  // CHARGING
+  EXPECT_EQ(in("ros")["current"], 4);
+  live_.speed_m_s = 0.5;  // braking, not charging
+  EXPECT_EQ(in("vda5050-3.0")["powerSupply"]["charging"], false);
+  live_.charge.phase = battery::ChargingPhase::taper;
+  EXPECT_EQ(in("vda5050-3.0")["powerSupply"]["charging"], true);
+  live_.charge.phase = battery::ChargingPhase::full;
+  EXPECT_EQ(in("ros")["power_supply_status"], 4);  // FULL
+  EXPECT_EQ(in("vda5050-2.1")["batteryState"]["charging"], false);
+}
+
+TEST_F(BatteryDialect, WhatIsNotMeasuredIsNeverZero) {
+  live_.sample.battery_current_a = live_.sample.battery_voltage_v = std::nan("");
+  EXPECT_FALSE(in("vda5050-3.0")["powerSupply"].contains("batteryCurrent"));
+  EXPECT_TRUE(in("ros")["current"].is_null());
+  EXPECT_EQ(in("ros")["power_supply_status"], 0);  // UNKNOWN
+  EXPECT_GT(in("ros")["voltage"], 20);             // mandatory: the model's
+}
+
+}  // namespace
+}  // namespace joulecast::api
