@@ -102,9 +102,9 @@ Result<std::string> answer(const Options& options, const Question& question, con
   if (!options.server.empty()) return ask_server(options, question, request);
   auto robot = robot::load_robot(options.robot_file);
   if (!robot) return tl::unexpected(robot.error());
-  auto drive = dynamics::drive_model(*robot);
-  if (!drive) return tl::unexpected(drive.error());
-  return question.offline(request, {std::move(*robot), std::move(*drive), file_version});
+  const auto model = server::model_in_force(std::move(*robot), file_version);
+  if (!model) return tl::unexpected(model.error());
+  return question.offline(request, **model);
 }
 
 extern const Question profile;
@@ -213,7 +213,9 @@ std::pair<CLI::App*, std::shared_ptr<Options>> add(CLI::App& program, Exit& exit
   auto* file =
       command->add_option("--robot", options->robot_file, "robot file: answer here, without a server");
   auto* server = command->add_option("--server", options->server, "joulecastd to ask, http://host:port");
-  auto* id = command->add_option("--robot-id", options->robot_id, "which robot of the server");
+  auto* id = command->add_option(
+      "--robot-id", options->robot_id,
+      question.fleet ? "which robot of the server; without it, all of them" : "which robot of the server");
   server->excludes(file);
   if (!question.fleet) server->needs(id);
   id->needs(server);
@@ -294,11 +296,6 @@ void add_autonomy(CLI::App& program, Exit& exit) {
   command->add_option("--dialect", options->texts[1].second, "answer as another standard's battery message")
       ->check(CLI::IsMember(
           std::vector<std::string>(std::begin(api::dialect_names), std::end(api::dialect_names))));
-  command->footer(
-      "Without --robot-id all robots of the server are asked. A list of tasks comes with --request, e.g.\n"
-      R"(  {"tasks": [{"name": "fetch", "distance_m": 40, "payload_kg": 20, "dwell_s": 30}],)"
-      "\n"
-      R"(   "charger": {"x_m": 0, "y_m": 0}, "reserve_fraction": 0.2, "confidence": 0.95})");
 }
 
 }  // namespace joulecast::client

@@ -22,6 +22,7 @@ constexpr Examples table[] = {
     {"estimate", "joulecast estimate --robot amr.json --length 10 --payload 20"},
     {"autonomy",
      "joulecast autonomy --robot amr.json --charge 0.6 --payload 20\n"
+     "joulecast autonomy --robot amr.json --charge 0.6 --dialect vda5050-3.0\n"
      "joulecast autonomy --server http://127.0.0.1:8080 --robot-id amr"},
     {"matrix", "joulecast matrix tasks.json --robot amr.json"},
     {"missions", "joulecast missions --server http://127.0.0.1:8080 --robot-id amr --limit 20"},

@@ -59,6 +59,8 @@ def cell(text):
 def fields(document, schema, prefix="", depth=3):
     """Rows of a table of an object's fields, those of objects within it after theirs; nothing for what is no object."""
     schema = resolve(document, schema)
+    if not prefix and "anyOf" in schema:  # the first form of several answers is the one described
+        schema = resolve(document, schema["anyOf"][0])
     required = set(schema.get("required", ()))
     rows = []
     for name, field in schema.get("properties", {}).items():
