@@ -26,11 +26,11 @@ import urllib.request
 
 from harness import Programs, check
 
-# Effects that change energy, with strengths that add about 4 to 12 % of it on the shipped robots.
+# Effects that change energy, with strengths that add some per cent of it on the shipped robots.
 EFFECTS = {
-    "coulomb_friction": (0.4, 0.9), "viscous_friction": (4, 10), "load_rolling_resistance": (0.015, 0.035),
-    "turning_scrub": (0.1, 0.25), "gear_efficiency": (0.08, 0.2), "chassis_mass_error": (0.5, 1.0),
-    "accessory_load": (1.5, 3.5), "driver_loss": (0.1, 0.25), "resistance_error": (0.8, 2.0), "torque_constant_loss": (0.08, 0.16),
+    "coulomb_friction": (0.4, 0.9), "viscous_friction": (12, 25), "load_rolling_resistance": (0.015, 0.035),
+    "turning_scrub": (0.1, 0.25), "gear_efficiency": (0.25, 0.5), "chassis_mass_error": (0.5, 1.0),
+    "accessory_load": (1.5, 3.5), "driver_loss": (0.1, 0.25), "resistance_error": (0.8, 2.0), "torque_constant_loss": (0.2, 0.35),
 }
 KINDS = ["nomad", "amr", "tug"]
 HISTORY_MISSIONS, NEW_MISSIONS = 12, 6
@@ -40,7 +40,7 @@ def options():
     parser = argparse.ArgumentParser()
     for name in ("daemon", "client", "source", "shared"):
         parser.add_argument("--" + name, required=True)
-    parser.add_argument("--robots", type=int, default=3)
+    parser.add_argument("--robots", type=int, default=4)
     parser.add_argument("--seed", type=int, default=1)
     return parser.parse_args()
 
