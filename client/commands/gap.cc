@@ -122,7 +122,8 @@ Exit run(const Options& options) {
     missions.apply = options.apply;
     return gap_from_missions(missions, *robot);
   }
-  const auto recordings = gap::load_recordings(options.logs, options.robot_id);
+  const auto recordings =
+      gap::load_recordings(options.logs, options.robot_id.empty() ? robot->robot_id : options.robot_id);
   if (!recordings) return report(recordings.error());
   if (!options.compare_by.empty())
     return gap_between_groups(*recordings, *robot, options.compare_by, options.json, options.report,
@@ -176,7 +177,8 @@ void add_gap(CLI::App& program, Exit& exit) {
                  "with --missions: judge the robot file even where the table brings a model's energies")
       ->needs(missions);
   auto* robot = command->add_option("--robot", options->robot_file, "robot file: the model");
-  command->add_option("--robot-id", options->robot_id, "which robot, where the logs hold several");
+  command->add_option("--robot-id", options->robot_id,
+                      "which robot of the logs, where it is not the robot file's own");
   command->add_flag("--json", options->json, "print the diagnosis as JSON");
   command->add_option("--report", options->report,
                       "write the diagnosis as one HTML page with its maps and plots");

@@ -8,6 +8,9 @@ namespace {
 
 using dynamics::Dual;
 
+// Where a current changes sign within a window, nobody knows what the brushes drop.
+constexpr double clear_sign = 0.995;
+
 // Copper heat for any time constant, between the ones that windows carry.
 std::array<double, 2> heat_at(const Window& w, double time_constant_s) {
   const auto& grid = heat_time_constants_s;
@@ -79,7 +82,7 @@ S metered_power(const dynamics::BasicDriveModel<S>& model, const Window& w) {
 }
 
 template <class S>
-ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w) {
+ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w, bool judge_power) {
   const auto& p = model.parameters();
   const S delay = p.sensor_delay_s - w.electrical_shift_s;  // that the windows still carry
   ChannelValues<S> r;
@@ -93,9 +96,15 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
     // except the measured current in the voltage's.
     const S reading = w.current_a[s] + delay * w.current_slope_a_s[s];
     const S current = (reading - p.motor_current.bias) / (S(1) + p.motor_current.gain);
-    r[index_of(Channel::voltage_right) + s] =
-        w.voltage_v[s] + delay * w.voltage_slope_v_s[s] -
-        (S(1) + p.motor_voltage.gain) * model.voltage_for(s, current, at) - p.motor_voltage.bias;
+    // The brushes' share by the mean sign under the window, not by the sign of the mean.
+    const S voltage =
+        model.voltage_for(s, current, at) +
+        p.brush_drop_v * (S(w.current_sign[s]) - dynamics::smooth_sign(current, dynamics::brush_width_a));
+    if (w.resting[s] || std::fabs(w.current_sign[s]) > clear_sign) {
+      r[index_of(Channel::voltage_right) + s] = w.voltage_v[s] + delay * w.voltage_slope_v_s[s] -
+                                                (S(1) + p.motor_voltage.gain) * voltage -
+                                                p.motor_voltage.bias;
+    }
     if (w.moving[s]) {
       r[index_of(Channel::torque_right) + s] =
           reading - (S(1) + p.motor_current.gain) * model.current_for(balance.total_nm[s]) -
@@ -110,7 +119,8 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
                 p.driver_loss * motor_abs + p.unreturned * braking;
   r[index_of(Channel::bus)] = S(w.battery_power_w) - model.metered_battery_power(bus, w.battery_voltage_v);
   const auto settled = [&](std::size_t s) { return w.moving[s] || w.resting[s]; };
-  if (settled(0) && settled(1)) r[index_of(Channel::power)] = S(w.battery_power_w) - metered_power(model, w);
+  if (judge_power && settled(0) && settled(1))
+    r[index_of(Channel::power)] = S(w.battery_power_w) - metered_power(model, w);
   // How far the open-circuit voltage is from the nominal one is a nuisance of its own.
   r[index_of(Channel::battery_voltage)] =
       S(w.battery_voltage_v) - (S(1) + p.battery_voltage.gain) * p.battery_voltage_v +
@@ -127,7 +137,7 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
 
 template double metered_power(const dynamics::BasicDriveModel<double>&, const Window&);
 template Dual metered_power(const dynamics::BasicDriveModel<Dual>&, const Window&);
-template ChannelValues<double> residuals(const dynamics::BasicDriveModel<double>&, const Window&);
-template ChannelValues<Dual> residuals(const dynamics::BasicDriveModel<Dual>&, const Window&);
+template ChannelValues<double> residuals(const dynamics::BasicDriveModel<double>&, const Window&, bool);
+template ChannelValues<Dual> residuals(const dynamics::BasicDriveModel<Dual>&, const Window&, bool);
 
 }  // namespace joulecast::gap

@@ -34,13 +34,15 @@ std::string_view name_of(Channel channel);
 template <class S>
 using ChannelValues = std::array<S, channel_count>;
 
-// Residuals of one window. Value NaN: the channel does not speak here.
+// Residuals of one window. Value NaN: the channel does not speak here. Channel::power costs as much as the
+// others together and is left out unless `judge_power`.
 template <class S>
-ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w);
+ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w, bool judge_power);
 
-extern template ChannelValues<double> residuals(const dynamics::BasicDriveModel<double>&, const Window&);
+extern template ChannelValues<double> residuals(const dynamics::BasicDriveModel<double>&, const Window&,
+                                                bool);
 extern template ChannelValues<dynamics::Dual> residuals(const dynamics::BasicDriveModel<dynamics::Dual>&,
-                                                        const Window&);
+                                                        const Window&, bool);
 
 // The battery power that the motion asks, as the robot's meter would read it [W].
 template <class S>

@@ -51,7 +51,7 @@ struct Zone {
 struct Shapes {
   std::vector<Zone> zones;  // found for floor_resistance_zone
   std::vector<double> scrub_rates_rad_s{0.01, 0.03, 0.1, 0.3};
-  std::vector<double> stribeck_speeds_m_s{0.05, 0.1, 0.2, 0.4};
+  std::vector<double> stribeck_speeds_m_s{0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4};
   std::vector<double> winding_time_constants_s{heat_time_constants_s.begin(), heat_time_constants_s.end()};
 
   // Closer values around those of a chosen effect, `factor` apart.
@@ -61,9 +61,10 @@ struct Shapes {
 // All regressors of one diagnosis, linearised where the chosen effects put the model.
 class ColumnSet {
  public:
-  // `power`: the motor channels are missing, so that battery power is judged from motion.
-  ColumnSet(const robot::RobotModel& robot, std::span<const Window> windows, bool power,
-            const Shapes& shapes);
+  // `power`: the motor channels are missing, so that battery power is judged from motion. `gap_share`: how
+  // large the gap is beside battery power, noise taken off; formulas are trusted to a part of it.
+  ColumnSet(const robot::RobotModel& robot, std::span<const Window> windows, bool power, const Shapes& shapes,
+            double gap_share);
 
   // Differentiates around these effects from now on; at first around none.
   void linearise_around(std::span<const Chosen> chosen);
@@ -96,7 +97,7 @@ class ColumnSet {
   };
   void add_effect(const dynamics::Effect& effect, dynamics::EffectValues<double> values,
                   std::size_t parameter, double variants);
-  void scale(std::span<const Window> windows);
+  void scale(std::span<const Window> windows, double gap_share);
 
   robot::RobotModel robot_;
   std::vector<dynamics::ActiveEffect> adopted_;  // of the robot file, always in force

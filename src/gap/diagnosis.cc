@@ -16,6 +16,8 @@ namespace {
 // An effect or an outside family that moves less than this share of the mean power is no finding.
 constexpr double least_effect_share = 0.011;
 constexpr double least_outside_share = 0.012;
+constexpr double least_outside_part = 0.2;     // and than this part of the gap
+constexpr double least_necessary_part = 0.05;  // of the gap, that comes back when an effect is left out
 constexpr double alternative_odds = 0.04;
 constexpr std::size_t most_alternatives = 2;
 constexpr std::size_t fewest_windows = 40;
@@ -23,6 +25,10 @@ constexpr double bootstrap_block_s = 10;
 constexpr int bootstrap_draws = 400;
 constexpr double settled_delay_s = 0.006;
 constexpr int most_delay_rounds = 4;
+constexpr double largest_unexplained_share = 0.016;
+constexpr double formula_accuracy = 0.015;
+constexpr double largest_gap_share = 0.12;  // to which the trust in formulas is scaled
+constexpr double calibration_share = 0.5;
 
 // How large a coefficient is beside what a robot as filed may have.
 bool beyond_tolerance(const ColumnSet& columns, const Evidence::Estimate& estimate, const Hypothesis& h) {
@@ -32,6 +38,15 @@ bool beyond_tolerance(const ColumnSet& columns, const Evidence::Estimate& estima
                     std::fabs(estimate.mean[static_cast<Eigen::Index>(j)]) / columns.columns()[j].tolerance);
   }
   return size > 2.5;
+}
+
+// Whether an effect has to show in battery power to be worth a name. These are seen by other channels (gyro,
+// map, battery voltage, the shape of transients) however little power they move.
+bool acts_on_power(const Hypothesis& h) {
+  constexpr auto elsewhere = std::to_array<std::string_view>(
+      {"wheel_radius_error", "wheel_radius_asymmetry", "track_error", "wheel_slip", "com_offset",
+       "battery_resistance", "inductance", "sensor_delay"});
+  return std::ranges::find(elsewhere, h.id()) == elsewhere.end();
 }
 
 // Explanations with what does not matter taken out, and the odds of those that become the same added up.
@@ -53,7 +68,35 @@ struct Posterior {
 
 constexpr double leading = 14;  // explanations this far below the best in log odds are let go
 
-Posterior posterior_of(const Fit& fit, const MovedShares& moved) {
+// Whether an outside family bends an effect along the variable that the effect itself follows: a departure of
+// its shape (a square zone for a round one), not something else.
+bool bends(const Hypothesis& family, const Hypothesis& effect) {
+  struct Bend {
+    std::string_view effect, channel, variable;
+  };
+  constexpr auto bends =
+      std::to_array<Bend>({{"floor_resistance_zone", "wheel_torque", "position"},
+                           {"slope", "wheel_torque", "heading"},
+                           {"slope", "wheel_torque", "position"},
+                           {"stribeck_friction", "wheel_torque", "speed"},
+                           {"turning_scrub", "wheel_torque", "yaw_rate"},
+                           {"gear_efficiency", "wheel_torque", "acceleration"},
+                           {"load_rolling_resistance", "wheel_torque", "payload"},
+                           {"brush_drop", "motor_voltage", "current"},
+                           {"winding_temperature", "motor_voltage", "time"},
+                           {"no_regeneration", "battery_power_from_motors", "acceleration"},
+                           {"driver_loss", "battery_power_from_motors", "speed"},
+                           {"floor_resistance_zone", "battery_power_from_motion", "position"},
+                           {"slope", "battery_power_from_motion", "heading"},
+                           {"turning_scrub", "battery_power_from_motion", "yaw_rate"},
+                           {"no_regeneration", "battery_power_from_motion", "acceleration"}});
+  return std::ranges::any_of(bends, [&](const Bend& b) {
+    return b.effect == effect.id() && b.channel == family.channel && b.variable == family.variable;
+  });
+}
+
+Posterior posterior_of(const Fit& fit, const MovedShares& moved, double gap_share) {
+  const double least_outside = std::max(least_outside_share, least_outside_part * gap_share);
   Posterior posterior;
   double total = 0;
   std::size_t looked_at = 0;
@@ -66,11 +109,16 @@ Posterior posterior_of(const Fit& fit, const MovedShares& moved) {
     for (std::size_t k = 0; k < e.hypotheses.size(); ++k) {
       const Hypothesis& h = fit.columns->hypotheses()[e.hypotheses[k]];
       const double share = moved(h, estimate.mean);
-      const bool matters =
-          h.outside() ? share > least_outside_share
-                      : share > least_effect_share || (fit.columns->columns()[h.columns[0]].power_w <=
-                                                           0.05 * fit.columns->mean_power_w() / h.expected &&
-                                                       beyond_tolerance(*fit.columns, estimate, h));
+      const bool bent =
+          h.outside() && std::ranges::any_of(e.hypotheses, [&](std::size_t other) {
+            const Hypothesis& effect = fit.columns->hypotheses()[other];
+            return !effect.outside() && bends(h, effect) && share < moved(effect, estimate.mean);
+          });
+      if (bent) continue;
+      const bool matters = h.outside()
+                               ? share > least_outside
+                               : share > least_effect_share ||
+                                     (!acts_on_power(h) && beyond_tolerance(*fit.columns, estimate, h));
       if (!matters) continue;
       kept.push_back(e.hypotheses[k]);
       outside = outside || h.outside();
@@ -150,6 +198,10 @@ std::vector<DiagnosedParameter> parameters_of(const ColumnSet& columns, const Ch
   } else {
     parameters[h.parameter].deviation = sd(h.columns[0]);
   }
+  // What the equations say of the strength, how far the formula holds, and what calibration alone may hold.
+  parameters[h.parameter].deviation =
+      std::hypot(parameters[h.parameter].deviation, formula_accuracy * active.values[h.parameter],
+                 calibration_share * columns.columns()[h.columns[0]].tolerance);
   return parameters;
 }
 
@@ -222,6 +274,38 @@ std::vector<double> power_of_motors(std::span<const Window> windows, const robot
   return power;
 }
 
+// Effects that act on power but are not needed for it: leaving them out and fitting the others again hardly
+// opens the gap. What they describe is the shape of the others.
+std::vector<std::size_t> necessary(const Fit& fit, const robot::RobotModel& robot,
+                                   std::vector<std::size_t> set, std::span<const Window> windows,
+                                   std::span<const double> measured, const Diagnosis& d) {
+  const ColumnSet& columns = *fit.columns;
+  const auto gap_with = [&](const std::vector<std::size_t>& some) {
+    const auto effects = columns.effects_of(coefficients_of(fit, fit.total, some));
+    return gap_size(measured, modelled_power(robot, effects, windows)).absolute_relative;
+  };
+  const auto named = [&](std::size_t h) { return !columns.hypotheses()[h].outside(); };
+  while (std::ranges::count_if(set, named) > 1) {
+    const double with_all = gap_with(set);
+    double least = least_necessary_part * d.power_absolute_relative;
+    auto spare = set.end();
+    for (auto it = set.begin(); it != set.end(); ++it) {
+      const Hypothesis& h = columns.hypotheses()[*it];
+      if (h.outside() || !acts_on_power(h)) continue;
+      std::vector<std::size_t> others = set;
+      std::erase(others, *it);
+      const double opened = gap_with(others) - with_all;
+      if (opened < least) {
+        least = opened;
+        spare = it;
+      }
+    }
+    if (spare == set.end()) break;
+    set.erase(spare);
+  }
+  return set;
+}
+
 double found_delay(const FitResult& result) {
   for (const dynamics::ActiveEffect& effect : result.fit.columns->effects_of(result.chosen)) {
     if (effect.effect->info().id == "sensor_delay") return effect.values[0];
@@ -273,10 +357,13 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
   d.power = with_battery > 0 ? PowerSource::battery
             : with_power > 0 ? PowerSource::motors
                              : PowerSource::none;
-  if (windows.size() < fewest_windows) return invalid("log", "holds too little motion to judge");
-  d.motor_channels = !without_motor_channels(windows);
-  if (with_battery == 0 && !d.motor_channels)
-    return invalid("log", "measures neither battery power nor motor current");
+  d.motor_channels = !windows.empty() && !without_motor_channels(windows);
+  if (windows.size() < fewest_windows || (with_battery == 0 && !d.motor_channels)) {
+    // Too little motion, or neither battery power nor motor currents: nothing can be said.
+    d.noise_floor = d.energy_relative = d.power_absolute_relative = missing;
+    d.next_drive = first_drives(robot);
+    return d;
+  }
   const std::vector<double> modelled = modelled_power(robot, {}, windows);
   const GapSize size = gap_size(measured, modelled);
   d.energy_relative = with_power > 0 ? size.energy_relative : missing;
@@ -284,11 +371,14 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
   d.noise_floor = with_power > 0 ? noise_floor(windows, measured, modelled) : missing;
   d.where = localise(windows, robot, modelled);
 
+  const double gap_share =
+      with_power > 0 ? std::clamp(d.power_absolute_relative - d.noise_floor, 0.0, largest_gap_share) : 0.0;
+
   // A delay is linear only while it is short beside the window: what is found is taken out and fitted again.
   std::vector<Window> judged = windows;
   std::optional<FitResult> result;
   for (int round = 0;; ++round) {
-    result = fit_windows(robot, judged, settings.progress, settings.parts);
+    result = fit_windows(robot, judged, gap_share, settings.progress, settings.parts);
     if (!result) return fail(Fault::conflict, "", "diagnosis cancelled");
     const double shift = judged.front().electrical_shift_s, delay = found_delay(*result);
     if (std::fabs(delay - shift) < settled_delay_s || round >= most_delay_rounds) break;
@@ -301,10 +391,10 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
   const Fit& fit = result->fit;
   const ColumnSet& columns = *fit.columns;
   const MovedShares moved(fit, judged);
-  const Posterior posterior = posterior_of(fit, moved);
+  const Posterior posterior = posterior_of(fit, moved, gap_share);
   const auto best =
       std::ranges::max_element(posterior.sets, {}, [](const auto& entry) { return entry.second; });
-  const std::vector<std::size_t>& set = best->first;
+  const std::vector<std::size_t> set = necessary(fit, robot, best->first, judged, judged_power, d);
 
   std::vector<std::size_t> named, unknown;
   for (const std::size_t h : set) (columns.hypotheses()[h].outside() ? unknown : named).push_back(h);
@@ -353,8 +443,11 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
     std::erase_if(d.effects,
                   [&](const DiagnosedEffect& e) { return e.probability < settings.report_probability; });
   } else if (named.empty()) {
-    d.verdict = posterior.none >= settings.report_probability ? Verdict::none : Verdict::inconclusive;
-    d.verdict_probability = posterior.none;
+    // Nothing named is no clean bill while a gap stands that noise does not make.
+    const bool open = d.power_absolute_relative - d.noise_floor > largest_unexplained_share;
+    const bool none = posterior.none >= settings.report_probability && !open;
+    d.verdict = none ? Verdict::none : Verdict::inconclusive;
+    d.verdict_probability = none ? posterior.none : 1 - posterior.none;
     d.effects.clear();
   } else {
     d.verdict = weakest_group >= settings.report_probability ? Verdict::effects : Verdict::inconclusive;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "gap/zone_scan.h"
 
@@ -12,9 +13,10 @@ constexpr int most_rounds = 4;
 constexpr double settled = 0.01;  // relative change of every coefficient
 
 Fit make_fit(const robot::RobotModel& robot, std::span<const Window> windows, bool power,
-             const Shapes& shapes, std::span<const dynamics::ActiveEffect> around, const MethodParts& parts) {
+             const Shapes& shapes, double gap_share, std::span<const dynamics::ActiveEffect> around,
+             const MethodParts& parts) {
   Fit fit;
-  fit.columns = std::make_unique<ColumnSet>(robot, windows, power, shapes);
+  fit.columns = std::make_unique<ColumnSet>(robot, windows, power, shapes, gap_share);
   fit.columns->leave_out(parts);
   std::vector<Chosen> chosen;
   for (const dynamics::ActiveEffect& effect : around) {
@@ -82,19 +84,23 @@ double MovedShares::operator()(const Hypothesis& hypothesis, const Eigen::Vector
   if (values_[h].size() == 0) return 0;
   const auto own = coefficients.segment(static_cast<Eigen::Index>(hypothesis.columns.front()),
                                         static_cast<Eigen::Index>(hypothesis.columns.size()));
-  return (values_[h] * own).cwiseAbs().sum() / static_cast<double>(samples_[h]) *
-         columns[hypothesis.columns.front()].power_w / columns_.mean_power_w();
+  const double unit = columns[hypothesis.columns.front()].power_w / columns_.mean_power_w();
+  // Windows average most of a wheel's turn out, but power does not: the mean size of its sinusoids, which
+  // are those of both wheels.
+  if (hypothesis.variable == "wheel_angle") return std::numbers::inv_pi * own.norm() * unit;
+  return (values_[h] * own).cwiseAbs().sum() / static_cast<double>(samples_[h]) * unit;
 }
 
 std::optional<FitResult> fit_windows(const robot::RobotModel& robot, std::span<const Window> windows,
-                                     const std::function<bool(double)>& goes_on, const MethodParts& parts) {
+                                     double gap_share, const std::function<bool(double)>& goes_on,
+                                     const MethodParts& parts) {
   const auto cancelled = [&](double part) { return goes_on && !goes_on(part); };
   const bool power = without_motor_channels(windows);
   FitResult result;
   if (ranges_of(windows, robot).position) {
     Shapes scan;
     scan.zones = {everywhere};
-    ColumnSet columns(robot, windows, power, scan);
+    ColumnSet columns(robot, windows, power, scan, gap_share);
     columns.leave_out(parts);
     const auto zone = std::ranges::find_if(
         columns.hypotheses(), [](const Hypothesis& h) { return h.id() == "floor_resistance_zone"; });
@@ -108,7 +114,7 @@ std::optional<FitResult> fit_windows(const robot::RobotModel& robot, std::span<c
   std::vector<dynamics::ActiveEffect> around;
   double factor = 1.5;
   for (int round = 0; round < most_rounds; ++round) {
-    result.fit = make_fit(robot, windows, power, result.shapes, around, parts);
+    result.fit = make_fit(robot, windows, power, result.shapes, gap_share, around, parts);
     if (cancelled(0.35 + 0.12 * (round + 1))) return std::nullopt;
     const Fit& fit = result.fit;
     const Explanation& best = fit.explanations.front();

@@ -31,7 +31,7 @@ bool without_motor_channels(std::span<const Window> windows);
 // Searches, then linearises around the effects found, narrows their shapes and searches again until the set
 // stands. Cancelled (empty) when `goes_on` returns false.
 std::optional<FitResult> fit_windows(const robot::RobotModel& robot, std::span<const Window> windows,
-                                     const std::function<bool(double)>& goes_on,
+                                     double gap_share, const std::function<bool(double)>& goes_on,
                                      const MethodParts& parts = {});
 
 // How much of the mean battery power hypotheses move (of the range of their own variable for kinematic

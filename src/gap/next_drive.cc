@@ -71,6 +71,7 @@ class Driver {
         n.motor_power_w[s] = n.voltage_v[s] * n.current_a[s];
         n.motor_power_abs_w[s] = std::fabs(n.motor_power_w[s]);
         n.braking_w[s] = std::max(0.0, -n.motor_power_w[s]);
+        n.current_sign[s] = n.current_a[s] > 0 ? 1.0 : n.current_a[s] < 0 ? -1.0 : 0.0;
         const double copper = robot_.motor.resistance_ohm * n.current_a[s] * n.current_a[s];
         for (std::size_t q = 0; q < heat_time_constants_s.size(); ++q) {
           heat_[q][s] += (copper - heat_[q][s]) * (1 - std::exp(-step_s / heat_time_constants_s[q]));
@@ -163,6 +164,15 @@ Information expected_information(const Fit& fit, const std::vector<Window>& wind
 }
 
 }  // namespace
+
+std::vector<NextDrive> first_drives(const robot::RobotModel& robot) {
+  std::vector<NextDrive> drives;
+  for (const Manoeuvre& m : manoeuvres(robot)) {
+    if (drives.size() == most_drives) break;
+    drives.push_back({m.text, "a gap from none", missing});
+  }
+  return drives;
+}
 
 std::vector<NextDrive> next_drives(const Fit& fit, const robot::RobotModel& robot,
                                    const Diagnosis& diagnosis) {

@@ -12,4 +12,7 @@ namespace joulecast::gap {
 std::vector<NextDrive> next_drives(const Fit& fit, const robot::RobotModel& robot,
                                    const Diagnosis& diagnosis);
 
+// What to drive before anything can be said: the first of the list.
+std::vector<NextDrive> first_drives(const robot::RobotModel& robot);
+
 }  // namespace joulecast::gap

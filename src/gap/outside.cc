@@ -131,9 +131,8 @@ void load_position(const Window& w, const Ranges& r, std::size_t, std::span<doub
 }
 void load_battery(const Window& w, const Ranges& r, std::size_t, std::span<double> out) {
   // By the motors' power: the battery's own reading would carry the noise of what it is compared with.
-  const double i = (w.motor_power_w[0] + w.motor_power_w[1]) / (r.battery_current_a * w.battery_voltage_v);
-  out[0] = i;
-  out[1] = i * std::fabs(i);
+  out[0] = (r.idle_power_w + w.motor_power_w[0] + w.motor_power_w[1]) /
+           (r.battery_current_a * w.battery_voltage_v);
 }
 void power_heading(const Window& w, const Ranges& r, std::size_t, std::span<double> out) {
   headings(w, 1.0, out);
@@ -180,6 +179,7 @@ Ranges ranges_of(std::span<const Window> windows, const robot::RobotModel& robot
   Ranges r;
   r.wheel_radius_m = robot.kinematics.wheel_radius_m;
   r.half_track_m = robot.kinematics.half_track_m;
+  r.idle_power_w = robot.idle_power_w;
   double speed = 0, wheel = 0, acceleration = 0, yaw = 0, payload_low = 1e300, payload_high = 0, duration = 1,
          current = 0, battery = 0;
   double x_low = 1e300, x_high = -1e300, y_low = 1e300, y_high = -1e300;
@@ -247,7 +247,7 @@ std::vector<OutsideFamily> outside_families(const Ranges& ranges, bool power) {
       {"speed", gyro, 3, yaw_speed},
       {"speed", travel, 3, travel_speed},
   };
-  if (!power) families.push_back({"battery_current", load, 2, load_battery});
+  if (!power) families.push_back({"battery_current", load, 1, load_battery});
   if (ranges.payload_varies) {
     families.push_back({"payload", torque_right, 3, torque_payload});
     families.push_back({"payload", load, 2, load_payload});

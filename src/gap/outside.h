@@ -14,7 +14,7 @@ struct Ranges {
   double duration_s = 1, current_a = 1, battery_current_a = 1;
   double x_low_m = 0, x_high_m = 1, y_low_m = 0, y_high_m = 1;
   bool position = false, heading = false, payload_varies = false;
-  double wheel_radius_m = 1, half_track_m = 1;
+  double wheel_radius_m = 1, half_track_m = 1, idle_power_w = 0;
 };
 
 Ranges ranges_of(std::span<const Window> windows, const robot::RobotModel& robot);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "telemetry/codec.h"
@@ -47,6 +48,17 @@ class Collector {
   std::vector<telemetry::Recording> missions_;
 };
 
+// At most three of the names, then how many more.
+std::string listed(const std::set<std::string, std::less<>>& names) {
+  std::string text;
+  std::size_t count = 0;
+  for (const std::string& name : names) {
+    if (count == 3) return text + " and " + std::to_string(names.size() - count) + " more";
+    text += (count++ > 0 ? ", " : "") + name;
+  }
+  return text;
+}
+
 bool usable(const telemetry::Sample& sample) {
   return std::isfinite(sample.wheel_velocity_rad_s[0]) && std::isfinite(sample.wheel_velocity_rad_s[1]);
 }
@@ -78,11 +90,15 @@ Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<teleme
 
 Result<RecordingSet> load_recordings(std::span<const std::string> paths, const std::string& robot_id) {
   std::map<std::string, Collector, std::less<>> robots;
+  std::set<std::string, std::less<>> others;
   std::size_t unreadable = 0;
   const auto take = [&](const telemetry::LogEvent& event) -> Result<bool> {
     const auto channel = telemetry::parse_channel(event.channel);
     if (!channel || channel->subject == telemetry::Subject::energy_state) return true;
-    if (!robot_id.empty() && channel->robot_id != robot_id) return true;
+    if (!robot_id.empty() && channel->robot_id != robot_id) {
+      others.emplace(channel->robot_id);
+      return true;
+    }
     Collector& robot = robots[std::string(channel->robot_id)];
     if (channel->subject == telemetry::Subject::telemetry) {
       if (const auto decoded = telemetry::decode_telemetry(event.data)) {
@@ -103,8 +119,12 @@ Result<RecordingSet> load_recordings(std::span<const std::string> paths, const s
       return tl::unexpected(std::move(read.error()));
   }
   unreadable += tally.damaged_places;
-  if (robots.empty())
-    return invalid("log", "holds no telemetry" + (robot_id.empty() ? "" : " of " + robot_id));
+  if (robots.empty()) {
+    std::string text = "holds no telemetry";
+    if (!robot_id.empty()) text += " of " + robot_id;
+    if (!others.empty()) text += ", only of " + listed(others);
+    return invalid("log", text);
+  }
   if (robots.size() > 1) {
     return invalid("log", "holds " + std::to_string(robots.size()) + " robots; name the one to diagnose");
   }

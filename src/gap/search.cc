@@ -2,13 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 namespace joulecast::gap {
 namespace {
 
 double log_twice_normal(double z) {  // log(2 Phi(z))
-  return std::log(std::max(std::erfc(-z / std::sqrt(2.0)), 1e-300));
+  if (z > -20) return std::log(std::erfc(-z / std::numbers::sqrt2));
+  // Far below zero by the asymptotic series, where the tail itself underflows.
+  return -0.5 * z * z - std::log(-z * std::sqrt(0.5 * std::numbers::pi)) + std::log1p(-1 / (z * z));
+}
+
+// Slip and a smaller wheel are one thing to every channel but the inertia's.
+bool moves_less_than_it_rolls(const Hypothesis& h) {
+  const std::string_view id = h.effect.effect->info().id;
+  return id == "wheel_slip" || id == "wheel_radius_error";
 }
 
 }  // namespace
@@ -112,7 +121,8 @@ std::vector<Explanation> search(const Evidence& evidence, const SearchSettings& 
         // One variant of an effect at a time.
         const bool taken = std::ranges::any_of(base.hypotheses, [&](std::size_t other) {
           return other == h || (!all[other].outside() && !all[h].outside() &&
-                                all[other].effect.effect == all[h].effect.effect);
+                                (all[other].effect.effect == all[h].effect.effect ||
+                                 (moves_less_than_it_rolls(all[other]) && moves_less_than_it_rolls(all[h]))));
         });
         if (taken) continue;
         Explanation candidate = base;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "dynamics/parameters.h"
+
 namespace joulecast::gap {
 namespace {
 
@@ -16,7 +18,8 @@ constexpr std::size_t block_windows = 50;
 // One mission's channels as columns, with what needs every sample worked out.
 struct Columns {
   std::vector<double> t;
-  std::array<std::vector<double>, 2> speed, smooth_speed, voltage, current, power, power_abs, braking, angle;
+  std::array<std::vector<double>, 2> speed, smooth_speed, voltage, current, power, power_abs, braking, angle,
+      current_sign;
   std::vector<double> battery_voltage, battery_current, battery_power, yaw_rate, x, y, heading, payload,
       charge;
   std::array<std::vector<double>, 2> copper;
@@ -74,6 +77,10 @@ Columns columns_of(const telemetry::Recording& mission, const robot::RobotModel&
     c.power[s].resize(n);
     c.power_abs[s].resize(n);
     c.braking[s].resize(n);
+    c.current_sign[s].resize(n);
+    const double soft_a = 0.1 * robot.motor.friction_torque_nm[s] /
+                              (robot.motor.torque_constant_nm_a * robot.motor.gear_ratio) +
+                          dynamics::brush_width_a;
     c.copper[s].resize(n);
     c.angle[s].resize(n);
     for (std::size_t k = 0; k < n; ++k) {
@@ -81,6 +88,7 @@ Columns columns_of(const telemetry::Recording& mission, const robot::RobotModel&
       const double power = volts[k] * amps[k];
       c.power_abs[s][k] = std::fabs(power);
       c.braking[s][k] = std::max(0.0, -power);
+      c.current_sign[s][k] = std::isfinite(amps[k]) ? std::tanh(amps[k] / soft_a) : 0.0;
       double current = amps[k];
       if (!std::isfinite(current)) {
         // No motor current: the nominal friction current heats the winding.
@@ -257,6 +265,8 @@ Window window_at(const Columns& c, const Heat& heat, std::size_t first, std::siz
     w.motor_power_w[s] = shape.mean(c.power[s]);
     w.motor_power_abs_w[s] = shape.mean(c.power_abs[s]);
     w.braking_w[s] = shape.mean(c.braking[s]);
+    // At rest the reading is noise about nothing.
+    w.current_sign[s] = w.resting[s] ? 0.0 : shape.mean(c.current_sign[s]);
     for (std::size_t q = 0; q < heat.size(); ++q) w.copper_heat_w[q][s] = shape.mean(heat[q][s]);
     for (std::size_t k = first; k < last; ++k) {
       const double weight = shape.weights()[k - first];

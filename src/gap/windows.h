@@ -31,6 +31,7 @@ struct Window {
   std::array<double, 2> voltage_slope_v_s{}, current_slope_a_s{};
   std::array<double, 2> motor_power_w{missing, missing};
   std::array<double, 2> motor_power_abs_w{}, braking_w{};  // mean |V i| and mean of -V i while negative
+  std::array<double, 2> current_sign{};  // mean sign of the current, soft below a tenth of the friction's
   std::array<std::array<double, 2>, heat_time_constants_s.size()> copper_heat_w{};
   double battery_voltage_v = missing, battery_current_a = missing, battery_power_w = missing;
   double battery_power_slope_w_s = 0, battery_current_slope_a_s = 0;

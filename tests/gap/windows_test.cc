@@ -58,7 +58,7 @@ TEST_P(AnyRate, TheModelLeavesNoResidualOfItself) {
   const dynamics::DriveModel model(robot, {});
   for (const bool motors : {true, false}) {
     for (const Window& w : make_windows(steady_ramp(robot, GetParam(), motors), robot)) {
-      const auto r = residuals(model, w);
+      const auto r = residuals(model, w, true);
       for (const Channel c : {Channel::voltage_right, Channel::torque_left}) {
         if (motors) {
           // Dry friction fades as (width/speed)^2/2; its curvature over a window leaves below 1e-8.

@@ -6,7 +6,7 @@ namespace joulecast::dynamics {
 
 struct AerodynamicDrag {
   static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"coefficient_n_s2_m2", "N s^2/m^2", 0, 0, 200, "drag over speed squared"}});
+      {{"coefficient_n_s2_m2", "N s^2/m^2", 0, 0, 1000, "drag over speed squared"}});
   static constexpr EffectInfo info{"aerodynamic_drag", ActsOn::wheel_torque, "F = a v |v|, a = rho A C / 2",
                                    "still air",        "thesis (1-3), F_a",  parameters};
 

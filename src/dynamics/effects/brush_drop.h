@@ -6,7 +6,7 @@ namespace joulecast::dynamics {
 
 struct BrushDrop {
   static constexpr std::array parameters =
-      std::to_array<EffectParameter>({{"voltage_v", "V", 0, 0, 10, "across both brushes"}});
+      std::to_array<EffectParameter>({{"voltage_v", "V", 0, 0, 20, "across both brushes"}});
   static constexpr EffectInfo info{"brush_drop",
                                    ActsOn::motor,
                                    "V + a sgn(i)",

@@ -6,7 +6,7 @@ namespace joulecast::dynamics {
 
 struct CoulombFriction {
   static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"ratio", "1", 0, -0.9, 5, "extra internal dry friction over the nominal T_m of each side"}});
+      {{"ratio", "1", 0, -0.9, 20, "extra internal dry friction over the nominal T_m of each side"}});
   static constexpr EffectInfo info{"coulomb_friction",
                                    ActsOn::wheel_torque,
                                    "T = (1 + a) T_m sgn(w)",

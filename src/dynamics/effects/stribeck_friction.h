@@ -6,7 +6,7 @@ namespace joulecast::dynamics {
 
 struct StribeckFriction {
   static constexpr std::array parameters =
-      std::to_array<EffectParameter>({{"ratio", "1", 0, 0, 5, "breakaway friction above T_m, over T_m"},
+      std::to_array<EffectParameter>({{"ratio", "1", 0, 0, 20, "breakaway friction above T_m, over T_m"},
                                       {"speed_rad_s", "rad/s", 2, 0.2, 20, "Stribeck speed of the wheel"}});
   static constexpr EffectInfo info{"stribeck_friction",
                                    ActsOn::wheel_torque,

@@ -6,7 +6,7 @@ namespace joulecast::dynamics {
 
 struct WindingTemperature {
   static constexpr std::array parameters =
-      std::to_array<EffectParameter>({{"thermal_resistance_k_w", "K/W", 0, 0, 100, "winding over ambient"},
+      std::to_array<EffectParameter>({{"thermal_resistance_k_w", "K/W", 0, 0, 300, "winding over ambient"},
                                       {"time_constant_s", "s", 600, 10, 7200, "of the winding"}});
   static constexpr EffectInfo info{
       "winding_temperature",

@@ -1,0 +1,77 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "client/virtual_robot/fleet.h"
+#include "gap/diagnosis.h"
+#include "gap/diagnosis_json.h"
+#include "robot/robot_file.h"
+
+namespace joulecast::gap {
+namespace {
+
+robot::RobotModel shipped() {
+  return *robot::parse_robot(virtual_robot::shipped_robots()[0].json_text);
+}
+
+// A robot that rolls at one speed; `power` whether its battery is metered.
+telemetry::Recording rolling(double duration_s, bool power) {
+  telemetry::Recording r;
+  for (int k = 0; 0.02 * k < duration_s; ++k) {
+    telemetry::Sample s;
+    s.utime_us = 20'000 * k;
+    s.wheel_velocity_rad_s = {3, 3};
+    if (power) {
+      s.battery_voltage_v = 24;
+      s.battery_current_a = 2;
+    }
+    r.samples.push_back(s);
+  }
+  return r;
+}
+
+TEST(FewData, AreInconclusiveAndAskForADrive) {
+  const auto set = make_recording_set("r", {rolling(6, true)});
+  ASSERT_TRUE(set);
+  const auto d = diagnose(*set, shipped());
+  ASSERT_TRUE(d);
+  EXPECT_EQ(d->verdict, Verdict::inconclusive);
+  EXPECT_TRUE(d->effects.empty());
+  EXPECT_FALSE(d->next_drive.empty());
+  const auto json = nlohmann::json::parse(to_json_text(*d));
+  EXPECT_TRUE(json["gap"]["power_absolute_relative"].is_null());
+  EXPECT_EQ(json["verdict"], "inconclusive");
+}
+
+TEST(FewData, WithoutElectricalReadingsNothingIsSaid) {
+  const auto set = make_recording_set("r", {rolling(60, false)});
+  ASSERT_TRUE(set);
+  const auto d = diagnose(*set, shipped());
+  ASSERT_TRUE(d);
+  EXPECT_EQ(d->verdict, Verdict::inconclusive);
+  EXPECT_FALSE(d->motor_channels);
+}
+
+TEST(FewData, AMissionTooShortIsRefused) {
+  const auto set = make_recording_set("r", {rolling(3, true)});
+  ASSERT_FALSE(set);
+  EXPECT_EQ(set.error().fault, Fault::invalid);
+}
+
+TEST(FewData, AnEndlessStandstillNamesNothing) {
+  telemetry::Recording r = rolling(60, true);
+  for (auto& s : r.samples) s.wheel_velocity_rad_s = {0, 0};
+  const auto set = make_recording_set("r", {r});
+  const auto d = diagnose(*set, shipped());
+  ASSERT_TRUE(d);
+  for (const DiagnosedEffect& e : d->effects) {
+    // A load that is always on is all that standing can show.
+    EXPECT_TRUE(e.id == "accessory_load" || e.id == "current_sensor_bias" || e.id == "voltage_sensor_gain" ||
+                e.id == "current_sensor_gain")
+        << e.id;
+  }
+}
+
+}  // namespace
+}  // namespace joulecast::gap
