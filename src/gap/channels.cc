@@ -9,7 +9,7 @@ namespace {
 using dynamics::Dual;
 
 // Where a current changes sign within a window, nobody knows what the brushes drop.
-constexpr double clear_sign = 0.995;
+constexpr double clear_sign = 0.9;
 
 // Copper heat for any time constant, between the ones that windows carry.
 std::array<double, 2> heat_at(const Window& w, double time_constant_s) {

@@ -64,7 +64,7 @@ class ColumnSet {
   // `power`: the motor channels are missing, so that battery power is judged from motion. `gap_share`: how
   // large the gap is beside battery power, noise taken off; formulas are trusted to a part of it.
   ColumnSet(const robot::RobotModel& robot, std::span<const Window> windows, bool power, const Shapes& shapes,
-            double gap_share);
+            double gap_share = 0);
 
   // Differentiates around these effects from now on; at first around none.
   void linearise_around(std::span<const Chosen> chosen);

@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "client/virtual_robot/fleet.h"
 #include "client/virtual_robot/simulate.h"
 #include "gap/diagnosis.h"
@@ -59,7 +62,33 @@ TEST(VirtualRobot, AnUnknownLoadIsOutside) {
   const Diagnosis d = diagnose_virtual({{"x_heading_load", 12}}, 13, true);
   EXPECT_EQ(name_of(d.verdict), "outside");
   EXPECT_EQ(d.outside.follows, "heading");
-  EXPECT_TRUE(d.effects.empty());
+  // Its mean is a constant load like any other, but nothing to be sure of.
+  for (const DiagnosedEffect& effect : d.effects) EXPECT_LT(effect.probability, 0.9) << effect.id;
+}
+
+TEST(VirtualRobot, SlipThatBurnsWhatItSlipsIsNamed) {
+  const Diagnosis d = diagnose_virtual({{"wheel_slip", 0.1}}, 14, true);
+  ASSERT_EQ(d.effects.size(), 1u);
+  // A smaller wheel differs from it by its lever alone.
+  const auto& others = d.effects[0].alternatives;
+  EXPECT_TRUE(d.effects[0].id == "wheel_slip" || std::ranges::find(others, "wheel_slip") != others.end())
+      << d.effects[0].id;
+  EXPECT_NEAR(std::fabs(d.effects[0].parameters[0].value), 0.1, 0.01);
+}
+
+TEST(VirtualRobot, ABrushDropIsNotTakenForResistance) {
+  const Diagnosis d = diagnose_virtual({{"brush_drop", 1.2}}, 15, true);
+  ASSERT_EQ(d.effects.size(), 1u);
+  EXPECT_EQ(d.effects[0].id, "brush_drop");
+  EXPECT_NEAR(d.effects[0].parameters[0].value, 1.2, 0.12);
+}
+
+TEST(VirtualRobot, ALoadThatFollowsTheBatteryCurrentIsNoSureSensorError) {
+  const Diagnosis d = diagnose_virtual({{"x_sag_load", 8}}, 16, true);
+  EXPECT_TRUE(d.verdict == Verdict::outside || d.verdict == Verdict::inconclusive)
+      << name_of(d.verdict) << ": " << (d.effects.empty() ? "" : d.effects[0].id) << ", outside "
+      << d.outside.probability;
+  for (const DiagnosedEffect& effect : d.effects) EXPECT_LT(effect.probability, 0.9) << effect.id;
 }
 
 }  // namespace
