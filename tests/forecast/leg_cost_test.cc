@@ -38,7 +38,8 @@ TEST(LegPricer, AgreesWithTheBaselinesQuadrature) {
       const double top = turning ? pace.yaw_rate_rad_s : pace.speed_m_s;
       const double v = std::min(top, std::sqrt(leg.way * a));
       const double duration[] = {leg.way / v + v / a};
-      const auto baseline = planning::ramp_baseline(drive, path_of(leg), duration, 0, 0, v / a / duration[0]);
+      const auto baseline = planning::ramp_baseline(*planning::DriveLoads::make(robot, {}), path_of(leg),
+                                                    duration, 0, 0, v / a / duration[0]);
       ASSERT_TRUE(baseline);
       EXPECT_NEAR(cost.duration_s, duration[0], 1e-9 * duration[0]);
       dynamics::Instant at;
