@@ -2,6 +2,7 @@ import { Component } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { html } from '../html.js';
 import * as format from '../format.js';
+import { post } from '../api.js';
 import { useLive } from '../live.js';
 import { mission_link, robot_link } from '../route.js';
 import { Sparkline } from '../sparkline.js';
@@ -9,6 +10,25 @@ import { useTheme } from '../theme.js';
 import { Choice, Empty, Failure, Loading, Quantity, Readout, useTitleOf } from '../widgets.js';
 
 const row_px = 46, spare_rows = 8, reorder_ms = 3000, low_charge = 0.25;
+
+const forecast_ms = 30_000;
+
+// Each robot's range with its band, as the service forecasts it; the live value stands in until it is there.
+function useRanges() {
+  const [ranges, set_ranges] = useState(new Map());
+  useEffect(() => {
+    const look = () => post('/v1/autonomy', {}).then((told) => set_ranges(new Map(told.robots.map((r) => [r.robot_id, r.range_quantiles_m]))), () => {});
+    look();
+    const timer = setInterval(look, forecast_ms);
+    return () => clearInterval(timer);
+  }, []);
+  return ranges;
+}
+
+function Range({ live, band }) {
+  if (!band || band.p50 === null) return html`<${Quantity} of=${format.length(live)} />`;
+  return html`<${Quantity} of=${format.length(band.p50)} /><span class="band"><span class="hidden">90 % between </span>${format.length(band.p05).n}–${format.text(format.length(band.p95))}</span>`;
+}
 
 const by = (value) => (a, b) => {
   const va = value(a.state), vb = value(b.state);
@@ -52,9 +72,9 @@ export function Charge({ share }) {
 
 class Row extends Component {
   shouldComponentUpdate(next) {
-    return next.revision !== this.props.revision || next.entry !== this.props.entry || next.index !== this.props.index || next.dark !== this.props.dark;
+    return next.revision !== this.props.revision || next.entry !== this.props.entry || next.index !== this.props.index || next.dark !== this.props.dark || next.band !== this.props.band;
   }
-  render({ entry, index, revision, dark }) {
+  render({ entry, index, revision, dark, band }) {
     const s = entry.state;
     const modelled_only = s.measured_power_w === null;
     return html`<tr aria-rowindex=${index + 2} class=${s.live ? '' : 'quiet'}>
@@ -63,7 +83,7 @@ class Row extends Component {
       <td class="figure power"><${Quantity} of=${format.power(s.measured_power_w ?? s.modelled_power_w)} />${modelled_only && s.modelled_power_w !== null && html`<span class="note"> mod.</span>`}</td>
       <td class="spark"><${Sparkline} track=${entry.power} revision=${revision} dark=${dark} /></td>
       <td class="charge"><${Charge} share=${s.state_of_charge} /></td>
-      <td class="figure"><${Quantity} of=${format.length(s.range_m)} /></td>
+      <td class="figure"><${Range} live=${s.range_m} band=${band} /></td>
       <td class="figure wide">${format.span(s.run_time_s)}</td>
       <td class="figure wide"><${Quantity} of=${format.unit(s.speed_m_s, 'm/s', 2)} /></td>
       <td class="mission">${s.mission ? html`<a href=${mission_link(s.mission.id)}>${s.mission.mission_id}</a>` : html`<span class="note">idle</span>`}</td>
@@ -147,7 +167,7 @@ function Summary({ robots }) {
 
 export function Fleet() {
   useTitleOf('Fleet');
-  const live = useLive(), dark = useTheme();
+  const live = useLive(), dark = useTheme(), ranges = useRanges();
   const [text, set_text] = useState('');
   const [only, set_only] = useState('all');
   const [sort, set_sort] = useState({ key: 'robot', down: false });
@@ -172,7 +192,7 @@ export function Fleet() {
         ${c.sort ? html`<button type="button" onClick=${() => turn(c.key)}>${c.title}<span class="arrow" aria-hidden="true">${c.key === sort.key ? (sort.down ? '▾' : '▴') : ''}</span></button>` : c.title}</th>`)}</tr></thead>
       <tbody ref=${body}>
         ${first > 0 && html`<tr key="above" aria-hidden="true" class="spacer"><td colspan=${columns.length} style=${{ height: `${first * row_px}px` }}></td></tr>`}
-        ${rows.slice(first, last).map((entry, k) => html`<${Row} key=${entry.id} entry=${entry} revision=${entry.revision} index=${first + k} dark=${dark} />`)}
+        ${rows.slice(first, last).map((entry, k) => html`<${Row} key=${entry.id} entry=${entry} revision=${entry.revision} index=${first + k} dark=${dark} band=${ranges.get(entry.id)} />`)}
         ${last < rows.length && html`<tr key="below" aria-hidden="true" class="spacer"><td colspan=${columns.length} style=${{ height: `${(rows.length - last) * row_px}px` }}></td></tr>`}
       </tbody>
     </table>
