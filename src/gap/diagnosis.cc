@@ -26,6 +26,7 @@ constexpr int bootstrap_draws = 400;
 constexpr double settled_delay_s = 0.006;
 constexpr int most_delay_rounds = 4;
 constexpr double largest_unexplained_share = 0.016;
+constexpr double least_deviations = 1.64;
 constexpr double most_outside = 0.3;     // posterior of something unknown beside a sure finding
 constexpr double surest_verdict = 0.97;  // what verdicts of posterior 1 came true in development trials
 constexpr double formula_accuracy = 0.015;
@@ -112,24 +113,29 @@ Posterior posterior_of(const Fit& fit, const MovedShares& moved, double gap_shar
   for (const Explanation& e : fit.explanations) {
     if (e.log_odds < fit.explanations.front().log_odds - leading || ++looked_at > 60) break;
     const double weight = std::exp(e.log_odds - fit.explanations.front().log_odds);
+    // Families that bend an effect are taken out first: what then is left of the effect has to matter.
+    std::vector<std::size_t> straight = e.hypotheses;
+    Evidence::Estimate estimate = fit.evidence->estimate(straight);
+    std::erase_if(straight, [&](std::size_t k) {
+      const Hypothesis& h = fit.columns->hypotheses()[k];
+      return h.outside() && std::ranges::any_of(e.hypotheses, [&](std::size_t other) {
+               const Hypothesis& effect = fit.columns->hypotheses()[other];
+               return !effect.outside() && bends(h, effect) &&
+                      moved(h, estimate.mean) < moved(effect, estimate.mean);
+             });
+    });
+    if (straight.size() < e.hypotheses.size()) estimate = fit.evidence->estimate(straight);
     std::vector<std::size_t> kept;
-    const Evidence::Estimate estimate = fit.evidence->estimate(e.hypotheses);
     bool outside = false;
-    for (std::size_t k = 0; k < e.hypotheses.size(); ++k) {
-      const Hypothesis& h = fit.columns->hypotheses()[e.hypotheses[k]];
+    for (const std::size_t k : straight) {
+      const Hypothesis& h = fit.columns->hypotheses()[k];
       const double share = moved(h, estimate.mean);
-      const bool bent =
-          h.outside() && std::ranges::any_of(e.hypotheses, [&](std::size_t other) {
-            const Hypothesis& effect = fit.columns->hypotheses()[other];
-            return !effect.outside() && bends(h, effect) && share < moved(effect, estimate.mean);
-          });
-      if (bent) continue;
       const bool matters = h.outside()
                                ? share > least_outside
                                : share > least_effect_share ||
                                      (!shows_in_power(h.id()) && beyond_tolerance(*fit.columns, estimate, h));
       if (!matters) continue;
-      kept.push_back(e.hypotheses[k]);
+      kept.push_back(k);
       outside = outside || h.outside();
     }
     posterior.sets[kept] += weight;
@@ -294,6 +300,14 @@ std::vector<std::size_t> necessary(const Fit& fit, const robot::RobotModel& robo
     return gap_size(measured, modelled_power(robot, effects, windows)).absolute_relative;
   };
   const auto named = [&](std::size_t h) { return !columns.hypotheses()[h].outside(); };
+  // A strength that its own uncertainty reaches round is no finding, however the odds stand.
+  const Evidence::Estimate estimate = fit.evidence->estimate(set);
+  std::erase_if(set, [&](std::size_t h) {
+    return named(h) && std::ranges::all_of(columns.hypotheses()[h].columns, [&](std::size_t k) {
+             const auto j = static_cast<Eigen::Index>(k);
+             return std::fabs(estimate.mean[j]) < least_deviations * estimate.sd[j];
+           });
+  });
   while (std::ranges::count_if(set, named) > 1) {
     const double with_all = gap_with(set);
     double least = least_necessary_part * d.power_absolute_relative;
