@@ -18,7 +18,7 @@ from pathlib import Path
 from sandbox import SKIP, Sandbox, multicast_here
 
 NUMBER = re.compile(r"[-+]?(?<![A-Za-z_])\d[\d.,]*(?:[eE][-+]?\d+)?")
-HEXADECIMAL_ID = re.compile(r"\b(?=[a-f]*\d)(?=\d*[a-f])[0-9a-f]{8,}\b")
+HEXADECIMAL_ID = re.compile(r"(?<![\w.])(?=[a-f]*\d)(?=\d*[a-f])[0-9a-f]{8,}\b")
 BLOCK = re.compile(r"^```(console|sh)\n(.*?)^```$", re.S | re.M)
 
 
