@@ -24,6 +24,11 @@ function state_of(k, now_ms) {
   };
 }
 
+function range_of(k) {
+  const median = 900 + 31 * k;
+  return { robot_id: `amr-${String(k + 1).padStart(3, '0')}`, range_quantiles_m: { p05: 0.8 * median, p50: median, p95: 1.3 * median } };
+}
+
 // {url, close()}; `robots` of them, each told once a second, spread over it.
 export async function serve_many_robots(page_directory, robots) {
   const streams = new Set();
@@ -37,6 +42,8 @@ export async function serve_many_robots(page_directory, robots) {
     if (url.pathname === '/v1/robots') {
       const now = Date.now();
       send(JSON.stringify({ robots: Array.from({ length: robots }, (_, k) => state_of(k, now)) }), 'application/json');
+    } else if (url.pathname === '/v1/autonomy') {
+      send(JSON.stringify({ robots: Array.from({ length: robots }, (_, k) => range_of(k)) }), 'application/json');
     } else if (url.pathname === '/v1/events') {
       response.writeHead(200, { 'content-type': 'text/event-stream', 'cache-control': 'no-cache' });
       streams.add(response);
