@@ -27,7 +27,8 @@ function useRanges() {
 
 function Range({ live, band }) {
   if (!band || band.p50 === null) return html`<${Quantity} of=${format.length(live)} />`;
-  return html`<${Quantity} of=${format.length(band.p50)} /><span class="band"><span class="hidden">90 % between </span>${format.length(band.p05).n}–${format.text(format.length(band.p95))}</span>`;
+  const low = format.length(band.p05), high = format.length(band.p95);
+  return html`<${Quantity} of=${format.length(band.p50)} /><span class="band"><span class="hidden">90 % between </span>${low.u === high.u ? low.n : format.text(low)}–${format.text(high)}</span>`;
 }
 
 const by = (value) => (a, b) => {
