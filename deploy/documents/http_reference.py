@@ -24,7 +24,7 @@ def kind(document, schema):
     name = schema["$ref"].rsplit("/", 1)[-1] if "$ref" in schema else None
     schema = resolve(document, schema)
     if "enum" in schema:
-        return " \\| ".join(f"`{value}`" for value in schema["enum"])
+        return " \\| ".join(f"`{'null' if value is None else value}`" for value in schema["enum"])
     if "const" in schema:
         return f"`{json.dumps(schema['const'])}`"
     for word in ("oneOf", "anyOf"):
@@ -63,7 +63,15 @@ def fields(document, schema, prefix="", depth=3):
         schema = resolve(document, schema["anyOf"][0])
     required = set(schema.get("required", ()))
     rows = []
+    for choice in schema.get("oneOf", ()):
+        # Choices told apart by a constant, such as the kinds of a path's segments.
+        told = next((f"{key}={value['const']}" for key, value in resolve(document, choice).get("properties", {}).items()
+                     if "const" in value), None)
+        if told:
+            rows += fields(document, choice, f"{prefix.rstrip('.')}({told}).", depth)
     for name, field in schema.get("properties", {}).items():
+        if f"({name}=" in prefix:  # what told this choice apart
+            continue
         full = {**resolve(document, field), **{k: v for k, v in field.items() if k != "$ref"}}
         description = cell(full.get("description", "")).rstrip(".")
         limits = bounds(full)

@@ -280,7 +280,7 @@ ${null===P?null===w.error&&Q`<${g} what="the plan" />`:Q`<div class=${w.busy?"st
 </div>
 <div class="columns">
 <${b} title="Against the usual profiles">
-<${Le} label="Energy of the plan, a trapezoid and a triangle in the same time" rows=${[{name:"Least energy",value:P.energy_j,of:J(P.energy_j),channel:"least",note:""},...["trapezoid","triangle"].map(e=>({name:e[0].toUpperCase()+e.slice(1),value:D[e]?.energy_j??null,of:J(D[e]?.energy_j),channel:"plain",note:D[e]?`we save ${H(V(D[e].saving_fraction,1))}`:"not possible here"}))]} />
+<${Le} label="Energy of the plan, a trapezoid and a triangle in the same time" rows=${[{name:"Least energy",value:P.energy_j,of:J(P.energy_j),channel:"least",note:""},...["trapezoid","triangle"].map(e=>({name:e[0].toUpperCase()+e.slice(1),value:D[e]?.energy_j??null,of:J(D[e]?.energy_j),channel:"plain",note:D[e]?`${D[e].within_limits?"":"breaks the limits; "}we save ${H(V(D[e].saving_fraction,1))}`:"not possible here"}))]} />
 <p class="note foot">All three in the same time on every run between stops.</p>
 <//>
 <${b} class="screen" title="Energy against time">${P.pareto.length<2?Q`<${p} title="No front">Nothing to trade: time and energy do not compete on this path.<//>`:Q`<${st} answer=${P} take=${({duration_s:e})=>{let t=String(Math.ceil(100*e)/100);y({..._,deadline:t}),N({deadline:t})}} />`}<//>

@@ -218,7 +218,7 @@ export function Plan({ given }) {
             <${Bars} label="Energy of the plan, a trapezoid and a triangle in the same time" rows=${[
               { name: 'Least energy', value: answer.energy_j, of: format.energy(answer.energy_j), channel: 'least', note: '' },
               ...['trapezoid', 'triangle'].map((name) => ({ name: name[0].toUpperCase() + name.slice(1), value: base[name]?.energy_j ?? null, of: format.energy(base[name]?.energy_j), channel: 'plain',
-                note: base[name] ? `we save ${format.text(format.percent(base[name].saving_fraction, 1))}` : 'not possible here' }))]} />
+                note: base[name] ? `${base[name].within_limits ? '' : 'breaks the limits; '}we save ${format.text(format.percent(base[name].saving_fraction, 1))}` : 'not possible here' }))]} />
             <p class="note foot">All three in the same time on every run between stops.</p>
           <//>
           <${Panel} class="screen" title="Energy against time">${answer.pareto.length < 2 ? html`<${Empty} title="No front">Nothing to trade: time and energy do not compete on this path.<//>` : html`<${Front} answer=${answer} take=${take} />`}<//>
