@@ -4,32 +4,10 @@
 
 #include <iterator>
 
+#include "base/xml_text.h"
+
 namespace joulecast::client {
 namespace {
-
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        // Control characters are not XML.
-        if (static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\t') out += c;
-    }
-  }
-  return out;
-}
 
 // Two decimals of a pixel, without trailing zeros.
 std::string px(double value) {
@@ -46,16 +24,16 @@ Svg::Svg(double width, double height, std::string_view title) {
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
       "font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\">\n<title>{2}</title>\n"
       "<rect width=\"{0}\" height=\"{1}\" fill=\"#fff\"/>\n",
-      px(width), px(height), escaped(title));
+      px(width), px(height), xml_escaped(title));
 }
 
 void Svg::style(const SvgStyle& style) {
   auto out = std::back_inserter(body_);
-  fmt::format_to(out, " fill=\"{}\"", escaped(style.fill));
+  fmt::format_to(out, " fill=\"{}\"", xml_escaped(style.fill));
   if (style.stroke != "none")
-    fmt::format_to(out, " stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"", escaped(style.stroke),
-                   px(style.width));
-  if (!style.dash.empty()) fmt::format_to(out, " stroke-dasharray=\"{}\"", escaped(style.dash));
+    fmt::format_to(out, " stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"",
+                   xml_escaped(style.stroke), px(style.width));
+  if (!style.dash.empty()) fmt::format_to(out, " stroke-dasharray=\"{}\"", xml_escaped(style.dash));
   if (style.opacity < 1) fmt::format_to(out, " opacity=\"{}\"", px(style.opacity));
   body_ += "/>\n";
 }
@@ -101,13 +79,13 @@ void Svg::text(SvgPoint at, std::string_view words, const SvgText& s) {
   static constexpr std::string_view anchors[] = {"start", "middle", "end"};
   auto out = std::back_inserter(body_);
   fmt::format_to(out, "<text x=\"{}\" y=\"{}\" font-size=\"{}\" fill=\"{}\"", px(at.x), px(at.y), px(s.size),
-                 escaped(s.fill));
+                 xml_escaped(s.fill));
   if (s.anchor != SvgAnchor::start)
     fmt::format_to(out, " text-anchor=\"{}\"", anchors[static_cast<std::size_t>(s.anchor)]);
   if (s.bold) body_ += " font-weight=\"bold\"";
   if (!s.halo.empty())
-    fmt::format_to(out, " stroke=\"{}\" stroke-width=\"3\" paint-order=\"stroke\"", escaped(s.halo));
-  fmt::format_to(out, ">{}</text>\n", escaped(words));
+    fmt::format_to(out, " stroke=\"{}\" stroke-width=\"3\" paint-order=\"stroke\"", xml_escaped(s.halo));
+  fmt::format_to(out, ">{}</text>\n", xml_escaped(words));
 }
 
 void Svg::begin_clip(double x, double y, double width, double height) {

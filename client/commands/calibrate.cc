@@ -4,7 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -13,6 +12,7 @@
 
 #include "battery/recording.h"
 #include "client/commands/table.h"
+#include "client/files.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::client {
@@ -38,14 +38,6 @@ Result<std::vector<battery::Recording>> read_all(const std::vector<std::string>&
     }
   }
   return all;
-}
-
-Result<void> write(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text << '\n';
-  file.close();
-  if (!file) return fail(Fault::unavailable, path, "cannot be written");
-  return {};
 }
 
 void print_json(const battery::Calibration& calibration) {
@@ -87,7 +79,7 @@ Exit run(const Options& options) {
   const std::string text = robot::to_json_text(calibration->battery);
   // What is written must be readable again, whatever was measured.
   if (const auto checked = robot::parse_battery(text); !checked) return report(checked.error());
-  if (const auto written = write(options.out, text); !written) return report(written.error());
+  if (const auto written = write_file(options.out, text + '\n'); !written) return report(written.error());
   if (options.json) {
     print_json(*calibration);
   } else {

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "base/json_number.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "energy/calibration.h"
@@ -105,7 +106,6 @@ Result<Outcome> calibrate(const Options& options) {
 
 void print_json(const Options& options, const Outcome& outcome) {
   const energy::DriveCalibration& fit = outcome.calibration;
-  const auto number = [](double v) { return std::isfinite(v) ? nlohmann::json(v) : nlohmann::json(); };
   nlohmann::json document{
       {"robot", robot::robot_to_json(fit.robot)},
       {"method", options.calibration.method == CalibrationMethod::steady ? "steady" : "whole"},
@@ -113,15 +113,15 @@ void print_json(const Options& options, const Outcome& outcome) {
       {"samples", fit.samples},
       {"slowest_rad_s", fit.slowest_rad_s},
       {"fastest_rad_s", fit.fastest_rad_s},
-      {"voltage_rms_v", number(fit.voltage_rms_v)},
-      {"torque_rms_nm", number(fit.torque_rms_nm)},
+      {"voltage_rms_v", json_number(fit.voltage_rms_v)},
+      {"torque_rms_nm", json_number(fit.torque_rms_nm)},
       {"parameters", nlohmann::json::array()},
       {"missions", nlohmann::json::array()}};
   for (const energy::ParameterEstimate& e : fit.estimates)
     document["parameters"].push_back({{"name", e.name},
                                       {"unit", e.unit},
                                       {"value", e.value},
-                                      {"standard_error", e.fitted ? number(e.standard_error) : nullptr},
+                                      {"standard_error", e.fitted ? json_number(e.standard_error) : nullptr},
                                       {"fitted", e.fitted},
                                       {"note", e.note}});
   for (const Comparison& c : outcome.missions)
@@ -131,8 +131,8 @@ void print_json(const Options& options, const Outcome& outcome) {
                                     {"measured_j", c.measured_j},
                                     {"file_j", c.before_j},
                                     {"calibrated_j", c.after_j},
-                                    {"file_error", number(c.error_before())},
-                                    {"calibrated_error", number(c.error_after())}});
+                                    {"file_error", json_number(c.error_before())},
+                                    {"calibrated_error", json_number(c.error_after())}});
   std::puts(document.dump(2).c_str());
 }
 

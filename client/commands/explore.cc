@@ -2,7 +2,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -10,6 +9,7 @@
 
 #include "client/commands/table.h"
 #include "client/exploration_drawing.h"
+#include "client/files.h"
 #include "client/virtual_robot/fleet.h"
 #include "exploration/exploration_json.h"
 #include "exploration/map_file.h"
@@ -54,14 +54,6 @@ std::vector<double> chosen_payloads(const Options& options, const robot::RobotMo
   std::vector<double> payloads{0, 5.7, 10.5};
   std::erase_if(payloads, [&](double kg) { return kg > robot.limits.payload_kg; });
   return payloads;
-}
-
-Result<void> write_file(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) return fail(Fault::unavailable, path, "cannot be written");
-  return {};
 }
 
 void print(const std::string& title, const Exploration& e, const std::vector<MissionEnergy>& energy) {

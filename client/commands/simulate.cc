@@ -15,6 +15,7 @@
 
 #include "base/host_clock.h"
 #include "client/commands/table.h"
+#include "client/files.h"
 #include "client/http_client.h"
 #include "client/interrupt.h"
 #include "client/lcm_url.h"
@@ -217,11 +218,7 @@ Result<void> write_truth(const Options& options, const std::vector<Member>& memb
     truths.push_back({spec.robot.robot_id, options.seed, vr::effects_of(spec.imperfections), spec.world,
                       fleet.robot(k).finished()});
   }
-  std::ofstream out(options.truth, std::ios::binary);
-  out << vr::truth_json(truths);
-  out.close();
-  if (!out) return fail(Fault::unavailable, options.truth, "cannot be written");
-  return {};
+  return write_file(options.truth, vr::truth_json(truths));
 }
 
 Exit run(const Options& options, bool lcm_asked) {

@@ -8,6 +8,7 @@
 #include <system_error>
 #include <variant>
 
+#include "client/files.h"
 #include "client/virtual_robot/simulate.h"
 #include "telemetry/codec.h"
 #include "telemetry/event_log.h"
@@ -40,14 +41,6 @@ Result<void> digest_file(Digest& digest, const std::filesystem::path& path) {
     digest.add({block.data(), static_cast<std::size_t>(in.gcount())});
   }
   if (!in.eof()) return fail(Fault::unavailable, path.string(), "cannot be read");
-  return {};
-}
-
-Result<void> write_text(const std::filesystem::path& path, const std::string& text) {
-  std::ofstream out(path, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) return fail(Fault::unavailable, path.string(), "cannot be written");
   return {};
 }
 
@@ -124,9 +117,11 @@ Result<std::uint64_t> drive_case(const TrialCase& c, const CaseFiles& files) {
   std::error_code failed;
   std::filesystem::create_directories(files.folder, failed);
   if (failed) return fail(Fault::unavailable, files.folder.string(), "cannot be made: " + failed.message());
-  if (auto done = write_text(files.robot(), c.robot_json); !done) return tl::unexpected<Error>(done.error());
+  if (auto done = client::write_file(files.robot().string(), c.robot_json); !done)
+    return tl::unexpected<Error>(done.error());
   if (auto done = write_log(c, files.log()); !done) return tl::unexpected<Error>(done.error());
-  if (auto done = write_text(files.truth(), truth_text(c)); !done) return tl::unexpected<Error>(done.error());
+  if (auto done = client::write_file(files.truth().string(), truth_text(c)); !done)
+    return tl::unexpected<Error>(done.error());
   Digest digest;
   for (const auto& path : {files.robot(), files.log(), files.truth()}) {
     if (auto done = digest_file(digest, path); !done) return tl::unexpected<Error>(done.error());

@@ -3,9 +3,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
+
+#include "base/json_number.h"
 
 namespace joulecast::trial {
 namespace {
@@ -87,10 +88,6 @@ std::string short_list(const std::vector<std::string>& items, const char* separa
   std::string out;
   for (const auto& item : items) out += (out.empty() ? "" : separator) + item;
   return out;
-}
-
-json number_or_null(double value) {
-  return std::isfinite(value) ? json(value) : json();
 }
 
 }  // namespace
@@ -237,8 +234,8 @@ json case_json(const CaseOutcome& o) {
     named.push_back({{"id", effect.id},
                      {"probability", effect.probability},
                      {"strength", effect.parameters.front().value},
-                     {"sd", number_or_null(effect.parameters.front().deviation)},
-                     {"share", number_or_null(effect.share)},
+                     {"sd", json_number(effect.parameters.front().deviation)},
+                     {"share", json_number(effect.share)},
                      {"alternatives", effect.alternatives}});
   }
   return {{"case", o.index},

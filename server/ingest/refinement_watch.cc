@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/json_number.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::server {
@@ -19,10 +20,6 @@ constexpr std::size_t missions_between = 4;   // proposals
 constexpr double least_significance = 3;      // standard deviations from the model in force
 constexpr double least_change = 0.02;         // of the friction torque or the idle power
 constexpr std::size_t most_remembered = 100;  // missions learned from
-
-json number(double value) {
-  return std::isfinite(value) ? json(value) : json();
-}
 
 energy::DriveWindows windows_of(const robot::RobotModel& robot) {
   auto windows = energy::DriveWindows::make(robot);
@@ -72,7 +69,7 @@ RefinementWatch::Judgement RefinementWatch::end_mission(const history::Mission& 
   json document{{"equations", finding.equations},
                 {"learned_from", learn},
                 {"payload", payload},
-                {"torque_rms_nm", number(finding.torque_rms_nm)},
+                {"torque_rms_nm", json_number(finding.torque_rms_nm)},
                 {"surprise", finding.surprise},
                 {"parameters", json::object()}};
   for (std::size_t k = 0; k < energy::refined_count; ++k)

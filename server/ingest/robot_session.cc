@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/json_number.h"
 #include "robot/robot_file.h"
 #include "telemetry/validation.h"
 
@@ -245,9 +246,8 @@ void RobotSession::leave_charger() {
                         {"charged_j", stay->charged_j},
                         {"complete", stay->complete},
                         {"mission", nullptr}};
-  const auto number = [](double v) { return std::isfinite(v) ? nlohmann::json(v) : nlohmann::json(); };
-  detail["start_charge"] = number(stay->start_charge);
-  detail["end_charge"] = number(charge_->estimate().charge);
+  detail["start_charge"] = json_number(stay->start_charge);
+  detail["end_charge"] = json_number(charge_->estimate().charge);
   if (open_ != nullptr) detail["mission"] = open_->record.key;
   outputs_.post(history::AppendEvent{{0, snapshot_.received_utime_us, robot_id_, "charged", detail.dump()}});
   remember_charge();

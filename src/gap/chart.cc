@@ -6,6 +6,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "base/xml_text.h"
+
 namespace joulecast::gap {
 namespace {
 
@@ -16,33 +18,10 @@ std::string px_text(double v) {
 }
 
 std::string title(std::string_view hint) {
-  return hint.empty() ? std::string() : "<title>" + escaped(hint) + "</title>";
+  return hint.empty() ? std::string() : "<title>" + xml_escaped(hint) + "</title>";
 }
 
 }  // namespace
-
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        if (static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\t') out += c;
-    }
-  }
-  return out;
-}
 
 std::string brief(double value, int digits) {
   if (!std::isfinite(value)) return "–";
@@ -81,7 +60,7 @@ Chart::Chart(double width, double height, Axis x, Axis y, std::string_view name)
   if (!(y_.high > y_.low)) y_.high = y_.low + 1;
   auto out = std::back_inserter(body_);
   fmt::format_to(out, "<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">", width, height,
-                 escaped(name));
+                 xml_escaped(name));
   for (const double y_tick : ticks_of(y_.low, y_.high, 4)) {
     fmt::format_to(out, "<line class=\"grid\" x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\"/>", left_px,
                    px_text(width - right_px), px_text(py(y_tick)));
@@ -95,9 +74,9 @@ Chart::Chart(double width, double height, Axis x, Axis y, std::string_view name)
     }
   }
   fmt::format_to(out, "<text class=\"axis mid\" x=\"{}\" y=\"{}\">{}</text>",
-                 px_text((left_px + width - right_px) / 2), px_text(height - 6), escaped(x_.label));
+                 px_text((left_px + width - right_px) / 2), px_text(height - 6), xml_escaped(x_.label));
   fmt::format_to(out, "<text class=\"axis mid\" transform=\"translate(12 {}) rotate(-90)\">{}</text>",
-                 px_text((top_px + height - bottom_px) / 2), escaped(y_.label));
+                 px_text((top_px + height - bottom_px) / 2), xml_escaped(y_.label));
 }
 
 double Chart::px(double x) const {
@@ -161,7 +140,7 @@ void Chart::level(double y, std::string_view style) {
 
 void Chart::category(double x, std::string_view text) {
   fmt::format_to(std::back_inserter(body_), "<text class=\"tick mid\" x=\"{}\" y=\"{}\">{}</text>",
-                 px_text(px(x)), px_text(height_ - bottom_px + 15), escaped(text));
+                 px_text(px(x)), px_text(height_ - bottom_px + 15), xml_escaped(text));
 }
 
 std::string Chart::str() const {
@@ -178,13 +157,13 @@ std::string bars(std::span<const BarRow> rows, std::string_view unit, std::strin
   if (!(high > low)) high = low + 1;
   const auto px = [&](double v) { return label + (v - low) / (high - low) * (width - label - value_px); };
   std::string out = fmt::format("<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">", width,
-                                row_px * static_cast<double>(rows.size()) + 6, escaped(name));
+                                row_px * static_cast<double>(rows.size()) + 6, xml_escaped(name));
   auto to = std::back_inserter(out);
   double y = 3;
   for (const BarRow& r : rows) {
     const double a = px(std::min(0.0, r.value)), b = px(std::max(0.0, r.value));
     fmt::format_to(to, "<text class=\"row end\" x=\"{}\" y=\"{}\">{}</text>", label - 8, px_text(y + 16),
-                   escaped(r.label));
+                   xml_escaped(r.label));
     fmt::format_to(to, "<rect class=\"{}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"16\">{}</rect>", r.style,
                    px_text(a), px_text(y + 3), px_text(std::max(1.0, b - a)), title(r.hint));
     double end = b;
@@ -195,7 +174,7 @@ std::string bars(std::span<const BarRow> rows, std::string_view unit, std::strin
       end = std::max(end, px(r.interval[1]));
     }
     fmt::format_to(to, "<text class=\"row\" x=\"{}\" y=\"{}\">{}{}</text>", px_text(end + 8), px_text(y + 16),
-                   brief(r.value), escaped(unit));
+                   brief(r.value), xml_escaped(unit));
     y += row_px;
   }
   return out + "</svg>";
@@ -214,7 +193,7 @@ std::string changes(std::span<const ChangeRow> rows, std::string_view axis, std:
   const auto px = [&](double v) { return label + (v - low) / (high - low) * (width - label - end_px); };
   const double height = row_px * static_cast<double>(rows.size()) + 44;
   std::string out = fmt::format("<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">", width,
-                                height, escaped(name));
+                                height, xml_escaped(name));
   auto to = std::back_inserter(out);
   for (const double tick : ticks_of(low, high, 6)) {
     fmt::format_to(to, "<line class=\"{0}\" x1=\"{1}\" x2=\"{1}\" y1=\"4\" y2=\"{2}\"/>",
@@ -226,7 +205,7 @@ std::string changes(std::span<const ChangeRow> rows, std::string_view axis, std:
   for (const ChangeRow& r : rows) {
     const double middle = y + row_px / 2;
     fmt::format_to(to, "<text class=\"tick end\" x=\"{}\" y=\"{}\">{}</text>", label - 8, px_text(middle + 4),
-                   escaped(r.label));
+                   xml_escaped(r.label));
     fmt::format_to(to, "<line class=\"whisker\" x1=\"{}\" x2=\"{}\" y1=\"{}\" y2=\"{}\"/>",
                    px_text(px(r.before)), px_text(px(r.after)), px_text(middle), px_text(middle));
     for (const auto& [value, style] : {std::pair{r.before, "before"}, {r.after, "after"}}) {
@@ -236,7 +215,7 @@ std::string changes(std::span<const ChangeRow> rows, std::string_view axis, std:
     y += row_px;
   }
   fmt::format_to(to, "<text class=\"axis mid\" x=\"{}\" y=\"{}\">{}</text>", px_text((label + width) / 2),
-                 px_text(height - 6), escaped(axis));
+                 px_text(height - 6), xml_escaped(axis));
   return out + "</svg>";
 }
 

@@ -8,9 +8,6 @@
 
 namespace joulecast::gap {
 
-// Text as HTML and SVG take it.
-std::string escaped(std::string_view text);
-
 // A number in a few digits: 0.0123, 4.5, 1200.
 std::string brief(double value, int digits = 3);
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "base/json_number.h"
 #include "dynamics/catalogue.h"
 #include "gap/design.h"
 #include "gap/fit.h"
@@ -278,7 +279,6 @@ Result<Comparison> compare_groups(const RecordingSet& recordings,
 
 nlohmann::json to_json(const Comparison& c) {
   using nlohmann::json;
-  const auto number = [](double v) { return std::isfinite(v) ? json(v) : json(nullptr); };
   json out = {{"robot_id", c.robot_id},       {"kind", "comparison"},    {"motor_currents", c.motor_currents},
               {"power_known", c.power_known}, {"groups", json::array()}, {"common", c.common},
               {"effects", json::array()},     {"limits", c.limits}};
@@ -287,15 +287,15 @@ nlohmann::json to_json(const Comparison& c) {
   for (const ComparedEffect& e : c.effects) {
     json strengths = json::object();
     for (std::size_t g = 0; g < e.groups.size(); ++g)
-      strengths[c.groups[g].name] = {{"value", number(e.groups[g].value)},
-                                     {"sd", number(e.groups[g].deviation)}};
+      strengths[c.groups[g].name] = {{"value", json_number(e.groups[g].value)},
+                                     {"sd", json_number(e.groups[g].deviation)}};
     out["effects"].push_back({{"id", e.id},
                               {"parameter", e.parameter},
                               {"unit", e.unit},
                               {"differs", e.differs},
                               {"possible", e.possible},
-                              {"log_evidence", number(e.gain)},
-                              {"chance", number(e.chance)},
+                              {"log_evidence", json_number(e.gain)},
+                              {"chance", json_number(e.chance)},
                               {"strengths", std::move(strengths)}});
   }
   return out;

@@ -476,7 +476,7 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
 
   const std::vector<Chosen> chosen = coefficients_of(fit, fit.total, set);
   const std::vector<dynamics::ActiveEffect> effects = columns.effects_of(chosen);
-  const std::vector<double> shapley = shapley_shares(robot, effects, windows, measured);
+  const std::vector<double> shapley = effect_shares(robot, effects, windows, measured);
   double weakest_group = 1;
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const Hypothesis& h = columns.hypotheses()[chosen[k].hypothesis];

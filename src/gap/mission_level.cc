@@ -441,7 +441,7 @@ Result<MissionDiagnosis> diagnose_runs(std::span<const MissionRun> given, const 
     d.verdict = weakest >= report_probability ? Verdict::effects : Verdict::inconclusive;
     d.verdict_probability = weakest;
   }
-  const std::vector<double> shares = columns.shapley_shares(effects);
+  const std::vector<double> shares = columns.effect_shares(effects);
   for (std::size_t k = 0; k < d.effects.size(); ++k) {
     d.effects[k].share = shares[k];
     d.adoptable.push_back(dynamics::adopt(effects[k]));

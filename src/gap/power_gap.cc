@@ -1,9 +1,10 @@
 #include "gap/power_gap.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numbers>
+
+#include "gap/shapley.h"
 
 namespace joulecast::gap {
 
@@ -70,30 +71,17 @@ double noise_floor(std::span<const Window> windows, std::span<const double> meas
   return sigma * std::sqrt(2 / std::numbers::pi) * static_cast<double>(count) / size;
 }
 
-std::vector<double> shapley_shares(const robot::RobotModel& robot,
-                                   std::span<const dynamics::ActiveEffect> effects,
-                                   std::span<const Window> windows, std::span<const double> measured_w) {
-  const std::size_t n = std::min<std::size_t>(effects.size(), 6);
-  std::vector<double> gap(std::size_t{1} << n);
-  for (std::size_t set = 0; set < gap.size(); ++set) {
+std::vector<double> effect_shares(const robot::RobotModel& robot,
+                                  std::span<const dynamics::ActiveEffect> effects,
+                                  std::span<const Window> windows, std::span<const double> measured_w) {
+  constexpr std::size_t most = 6;
+  std::vector<double> shares = shapley_shares(std::min(effects.size(), most), [&](const auto& members) {
     std::vector<dynamics::ActiveEffect> some;
-    for (std::size_t k = 0; k < n; ++k) {
-      if (set >> k & 1) some.push_back(effects[k]);
-    }
-    gap[set] = gap_size(measured_w, modelled_power(robot, some, windows)).absolute_relative;
-  }
-  const auto factorial = [](std::size_t k) { return std::tgamma(static_cast<double>(k) + 1); };
-  std::vector<double> share(effects.size(), 0.0);
-  for (std::size_t k = 0; k < n; ++k) {
-    for (std::size_t set = 0; set < gap.size(); ++set) {
-      if (set >> k & 1) continue;
-      const auto size = static_cast<std::size_t>(std::popcount(set));
-      share[k] += factorial(size) * factorial(n - size - 1) / factorial(n) *
-                  (gap[set] - gap[set | std::size_t{1} << k]);
-    }
-    if (gap[0] > 0) share[k] /= gap[0];
-  }
-  return share;
+    for (const std::size_t k : members) some.push_back(effects[k]);
+    return gap_size(measured_w, modelled_power(robot, some, windows)).absolute_relative;
+  });
+  shares.resize(effects.size(), 0.0);
+  return shares;
 }
 
 }  // namespace joulecast::gap

@@ -29,10 +29,9 @@ GapSize gap_size(std::span<const double> measured_w, std::span<const double> mod
 double noise_floor(std::span<const Window> windows, std::span<const double> measured_w,
                    std::span<const double> modelled_w);
 
-// Shapley values of the effects: how much each, on average over the orders of adding them, takes off the
-// integral of |measured - modelled|, over that integral without any. At most 6 effects.
-std::vector<double> shapley_shares(const robot::RobotModel& robot,
-                                   std::span<const dynamics::ActiveEffect> effects,
-                                   std::span<const Window> windows, std::span<const double> measured_w);
+// Shapley shares of the effects in the integral of |measured - modelled|; 0 beyond the sixth effect.
+std::vector<double> effect_shares(const robot::RobotModel& robot,
+                                  std::span<const dynamics::ActiveEffect> effects,
+                                  std::span<const Window> windows, std::span<const double> measured_w);
 
 }  // namespace joulecast::gap

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "base/xml_text.h"
 #include "dynamics/catalogue.h"
 #include "gap/chart.h"
 #include "gap/report_page.h"
@@ -54,8 +55,8 @@ std::string report_html(const Comparison& c, const robot::RobotModel& robot, con
       }
     }
     page.card(fmt::format(
-        "<h3>{} <code>{}</code></h3><p>{}: {}{}.{}</p>", escaped(words_of(e.id)), escaped(e.id),
-        escaped(meaning),
+        "<h3>{} <code>{}</code></h3><p>{}: {}{}.{}</p>", xml_escaped(words_of(e.id)), xml_escaped(e.id),
+        xml_escaped(meaning),
         e.differs ? "differs between the groups" : "no difference that these data make sure",
         e.gain > 0
             ? fmt::format(" (log odds {} of strengths of their own; equal strengths would differ so with "
@@ -72,7 +73,7 @@ std::string report_html(const Comparison& c, const robot::RobotModel& robot, con
   origin_section(page, origin, robot);
   std::vector<std::vector<std::string>> rows;
   for (const ComparedGroup& g : c.groups)
-    rows.push_back({escaped(g.name), std::to_string(g.missions), std::to_string(g.samples)});
+    rows.push_back({xml_escaped(g.name), std::to_string(g.missions), std::to_string(g.samples)});
   const std::vector<std::string> header{"Group", "missions", "samples"};
   page.table(header, rows, 1);
   return page.str();

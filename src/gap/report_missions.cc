@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "base/xml_text.h"
 #include "gap/chart.h"
 #include "gap/report_page.h"
 
@@ -42,14 +43,14 @@ std::string sentence_of(const MissionDiagnosis& d) {
 }
 
 std::vector<std::string> row_of(const LeftOut& l, const std::string& named) {
-  return {escaped(l.what),
+  return {xml_escaped(l.what),
           std::to_string(l.runs),
           percent(l.before),
           percent(l.after),
           l.before > 0 ? fmt::format("{} [{}, {}]", percent(1 - l.after / l.before, 2),
                                      percent(l.interval[0], 2), percent(l.interval[1], 2))
                        : "–",
-          escaped(named)};
+          xml_escaped(named)};
 }
 
 std::string names_of(const std::vector<std::string>& ids) {
@@ -111,15 +112,17 @@ std::string report_html(const MissionDiagnosis& d, const robot::RobotModel& robo
         "their sum by {}. The measured differences between the sides hold {} of that shift: 1 would be a "
         "halved "
         "term, 0 a right one. With the whole term the mean error of single motors goes from {} to {}.",
-        t.runs, percent(t.side_difference), percent(t.sum), escaped(with_deviation(t.share, t.share_sd, "1")),
-        percent(t.motor_error_before), percent(t.motor_error_after)));
+        t.runs, percent(t.side_difference), percent(t.sum),
+        xml_escaped(with_deviation(t.share, t.share_sd, "1")), percent(t.motor_error_before),
+        percent(t.motor_error_after)));
   }
   page.section("What these energies cannot tell");
   page.list(d.limits);
   if (!d.not_visible.empty()) {
     std::vector<std::string> names;
     for (const std::string& id : d.not_visible) names.push_back(words_of(id));
-    page.paragraph("Nothing is said of " + escaped(enumerate(names)) + ": they move none of these energies.");
+    page.paragraph("Nothing is said of " + xml_escaped(enumerate(names)) +
+                   ": they move none of these energies.");
   }
   page.section("Method");
   const std::vector<std::string> method{
@@ -143,8 +146,8 @@ std::string report_html(const MissionDiagnosis& d, const robot::RobotModel& robo
   std::vector<std::vector<std::string>> runs;
   for (const JudgedRun& r : d.runs) {
     const RunConditions& at = r.run.at;
-    runs.push_back({escaped(r.run.label), escaped(r.run.table), brief(at.distance_m), brief(at.speed_m_s),
-                    brief(at.acceleration_m_s2), brief(at.payload_kg),
+    runs.push_back({xml_escaped(r.run.label), xml_escaped(r.run.table), brief(at.distance_m),
+                    brief(at.speed_m_s), brief(at.acceleration_m_s2), brief(at.payload_kg),
                     at.turn_rad == 0 ? "straight"
                                      : fmt::format("{}° {}", brief(std::fabs(at.turn_rad) * 57.29578),
                                                    at.turn_rad > 0 ? "left" : "right"),

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "base/xml_text.h"
 #include "dynamics/catalogue.h"
 #include "gap/chart.h"
 
@@ -72,22 +73,22 @@ code{font:13px ui-monospace,"DejaVu Sans Mono",monospace;background:var(--shade)
 }  // namespace
 
 Page::Page(std::string title, std::string kicker, std::string verdict) : title_(std::move(title)) {
-  body_ = fmt::format("<p class=\"kicker\">{}</p><h1>{}</h1><p class=\"verdict\">{}</p>", escaped(kicker),
-                      escaped(title_), escaped(verdict));
+  body_ = fmt::format("<p class=\"kicker\">{}</p><h1>{}</h1><p class=\"verdict\">{}</p>", xml_escaped(kicker),
+                      xml_escaped(title_), xml_escaped(verdict));
 }
 
 void Page::figures(std::span<const Figure> figures) {
   body_ += "<div class=\"figures\">";
   for (const Figure& f : figures)
-    body_ += fmt::format("<div><b>{}</b><span>{}</span></div>", escaped(f.value), escaped(f.label));
+    body_ += fmt::format("<div><b>{}</b><span>{}</span></div>", xml_escaped(f.value), xml_escaped(f.label));
   body_ += "</div>";
 }
 
 void Page::section(std::string_view heading, std::string_view introduction) {
   if (open_) body_ += "</section>";
   open_ = true;
-  body_ += fmt::format("<section><h2>{}</h2>", escaped(heading));
-  if (!introduction.empty()) body_ += fmt::format("<p class=\"quiet\">{}</p>", escaped(introduction));
+  body_ += fmt::format("<section><h2>{}</h2>", xml_escaped(heading));
+  if (!introduction.empty()) body_ += fmt::format("<p class=\"quiet\">{}</p>", xml_escaped(introduction));
 }
 
 void Page::paragraph(std::string_view html) {
@@ -100,7 +101,7 @@ void Page::card(std::string_view html) {
 
 void Page::chart(std::string_view svg, std::string_view caption) {
   body_ += fmt::format("<figure>{}", svg);
-  if (!caption.empty()) body_ += fmt::format("<figcaption>{}</figcaption>", escaped(caption));
+  if (!caption.empty()) body_ += fmt::format("<figcaption>{}</figcaption>", xml_escaped(caption));
   body_ += "</figure>";
 }
 
@@ -112,7 +113,7 @@ void Page::charts(std::span<const std::pair<std::string, std::string>> svg_and_c
 
 void Page::list(std::span<const std::string> items) {
   body_ += "<ul>";
-  for (const std::string& item : items) body_ += fmt::format("<li>{}</li>", escaped(item));
+  for (const std::string& item : items) body_ += fmt::format("<li>{}</li>", xml_escaped(item));
   body_ += "</ul>";
 }
 
@@ -121,7 +122,7 @@ void Page::table(std::span<const std::string> header, std::span<const std::vecto
   const auto number = [&](std::size_t column) { return column >= first_number ? " class=\"n\"" : ""; };
   body_ += "<div class=\"scroll\"><table><thead><tr>";
   for (std::size_t c = 0; c < header.size(); ++c)
-    body_ += fmt::format("<th{}>{}</th>", number(c), escaped(header[c]));
+    body_ += fmt::format("<th{}>{}</th>", number(c), xml_escaped(header[c]));
   body_ += "</tr></thead><tbody>";
   for (const auto& row : rows) {
     body_ += "<tr>";
@@ -134,7 +135,7 @@ void Page::table(std::span<const std::string> header, std::span<const std::vecto
 void Page::legend(std::span<const std::pair<std::string, std::string>> style_and_text) {
   body_ += "<p class=\"legend\">";
   for (const auto& [name, text] : style_and_text)
-    body_ += fmt::format("<span><i class=\"{}\"></i>{}</span>", name, escaped(text));
+    body_ += fmt::format("<span><i class=\"{}\"></i>{}</span>", name, xml_escaped(text));
   body_ += "</p>";
 }
 
@@ -143,7 +144,7 @@ std::string Page::str() const {
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
       "content=\"width=device-width,initial-scale=1\"><meta name=\"color-scheme\" content=\"light dark\">"
       "<title>{}</title><style>{}</style></head><body><main>{}{}</main></body></html>\n",
-      escaped(title_), style, body_, open_ ? "</section>" : "");
+      xml_escaped(title_), style, body_, open_ ? "</section>" : "");
 }
 
 std::string words_of(std::string_view id) {
@@ -197,7 +198,7 @@ void effects_section(Page& page, std::span<const DiagnosedEffect> effects,
     const dynamics::Effect* known = dynamics::find_effect(e.id);
     std::string name = words_of(e.id);
     name.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(name.front())));
-    std::string card = fmt::format("<h3>{} <code>{}</code></h3>", escaped(name), escaped(e.id));
+    std::string card = fmt::format("<h3>{} <code>{}</code></h3>", xml_escaped(name), xml_escaped(e.id));
     for (const DiagnosedParameter& p : e.parameters) {
       std::string_view meaning = p.name;
       if (known != nullptr) {
@@ -207,23 +208,23 @@ void effects_section(Page& page, std::span<const DiagnosedEffect> effects,
       }
       if (&p == &e.parameters.front() || std::isfinite(p.deviation)) {
         card += fmt::format("<p class=\"strength\">{} <span class=\"quiet\">{}</span></p>",
-                            escaped(with_deviation(p.value, p.deviation, p.unit)), escaped(meaning));
+                            xml_escaped(with_deviation(p.value, p.deviation, p.unit)), xml_escaped(meaning));
       } else {
-        card += fmt::format("<p class=\"quiet\">{} (a shape, taken from a grid): {}</p>", escaped(meaning),
-                            escaped(with_deviation(p.value, p.deviation, p.unit)));
+        card += fmt::format("<p class=\"quiet\">{} (a shape, taken from a grid): {}</p>",
+                            xml_escaped(meaning), xml_escaped(with_deviation(p.value, p.deviation, p.unit)));
       }
     }
     card += fmt::format("<p>Probability {}; it closes {} of the gap{}.</p>", probability_text(e.probability),
                         percent(e.share), k < costs.size() && !costs[k].empty() ? "; " + costs[k] : "");
     if (known != nullptr) {
       card += fmt::format("<p class=\"quiet\">Formula: {}. Valid for: {}. Source: {}.</p>",
-                          escaped(known->info().formula), escaped(known->info().validity),
-                          escaped(known->info().source));
+                          xml_escaped(known->info().formula), xml_escaped(known->info().validity),
+                          xml_escaped(known->info().source));
     }
     if (!e.alternatives.empty()) {
       std::vector<std::string> others;
       for (const std::string& id : e.alternatives) others.push_back(words_of(id));
-      card += fmt::format("<p><b>These data do not tell it from</b> {}.</p>", escaped(enumerate(others)));
+      card += fmt::format("<p><b>These data do not tell it from</b> {}.</p>", xml_escaped(enumerate(others)));
     }
     page.card(card);
   }

@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 
+#include "base/xml_text.h"
 #include "gap/chart.h"
 #include "gap/power_gap.h"
 #include "gap/report_page.h"
@@ -405,8 +406,8 @@ void where_section(Page& page, const Diagnosis& d, const Powers& p, const robot:
   std::vector<std::vector<std::string>> rows;
   for (const WhereRegion& w : d.where) {
     rows.push_back(
-        {escaped(words_of(w.channel)), escaped(variable_words(w.variable)),
-         w.label.empty() ? brief(w.from) + " to " + brief(w.to) : escaped(w.label),
+        {xml_escaped(words_of(w.channel)), xml_escaped(variable_words(w.variable)),
+         w.label.empty() ? brief(w.from) + " to " + brief(w.to) : xml_escaped(w.label),
          fmt::format("{} [{}, {}]", percent(w.share), percent(w.interval[0], 2), percent(w.interval[1], 2))});
     if (rows.size() >= 12) break;
   }
@@ -440,7 +441,7 @@ void missions_table(Page& page, const Powers& p, const RecordingSet& set) {
     const auto seconds = static_cast<std::time_t>(begin / 1'000'000);
     std::tm utc{};
     gmtime_r(&seconds, &utc);
-    rows.push_back({escaped(mission_name(set, m)),
+    rows.push_back({xml_escaped(mission_name(set, m)),
                     fmt::format("{:04}-{:02}-{:02} {:02}:{:02}", utc.tm_year + 1900, utc.tm_mon + 1,
                                 utc.tm_mday, utc.tm_hour, utc.tm_min),
                     brief(set.missions.size() == 1 ? length_s / single_mission_parts : length_s),
@@ -528,7 +529,7 @@ std::string report_html(const Diagnosis& d, const RecordingSet& recordings, cons
     page.card(fmt::format(
         "<h3>Outside the catalogue</h3><p>Something shows in {} and follows {}; probability {}. No "
         "effect of the catalogue does that.</p>",
-        escaped(words_of(d.outside.channel)), escaped(words_of(d.outside.follows)),
+        xml_escaped(words_of(d.outside.channel)), xml_escaped(words_of(d.outside.follows)),
         probability_text(d.outside.probability)));
   } else {
     page.paragraph(fmt::format("Probability that something outside the catalogue is at work: {}.",
@@ -549,7 +550,7 @@ std::string report_html(const Diagnosis& d, const RecordingSet& recordings, cons
   std::vector<std::vector<std::string>> drives;
   for (const NextDrive& n : d.next_drive)
     drives.push_back(
-        {escaped(n.manoeuvre), escaped(words_of(n.separates)), brief(n.expected_log_evidence, 2)});
+        {xml_escaped(n.manoeuvre), xml_escaped(words_of(n.separates)), brief(n.expected_log_evidence, 2)});
   const std::vector<std::string> drive_header{"Drive", "to tell", "log evidence it adds"};
   if (!drives.empty()) page.table(drive_header, drives, 2);
   page.section("Limits");

@@ -1,10 +1,11 @@
 #include "gap/run_columns.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <set>
+
+#include "gap/shapley.h"
 
 namespace joulecast::gap {
 namespace {
@@ -269,31 +270,17 @@ std::vector<ActiveEffect> RunColumns::effects_of(std::span<const std::size_t> se
   return effects;
 }
 
-std::vector<double> RunColumns::shapley_shares(std::span<const ActiveEffect> effects) const {
-  const std::size_t n = effects.size();
-  std::vector<double> error(std::size_t{1} << n, 0.0);
-  for (std::size_t set = 0; set < error.size(); ++set) {
+std::vector<double> RunColumns::effect_shares(std::span<const ActiveEffect> effects) const {
+  return shapley_shares(effects.size(), [&](const std::vector<std::size_t>& members) {
     std::vector<ActiveEffect> some;
-    for (std::size_t k = 0; k < n; ++k) {
-      if (set >> k & 1) some.push_back(effects[k]);
-    }
+    for (const std::size_t k : members) some.push_back(effects[k]);
+    double error = 0;
     for (std::size_t k = 0; k < runs_.size(); ++k) {
       const double measured = runs_[k].measured_j();
-      error[set] += std::fabs(measured - modelled(k, some).sum_j) / measured;
+      error += std::fabs(measured - modelled(k, some).sum_j) / measured;
     }
-  }
-  const auto factorial = [](std::size_t k) { return std::tgamma(static_cast<double>(k) + 1); };
-  std::vector<double> share(n, 0.0);
-  for (std::size_t k = 0; k < n; ++k) {
-    for (std::size_t set = 0; set < error.size(); ++set) {
-      if (set >> k & 1) continue;
-      const auto size = static_cast<std::size_t>(std::popcount(set));
-      share[k] += factorial(size) * factorial(n - size - 1) / factorial(n) *
-                  (error[set] - error[set | std::size_t{1} << k]);
-    }
-    if (error[0] > 0) share[k] /= error[0];
-  }
-  return share;
+    return error;
+  });
 }
 
 }  // namespace joulecast::gap

@@ -51,7 +51,7 @@ class RunColumns {
 
   // How much each effect, on average over the orders of adding them, takes off the mean absolute relative
   // error, over that error without any.
-  std::vector<double> shapley_shares(std::span<const dynamics::ActiveEffect> effects) const;
+  std::vector<double> effect_shares(std::span<const dynamics::ActiveEffect> effects) const;
 
  private:
   Energy by_robot(std::size_t run, std::span<const dynamics::ActiveEffect> effects) const;
