@@ -1,8 +1,8 @@
-#include <charconv>
 #include <chrono>
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "server/api/common_parameters.h"
 #include "server/api/fields.h"
 #include "server/api/json_writer.h"
 #include "server/api/services.h"
@@ -21,27 +21,6 @@ using nlohmann::json;
 
 constexpr std::size_t most_missions = 1000;  // of one request
 constexpr double most_held_back = 0.9;
-
-Result<std::int64_t> diagnosis_id(const Request& request) {
-  const std::string& text = request.param("id");
-  std::int64_t id = 0;
-  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), id);
-  if (fault != std::errc() || end != text.data() + text.size() || id <= 0)
-    return fail(Fault::not_found, "id", "\"" + text + "\" names no diagnosis: ids are positive integers");
-  return id;
-}
-
-void write_keys(JsonWriter& out, std::string_view name, const std::vector<history::MissionKey>& keys) {
-  out.key(name).begin_array();
-  for (const history::MissionKey key : keys) out.value(key);
-  out.end_array();
-}
-
-template <class T>
-void write_optional(JsonWriter& out, std::string_view name, const std::optional<T>& value) {
-  out.key(name);
-  value ? out.value(*value) : out.null();
-}
 
 // What lists show of a result: the verdict, the effects and how far the gap shrinks.
 std::string summary_of(const std::string& result_json) {
@@ -69,11 +48,11 @@ void write_diagnosis(JsonWriter& out, const Services& services, const history::D
   out.field("progress", progress ? progress->fraction : d.state == history::DiagnosisState::done ? 1.0 : 0.0);
   out.field("ahead", static_cast<std::int64_t>(progress ? progress->ahead : 0));
   out.field("created_utime_us", d.created_utime_us);
-  write_optional(out, "started_utime_us", d.started_utime_us);
-  write_optional(out, "finished_utime_us", d.finished_utime_us);
-  write_optional(out, "model_version", d.model_version);
-  write_keys(out, "fitted_on", d.fitted_on);
-  write_keys(out, "held_back", d.held_back);
+  out.field("started_utime_us", d.started_utime_us);
+  out.field("finished_utime_us", d.finished_utime_us);
+  out.field("model_version", d.model_version);
+  out.array("fitted_on", d.fitted_on);
+  out.array("held_back", d.held_back);
   out.key("error");
   d.error.empty() ? out.null() : out.value(d.error);
   out.key("request").raw(d.request_json);
@@ -115,10 +94,7 @@ Result<Response> start(Services& services, const Request& request) {
       }
     }
   }
-  if (fields.has("since_utime_us"))
-    wanted.since_utime_us = fields.integer("since_utime_us", 0, std::int64_t{1} << 53);
-  else
-    (void)fields.member("since_utime_us");
+  wanted.since_utime_us = fields.optional_integer("since_utime_us", 0, std::int64_t{1} << 53);
   wanted.max_missions = static_cast<std::size_t>(
       fields.integer("max_missions", 1, static_cast<std::int64_t>(most_missions), 200));
   wanted.hold_back = fields.number("hold_back", {0, most_held_back}, wanted.hold_back);
@@ -129,13 +105,13 @@ Result<Response> start(Services& services, const Request& request) {
 }
 
 Result<Response> get(const Services& services, const Request& request) {
-  const Result<std::int64_t> id = diagnosis_id(request);
+  const Result<std::int64_t> id = path_id(request, "diagnosis");
   if (!id) return tl::unexpected(id.error());
   return answer(services, *id, 200);
 }
 
 Result<Response> cancel(Services& services, const Request& request) {
-  const Result<std::int64_t> id = diagnosis_id(request);
+  const Result<std::int64_t> id = path_id(request, "diagnosis");
   if (!id) return tl::unexpected(id.error());
   if (Result<void> done = services.diagnoses.cancel(*id); !done)
     return tl::unexpected(std::move(done.error()));
@@ -159,7 +135,7 @@ Result<Response> list(const Services& services, const Request& request) {
 }
 
 Result<Response> report(const Services& services, const Request& request) {
-  const Result<std::int64_t> id = diagnosis_id(request);
+  const Result<std::int64_t> id = path_id(request, "diagnosis");
   if (!id) return tl::unexpected(id.error());
   Result<std::string> html = services.store.diagnosis_report(*id);
   if (!html) return tl::unexpected(std::move(html.error()));
@@ -213,7 +189,7 @@ class ProgressStream final : public http::StreamSource {
 };
 
 Result<Response> events(const Services& services, const Request& request) {
-  const Result<std::int64_t> id = diagnosis_id(request);
+  const Result<std::int64_t> id = path_id(request, "diagnosis");
   if (!id) return tl::unexpected(id.error());
   if (const auto stored = services.store.diagnosis(*id); !stored) return tl::unexpected(stored.error());
   Response response;
@@ -245,15 +221,8 @@ std::vector<Endpoint> diagnosis_endpoints(Services& services) {
        .operation_id = "listDiagnoses",
        .summary = "Diagnoses, newest first, without their whole results",
        .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},
-                      {.name = "limit",
-                       .type = Type::integer,
-                       .description = "diagnoses a page",
-                       .minimum = 1,
-                       .maximum = static_cast<double>(history::max_page_size)},
-                      {.name = "before",
-                       .type = Type::integer,
-                       .description = "the next_before of the page before",
-                       .minimum = 1}},
+                      limit_parameter("diagnoses a page", history::max_page_size),
+                      before_parameter()},
        .response_schema = "diagnosis-list",
        .handler = [&services](const Request& r) { return list(services, r); }});
   rows.push_back({.method = Method::get,

@@ -68,6 +68,13 @@ std::optional<double> Fields::optional_number(std::string_view name, const Bound
   return number(name, bounds);
 }
 
+std::optional<std::int64_t> Fields::optional_integer(std::string_view name, std::int64_t minimum,
+                                                     std::int64_t maximum) {
+  read_.emplace(name);
+  if (!has(name)) return std::nullopt;
+  return integer(name, minimum, maximum);
+}
+
 std::int64_t Fields::integer(std::string_view name, std::int64_t minimum, std::int64_t maximum,
                              std::optional<std::int64_t> fallback) {
   const json* found = required(name, fallback.has_value());

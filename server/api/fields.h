@@ -34,6 +34,8 @@ class Fields {
   std::optional<double> optional_number(std::string_view name, const Bounds& bounds);
   std::int64_t integer(std::string_view name, std::int64_t minimum, std::int64_t maximum,
                        std::optional<std::int64_t> fallback = std::nullopt);
+  std::optional<std::int64_t> optional_integer(std::string_view name, std::int64_t minimum,
+                                               std::int64_t maximum);
   bool boolean(std::string_view name, std::optional<bool> fallback = std::nullopt);
   std::string text(std::string_view name, std::size_t max_length,
                    std::optional<std::string> fallback = std::nullopt);

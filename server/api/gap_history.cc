@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "server/api/common_parameters.h"
 #include "server/api/json_writer.h"
 #include "server/api/services.h"
 #include "server/diagnosis/gap_watch.h"
@@ -20,10 +21,6 @@ using nlohmann::json;
 constexpr std::int64_t most_missions = 5000;
 constexpr std::size_t sibling_missions = 10;  // newest ones, that tell how a robot does now
 
-void write_interval(JsonWriter& out, std::string_view name, const std::array<double, 2>& ends) {
-  out.key(name).begin_array().value(ends[0]).value(ends[1]).end_array();
-}
-
 void write_ratios(JsonWriter& out, const std::vector<gap::MissionRatio>& missions) {
   out.key("missions").begin_array();
   for (const gap::MissionRatio& m : missions) {
@@ -39,7 +36,7 @@ void write_marks(JsonWriter& out, const std::vector<gap::DriftMark>& marks) {
   for (const gap::DriftMark& m : marks) {
     out.begin_object().field("id", m.mission_key).field("start_utime_us", m.utime_us);
     out.field("model_version", m.model_version).field("ratio_before", m.before).field("ratio_after", m.after);
-    write_interval(out, "change_ci", m.interval);
+    out.array("change_ci", m.interval);
     out.field("missions", static_cast<std::int64_t>(m.missions)).end_object();
   }
   out.end_array();
@@ -93,7 +90,7 @@ Result<Response> gap_history(const Services& services, const Request& request) {
   for (const gap::SiblingRatio& s : gap::compare_siblings(kind)) {
     out.begin_object().field("robot_id", s.robot_id).field("missions", static_cast<std::int64_t>(s.missions));
     out.field("ratio", s.ratio);
-    write_interval(out, "ci", s.interval);
+    out.array("ci", s.interval);
     out.field("deviation", s.deviation).field("stands_out", s.stands_out).end_object();
   }
   out.end_array().end_object();
@@ -129,11 +126,7 @@ std::vector<Endpoint> gap_history_endpoints(Services& services) {
                   .summary =
                       "Measured over modelled energy of a robot's missions with marks where it drifted, the "
                       "models adopted, and the robots of its kind",
-                  .parameters = {{.name = "limit",
-                                  .type = Type::integer,
-                                  .description = "missions, newest first",
-                                  .minimum = 1,
-                                  .maximum = static_cast<double>(most_missions)}},
+                  .parameters = {limit_parameter("missions, newest first", most_missions)},
                   .response_schema = "gap-history",
                   .error_statuses = {404},
                   .handler = [&services](const Request& r) { return gap_history(services, r); }});
@@ -147,11 +140,7 @@ std::vector<Endpoint> gap_history_endpoints(Services& services) {
                        .type = Type::integer,
                        .description = "only entries with a greater id",
                        .minimum = 0},
-                      {.name = "limit",
-                       .type = Type::integer,
-                       .description = "entries a page",
-                       .minimum = 1,
-                       .maximum = static_cast<double>(history::max_page_size)}},
+                      limit_parameter("entries a page", history::max_page_size)},
        .response_schema = "audit-log",
        .handler = [&services](const Request& r) { return audit(services, r); }});
   return rows;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -33,6 +34,18 @@ class JsonWriter {
   JsonWriter& field(std::string_view name, const T& content) {
     key(name);
     return value(content);
+  }
+  template <class T>
+  JsonWriter& field(std::string_view name, const std::optional<T>& content) {
+    key(name);
+    return content ? value(*content) : null();
+  }
+  // An array of what value() takes.
+  template <class Range>
+  JsonWriter& array(std::string_view name, const Range& items) {
+    key(name).begin_array();
+    for (const auto& item : items) value(item);
+    return end_array();
   }
 
   // An array of numbers rounded to `places` decimals: series for people and planners, where the digits behind

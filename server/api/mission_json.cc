@@ -58,8 +58,7 @@ void write_mission(JsonWriter& json, const history::Mission& m) {
   json.field("end_utime_us", m.end_utime_us);
   json.field("payload_kg", m.payload_kg);
   json.field("note", m.note);
-  json.key("model_version");
-  m.model_version ? json.value(*m.model_version) : json.null();
+  json.field("model_version", m.model_version);
   json.key("energy");
   write_accounts(json, m.accounts);
   json.field("samples", m.samples);

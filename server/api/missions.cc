@@ -1,4 +1,3 @@
-#include <charconv>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -6,6 +5,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "server/api/common_parameters.h"
 #include "server/api/mission_json.h"
 #include "server/api/services.h"
 
@@ -17,17 +17,6 @@ using http::Method;
 using http::Parameter;
 using http::Request;
 using http::Response;
-
-Result<history::MissionKey> mission_key(const Request& request) {
-  const std::string& text = request.param("id");
-  history::MissionKey key = 0;
-  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), key);
-  if (fault != std::errc() || end != text.data() + text.size() || key <= 0) {
-    return fail(joulecast::Fault::not_found, "id",
-                "\"" + text + "\" names no mission: ids are positive integers");
-  }
-  return key;
-}
 
 Result<history::MissionFilter> filter_of(const Request& request) {
   history::MissionFilter filter;
@@ -122,7 +111,7 @@ Result<Response> totals(const Services& services, const Request& request) {
 }
 
 Result<history::Mission> mission_of(const Services& services, const Request& request) {
-  const Result<history::MissionKey> key = mission_key(request);
+  const Result<history::MissionKey> key = path_id(request, "mission");
   if (!key) return tl::unexpected(key.error());
   return services.store.mission(*key);
 }
@@ -135,7 +124,7 @@ class MissionSummaries {
   explicit MissionSummaries(const Services& services) : services_(services) {}
 
   std::optional<Response> find(const Request& request) {
-    const Result<history::MissionKey> key = mission_key(request);
+    const Result<history::MissionKey> key = path_id(request, "mission");
     if (!key) return std::nullopt;
     const std::uint64_t commits = services_.writer.status().commits;
     const std::lock_guard lock(mutex_);
@@ -180,8 +169,7 @@ Result<Response> ledger(const Services& services, const Request& request) {
   json.field("id", mission->key);
   json.field("robot_id", mission->robot_id);
   json.field("mission_id", mission->mission_id);
-  json.key("model_version");
-  mission->model_version ? json.value(*mission->model_version) : json.null();
+  json.field("model_version", mission->model_version);
   json.key("ledger");
   write_ledger(json, mission->accounts);
   json.end_object();
@@ -194,7 +182,7 @@ history::TimeRange range_of(const Request& request) {
 }
 
 Result<Response> trace(const Services& services, const Request& request) {
-  const Result<history::MissionKey> key = mission_key(request);
+  const Result<history::MissionKey> key = path_id(request, "mission");
   if (!key) return tl::unexpected(key.error());
   const Result<history::Trace> found =
       services.store.trace(*key, range_of(request), request.query_integer("points").value_or(1000));
@@ -242,7 +230,7 @@ Result<Response> trace(const Services& services, const Request& request) {
 }
 
 Result<Response> raw_telemetry(const Services& services, const Request& request) {
-  const Result<history::MissionKey> key = mission_key(request);
+  const Result<history::MissionKey> key = path_id(request, "mission");
   if (!key) return tl::unexpected(key.error());
   history::PageRequest page;
   page.limit = request.query_integer("limit").value_or(1000);
@@ -306,19 +294,14 @@ std::vector<Endpoint> mission_endpoints(Services& services) {
       {.name = "to_utime_us", .type = Type::integer, .description = "before this time"},
   };
   std::vector<Endpoint> rows;
-  rows.push_back(
-      {.method = Method::get,
-       .path = "/v1/missions",
-       .operation_id = "listMissions",
-       .summary = "Missions, newest first, in pages that stay stable while missions come",
-       .parameters = with(filter_parameters(), {{.name = "limit",
-                                                 .type = Type::integer,
-                                                 .description = "missions a page",
-                                                 .minimum = 1,
-                                                 .maximum = static_cast<double>(history::max_page_size)},
-                                                cursor}),
-       .response_schema = "mission-page",
-       .handler = bound(list)});
+  rows.push_back({.method = Method::get,
+                  .path = "/v1/missions",
+                  .operation_id = "listMissions",
+                  .summary = "Missions, newest first, in pages that stay stable while missions come",
+                  .parameters = with(filter_parameters(),
+                                     {limit_parameter("missions a page", history::max_page_size), cursor}),
+                  .response_schema = "mission-page",
+                  .handler = bound(list)});
   rows.push_back({.method = Method::get,
                   .path = "/v1/mission-totals",
                   .operation_id = "totalMissions",
@@ -355,19 +338,15 @@ std::vector<Endpoint> mission_endpoints(Services& services) {
        .response_schema = "mission-trace",
        .error_statuses = {404},
        .handler = bound(trace)});
-  rows.push_back({.method = Method::get,
-                  .path = "/v1/missions/{id}/telemetry",
-                  .operation_id = "getMissionTelemetry",
-                  .summary = "The samples of a mission as received, as far as the retention keeps them",
-                  .parameters = with(span, {{.name = "limit",
-                                             .type = Type::integer,
-                                             .description = "samples a page",
-                                             .minimum = 1,
-                                             .maximum = static_cast<double>(history::max_telemetry_samples)},
-                                            cursor}),
-                  .response_schema = "mission-telemetry",
-                  .error_statuses = {404},
-                  .handler = bound(raw_telemetry)});
+  rows.push_back(
+      {.method = Method::get,
+       .path = "/v1/missions/{id}/telemetry",
+       .operation_id = "getMissionTelemetry",
+       .summary = "The samples of a mission as received, as far as the retention keeps them",
+       .parameters = with(span, {limit_parameter("samples a page", history::max_telemetry_samples), cursor}),
+       .response_schema = "mission-telemetry",
+       .error_statuses = {404},
+       .handler = bound(raw_telemetry)});
   return rows;
 }
 

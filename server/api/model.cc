@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "robot/robot_file.h"
+#include "server/api/common_parameters.h"
 #include "server/api/fields.h"
 #include "server/api/json_writer.h"
 #include "server/api/services.h"
@@ -31,20 +32,15 @@ struct ModelRequest {
   bool force = false, dry_run = false;
 };
 
-std::optional<std::int64_t> optional_integer(Fields& fields, std::string_view name, std::int64_t minimum) {
-  if (!fields.has(name)) return (void)fields.member(name), std::nullopt;
-  return fields.integer(name, minimum, greatest_id);
-}
-
 Result<ModelRequest> read_request(const json& body) {
   Fields fields(body);
   ModelRequest r;
   r.model = fields.member("model");
-  r.diagnosis_id = optional_integer(fields, "diagnosis_id", 1);
-  r.proposal_id = optional_integer(fields, "proposal_id", 1);
-  r.version = optional_integer(fields, "version", 1);
-  r.since_utime_us = optional_integer(fields, "since_utime_us", 0);
-  r.expected_version = optional_integer(fields, "expected_version", 1);
+  r.diagnosis_id = fields.optional_integer("diagnosis_id", 1, greatest_id);
+  r.proposal_id = fields.optional_integer("proposal_id", 1, greatest_id);
+  r.version = fields.optional_integer("version", 1, greatest_id);
+  r.since_utime_us = fields.optional_integer("since_utime_us", 0, greatest_id);
+  r.expected_version = fields.optional_integer("expected_version", 1, greatest_id);
   if (fields.has("note")) r.note = fields.text("note", longest_note);
   r.force = fields.boolean("force", false);
   r.dry_run = fields.boolean("dry_run", false);
@@ -212,13 +208,8 @@ void write_proposal(JsonWriter& out, const history::Proposal& p) {
       .field("robot_id", p.robot_id)
       .field("created_utime_us", p.created_utime_us);
   out.field("kind", p.kind).field("state", history::name(p.state)).field("note", p.note);
-  out.key("base_version");
-  p.base_version ? out.value(*p.base_version) : out.null();
-  out.key("adopted_version");
-  p.adopted_version ? out.value(*p.adopted_version) : out.null();
-  out.key("fitted_on").begin_array();
-  for (const history::MissionKey key : p.fitted_on) out.value(key);
-  out.end_array();
+  out.field("base_version", p.base_version).field("adopted_version", p.adopted_version);
+  out.array("fitted_on", p.fitted_on);
   out.key("model").raw(p.model_json).key("detail").raw(p.detail_json).end_object();
 }
 
@@ -266,22 +257,15 @@ std::vector<Endpoint> model_endpoints(Services& services) {
                   .response_schema = "version-diff",
                   .error_statuses = {404},
                   .handler = [&services](const Request& r) { return diff(services, r); }});
-  rows.push_back({.method = Method::get,
-                  .path = "/v1/robots/{id}/proposals",
-                  .operation_id = "listProposals",
-                  .summary = "Models that were suggested for a robot, newest first",
-                  .parameters = {{.name = "limit",
-                                  .type = Type::integer,
-                                  .description = "proposals a page",
-                                  .minimum = 1,
-                                  .maximum = static_cast<double>(history::max_page_size)},
-                                 {.name = "before",
-                                  .type = Type::integer,
-                                  .description = "only proposals with a smaller id",
-                                  .minimum = 1}},
-                  .response_schema = "proposal-list",
-                  .error_statuses = {404},
-                  .handler = [&services](const Request& r) { return proposals(services, r); }});
+  rows.push_back(
+      {.method = Method::get,
+       .path = "/v1/robots/{id}/proposals",
+       .operation_id = "listProposals",
+       .summary = "Models that were suggested for a robot, newest first",
+       .parameters = {limit_parameter("proposals a page", history::max_page_size), before_parameter()},
+       .response_schema = "proposal-list",
+       .error_statuses = {404},
+       .handler = [&services](const Request& r) { return proposals(services, r); }});
   return rows;
 }
 

@@ -95,8 +95,7 @@ Result<Response> versions(const Services& services, const Request& request) {
     json.begin_object();
     json.field("model_version", v.version).field("created_utime_us", v.created_utime_us);
     json.field("origin", history::name(v.origin)).field("note", v.note).field("active", v.active);
-    json.key("parent_version");
-    v.parent_version ? json.value(*v.parent_version) : json.null();
+    json.field("parent_version", v.parent_version);
     json.key("model").raw(v.model_json);
     json.key("evidence");
     v.evidence_json.empty() ? json.null() : json.raw(v.evidence_json);
