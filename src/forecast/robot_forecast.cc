@@ -9,7 +9,7 @@ namespace {
 
 constexpr double evidence_keep = 0.985;  // of old evidence, at each mission
 constexpr double scatter_keep = 0.98;
-constexpr double adapt_step = 0.1;  // of the logarithm of the width, at a miss of the interval
+constexpr double adapt_step = 0.03;  // of the logarithm of the width, at a miss of the interval
 constexpr double widest = 4, narrowest = 0.5;
 constexpr std::int64_t watch_after = 5;   // missions: earlier scores are of a model hardly corrected
 constexpr std::int64_t drift_shown = 20;  // missions
@@ -179,7 +179,9 @@ double RobotForecast::score(Driving driving, const PastMission& mission, double&
         std::clamp(learning.log_inflation + adapt_step * ((hit ? 0.0 : 1.0) - (1 - interval)),
                    std::log(narrowest), std::log(widest));
   }
-  learning.scores.add(z);
+  // The scores of a robot hardly known tell of the model's error, mostly to one side, and not of the scatter
+  // about a corrected one.
+  learning.scores.add(z, 1 - estimate_part / (estimate_part + leg_part + common_part));
 
   // Scatter between legs, with what the whole mission was off taken out; and between missions, less what legs
   // and the estimate explain.

@@ -23,17 +23,19 @@ std::vector<Scores::Entry> reference() {
   return entries;
 }
 
-std::array<double, ScoreDistribution::count> quantiles_of(std::vector<Scores::Entry> entries) {
+std::array<double, ScoreDistribution::count> quantiles_of(std::vector<Scores::Entry> entries,
+                                                          double weight_to_come) {
   std::ranges::sort(entries, {}, &Scores::Entry::score);
   const double total = std::accumulate(entries.begin(), entries.end(), 0.0,
                                        [](double sum, const Scores::Entry& e) { return sum + e.weight; });
   std::array<double, ScoreDistribution::count> atoms{};
-  // Each entry sits at the middle of its weight; straight lines in between, the outermost hold beyond.
+  // Each entry sits at the middle of its weight, half of that of the score to come lies beyond either end: n
+  // equal entries stand at k/(n + 1). Straight lines in between, the outermost hold beyond.
   std::size_t k = 0;
-  double below = 0;
+  double below = 0.5 * weight_to_come;
   for (std::size_t a = 0; a < atoms.size(); ++a) {
-    const double wanted =
-        (static_cast<double>(a) + 0.5) / static_cast<double>(ScoreDistribution::count) * total;
+    const double wanted = (static_cast<double>(a) + 0.5) / static_cast<double>(ScoreDistribution::count) *
+                          (total + weight_to_come);
     while (k + 1 < entries.size() && below + entries[k].weight + 0.5 * entries[k + 1].weight < wanted)
       below += entries[k++].weight;
     const double here = below + 0.5 * entries[k].weight;
@@ -49,7 +51,7 @@ std::array<double, ScoreDistribution::count> quantiles_of(std::vector<Scores::En
 
 }  // namespace
 
-ScoreDistribution::ScoreDistribution() : atoms_(quantiles_of(reference())) {}
+ScoreDistribution::ScoreDistribution() : atoms_(quantiles_of(reference(), 0)) {}
 
 double ScoreDistribution::quantile(double probability) const {
   const double at = std::clamp(probability, 0.0, 1.0) * static_cast<double>(count) - 0.5;
@@ -69,10 +71,10 @@ double ScoreDistribution::probability(double z) const {
   return (at + 0.5) / static_cast<double>(count);
 }
 
-void Scores::add(double score) {
+void Scores::add(double score, double weight) {
   discount(keep);
   if (entries_.size() == most) entries_.erase(entries_.begin());
-  entries_.push_back({score, 1});
+  entries_.push_back({score, weight});
 }
 
 void Scores::discount(double share) {
@@ -89,11 +91,14 @@ ScoreDistribution pooled_scores(const Scores& own, std::span<const Scores::Entry
   entries.insert(entries.end(), own.entries().begin(), own.entries().end());
   double offered = 0;
   for (const Scores::Entry& entry : siblings) offered += entry.weight;
-  if (const double wanted = std::min(offered, own_enough - own.weight()); wanted > 0) {
+  const double wanted = std::min(offered, own_enough - own.weight());
+  if (wanted > 0) {
     for (const Scores::Entry& entry : siblings)
       entries.push_back({entry.score, entry.weight * wanted / offered});
   }
-  return ScoreDistribution(quantiles_of(std::move(entries)));
+  // The reference needs no room for the score to come: it is a distribution, and no sample of one.
+  const double seen = own.weight() + std::max(0.0, wanted);
+  return ScoreDistribution(quantiles_of(std::move(entries), seen / (seen + reference_weight)));
 }
 
 }  // namespace joulecast::forecast

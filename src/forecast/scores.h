@@ -34,7 +34,8 @@ class Scores {
   static constexpr double keep = 0.99;  // of a score's weight when a newer one comes
   static constexpr std::size_t most = 300;
 
-  void add(double score);
+  // `weight`, 0 to 1: how far the forecast that was scored resembles those to come.
+  void add(double score, double weight = 1);
   void discount(double share);  // of all weights so far: a change made them doubtful
   double weight() const;        // sum of weights
 
@@ -48,8 +49,9 @@ class Scores {
 };
 
 // Own scores, filled up to `own_enough` by siblings' (Mondrian by robot, widened to the kind while own scores
-// are few), and a reference of weight `reference_weight`: Student's t of 5 degrees of freedom, which stands
-// for the n + 1st point of conformal prediction and gives small samples a tail.
+// are few), and a reference of weight `reference_weight`: Student's t of 5 degrees of freedom, which gives
+// small samples a tail. Quantiles leave room for the score to come (the n + 1st point of conformal
+// prediction).
 inline constexpr double own_enough = 30;
 inline constexpr double reference_weight = 2;
 ScoreDistribution pooled_scores(const Scores& own, std::span<const Scores::Entry> siblings);

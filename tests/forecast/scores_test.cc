@@ -62,6 +62,25 @@ TEST(ScoreDistribution, CoversWhateverTheShape) {
   }
 }
 
+// The same of twenty scores that scatter more than the reference, so that it does not help: without room for
+// the score to come 85 % would fall inside.
+TEST(ScoreDistribution, CoversFromFewScores) {
+  Rng rng(3);
+  int inside = 0;
+  constexpr int trials = 20'000;
+  const auto draw = [&] { return 2 * rng.normal(); };
+  for (int t = 0; t < trials; ++t) {
+    Scores own;
+    for (int k = 0; k < 20; ++k) own.add(draw());
+    const ScoreDistribution d = pooled_scores(own, {});
+    const double next = draw();
+    inside += next >= d.quantile(0.05) && next <= d.quantile(0.95);
+  }
+  const double coverage = static_cast<double>(inside) / trials;
+  EXPECT_GT(coverage, 0.9 - 4 * std::sqrt(0.9 * 0.1 / trials));
+  EXPECT_LT(coverage, 0.92);
+}
+
 TEST(ScoreDistribution, SiblingsFillInAndFadeOut) {
   std::vector<Scores::Entry> siblings(100, Scores::Entry{3, 1});
   Scores own;
@@ -76,6 +95,8 @@ TEST(Scores, OldOnesFade) {
   for (int k = 0; k < 10; ++k) scores.add(k);
   EXPECT_EQ(scores.entries().back().weight, 1);
   EXPECT_NEAR(scores.entries().front().weight, std::pow(Scores::keep, 9), 1e-12);
+  scores.add(1, 0.25);
+  EXPECT_EQ(scores.entries().back().weight, 0.25);
   const double before = scores.weight();
   scores.discount(0.5);
   EXPECT_NEAR(scores.weight(), 0.5 * before, 1e-12);
