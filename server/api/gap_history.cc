@@ -97,7 +97,7 @@ Result<Response> gap_history(const Services& services, const Request& request) {
   return http::json_response(out.take());
 }
 
-// The audit log: adoptions, drifts, diagnoses.
+// The audit log: adoptions, drifts, diagnoses, mission ids that were used again.
 Result<Response> audit(const Services& services, const Request& request) {
   std::optional<std::string> robot;
   if (const auto id = request.query_value("robot_id")) robot = std::string(*id);
@@ -134,7 +134,8 @@ std::vector<Endpoint> gap_history_endpoints(Services& services) {
       {.method = Method::get,
        .path = "/v1/audit-log",
        .operation_id = "listAuditLog",
-       .summary = "What happened to robots and their models: adoptions, drifts, diagnoses, in order",
+       .summary = "What happened to robots and their models: adoptions, drifts, diagnoses, reused mission "
+                  "ids, in order",
        .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},
                       {.name = "after",
                        .type = Type::integer,

@@ -13,7 +13,8 @@ namespace {
 
 constexpr std::string_view charge_topic = "charge";          // of what is learned of the battery
 constexpr std::string_view refinement_topic = "refinement";  // of what is learned of the drive
-constexpr std::int64_t remember_charge_us = 10'000'000;      // by the robot's clock
+constexpr auto json_replace = nlohmann::json::error_handler_t::replace;
+constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
 
 history::MissionState state_of(telemetry::MissionEnd end) {
   switch (end) {
@@ -350,11 +351,30 @@ void RobotSession::open(const telemetry::MissionAction& action) {
   if (!key) outputs_.warn(robot_id_, describe(key.error()));
   record.key = key.value_or(0);
   if (record.key > 0) outputs_.post(history::StartMission{record});
+  if (!record.implicit) tell_of_namesake();
   snapshot_.mission_id = record.mission_id;
   snapshot_.mission_key = record.key;
   snapshot_.mission_start_utime_us = record.start_utime_us;
   snapshot_.accounts = {};
   outputs_.counters.missions_started[action.implicit ? 1 : 0].fetch_add(1, std::memory_order_relaxed);
+}
+
+// People look missions up by the robot's name for them: they should know when it is no longer unique.
+void RobotSession::tell_of_namesake() {
+  const history::Mission& record = open_->record;
+  const Result<std::optional<history::MissionKey>> earlier =
+      outputs_.store.earlier_mission(robot_id_, record.mission_id, record.start_utime_us);
+  if (!earlier) return outputs_.warn(robot_id_, describe(earlier.error()));
+  if (!*earlier) return;
+  constexpr IngestFault reused = IngestFault::reused_mission_id;  // not one of its samples' faults
+  outputs_.counters.add(reused);
+  ++snapshot_.faults[std::string(ingest_fault_names[static_cast<std::size_t>(reused)])];
+  const nlohmann::json detail{{"mission", record.key},
+                              {"mission_id", record.mission_id},
+                              {"start_utime_us", record.start_utime_us},
+                              {"earlier_mission", **earlier}};
+  outputs_.post(history::AppendEvent{{0, snapshot_.received_utime_us, robot_id_, "mission_id_reused",
+                                      detail.dump(-1, ' ', false, json_replace)}});
 }
 
 void RobotSession::close(const telemetry::MissionAction& action) {

@@ -89,6 +89,7 @@ class RobotSession {
   void keep(const telemetry::Sample& sample);
   void carry_out(const telemetry::MissionActions& actions);
   void open(const telemetry::MissionAction& action);
+  void tell_of_namesake();
   void close(const telemetry::MissionAction& action);
   void checkpoint();
   void on_point(const energy::MeterPoint& point);

@@ -143,6 +143,25 @@ class SqliteStore final : public Store {
     return reserved_[mission] = ++last_key_;
   }
 
+  Result<std::optional<MissionKey>> earlier_mission(std::string_view robot_id, std::string_view mission_id,
+                                                    std::int64_t before_utime_us) override {
+    std::lock_guard lock(keys_mutex_);
+    const auto stored = read([&](Database& database) -> Result<std::optional<queries::MissionStart>> {
+      return queries::last_called(database, robot_id, mission_id, before_utime_us);
+    });
+    if (!stored) return tl::unexpected(stored.error());
+    std::optional<queries::MissionStart> last = *stored;
+    // What is reserved sorts by start within a robot and name.
+    const auto after = reserved_.lower_bound(MissionName(robot_id, mission_id, before_utime_us));
+    if (after != reserved_.begin()) {
+      const auto& [mission, key] = *std::prev(after);
+      const auto& [robot, name, start_utime_us] = mission;
+      if (robot == robot_id && name == mission_id && (!last || last->start_utime_us < start_utime_us))
+        last = {start_utime_us, key};
+    }
+    return last ? std::optional(last->key) : std::nullopt;
+  }
+
   Result<std::vector<RobotRecord>> robots() const override { return read(queries::robots); }
 
   Result<ModelVersion> model(std::string_view robot_id, std::optional<std::int64_t> version) const override {

@@ -101,6 +101,12 @@ class Store {
   virtual Result<MissionKey> mission_key(std::string_view robot_id, std::string_view mission_id,
                                          std::int64_t start_utime_us) = 0;
 
+  // The last mission of that robot and name that started before the time, begun or about to be; absent when
+  // the name is new.
+  virtual Result<std::optional<MissionKey>> earlier_mission(std::string_view robot_id,
+                                                            std::string_view mission_id,
+                                                            std::int64_t before_utime_us) = 0;
+
   // By robot_id ascending.
   virtual Result<std::vector<RobotRecord>> robots() const = 0;
   // The active version, or the given one.

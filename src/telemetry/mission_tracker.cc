@@ -1,6 +1,7 @@
 #include "telemetry/mission_tracker.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 namespace joulecast::telemetry {
@@ -87,13 +88,32 @@ void MissionTracker::close_if_over(MissionActions& actions, std::int64_t utime_u
   }
 }
 
+bool MissionTracker::is_same_instant(std::int64_t said_us, std::int64_t other_us) const noexcept {
+  return std::abs(said_us - other_us) <= limits_.reorder_us;
+}
+
+bool MissionTracker::any_past(std::string_view mission_id, auto is_it) const {
+  return std::ranges::any_of(past_,
+                             [&](const Past& past) { return past.mission_id == mission_id && is_it(past); });
+}
+
 void MissionTracker::on_start(MissionActions& actions, const MissionEvent& event) {
-  if (current_ && current_->mission_id == event.mission_id) {
+  const auto repeats = [&](const Past& past) {
+    return past.start_us && is_same_instant(*past.start_us, event.utime_us);
+  };
+  if ((current_ && current_->mission_id == event.mission_id &&
+       is_same_instant(current_->start_utime_us, event.utime_us)) ||
+      any_past(event.mission_id, repeats)) {
     ++counters_.duplicate_events;
     return;
   }
-  if (const Past* past = find_past(event.mission_id)) {
-    ++(past->to_us < past->from_us ? counters_.out_of_order_events : counters_.duplicate_events);
+  // The start of an end that overtook it; not of a mission longer than any.
+  const auto has_ended = [&](const Past& past) {
+    return !past.start_us && past.said_end_us && event.utime_us <= *past.said_end_us &&
+           *past.said_end_us - event.utime_us <= limits_.explicit_max_us;
+  };
+  if (any_past(event.mission_id, has_ended)) {
+    ++counters_.out_of_order_events;
     return;
   }
   if (current_) {
@@ -109,24 +129,28 @@ void MissionTracker::on_start(MissionActions& actions, const MissionEvent& event
 
 void MissionTracker::on_end(MissionActions& actions, const MissionEvent& event) {
   const MissionEnd end = event.phase == MissionPhase::aborted ? MissionEnd::aborted : MissionEnd::finished;
-  if (current_ && current_->mission_id == event.mission_id) {
-    if (event.utime_us >= begin_us_) {
-      close(actions, event.utime_us, end, event.note);
-    } else {
-      ++counters_.out_of_order_events;
-      close(actions, current_->last_utime_us, end, event.note);
-    }
+  const bool of_current = current_ && current_->mission_id == event.mission_id;
+  const bool before_current = of_current && event.utime_us < begin_us_;
+  // Said already, or late: of a mission that ended otherwise, or of an earlier one of the open one's name.
+  const auto repeats = [&](const Past& past) {
+    if (of_current) return before_current || past.said_end_us == event.utime_us;
+    return !past.said_end_us || is_same_instant(*past.said_end_us, event.utime_us);
+  };
+  if (any_past(event.mission_id, repeats)) {
+    ++counters_.duplicate_events;
     return;
   }
-  if (find_past(event.mission_id) != nullptr) {
-    ++counters_.duplicate_events;
+  if (of_current) {
+    if (before_current) ++counters_.out_of_order_events;
+    close(actions, before_current ? current_->last_utime_us : event.utime_us, end, event.note,
+          event.utime_us);
     return;
   }
   ++counters_.unknown_missions;
   if (current_ && current_->implicit && event.utime_us >= begin_us_) {
     close(actions, event.utime_us, end, "known to the robot as " + event.mission_id);
   }
-  remember({event.mission_id});
+  remember({event.mission_id, {}, event.utime_us});
 }
 
 void MissionTracker::open(MissionActions& actions, std::string id, std::int64_t utime_us, double payload_kg,
@@ -146,12 +170,13 @@ void MissionTracker::open_implicit(MissionActions& actions, std::int64_t utime_u
   actions.push_back({MissionAction::Kind::open, std::move(id), utime_us, true, payload_kg, {}, {}});
 }
 
-void MissionTracker::close(MissionActions& actions, std::int64_t utime_us, MissionEnd end, std::string note) {
+void MissionTracker::close(MissionActions& actions, std::int64_t utime_us, MissionEnd end, std::string note,
+                           std::optional<std::int64_t> said_us) {
   ++counters_.closed;
   // A sample may carry a slightly later clock than the event that ends its mission.
   const std::int64_t end_us = std::max(utime_us, current_->last_utime_us);
   if (end == MissionEnd::finished || end == MissionEnd::aborted) explicit_end_us_ = end_us;
-  remember({current_->mission_id, begin_us_, end_us});
+  remember({current_->mission_id, current_->start_utime_us, said_us, begin_us_, end_us});
   actions.push_back({MissionAction::Kind::close, std::move(current_->mission_id), end_us, current_->implicit,
                      current_->payload_kg, end, std::move(note)});
   current_.reset();
@@ -160,12 +185,6 @@ void MissionTracker::close(MissionActions& actions, std::int64_t utime_us, Missi
 void MissionTracker::remember(Past past) {
   if (past_.size() == memory) past_.pop_front();
   past_.push_back(std::move(past));
-}
-
-const MissionTracker::Past* MissionTracker::find_past(std::string_view mission_id) const noexcept {
-  const auto found = std::find_if(past_.rbegin(), past_.rend(),
-                                  [&](const Past& past) { return past.mission_id == mission_id; });
-  return found == past_.rend() ? nullptr : &*found;
 }
 
 bool MissionTracker::lies_in_past(std::int64_t utime_us) const noexcept {

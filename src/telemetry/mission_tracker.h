@@ -17,7 +17,9 @@ struct MissionLimits {
   std::int64_t implicit_max_us = 3'600'000'000;  // an implicit mission is cut into pieces no longer than this
   std::int64_t explicit_silence_us = 600'000'000;  // silence after which a mission counts as never finished
   std::int64_t explicit_max_us = 24 * 3'600'000'000LL;  // a mission longer than this counts as never finished
-  std::int64_t reorder_us = 5'000'000;  // events older by more than this tell of a clock set back
+  // Events older by more than this tell of a clock set back; starts of one name nearer than this are one
+  // start.
+  std::int64_t reorder_us = 5'000'000;
   std::int64_t after_end_us = 500'000;  // samples this soon after a mission's end start no other
 };
 
@@ -64,7 +66,7 @@ struct MissionCounters {
   std::uint64_t opened_explicit = 0;
   std::uint64_t opened_implicit = 0;
   std::uint64_t closed = 0;
-  std::uint64_t duplicate_events = 0;     // of a mission open or closed already
+  std::uint64_t duplicate_events = 0;     // of a start or an end that was heard already
   std::uint64_t out_of_order_events = 0;  // older than the mission they would change
   std::uint64_t unknown_missions = 0;     // an end of a mission whose start was never heard
   std::uint64_t samples_outside = 0;      // belong to no mission: before its start, or just after an end
@@ -77,6 +79,10 @@ struct MissionCounters {
 // Telemetry without a mission opens an implicit one, `implicit-<utime>`. A STARTED closes whatever is open.
 // An end of a mission never heard of ends an open implicit mission (it was that mission, heard from its
 // middle) and is otherwise only counted.
+//
+// A mission is its id AND its start. A robot that counts its missions anew after a boot reuses ids: a STARTED
+// of a known id within reorder_us of that mission's start is the same start again and changes nothing, any
+// other begins another mission of that id.
 class MissionTracker {
  public:
   static constexpr std::size_t memory = 64;
@@ -99,22 +105,28 @@ class MissionTracker {
   [[nodiscard]] const MissionCounters& counters() const noexcept { return counters_; }
 
  private:
-  // A mission of the past, or (with an empty span) the id of one whose end came without a start.
+  // A mission of the past, or one of which the end came without a start.
   struct Past {
     std::string mission_id;
-    std::int64_t from_us = 0;
+    std::optional<std::int64_t> start_us;     // as its STARTED said; absent: no start was heard
+    std::optional<std::int64_t> said_end_us;  // as FINISHED or ABORTED said
+    std::int64_t from_us = 0;                 // its span in the clock at its end
     std::int64_t to_us = -1;
   };
 
   void open(MissionActions& actions, std::string id, std::int64_t utime_us, double payload_kg,
             std::string note);
   void open_implicit(MissionActions& actions, std::int64_t utime_us, double payload_kg);
-  void close(MissionActions& actions, std::int64_t utime_us, MissionEnd end, std::string note = {});
+  // `said_us`: when the robot says that it ended.
+  void close(MissionActions& actions, std::int64_t utime_us, MissionEnd end, std::string note = {},
+             std::optional<std::int64_t> said_us = {});
   void close_if_over(MissionActions& actions, std::int64_t utime_us);
   void on_start(MissionActions& actions, const MissionEvent& event);
   void on_end(MissionActions& actions, const MissionEvent& event);
   void remember(Past past);
-  [[nodiscard]] const Past* find_past(std::string_view mission_id) const noexcept;
+  [[nodiscard]] bool is_same_instant(std::int64_t said_us, std::int64_t other_us) const noexcept;
+  // A mission of the past that satisfies `is_it` and is called so.
+  [[nodiscard]] bool any_past(std::string_view mission_id, auto is_it) const;
   [[nodiscard]] bool lies_in_past(std::int64_t utime_us) const noexcept;
 
   MissionLimits limits_;

@@ -383,6 +383,25 @@ TEST_P(StoreConformance, GivesOneKeyToOneMission) {
   EXPECT_GT(need(store_->mission_key("amr-1", "new", 5)), key);
 }
 
+TEST_P(StoreConformance, KnowsTheEarlierMissionOfAName) {
+  const auto earlier = [&](std::string_view robot, std::string_view mission, std::int64_t before) {
+    return need(store_->earlier_mission(robot, mission, before));
+  };
+  EXPECT_FALSE(earlier("amr-1", "m", 5));
+  const MissionKey first = start_mission(*store_, "amr-1", "m", 5).key;
+  const MissionKey second = start_mission(*store_, "amr-1", "m", 7).key;
+  EXPECT_FALSE(earlier("amr-1", "m", 5));
+  EXPECT_EQ(earlier("amr-1", "m", 6), first);
+  EXPECT_EQ(earlier("amr-1", "m", 7), first);
+  EXPECT_EQ(earlier("amr-1", "m", 100), second);
+  EXPECT_FALSE(earlier("amr-2", "m", 100));
+  EXPECT_FALSE(earlier("amr-1", "n", 100));
+  const MissionKey about_to_begin = need(store_->mission_key("amr-1", "m", 9));
+  EXPECT_EQ(earlier("amr-1", "m", 9), second);
+  EXPECT_EQ(earlier("amr-1", "m", 10), about_to_begin);
+  EXPECT_FALSE(earlier("amr-2", "m", 10));
+}
+
 TEST_P(StoreConformance, RefusesAKeyOfAnotherMission) {
   const Mission m = start_mission(*store_, "amr-1", "m", 5);
   Mission other = m;

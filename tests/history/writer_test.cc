@@ -38,6 +38,10 @@ class FailingStore final : public Store {
   Result<MissionKey> mission_key(std::string_view r, std::string_view m, std::int64_t s) override {
     return store_->mission_key(r, m, s);
   }
+  Result<std::optional<MissionKey>> earlier_mission(std::string_view r, std::string_view m,
+                                                    std::int64_t s) override {
+    return store_->earlier_mission(r, m, s);
+  }
   Result<std::vector<RobotRecord>> robots() const override { return store_->robots(); }
   Result<ModelVersion> model(std::string_view r, std::optional<std::int64_t> v) const override {
     return store_->model(r, v);

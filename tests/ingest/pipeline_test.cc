@@ -205,6 +205,43 @@ TEST_F(PipelineTest, AStartSupersedesTheOpenMission) {
   EXPECT_EQ(missions[1].state, history::MissionState::finished);
 }
 
+TEST_F(PipelineTest, AMissionIdUsedAgainIsAnotherMission) {
+  const auto run = [&](std::int64_t from) {
+    send(event(MissionPhase::started, from, "1"));
+    send(event(MissionPhase::started, from, "1"));  // resent
+    for (std::int64_t k = 0; k <= 100; ++k) {
+      Sample s = sample(from + k);
+      s.sequence = k;  // the robot has booted
+      send(s);
+    }
+    send(event(MissionPhase::finished, from + 101, "1"));
+  };
+  run(0);
+  run(1000);
+  harness.restart();  // what was heard is known from the store
+  run(2000);
+  const auto missions = harness.missions();
+  ASSERT_EQ(missions.size(), 3u);
+  for (const history::Mission& mission : missions) {
+    EXPECT_EQ(mission.mission_id, "1");
+    EXPECT_EQ(mission.state, history::MissionState::finished);
+    EXPECT_EQ(mission.samples, 101);
+    EXPECT_EQ(mission.sample_faults.count("reused_mission_id"), 0u);
+    EXPECT_NEAR(mission.accounts.measured_j, 48 * 2.0, 1e-6);
+  }
+  EXPECT_EQ(harness.faults(IngestFault::reused_mission_id), 2u);
+  EXPECT_EQ(harness.faults(IngestFault::bad_event), 3u);
+  const auto events = harness.store->events(0, 100);
+  ASSERT_TRUE(events);
+  std::vector<std::string> told;
+  for (const history::Event& e : *events)
+    if (e.kind == "mission_id_reused") told.push_back(e.detail_json);
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_EQ(told[1], "{\"earlier_mission\":" + std::to_string(missions[1].key) + ",\"mission\":" +
+                         std::to_string(missions[2].key) + ",\"mission_id\":\"1\",\"start_utime_us\":" +
+                         std::to_string(missions[2].start_utime_us) + "}");
+}
+
 TEST_F(PipelineTest, AMissionGoesOnAfterAKill) {
   send(event(MissionPhase::started, 0));
   send_range(0, 100);

@@ -214,17 +214,80 @@ TEST_F(MissionTrackerTest, ResumesAMissionOfTheStore) {
   EXPECT_THAT(finished("m-1", 9), ElementsAre("close m-1 @9 finished"));
 }
 
-// Whatever arrives, actions alternate open and close of the same mission, and every id opens once.
+TEST_F(MissionTrackerTest, AnIdUsedAgainNamesAnotherMission) {
+  started("1", 0);
+  sample(5);
+  finished("1", 10);
+  EXPECT_THAT(started("1", 100), ElementsAre("open 1 @100"));
+  EXPECT_THAT(sample(101), IsEmpty());
+  EXPECT_TRUE(belongs);
+  EXPECT_THAT(started("1", 100), IsEmpty());  // resent
+  EXPECT_THAT(started("1", 0), IsEmpty());    // the first one's, late
+  EXPECT_THAT(finished("1", 10), IsEmpty());  // the first one's, late
+  EXPECT_EQ(tracker.counters().duplicate_events, 3u);
+  EXPECT_THAT(finished("1", 110), ElementsAre("close 1 @110 finished"));
+  EXPECT_EQ(tracker.counters().opened_implicit, 0u);
+}
+
+TEST_F(MissionTrackerTest, ARobotThatBootsInsideAMissionAndCountsAnewBeginsAnotherOne) {
+  started("1", 0);
+  sample(30);
+  EXPECT_THAT(started("1", 60), ElementsAre("close 1 @30 superseded", "open 1 @60"));
+  EXPECT_THAT(finished("1", 70), ElementsAre("close 1 @70 finished"));
+}
+
+TEST_F(MissionTrackerTest, AnIdUsedAgainAfterTheClockWasSetBackNamesAnotherMission) {
+  started("1", 1000);
+  sample(1010);
+  finished("1", 1020);
+  EXPECT_THAT(started("1", 10), ElementsAre("open 1 @10"));
+  EXPECT_THAT(sample(11), IsEmpty());
+  EXPECT_TRUE(belongs);
+  EXPECT_THAT(finished("1", 20), ElementsAre("close 1 @20 finished"));
+}
+
+TEST_F(MissionTrackerTest, AStartResentWithAFreshStampIsTheSameStart) {
+  started("1", 0);
+  EXPECT_THAT(started("1", 4), IsEmpty());
+  finished("1", 60);
+  EXPECT_THAT(started("1", 3), IsEmpty());
+  EXPECT_EQ(tracker.counters().duplicate_events, 2u);
+}
+
+TEST_F(MissionTrackerTest, AShortMissionOfAUsedIdEndsThoughAnotherEndedJustBefore) {
+  started("1", 0);
+  finished("1", 100);
+  started("1", 101);
+  EXPECT_THAT(finished("1", 103), ElementsAre("close 1 @103 finished"));
+}
+
+TEST_F(MissionTrackerTest, TheEndOfAUsedIdWhoseStartWasLostEndsTheImplicitMission) {
+  started("1", 0);
+  finished("1", 10);
+  sample(50);
+  EXPECT_THAT(finished("1", 60), ElementsAre("close implicit-50000000 @60 finished"));
+  EXPECT_EQ(tracker.counters().unknown_missions, 1u);
+  EXPECT_THAT(started("1", 100), ElementsAre("open 1 @100"));
+}
+
+TEST_F(MissionTrackerTest, AnOpenMissionOfTheStoreKnowsItsStartResent) {
+  tracker.resume({"1", 0, 50 * second_us, 2.0, false});
+  EXPECT_THAT(started("1", 0), IsEmpty());
+  EXPECT_THAT(started("1", 60), ElementsAre("close 1 @50 superseded", "open 1 @60"));
+}
+
+// Whatever arrives, actions alternate open and close of the same mission, and no mission, which is an id and
+// a start, opens twice.
 TEST(MissionTrackerProperty, ActionsAlwaysPair) {
   EXPECT_TRUE(rc::check([] {
     MissionTracker tracker;
     std::string open;
-    std::set<std::string> known;
+    std::set<std::pair<std::string, std::int64_t>> known;
     const auto follow = [&](const MissionActions& actions) {
       for (const MissionAction& action : actions) {
         if (action.kind == MissionAction::Kind::open) {
           RC_ASSERT(open.empty());
-          RC_ASSERT(known.insert(action.mission_id).second);
+          RC_ASSERT(known.insert({action.mission_id, action.utime_us}).second);
           open = action.mission_id;
         } else {
           RC_ASSERT(open == action.mission_id);
