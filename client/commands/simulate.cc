@@ -1,10 +1,12 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <ctime>
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -221,6 +223,27 @@ Result<void> write_truth(const Options& options, const std::vector<Member>& memb
   return write_file(options.truth, vr::truth_json(truths));
 }
 
+// Of missions in order of time: when they are run by the clock, the UTC second at which they start; in a log,
+// which comes out the same again, the seed.
+std::string name_of_run(const Options& options, bool over_lcm, std::int64_t start_us) {
+  if (!over_lcm) return "s" + std::to_string(options.seed);
+  const std::time_t seconds = start_us / 1'000'000;
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  std::array<char, 32> text{};
+  std::strftime(text.data(), text.size(), "%y%m%d-%H%M%S", &utc);
+  return text.data();
+}
+
+// Robot time from the first message to the last.
+double length_s(const std::vector<vr::SimulationSpec>& specs, const Options& options) {
+  if (options.duration_s > 0) return options.duration_s;
+  vr::Fleet rehearsal(specs, options.seed);
+  std::int64_t last_us = specs.front().start_utime_us;
+  while (const auto message = rehearsal.next()) last_us = message->emission.utime_us;
+  return 1e-6 * static_cast<double>(last_us - specs.front().start_utime_us);
+}
+
 Exit run(const Options& options, bool lcm_asked) {
   if (options.list_effects) {
     print_effects();
@@ -233,6 +256,12 @@ Exit run(const Options& options, bool lcm_asked) {
   if (over_lcm && options.speed == 0) {
     return report(
         {Fault::invalid, "speed", "0 (unpaced) goes with --log alone; LCM receivers would lose messages"});
+  }
+  const bool endless = options.duration_s == 0 && options.missions == 0;
+  if (over_lcm && options.speed > 1 && endless) {
+    return report(
+        {Fault::invalid, "speed",
+         "above 1 needs an end, so that no stamp lies in the future: give --duration or --missions"});
   }
   auto members = assemble(options);
   if (!members) return report(members.error());
@@ -253,11 +282,18 @@ Exit run(const Options& options, bool lcm_asked) {
     if (auto known = introduce(*members, options.server); !known) return report(known.error());
   }
 
-  const std::int64_t start_us = over_lcm ? host_utime_us() : batch_start_us;
   std::vector<vr::SimulationSpec> specs;
-  for (auto& member : *members) {
-    member.spec.start_utime_us = start_us;
-    specs.push_back(member.spec);
+  for (const Member& member : *members) specs.push_back(member.spec);
+  std::int64_t start_us = batch_start_us;
+  if (over_lcm) {
+    // Robots whose time runs faster begin as far in the past as brings their last stamp to the time it is
+    // sent.
+    const double ahead_s = options.speed > 1 ? (1 - 1 / options.speed) * length_s(specs, options) : 0;
+    start_us = host_utime_us() - std::llround(1e6 * ahead_s);
+  }
+  for (vr::SimulationSpec& spec : specs) {
+    spec.start_utime_us = start_us;
+    spec.run = name_of_run(options, over_lcm, start_us);
   }
   vr::Fleet fleet(specs, options.seed);
   if (!options.quiet && over_lcm) {
@@ -333,7 +369,10 @@ void add_simulate(CLI::App& program, Exit& exit) {
   command->add_option("--rate", options->rate_hz, "telemetry of each robot, Hz")
       ->check(CLI::Range(1.0, 200.0))
       ->capture_default_str();
-  command->add_option("--speed", options->speed, "robot seconds in one second; 0 = unpaced, with --log alone")
+  command
+      ->add_option("--speed", options->speed,
+                   "robot seconds in one second; 0 = unpaced, with --log alone. Above 1 the robots' clocks "
+                   "begin in the past, so that no stamp lies in the future")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_option("--duration", options->duration_s, "robot seconds to run; 0 = until stopped")

@@ -87,7 +87,8 @@ void VirtualRobot::start_mission() {
   MissionScript script = plan_mission(spec_.robot, spec_.script, planned_pose_, mission_rng_);
   mission_.script = script;
   mission_.charge_at_start = pack_.state_of_charge();
-  mission_.mission_id = spec_.robot.robot_id + "-m" + std::to_string(missions_begun_);
+  mission_.mission_id = spec_.robot.robot_id + (spec_.run.empty() ? "-m" : "-" + spec_.run + "-m") +
+                        std::to_string(missions_begun_);
   mission_.payload_kg = script.payload_kg;
   mission_.undeclared_kg = script.undeclared_kg;
   mission_.scatter = scatter;

@@ -2,16 +2,20 @@
 #include <stdlib.h>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <regex>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "base/host_clock.h"
 #include "client/commands/table.h"
 #include "telemetry/codec.h"
 #include "telemetry/event_log.h"
@@ -95,6 +99,57 @@ TEST_F(SimulateCommand, RepeatsBitForBit) {
               Exit::ok);
   }
   EXPECT_EQ(text_of(file("a.lcmlog")), text_of(file("b.lcmlog")));
+}
+
+struct Told {
+  std::vector<telemetry::MissionEvent> missions;
+  std::int64_t first_utime_us = 0, last_utime_us = 0;
+};
+
+Told told_by(const std::string& path) {
+  Told told;
+  auto reader = telemetry::EventLogReader::open(path);
+  if (!reader) return told;
+  telemetry::LogRead read;
+  while ((read = reader->next()).status == telemetry::LogStatus::event) {
+    if (told.first_utime_us == 0) told.first_utime_us = read.event.timestamp_us;
+    told.last_utime_us = read.event.timestamp_us;
+    if (auto event = telemetry::decode_mission_event(read.event.data)) told.missions.push_back(event->event);
+  }
+  return told;
+}
+
+TEST_F(SimulateCommand, MissionsOfTwoRunsHaveDifferentIds) {
+  const auto first_id = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"simulate",   "--quiet", "--robots", "1",
+                                   "--duration", "0.1",     "--log",    file("a.lcmlog")};
+    words.insert(words.end(), more.begin(), more.end());
+    EXPECT_EQ(run(words), Exit::ok);
+    const Told told = told_by(file("a.lcmlog"));
+    return told.missions.empty() ? "" : told.missions.front().mission_id;
+  };
+  EXPECT_EQ(first_id({"--seed", "7"}), "amr-01-s7-m1");
+  EXPECT_EQ(first_id({"--seed", "8"}), "amr-01-s8-m1");
+  const std::string live = first_id({"--seed", "7", "--lcm-url", "memq://"});
+  EXPECT_TRUE(std::regex_match(live, std::regex("amr-01-[0-9]{6}-[0-9]{6}-m1"))) << live;
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  EXPECT_NE(first_id({"--seed", "7", "--lcm-url", "memq://"}), live);
+}
+
+TEST_F(SimulateCommand, FastRobotsStampNothingInTheFuture) {
+  for (const auto& end : {std::vector<std::string>{"--duration", "40"},
+                          std::vector<std::string>{"--missions", "1", "--mission-duration", "20"}}) {
+    std::vector<std::string> words{"simulate", "--quiet",   "--robots", "2",     "--speed",
+                                   "40",       "--lcm-url", "memq://",  "--log", file("a.lcmlog")};
+    words.insert(words.end(), end.begin(), end.end());
+    ASSERT_EQ(run(words), Exit::ok);
+    const std::int64_t now_us = host_utime_us();
+    const Told told = told_by(file("a.lcmlog"));
+    EXPECT_LE(told.last_utime_us, now_us);
+    EXPECT_GT(told.last_utime_us, now_us - 5'000'000);
+    EXPECT_GT(told.last_utime_us - told.first_utime_us, 15'000'000);
+  }
+  EXPECT_EQ(run({"simulate", "--quiet", "--speed", "2", "--lcm-url", "memq://"}), Exit::fault);
 }
 
 TEST_F(SimulateCommand, SaysWhatIsWrong) {
