@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::string_view charge_topic = "charge";          // of what is learned of the battery
 constexpr std::string_view refinement_topic = "refinement";  // of what is learned of the drive
+constexpr std::int64_t clock_ahead_us = 10'000'000;          // beyond what transport and drift explain
 constexpr auto json_replace = nlohmann::json::error_handler_t::replace;
 constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
 
@@ -160,6 +161,7 @@ void RobotSession::on_sample(const telemetry::Sample& sample, std::int64_t host_
   snapshot_.received_utime_us = host_utime_us;
   if (model_ == nullptr) return on_fault(IngestFault::unknown_robot);
   if (telemetry::check_plausible(sample)) return on_fault(IngestFault::implausible);
+  if (sample.utime_us - host_utime_us > clock_ahead_us) on_fault(IngestFault::clock_ahead);
 
   const telemetry::Placement place = sequence_.place(sample.sequence, sample.utime_us);
   if (place.missing > 0) on_fault(IngestFault::missing, static_cast<std::uint64_t>(place.missing));

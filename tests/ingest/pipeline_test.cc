@@ -158,6 +158,18 @@ TEST_F(PipelineTest, AClockThatIsSetMakesTheMissionIncompleteAndAddsNoEnergy) {
   EXPECT_NEAR(mission.accounts.measured_j, 48 * 98 * 0.02, 1e-6);
 }
 
+TEST_F(PipelineTest, StampsInTheFutureAreAccountedAndCounted) {
+  send(event(MissionPhase::started, 0));
+  for (std::int64_t k = 0; k < 100; ++k)
+    harness.pipeline->handle({"nomad", sample(k), sample(k).utime_us - (k < 60 ? 10'000'000 : 10'000'001)});
+  send(event(MissionPhase::finished, 101));
+  EXPECT_EQ(harness.faults(IngestFault::clock_ahead), 40u);
+  const auto mission = harness.missions().at(0);
+  EXPECT_EQ(mission.sample_faults.at("clock_ahead"), 40);
+  EXPECT_EQ(mission.samples, 100);
+  EXPECT_FALSE(mission.incomplete);
+}
+
 TEST_F(PipelineTest, UnmeasuredChannelsAreNotZero) {
   send(event(MissionPhase::started, 0));
   for (std::int64_t k = 0; k < 100; ++k) {
