@@ -6,6 +6,7 @@ import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
 import path from 'node:path';
 import { minify } from 'terser';
+import { lean_uplot } from './lean_uplot.mjs';
 
 const here = path.dirname(fileURLToPath(import.meta.url));
 const limit_bytes = 60_000;  // gzipped, what the first view needs
@@ -31,7 +32,7 @@ const options = {
   format: 'esm',
   target: ['es2022'],
   charset: 'utf8',
-  plugins: [lean_templates],
+  plugins: [lean_templates, lean_uplot],
   legalComments: 'none',
   write: false,
 };

@@ -16,7 +16,9 @@ function state_of(k, now_ms) {
     robot_id: id, has_model: true, model_version: 1 + (k % 3), live: true, silent_s: 0.02, utime_us: Math.round(now_ms * 1000),
     measured_power_w: power, modelled_power_w: power * 0.97 + 0.5, speed_m_s: 0.7 + 0.3 * Math.sin(t / 5), yaw_rate_rad_s: 0.1 * Math.cos(t / 3),
     pose: [5 * Math.cos(t / 20), 5 * Math.sin(t / 20), t / 20], payload_kg: k % 40, battery_voltage_v: 25.4, battery_current_a: power / 25.4,
-    state_of_charge: 0.1 + 0.85 * ((k * 37) % 100) / 100, range_m: 900 + 31 * k, run_time_s: 3000 + 97 * k, winding_temperature_c: [31.2, 30.8],
+    state_of_charge: 0.1 + 0.85 * ((k * 37) % 100) / 100, state_of_charge_sd: 0.04,
+    charge: { source: 'voltage_and_current', time_to_charged_s: k % 5 === 0 ? 3840 : null, time_to_charged_sd_s: k % 5 === 0 ? 120 : null },
+    charging: k % 5 === 0 ? { phase: 'constant_current', since_utime_us: Math.round((now_ms - 60_000) * 1000), charged_ah: 0.4, charged_j: 36_000 } : null, range_m: 900 + 31 * k, run_time_s: 3000 + 97 * k, winding_temperature_c: [31.2, 30.8],
     mission: k % 5 === 0 ? null : { id: k + 1, mission_id: `${id}-m${k % 90}`, start_utime_us: Math.round((now_ms - 60_000) * 1000),
       energy: { battery_j: 2000 + k + t % 60, measured_j: 2000 + k, measured_s: 60, measured_motor_j: [700, 690], motor_measured_s: 60, modelled_j: 1980 + k,
         modelled_motor_j: [690, 680], unexplained_j: 20, drawn_j: 2100, returned_j: 100, charge_ah: 0.02, distance_m: 42, turned_rad: 3, duration_s: 60 } },
@@ -26,7 +28,7 @@ function state_of(k, now_ms) {
 
 function range_of(k) {
   const median = 900 + 31 * k;
-  return { robot_id: `amr-${String(k + 1).padStart(3, '0')}`, range_quantiles_m: { p05: 0.8 * median, p50: median, p95: 1.3 * median } };
+  return { robot_id: `amr-${String(k + 1).padStart(3, '0')}`, range_quantiles_m: { p05: 0.8 * median, p50: median, p95: 1.3 * median }, run_time_quantiles_s: { p05: 2000, p50: 3000, p95: 4000 } };
 }
 
 // {url, close()}; `robots` of them, each told once a second, spread over it.

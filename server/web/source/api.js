@@ -46,13 +46,13 @@ export function query(values) {
 export const id_path = (id) => encodeURIComponent(id);
 
 // {value, error, loading, reload}; asks again when `path` changes, keeps the last value while it does.
-// A null path asks nothing.
+// An empty or null path asks nothing.
 export function useGet(path) {
-  const [told, set_told] = useState({ value: null, error: null, loading: path !== null, path });
+  const [told, set_told] = useState({ value: null, error: null, loading: Boolean(path), path });
   const [turn, set_turn] = useState(0);
   const shown = useRef(path);
   useEffect(() => {
-    if (path === null) return undefined;
+    if (!path) return undefined;
     const abort = new AbortController();
     shown.current = path;
     set_told((before) => ({ ...before, loading: true }));

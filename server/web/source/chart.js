@@ -1,6 +1,5 @@
 // uPlot in a component: follows its container's width and the theme.
 import uPlot from 'uplot';
-import 'uplot/dist/uPlot.min.css';
 import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
 import { html } from './html.js';
 import { palette, useTheme } from './theme.js';
@@ -12,15 +11,26 @@ export function axis(label, more = {}) {
   const p = palette();
   const line = { stroke: p.graticule, width: 1 };
   return {
-    label: label || undefined, labelFont: `12px ${narrow}`, font: `12px ${narrow}`, stroke: p.muted, labelSize: label === '' ? 0 : 20, labelGap: 2, size: 50, gap: 4,
+    label: label || undefined, labelFont: `13px ${narrow}`, font: `13px ${narrow}`, stroke: p.muted, labelSize: label === '' ? 0 : 20, labelGap: 2, size: 50, gap: 4,
     grid: line, ticks: { ...line, size: 4 }, border: { show: true, stroke: p.line, width: 1 },
     values: (_, splits, index, space, step) => splits.map((v) => (v === null ? '' : fixed(v, Math.max(0, Math.ceil(-Math.log10(step) - 1e-9 + (String(step).match(/[1-9]/g)?.length ?? 1) - 1))))),
     ...more,
   };
 }
 
+const minute = 60, hour = 3600, day = 86_400;
+const clock_steps = [1, 5, 15, 30, minute, 5 * minute, 15 * minute, 30 * minute, hour, 3 * hour, 6 * hour, 12 * hour, day, 2 * day, 7 * day, 14 * day, 28 * day, 91 * day, 182 * day, 364 * day];
+
 // Local times, with the day where it changes.
-export function clock_values(_, splits, index, space, step) {
+export const clock_axis = { incrs: clock_steps, splits: clock_splits, values: clock_values };
+
+function clock_splits(_, index, low, high, step) {
+  const offset = new Date(low * 1000).getTimezoneOffset() * minute, splits = [];
+  for (let at = Math.ceil((low - offset) / step) * step + offset; at <= high; at += step) splits.push(at);
+  return splits;
+}
+
+function clock_values(_, splits, index, space, step) {
   let day = '';
   return splits.map((second) => {
     const d = new Date(second * 1000), today = `${d.getMonth() + 1}-${String(d.getDate()).padStart(2, '0')}`, hour = clock(second * 1e6).slice(0, step < 60 ? 8 : 5);

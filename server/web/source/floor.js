@@ -188,7 +188,7 @@ export function FloorPath({ points, kind = 'power', height = 380, label, cursor 
   };
   return html`<div class="floor-box">
     <${Canvas} draw=${draw} height=${height} label=${label} changes=${[points, kind, cursor, robot, under]} />
-    ${legend && html`<${Legend} scale=${scale} dark=${dark} title=${kind === 'gap' ? 'measured − modelled' : 'power'} />`}
+    ${legend && shown.some((row) => row[2] > 0 || kind === 'gap') && html`<${Legend} scale=${scale} dark=${dark} title=${kind === 'gap' ? 'measured − modelled' : 'power'} />`}
   </div>`;
 }
 

@@ -37,21 +37,24 @@ export function signed(text) {
 export function energy(joule) {
   if (!known(joule)) return { n: dash, u: '' };
   const size = Math.abs(joule);
-  if (size >= 999_500) return { n: digits(joule / 1e6, 4), u: 'MJ' };
-  if (size >= 999.5) return { n: digits(joule / 1e3, 4), u: 'kJ' };
-  return { n: size >= 0.05 ? digits(joule, 3) : fixed(joule, 2), u: 'J' };
+  if (size >= 9.995e8) return { n: digits(joule / 1e9), u: 'GJ' };
+  if (size >= 999_500) return { n: digits(joule / 1e6), u: 'MJ' };
+  if (size >= 999.5) return { n: digits(joule / 1e3), u: 'kJ' };
+  return { n: size >= 0.05 || size === 0 ? digits(joule) : fixed(joule, 2), u: 'J' };
 }
 
 export function power(watt) {
   if (!known(watt)) return { n: dash, u: '' };
-  if (Math.abs(watt) >= 9995) return { n: digits(watt / 1e3, 3), u: 'kW' };
-  return { n: fixed(watt, 1), u: 'W' };
+  const size = Math.abs(watt);
+  if (size >= 9995) return { n: digits(watt / 1e3), u: 'kW' };
+  return { n: fixed(watt, size < 100 ? 1 : 0), u: 'W' };
 }
 
 export function length(metre) {
   if (!known(metre)) return { n: dash, u: '' };
-  if (Math.abs(metre) >= 9995) return { n: digits(metre / 1e3, 3), u: 'km' };
-  return { n: digits(metre, 3), u: 'm' };
+  const size = Math.abs(metre);
+  if (size >= 9995) return { n: digits(metre / 1e3), u: 'km' };
+  return { n: size < 1 ? fixed(metre, 2) : digits(metre), u: 'm' };  // no robot knows its way to the millimetre
 }
 
 export function percent(share, places = 0) {
@@ -75,6 +78,13 @@ export function span(second) {
   if (s < 3600) return `${sign}${Math.floor(s / 60)}\u00a0min ${two(s % 60)}\u00a0s`;
   if (s < 172_800) return `${sign}${Math.floor(s / 3600)}\u00a0h ${two((s % 3600) / 60)}\u00a0min`;
   return `${sign}${Math.round(s / 86_400)}\u00a0d`;
+}
+
+// A span that is foreseen: to the minute, from a minute on.
+export function about(second) {
+  if (!known(second) || second < 60 || second >= 172_800) return span(second);
+  const minutes = Math.round(second / 60);
+  return minutes < 60 ? `${minutes}\u00a0min` : `${Math.floor(minutes / 60)}\u00a0h ${String(minutes % 60).padStart(2, '0')}\u00a0min`;
 }
 
 function parts(utime_us) {

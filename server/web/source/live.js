@@ -23,7 +23,7 @@ class Track {
 }
 
 const robots = new Map();
-const state = { link: 'connecting', since_ms: Date.now(), loaded: false, error: null, robots, revision: 0, events: 0 };
+const state = { link: 'connecting', since_ms: Date.now(), loaded: false, loads: 0, error: null, robots, revision: 0, events: 0 };
 const listeners = new Set();
 let source = null, drawn_ms = 0, scheduled = false, heard_ms = 0, retry_ms = 1000, ended_missions = new Set();
 
@@ -72,6 +72,7 @@ async function load() {
     for (const id of robots.keys()) if (!present.has(id)) robots.delete(id);
     for (const robot of list) take(robot);
     state.loaded = true;
+    state.loads += 1;
     state.error = null;
   } catch (error) {
     state.error = error;

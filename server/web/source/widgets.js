@@ -25,7 +25,7 @@ export function Loading({ what }) {
 }
 
 export function Failure({ error, retry }) {
-  const where = error.field ? ` (${error.field})` : '';
+  const where = error.field && !error.message.includes(error.field) ? ` (${error.field})` : '';
   return html`<div class="failure" role="alert">
     <p class="empty-title">${error.status === 0 ? error.title : `${error.title ?? 'Fault'}${error.status ? ` · ${error.status}` : ''}`}</p>
     <p>${error.message}${where}</p>

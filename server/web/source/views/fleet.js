@@ -13,22 +13,29 @@ const row_px = 46, spare_rows = 8, reorder_ms = 3000, low_charge = 0.25;
 
 const forecast_ms = 30_000;
 
-// Each robot's range with its band, as the service forecasts it; the live value stands in until it is there.
-function useRanges() {
+// Range and run time with their bands, as the service forecasts them, of one robot or of all; the live values stand in
+// until they are there.
+export function useRanges(only) {
   const [ranges, set_ranges] = useState(new Map());
   useEffect(() => {
-    const look = () => post('/v1/autonomy', {}).then((told) => set_ranges(new Map(told.robots.map((r) => [r.robot_id, r.range_quantiles_m]))), () => {});
+    const look = () => post('/v1/autonomy', only ? { robots: [only] } : {})
+      .then((told) => set_ranges(new Map(told.robots.map((r) => [r.robot_id, { range: r.range_quantiles_m, time: r.run_time_quantiles_s }]))), () => {});
     look();
     const timer = setInterval(look, forecast_ms);
     return () => clearInterval(timer);
-  }, []);
+  }, [only]);
   return ranges;
 }
 
+// Where nine tenths of a forecast lie; nothing where there is none.
+export function between(band, as) {
+  if (!format.known(band?.p05) || !format.known(band.p95)) return '';
+  const low = as(band.p05), high = as(band.p95);
+  return html`<span title="nine times of ten"><span class="hidden">90 % between </span>${low.u === high.u || low.n === '0' ? low.n : format.text(low)}–${format.text(high)}</span>`;
+}
+
 function Range({ live, band }) {
-  if (!band || band.p50 === null) return html`<${Quantity} of=${format.length(live)} />`;
-  const low = format.length(band.p05), high = format.length(band.p95);
-  return html`<${Quantity} of=${format.length(band.p50)} /><span class="band"><span class="hidden">90 % between </span>${low.u === high.u ? low.n : format.text(low)}–${format.text(high)}</span>`;
+  return html`<${Quantity} of=${format.length(band?.p50 ?? live)} /><span class="below">${between(band, format.length)}</span>`;
 }
 
 const by = (value) => (a, b) => {
@@ -43,18 +50,21 @@ const columns = [
   { key: 'power', title: 'Power', sort: by((s) => s.measured_power_w ?? s.modelled_power_w), class: 'figure power' },
   { key: 'trace', title: 'Last 90 s', class: 'spark' },
   { key: 'charge', title: 'Charge', sort: by((s) => s.state_of_charge), class: 'charge' },
-  { key: 'range', title: 'Range', sort: by((s) => s.range_m), class: 'figure' },
+  { key: 'range', title: 'Range', sort: by((s) => s.range_m), class: 'figure range' },
   { key: 'time', title: 'Run time', sort: by((s) => s.run_time_s), class: 'figure wide' },
   { key: 'speed', title: 'Speed', sort: by((s) => s.speed_m_s), class: 'figure wide' },
   { key: 'mission', title: 'Mission', sort: by((s) => s.mission?.start_utime_us), class: 'mission' },
-  { key: 'spent', title: 'Spent', sort: by((s) => s.mission?.energy.battery_j), class: 'figure' },
+  { key: 'spent', title: 'Spent', sort: by((s) => s.mission?.energy.battery_j), class: 'figure spent' },
 ];
+
+// Nothing came from it since the service started.
+const unheard = (state) => state.silent_s === null;
 
 export function health_of(state) {
   const faults = Object.values(state.faults).reduce((sum, n) => sum + n, 0);
   if (!state.has_model) return { level: 'bad', text: 'no model', faults };
   if (state.live) return { level: 'good', text: 'live', faults };
-  if (state.silent_s === null) return { level: 'none', text: 'never heard', faults };
+  if (unheard(state)) return { level: 'none', text: 'not heard', faults };
   return { level: 'bad', text: `silent ${format.span(state.silent_s)}`, faults };
 }
 
@@ -65,10 +75,20 @@ export function Health({ state }) {
     ${faults > 0 && html`<span class="note" title=${listed}> · ${format.fixed(faults)} faulty</span>`}`;
 }
 
-export function Charge({ share }) {
+// What a charger does to it, or how sure the charge is: {text, what}.
+export function charge_note({ charging, charge, state_of_charge_sd: sd }) {
+  const left_s = charge?.time_to_charged_s;
+  if (charging?.phase === 'full') return { text: 'charged', what: 'At its charger, which has ended' };
+  if (charging) return { text: `charging${format.known(left_s) ? `, ${format.about(left_s)}` : ''}`, what: `At its charger${format.known(left_s) ? `, ready in ${format.about(left_s)}` : ''}` };
+  return { text: format.known(sd) ? `± ${format.text(format.percent(sd))}` : '', what: 'standard deviation' };
+}
+
+export function Charge({ state }) {
+  const share = state.state_of_charge;
   if (share === null) return html`<span class="note">unknown</span>`;
-  return html`<span class=${`charge-bar ${share < low_charge ? 'low' : ''}`} aria-hidden="true"><span style=${{ width: `${Math.max(2, share * 100)}%` }}></span></span>
-    <${Quantity} of=${format.percent(share)} />`;
+  const { text, what } = charge_note(state);
+  return html`<span class=${`charge-bar ${state.charging ? 'charging' : share < low_charge ? 'low' : ''}`} aria-hidden="true"><span style=${{ width: `${Math.max(2, share * 100)}%` }}></span></span>
+    <${Quantity} of=${format.percent(share)} /><span class="below" title=${what}>${text}</span>`;
 }
 
 class Row extends Component {
@@ -83,12 +103,12 @@ class Row extends Component {
       <td class="health"><${Health} state=${s} /></td>
       <td class="figure power"><${Quantity} of=${format.power(s.measured_power_w ?? s.modelled_power_w)} />${modelled_only && s.modelled_power_w !== null && html`<span class="note"> mod.</span>`}</td>
       <td class="spark"><${Sparkline} track=${entry.power} revision=${revision} dark=${dark} /></td>
-      <td class="charge"><${Charge} share=${s.state_of_charge} /></td>
-      <td class="figure"><${Range} live=${s.range_m} band=${band} /></td>
-      <td class="figure wide">${format.span(s.run_time_s)}</td>
+      <td class="charge"><${Charge} state=${s} /></td>
+      <td class="figure range"><${Range} live=${s.range_m} band=${band} /></td>
+      <td class="figure wide">${format.about(s.run_time_s)}</td>
       <td class="figure wide"><${Quantity} of=${format.unit(s.speed_m_s, 'm/s', 2)} /></td>
       <td class="mission">${s.mission ? html`<a href=${mission_link(s.mission.id)}>${s.mission.mission_id}</a>` : html`<span class="note">idle</span>`}</td>
-      <td class="figure"><${Quantity} of=${format.energy(s.mission?.energy.battery_j)} /></td>
+      <td class="figure spent"><${Quantity} of=${format.energy(s.mission?.energy.battery_j)} /></td>
     </tr>`;
   }
 }
@@ -96,7 +116,7 @@ class Row extends Component {
 function chosen(robots, text, only) {
   const wanted = text.trim().toLowerCase();
   const keep = {
-    all: () => true, live: (s) => s.live, silent: (s) => !s.live, mission: (s) => s.mission !== null,
+    all: () => true, heard: (s) => !unheard(s), live: (s) => s.live, charging: (s) => s.charging !== null, silent: (s) => !s.live, mission: (s) => s.mission !== null,
     low: (s) => s.state_of_charge !== null && s.state_of_charge < low_charge,
   }[only];
   return [...robots.values()].filter((entry) => keep(entry.state) &&
@@ -107,11 +127,12 @@ function chosen(robots, text, only) {
 // that rows can be read.
 function useOrder(live, text, only, sort) {
   const kept = useRef({ key: '', at: -Infinity, rows: [] });
-  const key = `${text}|${only}|${sort.key}|${sort.down}|${live.robots.size}`;
+  const key = `${text}|${only}|${sort.key}|${sort.down}|${live.robots.size}|${live.loads}`;
   const now = performance.now();
   if (kept.current.key !== key || now - kept.current.at > reorder_ms) {
     const column = columns.find((c) => c.key === sort.key);
-    const rows = chosen(live.robots, text, only).sort((a, b) => (sort.down ? -1 : 1) * column.sort(a, b) || names.compare(a.id, b.id));
+    // Robots that were not heard stand last, whatever the order.
+    const rows = chosen(live.robots, text, only).sort((a, b) => unheard(a.state) - unheard(b.state) || (sort.down ? -1 : 1) * column.sort(a, b) || names.compare(a.id, b.id));
     kept.current = { key, at: now, rows };
   }
   return kept.current.rows;
@@ -141,12 +162,15 @@ function useWindow(count) {
 }
 
 function Summary({ robots }) {
-  let [power, live, running, spent, lowest, known_power] = [0, 0, 0, 0, null, false];
+  let [power, live, running, spent, lowest, known_power, charging, charged] = [0, 0, 0, 0, null, false, 0, 0];
   for (const { state: s } of robots.values()) {
     const drawn = s.measured_power_w ?? s.modelled_power_w;
     if (s.live) {
       live += 1;
-      if (drawn !== null) {
+      if (s.charging !== null) {
+        charging += 1;
+        charged -= Math.min(0, s.measured_power_w ?? 0);
+      } else if (drawn !== null) {
         power += drawn;
         known_power = true;
       }
@@ -161,7 +185,8 @@ function Summary({ robots }) {
     <${Readout} large label="Fleet power" of=${known_power ? format.power(power) : { n: '–', u: '' }} channel="measured" />
     <${Readout} large label="Live" of=${`${live}`} note=${`of ${robots.size}`} />
     <${Readout} large label="On a mission" of=${`${running}`} />
-    <${Readout} large label="Spent in running missions" of=${format.energy(spent)} />
+    <${Readout} large label="Spent in running missions" of=${format.energy(running > 0 ? spent : null)} />
+    ${charging > 0 && html`<${Readout} large label="Charging" of=${`${charging}`} note=${`at ${format.text(format.power(charged))}`} />`}
     <${Readout} large label="Lowest charge" of=${format.percent(lowest?.state_of_charge)} note=${lowest && html`<a href=${robot_link(lowest.robot_id)}>${lowest.robot_id}</a>`} />
   </dl>`;
 }
@@ -172,7 +197,10 @@ export function Fleet() {
   const [text, set_text] = useState('');
   const [only, set_only] = useState('all');
   const [sort, set_sort] = useState({ key: 'robot', down: false });
-  const rows = useOrder(live, text, only, sort);
+  const [whole, set_whole] = useState(false);
+  const quiet = [...live.robots.values()].filter((entry) => unheard(entry.state)).length;
+  const foldable = only === 'all' && text === '' && quiet > 0 && quiet < live.robots.size;
+  const rows = useOrder(live, text, foldable && !whole ? 'heard' : only, sort);
   const [body, first, last] = useWindow(rows.length);
   if (!live.loaded && live.robots.size === 0)
     return live.error !== null ? html`<${Failure} error=${live.error} />` : html`<${Loading} what="the fleet" />`;
@@ -185,7 +213,7 @@ export function Fleet() {
     <${Summary} robots=${live.robots} />
     <div class="tools">
       <label class="find"><span class="hidden">Find a robot or mission</span><input type="search" placeholder="Find a robot or mission" value=${text} onInput=${(e) => set_text(e.currentTarget.value)} /></label>
-      <${Choice} label="Show" value=${only} onChange=${set_only} options=${[['all', 'All'], ['live', 'Live'], ['silent', 'Silent'], ['mission', 'On a mission'], ['low', 'Low charge']]} />
+      <${Choice} label="Show" value=${only} onChange=${set_only} options=${[['all', 'All'], ['live', 'Live'], ['silent', 'Silent'], ['mission', 'On a mission'], ['charging', 'Charging'], ['low', 'Low charge']]} />
       <span class="key"><span class="swatch measured"></span>measured <span class="swatch modelled"></span>modelled</span>
     </div>
     <table class="grid fleet" aria-rowcount=${rows.length + 1}>
@@ -193,9 +221,10 @@ export function Fleet() {
         ${c.sort ? html`<button type="button" onClick=${() => turn(c.key)}>${c.title}<span class="arrow" aria-hidden="true">${c.key === sort.key ? (sort.down ? '▾' : '▴') : ''}</span></button>` : c.title}</th>`)}</tr></thead>
       <tbody ref=${body}>
         ${first > 0 && html`<tr key="above" aria-hidden="true" class="spacer"><td colspan=${columns.length} style=${{ height: `${first * row_px}px` }}></td></tr>`}
-        ${rows.slice(first, last).map((entry, k) => html`<${Row} key=${entry.id} entry=${entry} revision=${entry.revision} index=${first + k} dark=${dark} band=${ranges.get(entry.id)} />`)}
+        ${rows.slice(first, last).map((entry, k) => html`<${Row} key=${entry.id} entry=${entry} revision=${entry.revision} index=${first + k} dark=${dark} band=${ranges.get(entry.id)?.range} />`)}
         ${last < rows.length && html`<tr key="below" aria-hidden="true" class="spacer"><td colspan=${columns.length} style=${{ height: `${(rows.length - last) * row_px}px` }}></td></tr>`}
       </tbody>
     </table>
-    ${rows.length === 0 && html`<${Empty} title="No robot matches" />`}`;
+    ${rows.length === 0 && html`<${Empty} title="No robot matches" />`}
+    ${foldable && html`<p class="fold"><button type="button" class="plain" aria-expanded=${String(whole)} onClick=${() => set_whole(!whole)}>${whole ? 'Hide' : 'Show'} ${quiet} ${quiet === 1 ? 'robot' : 'robots'} not heard since the service started</button></p>`}`;
 }

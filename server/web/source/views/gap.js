@@ -78,7 +78,12 @@ function Start({ given, onStart }) {
   const [missions, set_missions] = useState('50');
   const [busy, set_busy] = useState(false);
   const [error, set_error] = useState(null);
-  const chosen = robot || robots[0] || '';
+  const newest = useGet('/v1/missions?state=finished&limit=200');
+  const lately = new Set(newest.value?.missions.map((m) => m.robot_id));
+  const driven = robots.filter((id) => lately.has(id)), others = robots.filter((id) => !lately.has(id));
+  const chosen = robot || (newest.loading ? '' : driven[0] ?? robots[0] ?? '');
+  const past = useGet(chosen && `/v1/mission-totals${query({ robot_id: chosen, state: 'finished' })}`);
+  const count = chosen && past.value !== null && !past.loading ? past.value.missions : null;
   const start = async (event) => {
     event.preventDefault();
     set_busy(true);
@@ -93,10 +98,10 @@ function Start({ given, onStart }) {
   };
   if (live.loaded && robots.length === 0) return html`<${Empty} title="No robot has a model yet">A gap is what is measured against a model: put a robot file to <code>/v1/robots/…</code>.<//>`;
   return html`<form class="filters" onSubmit=${start}>
-    <label class="field"><span>Robot</span><select value=${chosen} onChange=${(e) => set_robot(e.currentTarget.value)}>${robots.map((id) => html`<option key=${id} value=${id}>${id}</option>`)}</select></label>
+    <label class="field"><span>Robot</span><select value=${chosen} onChange=${(e) => set_robot(e.currentTarget.value)}>${[[driven, 'Drove lately'], [others, 'Others']].map(([ids, name]) => ids.length > 0 && html`<optgroup key=${name} label=${name}>${ids.map((id) => html`<option key=${id} value=${id}>${id}</option>`)}</optgroup>`)}</select></label>
     <label class="field"><span>Missions, newest</span><input class="short" type="number" min="1" max="1000" required value=${missions} onInput=${(e) => set_missions(e.currentTarget.value)} /></label>
-    <button type="submit" class="primary" disabled=${busy || chosen === ''}>Diagnose</button>
-    <p class="note">Every fourth mission is held back to test what is found.</p>
+    <button type="submit" class="primary" disabled=${busy || !count}>Diagnose</button>
+    <p class="note" role="status">${count === 0 ? html`${chosen} has no finished mission yet: there is nothing to diagnose.` : html`${count !== null && `${format.fixed(count)} finished ${count === 1 ? 'mission' : 'missions'}. `}Every fourth is held back to test what is found.`}</p>
     ${error && html`<${Failure} error=${error} />`}</form>`;
 }
 
@@ -201,6 +206,7 @@ function Result({ job }) {
 function One({ id }) {
   useTitleOf(`Diagnosis ${id}`);
   const job = useGet(`/v1/diagnoses/${encodeURIComponent(id)}`);
+  if (job.value === null && [400, 404].includes(job.error?.status)) return html`<${Empty} title=${`There is no diagnosis ${id}`}>See <a href="#/gap">all diagnoses</a>.<//>`;
   return html`<${Answer} of=${job} what="the diagnosis">${(d) => html`
     <div class="heading"><p class="crumbs"><a href="#/gap">Gap</a></p><h1>Diagnosis ${d.id}</h1><span><a href=${robot_link(d.robot_id)}>${d.robot_id}</a></span> <${State} of=${d} />
       <span class="note">${format.time(d.created_utime_us)}${d.model_version !== null && ` · model version ${d.model_version}`}</span><span class="spring"></span>

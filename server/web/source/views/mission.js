@@ -15,8 +15,8 @@ import { ratio_of } from './missions.js';
 const trace_points = 700, fine_points = 6000, group = 'mission';
 const run_clock = (_, splits) => splits.map((s) => {
   if (s === null) return '';
-  const sign = s < 0 ? '−' : '', t = Math.abs(s);
-  return `${sign}${Math.floor(t / 60)}:${String(Math.floor(t % 60)).padStart(2, '0')}`;
+  const sign = s < 0 ? '−' : '', t = Math.abs(s), two = (v) => String(Math.floor(v)).padStart(2, '0');
+  return t < 3600 ? `${sign}${Math.floor(t / 60)}:${two(t % 60)}` : `${sign}${Math.floor(t / 3600)}:${two((t % 3600) / 60)}:${two(t % 60)}`;
 });
 
 function seconds(trace, start_utime_us) {
@@ -70,14 +70,28 @@ function Charts({ trace, mission, zoom, set_zoom, set_cursor }) {
     const p = palette(), none = { stroke: 'transparent', points: { show: false } };
     return {
       cursor, hooks, scales: { x: { time: false } },
-      axes: [time_axis('time since the start, min:s'), axis('speed, m/s')],
+      axes: [time_axis('time since the start'), axis('speed, m/s')],
       bands: [{ series: [1, 2], fill: with_alpha(p.ink, 0.12) }],
       series: [{}, none, none, { stroke: p.ink, width: 1.5, points: { show: false } }],
     };
   };
-  return html`
-    <${Chart} make=${make_power} data=${power} height=${270} changes=${[mission.id]} label="Battery power over the mission, measured and modelled, with the least and greatest of each span" />
-    <${Chart} make=${make_speed} data=${speed} height=${150} changes=${[mission.id]} label="Speed over the mission" />`;
+  // Keys move the cursor over both charts and look closer around it.
+  const plots = useRef([]), at = useRef(0);
+  const key = (event) => {
+    const t = plots.current[0].data[0], far = Math.max(1, Math.round(t.length / 20)), step = event.shiftKey ? far : 1;
+    const to = { ArrowLeft: at.current - step, ArrowRight: at.current + step, Home: 0, End: t.length - 1 }[event.key];
+    const span = t[t.length - 1] - t[0], here = t[Math.min(at.current, t.length - 1)];
+    if (to !== undefined) {
+      at.current = Math.max(0, Math.min(t.length - 1, to));
+      for (const u of plots.current) u.setCursor({ left: u.valToPos(t[at.current], 'x'), top: 8 });
+    } else if (event.key === '+' && span > 4) set_zoom([Math.max(t[0], here - span / 4), Math.min(t[t.length - 1], here + span / 4)]);
+    else if (event.key === '-' || event.key === 'Escape') set_zoom(null);
+    else return;
+    event.preventDefault();
+  };
+  return html`<div class="charts" tabindex="0" role="group" aria-label="Power and speed over time. Left and right move the cursor, plus looks closer, minus shows the whole mission." onKeyDown=${key}>
+    <${Chart} make=${make_power} data=${power} height=${270} changes=${[mission.id]} onReady=${(u) => { plots.current[0] = u; }} label="Battery power over the mission, measured and modelled, with the least and greatest of each span" />
+    <${Chart} make=${make_speed} data=${speed} height=${150} changes=${[mission.id]} onReady=${(u) => { plots.current[1] = u; }} label="Speed over the mission" /></div>`;
 }
 
 function AtCursor({ trace, mission, index }) {
@@ -121,7 +135,7 @@ function TracePanels({ mission, whole, fine }) {
   return html`<div class="columns trace-columns">
     <${Panel} class="screen" title="Power and speed" aside=${html`
         <span class="key"><span class="swatch measured"></span>measured <span class="swatch modelled"></span>modelled <span class="swatch band"></span>least to greatest</span>
-        ${zoom === null ? html`<span class="note">drag to look closer</span>` : html`<button type="button" onClick=${() => set_zoom(null)}>Whole mission</button>`}`}>
+        ${zoom === null ? html`<span class="note">drag or press + to look closer</span>` : html`<button type="button" onClick=${() => set_zoom(null)}>Whole mission</button>`}`}>
       <${Charts} trace=${trace} mission=${mission} zoom=${zoom} set_zoom=${set_zoom} set_cursor=${set_cursor} />
       <${AtCursor} trace=${trace} mission=${mission} index=${cursor} />
       <p class="note foot">Each point is ${format.span(trace.width_us / 1e6)}${zoom !== null ? ', closer view' : ''}.</p>
@@ -188,8 +202,9 @@ function Facts({ mission }) {
 
 export function Mission({ id }) {
   const mission = useGet(`/v1/missions/${id_path(id)}`);
-  const ledger = useGet(`/v1/missions/${id_path(id)}/ledger`);
-  const trace = useGet(`/v1/missions/${id_path(id)}/trace${query({ points: trace_points })}`);
+  const there = mission.value !== null;
+  const ledger = useGet(there ? `/v1/missions/${id_path(id)}/ledger` : null);
+  const trace = useGet(there ? `/v1/missions/${id_path(id)}/trace${query({ points: trace_points })}` : null);
   // A long mission's path and stops need more than a chart does.
   const merged = trace.value !== null && trace.value.start_utime_us.length >= trace_points / 2;
   const finer = useGet(merged ? `/v1/missions/${id_path(id)}/trace${query({ points: fine_points })}` : null);
@@ -201,6 +216,7 @@ export function Mission({ id }) {
     const timer = setInterval(() => [mission, ledger, trace].forEach((told) => told.reload()), 3000);
     return () => clearInterval(timer);
   }, [open]);
+  if (!there && [400, 404].includes(mission.error?.status)) return html`<${Empty} title=${`There is no mission ${id}`}>No mission of this history has that number. See <a href="#/missions">all missions</a>.<//>`;
   return html`<${Answer} of=${mission} what="the mission">${(m) => {
     const e = m.energy, ratio = ratio_of(e);
     return html`

@@ -64,8 +64,9 @@ function Filters({ given, change }) {
       ${names.map((id) => html`<option key=${id} value=${id}>${id}</option>`)}</select>`)}
     ${field('From', html`<input type="datetime-local" value=${given.from ?? ''} onChange=${set('from')} />`)}
     ${field('To', html`<input type="datetime-local" value=${given.to ?? ''} onChange=${set('to')} />`)}
-    ${field('Payload from, kg', html`<input class="short" type="number" min="0" step="any" value=${given.payload_min ?? ''} onChange=${set('payload_min')} />`)}
-    ${field('to, kg', html`<input class="short" type="number" min="0" step="any" value=${given.payload_max ?? ''} onChange=${set('payload_max')} />`)}
+    <fieldset class="field"><legend>Payload, kg</legend><span class="with-unit">
+      <input class="short" type="number" min="0" step="any" aria-label="Payload, from kg" placeholder="from" value=${given.payload_min ?? ''} onChange=${set('payload_min')} />
+      <input class="short" type="number" min="0" step="any" aria-label="Payload, to kg" placeholder="to" value=${given.payload_max ?? ''} onChange=${set('payload_max')} /></span></fieldset>
     ${field('State', html`<select value=${given.state ?? ''} onChange=${set('state')}><option value="">all</option>${mission_states.map((s) => html`<option key=${s} value=${s}>${s}</option>`)}</select>`)}
     ${field('Measured', html`<select value=${given.incomplete ?? ''} onChange=${set('incomplete')}><option value="">all</option><option value="false">complete</option><option value="true">incomplete</option></select>`)}
     ${field('Named', html`<input type="text" value=${given.name ?? ''} onChange=${set('name')} />`)}

@@ -1,4 +1,3 @@
-import uPlot from 'uplot';
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import { html } from '../html.js';
 import * as format from '../format.js';
@@ -36,18 +35,22 @@ function Legs({ legs, change, fault }) {
   </ol><button type="button" onClick=${() => change([...legs, new_leg('straight')])}>Add a leg</button></fieldset>`;
 }
 
-// Speed over time of the profiles that the literature compares with, for one straight run from rest to rest:
-// ramps of a third (trapezoid) or a half (triangle) of the time.
-function ramp_speed(time_s, duration_s, peak, ramp) {
-  return time_s.map((t) => peak * Math.max(0, Math.min(1, t / (ramp * duration_s), (duration_s - t) / (ramp * duration_s))));
+// `column` of a profile at other times, straight between its own; nothing where there is no such profile.
+function at_times(time_s, profile, column) {
+  if (!profile) return time_s.map(() => null);
+  const own = profile.time_s, values = profile[column];
+  let k = 1;
+  return time_s.map((t) => {
+    while (k < own.length - 1 && own[k] < t) k += 1;
+    const part = own[k] > own[k - 1] ? Math.max(0, Math.min(1, (t - own[k - 1]) / (own[k] - own[k - 1]))) : 1;
+    return values[k - 1] + part * (values[k] - values[k - 1]);
+  });
 }
 
-function SpeedChart({ answer, straight }) {
+function SpeedChart({ answer }) {
   const p = answer.profile, turns = p.yaw_rate_rad_s.some((v) => Math.abs(v) > 1e-6);
   const { trapezoid, triangle } = answer.baselines;
-  const data = useMemo(() => [p.time_s, p.speed_m_s,
-    straight && trapezoid ? ramp_speed(p.time_s, trapezoid.duration_s, trapezoid.peak_speed_m_s, 1 / 3) : p.time_s.map(() => null),
-    straight && triangle ? ramp_speed(p.time_s, triangle.duration_s, triangle.peak_speed_m_s, 1 / 2) : p.time_s.map(() => null),
+  const data = useMemo(() => [p.time_s, p.speed_m_s, at_times(p.time_s, trapezoid?.profile, 'speed_m_s'), at_times(p.time_s, triangle?.profile, 'speed_m_s'),
     turns ? p.yaw_rate_rad_s : p.time_s.map(() => null)], [answer]);
   const power = useMemo(() => [p.time_s, p.power_w], [answer]);
   const cursor = { sync: { key: 'plan' }, drag: { x: false, y: false } };
@@ -55,35 +58,36 @@ function SpeedChart({ answer, straight }) {
     const c = palette(), dots = { show: false };
     return {
       cursor, scales: { x: { time: false }, yaw: {} },
-      axes: [axis('', { size: 26 }), axis('speed, m/s'), ...(turns ? [axis('yaw rate, rad/s', { scale: 'yaw', side: 1, grid: { show: false } })] : [])],
+      axes: [axis('', { size: 28 }), axis('speed, m/s'), ...(turns ? [axis('yaw rate, rad/s', { scale: 'yaw', side: 1, grid: { show: false } })] : [])],
       series: [{}, { stroke: c.accent, width: 2.25, points: dots }, { stroke: c.muted, width: 1.25, dash: [6, 4], points: dots }, { stroke: c.muted, width: 1.25, dash: [2, 3], points: dots },
         { stroke: c.modelled, width: 1.25, scale: turns ? 'yaw' : 'y', points: dots }],
     };
   };
   const make_power = () => {
     const c = palette();
-    return { cursor, scales: { x: { time: false } }, axes: [axis('time, s', { size: 26 }), axis('power, W'), ...(turns ? [axis(' ', { scale: 'y', side: 1, grid: { show: false }, ticks: { show: false }, values: () => [] })] : [])],
+    return { cursor, scales: { x: { time: false } }, axes: [axis('time, s', { size: 28 }), axis('power, W'), ...(turns ? [axis(' ', { scale: 'y', side: 1, grid: { show: false }, ticks: { show: false }, values: () => [] })] : [])],
       series: [{}, { stroke: c.accent, width: 1.75, fill: with_alpha(c.accent, 0.12), points: { show: false } }] };
   };
   return html`
-    <${Chart} make=${make} data=${data} height=${210} changes=${[turns, straight]} label=${`Speed over ${format.span(answer.duration_s)}, greatest ${format.fixed(answer.peak_speed_m_s, 2)} metres a second`} />
+    <${Chart} make=${make} data=${data} height=${210} changes=${[turns]} label=${`Speed over ${format.span(answer.duration_s)}, greatest ${format.fixed(answer.peak_speed_m_s, 2)} metres a second`} />
     <${Chart} make=${make_power} data=${power} height=${150} changes=${[turns]} label="Battery power of the optimal profile over time" />
-    <p class="note foot"><span class="swatch accent"></span>least energy ${turns && html`<span class="swatch modelled"></span>yaw rate `}${straight && html`<span class="swatch dashed"></span>trapezoid <span class="swatch dotted"></span>triangle`}</p>`;
+    <p class="note foot"><span class="swatch accent"></span>least energy ${turns && html`<span class="swatch modelled"></span>yaw rate `}<span class="swatch dashed"></span>trapezoid <span class="swatch dotted"></span>triangle</p>`;
 }
 
 function Front({ answer, take }) {
   const front = answer.pareto;
   const { trapezoid, triangle } = answer.baselines;
-  const data = useMemo(() => uPlot.join([
-    [front.map((f) => f.duration_s), front.map((f) => f.energy_j)],
-    [[answer.duration_s], [answer.energy_j]],
-    trapezoid ? [[trapezoid.duration_s], [trapezoid.energy_j]] : [[], []],
-    triangle ? [[triangle.duration_s], [triangle.energy_j]] : [[], []]]), [answer]);
+  const data = useMemo(() => {
+    // One row a duration, in order; a column of energies for each kind of point.
+    const kinds = [front, [answer], [trapezoid], [triangle]].map((points) => new Map(points.filter(Boolean).map((point) => [point.duration_s, point.energy_j])));
+    const times = [...new Set(kinds.flatMap((kind) => [...kind.keys()]))].sort((a, b) => a - b);
+    return [times, ...kinds.map((kind) => times.map((t) => kind.get(t) ?? null))];
+  }, [answer]);
   const make = () => {
     const c = palette(), dot = (colour, size, fill) => ({ stroke: 'transparent', paths: () => null, points: { show: true, size, width: 2, stroke: colour, fill } });
     return {
       scales: { x: { time: false } }, cursor: { y: false, drag: { x: false, y: false }, points: { show: false } },
-      axes: [axis('duration, s', { size: 26 }), axis('energy, J', { size: 58 })],
+      axes: [axis('duration, s', { size: 28, space: 70 }), axis('energy, J', { size: 58 })],
       series: [{}, { stroke: c.modelled, width: 1.5, spanGaps: true, points: { show: true, size: 5, fill: c.modelled } }, dot(c.accent, 12, c.accent), dot(c.muted, 9, c.screen), dot(c.muted, 9, c.muted)],
     };
   };
@@ -92,19 +96,32 @@ function Front({ answer, take }) {
   return html`<${Chart} make=${make} data=${data} height=${230} changes=${[]} label=${`Energy against duration, from ${format.span(front[0].duration_s)} to ${format.span(front[front.length - 1].duration_s)}`} />
     <p class="note foot"><span class="swatch accent dot"></span>this plan <span class="swatch hollow dot grey"></span>trapezoid <span class="swatch grey dot"></span>triangle <span class="swatch modelled"></span>front</p>
     <div class="front-pick"><label><span>Walk the front</span><input type="range" min="0" max=${front.length - 1} value=${at} onInput=${(e) => set_at(e.currentTarget.valueAsNumber)} aria-valuetext=${`${format.span(point.duration_s)}, ${format.text(format.energy(point.energy_j))}`} /></label>
-      <span class="number">${format.fixed(point.duration_s, 1)} s · ${format.text(format.energy(point.energy_j))}; a second less costs ${format.text(format.energy(point.time_multiplier_w))}</span>
+      <span class="number">${format.fixed(point.duration_s, 1)} s · ${format.text(format.energy(point.energy_j))}; a second less costs ${little(point.time_multiplier_w)}</span>
       <button type="button" onClick=${() => take(point)}>Take as deadline</button></div>`;
+}
+
+// Energies near nothing: how small they are is what matters.
+const little = (joule) => (joule !== 0 && Math.abs(joule) < 0.005 ? 'less than 0.01\u00a0J' : format.text(format.energy(joule)));
+
+const methods = { closed_form: 'formulas', interior_point: 'an interior-point method', mixed: 'formulas and an interior-point method' };
+
+// What is saved against a usual profile; one that breaks the limits is no choice, and may cost less.
+function against(baseline) {
+  if (!baseline) return 'not possible here';
+  const saved = baseline.saving_fraction, by = format.text(format.percent(Math.abs(saved), 1));
+  if (!baseline.within_limits) return `breaks the limits, and costs ${by} ${saved >= 0 ? 'more' : 'less'}`;
+  return saved >= 0 ? `we save ${by}` : `costs ${by} less`;
 }
 
 function Certificate({ answer }) {
   const c = answer.certificate;
   const row = (name, value) => html`<tr><th scope="row">${name}</th><td>${value}</td></tr>`;
   return html`<table class="facts"><tbody>
-    ${row('Found by', format.words(c.method))}
-    ${row('Above the lower bound by', html`at most ${format.text(format.energy(c.gap_j))}`)}
-    ${row('Discretisation', format.text(format.energy(c.discretisation_j)))}
+    ${row('Found by', methods[c.method] ?? format.words(c.method))}
+    ${row('At most above the optimum', little(c.gap_j))}
+    ${row('Error of the time steps', little(c.discretisation_j))}
     ${row('A global optimum', c.convex ? 'yes: the problem is convex' : 'not proven: the problem is not convex')}
-    ${row('A second less costs', format.text(format.energy(c.time_multiplier_w)))}
+    ${row('A second less costs', little(c.time_multiplier_w))}
     ${row('Limits met', c.binding.length === 0 ? 'none' : c.binding.map(format.words).join(', '))}
     ${row('Braking', `${format.text(format.energy(answer.braking_j))}, of which ${format.text(format.energy(answer.recovered_j))} returns`)}
     ${row('Peak power', format.text(format.power(answer.peak_power_w)))}
@@ -135,7 +152,7 @@ export function Plan({ given }) {
   const [legs, set_legs] = useState(first_legs);
   const [points, set_points] = useState([[-5, -2], [2, -2], [2, 2.5], [5, 2.5]]);
   const [terms, set_terms] = useState({ payload: '', deadline: '', value: '', charge: '' });
-  const [told, set_told] = useState({ answer: null, error: null, busy: false, autonomy: { value: null, error: null }, straight: false });
+  const [told, set_told] = useState({ answer: null, error: null, busy: false, autonomy: { value: null, error: null } });
   const running = useRef(null);
   const chosen = able.includes(robot) ? robot : able[0] ?? '';
 
@@ -153,7 +170,7 @@ export function Plan({ given }) {
     set_told((before) => ({ ...before, busy: true, error: null }));
     const body = {
       ...(way === 'draw' ? path_of_points(points) : { path: legs.map(segment_of) }),
-      payload_kg: number(asked.payload), deadline_s: number(asked.deadline), value_of_time_w: number(asked.value), pareto_points: front_points,
+      payload_kg: number(asked.payload), deadline_s: number(asked.deadline), value_of_time_w: number(asked.value), pareto_points: front_points, baseline_columns: true,
     };
     const charge = number(asked.charge);
     const url = `/v1/robots/${id_path(chosen)}`;
@@ -162,7 +179,7 @@ export function Plan({ given }) {
       .then((value) => ({ value, error: null }), (error) => ({ value: null, error }));
     try {
       const answer = await post(`${url}/profile`, body, abort.signal);
-      set_told({ answer, of: preview, error: null, busy: false, autonomy: await autonomy, straight: body.path.length === 1 && body.path[0].kind === 'straight' });
+      set_told({ answer, of: preview, error: null, busy: false, autonomy: await autonomy });
     } catch (error) {
       if (error.name !== 'AbortError') set_told((before) => ({ ...before, error, busy: false }));
     }
@@ -210,22 +227,21 @@ export function Plan({ given }) {
           <${Readout} large label="Per metre" of=${format.unit(answer.distance_m > 0 ? answer.energy_j / answer.distance_m : null, 'J/m')} />
         </dl>
         <div class="columns">
-          <${Panel} class="screen" title="Speed and power"><${SpeedChart} answer=${answer} straight=${told.straight} /><//>
-          <${Panel} class="screen" title="On the floor"><${FloorPath} points=${driven} under=${told.of === preview ? null : preview} height=${340} label="The planned path, coloured by power; circle: start, square: end" /><//>
-        </div>
-        <div class="columns">
-          <${Panel} title="Against the usual profiles">
-            <${Bars} label="Energy of the plan, a trapezoid and a triangle in the same time" rows=${[
-              { name: 'Least energy', value: answer.energy_j, of: format.energy(answer.energy_j), channel: 'least', note: '' },
-              ...['trapezoid', 'triangle'].map((name) => ({ name: name[0].toUpperCase() + name.slice(1), value: base[name]?.energy_j ?? null, of: format.energy(base[name]?.energy_j), channel: 'plain',
-                note: base[name] ? `${base[name].within_limits ? '' : 'breaks the limits; '}we save ${format.text(format.percent(base[name].saving_fraction, 1))}` : 'not possible here' }))]} />
-            <p class="note foot">All three in the same time on every run between stops.</p>
-          <//>
-          <${Panel} class="screen" title="Energy against time">${answer.pareto.length < 2 ? html`<${Empty} title="No front">Nothing to trade: time and energy do not compete on this path.<//>` : html`<${Front} answer=${answer} take=${take} />`}<//>
-        </div>
-        <div class="columns">
-          <${Panel} title="Where the energy goes"><${Waterfall} terms_j=${answer.ledger_j} battery_j=${answer.energy_j} measured=${false} /><//>
-          <${Panel} title="How sure the optimum is"><${Certificate} answer=${answer} /><//>
+          <div>
+            <${Panel} class="screen" title="Speed and power"><${SpeedChart} answer=${answer} /><//>
+            <${Panel} title="Against the usual profiles">
+              <${Bars} label="Energy of the plan, a trapezoid and a triangle in the same time" rows=${[
+                { name: 'Least energy', value: answer.energy_j, of: format.energy(answer.energy_j), channel: 'least', note: '' },
+                ...['trapezoid', 'triangle'].map((name) => ({ name: name[0].toUpperCase() + name.slice(1), value: base[name]?.energy_j ?? null, of: format.energy(base[name]?.energy_j), channel: 'plain', note: against(base[name]) }))]} />
+              <p class="note foot">All three in the same time on every run between stops.</p>
+            <//>
+            <${Panel} title="Where the energy goes"><${Waterfall} terms_j=${answer.ledger_j} battery_j=${answer.energy_j} measured=${false} /><//>
+          </div>
+          <div>
+            <${Panel} class="screen" title="On the floor"><${FloorPath} points=${driven} under=${told.of === preview ? null : preview} height=${340} label="The planned path, coloured by power; circle: start, square: end" /><//>
+            <${Panel} class="screen" title="Energy against time">${answer.pareto.length < 2 ? html`<${Empty} title="No front">Nothing to trade: time and energy do not compete on this path.<//>` : html`<${Front} answer=${answer} take=${take} />`}<//>
+            <${Panel} title="How sure the optimum is"><${Certificate} answer=${answer} /><//>
+          </div>
         </div></div>`}
       ${way === 'legs' && answer === null && preview.length > 1 && html`<${Panel} class="screen" title="Path"><${FloorPath} points=${preview.map(([x, y]) => [x, y, NaN])} legend=${false} label="The path that was entered" /><//>`}
     </div></div>`;

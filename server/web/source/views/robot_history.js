@@ -3,7 +3,7 @@ import { useMemo, useState } from 'preact/hooks';
 import { html } from '../html.js';
 import * as format from '../format.js';
 import { id_path, post, query, useGet } from '../api.js';
-import { Chart, axis, clock_values } from '../chart.js';
+import { Chart, axis, clock_axis } from '../chart.js';
 import { palette } from '../theme.js';
 import { robot_link } from '../route.js';
 import { Answer, Empty, Failure, Panel } from '../widgets.js';
@@ -60,8 +60,8 @@ function RatioChart({ told }) {
   const make = () => {
     const p = palette();
     return {
-      scales: { x: { time: true, range: (_, low, high) => { const pad = Math.max(60, 0.02 * (high - low)); return [low - pad, high + pad]; } }, y: { range: () => [1 - spread, 1 + spread] } },
-      axes: [axis('', { size: 36, space: 84, values: clock_values }), axis('measured / modelled', { size: 56 })],
+      scales: { x: { time: false, range: (_, low, high) => { const pad = Math.max(60, 0.02 * (high - low)); return [low - pad, high + pad]; } }, y: { range: () => [1 - spread, 1 + spread] } },
+      axes: [axis('', { size: 42, space: 90, ...clock_axis }), axis('measured / modelled', { size: 56 })],
       series: [{}, { stroke: 'transparent', width: 0, points: { show: true, size: 7, width: 1.5, stroke: p.measured, fill: p.measured }, paths: () => null }, { stroke: p.gap, width: 2, points: { show: false }, spanGaps: true }],
       cursor: { show: false }, hooks: { drawAxes: [draw_marks] },
     };
@@ -108,15 +108,26 @@ function Evidence({ of: { back_test: test, forced, diagnosis_id } }) {
   return html`${diagnosis_id && html`From <a href=${`#/gap/${diagnosis_id}`}>diagnosis ${diagnosis_id}</a>. `}${test.missions.length > 0 ? html`Energy error on ${test.missions.length} other missions: ${share(test.error_before, 2)} before, ${share(test.error_after, 2)} after.` : 'Not tested: there was no mission to test it on.'}${forced && html` <span class="flag">forced</span>`}`;
 }
 
+// This robot, those that stand out most, and the rest by how far they are off, in their own order.
+const most_siblings = 12;
+function chosen_of(siblings, id) {
+  const off = (s) => (s.robot_id === id ? Infinity : (s.stands_out ? 1 : 0) + Math.min(0.9, Math.abs(s.ratio - 1)));
+  const kept = new Set([...siblings].sort((a, b) => off(b) - off(a)).slice(0, most_siblings));
+  return siblings.filter((s) => kept.has(s));
+}
+
 function Siblings({ siblings, id }) {
+  const [whole, set_whole] = useState(false);
   if (siblings.length < 2) return html`<${Empty} title="No other robot of this kind has missions yet" />`;
   const off = Math.max(0.02, ...siblings.flatMap((s) => [Math.abs(s.ci[0] - 1), Math.abs(s.ci[1] - 1)]).filter((v) => Number.isFinite(v)));
   const at = (v) => `${50 + 50 * Math.max(-1, Math.min(1, (v - 1) / off))}%`;
-  return html`<table class="bars siblings"><thead class="hidden"><tr><th>Robot</th><th>Ratio</th><th></th></tr></thead><tbody>${siblings.map((s) => html`<tr key=${s.robot_id} class=${s.robot_id === id ? 'this' : ''}>
+  const some = whole || siblings.length <= most_siblings ? siblings : chosen_of(siblings, id);
+  return html`<table class="bars siblings"><thead class="hidden"><tr><th>Robot</th><th>Ratio</th><th></th></tr></thead><tbody>${some.map((s) => html`<tr key=${s.robot_id} class=${s.robot_id === id ? 'this' : ''}>
     <th scope="row">${s.robot_id === id ? html`<b>${id}</b>` : html`<a href=${robot_link(s.robot_id)}>${s.robot_id}</a>`}${s.stands_out && html` <span class="flag">stands out</span>`}</th>
     <td class="bar-cell"><svg width="100%" height="16" aria-hidden="true"><line x1="50%" x2="50%" y1="0" y2="16" class="one" /><line x1=${at(s.ci[0])} x2=${at(s.ci[1])} y1="8" y2="8" class="whisker" /><circle cx=${at(s.ratio)} cy="8" r="4" class=${s.stands_out ? 'out' : ''} /></svg></td>
     <td class="figure">${format.fixed(s.ratio, 3)}</td></tr>`)}</tbody></table>
-    <p class="note foot">Median of measured over modelled energy of each robot's newest missions, with its 95 % interval; the line is 1.</p>`;
+    <p class="note foot">Median of measured over modelled energy of each robot's newest missions, with its 95 % interval; the line is 1.</p>
+    ${siblings.length > most_siblings && html`<button type="button" aria-expanded=${String(whole)} onClick=${() => set_whole(!whole)}>${whole ? 'Show fewer' : `Show all ${siblings.length}`}</button>`}`;
 }
 
 export function RobotHistory({ id }) {
