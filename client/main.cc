@@ -1,12 +1,18 @@
 #include <CLI/CLI.hpp>
+#include <memory>
 
 #include "client/commands/examples.h"
+#include "client/commands/help.h"
 #include "client/commands/table.h"
+#include "client/wrapped.h"
 
 int main(int argc, char** argv) {
   using joulecast::client::Exit;
-  CLI::App program("joulecast: what a fleet of differential-drive robots spends, will spend and could save");
-  program.set_version_flag("--version", "joulecast " JOULECAST_VERSION);
+  CLI::App program("joulecast: what a fleet of differential-drive robots spends, will spend and could save",
+                   "joulecast");
+  program.formatter(std::make_shared<joulecast::client::HelpFormatter>(joulecast::client::help_width()));
+  program.get_help_ptr()->description("say this and leave");
+  program.set_version_flag("--version", "joulecast " JOULECAST_VERSION, "say the version and leave");
   program.footer(joulecast::client::exit_codes_help);
   program.require_subcommand(1);
   Exit exit = Exit::ok;

@@ -3,6 +3,8 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
+#include <deque>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -38,7 +40,7 @@ struct Options {
   bool json = false;
   std::string plot_file;
   // Members of the request, by flag.
-  std::vector<std::pair<std::string, std::optional<double>>> numbers;
+  std::deque<std::pair<std::string, std::optional<double>>> numbers;  // whose places CLI11 keeps
   std::vector<std::pair<std::string, std::optional<std::string>>> texts;
   std::optional<double> length_m;
   std::optional<double> turn_rad;
@@ -123,6 +125,28 @@ Result<void> plot(const Options& options, const Question& question, json request
   return write_file(options.plot_file, *drawing);
 }
 
+double number(const json& object, const char* name) {
+  const auto found = object.find(name);
+  return found != object.end() && found->is_number() ? found->get<double>() : std::nan("");
+}
+
+// A motion that the robot cannot drive has a price all the same: said aloud, whatever else is printed.
+void warn_of_limits(const json& answer) {
+  static const std::map<std::string, const char*> units{{"speed", "m/s"},      {"acceleration", "m/s^2"},
+                                                        {"yaw_rate", "rad/s"}, {"wheel_speed", "rad/s"},
+                                                        {"current", "A"},      {"voltage", "V"}};
+  const auto broken = answer.find("beyond_limits");
+  if (broken == answer.end()) return;
+  for (const json& limit : *broken) {
+    const std::string name = limit.value("limit", "");
+    const auto unit = units.find(name);
+    fmt::print(stderr,
+               "joulecast: warning: the robot cannot drive this: {} reaches {:.4g} {}, its limit is {:.4g}\n",
+               name, number(limit, "reached"), unit == units.end() ? "" : unit->second,
+               number(limit, "allowed"));
+  }
+}
+
 Exit run(const Options& options, const Question& question) {
   const auto request = request_of(options);
   if (!request) return report(request.error());
@@ -131,20 +155,16 @@ Exit run(const Options& options, const Question& question) {
   if (!options.plot_file.empty()) {
     if (const auto drawn = plot(options, question, *request); !drawn) return report(drawn.error());
   }
+  json document = json::parse(*text, nullptr, false);
+  if (document.is_object()) warn_of_limits(document);
   if (options.json) {
     std::puts(text->c_str());
     return Exit::ok;
   }
-  json document = json::parse(*text, nullptr, false);
   if (!document.is_object())
     return report({Fault::corrupt, options.server, "did not answer with a JSON object"});
   question.print(std::move(document));
   return Exit::ok;
-}
-
-double number(const json& object, const char* name) {
-  const auto found = object.find(name);
-  return found != object.end() && found->is_number() ? found->get<double>() : std::nan("");
 }
 
 void print_head(const json& a) {
@@ -236,49 +256,37 @@ std::pair<CLI::App*, std::shared_ptr<Options>> add(CLI::App& program, Exit& exit
 
 void add_numbers(CLI::App& command, Options& options,
                  std::initializer_list<std::array<const char*, 3>> flag_member_help) {
-  options.numbers.reserve(flag_member_help.size());
-  for (const auto& [flag, member, help] : flag_member_help) {
-    options.numbers.emplace_back(member, std::nullopt);
-    command.add_option(flag, options.numbers.back().second, help);
-  }
+  for (const auto& [flag, member, help] : flag_member_help)
+    command.add_option(flag, options.numbers.emplace_back(member, std::nullopt).second, help);
 }
 
-void add_drive_flags(CLI::App& command, Options& options, bool pareto) {
+void add_drive_flags(CLI::App& command, Options& options) {
   command.add_option("--plot", options.plot_file,
                      "draw speed, power and energy over time into this SVG, against the baselines");
   command.add_option("--turn", options.turn_rad,
                      "turn in place by so many rad (to the left), before --length");
   command.add_option("--length", options.length_m, "drive straight for so many m");
-  if (pareto) {
-    add_numbers(command, options,
-                {{"--payload", "payload_kg", "kg"},
-                 {"--deadline", "deadline_s", "s"},
-                 {"--value-of-time", "value_of_time_w", "J that a second is worth"},
-                 {"--start-speed", "start_speed_m_s", "m/s"},
-                 {"--end-speed", "end_speed_m_s", "m/s"},
-                 {"--regeneration", "regeneration", "share of braking power that returns, 0 to 1"},
-                 {"--pareto", "pareto_points", "points of the front of energy against time"}});
-  } else {
-    add_numbers(command, options,
-                {{"--payload", "payload_kg", "kg"},
-                 {"--deadline", "deadline_s", "s"},
-                 {"--value-of-time", "value_of_time_w", "J that a second is worth"},
-                 {"--start-speed", "start_speed_m_s", "m/s"},
-                 {"--end-speed", "end_speed_m_s", "m/s"},
-                 {"--regeneration", "regeneration", "share of braking power that returns, 0 to 1"}});
-  }
+  add_numbers(command, options,
+              {{"--payload", "payload_kg", "what the robot carries, kg"},
+               {"--deadline", "deadline_s", "arrive after so many s at the latest"},
+               {"--value-of-time", "value_of_time_w", "what a second is worth, J"},
+               {"--start-speed", "start_speed_m_s", "speed at the start, m/s; standing by default"},
+               {"--end-speed", "end_speed_m_s", "speed at the end, m/s; standing by default"},
+               {"--regeneration", "regeneration", "share of braking power that returns, 0 to 1"}});
 }
 
 }  // namespace
 
 void add_profile(CLI::App& program, Exit& exit) {
   auto [command, options] = add(program, exit, profile);
-  add_drive_flags(*command, *options, true);
+  add_drive_flags(*command, *options);
+  add_numbers(*command, *options,
+              {{"--pareto", "pareto_points", "also so many points of the front of energy against time"}});
 }
 
 void add_estimate(CLI::App& program, Exit& exit) {
   auto [command, options] = add(program, exit, estimate);
-  add_drive_flags(*command, *options, false);
+  add_drive_flags(*command, *options);
 }
 
 void add_autonomy(CLI::App& program, Exit& exit) {

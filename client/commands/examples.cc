@@ -45,7 +45,10 @@ constexpr Examples table[] = {
      "joulecast explore --case 1 --svg case1.svg\n"
      "joulecast explore --map yard.json --robot amr.json --payload 0 --payload 20"},
     {"thesis", "joulecast thesis\njoulecast thesis --table 4-1 --json\njoulecast thesis --figure 4-2a --csv"},
-    {"completion", "source <(joulecast completion bash)"},
+    {"completion",
+     "source <(joulecast completion bash)\n"
+     "joulecast completion zsh > _joulecast.zsh\n"
+     "joulecast completion fish > joulecast.fish"},
     {"calibrate drive", "joulecast calibrate drive amr.lcmlog --robot amr.json --out amr-calibrated.json"},
     {"calibrate battery", "joulecast calibrate battery cell_*_data.csv --capacity-ah 2.6 --out cell.json"},
     {"battery predict", "joulecast battery predict cell_random_data.csv --battery cell.json"},
@@ -64,10 +67,12 @@ CLI::App* find(CLI::App& program, const std::string& path) {
 void add_examples(CLI::App& program) {
   for (const auto& [command, text] : table) {
     CLI::App* app = find(program, command);
-    std::string footer = "Examples:\n  ";
+    // What a command tells of its own stands before.
+    std::string footer = app->get_footer() == program.get_footer() ? "" : app->get_footer() + "\n\n";
+    footer += "Examples:\n  ";
     for (const char* c = text; *c != '\0'; ++c)
       footer += *c == '\n' ? std::string("\n  ") : std::string(1, *c);
-    app->footer(footer + "\n\n" + program.get_footer());
+    app->footer(footer + "\n\nExit codes: joulecast --help");
   }
 }
 

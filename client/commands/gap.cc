@@ -168,9 +168,8 @@ void add_gap(CLI::App& program, Exit& exit) {
   auto* logs = command->add_option("log", options->logs, "LCM event logs of one robot");
   auto* missions = command
                        ->add_option("--missions", options->missions.runs,
-                                    "instead of logs a CSV table of runs of which only energies are known. "
-                                    "Its columns: " +
-                                        run_columns_help())
+                                    "instead of logs: a CSV table of runs of which only energies are known, "
+                                    "with the columns below")
                        ->excludes(logs);
   command
       ->add_flag("--robot-model", options->missions.robot_model,
@@ -210,6 +209,7 @@ void add_gap(CLI::App& program, Exit& exit) {
                  "with --server: adopt what is found, after the daemon's back-test")
       ->needs(server);
   command->add_flag("--force", options->force, "adopt or apply even when the back-test shows no improvement");
+  command->footer(run_columns_help());
   add_gap_trial(*command, exit);
   command->callback([options, command, logs, missions, robot, server, &exit] {
     if (!command->get_subcommands().empty()) return;

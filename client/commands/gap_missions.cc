@@ -1,10 +1,12 @@
 #include "client/commands/gap_missions.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "client/commands/gap_output.h"
 #include "client/files.h"
+#include "client/wrapped.h"
 #include "gap/mission_level.h"
 
 namespace joulecast::client {
@@ -61,11 +63,13 @@ void print(const gap::MissionDiagnosis& d) {
 }  // namespace
 
 std::string run_columns_help() {
-  std::string help;
+  constexpr std::size_t column_width = 28;
+  std::string help = "Columns of a table of runs:";
   for (const gap::RunColumn& column : gap::run_columns()) {
-    if (!help.empty()) help += "; ";
-    help += std::string(column.name) + (column.unit.empty() ? "" : " [" + std::string(column.unit) + "]") +
-            ": " + std::string(column.meaning);
+    std::string row =
+        "  " + std::string(column.name) + (column.unit.empty() ? "" : " [" + std::string(column.unit) + "]");
+    row.resize(std::max(row.size() + 1, column_width), ' ');
+    help += '\n' + row + wrapped(column.meaning, help_width(), row.size());
   }
   return help;
 }

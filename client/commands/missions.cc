@@ -101,7 +101,7 @@ void add_missions(CLI::App& program, Exit& exit) {
   constexpr std::array<std::array<const char*, 3>, 10> filters{{
       {"--robot-id", "robot_id", "only this robot's"},
       {"--mission-id", "mission_id", "only those that the robot called so"},
-      {"--state", "state", "open, finished, aborted, unfinished, superseded or interrupted"},
+      {"--state", "state", "only those in this state"},
       {"--incomplete", "incomplete", "true: only those with unmeasured parts; false: only those without"},
       {"--from", "from_utime_us", "started at or after, microseconds since 1970"},
       {"--to", "to_utime_us", "started before, microseconds since 1970"},
@@ -115,6 +115,9 @@ void add_missions(CLI::App& program, Exit& exit) {
     options->query.emplace_back(name, std::nullopt);
     command->add_option(flag, options->query.back().second, help);
   }
+  command->get_option("--state")->check(
+      CLI::IsMember({"open", "finished", "aborted", "unfinished", "superseded", "interrupted"}));
+  command->get_option("--incomplete")->check(CLI::IsMember({"true", "false"}));
   command->add_flag("--json", options->json, "print the page as the server sends it");
   command->callback([options, &exit] { exit = run(*options); });
 }

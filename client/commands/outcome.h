@@ -15,8 +15,13 @@ enum class Exit : int {
 };
 
 inline constexpr const char* exit_codes_help =
-    "Exit codes: 0 done; 1 an input is wrong, missing or damaged; 2 wrong use of the command line; "
-    "3 server, network or disk not reachable; 4 no solution satisfies the request; 5 bug in joulecast.";
+    "Exit codes:\n"
+    "  0  done\n"
+    "  1  an input is wrong, missing or damaged\n"
+    "  2  the command line is wrong\n"
+    "  3  server, network or disk could not be reached\n"
+    "  4  nothing satisfies the request\n"
+    "  5  a bug of joulecast's";
 
 [[nodiscard]] Exit exit_of(Fault fault);
 

@@ -84,8 +84,12 @@ Exit run(const Options& options) {
     else
       print(table);
   }
-  if (!found)
-    return report({Fault::invalid, "table", "is \"" + options.table + "\", which is not among ours"});
+  if (!found) {
+    std::string ids;
+    for (const thesis::Table& table : thesis::all_tables(*robots))
+      ids += (ids.empty() ? "" : ", ") + table.id;
+    return report({Fault::invalid, "--table", "is \"" + options.table + "\"; there are " + ids});
+  }
   if (options.json) std::printf("%s\n", all.dump(2).c_str());
   return Exit::ok;
 }
@@ -97,7 +101,8 @@ void add_thesis(CLI::App& program, Exit& exit) {
   auto* command = program.add_subcommand(
       "thesis", "The thesis's tables: printed value, ours, difference and what explains it");
   auto* table = command->add_option("--table", options->table, "only this one, e.g. 4-1");
-  auto* figure = command->add_option("--figure", options->figure, "data of figure 4-2a, 4-2b, 4-2c or 4-2d");
+  auto* figure = command->add_option("--figure", options->figure, "data of this figure")
+                     ->check(CLI::IsMember({"4-2a", "4-2b", "4-2c", "4-2d"}));
   figure->excludes(table);
   auto* csv =
       command->add_flag("--csv", options->csv, "the figure as CSV, which it is unless --json is given");

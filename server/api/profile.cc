@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -75,7 +76,7 @@ Result<void> write_baselines(JsonWriter& json, const planning::Planner& planner,
     }
     json.begin_object().field("energy_j", baseline->energy_j).field("duration_s", baseline->duration_s);
     json.field("peak_speed_m_s", baseline->peak_speed_m_s);
-    json.field("within_limits", baseline->keeps(request.problem.limits));
+    json.field("within_limits", baseline->beyond(request.problem.limits).empty());
     json.field("saving_fraction", 1 - plan.summary.energy_j / baseline->energy_j);
     if (columns) {
       json.key("profile").begin_object();
@@ -89,9 +90,11 @@ Result<void> write_baselines(JsonWriter& json, const planning::Planner& planner,
   return {};
 }
 
-// A given motion as columns: power at its points and in between, energy by Gauss's rule over each span.
+// A given motion as columns: power at its points and in between, energy by Gauss's rule over each span. What
+// it reaches goes into `peaks`.
 planning::Profile series_of(const dynamics::DriveModel& drive, const std::vector<energy::MotionPoint>& points,
-                            double payload_kg, const std::optional<energy::StartPose>& start) {
+                            double payload_kg, const std::optional<energy::StartPose>& start,
+                            planning::Peaks& peaks) {
   constexpr std::array<std::pair<double, double>, 3> gauss{
       {{0.1127016653792583, 5.0 / 18}, {0.5, 8.0 / 18}, {0.8872983346207417, 5.0 / 18}}};
   constexpr int cuts = 4;  // of a span, so that power's bow shows
@@ -105,6 +108,12 @@ planning::Profile series_of(const dynamics::DriveModel& drive, const std::vector
     const double span = b.time_s - a.time_s;
     const double slope = (b.speed_m_s - a.speed_m_s) / span,
                  bend = (b.yaw_rate_rad_s - a.yaw_rate_rad_s) / span;
+    const bool in_place = a.speed_m_s == 0 && b.speed_m_s == 0;
+    planning::Peaks here;
+    here.peak_speed_m_s = std::max(std::fabs(a.speed_m_s), std::fabs(b.speed_m_s));
+    here.peak_yaw_rate_rad_s = std::max(std::fabs(a.yaw_rate_rad_s), std::fabs(b.yaw_rate_rad_s));
+    here.peak_acceleration_m_s2 = std::fabs(in_place ? drive.parameters().half_track_m * bend : slope);
+    peaks.reach(here);
     const auto power = [&](double t) {
       dynamics::Instant at;
       at.wheel_speed_rad_s =
@@ -112,7 +121,9 @@ planning::Profile series_of(const dynamics::DriveModel& drive, const std::vector
       at.wheel_acceleration_rad_s2 = dynamics::wheels_of_body(drive.parameters(), slope, bend);
       at.payload_kg = payload_kg;
       at.x_m = pose.x_m, at.y_m = pose.y_m, at.heading_rad = pose.heading_rad;
-      return drive.flow(at).battery_power_w;
+      const auto flow = drive.flow(at);
+      peaks.reach(at.wheel_speed_rad_s, flow);
+      return flow.battery_power_w;
     };
     for (int cut = 0; cut <= cuts; ++cut) {
       const double t = span * cut / cuts, h = span / cuts;
@@ -231,6 +242,7 @@ Result<std::string> estimate_answer(const nlohmann::json& body, const server::Mo
   energy::Accounts accounts;
   const bool columns = fields.boolean("columns", false);
   planning::Profile series;
+  planning::Peaks peaks;  // stays at nothing for a plan, which keeps its limits
   if (const nlohmann::json* given = fields.member("profile")) {
     Fields profile(*given, fields.pointer("profile"));
     constexpr Bounds time{.minimum = 0, .maximum = 1e7}, speed{.minimum = -100, .maximum = 100};
@@ -251,7 +263,7 @@ Result<std::string> estimate_answer(const nlohmann::json& body, const server::Mo
     Result<energy::Accounts> priced = energy::estimate_motion(model.drive, points, payload, start);
     if (!priced) return tl::unexpected(std::move(priced.error()));
     accounts = *priced;
-    if (columns) series = series_of(model.drive, points, payload, start);
+    series = series_of(model.drive, points, payload, start, peaks);
   } else {
     const DriveRequest request = read_drive(fields, model.robot);
     if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
@@ -269,6 +281,12 @@ Result<std::string> estimate_answer(const nlohmann::json& body, const server::Mo
   json.field("robot_id", model.robot.robot_id).field("model_version", model.version);
   json.field("energy_j", accounts.battery_j).field("duration_s", accounts.duration_s);
   json.field("distance_m", accounts.distance_m).field("turned_rad", accounts.turned_rad);
+  json.key("beyond_limits").begin_array();
+  for (const planning::BrokenLimit& broken : peaks.beyond(planning::limits_of(model.robot))) {
+    json.begin_object().field("limit", broken.limit);
+    json.field("reached", broken.reached).field("allowed", broken.allowed).end_object();
+  }
+  json.end_array();
   json.key("ledger");
   write_ledger(json, accounts);
   if (columns) write_columns(json, series);

@@ -27,7 +27,7 @@ class Ramp {
   }
 
   double energy_j = 0;
-  Baseline peaks;  // of this run
+  Peaks peaks;  // of this run
 
  private:
   struct Span {
@@ -96,12 +96,7 @@ class Ramp {
     const auto flow = model_.flow(at_);
     const double yaw = run_.turn != 0 ? speed : speed * std::fabs(knot.curvature_1_m);
     peaks.peak_yaw_rate_rad_s = std::max(peaks.peak_yaw_rate_rad_s, yaw);
-    for (std::size_t s : {0u, 1u}) {
-      peaks.peak_wheel_speed_rad_s =
-          std::max(peaks.peak_wheel_speed_rad_s, std::fabs(at_.wheel_speed_rad_s[s]));
-      peaks.peak_current_a = std::max(peaks.peak_current_a, std::fabs(flow.current_a[s]));
-      peaks.peak_voltage_v = std::max(peaks.peak_voltage_v, std::fabs(flow.voltage_v[s]));
-    }
+    peaks.reach(at_.wheel_speed_rad_s, flow);
     return flow.battery_power_w;
   }
 
@@ -115,15 +110,6 @@ class Ramp {
 };
 
 }  // namespace
-
-bool Baseline::keeps(const Limits& l) const {
-  constexpr double rounding = 1 + 1e-6;
-  return peak_speed_m_s <= l.speed_m_s * rounding &&
-         peak_acceleration_m_s2 <= l.acceleration_m_s2 * rounding &&
-         peak_yaw_rate_rad_s <= l.yaw_rate_rad_s * rounding &&
-         peak_wheel_speed_rad_s <= l.wheel_speed_rad_s * rounding &&
-         peak_current_a <= l.current_a * rounding && peak_voltage_v <= l.voltage_v * rounding;
-}
 
 Result<Baseline> ramp_baseline(const DriveLoads& loads, const Path& path,
                                std::span<const double> run_duration_s, double start_speed_m_s,
@@ -155,11 +141,7 @@ Result<Baseline> ramp_baseline(const DriveLoads& loads, const Path& path,
     ramp.drive(ramp_s, top, end);
     baseline.energy_j += ramp.energy_j;
     baseline.duration_s += run_duration_s[k];
-    for (double Baseline::*peak :
-         {&Baseline::peak_speed_m_s, &Baseline::peak_acceleration_m_s2, &Baseline::peak_yaw_rate_rad_s,
-          &Baseline::peak_wheel_speed_rad_s, &Baseline::peak_current_a, &Baseline::peak_voltage_v}) {
-      baseline.*peak = std::max(baseline.*peak, ramp.peaks.*peak);
-    }
+    baseline.reach(ramp.peaks);
   }
   stand(path.dwell_after_s);
   return baseline;

@@ -6,26 +6,19 @@
 #include "base/error.h"
 #include "planning/load.h"
 #include "planning/path.h"
+#include "planning/peaks.h"
 #include "planning/problem.h"
 
 namespace joulecast::planning {
 
 // What robots drive without a planner, to compare with: on every run the speed ramps up, holds and ramps
 // down.
-struct Baseline {
+struct Baseline : Peaks {
   double energy_j = 0;  // from the battery, dwells included
   double duration_s = 0;
-  double peak_speed_m_s = 0;
-  double peak_acceleration_m_s2 = 0;  // along the way; turning in place, of the wheels' rims
-  double peak_yaw_rate_rad_s = 0;
-  double peak_wheel_speed_rad_s = 0;
-  double peak_current_a = 0, peak_voltage_v = 0;  // of the armatures
 
   // The motion over time, where it was asked for; columns of equal length. Energy since the start.
   std::vector<double> time_s, speed_m_s, yaw_rate_rad_s, power_w, energy_column_j;
-
-  // To within rounding.
-  bool keeps(const Limits& limits) const;
 };
 
 // Each run takes `run_duration_s`, accelerating for `ramp_fraction` of it and braking for as long: 1/3 is the

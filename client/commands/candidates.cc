@@ -1,0 +1,155 @@
+#include "client/commands/candidates.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+#include "client/commands/values.h"
+#include "client/http_client.h"
+
+namespace joulecast::client {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What the words before the last one say.
+struct Place {
+  CLI::App* app = nullptr;
+  const CLI::Option* open = nullptr;  // waits for a value
+  bool open_may_end = false;          // has one already, and takes more
+  std::vector<const CLI::Option*> given{};
+  std::size_t positionals = 0;
+  std::string server{};
+};
+
+bool takes_many(const CLI::Option& option) {
+  return option.get_expected_max() == CLI::detail::expected_max_vector_size;
+}
+
+const CLI::Option* option_named(CLI::App& app, const std::string& word) {
+  const auto has = [&word](const CLI::Option* option) { return option->check_name(word); };
+  for (const CLI::Option* option : app.get_options())
+    if (has(option)) return option;
+  for (CLI::App* group : app.get_subcommands([](const CLI::App* sub) { return sub->get_name().empty(); }))
+    for (const CLI::Option* option : group->get_options())
+      if (has(option)) return option;
+  return nullptr;
+}
+
+CLI::App* subcommand_named(CLI::App& app, const std::string& word) {
+  for (CLI::App* sub : app.get_subcommands([](const CLI::App* s) { return !s->get_name().empty(); }))
+    if (sub->get_name() == word) return sub;
+  return nullptr;
+}
+
+Place place_of(CLI::App& program, const std::vector<std::string>& words) {
+  Place at{.app = &program};
+  for (std::size_t k = 0; k + 1 < words.size(); ++k) {
+    const std::string& word = words[k];
+    if (word.size() > 1 && word.front() == '-') {
+      const std::string name = word.substr(0, word.find('='));
+      const CLI::Option* option = option_named(*at.app, name);
+      if (option != nullptr) at.given.push_back(option);
+      const bool waits = option != nullptr && option->get_items_expected_max() != 0 && name == word;
+      at.open = waits ? option : nullptr;
+      at.open_may_end = false;
+    } else if (at.open != nullptr) {
+      if (at.open->check_lname("server")) at.server = word;
+      if (takes_many(*at.open))
+        at.open_may_end = true;
+      else
+        at.open = nullptr;
+    } else if (CLI::App* sub = subcommand_named(*at.app, word); sub != nullptr && at.positionals == 0) {
+      at.app = sub;
+    } else {
+      ++at.positionals;
+    }
+  }
+  return at;
+}
+
+// Files and folders that begin as `begin` does; of files only those named like `pattern` ("*.json").
+std::vector<std::string> files(const std::string& begin, std::string_view pattern) {
+  const std::size_t slash = begin.rfind('/');
+  const std::string folder = slash == std::string::npos ? "" : begin.substr(0, slash + 1);
+  const std::string name = begin.substr(folder.size());
+  const std::string_view ending = pattern.starts_with('*') ? pattern.substr(1) : std::string_view{};
+  std::vector<std::string> found;
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder.empty() ? "." : folder, ignored)) {
+    const std::string own = entry.path().filename().string();
+    if (!own.starts_with(name) || (own.front() == '.' && name.empty())) continue;
+    if (entry.is_directory(ignored))
+      found.push_back(folder + own + '/');
+    else if (!ending.empty() && own.ends_with(ending))
+      found.push_back(folder + own);
+  }
+  std::ranges::sort(found);
+  return found;
+}
+
+std::vector<std::string> robots_of(const std::string& server) {
+  const auto address = parse_server_url(server);
+  if (!address) return {};
+  const auto reply = http_request(*address, HttpMethod::get, "/v1/robots", {}, std::chrono::seconds(1));
+  if (!reply || !reply->ok()) return {};
+  const auto told = nlohmann::json::parse(reply->body, nullptr, false);
+  std::vector<std::string> ids;
+  if (!told.is_object() || !told.contains("robots")) return ids;
+  for (const auto& robot : told["robots"]) ids.push_back(robot.value("robot_id", ""));
+  return ids;
+}
+
+std::vector<std::string> values(const CLI::Option& option, const Place& at, const std::string& begin) {
+  const ValueKind kind = value_kind(option, command_path(*at.app));
+  if (!kind.words.empty()) return kind.words;
+  if (!kind.files.empty()) return files(begin, kind.files);
+  if (kind.name == "URL" && option.check_lname("server")) return {"http://127.0.0.1:8080"};
+  if (option.check_lname("robot-id") && !at.server.empty()) return robots_of(at.server);
+  return {};
+}
+
+void add_options(CLI::App& app, const Place& at, std::vector<Candidate>& out) {
+  for (const CLI::Option* option : app.get_options()) {
+    const bool again = std::ranges::find(at.given, option) != at.given.end() && !takes_many(*option);
+    if (again || option->get_group().empty()) continue;
+    for (const auto& name : option->get_lnames()) out.push_back({"--" + name, option->get_description()});
+  }
+  for (CLI::App* group : app.get_subcommands([](const CLI::App* sub) { return sub->get_name().empty(); }))
+    add_options(*group, at, out);
+}
+
+}  // namespace
+
+std::vector<Candidate> candidates(CLI::App& program, const std::vector<std::string>& words) {
+  const std::string begin = words.empty() ? "" : words.back();
+  const Place at = place_of(program, words);
+  std::vector<Candidate> all;
+  const auto add_values = [&](const CLI::Option& option) {
+    for (auto& text : values(option, at, begin)) all.push_back({std::move(text), ""});
+  };
+  const bool option_begun = begin.starts_with('-');
+  if (at.open != nullptr && !(at.open_may_end && option_begun)) {
+    add_values(*at.open);
+  } else if (option_begun) {
+    add_options(*at.app, at, all);
+  } else {
+    if (at.positionals == 0)
+      for (const CLI::App* sub :
+           at.app->get_subcommands([](const CLI::App* s) { return !s->get_name().empty(); }))
+        all.push_back({sub->get_name(), sub->get_description()});
+    std::vector<const CLI::Option*> positionals;
+    for (const CLI::Option* option : at.app->get_options())
+      if (option->get_positional() && !option->get_group().empty()) positionals.push_back(option);
+    if (!positionals.empty() && (at.positionals < positionals.size() || takes_many(*positionals.back())))
+      add_values(*positionals[std::min(at.positionals, positionals.size() - 1)]);
+    if (all.empty() && begin.empty()) add_options(*at.app, at, all);
+  }
+  std::erase_if(all, [&begin](const Candidate& c) { return !c.text.starts_with(begin); });
+  return all;
+}
+
+}  // namespace joulecast::client

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+namespace joulecast::client {
+
+// Help as people read it: lines that fit the terminal, values called by what they are, defaults and bounds
+// behind the meaning of an option.
+class HelpFormatter : public CLI::Formatter {
+ public:
+  explicit HelpFormatter(std::size_t width) : width_(width) {
+    column_width(28);
+    label("Positionals", "Arguments");
+    label("SUBCOMMAND", "COMMAND");
+  }
+
+  std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override;
+  std::string make_usage(const CLI::App* app, std::string name) const override;
+  std::string make_description(const CLI::App* app) const override;
+  std::string make_expanded(const CLI::App* group) const override;
+  std::string make_option(const CLI::Option* option, bool is_positional) const override;
+  std::string make_subcommand(const CLI::App* sub) const override;
+  std::string make_footer(const CLI::App* app) const override;
+
+ private:
+  std::string row(const std::string& left, const std::string& text) const;
+
+  std::size_t width_;
+  mutable std::string command_;  // whose help is being written: options do not tell theirs
+};
+
+}  // namespace joulecast::client

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace joulecast::client {
+
+// Columns of the terminal that standard output is, 60 to 100; 100 where it is none, so that files are alike
+// everywhere.
+[[nodiscard]] std::size_t help_width();
+
+// `text` in lines of at most `width` columns, all but the first begun by `indent` blanks. Lines that `text`
+// breaks itself stay broken; a word longer than a line stands alone.
+[[nodiscard]] std::string wrapped(std::string_view text, std::size_t width, std::size_t indent = 0);
+
+}  // namespace joulecast::client

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <array>
+#include <string_view>
+#include <vector>
+
+#include "dynamics/drive_model.h"
+#include "planning/problem.h"
+
+namespace joulecast::planning {
+
+struct BrokenLimit {
+  std::string_view
+      limit;  // speed m/s, acceleration m/s^2, yaw_rate rad/s, wheel_speed rad/s, current A, voltage V
+  double reached = 0;
+  double allowed = 0;
+};
+
+// The greatest of what a motion reaches, of all that limits bound.
+struct Peaks {
+  double peak_speed_m_s = 0;
+  double peak_acceleration_m_s2 = 0;  // along the way; turning in place, of the wheels' rims
+  double peak_yaw_rate_rad_s = 0;
+  double peak_wheel_speed_rad_s = 0;
+  double peak_current_a = 0, peak_voltage_v = 0;  // of the armatures
+
+  void reach(const Peaks& other);
+  // What wheels and armatures do at an instant.
+  void reach(const std::array<double, 2>& wheel_speed_rad_s, const dynamics::PowerFlow<double>& flow);
+  // The limits broken by more than rounding, in the order above.
+  std::vector<BrokenLimit> beyond(const Limits& limits) const;
+};
+
+}  // namespace joulecast::planning

@@ -1,0 +1,157 @@
+// What the command line tells before it does anything: help and completion.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <set>
+#include <sstream>
+
+#include "client/commands/candidates.h"
+#include "client/commands/examples.h"
+#include "client/commands/help.h"
+#include "client/commands/table.h"
+#include "client/commands/values.h"
+#include "client/wrapped.h"
+
+namespace joulecast::client {
+namespace {
+
+using ::testing::Contains;
+using ::testing::Each;
+using ::testing::ElementsAre;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::IsSupersetOf;
+using ::testing::Not;
+
+class CommandLine : public ::testing::Test {
+ protected:
+  CommandLine() : program_("joulecast", "joulecast") {
+    program_.formatter(std::make_shared<HelpFormatter>(width));
+    for (const auto add : commands()) add(program_, exit_);
+    add_examples(program_);
+    char folder[] = "/tmp/joulecast-completion-XXXXXX";
+    EXPECT_NE(mkdtemp(folder), nullptr);
+    before_ = std::filesystem::current_path();
+    home_ = folder;
+    std::filesystem::current_path(home_);
+  }
+  ~CommandLine() override {
+    std::filesystem::current_path(before_);
+    std::filesystem::remove_all(home_);
+  }
+
+  std::vector<std::string> complete(const std::vector<std::string>& words) {
+    std::vector<std::string> texts;
+    for (const Candidate& c : candidates(program_, words)) texts.push_back(c.text);
+    return texts;
+  }
+  static void touch(const std::string& path) {
+    if (const auto folder = std::filesystem::path(path).parent_path(); !folder.empty())
+      std::filesystem::create_directories(folder);
+    std::ofstream{path} << "x";
+  }
+  // Every command with its path, the program itself left out.
+  void each_command(const CLI::App& app,
+                    const std::function<void(const CLI::App&, const std::string&)>& visit) {
+    for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
+      if (sub->get_name().empty()) continue;
+      visit(*sub, command_path(*sub));
+      each_command(*sub, visit);
+    }
+  }
+
+  static constexpr std::size_t width = 90;
+  Exit exit_ = Exit::ok;
+  CLI::App program_;
+  std::filesystem::path before_, home_;
+};
+
+TEST_F(CommandLine, CompletesCommandsAndThoseBelowThem) {
+  EXPECT_THAT(complete({"g"}), ElementsAre("gap"));
+  EXPECT_THAT(complete({"calibrate", ""}), ElementsAre("drive", "battery"));
+  EXPECT_THAT(complete({"gap", "tr"}), ElementsAre("trial"));
+}
+
+TEST_F(CommandLine, CompletesOptionsThatAreNotGivenYet) {
+  EXPECT_THAT(complete({"profile", "--r"}),
+              ElementsAre("--robot", "--robot-id", "--request", "--regeneration"));
+  EXPECT_THAT(complete({"profile", "--robot", "amr.json", "--r"}), Not(Contains("--robot")));
+  EXPECT_THAT(complete({"simulate", "--effect", "brush_drop=1", "--eff"}), ElementsAre("--effect"));
+  EXPECT_THAT(complete({"explore", "--c"}), ElementsAre("--case"));
+}
+
+TEST_F(CommandLine, CompletesEnumerations) {
+  EXPECT_THAT(complete({"autonomy", "--driving", ""}), ElementsAre("usual", "minimum_energy"));
+  EXPECT_THAT(complete({"calibrate", "drive", "--method", ""}), ElementsAre("steady", "whole"));
+  EXPECT_THAT(complete({"missions", "--state", "in"}), ElementsAre("interrupted"));
+  EXPECT_THAT(complete({"completion", ""}), IsSupersetOf({"bash", "zsh", "fish"}));
+  EXPECT_THAT(complete({"explore", "--case", ""}), ElementsAre("1", "2", "3", "4", "5"));
+  EXPECT_THAT(complete({"gap", "trial", "--only", "dou"}), ElementsAre("double"));
+}
+
+TEST_F(CommandLine, CompletesEffectsUpToTheirStrength) {
+  EXPECT_THAT(complete({"simulate", "--effect", ""}), Each(EndsWith("=")));
+  EXPECT_THAT(complete({"simulate", "--effect", "coul"}), ElementsAre("coulomb_friction="));
+  EXPECT_THAT(complete({"gap", "trial", "--only", "coul"}), ElementsAre("coulomb_friction"));
+}
+
+TEST_F(CommandLine, CompletesFilesOfTheKindThatIsAsked) {
+  for (const char* path :
+       {"amr.json", "amr.lcmlog", "runs.csv", "robots/tug.json", "notes.txt", ".hidden.json"})
+    touch(path);
+  EXPECT_THAT(complete({"profile", "--robot", ""}), ElementsAre("amr.json", "robots/"));
+  EXPECT_THAT(complete({"profile", "--robot", "robots/"}), ElementsAre("robots/tug.json"));
+  EXPECT_THAT(complete({"gap", "a"}), ElementsAre("amr.lcmlog"));
+  EXPECT_THAT(complete({"gap", "--robot", "amr.json", "--test", "amr.lcmlog", ""}),
+              ElementsAre("amr.lcmlog", "robots/"));
+  EXPECT_THAT(complete({"gap", "--missions", ""}), ElementsAre("robots/", "runs.csv"));
+  EXPECT_THAT(complete({"import", ""}), ElementsAre("robots/", "runs.csv"));
+  EXPECT_THAT(complete({"gap", "trial", "--keep", ""}), ElementsAre("robots/"));
+}
+
+TEST_F(CommandLine, CompletesNothingWhereAnythingMayStand) {
+  EXPECT_THAT(complete({"profile", "--length", ""}), IsEmpty());
+  EXPECT_THAT(complete({"profile", "--server", "http://127.0.0.1:1", "--robot-id", ""}),
+              IsEmpty());  // nobody answers
+}
+
+// A new option of text says by values.cc what it takes.
+TEST_F(CommandLine, EveryOptionSaysWhatItTakes) {
+  const std::set<std::string> free{"missions --cursor", "thesis --table"};
+  each_command(program_, [&free](const CLI::App& app, const std::string& path) {
+    for (const CLI::Option* option : app.get_options()) {
+      if (option->get_group().empty()) continue;
+      const std::string name = path + ' ' + option->get_name();
+      EXPECT_EQ(value_kind(*option, path).name == "TEXT", free.count(name) == 1) << name;
+      EXPECT_FALSE(option->get_description().empty()) << name;
+    }
+  });
+}
+
+TEST_F(CommandLine, HelpFitsTheTerminalAndNamesTheCommandInFull) {
+  each_command(program_, [](const CLI::App& app, const std::string& path) {
+    const std::string help = app.help("");
+    EXPECT_THAT(help, HasSubstr("Usage: joulecast " + path));
+    const std::string body = help.substr(0, help.find("Examples:"));
+    std::istringstream lines(body.substr(0, body.find("Columns of")));
+    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), width) << line;
+    EXPECT_THAT(help, Not(HasSubstr("Excludes:")));
+  });
+}
+
+TEST(Wrapped, KeepsWordsWholeAndIndentsWhatFollows) {
+  EXPECT_EQ(wrapped("one two three", 9), "one two\nthree");
+  EXPECT_EQ(wrapped("one two three", 9, 2), "one two\n  three");
+  EXPECT_EQ(wrapped("incomprehensibilities are long", 8), "incomprehensibilities\nare long");
+  EXPECT_EQ(wrapped("first\nsecond", 20), "first\nsecond");
+}
+
+}  // namespace
+}  // namespace joulecast::client
