@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "client/profile_drawing.h"
@@ -88,6 +90,36 @@ TEST(Profile, ColumnsEndAtTheirTotals) {
       estimate_answer,
       {{"profile", motion}, {"columns", true}, {"start_pose", {{"x_m", 1}, {"y_m", 2}, {"heading_rad", 0}}}});
   EXPECT_EQ(placed["profile"]["x_m"][0], 1);
+}
+
+TEST(Estimate, TellsTheLimitsThatAMotionBreaks) {
+  const robot::RobotModel nomad = testing::nomad();
+  const auto broken = [](const json& motion) {
+    std::map<std::string, std::array<double, 2>> by_name;
+    for (const json& limit : answer(estimate_answer, {{"profile", motion}})["beyond_limits"])
+      by_name[limit["limit"]] = {limit["reached"], limit["allowed"]};
+    return by_name;
+  };
+  const double v = nomad.limits.speed_m_s, a = nomad.limits.acceleration_m_s2,
+               yaw = nomad.limits.yaw_rate_rad_s;
+  // A ramp of half the acceleration to half the speed keeps them all.
+  EXPECT_TRUE(broken({{"time_s", {0, v / a, 2 * v / a}}, {"speed_m_s", {0, v / 2, 0}}}).empty());
+  const auto fast = broken({{"time_s", {0, 2 * v / a, 4 * v / a}}, {"speed_m_s", {0, 1.5 * v, 0}}});
+  ASSERT_TRUE(fast.contains("speed"));
+  EXPECT_DOUBLE_EQ(fast.at("speed")[0], 1.5 * v);
+  EXPECT_EQ(fast.at("speed")[1], v);
+  EXPECT_FALSE(fast.contains("acceleration"));
+  EXPECT_FALSE(fast.contains("yaw_rate"));
+  // Turning in place the wheels' rims accelerate.
+  const double rise_s = 2;
+  const auto turn = broken(
+      {{"time_s", {0, rise_s, 2 * rise_s}}, {"speed_m_s", {0, 0, 0}}, {"yaw_rate_rad_s", {0, -2 * yaw, 0}}});
+  ASSERT_TRUE(turn.contains("yaw_rate"));
+  EXPECT_DOUBLE_EQ(turn.at("yaw_rate")[0], 2 * yaw);
+  const double rim = nomad.kinematics.half_track_m * 2 * yaw / rise_s;
+  EXPECT_EQ(turn.contains("acceleration"), rim > a);
+  const json path = {{{"kind", "straight"}, {"length_m", 3}}};
+  EXPECT_TRUE(answer(estimate_answer, {{"path", path}})["beyond_limits"].empty());
 }
 
 TEST(Profile, StartPosesAreReadAlikeEverywhere) {

@@ -218,7 +218,7 @@ std::optional<double> best_ramp_cost(const DriveLoads& loads, const Path& run, c
     const auto b = ramp_baseline(loads, run, std::vector<double>{duration}, problem.start_speed_m_s,
                                  problem.end_speed_m_s, fraction);
     if (!b) return 1e300;
-    if (!b->keeps(problem.limits)) return 1e300;
+    if (!b->beyond(problem.limits).empty()) return 1e300;
     return b->energy_j + problem.value_of_time_w * b->duration_s;
   };
   double best = 1e300, at = 0;
@@ -255,7 +255,7 @@ void savings() {
                                       p.problem.end_speed_m_s, fraction);
       if (same) {
         equal[shape].push_back(1 - energy / same->energy_j);
-        if (same->keeps(p.problem.limits)) driveable[shape].push_back(equal[shape].back());
+        if (same->beyond(p.problem.limits).empty()) driveable[shape].push_back(equal[shape].back());
       }
       if (const auto best = best_ramp_cost(*loads, run, p.problem, duration, fraction))
         free_time[shape].push_back(1 - cost / *best);
