@@ -96,7 +96,8 @@ TEST(Estimate, TellsTheLimitsThatAMotionBreaks) {
   const robot::RobotModel nomad = testing::nomad();
   const auto broken = [](const json& motion) {
     std::map<std::string, std::array<double, 2>> by_name;
-    for (const json& limit : answer(estimate_answer, {{"profile", motion}})["beyond_limits"])
+    const json told = answer(estimate_answer, {{"profile", motion}});
+    for (const json& limit : told["beyond_limits"])
       by_name[limit["limit"]] = {limit["reached"], limit["allowed"]};
     return by_name;
   };
