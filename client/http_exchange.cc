@@ -30,7 +30,7 @@ class Exchange {
 
   Result<HttpReply> run() {
     resolver_.async_resolve(server_.host, server_.port, [this](beast::error_code error, const auto& found) {
-      if (settle(error, "resolve")) return;
+      if (settle(error, "find the host")) return;
       stream_.expires_after(timeout_);
       stream_.async_connect(found, [this](beast::error_code failed, const tcp::endpoint&) { send(failed); });
     });
@@ -44,14 +44,14 @@ class Exchange {
     return fail(Fault::unavailable, "http://" + server_.host + ":" + server_.port, why);
   }
 
-  bool settle(beast::error_code error, const char* step) {
+  bool settle(beast::error_code error, const char* step, const char* hint = "") {
     if (!error) return false;
-    outcome_ = failure(std::string("cannot ") + step + ": " + error.message());
+    outcome_ = failure(std::string("cannot ") + step + ": " + error.message() + hint);
     return true;
   }
 
   void send(beast::error_code error) {
-    if (settle(error, "connect")) return;
+    if (settle(error, "connect", "; is joulecastd running there?")) return;
     http::async_write(stream_, request_, [this](beast::error_code failed, std::size_t) { receive(failed); });
   }
 

@@ -1,9 +1,11 @@
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <memory>
 
 #include "client/commands/examples.h"
 #include "client/commands/help.h"
 #include "client/commands/table.h"
+#include "client/commands/wrong_use.h"
 #include "client/wrapped.h"
 
 int main(int argc, char** argv) {
@@ -22,7 +24,9 @@ int main(int argc, char** argv) {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     // Help and version come this way too, with code 0; every other parse error is wrong use.
-    return program.exit(error) == 0 ? static_cast<int>(Exit::ok) : static_cast<int>(Exit::usage);
+    if (error.get_exit_code() == 0) return program.exit(error);
+    std::fputs(joulecast::client::wrong_use(program, error).c_str(), stderr);
+    return static_cast<int>(Exit::usage);
   }
   return static_cast<int>(exit);
 }

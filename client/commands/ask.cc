@@ -20,6 +20,7 @@
 #include "robot/robot_file.h"
 #include "server/api/autonomy.h"
 #include "server/api/profile.h"
+#include "server/http/json_text.h"
 
 // What a scheduler asks of one robot: profile, estimate, autonomy. Answered here from a robot file, or by a
 // daemon; both answers come from the same functions.
@@ -66,7 +67,9 @@ Result<json> request_of(const Options& options) {
   if (!options.request_file.empty()) {
     const auto text = read_file(options.request_file);
     if (!text) return tl::unexpected(text.error());
-    request = json::parse(*text, nullptr, false);
+    auto parsed = http::parse_json(*text);
+    if (!parsed) return invalid(options.request_file, describe(parsed.error()));
+    request = std::move(*parsed);
     if (!request.is_object()) return invalid(options.request_file, "is not a JSON object");
   }
   if (options.length_m || options.turn_rad) {
@@ -248,7 +251,12 @@ std::pair<CLI::App*, std::shared_ptr<Options>> add(CLI::App& program, Exit& exit
   command->add_flag("--json", options->json, "print the answer as the server sends it");
   command->callback([options, &question, &exit] {
     if (options->robot_file.empty() && options->server.empty())
-      throw CLI::RequiredError("--robot or --server");
+      throw CLI::RequiredError("--robot (a file) or --server (a daemon's address)");
+    const bool drive = !question.fleet, asked = !options->request_file.empty();
+    if (drive && !asked && !options->length_m && !options->turn_rad)
+      throw CLI::RequiredError("--length, --turn or --request (what to drive)");
+    if (!drive && !asked && options->server.empty() && !options->numbers.front().second)
+      throw CLI::RequiredError("--charge, which a robot file does not know,");
     exit = run(*options, question);
   });
   return {command, options};

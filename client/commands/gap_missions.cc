@@ -78,7 +78,9 @@ Exit gap_from_missions(const GapMissionsOptions& options, const robot::RobotMode
   const auto text = read_file(options.runs);
   if (!text) return report(text.error());
   const auto runs = gap::read_mission_runs(*text, options.runs, robot);
-  if (!runs) return report(runs.error());
+  if (!runs)
+    return report({runs.error().fault, runs.error().field,
+                   runs.error().message + "; joulecast gap --help lists the columns"});
   const auto diagnosis = gap::diagnose_runs(*runs, robot, {options.robot_model, {}});
   if (!diagnosis) return report(diagnosis.error());
   if (options.json) {

@@ -68,7 +68,9 @@ Result<std::vector<Imported>> import_all(const Options& options) {
   const auto mapping = telemetry::ImportMapping::parse(*mapping_text);
   if (!mapping)
     return tl::unexpected(
-        Error{mapping.error().fault, options.mapping + "#" + mapping.error().field, mapping.error().message});
+        Error{mapping.error().fault,
+              options.mapping + (mapping.error().field.empty() ? "" : "#" + mapping.error().field),
+              mapping.error().message});
   telemetry::ImportOptions how;
   if (!options.robot_id.empty()) how.robot_id = options.robot_id;
   if (!options.start.empty()) {

@@ -18,6 +18,7 @@
 #include "client/http_client.h"
 #include "robot/robot_file.h"
 #include "server/api/autonomy.h"
+#include "server/http/json_text.h"
 
 namespace joulecast::client {
 namespace {
@@ -46,7 +47,9 @@ Result<std::string> ask_server(const Options& options, std::string request) {
 }
 
 Result<std::string> answer_here(const Options& options, const std::string& text) {
-  const json request = json::parse(text, nullptr, false);
+  const auto parsed = http::parse_json(text);
+  if (!parsed) return invalid(options.request_file, describe(parsed.error()));
+  const json& request = *parsed;
   if (!request.is_object()) return invalid(options.request_file, "is not a JSON object");
   std::map<std::string, std::shared_ptr<const server::ModelInForce>> models;
   for (const std::string& file : options.robot_files) {

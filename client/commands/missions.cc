@@ -67,6 +67,7 @@ void print_table(const json& page) {
                joules(energy, "duration_s"), joules(energy, "distance_m"), joules(energy, "battery_j"),
                joules(energy, "modelled_j"));
   }
+  if (page["missions"].empty()) fmt::print("no mission matches\n");
   if (const auto next = page.find("next_cursor"); next != page.end() && next->is_string())
     fmt::print("more: --cursor {}\n", next->get<std::string>());
 }

@@ -80,7 +80,7 @@ Result<std::vector<vr::EffectStrength>> parse_effects(const std::vector<std::str
     const char* end = text.data() + text.size();
     if (equals == std::string::npos || std::from_chars(text.data() + equals + 1, end, strength) !=
                                            std::from_chars_result{end, std::errc{}}) {
-      return invalid("effect", text + " is not id=strength");
+      return invalid("--effect", text + " is not id=strength; --list-effects names the ids and their units");
     }
     result.emplace_back(text.substr(0, equals), strength);
   }
@@ -251,16 +251,16 @@ Exit run(const Options& options, bool lcm_asked) {
   }
   const bool over_lcm = options.log.empty() || lcm_asked;
   if (!over_lcm && options.duration_s == 0 && options.missions == 0) {
-    return report({Fault::invalid, "log", "a log needs an end: give --duration or --missions"});
+    return report({Fault::invalid, "--log", "a log needs an end: give --duration or --missions"});
   }
   if (over_lcm && options.speed == 0) {
     return report(
-        {Fault::invalid, "speed", "0 (unpaced) goes with --log alone; LCM receivers would lose messages"});
+        {Fault::invalid, "--speed", "0 (unpaced) goes with --log alone; LCM receivers would lose messages"});
   }
   const bool endless = options.duration_s == 0 && options.missions == 0;
   if (over_lcm && options.speed > 1 && endless) {
     return report(
-        {Fault::invalid, "speed",
+        {Fault::invalid, "--speed",
          "above 1 needs an end, so that no stamp lies in the future: give --duration or --missions"});
   }
   auto members = assemble(options);

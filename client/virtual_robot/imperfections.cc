@@ -61,7 +61,8 @@ Result<Imperfections> make_imperfections(const std::vector<EffectStrength>& effe
   Imperfections result;
   for (const auto& [id, strength] : effects) {
     const auto* entry = std::find_if(table.begin(), table.end(), [&](const auto& e) { return e.id == id; });
-    if (entry == table.end()) return invalid("effect", "no effect is called " + id);
+    if (entry == table.end())
+      return invalid("--effect", "no effect is called " + id + "; --list-effects names them");
     if (!std::isfinite(strength) || std::abs(strength) > entry->search_limit) {
       return invalid("effect/" + id, "strength must be within +-" + std::to_string(entry->search_limit) +
                                          " " + std::string(entry->unit));

@@ -36,7 +36,7 @@ inline constexpr std::array<std::string_view, unknown_count> unknown_names = {"f
                                                                               "friction_torque_left_nm",
                                                                               "viscous_friction_nm_s_rad",
                                                                               "idle_power_w",
-                                                                              "mass_kg",
+                                                                              "mass_beyond_file_kg",
                                                                               "payload_kg",
                                                                               "slope_cos_rad",
                                                                               "slope_sin_rad",

@@ -470,7 +470,9 @@ Result<json> parse_text(std::string_view text) {
     if (!repeated.empty()) return invalid(child("", repeated), "is given twice in one object");
     return document;
   } catch (const json::exception& error) {
-    return invalid("", fmt::format("is not JSON: {}", error.what()));
+    const std::string_view what = error.what();  // begins with the library's name for it, in brackets
+    const std::size_t bracket = what.find("] ");
+    return invalid("", fmt::format("is not JSON: {}", what.substr(bracket == what.npos ? 0 : bracket + 2)));
   }
 }
 
@@ -495,7 +497,9 @@ Result<std::string> read_file(const std::filesystem::path& path) {
 template <class T>
 Result<T> load(const std::filesystem::path& path, Result<T> (*parse)(std::string_view)) {
   return read_file(path).and_then(parse).map_error([&](Error error) {
-    if (error.field != path.string()) error.message = path.string() + ": " + error.message;
+    if (error.field == path.string()) return error;
+    if (!error.field.empty()) error.message = error.field + ": " + error.message;
+    error.field = path.string();
     return error;
   });
 }

@@ -247,7 +247,7 @@ class Reader {
 
 Result<ImportMapping> ImportMapping::parse(std::string_view text) {
   const json document = json::parse(text, nullptr, false);
-  if (document.is_discarded()) return fail(Fault::invalid, "", "the mapping is not JSON");
+  if (document.is_discarded()) return fail(Fault::invalid, "", "is not JSON");
   Reader reader;
   auto content = std::make_shared<const Content>(reader.mapping(document));
   if (reader.error) return tl::unexpected<Error>(std::move(*reader.error));

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -16,6 +17,7 @@
 #include "client/commands/help.h"
 #include "client/commands/table.h"
 #include "client/commands/values.h"
+#include "client/commands/wrong_use.h"
 #include "client/wrapped.h"
 
 namespace joulecast::client {
@@ -36,6 +38,7 @@ class CommandLine : public ::testing::Test {
     program_.formatter(std::make_shared<HelpFormatter>(width));
     for (const auto add : commands()) add(program_, exit_);
     add_examples(program_);
+    program_.require_subcommand(1);
     char folder[] = "/tmp/joulecast-completion-XXXXXX";
     EXPECT_NE(mkdtemp(folder), nullptr);
     before_ = std::filesystem::current_path();
@@ -144,6 +147,39 @@ TEST_F(CommandLine, HelpFitsTheTerminalAndNamesTheCommandInFull) {
     for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), width) << line;
     EXPECT_THAT(help, Not(HasSubstr("Excludes:")));
   });
+}
+
+// What wrong_use() says of a command line.
+class WrongUse : public CommandLine {
+ protected:
+  std::string told(std::vector<std::string> words) {
+    std::reverse(words.begin(), words.end());
+    try {
+      program_.parse(std::move(words));
+    } catch (const CLI::ParseError& error) {
+      return wrong_use(program_, error);
+    }
+    return "nothing";
+  }
+};
+
+TEST_F(WrongUse, NamesTheNearestOptionAndCommand) {
+  EXPECT_EQ(told({"profile", "--robot", "a.json", "--lenght", "3"}),
+            "joulecast profile: has no option --lenght; did you mean --length?\njoulecast profile --help "
+            "says what it takes\n");
+  EXPECT_THAT(told({"calibrate", "drvie"}),
+              HasSubstr("joulecast calibrate: has no command drvie; did you mean drive?"));
+  EXPECT_THAT(told({"effects", "all"}), HasSubstr("joulecast effects: has no use for all"));
+  EXPECT_THAT(told({"profile", "--frobnicate"}), Not(HasSubstr("did you mean")));
+}
+
+TEST_F(WrongUse, SaysWhatIsWanted) {
+  EXPECT_THAT(told({"profile", "--robot"}), HasSubstr("--robot wants a FILE"));
+  EXPECT_THAT(told({"profile", "--robot", "a.json", "--length", "three"}),
+              HasSubstr("--length wants a NUMBER, not three"));
+  EXPECT_THAT(told({"profile", "--robot", "a.json"}), HasSubstr("--length, --turn or --request"));
+  EXPECT_THAT(told({"autonomy", "--robot", "a.json"}), HasSubstr("--charge"));
+  EXPECT_THAT(told({"calibrate"}), HasSubstr("wants a command: drive, battery"));
 }
 
 TEST(Wrapped, KeepsWordsWholeAndIndentsWhatFollows) {

@@ -1,0 +1,109 @@
+#include "client/commands/wrong_use.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <numeric>
+#include <vector>
+
+#include "client/commands/values.h"
+
+namespace joulecast::client {
+namespace {
+
+// How many letters must be put in, left out or changed.
+std::size_t distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t corner = std::exchange(row[0], i + 1);
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t changed = corner + (a[i] == b[j] ? 0 : 1);
+      corner = row[j + 1];
+      row[j + 1] = std::min({changed, row[j] + 1, corner + 1});
+    }
+  }
+  return row.back();
+}
+
+// "; did you mean X?" where one of `known` is near.
+std::string suggestion(const std::string& word, const std::vector<std::string>& known) {
+  const auto far = [&word](const std::string& name) { return distance(word, name); };
+  const auto nearest = std::ranges::min_element(known, {}, far);
+  if (nearest == known.end() || far(*nearest) > std::max<std::size_t>(1, (nearest->size() + 1) / 3))
+    return "";
+  return "; did you mean " + *nearest + "?";
+}
+
+std::vector<std::string> names_of_options(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options())
+    for (const auto& name : option->get_lnames()) names.push_back("--" + name);
+  for (const CLI::App* group :
+       app.get_subcommands([](const CLI::App* sub) { return sub->get_name().empty(); }))
+    for (auto& name : names_of_options(*group)) names.push_back(std::move(name));
+  return names;
+}
+
+std::vector<std::string> names_of_commands(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* sub : app.get_subcommands([](const CLI::App* s) { return !s->get_name().empty(); }))
+    names.push_back(sub->get_name());
+  return names;
+}
+
+bool takes_words(const CLI::App& app) {
+  return std::ranges::any_of(app.get_options(),
+                             [](const CLI::Option* option) { return option->get_positional(); });
+}
+
+// What nobody took explains more than what is missing for want of it.
+std::string about_rest(const CLI::App& app, const std::vector<std::string>& rest) {
+  const auto option = std::ranges::find_if(rest, [](const std::string& w) { return w.starts_with("-"); });
+  if (option != rest.end()) {
+    const std::string name = option->substr(0, option->find('='));
+    return "has no option " + name + suggestion(name, names_of_options(app));
+  }
+  const auto commands = names_of_commands(app);
+  if (!commands.empty() && !takes_words(app))
+    return "has no command " + rest.front() + suggestion(rest.front(), commands);
+  return "has no use for " + rest.front();
+}
+
+const CLI::Option* option_of(const CLI::App& app, const std::string& name) {
+  for (const CLI::Option* option : app.get_options())
+    if (option->check_name(name)) return option;
+  return nullptr;
+}
+
+}  // namespace
+
+std::string wrong_use(const CLI::App& program, const CLI::ParseError& error) {
+  const CLI::App* app = &program;
+  while (!app->get_subcommands().empty()) app = app->get_subcommands().front();
+  const std::string path = command_path(*app),
+                    command = program.get_name() + (path.empty() ? "" : " " + path);
+  std::string text = error.what();
+  const auto rest = app->remaining(false);
+  const bool missing = error.get_name() == "RequiredError";
+  if (!rest.empty() && (missing || error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError))) {
+    text = about_rest(*app, rest);
+  } else if (missing && text.starts_with("A subcommand")) {
+    text = fmt::format("wants a command: {}", fmt::join(names_of_commands(*app), ", "));
+  } else if (error.get_name() == "ArgumentMismatch" || error.get_name() == "ConversionError") {
+    // "--robot: 1 required TEXT missing"; "Could not convert: --length = three".
+    const std::size_t dashes = text.find("--");
+    const std::string name =
+        dashes == std::string::npos ? "" : text.substr(dashes, text.find_first_of(": =", dashes) - dashes);
+    const CLI::Option* option = name.empty() ? nullptr : option_of(*app, name);
+    const std::string kind = option == nullptr ? "" : value_kind(*option, path).name;
+    const std::size_t equals = text.find(" = ");
+    if (!kind.empty())
+      text =
+          name + " wants a " + kind + (equals == std::string::npos ? "" : ", not " + text.substr(equals + 3));
+  }
+  return fmt::format("{}: {}\n{} --help says what it takes\n", command, text, command);
+}
+
+}  // namespace joulecast::client
