@@ -31,6 +31,12 @@ def main():
         check(here.strip() == there.strip(), f"{question}: from the file\n{here}\nby the daemon\n{there}")
         table = programs.run(*question, "--robot", robot)
         check("amr (model version 1)" in table, f"{question} prints\n{table}")
+    # A motion that the robot cannot drive has a price all the same, and a warning.
+    with open(programs.path("fast.json"), "w") as file:
+        json.dump({"profile": {"time_s": [0, 2, 6, 8], "speed_m_s": [0, 3, 3, 0]}}, file)
+    warned = subprocess.run([options.client, "estimate", "--robot", robot, "--request", programs.path("fast.json")],
+                            capture_output=True, text=True, check=True)
+    check("speed reaches 3 m/s, its limit is 1.5" in warned.stderr, warned.stderr)
     with open(programs.path("errands.json"), "w") as file:
         json.dump({"robots": [{"robot_id": "amr", "pose": {"x_m": 1, "y_m": 2, "heading_rad": 3}}],
                    "tasks": [{"task_id": "near", "payload_kg": 10, "pickup": {"x_m": 3, "y_m": 4}, "dropoff": {"x_m": 9, "y_m": 4}},
@@ -53,13 +59,14 @@ def main():
     check(page == {"missions": [], "next_cursor": None}, f"a fresh daemon knows missions: {page}")
 
     faults = {
-        2: [["profile", "--length", "8"], ["estimate", "--server", programs.url], ["profile", "--length", "many"]],
+        2: [["profile", "--length", "8"], ["estimate", "--server", programs.url], ["profile", "--length", "many"],
+            ["profile", "--robot", robot], ["autonomy", "--robot", robot], ["missions", "--server", programs.url, "--state", "lost"]],
         1: [["profile", "--robot", programs.path("no-such-file.json"), "--length", "8"],
             ["profile", "--robot", robot, "--length", "-8"],
             ["profile", "--server", programs.url, "--robot-id", "nobody", "--length", "8"],
-            ["missions", "--server", programs.url, "--state", "lost"]],
+            ["missions", "--server", programs.url, "--limit", "many"]],
         3: [["profile", "--server", "http://127.0.0.1:1", "--robot-id", "amr", "--length", "8"]],
-        4: [["profile", "--robot", robot, "--length", "80", "--deadline", "1"], ["autonomy", "--robot", robot]],
+        4: [["profile", "--robot", robot, "--length", "80", "--deadline", "1"]],
     }
     for code, commands in faults.items():
         for command in commands:

@@ -18,8 +18,8 @@ export function axis(label, more = {}) {
   };
 }
 
-const minute = 60, hour = 3600, day = 86_400;
-const clock_steps = [1, 5, 15, 30, minute, 5 * minute, 15 * minute, 30 * minute, hour, 3 * hour, 6 * hour, 12 * hour, day, 2 * day, 7 * day, 14 * day, 28 * day, 91 * day, 182 * day, 364 * day];
+const minute = 60, hours = 3600, day = 86_400;
+export const clock_steps = [1, 2, 5, 10, 15, 30, ...[1, 2, 5, 10, 15, 30].map((m) => m * minute), ...[1, 2, 3, 6, 12].map((h) => h * hours), ...[1, 2, 7, 14, 28, 91, 182, 364, 728, 1820].map((d) => d * day)];
 
 // Local times, with the day where it changes.
 export const clock_axis = { incrs: clock_steps, splits: clock_splits, values: clock_values };

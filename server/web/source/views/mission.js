@@ -3,7 +3,7 @@ import { html } from '../html.js';
 import * as format from '../format.js';
 import { id_path, post, query, useGet } from '../api.js';
 import { Bars } from '../bars.js';
-import { Chart, axis, cursor_of, with_alpha } from '../chart.js';
+import { Chart, axis, clock_steps, cursor_of, with_alpha } from '../chart.js';
 import { FloorPath } from '../floor.js';
 import { least_drive_request } from '../least_drive.js';
 import { robot_link } from '../route.js';
@@ -55,15 +55,15 @@ function Charts({ trace, mission, zoom, set_zoom, set_cursor }) {
     }],
   };
   const cursor = { ...cursor_of(group), drag: { x: true, y: false, setScale: false, dist: 6 }, bind: { dblclick: () => () => set_zoom(null) } };
-  const time_axis = (label) => axis(label, { size: 26, values: run_clock });
+  const time_axis = (label) => axis(label, { size: 28, incrs: clock_steps, values: run_clock });
   const make_power = () => {
     const p = palette(), none = { show: true, stroke: 'transparent', points: { show: false } };
     return {
       cursor, hooks, scales: { x: { time: false } },
       axes: [time_axis(''), axis('power, W')],
       bands: [{ series: [1, 2], fill: with_alpha(p.measured, 0.2) }, { series: [4, 5], fill: with_alpha(p.modelled, 0.16) }],
-      series: [{}, none, none, { stroke: p.measured, width: 1.75, points: { show: false } }, none, none,
-        { stroke: p.modelled, width: 1.5, points: { show: false } }],
+      series: [{}, none, none, { stroke: p.measured, width: 2.75, points: { show: false } }, none, none,
+        { stroke: p.modelled, width: 1, points: { show: false } }],
     };
   };
   const make_speed = () => {

@@ -31,7 +31,7 @@ function LiveMap({ entry }) {
     ? begun.value.x_m.map((x, k) => [x ?? NaN, begun.value.y_m[k] ?? NaN, begun.value.measured_power_w.mean[k] ?? begun.value.modelled_power_w.mean[k] ?? NaN]) : [];
   const rows = [...before, ...heard.map(([x, y, , w]) => [x, y, w])];
   const [x, y, heading] = entry.state.pose;
-  if (rows.length === 0 || x === null) return html`<${Empty} title="No position">This robot does not tell where it is.<//>`;
+  if (rows.length === 0 || x === null) return html`<${Empty} title="No position">${entry.state.silent_s === null ? 'Nothing heard yet.' : 'This robot does not tell where it is.'}<//>`;
   return html`<${FloorPath} points=${rows} height=${340} ends=${false} robot=${[x, y, heading ?? 0]} label=${`Path of ${entry.id} so far, coloured by power, and where it is now`} />`;
 }
 
@@ -50,7 +50,8 @@ export function Robot({ id }) {
     <div class="heading"><p class="crumbs"><a href="#/fleet">Fleet</a></p><h1>${id}</h1>
       ${s && html`<span class="health"><${Health} state=${s} /></span>`}
       <span class="spring"></span><a class="button" href=${`#/plan${query({ robot: id })}`}>Plan a drive</a></div>
-    ${s && html`<dl class="readouts">
+    ${s && s.silent_s === null && html`<p class="note">Nothing was heard of it since the service started. What is kept of it stands below.</p>`}
+    ${s && s.silent_s !== null && html`<dl class="readouts">
       <${Readout} large label=${s.measured_power_w === null ? 'Power (modelled)' : 'Power'} of=${format.power(s.measured_power_w ?? s.modelled_power_w)} channel=${s.measured_power_w === null ? 'modelled' : 'measured'} note=${html`<${Sparkline} track=${entry.power} revision=${entry.revision} dark=${dark} width=${120} height=${26} />`} />
       <${Readout} large label="Charge" of=${format.percent(s.state_of_charge)} note=${[s.state_of_charge === null ? '' : charge_note(s).text, s.battery_voltage_v === null ? '' : format.text(format.unit(s.battery_voltage_v, 'V', 2))].filter(Boolean).join(' · ')} />
       <${Readout} large label="Range" of=${format.length(left?.range?.p50 ?? s.range_m)} note=${between(left?.range, format.length)} />

@@ -96,7 +96,7 @@ function Versions({ versions, robot, onChange }) {
     const changes = changes_of(v, parent);
     return html`<li key=${v.model_version} class=${v.active ? 'active' : ''}>
       <p><b>Version ${v.model_version}</b>${v.active && html` <span class="flag calm">in force</span>`} <span class="note">${format.time(v.created_utime_us)} · from ${{ file: 'a robot file', http: 'HTTP' }[v.origin] ?? `a ${v.origin}`}</span></p>
-      ${v.note && html`<p class="note">${v.note}</p>`}
+      ${v.note && !v.evidence?.diagnosis_id && html`<p class="note">${v.note}</p>`}
       ${v.evidence && html`<p class="note"><${Evidence} of=${v.evidence} /></p>`}
       ${!v.active && html`<p><button type="button" disabled=${told.busy !== null} onClick=${() => roll(v.model_version)}>${told.busy === v.model_version ? 'Putting in force …' : `Put version ${v.model_version} in force again`}</button></p>`}
       ${changes.length > 0 && html`<ul class="changes">${changes.slice(0, 12).map((c) => html`<li key=${c.key}><code>${c.key}</code> ${c.from} → ${c.to}</li>`)}${changes.length > 12 && html`<li class="note">and ${changes.length - 12} more</li>`}</ul>`}
