@@ -81,6 +81,26 @@ S metered_power(const dynamics::BasicDriveModel<S>& model, const Window& w) {
              (std::isfinite(w.battery_power_slope_w_s) ? w.battery_power_slope_w_s : 0.0);
 }
 
+void mark_turning_power(std::span<Window> windows, const dynamics::DriveModel& model) {
+  std::vector<double> motor_w(windows.size(), 0.0);
+  for (std::size_t k = 0; k < windows.size(); ++k) {
+    const Window& w = windows[k];
+    if (w.resting[0] && w.resting[1]) continue;
+    const auto flow = model.flow(instant_of(model, w));
+    motor_w[k] = flow.motor_power_w[0] + flow.motor_power_w[1];
+  }
+  for (std::size_t k = 0; k < windows.size(); ++k) {
+    double least = motor_w[k], most = motor_w[k];
+    const auto with = [&](std::size_t other) {
+      least = std::min(least, motor_w[other]);
+      most = std::max(most, motor_w[other]);
+    };
+    if (windows[k].continues && k > 0) with(k - 1);
+    if (k + 1 < windows.size() && windows[k + 1].continues) with(k + 1);
+    windows[k].power_turns = least < 0 && most > 0;
+  }
+}
+
 template <class S>
 ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w, bool judge_power) {
   const auto& p = model.parameters();
@@ -119,7 +139,7 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
                 p.driver_loss * motor_abs + p.unreturned * braking;
   r[index_of(Channel::bus)] = S(w.battery_power_w) - model.metered_battery_power(bus, w.battery_voltage_v);
   const auto settled = [&](std::size_t s) { return w.moving[s] || w.resting[s]; };
-  if (judge_power && settled(0) && settled(1))
+  if (judge_power && settled(0) && settled(1) && !w.power_turns)
     r[index_of(Channel::power)] = S(w.battery_power_w) - metered_power(model, w);
   // How far the open-circuit voltage is from the nominal one is a nuisance of its own.
   r[index_of(Channel::battery_voltage)] =

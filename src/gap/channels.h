@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <span>
 #include <string_view>
 
 #include "dynamics/drive_model.h"
@@ -43,6 +44,11 @@ extern template ChannelValues<double> residuals(const dynamics::BasicDriveModel<
                                                 bool);
 extern template ChannelValues<dynamics::Dual> residuals(const dynamics::BasicDriveModel<dynamics::Dual>&,
                                                         const Window&, bool);
+
+// Marks the windows in which the motors' power may change its sign, by the windows beside them. A model that
+// treats braking and driving power differently is not linear there, and the mean motion under a window says
+// too little.
+void mark_turning_power(std::span<Window> windows, const dynamics::DriveModel& model);
 
 // The battery power that the motion asks, as the robot's meter would read it [W].
 template <class S>

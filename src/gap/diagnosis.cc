@@ -409,7 +409,12 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
   d.missions = recordings.missions.size();
   d.samples = recordings.samples;
   if (const auto adopted = dynamics::active_effects(robot); !adopted) return tl::unexpected(adopted.error());
-  const std::vector<Window> windows = make_windows(recordings, robot, settings.parts.windows);
+  const auto windows_with = [&](const WindowSettings& wanted) {
+    std::vector<Window> made = make_windows(recordings, robot, wanted);
+    mark_turning_power(made, extended_model(robot, {}));
+    return made;
+  };
+  const std::vector<Window> windows = windows_with(settings.parts.windows);
   std::vector<double> measured = measured_power(windows);
   const auto known = [](double p) { return std::isfinite(p); };
   const auto with_battery = std::ranges::count_if(measured, known);
@@ -445,7 +450,7 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
     if (std::fabs(delay - shift) < settled_delay_s || round >= most_delay_rounds) break;
     WindowSettings moved = settings.parts.windows;
     moved.electrical_delay_s = delay;
-    judged = make_windows(recordings, robot, moved);
+    judged = windows_with(moved);
   }
   const std::vector<double> judged_power =
       d.power == PowerSource::motors ? power_of_motors(judged, robot) : measured_power(judged);

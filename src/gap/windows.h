@@ -33,6 +33,7 @@ struct Window {
   std::array<double, 2> motor_power_abs_w{}, braking_w{};  // mean |V i| and mean of -V i while negative
   std::array<double, 2> current_sign{};  // mean sign of the current, soft below a tenth of the friction's
   std::array<std::array<double, 2>, heat_time_constants_s.size()> copper_heat_w{};
+  bool power_turns = false;  // the motors may brake in one part of it and drive in another
   double battery_voltage_v = missing, battery_current_a = missing, battery_power_w = missing;
   double battery_power_slope_w_s = 0, battery_current_slope_a_s = 0;
   double electrical_shift_s = 0;  // by which electrical readings were moved back before windowing
