@@ -26,19 +26,19 @@ enum class IngestFault : std::size_t {
   clock_forward,
   clock_ahead,        // stamped well after the daemon's time; accounted for all the same
   gap,                // a silence too long to be bridged
+  zero_payload,       // said 0 where the mission's start declared a load: accounted with that
   outside_mission,    // belongs to no mission: just after an end, or before a start
   bad_event,          // duplicate, out-of-order or unknown mission event
   reused_mission_id,  // a mission began under an id that an earlier one had
   solver              // CVODE failed on an interval; its chord stood in
 };
-inline constexpr std::size_t ingest_fault_count = 18;
+inline constexpr std::size_t ingest_fault_count = 19;
 
 inline constexpr std::array<std::string_view, ingest_fault_count> ingest_fault_names = {
-    "undecodable",       "wrong_channel", "queue_full",      "too_many_robots",
-    "unknown_robot",     "implausible",   "duplicate",       "late",
-    "missing",           "restart",       "clock_backward",  "clock_forward",
-    "clock_ahead",       "gap",           "outside_mission", "bad_event",
-    "reused_mission_id", "solver"};
+    "undecodable", "wrong_channel", "queue_full",   "too_many_robots", "unknown_robot",  "implausible",
+    "duplicate",   "late",          "missing",      "restart",         "clock_backward", "clock_forward",
+    "clock_ahead", "gap",           "zero_payload", "outside_mission", "bad_event",      "reused_mission_id",
+    "solver"};
 
 // Written by the ingest threads, read by the metrics.
 struct IngestCounters {

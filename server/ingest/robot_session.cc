@@ -33,6 +33,10 @@ history::MissionState state_of(telemetry::MissionEnd end) {
   return history::MissionState::unfinished;
 }
 
+std::string name_of(IngestFault fault) {
+  return std::string(ingest_fault_names[static_cast<std::size_t>(fault)]);
+}
+
 Result<std::shared_ptr<const ModelInForce>> stored_model(const history::Store& store,
                                                          const std::string& robot_id, std::int64_t version) {
   const Result<history::ModelVersion> stored = store.model(robot_id, version);
@@ -49,6 +53,7 @@ struct RobotSession::OpenMission {
   history::Mission record;
   std::vector<telemetry::Sample> samples;
   std::uint64_t unsaved = 0;
+  telemetry::MissionPayload payload;
   // Gaps that an earlier run of the daemon counted; the meter counts those of this run.
   std::int64_t earlier_gaps = 0;
   double earlier_gap_s = 0;
@@ -139,6 +144,9 @@ void RobotSession::resume(const history::Mission& mission) {
   open_->earlier_gaps = mission.gap_count;
   open_->earlier_gap_s = mission.gap_s;
   open_->resumed_silent = true;
+  const auto zeros = mission.sample_faults.find(name_of(IngestFault::zero_payload));
+  const std::int64_t contradicted = zeros == mission.sample_faults.end() ? 0 : zeros->second;
+  open_->payload = telemetry::MissionPayload(mission.payload_kg, mission.samples > contradicted);
   missions_.resume({mission.mission_id, mission.start_utime_us, mission.end_utime_us, mission.payload_kg,
                     mission.implicit});
   snapshot_.mission_id = mission.mission_id;
@@ -150,7 +158,7 @@ void RobotSession::resume(const history::Mission& mission) {
 }
 
 void RobotSession::on_fault(IngestFault fault, std::uint64_t count) {
-  const std::string name(ingest_fault_names[static_cast<std::size_t>(fault)]);
+  const std::string name = name_of(fault);
   outputs_.counters.add(fault, count);
   snapshot_.faults[name] += count;
   if (open_ != nullptr) open_->record.sample_faults[name] += static_cast<std::int64_t>(count);
@@ -303,18 +311,28 @@ void RobotSession::on_own_sample(const telemetry::Sample& sample) {
   }
   ++snapshot_.samples;
   outputs_.counters.samples.fetch_add(1, std::memory_order_relaxed);
-  if (const Result<void> metered = meter_->add(sample); !metered) {
+  if (open_->payload.contradicts(sample.payload_kg)) on_fault(IngestFault::zero_payload);
+  telemetry::Sample counted = sample;
+  counted.payload_kg = open_->payload.take(sample.payload_kg);
+  if (const Result<void> metered = meter_->add(counted); !metered) {
     on_fault(IngestFault::solver);
     outputs_.warn(robot_id_, describe(metered.error()));
   }
-  refinement_->add(sample);
-  keep(sample);
+  refinement_->add(counted);
+  keep(sample);  // as it came
   changed_ = true;
 }
 
 void RobotSession::on_event(const telemetry::MissionEvent& event, std::int64_t host_utime_us) {
   snapshot_.received_utime_us = host_utime_us;
   if (model_ == nullptr) return on_fault(IngestFault::unknown_robot);
+  if (const auto fault = telemetry::check_plausible(event)) {
+    on_fault(IngestFault::implausible);
+    if (fault->why == telemetry::Implausibility::bad_clock) return;
+    telemetry::MissionEvent without_payload = event;
+    without_payload.payload_kg = telemetry::unmeasured;
+    return on_event(without_payload, host_utime_us);
+  }
   release_held();
   const auto refused = [&] {
     const telemetry::MissionCounters& c = missions_.counters();
@@ -346,6 +364,7 @@ void RobotSession::open(const telemetry::MissionAction& action) {
   record.start_utime_us = record.end_utime_us = action.utime_us;
   record.implicit = action.implicit;
   record.payload_kg = action.payload_kg;
+  open_->payload = telemetry::MissionPayload(action.payload_kg);
   record.note = action.note;
   record.model_version = model_->version;
   const Result<history::MissionKey> key =
@@ -370,7 +389,7 @@ void RobotSession::tell_of_namesake() {
   if (!*earlier) return;
   constexpr IngestFault reused = IngestFault::reused_mission_id;  // not one of its samples' faults
   outputs_.counters.add(reused);
-  ++snapshot_.faults[std::string(ingest_fault_names[static_cast<std::size_t>(reused)])];
+  ++snapshot_.faults[name_of(reused)];
   const nlohmann::json detail{{"mission", record.key},
                               {"mission_id", record.mission_id},
                               {"start_utime_us", record.start_utime_us},

@@ -19,6 +19,7 @@
 #include "server/ingest/refinement_watch.h"
 #include "server/ingest/trace_builder.h"
 #include "telemetry/mission_tracker.h"
+#include "telemetry/payload.h"
 #include "telemetry/sample.h"
 #include "telemetry/sequence_tracker.h"
 

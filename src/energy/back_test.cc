@@ -5,6 +5,8 @@
 #include <random>
 #include <utility>
 
+#include "telemetry/payload.h"
+
 namespace joulecast::energy {
 namespace {
 
@@ -60,8 +62,9 @@ Result<Replay> replay(const dynamics::DriveModel& model, const robot::RobotModel
   metering.half_window_s = std::max(metering.half_window_s, half_window_for({&run, 1}));
   Meter meter(model, robot.battery.capacity_ah, metering, take);
   source = &meter;
+  telemetry::MissionPayload payload(run.payload_kg);
   for (telemetry::Sample sample : run.samples) {
-    if (!std::isfinite(sample.payload_kg)) sample.payload_kg = run.payload_kg;
+    sample.payload_kg = payload.take(sample.payload_kg);
     if (Result<void> added = meter.add(sample); !added) return tl::unexpected(std::move(added.error()));
   }
   if (Result<void> flushed = meter.flush(); !flushed) return tl::unexpected(std::move(flushed.error()));

@@ -11,6 +11,7 @@
 
 #include "dynamics/drive_model.h"
 #include "energy/acceleration_filter.h"
+#include "telemetry/payload.h"
 
 namespace joulecast::energy {
 namespace {
@@ -163,7 +164,9 @@ class Calibrator {
     std::vector<SpeedSample> window;
     std::vector<Moment> stretch;
     std::size_t first = 0;
+    telemetry::MissionPayload payload(run.payload_kg);
     for (std::size_t k = 0; k < run.samples.size(); ++k) {
+      const double payload_kg = payload.take(run.samples[k].payload_kg);
       const double reach = half_window_s_ * (1 + 1e-9);
       while (seconds(k) - seconds(first) > reach) ++first;
       window.clear();
@@ -177,7 +180,7 @@ class Calibrator {
       const bool fit = inside && usable(run.samples[k], acceleration);
       if (gap || !fit || (!stretch.empty() && seconds(k) - stretch.front().t_s >= length))
         close(stretch, seconds(k) - (stretch.empty() ? 0 : stretch.front().t_s));
-      if (fit) stretch.push_back(observe(run.samples[k], acceleration, seconds(k), run.payload_kg));
+      if (fit) stretch.push_back(observe(run.samples[k], acceleration, seconds(k), payload_kg));
     }
     if (!stretch.empty()) close(stretch, stretch.back().t_s - stretch.front().t_s);
   }
@@ -198,7 +201,7 @@ class Calibrator {
     dynamics::Instant at;
     at.wheel_speed_rad_s = s.wheel_velocity_rad_s;
     at.wheel_acceleration_rad_s2 = acceleration;
-    at.payload_kg = std::isfinite(s.payload_kg) ? s.payload_kg : payload_kg;
+    at.payload_kg = payload_kg;
     at.x_m = s.pose[0];
     at.y_m = s.pose[1];
     at.heading_rad = s.pose[2];
@@ -492,8 +495,9 @@ Result<Accounts> metered(const robot::RobotModel& robot, const DriveRun& run, co
   Result<dynamics::DriveModel> drive = dynamics::drive_model(robot);
   if (!drive) return tl::unexpected(std::move(drive.error()));
   Meter meter(std::move(*drive), robot.battery.capacity_ah, settings, [](const MeterPoint&) {});
+  telemetry::MissionPayload payload(run.payload_kg);
   for (telemetry::Sample sample : run.samples) {
-    if (!std::isfinite(sample.payload_kg)) sample.payload_kg = run.payload_kg;
+    sample.payload_kg = payload.take(sample.payload_kg);
     if (Result<void> added = meter.add(sample); !added) return tl::unexpected(added.error());
   }
   if (Result<void> flushed = meter.flush(); !flushed) return tl::unexpected(flushed.error());

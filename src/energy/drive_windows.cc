@@ -90,7 +90,7 @@ DriveWindows::DriveWindows(const robot::RobotModel& robot, dynamics::DriveModel 
       moving_rad_s_(moving_share * robot.limits.speed_m_s / robot.kinematics.wheel_radius_m) {}
 
 std::vector<DriveEquation> DriveWindows::take() {
-  payload_sum_kg_ = windows_ = 0;
+  payload_sum_kg_ = windows_ = last_payload_kg_ = 0;
   return std::exchange(equations_, {});
 }
 

@@ -113,6 +113,7 @@ void Meter::interrupt() {
 
 void Meter::begin() {
   interrupt();
+  payload_kg_ = 0;
   accounts_ = {};
   gaps_ = 0;
   gap_seconds_ = 0;

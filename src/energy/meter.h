@@ -61,7 +61,8 @@ class Meter {
   double state_of_charge() const { return state_of_charge_; }
 
   // Takes the next sample: later than the previous one, finite where measured (src/telemetry/validation
-  // refuses others). A payload of NaN counts as the last declared one. An error is CVODE's; the interval's
+  // refuses others). A payload of NaN counts as the last one since begin(),
+  // at first 0. An error is CVODE's; the interval's
   // chord then stands for it.
   Result<void> add(const telemetry::Sample& sample);
 

@@ -9,6 +9,7 @@
 #include "telemetry/codec.h"
 #include "telemetry/event_log.h"
 #include "telemetry/mission_tracker.h"
+#include "telemetry/validation.h"
 
 namespace joulecast::gap {
 namespace {
@@ -106,7 +107,8 @@ Result<RecordingSet> load_recordings(std::span<const std::string> paths, const s
       } else {
         ++unreadable;
       }
-    } else if (const auto decoded = telemetry::decode_mission_event(event.data)) {
+    } else if (const auto decoded = telemetry::decode_mission_event(event.data);
+               decoded && !telemetry::check_plausible(decoded->event)) {
       robot.add(decoded->event);
     } else {
       ++unreadable;

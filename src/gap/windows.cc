@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "dynamics/parameters.h"
+#include "telemetry/payload.h"
 
 namespace joulecast::gap {
 namespace {
@@ -123,10 +124,10 @@ Columns columns_of(const telemetry::Recording& mission, const robot::RobotModel&
     c.heading.push_back(
         std::isfinite(last) && std::isfinite(h) ? last + std::remainder(h - last, 2 * std::numbers::pi) : h);
   }
-  double payload = std::isfinite(mission.payload_kg) ? mission.payload_kg : 0.0;
+  telemetry::MissionPayload payload(mission.payload_kg);
   fill(c.payload, [&](const Sample& s) {
-    if (std::isfinite(s.payload_kg)) payload = s.payload_kg;
-    return payload;
+    const double kg = payload.take(s.payload_kg);
+    return std::isfinite(kg) ? kg : 0.0;
   });
   return c;
 }

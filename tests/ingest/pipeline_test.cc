@@ -4,6 +4,8 @@
 
 #include <bit>
 #include <cmath>
+#include <functional>
+#include <limits>
 
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
@@ -182,6 +184,97 @@ TEST_F(PipelineTest, UnmeasuredChannelsAreNotZero) {
   EXPECT_EQ(mission.accounts.measured_s, 0);
   EXPECT_GT(mission.accounts.modelled_j, 0);
   EXPECT_DOUBLE_EQ(mission.accounts.battery_j, mission.accounts.modelled_j);
+}
+
+// Modelled energy of one accelerating mission whose STARTED declares `declared_kg` and whose samples say what
+// `said_kg` gives.
+struct Carried {
+  double modelled_j = 0, shown_kg = 0, stored_kg = 0;
+  std::uint64_t contradicted = 0;
+};
+
+Carried carried(double declared_kg, const std::function<double(std::int64_t)>& said_kg,
+                std::int64_t kill_at = -1) {
+  PipelineHarness harness;
+  harness.add_robot(testing::nomad());
+  // One before it, so that nothing of it may last.
+  for (const double kg : {30.0, declared_kg}) {
+    const std::int64_t from = kg == 30.0 ? -500 : 0;
+    MissionEvent started = event(MissionPhase::started, from, "m" + std::to_string(from));
+    started.payload_kg = kg;
+    harness.pipeline->handle({"nomad", started, started.utime_us});
+    for (std::int64_t k = from; k < from + 200; ++k) {
+      Sample s = sample(k);
+      s.sequence += 500;
+      const double t_s = 0.02 * static_cast<double>(k - from);
+      s.wheel_velocity_rad_s = {t_s, t_s};
+      s.payload_kg = from < 0 ? 30 : said_kg(k);
+      harness.pipeline->handle({"nomad", s, s.utime_us});
+      if (k == kill_at) {
+        harness.pipeline->tick(s.utime_us);
+        harness.restart();
+      }
+    }
+    harness.pipeline->suspend();
+    if (from < 0) {
+      const MissionEvent finished = event(MissionPhase::finished, -299, "m-500");
+      harness.pipeline->handle({"nomad", finished, finished.utime_us});
+    }
+  }
+  const history::Mission mission = harness.missions().at(1);
+  const auto raw = harness.store->telemetry(mission.key, {}, {.limit = 1, .cursor = {}});
+  return {mission.accounts.modelled_j, harness.fleet.find("nomad")->sample.payload_kg,
+          raw->samples.at(0).payload_kg, harness.faults(IngestFault::zero_payload)};
+}
+
+TEST(PipelinePayload, IsTheMissionsWhereTheSamplesSayNothing) {
+  const auto always = [](double kg) { return [kg](std::int64_t) { return kg; }; };
+  const Carried said = carried(20, always(20));
+  const Carried silent = carried(20, always(telemetry::unmeasured));
+  EXPECT_EQ(silent.modelled_j, said.modelled_j);
+  EXPECT_EQ(silent.shown_kg, 20);
+  EXPECT_TRUE(std::isnan(silent.stored_kg));  // evidence stays as it came
+  EXPECT_EQ(silent.contradicted, 0u);
+
+  const Carried empty = carried(telemetry::unmeasured, always(0));
+  EXPECT_GT(said.modelled_j, empty.modelled_j + 1);
+  EXPECT_EQ(carried(telemetry::unmeasured, always(telemetry::unmeasured)).modelled_j, empty.modelled_j);
+  EXPECT_EQ(carried(0, always(0)).contradicted, 0u);
+  EXPECT_EQ(carried(20, always(20), 100).contradicted, 0u);
+}
+
+TEST(PipelinePayload, AZeroAgainstADeclaredLoadIsAFieldThatNobodyFilledUntilALoadIsNamed) {
+  const auto always = [](double kg) { return [kg](std::int64_t) { return kg; }; };
+  const Carried unfilled = carried(20, always(0));
+  EXPECT_EQ(unfilled.modelled_j, carried(20, always(20)).modelled_j);
+  EXPECT_EQ(unfilled.contradicted, 200u);
+  EXPECT_EQ(unfilled.stored_kg, 0);
+
+  const auto set_down = [](std::int64_t k) { return k < 100 ? 20.0 : 0.0; };
+  const Carried less = carried(20, set_down);
+  EXPECT_LT(less.modelled_j, unfilled.modelled_j - 0.5);
+  EXPECT_EQ(less.shown_kg, 0);
+  EXPECT_EQ(less.contradicted, 0u);
+  // A restarted service remembers whether a load was named.
+  EXPECT_EQ(carried(20, set_down, 150).contradicted, 0u);
+  EXPECT_EQ(carried(20, always(0), 150).contradicted, 200u);
+}
+
+TEST_F(PipelineTest, AnEventWithAnAbsurdPayloadBeginsItsMissionWithoutOne) {
+  MissionEvent started = event(MissionPhase::started, 0);
+  started.payload_kg = -1e300;
+  send(started);
+  MissionEvent timeless = event(MissionPhase::started, 0, "m0");
+  timeless.utime_us = std::numeric_limits<std::int64_t>::min();
+  send(timeless);
+  send_range(0, 100);
+  send(event(MissionPhase::finished, 101));
+  EXPECT_EQ(harness.faults(IngestFault::implausible), 2u);
+  const auto missions = harness.missions();
+  ASSERT_EQ(missions.size(), 1u);
+  EXPECT_EQ(missions[0].mission_id, "m1");
+  EXPECT_TRUE(std::isnan(missions[0].payload_kg));
+  EXPECT_EQ(missions[0].samples, 100);
 }
 
 TEST_F(PipelineTest, ARobotWithoutAModelIsCountedAndSeen) {
