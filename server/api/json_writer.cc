@@ -5,6 +5,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "base/resolution.h"
+
 namespace joulecast::api {
 namespace {
 
@@ -91,6 +93,10 @@ JsonWriter& JsonWriter::key(std::string_view name) {
 }
 
 JsonWriter& JsonWriter::value(double number) {
+  return exact(resolved(number));
+}
+
+JsonWriter& JsonWriter::exact(double number) {
   if (!std::isfinite(number)) return null();
   separate();
   append_number(text_, number);
@@ -124,6 +130,19 @@ JsonWriter& JsonWriter::null() {
 JsonWriter& JsonWriter::raw(std::string_view json) {
   separate();
   text_ += json;
+  return *this;
+}
+
+JsonWriter& JsonWriter::compact(std::string_view json) {
+  separate();
+  bool quoted = false, escaped = false;
+  for (const char c : json) {
+    const bool space = c == ' ' || c == '\n' || c == '\t' || c == '\r';
+    if (space && !quoted) continue;
+    text_ += c;
+    if (c == '"' && !escaped) quoted = !quoted;
+    escaped = quoted && c == '\\' && !escaped;
+  }
   return *this;
 }
 

@@ -18,7 +18,8 @@ class JsonWriter {
   JsonWriter& end_array();
   JsonWriter& key(std::string_view name);
 
-  JsonWriter& value(double number);  // shortest text that reads back as the same double
+  JsonWriter& value(double number);  // resolved() (base/resolution.h), in the shortest text that reads back
+  JsonWriter& exact(double number);  // as it is, for evidence: the text reads back as the same double
   JsonWriter& value(std::int64_t number);
   JsonWriter& value(std::uint64_t number);
   JsonWriter& value(int number) { return value(static_cast<std::int64_t>(number)); }
@@ -29,6 +30,8 @@ class JsonWriter {
   JsonWriter& null();
   // JSON text made elsewhere.
   JsonWriter& raw(std::string_view json);
+  // JSON text written for people: without the space between its parts.
+  JsonWriter& compact(std::string_view json);
 
   template <class T>
   JsonWriter& field(std::string_view name, const T& content) {

@@ -4,12 +4,14 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "base/resolution.h"
+
 namespace joulecast {
 
-// A number that may be unknown: null where it is not finite. For .cc files alone; other headers take
-// json_fwd.hpp.
+// A number of an answer that may be unknown: null where it is not finite. For .cc files alone; other headers
+// take json_fwd.hpp.
 inline nlohmann::json json_number(double value) {
-  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
+  return std::isfinite(value) ? nlohmann::json(resolved(value)) : nlohmann::json(nullptr);
 }
 
 // The ends of an interval, lower first.

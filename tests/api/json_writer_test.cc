@@ -8,6 +8,8 @@
 #include <random>
 #include <vector>
 
+#include "base/json_number.h"
+
 namespace joulecast::api {
 namespace {
 
@@ -41,6 +43,22 @@ TEST(JsonColumn, ReadsBackWithinHalfADigit) {
       EXPECT_NEAR(read[k].get<double>(), numbers[k], tolerance) << places;
     }
   }
+}
+
+TEST(JsonWriter, LeavesOutWhatIsFinerThanAnyAnswer) {
+  JsonWriter json;
+  json.begin_array().value(1.2e-223).value(-9.9e-19).value(1e-18).value(-1e-17).exact(1.2e-223).end_array();
+  EXPECT_EQ(json.text(), "[0,0,1e-18,-1e-17,1.2e-223]");
+  EXPECT_EQ(json_number(1.2e-223).dump(), "0.0");
+}
+
+TEST(JsonWriter, TakesTheSpaceOutOfDocumentsAndLeavesTexts) {
+  JsonWriter json;
+  json.begin_object()
+      .key("model")
+      .compact("{\n  \"a b\": [1,\t2],\r\n  \"c\\\" \\\\\": \" d \"\n}")
+      .end_object();
+  EXPECT_EQ(json.text(), R"({"model":{"a b":[1,2],"c\" \\":" d "}})");
 }
 
 }  // namespace
