@@ -89,7 +89,9 @@ def table(title, rows):
 
 def render(document):
     lines = ["# HTTP reference", "", "Made from `schemas/openapi.json` by `http_reference.py`, which a test repeats. "
-             "Errors are RFC 9457 problem documents that name the field and the constraint.", ""]
+             "Errors are RFC 9457 problem documents that name the field and the constraint. `field` is a JSON pointer into the "
+             "body, which begins with `/`, or else the bare name of a query or path parameter or of a header. Numbers nearer "
+             "to 0 than 1e-18 are told as 0, but for raw telemetry.", ""]
     for path, item in document["paths"].items():
         for method in ("get", "put", "post", "delete"):
             if method not in item:

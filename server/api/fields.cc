@@ -40,7 +40,10 @@ const json* Fields::member(std::string_view name) {
 
 const json* Fields::required(std::string_view name, bool has_fallback) {
   const json* found = member(name);
-  if (found == nullptr && !has_fallback) fault(name, "is required");
+  if (found == nullptr && !has_fallback) {
+    misses_ = misses_ || ok();
+    fault(name, "is required");
+  }
   return found;
 }
 
@@ -145,14 +148,25 @@ std::vector<double> Fields::numbers(std::string_view name, std::size_t minimum, 
   return values;
 }
 
+std::vector<std::string> Fields::unknown() const {
+  std::vector<std::string> names;
+  if (!object_.is_object()) return names;
+  for (const auto& [name, content] : object_.items())
+    if (!read_.contains(name)) names.push_back(name);
+  return names;
+}
+
 Result<void> Fields::finish() {
-  if (!error_ && object_.is_object()) {
-    for (const auto& [name, content] : object_.items()) {
-      if (!read_.contains(name)) {
-        fault(name, "is not a known field");
-        break;
-      }
+  if (!error_) {
+    if (const auto names = unknown(); !names.empty()) {
+      // RFC 6901
+      std::string escaped;
+      for (const char c : names.front()) escaped += c == '~' ? "~0" : c == '/' ? "~1" : std::string(1, c);
+      fault(escaped, "is not a known field");
     }
+  } else if (misses_) {
+    if (const auto names = unknown(); !names.empty())
+      error_->message += fmt::format("; not known here: {}", fmt::join(names, ", "));
   }
   if (error_) return tl::unexpected(*error_);
   return {};

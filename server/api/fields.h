@@ -24,7 +24,7 @@ inline constexpr Bounds fraction{0, 1, false};
 
 // Reads one JSON object of a request, field by field, and remembers the first fault: the JSON pointer of the
 // field and the constraint that it broke. A null counts as absent. finish() also refuses keys that nobody
-// read.
+// read, and names them beside a required one that misses: often the one is the other, misspelt.
 class Fields {
  public:
   // `at` is the pointer of the object itself, "" for the whole body.
@@ -47,6 +47,8 @@ class Fields {
                               const Bounds& bounds);
   // A member that the caller reads by itself; null when absent.
   const nlohmann::json* member(std::string_view name);
+  // One that must be there; null, and a fault, when absent.
+  const nlohmann::json* required(std::string_view name, bool has_fallback = false);
 
   bool has(std::string_view name) const;
   std::string pointer(std::string_view name) const;
@@ -58,12 +60,13 @@ class Fields {
   Result<void> finish();
 
  private:
-  const nlohmann::json* required(std::string_view name, bool has_fallback);
+  std::vector<std::string> unknown() const;
 
   const nlohmann::json& object_;
   std::string at_;
   std::set<std::string, std::less<>> read_;
   std::optional<Error> error_;
+  bool misses_ = false;  // error_ is a required member of this object
 };
 
 }  // namespace joulecast::api

@@ -22,11 +22,8 @@ constexpr Bounds place{.minimum = -1e6, .maximum = 1e6};
 constexpr Bounds curvature{.minimum = -1e3, .maximum = 1e3};
 
 planning::Point read_point(Fields& fields, std::string_view name) {
-  const json* member = fields.member(name);
-  if (member == nullptr) {
-    fields.fault(name, "is required");
-    return {};
-  }
+  const json* member = fields.required(name);
+  if (member == nullptr) return {};
   Fields point(*member, fields.pointer(name));
   const planning::Point read{point.number("x_m", place), point.number("y_m", place)};
   if (Result<void> done = point.finish(); !done) fields.fault(std::move(done.error()));
@@ -34,8 +31,9 @@ planning::Point read_point(Fields& fields, std::string_view name) {
 }
 
 std::vector<planning::Point> read_points(Fields& fields, std::string_view name) {
-  const json* member = fields.member(name);
-  if (member == nullptr || !member->is_array() || member->empty() || member->size() > max_points) {
+  const json* member = fields.required(name);
+  if (member == nullptr) return {};
+  if (!member->is_array() || member->empty() || member->size() > max_points) {
     fields.fault(name, fmt::format("must be an array of 1 to {} points", max_points));
     return {};
   }
@@ -105,9 +103,10 @@ std::optional<planning::Pose> read_start_pose(Fields& fields) {
 
 std::optional<planning::Path> read_path(Fields& fields, const planning::PathOptions& options,
                                         double payload_limit_kg) {
-  const json* path = fields.member("path");
+  const json* path = fields.required("path");
   std::vector<planning::Segment> segments;
-  if (path == nullptr || !path->is_array() || path->empty() || path->size() > max_segments) {
+  if (path == nullptr) return std::nullopt;
+  if (!path->is_array() || path->empty() || path->size() > max_segments) {
     fields.fault("path", fmt::format("must be an array of 1 to {} segments", max_segments));
   } else {
     for (std::size_t k = 0; k < path->size() && fields.ok(); ++k) {

@@ -30,7 +30,8 @@ class StrictBuilder : public nlohmann::json_sax<json> {
   bool key(string_t& name) override {
     auto [place, inserted] = open_.back()->get_ref<json::object_t&>().emplace(name, nullptr);
     if (!inserted) {
-      error_ = Error{Fault::invalid, pointer() + "/" + name, "the key is given more than once"};
+      error_ = Error{Fault::invalid, pointer(open_.size() - 1) + "/" + escaped(name),
+                     "the key is given more than once"};
       return false;
     }
     slot_ = &place->second;
@@ -65,8 +66,8 @@ class StrictBuilder : public nlohmann::json_sax<json> {
   }
   bool open(json&& container) {
     if (open_.size() >= max_depth_) {
-      error_ =
-          Error{Fault::invalid, pointer(), "nested deeper than " + std::to_string(max_depth_) + " levels"};
+      error_ = Error{Fault::invalid, pointer(open_.size()),
+                     "nested deeper than " + std::to_string(max_depth_) + " levels"};
       return false;
     }
     open_.push_back(add(std::move(container)));
@@ -78,10 +79,29 @@ class StrictBuilder : public nlohmann::json_sax<json> {
     names_.pop_back();
     return true;
   }
-  std::string pointer() const {
+  // RFC 6901, to what stands or is about to stand in the given number of open containers, outermost first.
+  std::string pointer(std::size_t levels) const {
     std::string path;
-    for (std::size_t i = 0; i + 1 < names_.size(); ++i) path += "/" + names_[i];
+    for (std::size_t k = 0; k < levels; ++k) {
+      // A container that is open counts already among its array's elements.
+      const bool holds_next = k + 1 < open_.size();
+      path += "/" + (open_[k]->is_array() ? std::to_string(open_[k]->size() - (holds_next ? 1 : 0))
+                                          : escaped(names_[k]));
+    }
     return path;
+  }
+  static std::string escaped(std::string_view name) {
+    std::string text;
+    for (const char c : name) {
+      if (c == '~') {
+        text += "~0";
+      } else if (c == '/') {
+        text += "~1";
+      } else {
+        text += c;
+      }
+    }
+    return text;
   }
 
   json& root_;

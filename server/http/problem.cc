@@ -145,7 +145,7 @@ Response problem(const Error& error, std::string_view request_id) {
                    "The service failed on this request; its log has the cause under the request id.",
                    request_id);
   }
-  const bool callers = status != 503 && status != 404;
+  const bool callers = status != 503;
   return problem(status, slug_of(error.fault), describe(error), request_id, error.field,
                  callers ? std::string_view(error.message) : std::string_view{});
 }

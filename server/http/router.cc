@@ -104,6 +104,21 @@ std::optional<std::string> broken_constraint(const Parameter& parameter, std::st
   return std::nullopt;
 }
 
+// The rooms name what they were given by their own words: here it is what the client gave. A name that is no
+// parameter is a member of the body, or, where there is none, what the path names.
+std::string field_of(const Endpoint& endpoint, const Request& request, const Error& error) {
+  const std::string& field = error.field;
+  const unsigned status = status_of(error.fault);
+  if (field.empty() || field.starts_with('/') || status >= 500) return field;
+  const auto called = [&](const auto& each) { return each.first == field; };
+  if (std::ranges::any_of(request.path_params, called) ||
+      std::ranges::any_of(endpoint.parameters, [&](const Parameter& p) { return p.name == field; }))
+    return field;
+  if (!endpoint.request_schema.empty()) return "/" + field;
+  if (status == 404 && request.path_params.size() == 1) return std::string(request.path_params.front().first);
+  return field;
+}
+
 }  // namespace
 
 struct Router::Node {
@@ -192,7 +207,8 @@ Router::Match Router::match(Request& request) const {
   std::vector<const std::string*> captured;
   const Node* node = descend(*root_, target->segments, 0, captured);
   if (node == nullptr) {
-    return {nullptr, problem(404, "not-found", "No resource at " + request.path, request.id)};
+    return {nullptr, problem(404, "not-found", "No resource at " + request.path, request.id, "path",
+                             "must be one of the paths of /openapi.json")};
   }
   const Node::Slot* slot = node->slot(request.method == Method::head ? Method::get : request.method);
   if (slot == nullptr) {
@@ -203,8 +219,8 @@ Router::Match Router::match(Request& request) const {
       response.headers.emplace_back("Allow", node->allow + ", OPTIONS");
       return {nullptr, std::move(response)};
     }
-    auto response =
-        problem(405, "method-not-allowed", "Allowed here: " + node->allow + ", OPTIONS", request.id);
+    auto response = problem(405, "method-not-allowed", "Allowed here: " + node->allow + ", OPTIONS",
+                            request.id, "method", "must be one of " + node->allow + ", OPTIONS");
     response.headers.emplace_back("Allow", node->allow + ", OPTIONS");
     return {nullptr, std::move(response)};
   }
@@ -285,7 +301,7 @@ std::optional<Response> Router::run_brief(const Endpoint& endpoint, Request& req
 
 Response Router::fault(const Endpoint& endpoint, const Request& request, const Error& error) const {
   if (status_of(error.fault) == 500 && on_fault_) on_fault_(endpoint, request, error);
-  return problem(error, request.id);
+  return problem(Error{error.fault, field_of(endpoint, request, error), error.message}, request.id);
 }
 
 Response Router::handle(Request& request) const {

@@ -102,10 +102,10 @@ std::string identity(const MissionFilter& f) {
 Result<void> check_filter(const MissionFilter& f) {
   if (f.states.size() > mission_state_count) return invalid("state", "names a state more than once");
   if (f.start_from_utime_us && f.start_to_utime_us && *f.start_from_utime_us > *f.start_to_utime_us)
-    return invalid("start_from", "must not be later than start_to");
+    return invalid("from_utime_us", "must not be later than to_utime_us");
   if ((f.payload_min_kg && std::isnan(*f.payload_min_kg)) ||
       (f.payload_max_kg && std::isnan(*f.payload_max_kg)))
-    return invalid("payload", "bounds must be numbers");
+    return invalid("payload_min_kg", "must be a number, like payload_max_kg");
   if (f.payload_min_kg && f.payload_max_kg && *f.payload_min_kg > *f.payload_max_kg)
     return invalid("payload_min_kg", "must not be greater than payload_max_kg");
   return {};
@@ -113,7 +113,7 @@ Result<void> check_filter(const MissionFilter& f) {
 
 Result<void> check_range(TimeRange range) {
   if (range.from_utime_us <= range.to_utime_us) return {};
-  return invalid("from", "must not be later than to");
+  return invalid("from_utime_us", "must not be later than to_utime_us");
 }
 
 std::string select_missions() {

@@ -170,6 +170,16 @@ TEST_F(RouterTest, NamesWhatIsWrongWithJson) {
   EXPECT_EQ(json::parse(repeated.body).at("field"), "/motor/a");
 }
 
+TEST(JsonText, PointsIntoArraysByIndex) {
+  const auto field = [](std::string_view text) { return parse_json(text).error().field; };
+  EXPECT_EQ(field(R"({"path": [{"length_m": 1, "length_m": 2}]})"), "/path/0/length_m");
+  EXPECT_EQ(field(R"({"path": [1, [2, {}, {"a": 1, "a": 2}]]})"), "/path/1/2/a");
+  EXPECT_EQ(field(R"([{"a": 1, "a": 2}])"), "/0/a");
+  EXPECT_EQ(field(R"({"a/b": {"~": 1, "~": 2}})"), "/a~1b/~0");
+  EXPECT_EQ(parse_json(R"({"a": [1, [2, []]]})", 3).error().field, "/a/1/1");
+  EXPECT_EQ(parse_json(R"([[], [[]]])", 2).error().field, "/1/0");
+}
+
 TEST(JsonText, BoundsTheDepthAndKeepsValues) {
   EXPECT_TRUE(parse_json(std::string(64, '[') + std::string(64, ']')).has_value());
   EXPECT_FALSE(parse_json(std::string(65, '[') + std::string(65, ']')).has_value());
@@ -177,6 +187,41 @@ TEST(JsonText, BoundsTheDepthAndKeepsValues) {
   const std::string text =
       R"({"a":[1,-2,2.5,true,null,"x",{"b":[]}],"c":{"d":{"e":"f"}},"g":18446744073709551615})";
   EXPECT_EQ(parse_json(text).value(), json::parse(text));
+}
+
+// Rooms speak of what they were given by their own names; the client is told its own.
+TEST(Router, NamesWhatTheClientGave) {
+  std::vector<Endpoint> rows;
+  const auto fails = [](Fault fault, std::string field) {
+    return [fault, field](const Request&) -> Result<Response> { return fail(fault, field, "is wrong"); };
+  };
+  const auto add = [&](Method method, std::string path, Fault fault, std::string field, bool body) {
+    rows.push_back(row(method, std::move(path), fails(fault, std::move(field))));
+    if (body) rows.back().request_schema = "some";
+    rows.back().parameters = {{.name = "cursor"}};
+  };
+  add(Method::get, "/missions/{id}", Fault::not_found, "mission", false);
+  add(Method::get, "/missions", Fault::invalid, "cursor", false);
+  add(Method::post, "/robots/{id}/profile", Fault::infeasible, "deadline_s", true);
+  add(Method::post, "/robots/{id}/state", Fault::not_found, "id", true);
+  add(Method::post, "/queue", Fault::unavailable, "store", true);
+  const Router router(std::move(rows));
+  const auto told = [&](Method method, std::string target) {
+    Request request;
+    request.method = method;
+    request.target = std::move(target);
+    request.headers = {{"Content-Type", "application/json"}};
+    request.body = "{}";
+    return json::parse(router.handle(request).body);
+  };
+  EXPECT_EQ(told(Method::get, "/missions/9").at("field"), "id");
+  EXPECT_EQ(told(Method::get, "/missions/9").at("constraint"), "is wrong");
+  EXPECT_EQ(told(Method::get, "/missions").at("field"), "cursor");
+  EXPECT_EQ(told(Method::post, "/robots/x/profile").at("field"), "/deadline_s");
+  EXPECT_EQ(told(Method::post, "/robots/x/state").at("field"), "id");
+  EXPECT_EQ(told(Method::post, "/queue").at("field"), "store");
+  EXPECT_EQ(told(Method::get, "/nowhere").at("field"), "path");
+  EXPECT_TRUE(told(Method::get, "/nowhere").contains("constraint"));
 }
 
 TEST(Problem, GivesEachFaultItsStatus) {
