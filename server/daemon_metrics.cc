@@ -9,6 +9,8 @@
 
 namespace joulecast::server {
 
+static_assert(history::MissionState{} == history::MissionState::open);
+
 void export_metrics(Metrics& metrics, const IngestCounters& counters, const IngestService& ingest,
                     const FleetView& fleet, const history::Writer& writer, const history::Store& store,
                     const http::EventHub& events, std::function<std::int64_t()> now_utime_us) {
@@ -17,8 +19,8 @@ void export_metrics(Metrics& metrics, const IngestCounters& counters, const Inge
   const Counter samples = metrics.counter("joulecast_ingest_samples_total", "Samples accounted for");
   const std::vector<Counter> started = metrics.counters("joulecast_missions_started_total", "Missions begun",
                                                         "kind", {"announced", "implicit"});
-  std::vector<std::string> states;
-  for (std::size_t k = 0; k < history::mission_state_count; ++k)
+  std::vector<std::string> states;  // but for the first one, open
+  for (std::size_t k = 1; k < history::mission_state_count; ++k)
     states.emplace_back(history::name(static_cast<history::MissionState>(k)));
   const std::vector<Counter> ended =
       metrics.counters("joulecast_missions_ended_total", "Missions ended", "state", states);
@@ -57,7 +59,7 @@ void export_metrics(Metrics& metrics, const IngestCounters& counters, const Inge
         for (std::size_t k = 0; k < started.size(); ++k)
           started[k].raise_to(static_cast<double>(counters.missions_started[k]));
         for (std::size_t k = 0; k < ended.size(); ++k)
-          ended[k].raise_to(static_cast<double>(counters.missions_ended[k]));
+          ended[k].raise_to(static_cast<double>(counters.missions_ended[k + 1]));
         for (std::size_t k = 0; k < faults.size(); ++k)
           faults[k].raise_to(static_cast<double>(counters.faults[k]));
         const IngestStatus ingesting = ingest.status();
