@@ -100,9 +100,8 @@ void RobotSession::meter_with(std::shared_ptr<const ModelInForce> model) {
   snapshot_.model_version = model_ != nullptr ? model_->version : 0;
   if (model_ != nullptr) {
     legs_.emplace(model_->robot);
-    meter_ =
-        std::make_unique<energy::Meter>(model_->drive, model_->robot.battery.capacity_ah, settings_.meter,
-                                        [this](const energy::MeterPoint& point) { on_point(point); });
+    meter_ = std::make_unique<energy::Meter>(model_->drive, settings_.meter,
+                                             [this](const energy::MeterPoint& point) { on_point(point); });
     auto charge = std::make_unique<ChargeWatch>(model_->robot);
     if (charge_ != nullptr) {
       charge->take_over(*charge_);
@@ -467,9 +466,7 @@ void RobotSession::checkpoint() {
 
 void RobotSession::on_point(const energy::MeterPoint& point) {
   const energy::Accounts& accounts = meter_->accounts();
-  energy::MeterPoint shown = point;
-  shown.state_of_charge = snapshot_.state_of_charge;
-  trace_.add(shown, accounts);
+  trace_.add(point, accounts, snapshot_.state_of_charge);
   legs_->add({point.bridged ? point.interval_s : 0, point.speed_m_s, point.yaw_rate_rad_s,
               point.measured_power_w, point.sample.payload_kg});
   if (open_ != nullptr) open_->record.end_utime_us = point.sample.utime_us;

@@ -38,7 +38,8 @@ void TraceBuilder::begin() {
   any_ = touched_ = false;
 }
 
-void TraceBuilder::add(const energy::MeterPoint& point, const energy::Accounts& accounts) {
+void TraceBuilder::add(const energy::MeterPoint& point, const energy::Accounts& accounts,
+                       double state_of_charge) {
   std::int64_t start = point.sample.utime_us - point.sample.utime_us % history::trace_bucket_us;
   if (any_ && start != open_.start_utime_us) {
     if (touched_) finished_.push_back(open_.bucket());
@@ -56,7 +57,7 @@ void TraceBuilder::add(const energy::MeterPoint& point, const energy::Accounts& 
   open_.speed.add(point.speed_m_s, weight);
   open_.x.add(point.sample.pose[0], weight);
   open_.y.add(point.sample.pose[1], weight);
-  open_.state_of_charge = point.state_of_charge;
+  open_.state_of_charge = state_of_charge;
   open_.measured_j = accounts.measured_s > 0 ? accounts.measured_j : telemetry::unmeasured;
   open_.modelled_j = accounts.modelled_j;
   touched_ = true;

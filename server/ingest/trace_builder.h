@@ -12,8 +12,8 @@ namespace joulecast::server {
 class TraceBuilder {
  public:
   void begin();
-  // `accounts` as of the point.
-  void add(const energy::MeterPoint& point, const energy::Accounts& accounts);
+  // `accounts` and `state_of_charge` (0 to 1; NaN: unknown) as of the point.
+  void add(const energy::MeterPoint& point, const energy::Accounts& accounts, double state_of_charge);
   // The buckets that changed since the last call; the newest one may come again, fuller.
   std::vector<history::TraceBucket> take();
 

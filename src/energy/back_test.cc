@@ -31,8 +31,8 @@ struct Replay {
 };
 
 // The meter over a run; what it adds to its accounts from sample to sample goes into the bins.
-Result<Replay> replay(const dynamics::DriveModel& model, const robot::RobotModel& robot, const DriveRun& run,
-                      bool at_battery, const BackTestSettings& settings) {
+Result<Replay> replay(const dynamics::DriveModel& model, const DriveRun& run, bool at_battery,
+                      const BackTestSettings& settings) {
   Replay result;
   Accounts last;
   const Meter* source = nullptr;
@@ -60,7 +60,7 @@ Result<Replay> replay(const dynamics::DriveModel& model, const robot::RobotModel
   };
   MeterSettings metering = settings.meter;
   metering.half_window_s = std::max(metering.half_window_s, half_window_for({&run, 1}));
-  Meter meter(model, robot.battery.capacity_ah, metering, take);
+  Meter meter(model, metering, take);
   source = &meter;
   telemetry::MissionPayload payload(run.payload_kg);
   for (telemetry::Sample sample : run.samples) {
@@ -173,15 +173,15 @@ Result<BackTest> back_test(std::span<const DriveRun> runs, const robot::RobotMod
     // The battery's accounts where it was measured for most of the run, else the motors'.
     RunComparison row;
     row.name = run.name;
-    Result<Replay> a = replay(*first, before, run, true, settings);
+    Result<Replay> a = replay(*first, run, true, settings);
     if (a && a->battery_s < settings.least_duration_s) {
       row.at_battery = false;
-      a = replay(*first, before, run, false, settings);
+      a = replay(*first, run, false, settings);
     }
     if (!a) return tl::unexpected(std::move(a.error()));
     row.duration_s = row.at_battery ? a->battery_s : a->motors_s;
     if (row.duration_s < settings.least_duration_s) continue;
-    const Result<Replay> b = replay(*second, after, run, row.at_battery, settings);
+    const Result<Replay> b = replay(*second, run, row.at_battery, settings);
     if (!b) return tl::unexpected(b.error());
     for (const Span& bin : a->bins) row.measured_j += bin.measured_j;
     if (row.measured_j < settings.least_energy_j) continue;

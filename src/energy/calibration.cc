@@ -494,7 +494,7 @@ Result<DriveCalibration> calibrate_drive(const robot::RobotModel& robot, std::sp
 Result<Accounts> metered(const robot::RobotModel& robot, const DriveRun& run, const MeterSettings& settings) {
   Result<dynamics::DriveModel> drive = dynamics::drive_model(robot);
   if (!drive) return tl::unexpected(std::move(drive.error()));
-  Meter meter(std::move(*drive), robot.battery.capacity_ah, settings, [](const MeterPoint&) {});
+  Meter meter(std::move(*drive), settings, [](const MeterPoint&) {});
   telemetry::MissionPayload payload(run.payload_kg);
   for (telemetry::Sample sample : run.samples) {
     sample.payload_kg = payload.take(sample.payload_kg);

@@ -94,10 +94,8 @@ class Meter::Segment final : public InitialValueProblem {
   Cvode cvode_;
 };
 
-Meter::Meter(dynamics::DriveModel model, double capacity_ah, MeterSettings settings,
-             std::function<void(const MeterPoint&)> emit)
+Meter::Meter(dynamics::DriveModel model, MeterSettings settings, std::function<void(const MeterPoint&)> emit)
     : model_(std::move(model)),
-      capacity_ah_(capacity_ah),
       settings_(settings),
       emit_(std::move(emit)),
       segment_(std::make_unique<Segment>(model_, settings.tolerance)) {}
@@ -218,9 +216,7 @@ Result<void> Meter::settle(std::size_t index) {
       }
       accounts_.drawn_j += increment[account::drawn];
       accounts_.returned_j += increment[account::returned];
-      const double charge_ah = increment[account::charge_a] / seconds_per_hour;
-      accounts_.charge_ah += charge_ah;
-      state_of_charge_ -= charge_ah / capacity_ah_;
+      accounts_.charge_ah += increment[account::charge_a] / seconds_per_hour;
       accounts_.distance_m += increment[account::distance];
       accounts_.turned_rad += increment[account::turned];
       accounts_.duration_s += point.interval_s;
@@ -252,7 +248,6 @@ Result<void> Meter::settle(std::size_t index) {
             ? sample.motor_temperature_c[s]
             : settings_.winding_reference_c + model_.parameters().thermal_resistance_k_w * copper_heat_w_[s];
   }
-  point.state_of_charge = state_of_charge_;
   last_ = std::make_unique<Node>(node);
   emit_(point);
   return outcome;

@@ -36,7 +36,6 @@ struct MeterPoint {
   double measured_power_w = telemetry::unmeasured;
   double modelled_power_w = 0;
   std::array<double, 2> winding_temperature_c{};
-  double state_of_charge = telemetry::unmeasured;
 };
 
 // Integrates the energy accounts of one robot online. CVODE (Adams, fixed-point iteration) is restarted at
@@ -50,15 +49,11 @@ struct MeterPoint {
 class Meter {
  public:
   // `emit` receives every point in time order, late by what the acceleration filter looks ahead:
-  // half_window_s, or one sample interval where that is longer. State of charge is unknown until set.
-  Meter(dynamics::DriveModel model, double capacity_ah, MeterSettings settings,
-        std::function<void(const MeterPoint&)> emit);
+  // half_window_s, or one sample interval where that is longer.
+  Meter(dynamics::DriveModel model, MeterSettings settings, std::function<void(const MeterPoint&)> emit);
   ~Meter();
   Meter(const Meter&) = delete;
   Meter& operator=(const Meter&) = delete;
-
-  void set_state_of_charge(double state_of_charge) { state_of_charge_ = state_of_charge; }
-  double state_of_charge() const { return state_of_charge_; }
 
   // Takes the next sample: later than the previous one, finite where measured (src/telemetry/validation
   // refuses others). A payload of NaN counts as the last one since begin(),
@@ -69,7 +64,7 @@ class Meter {
   // Processes the samples that still wait for the filter, with one-sided windows.
   Result<void> flush();
 
-  // Starts new accounts at the next sample; flush() first. Temperature and charge carry over.
+  // Starts new accounts at the next sample; flush() first. The windings' temperature carries over.
   void begin();
 
   // Goes on with accounts from before a restart of the service; call before the first sample.
@@ -96,7 +91,6 @@ class Meter {
   Result<void> settle(std::size_t index);
 
   dynamics::DriveModel model_;
-  double capacity_ah_;
   MeterSettings settings_;
   std::function<void(const MeterPoint&)> emit_;
   std::deque<telemetry::Sample> waiting_;  // the filter's window; samples before next_ are history
@@ -107,7 +101,6 @@ class Meter {
   double usual_interval_s_ = 0;  // running mean of the sample intervals
   Accounts accounts_;
   std::array<double, 2> copper_heat_w_{};
-  double state_of_charge_ = telemetry::unmeasured;
   double payload_kg_ = 0;
   std::int64_t origin_utime_us_ = 0;
   std::size_t gaps_ = 0;

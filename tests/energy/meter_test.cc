@@ -50,8 +50,7 @@ Accounts metered(const std::vector<Sample>& samples, MeterSettings settings = {}
                  std::size_t* points = nullptr) {
   const robot::RobotModel robot = testing::nomad();
   std::size_t seen = 0;
-  Meter meter(*dynamics::drive_model(robot), robot.battery.capacity_ah, settings,
-              [&](const MeterPoint&) { ++seen; });
+  Meter meter(*dynamics::drive_model(robot), settings, [&](const MeterPoint&) { ++seen; });
   for (const Sample& s : samples) EXPECT_TRUE(meter.add(s));
   EXPECT_TRUE(meter.flush());
   if (points != nullptr) *points = seen;
@@ -117,7 +116,7 @@ TEST(Meter, SeesAccelerationAtEveryRateAsStated) {
       std::mt19937 random(11);
       std::uniform_real_distribution<double> shake(-0.1, 0.1);
       double product = 0, square = 0, latest_s = 0, latency_s = 0;
-      Meter meter(*dynamics::drive_model(robot), robot.battery.capacity_ah, {}, [&](const MeterPoint& point) {
+      Meter meter(*dynamics::drive_model(robot), {}, [&](const MeterPoint& point) {
         if (point.t_s < 1 || point.t_s > 39) return;  // whole windows only
         const double truth = 2 * omega * std::cos(omega * 1e-6 * static_cast<double>(point.sample.utime_us));
         product += point.wheel_acceleration_rad_s2[0] * truth;
@@ -144,7 +143,7 @@ TEST(Meter, SeesAccelerationAtEveryRateAsStated) {
 TEST(Meter, SeesAccelerationRoundMissingSamples) {
   const robot::RobotModel robot = testing::nomad();
   double worst = 0;
-  Meter meter(*dynamics::drive_model(robot), robot.battery.capacity_ah, {}, [&](const MeterPoint& point) {
+  Meter meter(*dynamics::drive_model(robot), {}, [&](const MeterPoint& point) {
     worst = std::max(worst, std::fabs(point.wheel_acceleration_rad_s2[0] - 2));
   });
   for (int k = 0; k < 300; ++k) {
@@ -181,7 +180,7 @@ TEST(Meter, BridgesShortSilencesAndCountsLongOnes) {
   std::erase_if(samples, [](const Sample& s) { return s.sequence > 500 && s.sequence < 540; });    // 0.8 s
   std::erase_if(samples, [](const Sample& s) { return s.sequence > 1000 && s.sequence < 1100; });  // 2 s
   const robot::RobotModel robot = testing::nomad();
-  Meter meter(*dynamics::drive_model(robot), robot.battery.capacity_ah, {}, [](const MeterPoint&) {});
+  Meter meter(*dynamics::drive_model(robot), {}, [](const MeterPoint&) {});
   for (const Sample& s : samples) ASSERT_TRUE(meter.add(s));
   ASSERT_TRUE(meter.flush());
   EXPECT_EQ(meter.gaps(), 1u);
@@ -200,18 +199,9 @@ TEST(Meter, WithoutBatteryChannelsTheModelStandsInAndNothingIsUnexplained) {
   EXPECT_GT(a.motor_measured_s, 19);
 }
 
-TEST(Meter, StateOfChargeFollowsTheCharge) {
-  const auto samples = drive(*dynamics::drive_model(testing::nomad()), 50, 60, 0);
-  const robot::RobotModel robot = testing::nomad();
-  double last = 0;
-  Meter meter(*dynamics::drive_model(robot), robot.battery.capacity_ah, {},
-              [&](const MeterPoint& p) { last = p.state_of_charge; });
-  meter.set_state_of_charge(0.8);
-  for (const Sample& s : samples) ASSERT_TRUE(meter.add(s));
-  ASSERT_TRUE(meter.flush());
-  EXPECT_NEAR(0.8 - last, meter.accounts().charge_ah / robot.battery.capacity_ah, 1e-12);
-  EXPECT_NEAR(meter.accounts().charge_ah * 3600 * 24, meter.accounts().measured_j,
-              1e-6 * meter.accounts().measured_j);
+TEST(Meter, ChargeFollowsTheEnergyAtASteadyVoltage) {
+  const Accounts a = metered(drive(*dynamics::drive_model(testing::nomad()), 50, 60, 0));
+  EXPECT_NEAR(a.charge_ah * 3600 * 24, a.measured_j, 1e-6 * a.measured_j);
 }
 
 }  // namespace
