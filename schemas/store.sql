@@ -1,4 +1,4 @@
--- The history of a fleet, schema version 4 (user_version; src/history/schema.cc lists the migrations to it).
+-- The history of a fleet, schema version 5 (user_version; src/history/schema.cc lists the migrations to it).
 -- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a REAL column: not measured.
 -- Energy leaving the battery is positive. Sides: right, left.
 
@@ -171,6 +171,7 @@ CREATE TABLE diagnosis (
   result_json TEXT CHECK (result_json IS NULL OR json_valid(result_json)),
   model_json TEXT CHECK (model_json IS NULL OR json_valid(model_json)),  -- the robot file with the effects found; NULL: nothing to adopt
   error TEXT NOT NULL,
+  summary_json TEXT CHECK (summary_json IS NULL OR json_valid(summary_json)),  -- what lists show of the result
   FOREIGN KEY (robot_id, model_version) REFERENCES model (robot_id, version)
 ) STRICT;
 

@@ -37,7 +37,7 @@ struct Job {
   DiagnosisRequest request;
   std::atomic<double> fraction = 0;
   std::atomic<bool> cancelled = false;
-  std::atomic<bool> running = false;
+  std::int64_t started_utime_us = 0;  // written before the job is the running one
 };
 
 json request_json(const DiagnosisRequest& request) {
@@ -45,6 +45,18 @@ json request_json(const DiagnosisRequest& request) {
   if (!request.missions.empty()) text["missions"] = request.missions;
   if (request.since_utime_us) text["since_utime_us"] = *request.since_utime_us;
   return text;
+}
+
+// What lists show of a result: the verdict, the effects and how far the gap shrinks.
+json summary_of(const json& result) {
+  json effects = json::array();
+  for (const json& effect : result["effects"])
+    effects.push_back(
+        {{"id", effect["id"]}, {"probability", effect["probability"]}, {"share", effect["share"]}});
+  return {{"verdict", result["verdict"]},
+          {"gap", result["gap"]},
+          {"effects", effects},
+          {"shrinkage", result["shrinkage"]}};
 }
 
 // As "2026-01-31 12:00".
@@ -112,6 +124,9 @@ class DiagnosisService::Impl {
             Fault::not_found, field,
             "mission " + std::to_string(request.missions[k]) + " is one of robot " + mission->robot_id);
     }
+    if (request.missions.empty()) {
+      if (Result<void> any = any_ended(request); !any) return tl::unexpected(std::move(any.error()));
+    }
     auto job = std::make_shared<Job>();
     job->request = request;
     DiagnosisRecord& record = job->record;
@@ -167,10 +182,11 @@ class DiagnosisService::Impl {
   std::optional<DiagnosisProgress> progress(std::int64_t id) const {
     const std::lock_guard lock(mutex_);
     if (running_ && running_->record.id == id)
-      return DiagnosisProgress{id, DiagnosisState::running, running_->fraction, 0};
+      return DiagnosisProgress{id, DiagnosisState::running, running_->fraction, 0,
+                               running_->started_utime_us};
     for (std::size_t k = 0; k < waiting_.size(); ++k) {
       if (waiting_[k]->record.id == id)
-        return DiagnosisProgress{id, DiagnosisState::queued, 0, k + (running_ ? 1 : 0)};
+        return DiagnosisProgress{id, DiagnosisState::queued, 0, k + (running_ ? 1 : 0), {}};
     }
     return std::nullopt;
   }
@@ -190,6 +206,22 @@ class DiagnosisService::Impl {
   }
 
  private:
+  // Whether the robot has a mission that a diagnosis could read.
+  Result<void> any_ended(const DiagnosisRequest& request) const {
+    using State = history::MissionState;
+    history::MissionFilter ended;
+    ended.robot_id = request.robot_id;
+    ended.start_from_utime_us = request.since_utime_us;
+    ended.states = {State::finished, State::aborted, State::unfinished, State::superseded,
+                    State::interrupted};
+    const auto page = store_.missions(ended, {.limit = 1, .cursor = {}});
+    if (!page) return tl::unexpected(page.error());
+    if (!page->missions.empty()) return {};
+    return fail(Fault::conflict, request.since_utime_us ? "/since_utime_us" : "/robot_id",
+                "robot " + request.robot_id + " has no mission" +
+                    (request.since_utime_us ? " from then on" : "") + " that has ended: nothing to diagnose");
+  }
+
   void work() {
     setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), low_priority);
     for (;;) {
@@ -198,7 +230,9 @@ class DiagnosisService::Impl {
         std::unique_lock lock(mutex_);
         wake_.wait(lock, [this] { return stopping_ || !waiting_.empty(); });
         if (stopping_) return;  // what waits is marked as interrupted by the next start
-        job = running_ = waiting_.front();
+        job = waiting_.front();
+        job->started_utime_us = now_utime_us_();
+        running_ = job;
         waiting_.pop_front();
       }
       const auto began = std::chrono::steady_clock::now();
@@ -212,7 +246,7 @@ class DiagnosisService::Impl {
   void run(Job& job) {
     DiagnosisRecord& record = job.record;
     record.state = DiagnosisState::running;
-    record.started_utime_us = now_utime_us_();
+    record.started_utime_us = job.started_utime_us;
     if (const auto stored = writer_.execute(history::UpdateDiagnosis{record, {}}); !stored)
       on_error_(stored.error());
     const Result<void> judged = judge(job);
@@ -245,9 +279,9 @@ class DiagnosisService::Impl {
     Result<StoredRecordings> history = read_recordings(store_, wanted);
     if (!history) return tl::unexpected(std::move(history.error()));
     if (history->missions.empty())
-      return invalid("missions", "none of the robot's missions has its telemetry stored (" +
-                                     std::to_string(history->left_out.no_telemetry) + " without, " +
-                                     std::to_string(history->left_out.open) + " still open)");
+      return invalid("/missions", "none of the robot's missions has its telemetry stored (" +
+                                      std::to_string(history->left_out.no_telemetry) + " without, " +
+                                      std::to_string(history->left_out.open) + " still open)");
     std::vector<telemetry::Recording> recordings;
     for (std::size_t k = 0; k < history->missions.size(); ++k) {
       StoredRecording& mission = history->missions[k];
@@ -272,6 +306,7 @@ class DiagnosisService::Impl {
     result["model_version"] = model->version;
     result["since_utime_us"] = wanted.since_utime_us ? json(*wanted.since_utime_us) : json(nullptr);
     record.result_json = result.dump();
+    record.summary_json = summary_of(result).dump();
     gap::ReportOrigin origin;
     for (const telemetry::Recording& mission : set->missions) origin.sources.push_back(mission.mission_id);
     origin.model = "version " + std::to_string(model->version) + " of " + record.robot_id;

@@ -37,6 +37,7 @@ struct DiagnosisProgress {
   history::DiagnosisState state = history::DiagnosisState::queued;
   double fraction = 0;    // of the work, 0 to 1
   std::size_t ahead = 0;  // jobs before it in the queue
+  std::optional<std::int64_t> started_utime_us;
 };
 
 struct DiagnosisCounts {
@@ -64,8 +65,8 @@ class DiagnosisService {
   Result<void> start();
   void stop();
 
-  // Queues a job and answers its id. Fault::not_found: no such robot or mission; ::unavailable: the queue is
-  // full.
+  // Queues a job and answers its id. Fault::not_found: no such robot or mission; ::conflict: the robot has no
+  // mission that has ended; ::unavailable: the queue is full.
   Result<std::int64_t> submit(const DiagnosisRequest& request);
   // Fault::not_found, or ::conflict when it has ended.
   Result<void> cancel(std::int64_t id);

@@ -40,8 +40,9 @@ std::size_t content_bytes(const Prune&) {
   return 0;
 }
 std::size_t content_bytes(const DiagnosisRecord& d) {
-  return d.robot_id.size() + d.request_json.size() + d.result_json.size() + d.model_json.size() +
-         d.error.size() + (d.fitted_on.capacity() + d.held_back.capacity()) * sizeof(MissionKey);
+  return d.robot_id.size() + d.request_json.size() + d.summary_json.size() + d.result_json.size() +
+         d.model_json.size() + d.error.size() +
+         (d.fitted_on.capacity() + d.held_back.capacity()) * sizeof(MissionKey);
 }
 std::size_t content_bytes(const AddDiagnosis& c) {
   return content_bytes(c.diagnosis);

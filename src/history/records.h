@@ -155,6 +155,7 @@ struct DiagnosisRecord {
   std::vector<MissionKey> fitted_on;
   std::vector<MissionKey> held_back;  // left for a back-test
   std::string result_json;            // empty: none
+  std::string summary_json;           // what lists show of the result; empty: none
   std::string model_json;             // the robot file with the effects found; empty: nothing to adopt
   std::string error;                  // of a failed one
 };

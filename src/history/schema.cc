@@ -8,7 +8,7 @@ extern const std::string_view store_sql;  // schemas/store.sql, embedded at buil
 
 namespace {
 
-constexpr std::int64_t store_version = 4;
+constexpr std::int64_t store_version = 5;
 constexpr Migration store_migrations[] = {
     {1, R"(
 CREATE TABLE learned (
@@ -70,6 +70,15 @@ CREATE INDEX proposal_by_robot ON proposal (robot_id, proposal_id);
     {3,
      "ALTER TABLE mission ADD COLUMN findings_json TEXT CHECK (findings_json IS NULL OR "
      "json_valid(findings_json));"},
+    {4, R"sql(
+ALTER TABLE diagnosis ADD COLUMN summary_json TEXT CHECK (summary_json IS NULL OR json_valid(summary_json));
+UPDATE diagnosis SET summary_json = json_object(
+  'effects', (SELECT json_group_array(json_object('id', value ->> 'id', 'probability', value -> 'probability',
+                                                  'share', value -> 'share'))
+              FROM json_each(result_json, '$.effects')),
+  'gap', result_json -> 'gap', 'shrinkage', result_json -> 'shrinkage', 'verdict', result_json -> 'verdict')
+WHERE json_type(result_json) = 'object';
+)sql"},
 };
 
 Result<void> migrate(Database& database, const Schema& schema, std::int64_t version) {

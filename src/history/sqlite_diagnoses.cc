@@ -32,12 +32,13 @@ tl::unexpected<Error> no_proposal(std::int64_t id) {
   return fail(Fault::not_found, "proposal", "no proposal has id " + std::to_string(id));
 }
 
-std::string select_diagnoses(bool with_model) {
+std::string select_diagnoses(bool whole) {
   return std::string(
              "SELECT diagnosis_id, robot_id, created_utime_us, started_utime_us, finished_utime_us, state, "
              "cause, "
-             "request_json, model_version, fitted_on, held_back, coalesce(result_json, ''), ") +
-         (with_model ? "coalesce(model_json, '')" : "''") + ", error FROM diagnosis";
+             "request_json, model_version, fitted_on, held_back, coalesce(summary_json, ''), ") +
+         (whole ? "coalesce(result_json, ''), coalesce(model_json, '')" : "'', ''") +
+         ", error FROM diagnosis";
 }
 
 Result<DiagnosisRecord> read_diagnosis(Rows& rows) {
@@ -59,6 +60,7 @@ Result<DiagnosisRecord> read_diagnosis(Rows& rows) {
     if (!read) return tl::unexpected(std::move(read.error()));
     *keys = std::move(*read);
   }
+  d.summary_json = rows.text();
   d.result_json = rows.text();
   d.model_json = rows.text();
   d.error = rows.text();
@@ -134,8 +136,8 @@ Outcome SqliteChanges::run(const UpdateDiagnosis& c) {
   const auto changed =
       Rows(database_.statement(
                "UPDATE diagnosis SET (started_utime_us, finished_utime_us, state, model_version, fitted_on, "
-               "held_back, result_json, model_json, error) = (?, ?, ?, ?, ?, ?, nullif(?, ''), nullif(?, "
-               "''), ?) "
+               "held_back, summary_json, result_json, model_json, error) = (?, ?, ?, ?, ?, ?, nullif(?, ''), "
+               "nullif(?, ''), nullif(?, ''), ?) "
                "WHERE diagnosis_id = ?"))
           .bind(d.started_utime_us)
           .bind(d.finished_utime_us)
@@ -143,6 +145,7 @@ Outcome SqliteChanges::run(const UpdateDiagnosis& c) {
           .bind(d.model_version)
           .bind(fitted_on)
           .bind(held_back)
+          .bind(d.summary_json)
           .bind(d.result_json)
           .bind(d.model_json)
           .bind(d.error)

@@ -137,7 +137,7 @@ class Store {
   virtual Result<std::optional<Learned>> learned(std::string_view robot_id, std::string_view topic) const = 0;
   virtual Result<DiagnosisRecord> diagnosis(std::int64_t id) const = 0;
   // Newest first, with id < before_id, at most `limit` (1 to max_page_size); of one robot when given. Lists
-  // leave out model_json.
+  // leave out result_json and model_json.
   virtual Result<std::vector<DiagnosisRecord>> diagnoses(std::optional<std::string> robot_id,
                                                          std::int64_t before_id,
                                                          std::int64_t limit) const = 0;

@@ -82,6 +82,12 @@ TEST_F(DiagnosisServiceTest, FindsTheEffectAndWhatItFoundCanBeAdopted) {
   EXPECT_EQ(result["verdict"], "effects") << d.result_json;
   EXPECT_EQ(result["effects"][0]["id"], "coulomb_friction") << d.result_json;
   EXPECT_EQ(result["model_version"], 1);
+  const json summary = json::parse(d.summary_json);
+  EXPECT_EQ(summary["verdict"], result["verdict"]);
+  EXPECT_EQ(summary["gap"], result["gap"]);
+  EXPECT_EQ(summary["shrinkage"], result["shrinkage"]);
+  EXPECT_EQ(summary["effects"][0]["probability"], result["effects"][0]["probability"]);
+  EXPECT_EQ(summary["effects"].size(), result["effects"].size());
 
   ModelAdoption adoption(*harness_.store, *writer_, harness_.models, [] { return 43; }, {});
   AdoptionRequest adopt;
@@ -127,7 +133,30 @@ TEST_F(DiagnosisServiceTest, AJobThatAStopCutsOffIsMarkedByTheNextStart) {
   EXPECT_FALSE(d->error.empty());
 }
 
+TEST_F(DiagnosisServiceTest, RefusesAtOnceWhatItCannotDo) {
+  serve();
+  const auto bare = service_->submit(request());
+  EXPECT_EQ(bare.error().fault, Fault::conflict);
+  EXPECT_EQ(bare.error().field, "/robot_id");
+  EXPECT_NE(bare.error().message.find("no mission that has ended"), std::string::npos)
+      << bare.error().message;
+  drive(harness_, testing::nomad(), 0);
+  DiagnosisRequest late = request();
+  late.since_utime_us = std::int64_t{1} << 52;
+  EXPECT_EQ(service_->submit(late).error().field, "/since_utime_us");
+  DiagnosisRequest unknown = request();
+  unknown.robot_id = "nobody";
+  EXPECT_EQ(service_->submit(unknown).error().field, "/robot_id");
+  unknown = request();
+  unknown.missions = {77};
+  EXPECT_EQ(service_->submit(unknown).error().field, "/missions/0");
+  EXPECT_TRUE(harness_.store->diagnoses({}, 100, 10)->empty());
+}
+
 TEST_F(DiagnosisServiceTest, SaysWhyItFailed) {
+  drive(harness_, testing::nomad(), 0);
+  history::Command prune = history::Prune{{.telemetry_max_age_us = {}, .telemetry_max_bytes = 0}, 1000};
+  ASSERT_TRUE(harness_.store->apply({&prune, 1}));
   serve();
   ASSERT_TRUE(service_->start());
   const auto id = service_->submit(request());
@@ -135,12 +164,27 @@ TEST_F(DiagnosisServiceTest, SaysWhyItFailed) {
   const auto d = wait_for(*id);
   EXPECT_EQ(d.state, DiagnosisState::failed);
   EXPECT_NE(d.error.find("none of the robot's missions"), std::string::npos) << d.error;
-  DiagnosisRequest unknown = request();
-  unknown.robot_id = "nobody";
-  EXPECT_EQ(service_->submit(unknown).error().field, "/robot_id");
-  unknown = request();
-  unknown.missions = {77};
-  EXPECT_EQ(service_->submit(unknown).error().field, "/missions/0");
+}
+
+TEST_F(DiagnosisServiceTest, TellsSinceWhenAJobRuns) {
+  const std::string_view file = virtual_robot::shipped_robots()[1].json_text;
+  const auto robot = *robot::parse_robot(file);
+  harness_.add_version(robot, 1);
+  testing::play(harness_, file, {{"coulomb_friction", 0.6}}, 4, 21, start_us);
+  serve();
+  DiagnosisRequest wanted;
+  wanted.robot_id = robot.robot_id;
+  const auto id = service_->submit(wanted);
+  ASSERT_TRUE(id) << describe(id.error());
+  EXPECT_FALSE(service_->progress(*id)->started_utime_us);
+  ASSERT_TRUE(service_->start());
+  std::size_t seen = 0;
+  for (auto progress = service_->progress(*id); progress; progress = service_->progress(*id)) {
+    if (progress->state != DiagnosisState::running) continue;
+    ++seen;
+    ASSERT_EQ(progress->started_utime_us, 42);
+  }
+  EXPECT_GT(seen, 0U);
 }
 
 class GapWatchTest : public DiagnosisServiceTest {

@@ -132,6 +132,34 @@ TEST_F(SchemaTest, AStoreOfVersionOneBecomesWhatAFreshOneIs) {
   EXPECT_EQ(old.integer("SELECT evidence_json IS NULL FROM model"), 1);
 }
 
+TEST_F(SchemaTest, DiagnosesOfVersionFourGetTheirSummaries) {
+  std::ifstream file(JOULECAST_SOURCE_DIR "/tests/history/store_v1.sql");
+  std::stringstream text;
+  text << file.rdbuf();
+  Database database = open();
+  database.execute(text.str());
+  database.execute("PRAGMA application_id = " + std::to_string(store_application_id));
+  database.execute("PRAGMA user_version = 1");
+  ASSERT_TRUE(bring_to_schema(database, Schema{4, {}, store_schema().migrations.first(3)}));
+  ASSERT_EQ(database.integer("PRAGMA user_version"), 4);
+  database.execute(
+      "INSERT INTO robot VALUES ('amr-1', 1, NULL);"
+      "INSERT INTO diagnosis (diagnosis_id, robot_id, created_utime_us, state, cause, request_json, "
+      "fitted_on, "
+      "held_back, error, result_json) VALUES "
+      "(1, 'amr-1', 1, 'done', 'request', '{}', '[]', '[]', '', '{\"verdict\": \"effects\", \"gap\": {\"a\": "
+      "0.5}, "
+      "\"effects\": [{\"id\": \"drag\", \"probability\": 0.75, \"share\": null, \"more\": [1, 2]}], "
+      "\"shrinkage\": null, \"long\": [1, 2, 3]}'),"
+      "(2, 'amr-1', 1, 'failed', 'request', '{}', '[]', '[]', 'x', NULL)");
+  const auto brought = bring_to_schema(database, store_schema());
+  ASSERT_TRUE(brought) << describe(brought.error());
+  EXPECT_EQ(database.text("SELECT summary_json FROM diagnosis WHERE diagnosis_id = 1"),
+            R"({"effects":[{"id":"drag","probability":0.75,"share":null}],"gap":{"a":0.5},)"
+            R"("shrinkage":null,"verdict":"effects"})");
+  EXPECT_EQ(database.integer("SELECT summary_json IS NULL FROM diagnosis WHERE diagnosis_id = 2"), 1);
+}
+
 TEST_F(SchemaTest, EmbedsTheSchemaFile) {
   std::ifstream file(JOULECAST_SOURCE_DIR "/schemas/store.sql");
   std::stringstream text;

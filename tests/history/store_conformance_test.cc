@@ -246,6 +246,7 @@ TEST_P(StoreConformance, KeepsADiagnosisFromItsRequestToItsReport) {
   d.started_utime_us = 6;
   d.finished_utime_us = 8;
   d.result_json = R"({"verdict": "none"})";
+  d.summary_json = R"({"verdict":"none"})";
   d.model_json = R"({"effects": {}})";
   EXPECT_EQ(apply(UpdateDiagnosis{d, "<html>"}), d.id);
   reopen();
@@ -256,6 +257,10 @@ TEST_P(StoreConformance, KeepsADiagnosisFromItsRequestToItsReport) {
   EXPECT_EQ(read.fitted_on, d.fitted_on);
   EXPECT_EQ(read.held_back, d.held_back);
   EXPECT_EQ(read.result_json, d.result_json);
+  EXPECT_EQ(read.summary_json, d.summary_json);
+  const DiagnosisRecord listed = need(store_->diagnoses({}, 100, 10)).at(0);
+  EXPECT_EQ(listed.summary_json, d.summary_json);
+  EXPECT_EQ(listed.result_json, "");
   EXPECT_EQ(read.model_json, d.model_json);
   EXPECT_EQ(read.started_utime_us, 6);
   EXPECT_EQ(read.finished_utime_us, 8);
@@ -519,12 +524,12 @@ TEST_P(StoreConformance, RefusesBadQueries) {
   refuses(f, {1, cursor}, "cursor");
   f.start_from_utime_us = 2;
   f.start_to_utime_us = 1;
-  refuses(f, {1, {}}, "start_from");
+  refuses(f, {1, {}}, "from_utime_us");
   f = {};
   f.payload_min_kg = telemetry::unmeasured;
-  refuses(f, {1, {}}, "payload");
+  refuses(f, {1, {}}, "payload_min_kg");
   EXPECT_EQ(store_->trace(1, {}, 0).error().field, "points");
-  EXPECT_EQ(store_->telemetry(1, {5, 4}, {}).error().field, "from");
+  EXPECT_EQ(store_->telemetry(1, {5, 4}, {}).error().field, "from_utime_us");
   EXPECT_EQ(store_->events(0, 0).error().field, "limit");
 }
 
