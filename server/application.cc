@@ -3,7 +3,6 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
-#include <filesystem>
 #include <mutex>
 #include <sstream>
 #include <thread>
@@ -342,34 +341,12 @@ void Application::stop() {
 }
 
 Result<std::string> openapi_document() {
-  // The table needs parts to point at; the document reads none of them.
-  const std::string path =
-      (std::filesystem::temp_directory_path() / ("joulecast-openapi-" + std::to_string(host_utime_us())))
-          .string();
-  std::filesystem::create_directories(path);
-  const auto document = [&]() -> Result<std::string> {
-    history::SqliteOptions sqlite;
-    sqlite.path = path + "/empty.db";
-    Result<std::unique_ptr<history::Store>> store = history::open_sqlite_store(sqlite);
-    if (!store) return tl::unexpected(std::move(store.error()));
-    history::Writer writer(**store, {});
-    server::ModelRegistry models;
-    const server::FleetView fleet;
-    Metrics metrics;
-    http::EventHub events;
-    server::Forecasts forecasts(**store);
-    planning::CostTableCache cost_tables;
-    server::ModelAdoption adoption(**store, writer, models, host_utime_us, {});
-    server::DiagnosisService diagnoses(**store, writer, models, host_utime_us, {}, [](const Error&) {});
-    api::Services services{**store,     writer,   models,    fleet,        forecasts,
-                           cost_tables, adoption, diagnoses, host_utime_us};
-    std::vector<http::Endpoint> table = api::endpoints(services);
-    table.push_back(http::events_endpoint(events));
-    for (http::Endpoint& row : http::operations_endpoints(metrics, {})) table.push_back(std::move(row));
-    return http::openapi_document(table, embedded_schemas());
-  }();
-  std::filesystem::remove_all(path);
-  return document;
+  Metrics metrics;
+  http::EventHub events;
+  std::vector<http::Endpoint> table = api::described_endpoints();
+  table.push_back(http::events_endpoint(events));
+  for (http::Endpoint& row : http::operations_endpoints(metrics, {})) table.push_back(std::move(row));
+  return http::openapi_document(table, embedded_schemas());
 }
 
 }  // namespace joulecast

@@ -302,37 +302,38 @@ Result<std::string> autonomy_answer(const nlohmann::json& body, const server::Ro
   return autonomy_json(*autonomy, request, robot, live);
 }
 
-std::vector<http::Endpoint> autonomy_endpoints(Services& services) {
-  std::vector<http::Endpoint> rows;
-  rows.push_back({.method = http::Method::post,
-                  .path = "/v1/robots/{id}/autonomy",
-                  .operation_id = "computeAutonomy",
-                  .summary = "How far and how long a robot still goes, and whether it can do a list of tasks",
-                  .request_schema = "autonomy-request",
-                  .response_schema = "autonomy",
-                  .error_statuses = {404, 422},
-                  .handler = [&services](const http::Request& r) -> Result<http::Response> {
-                    const std::string& id = r.param("id");
-                    const auto model = model_of(services, id);
-                    if (!model) return tl::unexpected(model.error());
-                    const auto live = services.fleet.find(id);
-                    Result<std::string> answer = autonomy_answer(*r.json, services.forecasts.of(*model),
-                                                                 live.get(), services.cost_tables);
-                    if (!answer) return tl::unexpected(std::move(answer.error()));
-                    return http::json_response(std::move(*answer));
-                  }});
-  rows.push_back({.method = http::Method::post,
-                  .path = "/v1/autonomy",
-                  .operation_id = "computeFleetAutonomy",
-                  .summary = "The autonomy of many robots in one call",
-                  .request_schema = "fleet-autonomy-request",
-                  .response_schema = "fleet-autonomy",
-                  .error_statuses = {422},
-                  .handler = [&services](const http::Request& r) -> Result<http::Response> {
+std::vector<TableRow> autonomy_rows() {
+  std::vector<TableRow> rows;
+  rows.push_back(
+      {{.method = http::Method::post,
+        .path = "/v1/robots/{id}/autonomy",
+        .operation_id = "computeAutonomy",
+        .summary = "How far and how long a robot still goes, and whether it can do a list of tasks",
+        .request_schema = "autonomy-request",
+        .response_schema = "autonomy",
+        .error_statuses = {404, 422}},
+       answered_by([](Services& services, const http::Request& r) -> Result<http::Response> {
+         const std::string& id = r.param("id");
+         const auto model = model_of(services, id);
+         if (!model) return tl::unexpected(model.error());
+         const auto live = services.fleet.find(id);
+         Result<std::string> answer =
+             autonomy_answer(*r.json, services.forecasts.of(*model), live.get(), services.cost_tables);
+         if (!answer) return tl::unexpected(std::move(answer.error()));
+         return http::json_response(std::move(*answer));
+       })});
+  rows.push_back({{.method = http::Method::post,
+                   .path = "/v1/autonomy",
+                   .operation_id = "computeFleetAutonomy",
+                   .summary = "The autonomy of many robots in one call",
+                   .request_schema = "fleet-autonomy-request",
+                   .response_schema = "fleet-autonomy",
+                   .error_statuses = {422}},
+                  answered_by([](Services& services, const http::Request& r) -> Result<http::Response> {
                     Result<std::string> answer = fleet_autonomy_answer(*r.json, services);
                     if (!answer) return tl::unexpected(std::move(answer.error()));
                     return http::json_response(std::move(*answer));
-                  }});
+                  })});
   return rows;
 }
 

@@ -12,7 +12,6 @@
 namespace joulecast::api {
 namespace {
 
-using http::Endpoint;
 using http::Method;
 using http::Parameter;
 using http::Request;
@@ -21,21 +20,6 @@ using nlohmann::json;
 
 constexpr std::size_t most_missions = 1000;  // of one request
 constexpr double most_held_back = 0.9;
-
-// What lists show of a result: the verdict, the effects and how far the gap shrinks.
-std::string summary_of(const std::string& result_json) {
-  const json result = json::parse(result_json, nullptr, false);
-  if (!result.is_object()) return "null";
-  json effects = json::array();
-  for (const json& effect : result.value("effects", json::array()))
-    effects.push_back(
-        {{"id", effect["id"]}, {"probability", effect["probability"]}, {"share", effect["share"]}});
-  return json{{"verdict", result["verdict"]},
-              {"gap", result["gap"]},
-              {"effects", effects},
-              {"shrinkage", result["shrinkage"]}}
-      .dump();
-}
 
 enum class Detail { list, whole };
 
@@ -48,7 +32,7 @@ void write_diagnosis(JsonWriter& out, const Services& services, const history::D
   out.field("progress", progress ? progress->fraction : d.state == history::DiagnosisState::done ? 1.0 : 0.0);
   out.field("ahead", static_cast<std::int64_t>(progress ? progress->ahead : 0));
   out.field("created_utime_us", d.created_utime_us);
-  out.field("started_utime_us", d.started_utime_us);
+  out.field("started_utime_us", progress ? progress->started_utime_us : d.started_utime_us);
   out.field("finished_utime_us", d.finished_utime_us);
   out.field("model_version", d.model_version);
   out.array("fitted_on", d.fitted_on);
@@ -58,12 +42,12 @@ void write_diagnosis(JsonWriter& out, const Services& services, const history::D
   out.key("request").raw(d.request_json);
   if (detail == Detail::list) {
     out.key("summary");
-    d.result_json.empty() ? out.null() : out.raw(summary_of(d.result_json));
+    d.summary_json.empty() ? out.null() : out.raw(d.summary_json);
   } else {
     out.key("result");
     d.result_json.empty() ? out.null() : out.raw(d.result_json);
     out.key("model");
-    d.model_json.empty() ? out.null() : out.raw(d.model_json);
+    d.model_json.empty() ? out.null() : out.compact(d.model_json);
   }
   out.end_object();
 }
@@ -201,58 +185,58 @@ Result<Response> events(const Services& services, const Request& request) {
 
 }  // namespace
 
-std::vector<Endpoint> diagnosis_endpoints(Services& services) {
+std::vector<TableRow> diagnosis_rows() {
   using Type = Parameter::Type;
-  std::vector<Endpoint> rows;
-  rows.push_back({.method = Method::post,
-                  .path = "/v1/diagnoses",
-                  .operation_id = "startDiagnosis",
-                  .summary =
-                      "Starts a diagnosis of the gap between a robot and its model over its stored missions, "
-                      "some of which are held back for a back-test",
-                  .request_schema = "diagnosis-request",
-                  .response_schema = "diagnosis",
-                  .success_status = 202,
-                  .error_statuses = {404, 422},
-                  .handler = [&services](const Request& r) { return start(services, r); }});
+  std::vector<TableRow> rows;
   rows.push_back(
-      {.method = Method::get,
-       .path = "/v1/diagnoses",
-       .operation_id = "listDiagnoses",
-       .summary = "Diagnoses, newest first, without their whole results",
-       .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},
-                      limit_parameter("diagnoses a page", history::max_page_size),
-                      before_parameter()},
-       .response_schema = "diagnosis-list",
-       .handler = [&services](const Request& r) { return list(services, r); }});
-  rows.push_back({.method = Method::get,
-                  .path = "/v1/diagnoses/{id}",
-                  .operation_id = "getDiagnosis",
-                  .summary = "A diagnosis: where it stands, and its result",
-                  .response_schema = "diagnosis",
-                  .error_statuses = {404},
-                  .handler = [&services](const Request& r) { return get(services, r); }});
-  rows.push_back({.method = Method::del,
-                  .path = "/v1/diagnoses/{id}",
-                  .operation_id = "cancelDiagnosis",
-                  .summary = "Cancels a diagnosis that waits or runs",
-                  .response_schema = "diagnosis",
-                  .error_statuses = {404, 409},
-                  .handler = [&services](const Request& r) { return cancel(services, r); }});
-  rows.push_back({.method = Method::get,
-                  .path = "/v1/diagnoses/{id}/events",
-                  .operation_id = "streamDiagnosis",
-                  .summary = "The progress of a diagnosis as server-sent events, until it has ended",
-                  .response_type = "text/event-stream",
-                  .error_statuses = {404},
-                  .handler = [&services](const Request& r) { return events(services, r); }});
-  rows.push_back({.method = Method::get,
-                  .path = "/v1/diagnoses/{id}/report",
-                  .operation_id = "getDiagnosisReport",
-                  .summary = "The report of a diagnosis as one self-contained page",
-                  .response_type = "text/html",
-                  .error_statuses = {404},
-                  .handler = [&services](const Request& r) { return report(services, r); }});
+      {{.method = Method::post,
+        .path = "/v1/diagnoses",
+        .operation_id = "startDiagnosis",
+        .summary = "Starts a diagnosis of the gap between a robot and its model over its stored missions, "
+                   "some of which are held back for a back-test",
+        .request_schema = "diagnosis-request",
+        .response_schema = "diagnosis",
+        .success_status = 202,
+        .error_statuses = {404, 409, 422}},
+       answered_by(start)});
+  rows.push_back(
+      {{.method = Method::get,
+        .path = "/v1/diagnoses",
+        .operation_id = "listDiagnoses",
+        .summary = "Diagnoses, newest first, without their whole results",
+        .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},
+                       limit_parameter("diagnoses a page", history::max_page_size),
+                       before_parameter()},
+        .response_schema = "diagnosis-list"},
+       answered_by(list)});
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/diagnoses/{id}",
+                   .operation_id = "getDiagnosis",
+                   .summary = "A diagnosis: where it stands, and its result",
+                   .response_schema = "diagnosis",
+                   .error_statuses = {404}},
+                  answered_by(get)});
+  rows.push_back({{.method = Method::del,
+                   .path = "/v1/diagnoses/{id}",
+                   .operation_id = "cancelDiagnosis",
+                   .summary = "Cancels a diagnosis that waits or runs",
+                   .response_schema = "diagnosis",
+                   .error_statuses = {404, 409}},
+                  answered_by(cancel)});
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/diagnoses/{id}/events",
+                   .operation_id = "streamDiagnosis",
+                   .summary = "The progress of a diagnosis as server-sent events, until it has ended",
+                   .response_type = "text/event-stream",
+                   .error_statuses = {404}},
+                  answered_by(events)});
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/diagnoses/{id}/report",
+                   .operation_id = "getDiagnosisReport",
+                   .summary = "The report of a diagnosis as one self-contained page",
+                   .response_type = "text/html",
+                   .error_statuses = {404}},
+                  answered_by(report)});
   return rows;
 }
 

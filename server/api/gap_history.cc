@@ -11,7 +11,6 @@
 namespace joulecast::api {
 namespace {
 
-using http::Endpoint;
 using http::Method;
 using http::Parameter;
 using http::Request;
@@ -117,33 +116,33 @@ Result<Response> audit(const Services& services, const Request& request) {
 
 }  // namespace
 
-std::vector<Endpoint> gap_history_endpoints(Services& services) {
+std::vector<TableRow> gap_history_rows() {
   using Type = Parameter::Type;
-  std::vector<Endpoint> rows;
-  rows.push_back({.method = Method::get,
-                  .path = "/v1/robots/{id}/gap-history",
-                  .operation_id = "getGapHistory",
-                  .summary =
-                      "Measured over modelled energy of a robot's missions with marks where it drifted, the "
-                      "models adopted, and the robots of its kind",
-                  .parameters = {limit_parameter("missions, newest first", most_missions)},
-                  .response_schema = "gap-history",
-                  .error_statuses = {404},
-                  .handler = [&services](const Request& r) { return gap_history(services, r); }});
+  std::vector<TableRow> rows;
   rows.push_back(
-      {.method = Method::get,
-       .path = "/v1/audit-log",
-       .operation_id = "listAuditLog",
-       .summary = "What happened to robots and their models: adoptions, drifts, diagnoses, reused mission "
-                  "ids, in order",
-       .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},
-                      {.name = "after",
-                       .type = Type::integer,
-                       .description = "only entries with a greater id",
-                       .minimum = 0},
-                      limit_parameter("entries a page", history::max_page_size)},
-       .response_schema = "audit-log",
-       .handler = [&services](const Request& r) { return audit(services, r); }});
+      {{.method = Method::get,
+        .path = "/v1/robots/{id}/gap-history",
+        .operation_id = "getGapHistory",
+        .summary = "Measured over modelled energy of a robot's missions with marks where it drifted, the "
+                   "models adopted, and the robots of its kind",
+        .parameters = {limit_parameter("missions, newest first", most_missions)},
+        .response_schema = "gap-history",
+        .error_statuses = {404}},
+       answered_by(gap_history)});
+  rows.push_back(
+      {{.method = Method::get,
+        .path = "/v1/audit-log",
+        .operation_id = "listAuditLog",
+        .summary = "What happened to robots and their models: adoptions, drifts, diagnoses, reused mission "
+                   "ids, in order",
+        .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},
+                       {.name = "after",
+                        .type = Type::integer,
+                        .description = "only entries with a greater id",
+                        .minimum = 0},
+                       limit_parameter("entries a page", history::max_page_size)},
+        .response_schema = "audit-log"},
+       answered_by(audit)});
   return rows;
 }
 

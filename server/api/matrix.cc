@@ -43,8 +43,9 @@ constexpr Bounds dwell{.minimum = 0, .maximum = 1e7};
 
 // The elements of an array member; the fault says how many there may be.
 const json* read_array(Fields& fields, std::string_view name, std::size_t most) {
-  const json* member = fields.member(name);
-  if (member == nullptr || !member->is_array() || member->empty() || member->size() > most) {
+  const json* member = fields.required(name);
+  if (member == nullptr) return nullptr;
+  if (!member->is_array() || member->empty() || member->size() > most) {
     fields.fault(name, fmt::format("must be an array of 1 to {} entries", most));
     return nullptr;
   }
@@ -353,17 +354,17 @@ bool MatrixAnswer::next(std::string& out, const std::stop_token& left) {
   return false;
 }
 
-std::vector<http::Endpoint> matrix_endpoints(Services& services) {
-  std::vector<http::Endpoint> rows;
+std::vector<TableRow> matrix_rows() {
+  std::vector<TableRow> rows;
   rows.push_back(
-      {.method = http::Method::post,
-       .path = "/v1/energy-matrix",
-       .operation_id = "computeEnergyMatrix",
-       .summary = "Energy and duration of every robot doing every task, row by row",
-       .request_schema = "energy-matrix-request",
-       .response_schema = "energy-matrix",
-       .error_statuses = {404, 413, 422},
-       .handler = [&services](const http::Request& r) -> Result<http::Response> {
+      {{.method = http::Method::post,
+        .path = "/v1/energy-matrix",
+        .operation_id = "computeEnergyMatrix",
+        .summary = "Energy and duration of every robot doing every task, row by row",
+        .request_schema = "energy-matrix-request",
+        .response_schema = "energy-matrix",
+        .error_statuses = {404, 413, 422}},
+       answered_by([](Services& services, const http::Request& r) -> Result<http::Response> {
          MatrixFleet fleet;
          fleet.model = [&services](const std::string& id) { return model_of(services, id); };
          fleet.pose = [&services](const std::string& id) -> std::optional<planning::Pose> {
@@ -388,7 +389,7 @@ std::vector<http::Endpoint> matrix_endpoints(Services& services) {
            return answer->next(out, left);
          });
          return response;
-       }});
+       })});
   return rows;
 }
 

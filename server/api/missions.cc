@@ -12,7 +12,6 @@
 namespace joulecast::api {
 namespace {
 
-using http::Endpoint;
 using http::Method;
 using http::Parameter;
 using http::Request;
@@ -251,7 +250,7 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
   // Raw samples are evidence: every digit is kept.
   const auto write = [&](std::string_view name, auto&& value) {
     json.key(name).begin_array();
-    for (const Sample& s : samples) json.value(value(s));
+    for (const Sample& s : samples) json.exact(value(s));
     json.end_array();
   };
   const auto pair = [&](std::string_view name, std::array<double, 2> Sample::*member) {
@@ -281,72 +280,73 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
 
 }  // namespace
 
-std::vector<Endpoint> mission_endpoints(Services& services) {
+std::vector<TableRow> mission_rows() {
   using Type = Parameter::Type;
-  const auto bound = [&services](Result<Response> (*answer)(const Services&, const Request&)) {
-    return [&services, answer](const Request& request) { return answer(services, request); };
-  };
-  const auto summaries = std::make_shared<MissionSummaries>(services);
   const Parameter cursor{
       .name = "cursor", .type = Type::text, .description = "the next_cursor of the page before"};
   const std::vector<Parameter> span = {
       {.name = "from_utime_us", .type = Type::integer, .description = "from this time on"},
       {.name = "to_utime_us", .type = Type::integer, .description = "before this time"},
   };
-  std::vector<Endpoint> rows;
-  rows.push_back({.method = Method::get,
-                  .path = "/v1/missions",
-                  .operation_id = "listMissions",
-                  .summary = "Missions, newest first, in pages that stay stable while missions come",
-                  .parameters = with(filter_parameters(),
-                                     {limit_parameter("missions a page", history::max_page_size), cursor}),
-                  .response_schema = "mission-page",
-                  .handler = bound(list)});
-  rows.push_back({.method = Method::get,
-                  .path = "/v1/mission-totals",
-                  .operation_id = "totalMissions",
-                  .summary = "Sums of energy and ledger over the missions that the filters choose",
-                  .parameters = filter_parameters(),
-                  .response_schema = "mission-totals",
-                  .handler = bound(totals)});
-  rows.push_back({.method = Method::get,
-                  .path = "/v1/missions/{id}",
-                  .operation_id = "getMission",
-                  .summary = "One mission: its energy, measured and modelled",
-                  .response_schema = "mission",
-                  .error_statuses = {404},
-                  .brief = [summaries](const Request& request) { return summaries->find(request); },
-                  .handler = [summaries](const Request& request) { return summaries->read(request); }});
-  rows.push_back({.method = Method::get,
-                  .path = "/v1/missions/{id}/ledger",
-                  .operation_id = "getMissionLedger",
-                  .summary = "Where the energy of a mission went; the terms add up to the battery's energy",
-                  .response_schema = "mission-ledger",
-                  .error_statuses = {404},
-                  .handler = bound(ledger)});
+  std::vector<TableRow> rows;
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/missions",
+                   .operation_id = "listMissions",
+                   .summary = "Missions, newest first, in pages that stay stable while missions come",
+                   .parameters = with(filter_parameters(),
+                                      {limit_parameter("missions a page", history::max_page_size), cursor}),
+                   .response_schema = "mission-page"},
+                  answered_by(list)});
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/mission-totals",
+                   .operation_id = "totalMissions",
+                   .summary = "Sums of energy and ledger over the missions that the filters choose",
+                   .parameters = filter_parameters(),
+                   .response_schema = "mission-totals"},
+                  answered_by(totals)});
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/missions/{id}",
+                   .operation_id = "getMission",
+                   .summary = "One mission: its energy, measured and modelled",
+                   .response_schema = "mission",
+                   .error_statuses = {404}},
+                  [](Services& services, http::Endpoint& endpoint) {
+                    const auto summaries = std::make_shared<MissionSummaries>(services);
+                    endpoint.brief = [summaries](const Request& request) { return summaries->find(request); };
+                    endpoint.handler = [summaries](const Request& request) {
+                      return summaries->read(request);
+                    };
+                  }});
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/missions/{id}/ledger",
+                   .operation_id = "getMissionLedger",
+                   .summary = "Where the energy of a mission went; the terms add up to the battery's energy",
+                   .response_schema = "mission-ledger",
+                   .error_statuses = {404}},
+                  answered_by(ledger)});
   rows.push_back(
-      {.method = Method::get,
-       .path = "/v1/missions/{id}/trace",
-       .operation_id = "getMissionTrace",
-       .summary =
-           "Power, speed, charge and position over a mission, as least, mean and greatest of equal spans",
-       .parameters = with(span, {{.name = "points",
-                                  .type = Type::integer,
-                                  .description = "spans at most",
-                                  .minimum = 1,
-                                  .maximum = static_cast<double>(history::max_trace_points)}}),
-       .response_schema = "mission-trace",
-       .error_statuses = {404},
-       .handler = bound(trace)});
+      {{.method = Method::get,
+        .path = "/v1/missions/{id}/trace",
+        .operation_id = "getMissionTrace",
+        .summary =
+            "Power, speed, charge and position over a mission, as least, mean and greatest of equal spans",
+        .parameters = with(span, {{.name = "points",
+                                   .type = Type::integer,
+                                   .description = "spans at most",
+                                   .minimum = 1,
+                                   .maximum = static_cast<double>(history::max_trace_points)}}),
+        .response_schema = "mission-trace",
+        .error_statuses = {404}},
+       answered_by(trace)});
   rows.push_back(
-      {.method = Method::get,
-       .path = "/v1/missions/{id}/telemetry",
-       .operation_id = "getMissionTelemetry",
-       .summary = "The samples of a mission as received, as far as the retention keeps them",
-       .parameters = with(span, {limit_parameter("samples a page", history::max_telemetry_samples), cursor}),
-       .response_schema = "mission-telemetry",
-       .error_statuses = {404},
-       .handler = bound(raw_telemetry)});
+      {{.method = Method::get,
+        .path = "/v1/missions/{id}/telemetry",
+        .operation_id = "getMissionTelemetry",
+        .summary = "The samples of a mission as received, as far as the retention keeps them",
+        .parameters = with(span, {limit_parameter("samples a page", history::max_telemetry_samples), cursor}),
+        .response_schema = "mission-telemetry",
+        .error_statuses = {404}},
+       answered_by(raw_telemetry)});
   return rows;
 }
 

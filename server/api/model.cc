@@ -13,7 +13,6 @@
 namespace joulecast::api {
 namespace {
 
-using http::Endpoint;
 using http::Method;
 using http::Parameter;
 using http::Request;
@@ -229,43 +228,43 @@ Result<Response> proposals(const Services& services, const Request& request) {
 
 }  // namespace
 
-std::vector<Endpoint> model_endpoints(Services& services) {
+std::vector<TableRow> model_rows() {
   using Type = Parameter::Type;
-  std::vector<Endpoint> rows;
-  rows.push_back({.method = Method::post,
-                  .path = "/v1/robots/{id}/model",
-                  .operation_id = "adoptModel",
-                  .summary =
-                      "Adopts a robot file, a diagnosis or a proposal as the next model version, after a "
-                      "back-test on missions that it was not fitted on; or puts an earlier version in force",
-                  .request_schema = "model-request",
-                  .response_schema = "model-adoption",
-                  .error_statuses = {404, 409, 422},
-                  .handler = [&services](const Request& r) { return post_model(services, r); }});
-  rows.push_back({.method = Method::get,
-                  .path = "/v1/robots/{id}/versions/diff",
-                  .operation_id = "compareRobotVersions",
-                  .summary = "What two versions of a robot's model differ in",
-                  .parameters = {{.name = "from",
-                                  .type = Type::integer,
-                                  .description = "version before; default: the one that `to` was made from",
-                                  .minimum = 1},
-                                 {.name = "to",
-                                  .type = Type::integer,
-                                  .description = "version after; default: the one in force",
-                                  .minimum = 1}},
-                  .response_schema = "version-diff",
-                  .error_statuses = {404},
-                  .handler = [&services](const Request& r) { return diff(services, r); }});
+  std::vector<TableRow> rows;
   rows.push_back(
-      {.method = Method::get,
-       .path = "/v1/robots/{id}/proposals",
-       .operation_id = "listProposals",
-       .summary = "Models that were suggested for a robot, newest first",
-       .parameters = {limit_parameter("proposals a page", history::max_page_size), before_parameter()},
-       .response_schema = "proposal-list",
-       .error_statuses = {404},
-       .handler = [&services](const Request& r) { return proposals(services, r); }});
+      {{.method = Method::post,
+        .path = "/v1/robots/{id}/model",
+        .operation_id = "adoptModel",
+        .summary = "Adopts a robot file, a diagnosis or a proposal as the next model version, after a "
+                   "back-test on missions that it was not fitted on; or puts an earlier version in force",
+        .request_schema = "model-request",
+        .response_schema = "model-adoption",
+        .error_statuses = {404, 409, 422}},
+       answered_by(post_model)});
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/robots/{id}/versions/diff",
+                   .operation_id = "compareRobotVersions",
+                   .summary = "What two versions of a robot's model differ in",
+                   .parameters = {{.name = "from",
+                                   .type = Type::integer,
+                                   .description = "version before; default: the one that `to` was made from",
+                                   .minimum = 1},
+                                  {.name = "to",
+                                   .type = Type::integer,
+                                   .description = "version after; default: the one in force",
+                                   .minimum = 1}},
+                   .response_schema = "version-diff",
+                   .error_statuses = {404}},
+                  answered_by(diff)});
+  rows.push_back(
+      {{.method = Method::get,
+        .path = "/v1/robots/{id}/proposals",
+        .operation_id = "listProposals",
+        .summary = "Models that were suggested for a robot, newest first",
+        .parameters = {limit_parameter("proposals a page", history::max_page_size), before_parameter()},
+        .response_schema = "proposal-list",
+        .error_statuses = {404}},
+       answered_by(proposals)});
   return rows;
 }
 

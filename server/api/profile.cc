@@ -294,43 +294,45 @@ Result<std::string> estimate_answer(const nlohmann::json& body, const server::Mo
   return json.take();
 }
 
-std::vector<http::Endpoint> planning_endpoints(Services& services) {
-  const auto with_model =
-      [&services](Result<std::string> (*answer)(const nlohmann::json&, const server::ModelInForce&)) {
-        return [&services, answer](const http::Request& r) -> Result<http::Response> {
-          const auto model = model_of(services, r.param("id"));
-          if (!model) return tl::unexpected(model.error());
-          Result<std::string> text = answer(*r.json, **model);
-          if (!text) return tl::unexpected(std::move(text.error()));
-          return http::json_response(std::move(*text));
-        };
-      };
-  std::vector<http::Endpoint> rows;
+std::vector<TableRow> planning_rows() {
+  const auto with_model = [](Result<std::string> (*answer)(const nlohmann::json&,
+                                                           const server::ModelInForce&)) {
+    return answered_by([answer](const Services& services, const http::Request& r) -> Result<http::Response> {
+      const auto model = model_of(services, r.param("id"));
+      if (!model) return tl::unexpected(model.error());
+      Result<std::string> text = answer(*r.json, **model);
+      if (!text) return tl::unexpected(std::move(text.error()));
+      return http::json_response(std::move(*text));
+    });
+  };
+  std::vector<TableRow> rows;
   rows.push_back(
-      {.method = http::Method::post,
-       .path = "/v1/robots/{id}/profile",
-       .operation_id = "computeProfile",
-       .summary =
-           "The minimum-energy motion along a path, with its certificate, against trapezoid and triangle",
-       .request_schema = "profile-request",
-       .response_schema = "profile",
-       .error_statuses = {404, 422},
-       .brief = [&services](const http::Request& r) -> std::optional<http::Response> {
-         const auto model = services.models.find(r.param("id"));
-         if (!model) return std::nullopt;
-         std::optional<std::string> text = brief_profile_answer(*r.json, *model);
-         if (!text) return std::nullopt;
-         return http::json_response(std::move(*text));
-       },
-       .handler = with_model(profile_answer)});
-  rows.push_back({.method = http::Method::post,
-                  .path = "/v1/robots/{id}/estimate",
-                  .operation_id = "estimateEnergy",
-                  .summary = "Energy and ledger of a given motion, or of the best one along a path",
-                  .request_schema = "estimate-request",
-                  .response_schema = "estimate",
-                  .error_statuses = {404, 422},
-                  .handler = with_model(estimate_answer)});
+      {{.method = http::Method::post,
+        .path = "/v1/robots/{id}/profile",
+        .operation_id = "computeProfile",
+        .summary =
+            "The minimum-energy motion along a path, with its certificate, against trapezoid and triangle",
+        .request_schema = "profile-request",
+        .response_schema = "profile",
+        .error_statuses = {404, 422}},
+       [with_model](Services& services, http::Endpoint& endpoint) {
+         with_model(profile_answer)(services, endpoint);
+         endpoint.brief = [&services](const http::Request& r) -> std::optional<http::Response> {
+           const auto model = services.models.find(r.param("id"));
+           if (!model) return std::nullopt;
+           std::optional<std::string> text = brief_profile_answer(*r.json, *model);
+           if (!text) return std::nullopt;
+           return http::json_response(std::move(*text));
+         };
+       }});
+  rows.push_back({{.method = http::Method::post,
+                   .path = "/v1/robots/{id}/estimate",
+                   .operation_id = "estimateEnergy",
+                   .summary = "Energy and ledger of a given motion, or of the best one along a path",
+                   .request_schema = "estimate-request",
+                   .response_schema = "estimate",
+                   .error_statuses = {404, 422}},
+                  with_model(estimate_answer)});
   return rows;
 }
 

@@ -8,7 +8,6 @@
 namespace joulecast::api {
 namespace {
 
-using http::Endpoint;
 using http::Method;
 using http::Request;
 using http::Response;
@@ -47,7 +46,7 @@ Result<Response> get(const Services& services, const Request& request) {
   json.field("model_version", model->version);
   json.field("origin", history::name(model->origin));
   json.field("created_utime_us", model->created_utime_us);
-  json.key("model").raw(model->model_json);
+  json.key("model").compact(model->model_json);
   json.end_object();
   return http::json_response(json.take());
 }
@@ -96,7 +95,7 @@ Result<Response> versions(const Services& services, const Request& request) {
     json.field("model_version", v.version).field("created_utime_us", v.created_utime_us);
     json.field("origin", history::name(v.origin)).field("note", v.note).field("active", v.active);
     json.field("parent_version", v.parent_version);
-    json.key("model").raw(v.model_json);
+    json.key("model").compact(v.model_json);
     json.key("evidence");
     v.evidence_json.empty() ? json.null() : json.raw(v.evidence_json);
     json.end_object();
@@ -107,44 +106,44 @@ Result<Response> versions(const Services& services, const Request& request) {
 
 }  // namespace
 
-std::vector<Endpoint> robot_endpoints(Services& services) {
-  std::vector<Endpoint> rows;
-  rows.push_back({.method = Method::get,
-                  .path = "/v1/robots",
-                  .operation_id = "listRobots",
-                  .summary = "The fleet: every robot that has a model or was heard of, with its live state",
-                  .response_schema = "robot-list",
-                  .handler = [&services](const Request& r) { return list(services, r); }});
-  rows.push_back({.method = Method::get,
-                  .path = "/v1/robots/{id}",
-                  .operation_id = "getRobot",
-                  .summary = "A robot's model in force",
-                  .response_schema = "robot-detail",
-                  .error_statuses = {404},
-                  .handler = [&services](const Request& r) { return get(services, r); }});
-  rows.push_back({.method = Method::put,
-                  .path = "/v1/robots/{id}",
-                  .operation_id = "putRobot",
-                  .summary = "Gives a robot a model; a changed one is a new version, used at once",
-                  .request_schema = "robot",
-                  .response_schema = "robot-version",
-                  .error_statuses = {422},
-                  .handler = [&services](const Request& r) { return put(services, r); }});
-  rows.push_back({.method = Method::get,
-                  .path = "/v1/robots/{id}/state",
-                  .operation_id = "getRobotState",
-                  .summary = "A robot's live state: power, charge, mission, health of its telemetry",
-                  .response_schema = "robot-state",
-                  .error_statuses = {404},
-                  .run = http::Run::io,
-                  .handler = [&services](const Request& r) { return state(services, r); }});
-  rows.push_back({.method = Method::get,
-                  .path = "/v1/robots/{id}/versions",
-                  .operation_id = "listRobotVersions",
-                  .summary = "Every version of a robot's model, newest first",
-                  .response_schema = "robot-version-list",
-                  .error_statuses = {404},
-                  .handler = [&services](const Request& r) { return versions(services, r); }});
+std::vector<TableRow> robot_rows() {
+  std::vector<TableRow> rows;
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/robots",
+                   .operation_id = "listRobots",
+                   .summary = "The fleet: every robot that has a model or was heard of, with its live state",
+                   .response_schema = "robot-list"},
+                  answered_by(list)});
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/robots/{id}",
+                   .operation_id = "getRobot",
+                   .summary = "A robot's model in force",
+                   .response_schema = "robot-detail",
+                   .error_statuses = {404}},
+                  answered_by(get)});
+  rows.push_back({{.method = Method::put,
+                   .path = "/v1/robots/{id}",
+                   .operation_id = "putRobot",
+                   .summary = "Gives a robot a model; a changed one is a new version, used at once",
+                   .request_schema = "robot",
+                   .response_schema = "robot-version",
+                   .error_statuses = {422}},
+                  answered_by(put)});
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/robots/{id}/state",
+                   .operation_id = "getRobotState",
+                   .summary = "A robot's live state: power, charge, mission, health of its telemetry",
+                   .response_schema = "robot-state",
+                   .error_statuses = {404},
+                   .run = http::Run::io},
+                  answered_by(state)});
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/robots/{id}/versions",
+                   .operation_id = "listRobotVersions",
+                   .summary = "Every version of a robot's model, newest first",
+                   .response_schema = "robot-version-list",
+                   .error_statuses = {404}},
+                  answered_by(versions)});
   return rows;
 }
 

@@ -5,13 +5,32 @@
 
 namespace joulecast::api {
 
-std::vector<http::Endpoint> endpoints(Services& services) {
-  std::vector<http::Endpoint> all;
-  for (const auto part : {robot_endpoints, model_endpoints, diagnosis_endpoints, gap_history_endpoints,
-                          mission_endpoints, planning_endpoints, matrix_endpoints, autonomy_endpoints}) {
-    std::vector<http::Endpoint> rows = part(services);
+namespace {
+
+std::vector<TableRow> table() {
+  std::vector<TableRow> all;
+  for (const auto part : {robot_rows, model_rows, diagnosis_rows, gap_history_rows, mission_rows,
+                          planning_rows, matrix_rows, autonomy_rows}) {
+    std::vector<TableRow> rows = part();
     all.insert(all.end(), std::make_move_iterator(rows.begin()), std::make_move_iterator(rows.end()));
   }
+  return all;
+}
+
+}  // namespace
+
+std::vector<http::Endpoint> endpoints(Services& services) {
+  std::vector<http::Endpoint> all;
+  for (TableRow& row : table()) {
+    row.bind(services, row.endpoint);
+    all.push_back(std::move(row.endpoint));
+  }
+  return all;
+}
+
+std::vector<http::Endpoint> described_endpoints() {
+  std::vector<http::Endpoint> all;
+  for (TableRow& row : table()) all.push_back(std::move(row.endpoint));
   return all;
 }
 

@@ -29,18 +29,37 @@ struct Services {
   std::function<std::int64_t()> now_utime_us;  // host clock
 };
 
+// A row of the API's table: what the endpoint is, without a handler, and apart from it how it is bound to
+// what it works with.
+struct TableRow {
+  http::Endpoint endpoint;
+  std::function<void(Services&, http::Endpoint&)> bind;
+};
+
+// Binds to a function of (Services&, const http::Request&).
+template <class Answer>
+std::function<void(Services&, http::Endpoint&)> answered_by(Answer answer) {
+  return [answer](Services& services, http::Endpoint& endpoint) {
+    endpoint.handler = [&services, answer](const http::Request& request) {
+      return answer(services, request);
+    };
+  };
+}
+
 // The table of the API: every endpoint but those of operations (server/http) stands here.
 std::vector<http::Endpoint> endpoints(Services& services);
+// What it says of them, for documents: without handlers.
+std::vector<http::Endpoint> described_endpoints();
 
 // One function an endpoint file, each returning its rows.
-std::vector<http::Endpoint> robot_endpoints(Services& services);
-std::vector<http::Endpoint> model_endpoints(Services& services);
-std::vector<http::Endpoint> diagnosis_endpoints(Services& services);
-std::vector<http::Endpoint> gap_history_endpoints(Services& services);
-std::vector<http::Endpoint> mission_endpoints(Services& services);
-std::vector<http::Endpoint> planning_endpoints(Services& services);
-std::vector<http::Endpoint> matrix_endpoints(Services& services);
-std::vector<http::Endpoint> autonomy_endpoints(Services& services);
+std::vector<TableRow> robot_rows();
+std::vector<TableRow> model_rows();
+std::vector<TableRow> diagnosis_rows();
+std::vector<TableRow> gap_history_rows();
+std::vector<TableRow> mission_rows();
+std::vector<TableRow> planning_rows();
+std::vector<TableRow> matrix_rows();
+std::vector<TableRow> autonomy_rows();
 
 // The model of a robot, or the error that says why there is none.
 Result<std::shared_ptr<const server::ModelInForce>> model_of(const Services& services,

@@ -100,6 +100,12 @@ class Checker:
         schema = {"components": self.document["components"], **response["content"][kind]["schema"]}
         for error in jsonschema.Draft202012Validator(schema).iter_errors(value):
             self.fault(f"{what}: {error.json_path}: {error.message[:300]}")
+        if status in (404, 405, 409, 422):
+            given = {p["name"] for p in operation.get("parameters", [])}
+            if not value.get("constraint"):
+                self.fault(f"{what}: the problem of status {status} names no constraint")
+            if not value.get("field", "").startswith("/") and value.get("field") not in given:
+                self.fault(f"{what}: {value.get('field')!r} is neither a JSON pointer nor a parameter")
         if status >= 400 and value.get("status") != status:
             self.fault(f"{what}: the problem names status {value.get('status')}, not {status}")
         return value
@@ -164,6 +170,28 @@ def exercise(checker, source):
                 body = None if method == "GET" else {"path": PATH}
                 checker.check(method, template, template.replace("{id}", "no-such-robot"), body, expect=404)
     checker.check("POST", "/v1/robots/{id}/profile", f"/v1/robots/{name}/profile", {"path": PATH}, expect=200)
+    for template, body, status, field, constraint in (
+            ("/v1/robots/{id}/profile", {}, 422, "/path", "is required"),
+            ("/v1/robots/{id}/profile", {"paht": PATH}, 422, "/path", "is required; not known here: paht"),
+            ("/v1/robots/{id}/profile", {"path": PATH, "spede": 1}, 422, "/spede", "is not a known field"),
+            ("/v1/robots/{id}/profile", {"path": []}, 422, "/path", "must be an array"),
+            ("/v1/robots/{id}/profile", {"path": [{"kind": "polyline"}]}, 422, "/path/0/points", "is required"),
+            ("/v1/robots/{id}/profile", {"path": PATH, "deadline_s": 0.01}, 422, "/deadline_s", ""),
+            ("/v1/robots/{id}/profile", b'{"path": [{"kind": "straight", "length_m": 1, "length_m": 2}]}', 400,
+             "/path/0/length_m", "the key is given more than once"),
+            ("/v1/energy-matrix", {"robots": [name]}, 422, "/tasks", "is required"),
+            ("/v1/diagnoses", {"robot_id": name}, 409, "/robot_id", "no mission that has ended")):
+        told = checker.check("POST", template, template.replace("{id}", name), body, expect=status) or {}
+        if told.get("field") != field or constraint not in told.get("constraint", ""):
+            checker.fault(f"{template} {body}: {told.get('field')}: {told.get('constraint')}, not {field}: {constraint}")
+    model = checker.check("GET", "/v1/robots/{id}", f"/v1/robots/{name}", expect=200)
+    compact = json.dumps(model, separators=(",", ":"), ensure_ascii=False)
+    served = ask(checker.url, "GET", f"/v1/robots/{name}")[2].decode()
+    if served.count(" ") > compact.count(" ") or "\n" in served:
+        checker.fault("a stored robot file is served with the space it was written with")
+    metrics = ask(checker.url, "GET", "/metrics")[2].decode()
+    if 'joulecast_missions_ended_total{state="finished"}' not in metrics or 'state="open"' in metrics:
+        checker.fault("joulecast_missions_ended_total counts missions that are open, or none")
     errand = {"task_id": "t", "payload_kg": 1, "empty": {"distance_m": 3}, "loaded": {"distances_m": [2, 4], "turns_rad": [1.6]}}
     matrix = {"robots": [{"robot_id": name, "pose": {"x_m": 0, "y_m": 0}}],
               "tasks": [errand, {**errand, "payload_kg": 1e5}, {"task_id": "u", "pickup": {"x_m": 1, "y_m": 2}, "dropoff": {"x_m": 3, "y_m": 0}}]}
