@@ -200,7 +200,7 @@ TEST_P(EffectEverywhere, IsMeteredAsTheInverseModelHasIt) {
   energy::MeterSettings settings;
   double energy_j = 0, last_w = 0;
   std::size_t seen = 0;
-  energy::Meter meter(model, robot.battery.capacity_ah, settings, [&](const energy::MeterPoint& point) {
+  energy::Meter meter(model, settings, [&](const energy::MeterPoint& point) {
     // What the winding has gathered shows as its temperature.
     std::array<double, 2> heat_w{};
     for (std::size_t s : {0u, 1u}) {

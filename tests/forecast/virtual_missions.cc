@@ -109,7 +109,7 @@ VirtualRobotRun run(std::string_view kind, int missions, std::uint64_t seed,
   dynamics::DriveModel drive = *dynamics::drive_model(robot);
   VirtualRobotRun out{robot, drive, effects, {}};
   LegTracker tracker(robot);
-  energy::Meter meter(drive, robot.battery.capacity_ah, {}, [&](const energy::MeterPoint& p) {
+  energy::Meter meter(drive, {}, [&](const energy::MeterPoint& p) {
     tracker.add({p.bridged ? p.interval_s : 0, p.speed_m_s, p.yaw_rate_rad_s, p.measured_power_w,
                  p.sample.payload_kg});
   });
