@@ -54,6 +54,18 @@ void print_table(const std::vector<history::Mission>& missions) {
   }
 }
 
+// Robots whose telemetry could not be accounted for; how many they are.
+std::size_t tell_strangers(const server::FleetView& fleet, const std::string& store_path) {
+  std::size_t count = 0;
+  for (const auto& robot : fleet.all()) {
+    if (robot->has_model) continue;
+    ++count;
+    std::fprintf(stderr, "joulecast: %s: %s has no model of this robot: give its file with --robot\n",
+                 robot->robot_id.c_str(), store_path.c_str());
+  }
+  return count;
+}
+
 }  // namespace
 
 void tell_damage(const std::string& path, const telemetry::LogRead& place) {
@@ -137,7 +149,7 @@ Exit replay_into(const ReplayInto& options) {
       }
     }
   }
-  return tally.damaged_places == 0 ? Exit::ok : Exit::fault;
+  return tally.damaged_places == 0 && tell_strangers(fleet, options.store_path) == 0 ? Exit::ok : Exit::fault;
 }
 
 }  // namespace joulecast::client

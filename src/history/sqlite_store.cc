@@ -52,7 +52,8 @@ class FileLock {
       return fail(Fault::unavailable, "database", "cannot open " + path + ": " + std::strerror(errno));
     auto lock = std::make_unique<FileLock>(descriptor);
     if (flock(descriptor, LOCK_EX | LOCK_NB) != 0)
-      return fail(Fault::conflict, "database", path + " is locked: another store holds the file open");
+      return fail(Fault::conflict, "database",
+                  path + " is locked: another joulecast program, a daemon perhaps, has this store open");
     return lock;
   }
 

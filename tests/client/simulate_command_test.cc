@@ -165,6 +165,15 @@ TEST_F(SimulateCommand, SaysWhatIsWrong) {
   EXPECT_EQ(run({}), std::nullopt);
 }
 
+TEST_F(SimulateCommand, ReplayIntoAStoreThatDoesNotKnowTheRobotIsNoSuccess) {
+  ASSERT_EQ(run({"simulate", "--quiet", "--robots", "1", "--duration", "5", "--log", file("a.lcmlog")}),
+            Exit::ok);
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(run({"replay", file("a.lcmlog"), "--into", file("h.db")}), Exit::fault);
+  EXPECT_NE(testing::internal::GetCapturedStderr().find("amr-01: " + file("h.db") + " has no model"),
+            std::string::npos);
+}
+
 TEST_F(SimulateCommand, ReplaySendsTheWholeLogAndReportsDamage) {
   ASSERT_EQ(run({"simulate", "--quiet", "--robots", "2", "--duration", "20", "--log", file("a.lcmlog")}),
             Exit::ok);
