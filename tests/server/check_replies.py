@@ -192,6 +192,8 @@ def exercise(checker, source):
     metrics = ask(checker.url, "GET", "/metrics")[2].decode()
     if 'joulecast_missions_ended_total{state="finished"}' not in metrics or 'state="open"' in metrics:
         checker.fault("joulecast_missions_ended_total counts missions that are open, or none")
+    fast = {"profile": {"time_s": [0, 1, 2], "speed_m_s": [0, 9, 0]}}  # beyond the robot's limits
+    checker.check("POST", "/v1/robots/{id}/estimate", f"/v1/robots/{name}/estimate", fast, expect=200)
     errand = {"task_id": "t", "payload_kg": 1, "empty": {"distance_m": 3}, "loaded": {"distances_m": [2, 4], "turns_rad": [1.6]}}
     matrix = {"robots": [{"robot_id": name, "pose": {"x_m": 0, "y_m": 0}}],
               "tasks": [errand, {**errand, "payload_kg": 1e5}, {"task_id": "u", "pickup": {"x_m": 1, "y_m": 2}, "dropoff": {"x_m": 3, "y_m": 0}}]}
