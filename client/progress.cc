@@ -32,8 +32,8 @@ std::string progress_line(const std::string& work, const std::string& unit, std:
     const double part = std::min(1.0, static_cast<double>(done) / static_cast<double>(total));
     constexpr int cells = 24;
     const int full = static_cast<int>(part * cells);
-    line += fmt::format("[{:=<{}}{: <{}}] {:3.0f} %  {} of {} {}", "", full, "", cells - full, 100 * part,
-                        done, total, unit);
+    line += fmt::format("[{:=<{}}{: <{}}] {:3.0f} %", "", full, "", cells - full, 100 * part);
+    if (unit != "%") line += fmt::format("  {} of {} {}", done, total, unit);
     // Before a hundredth is done the rate says little about the rest.
     if (part > 0.01 && part < 1) line += ", " + clock_text(elapsed_s * (1 - part) / part) + " left";
   } else {

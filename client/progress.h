@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <string>
 
 namespace joulecast::client {
@@ -28,6 +29,14 @@ class Progress {
     draw_if_due();
   }
   void set_total(std::uint64_t total) { total_ = total; }
+  // For work that tells its share done, 0 to 1, and asks whether to go on; the total is 100 then. Not to
+  // outlive this.
+  [[nodiscard]] std::function<bool(double)> shares() {
+    return [this](double share) {
+      reach(static_cast<std::uint64_t>(100 * share));
+      return true;
+    };
+  }
 
  private:
   using Clock = std::chrono::steady_clock;

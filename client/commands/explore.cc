@@ -10,6 +10,7 @@
 #include "client/commands/table.h"
 #include "client/exploration_drawing.h"
 #include "client/files.h"
+#include "client/progress.h"
 #include "client/virtual_robot/fleet.h"
 #include "exploration/exploration_json.h"
 #include "exploration/map_file.h"
@@ -87,7 +88,13 @@ Exit run(const Options& options) {
   if (!map) return report(map.error());
   const auto robot = chosen_robot(options);
   if (!robot) return report(robot.error());
-  const auto exploration = explore(*map);
+  const auto exploration = [&] {
+    Progress progress("exploring", "nodes");
+    return explore(*map, [&progress](std::size_t seen, std::size_t nodes) {
+      progress.set_total(nodes);
+      progress.reach(seen);
+    });
+  }();
   if (!exploration) return report(exploration.error());
   std::vector<MissionEnergy> energy;
   for (const double payload_kg : chosen_payloads(options, *robot)) {

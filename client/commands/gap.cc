@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
@@ -13,6 +15,7 @@
 #include "client/commands/gap_server.h"
 #include "client/commands/table.h"
 #include "client/files.h"
+#include "client/progress.h"
 #include "energy/back_test.h"
 #include "energy/back_test_json.h"
 #include "gap/adopt.h"
@@ -73,8 +76,7 @@ void print(const gap::Diagnosis& d) {
   if (!d.where.empty()) std::printf("where:\n");
   for (std::size_t k = 0; k < d.where.size() && k < 8; ++k) {
     const auto& w = d.where[k];
-    const std::string range =
-        w.label.empty() ? std::to_string(w.from) + " to " + std::to_string(w.to) : w.label;
+    const std::string range = w.label.empty() ? fmt::format("{:.3g} to {:.3g}", w.from, w.to) : w.label;
     std::printf("  %s, %s %s: %+.0f %% of the gap [%.0f, %.0f]\n", w.channel.c_str(), w.variable.c_str(),
                 range.c_str(), 100 * w.share, 100 * w.interval[0], 100 * w.interval[1]);
   }
@@ -128,7 +130,12 @@ Exit run(const Options& options) {
   if (!options.compare_by.empty())
     return gap_between_groups(*recordings, *robot, options.compare_by, options.json, options.report,
                               report_origin(options.logs, options.robot_file));
-  const auto diagnosis = gap::diagnose(*recordings, *robot);
+  const auto diagnosis = [&] {
+    Progress progress("diagnosing", "%", 100);
+    gap::DiagnosisSettings settings;
+    settings.progress = progress.shares();
+    return gap::diagnose(*recordings, *robot, settings);
+  }();
   if (!diagnosis) return report(diagnosis.error());
   const auto extended = gap::with_effects(*robot, diagnosis->adoptable);
   if (!extended) return report(extended.error());

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/files.h"
+#include "client/progress.h"
 #include "gap/compare.h"
 
 namespace joulecast::client {
@@ -48,7 +49,10 @@ Exit gap_between_groups(const gap::RecordingSet& recordings, const robot::RobotM
     groups.push_back(
         gap::group_of(mission.mission_id, by == "suffix" ? gap::GroupBy::suffix : gap::GroupBy::prefix));
   }
-  const auto comparison = gap::compare_groups(recordings, groups, robot);
+  const auto comparison = [&] {
+    Progress progress("comparing", "%", 100);
+    return gap::compare_groups(recordings, groups, robot, progress.shares());
+  }();
   if (!comparison) return report(comparison.error());
   if (json) {
     std::printf("%s\n", gap::to_json(*comparison).dump(2).c_str());

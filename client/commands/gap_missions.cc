@@ -6,6 +6,7 @@
 
 #include "client/commands/gap_output.h"
 #include "client/files.h"
+#include "client/progress.h"
 #include "client/wrapped.h"
 #include "gap/mission_level.h"
 
@@ -81,7 +82,10 @@ Exit gap_from_missions(const GapMissionsOptions& options, const robot::RobotMode
   if (!runs)
     return report({runs.error().fault, runs.error().field,
                    runs.error().message + "; joulecast gap --help lists the columns"});
-  const auto diagnosis = gap::diagnose_runs(*runs, robot, {options.robot_model, {}});
+  const auto diagnosis = [&] {
+    Progress progress("diagnosing", "%", 100);
+    return gap::diagnose_runs(*runs, robot, {options.robot_model, progress.shares()});
+  }();
   if (!diagnosis) return report(diagnosis.error());
   if (options.json) {
     std::printf("%s\n", gap::to_json(*diagnosis).dump(2).c_str());

@@ -16,6 +16,7 @@
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/http_client.h"
+#include "client/progress.h"
 #include "robot/robot_file.h"
 #include "server/api/autonomy.h"
 #include "server/http/json_text.h"
@@ -77,8 +78,8 @@ Result<std::string> answer_here(const Options& options, const std::string& text)
   auto answer = api::MatrixAnswer::make(request, fleet, tables);
   if (!answer) return tl::unexpected(std::move(answer.error()));
   std::string out;
-  while ((*answer)->next(out, {})) {
-  }
+  Progress progress("pricing", "robots", options.robot_files.size());
+  for (std::uint64_t rows = 0; (*answer)->next(out, {}); ++rows) progress.reach(rows);
   return out;
 }
 

@@ -43,7 +43,8 @@ std::size_t Exploration::detours() const {
   return corners;
 }
 
-Result<Exploration> explore(const Map& map) {
+Result<Exploration> explore(const Map& map,
+                            const std::function<void(std::size_t seen, std::size_t nodes)>& progress) {
   if (auto ok = validate(map); !ok) return tl::unexpected(ok.error());
   NodeGrid grid(map);
   const DistBug bug(map);
@@ -58,6 +59,7 @@ Result<Exploration> explore(const Map& map) {
       if (grid.state(n) == NodeState::seen && result.seen_in[n] == 0)
         result.seen_in[n] = result.rounds.size() + 1;
     const std::size_t unseen = round.scan.unseen_after;
+    if (progress) progress(grid.size() - unseen, grid.size());
     if (unseen > map.stop_unseen_nodes) round.next = next_best_view(map, grid, bug, at);
     if (round.next) {
       for (const Point& next : round.next->path) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <variant>
 #include <vector>
@@ -57,7 +58,8 @@ struct Exploration {
 };
 
 // Thesis chapter 5: scan, choose the next best view, go there by DistBug, until few enough nodes are unseen.
-// Deterministic. Errors are the map's.
-Result<Exploration> explore(const Map& map);
+// Deterministic. Errors are the map's. `progress` hears after each scan how many of all nodes are seen.
+Result<Exploration> explore(const Map& map,
+                            const std::function<void(std::size_t seen, std::size_t nodes)>& progress = {});
 
 }  // namespace joulecast::exploration

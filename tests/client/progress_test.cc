@@ -8,6 +8,8 @@ namespace {
 TEST(ProgressLine, ShowsABarAndTheTimeLeftWhereTheTotalIsKnown) {
   const auto line = progress_line("replaying", "messages", 250, 1000, 10, 200);
   EXPECT_EQ(line, "replaying [======                  ]  25 %  250 of 1000 messages, 30 s left");
+  EXPECT_EQ(progress_line("diagnosing", "%", 25, 100, 10, 200),
+            "diagnosing [======                  ]  25 %, 30 s left");
 }
 
 TEST(ProgressLine, ShowsTheRateWhereTheTotalIsNotKnown) {
