@@ -187,7 +187,7 @@ struct Application::Parts {
   }
 
   void run_beat() {
-    server::FleetEvents fleet_events(fleet, models, *store, events);
+    server::FleetEvents fleet_events(fleet, models, *forecasts, *store, events);
     std::unique_lock lock(beat_mutex);
     while (beating) {
       lock.unlock();
@@ -263,7 +263,8 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
     post(history::PutLearned{std::move(learnt.document)});
     if (learnt.drift) p.report_drift(model->robot.robot_id, *learnt.drift, post);
   };
-  p.ingest = std::make_unique<server::IngestService>(ingest_options(settings), p.models, outputs);
+  p.ingest =
+      std::make_unique<server::IngestService>(ingest_options(settings), p.models, *p.forecasts, outputs);
   if (Result<void> started = p.ingest->start(); !started) return tl::unexpected(std::move(started.error()));
 
   p.adoption = std::make_unique<server::ModelAdoption>(*p.store, *p.writer, p.models, host_utime_us,

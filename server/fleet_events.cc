@@ -20,7 +20,9 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
     if (told.snapshot == snapshot && told.live == live) continue;
     const auto model = models_.find(snapshot->robot_id);
     api::JsonWriter json;
-    api::write_state(json, *snapshot, model != nullptr ? &model->robot.battery : nullptr, now_utime_us);
+    std::optional<forecast::Reach> reach;
+    if (model != nullptr) reach = forecasts_.reach(model, *snapshot);
+    api::write_state(json, *snapshot, reach, now_utime_us);
     hub_.publish("state", json.text(), snapshot->robot_id);
     told = {snapshot, live};
   }

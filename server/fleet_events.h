@@ -7,6 +7,7 @@
 #include "history/store.h"
 #include "server/http/event_hub.h"
 #include "server/ingest/fleet_view.h"
+#include "server/ingest/forecasts.h"
 #include "server/ingest/model_registry.h"
 
 namespace joulecast::server {
@@ -15,9 +16,9 @@ namespace joulecast::server {
 // for each mission that ended. One thread.
 class FleetEvents {
  public:
-  FleetEvents(const FleetView& fleet, const ModelRegistry& models, const history::Store& store,
-              http::EventHub& hub)
-      : fleet_(fleet), models_(models), store_(store), hub_(hub) {}
+  FleetEvents(const FleetView& fleet, const ModelRegistry& models, Forecasts& forecasts,
+              const history::Store& store, http::EventHub& hub)
+      : fleet_(fleet), models_(models), forecasts_(forecasts), store_(store), hub_(hub) {}
 
   void publish(std::int64_t now_utime_us);
 
@@ -28,6 +29,7 @@ class FleetEvents {
   };
   const FleetView& fleet_;
   const ModelRegistry& models_;
+  Forecasts& forecasts_;
   const history::Store& store_;
   http::EventHub& hub_;
   std::map<std::string, Told> told_;

@@ -10,6 +10,7 @@
 #include "server/api/battery_dialects.h"
 #include "server/api/json_writer.h"
 #include "server/api/least_energy.h"
+#include "server/api/robot_json.h"
 #include "server/api/services.h"
 
 namespace joulecast::api {
@@ -19,13 +20,6 @@ using forecast::Driving;
 using forecast::Motion;
 using forecast::PricedLeg;
 using forecast::PricedTask;
-
-constexpr double plain_drive_m = 10;  // stands for a robot's legs while none are known
-
-void write_quantiles(JsonWriter& json, std::string_view name, const std::array<double, 3>& values) {
-  json.key(name).begin_object();
-  json.field("p05", values[0]).field("p50", values[1]).field("p95", values[2]).end_object();
-}
 
 void write_place(JsonWriter& json, std::string_view name, const std::optional<std::size_t>& index,
                  const AutonomyRequest& request) {
@@ -42,7 +36,7 @@ void write_place(JsonWriter& json, std::string_view name, const std::optional<st
 }
 
 void write_stage(JsonWriter& json, const forecast::TaskOutlook& stage) {
-  json.field("expected_energy_j", stage.expected_j).field("ends_after_s", stage.duration_s);
+  json.field("expected_energy_j", stage.mean_j).field("ends_after_s", stage.duration_s);
   json.field("success_probability", stage.probability);
   write_quantiles(json, "energy_since_start_j", stage.energy_j);
   write_quantiles(json, "arrival_charge", stage.charge);
@@ -51,7 +45,7 @@ void write_stage(JsonWriter& json, const forecast::TaskOutlook& stage) {
 void write_outlook(JsonWriter& json, const forecast::Outlook& outlook, const AutonomyRequest& request) {
   json.begin_object();
   json.field("success_probability", outlook.probability);
-  json.field("expected_energy_j", outlook.expected_j).field("duration_s", outlook.duration_s);
+  json.field("expected_energy_j", outlook.mean_j).field("duration_s", outlook.duration_s);
   write_quantiles(json, "energy_j", outlook.energy_j);
   json.key("legs").begin_array();
   for (std::size_t k = 0; k < outlook.tasks.size(); ++k) {
@@ -91,8 +85,8 @@ void write_minimum_energy(JsonWriter& json, const Autonomy& a) {
   const forecast::Outlook &best = *a.minimum_energy_outlook, &usual = *a.outlook;
   json.begin_object();
   json.field("success_probability", best.probability);
-  json.field("expected_energy_j", best.expected_j).field("duration_s", best.duration_s);
-  json.field("saved_j", usual.expected_j - best.expected_j);
+  json.field("expected_energy_j", best.mean_j).field("duration_s", best.duration_s);
+  json.field("saved_j", usual.mean_j - best.mean_j);
   json.field("saved_s", usual.duration_s - best.duration_s);
   const auto last = [](const forecast::Outlook& o) {
     if (o.charger) return o.charger->charge;
@@ -139,15 +133,6 @@ Result<Pricing> at_least_energy(const AutonomyRequest& request, LeastEnergy& lea
   return priced;
 }
 
-// The robot's recent legs, carrying this payload.
-std::vector<forecast::PlannedLeg> typical_legs(const forecast::Forecaster& forecaster, double payload_kg) {
-  std::vector<forecast::PlannedLeg> legs;
-  for (const forecast::Leg& leg : forecaster.typical)
-    legs.push_back({leg.motion, leg.way, leg.curvature_1_m, payload_kg, leg.duration_s});
-  if (legs.empty()) legs.push_back({Motion::drive, plain_drive_m, 0, payload_kg, 0});
-  return legs;
-}
-
 }  // namespace
 
 Whereabouts whereabouts(const server::RobotSnapshot* live) {
@@ -171,9 +156,13 @@ Result<forecast::Charge> charge_of(const std::optional<double>& given, const std
                 "is not known: the robot has reported no battery voltage and current since it was first "
                 "seen; give it in the request");
   }
-  double deviation = given_sd.value_or(0);
-  if (!given && !given_sd && std::isfinite(live->charge.estimate.sd)) deviation = live->charge.estimate.sd;
-  return forecast::Charge{charge, deviation, reserve.value_or(battery.reserve_fraction)};
+  forecast::Charge known{charge, given_sd.value_or(0), battery.reserve_fraction};
+  if (!given) {
+    known = server::live_charge(*live, battery);
+    if (given_sd) known.deviation = *given_sd;
+  }
+  if (reserve) known.reserve = *reserve;
+  return known;
 }
 
 Result<Autonomy> autonomy_of(const AutonomyRequest& request, const server::RobotOutlook& robot,
@@ -213,17 +202,15 @@ Result<Autonomy> autonomy_of(const AutonomyRequest& request, const server::Robot
     least.emplace(std::move(*made));
   }
 
-  const std::vector<forecast::PlannedLeg> typical = typical_legs(forecaster, out.payload_kg);
   if (request.minimum_energy) {
-    const auto priced = least->price(typical, out.pace.pause_s);
+    const auto priced = least->price(forecast::typical_legs(forecaster, out.payload_kg), out.pace.pause_s);
     if (!priced) return tl::unexpected(priced.error());
-    out.reach = forecast::reach(forecaster, Driving::stated, *robot.battery, out.charge, *priced,
-                                !forecaster.typical.empty());
+    out.reach = forecast::reach(forecaster, Driving::stated, *robot.battery, out.charge,
+                                forecast::sum_of(forecaster, Driving::stated, *priced));
   } else {
-    forecast::Pace pace = out.pace;
-    if (!forecaster.typical.empty()) pace.pause_s = 0;  // the recorded halts are among the legs
+    const auto priced = forecast::price_typical(forecaster, pricer, out.pace, out.payload_kg);
     out.reach = forecast::reach(forecaster, out.driving, *robot.battery, out.charge,
-                                forecast::price(pricer, typical, pace), !forecaster.typical.empty());
+                                forecast::sum_of(forecaster, out.driving, priced));
   }
   if (!with_plan) return out;
 

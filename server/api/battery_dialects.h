@@ -28,6 +28,7 @@ BatteryStatus battery_status(const robot::Battery& battery, const forecast::Char
                              const server::RobotSnapshot* live);
 
 // The status as another standard has it, JSON. What is not known is left out, in ROS null (its NaN).
+// Rounded to a hundredth of a per cent, mV, mA and mAh; range and run time down, to metres and milli-hours.
 //   VDA 5050 3.0  {"powerSupply": {...}}: percent, V, A (negative while discharging), m
 //   VDA 5050 2.1  {"batteryState": {...}}: percent, V, whole percent of health, whole metres
 //   MassRobotics  percent and hours, members of the status report

@@ -80,7 +80,8 @@ std::optional<planning::Station> read_station(Fields& fields, std::string_view n
 
 struct RobotRow {
   std::string robot_id;
-  std::shared_ptr<const server::ModelInForce> model;
+  std::shared_ptr<const server::ModelInForce> model;  // null: see `problem`
+  std::string problem;
   std::optional<planning::Pose> pose;
   std::optional<double> state_of_charge;
   server::RobotOutlook outlook;
@@ -89,7 +90,6 @@ struct RobotRow {
 
 RobotRow read_robot(const json& value, std::string at, const MatrixFleet& fleet, Fields& outer) {
   RobotRow row;
-  const std::string pointer = at;
   if (value.is_string()) {
     row.robot_id = value.get<std::string>();
   } else {
@@ -107,7 +107,7 @@ RobotRow read_robot(const json& value, std::string at, const MatrixFleet& fleet,
   if (!outer.ok()) return row;
   auto model = fleet.model(row.robot_id);
   if (!model) {
-    outer.fault({model.error().fault, pointer, model.error().message});
+    row.problem = model.error().message;
     return row;
   }
   row.model = std::move(*model);
@@ -188,6 +188,7 @@ struct MatrixAnswer::State {
   void collect_tables();
   void assemble();
   void write_row(std::size_t robot, JsonWriter& json) const;
+  std::string detail_of(Obstacle obstacle, std::size_t robot) const;
   // That the robot ends each task with its reserve, driving by minimum-energy profiles.
   void write_success(const RobotRow& robot, const std::vector<Cell>& cells, std::vector<double>& numbers,
                      JsonWriter& json) const;
@@ -207,6 +208,10 @@ void MatrixAnswer::State::assemble() {
   std::vector<planning::MatrixRobot> rows;
   rows.reserve(robots.size());
   for (const RobotRow& robot : robots) {
+    if (robot.model == nullptr) {
+      rows.emplace_back();
+      continue;
+    }
     rows.push_back(
         {*tables[table_of.at(robot.model.get())], robot.model->robot.limits.payload_kg, robot.pose});
   }
@@ -239,16 +244,38 @@ void MatrixAnswer::State::write_success(const RobotRow& robot, const std::vector
   json.column("success_probability", numbers, probability_places);
 }
 
+std::string MatrixAnswer::State::detail_of(Obstacle obstacle, std::size_t r) const {
+  const planning::MatrixRobot& robot = matrix->robot(r);
+  switch (obstacle) {
+    case Obstacle::none:
+      break;
+    case Obstacle::payload:
+      return fmt::format("this robot carries at most {} kg", robot.payload_limit_kg);
+    case Obstacle::limits:
+      return robot.table->obstacle() ? describe(*robot.table->obstacle())
+                                     : std::string("no motion within the limits");
+    case Obstacle::pose:
+      return "the robot reports no pose; give it in the request, or the way to the pick-up";
+    case Obstacle::model:
+      return robots[r].problem;
+  }
+  return {};
+}
+
 void MatrixAnswer::State::write_row(std::size_t r, JsonWriter& json) const {
   const planning::MatrixRobot& robot = matrix->robot(r);
   std::vector<Cell> cells;
   matrix->row(r, cells);
   std::vector<double> numbers(cells.size());
   json.begin_object();
-  json.field("robot_id", robots[r].robot_id).field("model_version", robots[r].model->version);
-  json.field("interpolation_error", robot.table->interpolation_error());
+  const bool known = robot.table != nullptr;
+  json.field("robot_id", robots[r].robot_id).key("model_version");
+  known ? json.value(robots[r].model->version) : json.null();
+  json.key("interpolation_error");
+  known ? json.value(robot.table->interpolation_error()) : json.null();
   json.key("neglected_effects").begin_array();
-  for (const std::string& id : robot.table->neglected()) json.value(id);
+  if (known)
+    for (const std::string& id : robot.table->neglected()) json.value(id);
   json.end_array();
   for (std::size_t t = 0; t < cells.size(); ++t) numbers[t] = cells[t].energy_j;
   json.column("energy_j", numbers, places);
@@ -256,14 +283,11 @@ void MatrixAnswer::State::write_row(std::size_t r, JsonWriter& json) const {
   json.column("duration_s", numbers, places);
   write_success(robots[r], cells, numbers, json);
   json.key("infeasible").begin_array();
-  for (const Obstacle obstacle : {Obstacle::payload, Obstacle::limits}) {
+  for (const Obstacle obstacle : {Obstacle::model, Obstacle::pose, Obstacle::payload, Obstacle::limits}) {
     const auto is = [&](const Cell& cell) { return cell.obstacle == obstacle; };
     if (std::none_of(cells.begin(), cells.end(), is)) continue;
     json.begin_object().field("reason", planning::name_of(obstacle));
-    json.field("detail", obstacle == Obstacle::payload
-                             ? fmt::format("this robot carries at most {} kg", robot.payload_limit_kg)
-                         : robot.table->obstacle() ? describe(*robot.table->obstacle())
-                                                   : std::string("no motion within the limits"));
+    json.field("detail", detail_of(obstacle, r));
     json.key("tasks").begin_array();
     for (std::size_t t = 0; t < cells.size(); ++t)
       if (is(cells[t])) json.value(static_cast<std::int64_t>(t));
@@ -292,27 +316,20 @@ Result<std::shared_ptr<MatrixAnswer>> MatrixAnswer::make(const json& request, co
   }
   for (std::size_t k = 0; fields.ok() && k < robots->size(); ++k)
     state->robots.push_back(read_robot((*robots)[k], fmt::format("/robots/{}", k), fleet, fields));
-  bool poses = false;
   for (std::size_t k = 0; fields.ok() && k < tasks->size(); ++k) {
     state->columns.push_back(read_task((*tasks)[k], fmt::format("/tasks/{}", k), robots->size(), fields));
-    poses = poses || state->columns.back().task.empty.empty();
-  }
-  for (std::size_t k = 0; fields.ok() && poses && k < state->robots.size(); ++k) {
-    if (!state->robots[k].pose) {
-      fields.fault(
-          {Fault::invalid, fmt::format("/robots/{}/pose", k),
-           "is required: a task gives its pick-up's place, and the robot reports no pose of its own"});
-    }
   }
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
   for (RobotRow& robot : state->robots) {
     if (!fleet.outlook || !fleet.charge) break;
+    if (robot.model == nullptr) continue;
     robot.charge = fleet.charge(*robot.model, robot.state_of_charge, reserve);
     if (std::isfinite(robot.charge.fraction)) robot.outlook = fleet.outlook(robot.model);
   }
   std::unordered_map<const server::ModelInForce*, bool> seen;
   for (const RobotRow& robot : state->robots)
-    if (seen.emplace(robot.model.get(), true).second) state->models.push_back(robot.model.get());
+    if (robot.model != nullptr && seen.emplace(robot.model.get(), true).second)
+      state->models.push_back(robot.model.get());
   state->tables.assign(state->models.size(), std::shared_ptr<const CostTable>());
   return std::shared_ptr<MatrixAnswer>(new MatrixAnswer(std::move(state)));
 }
@@ -363,7 +380,7 @@ std::vector<TableRow> matrix_rows() {
         .summary = "Energy and duration of every robot doing every task, row by row",
         .request_schema = "energy-matrix-request",
         .response_schema = "energy-matrix",
-        .error_statuses = {404, 413, 422}},
+        .error_statuses = {413, 422}},
        answered_by([](Services& services, const http::Request& r) -> Result<http::Response> {
          MatrixFleet fleet;
          fleet.model = [&services](const std::string& id) { return model_of(services, id); };

@@ -31,7 +31,8 @@ struct MatrixFleet {
 // The answer to one energy-matrix request, written piece by piece: a row of JSON for each robot.
 class MatrixAnswer {
  public:
-  // Reads and checks the request. Errors name the field; too many cells are Fault::too_large.
+  // Reads and checks the request. Errors name the field; too many cells are Fault::too_large. What is amiss
+  // with one robot, that it is not known or nobody knows where it stands, is told in its row.
   static Result<std::shared_ptr<MatrixAnswer>> make(const nlohmann::json& request, const MatrixFleet& fleet,
                                                     planning::CostTableCache& tables);
   ~MatrixAnswer();

@@ -108,15 +108,6 @@ Result<server::AdoptionRequest> adoption_of(const Services& services, const std:
     return tl::unexpected(std::move(effects.error()));
   }
   adoption.model = std::move(*model);
-  // What was fitted describes the robot as it was then: missions long before are no test of it.
-  if (!adoption.since_utime_us) {
-    for (const history::MissionKey key : fitted_on) {
-      const Result<history::Mission> mission = services.store.mission(key);
-      if (!mission) continue;
-      adoption.since_utime_us =
-          std::min(adoption.since_utime_us.value_or(mission->start_utime_us), mission->start_utime_us);
-    }
-  }
   adoption.fitted_on = std::move(fitted_on);
   return adoption;
 }

@@ -1,7 +1,6 @@
 #include "server/api/robot_json.h"
 
 #include "server/api/mission_json.h"
-#include "server/ingest/ingest_service.h"
 
 namespace joulecast::api {
 namespace {
@@ -48,8 +47,13 @@ bool is_live(const server::RobotSnapshot& snapshot, std::int64_t now_utime_us) {
   return silence_s(snapshot, now_utime_us) <= live_s;  // false for NaN
 }
 
-void write_state(JsonWriter& json, const server::RobotSnapshot& s, const robot::Battery* battery,
-                 std::int64_t now_utime_us) {
+void write_quantiles(JsonWriter& json, std::string_view name, const std::array<double, 3>& values) {
+  json.key(name).begin_object();
+  json.field("p05", values[0]).field("p50", values[1]).field("p95", values[2]).end_object();
+}
+
+void write_state(JsonWriter& json, const server::RobotSnapshot& s,
+                 const std::optional<forecast::Reach>& reach, std::int64_t now_utime_us) {
   json.begin_object();
   json.field("robot_id", s.robot_id);
   json.field("has_model", s.has_model);
@@ -72,10 +76,13 @@ void write_state(JsonWriter& json, const server::RobotSnapshot& s, const robot::
   json.field("state_of_charge", s.state_of_charge);
   json.field("state_of_charge_sd", s.charge.estimate.sd);
   write_charge(json, s.charge);
-  const server::Endurance left =
-      battery != nullptr ? server::recent_endurance(s, *battery) : server::Endurance{};
-  json.field("range_m", left.range_m);
-  json.field("run_time_s", left.run_time_s);
+  constexpr std::array<double, 3> unknown{telemetry::unmeasured, telemetry::unmeasured,
+                                          telemetry::unmeasured};
+  const std::array<double, 3>& range = reach ? reach->range_m : unknown;
+  const std::array<double, 3>& run_time = reach ? reach->run_time_s : unknown;
+  json.field("range_m", range[1]).field("run_time_s", run_time[1]);
+  write_quantiles(json, "range_quantiles_m", range);
+  write_quantiles(json, "run_time_quantiles_s", run_time);
   write_sides(json, "winding_temperature_c", s.winding_temperature_c);
   json.key("mission");
   if (s.mission_id.empty()) {

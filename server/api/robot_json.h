@@ -1,6 +1,10 @@
 #pragma once
 
-#include "robot/robot_model.h"
+#include <array>
+#include <optional>
+#include <string_view>
+
+#include "forecast/outlook.h"
 #include "server/api/json_writer.h"
 #include "server/ingest/fleet_view.h"
 
@@ -13,8 +17,11 @@ bool is_live(const server::RobotSnapshot& snapshot, std::int64_t now_utime_us);
 void write_charge(JsonWriter& json, const server::ChargeView& charge);
 
 // The live state of a robot: what GET /v1/robots/{id}/state answers and the fleet's event stream sends.
-// `battery` is null when the robot has no model.
-void write_state(JsonWriter& json, const server::RobotSnapshot& snapshot, const robot::Battery* battery,
-                 std::int64_t now_utime_us);
+// `reach` is by the robot's forecast; empty when it has no model.
+void write_state(JsonWriter& json, const server::RobotSnapshot& snapshot,
+                 const std::optional<forecast::Reach>& reach, std::int64_t now_utime_us);
+
+// Values at the quantiles 5, 50 and 95 %.
+void write_quantiles(JsonWriter& json, std::string_view name, const std::array<double, 3>& values);
 
 }  // namespace joulecast::api

@@ -1,3 +1,4 @@
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -21,8 +22,10 @@ void write_robot_state(JsonWriter& json, const Services& services, const std::st
     silent.has_model = model != nullptr;
     silent.model_version = model != nullptr ? model->version : 0;
   }
-  write_state(json, snapshot != nullptr ? *snapshot : silent,
-              model != nullptr ? &model->robot.battery : nullptr, services.now_utime_us());
+  const server::RobotSnapshot& now = snapshot != nullptr ? *snapshot : silent;
+  std::optional<forecast::Reach> reach;
+  if (model != nullptr) reach = services.forecasts.reach(model, now);
+  write_state(json, now, reach, services.now_utime_us());
 }
 
 Result<Response> list(const Services& services, const Request&) {

@@ -273,9 +273,10 @@ class DiagnosisService::Impl {
     wanted.since_utime_us = request.since_utime_us;
     // A robot that changed is two robots to the diagnosis: it is asked for the one that it is now.
     if (request.missions.empty() && !request.since_utime_us)
-      wanted.since_utime_us = last_drift(record.robot_id, model->version);
+      wanted.since_utime_us = last_drift(store_, record.robot_id, model->version, options_.max_missions);
     wanted.max_missions = std::min(request.max_missions, options_.max_missions);
     wanted.max_samples = options_.max_samples;
+    wanted.battery_capacity_ah = model->robot.battery.capacity_ah;
     Result<StoredRecordings> history = read_recordings(store_, wanted);
     if (!history) return tl::unexpected(std::move(history.error()));
     if (history->missions.empty())
@@ -322,14 +323,6 @@ class DiagnosisService::Impl {
       }
     }
     return {};
-  }
-
-  std::optional<std::int64_t> last_drift(const std::string& robot_id, std::int64_t version) const {
-    const auto missions = mission_ratios(store_, robot_id, options_.max_missions);
-    if (!missions) return std::nullopt;
-    const std::vector<gap::DriftMark> marks = gap::drift_marks(*missions);
-    if (marks.empty() || marks.back().model_version != version) return std::nullopt;
-    return marks.back().utime_us;
   }
 
   void finish(Job& job, DiagnosisState state, std::string error, std::string report) {

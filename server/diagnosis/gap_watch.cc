@@ -85,6 +85,15 @@ Result<std::vector<gap::MissionRatio>> mission_ratios(const history::Store& stor
   return ratios;
 }
 
+std::optional<std::int64_t> last_drift(const history::Store& store, const std::string& robot_id,
+                                       std::int64_t version, std::size_t limit) {
+  const auto missions = mission_ratios(store, robot_id, limit);
+  if (!missions) return std::nullopt;
+  const std::vector<gap::DriftMark> marks = gap::drift_marks(*missions);
+  if (marks.empty() || marks.back().model_version != version) return std::nullopt;
+  return marks.back().utime_us;
+}
+
 std::vector<std::string> robots_of_kind(const ModelRegistry& models, const std::string& robot_id) {
   const auto model = models.find(robot_id);
   if (model == nullptr) return {};

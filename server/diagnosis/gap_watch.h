@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
@@ -37,6 +38,11 @@ struct WatchCounts {
 // first.
 Result<std::vector<gap::MissionRatio>> mission_ratios(const history::Store& store,
                                                       const std::string& robot_id, std::size_t limit);
+
+// Start of the first mission after the robot's last change of consumption under this version of its model, as
+// far as its newest `limit` missions show one.
+std::optional<std::int64_t> last_drift(const history::Store& store, const std::string& robot_id,
+                                       std::int64_t version, std::size_t limit);
 
 // Robots whose files agree in all but their id, idle power and effects: one kind.
 std::vector<std::string> robots_of_kind(const ModelRegistry& models, const std::string& robot_id);

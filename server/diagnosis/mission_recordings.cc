@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/ingest/charge_watch.h"
+
 namespace joulecast::server {
 namespace {
 
@@ -44,6 +46,10 @@ class Reader {
     // A mission of which the retention has dropped a part is not what its accounts say.
     if (static_cast<std::int64_t>(samples->size()) * 10 < mission.samples * 9 || samples->size() < 2)
       return ++out.no_telemetry, Result<void>{};
+    if (const auto charging = mission.sample_faults.find("charging");
+        charging != mission.sample_faults.end() && charging->second > 0)
+      out.charging_samples += drop_charging(wanted_.battery_capacity_ah, *samples);
+    if (samples->size() < 2) return ++out.no_telemetry, Result<void>{};
     result_.samples += samples->size();
     result_.missions.push_back(
         {mission.key,

@@ -22,6 +22,9 @@ struct RecordingsWanted {
       only;  // empty: any; else exactly these, Fault::not_found for another robot's
   std::size_t max_missions = 100;
   std::size_t max_samples = 400'000;  // missions that would go beyond are left out
+  // Of the robot's battery. What a charger fed the robot in a mission's course is no cost of its motion and
+  // is taken out by it.
+  double battery_capacity_ah = 0;
 };
 
 struct StoredRecording {
@@ -30,12 +33,13 @@ struct StoredRecording {
   telemetry::Recording recording;  // in order of time
 };
 
-// Missions that were looked at and not taken, by reason.
+// Missions that were looked at and not taken, by reason; and samples of those that were.
 struct LeftOut {
   std::size_t excepted = 0;
   std::size_t open = 0;          // still running
   std::size_t no_telemetry = 0;  // the retention dropped it
   std::size_t too_many = 0;      // beyond the bounds
+  std::size_t charging_samples = 0;
 };
 
 struct StoredRecordings {

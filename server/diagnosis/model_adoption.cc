@@ -1,5 +1,6 @@
 #include "server/diagnosis/model_adoption.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -7,6 +8,7 @@
 
 #include "energy/back_test_json.h"
 #include "robot/robot_file.h"
+#include "server/diagnosis/gap_watch.h"
 
 namespace joulecast::server {
 namespace {
@@ -21,7 +23,9 @@ json report_of(const Adoption& adoption) {
   report["left_out"] = {{"fitted_on", out.excepted},
                         {"open", out.open},
                         {"no_telemetry", out.no_telemetry},
-                        {"beyond_limits", out.too_many}};
+                        {"beyond_limits", out.too_many},
+                        {"charging_samples", out.charging_samples}};
+  report["since_utime_us"] = adoption.since_utime_us ? json(*adoption.since_utime_us) : json();
   report["tested_against"] = adoption.previous_version;
   return report;
 }
@@ -63,6 +67,34 @@ Result<void> ModelAdoption::record(const std::string& robot_id, const std::strin
   return writer_.post(history::AppendEvent{{0, now_utime_us_(), robot_id, kind, std::move(detail_json)}});
 }
 
+Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request, const ModelInForce& before,
+                                                std::optional<std::int64_t>& since_utime_us) const {
+  constexpr std::size_t enough_missions = 3;
+  RecordingsWanted wanted;
+  wanted.robot_id = request.model.robot_id;
+  wanted.except = {request.fitted_on.begin(), request.fitted_on.end()};
+  wanted.max_missions = options_.max_missions;
+  wanted.max_samples = options_.max_samples;
+  wanted.battery_capacity_ah = before.robot.battery.capacity_ah;
+  since_utime_us = request.since_utime_us;
+  if (!since_utime_us) {
+    for (const history::MissionKey key : request.fitted_on)
+      if (const auto mission = store_.mission(key))
+        since_utime_us = std::min(since_utime_us.value_or(mission->start_utime_us), mission->start_utime_us);
+    const auto drift = last_drift(store_, wanted.robot_id, before.version, 2 * options_.max_missions);
+    if (drift && drift > since_utime_us) {
+      wanted.since_utime_us = drift;
+      Result<StoredRecordings> recent = read_recordings(store_, wanted);
+      if (!recent || recent->missions.size() >= enough_missions) {
+        since_utime_us = drift;
+        return recent;
+      }
+    }
+  }
+  wanted.since_utime_us = since_utime_us;
+  return read_recordings(store_, wanted);
+}
+
 Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std::function<bool()>& go_on) {
   const std::string& robot_id = request.model.robot_id;
   const std::shared_ptr<const ModelInForce> before = models_.find(robot_id);
@@ -81,13 +113,7 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
     const std::unique_lock lock(testing_, std::try_to_lock);
     if (!lock)
       return fail(Fault::unavailable, "", "another model is being tested; try again in some seconds");
-    RecordingsWanted wanted;
-    wanted.robot_id = robot_id;
-    wanted.since_utime_us = request.since_utime_us;
-    wanted.except = {request.fitted_on.begin(), request.fitted_on.end()};
-    wanted.max_missions = options_.max_missions;
-    wanted.max_samples = options_.max_samples;
-    const Result<StoredRecordings> history = read_recordings(store_, wanted);
+    const Result<StoredRecordings> history = this->history(request, *before, adoption.since_utime_us);
     if (!history) return tl::unexpected(history.error());
     adoption.left_out = history->left_out;
     std::vector<energy::DriveRun> runs;

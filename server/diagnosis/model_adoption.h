@@ -22,8 +22,11 @@ struct AdoptionRequest {
   robot::RobotModel model;  // the candidate; its robot_id says whose
   history::ModelOrigin origin = history::ModelOrigin::http;
   std::string note;
-  std::vector<history::MissionKey> fitted_on;    // left out of the back-test
-  std::optional<std::int64_t> since_utime_us;    // missions that started earlier are not tested on
+  std::vector<history::MissionKey> fitted_on;  // left out of the back-test
+  // Missions that started earlier are not tested on. Absent: those before the first that it was fitted on,
+  // for what was fitted describes the robot as it was then, and those before its last change of consumption,
+  // when enough came after it.
+  std::optional<std::int64_t> since_utime_us;
   std::optional<std::int64_t> expected_version;  // conflict when another one is in force
   std::optional<std::int64_t> diagnosis_id,
       proposal_id;       // where it comes from; an adopted proposal is closed
@@ -38,6 +41,7 @@ struct Adoption {
   energy::BackTest test;
   std::vector<history::MissionKey> tested_on;  // in the order of test.runs
   LeftOut left_out;
+  std::optional<std::int64_t> since_utime_us;  // tested on missions from then on; absent: on any
   std::string refusal;  // why it was not adopted; empty when it was, or on a dry run of one that would be
   std::string back_test_json;  // all of the above as schemas/back-test.schema.json
 };
@@ -77,6 +81,8 @@ class ModelAdoption {
   AdoptionCounts counts() const { return {adopted_, forced_, refused_}; }
 
  private:
+  Result<StoredRecordings> history(const AdoptionRequest& request, const ModelInForce& before,
+                                   std::optional<std::int64_t>& since_utime_us) const;
   Result<void> record(const std::string& robot_id, const std::string& kind, std::string detail_json);
 
   const history::Store& store_;

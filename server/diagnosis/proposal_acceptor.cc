@@ -54,10 +54,6 @@ bool ProposalAcceptor::try_one(const history::Proposal& proposal) {
   request.fitted_on = proposal.fitted_on;
   request.proposal_id = proposal.id;
   request.expected_version = proposal.base_version;
-  for (const history::MissionKey key : proposal.fitted_on)
-    if (const auto mission = store_.mission(key))
-      request.since_utime_us =
-          std::min(request.since_utime_us.value_or(mission->start_utime_us), mission->start_utime_us);
   const auto adoption = adoption_.adopt(request);
   if (!adoption) {
     tell_(proposal.robot_id, "a proposal was not tested: " + describe(adoption.error()));

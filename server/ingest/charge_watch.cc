@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 namespace joulecast::server {
 namespace {
@@ -24,6 +25,33 @@ battery::Seen seen_from(const json& document) {
 }
 
 }  // namespace
+
+std::size_t drop_charging(double capacity_ah, std::vector<telemetry::Sample>& samples) {
+  using battery::ChargingPhase;
+  battery::ChargingObserver charging(capacity_ah);
+  std::vector<telemetry::Sample> kept, undecided;
+  kept.reserve(samples.size());
+  const auto keep_undecided = [&] {
+    kept.insert(kept.end(), undecided.begin(), undecided.end());
+    undecided.clear();
+  };
+  for (const telemetry::Sample& s : samples) {
+    const ChargingPhase phase =
+        charging.add({s.utime_us, s.battery_voltage_v, s.battery_current_a, moves(s), telemetry::unmeasured});
+    if (phase == ChargingPhase::suspected) {
+      undecided.push_back(s);
+    } else if (charging.charging()) {
+      undecided.clear();
+    } else {
+      keep_undecided();
+      kept.push_back(s);
+    }
+  }
+  keep_undecided();
+  const std::size_t dropped = samples.size() - kept.size();
+  samples = std::move(kept);
+  return dropped;
+}
 
 ChargeWatch::ChargeWatch(const robot::RobotModel& robot)
     : tracker_(robot.battery, robot.idle_power_w),

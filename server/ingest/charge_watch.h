@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "battery/charge_tracker.h"
 #include "battery/charging.h"
@@ -19,6 +21,10 @@ struct ChargeView {
   battery::ChargingTime to_full;  // until the charger's end; away from it, if the robot went there now
   battery::ChargingHabit habit;
 };
+
+// Takes out what came while a charger fed the robot, as a ChargeWatch would share it out; how many samples.
+// `capacity_ah` of its battery.
+std::size_t drop_charging(double capacity_ah, std::vector<telemetry::Sample>& samples);
 
 // Follows one robot's state of charge and its stays at chargers, in missions and outside, and keeps what it
 // has learned over restarts.

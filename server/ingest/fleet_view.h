@@ -15,14 +15,6 @@
 
 namespace joulecast::server {
 
-// Energy used lately, weighted by exp(-age / recent_consumption_s): what live range and run time go by.
-struct RecentConsumption {
-  double energy_j = 0;
-  double distance_m = 0;
-  double duration_s = 0;
-};
-inline constexpr double recent_consumption_s = 900;
-
 // What is known of one robot at one moment; immutable once published.
 struct RobotSnapshot {
   std::string robot_id;
@@ -41,7 +33,6 @@ struct RobotSnapshot {
   std::int64_t mission_key = 0;
   std::int64_t mission_start_utime_us = 0;
   energy::Accounts accounts;  // of the open mission
-  RecentConsumption recent;
   std::uint64_t samples = 0;
   std::map<std::string, std::uint64_t>
       faults;  // reason -> messages rejected or repaired, since the daemon started

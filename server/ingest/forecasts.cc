@@ -39,6 +39,14 @@ struct Forecasts::Entry {
   std::deque<forecast::PastMission> kept;
   std::int64_t borrowed_at = -1;  // the kind's missions when its findings were pooled
   RobotOutlook outlook;
+
+  // Its recent legs summed, as long as nothing of what they depend on changes.
+  struct Typical {
+    std::shared_ptr<const forecast::Forecaster> forecaster;
+    double payload_kg = 0;
+    forecast::PlanSum sum;
+  };
+  Typical typical;
 };
 
 Forecasts::Forecasts(const history::Store& store) : store_(store) {}
@@ -155,6 +163,34 @@ void Forecasts::borrow(Entry& entry) {
   }
   entry.forecast->set_siblings(std::move(siblings));
   entry.outlook.forecaster = entry.forecast->forecaster();
+}
+
+forecast::Charge live_charge(const RobotSnapshot& live, const robot::Battery& battery) {
+  const double deviation = live.charge.estimate.sd;
+  return {live.state_of_charge, std::isfinite(deviation) ? deviation : 0, battery.reserve_fraction};
+}
+
+forecast::Reach Forecasts::reach(const std::shared_ptr<const ModelInForce>& model,
+                                 const RobotSnapshot& live) {
+  constexpr double nan = telemetry::unmeasured;
+  const forecast::Charge charge = live_charge(live, model->robot.battery);
+  if (!std::isfinite(charge.fraction)) return {nan, nan, nan, nan, {nan, nan, nan}, {nan, nan, nan}};
+  const bool heard = live.sample.utime_us != 0 && std::isfinite(live.sample.payload_kg);
+  const double payload_kg = heard ? live.sample.payload_kg : 0;
+  Entry& slot = entry(*model);
+  const std::lock_guard lock(slot.mutex);
+  bring_up(slot, model);
+  borrow(slot);
+  const std::shared_ptr<const forecast::Forecaster>& forecaster = slot.outlook.forecaster;
+  constexpr auto habit = forecast::Driving::usual;
+  if (slot.typical.forecaster != forecaster || slot.typical.payload_kg != payload_kg) {
+    const forecast::LegPricer pricer(model->robot, model->drive);
+    slot.typical = {
+        forecaster, payload_kg,
+        forecast::sum_of(*forecaster, habit,
+                         forecast::price_typical(*forecaster, pricer, forecaster->usual, payload_kg))};
+  }
+  return forecast::reach(*forecaster, habit, *slot.outlook.battery, charge, slot.typical.sum);
 }
 
 RobotOutlook Forecasts::of(std::shared_ptr<const ModelInForce> model) {

@@ -9,8 +9,10 @@
 #include <string_view>
 
 #include "forecast/charge_map.h"
+#include "forecast/outlook.h"
 #include "forecast/robot_forecast.h"
 #include "history/store.h"
+#include "server/ingest/fleet_view.h"
 #include "server/ingest/model_registry.h"
 
 namespace joulecast::server {
@@ -33,6 +35,10 @@ class Forecasts {
   ~Forecasts();
 
   RobotOutlook of(std::shared_ptr<const ModelInForce> model);
+
+  // Range and run time of a robot that goes on as it does: what it answers about its autonomy when nothing
+  // else is asked. NaN while its charge is not known.
+  forecast::Reach reach(const std::shared_ptr<const ModelInForce>& model, const RobotSnapshot& live);
 
   // A mission ended.
   struct Learnt {
@@ -62,6 +68,9 @@ class Forecasts {
   std::map<std::string, std::unique_ptr<Entry>, std::less<>> entries_;
   std::map<std::string, Kind, std::less<>> kinds_;
 };
+
+// The charge as it is followed, above the robot file's reserve. NaN: not known.
+forecast::Charge live_charge(const RobotSnapshot& live, const robot::Battery& battery);
 
 // Stored form of past missions, and back; nothing when the text is not of that form.
 std::string legs_json(const std::deque<forecast::PastMission>& missions);

@@ -20,24 +20,12 @@ constexpr std::int64_t live_us = 5'000'000;  // a robot not heard of for longer 
 
 }  // namespace
 
-Endurance recent_endurance(const RobotSnapshot& snapshot, const robot::Battery& battery) {
-  Endurance left;
-  const RecentConsumption& recent = snapshot.recent;
-  constexpr double enough_s = 10;
-  if (!std::isfinite(snapshot.state_of_charge) || recent.duration_s < enough_s || !(recent.energy_j > 0))
-    return left;
-  const double usable_j = std::max(0.0, snapshot.state_of_charge - battery.reserve_fraction) *
-                          battery.capacity_ah * 3600 * battery.nominal_voltage_v;
-  left.run_time_s = usable_j / (recent.energy_j / recent.duration_s);
-  if (recent.distance_m > 1) left.range_m = usable_j / (recent.energy_j / recent.distance_m);
-  return left;
-}
-
 class IngestService::Impl {
  public:
-  Impl(IngestOptions options, const ModelRegistry& models, SessionOutputs outputs)
+  Impl(IngestOptions options, const ModelRegistry& models, Forecasts& forecasts, SessionOutputs outputs)
       : options_(std::move(options)),
         models_(models),
+        forecasts_(forecasts),
         outputs_(outputs),
         pipeline_(options_.session, options_.max_robots, models, std::move(outputs)) {}
 
@@ -161,7 +149,7 @@ class IngestService::Impl {
         continue;
       const std::shared_ptr<const ModelInForce> model = models_.find(snapshot->robot_id);
       if (model == nullptr) continue;
-      const Endurance left = recent_endurance(*snapshot, model->robot.battery);
+      const forecast::Reach reach = forecasts_.reach(model, *snapshot);
       telemetry::EnergyState state;
       state.utime_us = snapshot->sample.utime_us;
       state.robot_id = snapshot->robot_id;
@@ -176,8 +164,11 @@ class IngestService::Impl {
       state.modelled_energy_j = snapshot->accounts.modelled_j;
       state.recovered_energy_j = snapshot->accounts.ledger[energy::Term::recovered];
       state.state_of_charge = snapshot->state_of_charge;
-      state.range_m = left.range_m;
-      state.run_time_s = left.run_time_s;
+      state.state_of_charge_sd = snapshot->charge.estimate.sd;
+      state.range_m = reach.range_m[1];
+      state.range_band_m = {reach.range_m.front(), reach.range_m.back()};
+      state.run_time_s = reach.run_time_s[1];
+      state.run_time_band_s = {reach.run_time_s.front(), reach.run_time_s.back()};
       state.winding_temperature_c = snapshot->winding_temperature_c;
       const auto bytes = telemetry::encode_energy_state(state);
       if (!bytes) continue;
@@ -189,6 +180,7 @@ class IngestService::Impl {
 
   IngestOptions options_;
   const ModelRegistry& models_;
+  Forecasts& forecasts_;
   SessionOutputs outputs_;
   Pipeline pipeline_;
   std::unique_ptr<telemetry::LcmLink> link_;
@@ -203,8 +195,9 @@ class IngestService::Impl {
   std::thread receiver_, accountant_;
 };
 
-IngestService::IngestService(IngestOptions options, const ModelRegistry& models, SessionOutputs outputs)
-    : impl_(std::make_unique<Impl>(std::move(options), models, std::move(outputs))) {}
+IngestService::IngestService(IngestOptions options, const ModelRegistry& models, Forecasts& forecasts,
+                             SessionOutputs outputs)
+    : impl_(std::make_unique<Impl>(std::move(options), models, forecasts, std::move(outputs))) {}
 IngestService::~IngestService() = default;
 Result<void> IngestService::start() {
   return impl_->start();

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "server/ingest/forecasts.h"
 #include "server/ingest/pipeline.h"
 
 namespace joulecast::server {
@@ -31,7 +32,8 @@ struct IngestStatus {
 // ticks it, and publishes each live robot's ENERGY_STATE.
 class IngestService {
  public:
-  IngestService(IngestOptions options, const ModelRegistry& models, SessionOutputs outputs);
+  IngestService(IngestOptions options, const ModelRegistry& models, Forecasts& forecasts,
+                SessionOutputs outputs);
   ~IngestService();
 
   // Recovers open missions, opens LCM and starts the threads.
@@ -45,12 +47,5 @@ class IngestService {
   class Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-// Range and run time left above the reserve at the recent consumption; NaN where not known.
-struct Endurance {
-  double range_m = telemetry::unmeasured;
-  double run_time_s = telemetry::unmeasured;
-};
-Endurance recent_endurance(const RobotSnapshot& snapshot, const robot::Battery& battery);
 
 }  // namespace joulecast::server

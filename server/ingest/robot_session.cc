@@ -476,15 +476,6 @@ void RobotSession::on_point(const energy::MeterPoint& point) {
   snapshot_.speed_m_s = point.speed_m_s;
   snapshot_.yaw_rate_rad_s = point.yaw_rate_rad_s;
   snapshot_.winding_temperature_c = point.winding_temperature_c;
-  if (point.bridged && point.interval_s > 0) {
-    RecentConsumption& recent = snapshot_.recent;
-    const double keep = 1 - std::min(1.0, point.interval_s / recent_consumption_s);
-    const double power =
-        std::isfinite(point.measured_power_w) ? point.measured_power_w : point.modelled_power_w;
-    recent.energy_j = keep * recent.energy_j + power * point.interval_s;
-    recent.distance_m = keep * recent.distance_m + std::fabs(point.speed_m_s) * point.interval_s;
-    recent.duration_s = keep * recent.duration_s + point.interval_s;
-  }
   snapshot_.accounts = accounts;
 }
 

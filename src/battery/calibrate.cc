@@ -159,16 +159,17 @@ robot::Battery battery_of(const Layout& layout, const double* p, const SlowTest&
   return battery;
 }
 
-// Voltage at each row, from the measured current and temperature; 25 °C where none was measured.
+// Voltage at each row, from the measured current and the last measured temperature; 25 °C before any was.
 void simulate(const Circuit& circuit, const Recording& recording, std::vector<double>& voltage_v) {
   voltage_v.resize(recording.size());
   State state = Circuit::rested(1);
+  double held_c = reference_temperature_c;
   for (std::size_t row = 0; row < recording.size(); ++row) {
     if (row > 0)
       state =
           circuit.advanced(state, recording.current_a[row], recording.duration_s(row), state.temperature_c);
-    const double measured = recording.temperature_c[row];
-    state.temperature_c = std::isfinite(measured) ? measured : reference_temperature_c;
+    if (const double measured = recording.temperature_c[row]; std::isfinite(measured)) held_c = measured;
+    state.temperature_c = held_c;
     voltage_v[row] = circuit.voltage_v(state, recording.current_a[row]);
   }
 }

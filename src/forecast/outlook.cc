@@ -10,6 +10,7 @@ namespace {
 
 constexpr double normal_95 = 1.6448536269514722;
 constexpr std::array<double, 3> normal_quantile{-normal_95, 0, normal_95};
+constexpr double plain_drive_m = 10;  // stands for a robot's legs while none are known
 constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
 
 // What a plan may take from the battery, and how well that is known.
@@ -40,7 +41,7 @@ double joined(double middle, double offset_a, double offset_b, double sign) {
 TaskOutlook stage(const Forecaster& forecaster, Driving driving, const ChargeMap& battery,
                   const Charge& charge, double lowest, const PlanSum& sum) {
   const Prediction p = forecaster.predict(sum, driving);
-  const double power = mean_power(sum, p.expected_j);
+  const double power = mean_power(sum, p.corrected_j);
   const Budget spend = budget(battery, charge, lowest, power);
   TaskOutlook out;
   out.duration_s = sum.duration_s;
@@ -65,7 +66,7 @@ double longest_wait(const Forecaster& forecaster, Driving driving, const ChargeM
     PlanSum waited = plan;
     forecaster.extend(waited, driving, Motion::stand, 0, {wait_s, standing_w * wait_s, 0, 0}, 0);
     const Prediction p = forecaster.predict(waited, driving);
-    const Budget spend = budget(battery, charge, lowest, mean_power(waited, p.expected_j));
+    const Budget spend = budget(battery, charge, lowest, mean_power(waited, p.corrected_j));
     return p.probability_below(spend.energy_j, spend.deviation_j) >= confidence;
   };
   if (!(standing_w > 0)) return std::numeric_limits<double>::infinity();
@@ -85,6 +86,12 @@ void extend(PlanSum& sum, const Forecaster& forecaster, Driving driving, std::sp
     forecaster.extend(sum, driving, leg.motion, leg.payload_kg, leg.cost, leg.way_m);
 }
 
+PlanSum sum_of(const Forecaster& forecaster, Driving driving, std::span<const PricedLeg> legs) {
+  PlanSum sum;
+  extend(sum, forecaster, driving, legs);
+  return sum;
+}
+
 std::vector<PricedLeg> price(const LegPricer& pricer, std::span<const PlannedLeg> legs, const Pace& pace) {
   std::vector<PricedLeg> priced;
   priced.reserve(2 * legs.size());
@@ -97,10 +104,24 @@ std::vector<PricedLeg> price(const LegPricer& pricer, std::span<const PlannedLeg
   return priced;
 }
 
+std::vector<PlannedLeg> typical_legs(const Forecaster& forecaster, double payload_kg) {
+  std::vector<PlannedLeg> legs;
+  for (const Leg& leg : forecaster.typical)
+    legs.push_back({leg.motion, leg.way, leg.curvature_1_m, payload_kg, leg.duration_s});
+  if (legs.empty()) legs.push_back({Motion::drive, plain_drive_m, 0, payload_kg, 0});
+  return legs;
+}
+
+std::vector<PricedLeg> price_typical(const Forecaster& forecaster, const LegPricer& pricer, Pace pace,
+                                     double payload_kg) {
+  if (!forecaster.typical.empty()) pace.pause_s = 0;
+  return price(pricer, typical_legs(forecaster, payload_kg), pace);
+}
+
 double probability_of_reserve(const Forecaster& forecaster, Driving driving, const ChargeMap& battery,
                               const Charge& charge, const PlanSum& plan) {
   const Prediction p = forecaster.predict(plan, driving);
-  const double power = mean_power(plan, p.expected_j);
+  const double power = mean_power(plan, p.corrected_j);
   const Budget spend = budget(battery, charge, lowest_charge(battery, charge, power), power);
   return p.probability_below(spend.energy_j, spend.deviation_j);
 }
@@ -145,14 +166,14 @@ Outlook look_ahead(const Forecaster& forecaster, Driving driving, const ChargeMa
   if (out.charger_given)
     extend(whole, forecaster, driving, tasks.empty() ? from_here : tasks.back().to_charger);
   const Prediction all = forecaster.predict(whole, driving);
-  const double lowest = lowest_charge(battery, charge, mean_power(whole, all.expected_j));
+  const double lowest = lowest_charge(battery, charge, mean_power(whole, all.corrected_j));
 
-  double expected_before = 0, probability_before = 1, worst = 0;
+  double mean_before = 0, probability_before = 1, worst = 0;
   const auto note = [&](TaskOutlook& stage_outlook, const PlanSum& sum, std::size_t index) {
     stage_outlook = stage(forecaster, driving, battery, charge, lowest, sum);
-    const double expected = forecaster.predict(sum, driving).expected_j;
-    stage_outlook.expected_j = expected - expected_before;
-    expected_before = expected;
+    const double mean = forecaster.predict(sum, driving).mean_j();
+    stage_outlook.mean_j = mean - mean_before;
+    mean_before = mean;
     // Energy only grows along the way, so a reserve once broken stays broken.
     stage_outlook.probability = std::min(stage_outlook.probability, probability_before);
     if (const double lost = probability_before - stage_outlook.probability; lost > worst) {
@@ -165,7 +186,7 @@ Outlook look_ahead(const Forecaster& forecaster, Driving driving, const ChargeMa
   out.tasks.resize(tasks.size());
   for (std::size_t k = 0; k < tasks.size(); ++k) note(out.tasks[k], sums[k + 1], k);
   if (out.charger_given) note(out.charger.emplace(), whole, tasks.size());
-  out.expected_j = all.expected_j;
+  out.mean_j = all.mean_j();
   for (std::size_t k = 0; k < told_quantiles.size(); ++k) out.energy_j[k] = all.quantile_j(told_quantiles[k]);
   out.duration_s = whole.duration_s;
   out.probability = probability_before;
@@ -178,7 +199,7 @@ Outlook look_ahead(const Forecaster& forecaster, Driving driving, const ChargeMa
     PlanSum plan = sums[k];
     extend(plan, forecaster, driving, k == 0 ? from_here : tasks[k - 1].to_charger);
     const Prediction p = forecaster.predict(plan, driving);
-    const Budget spend = budget(battery, charge, lowest, mean_power(plan, p.expected_j));
+    const Budget spend = budget(battery, charge, lowest, mean_power(plan, p.corrected_j));
     const double probability = p.probability_below(spend.energy_j, spend.deviation_j);
     if (probability < confidence) break;
     out.latest_departure = Departure{k, sums[k].duration_s, 0, probability};
@@ -191,25 +212,23 @@ Outlook look_ahead(const Forecaster& forecaster, Driving driving, const ChargeMa
 }
 
 Reach reach(const Forecaster& forecaster, Driving driving, const ChargeMap& battery, const Charge& charge,
-            std::span<const PricedLeg> typical, bool from_typical_legs) {
-  PlanSum once;
-  extend(once, forecaster, driving, typical);
+            const PlanSum& once) {
   Prediction p = forecaster.predict(once, driving);
   Reach out;
-  out.from_typical_legs = from_typical_legs;
-  out.mean_power_w = mean_power(once, p.expected_j);
-  out.energy_per_m_j = once.way_m > 0 ? p.expected_j / once.way_m : nowhere;
-  const Budget spend =
-      budget(battery, charge, lowest_charge(battery, charge, out.mean_power_w), out.mean_power_w);
+  out.energy_per_m_j = nowhere;
+  const double power_w = mean_power(once, p.corrected_j);
+  const Budget spend = budget(battery, charge, lowest_charge(battery, charge, power_w), power_w);
   out.usable_j = std::max(0.0, spend.energy_j);
   out.usable_deviation_j = spend.deviation_j;
-  if (!(p.expected_j > 0)) return out;
+  if (!(p.corrected_j > 0)) return out;
   // As often as the charge lasts: what the legs scatter averages out, what they share does not.
-  const double copies = std::max(1.0, out.usable_j / p.expected_j);
+  const double copies = std::max(1.0, out.usable_j / p.corrected_j);
   PlanSum often = once;
   for (double& x : often.features) x *= copies;
   for (double& x : often.square_j2) x *= copies;
   p = forecaster.predict(often, driving);
+  out.mean_power_w = mean_power(once, p.quantile_j(0.5) / copies);
+  if (once.way_m > 0) out.energy_per_m_j = p.quantile_j(0.5) / (copies * once.way_m);
   const double middle = out.usable_j / p.quantile_j(0.5);
   for (std::size_t k = 0; k < told_quantiles.size(); ++k) {
     const double by_energy = out.usable_j / p.quantile_j(1 - told_quantiles[k]) - middle;

@@ -35,7 +35,7 @@ struct Charge {
 };
 
 struct TaskOutlook {
-  double expected_j = 0;             // of this task alone
+  double mean_j = 0;                 // of this task alone
   double duration_s = 0;             // from now to its end
   double probability = 0;            // of holding the reserve to its end
   std::array<double, 3> energy_j{};  // from now, at told_quantiles
@@ -53,7 +53,7 @@ struct Departure {
 struct Outlook {
   std::vector<TaskOutlook> tasks;
   std::optional<TaskOutlook> charger;  // the way to the charger after the last task
-  double expected_j = 0;               // of everything, the way to the charger included
+  double mean_j = 0;                   // of everything, the way to the charger included
   std::array<double, 3> energy_j{};
   double duration_s = 0;
   double probability = 0;               // of finishing everything with the reserve
@@ -74,14 +74,20 @@ Outlook look_ahead(const Forecaster& forecaster, Driving driving, const ChargeMa
 struct Reach {
   double usable_j = 0;
   double usable_deviation_j = 0;
-  double energy_per_m_j = 0;  // NaN: its legs cover no way
-  double mean_power_w = 0;
+  double energy_per_m_j = 0;        // median over so long a way; NaN: its legs cover no way
+  double mean_power_w = 0;          // likewise
   std::array<double, 3> range_m{};  // at told_quantiles: the first is nearly always exceeded
   std::array<double, 3> run_time_s{};
-  bool from_typical_legs = false;  // false: a straight drive stands for legs not known yet
 };
 Reach reach(const Forecaster& forecaster, Driving driving, const ChargeMap& battery, const Charge& charge,
-            std::span<const PricedLeg> typical, bool from_typical_legs);
+            const PlanSum& typical);
+
+// The robot's recent legs carrying another payload; a straight drive stands for legs not known yet.
+std::vector<PlannedLeg> typical_legs(const Forecaster& forecaster, double payload_kg);
+
+// The same priced at a pace. Recorded halts are among the legs, so that nothing is added for pauses then.
+std::vector<PricedLeg> price_typical(const Forecaster& forecaster, const LegPricer& pricer, Pace pace,
+                                     double payload_kg);
 
 // That a plan ends with the reserve.
 double probability_of_reserve(const Forecaster& forecaster, Driving driving, const ChargeMap& battery,
@@ -103,7 +109,9 @@ class QuickSuccess {
   double budget_j_, deviation_j_;
 };
 
-// Adds the legs of a plan.
+// The legs of a plan, summed.
+PlanSum sum_of(const Forecaster& forecaster, Driving driving, std::span<const PricedLeg> legs);
+// Adds them to a plan.
 void extend(PlanSum& sum, const Forecaster& forecaster, Driving driving, std::span<const PricedLeg> legs);
 
 // Legs priced at a pace, each stop followed by the pace's pause.

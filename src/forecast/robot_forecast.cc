@@ -35,15 +35,19 @@ std::vector<Leg> measured(std::vector<Leg> legs) {
 }  // namespace
 
 double Prediction::quantile_j(double probability) const {
-  return expected_j * std::exp(spread * scores->quantile(probability));
+  return corrected_j * std::exp(spread * scores->quantile(probability));
+}
+
+double Prediction::mean_j() const {
+  return corrected_j * scores->mean_factor(spread);
 }
 
 double Prediction::probability_below(double energy_j, double deviation_j) const {
-  if (!(expected_j > 0)) return energy_j > 0 ? 1 : 0;
+  if (!(corrected_j > 0)) return energy_j > 0 ? 1 : 0;
   // The budget's own uncertainty widens the ratio's as independent parts do.
-  const double budget = std::max(energy_j, 1e-9 * expected_j), share = deviation_j / budget;
+  const double budget = std::max(energy_j, 1e-9 * corrected_j), share = deviation_j / budget;
   const double width = std::sqrt(spread * spread + share * share);
-  return scores->probability(std::log(budget / expected_j) / width);
+  return scores->probability(std::log(budget / corrected_j) / width);
 }
 
 void Forecaster::extend(PlanSum& sum, Driving driving, Motion motion, double payload_kg, const LegCost& cost,
@@ -60,14 +64,14 @@ Prediction Forecaster::predict(const PlanSum& sum, Driving driving) const {
   const Track& t = track(driving);
   Prediction p;
   p.scores = &t.scores;
-  p.expected_j = t.correction.energy_j(sum.features);
-  if (!(p.expected_j > 0)) {
-    p.expected_j = 0;
+  p.corrected_j = t.correction.energy_j(sum.features);
+  if (!(p.corrected_j > 0)) {
+    p.corrected_j = 0;
     return p;
   }
   double variance = t.correction.variance_j2(sum.features);
   for (std::size_t k = 0; k < motion_count; ++k) variance += t.scatter[k] * t.scatter[k] * sum.square_j2[k];
-  p.spread = t.inflation * std::sqrt(variance / (p.expected_j * p.expected_j) + t.common * t.common);
+  p.spread = t.inflation * std::sqrt(variance / (p.corrected_j * p.corrected_j) + t.common * t.common);
   return p;
 }
 

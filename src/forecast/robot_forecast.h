@@ -39,13 +39,14 @@ struct PlanSum {
   double way_m = 0;
 };
 
-// Energy of a plan: expected * exp(spread * z), z distributed as `scores`.
+// Energy of a plan: corrected * exp(spread * z), z distributed as `scores`.
 struct Prediction {
-  double expected_j = 0;
+  double corrected_j = 0;  // the model's, with the robot's correction
   double spread = 0;
   const ScoreDistribution* scores = nullptr;  // of the Forecaster
 
   double quantile_j(double probability) const;
+  double mean_j() const;
   // That the energy stays at or below an amount known with a standard deviation (0: exactly).
   double probability_below(double energy_j, double deviation_j = 0) const;
 };

@@ -20,6 +20,8 @@ class ScoreDistribution {
   // Of a score at or below `z`: straight between atoms; beyond the outermost, which leave 1/192 on either
   // side, the rest fades by a factor e each half deviation.
   double probability(double z) const;
+  // Mean of exp(spread * z).
+  double mean_factor(double spread) const;
   std::span<const double, count> atoms() const { return atoms_; }
 
  private:

@@ -50,6 +50,10 @@ std::string_view name_of(Obstacle obstacle) {
       return "payload";
     case Obstacle::limits:
       return "limits";
+    case Obstacle::pose:
+      return "pose";
+    case Obstacle::model:
+      return "model";
   }
   return "";
 }
@@ -58,6 +62,10 @@ CostMatrix::CostMatrix(std::vector<MatrixRobot> robots, std::vector<MatrixTask> 
     : robots_(std::move(robots)), tasks_(std::move(tasks)) {
   std::unordered_map<const CostTable*, std::size_t> places;
   for (const MatrixRobot& robot : robots_) {
+    if (robot.table == nullptr) {
+      table_of_.push_back(0);
+      continue;
+    }
     const auto [place, fresh] = places.try_emplace(robot.table.get(), loaded_.size());
     if (fresh) loaded_.push_back(std::make_unique<Loaded>());
     table_of_.push_back(place->second);
@@ -86,14 +94,22 @@ const std::vector<LegCost>& CostMatrix::loaded_legs(std::size_t table, const Cos
 
 void CostMatrix::row(std::size_t r, std::vector<Cell>& cells) const {
   const MatrixRobot& robot = robots_[r];
+  cells.assign(tasks_.size(), Cell{});
+  if (robot.table == nullptr) {
+    for (Cell& cell : cells) cell.obstacle = Obstacle::model;
+    return;
+  }
   const CostTable& costs = *robot.table;
   const std::vector<LegCost>& loaded = loaded_legs(table_of_[r], costs);
-  cells.assign(tasks_.size(), Cell{});
   for (std::size_t t = 0; t < tasks_.size(); ++t) {
     const MatrixTask& task = tasks_[t];
     Cell& cell = cells[t];
     if (task.payload_kg > robot.payload_limit_kg) {
       cell.obstacle = Obstacle::payload;
+      continue;
+    }
+    if (task.empty.empty() && !robot.pose) {
+      cell.obstacle = Obstacle::pose;
       continue;
     }
     LegCost sum = loaded[t];

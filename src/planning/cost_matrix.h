@@ -27,9 +27,9 @@ struct Station {
 };
 
 struct MatrixRobot {
-  std::shared_ptr<const CostTable> table;
+  std::shared_ptr<const CostTable> table;  // null: nothing is known of the robot
   double payload_limit_kg = 0;
-  std::optional<Pose> pose;  // where it stands; needed by tasks whose empty leg is not given
+  std::optional<Pose> pose;  // where it stands; tasks whose empty leg is not given need it
 };
 
 // Fetch at the pick-up, bring to the drop-off. A leg that is given goes before the stations.
@@ -44,7 +44,9 @@ struct MatrixTask {
 enum class Obstacle : unsigned char {
   none,
   payload,  // heavier than the robot may carry
-  limits    // no motion within the robot's limits with this payload
+  limits,   // no motion within the robot's limits with this payload
+  pose,     // where the robot stands is not known, and the task's empty leg is not given
+  model     // nothing is known of the robot
 };
 std::string_view name_of(Obstacle obstacle);
 
@@ -59,8 +61,7 @@ struct Cell {
 // Robots x tasks. Rows may be asked for from several threads at once.
 class CostMatrix {
  public:
-  // Each task has stations or legs for both ways, each robot a pose where a task needs one: the caller has
-  // checked.
+  // Each task has stations or legs for both ways: the caller has checked.
   CostMatrix(std::vector<MatrixRobot> robots, std::vector<MatrixTask> tasks);
 
   std::size_t robots() const { return robots_.size(); }

@@ -229,7 +229,7 @@ Result<EnergyState> decode_energy_state(std::span<const std::uint8_t> bytes) {
   guard.text("robot_id", Text::id, max_robot_id_length);
   guard.text("mission_id", Text::optional_id, max_mission_id_length);
   guard.fixed(8, "model_version");
-  guard.fixed(11 * real, "measured_power to winding_temperature");
+  guard.fixed(16 * real, "measured_power to winding_temperature");
   auto decoded = decode_guarded<energy_state_t>(bytes, guard);
   if (!decoded) return tl::unexpected<Error>(std::move(decoded.error()));
 
@@ -245,8 +245,11 @@ Result<EnergyState> decode_energy_state(std::span<const std::uint8_t> bytes) {
   state.unexplained_energy_j = decoded->unexplained_energy;
   state.recovered_energy_j = decoded->recovered_energy;
   state.state_of_charge = decoded->state_of_charge;
+  state.state_of_charge_sd = decoded->state_of_charge_sd;
   state.range_m = decoded->range;
+  copy(decoded->range_band, state.range_band_m);
   state.run_time_s = decoded->run_time;
+  copy(decoded->run_time_band, state.run_time_band_s);
   copy(decoded->winding_temperature, state.winding_temperature_c);
   return state;
 }
@@ -306,8 +309,11 @@ Result<std::vector<std::uint8_t>> encode_energy_state(const EnergyState& state) 
   message.unexplained_energy = state.unexplained_energy_j;
   message.recovered_energy = state.recovered_energy_j;
   message.state_of_charge = state.state_of_charge;
+  message.state_of_charge_sd = state.state_of_charge_sd;
   message.range = state.range_m;
+  copy(state.range_band_m, message.range_band);
   message.run_time = state.run_time_s;
+  copy(state.run_time_band_s, message.run_time_band);
   copy(state.winding_temperature_c, message.winding_temperature);
   return encode(message);
 }

@@ -50,8 +50,11 @@ struct EnergyState {
   double unexplained_energy_j = unmeasured;
   double recovered_energy_j = unmeasured;
   double state_of_charge = unmeasured;  // 0 to 1
-  double range_m = unmeasured;
-  double run_time_s = unmeasured;
+  double state_of_charge_sd = unmeasured;
+  double range_m = unmeasured;  // median
+  std::array<double, 2> range_band_m{unmeasured, unmeasured};
+  double run_time_s = unmeasured;  // median
+  std::array<double, 2> run_time_band_s{unmeasured, unmeasured};
   std::array<double, 2> winding_temperature_c{unmeasured, unmeasured};
 };
 

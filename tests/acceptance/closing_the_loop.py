@@ -2,16 +2,18 @@
 """What adopting a diagnosis is worth, on virtual robots with an effect that their files leave out.
 
 Each robot drives a history; the daemon diagnoses it, back-tests what it found on missions that it was not found on,
-and adopts it. Then the robot drives missions that nobody has seen, and the energy error of three kinds of answers is
+and adopts it. Then the robot drives missions that nobody has seen, and the energy error of four kinds of answers is
 told before and after the adoption:
   profile    the motion as it was driven, through the meter
   estimate   the motion as it was commanded, known before the robot sets off, by `joulecast estimate`
-  autonomy   energy a metre over all new missions, by `joulecast autonomy`
+  plan       the same as a list of tasks with stated paces, from the robot file alone, by `joulecast autonomy`
+  range      energy a metre as the daemon answers for the robot going on as in its history, over all new missions; it
+             learns from the history, so that it is right before the adoption too
 The diagnosis sees telemetry only. Effects and strengths are drawn from the seed.
 
   closing_the_loop.py --daemon ... --client ... --source ... --shared ... [--robots N] [--seed S]
 
-Fails when the median energy error of profile or estimate does not fall to a half, or when a back-test promised an
+Fails when the median energy error of profile, estimate or plan does not fall to a half, or when a back-test promised an
 improvement that new missions do not show.
 """
 import argparse
@@ -108,8 +110,48 @@ def metered(programs, robot_file, log, name):
     return [m["energy"] for m in answer["missions"]]
 
 
-def per_metre(programs, robot_file, payload_kg):
-    answer = json.loads(programs.run("autonomy", "--robot", robot_file, "--charge", 0.9, "--payload", payload_kg, "--json"))
+def task_of(motion, samples):
+    """A stretch of one kind of motion, (dt, speed, yaw rate) each, as a task that states its pace."""
+    whole = lambda values: sum(dt * v for (dt, _, _), v in zip(samples, values))
+    top = lambda values: max(abs(v) for v in values)
+    steepest = lambda values: max(abs(b - a) / dt for a, b, (dt, _, _) in zip(values, values[1:], samples[1:]))
+    speeds, rates = [s[1] for s in samples], [s[2] for s in samples]
+    way, turned = whole(speeds), whole(rates)
+    if motion == "stand" or len(samples) < 3:
+        return {"dwell_s": sum(s[0] for s in samples)}
+    if motion == "turn":
+        return {"turn_rad": turned, "yaw_rate_rad_s": top(rates), "yaw_acceleration_rad_s2": steepest(rates)}
+    pace = {"speed_m_s": top(speeds), "acceleration_m_s2": steepest(speeds)}
+    if abs(turned) < 0.3:
+        return {"distance_m": way, **pace}
+    return {"path": [{"kind": "arc", "radius_m": way / abs(turned), "angle_rad": turned}], **pace}
+
+
+def tasks_of(mission):
+    stretches = []
+    time_s, speed, rate = mission["time_s"], mission["speed_m_s"], mission["yaw_rate_rad_s"]
+    for k in range(1, len(time_s)):
+        motion = "drive" if abs(speed[k]) > 1e-9 else "turn" if abs(rate[k]) > 1e-9 else "stand"
+        if not stretches or stretches[-1][0] != motion:
+            stretches.append((motion, []))
+        stretches[-1][1].append((time_s[k] - time_s[k - 1], speed[k], rate[k]))
+    return [task_of(*stretch) for stretch in stretches]
+
+
+def planned(programs, robot_file, missions):
+    energies = []
+    for mission in missions:
+        with open(programs.path("tasks.json"), "w") as file:
+            json.dump({"state_of_charge": 0.9, "payload_kg": statistics.median(mission["payload_kg"]),
+                       "compare_minimum_energy": False, "tasks": tasks_of(mission)}, file)
+        answer = json.loads(programs.run("autonomy", "--robot", robot_file, "--request", programs.path("tasks.json"), "--json"))
+        energies.append(answer["plan"]["energy_j"]["p50"])
+    return energies
+
+
+def per_metre(programs, robot_id, payload_kg):
+    status, answer = ask(programs.url, "POST", f"/v1/robots/{robot_id}/autonomy", {"state_of_charge": 0.9, "payload_kg": payload_kg})
+    check(status == 200, f"autonomy: {status} {answer}")
     return answer["consumption"]["energy_per_m_j"]
 
 
@@ -136,7 +178,10 @@ def one_robot(given, draw, number):
     programs.run(*simulate, "--missions", NEW_MISSIONS, "--seed", seed + 1, "--pickups", 0, "--log", new)
     programs.run("replay", history, "--into", programs.store, "--robot", before_file, "--json")
 
+    missions = commanded(new)
+    payload_kg = statistics.median(p for m in missions for p in m["payload_kg"])
     programs.start()
+    a_metre = [per_metre(programs, robot["robot_id"], payload_kg)]
     status, job = ask(programs.url, "POST", "/v1/diagnoses", {"robot_id": robot["robot_id"]})
     check(status == 202, f"the diagnosis did not start: {job}")
     with urllib.request.urlopen(programs.url + f"/v1/diagnoses/{job['id']}/events", timeout=300) as events:
@@ -155,17 +200,17 @@ def one_robot(given, draw, number):
     check(detail["model_version"] == (2 if row["adopted"] else 1), "the version in force")
     with open(after_file, "w") as file:
         json.dump(detail["model"], file)
+    a_metre.append(per_metre(programs, robot["robot_id"], payload_kg))
     check(programs.stop() == 0, "the daemon did not stop in order")
 
-    missions = commanded(new)
     accounts = [metered(programs, file, new, name) for file, name in ((before_file, "b.db"), (after_file, "a.db"))]
     measured = [a["measured_j"] for a in accounts[0]]
     check(len(missions) == len(measured) == NEW_MISSIONS, f"{len(missions)} missions in the log, {len(measured)} accounted for")
-    payload_kg = statistics.median(p for m in missions for p in m["payload_kg"])
     measured_per_m = sum(measured) / sum(a["distance_m"] for a in accounts[0])
     row["profile"] = [mean_error([a["modelled_j"] for a in both], measured) for both in accounts]
     row["estimate"] = [mean_error(estimates(programs, file, missions), measured) for file in (before_file, after_file)]
-    row["autonomy"] = [abs(per_metre(programs, file, payload_kg) / measured_per_m - 1) for file in (before_file, after_file)]
+    row["plan"] = [mean_error(planned(programs, file, missions), measured) for file in (before_file, after_file)]
+    row["range"] = [abs(j / measured_per_m - 1) for j in a_metre]
     programs.folder.cleanup()
     return row
 
@@ -174,21 +219,21 @@ def main():
     given = options()
     draw = random.Random(given.seed)
     rows = []
-    print(f"{'robot':<9} {'hidden effect':<34} {'named':<46} {'back-test':>15} {'profile':>15} {'estimate':>15} {'autonomy':>15}   energy error, % before > after")
+    print(f"{'robot':<9} {'hidden effect':<34} {'named':<46} {'back-test':>15} {'profile':>15} {'estimate':>15} {'plan':>15} {'range':>15}   energy error, % before > after")
     for number in range(given.robots):
         row = one_robot(given, draw, number)
         rows.append(row)
         pair = lambda name: f"{100 * row[name][0]:6.2f} > {100 * row[name][1]:5.2f}" if name in row else "-"
         named = f"{row['verdict']}: {', '.join(row['named'])}" + ("" if row["adopted"] else " (not adopted)")
         print(f"{row['robot']:<9} {row['effect'] + ' ' + str(row['strength']):<34} {named:<46} {pair('back_test'):>15} {pair('profile'):>15} "
-              f"{pair('estimate'):>15} {pair('autonomy'):>15}", flush=True)
+              f"{pair('estimate'):>15} {pair('plan'):>15} {pair('range'):>15}", flush=True)
     medians = {}
-    for name in ("profile", "estimate", "autonomy"):
+    for name in ("profile", "estimate", "plan", "range"):
         medians[name] = [statistics.median(row[name][k] for row in rows) for k in (0, 1)]
         fall = 1 - medians[name][1] / medians[name][0]
         print(f"{name}: median error {100 * medians[name][0]:.2f} % before, {100 * medians[name][1]:.2f} % after adoption ({100 * fall:.0f} % less)")
     print(f"{sum(r['adopted'] for r in rows)} of {len(rows)} adopted; hidden effect named in {sum(r['effect'] in r['named'] for r in rows)}")
-    for name in ("profile", "estimate"):
+    for name in ("profile", "estimate", "plan"):
         check(medians[name][1] < 0.5 * medians[name][0], f"{name}: the error does not fall to a half")
     for row in rows:
         if row["adopted"]:

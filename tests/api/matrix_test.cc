@@ -36,6 +36,11 @@ class Matrix : public ::testing::Test {
     models_[id] = *server::model_in_force(robot, static_cast<std::int64_t>(models_.size() + 1));
   }
 
+  static json with_payload(json task, double payload_kg) {
+    task["payload_kg"] = payload_kg;
+    return task;
+  }
+
   Error error_of(const json& request) {
     const auto answer = MatrixAnswer::make(request, fleet_, tables_);
     EXPECT_FALSE(answer) << request;
@@ -137,6 +142,30 @@ TEST_F(Matrix, StopsWhenTheClientHasLeft) {
   EXPECT_EQ(text, so_far);
 }
 
+TEST_F(Matrix, OneRobotsTroubleIsItsOwn) {
+  // b reports no pose: what gives the way to its pick-up is answered all the same.
+  const json request = {{"robots", {"nobody", "b", "a"}}, {"tasks", {with_payload(stations_, 1), legs_}}};
+  const auto answer = MatrixAnswer::make(request, fleet_, tables_);
+  ASSERT_TRUE(answer) << describe(answer.error());
+  std::string text;
+  while ((*answer)->next(text, {})) {
+  }
+  const json rows = json::parse(text)["rows"];
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_TRUE(rows[0]["model_version"].is_null());
+  EXPECT_EQ(rows[0]["energy_j"], json({nullptr, nullptr}));
+  EXPECT_EQ(rows[0]["infeasible"],
+            json::array({{{"reason", "model"}, {"detail", "no robot nobody"}, {"tasks", {0, 1}}}}));
+  EXPECT_TRUE(rows[1]["energy_j"][0].is_null());
+  EXPECT_GT(rows[1]["energy_j"][1], 0);
+  ASSERT_EQ(rows[1]["infeasible"].size(), 1u);
+  EXPECT_EQ(rows[1]["infeasible"][0]["reason"], "pose");
+  EXPECT_EQ(rows[1]["infeasible"][0]["tasks"], json({0}));
+  EXPECT_GT(rows[2]["energy_j"][0], 0);
+  EXPECT_EQ(rows[2]["energy_j"][1], rows[1]["energy_j"][1]);
+  EXPECT_TRUE(rows[2]["infeasible"].empty());
+}
+
 TEST_F(Matrix, NamesTheFieldAtFault) {
   const json a = {"a"};
   const auto with = [](json object, const char* name, json value) {
@@ -161,8 +190,8 @@ TEST_F(Matrix, NamesTheFieldAtFault) {
            {{{"tasks", {legs_}}}, "/robots"},
            {{{"robots", a}}, "/tasks"},
            {{{"robots", json::array()}, {"tasks", {legs_}}}, "/robots"},
-           {{{"robots", {"a", "nobody"}}, {"tasks", {legs_}}}, "/robots/1", Fault::not_found},
-           {{{"robots", {"a", "b"}}, {"tasks", {stations_}}}, "/robots/1/pose"},
+           {{{"robots", {"a", {{"robot_id", "b"}, {"pose", {{"x_m", 0}}}}}}, {"tasks", {legs_}}},
+            "/robots/1/pose/y_m"},
            {{{"robots", a}, {"tasks", {legs_, with(legs_, "payload_kg", -1)}}}, "/tasks/1/payload_kg"},
            {{{"robots", a}, {"tasks", {with(legs_, "colour", 1)}}}, "/tasks/0/colour"},
            {{{"robots", a},

@@ -20,9 +20,10 @@ inline robot::RobotModel nomad_with_friction(double factor) {
 }
 
 // Puts a declared mission of `samples` samples at 50 Hz into the harness's history, driven by a robot that
-// behaves as `truth` says, with noise on speeds, currents and voltages. Returns its key.
+// behaves as `truth` says, with noise on speeds, currents and voltages. Returns its key. It may stand at a
+// charger first, for so many samples.
 inline history::MissionKey drive(PipelineHarness& harness, const robot::RobotModel& truth, int number,
-                                 int samples = 1500) {
+                                 int samples = 1500, int charging_samples = 0) {
   const auto model = *dynamics::drive_model(truth);
   std::mt19937_64 random(static_cast<std::uint64_t>(number));
   std::normal_distribution<double> noise(0, 0.05);
@@ -34,6 +35,7 @@ inline history::MissionKey drive(PipelineHarness& harness, const robot::RobotMod
   event(telemetry::MissionPhase::started, start_us - 1000);
   const double swing = 0.3 + 0.05 * (number % 5);
   for (int k = 0; k < samples; ++k) {
+    const bool charges = k < charging_samples;
     const double t = 0.02 * k;
     dynamics::Instant at;
     const double speed = 4 + 3 * std::sin(swing * t), turn = std::sin(0.7 * swing * t);
@@ -53,6 +55,10 @@ inline history::MissionKey drive(PipelineHarness& harness, const robot::RobotMod
     s.battery_voltage_v = 24;
     s.battery_current_a = flow.battery_power_w / 24 + noise(random);
     s.payload_kg = 0;
+    if (charges) {
+      s.wheel_velocity_rad_s = s.motor_current_a = s.motor_voltage_v = {0, 0};
+      s.battery_current_a = -3;
+    }
     harness.pipeline->handle({truth.robot_id, s, s.utime_us});
   }
   event(telemetry::MissionPhase::finished, start_us + 20'000LL * samples);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -70,6 +71,36 @@ TEST_F(ModelAdoptionTest, AdoptsABetterModelAndSaysWhy) {
   EXPECT_EQ(evidence["back_test"]["missions"][0]["id"], keys_[0]);
   ASSERT_EQ(events().size(), 1U);
   EXPECT_EQ(events()[0].kind, "model_adopted");
+}
+
+TEST_F(ModelAdoptionTest, LeavesOutWhatAChargerFed) {
+  keys_.push_back(drive(harness_, truth_, 4, 2500, 1000));
+  ASSERT_GT(harness_.missions().back().sample_faults["charging"], 900);
+  const auto adoption = adoption_->adopt(candidate(1.4));
+  ASSERT_TRUE(adoption) << describe(adoption.error());
+  ASSERT_EQ(adoption->tested_on.back(), keys_.back());
+  // 3 A into the battery for 20 s are some 1,500 J, more than the drive costs.
+  EXPECT_LT(std::fabs(adoption->test.runs.back().after.relative), 0.01);
+  const json report = json::parse(adoption->back_test_json);
+  EXPECT_GT(report["left_out"]["charging_samples"], 900);
+  EXPECT_LE(report["left_out"]["charging_samples"], 1000);
+}
+
+TEST_F(ModelAdoptionTest, TestsOnTheRobotAsItIsSinceItChanged) {
+  const robot::RobotModel worn = nomad_with_friction(2);
+  for (int number = 4; number < 8; ++number) keys_.push_back(drive(harness_, worn, number));
+  AdoptionRequest request = candidate(2);
+  request.dry_run = true;
+  request.fitted_on = {keys_[0], keys_[4], keys_[5]};  // two are left since the change, too few: all are asked
+  EXPECT_EQ(adoption_->adopt(request)->tested_on.size(), 5U);
+  request.dry_run = false;
+  request.fitted_on.clear();
+  const auto adoption = adoption_->adopt(request);
+  ASSERT_TRUE(adoption) << describe(adoption.error());
+  EXPECT_TRUE(adoption->adopted) << adoption->refusal;
+  EXPECT_EQ(adoption->tested_on, (std::vector<history::MissionKey>(keys_.begin() + 4, keys_.end())));
+  EXPECT_LT(adoption->test.error_after, 0.005);
+  EXPECT_EQ(json::parse(adoption->back_test_json)["since_utime_us"], harness_.missions()[4].start_utime_us);
 }
 
 TEST_F(ModelAdoptionTest, RefusesAWorseModelUnlessForced) {

@@ -39,7 +39,7 @@ TEST(Prediction, WhatLegsScatterAveragesOutAndWhatTheyShareDoesNot) {
     PlanSum sum;
     for (int k = 0; k < count; ++k) f.extend(sum, Driving::usual, Motion::drive, 0, drive(500).cost, 10);
     const Prediction p = f.predict(sum, Driving::usual);
-    EXPECT_NEAR(p.expected_j, 500 * count, 1e-9 * p.expected_j);
+    EXPECT_NEAR(p.corrected_j, 500 * count, 1e-9 * p.corrected_j);
     EXPECT_NEAR(p.spread, std::sqrt(0.03 * 0.03 + 0.2 * 0.2 / count), 1e-12);
   }
 }
@@ -55,11 +55,11 @@ TEST(Prediction, ProbabilityIsTheShareOfDraws) {
   Rng rng(9);
   for (const double deviation_j : {0.0, 150.0}) {
     for (const double factor : {0.93, 0.98, 1.0, 1.04, 1.1}) {
-      const double budget = factor * p.expected_j;
+      const double budget = factor * p.corrected_j;
       int within = 0;
       constexpr int draws = 20'000;
       for (int k = 0; k < draws; ++k) {
-        const double energy = p.expected_j * std::exp(p.spread * p.scores->quantile(rng.uniform()));
+        const double energy = p.corrected_j * std::exp(p.spread * p.scores->quantile(rng.uniform()));
         within += energy <= budget + deviation_j * rng.normal();
       }
       const double shape = deviation_j > 0 ? 0.02 : 0.5 / static_cast<double>(ScoreDistribution::count);
@@ -94,7 +94,8 @@ TEST(Outlook, TellsEachLegAndWhereItFails) {
     EXPECT_LE(task.charge[1], task.charge[2]);
     EXPECT_LE(task.energy_j[0], task.energy_j[1]);
   }
-  EXPECT_NEAR(out.expected_j, 1.5 * usable, 1e-6 * usable);
+  const double spread = std::hypot(0.03, 0.05 / std::sqrt(5));
+  EXPECT_NEAR(out.mean_j, 1.5 * usable * ScoreDistribution().mean_factor(spread), 1e-6 * usable);
   EXPECT_EQ(out.probability, out.tasks.back().probability);
 }
 
@@ -154,7 +155,7 @@ TEST(Reach, GoesAsFarAsTheChargeLastsAndIsOrdered) {
   const Forecaster f = forecaster(0.04, 0.2);
   const ChargeMap map = battery();
   const std::vector<PricedLeg> typical{drive(500, 10), {Motion::stand, 0, 0, {5, 100, 0, 0}}};
-  const Reach r = reach(f, Driving::usual, map, {0.6, 0, 0.15}, typical, true);
+  const Reach r = reach(f, Driving::usual, map, {0.6, 0, 0.15}, sum_of(f, Driving::usual, typical));
   EXPECT_NEAR(r.energy_per_m_j, 60, 1e-9);
   EXPECT_NEAR(r.mean_power_w, 60, 1e-9);
   EXPECT_NEAR(r.usable_j, map.energy_j(0.6, 0.15, 60), 1e-6);
@@ -168,8 +169,9 @@ TEST(Reach, GoesAsFarAsTheChargeLastsAndIsOrdered) {
 }
 
 TEST(Reach, NothingAboveTheReserveIsNoRange) {
-  const Reach r = reach(forecaster(0.04, 0.2), Driving::usual, battery(), {0.1, 0, 0.15},
-                        std::vector<PricedLeg>{drive(500)}, true);
+  const Forecaster f = forecaster(0.04, 0.2);
+  const std::vector<PricedLeg> typical{drive(500)};
+  const Reach r = reach(f, Driving::usual, battery(), {0.1, 0, 0.15}, sum_of(f, Driving::usual, typical));
   EXPECT_EQ(r.usable_j, 0);
   EXPECT_EQ(r.range_m[2], 0);
 }

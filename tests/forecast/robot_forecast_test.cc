@@ -66,7 +66,7 @@ TEST(RobotForecast, WithoutPastIsTheModelWithinFifteenPercent) {
   double model = 0;
   for (std::size_t k = 0; k < 3; ++k) model += sum.features[k];
   const Prediction p = f->predict(sum, Driving::stated);
-  EXPECT_NEAR(p.expected_j, model, 1e-9 * model);
+  EXPECT_NEAR(p.corrected_j, model, 1e-9 * model);
   EXPECT_GT(p.spread, 0.08);
   EXPECT_LT(p.spread, 0.2);
   EXPECT_EQ(f->missions, 0);
@@ -76,12 +76,12 @@ TEST(RobotForecast, LearnsARobotThatSpendsMore) {
   MadeMissions made(2);
   RobotForecast forecast(made.robot, made.drive);
   const double before =
-      forecast.forecaster()->predict(plan_of(*forecast.forecaster(), made), Driving::stated).expected_j;
+      forecast.forecaster()->predict(plan_of(*forecast.forecaster(), made), Driving::stated).corrected_j;
   for (int k = 0; k < 20; ++k) forecast.learn(made.next(1.3, 0.02, 0.05));
   const auto f = forecast.forecaster();
   const Prediction p = f->predict(plan_of(*f, made), Driving::stated);
   // Twenty missions of 2 % tell the level to 0.5 %; four of those.
-  EXPECT_NEAR(p.expected_j / before, 1.3, 1.3 * 4 * 0.02 / std::sqrt(20.0) + 0.01);
+  EXPECT_NEAR(p.corrected_j / before, 1.3, 1.3 * 4 * 0.02 / std::sqrt(20.0) + 0.01);
   EXPECT_LT(p.spread, 0.05);
   EXPECT_EQ(f->missions, 20);
   EXPECT_FALSE(f->drift);
@@ -112,7 +112,7 @@ TEST(RobotForecast, SaysWhenTheRobotChangesAndFollows) {
   double model = 0;
   for (std::size_t k = 0; k < 3; ++k) model += sum.features[k];
   // What came before the change keeps a twentieth of its weight: 1.5 missions against some ten.
-  EXPECT_NEAR(f->predict(sum, Driving::stated).expected_j / model, 1.15,
+  EXPECT_NEAR(f->predict(sum, Driving::stated).corrected_j / model, 1.15,
               0.15 * 0.2 + 4 * 0.02 / std::sqrt(8.0));
   // Twenty missions after the last news of it, it is none any more.
   for (int k = 0; k < 45; ++k) forecast.learn(made.next(1.15, 0.02, 0.05));
@@ -130,7 +130,7 @@ TEST(RobotForecast, SiblingsSpareANewcomerTheLearning) {
   }
   RobotForecast newcomer(made.robot, made.drive);
   const double alone =
-      newcomer.forecaster()->predict(plan_of(*newcomer.forecaster(), made), Driving::stated).expected_j;
+      newcomer.forecaster()->predict(plan_of(*newcomer.forecaster(), made), Driving::stated).corrected_j;
   std::array<Siblings, driving_count> siblings;
   for (std::size_t d = 0; d < driving_count; ++d) {
     std::vector<const OwnFinding*> others;
@@ -141,7 +141,7 @@ TEST(RobotForecast, SiblingsSpareANewcomerTheLearning) {
   const auto f = newcomer.forecaster();
   const Prediction p = f->predict(plan_of(*f, made), Driving::stated);
   EXPECT_EQ(f->siblings, 3);
-  EXPECT_NEAR(p.expected_j / alone, 1.25, 0.05);
+  EXPECT_NEAR(p.corrected_j / alone, 1.25, 0.05);
 }
 
 TEST(RobotForecast, AnotherModelIsLearntAgainstAnew) {

@@ -88,7 +88,7 @@ TEST(Codec, MissionEventRoundTrip) {
 }
 
 TEST(Codec, EnergyStateRoundTrip) {
-  EnergyState state{7, "amr-07", "", 3, 1, 2, 3, 4, 5, 6, 0.5, 8, 9, {10, 11}};
+  EnergyState state{7, "amr-07", "", 3, 1, 2, 3, 4, 5, 6, 0.5, 0.01, 8, {6, 10}, 9, {7, 11}, {10, 11}};
   const auto bytes = encode_energy_state(state);
   ASSERT_TRUE(bytes);
   const auto m = generated_decode<energy_state_t>(*bytes);
@@ -108,6 +108,9 @@ TEST(Codec, EnergyStateRoundTrip) {
   EXPECT_EQ(decoded->state_of_charge, 0.5);
   EXPECT_EQ(decoded->range_m, 8);
   EXPECT_EQ(decoded->run_time_s, 9);
+  EXPECT_EQ(decoded->state_of_charge_sd, 0.01);
+  EXPECT_EQ(decoded->range_band_m, (std::array<double, 2>{6, 10}));
+  EXPECT_EQ(decoded->run_time_band_s, (std::array<double, 2>{7, 11}));
   EXPECT_EQ(decoded->winding_temperature_c, (std::array<double, 2>{10, 11}));
 }
 
