@@ -278,13 +278,17 @@ std::optional<Thermal> thermal_fit(const std::vector<Target>& targets, const Cur
     for (const Target& target : targets) {
       const Recording& recording = *target.recording;
       double filtered_w = 0, charge = 1;
+      const auto known = std::find_if(recording.temperature_c.begin(), recording.temperature_c.end(),
+                                      [](double t) { return std::isfinite(t); });
+      if (known == recording.temperature_c.end()) continue;
+      const double first_c = *known;
       for (std::size_t row = 1; row < recording.size(); ++row) {
         const double seconds = recording.duration_s(row);
         charge -= recording.current_a[row] * seconds / (3600 * capacity_ah);
         const double loss_w =
             recording.current_a[row] * (open_circuit_voltage_v.extended(charge) - recording.voltage_v[row]);
         filtered_w += -std::expm1(-seconds / tau) * (loss_w - filtered_w);
-        const double rise_k = recording.temperature_c[row] - recording.temperature_c.front();
+        const double rise_k = recording.temperature_c[row] - first_c;
         if (!std::isfinite(rise_k)) continue;
         xx += filtered_w * filtered_w;
         xy += filtered_w * rise_k;

@@ -53,8 +53,9 @@ Result<Prediction> predict(const Circuit& circuit, const Recording& recording, L
   if (!(recording.charge_ah() > 0)) return invalid(recording.name, "draws no charge");
   const auto recorded = recorded_load(recording, from);
   if (!recorded) return tl::unexpected(recorded.error());
-  const double first_c = recording.temperature_c.front();
-  const double ambient_c = std::isfinite(first_c) ? first_c : reference_temperature_c;
+  const auto known = std::find_if(recording.temperature_c.begin(), recording.temperature_c.end(),
+                                  [](double t) { return std::isfinite(t); });
+  const double ambient_c = known != recording.temperature_c.end() ? *known : reference_temperature_c;
   const State start = Circuit::rested(1, ambient_c);
 
   Prediction out;

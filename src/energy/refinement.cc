@@ -197,6 +197,8 @@ MissionFinding Refinement::judge(std::span<const DriveEquation> equations, doubl
   for (Eigen::Index k = 0; k < m; ++k)
     out.parameters[static_cast<std::size_t>(k)] = {file[k] + alone.value[k], std::sqrt(of_mission(k, k))};
 
+  out.parameters.back().sd = with_inertia_scale(out.parameters.back().sd);
+
   const Kept innovation = file + alone.value.head<m>() - mean;
   const KeptSquare total = drifted + of_mission + scatter_factor_ * scatter;
   out.surprise = innovation.dot(total.ldlt().solve(innovation)) / static_cast<double>(m);
@@ -213,6 +215,13 @@ MissionFinding Refinement::judge(std::span<const DriveEquation> equations, doubl
   return out;
 }
 
+double Refinement::with_inertia_scale(double mass_sd_kg) const {
+  const double radius_m = robot_.kinematics.wheel_radius_m;
+  const double turning_kg =
+      2 * (robot_.mass.wheel_inertia_kg_m2 + robot_.motor.rotor_inertia_kg_m2) / (radius_m * radius_m);
+  return std::hypot(mass_sd_kg, trust_.inertia_scale * (robot_.total_mass_kg(0) + turning_kg));
+}
+
 std::array<Estimate, refined_count> Refinement::estimates() const {
   const Eigen::Map<const KeptSquare> covariance(covariance_.data());
   std::array<Estimate, refined_count> out;
@@ -220,6 +229,7 @@ std::array<Estimate, refined_count> Refinement::estimates() const {
     const auto i = static_cast<Eigen::Index>(k);
     out[k] = {mean_[k], std::sqrt(covariance(i, i))};
   }
+  out.back().sd = with_inertia_scale(out.back().sd);
   return out;
 }
 

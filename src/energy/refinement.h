@@ -30,6 +30,10 @@ struct RefinementTrust {
   double yaw_inertia = 0.05;
   double current_bias = 0.002;  // of the current limit
   double driver_loss = 0.03;
+  // Of all that is accelerated, wheels and rotors included: currents that are sampled in step with the motor
+  // controller miss their mean while the speed changes, by up to half its period over the motor's mechanical
+  // time constant, at every acceleration alike, so that no number of missions averages it out.
+  double inertia_scale = 0.02;
   // Payload.
   double payload_wide = 1.5;     // of the payload limit: what may be carried undeclared
   double payload_least = 0.05;   // of the payload limit: less is not worth an event
@@ -73,7 +77,8 @@ class Refinement {
   MissionFinding judge(std::span<const DriveEquation> equations, double declared_kg, bool learn);
 
   std::size_t missions() const { return missions_; }  // learned from
-  // Absolute values: friction right and left, viscous, idle power, and mass beyond the file's.
+  // Absolute values: friction right and left, viscous, idle power, and mass beyond the file's; the mass's
+  // deviation holds the trust's inertia_scale.
   std::array<Estimate, refined_count> estimates() const;
   double scatter_factor() const { return scatter_factor_; }  // of the trust's scatter, as missions show it
 
@@ -92,6 +97,8 @@ class Refinement {
   bool recall(const Memory& memory);  // false when it is none
 
  private:
+  double with_inertia_scale(double mass_sd_kg) const;
+
   robot::RobotModel robot_;
   RefinementTrust trust_;
   std::array<double, refined_count> mean_{};

@@ -167,13 +167,15 @@ Outlook look_ahead(const Forecaster& forecaster, Driving driving, const ChargeMa
     extend(whole, forecaster, driving, tasks.empty() ? from_here : tasks.back().to_charger);
   const Prediction all = forecaster.predict(whole, driving);
   const double lowest = lowest_charge(battery, charge, mean_power(whole, all.corrected_j));
+  // What the mean lies above the corrected energy is shared out by energy, so that the parts add up to it.
+  const double mean_share = all.corrected_j > 0 ? all.mean_j() / all.corrected_j : 1;
 
-  double mean_before = 0, probability_before = 1, worst = 0;
+  double corrected_before = 0, probability_before = 1, worst = 0;
   const auto note = [&](TaskOutlook& stage_outlook, const PlanSum& sum, std::size_t index) {
     stage_outlook = stage(forecaster, driving, battery, charge, lowest, sum);
-    const double mean = forecaster.predict(sum, driving).mean_j();
-    stage_outlook.mean_j = mean - mean_before;
-    mean_before = mean;
+    const double corrected = forecaster.predict(sum, driving).corrected_j;
+    stage_outlook.mean_j = mean_share * (corrected - corrected_before);
+    corrected_before = corrected;
     // Energy only grows along the way, so a reserve once broken stays broken.
     stage_outlook.probability = std::min(stage_outlook.probability, probability_before);
     if (const double lost = probability_before - stage_outlook.probability; lost > worst) {

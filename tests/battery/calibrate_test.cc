@@ -92,6 +92,19 @@ TEST(Calibrate, DoesNotMindRestsAroundTheSlowTestNorARechargeAfterIt) {
   EXPECT_NE(reversed.error().message.find("positive while"), std::string::npos);
 }
 
+TEST(Calibrate, DoesNotMindRowsWithoutTemperature) {
+  const Circuit truth(full_battery());
+  const std::vector<Recording> whole = identification(truth);
+  std::vector<Recording> gappy = whole;
+  for (Recording& recording : gappy)
+    for (std::size_t row = 0; row < recording.size(); row += 7) recording.temperature_c[row] = std::nan("");
+  const auto expected = calibrate(whole), found = calibrate(gappy);
+  ASSERT_TRUE(expected && found);
+  ASSERT_TRUE(expected->battery.thermal_resistance_k_w && found->battery.thermal_resistance_k_w);
+  EXPECT_NEAR(*found->battery.thermal_resistance_k_w, *expected->battery.thermal_resistance_k_w,
+              0.02 * *expected->battery.thermal_resistance_k_w);
+}
+
 TEST(Calibrate, SaysWhichTestIsMissing) {
   const Circuit truth(full_battery());
   const auto all = identification(truth);

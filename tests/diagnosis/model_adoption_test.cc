@@ -45,7 +45,7 @@ class ModelAdoptionTest : public ::testing::Test {
 
 TEST_F(ModelAdoptionTest, AdoptsABetterModelAndSaysWhy) {
   AdoptionRequest request = candidate(1.4);
-  request.fitted_on = {keys_[1]};
+  request.fitted_on = {keys_[0]};
   request.diagnosis_id = 7;
   request.origin = history::ModelOrigin::diagnosis;
   const auto adoption = adoption_->adopt(request);
@@ -53,7 +53,7 @@ TEST_F(ModelAdoptionTest, AdoptsABetterModelAndSaysWhy) {
   EXPECT_TRUE(adoption->adopted) << adoption->refusal;
   EXPECT_EQ(adoption->version, 2);
   EXPECT_EQ(adoption->previous_version, 1);
-  EXPECT_EQ(adoption->tested_on, (std::vector<history::MissionKey>{keys_[0], keys_[2], keys_[3]}));
+  EXPECT_EQ(adoption->tested_on, (std::vector<history::MissionKey>{keys_[1], keys_[2], keys_[3]}));
   EXPECT_EQ(adoption->left_out.excepted, 1U);
   EXPECT_GT(adoption->test.error_before, 0.05);
   EXPECT_LT(adoption->test.error_after, 0.005);
@@ -67,8 +67,8 @@ TEST_F(ModelAdoptionTest, AdoptsABetterModelAndSaysWhy) {
   EXPECT_EQ(evidence["diagnosis_id"], 7);
   EXPECT_EQ(evidence["forced"], false);
   EXPECT_EQ(evidence["back_test"]["missions"].size(), 3U);
-  EXPECT_EQ(evidence["back_test"]["missions"][0]["mission_id"], "m0");
-  EXPECT_EQ(evidence["back_test"]["missions"][0]["id"], keys_[0]);
+  EXPECT_EQ(evidence["back_test"]["missions"][0]["mission_id"], "m1");
+  EXPECT_EQ(evidence["back_test"]["missions"][0]["id"], keys_[1]);
   ASSERT_EQ(events().size(), 1U);
   EXPECT_EQ(events()[0].kind, "model_adopted");
 }
