@@ -91,6 +91,15 @@ void print_one(const json& a) {
   if (const double sd = number(a, "state_of_charge_sd"); sd > 0) fmt::print(" +- {}", percent(sd));
   fmt::print(", reserve {}, {} J to spend\n", percent(number(a, "reserve_fraction")),
              figure(number(a, "usable_energy_j")));
+  const double to_full_s = number(a, "time_to_charged_s");
+  if (a["charging"].is_string() && a["charging"] == "full") {
+    fmt::print("At the charger, full.\n");
+  } else if (a["charging"].is_string()) {
+    fmt::print("Charging: full in {} +- {}.\n", span(to_full_s), span(number(a, "time_to_charged_sd_s")));
+  } else if (std::isfinite(to_full_s)) {
+    fmt::print("A charger would fill it in {} +- {}.\n", span(to_full_s),
+               span(number(a, "time_to_charged_sd_s")));
+  }
   const json& c = a["consumption"];
   const std::string basis = c.value("basis", "");
   fmt::print("Driving {} at {} m/s with {} kg: {} J/m, {} W; ", driving.value("kind", ""),

@@ -76,6 +76,18 @@ void write_outlook(JsonWriter& json, const forecast::Outlook& outlook, const Aut
   json.end_object();
 }
 
+// What a charger does to the battery now, and how long it would take to fill it from here.
+void write_charging(JsonWriter& json, const Autonomy& a, const server::RobotSnapshot* live) {
+  using battery::ChargingPhase;
+  const bool known = live != nullptr && a.charge_is_live;
+  const ChargingPhase phase = known ? live->charge.phase : ChargingPhase::none;
+  json.key("charging");
+  phase == ChargingPhase::none || phase == ChargingPhase::suspected ? json.null()
+                                                                    : json.value(battery::name(phase));
+  json.field("time_to_charged_s", known ? live->charge.to_full.duration_s : telemetry::unmeasured);
+  json.field("time_to_charged_sd_s", known ? live->charge.to_full.sd_s : telemetry::unmeasured);
+}
+
 void write_minimum_energy(JsonWriter& json, const Autonomy& a) {
   json.key("minimum_energy");
   if (!a.minimum_energy_outlook || !a.outlook) {
@@ -247,6 +259,7 @@ std::string autonomy_json(const Autonomy& a, const AutonomyRequest& request,
   json.field("robot_id", robot.model->robot.robot_id).field("model_version", robot.model->version);
   json.field("state_of_charge", a.charge.fraction).field("state_of_charge_sd", a.charge.deviation);
   json.field("reserve_fraction", a.charge.reserve);
+  write_charging(json, a, live);
   json.field("usable_energy_j", a.reach.usable_j).field("usable_energy_sd_j", a.reach.usable_deviation_j);
   json.field("payload_kg", a.payload_kg);
   json.key("driving").begin_object();

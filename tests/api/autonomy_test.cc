@@ -8,6 +8,8 @@
 #include <string>
 
 #include "server/api/battery_dialects.h"
+#include "server/api/robot_json.h"
+#include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
 
 namespace joulecast::api {
@@ -62,6 +64,26 @@ TEST_F(AutonomyAnswer, OfARobotAsItIs) {
   EXPECT_GT(ask({{"driving", "minimum_energy"}})["range_m"], ask({{"speed_m_s", 0.3}})["range_m"]);
 }
 
+// What the robot's state and its energy state on LCM tell is this answer, not another one.
+TEST_F(AutonomyAnswer, IsWhatTheLiveStateTells) {
+  testing::PipelineHarness harness;
+  server::Forecasts forecasts(*harness.store);
+  live_.charge.estimate.sd = 0.02;
+  for (const double payload_kg : {2.0, 5.0, 2.0}) {
+    live_.sample.payload_kg = payload_kg;
+    const json a = ask(json::object());
+    const forecast::Reach reach = forecasts.reach(robot_.model, live_);
+    EXPECT_EQ(reach.range_m[1], a["range_m"]);
+    EXPECT_EQ(reach.range_m[0], a["range_quantiles_m"]["p05"]);
+    EXPECT_EQ(reach.run_time_s[2], a["run_time_quantiles_s"]["p95"]);
+    JsonWriter state;
+    write_state(state, live_, reach, 1);
+    EXPECT_EQ(json::parse(state.take())["range_quantiles_m"], a["range_quantiles_m"]);
+  }
+  live_.state_of_charge = std::nan("");
+  EXPECT_TRUE(std::isnan(forecasts.reach(robot_.model, live_).range_m[1]));
+}
+
 TEST_F(AutonomyAnswer, OfATaskListEndsAtTheCharger) {
   json tasks = json::array();
   for (int k = 0; k < 4; ++k)
@@ -104,6 +126,17 @@ TEST_F(AutonomyAnswer, TheFiltersUncertaintyOfTheChargeCounts) {
   EXPECT_EQ(a["state_of_charge_sd"], 0.03);
   EXPECT_GT(a["usable_energy_sd_j"], 0);
   EXPECT_EQ(ask({{"state_of_charge", 0.62}})["state_of_charge_sd"], 0);
+}
+
+TEST_F(AutonomyAnswer, TellsHowLongACharger) {
+  EXPECT_TRUE(ask(json::object())["charging"].is_null());
+  live_.charge.phase = battery::ChargingPhase::taper;
+  live_.charge.to_full = {1800, 200};
+  const json a = ask(json::object());
+  EXPECT_EQ(a["charging"], "taper");
+  EXPECT_EQ(a["time_to_charged_s"], 1800);
+  EXPECT_EQ(a["time_to_charged_sd_s"], 200);
+  EXPECT_TRUE(ask({{"state_of_charge", 0.3}})["time_to_charged_s"].is_null());  // of another charge
 }
 
 TEST_F(AutonomyAnswer, PathAndDistanceAreOneTask) {
