@@ -112,16 +112,17 @@ def metered(programs, robot_file, log, name):
 
 def task_of(motion, samples):
     """A stretch of one kind of motion, (dt, speed, yaw rate) each, as a task that states its pace."""
-    whole = lambda values: sum(dt * v for (dt, _, _), v in zip(samples, values))
-    top = lambda values: max(abs(v) for v in values)
-    steepest = lambda values: max(abs(b - a) / dt for a, b, (dt, _, _) in zip(values, values[1:], samples[1:]))
-    speeds, rates = [s[1] for s in samples], [s[2] for s in samples]
-    way, turned = whole(speeds), whole(rates)
+    duration_s = sum(dt for dt, _, _ in samples)
+    way, turned = sum(dt * v for dt, v, _ in samples), sum(dt * w for dt, _, w in samples)
     if motion == "stand" or len(samples) < 3:
-        return {"dwell_s": sum(s[0] for s in samples)}
+        return {"dwell_s": duration_s}
+    # A trapezoid of cruise v takes way / v + v / acceleration.
+    ramp_s = lambda way, top: max(0.02, duration_s - way / top)
     if motion == "turn":
-        return {"turn_rad": turned, "yaw_rate_rad_s": top(rates), "yaw_acceleration_rad_s2": steepest(rates)}
-    pace = {"speed_m_s": top(speeds), "acceleration_m_s2": steepest(speeds)}
+        top = max(abs(w) for _, _, w in samples)
+        return {"turn_rad": turned, "yaw_rate_rad_s": top, "yaw_acceleration_rad_s2": top / ramp_s(abs(turned), top)}
+    top = max(abs(v) for _, v, _ in samples)
+    pace = {"speed_m_s": top, "acceleration_m_s2": top / ramp_s(way, top)}
     if abs(turned) < 0.3:
         return {"distance_m": way, **pace}
     return {"path": [{"kind": "arc", "radius_m": way / abs(turned), "angle_rad": turned}], **pace}
