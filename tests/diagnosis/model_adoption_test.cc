@@ -91,7 +91,8 @@ TEST_F(ModelAdoptionTest, TestsOnTheRobotAsItIsSinceItChanged) {
   for (int number = 4; number < 8; ++number) keys_.push_back(drive(harness_, worn, number));
   AdoptionRequest request = candidate(2);
   request.dry_run = true;
-  request.fitted_on = {keys_[0], keys_[4], keys_[5]};  // two are left since the change, too few: all are asked
+  request.fitted_on = {keys_[0], keys_[4],
+                       keys_[5]};  // two are left since the change, too few: all are asked
   EXPECT_EQ(adoption_->adopt(request)->tested_on.size(), 5U);
   request.dry_run = false;
   request.fitted_on.clear();
