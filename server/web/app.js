@@ -10,7 +10,7 @@ ${n>0&&ee`<span class="note" title=${s}> · ${W(n)} faulty</span>`}`}function he
 <td class="figure range"><${re} live=${l.range_m} band=${s} /></td>
 <td class="figure wide">${X(l.run_time_s)}</td>
 <td class="figure wide"><${m} of=${q(l.speed_m_s,"m/s",2)} /></td>
-<td class="mission">${l.mission?ee`<a href=${h(l.mission.id)}>${l.mission.mission_id}</a>`:ee`<span class="note">idle</span>`}</td>
+<td class="mission">${l.mission?ee`<a href=${h(l.mission.id)} title=${l.mission.mission_id}>${((e,t)=>e.startsWith(`${t}-`)?e.slice(t.length+1):e)(l.mission.mission_id,e.id)}</a>`:ee`<span class="note">idle</span>`}</td>
 <td class="figure spent"><${m} of=${J(l.mission?.energy.battery_j)} /></td>
 </tr>`}};function pe({robots:e}){let[t,a,n,s,l,r,o,i]=[0,0,0,0,null,!1,0,0];for(let{state:d}of e.values()){let e=d.measured_power_w??d.modelled_power_w;d.live&&(a+=1,null!==d.charging?(o+=1,i-=Math.min(0,d.measured_power_w??0)):null!==e&&(t+=e,r=!0)),null!==d.mission&&(n+=1,s+=d.mission.energy.battery_j),null!==d.state_of_charge&&(null===l||d.state_of_charge<l.state_of_charge)&&(l=d)}return ee`<dl class="readouts">
 <${p} large label="Fleet power" of=${r?U(t):{n:"–",u:""}} channel="measured" />

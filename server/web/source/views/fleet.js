@@ -91,6 +91,9 @@ export function Charge({ state }) {
     <${Quantity} of=${format.percent(share)} /><span class="below" title=${what}>${text}</span>`;
 }
 
+// Missions that are named after their robot need not say so in its row.
+const own_part = (mission_id, robot_id) => (mission_id.startsWith(`${robot_id}-`) ? mission_id.slice(robot_id.length + 1) : mission_id);
+
 class Row extends Component {
   shouldComponentUpdate(next) {
     return next.revision !== this.props.revision || next.entry !== this.props.entry || next.index !== this.props.index || next.dark !== this.props.dark || next.band !== this.props.band;
@@ -107,7 +110,7 @@ class Row extends Component {
       <td class="figure range"><${Range} live=${s.range_m} band=${band} /></td>
       <td class="figure wide">${format.about(s.run_time_s)}</td>
       <td class="figure wide"><${Quantity} of=${format.unit(s.speed_m_s, 'm/s', 2)} /></td>
-      <td class="mission">${s.mission ? html`<a href=${mission_link(s.mission.id)}>${s.mission.mission_id}</a>` : html`<span class="note">idle</span>`}</td>
+      <td class="mission">${s.mission ? html`<a href=${mission_link(s.mission.id)} title=${s.mission.mission_id}>${own_part(s.mission.mission_id, entry.id)}</a>` : html`<span class="note">idle</span>`}</td>
       <td class="figure spent"><${Quantity} of=${format.energy(s.mission?.energy.battery_j)} /></td>
     </tr>`;
   }
