@@ -303,9 +303,10 @@ void add_autonomy(CLI::App& program, Exit& exit) {
               {{"--charge", "state_of_charge", "state of charge instead of the live one, 0 to 1"},
                {"--charge-sd", "state_of_charge_sd", "its standard deviation"},
                {"--reserve", "reserve_fraction", "charge to keep instead of the robot file's, 0 to 1"},
-               {"--payload", "payload_kg", "kg carried now"},
+               {"--payload", "payload_kg", "what the robot carries now, kg"},
                {"--speed", "speed_m_s", "m/s that the plan states, instead of the robot's habit"},
-               {"--confidence", "confidence", "of the latest departure to the charger, 0.01 to 0.999"}});
+               {"--confidence", "confidence",
+                "how sure the latest departure to the charger shall be, 0.01 to 0.999"}});
   options->texts = {{"driving", std::nullopt}, {"dialect", std::nullopt}};
   command->add_option("--driving", options->texts[0].second, "usual, or by minimum-energy profiles")
       ->check(CLI::IsMember({"usual", "minimum_energy"}));

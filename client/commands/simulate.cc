@@ -381,7 +381,7 @@ void add_simulate(CLI::App& program, Exit& exit) {
   command->add_option("--missions", options->missions, "missions of each robot; 0 = without end")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_option("--mission-duration", options->mission_duration_s, "of one mission, about, s")
+  command->add_option("--mission-duration", options->mission_duration_s, "about how long a mission takes, s")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->add_option("--effect", options->effects,
@@ -390,7 +390,9 @@ void add_simulate(CLI::App& program, Exit& exit) {
   command->add_option("--scatter", options->scatter, "size of the differences between missions, 0 = none")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_option("--jitter", options->jitter, "of the sampling instant, part of the period")
+  command
+      ->add_option("--jitter", options->jitter,
+                   "how far sampling strays from its instant, part of the period")
       ->check(CLI::Range(0.0, 0.45))
       ->capture_default_str();
   command->add_option("--loss", options->loss, "probability that a sample is lost")
@@ -406,14 +408,15 @@ void add_simulate(CLI::App& program, Exit& exit) {
       ->capture_default_str();
   command
       ->add_option("--charge-below", options->charge_below,
-                   "charge, 0 to 1, under which a robot charges between missions; 0 = packs are exchanged")
+                   "charge under which a robot charges between missions; 0 = packs are exchanged")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   command
-      ->add_option("--charge-rate", options->charge_rate_per_h, "of chargers, part of the capacity an hour")
+      ->add_option("--charge-rate", options->charge_rate_per_h,
+                   "how fast chargers are, part of the capacity an hour")
       ->check(CLI::Range(0.05, 10.0))
       ->capture_default_str();
-  command->add_option("--initial-charge", options->initial_charge, "charge at the beginning, 0 to 1")
+  command->add_option("--initial-charge", options->initial_charge, "charge at the beginning")
       ->check(CLI::Range(0.05, 1.0))
       ->capture_default_str();
   command->add_flag("--manoeuvre", options->manoeuvre,
