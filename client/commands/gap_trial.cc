@@ -18,7 +18,7 @@ struct Options {
   trial::RunSettings run;
   std::string only;
   std::string channels = "mixed";
-  std::string keep;
+  std::string keep, again;
   bool json = false;
   bool usual_plant = false;
 };
@@ -43,6 +43,8 @@ Exit run(Options& options) {
                                                : trial::ChannelChoice::mixed;
   t.vary_plant = !options.usual_plant;
   options.run.keep = options.keep;
+  options.run.again = !options.again.empty();
+  if (options.run.again) options.run.keep = options.again;
   std::size_t finished = 0;
   options.run.done = [&](const trial::CaseOutcome& outcome) { show(outcome, ++finished, t.count); };
 
@@ -87,6 +89,11 @@ void add_gap_trial(CLI::App& gap, Exit& exit) {
   command->add_flag("--compare", options->run.compare,
                     "judge every log by simpler methods too, and with each part of the method left out");
   command->add_option("--keep", options->keep, "folder that keeps robot files, logs and truths of all cases");
+  command
+      ->add_option(
+          "--again", options->again,
+          "judge the first --count cases that an earlier --keep left in this folder; nothing is drawn")
+      ->excludes("--keep");
   command->add_flag("--json", options->json, "print scores and cases as JSON");
   command->callback([options, &exit] { exit = run(*options); });
 }

@@ -49,7 +49,7 @@ Result<CaseOutcome> run_case(const RunSettings& settings, const std::filesystem:
 
   CaseOutcome outcome;
   outcome.index = index;
-  const auto digest = drive_case(draw_case(settings.trial, index), files);
+  const auto digest = settings.again ? digest_of(files) : drive_case(draw_case(settings.trial, index), files);
   if (!digest) return tl::unexpected<Error>(digest.error());
   outcome.digest = *digest;
 

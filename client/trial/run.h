@@ -14,6 +14,7 @@ struct RunSettings {
   TrialSettings trial;
   std::size_t jobs = 1;
   std::filesystem::path keep;  // folder that takes robot files, logs and truths; empty: all are removed
+  bool again = false;          // judge the cases that `keep` holds already; nothing is drawn or driven
   bool compare = false;        // judge every log by the baselines and with each part of the method left out
   std::function<void(const CaseOutcome&)> done;  // called after each case, by one thread at a time
 };

@@ -207,7 +207,8 @@ class Workshop {
 bool meets_needs(std::string_view id, const vr::SimulationSpec& spec) {
   // Where the robot is not localised nothing can tell a place from a time.
   const bool place = id == "floor_resistance_zone" || id == "slope" || id == "x_radio_zone" ||
-                     id == "x_heading_load" || id == "wheel_slip" || id == "wheel_radius_error";
+                     id == "x_heading_load" || id == "x_floor_patches" || id == "wheel_slip" ||
+                     id == "wheel_radius_error";
   return spec.sensors.pose || !place;
 }
 

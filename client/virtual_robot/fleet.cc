@@ -16,6 +16,7 @@ World draw_world(Rng& rng, double map_half_width_m) {
   world.thermal_time_constant_s = rng.uniform(150, 400);
   world.period_s = rng.uniform(12, 40);
   world.burst_time_s = rng.uniform(10, 30);
+  world.patch_m = rng.uniform(0.7, 2.2);
   return world;
 }
 

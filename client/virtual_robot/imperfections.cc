@@ -49,6 +49,13 @@ constexpr auto table = std::to_array<EffectEntry>({
     {"x_heading_load", &I::x_heading_load, "W", 600, true},
     {"x_sag_load", &I::x_sag_load, "W", 600, true},
     {"x_cold_bearing", &I::x_cold_bearing, "1", 30, true},
+    {"x_cold_grease", &I::x_cold_grease, "1", 60, true},
+    {"x_brake_drag", &I::x_brake_drag, "1", 12, true},
+    {"x_oval_wheel", &I::x_oval_wheel, "1", 12, true},
+    {"x_floor_patches", &I::x_floor_patches, "1", 0.3, true},
+    {"x_payload_speed", &I::x_payload_speed, "1", 0.6, true},
+    {"x_turn_lamp", &I::x_turn_lamp, "W", 600, true},
+    {"x_warm_fan", &I::x_warm_fan, "1", 5, true},
 });
 
 }  // namespace

@@ -61,6 +61,13 @@ struct Imperfections {
   double x_heading_load = 0;   // W (1 + cos(heading - World::slope_direction_rad)) / 2
   double x_sag_load = 0;       // W per 1 % of battery sag
   double x_cold_bearing = 0;   // of T_m, decays from the mission's start with World::burst_time_s
+  double x_cold_grease = 0;    // of T_m at the speed limit; T ~ w, decays like the cold bearing's
+  double x_brake_drag = 0;     // of T_m, while a brake holds: irregular spells of some World::period_s / 3
+  double x_oval_wheel = 0;     // of T_m, T_m c sin(theta): the axle rises and falls once a turn
+  double x_floor_patches = 0;  // F = c m g (1 + sin(k x) sin(k y)) / 2, k = pi / World::patch_m
+  double x_payload_speed = 0;  // F = c m_p g |v| / v_max: tyres that flex under load
+  double x_turn_lamp = 0;      // W while the robot turns
+  double x_warm_fan = 0;       // W per W of motor power, low-passed with World::burst_time_s
 };
 
 // Shapes that the strengths do not say.
@@ -75,6 +82,7 @@ struct World {
   double thermal_time_constant_s = 240;
   double period_s = 24;
   double burst_time_s = 20;
+  double patch_m = 1.2;
   double brush_softness = 1;  // of the current over which the brush drop builds up
   double motor_sensor_share = 1, battery_sensor_share = 1;  // of gains and biases of electrical sensors
 };

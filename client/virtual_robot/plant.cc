@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numbers>
 
 namespace joulecast::virtual_robot {
 namespace {
@@ -12,6 +13,7 @@ constexpr double payload_yaw_m2 = 0.02;  // yaw inertia of a kilogram of payload
 constexpr double copper_per_kelvin = 0.00393;
 constexpr double scrub_rate_rad_s = 0.02;          // yaw rate at which the tyres have built up their moment
 constexpr double gear_speed_rad_s = 0.05;          // wheel speed at which mesh losses have built up
+constexpr double turning_rad_s = 0.1;              // slowest yaw rate that counts as turning
 constexpr double zone_edge_m = 0.10;               // width over which a wheel enters the zone
 constexpr double shortest_electrical_s = 1e-4;     // a file without inductance still has some
 constexpr std::array<double, 2> sides{1.0, -1.0};  // right turns the robot left
@@ -89,6 +91,7 @@ void Plant::update_inertia() {
       robot_.yaw_inertia_kg_m2 * (1 + effect_.yaw_inertia_error) + payload_yaw_m2 * payload_kg_;
   coupling_kg_m_ = chassis_kg * (robot_.com_offset_m + effect_.com_offset);
   payload_floor_n_ = effect_.load_rolling_resistance * payload_kg_ * gravity_m_s2;
+  payload_flex_n_s_m_ = effect_.x_payload_speed * payload_kg_ * gravity_m_s2 / robot_.speed_limit_m_s;
 
   // Kinetic energy with v = (a1 w1 + a2 w2)/2 and yaw rate = (a1 w1 - a2 w2)/(2 l) is half w' M w.
   const double sum = 0.25 * inertial_mass_kg_;
@@ -103,6 +106,17 @@ void Plant::update_inertia() {
 double Plant::zone_share(double x_m, double y_m) const {
   const double inside_m = world_.zone_radius_m - std::hypot(x_m - world_.zone_x_m, y_m - world_.zone_y_m);
   return std::clamp(0.5 + inside_m / zone_edge_m, 0.0, 1.0);
+}
+
+double Plant::patch_share(double x_m, double y_m) const {
+  const double k = std::numbers::pi / world_.patch_m;
+  return 0.5 * (1 + std::sin(k * x_m) * std::sin(k * y_m));
+}
+
+// Two periods that never meet again, so that no clock foretells the spells.
+bool Plant::brake_holds() const {
+  const double turn = 2 * std::numbers::pi * time_s_ / world_.period_s;
+  return std::sin(turn) + std::sin(std::numbers::sqrt2 * 1.7 * turn) > 0.3;
 }
 
 double Plant::driver_power_w(double motor_power_w) const {
@@ -141,10 +155,14 @@ Plant::Rates Plant::rates(const PlantState& s, const std::array<double, 2>& volt
   if (effect_.floor_resistance_zone != 0) {
     floor_n += effect_.floor_resistance_zone * weight_n_ * zone_share(s.x_m, s.y_m);
   }
+  if (effect_.x_floor_patches != 0)
+    floor_n += effect_.x_floor_patches * weight_n_ * patch_share(s.x_m, s.y_m);
+  floor_n += payload_flex_n_s_m_ * std::abs(v);
   double dry_factor = 1;
   if (effect_.x_cold_bearing != 0) {
     dry_factor += effect_.x_cold_bearing * std::exp(-time_since_start_s_ / world_.burst_time_s);
   }
+  if (effect_.x_brake_drag != 0 && brake_holds()) dry_factor += effect_.x_brake_drag;
 
   std::array<double, 2> net_nm{};
   for (std::size_t side : {0u, 1u}) {
@@ -158,7 +176,13 @@ Plant::Rates Plant::rates(const PlantState& s, const std::array<double, 2>& volt
     const double floor_nm = 0.5 * floor_n * arm_m_[side];
     const double bend_rate = bristle_.bend_rate(s.bend[side], w);
     const double ratio = Bristle::torque_ratio(s.bend[side], bend_rate, w);
-    const double internal_nm = dry_nm * ratio + viscous_nm_s_rad_ * w + cubic_nm_s3_rad3_ * w * w * w;
+    double internal_nm = dry_nm * ratio + viscous_nm_s_rad_ * w + cubic_nm_s3_rad3_ * w * w * w;
+    if (effect_.x_cold_grease != 0) {
+      internal_nm += effect_.x_cold_grease * dry_nm_[side] * w * robot_.wheel_radius_m /
+                     robot_.speed_limit_m_s * std::exp(-time_since_start_s_ / world_.burst_time_s);
+    }
+    if (effect_.x_oval_wheel != 0)
+      internal_nm += effect_.x_oval_wheel * dry_nm_[side] * std::sin(s.wheel_angle_rad[side]);
 
     // What the gear passes on, after friction ahead of it: driving x = tau (1 + a), braking x = tau (1 - a).
     const double motor_nm = torque_per_a_ * i;
@@ -226,6 +250,8 @@ void Plant::advance(const std::array<double, 2>& voltage_v, double step_s) {
   move_weighted(state_, a.state, b.state, c.state, d.state, step_s);
   move_weighted(accounts_, a.power, b.power, c.power, d.power, step_s);
   time_since_start_s_ += step_s;
+  time_s_ += step_s;
+  warmth_w_ += (std::abs(motor_power_w(voltage_v)) - warmth_w_) * step_s / world_.burst_time_s;
 }
 
 double Plant::speed_m_s() const {
@@ -280,7 +306,8 @@ double Plant::outside_load_w() const {
   if (effect_.x_heading_load != 0) {
     load_w += effect_.x_heading_load * 0.5 * (1 + std::cos(state_.heading_rad - world_.slope_direction_rad));
   }
-  return load_w;
+  if (std::abs(yaw_rate_rad_s()) > turning_rad_s) load_w += effect_.x_turn_lamp;
+  return load_w + effect_.x_warm_fan * warmth_w_;
 }
 
 }  // namespace joulecast::virtual_robot

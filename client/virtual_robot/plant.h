@@ -74,7 +74,7 @@ class Plant {
   double bus_power_w(const std::array<double, 2>& voltage_v) const;    // drawn by the drivers
   double stored_energy_j() const;                                      // kinetic and magnetic
   std::array<double, 2> copper_power_w() const;
-  // Electrical loads that follow where the robot is, how it heads and how long it has been under way.
+  // Electrical loads that follow where the robot is, how it moves and how long it has been under way.
   double outside_load_w() const;
 
  private:
@@ -82,6 +82,8 @@ class Plant {
   Rates rates(const PlantState& s, const std::array<double, 2>& voltage_v) const;
   double driver_power_w(double motor_power_w) const;
   double zone_share(double x_m, double y_m) const;
+  double patch_share(double x_m, double y_m) const;
+  bool brake_holds() const;
   void update_inertia();
 
   RobotParameters robot_;
@@ -95,6 +97,8 @@ class Plant {
   double payload_kg_ = 0;     // true one
   double undeclared_kg_ = 0;  // of it, on this mission
   double time_since_start_s_ = 0;
+  double time_s_ = 0;              // since the plant was made
+  double warmth_w_ = 0;            // motor power, low-passed
   std::array<double, 2> arm_m_{};  // travel of the body per wheel angle, slip included
   double half_track_m_ = 0;
   double torque_per_a_ = 0;   // K_t n
@@ -111,6 +115,7 @@ class Plant {
   double viscous_nm_s_rad_ = 0;
   double cubic_nm_s3_rad3_ = 0;
   double payload_floor_n_ = 0;
+  double payload_flex_n_s_m_ = 0;
   double longest_step_s_ = 0;
 };
 

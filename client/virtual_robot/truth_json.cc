@@ -48,7 +48,8 @@ std::string truth_json(const std::vector<Truth>& truths) {
                         {"emf_loss_share", w.emf_loss_share},
                         {"thermal_time_constant_s", w.thermal_time_constant_s},
                         {"period_s", w.period_s},
-                        {"burst_time_s", w.burst_time_s}}},
+                        {"burst_time_s", w.burst_time_s},
+                        {"patch_m", w.patch_m}}},
                       {"missions", missions}});
   }
   return json{{"robots", robots}}.dump(2) + "\n";

@@ -44,7 +44,9 @@ INSTANTIATE_TEST_SUITE_P(
         Expected{"current_sensor_bias", 0.1}, Expected{"voltage_sensor_gain", 0.05},
         Expected{"x_radio_zone", 10}, Expected{"x_periodic_load", 10}, Expected{"x_cogging", 0.5},
         Expected{"x_start_burst", 20}, Expected{"x_speed_cubed", 1}, Expected{"x_heading_load", 10},
-        Expected{"x_sag_load", 10}, Expected{"x_cold_bearing", 1}),
+        Expected{"x_sag_load", 10}, Expected{"x_cold_bearing", 1}, Expected{"x_cold_grease", 2},
+        Expected{"x_brake_drag", 1}, Expected{"x_floor_patches", 0.03}, Expected{"x_payload_speed", 0.1},
+        Expected{"x_turn_lamp", 20}, Expected{"x_warm_fan", 0.3}),
     [](const auto& effect) { return std::string(effect.param.id); });
 
 TEST_P(CostlyEffect, CostsEnergyAndMoreOfItCostsMore) {
@@ -64,16 +66,17 @@ TEST_P(CostlyEffect, CostsEnergyAndMoreOfItCostsMore) {
 }
 
 TEST(Effects, EveryEffectOfTheTableIsCostlyOrHasATestOfItsOwn) {
-  constexpr std::array<std::string_view, 8> others{"slope",
+  constexpr std::array<std::string_view, 9> others{"slope",
                                                    "com_offset",
                                                    "inductance",
                                                    "battery_resistance",
                                                    "wheel_radius_error",
                                                    "wheel_radius_asymmetry",
                                                    "track_error",
-                                                   "sensor_delay"};
-  // 32 costly ones above.
-  EXPECT_EQ(effect_table().size(), 32 + others.size());
+                                                   "sensor_delay",
+                                                   "x_oval_wheel"};
+  // 38 costly ones above.
+  EXPECT_EQ(effect_table().size(), 38 + others.size());
   for (const auto id : others) {
     EXPECT_TRUE(std::any_of(effect_table().begin(), effect_table().end(), [&](const auto& e) {
       return e.id == id;

@@ -73,6 +73,10 @@ TEST_P(PlantOfKind, ElectricalWorkIsLossesPlusStoredEnergy) {
   every.wheel_slip = 0.03;
   every.x_cogging = 0.3;
   every.x_speed_cubed = 0.5;
+  every.x_cold_grease = 0.5;
+  every.x_oval_wheel = 0.3;
+  every.x_floor_patches = 0.01;
+  every.x_payload_speed = 0.02;
   World world;
   world.emf_loss_share = 0.5;
   Plant plant(robot, every, world);
