@@ -78,6 +78,11 @@ constexpr auto extra_count = static_cast<std::size_t>(Extra::count);
 
 }  // namespace
 
+std::optional<double> usual_strength(std::string_view effect) {
+  const Expectation* known = expectation_of(effect);
+  return known == nullptr ? std::nullopt : std::optional(known->most);
+}
+
 void Shapes::narrow(const ActiveEffect& effect, double wheel_radius_m, double factor) {
   const std::string_view id = effect.effect->info().id;
   const double at = effect.values[1];
@@ -200,7 +205,7 @@ void ColumnSet::add_effect(const Effect& effect, EffectValues<double> values, st
   h.parameter = parameter;
   h.columns = {columns_.size()};
   const auto& info = effect.info().parameters[parameter];
-  h.nonnegative = info.minimum >= 0 || effect.info().id == "wheel_slip";
+  h.nonnegative = info.minimum >= 0 || effect.info().id == "wheel_slip" || effect.info().id == "sensor_delay";
   h.log_prior = effect_log_prior - std::log(variants);
   const std::string_view id = effect.info().id;
   h.one_shape = id == "turning_scrub" || id == "stribeck_friction" || id == "winding_temperature";
@@ -398,6 +403,12 @@ void ColumnSet::scale(std::span<const Window> windows, double gap_share) {
         c.tolerance =
             std::hypot(0.006 * robot_.idle_power_w, (0.0005 + discrepancy * gap_share) * mean_power_w_);
         c.scatter = 0.008 * robot_.idle_power_w;
+      }
+      // Shapes of one effect are nearly one column: together they are off by what one of them may be.
+      if (h.one_shape) {
+        const auto shapes = std::ranges::count_if(
+            hypotheses_, [&](const Hypothesis& other) { return other.effect.effect == h.effect.effect; });
+        c.tolerance /= std::sqrt(static_cast<double>(shapes));
       }
       if (!std::isfinite(c.tolerance)) c.tolerance = 1e-3;
       if (!std::isfinite(h.expected)) h.expected = 1;

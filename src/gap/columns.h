@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "dynamics/catalogue.h"
@@ -36,6 +37,10 @@ struct Hypothesis {
     return outside() ? "outside:" + channel + ":" + variable : std::string(effect.effect->info().id);
   }
 };
+
+// The strength that is expected of an effect where it is there, however little power that moves; nothing
+// where power alone says it.
+std::optional<double> usual_strength(std::string_view effect);
 
 // A chosen effect in the coordinates of its hypothesis: (strength), or for slope (angle cos, angle sin).
 struct Chosen {

@@ -3,54 +3,34 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <random>
 
 #include "gap/fit.h"
+#include "gap/held_out.h"
 #include "gap/next_drive.h"
+#include "gap/posterior.h"
 #include "gap/power_gap.h"
+#include "gap/ripple.h"
 #include "gap/where.h"
 
 namespace joulecast::gap {
 namespace {
 
-// An effect or an outside family that moves less than this share of the mean power is no finding.
-constexpr double least_effect_share = 0.011;
-constexpr double least_outside_share = 0.012;
-constexpr double least_outside_part = 0.2;     // and than this part of the gap
 constexpr double least_necessary_part = 0.05;  // of the gap, that comes back when an effect is left out
 constexpr double alternative_odds = 0.04;
 constexpr std::size_t most_alternatives = 2;
 constexpr std::size_t fewest_windows = 40;
-constexpr double bootstrap_block_s = 10;
-constexpr int bootstrap_draws = 400;
 constexpr double settled_delay_s = 0.006;
 constexpr int most_delay_rounds = 4;
-constexpr double largest_unexplained_share = 0.016;
+// Of the mean power, beyond the noise floor: what may be left over while nothing is named, and beside names
+// with a part of the gap. Robots as filed left at most 0.008 in development trials, right names 0.02.
+constexpr double largest_unnamed_share = 0.012;
+constexpr double largest_left_share = 0.014, largest_left_part = 0.1;
 constexpr double least_deviations = 1.64;
 constexpr double most_outside = 0.3;     // posterior of something unknown beside a sure finding
 constexpr double surest_verdict = 0.97;  // what verdicts of posterior 1 came true in development trials
 constexpr double formula_accuracy = 0.015;
 constexpr double largest_gap_share = 0.12;  // to which the trust in formulas is scaled
 constexpr double calibration_share = 0.5;
-
-// How large a coefficient is beside what a robot as filed may have.
-bool beyond_tolerance(const ColumnSet& columns, const Evidence::Estimate& estimate, const Hypothesis& h) {
-  double size = 0;
-  for (const std::size_t j : h.columns) {
-    size = std::max(size,
-                    std::fabs(estimate.mean[static_cast<Eigen::Index>(j)]) / columns.columns()[j].tolerance);
-  }
-  return size > 2.5;
-}
-
-// Whether an effect has to show in battery power to be worth a name. These are seen by other channels (gyro,
-// map, battery voltage, the shape of transients) however little power they move.
-bool shows_in_power(std::string_view id) {
-  constexpr auto elsewhere = std::to_array<std::string_view>(
-      {"wheel_radius_error", "wheel_radius_asymmetry", "track_error", "wheel_slip", "com_offset",
-       "battery_resistance", "inductance", "sensor_delay"});
-  return std::ranges::find(elsewhere, id) == elsewhere.end();
-}
 
 // A battery sensor that reads too much while the motors' are right: a load that follows the current would
 // read the same.
@@ -59,94 +39,16 @@ bool like_a_load(const Hypothesis& h) {
   return (id == "current_sensor_gain" || id == "voltage_sensor_gain") && h.effect.values[1] == 0;
 }
 
-// Explanations with what does not matter taken out, and the odds of those that become the same added up.
-struct Posterior {
-  std::map<std::vector<std::size_t>, double> sets;  // probability
-  double none = 0, outside = 0;
-
-  double of_effect(const ColumnSet& columns, const dynamics::Effect* effect) const {
-    double p = 0;
-    for (const auto& [set, probability] : sets) {
-      if (std::ranges::any_of(
-              set, [&](std::size_t h) { return columns.hypotheses()[h].effect.effect == effect; })) {
-        p += probability;
-      }
-    }
-    return p;
-  }
-};
-
-constexpr double leading = 14;  // explanations this far below the best in log odds are let go
-
-// Whether an outside family bends an effect along the variable that the effect itself follows: a departure of
-// its shape (a square zone for a round one), not something else.
-bool bends(const Hypothesis& family, const Hypothesis& effect) {
-  struct Bend {
-    std::string_view effect, channel, variable;
-  };
-  constexpr auto bends =
-      std::to_array<Bend>({{"floor_resistance_zone", "wheel_torque", "position"},
-                           {"slope", "wheel_torque", "heading"},
-                           {"slope", "wheel_torque", "position"},
-                           {"stribeck_friction", "wheel_torque", "speed"},
-                           {"turning_scrub", "wheel_torque", "yaw_rate"},
-                           {"gear_efficiency", "wheel_torque", "acceleration"},
-                           {"load_rolling_resistance", "wheel_torque", "payload"},
-                           {"brush_drop", "motor_voltage", "current"},
-                           {"winding_temperature", "motor_voltage", "time"},
-                           {"no_regeneration", "battery_power_from_motors", "acceleration"},
-                           {"driver_loss", "battery_power_from_motors", "speed"},
-                           {"floor_resistance_zone", "battery_power_from_motion", "position"},
-                           {"slope", "battery_power_from_motion", "heading"},
-                           {"turning_scrub", "battery_power_from_motion", "yaw_rate"},
-                           {"no_regeneration", "battery_power_from_motion", "acceleration"}});
-  return std::ranges::any_of(bends, [&](const Bend& b) {
-    return b.effect == effect.id() && b.channel == family.channel && b.variable == family.variable;
-  });
-}
-
-Posterior posterior_of(const Fit& fit, const MovedShares& moved, double gap_share) {
-  const double least_outside = std::max(least_outside_share, least_outside_part * gap_share);
-  Posterior posterior;
-  double total = 0;
-  std::size_t looked_at = 0;
-  for (const Explanation& e : fit.explanations) {
-    if (e.log_odds < fit.explanations.front().log_odds - leading || ++looked_at > 60) break;
-    const double weight = std::exp(e.log_odds - fit.explanations.front().log_odds);
-    // Families that bend an effect are taken out first: what then is left of the effect has to matter.
-    std::vector<std::size_t> straight = e.hypotheses;
-    Evidence::Estimate estimate = fit.evidence->estimate(straight);
-    std::erase_if(straight, [&](std::size_t k) {
-      const Hypothesis& h = fit.columns->hypotheses()[k];
-      return h.outside() && std::ranges::any_of(e.hypotheses, [&](std::size_t other) {
-               const Hypothesis& effect = fit.columns->hypotheses()[other];
-               return !effect.outside() && bends(h, effect) &&
-                      moved(h, estimate.mean) < moved(effect, estimate.mean);
-             });
-    });
-    if (straight.size() < e.hypotheses.size()) estimate = fit.evidence->estimate(straight);
-    std::vector<std::size_t> kept;
-    bool outside = false;
-    for (const std::size_t k : straight) {
-      const Hypothesis& h = fit.columns->hypotheses()[k];
-      const double share = moved(h, estimate.mean);
-      const bool matters = h.outside()
-                               ? share > least_outside
-                               : share > least_effect_share ||
-                                     (!shows_in_power(h.id()) && beyond_tolerance(*fit.columns, estimate, h));
-      if (!matters) continue;
-      kept.push_back(k);
-      outside = outside || h.outside();
-    }
-    posterior.sets[kept] += weight;
-    total += weight;
-    if (kept.empty()) posterior.none += weight;
-    if (outside) posterior.outside += weight;
-  }
-  for (auto& [set, p] : posterior.sets) p /= total;
-  posterior.none /= total;
-  posterior.outside /= total;
-  return posterior;
+// A strength that no robot has: at the edge where the formula ends, or far beyond what was ever expected.
+// Sets of such strengths fit what none of their members is.
+bool implausible(const dynamics::ActiveEffect& active, const robot::RobotModel& robot) {
+  constexpr double at_edge = 0.99, beyond_usual = 3, of_idle = 0.2;
+  const auto& strength = active.effect->info().parameters[0];
+  const double value = active.values[0];
+  if (strength.minimum < 0 && value <= at_edge * strength.minimum) return true;
+  if (active.effect->info().id == "accessory_load") return value < -of_idle * robot.idle_power_w;
+  const auto usual = usual_strength(active.effect->info().id);
+  return usual && std::fabs(value) > beyond_usual * *usual;
 }
 
 struct Alternative {
@@ -179,22 +81,6 @@ std::vector<Alternative> alternatives_to(const Fit& fit, const std::vector<std::
   return result;
 }
 
-std::vector<Chosen> coefficients_of(const Fit& fit, const Information& total,
-                                    const std::vector<std::size_t>& set) {
-  const Evidence evidence(*fit.columns, total);
-  const Evidence::Estimate estimate = evidence.estimate(set);
-  std::vector<Chosen> chosen;
-  for (const std::size_t h : set) {
-    if (fit.columns->hypotheses()[h].outside()) continue;
-    Chosen c{h, {}};
-    for (const std::size_t j : fit.columns->hypotheses()[h].columns) {
-      c.coefficients.push_back(estimate.mean[static_cast<Eigen::Index>(j)]);
-    }
-    chosen.push_back(std::move(c));
-  }
-  return chosen;
-}
-
 std::vector<DiagnosedParameter> parameters_of(const ColumnSet& columns, const Chosen& chosen,
                                               const Evidence::Estimate& estimate) {
   const Hypothesis& h = columns.hypotheses()[chosen.hypothesis];
@@ -218,66 +104,6 @@ std::vector<DiagnosedParameter> parameters_of(const ColumnSet& columns, const Ch
       std::hypot(parameters[h.parameter].deviation, formula_accuracy * active.values[h.parameter],
                  calibration_share * columns.columns()[h.columns[0]].tolerance);
   return parameters;
-}
-
-// Leave one mission out, fit the rest, predict it. `measured` is of these windows, `plain` and `nominal` of
-// the ones without any delay taken out.
-Shrinkage held_out(const Fit& fit, const robot::RobotModel& robot, const std::vector<std::size_t>& set,
-                   std::span<const Window> windows, std::span<const double> measured,
-                   std::span<const double> plain, std::span<const double> nominal, double floor) {
-  std::vector<double> predicted(windows.size(), missing);
-  for (std::size_t m = 0; m < fit.missions.size(); ++m) {
-    Information rest;
-    for (std::size_t k = 0; k < fit.missions.size(); ++k) {
-      if (k != m) rest += fit.missions[k];
-    }
-    if (rest.xx.size() == 0) rest = fit.total;
-    const auto effects = fit.columns->effects_of(coefficients_of(fit, rest, set));
-    const dynamics::DriveModel model = extended_model(robot, effects);
-    for (std::size_t k = 0; k < windows.size(); ++k) {
-      if (windows[k].mission == m) predicted[k] = metered_power(model, windows[k]);
-    }
-  }
-  struct Block {
-    double before = 0, after = 0, size = 0;
-  };
-  std::map<std::pair<std::size_t, int>, Block> by_time;
-  for (std::size_t k = 0; k < windows.size(); ++k) {
-    if (!std::isfinite(measured[k] + predicted[k])) continue;
-    Block& b = by_time[{windows[k].mission, static_cast<int>(windows[k].t_s / bootstrap_block_s)}];
-    b.before += std::fabs(plain[k] - nominal[k]);
-    b.after += std::fabs(measured[k] - predicted[k]);
-    b.size += std::fabs(measured[k]);
-  }
-  std::vector<Block> blocks;
-  Block sum;
-  for (const auto& [key, b] : by_time) {
-    blocks.push_back(b);
-    sum.before += b.before;
-    sum.after += b.after;
-    sum.size += b.size;
-  }
-  Shrinkage s;
-  if (blocks.empty() || sum.size <= 0 || sum.before <= 0) return s;
-  s.before = sum.before / sum.size;
-  s.after = sum.after / sum.size;
-  s.fraction = 1 - sum.after / sum.before;
-  s.remaining_over_noise_floor = floor > 0 ? s.after / floor : missing;
-  std::mt19937_64 random(20240229);
-  std::uniform_int_distribution<std::size_t> pick(0, blocks.size() - 1);
-  std::vector<double> fractions;
-  for (int draw = 0; draw < bootstrap_draws; ++draw) {
-    Block d;
-    for (std::size_t k = 0; k < blocks.size(); ++k) {
-      const Block& b = blocks[pick(random)];
-      d.before += b.before;
-      d.after += b.after;
-    }
-    fractions.push_back(1 - d.after / d.before);
-  }
-  std::ranges::sort(fractions);
-  s.interval = {fractions[bootstrap_draws / 40], fractions[bootstrap_draws - 1 - bootstrap_draws / 40]};
-  return s;
 }
 
 // Where the battery is not measured: the motors' power and the idle power of the robot file.
@@ -476,11 +302,22 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
       d.outside.follows = h.variable;
     }
   }
-  d.outside.probability = posterior.outside;
-  if (d.outside.probability < settings.report_probability) d.outside.channel = d.outside.follows = "";
-
   const std::vector<Chosen> chosen = coefficients_of(fit, fit.total, set);
   const std::vector<dynamics::ActiveEffect> effects = columns.effects_of(chosen);
+  std::optional<Ripple> ripple;
+  if (settings.parts.open_set)
+    ripple = find_ripple(recordings, robot, effects, d.motor_channels, judged.front().electrical_shift_s);
+  if (ripple && ripple->power_share < least_outside_of(gap_share)) ripple.reset();
+  if (ripple) {
+    unknown_share += ripple->power_share;
+    if (ripple->power_share > largest) {
+      d.outside.channel = name_of(d.motor_channels ? Channel::torque_right : Channel::power);
+      d.outside.follows = "wheel_angle";
+    }
+  }
+  d.outside.probability = ripple ? 1 : posterior.outside;
+  if (d.outside.probability < settings.report_probability) d.outside.channel = d.outside.follows = "";
+
   const std::vector<double> shapley = effect_shares(robot, effects, windows, measured);
   double weakest_group = 1;
   for (std::size_t k = 0; k < chosen.size(); ++k) {
@@ -500,49 +337,61 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
     weakest_group = std::min(weakest_group, group);
     d.effects.push_back(std::move(effect));
   }
-  if (!unknown.empty() && posterior.outside >= settings.report_probability) {
+  if (!named.empty() && with_power > 0)
+    d.shrinkage = held_out(fit, robot, set, judged, judged_power, measured, modelled, d.noise_floor);
+  // What the effects leave of the gap on missions that they were not fitted to, or make of them.
+  const bool worse = d.shrinkage && d.shrinkage->interval[1] < 0 &&
+                     d.power_absolute_relative - d.noise_floor > largest_unnamed_share;
+  const bool unexplained =
+      d.shrinkage && (worse || d.shrinkage->after - d.noise_floor >
+                                   largest_left_share + largest_left_part * d.power_absolute_relative);
+  const bool strained =
+      std::ranges::any_of(effects, [&](const auto& effect) { return implausible(effect, robot); });
+  if (ripple || (!unknown.empty() && posterior.outside >= settings.report_probability)) {
     d.verdict = Verdict::outside;
-    d.verdict_probability = posterior.outside;
+    d.verdict_probability = d.outside.probability;
     // What shares the data with something unknown is no sure finding.
     const double trust = named_share / (named_share + unknown_share);
     for (DiagnosedEffect& effect : d.effects) effect.probability *= trust;
-    std::erase_if(d.effects,
-                  [&](const DiagnosedEffect& e) { return e.probability < settings.report_probability; });
   } else if (named.empty()) {
     // Nothing named is no clean bill while a gap stands that noise does not make.
-    const bool open = d.power_absolute_relative - d.noise_floor > largest_unexplained_share;
-    const bool none = posterior.none >= settings.report_probability && !open;
+    const bool open = d.power_absolute_relative - d.noise_floor > largest_unnamed_share;
+    const bool none = !open && (posterior.none >= settings.report_probability || !best->first.empty());
     d.verdict = none ? Verdict::none : Verdict::inconclusive;
-    d.verdict_probability = none ? posterior.none : 1 - posterior.none;
-    d.effects.clear();
+    d.verdict_probability = none   ? std::max(posterior.none, settings.report_probability)
+                            : open ? 1
+                                   : 1 - posterior.none;
   } else {
     const bool sure = weakest_group >= settings.report_probability && posterior.outside < most_outside &&
-                      std::ranges::none_of(chosen, [&](const Chosen& c) {
+                      !unexplained && !strained && std::ranges::none_of(chosen, [&](const Chosen& c) {
                         return d.motor_channels && like_a_load(columns.hypotheses()[c.hypothesis]);
                       });
     d.verdict = sure ? Verdict::effects : Verdict::inconclusive;
     d.verdict_probability = weakest_group;
   }
+  for (DiagnosedEffect& effect : d.effects) {
+    if (unexplained) effect.probability *= std::clamp(d.shrinkage->fraction, 0.0, 1.0);
+    if (strained) effect.probability *= 0.5;
+  }
+  if (d.verdict == Verdict::outside) {
+    std::erase_if(d.effects,
+                  [&](const DiagnosedEffect& e) { return e.probability < settings.report_probability; });
+  }
   if (!d.effects.empty()) {
-    std::vector<std::size_t> kept;
     for (const DiagnosedEffect& e : d.effects) {
       for (std::size_t k = 0; k < chosen.size(); ++k) {
-        if (columns.hypotheses()[chosen[k].hypothesis].id() != e.id) continue;
-        kept.push_back(chosen[k].hypothesis);
-        d.adoptable.push_back(dynamics::adopt(effects[k]));
+        if (columns.hypotheses()[chosen[k].hypothesis].id() == e.id)
+          d.adoptable.push_back(dynamics::adopt(effects[k]));
       }
     }
-    if (with_power > 0)
-      d.shrinkage = held_out(fit, robot, set, judged, judged_power, measured, modelled, d.noise_floor);
     temper(d.effects);
     name_burning_slip(d.effects);
     std::ranges::stable_sort(d.effects, std::greater{}, &DiagnosedEffect::share);
+  } else {
+    d.shrinkage.reset();
   }
-  if (d.shrinkage && d.shrinkage->interval[1] < 0) {
-    // What makes missions that it was not fitted to worse is no explanation.
-    d.verdict = Verdict::inconclusive;
-    d.adoptable.clear();
-  }
+  // What makes missions that it was not fitted to worse is no explanation.
+  if (d.shrinkage && d.shrinkage->interval[1] < 0) d.adoptable.clear();
   d.verdict_probability = std::min(1.0, d.verdict_probability) * surest_verdict;
   d.next_drive = next_drives(fit, robot, d);
   return d;

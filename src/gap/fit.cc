@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "gap/zone_scan.h"
 
@@ -10,6 +9,8 @@ namespace joulecast::gap {
 namespace {
 
 constexpr int most_rounds = 4;
+// Log odds of an explanation from which on the formulas' own errors count as much as the noise.
+constexpr double trusted_log_odds = 300;
 constexpr double settled = 0.01;  // relative change of every coefficient
 
 Fit make_fit(const robot::RobotModel& robot, std::span<const Window> windows, bool power,
@@ -27,6 +28,9 @@ Fit make_fit(const robot::RobotModel& robot, std::span<const Window> windows, bo
   fit.missions = mission_information(*fit.columns, fit.design);
   for (const Information& mission : fit.missions) fit.total += mission;
   fit.evidence = std::make_unique<Evidence>(*fit.columns, fit.total);
+  fit.explanations = search(*fit.evidence);
+  const double signal = fit.explanations.front().log_odds;
+  fit.evidence = std::make_unique<Evidence>(*fit.columns, fit.total, 1 / (1 + signal / trusted_log_odds));
   fit.explanations = search(*fit.evidence);
   return fit;
 }
@@ -85,9 +89,6 @@ double MovedShares::operator()(const Hypothesis& hypothesis, const Eigen::Vector
   const auto own = coefficients.segment(static_cast<Eigen::Index>(hypothesis.columns.front()),
                                         static_cast<Eigen::Index>(hypothesis.columns.size()));
   const double unit = columns[hypothesis.columns.front()].power_w / columns_.mean_power_w();
-  // Windows average most of a wheel's turn out, but power does not: the mean size of its sinusoids, which
-  // are those of both wheels.
-  if (hypothesis.variable == "wheel_angle") return std::numbers::inv_pi * own.norm() * unit;
   return (values_[h] * own).cwiseAbs().sum() / static_cast<double>(samples_[h]) * unit;
 }
 

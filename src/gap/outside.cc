@@ -86,14 +86,6 @@ void torque_heading(const Window& w, const Ranges&, std::size_t s, std::span<dou
 void torque_position(const Window& w, const Ranges& r, std::size_t s, std::span<double> out) {
   positions(w, r, direction(w, s), out);
 }
-void torque_angle(const Window& w, const Ranges&, std::size_t s, std::span<double> out) {
-  for (std::size_t h = 0; h < wheel_harmonics; ++h) {
-    for (std::size_t side : {0u, 1u}) {
-      out[4 * h + 2 * side] = side == s ? w.angle_cos[h][s] : 0.0;
-      out[4 * h + 2 * side + 1] = side == s ? w.angle_sin[h][s] : 0.0;
-    }
-  }
-}
 
 // Electrical load.
 void load_speed(const Window& w, const Ranges& r, std::size_t, std::span<double> out) {
@@ -235,7 +227,6 @@ std::vector<OutsideFamily> outside_families(const Ranges& ranges, bool power) {
       {"acceleration", torque_right, 3, torque_acceleration},
       {"yaw_rate", torque_right, 5, torque_yaw},
       {"time", torque_right, 4, torque_time},
-      {"wheel_angle", torque_right, 4 * wheel_harmonics, torque_angle},
       {"speed", load, 4, load_speed},
       {"acceleration", load, 3, load_acceleration},
       {"yaw_rate", load, 3, load_yaw},

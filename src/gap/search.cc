@@ -22,15 +22,16 @@ bool moves_less_than_it_rolls(const Hypothesis& h) {
 
 }  // namespace
 
-Evidence::Evidence(const ColumnSet& columns, const Information& total) : columns_(columns), total_(total) {
+Evidence::Evidence(const ColumnSet& columns, const Information& total, double coarsening)
+    : columns_(columns), total_(total) {
   const auto p = static_cast<Eigen::Index>(columns.size());
   unit_.resize(p);
   for (Eigen::Index k = 0; k < p; ++k) {
     const Column& c = columns.columns()[static_cast<std::size_t>(k)];
     unit_[k] = c.tolerance > 0 ? c.tolerance : 1e-9 * std::max(1.0, c.scatter);
   }
-  const Eigen::MatrixXd scaled = unit_.asDiagonal() * total.xx * unit_.asDiagonal();
-  const Eigen::VectorXd scaled_y = unit_.asDiagonal() * total.xy;
+  const Eigen::MatrixXd scaled = coarsening * (unit_.asDiagonal() * total.xx * unit_.asDiagonal());
+  const Eigen::VectorXd scaled_y = coarsening * (unit_.asDiagonal() * total.xy);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(0.5 * (scaled + scaled.transpose()));
   const Eigen::VectorXd d = eigen.eigenvalues().cwiseMax(0.0);
   const Eigen::VectorXd shrink = (1.0 + d.array()).inverse();

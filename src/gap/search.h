@@ -12,7 +12,10 @@ namespace joulecast::gap {
 // each tolerance. What is left to decide is which coefficients are larger than a robot as filed would have.
 class Evidence {
  public:
-  Evidence(const ColumnSet& columns, const Information& total);
+  // `coarsening`: the odds are those of this fraction of the data, 1 for all of them. Formulas hold only so
+  // far, and what little they are off by decides nothing once its signal is divided down; Miller and Dunson,
+  // Robust Bayesian inference via coarsening, 2019. Estimates take all data.
+  Evidence(const ColumnSet& columns, const Information& total, double coarsening = 1);
 
   // Log of the evidence that these hypotheses hold over that none does, prior odds included. Gaussian
   // integral, corrected for strengths that cannot be negative.

@@ -228,7 +228,6 @@ class Shape {  // one window's weights
   }
   double mean(const std::vector<double>& v) const { return sum(weight_, v); }
   double slope(const std::vector<double>& v) const { return sum(slope_, v); }
-  const std::vector<double>& weights() const { return weight_; }
 
  private:
   double sum(const std::vector<double>& weights, const std::vector<double>& v) const {
@@ -269,18 +268,6 @@ Window window_at(const Columns& c, const Heat& heat, std::size_t first, std::siz
     // At rest the reading is noise about nothing.
     w.current_sign[s] = w.resting[s] ? 0.0 : shape.mean(c.current_sign[s]);
     for (std::size_t q = 0; q < heat.size(); ++q) w.copper_heat_w[q][s] = shape.mean(heat[q][s]);
-    for (std::size_t k = first; k < last; ++k) {
-      const double weight = shape.weights()[k - first];
-      const double one = std::cos(c.angle[s][k]), im = std::sin(c.angle[s][k]);
-      double re = 1, imaginary = 0;
-      for (std::size_t h = 0; h < wheel_harmonics; ++h) {
-        const double next = re * one - imaginary * im;
-        imaginary = re * im + imaginary * one;
-        re = next;
-        w.angle_cos[h][s] += weight * re;
-        w.angle_sin[h][s] += weight * imaginary;
-      }
-    }
   }
   w.battery_voltage_v = shape.mean(c.battery_voltage);
   w.battery_current_a = shape.mean(c.battery_current);

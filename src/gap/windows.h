@@ -15,7 +15,6 @@ inline constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 // Time constants on which the copper heat is low-passed [s].
 inline constexpr std::array<double, 6> heat_time_constants_s{30, 60, 120, 240, 480, 960};
-inline constexpr std::size_t wheel_harmonics = 3;
 
 // What one smooth window (a raised cosine) of a recording says: the averages of every channel under the
 // window, and slopes in weak form, so that linear equations between channels hold exactly and no noisy
@@ -40,8 +39,6 @@ struct Window {
   double charge_as = 0;           // drawn since the mission began
   double yaw_rate_rad_s = missing;
   double x_m = missing, y_m = missing, heading_rad = missing;
-  // Mean cosine and sine of 1, 2, ... times the angle of each wheel.
-  std::array<std::array<double, 2>, wheel_harmonics> angle_cos{}, angle_sin{};
   // Progress by the map over a span that starts here; NaN except once a span.
   double forward_m = missing, turn_rad = missing;
   double chord = 1;                        // straight distance over path length in that span

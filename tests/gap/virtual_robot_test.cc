@@ -91,5 +91,34 @@ TEST(VirtualRobot, ALoadThatFollowsTheBatteryCurrentIsNoSureSensorError) {
   for (const DiagnosedEffect& effect : d.effects) EXPECT_LT(effect.probability, 0.9) << effect.id;
 }
 
+TEST(VirtualRobot, ATorqueThatRepeatsWithTheWheelIsNoSureDryFriction) {
+  for (const bool motors : {true, false}) {
+    const Diagnosis d = diagnose_virtual({{"x_cogging", 0.8}}, 17, motors);
+    EXPECT_EQ(name_of(d.verdict), "outside");
+    EXPECT_EQ(d.outside.follows, "wheel_angle");
+    for (const DiagnosedEffect& effect : d.effects) EXPECT_LT(effect.probability, 0.9) << effect.id;
+  }
+}
+
+TEST(VirtualRobot, ADelayBetweenChannelsIsNoRipple) {
+  // Currents that come late leave a mark at every start and stop, not at an angle.
+  const Diagnosis d = diagnose_virtual({{"sensor_delay", 0.13}}, 18, true);
+  EXPECT_EQ(name_of(d.verdict), "effects");
+  EXPECT_NEAR(d.effects.at(0).parameters[0].value, 0.13, 0.01);
+}
+
+TEST(VirtualRobot, FrictionThatComesAndGoesIsNoFrictionOfTheCatalogue) {
+  const Diagnosis d = diagnose_virtual({{"x_brake_drag", 1}}, 19, true);
+  EXPECT_TRUE(d.verdict == Verdict::outside || d.verdict == Verdict::inconclusive) << name_of(d.verdict);
+  for (const DiagnosedEffect& effect : d.effects) EXPECT_LT(effect.probability, 0.9) << effect.id;
+}
+
+TEST(VirtualRobot, ALargeLossIsNotPatchedTogetherFromLargeErrorsThatCancel) {
+  const Diagnosis d = diagnose_virtual({{"driver_loss", 0.42}}, 20, true);
+  ASSERT_EQ(d.effects.size(), 1u);
+  EXPECT_EQ(d.effects[0].id, "driver_loss");
+  EXPECT_NEAR(d.effects[0].parameters[0].value, 0.42, 0.042);
+}
+
 }  // namespace
 }  // namespace joulecast::gap

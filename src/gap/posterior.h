@@ -1,0 +1,29 @@
+#pragma once
+
+#include <map>
+#include <string_view>
+#include <vector>
+
+#include "gap/fit.h"
+
+namespace joulecast::gap {
+
+// Whether an effect has to show in battery power to be worth a name. The others are seen by other channels
+// (gyro, map, battery voltage, the shape of transients) however little power they move.
+bool shows_in_power(std::string_view id);
+
+// Explanations with what does not matter taken out, and the odds of those that become the same added up.
+struct Posterior {
+  std::map<std::vector<std::size_t>, double> sets;  // probability
+  double none = 0, outside = 0;
+
+  double of_effect(const ColumnSet& columns, const dynamics::Effect* effect) const;
+};
+
+// Share of the mean power that something outside the catalogue has to move to be a finding.
+double least_outside_of(double gap_share);
+
+// `gap_share`: the gap beside battery power, noise taken off.
+Posterior posterior_of(const Fit& fit, const MovedShares& moved, double gap_share);
+
+}  // namespace joulecast::gap

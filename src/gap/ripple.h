@@ -1,0 +1,28 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "dynamics/catalogue.h"
+#include "gap/recordings.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::gap {
+
+// Something that repeats with the angle of a wheel: cogging, a tooth, an oval wheel. Windows average it out
+// and keep its mean, which then looks like dry friction.
+struct Ripple {
+  double per_turn = 0;     // cycles a turn of the wheel
+  double power_share = 0;  // mean power that it moves to and fro, over the mean battery power
+  double contrast = 0;     // its power over that of neighbouring frequencies
+};
+
+// Looks for it sample by sample in what the model with these effects leaves of the motor currents, or of the
+// battery power when `motors` is false (both read `delay_s` late): the mean periodogram over the wheel's
+// angle, in stretches of a few turns, on a grid of frequencies. Nothing when no frequency stands out of its
+// neighbours beyond chance.
+std::optional<Ripple> find_ripple(const RecordingSet& set, const robot::RobotModel& robot,
+                                  std::span<const dynamics::ActiveEffect> effects, bool motors,
+                                  double delay_s);
+
+}  // namespace joulecast::gap
