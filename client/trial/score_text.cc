@@ -233,6 +233,7 @@ json case_json(const CaseOutcome& o) {
   for (const auto& effect : o.diagnosis.effects) {
     named.push_back({{"id", effect.id},
                      {"probability", effect.probability},
+                     {"posterior", effect.posterior},
                      {"strength", effect.parameters.front().value},
                      {"sd", json_number(effect.parameters.front().deviation)},
                      {"share", json_number(effect.share)},
@@ -254,8 +255,8 @@ json case_json(const CaseOutcome& o) {
            {{"probability", o.diagnosis.outside.probability},
             {"channel", o.diagnosis.outside.channel},
             {"follows", o.diagnosis.outside.follows}}},
-          {"gap", number_or_null(o.diagnosis.power_absolute_relative)},
-          {"noise_floor", number_or_null(o.diagnosis.noise_floor)},
+          {"gap", json_number(o.diagnosis.power_absolute_relative)},
+          {"noise_floor", json_number(o.diagnosis.noise_floor)},
           {"remaining", o.diagnosis.shrinkage ? json(o.diagnosis.shrinkage->after) : json()},
           {"shrinkage", o.diagnosis.shrinkage ? json(o.diagnosis.shrinkage->fraction) : json()},
           {"oracle_shrinkage", o.oracle ? json(*o.oracle) : json()},

@@ -31,7 +31,8 @@ struct DiagnosedParameter {
 
 struct DiagnosedEffect {
   std::string id;
-  double probability = 0;
+  double probability = 0;  // that it is there, as such names came true in development trials
+  double posterior = 0;    // by the evidence alone
   std::vector<DiagnosedParameter> parameters;  // as the catalogue names them; the first is the strength
   double share = 0;                       // Shapley: fraction of the gap that it closes on held-out missions
   std::vector<std::string> alternatives;  // that these data cannot tell from it

@@ -69,13 +69,13 @@ TEST(Trial, OracleTakesAwayMostOfTheGap) {
   EXPECT_LT(*outcomes->front().oracle, 1);
 }
 
-// Bounds far enough below what the diagnosis reaches that chance alone does not break them, and far above
-// what it reaches with a part broken: leaving out the nuisance model alone names something in every case
-// without a gap.
+// One or two cases of each kind below what the diagnosis reaches (18 of 20; 8 and 7 of 9 singles named first
+// and exactly, all pairs, clear robots and unknown effects), and far above what it reaches with a part
+// broken: leaving out the nuisance model alone names something in every case without a gap.
 TEST(Trial, StaysAboveItsBounds) {
   const auto outcomes = run_trial(trial_of(20, 7));
   ASSERT_TRUE(outcomes);
-  Rate single, first, pair, none, outside;
+  Rate single, first, pair, none, outside, all;
   for (const CaseOutcome& o : *outcomes) {
     switch (o.truth.kind) {
       case Kind::none:
@@ -92,13 +92,16 @@ TEST(Trial, StaysAboveItsBounds) {
         outside.count(exactly_right(o));
         break;
     }
+    all.count(exactly_right(o));
     if (!exactly_right(o)) std::puts(case_text(o).c_str());
   }
   EXPECT_GE(none.value(), 0.6);
   EXPECT_GE(first.value(), 0.65);
-  EXPECT_GE(single.value(), 0.5);
-  EXPECT_GE(pair.value(), 0.2);
-  EXPECT_GE(outside.value(), 0.3);
+  EXPECT_GE(single.value(), 0.65);
+  EXPECT_GE(pair.value(), 0.6);
+  EXPECT_GE(outside.value(), 0.6);
+  EXPECT_GE(all.value(), 0.8);
+  EXPECT_EQ(score_of(*outcomes).outside_misled.hits, 0u);
 }
 
 }  // namespace
