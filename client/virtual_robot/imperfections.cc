@@ -71,8 +71,8 @@ Result<Imperfections> make_imperfections(const std::vector<EffectStrength>& effe
     if (entry == table.end())
       return invalid("--effect", "no effect is called " + id + "; --list-effects names them");
     if (!std::isfinite(strength) || std::abs(strength) > entry->search_limit) {
-      return invalid("effect/" + id, "strength must be within +-" + std::to_string(entry->search_limit) +
-                                         " " + std::string(entry->unit));
+      return invalid("--effect", "the strength of " + id + " must be within +-" +
+                                     std::to_string(entry->search_limit) + " " + std::string(entry->unit));
     }
     result.*(entry->strength) = strength;
   }

@@ -1,3 +1,5 @@
+#include <gmock/gmock.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -206,9 +208,12 @@ TEST(Effects, StrengthIsFoundForAGapAndItsAbsenceSaid) {
 }
 
 TEST(Effects, UnknownIdsAndAbsurdStrengthsAreNamed) {
-  EXPECT_EQ(make_imperfections({{"coulomb_fricton", 0.1}}).error().field, "effect");
-  EXPECT_EQ(make_imperfections({{"slope", 3}}).error().field, "effect/slope");
-  EXPECT_EQ(make_imperfections({{"slope", std::nan("")}}).error().field, "effect/slope");
+  const auto complaint = [](const char* id, double strength) {
+    return describe(make_imperfections({{id, strength}}).error());
+  };
+  EXPECT_THAT(complaint("coulomb_fricton", 0.1), testing::HasSubstr("coulomb_fricton; --list-effects"));
+  EXPECT_THAT(complaint("slope", 3), testing::HasSubstr("--effect: the strength of slope must be within"));
+  EXPECT_THAT(complaint("slope", std::nan("")), testing::HasSubstr("the strength of slope must be within"));
 }
 
 }  // namespace
