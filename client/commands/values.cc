@@ -46,6 +46,7 @@ constexpr auto table = std::to_array<Named>({
     {"gap", "--report", "FILE", "*.html"},
     {"gap", "--test", "FILE", "*.lcmlog"},
     {"gap trial", "--keep", "FOLDER", "/"},
+    {"gap trial", "--again", "FOLDER", "/"},
     {"gap trial", "--only", "KIND", ""},
     {"simulate", "--effect", "ID=STRENGTH", ""},
     {"missions", "--from", "TIME", ""},
