@@ -91,10 +91,13 @@ void print(const energy::BackTest& test) {
   for (const energy::RunComparison& run : test.runs)
     std::printf("%-24s %12.2f %12.2f %% %12.2f %%\n", run.name.c_str(), run.measured_j,
                 100 * run.before.relative, 100 * run.after.relative);
-  std::printf("energy error %.2f %% -> %.2f %%, improvement %.2f %% [%.2f, %.2f]: %s\n",
-              100 * test.error_before, 100 * test.error_after, 100 * test.improvement(),
-              100 * test.improvement_interval[0], 100 * test.improvement_interval[1],
-              test.improves() ? "it improves" : "no improvement is shown");
+  const auto fall = [](const char* what, double before, double after, const std::array<double, 2>& interval) {
+    std::printf("%s %.2f %% -> %.2f %%, falls by %.2f %% [%.2f, %.2f]\n", what, 100 * before, 100 * after,
+                100 * (before - after), 100 * interval[0], 100 * interval[1]);
+  };
+  fall("energy error", test.error_before, test.error_after, test.improvement_interval);
+  fall("power gap", test.power_gap_before, test.power_gap_after, test.power_gap_fall_interval);
+  std::puts(test.improves() ? "it improves" : "no improvement is shown");
 }
 
 // The robot file and the one with the effects found, on missions of other logs.

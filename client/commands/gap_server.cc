@@ -100,8 +100,9 @@ void print_test(const json& test) {
     fmt::print("{:<24} {:>12.2f} {:>12.2f} % {:>12.2f} %\n", m["mission_id"].get<std::string>(),
                number(m["measured_j"]), 100 * number(m["before"]["relative"]),
                100 * number(m["after"]["relative"]));
-  fmt::print("energy error {:.2f} % -> {:.2f} %\n", 100 * number(test["error_before"]),
-             100 * number(test["error_after"]));
+  fmt::print("energy error {:.2f} % -> {:.2f} %, power gap {:.2f} % -> {:.2f} %\n",
+             100 * number(test["error_before"]), 100 * number(test["error_after"]),
+             100 * number(test["power_gap_before"]), 100 * number(test["power_gap_after"]));
 }
 
 Result<json> adopt(const Daemon& daemon, const GapServerOptions& options, const json& job) {

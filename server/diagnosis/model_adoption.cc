@@ -44,12 +44,19 @@ std::string refusal_of(const energy::BackTest& test) {
   if (test.improves()) return {};
   const std::string errors = "energy error " + percent(test.error_before) + " before, " +
                              percent(test.error_after) + " after, on " + std::to_string(test.runs.size()) +
-                             " missions";
+                             " missions",
+                    power = percent(test.power_gap_before) + " before, " + percent(test.power_gap_after) +
+                            " after";
   if (test.power_gap_after > test.power_gap_before)
-    return "power is further off with it than without: " + percent(test.power_gap_before) + " before, " +
-           percent(test.power_gap_after) + " after (" + errors + ")";
-  return "no improvement is shown: " + errors + "; the improvement's 95 % interval is " +
-         percent(test.improvement_interval[0]) + " to " + percent(test.improvement_interval[1]);
+    return "power is further off with it than without: " + power + " (" + errors + ")";
+  const auto interval = [](const std::array<double, 2>& of) {
+    return percent(of[0]) + " to " + percent(of[1]);
+  };
+  if (test.improvement_interval[1] < 0)
+    return "missions' energy is further off with it than without: " + errors + " (power " + power + ")";
+  return "no improvement is shown: " + errors + ", 95 % interval of its fall " +
+         interval(test.improvement_interval) + "; power off by " + power + ", of its fall " +
+         interval(test.power_gap_fall_interval);
 }
 
 }  // namespace

@@ -35,18 +35,24 @@ struct RunComparison {
   ModelError before, after;
 };
 
-// Over all runs, weighted by measured energy: sum |energy error| / sum measured energy.
+// Over all runs, weighted by measured energy: sum |energy error| / sum measured energy, and the power gap
+// (power_absolute_relative), which unlike the former cannot be small because errors of either sign cancel.
+// Intervals of what falls, 95 %: runs on which the models differ drawn with replacement, and blocks within
+// each; the other runs stay as they are. NaN without runs.
 struct BackTest {
   std::vector<RunComparison> runs;
   double error_before = 0;
   double error_after = 0;
-  // error_before - error_after, 95 %: runs drawn with replacement and blocks within each. NaN without runs.
   std::array<double, 2> improvement_interval{};
-  double power_gap_before = 0;  // power_absolute_relative over all runs
+  double power_gap_before = 0;
   double power_gap_after = 0;
+  std::array<double, 2> power_gap_fall_interval{};
 
   double improvement() const { return error_before - error_after; }
-  // The whole interval lies above zero, and the power gap does not grow. False without runs.
+  double power_gap_fall() const { return power_gap_before - power_gap_after; }
+  // One of the two falls beyond doubt (its whole interval above zero) while the other does not grow: the
+  // power gap not at all, the energy error, where chance alone moves it, not beyond doubt. False without
+  // runs.
   bool improves() const;
 };
 

@@ -38,6 +38,7 @@ json back_test_to_json(const BackTest& test) {
   out["improvement_ci"] = json_interval(test.improvement_interval);
   out["power_gap_before"] = known(test.power_gap_before);
   out["power_gap_after"] = known(test.power_gap_after);
+  out["power_gap_fall_ci"] = json_interval(test.power_gap_fall_interval);
   out["improves"] = test.improves();
   return out;
 }

@@ -26,17 +26,18 @@ robot::RobotModel with_friction(double factor) {
 }
 
 // A run at 50 Hz of speeds that go up and down, powered as the robot's model says, with noise on the current.
-std::vector<Sample> driven(const robot::RobotModel& robot, std::uint64_t seed, int samples = 3000) {
+std::vector<Sample> driven(const robot::RobotModel& robot, std::uint64_t seed, double payload_kg = 0) {
   const auto model = *dynamics::drive_model(robot);
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise(0, 0.05);
   const double swing = 0.2 + 0.01 * static_cast<double>(seed);
   std::vector<Sample> run;
-  for (int k = 0; k < samples; ++k) {
+  for (int k = 0; k < 3000; ++k) {
     const double t = 0.02 * k;
     dynamics::Instant at;
     at.wheel_speed_rad_s = {4 + 2 * std::sin(swing * t), 4 + 2 * std::sin(swing * t + 0.3)};
     at.wheel_acceleration_rad_s2 = {2 * swing * std::cos(swing * t), 2 * swing * std::cos(swing * t + 0.3)};
+    at.payload_kg = payload_kg;
     const auto flow = model.flow(at);
     Sample s;
     s.utime_us = 20'000LL * k;
@@ -45,7 +46,7 @@ std::vector<Sample> driven(const robot::RobotModel& robot, std::uint64_t seed, i
     s.motor_voltage_v = flow.voltage_v;
     s.battery_voltage_v = 24;
     s.battery_current_a = flow.battery_power_w / 24 + noise(random);
-    s.payload_kg = 0;
+    s.payload_kg = payload_kg;
     run.push_back(s);
   }
   return run;
@@ -87,6 +88,48 @@ TEST_F(BackTestTest, AWorseOrAnEqualModelDoesNotImprove) {
   const auto same = back_test(runs(), nomad(), nomad());
   EXPECT_FALSE(same->improves());
   EXPECT_EQ(same->improvement(), 0);
+}
+
+// Too much friction and too much idle power in turn: the energy error of the model in force is small because
+// its two errors cancel, the power is off at every instant.
+TEST_F(BackTestTest, APowerGapThatFallsBeyondDoubtIsEnough) {
+  robot::RobotModel cancelling = truth_;
+  for (double& torque : cancelling.motor.friction_torque_nm) torque *= 0.9;
+  const auto energy = [&](const robot::RobotModel& model, std::size_t run) {
+    return metered(model, runs()[run], {})->modelled_j;
+  };
+  const double missing_j =
+      energy(truth_, 0) + energy(truth_, 1) - energy(cancelling, 0) - energy(cancelling, 1);
+  cancelling.idle_power_w += missing_j / (2 * 59.98);
+  const auto test = back_test(runs(), cancelling, truth_);
+  ASSERT_TRUE(test) << describe(test.error());
+  EXPECT_LT(test->improvement_interval[0], 0);
+  EXPECT_GT(test->power_gap_fall_interval[0], 0);
+  EXPECT_LE(test->power_gap_fall_interval[0], test->power_gap_fall());
+  EXPECT_GE(test->power_gap_fall_interval[1], test->power_gap_fall());
+  EXPECT_TRUE(test->improves());
+}
+
+// Of three missions one is driven empty, where an effect of the payload changes nothing.
+TEST_F(BackTestTest, RunsOnWhichTheModelsAgreeDoNotDiluteTheOthers) {
+  robot::RobotModel loaded = nomad();
+  loaded.effects.push_back({"load_rolling_resistance", {{"coefficient", 0.03}}});
+  std::vector<DriveRun> given;
+  std::vector<std::vector<Sample>> recorded;
+  for (const double payload_kg : {0.0, 8.0, 8.0})
+    recorded.push_back(driven(loaded, recorded.size() + 1, payload_kg));
+  for (const auto& samples : recorded) given.push_back({"run", samples, samples.front().payload_kg});
+  const auto test = back_test(given, nomad(), loaded);
+  ASSERT_TRUE(test) << describe(test.error());
+  ASSERT_EQ(test->runs.size(), 3U);
+  EXPECT_EQ(test->runs[0].before.energy_j, test->runs[0].after.energy_j);
+  EXPECT_GT(test->improvement_interval[0], 0);
+  EXPECT_TRUE(test->improves());
+  // The interval is of the fall over all runs, the empty one included.
+  EXPECT_LE(test->improvement_interval[0], test->improvement());
+  EXPECT_GE(test->improvement_interval[1], test->improvement());
+  given.resize(1);
+  EXPECT_FALSE(back_test(given, nomad(), loaded)->improves());
 }
 
 TEST_F(BackTestTest, JudgesByTheMotorsWhereTheBatteryIsNotMeasured) {

@@ -158,8 +158,8 @@ function TestTable({ test }) {
 export function BackTest({ test }) {
   if (test.missions.length === 0) return html`<p>There is no mission to test it on: none with stored telemetry and measured energy that it was not fitted on.</p>`;
   const left = [[test.left_out.fitted_on, 'it was found on'], [test.left_out.open, 'still running'], [test.left_out.no_telemetry, 'without telemetry'], [test.left_out.beyond_limits, 'beyond the limits']].filter(([n]) => n > 0).map(([n, why]) => `${n} ${why}`).join(', ');
-  return html`<div class=${`verdict-box ${test.improves ? 'makes' : 'fails'}`}><p class="verdict">On ${test.missions.length} missions that it was not found on, the energy error ${test.improves ? 'falls' : 'goes'} from <b>${share(test.error_before, 2)}</b> to <b>${share(test.error_after, 2)}</b>.</p>
-    <p class="note">Improvement ${range_of(test.improvement_ci, 2)} (95 %); power gap ${share(test.power_gap_before)} to ${share(test.power_gap_after)}; against model version ${test.tested_against}.${left && ` Left out: ${left}.`}</p></div>
+  return html`<div class=${`verdict-box ${test.improves ? 'makes' : 'fails'}`}><p class="verdict">On ${test.missions.length} missions that it was not found on, the energy error ${test.error_after < test.error_before ? 'falls' : 'goes'} from <b>${share(test.error_before, 2)}</b> to <b>${share(test.error_after, 2)}</b>.</p>
+    <p class="note">Improvement ${range_of(test.improvement_ci, 2)} (95 %); power gap ${share(test.power_gap_before, 2)} to ${share(test.power_gap_after, 2)}, falls by ${range_of(test.power_gap_fall_ci, 2)}; against model version ${test.tested_against}.${left && ` Left out: ${left}.`}</p></div>
     <div class="scroll"><${TestTable} test=${test} /></div>`;
 }
 
