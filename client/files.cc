@@ -2,20 +2,19 @@
 
 #include <fstream>
 #include <iostream>
-#include <iterator>
+#include <sstream>
+#include <utility>
+
+#include "base/text_file.h"
 
 namespace joulecast::client {
 
 Result<std::string> read_file(const std::string& path) {
-  std::ifstream file;
-  if (path != "-") {
-    file.open(path, std::ios::binary);
-    if (!file) return fail(Fault::not_found, path, "cannot be opened");
-  }
-  std::istream& in = path == "-" ? std::cin : file;
-  std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  if (in.bad()) return fail(Fault::unavailable, path, "cannot be read");
-  return text;
+  if (path != "-") return read_text_file(path);
+  std::ostringstream text;
+  if (std::cin.peek() != std::istream::traits_type::eof()) text << std::cin.rdbuf();
+  if (std::cin.bad() || text.fail()) return fail(Fault::unavailable, path, "cannot be read");
+  return std::move(text).str();
 }
 
 Result<void> write_file(const std::string& path, const std::string& text) {

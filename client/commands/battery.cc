@@ -37,15 +37,19 @@ Result<Predicted> predict_all(const Options& options) {
   if (!parameters) return tl::unexpected(parameters.error());
   const battery::Circuit circuit(*parameters);
   Predicted predictions;
-  for (const std::string& file : options.recordings) {
-    const auto recordings = battery::read_recordings(file);
-    if (!recordings) return tl::unexpected(recordings.error());
-    for (const battery::Recording& recording : *recordings) {
-      const auto prediction = battery::predict(circuit, recording, options.from);
-      if (prediction) {
-        predictions.done.push_back(*prediction);
-      } else {
-        predictions.failed.emplace_back(recording.name, prediction.error());
+  for (const std::string& source : options.recordings) {
+    const auto files = battery::discharge_files(source);
+    if (!files) return tl::unexpected(files.error());
+    for (const auto& file : *files) {
+      const auto recordings = battery::read_recordings(file);
+      if (!recordings) return tl::unexpected(recordings.error());
+      for (const battery::Recording& recording : *recordings) {
+        const auto prediction = battery::predict(circuit, recording, options.from);
+        if (prediction) {
+          predictions.done.push_back(*prediction);
+        } else {
+          predictions.failed.emplace_back(recording.name, prediction.error());
+        }
       }
     }
   }
@@ -114,9 +118,16 @@ void add_battery(CLI::App& program, Exit& exit) {
   auto* group = program.add_subcommand("battery", "Ask a battery's model");
   group->require_subcommand(1);
   auto options = std::make_shared<Options>();
-  auto* command = group->add_subcommand(
-      "predict", "Predict recorded discharges from their current or power and compare time and voltage");
-  command->add_option("recordings", options->recordings, "CSV files (columns t_s, I_A, V_V, T_C, cycle)")
+  auto* command = group->add_subcommand("predict",
+                                        "Predict recorded discharges from their current or power, and "
+                                        "compare the time until the voltage where they "
+                                        "end (the cut-off, if that is higher) and the voltage on the way");
+  command
+      ->add_option("recordings", options->recordings,
+                   "CSV files (columns t_s, I_A discharging positive, V_V, T_C, cycle: each value a "
+                   "discharge of its own), a "
+                   "folder or the common beginning of the names of one battery's files, which stand for its "
+                   "<beginning>_rw.csv. Each discharge begins full and at rest")
       ->required();
   command->add_option("--battery", options->battery, "battery object of a robot file, as calibrate writes it")
       ->required();

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -26,15 +28,24 @@ struct Options {
   bool json = false;
 };
 
-Result<std::vector<battery::Recording>> read_all(const std::vector<std::string>& sources) {
-  std::vector<battery::Recording> all;
+struct Read {
+  std::vector<battery::Recording> recordings;
+  std::vector<battery::PassedOver> unreadable;  // of the files that a folder or a beginning stands for
+};
+
+Result<Read> read_all(const std::vector<std::string>& sources) {
+  Read all;
   for (const std::string& source : sources) {
     const auto files = battery::identification_files(source);
     if (!files) return tl::unexpected(files.error());
     for (const auto& file : *files) {
       auto recordings = battery::read_recordings(file);
-      if (!recordings) return tl::unexpected(recordings.error());
-      for (auto& recording : *recordings) all.push_back(std::move(recording));
+      if (!recordings && files->size() == 1) return tl::unexpected(recordings.error());
+      if (!recordings) {
+        all.unreadable.push_back({file.filename().string(), describe(recordings.error())});
+        continue;
+      }
+      for (auto& recording : *recordings) all.recordings.push_back(std::move(recording));
     }
   }
   return all;
@@ -47,6 +58,9 @@ void print_json(const battery::Calibration& calibration) {
   for (const battery::RecordingFit& fit : calibration.recordings)
     document["recordings"].push_back(
         {{"name", fit.name}, {"open_circuit", fit.open_circuit}, {"voltage_rms_v", fit.voltage_rms_v}});
+  document["passed_over"] = nlohmann::json::array();
+  for (const battery::PassedOver& p : calibration.passed_over)
+    document["passed_over"].push_back({{"name", p.name}, {"reason", p.reason}});
   std::puts(document.dump(2).c_str());
 }
 
@@ -68,14 +82,21 @@ void print_text(const battery::Calibration& calibration) {
   for (const battery::RecordingFit& fit : calibration.recordings)
     fmt::print("{:<32} voltage rms {:5.1f} mV{}\n", fit.name, 1e3 * fit.voltage_rms_v,
                fit.open_circuit ? ", gives the open-circuit voltage" : "");
+  for (const battery::PassedOver& p : calibration.passed_over)
+    fmt::print("passed over: {}: {}\n", p.name, p.reason);
 }
 
 Exit run(const Options& options) {
-  const auto recordings = read_all(options.sources);
-  if (!recordings) return report(recordings.error());
-  const auto calibration =
-      battery::calibrate(*recordings, {options.rated_capacity_ah, options.reserve_fraction});
-  if (!calibration) return report(calibration.error());
+  auto read = read_all(options.sources);
+  if (!read) return report(read.error());
+  auto calibration =
+      battery::calibrate(read->recordings, {options.rated_capacity_ah, options.reserve_fraction});
+  if (!calibration) {
+    for (const battery::PassedOver& p : read->unreadable)
+      fmt::print(stderr, "joulecast: passed over: {}: {}\n", p.name, p.reason);
+    return report(calibration.error());
+  }
+  std::ranges::move(read->unreadable, std::back_inserter(calibration->passed_over));
   const std::string text = robot::to_json_text(calibration->battery);
   // What is written must be readable again, whatever was measured.
   if (const auto checked = robot::parse_battery(text); !checked) return report(checked.error());
@@ -102,7 +123,11 @@ void add_calibrate(CLI::App& program, Exit& exit) {
   command
       ->add_option(
           "recordings", options->sources,
-          "CSV files, a folder of one battery's tests, or the common beginning of <beginning>_*_data.csv")
+          "CSV files, a folder of one battery's tests, or the common beginning of their names: "
+          "<beginning>_*_data.csv, or else <beginning>_*.csv; <beginning>_rw.csv is kept to try the battery "
+          "on. "
+          "Each test begins full and at rest. The slowest full discharge gives the open-circuit voltage, "
+          "whatever its name")
       ->required();
   command->add_option("--capacity-ah", options->rated_capacity_ah, "rated capacity; gives an ageing factor")
       ->check(CLI::PositiveNumber);

@@ -50,8 +50,12 @@ constexpr Examples table[] = {
      "joulecast completion zsh > _joulecast.zsh\n"
      "joulecast completion fish > joulecast.fish"},
     {"calibrate drive", "joulecast calibrate drive amr.lcmlog --robot amr.json --out amr-calibrated.json"},
-    {"calibrate battery", "joulecast calibrate battery cell_*_data.csv --capacity-ah 2.6 --out cell.json"},
-    {"battery predict", "joulecast battery predict cell_random_data.csv --battery cell.json"},
+    {"calibrate battery",
+     "joulecast calibrate battery cell --capacity-ah 2.6 --out cell.json\n"
+     "joulecast calibrate battery cell_c20_data.csv cell_1c_data.csv --out cell.json"},
+    {"battery predict",
+     "joulecast battery predict cell_rw.csv --battery cell.json\n"
+     "joulecast battery predict cell --battery cell.json --from power --json"},
 };
 
 // The command "calibrate drive" names: a subcommand of a subcommand.

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <ctime>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -16,6 +15,7 @@
 #include <vector>
 
 #include "base/host_clock.h"
+#include "base/text_file.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/http_client.h"
@@ -87,12 +87,6 @@ Result<std::vector<vr::EffectStrength>> parse_effects(const std::vector<std::str
   return result;
 }
 
-Result<std::string> read_text(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) return fail(Fault::not_found, path, "cannot be opened");
-  return std::string{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
 Result<Member> make_member(const std::string& source, const std::string& text,
                            const std::optional<std::string>& id) {
   auto document = nlohmann::json::parse(text, nullptr, false);
@@ -130,7 +124,7 @@ Result<std::vector<Member>> assemble(const Options& options) {
       text = std::string(shipped[k % shipped.size()].json_text);
     } else {
       source = options.robot_files[k % options.robot_files.size()];
-      auto read = read_text(source);
+      auto read = read_text_file(source);
       if (!read) return tl::unexpected<Error>(read.error());
       text = std::move(*read);
     }

@@ -2,12 +2,12 @@
 
 #include <array>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <system_error>
 #include <variant>
 
+#include "base/text_file.h"
 #include "client/files.h"
 #include "client/virtual_robot/simulate.h"
 #include "telemetry/codec.h"
@@ -134,10 +134,9 @@ Result<std::uint64_t> digest_of(const CaseFiles& files) {
 }
 
 Result<SealedTruth> open_truth(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) return fail(Fault::not_found, path.string(), "cannot be opened");
-  const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  const json document = json::parse(text, nullptr, false);
+  const Result<std::string> text = read_text_file(path);
+  if (!text) return tl::unexpected(text.error());
+  const json document = json::parse(*text, nullptr, false);
   if (document.is_discarded()) return fail(Fault::corrupt, path.string(), "is not JSON");
   try {
     SealedTruth truth;

@@ -1,9 +1,9 @@
 #include "client/virtual_robot/robot_parameters.h"
 
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
+
+#include "base/text_file.h"
 
 namespace joulecast::virtual_robot {
 namespace {
@@ -128,10 +128,9 @@ Result<RobotParameters> parse_robot(const std::string& json_text) {
 }
 
 Result<RobotParameters> read_robot_file(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) return fail(Fault::not_found, path, "cannot be opened");
-  const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  auto robot = parse_robot(text);
+  const Result<std::string> text = read_text_file(path);
+  if (!text) return tl::unexpected(text.error());
+  auto robot = parse_robot(*text);
   if (!robot) return fail(robot.error().fault, path + "#" + robot.error().field, robot.error().message);
   return robot;
 }

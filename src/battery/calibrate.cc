@@ -309,14 +309,20 @@ std::optional<Thermal> thermal_fit(const std::vector<Target>& targets, const Cur
 }  // namespace
 
 Result<Calibration> calibrate(const std::vector<Recording>& given, const CalibrationOptions& options) {
+  Calibration out;
   std::vector<Recording> recordings;
   for (const Recording& recording : given) {
     Recording part = without_charging(recording);
-    if (part.size() < 2 || !(part.charge_ah() > 0))
+    if (part.size() >= 2 && part.charge_ah() > 0) {
+      recordings.push_back(std::move(part));
+      continue;
+    }
+    if (recording.charge_ah() < 0 && recording.voltage_v.back() < recording.voltage_v.front())
       return invalid(
           "recordings",
-          recording.name + " draws no charge; current must be positive while the battery discharges");
-    recordings.push_back(std::move(part));
+          recording.name +
+              " charges while its voltage falls; current must be positive while the battery discharges");
+    out.passed_over.push_back({recording.name, "draws no charge"});
   }
   const Recording* slowest = nullptr;
   std::vector<Target> targets;
@@ -344,14 +350,22 @@ Result<Calibration> calibrate(const std::vector<Recording>& given, const Calibra
   known.nominal_voltage_v = Curve(slow.voltage).mean();
   for (const Recording& recording : recordings) {
     if (&recording == slowest) continue;
-    if (!(recording.charge_ah() > 0.1 * slow.capacity_ah && recording.charge_ah() <= 1.2 * slow.capacity_ah))
-      return invalid("recordings",
-                     fmt::format("{} draws {} Ah, must be between 0.1 and 1.2 times the {} Ah of {}",
-                                 recording.name, recording.charge_ah(), slow.capacity_ah, slowest->name));
+    if (const double charge_ah = recording.charge_ah();
+        !(charge_ah > 0.1 * slow.capacity_ah && charge_ah <= 1.2 * slow.capacity_ah)) {
+      out.passed_over.push_back(
+          {recording.name,
+           fmt::format("draws {:.3f} Ah, must be between 0.1 and 1.2 times the {:.3f} Ah of {}", charge_ah,
+                       slow.capacity_ah, slowest->name)});
+      continue;
+    }
     targets.push_back({&recording, weights(recording, known.nominal_voltage_v, slow.capacity_ah)});
   }
-  if (targets.empty())
-    return invalid("recordings", "need a constant-current or pulse discharge besides the slow one");
+  if (targets.empty()) {
+    std::string unused;
+    for (const PassedOver& p : out.passed_over)
+      unused += fmt::format("{} {} {}", unused.empty() ? ";" : ",", p.name, p.reason);
+    return invalid("recordings", "need a constant-current or pulse discharge besides the slow one" + unused);
+  }
 
   known.capacity_ah = options.rated_capacity_ah.value_or(slow.capacity_ah);
   if (options.rated_capacity_ah) known.ageing_factor = slow.capacity_ah / *options.rated_capacity_ah;
@@ -399,7 +413,6 @@ Result<Calibration> calibrate(const std::vector<Recording>& given, const Calibra
   if (!summary.IsSolutionUsable())
     return fail(Fault::infeasible, "recordings", "the fit found no parameters: " + summary.message);
 
-  Calibration out;
   out.iterations = static_cast<int>(summary.iterations.size());
   out.battery = battery_of(layout, p.data(), slow, known);
   if (layout.with_activation) {
@@ -411,13 +424,16 @@ Result<Calibration> calibrate(const std::vector<Recording>& given, const Calibra
   }
   const Circuit circuit(out.battery);
   std::vector<double> voltage;
-  for (const Recording& recording : recordings) {
-    simulate(circuit, recording, voltage);
+  std::vector<const Recording*> used{slowest};
+  for (const Target& target : targets) used.push_back(target.recording);
+  std::ranges::sort(used);  // in the order given
+  for (const Recording* recording : used) {
+    simulate(circuit, *recording, voltage);
     double sum = 0;
     for (std::size_t row = 0; row < voltage.size(); ++row)
-      sum += std::pow(voltage[row] - recording.voltage_v[row], 2);
+      sum += std::pow(voltage[row] - recording->voltage_v[row], 2);
     out.recordings.push_back(
-        {recording.name, &recording == slowest, std::sqrt(sum / static_cast<double>(voltage.size()))});
+        {recording->name, recording == slowest, std::sqrt(sum / static_cast<double>(voltage.size()))});
   }
   return out;
 }

@@ -23,9 +23,16 @@ struct RecordingFit {
   double voltage_rms_v = 0;   // of the fitted circuit with the measured temperature
 };
 
+// A recording that says nothing of the circuit, and why.
+struct PassedOver {
+  std::string name;
+  std::string reason;
+};
+
 struct Calibration {
   robot::Battery battery;
   std::vector<RecordingFit> recordings;
+  std::vector<PassedOver> passed_over;
   int iterations = 0;
 };
 
@@ -35,7 +42,8 @@ struct Calibration {
 // resistance over charge, a branch, two charge lags and (where temperatures vary by 3 K) the activation are
 // fitted by least squares on the voltage, each sample's error weighed as 0.135 % of the nominal voltage plus
 // 0.2 % of the capacity along the curve, so that the steep end counts by its time rather than its volts.
-// Thermal parameters follow from measured losses and temperatures. Errors: no slow discharge, no other test.
+// Thermal parameters follow from measured losses and temperatures. Recordings that draw no charge, or too
+// little or too much of it, are passed over. Errors: no slow discharge, no other test.
 Result<Calibration> calibrate(const std::vector<Recording>& given, const CalibrationOptions& options = {});
 
 }  // namespace joulecast::battery

@@ -19,6 +19,11 @@ double quantile(std::vector<double> values, double share) {
   return values[below] + (at - static_cast<double>(below)) * (values[above] - values[below]);
 }
 
+bool same_current(const Recording& recording, std::size_t row) {
+  return std::abs(recording.current_a[row] - recording.current_a[row - 1]) <=
+         1e-3 * std::abs(recording.current_a[row]);
+}
+
 // Over the rows before the discharge has drawn all but least_charge of `full_ah`.
 double rms_above_least_charge(const Recording& recording, const std::vector<double>& predicted_v,
                               double full_ah) {
@@ -33,6 +38,19 @@ double rms_above_least_charge(const Recording& recording, const std::vector<doub
   return std::sqrt(sum / static_cast<double>(rows));
 }
 
+// Until the recorded voltage is first down at `end_voltage_v`, which it reaches; straight between rows of the
+// same current.
+double time_to_s(const Recording& recording, double end_voltage_v) {
+  std::size_t row = 0;
+  while (row + 1 < recording.size() && recording.voltage_v[row] > end_voltage_v) ++row;
+  const double at_s = recording.time_s[row] - recording.time_s.front();
+  if (row == 0) return at_s;
+  const double above_v = recording.voltage_v[row - 1] - end_voltage_v,
+               fall_v = recording.voltage_v[row - 1] - recording.voltage_v[row];
+  if (!same_current(recording, row) || !(fall_v > 0)) return at_s;
+  return at_s - recording.duration_s(row) * (1 - above_v / fall_v);
+}
+
 }  // namespace
 
 Result<Load> recorded_load(const Recording& recording, Load::Kind kind) {
@@ -43,9 +61,7 @@ Result<Load> recorded_load(const Recording& recording, Load::Kind kind) {
   auto load = held_load(kind, recording.time_s, power);
   if (!load) return load;
   for (std::size_t row = 1; row < recording.size(); ++row)
-    if (std::abs(recording.current_a[row] - recording.current_a[row - 1]) <=
-        1e-3 * std::abs(recording.current_a[row]))
-      load->pieces[row - 1].begin = power[row - 1];
+    if (same_current(recording, row)) load->pieces[row - 1].begin = power[row - 1];
   return load;
 }
 
@@ -61,10 +77,10 @@ Result<Prediction> predict(const Circuit& circuit, const Recording& recording, L
   Prediction out;
   out.name = recording.name;
   out.end_voltage_v = std::max(circuit.cutoff_voltage_v(), recording.voltage_v.back());
-  out.measured_s = recording.duration_s();
+  out.measured_s = time_to_s(recording, out.end_voltage_v);
   Load continued = *recorded;
   const double last = continued.pieces.back().end;
-  continued.pieces.push_back({out.measured_s, last, last});
+  continued.pieces.push_back({recording.duration_s(), last, last});
   const auto to_end = discharge(circuit, start, continued, {out.end_voltage_v, std::nullopt, ambient_c});
   if (!to_end) return tl::unexpected(to_end.error());
   if (to_end->ending == Ending::load_ended)

@@ -15,7 +15,7 @@ namespace joulecast::battery {
 struct Prediction {
   std::string name;
   double end_voltage_v = 0;  // the cut-off, or the last recorded voltage where that is above it
-  double measured_s = 0;     // until the recording's end
+  double measured_s = 0;     // until the recording reaches end_voltage_v
   double predicted_s = 0;    // until the circuit's terminals reach end_voltage_v; the last load goes on
   double time_error = 0;     // predicted / measured - 1
   // Over the rows above least_charge: of the charge that this discharge delivered, and of the battery's

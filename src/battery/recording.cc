@@ -7,10 +7,10 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <optional>
+
+#include "base/text_file.h"
 
 namespace joulecast::battery {
 namespace {
@@ -97,8 +97,11 @@ double Recording::charge_ah() const {
 }
 
 Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std::string& name) {
-  const auto at = positions(next_line(csv));
+  const bool ends_with_newline = csv.ends_with('\n');
+  const std::string_view header = next_line(csv);
+  const auto at = positions(header);
   if (!at) return tl::unexpected(at.error());
+  const std::size_t width = cells_of(header).size();
   std::vector<Recording> out;
   std::string_view cycle;
   std::size_t line_number = 1;
@@ -107,12 +110,14 @@ Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std:
     const std::string_view line = next_line(csv);
     if (line.empty()) continue;
     const auto cells = cells_of(line);
+    // A logger that was cut off leaves a last line without its end.
+    if (csv.empty() && !ends_with_newline && cells.size() < width) break;
     double value[columns] = {};
     for (std::size_t c = 0; c < cycle_column; ++c) {
       value[c] = std::numeric_limits<double>::quiet_NaN();
       if (!(*at)[c]) continue;
       const std::string_view cell = *(*at)[c] < cells.size() ? cells[*(*at)[c]] : std::string_view{};
-      if (cell.empty() && c == temperature_column) continue;
+      if (c == temperature_column && (cell.empty() || same_name(cell, "nan"))) continue;
       const auto read = number(cell);
       if (!read)
         return invalid(
@@ -149,50 +154,92 @@ Result<std::vector<Recording>> read_recordings(const std::filesystem::path& path
   if (!ignored && bytes > max_file_bytes)
     return fail(Fault::too_large, path.string(),
                 fmt::format("is {} bytes, must be at most {}", bytes, max_file_bytes));
-  std::ifstream file(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file.is_open() || file.bad()) return fail(Fault::not_found, path.string(), "cannot be read");
-  return parse_recordings(text, path.filename().string()).map_error([&](Error error) {
+  const Result<std::string> text = read_text_file(path);
+  if (!text) return tl::unexpected(text.error());
+  return parse_recordings(*text, path.filename().string()).map_error([&](Error error) {
     error.message = fmt::format("{}: {}", path.string(), error.message);
     return error;
   });
 }
 
-Result<std::vector<std::filesystem::path>> identification_files(const std::string& file_or_prefix) {
-  namespace fs = std::filesystem;
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view random_ending = "_rw.csv", test_ending = "_data.csv";
+
+// The CSV files that a folder, or the common beginning of their names, stands for; sorted.
+Result<std::vector<fs::path>> files_of(const std::string& folder_or_prefix) {
   std::error_code ignored;
-  if (fs::is_regular_file(file_or_prefix, ignored)) return std::vector<fs::path>{file_or_prefix};
-  const bool whole_folder = fs::is_directory(file_or_prefix, ignored);
-  const fs::path prefix(file_or_prefix);
+  const bool whole_folder = fs::is_directory(folder_or_prefix, ignored);
+  const fs::path prefix(folder_or_prefix);
   const fs::path folder = whole_folder               ? prefix
                           : prefix.has_parent_path() ? prefix.parent_path()
                                                      : fs::path(".");
   std::string start = whole_folder ? "" : prefix.filename().string();
   if (!whole_folder && !start.ends_with('_')) start += '_';
-  std::vector<fs::path> tests, others;
+  std::vector<fs::path> found;
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
     const std::string name = entry.path().filename().string();
-    if (!name.starts_with(start) || !name.ends_with(".csv") || name.ends_with("_rw.csv")) continue;
-    (name.ends_with("_data.csv") ? tests : others).push_back(entry.path());
+    if (name.starts_with(start) && name.ends_with(".csv")) found.push_back(entry.path());
   }
-  std::vector<fs::path>& found = tests.empty() ? others : tests;
   if (found.empty() || (!whole_folder && start == "_"))
-    return fail(Fault::not_found, file_or_prefix,
+    return fail(Fault::not_found, folder_or_prefix,
                 "is no file, no folder with CSV files, and begins no name of the form <beginning>_*.csv");
   std::sort(found.begin(), found.end());
-  if (whole_folder) {
-    const auto battery = [](const fs::path& file) {
-      const std::string name = file.filename().string();
-      return name.substr(0, name.find('_'));
-    };
-    if (battery(found.front()) != battery(found.back()))
-      return invalid(file_or_prefix,
-                     fmt::format("holds tests of several batteries, {} to {}: name one by the "
-                                 "beginning of its files, as {}",
-                                 battery(found.front()), battery(found.back()),
-                                 (prefix / battery(found.front())).string()));
-  }
   return found;
+}
+
+bool ends_with(const fs::path& file, std::string_view ending) {
+  return file.filename().string().ends_with(ending);
+}
+
+// A folder's files must be one battery's, which their names begin with.
+Result<std::vector<fs::path>> of_one_battery(const std::string& folder_or_prefix,
+                                             std::vector<fs::path> found) {
+  std::error_code ignored;
+  if (!fs::is_directory(folder_or_prefix, ignored)) return found;
+  const auto battery = [](const fs::path& file) {
+    const std::string name = file.filename().string();
+    return name.substr(0, name.find('_'));
+  };
+  if (battery(found.front()) == battery(found.back())) return found;
+  return invalid(folder_or_prefix,
+                 fmt::format("holds tests of several batteries, {} to {}: name one by the "
+                             "beginning of its files, as {}",
+                             battery(found.front()), battery(found.back()),
+                             (fs::path(folder_or_prefix) / battery(found.front())).string()));
+}
+
+bool stands_for_itself(const std::string& file) {
+  std::error_code ignored;
+  return fs::exists(file, ignored) && !fs::is_directory(file, ignored);
+}
+
+}  // namespace
+
+Result<std::vector<std::filesystem::path>> identification_files(const std::string& file_or_prefix) {
+  if (stands_for_itself(file_or_prefix)) return std::vector<fs::path>{file_or_prefix};
+  auto found = files_of(file_or_prefix);
+  if (!found) return found;
+  std::erase_if(*found, [](const fs::path& file) { return ends_with(file, random_ending); });
+  if (std::ranges::any_of(*found, [](const fs::path& file) { return ends_with(file, test_ending); }))
+    std::erase_if(*found, [](const fs::path& file) { return !ends_with(file, test_ending); });
+  if (found->empty())
+    return fail(Fault::not_found, file_or_prefix,
+                "stands for no tests: only for random discharges, *_rw.csv");
+  return of_one_battery(file_or_prefix, std::move(*found));
+}
+
+Result<std::vector<std::filesystem::path>> discharge_files(const std::string& file_or_prefix) {
+  if (stands_for_itself(file_or_prefix)) return std::vector<fs::path>{file_or_prefix};
+  auto found = files_of(file_or_prefix);
+  if (!found) return found;
+  std::erase_if(*found, [](const fs::path& file) { return !ends_with(file, random_ending); });
+  if (found->empty())
+    return fail(Fault::not_found, file_or_prefix,
+                "stands for no random discharges, *_rw.csv: name the files");
+  return of_one_battery(file_or_prefix, std::move(*found));
 }
 
 }  // namespace joulecast::battery

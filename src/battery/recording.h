@@ -25,9 +25,9 @@ struct Recording {
 };
 
 // Reads CSV with a header line that names t_s, I_A and V_V (or time_s, current_a, voltage_v and the like) and
-// may name T_C (empty: not measured) and cycle (each value a recording of its own); other columns are passed
-// over. Of rows with the same time the last counts. `name` begins the recordings' names. Errors name the line
-// and the column.
+// may name T_C (empty or nan: not measured) and cycle (each value a recording of its own); other columns are
+// passed over. Of rows with the same time the last counts; a last line that breaks off does not. `name`
+// begins the recordings' names. Errors name the line and the column.
 Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std::string& name);
 
 // As parse_recordings; an unreadable file is Fault::not_found.
@@ -37,5 +37,9 @@ Result<std::vector<Recording>> read_recordings(const std::filesystem::path& path
 // battery's identification tests, <prefix>_*_data.csv, or where there are none <prefix>_*.csv but for the
 // random discharges <prefix>_rw.csv. Sorted.
 Result<std::vector<std::filesystem::path>> identification_files(const std::string& file_or_prefix);
+
+// The same for what a calibrated battery is tried on: a file stands for itself, a folder or the beginning of
+// the names of one battery's files for its random discharges <prefix>_rw.csv.
+Result<std::vector<std::filesystem::path>> discharge_files(const std::string& file_or_prefix);
 
 }  // namespace joulecast::battery

@@ -4,11 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "base/text_file.h"
 #include "robot/robot_fields.h"
 
 namespace joulecast::robot {
@@ -487,16 +486,9 @@ Result<Battery> parse_battery_document(const json& document) {
   return model.battery;
 }
 
-Result<std::string> read_file(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file.is_open() || file.bad()) return fail(Fault::not_found, path.string(), "cannot be read");
-  return text;
-}
-
 template <class T>
 Result<T> load(const std::filesystem::path& path, Result<T> (*parse)(std::string_view)) {
-  return read_file(path).and_then(parse).map_error([&](Error error) {
+  return read_text_file(path).and_then(parse).map_error([&](Error error) {
     if (error.field == path.string()) return error;
     if (!error.field.empty()) error.message = error.field + ": " + error.message;
     error.field = path.string();

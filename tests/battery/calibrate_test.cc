@@ -116,6 +116,41 @@ TEST(Calibrate, SaysWhichTestIsMissing) {
   EXPECT_THAT(calibrate({all[0], rest}).error().message, testing::HasSubstr("half draws no charge"));
 }
 
+TEST(Calibrate, PassesOverTestsThatSayNothing) {
+  const Circuit truth(full_battery());
+  const std::vector<Recording> plain = identification(truth);
+  std::vector<Recording> more = plain;
+  Recording recharge = plain[1], check = plain[1];
+  recharge.name = "recharge";
+  for (double& current : recharge.current_a) current = -current;
+  std::ranges::reverse(recharge.voltage_v);
+  check.name = "check";
+  for (auto* column : {&check.time_s, &check.current_a, &check.voltage_v, &check.temperature_c})
+    column->resize(5);
+  more.insert(more.begin() + 1, {recharge, check});
+  const auto expected = calibrate(plain), found = calibrate(more);
+  ASSERT_TRUE(found) << describe(found.error());
+  EXPECT_EQ(found->battery, expected->battery);
+  ASSERT_EQ(found->passed_over.size(), 2u);
+  EXPECT_EQ(found->passed_over[0].name, "recharge");
+  EXPECT_EQ(found->passed_over[1].name, "check");
+  ASSERT_EQ(found->recordings.size(), plain.size());
+  for (std::size_t k = 0; k < plain.size(); ++k) EXPECT_EQ(found->recordings[k].name, plain[k].name);
+}
+
+// Recorded down to a lower voltage than the cut-off: what counts is when the cut-off is reached, not when the
+// recording ends.
+TEST(Predict, ARecordingBelowTheCutOffCountsToTheCutOff) {
+  robot::Battery battery = full_battery();
+  const Recording recording = simulated(Circuit(battery), "low", {2}, 120, 10);
+  battery.cutoff_voltage_v = 3.3;
+  const auto prediction = predict(Circuit(battery), recording, Load::Kind::current);
+  ASSERT_TRUE(prediction) << describe(prediction.error());
+  EXPECT_EQ(prediction->end_voltage_v, 3.3);
+  EXPECT_LT(prediction->measured_s, 0.98 * recording.duration_s());
+  EXPECT_NEAR(prediction->predicted_s, prediction->measured_s, 1);
+}
+
 TEST(Predict, TheTrueBatteryPredictsItself) {
   const Circuit truth(full_battery());
   const Recording recording = simulated(truth, "own", {2, 0, 4}, 120, 10);

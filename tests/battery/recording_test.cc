@@ -56,6 +56,13 @@ TEST(Recording, DamagedTextIsRefusedWithLineAndColumn) {
   }
 }
 
+TEST(Recording, ALastLineThatBreaksOffAndTemperaturesThatAreNoNumbersDoNotMatter) {
+  const auto recordings = parse_recordings("t_s,I_A,V_V,T_C\n0,0,4,NaN\n10,1,3.9,25\n20,1,3.", "x");
+  ASSERT_TRUE(recordings) << describe(recordings.error());
+  EXPECT_THAT(recordings->front().time_s, ElementsAre(0, 10));
+  EXPECT_TRUE(std::isnan(recordings->front().temperature_c[0]));
+}
+
 TEST(Recording, OtherNamesOfTheColumnsAreUnderstood) {
   const auto recordings = parse_recordings("Time_s,Current_A,Voltage_V\n0,0,4\n10,1,3.9\n", "x");
   ASSERT_TRUE(recordings) << describe(recordings.error());
@@ -82,6 +89,14 @@ TEST(Recording, FindsTheTestsOfABatteryByFolderAndByBeginning) {
   put("X_ocv_data.csv");
   EXPECT_THAT(names((folder / "X").string()), ElementsAre("X_ocv_data.csv"));
   EXPECT_THAT(names(folder.string()), ElementsAre("X_ocv_data.csv"));
+  const auto discharges = [&](const std::string& given) {
+    return discharge_files(given).value().at(0).filename();
+  };
+  EXPECT_EQ(discharges((folder / "X").string()), "X_rw.csv");
+  EXPECT_EQ(discharges(folder.string()), "X_rw.csv");
+  EXPECT_EQ(discharges((folder / "Y_slow.csv").string()), "Y_slow.csv");
+  EXPECT_THAT(discharge_files((folder / "Y").string()).error().message, HasSubstr("no random discharges"));
+  EXPECT_THAT(read_recordings(folder).error().message, HasSubstr("folder"));
   put("Y_ocv_data.csv");
   EXPECT_THAT(identification_files(folder.string()).error().message, HasSubstr("several batteries, X to Y"));
   fs::remove_all(folder);

@@ -55,7 +55,7 @@ def battery_recordings(home):
     write("cell_c20_data.csv", discharge(lambda t: 0.13, 60))
     write("cell_1c_data.csv", discharge(lambda t: 2.6, 5))
     write("cell_pulses_data.csv", discharge(lambda t: 2.6 if t % 1800 < 360 else 0.0, 5))
-    write("cell_random_data.csv", discharge(lambda t: 1.5 + math.sin(t / 40) + 0.4 * math.sin(t / 7), 5))
+    write("cell_rw.csv", discharge(lambda t: 1.5 + math.sin(t / 40) + 0.4 * math.sin(t / 7), 5))
 
 
 def foreign_table(home):

@@ -260,6 +260,9 @@ TEST(RobotFile, UnreadableFileIsNotFound) {
   ASSERT_FALSE(model);
   EXPECT_EQ(model.error().fault, Fault::not_found);
   EXPECT_THAT(model.error().field, HasSubstr("absent.json"));
+  const auto folder = load_robot(shipped);
+  ASSERT_FALSE(folder);
+  EXPECT_EQ(folder.error().fault, Fault::not_found);
 }
 
 TEST(RobotFile, ModelsBuiltInCodeAreHeldToTheSameConstraints) {
