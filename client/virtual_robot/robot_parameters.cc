@@ -99,19 +99,23 @@ Result<RobotParameters> parse_robot(const std::string& json_text) {
   p.nominal_voltage_v = in.number("/battery/nominal_voltage_v", Sign::positive);
   p.capacity_ah = in.number("/battery/capacity_ah", Sign::positive);
   p.internal_resistance_ohm = in.number("/battery/internal_resistance_ohm", Sign::not_negative);
-  if (const json* curve = in.find("/battery/open_circuit_voltage"); curve != nullptr && curve->is_array()) {
-    for (std::size_t k = 0; k < curve->size(); ++k) {
-      const std::string at = "/battery/open_circuit_voltage/" + std::to_string(k);
-      const json& point = (*curve)[k];
-      if (!point.is_array() || point.size() != 2) {
-        in.report(at, "must be [charge, volts]");
-        break;
+  p.capacity_ah *= in.number_or("/battery/ageing_factor", Sign::positive, 1);
+  if (in.find("/battery/open_circuit_voltage") != nullptr) {
+    const std::string at = "/battery/open_circuit_voltage";
+    const json* charge = in.find(at + "/charge");
+    const json* voltage = in.find(at + "/voltage_v");
+    if (charge == nullptr || voltage == nullptr || !charge->is_array() || !voltage->is_array() ||
+        charge->size() < 2 || charge->size() != voltage->size()) {
+      in.report(at, "must hold charge and voltage_v, of the same length, two or more");
+    } else {
+      for (std::size_t k = 0; k < charge->size(); ++k) {
+        const std::string index = "/" + std::to_string(k);
+        const double share = in.check(at + "/charge" + index, (*charge)[k], Sign::not_negative);
+        if (!p.open_circuit_voltage.empty() && share <= p.open_circuit_voltage.back().first)
+          in.report(at + "/charge" + index, "must ascend");
+        p.open_circuit_voltage.emplace_back(
+            share, in.check(at + "/voltage_v" + index, (*voltage)[k], Sign::positive));
       }
-      const double charge = in.check(at + "/0", point[0], Sign::not_negative);
-      if (!p.open_circuit_voltage.empty() && charge <= p.open_circuit_voltage.back().first) {
-        in.report(at + "/0", "must ascend");
-      }
-      p.open_circuit_voltage.emplace_back(charge, in.check(at + "/1", point[1], Sign::positive));
     }
   }
   p.idle_power_w = in.number_or("/idle_power_w", Sign::not_negative, 0);

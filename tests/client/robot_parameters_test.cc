@@ -26,6 +26,17 @@ TEST(RobotParameters, TakesEveryFieldFromTheFile) {
   EXPECT_EQ(amr.payload_limit_kg, 60);
 }
 
+TEST(RobotParameters, TakesACalibratedBattery) {
+  auto document = amr_json();
+  document["battery"]["open_circuit_voltage"] = {{"charge", {0, 0.5, 1}}, {"voltage_v", {21, 25, 29}}};
+  document["battery"]["ageing_factor"] = 0.9;
+  const auto robot = parse_robot(document.dump());
+  ASSERT_TRUE(robot) << describe(robot.error());
+  EXPECT_EQ(robot->open_circuit_voltage,
+            (std::vector<std::pair<double, double>>{{0, 21}, {0.5, 25}, {1, 29}}));
+  EXPECT_DOUBLE_EQ(robot->capacity_ah, 0.9 * shipped("amr").capacity_ah);
+}
+
 TEST(RobotParameters, NamesThePointerAtFault) {
   const auto fault_of = [](const char* pointer, nlohmann::json value) {
     auto document = amr_json();
@@ -38,8 +49,10 @@ TEST(RobotParameters, NamesThePointerAtFault) {
   EXPECT_EQ(fault_of("/motor/friction_torque_nm", {1, -1}), "/motor/friction_torque_nm/1");
   EXPECT_EQ(fault_of("/motor/friction_torque_nm", 1), "/motor/friction_torque_nm");
   EXPECT_EQ(fault_of("/robot_id", ""), "/robot_id");
-  EXPECT_EQ(fault_of("/battery/open_circuit_voltage", {{0.5, 24}, {0.5, 25}}),
-            "/battery/open_circuit_voltage/1/0");
+  EXPECT_EQ(fault_of("/battery/open_circuit_voltage", {{"charge", {0.5, 0.5}}, {"voltage_v", {24, 25}}}),
+            "/battery/open_circuit_voltage/charge/1");
+  EXPECT_EQ(fault_of("/battery/open_circuit_voltage", {{"charge", {0, 1}}, {"voltage_v", {24}}}),
+            "/battery/open_circuit_voltage");
   EXPECT_EQ(fault_of("/effects/slope", {{"angle_rad", 0.1}}), "/effects");
   EXPECT_EQ(fault_of("/idle_power_w", 10), "accepted");
   auto lacking = amr_json();
