@@ -22,10 +22,11 @@ constexpr std::size_t most_alternatives = 2;
 constexpr std::size_t fewest_windows = 40;
 constexpr double settled_delay_s = 0.006;
 constexpr int most_delay_rounds = 4;
-// Of the mean power, beyond the noise floor: what may be left over while nothing is named, and beside names
-// with a part of the gap. Robots as filed left at most 0.008 in development trials, right names 0.02.
-constexpr double largest_unnamed_share = 0.012;
+// Of the mean power, beyond the noise floor: what may be left over beside names, with a part of the gap.
+// Right names left at most 0.02 in development trials.
 constexpr double largest_left_share = 0.014, largest_left_part = 0.1;
+constexpr double largest_to_and_fro = 2.5;  // power that effects move, over the gap
+constexpr double explained_part = 0.5;      // of what may be left
 constexpr double least_deviations = 1.64;
 constexpr double most_outside = 0.3;     // posterior of something unknown beside a sure finding
 constexpr double surest_verdict = 0.97;  // what verdicts of posterior 1 came true in development trials
@@ -313,7 +314,7 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
   std::optional<Ripple> ripple;
   if (settings.parts.open_set)
     ripple = find_ripple(recordings, robot, effects, d.motor_channels, judged.front().electrical_shift_s);
-  if (ripple && ripple->power_share < least_outside_of(gap_share)) ripple.reset();
+  if (ripple && ripple->power_share < least_outside_of(gap_share, 0)) ripple.reset();
   if (ripple) {
     unknown_share += ripple->power_share;
     if (ripple->power_share > largest) {
@@ -351,8 +352,18 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
   const double left = d.shrinkage ? d.shrinkage->after - d.noise_floor : 0.0;
   const double may_be_left = largest_left_share + largest_left_part * d.power_absolute_relative;
   const bool unexplained = worse || left > may_be_left;
-  const bool strained =
-      std::ranges::any_of(effects, [&](const auto& effect) { return implausible(effect, robot); });
+  // Effects that undo most of what each other does are the shape of something else.
+  double to_and_fro = 0;
+  const Evidence::Estimate whole = fit.evidence->estimate(best->first);
+  for (const std::size_t h : best->first) {
+    if (!columns.hypotheses()[h].outside()) to_and_fro += moved(columns.hypotheses()[h], whole.mean);
+  }
+  const bool cancels = to_and_fro > largest_to_and_fro * d.power_absolute_relative;
+  // What leaves next to nothing is what it says, however strong.
+  const bool explains = d.shrinkage && left < explained_part * may_be_left;
+  const bool strained = cancels || (!explains && std::ranges::any_of(effects, [&](const auto& effect) {
+                          return implausible(effect, robot);
+                        }));
   if (ripple || (!unknown.empty() && posterior.outside >= settings.report_probability)) {
     d.verdict = Verdict::outside;
     d.verdict_probability = d.outside.probability;

@@ -45,16 +45,19 @@ namespace {
 constexpr double leading = 14;  // explanations this far below the best in log odds are let go
 
 // Whether an outside family bends an effect along the variable that the effect itself follows: a departure of
-// its shape (a square zone for a round one), not something else.
-bool bends(const Hypothesis& family, const Hypothesis& effect) {
+// its shape (a square zone for a round one), not something else. Friction at low speed is called Stribeck's
+// although hardly any follows his curve.
+bool bends(const Hypothesis& family, double family_share, const Hypothesis& effect, double effect_share) {
+  constexpr double shape_of_stribeck = 2.5;
   struct Bend {
     std::string_view effect, channel, variable;
+    double most = 1;  // power that the family may move, over the effect's
   };
   constexpr auto bends =
       std::to_array<Bend>({{"floor_resistance_zone", "wheel_torque", "position"},
                            {"slope", "wheel_torque", "heading"},
                            {"slope", "wheel_torque", "position"},
-                           {"stribeck_friction", "wheel_torque", "speed"},
+                           {"stribeck_friction", "wheel_torque", "speed", shape_of_stribeck},
                            {"turning_scrub", "wheel_torque", "yaw_rate"},
                            {"gear_efficiency", "wheel_torque", "acceleration"},
                            {"load_rolling_resistance", "wheel_torque", "payload"},
@@ -65,54 +68,63 @@ bool bends(const Hypothesis& family, const Hypothesis& effect) {
                            {"floor_resistance_zone", "battery_power_from_motion", "position"},
                            {"slope", "battery_power_from_motion", "heading"},
                            {"turning_scrub", "battery_power_from_motion", "yaw_rate"},
-                           {"stribeck_friction", "battery_power_from_motion", "speed"},
+                           {"stribeck_friction", "battery_power_from_motion", "speed", shape_of_stribeck},
                            {"no_regeneration", "battery_power_from_motion", "acceleration"}});
   return std::ranges::any_of(bends, [&](const Bend& b) {
-    return b.effect == effect.id() && b.channel == family.channel && b.variable == family.variable;
+    return b.effect == effect.id() && b.channel == family.channel && b.variable == family.variable &&
+           family_share < b.most * effect_share;
   });
 }
 
-// Friction that grows towards standstill is Stribeck's whatever curve it follows: where the flexible speed
-// law of a channel says hardly more than his, his stands for it.
-void name_low_speed_friction(const Fit& fit, std::vector<std::size_t>& set) {
-  constexpr double nearly_all = 0.85;  // of the log odds that the flexible law brings
+// A flexible law bends to noise and to how a formula ends: where one effect of the catalogue says nearly as
+// much, it stands for the law. More is forgiven friction that grows towards standstill: it is Stribeck's
+// whatever curve it follows.
+void name_by_catalogue(const Fit& fit, std::vector<std::size_t>& set) {
+  constexpr double nearly_all_of_stribeck = 0.85, nearly_all = 0.92;  // of the log odds that the law brings
+  constexpr double close = 4;                                         // in log odds
   const auto& all = fit.columns->hypotheses();
-  const auto stribeck = [&](std::size_t h) {
-    return !all[h].outside() && all[h].id() == "stribeck_friction";
-  };
-  const auto law = std::ranges::find_if(set, [&](std::size_t h) {
-    return all[h].outside() && all[h].variable == "speed" &&
-           (all[h].channel == "wheel_torque" || all[h].channel == "battery_power_from_motion");
-  });
-  if (law == set.end() || std::ranges::any_of(set, stribeck)) return;
-  std::vector<std::size_t> others = set;
-  std::erase(others, *law);
-  const double without = fit.evidence->log_odds(others), with = fit.evidence->log_odds(set);
-  std::optional<std::size_t> best;
-  double odds = without + nearly_all * (with - without);
-  for (std::size_t h = 0; h < all.size(); ++h) {
-    if (!stribeck(h)) continue;
-    std::vector<std::size_t> named = others;
-    named.push_back(h);
-    if (const double o = fit.evidence->log_odds(named); o > odds) {
-      odds = o;
+  for (std::size_t& law : set) {
+    if (!all[law].outside()) continue;
+    const bool of_speed = all[law].variable == "speed" && (all[law].channel == "wheel_torque" ||
+                                                           all[law].channel == "battery_power_from_motion");
+    std::vector<std::size_t> named = set;
+    std::erase(named, law);
+    const double without = fit.evidence->log_odds(named), with = fit.evidence->log_odds(set);
+    named.push_back(law);
+    std::optional<std::size_t> best;
+    double most = without;
+    for (std::size_t h = 0; h < all.size(); ++h) {
+      if (all[h].outside() || std::ranges::any_of(set, [&](std::size_t other) {
+            return all[other].effect.effect == all[h].effect.effect;
+          }))
+        continue;
+      named.back() = h;
+      const double odds = fit.evidence->log_odds(named);
+      const bool enough = of_speed && all[h].id() == "stribeck_friction"
+                              ? odds > without + nearly_all_of_stribeck * (with - without)
+                              : odds > without + nearly_all * (with - without) && odds > with - close;
+      if (!enough || odds <= most) continue;
+      most = odds;
       best = h;
     }
+    if (best) law = *best;
   }
-  if (!best) return;
-  *law = *best;
   std::ranges::sort(set);
+}
+
+double odds_without(const Fit& fit, std::vector<std::size_t> set, std::size_t member) {
+  std::erase(set, member);
+  return fit.evidence->log_odds(set);
 }
 
 }  // namespace
 
-double least_outside_of(double gap_share) {
-  constexpr double of_power = 0.012, of_gap = 0.2;
-  return std::max(of_power, of_gap * gap_share);
+double least_outside_of(double gap_share, double log_odds) {
+  constexpr double of_power = 0.012, of_power_for_certain = 0.006, of_gap = 0.2, certain = 30;
+  return std::max(log_odds > certain ? of_power_for_certain : of_power, of_gap * gap_share);
 }
 
 Posterior posterior_of(const Fit& fit, const MovedShares& moved, double gap_share) {
-  const double least_outside = least_outside_of(gap_share);
   Posterior posterior;
   double total = 0;
   std::size_t looked_at = 0;
@@ -121,24 +133,25 @@ Posterior posterior_of(const Fit& fit, const MovedShares& moved, double gap_shar
     const double weight = std::exp(e.log_odds - fit.explanations.front().log_odds);
     // Families that bend an effect are taken out first: what then is left of the effect has to matter.
     std::vector<std::size_t> straight = e.hypotheses;
-    name_low_speed_friction(fit, straight);
+    name_by_catalogue(fit, straight);
     Evidence::Estimate estimate = fit.evidence->estimate(straight);
     std::erase_if(straight, [&](std::size_t k) {
       const Hypothesis& h = fit.columns->hypotheses()[k];
       return h.outside() && std::ranges::any_of(e.hypotheses, [&](std::size_t other) {
                const Hypothesis& effect = fit.columns->hypotheses()[other];
-               return !effect.outside() && bends(h, effect) &&
-                      moved(h, estimate.mean) < moved(effect, estimate.mean);
+               return !effect.outside() &&
+                      bends(h, moved(h, estimate.mean), effect, moved(effect, estimate.mean));
              });
     });
     if (straight.size() < e.hypotheses.size()) estimate = fit.evidence->estimate(straight);
     std::vector<std::size_t> kept;
     bool outside = false;
+    const double odds = fit.evidence->log_odds(straight);
     for (const std::size_t k : straight) {
       const Hypothesis& h = fit.columns->hypotheses()[k];
       const double share = moved(h, estimate.mean);
       const bool matters = h.outside()
-                               ? share > least_outside
+                               ? share > least_outside_of(gap_share, odds - odds_without(fit, straight, k))
                                : share > least_effect_share ||
                                      (!shows_in_power(h.id()) && beyond_tolerance(*fit.columns, estimate, h));
       if (!matters) continue;
@@ -149,6 +162,12 @@ Posterior posterior_of(const Fit& fit, const MovedShares& moved, double gap_shar
     total += weight;
     if (kept.empty()) posterior.none += weight;
     if (outside) posterior.outside += weight;
+  }
+  // A gap that noise does not make is not nothing, however little the channels say what it is.
+  if (gap_share > largest_unnamed_share && posterior.sets.size() > 1) {
+    total -= posterior.none;
+    posterior.none = 0;
+    posterior.sets.erase(std::vector<std::size_t>{});
   }
   for (auto& [set, p] : posterior.sets) p /= total;
   posterior.none /= total;

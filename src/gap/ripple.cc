@@ -14,29 +14,39 @@ namespace {
 
 using telemetry::Sample;
 
-constexpr double stretch_rad = 8 * std::numbers::pi;  // four turns: resolves half a cycle a turn
-constexpr double fastest_per_turn = 12, per_turn_step = 0.25, slowest_per_turn = 0.75;
-constexpr std::size_t frequencies =
-    static_cast<std::size_t>((fastest_per_turn - slowest_per_turn) / per_turn_step) + 1;
+// What repeats within a turn of the wheel is looked for in long stretches, what repeats with the motor behind
+// its gear in short ones of slow motion.
+struct Band {
+  double stretch_turns;  // resolves two cycles in so many
+  double slowest_per_turn, fastest_per_turn;
+  double longest_step_rad;  // between samples
+
+  double step_per_turn() const { return 1 / stretch_turns; }
+  std::size_t frequencies() const {
+    return static_cast<std::size_t>((fastest_per_turn - slowest_per_turn) * stretch_turns) + 1;
+  }
+};
+constexpr auto bands = std::to_array<Band>({{4, 0.75, 12, 0.6}, {0.5, 10, 60, 0.08}});
 constexpr double moving_rad_s = 0.2;
-constexpr double longest_step_rad = 0.6;  // between samples; a cycle has to have five
 constexpr std::size_t fewest_samples = 40, fewest_stretches = 8;
 constexpr std::size_t most_samples = 60'000;
-constexpr double least_contrast = 4.5;
-constexpr double chance = 5.0;  // standard deviations of a mean periodogram
+constexpr double least_contrast = 2.7;  // nothing else went beyond 2 in 150 recordings without a ripple
+constexpr double chance = 5.0;          // standard deviations of a mean periodogram
 
 // The model's leftover between two samples.
 struct Step {
   double angle_rad = 0, duration_s = 0, value = 0;
-  double watts_per_value = 0;  // battery power that a unit of the leftover means
 };
 
 class Spectrum {
  public:
+  explicit Spectrum(const Band& band)
+      : band_(band), relative_(band.frequencies(), 0.0), power_(band.frequencies(), 0.0) {}
+
   // One stretch: its periodogram in units of its own noise.
   void add(std::span<const Step> steps) {
     const double from = steps.front().angle_rad, length = steps.back().angle_rad - from;
-    double total = 0, mean = 0, centre = 0, watts = 0;
+    double total = 0, mean = 0, centre = 0;
     std::vector<double> weight(steps.size());
     for (std::size_t k = 0; k < steps.size(); ++k) {
       const double u = 2 * std::numbers::pi * (steps[k].angle_rad - from) / length;
@@ -44,11 +54,9 @@ class Spectrum {
       total += weight[k];
       mean += weight[k] * steps[k].value;
       centre += weight[k] * steps[k].angle_rad;
-      watts += weight[k] * steps[k].watts_per_value;
     }
     mean /= total;
     centre /= total;
-    watts /= total;
     double slope = 0, square = 0;
     for (std::size_t k = 0; k < steps.size(); ++k) {
       const double u = steps[k].angle_rad - centre;
@@ -56,41 +64,41 @@ class Spectrum {
       square += weight[k] * u * u;
     }
     slope /= square;
-    std::array<std::complex<double>, frequencies> sum{};
+    std::vector<std::complex<double>> sum(power_.size());
     for (std::size_t k = 0; k < steps.size(); ++k) {
       const double angle = steps[k].angle_rad - from;
       const double left = weight[k] * (steps[k].value - mean - slope * (steps[k].angle_rad - centre));
-      std::complex<double> wave = left * std::polar(1.0, -slowest_per_turn * angle);
-      const std::complex<double> next = std::polar(1.0, -per_turn_step * angle);
+      std::complex<double> wave = left * std::polar(1.0, -band_.slowest_per_turn * angle);
+      const std::complex<double> next = std::polar(1.0, -band_.step_per_turn() * angle);
       for (auto& total_at : sum) {
         total_at += wave;
         wave *= next;
       }
     }
-    std::array<double, frequencies> power{};
-    for (std::size_t n = 0; n < frequencies; ++n) power[n] = std::norm(2.0 * sum[n] / total);
+    std::vector<double> power(sum.size());
+    std::ranges::transform(sum, power.begin(), [&](const auto& s) { return std::norm(2.0 * s / total); });
     auto sorted = power;
-    const auto middle = sorted.begin() + frequencies / 2;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
     std::ranges::nth_element(sorted, middle);
     const double noise = *middle / std::numbers::ln2;  // the median of an exponential distribution
     if (!(noise > 0)) return;
-    for (std::size_t n = 0; n < frequencies; ++n) {
+    for (std::size_t n = 0; n < power.size(); ++n) {
       relative_[n] += power[n] / noise;
       power_[n] += power[n];
     }
-    watts_ += watts;
     ++stretches_;
   }
 
-  std::optional<Ripple> line(double mean_power_w, double turning_share) const {
+  // `watts_per_value`: mean over all time, of the mean battery power.
+  std::optional<Ripple> line(double watts_per_value) const {
     if (stretches_ < fewest_stretches) return std::nullopt;
     const auto count = static_cast<double>(stretches_);
     std::optional<Ripple> best;
-    for (std::size_t n = 1; n + 1 < frequencies; ++n) {
+    for (std::size_t n = 1; n + 1 < relative_.size(); ++n) {
       if (relative_[n] < relative_[n - 1] || relative_[n] < relative_[n + 1]) continue;
       // What neighbours beyond the line's own width have; those at the ends have them on one side.
       std::vector<double> near, near_power;
-      for (std::size_t k = 0; k < frequencies; ++k) {
+      for (std::size_t k = 0; k < relative_.size(); ++k) {
         const auto apart = k > n ? k - n : n - k;
         if (apart < 3 || apart > 8) continue;
         near.push_back(relative_[k]);
@@ -103,19 +111,112 @@ class Spectrum {
       if (contrast < least_contrast || here < floor * (1 + chance / std::sqrt(count))) continue;
       const double square = (power_[n] - near_power[near_power.size() / 2]) / count;
       const double amplitude = std::sqrt(std::max(0.0, square));
-      const double share =
-          2 * std::numbers::inv_pi * amplitude * watts_ / count * turning_share / mean_power_w;
+      const double share = 2 * std::numbers::inv_pi * amplitude * watts_per_value;
       if (best && best->power_share >= share) continue;
-      best = Ripple{slowest_per_turn + per_turn_step * static_cast<double>(n), share, contrast};
+      best = Ripple{band_.slowest_per_turn + band_.step_per_turn() * static_cast<double>(n), share, contrast};
     }
     return best;
   }
 
  private:
-  std::array<double, frequencies> relative_{}, power_{};
-  double watts_ = 0;
+  Band band_;
+  std::vector<double> relative_, power_;
   std::size_t stretches_ = 0;
 };
+
+// One mission as the search needs it. Electrical readings of the instant of sample k are at k + late.
+struct Track {
+  const telemetry::Recording* mission;
+  std::size_t late;
+  std::vector<double> payload_kg;
+
+  Track(const telemetry::Recording& recording, double delay_s) : mission(&recording) {
+    const auto& samples = recording.samples;
+    const double mean_step_s = 1e-6 *
+                               static_cast<double>(samples.back().utime_us - samples.front().utime_us) /
+                               static_cast<double>(samples.size() - 1);
+    late = static_cast<std::size_t>(std::lround(std::max(0.0, delay_s) / mean_step_s));
+    double payload = std::isfinite(recording.payload_kg) ? recording.payload_kg : 0.0;
+    for (const Sample& sample : samples) {
+      if (std::isfinite(sample.payload_kg)) payload = sample.payload_kg;
+      payload_kg.push_back(payload);
+    }
+  }
+
+  std::size_t size() const { return mission->samples.size(); }
+  const Sample& at(std::size_t k) const { return mission->samples[k]; }
+  double step_s(std::size_t k) const {
+    return 1e-6 * static_cast<double>(at(k).utime_us - at(k - 1).utime_us);
+  }
+  // Means over the step that ends at sample k.
+  double speed_rad_s(std::size_t k, std::size_t s) const {
+    return 0.5 * (at(k - 1).wheel_velocity_rad_s[s] + at(k).wheel_velocity_rad_s[s]);
+  }
+  double current_a(std::size_t k, std::size_t s) const {
+    return 0.5 * (at(k - 1 + late).motor_current_a[s] + at(k + late).motor_current_a[s]);
+  }
+  double power_w(std::size_t k) const {
+    const Sample &a = at(k - 1), &b = at(k);
+    return 0.5 * (a.battery_voltage_v * a.battery_current_a + b.battery_voltage_v * b.battery_current_a);
+  }
+};
+
+// Steps [first, last) of a mission in which a wheel turns far enough in one direction.
+struct Stretch {
+  std::size_t track, first, last;
+};
+
+std::vector<Stretch> stretches_of(std::span<const Track> tracks, std::size_t s, const Band& band) {
+  const double length_rad = 2 * std::numbers::pi * band.stretch_turns;
+  std::vector<Stretch> found;
+  for (std::size_t t = 0; t < tracks.size(); ++t) {
+    const Track& track = tracks[t];
+    std::size_t first = 1;
+    double turned_rad = 0;
+    for (std::size_t k = 1; k + track.late < track.size(); ++k) {
+      const double speed = track.speed_rad_s(k, s), turned = speed * track.step_s(k);
+      if (!(track.step_s(k) > 0) || !(std::fabs(speed) >= moving_rad_s) ||
+          !(std::fabs(turned) <= band.longest_step_rad) || turned_rad * turned < 0) {
+        first = k + 1;
+        turned_rad = 0;
+        continue;
+      }
+      turned_rad += turned;
+      if (std::fabs(turned_rad) < length_rad) continue;
+      if (k + 1 - first >= fewest_samples) found.push_back({t, first, k + 1});
+      first = k + 1;
+      turned_rad = 0;
+    }
+  }
+  return found;
+}
+
+// What the model leaves of the current of a wheel's motor, or of the battery power; empty where something is
+// not measured.
+std::vector<Step> leftover(const Track& track, const Stretch& stretch, std::size_t s,
+                           const dynamics::DriveModel& model, bool motors) {
+  std::vector<Step> steps;
+  double angle = 0;
+  for (std::size_t k = stretch.first; k < stretch.last; ++k) {
+    const Sample &a = track.at(k - 1), &b = track.at(k);
+    const double step_s = track.step_s(k);
+    dynamics::Instant at;
+    at.payload_kg = track.payload_kg[k];
+    for (std::size_t q : {0u, 1u}) {
+      at.wheel_speed_rad_s[q] = track.speed_rad_s(k, q);
+      at.wheel_acceleration_rad_s2[q] = (b.wheel_velocity_rad_s[q] - a.wheel_velocity_rad_s[q]) / step_s;
+    }
+    at.x_m = 0.5 * (a.pose[0] + b.pose[0]);
+    at.y_m = 0.5 * (a.pose[1] + b.pose[1]);
+    at.heading_rad = b.pose[2];
+    angle += std::fabs(at.wheel_speed_rad_s[s]) * step_s;
+    const double value = motors ? track.current_a(k, s) - model.current_for(model.balance(at).total_nm[s])
+                                : track.power_w(k) - model.flow(at).battery_power_w;
+    if (!std::isfinite(value)) return {};
+    steps.push_back({angle, step_s, value});
+  }
+  return steps;
+}
 
 }  // namespace
 
@@ -123,97 +224,53 @@ std::optional<Ripple> find_ripple(const RecordingSet& set, const robot::RobotMod
                                   std::span<const dynamics::ActiveEffect> effects, bool motors,
                                   double delay_s) {
   const dynamics::DriveModel model = extended_model(robot, effects);
-  const double kt = model.parameters().torque_constant_nm_a;
-  const double ohm = robot.motor.resistance_ohm;
-  std::array<Spectrum, 2> spectra;
-  std::array<double, 2> turning_s{};
-  double total_s = 0, energy_j = 0;
-  const std::size_t keep_every = std::max<std::size_t>(1, set.samples / most_samples);
-  std::size_t stretch_count = 0;
-  std::vector<Step> stretch;
-  for (const telemetry::Recording& mission : set.missions) {
-    const double mean_step_s =
-        1e-6 * static_cast<double>(mission.samples.back().utime_us - mission.samples.front().utime_us) /
-        static_cast<double>(mission.samples.size() - 1);
-    // Electrical readings of the same instant come so many samples later.
-    const auto late = static_cast<std::size_t>(std::lround(std::max(0.0, delay_s) / mean_step_s));
-    double payload = std::isfinite(mission.payload_kg) ? mission.payload_kg : 0.0;
-    for (std::size_t s : {0u, 1u}) {
-      stretch.clear();
-      double angle = 0, began = 0;
-      const auto end = [&] {
-        stretch.clear();
-        began = angle;
-      };
-      for (std::size_t k = 1; k + late < mission.samples.size(); ++k) {
-        const Sample &a = mission.samples[k - 1], &b = mission.samples[k];
-        const Sample &from = mission.samples[k - 1 + late], &to = mission.samples[k + late];
-        const double step_s = 1e-6 * static_cast<double>(b.utime_us - a.utime_us);
-        if (std::isfinite(b.payload_kg)) payload = b.payload_kg;
-        dynamics::Instant at;
-        at.payload_kg = payload;
-        for (std::size_t q : {0u, 1u}) {
-          at.wheel_speed_rad_s[q] = 0.5 * (a.wheel_velocity_rad_s[q] + b.wheel_velocity_rad_s[q]);
-          at.wheel_acceleration_rad_s2[q] = (b.wheel_velocity_rad_s[q] - a.wheel_velocity_rad_s[q]) / step_s;
-        }
-        const double speed = at.wheel_speed_rad_s[s], turned = speed * step_s;
-        const double power =
-            0.5 * (a.battery_voltage_v * a.battery_current_a + b.battery_voltage_v * b.battery_current_a);
-        if (s == 0 && std::isfinite(power)) {
-          total_s += step_s;
-          energy_j += std::fabs(power) * step_s;
-        }
-        if (!(step_s > 0) || std::fabs(speed) < moving_rad_s || std::fabs(turned) > longest_step_rad ||
-            (!stretch.empty() && speed * stretch.back().watts_per_value < 0)) {
-          end();
-          continue;
-        }
-        turning_s[s] += step_s;
-        angle += std::fabs(turned);
-        if (stretch_count % keep_every != 0) {
-          if (angle - began < stretch_rad) continue;
-          ++stretch_count;
-          end();
-          continue;
-        }
-        at.x_m = 0.5 * (a.pose[0] + b.pose[0]);
-        at.y_m = 0.5 * (a.pose[1] + b.pose[1]);
-        at.heading_rad = b.pose[2];
-        const double current = 0.5 * (from.motor_current_a[s] + to.motor_current_a[s]);
-        Step step{angle, step_s, missing, 0};
-        if (motors) {
-          step.value = current - model.current_for(model.balance(at).total_nm[s]);
-          step.watts_per_value = std::copysign(kt * std::fabs(speed) + 2 * ohm * std::fabs(current), speed);
-        } else {
-          step.value = power - model.flow(at).battery_power_w;
-          step.watts_per_value = std::copysign(1.0, speed);
-        }
-        if (!std::isfinite(step.value)) {
-          end();
-          continue;
-        }
-        stretch.push_back(step);
-        if (angle - began < stretch_rad) continue;
-        ++stretch_count;
-        if (stretch.size() >= fewest_samples) {
-          for (Step& q : stretch) q.watts_per_value = std::fabs(q.watts_per_value);
-          spectra[s].add(stretch);
-        }
-        end();
+  std::vector<Track> tracks;
+  for (const telemetry::Recording& mission : set.missions) tracks.emplace_back(mission, delay_s);
+
+  double energy_j = 0;
+  std::array<double, 2> joules_per_value{};  // of battery energy, for a leftover of one all the time
+  for (const Track& track : tracks) {
+    for (std::size_t k = 1; k + track.late < track.size(); ++k) {
+      const double step_s = track.step_s(k), power = track.power_w(k);
+      if (!(step_s > 0)) continue;
+      if (std::isfinite(power)) energy_j += std::fabs(power) * step_s;
+      for (std::size_t s : {0u, 1u}) {
+        const double speed = std::fabs(track.speed_rad_s(k, s)), current = std::fabs(track.current_a(k, s));
+        if (!(speed >= moving_rad_s)) continue;
+        const double watts = motors ? model.parameters().torque_constant_nm_a * speed +
+                                          2 * robot.motor.resistance_ohm * current
+                                    : 1.0;
+        if (std::isfinite(watts)) joules_per_value[s] += watts * step_s;
       }
     }
   }
   if (!(energy_j > 0)) return std::nullopt;
+
   std::optional<Ripple> best;
-  double share = 0;
-  for (std::size_t s : {0u, 1u}) {
-    const auto line = spectra[s].line(energy_j / total_s, turning_s[s] / total_s);
-    if (!line) continue;
-    // Both wheels' add up, unless one reading sums them already.
-    share = motors ? share + line->power_share : std::max(share, line->power_share);
-    if (!best || line->power_share > best->power_share) best = line;
+  for (const Band& band : bands) {
+    std::optional<Ripple> strongest;
+    double share = 0;
+    for (std::size_t s : {0u, 1u}) {
+      const std::vector<Stretch> stretches = stretches_of(tracks, s, band);
+      std::size_t samples = 0;
+      for (const Stretch& stretch : stretches) samples += stretch.last - stretch.first;
+      const std::size_t keep_every = samples / most_samples + 1;
+      Spectrum spectrum(band);
+      for (std::size_t k = 0; k < stretches.size(); k += keep_every) {
+        const Track& track = tracks[stretches[k].track];
+        if (const auto steps = leftover(track, stretches[k], s, model, motors); !steps.empty())
+          spectrum.add(steps);
+      }
+      const auto line = spectrum.line(joules_per_value[s] / energy_j);
+      if (!line) continue;
+      // Both wheels' add up, unless one reading sums them already.
+      share = motors ? share + line->power_share : std::max(share, line->power_share);
+      if (!strongest || line->power_share > strongest->power_share) strongest = line;
+    }
+    if (!strongest) continue;
+    strongest->power_share = share;
+    if (!best || share > best->power_share) best = strongest;
   }
-  if (best) best->power_share = share;
   return best;
 }
 
