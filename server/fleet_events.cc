@@ -23,7 +23,7 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
     std::optional<forecast::Reach> reach;
     if (model != nullptr) reach = forecasts_.reach(model, *snapshot);
     api::write_state(json, *snapshot, reach, now_utime_us);
-    hub_.publish("state", json.text(), snapshot->robot_id);
+    hub_.publish_newest("state", json.text(), snapshot->robot_id);
     told = {snapshot, live};
   }
 }

@@ -5,6 +5,7 @@
 #include <deque>
 #include <mutex>
 #include <random>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -18,7 +19,8 @@ using Clock = std::chrono::steady_clock;
 struct Event {
   std::uint64_t number;
   std::string topic;
-  std::string text;  // as sent
+  std::string replaces;  // events of one name here outdate each other; empty: each tells something of its own
+  std::string text;      // as sent
 };
 
 std::string new_epoch() {
@@ -69,9 +71,10 @@ struct EventHub::State::Subscriber : public StreamSource {
     if (overflowed) return Next::abort;
     out += notice;
     notice.clear();
-    for (const auto& event : queue) out += event->text;
-    queue.clear();
-    queued_bytes = 0;
+    for (const auto& event : queue) {
+      if (event) out += event->text;
+    }
+    empty_queue();
     const auto now = Clock::now();
     if (!out.empty()) {
       last_sent = now;
@@ -89,8 +92,7 @@ struct EventHub::State::Subscriber : public StreamSource {
     const std::lock_guard lock(mutex);
     left = true;
     wake = nullptr;
-    queue.clear();
-    queued_bytes = 0;
+    empty_queue();
   }
   bool hopeless() const override { return overflowed; }
   bool endless() const override { return true; }
@@ -104,9 +106,17 @@ struct EventHub::State::Subscriber : public StreamSource {
     {
       const std::lock_guard lock(mutex);
       if (left || overflowed) return true;
+      if (!event->replaces.empty()) {
+        const auto [place, first] = newest.try_emplace(event->replaces, queue.size());
+        if (!first) {
+          queued_bytes -= queue[place->second]->text.size();
+          queue[place->second].reset();
+          place->second = queue.size();
+        }
+      }
       if (queued_bytes + event->text.size() > limit) {
         overflowed = true;
-        queue.clear();
+        empty_queue();
         kept = false;
         call = wake;
       } else {
@@ -128,12 +138,20 @@ struct EventHub::State::Subscriber : public StreamSource {
     if (call) call();
   }
 
+  void empty_queue() {
+    queue.clear();
+    newest.clear();
+    queued_bytes = 0;
+  }
+
   const std::string topic;
   const std::size_t limit;
   const std::chrono::milliseconds heartbeat;
   std::mutex mutex;
   std::function<void()> wake;
-  std::vector<std::shared_ptr<const Event>> queue;
+  std::vector<std::shared_ptr<const Event>> queue;  // null: outdated before it was sent
+  std::unordered_map<std::string, std::size_t>
+      newest;          // where in the queue, of events that outdate each other
   std::string notice;  // sent once, before anything else
   std::size_t queued_bytes = 0;
   Clock::time_point last_sent = Clock::now();
@@ -158,10 +176,20 @@ EventHub::~EventHub() {
 }
 
 void EventHub::publish(std::string_view event, std::string_view data, std::string_view topic) {
+  send(event, data, topic, {});
+}
+
+void EventHub::publish_newest(std::string_view event, std::string_view data, std::string_view topic) {
+  send(event, data, topic, std::string(event).append(" ").append(topic));
+}
+
+void EventHub::send(std::string_view event, std::string_view data, std::string_view topic,
+                    std::string replaces) {
   const std::lock_guard lock(state_->mutex);
   auto entry = std::make_shared<Event>();
   entry->number = state_->next_number++;
   entry->topic = topic;
+  entry->replaces = std::move(replaces);
   append_line(entry->text, "event", event);
   append_line(entry->text, "id", state_->epoch + "-" + std::to_string(entry->number));
   append_line(entry->text, "data", data);

@@ -18,8 +18,8 @@ namespace joulecast::http {
 class EventHub {
  public:
   struct Options {
-    std::size_t queue_bytes = 256 * 1024;    // per client
-    std::size_t backlog_bytes = 512 * 1024;  // kept for returning clients
+    std::size_t queue_bytes = 8 * 1024 * 1024;  // per client
+    std::size_t backlog_bytes = 512 * 1024;     // kept for returning clients
     std::chrono::milliseconds heartbeat{15'000};
     std::size_t max_subscribers = 256;
   };
@@ -38,6 +38,9 @@ class EventHub {
   // Any thread; never blocks on a client. `data` is one JSON text, `topic` what subscribers may select by (a
   // robot's id; empty goes to all).
   void publish(std::string_view event, std::string_view data, std::string_view topic = {});
+  // The same, for events that outdate earlier ones of the same event and topic: a client that reads slowly
+  // gets the newest of them alone.
+  void publish_newest(std::string_view event, std::string_view data, std::string_view topic);
 
   // The event stream of one client; an empty topic selects everything. Fault::unavailable beyond
   // max_subscribers. A stream may outlive its hub and then ends.
@@ -52,6 +55,7 @@ class EventHub {
 
  private:
   struct State;
+  void send(std::string_view event, std::string_view data, std::string_view topic, std::string replaces);
   std::shared_ptr<State> state_;
 };
 

@@ -90,6 +90,25 @@ TEST(EventHub, DropsAFullQueueOnceAndWakesIt) {
   EXPECT_EQ(text, "");
 }
 
+TEST(EventHub, SendsSlowClientsTheNewestOfWhatOutdatesItself) {
+  EventHub hub({.queue_bytes = 1000});
+  const auto slow = hub.subscribe().value();
+  for (int i = 0; i < 500; ++i) {
+    for (const char* robot : {"a", "b"}) hub.publish_newest("state", std::to_string(i), robot);
+    if (i == 100) hub.publish("mission", "ended", "a");
+  }
+  EXPECT_EQ(hub.counts().dropped_clients, 0U);
+  const std::string text = drain(*slow);
+  const auto of_mission = text.find("data: ended\n");
+  EXPECT_NE(of_mission, std::string::npos);
+  const auto first = text.find("event: state\n"), second = text.find("event: state\n", first + 1);
+  EXPECT_LT(of_mission, first);
+  EXPECT_EQ(text.find("event: state\n", second + 1), std::string::npos) << text;
+  EXPECT_NE(text.find("data: 499\n", second), std::string::npos);
+  hub.publish_newest("state", "500", "a");
+  EXPECT_NE(drain(*slow).find("data: 500\n"), std::string::npos);
+}
+
 TEST(EventHub, LineBreaksCannotForgeEvents) {
   EventHub hub;
   const auto source = hub.subscribe().value();
