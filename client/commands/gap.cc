@@ -42,50 +42,6 @@ struct Options {
   GapMissionsOptions missions;
 };
 
-void print(const gap::Diagnosis& d) {
-  std::printf("%s: %zu missions, %zu samples%s\n", d.robot_id.c_str(), d.missions, d.samples,
-              d.motor_channels ? "" : " (no motor channels: judged from battery power and motion alone)");
-  if (d.power == gap::PowerSource::none) {
-    std::printf("gap: no power was recorded; judged from torques\n");
-  } else {
-    std::printf(
-        "gap: energy %+.1f %%, absolute power %.1f %% (noise floor %.1f %%)%s\n", 100 * d.energy_relative,
-        100 * d.power_absolute_relative, 100 * d.noise_floor,
-        d.power == gap::PowerSource::motors ? ", of the motors' power with the file's idle power" : "");
-  }
-  const auto verdict = gap::name_of(d.verdict);
-  std::printf("verdict: %.*s (probability %.2f)\n", static_cast<int>(verdict.size()), verdict.data(),
-              d.verdict_probability);
-  for (const auto& e : d.effects) print_effect(e);
-  if (!d.outside.channel.empty()) {
-    std::printf("  outside the catalogue: in %s, follows %s (probability %.2f)\n", d.outside.channel.c_str(),
-                d.outside.follows.c_str(), d.outside.probability);
-  }
-  if (d.shrinkage) {
-    std::printf("held-out gap: %.1f %% -> %.1f %%, shrinks by %.0f %% [%.0f, %.0f]",
-                100 * d.shrinkage->before, 100 * d.shrinkage->after, 100 * d.shrinkage->fraction,
-                100 * d.shrinkage->interval[0], 100 * d.shrinkage->interval[1]);
-    if (std::isfinite(d.shrinkage->remaining_over_noise_floor))
-      std::printf("; remaining is %.1f noise floors", d.shrinkage->remaining_over_noise_floor);
-    std::printf("\n");
-    if (d.shrinkage->interval[1] < 0)
-      std::printf("  it grows on missions left out: these effects are no explanation\n");
-    else if (d.shrinkage->interval[0] < 0)
-      std::printf("  that the effects help on missions left out is not sure\n");
-  }
-  if (!d.where.empty()) std::printf("where:\n");
-  for (std::size_t k = 0; k < d.where.size() && k < 8; ++k) {
-    const auto& w = d.where[k];
-    const std::string range = w.label.empty() ? fmt::format("{:.3g} to {:.3g}", w.from, w.to) : w.label;
-    std::printf("  %s, %s %s: %+.0f %% of the gap [%.0f, %.0f]\n", w.channel.c_str(), w.variable.c_str(),
-                range.c_str(), 100 * w.share, 100 * w.interval[0], 100 * w.interval[1]);
-  }
-  for (const auto& n : d.next_drive) {
-    std::printf("next drive, to tell %s: %s (log evidence +%.1f)\n", n.separates.c_str(), n.manoeuvre.c_str(),
-                n.expected_log_evidence);
-  }
-}
-
 void print(const energy::BackTest& test) {
   std::printf("%-24s %12s %14s %14s\n", "tested on mission", "measured J", "error before", "error after");
   for (const energy::RunComparison& run : test.runs)
@@ -148,12 +104,12 @@ Exit run(const Options& options) {
     if (!tested) return report(tested.error());
     test = std::move(*tested);
   }
+  nlohmann::json document = gap::diagnosis_to_json(*diagnosis);
   if (options.json) {
-    nlohmann::json document = gap::diagnosis_to_json(*diagnosis);
     if (test) document["back_test"] = energy::back_test_to_json(*test);
     std::printf("%s\n", document.dump(2).c_str());
   } else {
-    print(*diagnosis);
+    print_diagnosis(document);
     if (test) print(*test);
   }
   if (!options.report.empty()) {

@@ -19,7 +19,7 @@ void print_left_out(const gap::LeftOut& l) {
               100 * l.interval[0], 100 * l.interval[1]);
 }
 
-void print(const gap::MissionDiagnosis& d) {
+void print(const gap::MissionDiagnosis& d, const nlohmann::json& effects) {
   std::printf("%s: energies of %zu runs, model by %s\n", d.robot_id.c_str(), d.runs.size(),
               d.model_given ? "the table" : "the robot file");
   std::printf("gap: energy %+.1f %%, mean absolute error of a run %.1f %% (scatter alone makes %.1f %%)\n",
@@ -27,7 +27,7 @@ void print(const gap::MissionDiagnosis& d) {
   const auto verdict = gap::name_of(d.verdict);
   std::printf("verdict: %.*s (probability %.2f)\n", static_cast<int>(verdict.size()), verdict.data(),
               d.verdict_probability);
-  for (const gap::DiagnosedEffect& e : d.effects) print_effect(e);
+  for (const nlohmann::json& e : effects) print_effect(e);
   if (!d.outside.empty()) {
     std::printf("  outside the catalogue: follows %s (probability %.2f)\n", d.outside.c_str(),
                 d.outside_probability);
@@ -87,10 +87,11 @@ Exit gap_from_missions(const GapMissionsOptions& options, const robot::RobotMode
     return gap::diagnose_runs(*runs, robot, {options.robot_model, progress.shares()});
   }();
   if (!diagnosis) return report(diagnosis.error());
+  const nlohmann::json document = gap::to_json(*diagnosis);
   if (options.json) {
-    std::printf("%s\n", gap::to_json(*diagnosis).dump(2).c_str());
+    std::printf("%s\n", document.dump(2).c_str());
   } else {
-    print(*diagnosis);
+    print(*diagnosis, document["effects"]);
   }
   if (!options.report.empty()) {
     const auto page = gap::report_html(*diagnosis, robot, report_origin({options.runs}, options.robot_file));

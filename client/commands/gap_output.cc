@@ -2,28 +2,104 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
+#include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "client/files.h"
+#include "client/wrapped.h"
 #include "gap/adopt.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::client {
 
-void print_effect(const gap::DiagnosedEffect& e) {
-  std::printf("  %s: probability %.2f, closes %.0f %% of the gap\n", e.id.c_str(), e.probability,
-              100 * e.share);
-  for (const auto& p : e.parameters) {
-    const std::string unit = p.unit == "1" ? "" : " " + p.unit;
-    if (p.deviation >= 0) {
-      std::printf("    %s = %.4g +- %.2g%s\n", p.name.c_str(), p.value, p.deviation, unit.c_str());
-    } else {
-      std::printf("    %s = %.4g%s\n", p.name.c_str(), p.value, unit.c_str());
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t most_regions = 8;
+
+double number(const json& value) {
+  return value.is_number() ? value.get<double>() : std::nan("");
+}
+
+std::string text(const json& value) {
+  return value.is_string() ? value.get<std::string>() : "";
+}
+
+// Both ends as finely as the width asks for.
+std::string range_of(const json& region) {
+  if (region["from"].is_string()) return text(region["from"]);
+  const double from = number(region["from"]), to = number(region["to"]);
+  const int places =
+      to > from ? std::clamp(1 - static_cast<int>(std::floor(std::log10(to - from))), 0, 6) : 3;
+  const double step = std::pow(10.0, -places);
+  const auto end = [&](double value) {
+    return fmt::format("{:.{}f}", std::fabs(value) < 0.5 * step ? 0.0 : value, places);
+  };
+  return end(from) + " to " + end(to);
+}
+
+void print_shrinkage(const json& s) {
+  const double low = number(s["ci"][0]), high = number(s["ci"][1]);
+  fmt::print("held-out gap: {:.1f} % -> {:.1f} %, shrinks by {:.0f} % [{:.0f}, {:.0f}]",
+             100 * number(s["held_out_before"]), 100 * number(s["held_out_after"]),
+             100 * number(s["fraction"]), 100 * low, 100 * high);
+  if (s["remaining_over_noise_floor"].is_number())
+    fmt::print("; remaining is {:.1f} noise floors", number(s["remaining_over_noise_floor"]));
+  fmt::print("\n");
+  if (low < 0 && high >= 0) fmt::print("  that the effects help on missions left out is not sure\n");
+}
+
+}  // namespace
+
+void print_effect(const json& e) {
+  fmt::print("  {}: probability {:.2f}, closes {:.0f} % of the gap\n", text(e["id"]),
+             number(e["probability"]), 100 * number(e["share"]));
+  for (const bool estimated : {true, false}) {
+    for (const auto& [name, p] : e["parameters"].items()) {
+      if (p["sd"].is_number() != estimated) continue;
+      fmt::print("    {} = {:.4g}{}{}\n", name, number(p["value"]),
+                 estimated ? fmt::format(" +- {:.2g}", number(p["sd"])) : "",
+                 p["unit"] == "1" ? "" : " " + text(p["unit"]));
     }
   }
-  for (const auto& other : e.alternatives) std::printf("    cannot be told from %s\n", other.c_str());
+  for (const json& other : e["alternatives"]) fmt::print("    cannot be told from {}\n", text(other));
+}
+
+void print_diagnosis(const json& d) {
+  fmt::print(
+      "{}: {} missions, {} samples{}\n", text(d["robot_id"]), d["missions"].get<std::size_t>(),
+      d["samples"].get<std::size_t>(),
+      d["motor_channels"] == true ? "" : " (no motor channels: judged from battery power and motion alone)");
+  if (d["power"] == gap::name_of(gap::PowerSource::none)) {
+    fmt::print("gap: no power was recorded; judged from torques\n");
+  } else {
+    fmt::print("gap: energy {:+.1f} %, absolute power {:.1f} % (noise floor {:.1f} %){}\n",
+               100 * number(d["gap"]["energy_relative"]), 100 * number(d["gap"]["power_absolute_relative"]),
+               100 * number(d["gap"]["noise_floor"]),
+               d["power"] == gap::name_of(gap::PowerSource::motors)
+                   ? ", of the motors' power with the file's idle power"
+                   : "");
+  }
+  fmt::print("verdict: {} (probability {:.2f})\n", text(d["verdict"]), number(d["verdict_probability"]));
+  for (const json& reason : d.value("reasons", json::array()))
+    fmt::print("  {}\n", wrapped(text(reason), help_width(), 2));
+  for (const json& e : d["effects"]) print_effect(e);
+  if (!d["effects"].empty()) print_shrinkage(d["shrinkage"]);
+  if (!d["where"].empty()) fmt::print("where:\n");
+  for (std::size_t k = 0; k < d["where"].size() && k < most_regions; ++k) {
+    const json& w = d["where"][k];
+    fmt::print("  {}, {} {}: {:+.0f} % of the gap [{:.0f}, {:.0f}]\n", text(w["channel"]),
+               text(w["variable"]), range_of(w), 100 * number(w["share"]), 100 * number(w["ci"][0]),
+               100 * number(w["ci"][1]));
+  }
+  for (const json& n : d["next_drive"]) {
+    fmt::print("next drive, to tell {}: {} (log evidence +{:.1f})\n", text(n["separates"]),
+               text(n["manoeuvre"]), number(n["expected_log_evidence"]));
+  }
 }
 
 Exit write_adopted(std::span<const robot::AdoptedEffect> found, robot::RobotModel robot,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,8 +12,11 @@
 
 namespace joulecast::client {
 
-// One effect with its strength and what it cannot be told from.
-void print_effect(const gap::DiagnosedEffect& effect);
+// One effect of a diagnosis's JSON with its strength and what it cannot be told from.
+void print_effect(const nlohmann::json& effect);
+
+// A diagnosis of recordings as its JSON tells it, offline or by a daemon.
+void print_diagnosis(const nlohmann::json& diagnosis);
 
 // Writes the robot file with the effects found next to those it has.
 Exit write_adopted(std::span<const robot::AdoptedEffect> found, robot::RobotModel robot,

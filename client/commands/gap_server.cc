@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "client/commands/gap_output.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/http_client.h"
@@ -68,29 +69,9 @@ Result<json> follow(const Daemon& daemon, json job) {
 }
 
 void print_result(const json& job) {
-  const json& r = job["result"];
-  fmt::print("{} (model version {}): diagnosis {} on {} missions, {} held back\n",
-             job["robot_id"].get<std::string>(), job["model_version"].get<std::int64_t>(),
-             job["id"].get<std::int64_t>(), job["fitted_on"].size(), job["held_back"].size());
-  fmt::print("gap: energy {:+.1f} %, absolute power {:.1f} % (noise floor {:.1f} %)\n",
-             100 * number(r["gap"]["energy_relative"]), 100 * number(r["gap"]["power_absolute_relative"]),
-             100 * number(r["gap"]["noise_floor"]));
-  fmt::print("verdict: {}\n", r["verdict"].get<std::string>());
-  for (const json& e : r["effects"]) {
-    fmt::print("  {}: probability {:.2f}, closes {:.0f} % of the gap\n", e["id"].get<std::string>(),
-               number(e["probability"]), 100 * number(e["share"]));
-    for (const auto& [name, p] : e["parameters"].items())
-      fmt::print("    {} = {:.4g} +- {:.2g} {}\n", name, number(p["value"]), number(p["sd"]),
-                 p["unit"] == "1" ? "" : p["unit"].get<std::string>());
-    for (const json& other : e["alternatives"])
-      fmt::print("    cannot be told from {}\n", other.get<std::string>());
-  }
-  const json& s = r["shrinkage"];
-  fmt::print("held-out gap: {:.1f} % -> {:.1f} %\n", 100 * number(s["held_out_before"]),
-             100 * number(s["held_out_after"]));
-  for (const json& n : r["next_drive"])
-    fmt::print("next drive, to tell {}: {}\n", n["separates"].get<std::string>(),
-               n["manoeuvre"].get<std::string>());
+  fmt::print("diagnosis {} against model version {}, {} missions held back\n", job["id"].get<std::int64_t>(),
+             job["model_version"].get<std::int64_t>(), job["held_back"].size());
+  print_diagnosis(job["result"]);
 }
 
 void print_test(const json& test) {

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/json_number.h"
+#include "gap/verdict_text.h"
 
 namespace joulecast::gap {
 using nlohmann::json;
@@ -28,6 +29,7 @@ json diagnosis_to_json(const Diagnosis& d) {
   }
   out["verdict"] = name_of(d.verdict);
   out["verdict_probability"] = json_number(d.verdict_probability);
+  out["reasons"] = verdict_reasons(d);
   out["effects"] = json::array();
   for (const DiagnosedEffect& e : d.effects) {
     json parameters = json::object();

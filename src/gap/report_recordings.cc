@@ -11,6 +11,7 @@
 #include "gap/chart.h"
 #include "gap/power_gap.h"
 #include "gap/report_page.h"
+#include "gap/verdict_text.h"
 #include "gap/where.h"
 
 namespace joulecast::gap {
@@ -86,20 +87,6 @@ std::string variable_words(const std::string& variable) {
   return found == words.end() ? words_of(variable) : found->second;
 }
 
-std::string effect_names(const Diagnosis& d) {
-  std::vector<std::string> names;
-  for (const DiagnosedEffect& e : d.effects) {
-    std::string name = words_of(e.id);
-    if (!e.alternatives.empty()) {
-      std::vector<std::string> others;
-      for (const std::string& id : e.alternatives) others.push_back(words_of(id));
-      name += " (or " + enumerate(others) + ", which these data do not tell from it)";
-    }
-    names.push_back(std::move(name));
-  }
-  return enumerate(names);
-}
-
 std::string sentence_of(const Diagnosis& d) {
   const std::string gap =
       std::isfinite(d.power_absolute_relative)
@@ -125,17 +112,14 @@ std::string sentence_of(const Diagnosis& d) {
           d.missions, gap, percent(d.noise_floor));
     case Verdict::outside:
       return fmt::format(
-          "On {} missions {}. Part of it comes from something outside the catalogue of effects: it "
-          "shows in {} and follows {}.",
-          d.missions, gap, words_of(d.outside.channel), words_of(d.outside.follows));
+          "On {} missions {}. Part of it comes from something outside the catalogue of effects. {}",
+          d.missions, gap, fmt::join(verdict_reasons(d), " "));
     case Verdict::inconclusive:
       break;
   }
-  const bool worse = d.shrinkage && d.shrinkage->interval[1] < 0;
-  return fmt::format(
-      "On {} missions {}. These data do not decide what causes it{}{}.", d.missions, gap,
-      d.effects.empty() ? "" : "; likeliest: " + effect_names(d),
-      worse ? "; but that makes missions left out of the fit worse, so that it is no explanation" : "");
+  return fmt::format("On {} missions {}. These data do not decide what causes it{}. {}", d.missions, gap,
+                     d.effects.empty() ? "" : "; likeliest: " + effect_names(d),
+                     fmt::join(verdict_reasons(d), " "));
 }
 
 void shrinkage_section(Page& page, const Diagnosis& d) {

@@ -1,7 +1,7 @@
 import { useEffect, useRef, useState } from 'preact/hooks';
 
 // What the service refused, or that it could not be reached (status 0).
-export class Problem extends Error {
+class Problem extends Error {
   constructor(status, title, detail, field) {
     super(detail || title);
     Object.assign(this, { status, title, detail, field });

@@ -15,7 +15,7 @@ const columns = {
 };
 
 // RFC 4180; a text that a spreadsheet would take for a formula gets an apostrophe.
-export function csv_field(value) {
+function csv_field(value) {
   if (value === null || value === undefined) return '';
   if (typeof value !== 'string') return String(value);
   const safe = /^[=+\-@\t\r]/.test(value) ? `'${value}` : value;

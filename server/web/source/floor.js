@@ -6,7 +6,7 @@ import { scale_for } from './colour.js';
 import { digits } from './format.js';
 
 // Where the floor lies on the canvas.
-export function fit(points, width, height, margin = 28, least_m = 2) {
+function fit(points, width, height, margin = 28, least_m = 2) {
   let [x0, x1, y0, y1] = [Infinity, -Infinity, Infinity, -Infinity];
   for (const [x, y] of points) {
     if (!Number.isFinite(x) || !Number.isFinite(y)) continue;
@@ -29,7 +29,7 @@ export function view_of(scale, cx, cy, width, height) {
   };
 }
 
-export function nice_length(metre) {
+function nice_length(metre) {
   const power = 10 ** Math.floor(Math.log10(metre));
   return [5, 2, 1].map((k) => k * power).find((k) => k <= metre) ?? power;
 }
@@ -192,7 +192,7 @@ export function FloorPath({ points, kind = 'power', height = 380, label, cursor 
   </div>`;
 }
 
-export function Legend({ scale, title, unit = 'W' }) {
+function Legend({ scale, title, unit = 'W' }) {
   const middle = (scale.low + scale.high) / 2;
   const draw = (c, width, height) => {
     const step = width / scale.colours.length;

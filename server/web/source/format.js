@@ -34,13 +34,13 @@ export function signed(text) {
 }
 
 // {n, u}: the number and the unit, prefixed so that the number stays short.
-export function energy(joule) {
+export function energy(joule, count = 3) {
   if (!known(joule)) return { n: dash, u: '' };
   const size = Math.abs(joule);
-  if (size >= 9.995e8) return { n: digits(joule / 1e9), u: 'GJ' };
-  if (size >= 999_500) return { n: digits(joule / 1e6), u: 'MJ' };
-  if (size >= 999.5) return { n: digits(joule / 1e3), u: 'kJ' };
-  return { n: size >= 0.05 || size === 0 ? digits(joule) : fixed(joule, 2), u: 'J' };
+  if (size >= 9.995e8) return { n: digits(joule / 1e9, count), u: 'GJ' };
+  if (size >= 999_500) return { n: digits(joule / 1e6, count), u: 'MJ' };
+  if (size >= 999.5) return { n: digits(joule / 1e3, count), u: 'kJ' };
+  return { n: size >= 0.05 || size === 0 ? digits(joule, count) : fixed(joule, 2), u: 'J' };
 }
 
 export function power(watt) {
@@ -55,6 +55,27 @@ export function length(metre) {
   const size = Math.abs(metre);
   if (size >= 9995) return { n: digits(metre / 1e3), u: 'km' };
   return { n: size < 1 ? fixed(metre, 2) : digits(metre), u: 'm' };  // no robot knows its way to the millimetre
+}
+
+// A band of lengths in the unit of its far end: 2.4–35 km, 0–920 m.
+export function length_band(low, high) {
+  if (!known(low) || !known(high)) return '';
+  const [per, u] = high >= 9995 ? [1000, 'km'] : [1, 'm'];
+  return `${digits(low / per, 2)}–${digits(high / per, 2)}\u00a0${u}`;
+}
+
+// Both ends of a range, as finely as its width asks for.
+export function range(low, high) {
+  const wide = Math.abs(high - low);
+  const places = wide > 0 ? Math.max(0, Math.min(6, 1 - Math.floor(Math.log10(wide)))) : 3;
+  return `${fixed(low, places)} to ${fixed(high, places)}`;
+}
+
+// "0.54 ± 0.04": as many digits as the deviation has to say.
+export function with_deviation(value, deviation) {
+  if (!known(deviation) || deviation <= 0) return digits(value);
+  const places = Math.max(0, Math.min(6, 1 - Math.floor(Math.log10(deviation))));
+  return `${fixed(value, places)} ± ${fixed(deviation, places)}`;
 }
 
 export function percent(share, places = 0) {
@@ -82,7 +103,8 @@ export function span(second) {
 
 // A span that is foreseen: to the minute, from a minute on.
 export function about(second) {
-  if (!known(second) || second < 60 || second >= 172_800) return span(second);
+  if (known(second) && second < 60) return `${fixed(second)}\u00a0s`;
+  if (!known(second) || second >= 172_800) return span(second);
   const minutes = Math.round(second / 60);
   return minutes < 60 ? `${minutes}\u00a0min` : `${Math.floor(minutes / 60)}\u00a0h ${String(minutes % 60).padStart(2, '0')}\u00a0min`;
 }

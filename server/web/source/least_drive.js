@@ -6,7 +6,7 @@ const idle_margin = 1.05;  // a standing robot that draws more than this over it
 
 // {length_m, stood_s, first, last}: each run between stops, how long the robot stood still before it, and the
 // directions in which it begins and ends (rad, NaN where the robot did not tell its place).
-export function runs_of(trace, idle_power_w) {
+function runs_of(trace, idle_power_w) {
   const runs = [];
   let run = null, place = null, stood_s = 0;
   trace.speed_m_s.mean.forEach((speed, k) => {

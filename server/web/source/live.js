@@ -25,7 +25,7 @@ class Track {
 const robots = new Map();
 const state = { link: 'connecting', since_ms: Date.now(), loaded: false, loads: 0, error: null, robots, revision: 0, events: 0 };
 const listeners = new Set();
-let source = null, drawn_ms = 0, scheduled = false, heard_ms = 0, retry_ms = 1000, ended_missions = new Set();
+let source = null, drawn_ms = 0, scheduled = false, heard_ms = 0, retry_ms = 1000;
 
 function tell() {
   scheduled = false;
@@ -94,10 +94,8 @@ function connect() {
     take(JSON.parse(event.data));
     changed();
   });
-  source.addEventListener('mission', (event) => {
+  source.addEventListener('mission', () => {
     heard_ms = performance.now();
-    const mission = JSON.parse(event.data);
-    for (const listener of ended_missions) listener(mission);
   });
   source.addEventListener('reset', load);
   source.addEventListener('error', () => {
@@ -138,12 +136,4 @@ export function useLive() {
     return () => listeners.delete(set_revision);
   }, []);
   return state;
-}
-
-// Calls `listener` with every mission that ends.
-export function useEndedMissions(listener) {
-  useEffect(() => {
-    ended_missions.add(listener);
-    return () => ended_missions.delete(listener);
-  }, [listener]);
 }

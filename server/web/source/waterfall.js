@@ -15,7 +15,7 @@ const row_px = 30;
 
 const next_to_nothing = 1e-5;  // of the whole
 
-export function rows_of(terms_j, battery_j) {
+function rows_of(terms_j, battery_j) {
   const empty = (value) => Math.abs(value) <= next_to_nothing * Math.abs(battery_j);
   const rows = [];
   let at = 0;

@@ -53,11 +53,10 @@ export function Choice({ label, options, value, onChange }) {
   </div>`;
 }
 
-const state_notes = {
+export const state_notes = {
   open: 'running', finished: 'finished', aborted: 'aborted', unfinished: 'fell silent', superseded: 'superseded',
   interrupted: 'interrupted',
 };
-export const mission_states = Object.keys(state_notes);
 
 export function MissionState({ mission }) {
   return html`<span class=${`state state-${mission.state}`}>${state_notes[mission.state] ?? mission.state}</span>`;

@@ -2,7 +2,6 @@ import { Component } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { html } from '../html.js';
 import * as format from '../format.js';
-import { post } from '../api.js';
 import { useLive } from '../live.js';
 import { mission_link, robot_link } from '../route.js';
 import { Sparkline } from '../sparkline.js';
@@ -11,31 +10,10 @@ import { Choice, Empty, Failure, Loading, Quantity, Readout, useTitleOf } from '
 
 const row_px = 46, spare_rows = 8, reorder_ms = 3000, low_charge = 0.25;
 
-const forecast_ms = 30_000;
-
-// Range and run time with their bands, as the service forecasts them, of one robot or of all; the live values stand in
-// until they are there.
-export function useRanges(only) {
-  const [ranges, set_ranges] = useState(new Map());
-  useEffect(() => {
-    const look = () => post('/v1/autonomy', only ? { robots: [only] } : {})
-      .then((told) => set_ranges(new Map(told.robots.map((r) => [r.robot_id, { range: r.range_quantiles_m, time: r.run_time_quantiles_s }]))), () => {});
-    look();
-    const timer = setInterval(look, forecast_ms);
-    return () => clearInterval(timer);
-  }, [only]);
-  return ranges;
-}
-
-// Where nine tenths of a forecast lie; nothing where there is none.
+// Where nine tenths of a forecast lie, written by `as(low, high)`; nothing where there is none.
 export function between(band, as) {
   if (!format.known(band?.p05) || !format.known(band.p95)) return '';
-  const low = as(band.p05), high = as(band.p95);
-  return html`<span title="nine times of ten"><span class="hidden">90 % between </span>${low.u === high.u || low.n === '0' ? low.n : format.text(low)}–${format.text(high)}</span>`;
-}
-
-function Range({ live, band }) {
-  return html`<${Quantity} of=${format.length(band?.p50 ?? live)} /><span class="below">${between(band, format.length)}</span>`;
+  return html`<span title="nine times of ten"><span class="hidden">90 % between </span>${as(band.p05, band.p95)}</span>`;
 }
 
 const by = (value) => (a, b) => {
@@ -60,7 +38,7 @@ const columns = [
 // Nothing came from it since the service started.
 const unheard = (state) => state.silent_s === null;
 
-export function health_of(state) {
+function health_of(state) {
   const faults = Object.values(state.faults).reduce((sum, n) => sum + n, 0);
   if (!state.has_model) return { level: 'bad', text: 'no model', faults };
   if (state.live) return { level: 'good', text: 'live', faults };
@@ -96,9 +74,9 @@ const own_part = (mission_id, robot_id) => (mission_id.startsWith(`${robot_id}-`
 
 class Row extends Component {
   shouldComponentUpdate(next) {
-    return next.revision !== this.props.revision || next.entry !== this.props.entry || next.index !== this.props.index || next.dark !== this.props.dark || next.band !== this.props.band;
+    return next.revision !== this.props.revision || next.entry !== this.props.entry || next.index !== this.props.index || next.dark !== this.props.dark;
   }
-  render({ entry, index, revision, dark, band }) {
+  render({ entry, index, revision, dark }) {
     const s = entry.state;
     const modelled_only = s.measured_power_w === null;
     return html`<tr aria-rowindex=${index + 2} class=${s.live ? '' : 'quiet'}>
@@ -107,7 +85,7 @@ class Row extends Component {
       <td class="figure power"><${Quantity} of=${format.power(s.measured_power_w ?? s.modelled_power_w)} />${modelled_only && s.modelled_power_w !== null && html`<span class="note"> mod.</span>`}</td>
       <td class="spark"><${Sparkline} track=${entry.power} revision=${revision} dark=${dark} /></td>
       <td class="charge"><${Charge} state=${s} /></td>
-      <td class="figure range"><${Range} live=${s.range_m} band=${band} /></td>
+      <td class="figure range"><${Quantity} of=${format.length(s.range_m)} /><span class="below">${between(s.range_quantiles_m, format.length_band)}</span></td>
       <td class="figure wide">${format.about(s.run_time_s)}</td>
       <td class="figure wide"><${Quantity} of=${format.unit(s.speed_m_s, 'm/s', 2)} /></td>
       <td class="mission">${s.mission ? html`<a href=${mission_link(s.mission.id)} title=${s.mission.mission_id}>${own_part(s.mission.mission_id, entry.id)}</a>` : html`<span class="note">idle</span>`}</td>
@@ -196,7 +174,7 @@ function Summary({ robots }) {
 
 export function Fleet() {
   useTitleOf('Fleet');
-  const live = useLive(), dark = useTheme(), ranges = useRanges();
+  const live = useLive(), dark = useTheme();
   const [text, set_text] = useState('');
   const [only, set_only] = useState('all');
   const [sort, set_sort] = useState({ key: 'robot', down: false });
@@ -224,7 +202,7 @@ export function Fleet() {
         ${c.sort ? html`<button type="button" onClick=${() => turn(c.key)}>${c.title}<span class="arrow" aria-hidden="true">${c.key === sort.key ? (sort.down ? '▾' : '▴') : ''}</span></button>` : c.title}</th>`)}</tr></thead>
       <tbody ref=${body}>
         ${first > 0 && html`<tr key="above" aria-hidden="true" class="spacer"><td colspan=${columns.length} style=${{ height: `${first * row_px}px` }}></td></tr>`}
-        ${rows.slice(first, last).map((entry, k) => html`<${Row} key=${entry.id} entry=${entry} revision=${entry.revision} index=${first + k} dark=${dark} band=${ranges.get(entry.id)?.range} />`)}
+        ${rows.slice(first, last).map((entry, k) => html`<${Row} key=${entry.id} entry=${entry} revision=${entry.revision} index=${first + k} dark=${dark} />`)}
         ${last < rows.length && html`<tr key="below" aria-hidden="true" class="spacer"><td colspan=${columns.length} style=${{ height: `${(rows.length - last) * row_px}px` }}></td></tr>`}
       </tbody>
     </table>

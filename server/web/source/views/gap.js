@@ -4,26 +4,14 @@ import { html } from '../html.js';
 import * as format from '../format.js';
 import { del, post, query, useGet } from '../api.js';
 import { useLive } from '../live.js';
-import { keep_in_address, mission_link, robot_link } from '../route.js';
+import { mission_link, robot_link } from '../route.js';
 import { Answer, Empty, Failure, Panel, Quantity, Readout, useTitleOf } from '../widgets.js';
+import { JobRows, State, share, state_notes, verdicts } from './jobs.js';
 
 export { RobotHistory } from './robot_history.js';
 
-const state_notes = { queued: 'waiting', running: 'running', done: 'done', failed: 'failed', cancelled: 'cancelled', interrupted: 'cut off by a restart' };
 const ended = (d) => d.state !== 'queued' && d.state !== 'running';
-export const share = (value, places = 1) => format.text(format.percent(value, places));
 const range_of = (ci, places = 1) => (ci && format.known(ci[0]) ? `${share(ci[0], places)} to ${share(ci[1], places)}` : '–');
-
-const verdicts = {
-  none: ['No gap', 'What is measured agrees with the model, as far as these missions tell.'],
-  effects: ['Effects found', 'The model leaves out what is listed here.'],
-  outside: ['Outside the catalogue', 'Something is at work that no known effect describes.'],
-  inconclusive: ['Inconclusive', 'These missions do not tell causes apart. What to drive next would.'],
-};
-
-function State({ of }) {
-  return html`<span class=${`job job-${of.state}`}>${state_notes[of.state]}</span>`;
-}
 
 // Follows a job that waits or runs; `onEnd` when it has ended.
 function useProgress(job, onEnd) {
@@ -51,24 +39,6 @@ function Progress({ job, onEnd }) {
     <progress id="progress" max="100" value=${now.state === 'queued' ? undefined : part}></progress>
     <button type="button" onClick=${() => del(`/v1/diagnoses/${job.id}`).catch(set_error)}>Cancel</button>
     ${error && html`<${Failure} error=${error} />`}</div>`;
-}
-
-function found_words(summary) {
-  if (!summary) return '–';
-  if (summary.effects.length === 0) return verdicts[summary.verdict][0].toLowerCase();
-  return summary.effects.map((e) => format.words(e.id)).join(', ');
-}
-
-export function JobRows({ jobs, with_robot = true }) {
-  return html`<table class="grid jobs"><thead><tr><th scope="col">Diagnosis</th>${with_robot && html`<th scope="col">Robot</th>`}<th scope="col">Begun</th><th scope="col">State</th><th scope="col">Found</th>
-    <th scope="col" class="figure">Gap</th>${with_robot && html`<th scope="col" class="figure">Left, held out</th><th scope="col" class="figure">Missions</th>`}</tr></thead>
-    <tbody>${jobs.map((d) => html`<tr key=${d.id}>
-      <th scope="row"><a href=${`#/gap/${d.id}`}>${d.id}</a>${d.cause === 'watch' && html` <span class="note">by the watch</span>`}</th>
-      ${with_robot && html`<td><a href=${robot_link(d.robot_id)}>${d.robot_id}</a></td>`}
-      <td class="when">${format.time(d.created_utime_us)}</td><td><${State} of=${d} /></td>
-      <td>${d.error ? html`<span class="note">${d.error}</span>` : found_words(d.summary)}</td>
-      <td class="figure">${share(d.summary?.gap.power_absolute_relative)}</td>${with_robot && html`<td class="figure">${share(d.summary?.shrinkage.held_out_after)}</td>
-      <td class="figure">${d.fitted_on.length || '–'}</td>`}</tr>`)}</tbody></table>`;
 }
 
 function Start({ given, onStart }) {
@@ -120,11 +90,22 @@ function All({ given }) {
 const channels = { battery_power: 'battery power', wheel_torque: 'wheel torque', motor_voltage: 'motor voltage', battery_voltage: 'battery voltage' };
 const suffixes = [['_m_s2', 'm/s²'], ['_rad_s', 'rad/s'], ['_m_s', 'm/s'], ['_kg', 'kg'], ['_rad', 'rad'], ['_s', 's'], ['_m', 'm'], ['_w', 'W']];
 
+// "speed_m_s" -> ["speed", "m/s"]
+function unit_of(name) {
+  const [suffix, unit] = suffixes.find(([s]) => name.endsWith(s)) ?? ['', ''];
+  return [name.slice(0, name.length - suffix.length), unit];
+}
+
+// A ratio changes what the model has by a part of it; the others stand in their unit.
+function strength(name, { value, sd, unit }) {
+  if (name !== 'ratio') return `${format.with_deviation(value, sd)}${unit === '1' ? '' : ` ${unit}`}`;
+  return `${value < 0 ? '' : '+'}${format.with_deviation(100 * value, format.known(sd) ? 100 * sd : sd)} %`;
+}
+
 // "speed_m_s" from 0.2 to 0.4 -> ["speed", "0.2 to 0.4 m/s"]
 function region(w) {
-  const [suffix, unit] = suffixes.find(([s]) => w.variable.endsWith(s)) ?? ['', ''];
-  const name = format.words(w.variable.slice(0, w.variable.length - suffix.length));
-  return [name, typeof w.from === 'string' ? w.from : `${format.digits(w.from)} to ${format.digits(w.to)}${unit && ` ${unit}`}`];
+  const [plain, unit] = unit_of(w.variable), name = format.words(plain);
+  return [name, typeof w.from === 'string' ? w.from : `${format.range(w.from, w.to)}${unit && ` ${unit}`}`];
 }
 
 function Where({ regions }) {
@@ -141,7 +122,7 @@ function Where({ regions }) {
 function Effects({ effects }) {
   return html`<table class="grid effects"><thead><tr><th scope="col">Effect</th><th scope="col" class="figure">Probability</th><th scope="col">Strength</th><th scope="col" class="figure">Closes of the gap</th><th scope="col">Cannot be told from</th></tr></thead>
     <tbody>${effects.map((e) => html`<tr key=${e.id}><th scope="row">${format.words(e.id)}</th><td class="figure">${share(e.probability, 0)}</td>
-      <td>${Object.entries(e.parameters).map(([name, p]) => html`<div key=${name}><span class="note">${format.words(name)}</span> ${format.digits(p.value)}${format.known(p.sd) ? ` ± ${format.digits(p.sd, 2)}` : ''}${p.unit === '1' ? '' : ` ${p.unit}`}</div>`)}</td>
+      <td>${Object.entries(e.parameters).map(([name, p]) => html`<div key=${name}><span class="note">${format.words(unit_of(name)[0])}</span> ${strength(name, p)}</div>`)}</td>
       <td class="figure">${share(e.share, 0)}</td><td>${e.alternatives.map(format.words).join(', ') || '–'}</td></tr>`)}</tbody></table>`;
 }
 
@@ -155,7 +136,7 @@ function TestTable({ test }) {
       <td class="figure" title=${range_of(m.after.ci)}>${format.signed(share(m.after.relative))}</td><td class="wide bar-cell">${bar(m.after, 'modelled')}</td></tr>`)}</tbody></table>`;
 }
 
-export function BackTest({ test }) {
+function BackTest({ test }) {
   if (test.missions.length === 0) return html`<p>There is no mission to test it on: none with stored telemetry and measured energy that it was not fitted on.</p>`;
   const left = [[test.left_out.fitted_on, 'it was found on'], [test.left_out.open, 'still running'], [test.left_out.no_telemetry, 'without telemetry'], [test.left_out.beyond_limits, 'beyond the limits']].filter(([n]) => n > 0).map(([n, why]) => `${n} ${why}`).join(', ');
   return html`<div class=${`verdict-box ${test.improves ? 'makes' : 'fails'}`}><p class="verdict">On ${test.missions.length} missions that it was not found on, the energy error ${test.error_after < test.error_before ? 'falls' : 'goes'} from <b>${share(test.error_before, 2)}</b> to <b>${share(test.error_after, 2)}</b>.</p>
@@ -174,21 +155,21 @@ function Adopt({ job }) {
       set_told((t) => ({ ...t, test: error.told?.back_test ?? t.test, error, busy: '' }));
     }
   };
-  const { test, error, busy, adopted } = told;
+  const { test, error, busy, adopted } = told, refused = error?.status === 409 && test !== null;
   return html`${adopted !== null && html`<p class="adopted" role="status">Version ${adopted} is in force for <a href=${robot_link(job.robot_id)}>${job.robot_id}</a>: planning and autonomy use it now, the meter from the next mission on.</p>`}
     ${test && html`<${BackTest} test=${test} />`}
-    ${error && html`<${Failure} error=${error} />`}
+    ${refused ? html`<p class="failure" role="alert"><b>Not adopted:</b> it does not bring the model closer on these missions.</p>` : error && html`<${Failure} error=${error} />`}
     ${adopted === null && html`<div class="tools adopt">
       <button type="button" disabled=${busy !== ''} onClick=${() => ask('test', { dry_run: true })}>${busy === 'test' ? 'Testing …' : test ? 'Test again' : 'Test on other missions'}</button>
       <button type="button" class="primary" disabled=${busy !== ''} onClick=${() => ask('adopt', {})}>${busy === 'adopt' ? 'Testing and adopting …' : 'Adopt'}</button>
-      ${error?.status === 409 && test && html`<button type="button" disabled=${busy !== ''} onClick=${() => ask('adopt', { force: true })}>Adopt all the same</button>`}
+      ${refused && html`<button type="button" disabled=${busy !== ''} onClick=${() => ask('adopt', { force: true })}>Adopt all the same</button>`}
       <span class="note">Adopting makes the next model version, after a test on missions that this was not found on.</span></div>`}`;
 }
 
 function Result({ job }) {
   const r = job.result, [name, words] = verdicts[r.verdict] ?? [r.verdict, ''];
   const s = r.shrinkage;
-  return html`<div class=${`verdict-box ${r.verdict === 'none' || r.verdict === 'effects' ? '' : 'fails'}`}><p class="verdict"><b>${name}</b>${r.effects.length > 0 && html`: ${r.effects.map((e) => format.words(e.id)).join(', ')}`}</p><p class="note">${words}${r.outside.channel && ` It shows in ${format.words(r.outside.channel)} and follows ${format.words(r.outside.follows)}.`}</p></div>
+  return html`<div class=${`verdict-box ${r.verdict === 'none' || r.verdict === 'effects' ? '' : 'fails'}`}><p class="verdict"><b>${name}</b>${r.effects.length > 0 && html`${r.verdict === 'effects' ? ':' : '; likeliest'} ${r.effects.map((e) => format.words(e.id)).join(', ')}`}</p><p class="note">${words}</p>${r.reasons?.length > 0 && html`<ul class="reasons">${r.reasons.map((reason) => html`<li key=${reason}>${reason}</li>`)}</ul>`}</div>
     <dl class="readouts">
       <${Readout} large label="Gap in power" of=${format.percent(r.gap.power_absolute_relative, 1)} note=${`noise ${share(r.gap.noise_floor)}`} />
       <${Readout} large label="Gap in energy" of=${format.percent(r.gap.energy_relative, 1)} />
@@ -198,7 +179,7 @@ function Result({ job }) {
     </dl>
     ${r.effects.length > 0 && html`<${Panel} title="Which effect"><div class="scroll"><${Effects} effects=${r.effects} /></div><//>`}
     <div class="columns"><${Panel} title="Where measured power leaves the model"><${Where} regions=${r.where} /><//>
-      <${Panel} title="What to drive next">${r.next_drive.length === 0 ? html`<${Empty} title=${r.verdict === 'outside' ? 'No drive is suggested' : 'Nothing more is needed'} />`
+      <${Panel} title="What to drive next">${r.next_drive.length === 0 ? html`<${Empty} title=${r.verdict === 'effects' || r.verdict === 'none' ? 'Nothing more is needed' : 'No drive would tell more'} />`
         : html`<ol class="next">${r.next_drive.map((n, k) => html`<li key=${k}><b>${n.manoeuvre}</b> <span class="note">to tell ${format.words(n.separates)}</span></li>`)}</ol>`}<//></div>
     <${Panel} title="Adopt">${job.model === null ? html`<${Empty} title="Nothing to adopt" />` : html`<${Adopt} job=${job} />`}<//>`;
 }

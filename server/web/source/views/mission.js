@@ -8,7 +8,7 @@ import { FloorPath } from '../floor.js';
 import { least_drive_request } from '../least_drive.js';
 import { robot_link } from '../route.js';
 import { palette } from '../theme.js';
-import { Answer, Choice, Empty, Failure, Loading, MissionState, Panel, Quantity, Readout, useTitleOf } from '../widgets.js';
+import { Answer, Choice, Empty, Failure, Loading, MissionState, Panel, Readout, useTitleOf } from '../widgets.js';
 import { Waterfall } from '../waterfall.js';
 import { ratio_of } from './missions.js';
 
@@ -171,9 +171,9 @@ function LeastDrive({ mission, trace }) {
   return html`
     <p class="verdict">${share > 0.005 ? html`The same legs could have been driven for <b>${format.fixed(share * 100, 1)}${'\u00a0'}%</b> less.` : share > -0.005 ? 'Driven about as cheaply as the model allows.' : 'Driven for less than these legs cost from stop to stop: the robot turned while it drove.'}</p>
     <${Bars} label="Energy of the mission and of the minimum-energy drive" rows=${[
-      { name: 'Measured', value: e.measured_j, of: format.energy(e.measured_j), channel: 'measured', note: format.span(e.duration_s) },
-      { name: 'Modelled', value: e.modelled_j, of: format.energy(e.modelled_j), channel: 'modelled', note: format.span(e.duration_s) },
-      { name: 'Least energy', value: least.energy_j, of: format.energy(least.energy_j), channel: 'least', note: format.span(least.duration_s) },
+      { name: 'Measured', value: e.measured_j, of: format.energy(e.measured_j, 4), channel: 'measured', note: format.span(e.duration_s) },
+      { name: 'Modelled', value: e.modelled_j, of: format.energy(e.modelled_j, 4), channel: 'modelled', note: format.span(e.duration_s) },
+      { name: 'Least energy', value: least.energy_j, of: format.energy(least.energy_j, 4), channel: 'least', note: format.span(least.duration_s) },
     ]} />
     <p class="note foot">${legs} ${legs === 1 ? 'leg' : 'legs'} between stops, ${format.text(format.length(e.distance_m))} in all, ${format.fixed((turned * 180) / Math.PI)}° turned at the stops,${stood_s > 0 ? ` ${format.span(stood_s)} standing as the mission did,` : ''}${' '}payload ${format.text(format.unit(mission.payload_kg ?? 0, 'kg'))}, arriving no later. Model version ${least.model_version}; the saving is against the modelled energy, so that a gap of the model does not count as one.</p>`;
 }

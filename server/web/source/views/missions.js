@@ -5,7 +5,7 @@ import { query, useGet } from '../api.js';
 import { export_missions } from '../export.js';
 import { useLive } from '../live.js';
 import { keep_in_address, mission_link, robot_link } from '../route.js';
-import { Answer, Empty, Failure, MissionState, Quantity, Readout, mission_states, useTitleOf } from '../widgets.js';
+import { Answer, Empty, Failure, MissionState, Quantity, Readout, state_notes, useTitleOf } from '../widgets.js';
 
 const page_rows = 50;
 
@@ -13,7 +13,7 @@ const page_rows = 50;
 const utime_us = (local) => (local ? new Date(local).getTime() * 1000 : undefined);
 
 // The filter as the service takes it, from the filter as the address keeps it.
-export function filter_of(given) {
+function filter_of(given) {
   return {
     robot_id: given.robot, mission_id: given.name, state: given.state, incomplete: given.incomplete,
     from_utime_us: utime_us(given.from), to_utime_us: utime_us(given.to),
@@ -67,8 +67,8 @@ function Filters({ given, change }) {
     <fieldset class="field"><legend>Payload, kg</legend><span class="with-unit">
       <input class="short" type="number" min="0" step="any" aria-label="Payload, from kg" placeholder="from" value=${given.payload_min ?? ''} onChange=${set('payload_min')} />
       <input class="short" type="number" min="0" step="any" aria-label="Payload, to kg" placeholder="to" value=${given.payload_max ?? ''} onChange=${set('payload_max')} /></span></fieldset>
-    ${field('State', html`<select value=${given.state ?? ''} onChange=${set('state')}><option value="">all</option>${mission_states.map((s) => html`<option key=${s} value=${s}>${s}</option>`)}</select>`)}
-    ${field('Measured', html`<select value=${given.incomplete ?? ''} onChange=${set('incomplete')}><option value="">all</option><option value="false">complete</option><option value="true">incomplete</option></select>`)}
+    ${field('State', html`<select value=${given.state ?? ''} onChange=${set('state')}><option value="">all</option>${Object.entries(state_notes).map(([state, name]) => html`<option key=${state} value=${state}>${name}</option>`)}</select>`)}
+    ${field('Record', html`<select value=${given.incomplete ?? ''} onChange=${set('incomplete')}><option value="">all</option><option value="false">complete</option><option value="true">incomplete</option></select>`)}
     ${field('Named', html`<input type="text" value=${given.name ?? ''} onChange=${set('name')} />`)}
     <button type="button" class="plain" disabled=${!any} onClick=${() => change({})}>Clear</button>
   </form>`;
@@ -84,7 +84,7 @@ function Totals({ told }) {
       <${Readout} label="Unexplained" of=${format.energy(e.unexplained_j)} channel="gap" note=${e.unexplained_j !== null && e.battery_j !== 0 ? `${format.fixed((100 * e.unexplained_j) / e.battery_j, 1)} %` : ''} />
       <${Readout} label="Distance" of=${format.length(e.distance_m)} />
       <${Readout} label="Per metre" of=${format.unit(e.distance_m > 0 ? e.battery_j / e.distance_m : null, 'J/m')} />
-      <${Readout} label="Driving" of=${format.span(e.duration_s)} />
+      <${Readout} label="Duration" of=${format.span(e.duration_s)} />
     </dl>`;
   }}<//>`;
 }

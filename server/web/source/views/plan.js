@@ -140,7 +140,7 @@ function Verdict({ answer, autonomy }) {
     <p class="verdict"><b>${makes ? 'The robot makes it' : 'The robot does not make it'}</b>${makes
       ? html`: arrives with ${format.text(format.percent(arrival, arrival > 0.995 ? 2 : 1))} charge, ${format.text(format.energy(left))} above its reserve of ${format.text(format.percent(a.reserve_fraction))}.`
       : html`: ${format.text(format.energy(-left))} short of its reserve of ${format.text(format.percent(a.reserve_fraction))}.`}</p>
-    <p class="note">Starts with ${format.text(format.percent(a.state_of_charge, 1))}, ${format.text(format.energy(a.usable_energy_j))} usable${times >= 2 ? `: ${format.fixed(times)} such drives` : ''}. At its ${a.consumption.basis === 'model' ? 'modelled' : 'recent'} consumption it has ${format.text(format.length(a.range_m))} or ${format.span(a.run_time_s)} left.</p></div>`;
+    <p class="note">Starts with ${format.text(format.percent(a.state_of_charge, 1))}, ${format.text(format.energy(a.usable_energy_j))} usable${times >= 2 ? `: about ${format.fixed(Number(times.toPrecision(2)))} such drives` : ''}. At its ${a.consumption.basis === 'model' ? 'modelled' : 'recent'} consumption it has ${format.text(format.length(a.range_m))} or ${format.span(a.run_time_s)} left.</p></div>`;
 }
 
 export function Plan({ given }) {
@@ -231,8 +231,8 @@ export function Plan({ given }) {
             <${Panel} class="screen" title="Speed and power"><${SpeedChart} answer=${answer} /><//>
             <${Panel} title="Against the usual profiles">
               <${Bars} label="Energy of the plan, a trapezoid and a triangle in the same time" rows=${[
-                { name: 'Least energy', value: answer.energy_j, of: format.energy(answer.energy_j), channel: 'least', note: '' },
-                ...['trapezoid', 'triangle'].map((name) => ({ name: name[0].toUpperCase() + name.slice(1), value: base[name]?.energy_j ?? null, of: format.energy(base[name]?.energy_j), channel: 'plain', note: against(base[name]) }))]} />
+                { name: 'Least energy', value: answer.energy_j, of: format.energy(answer.energy_j, 4), channel: 'least', note: '' },
+                ...['trapezoid', 'triangle'].map((name) => ({ name: name[0].toUpperCase() + name.slice(1), value: base[name]?.energy_j ?? null, of: format.energy(base[name]?.energy_j, 4), channel: 'plain', note: against(base[name]) }))]} />
               <p class="note foot">All three in the same time on every run between stops.</p>
             <//>
             <${Panel} title="Where the energy goes"><${Waterfall} terms_j=${answer.ledger_j} battery_j=${answer.energy_j} measured=${false} /><//>

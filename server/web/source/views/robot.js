@@ -8,7 +8,7 @@ import { Sparkline } from '../sparkline.js';
 import { useTheme } from '../theme.js';
 import { mission_link } from '../route.js';
 import { Answer, Empty, Panel, Readout, useTitleOf } from '../widgets.js';
-import { Health, between, charge_note, useRanges } from './fleet.js';
+import { Health, between, charge_note } from './fleet.js';
 import { flat } from './flat.js';
 import { Later } from './later.js';
 import { MissionRows } from './missions.js';
@@ -37,7 +37,7 @@ function LiveMap({ entry }) {
 
 export function Robot({ id }) {
   useTitleOf(id);
-  const live = useLive(), dark = useTheme(), left = useRanges(id).get(id);
+  const live = useLive(), dark = useTheme();
   const detail = useGet(`/v1/robots/${id_path(id)}`);
   const missions = useGet(`/v1/missions${query({ robot_id: id, limit: recent_rows })}`);
   const entry = live.robots.get(id), s = entry?.state;
@@ -54,8 +54,8 @@ export function Robot({ id }) {
     ${s && s.silent_s !== null && html`<dl class="readouts">
       <${Readout} large label=${s.measured_power_w === null ? 'Power (modelled)' : 'Power'} of=${format.power(s.measured_power_w ?? s.modelled_power_w)} channel=${s.measured_power_w === null ? 'modelled' : 'measured'} note=${html`<${Sparkline} track=${entry.power} revision=${entry.revision} dark=${dark} width=${120} height=${26} />`} />
       <${Readout} large label="Charge" of=${format.percent(s.state_of_charge)} note=${[s.state_of_charge === null ? '' : charge_note(s).text, s.battery_voltage_v === null ? '' : format.text(format.unit(s.battery_voltage_v, 'V', 2))].filter(Boolean).join(' · ')} />
-      <${Readout} large label="Range" of=${format.length(left?.range?.p50 ?? s.range_m)} note=${between(left?.range, format.length)} />
-      <${Readout} large label="Run time" of=${format.about(left?.time?.p50 ?? s.run_time_s)} note=${between(left?.time, (v) => ({ n: format.about(v), u: '' }))} />
+      <${Readout} large label="Range" of=${format.length(s.range_m)} note=${between(s.range_quantiles_m, format.length_band)} />
+      <${Readout} large label="Run time" of=${format.about(s.run_time_s)} note=${between(s.run_time_quantiles_s, (low, high) => `${format.about(low)} – ${format.about(high)}`)} />
       ${s.charging === null && format.known(s.charge.time_to_charged_s) && html`<${Readout} large label="To charge" of=${format.about(s.charge.time_to_charged_s)} note="if it went now" />`}
       <${Readout} large label="Speed" of=${format.unit(s.speed_m_s, 'm/s', 2)} />
       <${Readout} large label="Payload" of=${format.unit(s.payload_kg, 'kg')} />

@@ -8,7 +8,7 @@ import { palette } from '../theme.js';
 import { robot_link } from '../route.js';
 import { Answer, Empty, Failure, Panel } from '../widgets.js';
 import { flat } from './flat.js';
-import { JobRows, share } from './gap.js';
+import { JobRows, share } from './jobs.js';
 
 const median_missions = 9;
 
@@ -51,9 +51,9 @@ function RatioChart({ told }) {
     // A version counts from the first mission that it metered: replayed missions are older than the version.
     for (const v of versions) {
       const first = missions.find((m) => m.model_version === v.model_version);
-      if (first !== undefined) line(first.start_utime_us, p.muted, `v${v.model_version}`, 1, []);
+      if (first !== undefined) line(first.start_utime_us, p.muted, `v${v.model_version}`, -0.3, []);
     }
-    for (const d of drift) line(d.start_utime_us, p.gap, `${format.signed(share(d.ratio_after - d.ratio_before))}`, 2, [4, 3]);
+    for (const d of drift) line(d.start_utime_us, p.gap, `${format.signed(share(d.ratio_after - d.ratio_before))}`, 1, [4, 3]);
     c.restore();
   };
   const spread = Math.max(0.05, ...data[1].map((v) => Math.min(0.6, Math.abs(v - 1)))) * 1.15;
