@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <ctime>
 #include <filesystem>
@@ -11,6 +10,7 @@
 #include "client/files.h"
 #include "client/wrapped.h"
 #include "gap/adopt.h"
+#include "gap/chart.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::client {
@@ -29,17 +29,9 @@ std::string text(const json& value) {
   return value.is_string() ? value.get<std::string>() : "";
 }
 
-// Both ends as finely as the width asks for.
 std::string range_of(const json& region) {
   if (region["from"].is_string()) return text(region["from"]);
-  const double from = number(region["from"]), to = number(region["to"]);
-  const int places =
-      to > from ? std::clamp(1 - static_cast<int>(std::floor(std::log10(to - from))), 0, 6) : 3;
-  const double step = std::pow(10.0, -places);
-  const auto end = [&](double value) {
-    return fmt::format("{:.{}f}", std::fabs(value) < 0.5 * step ? 0.0 : value, places);
-  };
-  return end(from) + " to " + end(to);
+  return gap::brief_range(number(region["from"]), number(region["to"]));
 }
 
 void print_shrinkage(const json& s) {

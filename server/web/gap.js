@@ -44,7 +44,7 @@ ${a&&e`<${B} key=${a.id} job=${a} onEnd=${s.reload} />`}
 <td class="figure">${j(A(t.share,0))}</td></tr>`)}</tbody></table>
 <p class="note foot">Share of the integral of |measured − modelled| power; line: 95 % interval, widened for the number of regions looked at. Regions overlap.</p>`}function te({effects:t}){return e`<table class="grid effects"><thead><tr><th scope="col">Effect</th><th scope="col" class="figure">Probability</th><th scope="col">Strength</th><th scope="col" class="figure">Closes of the gap</th><th scope="col">Cannot be told from</th></tr></thead>
 <tbody>${t.map(t=>e`<tr key=${t.id}><th scope="row">${P(t.id)}</th><td class="figure">${A(t.probability,0)}</td>
-<td>${Object.entries(t.parameters).map(([t,s])=>e`<div key=${t}><span class="note">${P(Y(t)[0])}</span> ${function(e,{value:t,sd:s,unit:o}){return"ratio"!==e?`${C(t,s)}${"1"===o?"":` ${o}`}`:`${t<0?"":"+"}${C(100*t,x(s)?100*s:s)} %`}(t,s)}</div>`)}</td>
+<td>${Object.entries(t.parameters).map(([t,s])=>e`<div key=${t}><span class="note">${"ratio"===t?"by":P(Y(t)[0])}</span> ${function(e,{value:t,sd:s,unit:o}){return"ratio"!==e?`${C(t,s)}${"1"===o?"":` ${o}`}`:`${t<0?"":"+"}${C(100*t,x(s)?100*s:s)} %`}(t,s)}</div>`)}</td>
 <td class="figure">${A(t.share,0)}</td><td>${t.alternatives.map(P).join(", ")||"–"}</td></tr>`)}</tbody></table>`}function se({test:t}){let s=Math.max(.01,...t.missions.flatMap(e=>[Math.abs(e.before.relative),Math.abs(e.after.relative)])),o=(t,o)=>e`<svg width="100%" height="12" aria-hidden="true"><rect height="8" y="2" width=${`${Math.max(.5,100*Math.abs(t.relative)/s)}%`} class=${`account ${o}`} /></svg>`;return e`<table class="grid test"><thead><tr><th scope="col">Mission</th><th scope="col" class="figure">Measured</th><th scope="col" class="figure">Error before</th><th scope="col" class="wide"></th><th scope="col" class="figure">Error after</th><th scope="col" class="wide"></th></tr></thead>
 <tbody>${t.missions.map(t=>e`<tr key=${t.id}><th scope="row"><a href=${d(t.id)}>${t.mission_id}</a>${"motors"===t.basis&&e` <span class="note">at the motors</span>`}</th>
 <td class="figure"><${$} of=${S(t.measured_j)} /></td>
@@ -62,8 +62,8 @@ ${h&&e`<button type="button" disabled=${""!==d} onClick=${()=>i("adopt",{force:!
 <dl class="readouts">
 <${h} large label="Gap in power" of=${N(s.gap.power_absolute_relative,1)} note=${`noise ${A(s.gap.noise_floor)}`} />
 <${h} large label="Gap in energy" of=${N(s.gap.energy_relative,1)} />
-<${h} large label="Held out, with it" of=${N(i.held_out_after,1)} note=${`from ${A(i.held_out_before)}`} />
-<${h} large label="Gap shrinks by" of=${N(i.fraction,0)} note=${s.effects.length>0?U(i.ci,0):""} />
+${s.effects.length>0&&e`<${h} large label="Held out, with it" of=${N(i.held_out_after,1)} note=${`from ${A(i.held_out_before)}`} />
+<${h} large label="Gap shrinks by" of=${N(i.fraction,0)} note=${U(i.ci,0)} />`}
 <${h} large label="Missions" of=${`${s.missions}`} note=${`${M(s.samples)} samples`} />
 </dl>
 ${s.effects.length>0&&e`<${p} title="Which effect"><div class="scroll"><${te} effects=${s.effects} /></div><//>`}

@@ -38,6 +38,18 @@ std::string brief(double value, int digits) {
   return text;
 }
 
+std::string brief_range(double low, double high) {
+  const double width = std::fabs(high - low);
+  const int places = width > 0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(width))), 0, 6) : 3;
+  const auto end = [&](double value) {
+    std::string text = fmt::format("{:.{}f}", value, places);
+    if (text.front() == '-')
+      text = text.find_first_not_of("-0.") == std::string::npos ? text.substr(1) : "−" + text.substr(1);
+    return text;
+  };
+  return end(low) + " to " + end(high);
+}
+
 std::vector<double> ticks_of(double low, double high, int about) {
   const double raw = (high - low) / about;
   const double power = std::pow(10, std::floor(std::log10(raw)));

@@ -87,6 +87,20 @@ std::string variable_words(const std::string& variable) {
   return found == words.end() ? words_of(variable) : found->second;
 }
 
+std::string effect_names(const Diagnosis& d) {
+  std::vector<std::string> names;
+  for (const DiagnosedEffect& e : d.effects) {
+    std::string name = words_of(e.id);
+    if (!e.alternatives.empty()) {
+      std::vector<std::string> others;
+      for (const std::string& id : e.alternatives) others.push_back(words_of(id));
+      name += " (or " + enumerate(others) + ", which these data do not tell from it)";
+    }
+    names.push_back(std::move(name));
+  }
+  return enumerate(names);
+}
+
 std::string sentence_of(const Diagnosis& d) {
   const std::string gap =
       std::isfinite(d.power_absolute_relative)
@@ -117,8 +131,10 @@ std::string sentence_of(const Diagnosis& d) {
     case Verdict::inconclusive:
       break;
   }
+  std::vector<std::string> likeliest;
+  for (const DiagnosedEffect& e : d.effects) likeliest.push_back(words_of(e.id));
   return fmt::format("On {} missions {}. These data do not decide what causes it{}. {}", d.missions, gap,
-                     d.effects.empty() ? "" : "; likeliest: " + effect_names(d),
+                     likeliest.empty() ? "" : "; likeliest: " + enumerate(likeliest),
                      fmt::join(verdict_reasons(d), " "));
 }
 
@@ -391,7 +407,7 @@ void where_section(Page& page, const Diagnosis& d, const Powers& p, const robot:
   for (const WhereRegion& w : d.where) {
     rows.push_back(
         {xml_escaped(words_of(w.channel)), xml_escaped(variable_words(w.variable)),
-         w.label.empty() ? brief(w.from) + " to " + brief(w.to) : xml_escaped(w.label),
+         w.label.empty() ? brief_range(w.from, w.to) : xml_escaped(w.label),
          fmt::format("{} [{}, {}]", percent(w.share), percent(w.interval[0], 2), percent(w.interval[1], 2))});
     if (rows.size() >= 12) break;
   }

@@ -93,20 +93,6 @@ std::vector<std::string> against_effects(const Diagnosis& d) {
 
 }  // namespace
 
-std::string effect_names(const Diagnosis& d) {
-  std::vector<std::string> names;
-  for (const DiagnosedEffect& e : d.effects) {
-    std::string name = words_of(e.id);
-    if (!e.alternatives.empty()) {
-      std::vector<std::string> others;
-      for (const std::string& id : e.alternatives) others.push_back(words_of(id));
-      name += " (or " + enumerate(others) + ", which these data do not tell from it)";
-    }
-    names.push_back(std::move(name));
-  }
-  return enumerate(names);
-}
-
 std::vector<std::string> verdict_reasons(const Diagnosis& d) {
   switch (d.verdict) {
     case Verdict::none:

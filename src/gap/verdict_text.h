@@ -7,9 +7,6 @@
 
 namespace joulecast::gap {
 
-// The effects found, as words, each with what cannot be told from it.
-std::string effect_names(const Diagnosis& diagnosis);
-
 // Why a verdict is not "effects" or "none", a sentence each: where and by what something outside the
 // catalogue shows, or what speaks against the effects that are likeliest. Empty for the other verdicts.
 std::vector<std::string> verdict_reasons(const Diagnosis& diagnosis);

@@ -18,17 +18,13 @@ function state_of(k, now_ms) {
     pose: [5 * Math.cos(t / 20), 5 * Math.sin(t / 20), t / 20], payload_kg: k % 40, battery_voltage_v: 25.4, battery_current_a: power / 25.4,
     state_of_charge: 0.1 + 0.85 * ((k * 37) % 100) / 100, state_of_charge_sd: 0.04,
     charge: { source: 'voltage_and_current', time_to_charged_s: k % 5 === 0 ? 3840 : null, time_to_charged_sd_s: k % 5 === 0 ? 120 : null },
-    charging: k % 5 === 0 ? { phase: 'constant_current', since_utime_us: Math.round((now_ms - 60_000) * 1000), charged_ah: 0.4, charged_j: 36_000 } : null, range_m: 900 + 31 * k, run_time_s: 3000 + 97 * k, winding_temperature_c: [31.2, 30.8],
+    charging: k % 5 === 0 ? { phase: 'constant_current', since_utime_us: Math.round((now_ms - 60_000) * 1000), charged_ah: 0.4, charged_j: 36_000 } : null, range_m: 900 + 31 * k, range_quantiles_m: { p05: 0.8 * (900 + 31 * k), p50: 900 + 31 * k, p95: 1.3 * (900 + 31 * k) },
+    run_time_s: 3000 + 97 * k, run_time_quantiles_s: { p05: 2000, p50: 3000 + 97 * k, p95: 60_000 }, winding_temperature_c: [31.2, 30.8],
     mission: k % 5 === 0 ? null : { id: k + 1, mission_id: `${id}-m${k % 90}`, start_utime_us: Math.round((now_ms - 60_000) * 1000),
       energy: { battery_j: 2000 + k + t % 60, measured_j: 2000 + k, measured_s: 60, measured_motor_j: [700, 690], motor_measured_s: 60, modelled_j: 1980 + k,
         modelled_motor_j: [690, 680], unexplained_j: 20, drawn_j: 2100, returned_j: 100, charge_ah: 0.02, distance_m: 42, turned_rad: 3, duration_s: 60 } },
     samples: 3000, faults: k % 29 === 0 ? { late: 3 } : {},
   };
-}
-
-function range_of(k) {
-  const median = 900 + 31 * k;
-  return { robot_id: `amr-${String(k + 1).padStart(3, '0')}`, range_quantiles_m: { p05: 0.8 * median, p50: median, p95: 1.3 * median }, run_time_quantiles_s: { p05: 2000, p50: 3000, p95: 4000 } };
 }
 
 // {url, close()}; `robots` of them, each told once a second, spread over it.
@@ -44,8 +40,6 @@ export async function serve_many_robots(page_directory, robots) {
     if (url.pathname === '/v1/robots') {
       const now = Date.now();
       send(JSON.stringify({ robots: Array.from({ length: robots }, (_, k) => state_of(k, now)) }), 'application/json');
-    } else if (url.pathname === '/v1/autonomy') {
-      send(JSON.stringify({ robots: Array.from({ length: robots }, (_, k) => range_of(k)) }), 'application/json');
     } else if (url.pathname === '/v1/events') {
       response.writeHead(200, { 'content-type': 'text/event-stream', 'cache-control': 'no-cache' });
       streams.add(response);

@@ -17,7 +17,7 @@ for (const name of ['daemon', 'client', 'page', 'out']) {
   if (given[name] === undefined) throw new Error(`--${name} is missing`);
 }
 const axe = await readFile(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
-const sizes = { laptop: { width: 1280, height: 800 }, tablet: { width: 820, height: 1180 } };
+const sizes = { laptop: { width: 1366, height: 768 }, tablet: { width: 820, height: 1180 } };
 const first_view_limit_ms = 1000, mission_limit_ms = 1000, bundle_limit_bytes = 60_000;
 const figures = {};
 let failed = 0, passed = 0;
@@ -78,13 +78,16 @@ await stop(daemon);
 await run(given.client, ['simulate', '--robot', hour_robot, '--robots', '1', '--seed', '11', '--log', hour_log, '--speed', '0', '--missions', '1', '--mission-duration', '3600', '--duration', '4200', '--quiet']);
 await run(given.client, ['replay', hour_log, '--into', store, '--robot', hour_robot]);
 await rm(hour_log);
-// A robot with more friction than its file says, for the diagnosis.
-const worn_log = path.join(given.out, 'worn.lcmlog');
-const worn_robot = path.join(given.out, 'worn-robot.json');
-await writeFile(worn_robot, JSON.stringify({ ...JSON.parse(await readFile(hour_robot, 'utf8')), robot_id: 'worn-01' }));
-await run(given.client, ['simulate', '--robot', worn_robot, '--robots', '1', '--seed', '12', '--effect', 'coulomb_friction=0.6', '--log', worn_log, '--speed', '0', '--missions', '8', '--quiet']);
-await run(given.client, ['replay', worn_log, '--into', store, '--robot', worn_robot]);
-await rm(worn_log);
+// For the diagnosis a robot with more friction than its file says, and one with a wheel out of round.
+async function with_effect(robot_id, effect) {
+  const log = path.join(given.out, `${robot_id}.lcmlog`), file = path.join(given.out, `${robot_id}.json`);
+  await writeFile(file, JSON.stringify({ ...JSON.parse(await readFile(hour_robot, 'utf8')), robot_id }));
+  await run(given.client, ['simulate', '--robot', file, '--robots', '1', '--seed', '12', '--effect', effect, '--log', log, '--speed', '0', '--missions', '8', '--quiet']);
+  await run(given.client, ['replay', log, '--into', store, '--robot', file]);
+  await rm(log);
+}
+await with_effect('worn-01', 'coulomb_friction=0.6');
+await with_effect('oval-01', 'x_oval_wheel=4');
 daemon = await start_until(given.daemon, daemon_args, ready);
 
 const browser = await chromium.launch({ executablePath: given.chromium, args: ['--headless', '--no-sandbox', '--disable-gpu', '--disable-quic',
@@ -95,7 +98,7 @@ async function open_page(options = {}) {
   const context = await browser.newContext({ viewport: sizes.laptop, colorScheme: 'light', acceptDownloads: true, ...options });
   const page = await context.newPage();
   page.setDefaultTimeout(30_000);
-  page.on('console', (said) => ['error', 'warning'].includes(said.type()) && !faults_wanted && faults.push(said.text()));
+  page.on('console', (said) => ['error', 'warning'].includes(said.type()) && !faults_wanted && faults.push(`${said.text()} ${said.location().url} ${new Date().toISOString()}`));
   page.on('pageerror', (error) => faults.push(error.stack));
   return page;
 }
@@ -103,7 +106,7 @@ const go = (page, hash) => page.goto(`${base}/${hash}`);
 
 const finished = await until('four missions that ended', async () => {
   const { missions } = await get('/v1/missions?limit=200');
-  const ended = missions.filter((m) => m.state === 'finished' && m.robot_id !== 'worn-01' && m.gap_s === 0 && m.energy.duration_s < 600);
+  const ended = missions.filter((m) => m.state === 'finished' && !['worn-01', 'oval-01'].includes(m.robot_id) && m.gap_s === 0 && m.energy.duration_s < 600);
   return ended.length >= 4 ? ended : null;
 }, 90);
 const mission = finished[0], robot = mission.robot_id;
@@ -114,10 +117,10 @@ await check('the fleet is live', async () => {
   await go(page, '#/fleet');
   await page.waitForSelector('.fleet tbody th a');
   equal(await page.locator('.fleet tbody tr:not(.spacer)').count(), 4, 'rows of robots that were heard');
-  await page.getByRole('button', { name: 'Show 2 robots not heard since the service started' }).click();
-  await until('rows of all robots', async () => (await page.locator('.fleet tbody tr:not(.spacer)').count()) === 6);
-  equal(JSON.stringify((await page.locator('.fleet tbody th a').allTextContents()).slice(4)), '["hour-01","worn-01"]', 'the last rows');
-  await page.getByRole('button', { name: 'Hide 2 robots' }).click();
+  await page.getByRole('button', { name: 'Show 3 robots not heard since the service started' }).click();
+  await until('rows of all robots', async () => (await page.locator('.fleet tbody tr:not(.spacer)').count()) === 7);
+  equal(JSON.stringify((await page.locator('.fleet tbody th a').allTextContents()).slice(4)), '["hour-01","oval-01","worn-01"]', 'the last rows');
+  await page.getByRole('button', { name: 'Hide 3 robots' }).click();
   const row = page.locator('.fleet tbody tr', { hasText: robot });
   const before = await row.locator('td.power .number').textContent();
   await until('another power', async () => (await row.locator('td.power .number').textContent()) !== before);
@@ -130,7 +133,7 @@ await check('the fleet is found, chosen and ordered', async () => {
   await until('one row', async () => (await page.locator('.fleet tbody tr:not(.spacer)').count()) === 1);
   await page.getByPlaceholder('Find a robot or mission').fill('');
   await page.getByRole('button', { name: 'Silent' }).click();
-  await until('the robots that are silent', async () => JSON.stringify(await names()) === '["hour-01","worn-01"]');
+  await until('the robots that are silent', async () => JSON.stringify(await names()) === '["hour-01","oval-01","worn-01"]');
   await page.getByRole('button', { name: 'Low charge' }).click();
   await page.getByText('No robot matches').waitFor();
   await page.getByRole('button', { name: 'All', exact: true }).click();
@@ -371,6 +374,17 @@ await check('a diagnosis is started by keyboard, followed and read', async () =>
   expect((await page.locator('.where tbody tr').count()) >= 5, 'regions');
 });
 
+let outside = 0;
+await check('a diagnosis says why it is not sure', async () => {
+  outside = (await (await fetch(`${base}/v1/diagnoses`, { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify({ robot_id: 'oval-01' }) })).json()).id;
+  await go(page, `#/gap/${outside}`);
+  await page.getByText('Outside the catalogue').waitFor({ timeout: 120_000 });
+  const { result } = await get(`/v1/diagnoses/${outside}`);
+  equal(result.outside.follows, 'wheel_angle', 'what it follows');
+  equal(await page.locator('.reasons li').first().textContent(), result.reasons[0], 'the reason');
+  expect(result.reasons[0].includes('repeats with each turn of a wheel'), result.reasons[0]);
+});
+
 await check('what was found is tested on other missions, adopted and rolled back', async () => {
   await go(page, `#/gap/${diagnosis}`);
   await page.getByRole('button', { name: 'Test on other missions' }).click();
@@ -413,7 +427,7 @@ await check('what does not improve is refused with its figures', async () => {
 });
 
 const views = { fleet: '#/fleet', robot: `#/robots/${robot}`, missions: '#/missions', mission: `#/missions/${mission.id}`, hour: `#/missions/${hour.id}`, plan: `#/plan?robot=${robot}`,
-  gap: '#/gap', diagnosis: `#/gap/${diagnosis}`, worn: '#/robots/worn-01' };
+  gap: '#/gap', diagnosis: `#/gap/${diagnosis}`, outside: `#/gap/${outside}`, worn: '#/robots/worn-01' };
 for (const [size, viewport] of Object.entries(sizes)) {
   for (const colorScheme of ['light', 'dark']) {
     const shown = await open_page({ viewport, colorScheme });
@@ -526,6 +540,62 @@ await check('500 live robots leave the page free', async () => {
   expect(figures.main_thread_share_500_robots < 0.5, `main thread busy ${figures.main_thread_share_500_robots}`);
 });
 await many.close();
+
+// The service itself: a history of 100,000 missions and 500 robots that each tell something every second.
+const plenty_store = path.join(given.out, 'plenty.db'), plenty_missions = 100_000;
+const plenty_args = daemon_args.map((value) => (value === store ? plenty_store : value));
+daemon = await start_until(given.daemon, plenty_args, ready);
+const plenty = await start_until(given.client, ['simulate', '--robots', '500', '--rate', '1', '--seed', '5', '--mission-duration', '20', '--server', base, '--lcm-url', lcm_url, '--quiet'],
+  async () => (await get('/v1/robots')).robots.filter((one) => one.live).length === 500, 90);
+await until('missions to copy', async () => (await get('/v1/missions?state=finished&limit=1')).missions.length > 0, 90);
+await stop(daemon);
+await run('python3', [path.join(import.meta.dirname, 'many_missions.py'), plenty_store, String(plenty_missions)]);
+daemon = await start_until(given.daemon, plenty_args, ready);
+await until('500 live robots', async () => (await get('/v1/robots')).robots.filter((one) => one.live).length === 500, 60);
+
+// Milliseconds until `there` holds in a fresh page at `hash`.
+const opened = async (hash, there) => {
+  const fresh = await open_page();
+  await fresh.goto(`${base}/${hash}`, { waitUntil: 'commit' });
+  const shown_ms = await fresh.evaluate((source) => new Promise((shown) => {
+    const holds = new Function(`return ${source}`)();
+    const look = () => requestAnimationFrame(holds() ? () => shown(performance.now()) : look);
+    look();
+  }), String(there));
+  await fresh.context().close();
+  return shown_ms;
+};
+await check('500 live robots and 100,000 missions of a running service open in time', async () => {
+  figures.service_500_robots_ms = await times_of(first_view_limit_ms, () => opened('#/fleet', () => document.querySelector('.fleet tbody tr .sparkline') && document.body.textContent.includes('of 500')));
+  figures.service_100000_missions_ms = await times_of(first_view_limit_ms, () => opened('#/missions', () => document.querySelectorAll('.missions tbody tr').length === 50 && /of 10\d.\d{3}/.test(document.body.textContent)));
+  expect(figures.service_500_robots_ms[0] < first_view_limit_ms, `fleet after ${figures.service_500_robots_ms} ms`);
+  expect(figures.service_100000_missions_ms[0] < first_view_limit_ms, `missions after ${figures.service_100000_missions_ms} ms`);
+});
+
+await check('500 live robots stay live on the page', async () => {
+  const watched = await open_page();
+  await watched.goto(`${base}/#/fleet`);
+  await watched.locator('.fleet tbody th a').first().waitFor();
+  const first = watched.locator('.fleet tbody tr').first().locator('td.power .number');
+  const powers = new Set();
+  for (let second = 0; second < 10; ++second) {
+    powers.add(await first.textContent());
+    await watched.waitForTimeout(1000);
+  }
+  expect(powers.size >= 4, `powers of the first robot in ten seconds: ${[...powers]}`);
+  equal(await watched.locator('.link').textContent(), 'Live', 'the link');
+  const { missions } = await get('/v1/missions?state=finished&limit=1');
+  expect((await get('/v1/mission-totals')).missions >= plenty_missions && missions.length === 1, 'missions in the history');
+  await watched.screenshot({ path: path.join(given.out, 'screenshots', 'fleet-500-service-laptop.png') });
+  await watched.goto(`${base}/#/missions`);
+  await watched.getByRole('button', { name: 'Older' }).click();
+  await watched.getByText('51 – 100 of').waitFor();
+  await watched.screenshot({ path: path.join(given.out, 'screenshots', 'missions-100000-laptop.png') });
+  await watched.context().close();
+});
+await stop(plenty);
+await stop(daemon);
+await rm(plenty_store, { force: true });
 await browser.close();
 
 await check('the bundle is small', async () => {

@@ -95,7 +95,7 @@ export function span(second) {
   if (!known(second)) return dash;
   const s = Math.abs(second), sign = second < 0 ? minus : '';
   const two = (v) => String(Math.floor(v)).padStart(2, '0');
-  if (s < 60) return `${sign}${s < 10 ? s.toFixed(1) : s.toFixed(0)}\u00a0s`;
+  if (s < 60) return `${sign}${s < 9.95 ? s.toFixed(1) : s.toFixed(0)}\u00a0s`;
   if (s < 3600) return `${sign}${Math.floor(s / 60)}\u00a0min ${two(s % 60)}\u00a0s`;
   if (s < 172_800) return `${sign}${Math.floor(s / 3600)}\u00a0h ${two((s % 3600) / 60)}\u00a0min`;
   return `${sign}${Math.round(s / 86_400)}\u00a0d`;

@@ -122,7 +122,7 @@ function Where({ regions }) {
 function Effects({ effects }) {
   return html`<table class="grid effects"><thead><tr><th scope="col">Effect</th><th scope="col" class="figure">Probability</th><th scope="col">Strength</th><th scope="col" class="figure">Closes of the gap</th><th scope="col">Cannot be told from</th></tr></thead>
     <tbody>${effects.map((e) => html`<tr key=${e.id}><th scope="row">${format.words(e.id)}</th><td class="figure">${share(e.probability, 0)}</td>
-      <td>${Object.entries(e.parameters).map(([name, p]) => html`<div key=${name}><span class="note">${format.words(unit_of(name)[0])}</span> ${strength(name, p)}</div>`)}</td>
+      <td>${Object.entries(e.parameters).map(([name, p]) => html`<div key=${name}><span class="note">${name === 'ratio' ? 'by' : format.words(unit_of(name)[0])}</span> ${strength(name, p)}</div>`)}</td>
       <td class="figure">${share(e.share, 0)}</td><td>${e.alternatives.map(format.words).join(', ') || '–'}</td></tr>`)}</tbody></table>`;
 }
 
@@ -173,8 +173,8 @@ function Result({ job }) {
     <dl class="readouts">
       <${Readout} large label="Gap in power" of=${format.percent(r.gap.power_absolute_relative, 1)} note=${`noise ${share(r.gap.noise_floor)}`} />
       <${Readout} large label="Gap in energy" of=${format.percent(r.gap.energy_relative, 1)} />
-      <${Readout} large label="Held out, with it" of=${format.percent(s.held_out_after, 1)} note=${`from ${share(s.held_out_before)}`} />
-      <${Readout} large label="Gap shrinks by" of=${format.percent(s.fraction, 0)} note=${r.effects.length > 0 ? range_of(s.ci, 0) : ''} />
+      ${r.effects.length > 0 && html`<${Readout} large label="Held out, with it" of=${format.percent(s.held_out_after, 1)} note=${`from ${share(s.held_out_before)}`} />
+        <${Readout} large label="Gap shrinks by" of=${format.percent(s.fraction, 0)} note=${range_of(s.ci, 0)} />`}
       <${Readout} large label="Missions" of=${`${r.missions}`} note=${`${format.fixed(r.samples)} samples`} />
     </dl>
     ${r.effects.length > 0 && html`<${Panel} title="Which effect"><div class="scroll"><${Effects} effects=${r.effects} /></div><//>`}
