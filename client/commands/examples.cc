@@ -25,7 +25,9 @@ constexpr Examples table[] = {
      "joulecast autonomy --robot amr.json --charge 0.6 --dialect vda5050-3.0\n"
      "joulecast autonomy --server http://127.0.0.1:8080 --robot-id amr"},
     {"matrix", "joulecast matrix tasks.json --robot amr.json"},
-    {"missions", "joulecast missions --server http://127.0.0.1:8080 --robot-id amr --limit 20"},
+    {"missions",
+     "joulecast missions --server http://127.0.0.1:8080 --robot-id amr --limit 20\n"
+     "joulecast missions --server http://127.0.0.1:8080 --from 2026-11-21T06:00:00Z --state finished"},
     {"import",
      "joulecast import runs.csv --mapping mapping.json --start 2026-03-01T08:00:00Z --out imported.lcmlog"},
     {"replay",
@@ -42,7 +44,7 @@ constexpr Examples table[] = {
     {"gap trial", "joulecast gap trial --count 2 --seed 1"},
     {"effects", "joulecast effects"},
     {"explore",
-     "joulecast explore --case 1 --svg case1.svg\n"
+     "joulecast explore --case 1 --plot case1.svg\n"
      "joulecast explore --map yard.json --robot amr.json --payload 0 --payload 20"},
     {"thesis", "joulecast thesis\njoulecast thesis --table 4-1 --json\njoulecast thesis --figure 4-2a --csv"},
     {"completion",

@@ -137,7 +137,7 @@ void add_explore(CLI::App& program, Exit& exit) {
                       "distance of the nodes [m], instead of the map's");
   command->add_option("--turn-rate", options->turn_rate_rad_s,
                       "rate of turns in place [rad/s]; the robot's limit when not given");
-  command->add_option("--svg", options->svg_file, "draw the exploration into this file");
+  command->add_option("--plot,--svg", options->svg_file, "draw the exploration into this file");
   command->add_flag("--json", options->json, "print the exploration log as JSON");
   command->callback([options, &exit] { exit = run(*options); });
 }

@@ -31,7 +31,11 @@ std::string text(const json& value) {
 
 std::string range_of(const json& region) {
   if (region["from"].is_string()) return text(region["from"]);
-  return gap::brief_range(number(region["from"]), number(region["to"]));
+  std::string range = gap::brief_range(number(region["from"]), number(region["to"]));
+  constexpr std::string_view minus = "−";  // other figures of the command line have a hyphen
+  for (auto at = range.find(minus); at != std::string::npos; at = range.find(minus, at))
+    range.replace(at, minus.size(), "-");
+  return range;
 }
 
 void print_shrinkage(const json& s) {

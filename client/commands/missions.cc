@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/commands/parse_time.h"
 #include "client/commands/table.h"
 #include "client/http_client.h"
 
@@ -76,9 +77,16 @@ Exit run(const Options& options) {
   const auto server = parse_server_url(options.server);
   if (!server) return report(server.error());
   std::string target = "/v1/missions";
-  for (const auto& [name, value] : options.query)
-    if (value)
-      target += (target.find('?') == std::string::npos ? '?' : '&') + name + '=' + percent_encoded(*value);
+  for (const auto& [name, value] : options.query) {
+    if (!value) continue;
+    std::string sent = *value;
+    if (name.ends_with("_utime_us")) {
+      const auto utime_us = parse_time(sent, name.starts_with("from") ? "--from" : "--to");
+      if (!utime_us) return report(utime_us.error());
+      sent = std::to_string(*utime_us);
+    }
+    target += (target.find('?') == std::string::npos ? '?' : '&') + name + '=' + percent_encoded(sent);
+  }
   const auto reply = http_request(*server, HttpMethod::get, target, {}, std::chrono::seconds(30));
   if (!reply) return report(reply.error());
   if (!reply->ok()) return report(error_of(*reply));
@@ -104,8 +112,9 @@ void add_missions(CLI::App& program, Exit& exit) {
       {"--mission-id", "mission_id", "only those that the robot called so"},
       {"--state", "state", "only those in this state"},
       {"--incomplete", "incomplete", "true: only those with unmeasured parts; false: only those without"},
-      {"--from", "from_utime_us", "started at or after, microseconds since 1970"},
-      {"--to", "to_utime_us", "started before, microseconds since 1970"},
+      {"--from", "from_utime_us",
+       "started at or after, UTC (2024-07-18T09:10:45Z) or microseconds since 1970"},
+      {"--to", "to_utime_us", "started before, the same"},
       {"--payload-min", "payload_min_kg", "kg"},
       {"--payload-max", "payload_max_kg", "kg"},
       {"--limit", "limit", "missions on the page"},

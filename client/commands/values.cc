@@ -36,7 +36,6 @@ constexpr auto table = std::to_array<Named>({
     {"calibrate drive", "--train", "ID", ""},
     {"battery predict", "--battery", "FILE", "*.json"},
     {"", "--plot", "FILE", "*.svg"},
-    {"", "--svg", "FILE", "*.svg"},
     {"explore", "--map", "FILE", "*.json"},
     {"replay", "--into", "FILE", "*.db"},
     {"simulate", "--log", "FILE", "*.lcmlog"},

@@ -1,5 +1,7 @@
 #include "planning/planner.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -9,6 +11,13 @@
 
 namespace joulecast::planning {
 namespace {
+
+// `least_s` is told rounded up, so that it can be asked for.
+tl::unexpected<Error> too_soon(double deadline_s, double least_s) {
+  return fail(Fault::infeasible, "deadline_s",
+              fmt::format("is {} s, the limits allow no less than {:.4f} s", deadline_s,
+                          std::ceil(least_s * 1e4) / 1e4));
+}
 
 // Everything that one request needs: its runs, each with its solver, and the dwells between them.
 class Request {
@@ -94,9 +103,7 @@ class Request {
   // to be beyond reach on the way is refused as one that was known to be.
   Result<void> within_reach(double deadline) const {
     if (deadline >= shortest_s_ * (1 + 1e-6)) return {};
-    return fail(Fault::infeasible, "deadline_s",
-                "is " + std::to_string(deadline) + ", the limits allow no less than " +
-                    std::to_string(shortest_s_ * (1 + 1e-5)));
+    return too_soon(deadline, shortest_s_ * (1 + 1e-5));
   }
 
   // Whether closed forms answer every run at the value of time, and no deadline asks for more; then solved.
@@ -472,9 +479,7 @@ Result<double> Planner::needed_speed(const Path& path, const Problem& problem) c
   const auto fastest = late(problem.limits.speed_m_s);
   if (!fastest) return fastest;
   if (*fastest > 1e-6 * deadline) {
-    return fail(Fault::infeasible, "deadline_s",
-                "is " + std::to_string(deadline) + ", the limits allow no less than " +
-                    std::to_string(deadline + *fastest));
+    return too_soon(deadline, deadline + *fastest);
   }
   const double ends = std::max(problem.start_speed_m_s, problem.end_speed_m_s);
   if (path.distance_m() == 0) return 0.0;
