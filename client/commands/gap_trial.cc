@@ -34,7 +34,7 @@ Exit run(Options& options) {
     t.only = trial::kind_of(options.only == "double" ? "pair" : options.only);
     const auto known = virtual_robot::effect_table();
     if (!t.only && std::ranges::find(known, options.only, &virtual_robot::EffectEntry::id) == known.end()) {
-      return report({Fault::invalid, "only", options.only + " is neither a kind of case nor an effect"});
+      return report({Fault::invalid, "--only", options.only + " is neither a kind of case nor an effect"});
     }
     if (!t.only) t.only_effect = options.only;
   }

@@ -165,7 +165,7 @@ ${Object.entries(Ye).map(([e,{name:a}])=>t`<option key=${e} value=${e}>${a}</opt
 <p class="note foot"><span class="swatch accent"></span>least energy ${n&&t`<span class="swatch modelled"></span>yaw rate `}<span class="swatch dashed"></span>trapezoid <span class="swatch dotted"></span>triangle</p>`}function it({answer:e,take:a}){let n=e.pareto,{trapezoid:s,triangle:l}=e.baselines,o=W(()=>{let t=[n,[e],[s],[l]].map(e=>new Map(e.filter(Boolean).map(e=>[e.duration_s,e.energy_j]))),a=[...new Set(t.flatMap(e=>[...e.keys()]))].sort((e,t)=>e-t);return[a,...t.map(e=>a.map(t=>e.get(t)??null))]},[e]),[r,i]=O(0),d=n[Math.min(r,n.length-1)];return t`<${D} make=${()=>{let e=h(),t=(e,t,a)=>({stroke:"transparent",paths:()=>null,points:{show:!0,size:t,width:2,stroke:e,fill:a}});return{scales:{x:{time:!1}},cursor:{y:!1,drag:{x:!1,y:!1},points:{show:!1}},axes:[S("duration, s",{size:28,space:70}),S("energy, J",{size:58})],series:[{},{stroke:e.modelled,width:1.5,spanGaps:!0,points:{show:!0,size:5,fill:e.modelled}},t(e.accent,12,e.accent),t(e.muted,9,e.screen),t(e.muted,9,e.muted)]}}} data=${o} height=${230} changes=${[]} label=${`Energy against duration, from ${Q(n[0].duration_s)} to ${Q(n[n.length-1].duration_s)}`} />
 <p class="note foot"><span class="swatch accent dot"></span>this plan <span class="swatch hollow dot grey"></span>trapezoid <span class="swatch grey dot"></span>triangle <span class="swatch modelled"></span>front</p>
 <div class="front-pick"><label><span>Walk the front</span><input type="range" min="0" max=${n.length-1} value=${r} onInput=${e=>i(e.currentTarget.valueAsNumber)} aria-valuetext=${`${Q(d.duration_s)}, ${Z(H(d.energy_j))}`} /></label>
-<span class="number">${I(d.duration_s,1)} s · ${Z(H(d.energy_j))}; a second less costs ${dt(d.time_multiplier_w)}</span>
+<span class="number">${I(d.duration_s,2)} s · ${Z(H(d.energy_j,4))}; a second less costs ${dt(d.time_multiplier_w)}</span>
 <button type="button" onClick=${()=>a(d)}>Take as deadline</button></div>`}var dt=e=>0!==e&&Math.abs(e)<.005?"less than 0.01 J":Z(H(e)),ut={closed_form:"formulas",interior_point:"an interior-point method",mixed:"formulas and an interior-point method"};function ct(e){if(!e)return"not possible here";let t=e.saving_fraction,a=Z(X(Math.abs(t),1));return e.within_limits?t>=0?`we save ${a}`:`costs ${a} less`:`breaks the limits, and costs ${a} ${t>=0?"more":"less"}`}function ht({answer:e}){let a=e.certificate,n=(e,a)=>t`<tr><th scope="row">${e}</th><td>${a}</td></tr>`;return t`<table class="facts"><tbody>
 ${n("Found by",ut[a.method]??ne(a.method))}
 ${n("At most above the optimum",dt(a.gap_j))}
@@ -212,7 +212,7 @@ ${null===h.charging&&J(h.charge.time_to_charged_s)&&t`<${_} large label="To char
 <${_} large label="Windings, right · left" of=${null===h.winding_temperature_c[0]?"–":`${I(h.winding_temperature_c[0])} · ${I(h.winding_temperature_c[1])} °C`} />
 <${_} large label="Mission" of=${H(h.mission?.energy.battery_j)} note=${h.mission?t`<a href=${p(h.mission.id)}>${h.mission.mission_id}</a>`:"none running"} />
 </dl>`}
-<${fe} part="RobotHistory" id=${e} />
+${(h||r.value)&&t`<${fe} part="RobotHistory" id=${e} />`}
 <${k} title="Recent missions" aside=${t`<a href=${`#/missions${s({robot:e})}`}>All missions of ${e}</a>`}><${w} of=${d} what="missions">${e=>0===e.missions.length?t`<${b} title="No mission yet" />`:t`<div class="scroll"><${Oe} missions=${e.missions} with_robot=${!1} /></div>`}<//><//>
 <div class="columns">
 <${k} class="screen" title="On the floor now">${u?t`<${Fe} entry=${u} />`:t`<${b} title="Never heard" />`}<//>
@@ -229,11 +229,11 @@ ${c.error&&t`<${y} error=${c.error} retry=${c.reload} />`}
 <div class=${c.loading?"stale":""} aria-busy=${String(c.loading)}>
 ${0===e.length?t`<${b} title=${Object.keys(a).length>0?"No mission matches":"No mission yet"}>Missions appear when a robot announces one or sends telemetry.<//>`:t`<div class="scroll"><${Oe} missions=${e} /></div>`}
 </div>
-<nav class="pages" aria-label="Pages of missions">
+${e.length>0&&t`<nav class="pages" aria-label="Pages of missions">
 <button type="button" disabled=${1===l.length} onClick=${()=>r(l.slice(0,-1))}>Newer</button>
-<span>${I(50*(l.length-1)+Math.min(1,e.length))} – ${I(50*(l.length-1)+e.length)}${h.value?` of ${I(h.value.missions)}`:""}</span>
+<span>${I(50*(l.length-1)+1)} – ${I(50*(l.length-1)+e.length)}${h.value?` of ${I(h.value.missions)}`:""}</span>
 <button type="button" disabled=${null===n} onClick=${()=>r([...l,n])}>Older</button>
-</nav>`}<//>`},mission:function({id:e}){let a=o(`/v1/missions/${l(e)}`),n=null!==a.value,r=o(n?`/v1/missions/${l(e)}/ledger`:null),i=o(n?`/v1/missions/${l(e)}/trace${s({points:700})}`:null),d=null!==i.value&&i.value.start_utime_us.length>=350,u=o(d?`/v1/missions/${l(e)}/trace${s({points:6e3})}`:null),c=d?u.value:i.value;C(a.value?.mission_id??"Mission");let h="open"===a.value?.state;return A(()=>{if(!h)return;let e=setInterval(()=>[a,r,i].forEach(e=>e.reload()),3e3);return()=>clearInterval(e)},[h]),!n&&[400,404].includes(a.error?.status)?t`<${b} title=${`There is no mission ${e}`}>No mission of this history has that number. See <a href="#/missions">all missions</a>.<//>`:t`<${w} of=${a} what="the mission">${e=>{let a=e.energy,n=Ee(a);return t`
+</nav>`}`}<//>`},mission:function({id:e}){let a=o(`/v1/missions/${l(e)}`),n=null!==a.value,r=o(n?`/v1/missions/${l(e)}/ledger`:null),i=o(n?`/v1/missions/${l(e)}/trace${s({points:700})}`:null),d=null!==i.value&&i.value.start_utime_us.length>=350,u=o(d?`/v1/missions/${l(e)}/trace${s({points:6e3})}`:null),c=d?u.value:i.value;C(a.value?.mission_id??"Mission");let h="open"===a.value?.state;return A(()=>{if(!h)return;let e=setInterval(()=>[a,r,i].forEach(e=>e.reload()),3e3);return()=>clearInterval(e)},[h]),!n&&[400,404].includes(a.error?.status)?t`<${b} title=${`There is no mission ${e}`}>No mission of this history has that number. See <a href="#/missions">all missions</a>.<//>`:t`<${w} of=${a} what="the mission">${e=>{let a=e.energy,n=Ee(a);return t`
 <div class="heading"><p class="crumbs"><a href="#/missions">Missions</a> / <a href=${m(e.robot_id)}>${e.robot_id}</a></p>
 <h1>${e.mission_id}</h1><${j} mission=${e} />
 ${e.incomplete&&t`<span class="flag">incomplete${e.incomplete_reason?`: ${ne(e.incomplete_reason)}`:""}</span>`}

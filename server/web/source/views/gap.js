@@ -83,7 +83,7 @@ function All({ given }) {
     <${Start} given=${given} onStart=${(job) => { location.hash = `#/gap/${job.id}`; }} />
     ${running && html`<${Progress} key=${running.id} job=${running} onEnd=${jobs.reload} />`}
     <${Panel} title=${given.robot ? `Diagnoses of ${given.robot}` : 'Diagnoses'} aside=${given.robot && html`<a href="#/gap">All robots</a>`}><${Answer} of=${jobs} what="diagnoses">${(told) =>
-      told.diagnoses.length === 0 ? html`<${Empty} title="No diagnosis yet">Choose a robot and press Diagnose: it says where measured power leaves the model, and which effect is missing.<//>`
+      told.diagnoses.length === 0 ? html`<${Empty} title="No diagnosis yet">A diagnosis says where measured power leaves the model, and which effect is missing.<//>`
         : html`<div class="scroll"><${JobRows} jobs=${told.diagnoses} /></div>`}<//><//>`;
 }
 

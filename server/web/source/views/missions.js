@@ -154,9 +154,9 @@ export function Missions({ given: asked }) {
         ? html`<${Empty} title=${Object.keys(given).length > 0 ? 'No mission matches' : 'No mission yet'}>Missions appear when a robot announces one or sends telemetry.<//>`
         : html`<div class="scroll"><${MissionRows} missions=${missions} /></div>`}
       </div>
-      <nav class="pages" aria-label="Pages of missions">
+      ${missions.length > 0 && html`<nav class="pages" aria-label="Pages of missions">
         <button type="button" disabled=${cursors.length === 1} onClick=${() => set_cursors(cursors.slice(0, -1))}>Newer</button>
-        <span>${format.fixed((cursors.length - 1) * page_rows + Math.min(1, missions.length))} – ${format.fixed((cursors.length - 1) * page_rows + missions.length)}${totals.value ? ` of ${format.fixed(totals.value.missions)}` : ''}</span>
+        <span>${format.fixed((cursors.length - 1) * page_rows + 1)} – ${format.fixed((cursors.length - 1) * page_rows + missions.length)}${totals.value ? ` of ${format.fixed(totals.value.missions)}` : ''}</span>
         <button type="button" disabled=${next_cursor === null} onClick=${() => set_cursors([...cursors, next_cursor])}>Older</button>
-      </nav>`}<//>`;
+      </nav>`}`}<//>`;
 }

@@ -96,7 +96,7 @@ function Front({ answer, take }) {
   return html`<${Chart} make=${make} data=${data} height=${230} changes=${[]} label=${`Energy against duration, from ${format.span(front[0].duration_s)} to ${format.span(front[front.length - 1].duration_s)}`} />
     <p class="note foot"><span class="swatch accent dot"></span>this plan <span class="swatch hollow dot grey"></span>trapezoid <span class="swatch grey dot"></span>triangle <span class="swatch modelled"></span>front</p>
     <div class="front-pick"><label><span>Walk the front</span><input type="range" min="0" max=${front.length - 1} value=${at} onInput=${(e) => set_at(e.currentTarget.valueAsNumber)} aria-valuetext=${`${format.span(point.duration_s)}, ${format.text(format.energy(point.energy_j))}`} /></label>
-      <span class="number">${format.fixed(point.duration_s, 1)} s · ${format.text(format.energy(point.energy_j))}; a second less costs ${little(point.time_multiplier_w)}</span>
+      <span class="number">${format.fixed(point.duration_s, 2)} s · ${format.text(format.energy(point.energy_j, 4))}; a second less costs ${little(point.time_multiplier_w)}</span>
       <button type="button" onClick=${() => take(point)}>Take as deadline</button></div>`;
 }
 

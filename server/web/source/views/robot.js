@@ -62,7 +62,7 @@ export function Robot({ id }) {
       <${Readout} large label="Windings, right · left" of=${s.winding_temperature_c[0] === null ? '–' : `${format.fixed(s.winding_temperature_c[0])} · ${format.fixed(s.winding_temperature_c[1])} °C`} />
       <${Readout} large label="Mission" of=${format.energy(s.mission?.energy.battery_j)} note=${s.mission ? html`<a href=${mission_link(s.mission.id)}>${s.mission.mission_id}</a>` : 'none running'} />
     </dl>`}
-    <${Later} part="RobotHistory" id=${id} />
+    ${(s || detail.value) && html`<${Later} part="RobotHistory" id=${id} />`}
     <${Panel} title="Recent missions" aside=${html`<a href=${`#/missions${query({ robot: id })}`}>All missions of ${id}</a>`}><${Answer} of=${missions} what="missions">${(page) =>
       page.missions.length === 0 ? html`<${Empty} title="No mission yet" />` : html`<div class="scroll"><${MissionRows} missions=${page.missions} with_robot=${false} /></div>`}<//><//>
     <div class="columns">
