@@ -31,7 +31,8 @@ Circuit::Circuit(const robot::Battery& battery)
       coulombic_efficiency_(battery.coulombic_efficiency.value_or(1)),
       activation_k_(battery.activation_k.value_or(0)),
       thermal_resistance_k_w_(battery.thermal_resistance_k_w.value_or(0)),
-      thermal_time_constant_s_(battery.thermal_time_constant_s.value_or(infinity)) {
+      thermal_time_constant_s_(battery.thermal_time_constant_s.value_or(infinity)),
+      typical_curve_(battery.open_circuit_voltage.empty()) {
   assert(battery.branches.size() <= branches_.size());
   std::fill(branches_.begin(), branches_.end(), robot::BatteryBranch{0, infinity});
   std::copy(battery.branches.begin(), battery.branches.end(), branches_.begin());

@@ -41,6 +41,7 @@ class Circuit {
   double capacity_ah() const { return capacity_ah_; }  // present, ageing included
   double cutoff_voltage_v() const { return cutoff_voltage_v_; }
   double reserve_fraction() const { return reserve_fraction_; }
+  bool typical_curve() const { return typical_curve_; }  // the battery's own open-circuit curve is not known
 
   double open_circuit_voltage_v(double charge) const { return open_circuit_voltage_.extended(charge); }
   double open_circuit_slope_v(double charge) const { return open_circuit_voltage_.slope(charge); }
@@ -86,6 +87,7 @@ class Circuit {
   double activation_k_;
   double thermal_resistance_k_w_;
   double thermal_time_constant_s_;  // infinite without thermal parameters
+  bool typical_curve_;
 };
 
 }  // namespace joulecast::battery

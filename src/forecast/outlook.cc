@@ -28,8 +28,9 @@ double lowest_charge(const ChargeMap& battery, const Charge& charge, double powe
 }
 
 Budget budget(const ChargeMap& battery, const Charge& charge, double lowest, double power_w) {
-  return {battery.energy_j(charge.fraction, lowest, power_w),
-          charge.deviation * battery.slope_j(charge.fraction, power_w)};
+  const double energy_j = battery.energy_j(charge.fraction, lowest, power_w);
+  return {energy_j, std::hypot(charge.deviation * battery.slope_j(charge.fraction, power_w),
+                               battery.relative_deviation() * std::max(0.0, energy_j))};
 }
 
 // Quantiles of a difference of independent parts, from each one's own: exact for normals, and close where one
@@ -46,15 +47,8 @@ TaskOutlook stage(const Forecaster& forecaster, Driving driving, const ChargeMap
   TaskOutlook out;
   out.duration_s = sum.duration_s;
   out.probability = p.probability_below(spend.energy_j, spend.deviation_j);
-  for (std::size_t k = 0; k < told_quantiles.size(); ++k) {
-    out.energy_j[k] = p.quantile_j(told_quantiles[k]);
-    out.charge[k] = battery.charge_after(charge.fraction, p.quantile_j(1 - told_quantiles[k]), power);
-  }
-  const double middle = out.charge[1];
-  for (std::size_t k = 0; k < told_quantiles.size(); ++k)
-    out.charge[k] = joined(middle, out.charge[k] - middle, normal_quantile[k] * charge.deviation,
-                           told_quantiles[k] < 0.5 ? -1 : 1);
-  for (double& c : out.charge) c = std::clamp(c, 0.0, 1.0);
+  for (std::size_t k = 0; k < told_quantiles.size(); ++k) out.energy_j[k] = p.quantile_j(told_quantiles[k]);
+  out.charge = arrival_charge(p, battery, charge, power);
   return out;
 }
 
@@ -80,6 +74,22 @@ double longest_wait(const Forecaster& forecaster, Driving driving, const ChargeM
 }
 
 }  // namespace
+
+std::array<double, 3> arrival_charge(const Prediction& prediction, const ChargeMap& battery,
+                                     const Charge& charge, double mean_power_w) {
+  std::array<double, 3> out;
+  for (std::size_t k = 0; k < told_quantiles.size(); ++k)
+    out[k] =
+        battery.charge_after(charge.fraction, prediction.quantile_j(1 - told_quantiles[k]), mean_power_w);
+  const double middle = out[1];
+  const double deviation =
+      std::hypot(charge.deviation, battery.relative_deviation() * (charge.fraction - middle));
+  for (std::size_t k = 0; k < told_quantiles.size(); ++k)
+    out[k] =
+        joined(middle, out[k] - middle, normal_quantile[k] * deviation, told_quantiles[k] < 0.5 ? -1 : 1);
+  for (double& c : out) c = std::clamp(c, 0.0, 1.0);
+  return out;
+}
 
 void extend(PlanSum& sum, const Forecaster& forecaster, Driving driving, std::span<const PricedLeg> legs) {
   for (const PricedLeg& leg : legs)

@@ -109,6 +109,10 @@ class QuickSuccess {
   double budget_j_, deviation_j_;
 };
 
+// The charge left after what was predicted, at told_quantiles.
+std::array<double, 3> arrival_charge(const Prediction& prediction, const ChargeMap& battery,
+                                     const Charge& charge, double mean_power_w);
+
 // The legs of a plan, summed.
 PlanSum sum_of(const Forecaster& forecaster, Driving driving, std::span<const PricedLeg> legs);
 // Adds them to a plan.

@@ -168,8 +168,9 @@ int run(int each, int missions, std::uint64_t seed) {
           charge.reserve = battery.charge_after(charge.fraction, row.budget_j, power);
           for (std::size_t d = 0; d < driving_count; ++d) {
             row.success[d] = probability_of_reserve(*f, static_cast<Driving>(d), battery, charge, plan[d]);
-            row.arrival_low[d] = battery.charge_after(charge.fraction, row.told[d].quantile_j(0.95), power);
-            row.arrival_high[d] = battery.charge_after(charge.fraction, row.told[d].quantile_j(0.05), power);
+            const auto arrival = arrival_charge(row.told[d], battery, charge, power);
+            row.arrival_low[d] = arrival.front();
+            row.arrival_high[d] = arrival.back();
           }
           row.arrival = mission.charge_at_end;
           row.held = mission.charge_at_end >= charge.reserve;

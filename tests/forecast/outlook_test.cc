@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "battery/cell_shapes.h"
 #include "client/virtual_robot/rng.h"
 #include "robots.h"
 
@@ -149,6 +150,25 @@ TEST(Outlook, AnUncertainChargeWidensArrivalAndLowersSureThings) {
   EXPECT_LT(vague.tasks[0].charge[0], sure.tasks[0].charge[0]);
   EXPECT_GT(vague.tasks[0].charge[2], sure.tasks[0].charge[2]);
   EXPECT_NEAR(vague.tasks[0].charge[1], sure.tasks[0].charge[1], 1e-12);
+}
+
+TEST(Outlook, ATypicalCurveIsTrustedLessThanTheBatterysOwn) {
+  const Forecaster f = forecaster(0.005, 0.005);
+  robot::Battery own = shipped("amr").battery;
+  ASSERT_TRUE(own.open_circuit_voltage.empty());
+  const ChargeMap typical = battery();
+  own.open_circuit_voltage = battery::default_open_circuit_voltage(own.nominal_voltage_v);
+  const ChargeMap known{battery::Circuit(own)};
+  std::vector<PricedTask> tasks(1);
+  tasks[0].legs = {drive(0.985 * known.energy_j(0.8, 0.15, 100), 100)};
+  const Outlook sure = look_ahead(f, Driving::usual, known, {0.8, 0, 0.15}, tasks, {}, standing_w, 0.95);
+  const Outlook vague = look_ahead(f, Driving::usual, typical, {0.8, 0, 0.15}, tasks, {}, standing_w, 0.95);
+  EXPECT_LT(vague.probability, sure.probability);
+  EXPECT_EQ(vague.tasks[0].charge[1], sure.tasks[0].charge[1]);
+  // The voltage's own part, at least.
+  EXPECT_LT(vague.tasks[0].charge[0], vague.tasks[0].charge[1] - 1.64 * 0.008 * 0.64);
+  EXPECT_LT(sure.tasks[0].charge[0], sure.tasks[0].charge[1] - 1.64 * 0.004 * 0.64);
+  EXPECT_GT(sure.tasks[0].charge[0], vague.tasks[0].charge[0]);
 }
 
 TEST(Reach, GoesAsFarAsTheChargeLastsAndIsOrdered) {
