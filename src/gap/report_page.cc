@@ -228,7 +228,7 @@ void effects_section(Page& page, std::span<const DiagnosedEffect> effects,
     }
     page.card(card);
   }
-  if (effects.empty()) page.paragraph("No effect of the catalogue is needed to explain these data.");
+  if (effects.empty()) page.paragraph("No effect of the catalogue is named.");
 }
 
 void origin_section(Page& page, const ReportOrigin& origin, const robot::RobotModel& robot) {

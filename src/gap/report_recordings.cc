@@ -27,9 +27,10 @@ constexpr std::size_t most_rows = 40;
 struct Powers {
   std::vector<Window> windows;
   std::vector<double> measured, before, after;
-  std::vector<double> cost;  // mean |change of power| by each effect [W]
-  double mean = 0;           // |measured|
-  bool from_battery = true;  // otherwise the motors' with the idle power
+  std::vector<double> cost;   // mean |change of power| by each effect [W]
+  double mean = 0;            // |measured|
+  bool from_battery = true;   // otherwise the motors' with the idle power
+  bool with_effects = false;  // else `after` is `before`
 
   bool any_known() const { return mean > 0; }
   bool known(std::size_t k) const { return std::isfinite(measured[k] - before[k]); }
@@ -50,6 +51,7 @@ Powers powers_of(const Diagnosis& d, const RecordingSet& recordings, const robot
   for (const robot::AdoptedEffect& adopted : d.adoptable) {
     if (auto active = dynamics::activate(adopted)) effects.push_back(*active);
   }
+  p.with_effects = !effects.empty();
   p.before = modelled_power(robot, {}, p.windows);
   p.after = modelled_power(robot, effects, p.windows);
   std::size_t count = 0;
@@ -202,7 +204,7 @@ struct Bin {
 };
 
 std::string chart_of(const std::vector<Bin>& cells, std::span<const double> edges,
-                     std::span<const std::string> labels, const std::string& axis) {
+                     std::span<const std::string> labels, const std::string& axis, bool with_effects) {
   double low = 0, high = 0;
   for (const Bin& b : cells) {
     if (b.count == 0) continue;
@@ -221,12 +223,13 @@ std::string chart_of(const std::vector<Bin>& cells, std::span<const double> edge
     const double from = edges[b], to = edges[b + 1], width = to - from, middle = from + 0.5 * width;
     if (!labels.empty()) chart.category(middle, labels[b]);
     if (bin.count < 5) continue;
-    const std::string hint = fmt::format("{} W before, {} W after, {} windows", brief(bin.mean_before()),
-                                         brief(bin.mean_after()), bin.count);
-    chart.bar(from + 0.08 * width, middle, 0, bin.mean_before(), "before", hint);
-    chart.bar(middle, to - 0.08 * width, 0, bin.mean_after(), "after", hint);
+    const double before_to = with_effects ? middle : to - 0.08 * width;
+    const std::string then = with_effects ? fmt::format(" before, {} W after", brief(bin.mean_after())) : "";
+    const std::string hint = fmt::format("{} W{}, {} windows", brief(bin.mean_before()), then, bin.count);
+    chart.bar(from + 0.08 * width, before_to, 0, bin.mean_before(), "before", hint);
+    if (with_effects) chart.bar(middle, to - 0.08 * width, 0, bin.mean_after(), "after", hint);
     if (const double half = bin.half_width(); std::isfinite(half)) {
-      const double at = from + 0.29 * width;
+      const double at = 0.5 * (from + 0.08 * width + before_to);
       chart.segment({at, bin.mean_before() - half}, {at, bin.mean_before() + half}, "whisker");
     }
   }
@@ -245,7 +248,7 @@ std::vector<std::pair<std::string, std::string>> maps_of(const Powers& p, const 
     if (found != phases.end()) by_phase[static_cast<std::size_t>(found - phases.begin())].add(p, k);
   }
   const std::vector<double> places{0, 1, 2, 3, 4, 5};
-  maps.emplace_back(chart_of(by_phase, places, phases, "phase"), "");
+  maps.emplace_back(chart_of(by_phase, places, phases, "phase", p.with_effects), "");
   struct Variable {
     std::string axis;
     std::function<double(const Window&)> value;
@@ -280,7 +283,7 @@ std::vector<std::pair<std::string, std::string>> maps_of(const Powers& p, const 
       if (!p.known(k) || !(at >= low && at <= high)) continue;
       cells[std::min(bins - 1, static_cast<std::size_t>((at - low) / (high - low) * bins))].add(p, k);
     }
-    maps.emplace_back(chart_of(cells, edges, {}, v.axis), "");
+    maps.emplace_back(chart_of(cells, edges, {}, v.axis, p.with_effects), "");
   }
   return maps;
 }
@@ -328,8 +331,8 @@ void floor_map(Page& page, const Powers& p) {
   const std::vector<std::pair<std::string, std::string>> legend{{"more", "takes more than the model says"},
                                                                 {"less", "takes less"}};
   page.legend(legend);
-  const std::vector<std::pair<std::string, std::string>> pictures{{picture(false), "Model as it is"},
-                                                                  {picture(true), "With the effects found"}};
+  std::vector<std::pair<std::string, std::string>> pictures{{picture(false), "Model as it is"}};
+  if (p.with_effects) pictures.emplace_back(picture(true), "With the effects found");
   page.charts(pictures);
 }
 
@@ -376,8 +379,9 @@ void power_section(Page& page, const Powers& p, const RecordingSet& set) {
   page.section("Power over time",
                fmt::format("{}, the {} s with the largest gap.", mission_name(set, worst.first),
                            brief(measured.back().x - measured.front().x, 2)));
-  const std::vector<std::pair<std::string, std::string>> legend{
-      {"measured", "measured"}, {"before", "model as it is"}, {"after", "with the effects found"}};
+  std::vector<std::pair<std::string, std::string>> legend{{"measured", "measured"},
+                                                          {"before", "model as it is"}};
+  if (p.with_effects) legend.emplace_back("after", "with the effects found");
   page.legend(legend);
   Chart chart(
       820, 300, {measured.front().x, measured.back().x, "time since the mission began, s", true},
@@ -385,7 +389,7 @@ void power_section(Page& page, const Powers& p, const RecordingSet& set) {
       "measured and modelled power");
   chart.level(0, "zero");
   chart.line(before, "before");
-  chart.line(after, "after");
+  if (p.with_effects) chart.line(after, "after");
   chart.line(measured, "measured");
   page.chart(chart.str());
 }
@@ -395,8 +399,8 @@ void where_section(Page& page, const Diagnosis& d, const Powers& p, const robot:
       "Where the model misses",
       "Mean of measured less modelled power in ranges of one variable each. Above zero the robot takes more "
       "than the model says. Whiskers: 95 % intervals of the model as it is, by blocks of 8 s.");
-  const std::vector<std::pair<std::string, std::string>> legend{{"before", "model as it is"},
-                                                                {"after", "with the effects found"}};
+  std::vector<std::pair<std::string, std::string>> legend{{"before", "model as it is"}};
+  if (p.with_effects) legend.emplace_back("after", "with the effects found");
   page.legend(legend);
   page.charts(maps_of(p, robot));
   if (d.where.empty()) {
@@ -526,11 +530,11 @@ std::string report_html(const Diagnosis& d, const RecordingSet& recordings, cons
   }
   effects_section(page, d.effects, costs);
   if (!d.outside.channel.empty()) {
-    page.card(fmt::format(
-        "<h3>Outside the catalogue</h3><p>Something shows in {} and follows {}; probability {}. No "
-        "effect of the catalogue does that.</p>",
-        xml_escaped(words_of(d.outside.channel)), xml_escaped(words_of(d.outside.follows)),
-        probability_text(d.outside.probability)));
+    page.card(
+        fmt::format("<h3>Outside the catalogue</h3><p>Something is at work that no effect of the catalogue "
+                    "describes, with "
+                    "a probability of {}. {}</p>",
+                    probability_text(d.outside.probability), xml_escaped(outside_words(d.outside))));
   } else {
     page.paragraph(fmt::format("Probability that something outside the catalogue is at work: {}.",
                                probability_text(d.outside.probability)));

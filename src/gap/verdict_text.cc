@@ -53,10 +53,10 @@ std::vector<std::string> against_effects(const Diagnosis& d) {
   if (d.shrinkage && std::isfinite(d.shrinkage->after)) {
     const Shrinkage& s = *d.shrinkage;
     if (s.interval[1] < 0) {
-      reasons.push_back(sentence(
-          fmt::format("on missions left out of the fit {} the gap larger, {} instead of {}, and so no "
-                      "explanation",
-                      one ? "it makes" : "they make", percent(s.after), percent(s.before))));
+      reasons.push_back(
+          sentence(fmt::format("on missions left out of the fit {}, {} instead of {}, and is no explanation",
+                               one ? "it makes the gap larger" : "what they do makes the gap larger",
+                               percent(s.after), percent(s.before))));
     } else if (s.after > notable_rest * d.noise_floor) {
       reasons.push_back(sentence(
           fmt::format("with {} {} of the power is still missed on missions left out of the fit, where "
@@ -93,14 +93,18 @@ std::vector<std::string> against_effects(const Diagnosis& d) {
 
 }  // namespace
 
+std::string outside_words(const Outside& outside) {
+  return sentence(
+      fmt::format("it shows in {} and {}", channel_words(outside.channel), follows_words(outside.follows)));
+}
+
 std::vector<std::string> verdict_reasons(const Diagnosis& d) {
   switch (d.verdict) {
     case Verdict::none:
     case Verdict::effects:
       return {};
     case Verdict::outside:
-      return {sentence(fmt::format("it shows in {} and {}", channel_words(d.outside.channel),
-                                   follows_words(d.outside.follows)))};
+      return {outside_words(d.outside)};
     case Verdict::inconclusive:
       break;
   }

@@ -32,6 +32,6 @@ export function JobRows({ jobs, with_robot = true }) {
       ${with_robot && html`<td><a href=${robot_link(d.robot_id)}>${d.robot_id}</a></td>`}
       <td class="when">${format.time(d.created_utime_us)}</td><td><${State} of=${d} /></td>
       <td>${d.error ? html`<span class="note">${d.error}</span>` : found_words(d.summary)}</td>
-      <td class="figure">${share(d.summary?.gap.power_absolute_relative)}</td>${with_robot && html`<td class="figure">${share(d.summary?.shrinkage.held_out_after)}</td>
+      <td class="figure">${share(d.summary?.gap.power_absolute_relative)}</td>${with_robot && html`<td class="figure">${share(d.summary?.effects.length > 0 ? d.summary.shrinkage.held_out_after : null)}</td>
       <td class="figure">${d.fitted_on.length || '–'}</td>`}</tr>`)}</tbody></table>`;
 }

@@ -76,7 +76,7 @@ function changes_of(version, before) {
   if (before === undefined) return [];
   const now = flat(version.model), then = flat(before.model);
   return [...new Set([...Object.keys(now), ...Object.keys(then)])].filter((key) => now[key] !== then[key])
-    .map((key) => ({ key, from: then[key] ?? '–', to: now[key] ?? '–' }));
+    .map((key) => ({ key, from: then[key] ?? null, to: now[key] ?? null }));
 }
 
 function Versions({ versions, robot, onChange }) {
@@ -99,7 +99,7 @@ function Versions({ versions, robot, onChange }) {
       ${v.note && !v.evidence?.diagnosis_id && html`<p class="note">${v.note}</p>`}
       ${v.evidence && html`<p class="note"><${Evidence} of=${v.evidence} /></p>`}
       ${!v.active && html`<p><button type="button" disabled=${told.busy !== null} onClick=${() => roll(v.model_version)}>${told.busy === v.model_version ? 'Putting in force …' : `Put version ${v.model_version} in force again`}</button></p>`}
-      ${changes.length > 0 && html`<ul class="changes">${changes.slice(0, 12).map((c) => html`<li key=${c.key}><code>${c.key}</code> ${c.from} → ${c.to}</li>`)}${changes.length > 12 && html`<li class="note">and ${changes.length - 12} more</li>`}</ul>`}
+      ${changes.length > 0 && html`<ul class="changes">${changes.slice(0, 12).map((c) => html`<li key=${c.key}><code>${c.key}</code> ${c.from === null ? `new: ${c.to}` : c.to === null ? `gone, was ${c.from}` : `${c.from} → ${c.to}`}</li>`)}${changes.length > 12 && html`<li class="note">and ${changes.length - 12} more</li>`}</ul>`}
     </li>`;
   })}</ol>`;
 }
@@ -118,7 +118,8 @@ function chosen_of(siblings, id) {
 
 function Siblings({ siblings, id }) {
   const [whole, set_whole] = useState(false);
-  if (siblings.length < 2) return html`<${Empty} title="No other robot of this kind has missions yet" />`;
+  const here = siblings.some((s) => s.robot_id === id);
+  if (siblings.length <= (here ? 1 : 0)) return html`<${Empty} title="No other robot of this kind has missions yet" />`;
   const off = Math.max(0.02, ...siblings.flatMap((s) => [Math.abs(s.ci[0] - 1), Math.abs(s.ci[1] - 1)]).filter((v) => Number.isFinite(v)));
   const at = (v) => `${50 + 50 * Math.max(-1, Math.min(1, (v - 1) / off))}%`;
   const some = whole || siblings.length <= most_siblings ? siblings : chosen_of(siblings, id);
@@ -126,7 +127,7 @@ function Siblings({ siblings, id }) {
     <th scope="row">${s.robot_id === id ? html`<b>${id}</b>` : html`<a href=${robot_link(s.robot_id)}>${s.robot_id}</a>`}${s.stands_out && html` <span class="flag">stands out</span>`}</th>
     <td class="bar-cell"><svg width="100%" height="16" aria-hidden="true"><line x1="50%" x2="50%" y1="0" y2="16" class="one" /><line x1=${at(s.ci[0])} x2=${at(s.ci[1])} y1="8" y2="8" class="whisker" /><circle cx=${at(s.ratio)} cy="8" r="4" class=${s.stands_out ? 'out' : ''} /></svg></td>
     <td class="figure">${format.fixed(s.ratio, 3)}</td></tr>`)}</tbody></table>
-    <p class="note foot">Median of measured over modelled energy of each robot's newest missions, with its 95 % interval; the line is 1.</p>
+    <p class="note foot">Median of measured over modelled energy of each robot's newest missions, with its 95 % interval; the line is 1.${!here && ` ${id} has not driven enough under its model in force.`}</p>
     ${siblings.length > most_siblings && html`<button type="button" aria-expanded=${String(whole)} onClick=${() => set_whole(!whole)}>${whole ? 'Show fewer' : `Show all ${siblings.length}`}</button>`}`;
 }
 
