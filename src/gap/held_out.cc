@@ -12,6 +12,60 @@ namespace {
 
 constexpr double bootstrap_block_s = 10;
 constexpr int bootstrap_draws = 400;
+constexpr double least_information =
+    0.1;  // of all there is on a coefficient, that the other missions must have
+
+// What is known without a part of the windows, and which windows these are.
+struct Fold {
+  std::size_t first, last;  // windows [first, last)
+  Information others;
+};
+
+Information without(std::span<const Information> all, std::size_t left_out) {
+  Information sum;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (k != left_out) sum += all[k];
+  }
+  return sum;
+}
+
+// One fold for each mission. Where the others hardly know a coefficient of the set, such as that of a load
+// that only one mission carried, its halves take turns.
+std::vector<Fold> folds_of(const Fit& fit, std::span<const std::size_t> set,
+                           std::span<const Window> windows) {
+  const auto known = [&](const Information& some) {
+    return some.xx.size() > 0 && std::ranges::all_of(set, [&](std::size_t h) {
+             const Hypothesis& hypothesis = fit.columns->hypotheses()[h];
+             return hypothesis.outside() || std::ranges::all_of(hypothesis.columns, [&](std::size_t k) {
+                      const auto j = static_cast<Eigen::Index>(k);
+                      return some.xx(j, j) >= least_information * fit.total.xx(j, j);
+                    });
+           });
+  };
+  std::vector<Fold> folds;
+  for (std::size_t first = 0; first < windows.size();) {
+    const std::size_t mission = windows[first].mission;
+    std::size_t last = first;
+    while (last < windows.size() && windows[last].mission == mission) ++last;
+    if (Information others = without(fit.missions, mission); known(others)) {
+      folds.push_back({first, last, std::move(others)});
+    } else {
+      const std::size_t middle = first + (last - first) / 2;
+      Design halves = fit.design;
+      for (ChannelDesign& d : halves.channels) {
+        for (std::size_t row = 0; row < d.mission.size(); ++row) {
+          if (d.mission[row] == mission && d.window[row] >= middle) d.mission[row] = halves.missions;
+        }
+      }
+      ++halves.missions;
+      const std::vector<Information> parts = mission_information(*fit.columns, halves);
+      folds.push_back({first, middle, without(parts, mission)});
+      folds.push_back({middle, last, without(parts, parts.size() - 1)});
+    }
+    first = last;
+  }
+  return folds;
+}
 
 }  // namespace
 
@@ -35,17 +89,10 @@ Shrinkage held_out(const Fit& fit, const robot::RobotModel& robot, std::span<con
                    std::span<const Window> windows, std::span<const double> measured,
                    std::span<const double> plain, std::span<const double> nominal, double floor) {
   std::vector<double> predicted(windows.size(), missing);
-  for (std::size_t m = 0; m < fit.missions.size(); ++m) {
-    Information rest;
-    for (std::size_t k = 0; k < fit.missions.size(); ++k) {
-      if (k != m) rest += fit.missions[k];
-    }
-    if (rest.xx.size() == 0) rest = fit.total;
-    const auto effects = fit.columns->effects_of(coefficients_of(fit, rest, set));
+  for (const Fold& fold : folds_of(fit, set, windows)) {
+    const auto effects = fit.columns->effects_of(coefficients_of(fit, fold.others, set));
     const dynamics::DriveModel model = extended_model(robot, effects);
-    for (std::size_t k = 0; k < windows.size(); ++k) {
-      if (windows[k].mission == m) predicted[k] = metered_power(model, windows[k]);
-    }
+    for (std::size_t k = fold.first; k < fold.last; ++k) predicted[k] = metered_power(model, windows[k]);
   }
   struct Block {
     double before = 0, after = 0, size = 0;

@@ -108,7 +108,10 @@ class Spectrum {
       std::ranges::sort(near_power);
       const double floor = near[near.size() / 2] / count, here = relative_[n] / count;
       const double contrast = here / floor;
-      if (contrast < least_contrast || here < floor * (1 + chance / std::sqrt(count))) continue;
+      // Among what stands out of the noise by itself a line has to stand out more.
+      if (contrast < least_contrast * std::max(1.0, std::sqrt(floor)) ||
+          here < floor * (1 + chance / std::sqrt(count)))
+        continue;
       const double square = (power_[n] - near_power[near_power.size() / 2]) / count;
       const double amplitude = std::sqrt(std::max(0.0, square));
       const double share = 2 * std::numbers::inv_pi * amplitude * watts_per_value;

@@ -13,12 +13,11 @@ namespace {
 
 namespace vr = virtual_robot;
 
-// Diagnoses missions of the project's own plant, which shares no physics with the model.
-Diagnosis diagnose_virtual(const std::vector<vr::EffectStrength>& effects, std::uint64_t seed, bool motors,
-                           int missions = 5) {
-  const auto text = vr::shipped_robots()[1].json_text;
+// Missions of the project's own plant, which shares no physics with the model.
+std::vector<telemetry::Recording> virtual_missions(const std::vector<vr::EffectStrength>& effects,
+                                                   std::uint64_t seed, bool motors, int missions) {
   vr::SimulationSpec spec;
-  spec.robot = *vr::parse_robot(std::string(text));
+  spec.robot = *vr::parse_robot(std::string(vr::shipped_robots()[1].json_text));
   spec.imperfections = *vr::make_imperfections(effects);
   spec.missions = missions;
   spec.sensors.motor_channels = motors;
@@ -36,8 +35,17 @@ Diagnosis diagnose_virtual(const std::vector<vr::EffectStrength>& effects, std::
       recordings.back().samples.push_back(run.samples[next++]);
     }
   }
-  return *diagnose(*make_recording_set(spec.robot.robot_id, std::move(recordings)),
-                   *robot::parse_robot(text));
+  return recordings;
+}
+
+Diagnosis diagnose_missions(std::vector<telemetry::Recording> recordings) {
+  const auto robot = *robot::parse_robot(vr::shipped_robots()[1].json_text);
+  return *diagnose(*make_recording_set(robot.robot_id, std::move(recordings)), robot);
+}
+
+Diagnosis diagnose_virtual(const std::vector<vr::EffectStrength>& effects, std::uint64_t seed, bool motors,
+                           int missions = 5) {
+  return diagnose_missions(virtual_missions(effects, seed, motors, missions));
 }
 
 TEST(VirtualRobot, WithoutImperfectionsShowsNoGap) {
@@ -55,6 +63,24 @@ TEST(VirtualRobot, ASingleMissionSufficesForAStrongEffect) {
   EXPECT_EQ(d.effects[0].id, "coulomb_friction");
   EXPECT_EQ(d.missions, 1u);
   ASSERT_TRUE(d.shrinkage);
+  EXPECT_GT(d.shrinkage->fraction, 0.5);
+}
+
+// Without the loaded mission nothing is known of what load does: its halves are held out in turn.
+TEST(VirtualRobot, OneLoadedMissionSufficesForWhatLoadDoes) {
+  auto recordings = virtual_missions({{"load_rolling_resistance", 0.15}}, 17, true, 12);
+  bool loaded = false;
+  std::erase_if(recordings, [&](const telemetry::Recording& mission) {
+    const bool first_load = mission.payload_kg > 0 && !loaded;
+    loaded = loaded || first_load;
+    return mission.payload_kg > 0 && !first_load;
+  });
+  ASSERT_GE(recordings.size(), 2u);
+  ASSERT_TRUE(loaded);
+  const Diagnosis d = diagnose_missions(std::move(recordings));
+  EXPECT_EQ(name_of(d.verdict), "effects");
+  ASSERT_EQ(d.effects.size(), 1u);
+  EXPECT_EQ(d.effects[0].id, "load_rolling_resistance");
   EXPECT_GT(d.shrinkage->fraction, 0.5);
 }
 
