@@ -34,8 +34,8 @@ std::string channel_words(std::string_view channel) {
 
 std::string follows_words(std::string_view variable) {
   if (variable == "wheel_angle")
-    return "repeats with each turn of a wheel, as of a wheel out of round, a bent axle or a damaged gear "
-           "tooth";
+    return "repeats with the turning of a wheel, as of a wheel out of round, a bent axle, a damaged tooth "
+           "or a motor that cogs";
   if (variable == "time") return "changes with the time since the mission began";
   if (variable == "position") return "depends on where the robot is";
   return "follows the " + words_of(variable);

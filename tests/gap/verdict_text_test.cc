@@ -35,7 +35,7 @@ TEST(VerdictText, TellsWhereSomethingUnknownShowsAndWhatItFollows) {
   Diagnosis d = with_effect(Verdict::outside);
   d.outside = {.probability = 1, .channel = "wheel_torque", .follows = "wheel_angle"};
   EXPECT_THAT(verdict_reasons(d),
-              ElementsAre(HasSubstr("the torque at the wheels and repeats with each turn of a wheel")));
+              ElementsAre(HasSubstr("the torque at the wheels and repeats with the turning of a wheel")));
   d.outside.follows = "yaw_rate";
   EXPECT_THAT(verdict_reasons(d),
               ElementsAre("It shows in the torque at the wheels and follows the yaw rate."));

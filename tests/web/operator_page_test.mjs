@@ -382,7 +382,7 @@ await check('a diagnosis says why it is not sure', async () => {
   const { result } = await get(`/v1/diagnoses/${outside}`);
   equal(result.outside.follows, 'wheel_angle', 'what it follows');
   equal(await page.locator('.reasons li').first().textContent(), result.reasons[0], 'the reason');
-  expect(result.reasons[0].includes('repeats with each turn of a wheel'), result.reasons[0]);
+  expect(result.reasons[0].includes('repeats with the turning of a wheel'), result.reasons[0]);
 });
 
 await check('what was found is tested on other missions, adopted and rolled back', async () => {
