@@ -319,6 +319,29 @@ await check('what is not there is said', async () => {
   faults_wanted = false;
 });
 
+await check('waiting and faults are said, and tried again', async () => {
+  const fresh = await open_page();
+  const shot = (name) => fresh.screenshot({ path: path.join(given.out, 'screenshots', `${name}-laptop.png`) });
+  let let_go;
+  const held = new Promise((go_on) => (let_go = go_on));
+  await fresh.route('**/v1/missions?*', async (route) => {
+    await held;
+    await route.fulfill({ status: 503, contentType: 'application/problem+json', body: JSON.stringify({ title: 'Service Unavailable', status: 503, detail: 'the store is busy' }) });
+  });
+  await go(fresh, '#/missions');
+  await fresh.getByText('Reading missions').waitFor();
+  await shot('missions-loading');
+  faults_wanted = true;
+  let_go();
+  await fresh.getByText('the store is busy').waitFor();
+  await shot('missions-fault');
+  await fresh.unroute('**/v1/missions?*');
+  await fresh.getByRole('button', { name: 'Try again' }).click();
+  await fresh.locator('.missions tbody tr').first().waitFor();
+  await fresh.context().close();
+  faults_wanted = false;
+});
+
 await check('every link of every view leads somewhere', async () => {
   const seen = new Set();
   for (const hash of ['#/fleet', `#/robots/${robot}`, '#/missions', `#/missions/${mission.id}`, '#/plan']) {
