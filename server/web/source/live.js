@@ -25,7 +25,7 @@ class Track {
 const robots = new Map();
 const state = { link: 'connecting', since_ms: Date.now(), loaded: false, loads: 0, error: null, robots, revision: 0, events: 0 };
 const listeners = new Set();
-let source = null, drawn_ms = 0, scheduled = false, heard_ms = 0, retry_ms = 1000;
+let source = null, drawn_ms = 0, scheduled = false, loading = false, heard_ms = 0, retry_ms = 1000;
 
 function tell() {
   scheduled = false;
@@ -66,6 +66,7 @@ function link(name) {
 }
 
 async function load() {
+  loading = true;
   try {
     const { robots: list } = await get('/v1/robots');
     const present = new Set(list.map((robot) => robot.robot_id));
@@ -77,6 +78,7 @@ async function load() {
   } catch (error) {
     state.error = error;
   }
+  loading = false;
   changed();
 }
 
@@ -84,7 +86,7 @@ function connect() {
   source = new EventSource('/v1/events');
   source.addEventListener('open', () => {
     heard_ms = performance.now();
-    if (state.link === 'offline' || !state.loaded) load();
+    if (state.link === 'offline' || (!state.loaded && !loading)) load();
     retry_ms = 1000;
     link('live');
   });

@@ -1,4 +1,5 @@
 import { Component } from 'preact';
+import { useMemo } from 'preact/hooks';
 import { html } from './html.js';
 import * as format from './format.js';
 
@@ -81,6 +82,11 @@ export class Guard extends Component {
     if (this.state.error === null) return this.props.children;
     return html`<${Failure} error=${this.state.error} retry=${() => this.setState({ error: null })} />`;
   }
+}
+
+// Robots as options of a choice; drawn anew only when they change, since what is live is told many times a second.
+export function useOptions(ids) {
+  return useMemo(() => ids.map((id) => html`<option key=${id} value=${id}>${id}</option>`), [ids.join('\n')]);
 }
 
 export function useTitleOf(text) {

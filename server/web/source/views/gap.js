@@ -5,7 +5,7 @@ import * as format from '../format.js';
 import { del, post, query, useGet } from '../api.js';
 import { useLive } from '../live.js';
 import { mission_link, robot_link } from '../route.js';
-import { Answer, Empty, Failure, Panel, Quantity, Readout, useTitleOf } from '../widgets.js';
+import { Answer, Empty, Failure, Panel, Quantity, Readout, useOptions, useTitleOf } from '../widgets.js';
 import { JobRows, State, share, state_notes, verdicts } from './jobs.js';
 
 export { RobotHistory } from './robot_history.js';
@@ -51,6 +51,7 @@ function Start({ given, onStart }) {
   const newest = useGet('/v1/missions?state=finished&limit=200');
   const lately = new Set(newest.value?.missions.map((m) => m.robot_id));
   const driven = robots.filter((id) => lately.has(id)), others = robots.filter((id) => !lately.has(id));
+  const of_driven = useOptions(driven), of_others = useOptions(others);
   const chosen = robot || (newest.loading ? '' : driven[0] ?? robots[0] ?? '');
   const past = useGet(chosen && `/v1/mission-totals${query({ robot_id: chosen, state: 'finished' })}`);
   const count = chosen && past.value !== null && !past.loading ? past.value.missions : null;
@@ -68,7 +69,7 @@ function Start({ given, onStart }) {
   };
   if (live.loaded && robots.length === 0) return html`<${Empty} title="No robot has a model yet">A gap is what is measured against a model: put a robot file to <code>/v1/robots/…</code>.<//>`;
   return html`<form class="filters" onSubmit=${start}>
-    <label class="field"><span>Robot</span><select value=${chosen} onChange=${(e) => set_robot(e.currentTarget.value)}>${[[driven, 'Drove lately'], [others, 'Others']].map(([ids, name]) => ids.length > 0 && html`<optgroup key=${name} label=${name}>${ids.map((id) => html`<option key=${id} value=${id}>${id}</option>`)}</optgroup>`)}</select></label>
+    <label class="field"><span>Robot</span><select value=${chosen} onChange=${(e) => set_robot(e.currentTarget.value)}>${[[driven, of_driven, 'Drove lately'], [others, of_others, 'Others']].map(([ids, options, name]) => ids.length > 0 && html`<optgroup key=${name} label=${name}>${options}</optgroup>`)}</select></label>
     <label class="field"><span>Missions, newest</span><input class="short" type="number" min="1" max="1000" required value=${missions} onInput=${(e) => set_missions(e.currentTarget.value)} /></label>
     <button type="submit" class="primary" disabled=${busy || !count}>Diagnose</button>
     <p class="note" role="status">${count === 0 ? html`${chosen} has no finished mission yet: there is nothing to diagnose.` : html`${count !== null && `${format.fixed(count)} finished ${count === 1 ? 'mission' : 'missions'}. `}Every fourth is held back to test what is found.`}</p>

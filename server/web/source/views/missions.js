@@ -5,7 +5,7 @@ import { query, useGet } from '../api.js';
 import { export_missions } from '../export.js';
 import { useLive } from '../live.js';
 import { keep_in_address, mission_link, robot_link } from '../route.js';
-import { Answer, Empty, Failure, MissionState, Quantity, Readout, state_notes, useTitleOf } from '../widgets.js';
+import { Answer, Empty, Failure, MissionState, Quantity, Readout, state_notes, useOptions, useTitleOf } from '../widgets.js';
 
 const page_rows = 50;
 
@@ -55,13 +55,14 @@ export function Ratio({ value }) {
 function Filters({ given, change }) {
   const live = useLive();
   const names = [...live.robots.keys()].sort();
+  const options = useOptions(names);
   const set = (key) => (event) => change({ ...given, [key]: event.currentTarget.value });
   const field = (label, control) => html`<label class="field"><span>${label}</span>${control}</label>`;
   const any = Object.values(given).some((v) => v !== '' && v !== undefined);
   return html`<form class="filters" aria-label="Filter missions" onSubmit=${(e) => e.preventDefault()}>
     ${field('Robot', html`<select value=${given.robot ?? ''} onChange=${set('robot')}><option value="">all</option>
       ${given.robot && !names.includes(given.robot) && html`<option value=${given.robot}>${given.robot}</option>`}
-      ${names.map((id) => html`<option key=${id} value=${id}>${id}</option>`)}</select>`)}
+      ${options}</select>`)}
     ${field('From', html`<input type="datetime-local" value=${given.from ?? ''} onChange=${set('from')} />`)}
     ${field('To', html`<input type="datetime-local" value=${given.to ?? ''} onChange=${set('to')} />`)}
     <fieldset class="field"><legend>Payload, kg</legend><span class="with-unit">

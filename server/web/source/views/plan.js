@@ -9,7 +9,7 @@ import { FloorPath } from '../floor.js';
 import { useLive } from '../live.js';
 import { keep_in_address } from '../route.js';
 import { palette } from '../theme.js';
-import { Choice, Empty, Failure, Loading, Panel, Readout, useTitleOf } from '../widgets.js';
+import { Choice, Empty, Failure, Loading, Panel, Readout, useOptions, useTitleOf } from '../widgets.js';
 import { Waterfall } from '../waterfall.js';
 import { DrawPath } from './draw.js';
 
@@ -154,6 +154,7 @@ export function Plan({ given }) {
   const [terms, set_terms] = useState({ payload: '', deadline: '', value: '', charge: '' });
   const [told, set_told] = useState({ answer: null, error: null, busy: false, autonomy: { value: null, error: null } });
   const running = useRef(null);
+  const options = useOptions(able);
   const chosen = able.includes(robot) ? robot : able[0] ?? '';
 
   const preview = useMemo(() => (way === 'legs' ? points_of_legs(legs).filter(([x, y]) => Number.isFinite(x + y)) : points), [way, legs, points]);
@@ -202,7 +203,7 @@ export function Plan({ given }) {
   const base = answer?.baselines;
   return html`<h1 class="hidden">Plan</h1><div class="plan">
     <form class="plan-form" onSubmit=${(e) => { e.preventDefault(); compute(); }}>
-      <label class="field"><span>Robot</span><select value=${chosen} onChange=${(e) => { set_robot(e.currentTarget.value); keep_in_address('plan', { robot: e.currentTarget.value }); }}>${able.map((id) => html`<option key=${id} value=${id}>${id}</option>`)}</select></label>
+      <label class="field"><span>Robot</span><select value=${chosen} onChange=${(e) => { set_robot(e.currentTarget.value); keep_in_address('plan', { robot: e.currentTarget.value }); }}>${options}</select></label>
       <${Choice} label="How to give the path" value=${way} onChange=${set_way} options=${[['legs', 'Enter legs'], ['draw', 'Draw']]} />
       ${way === 'legs' ? html`<${Legs} legs=${legs} change=${set_legs} fault=${faulty ? Number(faulty[1]) : null} />`
         : html`<p class="note">${points.length} points, ${format.text(format.length(points.slice(1).reduce((sum, [x, y], k) => sum + Math.hypot(x - points[k][0], y - points[k][1]), 0)))}. Draw on the floor.</p>`}
