@@ -121,7 +121,8 @@ TEST(Planner, DeadlineIsMetByThePriceOfTime) {
       ASSERT_FALSE(tooShort);
       EXPECT_EQ(tooShort.error().fault, Fault::infeasible);
       EXPECT_EQ(tooShort.error().field, "deadline_s");
-      const double shortest = std::stod(tooShort.error().message.substr(tooShort.error().message.rfind(' ')));
+      const std::string& told = tooShort.error().message;
+      const double shortest = std::stod(told.substr(told.rfind("no less than ") + 13));
       for (double share : {0.7, 0.3, 0.02}) {
         problem.deadline_s = shortest + share * (relaxed->summary.duration_s - shortest);
         const auto hurried = plan(robot, path, problem);
