@@ -120,8 +120,11 @@ double odds_without(const Fit& fit, std::vector<std::size_t> set, std::size_t me
 }  // namespace
 
 double least_outside_of(double gap_share, double log_odds) {
-  constexpr double of_power = 0.012, of_power_for_certain = 0.006, of_gap = 0.2, certain = 30;
-  return std::max(log_odds > certain ? of_power_for_certain : of_power, of_gap * gap_share);
+  constexpr double of_power = 0.012, without_a_gap = 0.016, for_certain = 0.006, of_gap = 0.2;
+  constexpr double closed = 0.01, certain = 30;
+  if (gap_share < closed) return without_a_gap;
+  const bool sure = log_odds > certain && gap_share > largest_unnamed_share;
+  return std::max(sure ? for_certain : of_power, of_gap * gap_share);
 }
 
 Posterior posterior_of(const Fit& fit, const MovedShares& moved, double gap_share) {

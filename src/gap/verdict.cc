@@ -12,6 +12,7 @@ namespace {
 // Right names left at most 0.02 in development trials.
 constexpr double largest_left_share = 0.014, largest_left_part = 0.1;
 constexpr double largest_to_and_fro = 2.5;  // power that effects move, over the gap
+constexpr double least_closed = 0.05;       // of the gap, on held-out missions
 constexpr double explained_part = 0.5;      // of what may be left
 constexpr double most_outside = 0.3;        // posterior of something unknown beside a sure finding
 constexpr double surest_verdict = 0.97;     // what verdicts of posterior 1 came true in development trials
@@ -55,6 +56,7 @@ void temper(std::vector<DiagnosedEffect>& effects, double left) {
 struct Doubts {
   bool open = false;         // a gap stands that noise does not make
   bool unexplained = false;  // held-out missions keep more of it than right names leave
+  bool idle = false;         // on held-out missions they close nothing
   bool strained = false;     // strengths that no robot has, or effects that undo each other
   double left = 0;           // on held-out missions, over what may be left
 };
@@ -66,6 +68,8 @@ Doubts doubts_of(const Diagnosis& d, const Naming& naming, const robot::RobotMod
     doubts.left = (d.shrinkage->after - d.noise_floor) /
                   (largest_left_share + largest_left_part * d.power_absolute_relative);
   }
+  doubts.idle = d.shrinkage && d.shrinkage->fraction < least_closed &&
+                std::ranges::all_of(d.effects, shows_in_power, &DiagnosedEffect::id);
   const bool worse = d.shrinkage && d.shrinkage->interval[1] < 0 && doubts.open;
   doubts.unexplained = worse || doubts.left > 1;
   // Effects that undo most of what each other does are the shape of something else. What leaves next to
@@ -89,8 +93,9 @@ void judge(Diagnosis& d, const Naming& naming, const Posterior& posterior, const
     // What shares the data with something unknown is no sure finding.
     const double trust = naming.named_share / (naming.named_share + naming.unknown_share);
     for (DiagnosedEffect& effect : d.effects) effect.probability *= trust;
-  } else if (d.effects.empty()) {
+  } else if (d.effects.empty() || doubts.idle) {
     const bool none = !doubts.open && (posterior.none >= report_probability || !naming.whole.empty());
+    if (none) d.effects.clear();
     d.verdict = none ? Verdict::none : Verdict::inconclusive;
     d.verdict_probability = none          ? std::max(posterior.none, report_probability)
                             : doubts.open ? 1
@@ -107,7 +112,7 @@ void judge(Diagnosis& d, const Naming& naming, const Posterior& posterior, const
   d.verdict_probability = std::min(1.0, d.verdict_probability) * surest_verdict;
 
   for (DiagnosedEffect& effect : d.effects) {
-    if (doubts.unexplained) effect.probability *= std::clamp(d.shrinkage->fraction, 0.0, 1.0);
+    if (doubts.unexplained || doubts.idle) effect.probability *= std::clamp(d.shrinkage->fraction, 0.0, 1.0);
     if (doubts.strained) effect.probability *= 0.5;
   }
   temper(d.effects, doubts.unexplained ? 0 : doubts.left);
