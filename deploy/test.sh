@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs, checks formatting and lint, builds without a warning and passes the tests. With --sanitize the tests also run
-# under the address and undefined-behaviour sanitizers, in a build of their own.
+# Installs, checks formatting and lint, builds everything without a warning, benchmarks too, and passes the tests. With
+# --sanitize the tests also run under the address and undefined-behaviour sanitizers, in a build of their own.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 sanitize=false
@@ -24,7 +24,7 @@ if $sanitize; then
   cmake --build --preset sanitize
   isolated ctest --preset sanitize -j 2 -LE web
 fi
-cmake --preset release -DJOULECAST_WERROR=ON
+cmake --preset release -DJOULECAST_WERROR=ON -DJOULECAST_BENCHMARKS=ON
 cmake --build --preset release
 cmake --build --preset release --target web_test_packages
 isolated ctest --preset release -j 2

@@ -79,7 +79,7 @@ double meter_only(const std::vector<Message>& all) {
     samples.push_back(std::get<telemetry::Sample>(
         server::decode_message(all[k].channel, all[k].bytes, 0, counters)->content));
   }
-  energy::Meter meter(*dynamics::drive_model(benchmarks::robot_named("bench-0")), 18, {},
+  energy::Meter meter(*dynamics::drive_model(benchmarks::robot_named("bench-0")), {},
                       [](const energy::MeterPoint&) {});
   const Timer timer("metering (CVODE, all accounts)", samples.size());
   for (const telemetry::Sample& s : samples) {
