@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace joulecast::forecast {
@@ -43,11 +44,25 @@ double Prediction::mean_j() const {
 }
 
 double Prediction::probability_below(double energy_j, double deviation_j) const {
-  if (!(corrected_j > 0)) return energy_j > 0 ? 1 : 0;
-  // The budget's own uncertainty widens the ratio's as independent parts do.
-  const double budget = std::max(energy_j, 1e-9 * corrected_j), share = deviation_j / budget;
-  const double width = std::sqrt(spread * spread + share * share);
-  return scores->probability(std::log(budget / corrected_j) / width);
+  const auto budget_covers = [&](double spent_j) {
+    if (!(deviation_j > 0)) return spent_j <= energy_j ? 1.0 : 0.0;
+    return 0.5 * std::erfc((spent_j - energy_j) / (deviation_j * std::numbers::sqrt2));
+  };
+  if (!(corrected_j > 0)) return budget_covers(0);
+  constexpr double narrow = 0.5;  // deviation of the budget over that of the energy
+  if (deviation_j <= narrow * corrected_j * spread) {
+    // It widens the ratio as independent parts do, and leaves its shape.
+    const double share = deviation_j / corrected_j;
+    return scores->probability(std::log(std::max(energy_j / corrected_j, 1e-9)) / std::hypot(spread, share));
+  }
+  // Atoms four at a time: the budget's deviation blurs what lies between them.
+  constexpr std::size_t together = 4;
+  const auto atoms = scores->atoms();
+  double sum = 0;
+  for (std::size_t k = 0; k < atoms.size(); k += together) {
+    sum += budget_covers(corrected_j * std::exp(spread * 0.5 * (atoms[k + 1] + atoms[k + 2])));
+  }
+  return sum * together / static_cast<double>(atoms.size());
 }
 
 void Forecaster::extend(PlanSum& sum, Driving driving, Motion motion, double payload_kg, const LegCost& cost,

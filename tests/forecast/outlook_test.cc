@@ -54,20 +54,31 @@ TEST(Prediction, ProbabilityIsTheShareOfDraws) {
   for (int k = 0; k < 6; ++k) f.extend(sum, Driving::stated, Motion::drive, 0, drive(800).cost, 10);
   const Prediction p = f.predict(sum, Driving::stated);
   Rng rng(9);
-  for (const double deviation_j : {0.0, 150.0}) {
-    for (const double factor : {0.93, 0.98, 1.0, 1.04, 1.1}) {
-      const double budget = factor * p.corrected_j;
-      int within = 0;
-      constexpr int draws = 20'000;
-      for (int k = 0; k < draws; ++k) {
-        const double energy = p.corrected_j * std::exp(p.spread * p.scores->quantile(rng.uniform()));
-        within += energy <= budget + deviation_j * rng.normal();
-      }
-      const double shape = deviation_j > 0 ? 0.02 : 0.5 / static_cast<double>(ScoreDistribution::count);
-      EXPECT_NEAR(p.probability_below(budget, deviation_j), static_cast<double>(within) / draws,
-                  4 * std::sqrt(0.25 / draws) + shape)
-          << factor;
+  // Budgets as exact as the plan's energy, and uncertain ones many times as large, as of a charge that is
+  // hardly known.
+  struct Case {
+    double factor, deviation_j;
+  };
+  std::vector<Case> cases;
+  for (const double deviation_j : {0.0, 150.0, 600.0}) {
+    for (const double factor : {0.93, 0.98, 1.0, 1.04, 1.1}) cases.push_back({factor, deviation_j});
+  }
+  for (const double factor : {0.0, 5.0, 100.0, 1000.0}) {
+    for (const double share : {0.2, 0.4, 0.6, 1.5})
+      cases.push_back({factor, share * std::max(1.0, factor) * p.corrected_j});
+  }
+  for (const auto& [factor, deviation_j] : cases) {
+    const double budget = factor * p.corrected_j;
+    int within = 0;
+    constexpr int draws = 20'000;
+    for (int k = 0; k < draws; ++k) {
+      const double energy = p.corrected_j * std::exp(p.spread * p.scores->quantile(rng.uniform()));
+      within += energy <= budget + deviation_j * rng.normal();
     }
+    const double shape = deviation_j > 0 ? 0.02 : 0.5 / static_cast<double>(ScoreDistribution::count);
+    EXPECT_NEAR(p.probability_below(budget, deviation_j), static_cast<double>(within) / draws,
+                4 * std::sqrt(0.25 / draws) + shape)
+        << factor << " +- " << deviation_j;
   }
 }
 
