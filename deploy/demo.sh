@@ -12,7 +12,10 @@ stop() {
   local file
   for file in "$home"/*.pid; do
     [ -e "$file" ] || continue
-    kill "$(cat "$file")" 2>/dev/null || true
+    # After a restart of the machine the number may be another program's.
+    case "$(readlink "/proc/$(cat "$file")/exe" 2>/dev/null || true)" in
+      "$PWD"/build/demo-build/*) kill "$(cat "$file")" 2>/dev/null || true ;;
+    esac
     rm -f "$file"
   done
 }
@@ -28,6 +31,15 @@ cmake --build build/demo-build --target joulecastd joulecast
 mkdir -p "$home"
 stop
 
+for _ in $(seq 50); do
+  curl -s -o /dev/null "$url" || break
+  sleep 0.1
+done
+if curl -s -o /dev/null "$url"; then
+  echo "Something else answers at $url: stop it, or say DEMO_PORT=8081 deploy/demo.sh" >&2
+  exit 1
+fi
+
 # LCM travels by multicast over the loopback interface.
 if ! ip route get 239.255.76.67 >/dev/null 2>&1; then
   sudo=()
@@ -39,8 +51,8 @@ fi
 build/demo-build/server/joulecastd --store-path "$home/history.db" --http-port "$port" >"$home/joulecastd.log" 2>&1 &
 echo $! >"$home/joulecastd.pid"
 for _ in $(seq 50); do
-  curl -sf "$url/readyz" >/dev/null && break
   kill -0 "$(cat "$home/joulecastd.pid")" 2>/dev/null || { cat "$home/joulecastd.log" >&2; exit 1; }
+  curl -sf "$url/readyz" >/dev/null && break
   sleep 0.1
 done
 build/demo-build/client/joulecast simulate --robots 4 --seed "$(date +%s)" --mission-duration 40 --server "$url" --quiet >"$home/simulate.log" 2>&1 &
@@ -59,12 +71,12 @@ ask() {
 }
 robot="$(curl -sf "$url/v1/missions?limit=1" | python3 -c 'import json, sys; print(json.load(sys.stdin)["missions"][0]["robot_id"])')"
 mission="$(curl -sf "$url/v1/missions?limit=1&state=finished" | python3 -c 'import json, sys; print(json.load(sys.stdin)["missions"][0]["id"])')"
-lines=24 ask "Operator: what is $robot doing?" curl -sf "$url/v1/robots/$robot/state"
+lines=40 ask "Operator: what is $robot doing?" curl -sf "$url/v1/robots/$robot/state"
 lines=40 ask "Operator: what did the last finished mission spend?" curl -sf "$url/v1/missions/$mission"
 lines=30 ask "Operator: where did that energy go?" curl -sf "$url/v1/missions/$mission/ledger"
-lines=24 ask "Scheduler: the cheapest way for $robot to drive 10 m?" curl -sf -X POST "$url/v1/robots/$robot/profile" \
+lines=40 ask "Scheduler: the cheapest way for $robot to drive 10 m?" curl -sf -X POST "$url/v1/robots/$robot/profile" \
   -H 'Content-Type: application/json' -d '{"path": [{"kind": "straight", "length_m": 10}], "columns": false}'
-lines=24 ask "Scheduler: how far can $robot still go?" curl -sf -X POST "$url/v1/robots/$robot/autonomy" -H 'Content-Type: application/json' -d '{}'
+lines=45 ask "Scheduler: how far can $robot still go?" curl -sf -X POST "$url/v1/robots/$robot/autonomy" -H 'Content-Type: application/json' -d '{}'
 echo
 echo "Running on:     $url/   (API: $url/openapi.json, live fleet: $url/v1/events)"
 echo "Logs:           $home/joulecastd.log, $home/simulate.log"
