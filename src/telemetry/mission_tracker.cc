@@ -149,6 +149,11 @@ void MissionTracker::on_end(MissionActions& actions, const MissionEvent& event) 
   ++counters_.unknown_missions;
   if (current_ && current_->implicit && event.utime_us >= begin_us_) {
     close(actions, event.utime_us, end, "known to the robot as " + event.mission_id);
+  } else if (current_ && event.utime_us > begin_us_ + limits_.reorder_us) {
+    // A robot does one mission at a time: whose end is told now began after the open one, unheard.
+    close(actions, event.utime_us, MissionEnd::superseded,
+          "holds mission " + event.mission_id + " too, whose start was not heard");
+    explicit_end_us_ = event.utime_us;
   }
   remember({event.mission_id, {}, event.utime_us});
 }

@@ -163,6 +163,18 @@ TEST_F(MissionTrackerTest, UnknownEndLeavesAnExplicitMissionButEndsAnImplicitOne
   EXPECT_NE(actions[0].note.find("m-9"), std::string::npos);
 }
 
+// Its start fell into the daemon's downtime, say.
+TEST_F(MissionTrackerTest, TheEndOfALaterMissionWhoseStartWasLostEndsTheOpenOne) {
+  tracker.resume({"m-2", 0, 12 * second_us, 2.0, false});
+  sample(20);
+  const MissionActions actions = tracker.on_event({30 * second_us, "m-3", MissionPhase::finished, 0, ""});
+  EXPECT_THAT(told(actions), ElementsAre("close m-2 @30 superseded"));
+  EXPECT_NE(actions[0].note.find("m-3"), std::string::npos);
+  EXPECT_EQ(tracker.counters().unknown_missions, 1u);
+  EXPECT_FALSE(tracker.current());
+  EXPECT_THAT(started("m-4", 40), ElementsAre("open m-4 @40"));
+}
+
 TEST_F(MissionTrackerTest, SamplesAtAndJustAfterAnEndStartNothing) {
   started("m-1", 0);
   finished("m-1", 10);
