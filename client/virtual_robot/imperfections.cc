@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 namespace joulecast::virtual_robot {
 namespace {
@@ -71,8 +72,10 @@ Result<Imperfections> make_imperfections(const std::vector<EffectStrength>& effe
     if (entry == table.end())
       return invalid("--effect", "no effect is called " + id + "; --list-effects names them");
     if (!std::isfinite(strength) || std::abs(strength) > entry->search_limit) {
-      return invalid("--effect", "the strength of " + id + " must be within +-" +
-                                     std::to_string(entry->search_limit) + " " + std::string(entry->unit));
+      std::ostringstream text;
+      text << "the strength of " << id << " must be within +-" << entry->search_limit;
+      if (entry->unit != "1") text << ' ' << entry->unit;
+      return invalid("--effect", text.str());
     }
     result.*(entry->strength) = strength;
   }

@@ -1,5 +1,7 @@
 #include "gap/recordings.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -84,7 +86,7 @@ Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<teleme
   std::ranges::stable_sort(set.missions, {},
                            [](const telemetry::Recording& m) { return m.samples.front().utime_us; });
   if (set.missions.empty()) {
-    return invalid("log", "holds no mission of at least " + std::to_string(shortest_mission_s) + " s");
+    return invalid("log", fmt::format("holds no mission of at least {:g} s", shortest_mission_s));
   }
   return set;
 }
@@ -117,8 +119,10 @@ Result<RecordingSet> load_recordings(std::span<const std::string> paths, const s
   };
   telemetry::LogTally tally;
   for (const std::string& path : paths) {
+    const std::uint64_t before = tally.events;
     if (Result<bool> read = telemetry::read_events(path, take, tally); !read)
       return tl::unexpected(std::move(read.error()));
+    if (tally.events == before) return invalid("log", path + " is no LCM event log, or an empty one");
   }
   unreadable += tally.damaged_places;
   if (robots.empty()) {
