@@ -168,6 +168,7 @@ Posterior posterior_of(const Fit& fit, const MovedShares& moved, double gap_shar
   }
   // A gap that noise does not make is not nothing, however little the channels say what it is.
   if (gap_share > largest_unnamed_share && posterior.sets.size() > 1) {
+    posterior.by_gap_alone = posterior.none > 0.5 * total;
     total -= posterior.none;
     posterior.none = 0;
     posterior.sets.erase(std::vector<std::size_t>{});

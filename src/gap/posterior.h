@@ -16,6 +16,7 @@ bool shows_in_power(std::string_view id);
 struct Posterior {
   std::map<std::vector<std::size_t>, double> sets;  // probability
   double none = 0, outside = 0;
+  bool by_gap_alone = false;  // the evidence says nothing is there, but a gap stands that noise does not make
 
   double of_effect(const ColumnSet& columns, const dynamics::Effect* effect) const;
 };

@@ -13,6 +13,7 @@ namespace {
 constexpr double largest_left_share = 0.014, largest_left_part = 0.1;
 constexpr double largest_to_and_fro = 2.5;  // power that effects move, over the gap
 constexpr double least_closed = 0.05;       // of the gap, on held-out missions
+constexpr double surely_closed = 0.3;       // of the gap, for names that the gap alone speaks for
 constexpr double explained_part = 0.5;      // of what may be left
 constexpr double most_outside = 0.3;        // posterior of something unknown beside a sure finding
 constexpr double surest_verdict = 0.97;     // what verdicts of posterior 1 came true in development trials
@@ -101,11 +102,13 @@ void judge(Diagnosis& d, const Naming& naming, const Posterior& posterior, const
                             : doubts.open ? 1
                                           : 1 - posterior.none;
   } else {
-    const bool sure = naming.weakest_group >= report_probability && posterior.outside < most_outside &&
-                      !doubts.unexplained && !doubts.strained &&
-                      std::ranges::none_of(naming.chosen, [&](const Chosen& c) {
-                        return d.motor_channels && like_a_load(columns.hypotheses()[c.hypothesis]);
-                      });
+    const bool sure =
+        naming.weakest_group >= report_probability && posterior.outside < most_outside &&
+        !doubts.unexplained && !doubts.strained &&
+        (!posterior.by_gap_alone || (d.shrinkage && d.shrinkage->interval[0] > surely_closed)) &&
+        std::ranges::none_of(naming.chosen, [&](const Chosen& c) {
+          return d.motor_channels && like_a_load(columns.hypotheses()[c.hypothesis]);
+        });
     d.verdict = sure ? Verdict::effects : Verdict::inconclusive;
     d.verdict_probability = naming.weakest_group;
   }
