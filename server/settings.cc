@@ -10,6 +10,7 @@
 #include <sstream>
 #include <utility>
 
+#include "base/nearest_word.h"
 #include "server/http/json_text.h"
 #include "server/http/text.h"
 
@@ -24,12 +25,6 @@ const Setting* find_setting(std::string_view key) {
     if (setting.key == key) return &setting;
   }
   return nullptr;
-}
-
-std::string with_suggestion(std::string message, std::string_view word,
-                            const std::vector<std::string>& candidates) {
-  if (const auto near = nearest(word, candidates)) message += "; did you mean " + *near + "?";
-  return message;
 }
 
 template <class Name>
@@ -201,8 +196,9 @@ Result<void> Settings::set(std::string_view key, std::string_view value, Origin 
   const Setting* setting = find_setting(key);
   if (setting == nullptr) {
     return invalid(std::string(where),
-                   with_suggestion("unknown setting", key,
-                                   all_names([](const Setting& each) { return std::string(each.key); })));
+                   "unknown setting" + did_you_mean(key, all_names([](const Setting& each) {
+                                                      return std::string(each.key);
+                                                    })));
   }
   if (auto broken = broken_constraint(*setting, value))
     return invalid(std::string(where), std::move(*broken));
@@ -221,14 +217,13 @@ Result<void> Settings::read_file_text(std::string_view json_text, std::string_vi
   for (const auto& [section, content] : document->items()) {
     if (section == "$schema" && content.is_string()) continue;
     if (!content.is_object()) {
-      return invalid(
-          prefix + section,
-          with_suggestion("must be an object such as {\"http\": {\"port\": 8080}}", section, keys));
+      return invalid(prefix + section,
+                     "must be an object such as {\"http\": {\"port\": 8080}}" + did_you_mean(section, keys));
     }
     for (const auto& [name, value] : content.items()) {
       const std::string key = section + "." + name;
       const Setting* setting = find_setting(key);
-      if (setting == nullptr) return invalid(prefix + key, with_suggestion("unknown setting", key, keys));
+      if (setting == nullptr) return invalid(prefix + key, "unknown setting" + did_you_mean(key, keys));
       const auto text = text_of(*setting, value);
       if (!text) return invalid(prefix + key, "must be of type " + kind(*setting));
       if (auto done = set(key, *text, Origin::file, prefix + key); !done) return done;
@@ -287,7 +282,7 @@ Result<Invocation> read_settings(const std::vector<std::string>& arguments,
       auto known = all_names([](const Setting& each) { return each.flag(); });
       for (const auto& each : actions) known.push_back(each.first);
       known.emplace_back("--config");
-      return invalid(name, with_suggestion("unknown flag", name, known));
+      return invalid(name, "unknown flag" + did_you_mean(name, known));
     }
     std::string value;
     if (equals != std::string::npos) {
@@ -324,7 +319,7 @@ Result<Invocation> read_settings(const std::vector<std::string>& arguments,
     if (setting == table.end()) {
       auto known = all_names([](const Setting& each) { return each.environment(); });
       known.emplace_back("JOULECAST_CONFIG");
-      return invalid(name, with_suggestion("unknown environment variable", name, known));
+      return invalid(name, "unknown environment variable" + did_you_mean(name, known));
     }
     variables.push_back({std::string(setting->key), std::move(value), name});
   }
@@ -375,6 +370,11 @@ std::string settings_help() {
             (setting.default_value.empty() ? std::string("empty") : std::string(setting.default_value)) +
             (setting.unit.empty() ? "" : " " + std::string(setting.unit)) + "]\n";
   }
+  text +=
+      "\nexit codes\n"
+      "  0  stopped as asked, or printed what was asked for\n"
+      "  1  the service could not start; its log says which setting stands in the way\n"
+      "  2  the command line, an environment variable or the settings file is wrong\n";
   return text;
 }
 
@@ -429,29 +429,6 @@ std::string settings_schema() {
   schema["additionalProperties"] = false;
   schema["properties"] = std::move(sections);
   return schema.dump(2) + "\n";
-}
-
-std::optional<std::string> nearest(std::string_view word, const std::vector<std::string>& candidates) {
-  std::optional<std::string> best;
-  std::size_t best_edits = std::max<std::size_t>(2, word.size() / 3) + 1;
-  for (const std::string& candidate : candidates) {
-    // Levenshtein distance, one row at a time.
-    std::vector<std::size_t> row(candidate.size() + 1);
-    for (std::size_t j = 0; j < row.size(); ++j) row[j] = j;
-    for (std::size_t i = 1; i <= word.size(); ++i) {
-      std::size_t diagonal = std::exchange(row[0], i);
-      for (std::size_t j = 1; j < row.size(); ++j) {
-        const std::size_t substituted = diagonal + (word[i - 1] == candidate[j - 1] ? 0U : 1U);
-        diagonal = row[j];
-        row[j] = std::min({substituted, row[j] + 1, row[j - 1] + 1});
-      }
-    }
-    if (row.back() < best_edits) {
-      best_edits = row.back();
-      best = candidate;
-    }
-  }
-  return best;
 }
 
 }  // namespace joulecast

@@ -96,7 +96,4 @@ std::string settings_help();
 // JSON Schema 2020-12 of the settings file, from the table; schemas/config.schema.json is this text.
 std::string settings_schema();
 
-// The candidate nearest to a misspelt word by edits, or nullopt when none is near enough to be meant.
-std::optional<std::string> nearest(std::string_view word, const std::vector<std::string>& candidates);
-
 }  // namespace joulecast

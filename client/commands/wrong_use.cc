@@ -4,37 +4,13 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <numeric>
 #include <vector>
 
+#include "base/nearest_word.h"
 #include "client/commands/values.h"
 
 namespace joulecast::client {
 namespace {
-
-// How many letters must be put in, left out or changed.
-std::size_t distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t corner = std::exchange(row[0], i + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t changed = corner + (a[i] == b[j] ? 0 : 1);
-      corner = row[j + 1];
-      row[j + 1] = std::min({changed, row[j] + 1, corner + 1});
-    }
-  }
-  return row.back();
-}
-
-// "; did you mean X?" where one of `known` is near.
-std::string suggestion(const std::string& word, const std::vector<std::string>& known) {
-  const auto far = [&word](const std::string& name) { return distance(word, name); };
-  const auto nearest = std::ranges::min_element(known, {}, far);
-  if (nearest == known.end() || far(*nearest) > std::max<std::size_t>(1, (nearest->size() + 1) / 3))
-    return "";
-  return "; did you mean " + *nearest + "?";
-}
 
 std::vector<std::string> names_of_options(const CLI::App& app) {
   std::vector<std::string> names;
@@ -63,11 +39,11 @@ std::string about_rest(const CLI::App& app, const std::vector<std::string>& rest
   const auto option = std::ranges::find_if(rest, [](const std::string& w) { return w.starts_with("-"); });
   if (option != rest.end()) {
     const std::string name = option->substr(0, option->find('='));
-    return "has no option " + name + suggestion(name, names_of_options(app));
+    return "has no option " + name + did_you_mean(name, names_of_options(app));
   }
   const auto commands = names_of_commands(app);
   if (!commands.empty() && !takes_words(app))
-    return "has no command " + rest.front() + suggestion(rest.front(), commands);
+    return "has no command " + rest.front() + did_you_mean(rest.front(), commands);
   return "has no use for " + rest.front();
 }
 

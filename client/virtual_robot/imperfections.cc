@@ -4,6 +4,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "base/nearest_word.h"
+
 namespace joulecast::virtual_robot {
 namespace {
 
@@ -69,8 +71,12 @@ Result<Imperfections> make_imperfections(const std::vector<EffectStrength>& effe
   Imperfections result;
   for (const auto& [id, strength] : effects) {
     const auto* entry = std::find_if(table.begin(), table.end(), [&](const auto& e) { return e.id == id; });
-    if (entry == table.end())
-      return invalid("--effect", "no effect is called " + id + "; --list-effects names them");
+    if (entry == table.end()) {
+      std::vector<std::string> ids;
+      for (const EffectEntry& each : table) ids.emplace_back(each.id);
+      return invalid("--effect",
+                     "no effect is called " + id + did_you_mean(id, ids) + "; --list-effects names them all");
+    }
     if (!std::isfinite(strength) || std::abs(strength) > entry->search_limit) {
       std::ostringstream text;
       text << "the strength of " << id << " must be within +-" << entry->search_limit;

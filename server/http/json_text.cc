@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/json_hint.h"
+
 namespace joulecast::http {
 namespace {
 
@@ -14,7 +16,8 @@ using nlohmann::json;
 // Builds the value from parser events, which is where repeated keys can still be seen.
 class StrictBuilder : public nlohmann::json_sax<json> {
  public:
-  StrictBuilder(json& root, std::size_t max_depth) : root_(root), max_depth_(max_depth) {}
+  StrictBuilder(json& root, std::string_view text, std::size_t max_depth)
+      : root_(root), text_(text), max_depth_(max_depth) {}
 
   bool null() override { return add(json(nullptr)) != nullptr; }
   bool boolean(bool value) override { return add(json(value)) != nullptr; }
@@ -44,7 +47,9 @@ class StrictBuilder : public nlohmann::json_sax<json> {
     std::string text = cause.what();
     const auto start = text.find("] ");
     if (start != std::string::npos) text.erase(0, start + 2);
-    error_ = Error{Fault::invalid, "", "malformed JSON at byte " + std::to_string(position) + ": " + text};
+    const std::string hint = not_finite_hint(text_, position);
+    error_ = Error{Fault::invalid, hint.empty() ? "" : pointer(open_.size()),
+                   "malformed JSON at byte " + std::to_string(position) + ": " + text + hint};
     return false;
   }
 
@@ -105,6 +110,7 @@ class StrictBuilder : public nlohmann::json_sax<json> {
   }
 
   json& root_;
+  std::string_view text_;
   std::size_t max_depth_;
   std::vector<json*> open_;  // containers being filled, outermost first; stable: only the last one grows
   std::vector<std::string> names_;  // the key being filled in each, empty for arrays
@@ -116,7 +122,7 @@ class StrictBuilder : public nlohmann::json_sax<json> {
 
 Result<json> parse_json(std::string_view text, std::size_t max_depth) {
   json value;
-  StrictBuilder builder(value, max_depth);
+  StrictBuilder builder(value, text, max_depth);
   if (json::sax_parse(text.begin(), text.end(), &builder)) return value;
   auto error = builder.take_error();
   return tl::unexpected<Error>(error ? *error : Error{Fault::invalid, "", "malformed JSON"});

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "base/json_hint.h"
 #include "base/text_file.h"
 #include "robot/robot_fields.h"
 
@@ -471,7 +472,9 @@ Result<json> parse_text(std::string_view text) {
   } catch (const json::exception& error) {
     const std::string_view what = error.what();  // begins with the library's name for it, in brackets
     const std::size_t bracket = what.find("] ");
-    return invalid("", fmt::format("is not JSON: {}", what.substr(bracket == what.npos ? 0 : bracket + 2)));
+    const auto* fault = dynamic_cast<const json::parse_error*>(&error);
+    return invalid("", fmt::format("is not JSON: {}{}", what.substr(bracket == what.npos ? 0 : bracket + 2),
+                                   fault == nullptr ? "" : not_finite_hint(text, fault->byte)));
   }
 }
 

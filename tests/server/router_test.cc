@@ -177,6 +177,15 @@ TEST(JsonText, PointsIntoArraysByIndex) {
   EXPECT_EQ(field(R"([{"a": 1, "a": 2}])"), "/0/a");
   EXPECT_EQ(field(R"({"a/b": {"~": 1, "~": 2}})"), "/a~1b/~0");
   EXPECT_EQ(parse_json(R"({"a": [1, [2, []]]})", 3).error().field, "/a/1/1");
+  for (const char* text :
+       {R"({"a": [1, NaN]})", R"({"a": [1, -Infinity]})", R"({"a": [1, nan]})", R"({"a": [1, inf]})"}) {
+    const Error error = parse_json(text).error();
+    EXPECT_EQ(error.field, "/a/1") << text;
+    EXPECT_NE(error.message.find("; JSON has no "), std::string::npos) << error.message;
+    EXPECT_NE(error.message.find("write null"), std::string::npos) << error.message;
+  }
+  for (const char* text : {R"({"a": none})", R"({"a": i})", R"({"a": -})", "[n", "N"})
+    EXPECT_EQ(parse_json(text).error().message.find("JSON has no"), std::string::npos) << text;
   EXPECT_EQ(parse_json(R"([[], [[]]])", 2).error().field, "/1/0");
 }
 
