@@ -246,6 +246,17 @@ void RobotSession::on_charger_sample(const telemetry::Sample& sample) {
   keep(sample);
 }
 
+// A sample that no mission accounts for still tells what the robot does now.
+void RobotSession::show(const telemetry::Sample& sample) {
+  snapshot_.sample = sample;
+  snapshot_.measured_power_w = sample.battery_voltage_v * sample.battery_current_a;
+  snapshot_.modelled_power_w = telemetry::unmeasured;
+  const dynamics::Body<double> body =
+      dynamics::body_of_wheels(model_->drive.parameters(), sample.wheel_velocity_rad_s, {});
+  snapshot_.speed_m_s = body.speed_m_s;
+  snapshot_.yaw_rate_rad_s = body.yaw_rate_rad_s;
+}
+
 void RobotSession::leave_charger() {
   at_charger_ = false;
   const std::optional<battery::ChargingStay> stay = charge_->take_ended();
@@ -296,7 +307,10 @@ void RobotSession::keep(const telemetry::Sample& sample) {
 void RobotSession::on_own_sample(const telemetry::Sample& sample) {
   const telemetry::SampleStep step = missions_.on_sample(sample.utime_us, sample.payload_kg);
   carry_out(step.actions);
-  if (!step.belongs || open_ == nullptr) return on_fault(IngestFault::outside_mission);
+  if (!step.belongs || open_ == nullptr) {
+    show(sample);
+    return on_fault(IngestFault::outside_mission);
+  }
 
   if (open_->resumed_silent) {
     open_->resumed_silent = false;

@@ -83,6 +83,7 @@ class RobotSession {
   // A sample in its place that is the robot's own, or that came while a charger fed it.
   void on_own_sample(const telemetry::Sample& sample);
   void on_charger_sample(const telemetry::Sample& sample);
+  void show(const telemetry::Sample& sample);
   void release_held();
   void leave_charger();
   void remember_charge();

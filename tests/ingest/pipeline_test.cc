@@ -172,6 +172,40 @@ TEST_F(PipelineTest, StampsInTheFutureAreAccountedAndCounted) {
   EXPECT_FALSE(mission.incomplete);
 }
 
+// What belongs to no mission is not accounted for, but the fleet sees what the robot does now.
+TEST(PipelineOutsideMissions, ARobotIsSeenAsItIs) {
+  server::SessionSettings settings;
+  settings.implicit_missions = false;
+  PipelineHarness harness(settings);
+  harness.add_robot(testing::nomad());
+  const auto send = [&](const auto& message) {
+    harness.pipeline->handle({"nomad", message, message.utime_us});
+  };
+  send(event(MissionPhase::started, 0));
+  std::int64_t k = 0;
+  for (; k < 100; ++k) {
+    Sample s = sample(k);
+    s.wheel_velocity_rad_s = {5, 5};
+    send(s);
+  }
+  send(event(MissionPhase::finished, k));
+  harness.pipeline->tick(sample(k).utime_us);
+  EXPECT_GT(harness.fleet.find("nomad")->speed_m_s, 0.1);
+  for (; k < 200; ++k) {
+    Sample s = sample(k);
+    s.wheel_velocity_rad_s = {0, 0};
+    s.battery_current_a = 0.25;
+    send(s);
+  }
+  harness.pipeline->tick(sample(k).utime_us);
+  const auto now = harness.fleet.find("nomad");
+  EXPECT_EQ(now->speed_m_s, 0);
+  EXPECT_EQ(now->sample.utime_us, sample(199).utime_us);
+  EXPECT_DOUBLE_EQ(now->measured_power_w, 0.25 * now->sample.battery_voltage_v);
+  EXPECT_TRUE(std::isnan(now->modelled_power_w));
+  EXPECT_EQ(harness.missions().at(0).samples, 100);
+}
+
 TEST_F(PipelineTest, UnmeasuredChannelsAreNotZero) {
   send(event(MissionPhase::started, 0));
   for (std::int64_t k = 0; k < 100; ++k) {
