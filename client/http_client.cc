@@ -10,7 +10,7 @@ namespace joulecast::client {
 Result<ServerAddress> parse_server_url(std::string_view url) {
   constexpr std::string_view scheme = "http://";
   const std::string given(url);
-  if (!url.starts_with(scheme)) return invalid("server", given + " must begin with http://");
+  if (!url.starts_with(scheme)) return invalid("--server", given + " must begin with http://");
   url.remove_prefix(scheme.size());
   const std::size_t slash = std::min(url.find('/'), url.size());
   std::string_view authority = url.substr(0, slash);
@@ -26,12 +26,12 @@ Result<ServerAddress> parse_server_url(std::string_view url) {
     const bool digits = std::all_of(address.port.begin(), address.port.end(),
                                     [](unsigned char c) { return std::isdigit(c) != 0; });
     if (address.port.empty() || address.port.size() > 5 || !digits || std::stoi(address.port) > 65535) {
-      return invalid("server", given + " has no valid port");
+      return invalid("--server", given + " has no valid port");
     }
   }
   if (authority.starts_with('[') && authority.ends_with(']'))
     authority = authority.substr(1, authority.size() - 2);
-  if (authority.empty()) return invalid("server", given + " names no host");
+  if (authority.empty()) return invalid("--server", given + " names no host");
   address.host = std::string(authority);
   return address;
 }
@@ -47,15 +47,21 @@ Error error_of(const HttpReply& reply) {
   } else if (reply.status >= 400 && reply.status < 500 && reply.status != 429) {
     fault = Fault::invalid;
   }
-  std::string message = "the server answered " + std::to_string(reply.status);
+  const std::string answered = "the server answered " + std::to_string(reply.status);
   const auto problem = nlohmann::json::parse(reply.body, nullptr, false);
-  if (problem.is_object()) {
-    for (const char* key : {"title", "detail"}) {
-      if (const auto at = problem.find(key); at != problem.end() && at->is_string()) {
-        message += ": " + at->get<std::string>();
-      }
-    }
-  }
+  const auto text = [&problem](const char* key) {
+    if (!problem.is_object()) return std::string();
+    const auto at = problem.find(key);
+    return at != problem.end() && at->is_string() ? at->get<std::string>() : std::string();
+  };
+  if (text("type") == "urn:joulecast:problem:infeasible") fault = Fault::infeasible;
+  // What is wrong with one field is said as if it had been found here.
+  if (const std::string field = text("field"), constraint = text("constraint");
+      !field.empty() && !constraint.empty())
+    return {fault, field, constraint + " (" + answered + ")"};
+  std::string message = answered;
+  for (const char* key : {"title", "detail"})
+    if (const std::string said = text(key); !said.empty()) message += ": " + said;
   return {fault, {}, message};
 }
 

@@ -235,7 +235,7 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   history::SqliteOptions sqlite;
   sqlite.path = settings.text("store.path");
   Result<std::unique_ptr<history::Store>> store = history::open_sqlite_store(sqlite);
-  if (!store) return tl::unexpected(std::move(store.error()));
+  if (!store) return fail(store.error().fault, "store.path", std::move(store.error().message));
   p.store = std::move(*store);
   p.writer = std::make_unique<history::Writer>(*p.store, writer_options(settings));
 
@@ -265,7 +265,8 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   };
   p.ingest =
       std::make_unique<server::IngestService>(ingest_options(settings), p.models, *p.forecasts, outputs);
-  if (Result<void> started = p.ingest->start(); !started) return tl::unexpected(std::move(started.error()));
+  if (Result<void> started = p.ingest->start(); !started)
+    return fail(started.error().fault, "lcm.url", std::move(started.error().message));
 
   p.adoption = std::make_unique<server::ModelAdoption>(*p.store, *p.writer, p.models, host_utime_us,
                                                        adoption_options(settings));

@@ -32,6 +32,13 @@ using nlohmann::json;
 // A file on its own has no history of versions: it counts as the first.
 constexpr std::int64_t file_version = 1;
 
+// A member of the request that a flag gives.
+template <class Value>
+struct Member {
+  std::string flag, name;
+  std::optional<Value> value = std::nullopt;
+};
+
 struct Options {
   std::string robot_file;
   std::string server;
@@ -40,9 +47,8 @@ struct Options {
   double timeout_s = 60;
   bool json = false;
   std::string plot_file;
-  // Members of the request, by flag.
-  std::deque<std::pair<std::string, std::optional<double>>> numbers;  // whose places CLI11 keeps
-  std::vector<std::pair<std::string, std::optional<std::string>>> texts;
+  std::deque<Member<double>> numbers;  // whose places CLI11 keeps
+  std::vector<Member<std::string>> texts;
   std::optional<double> length_m;
   std::optional<double> turn_rad;
 };
@@ -78,14 +84,29 @@ Result<json> request_of(const Options& options) {
     if (options.length_m) path.push_back({{"kind", "straight"}, {"length_m", *options.length_m}});
     request["path"] = std::move(path);
   }
-  for (const auto& [name, value] : options.numbers)
+  for (const auto& [flag, name, value] : options.numbers)
     if (value) request[name] = *value;
-  for (const auto& [name, value] : options.texts)
+  for (const auto& [flag, name, value] : options.texts)
     if (value) request[name] = *value;
   // Counts are whole numbers in the request.
   if (const auto points = request.find("pareto_points"); points != request.end() && points->is_number_float())
     *points = static_cast<std::int64_t>(points->get<double>());
   return request;
+}
+
+// What was typed is called by its flag, not by the place of the request where it went.
+Error in_words_of_the_caller(Error error, const Options& options) {
+  const auto rename = [&error](const std::string& pointer, const std::string& flag) {
+    if (error.field == pointer || error.field == pointer.substr(1)) error.field = flag;
+  };
+  if (!options.robot_id.empty()) rename("/id", "--robot-id");
+  if (options.turn_rad) rename("/path/0/angle_rad", "--turn");
+  if (options.length_m) rename(options.turn_rad ? "/path/1/length_m" : "/path/0/length_m", "--length");
+  for (const auto& [flag, name, value] : options.numbers)
+    if (value) rename("/" + name, flag);
+  for (const auto& [flag, name, value] : options.texts)
+    if (value) rename("/" + name, flag);
+  return error;
 }
 
 Result<std::string> ask_server(const Options& options, const Question& question, const json& request) {
@@ -154,7 +175,7 @@ Exit run(const Options& options, const Question& question) {
   const auto request = request_of(options);
   if (!request) return report(request.error());
   const auto text = answer(options, question, *request);
-  if (!text) return report(text.error());
+  if (!text) return report(in_words_of_the_caller(text.error(), options));
   if (!options.plot_file.empty()) {
     if (const auto drawn = plot(options, question, *request); !drawn) return report(drawn.error());
   }
@@ -182,13 +203,33 @@ void print_ledger(const json& ledger) {
       fmt::print("  {:<20} {:>12.3f} J\n", term, joules.get<double>());
 }
 
+// What less time would cost, and how little the limits allow.
+void print_haste(double duration_s, const json& certificate) {
+  const double shortest_s = number(certificate, "shortest_time_s"),
+               price_w = number(certificate, "time_multiplier_w");
+  if (duration_s <= shortest_s * (1 + api::at_the_limit)) {
+    fmt::print("no faster time is possible: the robot is at its limits\n");
+    return;
+  }
+  constexpr double dear_w = 0.005;  // less is not worth a word
+  const std::string least =
+      std::isfinite(shortest_s) ? fmt::format("; the robot's limits allow {:.2f} s at best", shortest_s) : "";
+  if (!(price_w >= dear_w)) {
+    fmt::print("this is the cheapest time{}\n", least);
+  } else if (duration_s - shortest_s < 1) {
+    fmt::print("less time would cost {:.3g} J a second or more{}\n", price_w, least);
+  } else {
+    fmt::print("a second less would cost {:.3g} J or more{}\n", price_w, least);
+  }
+}
+
 void print_profile(json a) {
   print_head(a);
   fmt::print("peak {:.3f} m/s, {:.1f} W; braking {:.2f} J, recovered {:.2f} J\n", number(a, "peak_speed_m_s"),
              number(a, "peak_power_w"), number(a, "braking_j"), number(a, "recovered_j"));
   const json& c = a["certificate"];
-  fmt::print("{}: at most {:.3g} J above the optimum; a second less would cost {:.3g} J\n",
-             c.value("method", ""), number(c, "gap_j"), number(c, "time_multiplier_w"));
+  fmt::print("{}: at most {:.3g} J above the optimum\n", c.value("method", ""), number(c, "gap_j"));
+  print_haste(number(a, "duration_s"), c);
   for (const auto& [shape, baseline] : a["baselines"].items()) {
     if (baseline.is_null()) continue;
     fmt::print("against a {:<10} {:>10.2f} J, {:.1f} % saved{}\n", shape, number(baseline, "energy_j"),
@@ -255,7 +296,7 @@ std::pair<CLI::App*, std::shared_ptr<Options>> add(CLI::App& program, Exit& exit
     const bool drive = !question.fleet, asked = !options->request_file.empty();
     if (drive && !asked && !options->length_m && !options->turn_rad)
       throw CLI::RequiredError("--length, --turn or --request (what to drive)");
-    if (!drive && !asked && options->server.empty() && !options->numbers.front().second)
+    if (!drive && !asked && options->server.empty() && !options->numbers.front().value)
       throw CLI::RequiredError("--charge, which a robot file does not know,");
     exit = run(*options, question);
   });
@@ -265,7 +306,7 @@ std::pair<CLI::App*, std::shared_ptr<Options>> add(CLI::App& program, Exit& exit
 void add_numbers(CLI::App& command, Options& options,
                  std::initializer_list<std::array<const char*, 3>> flag_member_help) {
   for (const auto& [flag, member, help] : flag_member_help)
-    command.add_option(flag, options.numbers.emplace_back(member, std::nullopt).second, help);
+    command.add_option(flag, options.numbers.emplace_back(Member<double>{flag, member}).value, help);
 }
 
 void add_drive_flags(CLI::App& command, Options& options) {
@@ -307,10 +348,10 @@ void add_autonomy(CLI::App& program, Exit& exit) {
                {"--speed", "speed_m_s", "m/s that the plan states, instead of the robot's habit"},
                {"--confidence", "confidence",
                 "how sure the latest departure to the charger shall be, 0.01 to 0.999"}});
-  options->texts = {{"driving", std::nullopt}, {"dialect", std::nullopt}};
-  command->add_option("--driving", options->texts[0].second, "usual, or by minimum-energy profiles")
+  options->texts = {{"--driving", "driving"}, {"--dialect", "dialect"}};
+  command->add_option("--driving", options->texts[0].value, "usual, or by minimum-energy profiles")
       ->check(CLI::IsMember({"usual", "minimum_energy"}));
-  command->add_option("--dialect", options->texts[1].second, "answer as another standard's battery message")
+  command->add_option("--dialect", options->texts[1].value, "answer as another standard's battery message")
       ->check(CLI::IsMember(
           std::vector<std::string>(std::begin(api::dialect_names), std::end(api::dialect_names))));
 }

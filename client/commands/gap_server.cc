@@ -137,7 +137,11 @@ Result<Exit> carry_out(const GapServerOptions& options) {
 
 Exit gap_from_server(const GapServerOptions& options) {
   const Result<Exit> done = carry_out(options);
-  return done ? *done : report(done.error());
+  if (done) return *done;
+  Error error = done.error();
+  if (error.field == "/robot_id") error.field = "--robot-id";
+  if (error.field == "/max_missions") error.field = "--max-missions";
+  return report(error);
 }
 
 }  // namespace joulecast::client

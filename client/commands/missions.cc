@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <ctime>
@@ -22,8 +23,12 @@ using nlohmann::json;
 
 struct Options {
   std::string server;
-  // Query parameters of GET /v1/missions, by flag.
-  std::vector<std::pair<std::string, std::optional<std::string>>> query;
+  // A query parameter of GET /v1/missions.
+  struct Parameter {
+    std::string flag, name;
+    std::optional<std::string> value = std::nullopt;
+  };
+  std::vector<Parameter> query;
   bool json = false;
 };
 
@@ -77,11 +82,11 @@ Exit run(const Options& options) {
   const auto server = parse_server_url(options.server);
   if (!server) return report(server.error());
   std::string target = "/v1/missions";
-  for (const auto& [name, value] : options.query) {
+  for (const auto& [flag, name, value] : options.query) {
     if (!value) continue;
     std::string sent = *value;
     if (name.ends_with("_utime_us")) {
-      const auto utime_us = parse_time(sent, name.starts_with("from") ? "--from" : "--to");
+      const auto utime_us = parse_time(sent, flag);
       if (!utime_us) return report(utime_us.error());
       sent = std::to_string(*utime_us);
     }
@@ -89,7 +94,12 @@ Exit run(const Options& options) {
   }
   const auto reply = http_request(*server, HttpMethod::get, target, {}, std::chrono::seconds(30));
   if (!reply) return report(reply.error());
-  if (!reply->ok()) return report(error_of(*reply));
+  if (!reply->ok()) {
+    Error error = error_of(*reply);
+    const auto by_name = std::ranges::find(options.query, error.field, &Options::Parameter::name);
+    if (by_name != options.query.end()) error.field = by_name->flag;
+    return report(error);
+  }
   if (options.json) {
     std::puts(reply->body.c_str());
     return Exit::ok;
@@ -122,8 +132,8 @@ void add_missions(CLI::App& program, Exit& exit) {
   }};
   options->query.reserve(filters.size());
   for (const auto& [flag, name, help] : filters) {
-    options->query.emplace_back(name, std::nullopt);
-    command->add_option(flag, options->query.back().second, help);
+    options->query.push_back({flag, name});
+    command->add_option(flag, options->query.back().value, help);
   }
   command->get_option("--state")->check(
       CLI::IsMember({"open", "finished", "aborted", "unfinished", "superseded", "interrupted"}));

@@ -24,6 +24,8 @@ Exit exit_of(Fault fault) {
 
 Exit report(const Error& error) {
   std::fprintf(stderr, "joulecast: %s\n", describe(error).c_str());
+  // What an option's value is refused for is wrong use, whoever found it out.
+  if (error.fault == Fault::invalid && error.field.starts_with("--")) return Exit::usage;
   return exit_of(error.fault);
 }
 

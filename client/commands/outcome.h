@@ -7,8 +7,8 @@ namespace joulecast::client {
 // What the program tells its caller; part of the command line's contract.
 enum class Exit : int {
   ok = 0,
-  fault = 1,        // an input was read and found wrong, missing or damaged
-  usage = 2,        // the command line itself is wrong
+  fault = 1,        // the work failed: an input was read and found wrong, missing or damaged
+  usage = 2,        // the command line itself is wrong, or a value given in it
   unreachable = 3,  // server, network or disk did not answer
   infeasible = 4,   // well-formed, but nothing satisfies it
   internal = 5      // a bug of joulecast's
@@ -17,8 +17,8 @@ enum class Exit : int {
 inline constexpr const char* exit_codes_help =
     "Exit codes:\n"
     "  0  done\n"
-    "  1  an input is wrong, missing or damaged\n"
-    "  2  the command line is wrong\n"
+    "  1  the work failed: an input is wrong, missing or damaged\n"
+    "  2  the command line is wrong, or a value given in it\n"
     "  3  server, network or disk could not be reached\n"
     "  4  nothing satisfies the request\n"
     "  5  a bug of joulecast's";

@@ -7,10 +7,12 @@
 #include <cstdint>
 #include <cstdio>
 #include <ctime>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -64,6 +66,7 @@ struct Options {
   bool temperature = false;
   bool list_effects = false;
   bool quiet = false;
+  bool force = false;
 };
 
 // A robot file under the id that its robot has in this fleet.
@@ -257,6 +260,9 @@ Exit run(const Options& options, bool lcm_asked) {
         {Fault::invalid, "--speed",
          "above 1 needs an end, so that no stamp lies in the future: give --duration or --missions"});
   }
+  for (const auto& [flag, file] : {std::pair{"--log", &options.log}, {"--truth", &options.truth}})
+    if (!options.force && std::filesystem::is_regular_file(*file))
+      return report({Fault::conflict, flag, *file + " is there already; --force writes over it"});
   auto members = assemble(options);
   if (!members) return report(members.error());
 
@@ -358,6 +364,8 @@ void add_simulate(CLI::App& program, Exit& exit) {
                       "write an LCM event log; without --lcm-url nothing is published");
   command->add_option("--truth", options->truth,
                       "write what was put into the robots and their true energies, JSON");
+  command->add_flag("--force", options->force,
+                    "write over files of --log and --truth that are there already");
   command->add_option("--server", options->server,
                       "put the robot files into this joulecastd first, http://host:port");
   command->add_option("--rate", options->rate_hz, "telemetry of each robot, Hz")

@@ -209,7 +209,7 @@ Result<Autonomy> autonomy_of(const AutonomyRequest& request, const server::Robot
   std::optional<LeastEnergy> least;
   const bool with_plan = !request.tasks.empty() || !request.from_here.empty();
   if (request.minimum_energy || (request.compare_minimum_energy && with_plan)) {
-    auto made = LeastEnergy::make(model, tables);
+    auto made = LeastEnergy::make(model, tables, request.value_of_time_w);
     if (!made) return tl::unexpected(made.error());
     least.emplace(std::move(*made));
   }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -22,6 +23,7 @@ constexpr Bounds place{.minimum = -1e6, .maximum = 1e6};
 constexpr Bounds heading{.minimum = -1e3, .maximum = 1e3};
 constexpr Bounds payload{.minimum = 0, .maximum = 1e6};
 constexpr Bounds way{.minimum = 0, .maximum = 1e6};
+constexpr std::array<std::string_view, 4> what_to_do{"path", "turn_rad", "distance_m", "dwell_s"};
 constexpr Bounds dwell{.minimum = 0, .maximum = 1e7};
 
 struct Charger {
@@ -114,6 +116,7 @@ AutonomyRequest read_autonomy(Fields& fields, const Whereabouts& now, bool singl
   request.minimum_energy = fields.choice("driving", {"usual", "minimum_energy"}, "usual") == "minimum_energy";
   request.compare_minimum_energy =
       fields.boolean("compare_minimum_energy", single) && !request.minimum_energy;
+  request.value_of_time_w = fields.number("value_of_time_w", {.minimum = 0, .maximum = 1e6}, 0);
   request.pace = read_pace(fields);
   request.confidence = fields.number("confidence", {.minimum = 0.01, .maximum = 0.999}, 0.95);
   const std::vector<std::string_view> dialects(std::begin(dialect_names), std::end(dialect_names));
@@ -161,7 +164,13 @@ AutonomyRequest read_autonomy(Fields& fields, const Whereabouts& now, bool singl
     if (distance_m && !charger_given)
       own.fault("to_charger_m", "needs the charger's place or \"to_charger_m\" of the request");
     task.to_charger = to_charger(charger, pose, distance_m, payload_kg);
-    if (Result<void> done = own.finish(); !done) fields.fault(std::move(done.error()));
+    if (Result<void> done = own.finish(); !done) {
+      fields.fault(std::move(done.error()));
+    } else if (std::ranges::none_of(what_to_do, [&](std::string_view name) { return own.has(name); })) {
+      fields.fault({Fault::invalid, own.pointer("path"),
+                    fmt::format("is required where none of {} is given: a task drives or stands",
+                                fmt::join(what_to_do.begin() + 1, what_to_do.end(), ", "))});
+    }
     request.tasks.push_back(std::move(task));
   }
   return request;

@@ -39,6 +39,7 @@ struct AutonomyRequest {
   std::optional<double> payload_kg;          // instead of the live one
   bool minimum_energy = false;               // the robot drives the planner's profiles
   bool compare_minimum_energy = false;
+  double value_of_time_w = 0;  // of the planner's profiles
   StatedPace pace;
   double confidence = 0.95;
   std::vector<TaskRequest> tasks;

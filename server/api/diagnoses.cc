@@ -83,6 +83,8 @@ Result<Response> start(Services& services, const Request& request) {
       fields.integer("max_missions", 1, static_cast<std::int64_t>(most_missions), 200));
   wanted.hold_back = fields.number("hold_back", {0, most_held_back}, wanted.hold_back);
   if (Result<void> read = fields.finish(); !read) return tl::unexpected(std::move(read.error()));
+  if (const auto known = model_of(services, wanted.robot_id, "/robot_id"); !known)
+    return tl::unexpected(known.error());
   const Result<std::int64_t> id = services.diagnoses.submit(wanted);
   if (!id) return tl::unexpected(id.error());
   return answer(services, *id, 202);

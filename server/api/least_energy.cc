@@ -11,28 +11,36 @@ using forecast::Motion;
 using forecast::PlannedLeg;
 using forecast::PricedLeg;
 
-LeastEnergy::LeastEnergy(std::shared_ptr<const planning::CostTable> table, const server::ModelInForce& model)
-    : table_(std::move(table)), model_(&model), standing_w_(model.drive.battery_power_for({0, 0})) {}
+LeastEnergy::LeastEnergy(std::shared_ptr<const planning::CostTable> table, const server::ModelInForce& model,
+                         double value_of_time_w)
+    : table_(std::move(table)),
+      model_(&model),
+      standing_w_(model.drive.battery_power_for({0, 0})),
+      value_of_time_w_(value_of_time_w) {}
 
-Result<LeastEnergy> LeastEnergy::make(const server::ModelInForce& model, planning::CostTableCache& tables) {
+Result<LeastEnergy> LeastEnergy::make(const server::ModelInForce& model, planning::CostTableCache& tables,
+                                      double value_of_time_w) {
+  if (value_of_time_w > 0) return LeastEnergy(nullptr, model, value_of_time_w);
   auto table = tables.get(model.robot, {});
   if (!table) return tl::unexpected(std::move(table.error()));
-  return LeastEnergy(std::move(*table), model);
+  return LeastEnergy(std::move(*table), model, 0);
 }
 
 Result<planning::LegCost> LeastEnergy::curve(const PlannedLeg& leg) {
   const auto same = [&](const Curve& known) {
-    return known.leg.way == leg.way && known.leg.payload_kg == leg.payload_kg &&
-           known.leg.curvature_1_m == leg.curvature_1_m;
+    return known.leg.motion == leg.motion && known.leg.way == leg.way &&
+           known.leg.payload_kg == leg.payload_kg && known.leg.curvature_1_m == leg.curvature_1_m;
   };
   if (const auto found = std::ranges::find_if(curves_, same); found != curves_.end()) return found->cost;
   planning::Path path;
   planning::Run run;
   run.payload_kg = path.final_payload_kg = leg.payload_kg;
+  if (leg.motion == Motion::turn) run.turn = 1;
   run.knots = {{0, leg.curvature_1_m, {}}, {leg.way, leg.curvature_1_m, {}}};
   path.runs.push_back(std::move(run));
   planning::Problem problem;
   problem.limits = planning::limits_of(model_->robot);
+  problem.value_of_time_w = value_of_time_w_;
   const Result<planning::PlanCost> best = model_->planner.cost(path, problem);
   if (!best) return tl::unexpected(best.error());
   curves_.push_back({leg, {best->energy_j, best->duration_s}});
@@ -43,9 +51,10 @@ Result<LegCost> LeastEnergy::cost(const PlannedLeg& leg) {
   if (leg.motion == Motion::stand || !(leg.way > 0))
     return LegCost{leg.duration_s, standing_w_ * leg.duration_s, 0, 0};
   planning::LegCost best;
-  if (leg.motion == Motion::turn && leg.way <= planning::widest_turn_rad) {
+  if (table_ != nullptr && leg.motion == Motion::turn && leg.way <= planning::widest_turn_rad) {
     best = table_->turn(leg.way, leg.payload_kg);
-  } else if (leg.motion == Motion::drive && leg.curvature_1_m == 0 && leg.way <= planning::longest_leg_m) {
+  } else if (table_ != nullptr && leg.motion == Motion::drive && leg.curvature_1_m == 0 &&
+             leg.way <= planning::longest_leg_m) {
     best = table_->straight(leg.way, leg.payload_kg);
   } else {
     const auto solved = curve(leg);

@@ -43,7 +43,8 @@ void write_certificate(JsonWriter& json, const planning::Certificate& c) {
       .field("discretisation_j", c.discretisation_j);
   json.field("residual", c.residual)
       .field("convex", c.convex)
-      .field("time_multiplier_w", c.time_multiplier_w);
+      .field("time_multiplier_w", c.time_multiplier_w)
+      .field("shortest_time_s", c.shortest_time_s);
   json.key("binding").begin_array();
   for (const planning::Bound bound : c.binding) json.value(planning::name_of(bound));
   json.end_array().field("iterations", c.iterations).end_object();

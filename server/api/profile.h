@@ -9,6 +9,10 @@
 
 namespace joulecast::api {
 
+// A plan this little above the shortest time, relatively, is as fast as the robot can: ten times what the
+// planner meets deadlines to.
+inline constexpr double at_the_limit = 1e-3;
+
 // JSON: the minimum-energy motion along the requested path within the robot's limits, its ledger and
 // certificate, against a trapezoid and a triangle that take as long on every run between stops; with
 // "pareto_points", the front of energy against time.

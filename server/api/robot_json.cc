@@ -24,7 +24,8 @@ void write_charge(JsonWriter& json, const server::ChargeView& charge) {
   json.field("source", battery::name(estimate.source));
   json.field("default_curve", estimate.default_curve);
   json.field("flat_curve", estimate.flat_curve);
-  json.field("current_bias_a", estimate.current_bias_a);
+  const bool heard = estimate.source != battery::ChargeSource::unknown;
+  json.field("current_bias_a", heard ? estimate.current_bias_a : telemetry::unmeasured);
   json.field("current_bias_sd_a", estimate.current_bias_sd_a);
   json.field("time_to_charged_s", charge.to_full.duration_s);
   json.field("time_to_charged_sd_s", charge.to_full.sd_s);

@@ -41,6 +41,7 @@ Result<Response> list(const Services& services, const Request&) {
 
 Result<Response> get(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
+  if (const auto known = model_of(services, id); !known) return tl::unexpected(known.error());
   const Result<history::ModelVersion> model = services.store.model(id);
   if (!model) return tl::unexpected(model.error());
   JsonWriter json;
@@ -81,7 +82,7 @@ Result<Response> put(Services& services, const Request& request) {
 Result<Response> state(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
   if (services.models.find(id) == nullptr && services.fleet.find(id) == nullptr) {
-    return fail(Fault::not_found, "id", "no robot " + id);
+    return tl::unexpected(server::unknown_robot("id", id));
   }
   JsonWriter json;
   write_robot_state(json, services, id);
@@ -89,6 +90,8 @@ Result<Response> state(const Services& services, const Request& request) {
 }
 
 Result<Response> versions(const Services& services, const Request& request) {
+  if (const auto known = model_of(services, request.param("id")); !known)
+    return tl::unexpected(known.error());
   const Result<std::vector<history::ModelVersion>> found = services.store.model_versions(request.param("id"));
   if (!found) return tl::unexpected(found.error());
   JsonWriter json;

@@ -61,8 +61,9 @@ std::vector<TableRow> planning_rows();
 std::vector<TableRow> matrix_rows();
 std::vector<TableRow> autonomy_rows();
 
-// The model of a robot, or the error that says why there is none.
+// The model of a robot that `field` of the request names, or the error that says why there is none.
 Result<std::shared_ptr<const server::ModelInForce>> model_of(const Services& services,
-                                                             const std::string& robot_id);
+                                                             const std::string& robot_id,
+                                                             std::string field = "id");
 
 }  // namespace joulecast::api

@@ -113,8 +113,7 @@ class DiagnosisService::Impl {
 
   Result<std::int64_t> submit(const DiagnosisRequest& request) {
     const auto model = models_.find(request.robot_id);
-    if (model == nullptr)
-      return fail(Fault::not_found, "/robot_id", "no robot " + request.robot_id + " with a model");
+    if (model == nullptr) return tl::unexpected(unknown_robot("/robot_id", request.robot_id));
     for (std::size_t k = 0; k < request.missions.size(); ++k) {
       const auto mission = store_.mission(request.missions[k]);
       const std::string field = "/missions/" + std::to_string(k);

@@ -14,6 +14,11 @@ Result<std::shared_ptr<const ModelInForce>> model_in_force(robot::RobotModel rob
       ModelInForce{std::move(robot), std::move(*drive), version, std::move(*planner)});
 }
 
+Error unknown_robot(std::string field, std::string_view robot_id) {
+  return {Fault::not_found, std::move(field),
+          "no robot is called '" + std::string(robot_id) + "'; GET /v1/robots lists those that there are"};
+}
+
 Result<void> ModelRegistry::put(robot::RobotModel robot, std::int64_t version) {
   Result<std::shared_ptr<const ModelInForce>> model = model_in_force(std::move(robot), version);
   if (!model) return tl::unexpected(std::move(model.error()));

@@ -27,6 +27,9 @@ struct ModelInForce {
 // An effect that the catalogue rejects is an error.
 Result<std::shared_ptr<const ModelInForce>> model_in_force(robot::RobotModel robot, std::int64_t version);
 
+// What every answer says of a robot id that nobody has.
+Error unknown_robot(std::string field, std::string_view robot_id);
+
 // The models in force, by robot. Any thread.
 class ModelRegistry {
  public:

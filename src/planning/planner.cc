@@ -396,6 +396,7 @@ Plan Request::written() const {
   writer.dwell(path_.dwell_after_s, pose, path_.final_payload_kg);
   c.method = closed && numeric ? Method::mixed : numeric ? Method::interior_point : Method::closed_form;
   c.time_multiplier_w = price_w_;
+  c.shortest_time_s = least_time_s();
   binding[static_cast<std::size_t>(Bound::deadline)] = deadline_binds_;
   for (std::size_t b = 0; b < bound_count; ++b) {
     if (binding[b]) c.binding.push_back(static_cast<Bound>(b));

@@ -55,8 +55,10 @@ struct Certificate {
   double discretisation_j = 0;
   double residual = 0;  // largest stationarity residual over the cost, 0 for the closed form to rounding
   bool convex = true;
-  double time_multiplier_w =
-      0;  // what a second less would cost; the deadline's multiplier plus the value of time
+  // What the next second less costs, per second; 0 where the time is the cheapest. The deadline's multiplier
+  // plus the value of time.
+  double time_multiplier_w = 0;
+  double shortest_time_s = 0;  // of the fastest motion that the limits allow, dwells included
   std::vector<Bound> binding;
   int iterations = 0;
 };

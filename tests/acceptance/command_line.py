@@ -55,24 +55,53 @@ def main():
         lines = xml.etree.ElementTree.parse(picture).getroot().findall(".//{http://www.w3.org/2000/svg}polyline")
         check(len(lines) >= 3, f"{question} draws {len(lines)} lines")
 
+    # Nobody is offered a second that the robot cannot save.
+    drive = ["profile", "--robot", robot, "--length", "8"]
+    free = json.loads(programs.run(*drive, "--json"))
+    shortest_s = free["certificate"]["shortest_time_s"]
+    check(shortest_s < free["duration_s"] < shortest_s + 1 and free["certificate"]["time_multiplier_w"] == 0, free["certificate"])
+    check(f"this is the cheapest time; the robot's limits allow {shortest_s:.2f} s at best" in programs.run(*drive), programs.run(*drive))
+    for deadline_s, words in ((shortest_s * 1.0002, "no faster time is possible: the robot is at its limits"),
+                              ((shortest_s + 3 * free["duration_s"]) / 4, "less time would cost ")):
+        told = programs.run(*drive, "--deadline", f"{deadline_s:.5f}")
+        check(words in told and "a second less would cost 0" not in told, told)
+
     page = json.loads(programs.run("missions", "--server", programs.url, "--robot-id", "amr", "--json"))
     check(page == {"missions": [], "next_cursor": None}, f"a fresh daemon knows missions: {page}")
 
+    asked_by = ["--robot", robot], ["--server", programs.url, "--robot-id", "amr"]
     faults = {
         2: [["profile", "--length", "8"], ["estimate", "--server", programs.url], ["profile", "--length", "many"],
-            ["profile", "--robot", robot], ["autonomy", "--robot", robot], ["missions", "--server", programs.url, "--state", "lost"]],
-        1: [["profile", "--robot", programs.path("no-such-file.json"), "--length", "8"],
-            ["profile", "--robot", robot, "--length", "-8"],
-            ["profile", "--server", programs.url, "--robot-id", "nobody", "--length", "8"],
+            ["profile", "--robot", robot], ["autonomy", "--robot", robot], ["missions", "--server", programs.url, "--state", "lost"],
+            *(["profile", *by, "--length", "-8"] for by in asked_by), *(["autonomy", *by, "--charge", "2"] for by in asked_by),
+            *(["estimate", *by, "--turn", "1", "--length", "5", "--payload", "999"] for by in asked_by),
             ["missions", "--server", programs.url, "--limit", "many"]],
+        1: [["profile", "--robot", programs.path("no-such-file.json"), "--length", "8"],
+            ["profile", "--server", programs.url, "--robot-id", "nobody", "--length", "8"]],
         3: [["profile", "--server", "http://127.0.0.1:1", "--robot-id", "amr", "--length", "8"]],
-        4: [["profile", "--robot", robot, "--length", "80", "--deadline", "1"]],
+        4: [["profile", *by, "--length", "80", "--deadline", "1"] for by in asked_by],
     }
+    said = {}
     for code, commands in faults.items():
         for command in commands:
             done = subprocess.run([options.client, *command], capture_output=True, text=True)
             check(done.returncode == code, f"{command} ends with {done.returncode}, not {code}: {done.stderr}")
             check(done.stderr, f"{command} fails without a word")
+            said[" ".join(command[:1] + command[-2:])] = said.get(" ".join(command[:1] + command[-2:]), "") + done.stderr
+    # What was typed is called by its flag, with a file as with a daemon, and a robot that is not there is told the same way.
+    for asked, flag in (("profile --length -8", "--length"), ("autonomy --charge 2", "--charge"), ("estimate --payload 999", "--payload"),
+                        ("profile --deadline 1", "--deadline"), ("missions --limit many", "--limit")):
+        check(f"joulecast: {flag}: " in said[asked], f"{asked}: {said[asked]}")
+        check(said[asked].count("joulecast: ") == said[asked].count(f"joulecast: {flag}: "), f"{asked}: {said[asked]}")
+    wording = "no robot is called 'nobody'; GET /v1/robots lists those that there are"
+    for command in (["profile", "--length", "8"], ["autonomy", "--charge", "0.5"], ["gap"]):
+        done = subprocess.run([options.client, *command, "--server", programs.url, "--robot-id", "nobody"], capture_output=True, text=True)
+        check(done.returncode == 1 and f"joulecast: --robot-id: {wording}" in done.stderr, f"{command}: {done.stderr}")
+    # The daemon: 2 for a wrong command line, 1 where it cannot start; it names the setting either way.
+    for code, name, setting in ((2, "--http-port", "99999"), (1, "store.path", "/no/such/folder/store.db")):
+        flag = name if name.startswith("--") else "--store-path"
+        done = subprocess.run([options.daemon, flag, setting, "--lcm-url", "memq://"], capture_output=True, text=True, timeout=30)
+        check(done.returncode == code and f"{name}: " in done.stdout + done.stderr, f"{flag} {setting}: {done.returncode} {done.stdout}{done.stderr}")
     check(programs.stop() == 0, "the daemon did not stop in order")
 
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "server/api/battery_dialects.h"
+#include "server/api/profile.h"
 #include "server/api/robot_json.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
@@ -147,6 +148,42 @@ TEST_F(AutonomyAnswer, PathAndDistanceAreOneTask) {
               by_distance["plan"]["expected_energy_j"].get<double>(), 1e-6);
 }
 
+// A plan for a deadline is one that values a second at the deadline's multiplier: so the chance of any plan
+// of the profile endpoint can be asked for.
+TEST_F(AutonomyAnswer, AValueOfTimePricesThePlanOfADeadline) {
+  robot::RobotModel frugal = testing::nomad();  // its standing costs little, so that haste costs much
+  frugal.idle_power_w /= 10;
+  frugal.limits.speed_m_s *= 2;
+  frugal.limits.acceleration_m_s2 *= 2;
+  robot_ = server::Forecasts::untried(*server::model_in_force(frugal, 1));
+  const json path = {{{"kind", "straight"}, {"length_m", 20}},
+                     {{"kind", "turn"}, {"angle_rad", 1.5}},
+                     {{"kind", "straight"}, {"length_m", 5}}};
+  const auto planned = [&](json more) {
+    more.update({{"path", path}, {"payload_kg", 2}, {"columns", false}});
+    const auto text = profile_answer(more, *robot_.model);
+    EXPECT_TRUE(text) << (text ? "" : describe(text.error()));
+    return text ? json::parse(*text) : json::object();
+  };
+  const json free = planned({{"limits", nullptr}});
+  const double shortest_s = free["certificate"]["shortest_time_s"];
+  const json hasty = planned({{"deadline_s", 0.5 * (free["duration_s"].get<double>() + shortest_s)}});
+  ASSERT_LT(hasty["duration_s"].get<double>(), 0.98 * free["duration_s"].get<double>());
+  const json a = ask({{"state_of_charge", 0.5},
+                      {"payload_kg", 2},
+                      {"value_of_time_w", hasty["certificate"]["time_multiplier_w"]},
+                      {"tasks", {{{"path", path}}}}});
+  const json& best = a["minimum_energy"];
+  // The profile meets its deadline to 1e-4 of it; both are solved on the same grids. Of energy the forecast
+  // tells the mean of a skewed distribution, which lies about half its relative variance above.
+  EXPECT_NEAR(best["duration_s"].get<double>(), hasty["duration_s"].get<double>(),
+              2e-4 * hasty["duration_s"].get<double>());
+  const double energy_j = best["expected_energy_j"];
+  EXPECT_GT(energy_j, hasty["energy_j"]);
+  EXPECT_LT(energy_j, hasty["energy_j"].get<double>() * 1.02);
+  EXPECT_EQ(fault({{"value_of_time_w", -1}}, &live_).field, "/value_of_time_w");
+}
+
 TEST_F(AutonomyAnswer, FaultsNameTheField) {
   EXPECT_EQ(fault(json::object(), nullptr).field, "/state_of_charge");
   EXPECT_EQ(fault(json::object(), nullptr).fault, Fault::infeasible);
@@ -154,6 +191,11 @@ TEST_F(AutonomyAnswer, FaultsNameTheField) {
             "/tasks/0/payload_kg");
   EXPECT_EQ(fault({{"tasks", {{{"distance_m", -5}}}}}, &live_).field, "/tasks/0/distance_m");
   EXPECT_EQ(fault({{"tasks", {{{"no", 1}}}}}, &live_).field, "/tasks/0/no");
+  const Error empty = fault({{"tasks", {{{"distance_m", 5}}, json::object()}}}, &live_);
+  EXPECT_EQ(empty.field, "/tasks/1/path");
+  EXPECT_EQ(empty.message,
+            "is required where none of turn_rad, distance_m, dwell_s is given: a task drives or stands");
+  EXPECT_EQ(fault({{"tasks", {{{"name", "t"}, {"payload_kg", 5}}}}}, &live_).field, "/tasks/0/path");
   EXPECT_EQ(fault({{"tasks", {{{"path", json::array()}}}}}, &live_).field, "/tasks/0/path");
   EXPECT_EQ(fault({{"dialect", "klingon"}}, &live_).field, "/dialect");
   EXPECT_EQ(fault({{"confidence", 1}}, &live_).field, "/confidence");

@@ -121,8 +121,8 @@ Told told_by(const std::string& path) {
 
 TEST_F(SimulateCommand, MissionsOfTwoRunsHaveDifferentIds) {
   const auto first_id = [&](std::vector<std::string> more) {
-    std::vector<std::string> words{"simulate",   "--quiet", "--robots", "1",
-                                   "--duration", "0.1",     "--log",    file("a.lcmlog")};
+    std::vector<std::string> words{"simulate", "--quiet", "--robots",       "1",      "--duration",
+                                   "0.1",      "--log",   file("a.lcmlog"), "--force"};
     words.insert(words.end(), more.begin(), more.end());
     EXPECT_EQ(run(words), Exit::ok);
     const Told told = told_by(file("a.lcmlog"));
@@ -140,7 +140,8 @@ TEST_F(SimulateCommand, FastRobotsStampNothingInTheFuture) {
   for (const auto& end : {std::vector<std::string>{"--duration", "40"},
                           std::vector<std::string>{"--missions", "1", "--mission-duration", "20"}}) {
     std::vector<std::string> words{"simulate", "--quiet",   "--robots", "2",     "--speed",
-                                   "40",       "--lcm-url", "memq://",  "--log", file("a.lcmlog")};
+                                   "40",       "--lcm-url", "memq://",  "--log", file("a.lcmlog"),
+                                   "--force"};
     words.insert(words.end(), end.begin(), end.end());
     ASSERT_EQ(run(words), Exit::ok);
     const std::int64_t now_us = host_utime_us();
@@ -149,20 +150,48 @@ TEST_F(SimulateCommand, FastRobotsStampNothingInTheFuture) {
     EXPECT_GT(told.last_utime_us, now_us - 5'000'000);
     EXPECT_GT(told.last_utime_us - told.first_utime_us, 15'000'000);
   }
-  EXPECT_EQ(run({"simulate", "--quiet", "--speed", "2", "--lcm-url", "memq://"}), Exit::fault);
+  EXPECT_EQ(run({"simulate", "--quiet", "--speed", "2", "--lcm-url", "memq://"}), Exit::usage);
 }
 
 TEST_F(SimulateCommand, SaysWhatIsWrong) {
-  EXPECT_EQ(run({"simulate", "--log", file("a.lcmlog")}), Exit::fault);  // without an end
-  EXPECT_EQ(run({"simulate", "--speed", "0", "--missions", "1"}), Exit::fault);
+  EXPECT_EQ(run({"simulate", "--log", file("a.lcmlog")}), Exit::usage);  // without an end
+  EXPECT_EQ(run({"simulate", "--speed", "0", "--missions", "1"}), Exit::usage);
   EXPECT_EQ(run({"simulate", "--robot", file("absent.json"), "--log", file("a.lcmlog"), "--duration", "1"}),
             Exit::fault);
   EXPECT_EQ(run({"simulate", "--effect", "slope", "--log", file("a.lcmlog"), "--duration", "1"}),
-            Exit::fault);
+            Exit::usage);
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(run({"simulate", "--effect", "coulomb_fricton=1", "--log", file("a.lcmlog"), "--duration", "1"}),
+            Exit::usage);
+  EXPECT_NE(testing::internal::GetCapturedStderr().find("did you mean coulomb_friction?"), std::string::npos);
+  EXPECT_FALSE(fs::exists(file("a.lcmlog")));
   EXPECT_EQ(run({"simulate", "--log", "/no/such/folder/a.lcmlog", "--duration", "1"}), Exit::unreachable);
   EXPECT_EQ(run({"simulate", "--rate", "0"}), std::nullopt);
   EXPECT_EQ(run({"simulate", "--robots", "0"}), std::nullopt);
   EXPECT_EQ(run({}), std::nullopt);
+}
+
+TEST_F(SimulateCommand, WritesOverAFileOnlyWhenForced) {
+  const auto simulate = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"simulate", "--quiet", "--robots", "1", "--duration", "1"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run(words);
+  };
+  for (const char* flag : {"--log", "--truth"}) {
+    const std::string mine = file(flag);
+    std::ofstream(mine) << "mine";
+    std::vector<std::string> words{flag, mine};
+    if (words[0] == "--truth") words.insert(words.end(), {"--log", file("b.lcmlog")});
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(simulate(words), Exit::fault);
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "joulecast: " + std::string(flag) + ": " + mine +
+                                                          " is there already; --force writes over it\n");
+    EXPECT_EQ(text_of(mine), "mine");
+    EXPECT_FALSE(fs::exists(file("b.lcmlog")));
+    words.emplace_back("--force");
+    EXPECT_EQ(simulate(words), Exit::ok);
+    EXPECT_NE(text_of(mine), "mine");
+  }
 }
 
 TEST_F(SimulateCommand, ReplayIntoAStoreThatDoesNotKnowTheRobotIsNoSuccess) {

@@ -111,6 +111,92 @@ class Checker:
         return value
 
 
+def numbers_of(document, schema, value, at=""):
+    """Every number of a request with its pointer and its schema."""
+    while "$ref" in schema:
+        schema = document["components"]["schemas"][schema["$ref"].rsplit("/", 1)[1]]
+    for option in schema.get("oneOf", schema.get("anyOf", ())):
+        constants = {k: v["const"] for k, v in option.get("properties", {}).items() if "const" in v}
+        if "properties" in option and isinstance(value, dict) and all(value.get(k) == v for k, v in constants.items()):
+            schema = option
+            break
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from numbers_of(document, schema["properties"][key], inner, f"{at}/{key}")
+    elif isinstance(value, list):
+        for k, inner in enumerate(value):
+            yield from numbers_of(document, schema["items"], inner, f"{at}/{k}")
+    elif isinstance(value, (int, float)) and not isinstance(value, bool):
+        yield at, schema
+
+
+def replaced(value, pointer, number):
+    copy = json.loads(json.dumps(value))
+    *way, last = pointer.strip("/").split("/")
+    node = copy
+    for part in way:
+        node = node[int(part)] if isinstance(node, list) else node[part]
+    node[int(last) if isinstance(node, list) else last] = number
+    return copy
+
+
+POINT = {"x_m": 1, "y_m": 1}
+POSE = {**POINT, "heading_rad": 1}
+SEGMENTS = [{"kind": "straight", "length_m": 1}, {"kind": "turn", "angle_rad": 1}, {"kind": "arc", "radius_m": 1, "angle_rad": 1},
+            {"kind": "polyline", "points": [POINT]}, {"kind": "bezier", "control_1": {"x_m": 2, "y_m": 2}, "control_2": {"x_m": 3, "y_m": 2}, "end": {"x_m": 4, "y_m": 2}},
+            {"kind": "gaussian_detour", "length_m": 4, "amplitude_m": 1, "centre_m": 2, "width_m": 1},
+            {"kind": "clothoid", "length_m": 1, "start_curvature_1_m": 0, "end_curvature_1_m": 1},
+            {"kind": "curvature", "way_m": [0, 1], "curvature_1_m": [0, 0]}, {"kind": "dwell", "duration_s": 1}]
+PACE = {"speed_m_s": 1, "acceleration_m_s2": 1, "yaw_rate_rad_s": 1, "yaw_acceleration_rad_s2": 1}
+LIMITS = {"speed_m_s": 1, "acceleration_m_s2": 1, "yaw_rate_rad_s": 1, "wheel_speed_rad_s": 1, "current_a": 1, "voltage_v": 1}
+DRIVE = {"path": SEGMENTS, "start_pose": POSE, "payload_kg": 0, "deadline_s": 1e4, "value_of_time_w": 1, "regeneration": 0.5,
+         "start_speed_m_s": 0, "end_speed_m_s": 0, "limits": LIMITS}
+AUTONOMY = {"state_of_charge": 0.5, "state_of_charge_sd": 0.1, "reserve_fraction": 0.1, "payload_kg": 0, "value_of_time_w": 0,
+            "confidence": 0.9, "start_pose": POSE, "charger": {**POINT, "detour_factor": 1}, "to_charger_m": 1, **PACE,
+            "tasks": [{"path": SEGMENTS, "dwell_s": 1, "payload_kg": 0, **PACE},
+                      {"turn_rad": 1, "distance_m": 1, "to_charger_m": 1}]}
+# What no number bounds: the robot's own limits do, or nothing does.
+UNBOUNDED = {"payload_kg", "start_speed_m_s", "end_speed_m_s", "deadline_s", "way_m", *PACE, *LIMITS}
+
+
+def hold_bounds(checker, name):
+    """The bounds of numbers in requests are those that the service keeps."""
+    requests = {
+        "/v1/robots/{id}/profile": {**DRIVE, "pareto_points": 0},
+        "/v1/robots/{id}/estimate": {"profile": {"time_s": [0, 1], "speed_m_s": [0, 1], "yaw_rate_rad_s": [0, 1]}, "payload_kg": 0, "start_pose": POSE},
+        "/v1/robots/{id}/autonomy": AUTONOMY,
+        "/v1/autonomy": {"request": AUTONOMY},
+        "/v1/energy-matrix": {"robots": [{"robot_id": name, "pose": POSE, "state_of_charge": 0.5}], "value_of_time_w": 0,
+                              "regeneration": 0.5, "reserve_fraction": 0.1,
+                              "tasks": [{"task_id": "t", "payload_kg": 0, "pickup": POSE, "dropoff": POSE, "pickup_dwell_s": 1,
+                                         "dropoff_dwell_s": 1, "empty": {"distance_m": 1}, "loaded": {"distances_m": [1], "turns_rad": [1]}}]},
+        "/v1/diagnoses": {"robot_id": name, "max_missions": 1, "hold_back": 0.1, "since_utime_us": 0, "missions": [1]},
+    }
+    held = 0
+    for template, body in requests.items():
+        schema = checker.document["paths"][template]["post"]["requestBody"]["content"]["application/json"]["schema"]
+        for pointer, number in numbers_of(checker.document, schema, body):
+            leaf = next(part for part in reversed(pointer.split("/")) if not part.isdigit())
+            low = number.get("minimum", number.get("exclusiveMinimum"))
+            if leaf not in UNBOUNDED and pointer != "/missions/0" and (low is None or "maximum" not in number):
+                checker.fault(f"{template} {pointer}: the schema does not say from where to where it goes")
+            beyond = []
+            if low is not None:
+                beyond.append((low, low - max(1, abs(low)) if "minimum" in number else low))
+            if "maximum" in number:
+                beyond.append((number["maximum"], number["maximum"] + max(1, abs(number["maximum"]))))
+            for bound, value in beyond:
+                told = checker.check("POST", template, template.replace("{id}", name), replaced(body, pointer, value), expect=422) or {}
+                numbers = [float(n) for n in re.findall(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?", told.get("constraint", ""))]
+                positive = bound == 1 and "positive" in told.get("constraint", "")
+                if told.get("field") != pointer or not (positive or any(abs(n - bound) <= 1e-9 * abs(bound) for n in numbers)):
+                    checker.fault(f"{template} {pointer} = {value}: {told.get('field')}: {told.get('constraint')}; the schema says {bound}")
+                held += 1
+    print(f"{held} bounds of requests hold")
+    if held < 200:
+        checker.fault("hardly any bound was looked at")
+
+
 def main():
     arguments = argparse.ArgumentParser()
     arguments.add_argument("--source", required=True, type=pathlib.Path)
@@ -184,6 +270,28 @@ def exercise(checker, source):
         told = checker.check("POST", template, template.replace("{id}", name), body, expect=status) or {}
         if told.get("field") != field or constraint not in told.get("constraint", ""):
             checker.fault(f"{template} {body}: {told.get('field')}: {told.get('constraint')}, not {field}: {constraint}")
+    hold_bounds(checker, name)
+    empty = checker.check("POST", "/v1/robots/{id}/autonomy", f"/v1/robots/{name}/autonomy", {"state_of_charge": 0.5, "tasks": [{}]}, expect=422)
+    if (empty or {}).get("field") != "/tasks/0/path":
+        checker.fault(f"an empty task: {empty}")
+    # A robot that is not there is told in the same words everywhere.
+    wording = "no robot is called 'no-such-robot'; GET /v1/robots lists those that there are"
+    asked = [("GET", t, t.replace("{id}", "no-such-robot"), None) for t in ("/v1/robots/{id}", "/v1/robots/{id}/state", "/v1/robots/{id}/versions",
+                                                                            "/v1/robots/{id}/proposals", "/v1/robots/{id}/gap-history")]
+    asked += [("POST", t, t.replace("{id}", "no-such-robot"), {"path": PATH}) for t in ("/v1/robots/{id}/profile", "/v1/robots/{id}/estimate")]
+    asked += [("POST", "/v1/robots/{id}/autonomy", "/v1/robots/no-such-robot/autonomy", {}), ("POST", "/v1/diagnoses", "/v1/diagnoses", {"robot_id": "no-such-robot"}),
+              ("POST", "/v1/robots/{id}/model", "/v1/robots/no-such-robot/model", {"version": 1})]
+    for method, template, path, body in asked:
+        told = checker.check(method, template, path, body, expect=404) or {}
+        if told.get("constraint") != wording:
+            checker.fault(f"{method} {path}: {told.get('constraint')}")
+    told = checker.check("POST", "/v1/autonomy", body={"robots": ["no-such-robot"]}, expect=200)
+    if told["robots"][0]["problem"]["message"] != wording:
+        checker.fault(f"/v1/autonomy: {told}")
+    # Nothing was heard of its battery yet.
+    charge = checker.check("GET", "/v1/robots/{id}/state", f"/v1/robots/{name}/state", expect=200)["charge"]
+    if charge["current_bias_a"] is not None:
+        checker.fault(f"a robot that was never heard has a current sensor's offset: {charge}")
     model = checker.check("GET", "/v1/robots/{id}", f"/v1/robots/{name}", expect=200)
     compact = json.dumps(model, separators=(",", ":"), ensure_ascii=False)
     served = ask(checker.url, "GET", f"/v1/robots/{name}")[2].decode()
