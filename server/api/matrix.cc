@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -33,7 +34,7 @@ constexpr std::size_t max_tasks = 10'000;
 constexpr std::size_t max_cells = 4'000'000;
 constexpr std::size_t max_stretches = 1'000;
 constexpr std::size_t rows_per_piece = 16;
-constexpr std::size_t tables_per_piece = 2;
+constexpr std::chrono::milliseconds tables_piece{20};  // most are there already, one to be built takes longer
 constexpr std::size_t max_id_bytes = 128;
 constexpr int places = 3;  // of energies and durations: millijoules and milliseconds
 constexpr Bounds place{.minimum = -1e6, .maximum = 1e6};
@@ -195,11 +196,16 @@ struct MatrixAnswer::State {
 };
 
 void MatrixAnswer::State::collect_tables() {
-  const std::size_t count = std::min(tables_per_piece, models.size() - tables_done);
-  on_two_threads(count, [&](std::size_t k) {
-    tables[tables_done + k] = cache->get(models[tables_done + k]->robot, options);
+  const auto until = std::chrono::steady_clock::now() + tables_piece;
+  std::atomic<std::size_t> next = tables_done;
+  on_two_threads(2, [&](std::size_t) {
+    do {
+      const std::size_t k = next++;
+      if (k >= models.size()) return;
+      tables[k] = cache->get(models[k]->robot, options);
+    } while (std::chrono::steady_clock::now() < until);
   });
-  tables_done += count;
+  tables_done = std::min(next.load(), models.size());
 }
 
 void MatrixAnswer::State::assemble() {

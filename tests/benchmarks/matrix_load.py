@@ -2,7 +2,9 @@
 """The energy matrix over HTTP: time to the last byte, the daemon's memory and CPU, and what it does when the client
 leaves.
 
-  matrix_load.py --daemon PROGRAM --source DIR [--robots 1000] [--tasks 1000] [--models 4]
+  matrix_load.py --daemon PROGRAM --source DIR [--robots 1000] [--tasks 1000] [--models 4] [--without-charge]
+
+Without charges no probabilities are answered: the difference is what those cost.
 """
 import argparse
 import http.client
@@ -80,6 +82,7 @@ def main():
     arguments.add_argument("--tasks", type=int, default=1000)
     arguments.add_argument("--models", type=int, default=4)
     arguments.add_argument("--regeneration", type=float)
+    arguments.add_argument("--without-charge", action="store_true")
     options = arguments.parse_args()
     chance = random.Random(3)
     with tempfile.TemporaryDirectory() as folder:
@@ -96,8 +99,9 @@ def main():
                     time.sleep(0.05)
             names = fleet(options, api)
             place = lambda: {"x_m": round(chance.uniform(0, 120), 2), "y_m": round(chance.uniform(0, 80), 2)}
+            charge = lambda: {} if options.without_charge else {"state_of_charge": round(chance.uniform(0.15, 1), 3)}
             request = {
-                "robots": [{"robot_id": name, "pose": {**place(), "heading_rad": round(chance.uniform(-3, 3), 3)}} for name in names],
+                "robots": [{"robot_id": name, "pose": {**place(), "heading_rad": round(chance.uniform(-3, 3), 3)}, **charge()} for name in names],
                 "tasks": [{"task_id": f"task-{k}", "payload_kg": round(chance.uniform(0, 60), 2), "pickup": place(),
                            "dropoff": {**place(), "heading_rad": 1.57}, "pickup_dwell_s": 10} for k in range(options.tasks)]}
             print(f"before: resident {memory_mb(daemon.pid, 'VmRSS'):.0f} MB; {options.models} different models")
@@ -117,8 +121,9 @@ def main():
             answer = json.loads(b"".join(pieces))
             rows = answer["rows"]
             cells = sum(len(row["energy_j"]) for row in rows)
+            likely = sum(value is not None for row in rows for value in row["success_probability"] or ())
             feasible = sum(value is not None for row in rows for value in row["energy_j"])
-            print(f"{len(rows)} x {len(answer['tasks'])}: {cells} cells, {feasible} feasible; largest interpolation error "
+            print(f"{len(rows)} x {len(answer['tasks'])}: {cells} cells, {feasible} feasible, {likely} with a probability; largest interpolation error "
                   f"{max(row['interpolation_error'] for row in rows):.1e}")
             connection, reply = api.open("POST", "/v1/energy-matrix", request)
             reply.read(100_000)
