@@ -144,6 +144,31 @@ await check('the fleet is found, chosen and ordered', async () => {
   equal(await page.locator('th.robot[aria-sort]').getAttribute('aria-sort'), 'descending', 'aria-sort');
 });
 
+await check('a robot that stands, is silent or was restarted is shown as that', async () => {
+  const fresh = await open_page();
+  await fresh.route('**/v1/events', (route) => route.fulfill({ contentType: 'text/event-stream', body: 'retry: 600000\n\n' }));
+  const heard = { live: true, silent_s: 0.1, has_model: true, speed_m_s: 0.7, measured_power_w: 61, mission: null, faults: {} };
+  const told = [{ ...heard, robot_id: 'restarted', faults: { restart: 1, gap: 1, outside_mission: 40 } }, { ...heard, robot_id: 'lossy', faults: { missing: 3, restart: 1 } },
+    { ...heard, robot_id: 'quiet', live: false, silent_s: 7200 }, { ...heard, robot_id: 'standing', speed_m_s: 0, measured_power_w: 20 }];
+  await fresh.route('**/v1/robots', async (route) => {
+    const { robots } = await (await route.fetch()).json();
+    await route.fulfill({ json: { robots: told.map((own) => ({ ...robots[0], ...own })) } });
+  });
+  faults_wanted = true;  // the stream ends at once
+  await go(fresh, '#/fleet');
+  await fresh.locator('.fleet tbody th a').first().waitFor();
+  const cells = async (robot) => (await fresh.locator('.fleet tbody tr', { hasText: robot }).locator('td').allTextContents()).map((text) => text.trim());
+  equal((await cells('restarted'))[0], 'live', 'after a restart');
+  expect((await cells('lossy'))[0].includes('3 faulty'), `lost samples: ${(await cells('lossy'))[0]}`);
+  const quiet = await cells('quiet');
+  expect(/^silent since (\d\d:\d\d|\w+ \d+)$/.test(quiet[0]), `silence: ${quiet[0]}`);
+  equal([quiet[1], quiet[6], quiet[7]].join(' '), '– – –', 'power, speed and mission of a silent robot');
+  const standing = await cells('standing');
+  expect(standing[6].startsWith('0.00') && standing[7] === 'idle', `a standing robot: ${standing}`);
+  await fresh.context().close();
+  faults_wanted = false;
+});
+
 await check('the keyboard reaches a robot and comes back', async () => {
   await go(page, '#/fleet');
   const link = page.locator('.fleet tbody th a').first();
@@ -227,6 +252,24 @@ await check('a mission is compared with the minimum-energy drive', async () => {
   expect(least_j > 0 && least_j < 1.03 * mission.energy.modelled_j, `least ${shown}, modelled ${mission.energy.modelled_j} J`);
 });
 
+await check('what was picked up and set down on the way counts in the comparison', async () => {
+  let carried = [];
+  for (const m of (await get('/v1/missions?robot_id=worn-01&limit=50')).missions) {
+    const told = new Set((await get(`/v1/missions/${m.id}/telemetry?limit=100000`)).payload_kg);
+    if (told.size < 2) continue;
+    const asked = page.waitForRequest((r) => r.url().endsWith('/profile'));
+    await go(page, `#/missions/${m.id}`);
+    const { path: legs, payload_kg } = (await asked).postDataJSON();
+    carried = [payload_kg, ...legs.filter((leg) => leg.kind === 'payload').map((leg) => leg.payload_kg)];
+    expect(carried.every((kg) => told.has(kg)), `carried ${carried}, told ${[...told]}`);
+    if (carried.length > 1) break;
+  }
+  expect(carried.length > 1, 'no mission changed its payload between legs');
+  await page.getByText('payload as the robot told it on the way').waitFor();
+  await go(page, `#/missions/${mission.id}`);
+  await page.locator('.bars tr').nth(2).waitFor();
+});
+
 await check('the trace is read at the cursor, and closer', async () => {
   const plot = page.locator('.uplot .u-over').first(), box = await plot.boundingBox();
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
@@ -260,6 +303,38 @@ await check('a plan gives what the service computes', async () => {
   const joule = number(shown) * (shown.includes('kJ') ? 1000 : 1);
   expect(Math.abs(joule - answer.energy_j) <= 0.006 * answer.energy_j, `${shown} against ${answer.energy_j} J`);
   expect(answer.pareto.length > 2, 'a front');
+});
+
+await check('a plan tells how likely the robot makes it', async () => {
+  const told = page.waitForResponse((r) => r.url().endsWith('/autonomy'));
+  const charge = (await get(`/v1/robots/${robot}`)).model.battery.reserve_fraction * 100 + 0.2;
+  await page.getByLabel('Charge now').fill(String(charge));
+  await page.keyboard.press('Enter');
+  const { plan, minimum_energy } = await (await told).json();
+  const shown = (p) => (p > 0.999 ? 'more than 99.9\u00a0%' : p < 0.001 ? 'less than 0.1\u00a0%' : `${(100 * p).toFixed(p > 0.99 || p < 0.01 ? 1 : 0)}\u00a0%`);
+  const verdict = `${shown(minimum_energy.success_probability)} chance to finish with its reserve of`;
+  await until(verdict, async () => (await page.locator('.verdict-box .verdict').allTextContents()).some((text) => text.includes(verdict)));
+  const rows = await page.locator('.chances tbody tr').allTextContents();
+  for (const [k, p] of [minimum_energy, plan].entries()) expect(rows[k].includes(shown(p.success_probability)), `${rows[k]} against ${p.success_probability}`);
+  const low = page.waitForResponse((r) => r.url().endsWith('/autonomy'));
+  await page.getByLabel('Charge now').fill('');
+  await page.keyboard.press('Enter');
+  await low;
+});
+
+await check('nobody is offered time that the robot cannot save', async () => {
+  let told = page.waitForResponse((r) => r.url().endsWith('/profile'));
+  await page.getByRole('button', { name: 'Compute' }).click();
+  const { certificate } = await (await told).json();
+  told = page.waitForResponse((r) => r.url().endsWith('/profile'));
+  await page.getByLabel('Deadline').fill((certificate.shortest_time_s * 1.0004).toFixed(5));
+  await page.keyboard.press('Enter');
+  await told;
+  await page.locator('.facts').getByText('no faster time is possible: the robot is at its limits').waitFor();
+  equal(await page.getByText(/(second less|less time) costs 0 J/).count(), 0, 'offers for nothing');
+  await page.getByLabel('Deadline').fill('');
+  await page.getByRole('button', { name: 'Compute' }).click();
+  await page.locator('.facts').getByText('the cheapest time').waitFor();
 });
 
 await check('a deadline from the front is met, and the charge decides', async () => {

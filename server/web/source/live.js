@@ -48,6 +48,7 @@ function take(told) {
     entry = { id: told.robot_id, revision: 0, power: new Track(power_samples), path: new Track(path_samples) };
     robots.set(told.robot_id, entry);
   }
+  told.heard_us = told.silent_s === null ? null : (Date.now() - 1000 * told.silent_s) * 1000;
   const fresh = entry.state === undefined || entry.state.utime_us !== told.utime_us;
   entry.state = told;
   entry.revision += 1;

@@ -21,16 +21,20 @@ const by = (value) => (a, b) => {
   const missing = (va === null || va === undefined) - (vb === null || vb === undefined);
   return missing || (va < vb ? -1 : va > vb ? 1 : 0);
 };
+// A robot that fell silent may do anything by now: what it last did is no answer to what it does.
+export const now = (state, value) => (state.live ? value : null);
+const power_now = (state) => now(state, state.measured_power_w ?? state.modelled_power_w);
+
 const names = new Intl.Collator('en', { numeric: true });
 const columns = [
   { key: 'robot', title: 'Robot', sort: (a, b) => names.compare(a.id, b.id), class: 'robot' },
   { key: 'health', title: 'Telemetry', sort: by((s) => (s.live ? 0 : s.silent_s === null ? Infinity : 1 + s.silent_s)), class: 'health' },
-  { key: 'power', title: 'Power', sort: by((s) => s.measured_power_w ?? s.modelled_power_w), class: 'figure power' },
+  { key: 'power', title: 'Power', sort: by((s) => power_now(s)), class: 'figure power' },
   { key: 'trace', title: 'Last 90 s', class: 'spark' },
   { key: 'charge', title: 'Charge', sort: by((s) => s.state_of_charge), class: 'charge' },
   { key: 'range', title: 'Range', sort: by((s) => s.range_m), class: 'figure range' },
   { key: 'time', title: 'Run time', sort: by((s) => s.run_time_s), class: 'figure wide' },
-  { key: 'speed', title: 'Speed', sort: by((s) => s.speed_m_s), class: 'figure wide' },
+  { key: 'speed', title: 'Speed', sort: by((s) => now(s, s.speed_m_s)), class: 'figure wide' },
   { key: 'mission', title: 'Mission', sort: by((s) => s.mission?.start_utime_us), class: 'mission' },
   { key: 'spent', title: 'Spent', sort: by((s) => s.mission?.energy.battery_j), class: 'figure spent' },
 ];
@@ -38,17 +42,26 @@ const columns = [
 // Nothing came from it since the service started.
 const unheard = (state) => state.silent_s === null;
 
+// What happens in good order: robots and the service are restarted, and stand between missions.
+const ordinary = ['restart', 'gap', 'outside_mission', 'reused_mission_id'];
+
 function health_of(state) {
-  const faults = Object.values(state.faults).reduce((sum, n) => sum + n, 0);
+  const faults = Object.entries(state.faults).reduce((sum, [reason, n]) => sum + (ordinary.includes(reason) ? 0 : n), 0);
   if (!state.has_model) return { level: 'bad', text: 'no model', faults };
   if (state.live) return { level: 'good', text: 'live', faults };
   if (unheard(state)) return { level: 'none', text: 'not heard', faults };
-  return { level: 'bad', text: `silent ${format.span(state.silent_s)}`, faults };
+  return { level: 'bad', text: `silent since ${since(state.heard_us)}`, faults };
+}
+
+// When it was, as short as today allows.
+export function since(utime_us) {
+  const at = new Date(utime_us / 1000);
+  return Date.now() - at < 86_400e3 ? format.clock(utime_us).slice(0, 5) : at.toLocaleDateString('en', { day: 'numeric', month: 'short' });
 }
 
 export function Health({ state }) {
   const { level, text, faults } = health_of(state);
-  const listed = Object.entries(state.faults).map(([reason, n]) => `${n} ${format.words(reason)}`).join(', ');
+  const listed = Object.entries(state.faults).filter(([reason]) => !ordinary.includes(reason)).map(([reason, n]) => `${n} ${format.words(reason)}`).join(', ');
   return html`<span class=${`lamp ${level}`} aria-hidden="true"></span>${text}
     ${faults > 0 && html`<span class="note" title=${listed}> · ${format.fixed(faults)} faulty</span>`}`;
 }
@@ -78,17 +91,17 @@ class Row extends Component {
   }
   render({ entry, index, revision, dark }) {
     const s = entry.state;
-    const modelled_only = s.measured_power_w === null;
+    const modelled_only = s.live && s.measured_power_w === null;
     return html`<tr aria-rowindex=${index + 2} class=${s.live ? '' : 'quiet'}>
       <th scope="row" class="robot"><a href=${robot_link(entry.id)}>${entry.id}</a></th>
       <td class="health"><${Health} state=${s} /></td>
-      <td class="figure power"><${Quantity} of=${format.power(s.measured_power_w ?? s.modelled_power_w)} />${modelled_only && s.modelled_power_w !== null && html`<span class="note"> mod.</span>`}</td>
+      <td class="figure power"><${Quantity} of=${format.power(power_now(s))} />${modelled_only && s.modelled_power_w !== null && html`<span class="note"> mod.</span>`}</td>
       <td class="spark"><${Sparkline} track=${entry.power} revision=${revision} dark=${dark} /></td>
       <td class="charge"><${Charge} state=${s} /></td>
       <td class="figure range"><${Quantity} of=${format.length(s.range_m)} /><span class="below">${between(s.range_quantiles_m, format.length_band)}</span></td>
       <td class="figure wide">${format.about(s.run_time_s)}</td>
-      <td class="figure wide"><${Quantity} of=${format.unit(s.speed_m_s, 'm/s', 2)} /></td>
-      <td class="mission">${s.mission ? html`<a href=${mission_link(s.mission.id)} title=${s.mission.mission_id}>${own_part(s.mission.mission_id, entry.id)}</a>` : html`<span class="note">idle</span>`}</td>
+      <td class="figure wide"><${Quantity} of=${format.unit(now(s, s.speed_m_s), 'm/s', 2)} /></td>
+      <td class="mission">${s.mission ? html`<a href=${mission_link(s.mission.id)} title=${s.mission.mission_id}>${own_part(s.mission.mission_id, entry.id)}</a>` : html`<span class="note">${s.live ? 'idle' : '–'}</span>`}</td>
       <td class="figure spent"><${Quantity} of=${format.energy(s.mission?.energy.battery_j)} /></td>
     </tr>`;
   }

@@ -5,7 +5,7 @@ import { id_path, post, query, useGet } from '../api.js';
 import { Bars } from '../bars.js';
 import { Chart, axis, clock_steps, cursor_of, with_alpha } from '../chart.js';
 import { FloorPath } from '../floor.js';
-import { least_drive_request } from '../least_drive.js';
+import { driven_runs, least_drive_request, payloads_of } from '../least_drive.js';
 import { robot_link } from '../route.js';
 import { palette } from '../theme.js';
 import { Answer, Choice, Empty, Failure, Loading, MissionState, Panel, Readout, useTitleOf } from '../widgets.js';
@@ -148,22 +148,34 @@ function TracePanels({ mission, whole, fine }) {
   </div>`;
 }
 
+// With what load the minimum-energy drive was reckoned.
+function carried_note(mission, payloads) {
+  const kg = (value) => format.text(format.unit(value, 'kg'));
+  if (payloads === null) return `the declared payload of ${kg(mission.payload_kg ?? 0)} all the way: what it was on the way is not looked at`;
+  const [low, high] = [Math.min(...payloads), Math.max(...payloads)];
+  return low === high ? `payload ${kg(low)}` : `payload as the robot told it on the way, ${kg(low)} to ${kg(high)}`;
+}
+
 function LeastDrive({ mission, trace }) {
   const robot = useGet(`/v1/robots/${id_path(mission.robot_id)}`);
   const idle_power_w = robot.value?.model.idle_power_w;
-  const request = useMemo(() => (idle_power_w === undefined ? null : least_drive_request(mission, trace, idle_power_w)), [mission.id, mission.state, idle_power_w]);
+  const driven = useMemo(() => (idle_power_w === undefined ? null : driven_runs(mission, trace, idle_power_w)), [mission.id, mission.state, idle_power_w]);
   const [told, set_told] = useState({ value: null, error: null });
   useEffect(() => {
-    if (request === null) return undefined;
+    if (driven === null) return undefined;
     const abort = new AbortController();
-    post(`/v1/robots/${id_path(mission.robot_id)}/profile`, request, abort.signal)
-      .then((value) => set_told({ value, error: null }), (error) => error.name === 'AbortError' || set_told({ value: null, error }));
+    payloads_of(mission, driven.runs, abort.signal).then(async (payloads) => {
+      const request = least_drive_request(mission, driven, payloads);
+      const value = await post(`/v1/robots/${id_path(mission.robot_id)}/profile`, request, abort.signal);
+      set_told({ value, error: null, request, payloads });
+    }).catch((error) => error.name === 'AbortError' || set_told({ value: null, error }));
     return () => abort.abort();
-  }, [request]);
+  }, [driven]);
   const error = robot.value === null ? robot.error : told.error;
   if (error !== null) return html`<${Failure} error=${error} />`;
-  if (robot.value !== null && request === null) return html`<${Empty} title="Nothing to compare">The robot did not drive, or in too many short runs.<//>`;
+  if (robot.value !== null && driven === null) return html`<${Empty} title="Nothing to compare">The robot did not drive, or in too many short runs.<//>`;
   if (told.value === null) return html`<${Loading} what="the minimum-energy drive" />`;
+  const { request, payloads } = told;
   const e = mission.energy, least = told.value, share = 1 - least.energy_j / e.modelled_j;
   const turned = request.path.reduce((sum, leg) => sum + Math.abs(leg.angle_rad ?? 0), 0);
   const stood_s = request.path.reduce((sum, leg) => sum + (leg.duration_s ?? 0), 0);
@@ -175,7 +187,7 @@ function LeastDrive({ mission, trace }) {
       { name: 'Modelled', value: e.modelled_j, of: format.energy(e.modelled_j, 4), channel: 'modelled', note: format.span(e.duration_s) },
       { name: 'Least energy', value: least.energy_j, of: format.energy(least.energy_j, 4), channel: 'least', note: format.span(least.duration_s) },
     ]} />
-    <p class="note foot">${legs} ${legs === 1 ? 'leg' : 'legs'} between stops, ${format.text(format.length(e.distance_m))} in all, ${format.fixed((turned * 180) / Math.PI)}° turned at the stops,${stood_s > 0 ? ` ${format.span(stood_s)} standing as the mission did,` : ''}${' '}payload ${format.text(format.unit(mission.payload_kg ?? 0, 'kg'))}, arriving no later. Model version ${least.model_version}; the saving is against the modelled energy, so that a gap of the model does not count as one.</p>`;
+    <p class="note foot">${legs} ${legs === 1 ? 'leg' : 'legs'} between stops, ${format.text(format.length(e.distance_m))} in all, ${format.fixed((turned * 180) / Math.PI)}° turned at the stops,${stood_s > 0 ? ` ${format.span(stood_s)} standing as the mission did,` : ''}${' '}${carried_note(mission, payloads)}, arriving no later. Model version ${least.model_version}; the saving is against the modelled energy, so that a gap of the model does not count as one.</p>`;
 }
 
 function Facts({ mission }) {
@@ -231,7 +243,7 @@ export function Mission({ id }) {
       <${Readout} large label="Distance" of=${format.length(e.distance_m)} />
       <${Readout} large label="Duration" of=${format.span(e.duration_s)} />
       <${Readout} large label="Per metre" of=${format.unit(e.distance_m > 0.1 ? e.battery_j / e.distance_m : null, 'J/m')} />
-      <${Readout} large label="Payload" of=${format.unit(m.payload_kg, 'kg')} />
+      <${Readout} large label="Declared payload" of=${format.unit(m.payload_kg, 'kg')} />
     </dl>
     <${Answer} of=${trace} what="the trace">${(value) => html`<${TracePanels} mission=${m} whole=${value} fine=${fine ?? value} />`}<//>
     <div class="columns">

@@ -96,12 +96,19 @@ function Front({ answer, take }) {
   return html`<${Chart} make=${make} data=${data} height=${230} changes=${[]} label=${`Energy against duration, from ${format.span(front[0].duration_s)} to ${format.span(front[front.length - 1].duration_s)}`} />
     <p class="note foot"><span class="swatch accent dot"></span>this plan <span class="swatch hollow dot grey"></span>trapezoid <span class="swatch grey dot"></span>triangle <span class="swatch modelled"></span>front</p>
     <div class="front-pick"><label><span>Walk the front</span><input type="range" min="0" max=${front.length - 1} value=${at} onInput=${(e) => set_at(e.currentTarget.valueAsNumber)} aria-valuetext=${`${format.span(point.duration_s)}, ${format.text(format.energy(point.energy_j))}`} /></label>
-      <span class="number">${format.fixed(point.duration_s, 2)} s · ${format.text(format.energy(point.energy_j, 4))}; a second less costs ${little(point.time_multiplier_w)}</span>
+      <span><span class="number">${format.fixed(point.duration_s, 2)} s · ${format.text(format.energy(point.energy_j, 4))}</span>; ${haste(point, answer.certificate.shortest_time_s)}</span>
       <button type="button" onClick=${() => take(point)}>Take as deadline</button></div>`;
 }
 
 // Energies near nothing: how small they are is what matters.
 const little = (joule) => (joule !== 0 && Math.abs(joule) < 0.005 ? 'less than 0.01\u00a0J' : format.text(format.energy(joule)));
+
+// What less time would cost, where the robot can be faster at all.
+function haste({ duration_s, time_multiplier_w: price_w }, shortest_s) {
+  if (duration_s <= shortest_s * 1.001) return 'no faster time is possible: the robot is at its limits';
+  if (!(price_w >= 0.005)) return 'the cheapest time';
+  return duration_s - shortest_s < 1 ? `less time costs ${format.text(format.energy(price_w))} a second or more` : `a second less costs ${format.text(format.energy(price_w))} or more`;
+}
 
 const methods = { closed_form: 'formulas', interior_point: 'an interior-point method', mixed: 'formulas and an interior-point method' };
 
@@ -121,7 +128,8 @@ function Certificate({ answer }) {
     ${row('At most above the optimum', little(c.gap_j))}
     ${row('Error of the time steps', little(c.discretisation_j))}
     ${row('A global optimum', c.convex ? 'yes: the problem is convex' : 'not proven: the problem is not convex')}
-    ${row('A second less costs', little(c.time_multiplier_w))}
+    ${row('In less time', haste({ ...answer, ...c }, c.shortest_time_s))}
+    ${row('Shortest time', format.known(c.shortest_time_s) ? `${format.fixed(c.shortest_time_s, 2)} s, by the robot's limits` : 'not bounded')}
     ${row('Limits met', c.binding.length === 0 ? 'none' : c.binding.map(format.words).join(', '))}
     ${row('Braking', `${format.text(format.energy(answer.braking_j))}, of which ${format.text(format.energy(answer.recovered_j))} returns`)}
     ${row('Peak power', format.text(format.power(answer.peak_power_w)))}
@@ -129,18 +137,37 @@ function Certificate({ answer }) {
   </tbody></table>`;
 }
 
+// How likely, as far as it means something.
+function chance(p) {
+  if (p > 0.999) return 'more than 99.9\u00a0%';
+  if (p < 0.001) return 'less than 0.1\u00a0%';
+  return format.text(format.percent(p, p > 0.99 || p < 0.01 ? 1 : 0));
+}
+
+const verdicts = [[0.95, 'The robot makes it', 'makes'], [0.5, 'The robot probably makes it', 'maybe'], [0.05, 'The robot probably does not make it', 'fails'], [-1, 'The robot does not make it', 'fails']];
+
+const bases = {
+  recent_missions: ({ missions }) => `its ${missions === 1 ? 'last mission' : `last ${missions} missions`}`,
+  siblings: ({ siblings }) => `missions of ${siblings} ${siblings === 1 ? 'robot' : 'robots'} of its kind`,
+  model: () => 'its model alone: no mission has shown yet how far that is off',
+};
+
 function Verdict({ answer, autonomy }) {
   if (autonomy.error !== null) return html`<${Failure} error=${autonomy.error} />`;
-  if (autonomy.value === null) return html`<p class="verdict open">The robot has not told its charge: enter it to see whether the robot makes it.</p>`;
-  const a = autonomy.value, left = a.usable_energy_j - answer.energy_j, makes = left >= 0;
-  const span = a.state_of_charge - a.reserve_fraction;
-  const arrival = span > 0 ? a.state_of_charge - (span * answer.energy_j) / a.usable_energy_j : null;
-  const times = answer.energy_j > 0 ? Math.floor(a.usable_energy_j / answer.energy_j) : null;
-  return html`<div class=${`verdict-box ${makes ? 'makes' : 'fails'}`}>
-    <p class="verdict"><b>${makes ? 'The robot makes it' : 'The robot does not make it'}</b>${makes
-      ? html`: arrives with ${format.text(format.percent(arrival, arrival > 0.995 ? 2 : 1))} charge, ${format.text(format.energy(left))} above its reserve of ${format.text(format.percent(a.reserve_fraction))}.`
-      : html`: ${format.text(format.energy(-left))} short of its reserve of ${format.text(format.percent(a.reserve_fraction))}.`}</p>
-    <p class="note">Starts with ${format.text(format.percent(a.state_of_charge, 1))}, ${format.text(format.energy(a.usable_energy_j))} usable${times >= 2 ? `: about ${format.fixed(Number(times.toPrecision(2)))} such drives` : ''}. At its ${a.consumption.basis === 'model' ? 'modelled' : 'recent'} consumption it has ${format.text(format.length(a.range_m))} or ${format.span(a.run_time_s)} left.</p></div>`;
+  if (autonomy.value === null) return autonomy.busy ? html`<p class="verdict open">Reckoning the chance to make it …</p>`
+    : html`<p class="verdict open">The robot has not told its charge: enter it to see how likely the robot makes it.</p>`;
+  const a = autonomy.value, { plan: usual, minimum_energy: planned } = a, reserve = format.text(format.percent(a.reserve_fraction));
+  const drives = [planned && { name: 'Driven as planned here', arrival: planned.arrival_charge, ...planned },
+    { name: `Driven as ${a.consumption.missions > 0 ? 'it usually drives' : 'robots usually drive'}`, arrival: usual.legs[0].arrival_charge, ...usual }].filter(Boolean);
+  const [, words, name] = verdicts.find(([least]) => drives[0].success_probability >= least);
+  const times = drives[0].expected_energy_j > 0 ? Math.floor(a.usable_energy_j / drives[0].expected_energy_j) : null;
+  const percent = (share) => format.text(format.percent(share, 1));
+  return html`<div class=${`verdict-box ${name}`}>
+    <p class="verdict"><b>${words}</b>: ${chance(drives[0].success_probability)} chance to finish with its reserve of ${reserve} left.</p>
+    <div class="scroll"><table class="chances"><thead><tr><th scope="col"><span class="hidden">How it is driven</span></th><th scope="col">Chance</th><th scope="col" title="mean of the forecast">Energy</th><th scope="col">Takes</th><th scope="col" title="nine times of ten within the span">Charge on arrival</th></tr></thead>
+      <tbody>${drives.map((drive) => html`<tr key=${drive.name}><th scope="row">${drive.name}</th><td class="number">${chance(drive.success_probability)}</td><td class="number">${format.text(format.energy(drive.expected_energy_j))}</td><td class="number">${format.about(drive.duration_s)}</td>
+        <td class="number">${percent(drive.arrival.p50)}${percent(drive.arrival.p05) !== percent(drive.arrival.p95) && html` <span class="note">nine times of ten ${percent(drive.arrival.p05)} to ${percent(drive.arrival.p95)}</span>`}</td></tr>`)}</tbody></table></div>
+    <p class="note">Starts with ${percent(a.state_of_charge)}${a.state_of_charge_sd > 0.0005 ? ` ± ${percent(a.state_of_charge_sd)}` : ''} charge, ${format.text(format.energy(a.usable_energy_j))} usable${times >= 2 ? `: about ${format.fixed(Number(times.toPrecision(2)))} such drives` : ''}. Foreseen by ${bases[a.consumption.basis](a.consumption)}${a.driving.pause_s > 0.05 ? `, with its usual pause of ${format.fixed(a.driving.pause_s, 1)} s at each stop` : ''}.</p></div>`;
 }
 
 export function Plan({ given }) {
@@ -176,11 +203,15 @@ export function Plan({ given }) {
     const charge = number(asked.charge);
     const url = `/v1/robots/${id_path(chosen)}`;
     const known = charge !== undefined || live.robots.get(chosen)?.state.state_of_charge !== null;
-    const autonomy = !known ? { value: null, error: null } : post(`${url}/autonomy`, { state_of_charge: charge === undefined ? undefined : charge / 100, payload_kg: body.payload_kg }, abort.signal)
-      .then((value) => ({ value, error: null }), (error) => ({ value: null, error }));
     try {
       const answer = await post(`${url}/profile`, body, abort.signal);
-      set_told({ answer, of: preview, error: null, busy: false, autonomy: await autonomy });
+      set_told({ answer, of: preview, error: null, busy: false, autonomy: { value: null, error: null, busy: known } });
+      if (!known) return;
+      // The chance of this very plan: a deadline's plan is the one that values a second as its certificate says.
+      const asked_for = { state_of_charge: charge === undefined ? undefined : charge / 100, payload_kg: body.payload_kg ?? 0, start_pose: body.start_pose ?? { x_m: 0, y_m: 0, heading_rad: 0 },
+        value_of_time_w: Math.min(1e6, answer.certificate.time_multiplier_w), tasks: [{ name: 'this drive', path: body.path }] };
+      const autonomy = await post(`${url}/autonomy`, asked_for, abort.signal).then((value) => ({ value, error: null }), (error) => ({ value: null, error }));
+      if (!abort.signal.aborted) set_told((before) => ({ ...before, autonomy }));
     } catch (error) {
       if (error.name !== 'AbortError') set_told((before) => ({ ...before, error, busy: false }));
     }
