@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/nearest_word.h"
 #include "client/commands/table.h"
 #include "client/trial/run.h"
 #include "client/trial/score_text.h"
@@ -34,7 +35,11 @@ Exit run(Options& options) {
     t.only = trial::kind_of(options.only == "double" ? "pair" : options.only);
     const auto known = virtual_robot::effect_table();
     if (!t.only && std::ranges::find(known, options.only, &virtual_robot::EffectEntry::id) == known.end()) {
-      return report({Fault::invalid, "--only", options.only + " is neither a kind of case nor an effect"});
+      std::vector<std::string> ids;
+      for (const virtual_robot::EffectEntry& each : known) ids.emplace_back(each.id);
+      return report(
+          {Fault::invalid, "--only",
+           options.only + " is neither a kind of case nor an effect" + did_you_mean(options.only, ids)});
     }
     if (!t.only) t.only_effect = options.only;
   }

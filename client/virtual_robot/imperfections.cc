@@ -75,7 +75,7 @@ Result<Imperfections> make_imperfections(const std::vector<EffectStrength>& effe
       std::vector<std::string> ids;
       for (const EffectEntry& each : table) ids.emplace_back(each.id);
       return invalid("--effect",
-                     "no effect is called " + id + did_you_mean(id, ids) + "; --list-effects names them all");
+                     "no effect is called " + id + "; --list-effects names them" + did_you_mean(id, ids));
     }
     if (!std::isfinite(strength) || std::abs(strength) > entry->search_limit) {
       std::ostringstream text;

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <string>
+#include <vector>
 
+#include "base/nearest_word.h"
 #include "dynamics/effects/accessory_load.h"
 #include "dynamics/effects/aerodynamic_drag.h"
 #include "dynamics/effects/battery_resistance.h"
@@ -103,7 +105,11 @@ ActiveEffect initial(const Effect& effect) {
 Result<ActiveEffect> activate(const robot::AdoptedEffect& adopted) {
   const std::string at = "/effects/" + adopted.id;
   const Effect* effect = find_effect(adopted.id);
-  if (effect == nullptr) return invalid(at, "is not an effect of the catalogue");
+  if (effect == nullptr) {
+    std::vector<std::string> ids;
+    for (const Effect* known : catalogue()) ids.emplace_back(known->info().id);
+    return invalid(at, "is not an effect of the catalogue" + did_you_mean(adopted.id, ids));
+  }
   ActiveEffect active = initial(*effect);
   const auto& parameters = effect->info().parameters;
   bool strength_given = false;

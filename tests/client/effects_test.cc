@@ -211,7 +211,11 @@ TEST(Effects, UnknownIdsAndAbsurdStrengthsAreNamed) {
   const auto complaint = [](const char* id, double strength) {
     return describe(make_imperfections({{id, strength}}).error());
   };
-  EXPECT_THAT(complaint("coulomb_fricton", 0.1), testing::HasSubstr("coulomb_fricton; --list-effects"));
+  EXPECT_THAT(
+      complaint("coulomb_fricton", 0.1),
+      testing::EndsWith("coulomb_fricton; --list-effects names them; did you mean coulomb_friction?"));
+  EXPECT_THAT(complaint("flux_capacitor", 0.1),
+              testing::EndsWith("flux_capacitor; --list-effects names them"));
   EXPECT_THAT(complaint("slope", 3), testing::HasSubstr("--effect: the strength of slope must be within"));
   EXPECT_THAT(complaint("slope", std::nan("")), testing::HasSubstr("the strength of slope must be within"));
 }

@@ -191,6 +191,8 @@ TEST(Catalogue, HoldsEachIdOnceAndNamesUnknownOnes) {
   const auto unknown = activate({"warp_drive", {}});
   ASSERT_FALSE(unknown);
   EXPECT_EQ(unknown.error().field, "/effects/warp_drive");
+  EXPECT_EQ(activate({"coulomb_fricton", {}}).error().message,
+            "is not an effect of the catalogue; did you mean coulomb_friction?");
   const auto unnamed = activate({"slope", {{"steepness", 1}}});
   ASSERT_FALSE(unnamed);
   EXPECT_EQ(unnamed.error().field, "/effects/slope/steepness");
