@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -94,11 +95,16 @@ Result<json> request_of(const Options& options) {
   return request;
 }
 
+// Where the request stands in what a fleet is asked.
+constexpr std::string_view fleet_request = "/request";
+
 // What was typed is called by its flag, not by the place of the request where it went.
 Error in_words_of_the_caller(Error error, const Options& options) {
   const auto rename = [&error](const std::string& pointer, const std::string& flag) {
     if (error.field == pointer || error.field == pointer.substr(1)) error.field = flag;
   };
+  if (options.robot_id.empty() && !options.server.empty() && error.field.starts_with(fleet_request))
+    error.field.erase(0, fleet_request.size());
   if (!options.robot_id.empty()) rename("/id", "--robot-id");
   if (options.turn_rad) rename("/path/0/angle_rad", "--turn");
   if (options.length_m) rename(options.turn_rad ? "/path/1/length_m" : "/path/0/length_m", "--length");

@@ -74,6 +74,7 @@ def main():
         2: [["profile", "--length", "8"], ["estimate", "--server", programs.url], ["profile", "--length", "many"],
             ["profile", "--robot", robot], ["autonomy", "--robot", robot], ["missions", "--server", programs.url, "--state", "lost"],
             *(["profile", *by, "--length", "-8"] for by in asked_by), *(["autonomy", *by, "--charge", "2"] for by in asked_by),
+            ["autonomy", "--server", programs.url, "--charge", "2"],
             *(["estimate", *by, "--turn", "1", "--length", "5", "--payload", "999"] for by in asked_by),
             ["missions", "--server", programs.url, "--limit", "many"]],
         1: [["profile", "--robot", programs.path("no-such-file.json"), "--length", "8"],
