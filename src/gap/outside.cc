@@ -28,6 +28,11 @@ void decays(double t_s, const Ranges& r, double factor, std::span<double> out) {
   out[3] = factor * (t_s / r.duration_s - 0.5);
 }
 
+void recent_motion(const Window& w, const Ranges& r, double factor, std::span<double> out) {
+  for (std::size_t k = 0; k < w.recent_rad_s.size(); ++k)
+    out[k] = factor * w.recent_rad_s[k] / r.wheel_speed_rad_s;
+}
+
 void positions(const Window& w, const Ranges& r, double factor, std::span<double> out) {
   const double width_x = (r.x_high_m - r.x_low_m) / (grid_side - 1),
                width_y = (r.y_high_m - r.y_low_m) / (grid_side - 1);
@@ -80,6 +85,9 @@ void torque_payload(const Window& w, const Ranges& r, std::size_t s, std::span<d
 void torque_time(const Window& w, const Ranges& r, std::size_t s, std::span<double> out) {
   decays(w.t_s, r, direction(w, s), out);
 }
+void torque_recent_motion(const Window& w, const Ranges& r, std::size_t s, std::span<double> out) {
+  recent_motion(w, r, direction(w, s), out);
+}
 void torque_heading(const Window& w, const Ranges&, std::size_t s, std::span<double> out) {
   headings(w, direction(w, s), out);
 }
@@ -114,6 +122,9 @@ void load_payload(const Window& w, const Ranges& r, std::size_t, std::span<doubl
 }
 void load_time(const Window& w, const Ranges& r, std::size_t, std::span<double> out) {
   decays(w.t_s, r, 1.0, out);
+}
+void load_recent_motion(const Window& w, const Ranges& r, std::size_t, std::span<double> out) {
+  recent_motion(w, r, 1.0, out);
 }
 void load_heading(const Window& w, const Ranges&, std::size_t, std::span<double> out) {
   headings(w, 1.0, out);
@@ -227,6 +238,8 @@ std::vector<OutsideFamily> outside_families(const Ranges& ranges, bool power) {
       {"acceleration", torque_right, 3, torque_acceleration},
       {"yaw_rate", torque_right, 5, torque_yaw},
       {"time", torque_right, 4, torque_time},
+      {"recent_motion", torque_right, motion_time_constants_s.size(), torque_recent_motion},
+      {"recent_motion", load, motion_time_constants_s.size(), load_recent_motion},
       {"speed", load, 4, load_speed},
       {"acceleration", load, 3, load_acceleration},
       {"yaw_rate", load, 3, load_yaw},

@@ -144,24 +144,40 @@ double median_period(const telemetry::Recording& mission) {
   return *middle;
 }
 
-// Copper heat low-passed on every time constant, at every sample.
-using Heat = std::array<std::array<std::vector<double>, 2>, heat_time_constants_s.size()>;
+// What the past leaves at every sample.
+struct Memory {
+  // Copper heat and speed, low-passed on every time constant.
+  std::array<std::array<std::vector<double>, 2>, heat_time_constants_s.size()> heat;
+  std::array<std::vector<double>, motion_time_constants_s.size()> motion;
+};
 
-Heat heat_of(const Columns& c) {
-  Heat heat;
-  for (std::size_t q = 0; q < heat.size(); ++q) {
+// From nothing at the mission's start.
+template <class Value>
+std::vector<double> low_passed(const std::vector<double>& t, double time_constant_s, const Value& value) {
+  std::vector<double> out(t.size());
+  double state = 0;
+  for (std::size_t k = 0; k < out.size(); ++k) {
+    const double step = k == 0 ? 0.0 : t[k] - t[k - 1];
+    state += (value(k) - state) * (1 - std::exp(-step / time_constant_s));
+    out[k] = state;
+  }
+  return out;
+}
+
+Memory memory_of(const Columns& c) {
+  Memory memory;
+  for (std::size_t q = 0; q < memory.heat.size(); ++q) {
     for (std::size_t s : {0u, 1u}) {
-      auto& out = heat[q][s];
-      out.resize(c.t.size());
-      double state = 0;
-      for (std::size_t k = 0; k < out.size(); ++k) {
-        const double step = k == 0 ? 0.0 : c.t[k] - c.t[k - 1];
-        state += (c.copper[s][k] - state) * (1 - std::exp(-step / heat_time_constants_s[q]));
-        out[k] = state;
-      }
+      memory.heat[q][s] =
+          low_passed(c.t, heat_time_constants_s[q], [&](std::size_t k) { return c.copper[s][k]; });
     }
   }
-  return heat;
+  for (std::size_t q = 0; q < memory.motion.size(); ++q) {
+    memory.motion[q] = low_passed(c.t, motion_time_constants_s[q], [&](std::size_t k) {
+      return 0.5 * (std::fabs(c.smooth_speed[0][k]) + std::fabs(c.smooth_speed[1][k]));
+    });
+  }
+  return memory;
 }
 
 // Mean of a column within +-half_s of an instant.
@@ -239,7 +255,7 @@ class Shape {  // one window's weights
   std::vector<double> weight_, slope_;
 };
 
-Window window_at(const Columns& c, const Heat& heat, std::size_t first, std::size_t last, double centre,
+Window window_at(const Columns& c, const Memory& memory, std::size_t first, std::size_t last, double centre,
                  double length) {
   const Shape shape(c, first, last, centre, length);
   Window w;
@@ -267,8 +283,10 @@ Window window_at(const Columns& c, const Heat& heat, std::size_t first, std::siz
     w.braking_w[s] = shape.mean(c.braking[s]);
     // At rest the reading is noise about nothing.
     w.current_sign[s] = w.resting[s] ? 0.0 : shape.mean(c.current_sign[s]);
-    for (std::size_t q = 0; q < heat.size(); ++q) w.copper_heat_w[q][s] = shape.mean(heat[q][s]);
+    for (std::size_t q = 0; q < memory.heat.size(); ++q)
+      w.copper_heat_w[q][s] = shape.mean(memory.heat[q][s]);
   }
+  for (std::size_t q = 0; q < memory.motion.size(); ++q) w.recent_rad_s[q] = shape.mean(memory.motion[q]);
   w.battery_voltage_v = shape.mean(c.battery_voltage);
   w.battery_current_a = shape.mean(c.battery_current);
   w.battery_power_w = shape.mean(c.battery_power);
@@ -301,7 +319,7 @@ std::vector<Window> make_windows(const RecordingSet& set, const robot::RobotMode
     const double length = std::max(settings.length_s, static_cast<double>(settings.fewest_samples) * period);
     const double longest_gap = std::max(settings.longest_gap_s, 2.5 * period);
     const Columns c = columns_of(set.missions[m], robot, period, settings.electrical_delay_s);
-    const Heat heat = heat_of(c);
+    const Memory memory = memory_of(c);
     const double hop = 0.5 * length;
     const auto windows_a_span = static_cast<std::size_t>(std::max(1.0, std::round(settings.span_s / hop)));
     std::size_t first = 0;
@@ -324,7 +342,7 @@ std::vector<Window> make_windows(const RecordingSet& set, const robot::RobotMode
         continues = false;
         continue;
       }
-      Window w = window_at(c, heat, first, last, from + 0.5 * length, length);
+      Window w = window_at(c, memory, first, last, from + 0.5 * length, length);
       w.mission = m;
       w.electrical_shift_s = settings.electrical_delay_s;
       w.continues = continues;

@@ -16,6 +16,9 @@ inline constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 // Time constants on which the copper heat is low-passed [s].
 inline constexpr std::array<double, 6> heat_time_constants_s{30, 60, 120, 240, 480, 960};
 
+// Time constants on which the motion is low-passed [s].
+inline constexpr std::array<double, 3> motion_time_constants_s{8, 25, 80};
+
 // What one smooth window (a raised cosine) of a recording says: the averages of every channel under the
 // window, and slopes in weak form, so that linear equations between channels hold exactly and no noisy
 // derivative is taken. NaN: not measured. Sides [0] right, [1] left.
@@ -32,6 +35,7 @@ struct Window {
   std::array<double, 2> motor_power_abs_w{}, braking_w{};  // mean |V i| and mean of -V i while negative
   std::array<double, 2> current_sign{};  // mean sign of the current, soft below a tenth of the friction's
   std::array<std::array<double, 2>, heat_time_constants_s.size()> copper_heat_w{};
+  std::array<double, motion_time_constants_s.size()> recent_rad_s{};  // mean |wheel speed|, low-passed
   bool power_turns = false;  // the motors may brake in one part of it and drive in another
   double battery_voltage_v = missing, battery_current_a = missing, battery_power_w = missing;
   double battery_power_slope_w_s = 0, battery_current_slope_a_s = 0;
