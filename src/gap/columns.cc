@@ -21,7 +21,7 @@ struct Expectation {
 };
 
 constexpr auto expectations = std::to_array<Expectation>({
-    {"coulomb_friction", 0.006, 0, 5},
+    {"coulomb_friction", 0.008, 0.015, 5},
     {"friction_asymmetry", 0.006, 0.010, 5},
     {"viscous_friction", 0.04, 0.03, 200},
     {"stribeck_friction", 0.02, 0, 5},

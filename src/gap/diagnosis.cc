@@ -143,7 +143,7 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
       d.power == PowerSource::motors ? power_of_motors(judged, robot) : measured_power(judged);
   const Fit& fit = result->fit;
   const MovedShares moved(fit, judged);
-  const Posterior posterior = posterior_of(fit, moved, gap_share);
+  const Posterior posterior = posterior_of(fit, moved, gap_share, d.power_absolute_relative);
   Naming naming = name_effects(fit, posterior, moved, robot, judged, judged_power, d.power_absolute_relative);
   std::optional<Ripple> ripple;
   if (settings.parts.open_set)

@@ -8,8 +8,11 @@
 namespace joulecast::gap {
 namespace {
 
-// An effect or an outside family that moves less than this share of the mean power is no finding.
-constexpr double least_effect_share = 0.011;
+// An effect that moves less than this share of the mean power is no finding, unless the data leave no doubt.
+double least_share_of(double log_odds) {
+  constexpr double usually = 0.011, for_certain = 0.007, certain = 50;
+  return log_odds > certain ? for_certain : usually;
+}
 
 // How large a coefficient is beside what a robot as filed may have.
 bool beyond_tolerance(const ColumnSet& columns, const Evidence::Estimate& estimate, const Hypothesis& h) {
@@ -42,7 +45,8 @@ double Posterior::of_effect(const ColumnSet& columns, const dynamics::Effect* ef
 
 namespace {
 
-constexpr double leading = 14;  // explanations this far below the best in log odds are let go
+constexpr double against_to_and_fro = 5;  // in log odds
+constexpr double leading = 14;            // explanations this far below the best in log odds are let go
 
 // Whether an outside family bends an effect along the variable that the effect itself follows: a departure of
 // its shape (a square zone for a round one), not something else. Friction at low speed is called Stribeck's
@@ -112,6 +116,15 @@ void name_by_catalogue(const Fit& fit, std::vector<std::size_t>& set) {
   std::ranges::sort(set);
 }
 
+// Whether the members of an explanation undo most of what each other does.
+bool to_and_fro(const Fit& fit, const MovedShares& moved, const Explanation& e, double power_gap) {
+  constexpr double most = 3;  // power that they move, over the gap
+  const Evidence::Estimate estimate = fit.evidence->estimate(e.hypotheses);
+  double sum = 0;
+  for (const std::size_t h : e.hypotheses) sum += moved(fit.columns->hypotheses()[h], estimate.mean);
+  return sum > most * power_gap;
+}
+
 double odds_without(const Fit& fit, std::vector<std::size_t> set, std::size_t member) {
   std::erase(set, member);
   return fit.evidence->log_odds(set);
@@ -127,13 +140,14 @@ double least_outside_of(double gap_share, double log_odds) {
   return std::max(sure ? for_certain : of_power, of_gap * gap_share);
 }
 
-Posterior posterior_of(const Fit& fit, const MovedShares& moved, double gap_share) {
+Posterior posterior_of(const Fit& fit, const MovedShares& moved, double gap_share, double power_gap) {
   Posterior posterior;
   double total = 0;
   std::size_t looked_at = 0;
   for (const Explanation& e : fit.explanations) {
     if (e.log_odds < fit.explanations.front().log_odds - leading || ++looked_at > 60) break;
-    const double weight = std::exp(e.log_odds - fit.explanations.front().log_odds);
+    const double held_against = to_and_fro(fit, moved, e, power_gap) ? against_to_and_fro : 0;
+    const double weight = std::exp(e.log_odds - fit.explanations.front().log_odds - held_against);
     // Families that bend an effect are taken out first: what then is left of the effect has to matter.
     std::vector<std::size_t> straight = e.hypotheses;
     name_by_catalogue(fit, straight);
@@ -153,9 +167,10 @@ Posterior posterior_of(const Fit& fit, const MovedShares& moved, double gap_shar
     for (const std::size_t k : straight) {
       const Hypothesis& h = fit.columns->hypotheses()[k];
       const double share = moved(h, estimate.mean);
+      const double gained = odds - odds_without(fit, straight, k);
       const bool matters = h.outside()
-                               ? share > least_outside_of(gap_share, odds - odds_without(fit, straight, k))
-                               : share > least_effect_share ||
+                               ? share > least_outside_of(gap_share, gained)
+                               : share > least_share_of(gained) ||
                                      (!shows_in_power(h.id()) && beyond_tolerance(*fit.columns, estimate, h));
       if (!matters) continue;
       kept.push_back(k);

@@ -29,7 +29,8 @@ inline constexpr double largest_unnamed_share = 0.012;
 // prefer it by these log odds.
 double least_outside_of(double gap_share, double log_odds);
 
-// `gap_share`: the gap beside battery power, noise taken off.
-Posterior posterior_of(const Fit& fit, const MovedShares& moved, double gap_share);
+// `power_gap`: the gap beside battery power, NaN where power is not measured; `gap_share`: the same with
+// noise taken off.
+Posterior posterior_of(const Fit& fit, const MovedShares& moved, double gap_share, double power_gap);
 
 }  // namespace joulecast::gap

@@ -16,6 +16,7 @@ constexpr double least_closed = 0.05;       // of the gap, on held-out missions
 constexpr double surely_closed = 0.3;       // of the gap, for names that the gap alone speaks for
 constexpr double explained_part = 0.5;      // of what may be left
 constexpr double most_outside = 0.3;        // posterior of something unknown beside a sure finding
+constexpr double most_none = 0.1;           // posterior of nothing beside a sure finding
 constexpr double surest_verdict = 0.97;     // what verdicts of posterior 1 came true in development trials
 
 // A battery sensor that reads too much while the motors' are right: a load that follows the current would
@@ -58,6 +59,7 @@ struct Doubts {
   bool open = false;         // a gap stands that noise does not make
   bool unexplained = false;  // held-out missions keep more of it than right names leave
   bool idle = false;         // on held-out missions they close nothing
+  bool hardly = false;       // or hardly anything, if anything
   bool strained = false;     // strengths that no robot has, or effects that undo each other
   double left = 0;           // on held-out missions, over what may be left
 };
@@ -69,8 +71,9 @@ Doubts doubts_of(const Diagnosis& d, const Naming& naming, const robot::RobotMod
     doubts.left = (d.shrinkage->after - d.noise_floor) /
                   (largest_left_share + largest_left_part * d.power_absolute_relative);
   }
-  doubts.idle = d.shrinkage && d.shrinkage->fraction < least_closed &&
-                std::ranges::all_of(d.effects, shows_in_power, &DiagnosedEffect::id);
+  const bool by_power = d.shrinkage && std::ranges::all_of(d.effects, shows_in_power, &DiagnosedEffect::id);
+  doubts.idle = by_power && d.shrinkage->fraction < least_closed;
+  doubts.hardly = by_power && d.shrinkage->interval[0] < 0;
   const bool worse = d.shrinkage && d.shrinkage->interval[1] < 0 && doubts.open;
   doubts.unexplained = worse || doubts.left > 1;
   // Effects that undo most of what each other does are the shape of something else. What leaves next to
@@ -88,7 +91,13 @@ Doubts doubts_of(const Diagnosis& d, const Naming& naming, const robot::RobotMod
 void judge(Diagnosis& d, const Naming& naming, const Posterior& posterior, const ColumnSet& columns,
            const robot::RobotModel& robot, double report_probability) {
   const Doubts doubts = doubts_of(d, naming, robot);
-  if (!d.outside.follows.empty()) {
+  if (!d.outside.follows.empty() && (posterior.by_gap_alone || posterior.none > most_none)) {
+    // That something is there only the size of the gap says, or not even that.
+    d.outside.channel = d.outside.follows = "";
+    d.effects.clear();
+    d.verdict = Verdict::inconclusive;
+    d.verdict_probability = posterior.by_gap_alone ? 1 : posterior.outside;
+  } else if (!d.outside.follows.empty()) {
     d.verdict = Verdict::outside;
     d.verdict_probability = d.outside.probability;
     // What shares the data with something unknown is no sure finding.
@@ -106,7 +115,7 @@ void judge(Diagnosis& d, const Naming& naming, const Posterior& posterior, const
         naming.weakest_group >= report_probability && posterior.outside < most_outside &&
         !doubts.unexplained && !doubts.strained &&
         (!posterior.by_gap_alone || (d.shrinkage && d.shrinkage->interval[0] > surely_closed)) &&
-        std::ranges::none_of(naming.chosen, [&](const Chosen& c) {
+        !doubts.hardly && std::ranges::none_of(naming.chosen, [&](const Chosen& c) {
           return d.motor_channels && like_a_load(columns.hypotheses()[c.hypothesis]);
         });
     d.verdict = sure ? Verdict::effects : Verdict::inconclusive;
