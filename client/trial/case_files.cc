@@ -60,6 +60,7 @@ json catalogue_values(const std::string& id, double strength, const vr::Simulati
     add("side", w.weak_side);
   } else if (id == "stribeck_friction") {
     add("speed_rad_s", w.stribeck_speed_m_s / spec.robot.wheel_radius_m);
+    add("exponent", w.stribeck_power);
   } else if (id == "torque_constant_loss") {
     add("voltage_share", w.emf_loss_share);
   } else if (id == "current_sensor_gain" || id == "current_sensor_bias" || id == "voltage_sensor_gain") {

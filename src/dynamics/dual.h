@@ -36,6 +36,9 @@ inline Dual exp(Dual a) {
   const double e = std::exp(a.value);
   return {e, e * a.slope};
 }
+inline Dual log(Dual a) {
+  return {std::log(a.value), a.slope / a.value};
+}
 inline Dual sin(Dual a) {
   return {std::sin(a.value), std::cos(a.value) * a.slope};
 }
@@ -62,6 +65,7 @@ inline double value_of(Dual a) {
 
 using std::cos;
 using std::exp;
+using std::log;
 using std::sin;
 using std::sqrt;
 using std::tanh;

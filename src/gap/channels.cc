@@ -43,6 +43,30 @@ dynamics::Instant instant_of(const dynamics::BasicDriveModel<S>& model, const Wi
   return at;
 }
 
+// Mean of a function of the motion under a window. Friction bends with speed: where the speed changes under
+// the window, its begin, middle and end are taken apart.
+template <class Function>
+auto mean_under(const Window& w, const dynamics::Instant& middle, const Function& f) {
+  constexpr double least_change_rad_s = 0.03;
+  const auto changes = [&](std::size_t s) {
+    if (w.resting[s]) return false;
+    return std::ranges::any_of(std::array<std::size_t, 3>{0, 1, 2}, [&](std::size_t part) {
+      return w.part_weight[part] > 0 &&
+             std::fabs(w.part_speed_rad_s[part][s] - w.speed_rad_s[s]) > least_change_rad_s;
+    });
+  };
+  if (!changes(0) && !changes(1)) return f(middle);
+  auto mean = f(middle) * 0.0;
+  for (std::size_t part = 0; part < w.part_weight.size(); ++part) {
+    dynamics::Instant at = middle;
+    for (std::size_t s : {0u, 1u}) {
+      if (!w.resting[s]) at.wheel_speed_rad_s[s] = w.part_speed_rad_s[part][s];
+    }
+    mean += f(at) * w.part_weight[part];
+  }
+  return mean;
+}
+
 }  // namespace
 
 std::string_view name_of(Channel channel) {
@@ -75,7 +99,8 @@ S metered_power(const dynamics::BasicDriveModel<S>& model, const Window& w) {
   if (w.resting[0] && w.resting[1]) {
     return model.metered_battery_power(model.battery_power_for({S(0), S(0)}), w.battery_voltage_v);
   }
-  const S power = model.flow(at).battery_power_w;
+  const S power =
+      mean_under(w, at, [&](const dynamics::Instant& node) { return model.flow(node).battery_power_w; });
   return model.metered_battery_power(power, w.battery_voltage_v) -
          (model.parameters().sensor_delay_s - w.electrical_shift_s) *
              (std::isfinite(w.battery_power_slope_w_s) ? w.battery_power_slope_w_s : 0.0);
@@ -109,6 +134,9 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
   r.fill(S(missing));
   const dynamics::Instant at = instant_of(model, w);
   const auto balance = model.balance(at);
+  const auto torque_nm = [&](std::size_t s) {
+    return mean_under(w, at, [&](const dynamics::Instant& node) { return model.balance(node).total_nm[s]; });
+  };
   std::array<S, 2> motor_power{};
   S motor_abs = 0, braking = 0;
   for (std::size_t s : {0u, 1u}) {
@@ -127,8 +155,7 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
     }
     if (w.moving[s]) {
       r[index_of(Channel::torque_right) + s] =
-          reading - (S(1) + p.motor_current.gain) * model.current_for(balance.total_nm[s]) -
-          p.motor_current.bias;
+          reading - (S(1) + p.motor_current.gain) * model.current_for(torque_nm(s)) - p.motor_current.bias;
     }
     const S gain = (S(1) + p.motor_current.gain) * (S(1) + p.motor_voltage.gain);
     motor_power[s] = (S(w.motor_power_w[s]) - p.motor_current.bias * w.voltage_v[s]) / gain;

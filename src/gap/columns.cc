@@ -125,7 +125,10 @@ ColumnSet::ColumnSet(const robot::RobotModel& robot, std::span<const Window> win
     } else if (id == "stribeck_friction") {
       for (const double speed_m_s : shapes.stribeck_speeds_m_s) {
         v[1] = speed_m_s / robot.kinematics.wheel_radius_m;
-        add_effect(*effect, v, 0, 4);
+        for (const double exponent : shapes.stribeck_exponents) {
+          v[2] = exponent;
+          add_effect(*effect, v, 0, 6);
+        }
       }
     } else if (id == "turning_scrub") {
       for (const double rate_rad_s : shapes.scrub_rates_rad_s) {
@@ -403,6 +406,11 @@ void ColumnSet::scale(std::span<const Window> windows, double gap_share) {
         c.tolerance =
             std::hypot(0.006 * robot_.idle_power_w, (0.0005 + discrepancy * gap_share) * mean_power_w_);
         c.scatter = 0.008 * robot_.idle_power_w;
+      }
+      if (h.id() == "battery_resistance") {
+        // Steps of the reading as large as the sag make any resistance of it.
+        const double sag_v = robot_.battery.internal_resistance_ohm * ranges_.battery_current_a;
+        if (sag_v > 0) c.tolerance = std::hypot(c.tolerance, 2 * ranges_.battery_voltage_step_v / sag_v);
       }
       // Shapes of one effect are nearly one column: together they are off by what one of them may be.
       if (h.one_shape) {

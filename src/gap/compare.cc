@@ -120,6 +120,58 @@ double chance_of(std::span<const GroupStrength> groups) {
   return chi_square_tail(chi, static_cast<double>(count - 1));
 }
 
+// Effects that groups share, and those of which each group has its own strength.
+struct Choice {
+  std::vector<std::size_t> common, differing;
+  std::vector<double> gains;  // of each that differs, over one strength for all
+  double explained = 0;       // log evidence, over none
+};
+
+// One effect after the other is taken in, with one strength for all or with one for each group, as long as
+// that is worth it; of each effect one variant.
+Choice choose(const ColumnSet& columns, std::span<const Information> groups,
+              std::span<const std::size_t> candidates) {
+  Choice choice;
+  auto& [common, differing, gains, explained] = choice;
+  const auto taken = [&](std::size_t h) {
+    const auto same = [&](std::size_t other) {
+      return columns.hypotheses()[other].effect.effect == columns.hypotheses()[h].effect.effect;
+    };
+    return std::ranges::any_of(choice.common, same) || std::ranges::any_of(choice.differing, same);
+  };
+  const double none = GroupedFit(columns, groups, {}, {}).log_evidence();
+  double reached = none;
+  while (common.size() + differing.size() < most_effects) {
+    double best = 0, best_common = 0;
+    std::size_t chosen = columns.hypotheses().size();
+    bool differs = false;
+    for (const std::size_t h : candidates) {
+      if (taken(h)) continue;
+      std::vector<std::size_t> more = common;
+      more.push_back(h);
+      const double alike = GroupedFit(columns, groups, more, differing).log_evidence() - reached + log_prior;
+      more = differing;
+      more.push_back(h);
+      const double apart = GroupedFit(columns, groups, common, more).log_evidence() - reached + 2 * log_prior;
+      if (std::max(alike, apart) <= best) continue;
+      best = std::max(alike, apart);
+      best_common = alike;
+      differs = apart > alike;
+      chosen = h;
+    }
+    if (chosen == columns.hypotheses().size()) break;
+    if (differs) {
+      differing.push_back(chosen);
+      gains.push_back(best - best_common);
+    } else {
+      common.push_back(chosen);
+    }
+    reached = GroupedFit(columns, groups, common, differing).log_evidence();
+  }
+  explained = reached - none;
+  return choice;
+}
+
 }  // namespace
 
 std::string group_of(const std::string& mission_id, GroupBy by) {
@@ -188,45 +240,14 @@ Result<Comparison> compare_groups(const RecordingSet& recordings,
   };
   const std::vector<Information> all = grouped(missions.size());
 
-  // One effect after the other is taken in, with one strength for all or with one for each group, as long as
-  // that is worth it; of each effect one variant.
-  std::vector<std::size_t> common, differing;
-  std::vector<double> gains;
-  const auto taken = [&](std::size_t h) {
-    const auto same = [&](std::size_t other) {
-      return columns.hypotheses()[other].effect.effect == columns.hypotheses()[h].effect.effect;
-    };
-    return std::ranges::any_of(common, same) || std::ranges::any_of(differing, same);
-  };
-  double reached = GroupedFit(columns, all, {}, {}).log_evidence();
-  while (common.size() + differing.size() < most_effects) {
-    double best = 0, best_common = 0;
-    std::size_t chosen = columns.hypotheses().size();
-    bool differs = false;
-    for (const std::size_t h : candidates) {
-      if (taken(h)) continue;
-      std::vector<std::size_t> more = common;
-      more.push_back(h);
-      const double alike = GroupedFit(columns, all, more, differing).log_evidence() - reached + log_prior;
-      more = differing;
-      more.push_back(h);
-      const double apart = GroupedFit(columns, all, common, more).log_evidence() - reached + 2 * log_prior;
-      if (std::max(alike, apart) <= best) continue;
-      best = std::max(alike, apart);
-      best_common = alike;
-      differs = apart > alike;
-      chosen = h;
-    }
-    if (chosen == columns.hypotheses().size()) break;
-    if (differs) {
-      differing.push_back(chosen);
-      gains.push_back(best - best_common);
-    } else {
-      common.push_back(chosen);
-    }
-    reached = GroupedFit(columns, all, common, differing).log_evidence();
-    if (progress && !progress(0.7)) return fail(Fault::conflict, "", "comparison cancelled");
-  }
+  // Chosen twice: what the first choice explains says how far the formulas themselves can be believed.
+  Choice choice = choose(columns, all, candidates);
+  std::vector<Information> believed = all;
+  for (Information& sum : believed) sum *= coarsening_for(choice.explained);
+  if (progress && !progress(0.6)) return fail(Fault::conflict, "", "comparison cancelled");
+  choice = choose(columns, believed, candidates);
+  if (progress && !progress(0.8)) return fail(Fault::conflict, "", "comparison cancelled");
+  const auto& [common, differing, gains, explained] = choice;
   for (const std::size_t h : common) c.common.push_back(columns.hypotheses()[h].id());
 
   // Common effects are read in each group too, so that what does not differ is seen beside what does.

@@ -195,6 +195,13 @@ Information& Information::operator+=(const Information& other) {
   return *this;
 }
 
+Information& Information::operator*=(double factor) {
+  xx *= factor;
+  xy *= factor;
+  yy *= factor;
+  return *this;
+}
+
 std::vector<Information> mission_information(const ColumnSet& columns, const Design& design) {
   const auto p = static_cast<Eigen::Index>(columns.size());
   std::vector<Information> missions(design.missions);

@@ -38,6 +38,7 @@ struct Information {
   double yy = 0;
 
   Information& operator+=(const Information& other);
+  Information& operator*=(double factor);
 };
 
 // One for each mission, with the coefficients' own deviations in that mission (Column::scatter) integrated

@@ -17,7 +17,8 @@ namespace {
 
 constexpr std::size_t fewest_windows = 40;
 constexpr double settled_delay_s = 0.006;
-constexpr int most_delay_rounds = 4;
+constexpr double settled_bias = 0.1;  // of the friction's current
+constexpr int most_rounds = 4;
 constexpr double largest_gap_share = 0.12;  // to which the trust in formulas is scaled
 
 // Where the battery is not measured: the motors' power and the idle power of the robot file.
@@ -54,11 +55,14 @@ std::vector<robot::AdoptedEffect> adoptable_of(std::span<const DiagnosedEffect> 
   return adoptable;
 }
 
-double found_delay(const FitResult& result) {
+// What the sensors were found to do to a motor's readings: what windows take out of them.
+void take_out_of(const FitResult& result, WindowSettings& settings) {
+  settings.electrical_delay_s = settings.motor_current_bias_a = 0;
   for (const dynamics::ActiveEffect& effect : result.fit.columns->effects_of(result.chosen)) {
-    if (effect.effect->info().id == "sensor_delay") return effect.values[0];
+    const std::string_view id = effect.effect->info().id;
+    if (id == "sensor_delay") settings.electrical_delay_s = effect.values[0];
+    if (id == "current_sensor_bias") settings.motor_current_bias_a = effect.values[0] * effect.values[1];
   }
-  return 0;
 }
 
 }  // namespace
@@ -127,17 +131,23 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
   const double gap_share =
       with_power > 0 ? std::clamp(d.power_absolute_relative - d.noise_floor, 0.0, largest_gap_share) : 0.0;
 
-  // A delay is linear only while it is short beside the window: what is found is taken out and fitted again.
+  // A delay is linear only while it is short beside the window, a bias only while it turns no current's sign:
+  // what is found is taken out and fitted again.
   std::vector<Window> judged = windows;
   std::optional<FitResult> result;
+  const double settled_bias_a = settled_bias * robot.motor.friction_torque_nm[0] /
+                                (robot.motor.torque_constant_nm_a * robot.motor.gear_ratio);
+  WindowSettings taken_out = settings.parts.windows;
   for (int round = 0;; ++round) {
     result = fit_windows(robot, judged, gap_share, settings.progress, settings.parts);
     if (!result) return fail(Fault::conflict, "", "diagnosis cancelled");
-    const double shift = judged.front().electrical_shift_s, delay = found_delay(*result);
-    if (std::fabs(delay - shift) < settled_delay_s || round >= most_delay_rounds) break;
-    WindowSettings moved = settings.parts.windows;
-    moved.electrical_delay_s = delay;
-    judged = windows_with(moved);
+    const WindowSettings before = taken_out;
+    take_out_of(*result, taken_out);
+    const bool settled =
+        std::fabs(taken_out.electrical_delay_s - before.electrical_delay_s) < settled_delay_s &&
+        std::fabs(taken_out.motor_current_bias_a - before.motor_current_bias_a) < settled_bias_a;
+    if (settled || round >= most_rounds) break;
+    judged = windows_with(taken_out);
   }
   const std::vector<double> judged_power =
       d.power == PowerSource::motors ? power_of_motors(judged, robot) : measured_power(judged);

@@ -30,7 +30,7 @@ Fit make_fit(const robot::RobotModel& robot, std::span<const Window> windows, bo
   fit.evidence = std::make_unique<Evidence>(*fit.columns, fit.total);
   fit.explanations = search(*fit.evidence);
   const double signal = fit.explanations.front().log_odds;
-  fit.evidence = std::make_unique<Evidence>(*fit.columns, fit.total, 1 / (1 + signal / trusted_log_odds));
+  fit.evidence = std::make_unique<Evidence>(*fit.columns, fit.total, coarsening_for(signal));
   fit.explanations = search(*fit.evidence);
   return fit;
 }
@@ -42,6 +42,10 @@ bool without_motor_channels(std::span<const Window> windows) {
     return std::isfinite(w.current_a[0]) && std::isfinite(w.current_a[1]);
   });
   return static_cast<std::size_t>(with) < windows.size() / 5;
+}
+
+double coarsening_for(double log_odds) {
+  return 1 / (1 + std::max(0.0, log_odds) / trusted_log_odds);
 }
 
 MovedShares::MovedShares(const Fit& fit, std::span<const Window> windows)

@@ -197,6 +197,7 @@ Ranges ranges_of(std::span<const Window> windows, const robot::RobotModel& robot
       if (std::isfinite(w.current_a[s])) current = std::max(current, std::fabs(w.current_a[s]));
     }
     if (std::isfinite(w.battery_current_a)) battery = std::max(battery, std::fabs(w.battery_current_a));
+    r.battery_voltage_step_v = std::max(r.battery_voltage_step_v, w.battery_voltage_step_v);
     payload_low = std::min(payload_low, w.payload_kg);
     payload_high = std::max(payload_high, w.payload_kg);
     duration = std::max(duration, w.t_s);

@@ -14,17 +14,36 @@ using telemetry::Sample;
 
 constexpr double moving_rad_s = 0.10;   // slowest wheel that surely turns
 constexpr double resting_rad_s = 0.03;  // fastest wheel that surely stands
+// Turned since it stood, from which on a wheel slides: before that dry friction builds up as contacts bend
+// (Canudas de Wit and others 1995).
+constexpr double sliding_rad = 0.1;
 constexpr std::size_t block_windows = 50;
 
 // One mission's channels as columns, with what needs every sample worked out.
 struct Columns {
   std::vector<double> t;
   std::array<std::vector<double>, 2> speed, smooth_speed, voltage, current, power, power_abs, braking, angle,
-      current_sign;
+      current_sign, slid;
   std::vector<double> battery_voltage, battery_current, battery_power, yaw_rate, x, y, heading, payload,
       charge;
   std::array<std::vector<double>, 2> copper;
+  double battery_voltage_step_v = 0;
 };
+
+// Median distance between neighbouring values among readings that differ: the step of a coarse converter,
+// next to nothing for a fine one.
+double step_of(std::vector<double> readings) {
+  std::erase_if(readings, [](double v) { return !std::isfinite(v); });
+  std::ranges::sort(readings);
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < readings.size(); ++k) {
+    if (readings[k] > readings[k - 1]) steps.push_back(readings[k] - readings[k - 1]);
+  }
+  if (steps.empty()) return 0;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::ranges::nth_element(steps, middle);
+  return *middle;
+}
 
 // Centred mean over samples within +-half_s.
 std::vector<double> smoothed(const std::vector<double>& t, const std::vector<double>& v, double half_s) {
@@ -54,7 +73,8 @@ std::vector<double> shifted(const std::vector<double>& t, const std::vector<doub
 }
 
 Columns columns_of(const telemetry::Recording& mission, const robot::RobotModel& robot, double period_s,
-                   double delay_s) {
+                   const WindowSettings& settings) {
+  const double delay_s = settings.electrical_delay_s;
   const std::size_t n = mission.samples.size();
   Columns c;
   const auto fill = [&](std::vector<double>& column, auto&& get) {
@@ -84,12 +104,14 @@ Columns columns_of(const telemetry::Recording& mission, const robot::RobotModel&
                           dynamics::brush_width_a;
     c.copper[s].resize(n);
     c.angle[s].resize(n);
+    c.slid[s].resize(n);
     for (std::size_t k = 0; k < n; ++k) {
       c.power[s][k] = c.voltage[s][k] * c.current[s][k];
       const double power = volts[k] * amps[k];
       c.power_abs[s][k] = std::fabs(power);
       c.braking[s][k] = std::max(0.0, -power);
-      c.current_sign[s][k] = std::isfinite(amps[k]) ? std::tanh(amps[k] / soft_a) : 0.0;
+      c.current_sign[s][k] =
+          std::isfinite(amps[k]) ? std::tanh((amps[k] - settings.motor_current_bias_a) / soft_a) : 0.0;
       double current = amps[k];
       if (!std::isfinite(current)) {
         // No motor current: the nominal friction current heats the winding.
@@ -102,10 +124,15 @@ Columns columns_of(const telemetry::Recording& mission, const robot::RobotModel&
       c.copper[s][k] = robot.motor.resistance_ohm * current * current;
       const double step = k == 0 ? 0.0 : c.t[k] - c.t[k - 1];
       c.angle[s][k] = k == 0 ? 0.0 : c.angle[s][k - 1] + 0.5 * step * (c.speed[s][k] + c.speed[s][k - 1]);
+      const double speed = c.smooth_speed[s][k];
+      const bool stands = std::fabs(speed) < resting_rad_s || (k > 0 && speed * c.smooth_speed[s][k - 1] < 0);
+      // A recording that begins on the way slides from its beginning.
+      c.slid[s][k] = stands ? 0.0 : k == 0 ? sliding_rad : c.slid[s][k - 1] + std::fabs(speed) * step;
     }
   }
   electrical(c.battery_voltage, [](const Sample& s) { return s.battery_voltage_v; });
   electrical(c.battery_current, [](const Sample& s) { return s.battery_current_a; });
+  c.battery_voltage_step_v = step_of(c.battery_voltage);
   c.battery_power.resize(n);
   c.charge.resize(n);
   for (std::size_t k = 0; k < n; ++k) {
@@ -234,6 +261,11 @@ class Shape {  // one window's weights
       mean_slope += slope_[k - first];
     }
     for (double& w : weight_) w /= total;
+    for (std::size_t k = first; k < last; ++k) {
+      const double third = 3 * (c.t[k] - centre) / length;
+      part_.push_back(third < -0.5 ? 0 : third > 0.5 ? 2 : 1);
+      part_weight_[part_.back()] += weight_[k - first];
+    }
     // The slope's weights see no constant and have gain one on a straight line.
     double gain = 0;
     for (std::size_t k = 0; k < weight_.size(); ++k) {
@@ -243,6 +275,15 @@ class Shape {  // one window's weights
     for (double& s : slope_) s /= gain;
   }
   double mean(const std::vector<double>& v) const { return sum(weight_, v); }
+  // Of the samples in the window's begin, middle and end; 0 where there are none.
+  const std::array<double, 3>& part_weight() const { return part_weight_; }
+  double mean_of_part(std::size_t part, const std::vector<double>& v) const {
+    double total = 0;
+    for (std::size_t k = 0; k < weight_.size(); ++k) {
+      if (part_[k] == part) total += weight_[k] * v[first_ + k];
+    }
+    return part_weight_[part] > 0 ? total / part_weight_[part] : 0;
+  }
   double slope(const std::vector<double>& v) const { return sum(slope_, v); }
 
  private:
@@ -253,6 +294,8 @@ class Shape {  // one window's weights
   }
   std::size_t first_;
   std::vector<double> weight_, slope_;
+  std::vector<std::size_t> part_;  // of each sample
+  std::array<double, 3> part_weight_{};
 };
 
 Window window_at(const Columns& c, const Memory& memory, std::size_t first, std::size_t last, double centre,
@@ -260,19 +303,23 @@ Window window_at(const Columns& c, const Memory& memory, std::size_t first, std:
   const Shape shape(c, first, last, centre, length);
   Window w;
   w.t_s = centre;
+  w.part_weight = shape.part_weight();
   w.payload_kg = shape.mean(c.payload);
   for (std::size_t s : {0u, 1u}) {
     w.speed_rad_s[s] = shape.mean(c.speed[s]);
     w.acceleration_rad_s2[s] = shape.slope(c.speed[s]);
+    for (std::size_t part = 0; part < w.part_weight.size(); ++part)
+      w.part_speed_rad_s[part][s] = shape.mean_of_part(part, c.speed[s]);
     double slowest = std::numeric_limits<double>::infinity(), fastest = 0;
-    bool forward = false, backward = false;
+    bool forward = false, backward = false, slides = true;
     for (std::size_t k = first; k < last; ++k) {
       const double speed = c.smooth_speed[s][k];
+      slides = slides && c.slid[s][k] >= sliding_rad;
       slowest = std::min(slowest, std::fabs(speed));
       fastest = std::max(fastest, std::fabs(speed));
       (speed > 0 ? forward : backward) = true;
     }
-    w.moving[s] = slowest > moving_rad_s && !(forward && backward);
+    w.moving[s] = slowest > moving_rad_s && !(forward && backward) && slides;
     w.resting[s] = fastest < resting_rad_s;
     w.voltage_v[s] = shape.mean(c.voltage[s]);
     w.current_a[s] = shape.mean(c.current[s]);
@@ -288,6 +335,7 @@ Window window_at(const Columns& c, const Memory& memory, std::size_t first, std:
   }
   for (std::size_t q = 0; q < memory.motion.size(); ++q) w.recent_rad_s[q] = shape.mean(memory.motion[q]);
   w.battery_voltage_v = shape.mean(c.battery_voltage);
+  w.battery_voltage_step_v = c.battery_voltage_step_v;
   w.battery_current_a = shape.mean(c.battery_current);
   w.battery_power_w = shape.mean(c.battery_power);
   w.battery_power_slope_w_s = shape.slope(c.battery_power);
@@ -318,7 +366,7 @@ std::vector<Window> make_windows(const RecordingSet& set, const robot::RobotMode
     const double period = median_period(set.missions[m]);
     const double length = std::max(settings.length_s, static_cast<double>(settings.fewest_samples) * period);
     const double longest_gap = std::max(settings.longest_gap_s, 2.5 * period);
-    const Columns c = columns_of(set.missions[m], robot, period, settings.electrical_delay_s);
+    const Columns c = columns_of(set.missions[m], robot, period, settings);
     const Memory memory = memory_of(c);
     const double hop = 0.5 * length;
     const auto windows_a_span = static_cast<std::size_t>(std::max(1.0, std::round(settings.span_s / hop)));

@@ -28,6 +28,9 @@ struct Window {
   double t_s = 0;          // since the mission began
   double payload_kg = 0;
   std::array<double, 2> speed_rad_s{}, acceleration_rad_s2{};
+  // Begin, middle and end of the window: their parts of the mean and the mean speeds in them.
+  std::array<double, 3> part_weight{0, 1, 0};
+  std::array<std::array<double, 2>, 3> part_speed_rad_s{};
   std::array<bool, 2> moving{}, resting{};  // throughout the window; neither: starting or stopping
   std::array<double, 2> voltage_v{missing, missing}, current_a{missing, missing};
   std::array<double, 2> voltage_slope_v_s{}, current_slope_a_s{};
@@ -38,6 +41,7 @@ struct Window {
   std::array<double, motion_time_constants_s.size()> recent_rad_s{};  // mean |wheel speed|, low-passed
   bool power_turns = false;  // the motors may brake in one part of it and drive in another
   double battery_voltage_v = missing, battery_current_a = missing, battery_power_w = missing;
+  double battery_voltage_step_v = 0;  // between readings that differ, of the whole mission
   double battery_power_slope_w_s = 0, battery_current_slope_a_s = 0;
   double electrical_shift_s = 0;  // by which electrical readings were moved back before windowing
   double charge_as = 0;           // drawn since the mission began
@@ -55,6 +59,7 @@ struct WindowSettings {
   double longest_gap_s = 0.25;      // between samples inside a window
   double span_s = 1.0;              // over which progress by the map is compared
   double electrical_delay_s = 0;    // by which electrical channels lag; taken out before windowing
+  double motor_current_bias_a = 0;  // of the reading, when the sign of a current is asked for
   std::size_t most_windows = 8000;  // beyond it, blocks of windows are left out evenly
 };
 

@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "dynamics/stribeck_curve.h"
+
 namespace joulecast::planning {
 
 using dynamics::Instant;
@@ -29,6 +31,7 @@ Result<DriveLoads> DriveLoads::make(const robot::RobotModel& robot, std::optiona
     if (effect.effect->info().id == "stribeck_friction") {
       for (std::size_t s : {0u, 1u}) loads.stribeck_nm_[s] = effect.values[0] * p.friction_torque_nm[s];
       loads.stribeck_speed_rad_s_ = effect.values[1];
+      loads.stribeck_exponent_ = effect.values[2];
     }
   }
   Electric& e = loads.electric_;
@@ -104,9 +107,10 @@ WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slo
     if (stribeck_nm_[s] != 0 && pace[s] != 0) {
       w.stribeck = stribeck_nm_[s] * direction;
       w.stribeck_speed = stribeck_speed_rad_s_ / std::fabs(pace[s]);
+      w.stribeck_exponent = stribeck_exponent_;
       for (std::size_t k = 0; k < 3; ++k) {
         const double x = 0.5 * static_cast<double>(k + 1) / w.stribeck_speed;
-        inside[k] -= w.stribeck * std::exp(-x * x);
+        inside[k] -= w.stribeck * dynamics::stribeck_curve(x, w.stribeck_exponent);
       }
     }
     fit(slow.through[s], middle.through[s], fast.through[s], w.t0, w.t1, w.t2);

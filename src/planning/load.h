@@ -14,7 +14,7 @@ namespace joulecast::planning {
 // What one wheel's motor must deliver at a place of a run, as a function of the speed v along the run's
 // coordinate and its acceleration q:
 //   through the gear  tau = inertia q + t0 + t1 v + t2 v^2
-//   inside the motor  f   = f0 + f1 v + f2 v^2 + stribeck exp(-(v/stribeck_speed)^2)
+//   inside the motor  f   = f0 + f1 v + f2 v^2 + stribeck exp(-|v/stribeck_speed|^stribeck_exponent)
 //   torque            T   = tau + gear |tau| + f.
 // Its wheel turns at pace * v.
 struct WheelLoad {
@@ -22,7 +22,7 @@ struct WheelLoad {
   double inertia = 0;
   double t0 = 0, t1 = 0, t2 = 0;
   double f0 = 0, f1 = 0, f2 = 0;
-  double stribeck = 0, stribeck_speed = 1;
+  double stribeck = 0, stribeck_speed = 1, stribeck_exponent = 2;
   double gear = 0;  // signed by the wheel's direction
 
   bool linear() const { return t1 == 0 && t2 == 0 && f2 == 0 && stribeck == 0 && gear == 0; }
@@ -69,7 +69,7 @@ class DriveLoads {
   Electric electric_;
   bool needs_position_ = false, needs_heading_ = false;
   std::array<double, 2> stribeck_nm_{};
-  double stribeck_speed_rad_s_ = 1;
+  double stribeck_speed_rad_s_ = 1, stribeck_exponent_ = 2;
 };
 
 // P of each motor where its load is linear: thesis (4-1) on any coordinate.

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "dynamics/stribeck_curve.h"
+
 namespace joulecast::planning {
 namespace {
 
@@ -16,7 +18,7 @@ double speed_of(double z0, double z1) {
 double torque_of(const WheelLoad& w, double v, double q) {
   const double through = w.inertia * q + w.t0 + v * (w.t1 + v * w.t2);
   double t = through + w.gear * std::fabs(through) + w.f0 + v * (w.f1 + v * w.f2);
-  if (w.stribeck != 0) t += w.stribeck * std::exp(-(v * v) / (w.stribeck_speed * w.stribeck_speed));
+  if (w.stribeck != 0) t += w.stribeck * dynamics::stribeck_curve(v / w.stribeck_speed, w.stribeck_exponent);
   return t;
 }
 
@@ -188,10 +190,11 @@ SpeedSolver::Torque SpeedSolver::torque(const WheelLoad& w, double v, double q) 
     r.tqq = w.gear * bend * w.inertia * w.inertia;
   }
   if (w.stribeck != 0) {
-    const double x = v / w.stribeck_speed, y = w.stribeck * std::exp(-x * x);
-    r.t += y;
-    r.tv -= 2 * x / w.stribeck_speed * y;
-    r.tvv += (4 * x * x - 2) / (w.stribeck_speed * w.stribeck_speed) * y;
+    const dynamics::StribeckSlopes curve =
+        dynamics::stribeck_slopes(v / w.stribeck_speed, w.stribeck_exponent);
+    r.t += w.stribeck * curve.value;
+    r.tv += w.stribeck * curve.first / w.stribeck_speed;
+    r.tvv += w.stribeck * curve.second / (w.stribeck_speed * w.stribeck_speed);
   }
   return r;
 }

@@ -235,7 +235,7 @@ double planned_power_w(const planning::Electric& e, const planning::WheelLoads& 
     const double tau = w.inertia * acceleration + w.t0 + w.t1 * speed + w.t2 * speed * speed;
     const double x = speed / w.stribeck_speed;
     const double torque = tau + w.gear * std::fabs(tau) + w.f0 + w.f1 * speed + w.f2 * speed * speed +
-                          w.stribeck * std::exp(-x * x);
+                          w.stribeck * std::exp(-std::pow(x, w.stribeck_exponent));
     const double motor_w = e.copper_w_n2_m2[s] * torque * torque + e.back_emf * w.pace * speed * torque +
                            e.brush_w_nm * std::fabs(torque);
     power_w += (motor_w > 0 ? e.up : e.down) * motor_w;
