@@ -93,8 +93,9 @@ void print_diagnosis(const json& d) {
                100 * number(w["ci"][1]));
   }
   for (const json& n : d["next_drive"]) {
-    fmt::print("next drive, to tell {}: {} (log evidence +{:.1f})\n", text(n["separates"]),
-               text(n["manoeuvre"]), number(n["expected_log_evidence"]));
+    const json& evidence = n["expected_log_evidence"];
+    fmt::print("next drive, to tell {}: {}{}\n", text(n["separates"]), text(n["manoeuvre"]),
+               evidence.is_null() ? "" : fmt::format(" (log evidence +{:.1f})", number(evidence)));
   }
 }
 

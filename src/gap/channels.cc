@@ -47,15 +47,13 @@ dynamics::Instant instant_of(const dynamics::BasicDriveModel<S>& model, const Wi
 // the window, its begin, middle and end are taken apart.
 template <class Function>
 auto mean_under(const Window& w, const dynamics::Instant& middle, const Function& f) {
-  constexpr double least_change_rad_s = 0.03;
+  constexpr double least_change_rad_s = 0.05;  // from begin to end
   const auto changes = [&](std::size_t s) {
-    if (w.resting[s]) return false;
-    return std::ranges::any_of(std::array<std::size_t, 3>{0, 1, 2}, [&](std::size_t part) {
-      return w.part_weight[part] > 0 &&
-             std::fabs(w.part_speed_rad_s[part][s] - w.speed_rad_s[s]) > least_change_rad_s;
-    });
+    return !w.resting[s] &&
+           std::fabs(w.part_speed_rad_s[2][s] - w.part_speed_rad_s[0][s]) > least_change_rad_s;
   };
-  if (!changes(0) && !changes(1)) return f(middle);
+  const bool whole = std::ranges::all_of(w.part_weight, [](double weight) { return weight > 0; });
+  if (!whole || (!changes(0) && !changes(1))) return f(middle);
   auto mean = f(middle) * 0.0;
   for (std::size_t part = 0; part < w.part_weight.size(); ++part) {
     dynamics::Instant at = middle;

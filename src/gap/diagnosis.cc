@@ -180,6 +180,10 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
   name_burning_slip(d.effects);
   std::ranges::stable_sort(d.effects, std::greater{}, &DiagnosedEffect::share);
   d.next_drive = next_drives(fit, robot, d);
+  if (d.verdict == Verdict::outside) {
+    const auto more = drives_for(d.outside);
+    d.next_drive.insert(d.next_drive.begin(), more.begin(), more.end());
+  }
   return d;
 }
 

@@ -1,8 +1,10 @@
 #include "gap/next_drive.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
+#include <string_view>
 
 namespace joulecast::gap {
 namespace {
@@ -172,6 +174,30 @@ std::vector<NextDrive> first_drives(const robot::RobotModel& robot) {
     drives.push_back({m.text, "a gap from none", missing});
   }
   return drives;
+}
+
+std::vector<NextDrive> drives_for(const Outside& outside) {
+  struct Advice {
+    std::string_view variable, manoeuvre;
+  };
+  constexpr auto advice = std::to_array<Advice>({
+      {"time", "the same drive twice: after an hour of rest, and again at once"},
+      {"recent_motion", "five minutes of standing, ten of driving without a halt, ten of standing"},
+      {"position", "the same course on another part of the floor"},
+      {"heading", "legs in eight headings over one place"},
+      {"payload", "the same leg and turn with no, half and full payload"},
+      {"speed", "straight legs at 10, 20, 40, 60, 80 and 100 % of the speed limit, 8 s each"},
+      {"acceleration", "starts and stops at a quarter, half and all of the acceleration limit"},
+      {"yaw_rate", "turns in place both ways at 10, 30, 60 and 100 % of the yaw rate limit, 6 s each"},
+      {"wheel_angle", "straight legs at 5 and 10 % of the speed limit over ten turns of a wheel"},
+      {"current", "the same leg with no, half and full payload, started hard and gently"},
+      {"battery_current",
+       "the same leg with no, half and full payload, on a full and on a half-empty battery"},
+  });
+  const auto* found = std::ranges::find(advice, outside.follows, &Advice::variable);
+  if (found == advice.end()) return {};
+  return {{std::string(found->manoeuvre), "what follows the " + std::string(found->variable) + " from chance",
+           missing}};
 }
 
 std::vector<NextDrive> next_drives(const Fit& fit, const robot::RobotModel& robot,

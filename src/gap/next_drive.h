@@ -12,6 +12,9 @@ namespace joulecast::gap {
 std::vector<NextDrive> next_drives(const Fit& fit, const robot::RobotModel& robot,
                                    const Diagnosis& diagnosis);
 
+// What shows whether something follows a variable, and how.
+std::vector<NextDrive> drives_for(const Outside& outside);
+
 // What to drive before anything can be said: the first of the list.
 std::vector<NextDrive> first_drives(const robot::RobotModel& robot);
 

@@ -37,6 +37,8 @@ std::string follows_words(std::string_view variable) {
     return "repeats with the turning of a wheel, as of a wheel out of round, a bent axle, a damaged tooth "
            "or a motor that cogs";
   if (variable == "time") return "changes with the time since the mission began";
+  if (variable == "recent_motion")
+    return "grows or falls with how much the robot moved of late, as of what warms up in use";
   if (variable == "position") return "depends on where the robot is";
   return "follows the " + words_of(variable);
 }
@@ -57,6 +59,10 @@ std::vector<std::string> against_effects(const Diagnosis& d) {
           sentence(fmt::format("on missions left out of the fit {}, {} instead of {}, and is no explanation",
                                one ? "it makes the gap larger" : "what they do makes the gap larger",
                                percent(s.after), percent(s.before))));
+    } else if (s.interval[0] < 0) {
+      reasons.push_back(sentence(fmt::format(
+          "that {} on missions left out of the fit is not sure: the gap shrinks by {} to {} there",
+          one ? "it helps" : "they help", percent(s.interval[0]), percent(s.interval[1]))));
     } else if (s.after > notable_rest * d.noise_floor) {
       reasons.push_back(sentence(
           fmt::format("with {} {} of the power is still missed on missions left out of the fit, where "

@@ -28,7 +28,8 @@ struct Window {
   double t_s = 0;          // since the mission began
   double payload_kg = 0;
   std::array<double, 2> speed_rad_s{}, acceleration_rad_s2{};
-  // Begin, middle and end of the window: their parts of the mean and the mean speeds in them.
+  // Begin, middle and end of the window: their parts of the mean and the mean speeds in them; a part
+  // without samples has no weight.
   std::array<double, 3> part_weight{0, 1, 0};
   std::array<std::array<double, 2>, 3> part_speed_rad_s{};
   std::array<bool, 2> moving{}, resting{};  // throughout the window; neither: starting or stopping

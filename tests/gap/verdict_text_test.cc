@@ -41,6 +41,18 @@ TEST(VerdictText, TellsWhereSomethingUnknownShowsAndWhatItFollows) {
               ElementsAre("It shows in the torque at the wheels and follows the yaw rate."));
 }
 
+TEST(VerdictText, TellsWhatRemembersTheMotion) {
+  Diagnosis d = with_effect(Verdict::outside);
+  d.outside = {.probability = 1, .channel = "battery_power_from_motors", .follows = "recent_motion"};
+  EXPECT_THAT(verdict_reasons(d), ElementsAre(HasSubstr("how much the robot moved of late")));
+}
+
+TEST(VerdictText, SaysThatHelpIsNotSure) {
+  Diagnosis d = with_effect(Verdict::inconclusive);
+  d.shrinkage->interval = {-0.1, 0.22};
+  EXPECT_THAT(verdict_reasons(d), ElementsAre(HasSubstr("is not sure: the gap shrinks by")));
+}
+
 TEST(VerdictText, NamesWhatSpeaksAgainstTheLikeliest) {
   Diagnosis d = with_effect(Verdict::inconclusive);
   EXPECT_THAT(verdict_reasons(d), ElementsAre(HasSubstr("Coulomb friction has a probability of 0.40 only")));

@@ -77,5 +77,75 @@ TEST_P(AnyRate, TheModelLeavesNoResidualOfItself) {
 
 INSTANTIATE_TEST_SUITE_P(Rates, AnyRate, ::testing::Values(10.0, 50.0, 200.0));
 
+// A wheel that starts from rest; one side only, so that the other stays at rest.
+RecordingSet start_from_rest(const robot::RobotModel& robot) {
+  telemetry::Recording mission;
+  mission.mission_id = "start";
+  for (int k = 0; k < 500; ++k) {
+    const double t = k / 50.0;
+    telemetry::Sample s;
+    s.utime_us = 1'000'000 + 20'000 * k;
+    s.sequence = k;
+    s.wheel_velocity_rad_s = {t > 2 ? 0.3 * (t - 2) : 0.0, 0};
+    s.motor_current_a = {0.4, 0};
+    s.battery_voltage_v = k % 2 == 0 ? 24.0 : 24.5;
+    mission.samples.push_back(s);
+  }
+  return *make_recording_set(robot.robot_id, {mission});
+}
+
+TEST(Windows, AWheelSlidesOnceItsContactsHaveBent) {
+  const auto robot = testing::nomad();
+  for (const Window& w : make_windows(start_from_rest(robot), robot)) {
+    EXPECT_FALSE(w.moving[1]);
+    // 0.15 rad/s^2 (t - 2)^2 turned: a tenth of a radian after 0.82 s.
+    if (w.t_s < 2.8) {
+      EXPECT_FALSE(w.moving[0]) << w.t_s;
+    }
+    if (w.t_s > 3.2) {
+      EXPECT_TRUE(w.moving[0]) << w.t_s;
+    }
+  }
+}
+
+TEST(Windows, PartsMakeUpTheMean) {
+  const auto robot = testing::nomad();
+  for (const Window& w : make_windows(start_from_rest(robot), robot)) {
+    double weight = 0, mean = 0;
+    for (std::size_t part = 0; part < w.part_weight.size(); ++part) {
+      weight += w.part_weight[part];
+      mean += w.part_weight[part] * w.part_speed_rad_s[part][0];
+    }
+    EXPECT_NEAR(weight, 1, 1e-12);
+    EXPECT_NEAR(mean, w.speed_rad_s[0], 1e-12);
+    EXPECT_LE(w.part_speed_rad_s[0][0], w.part_speed_rad_s[2][0]);
+  }
+}
+
+TEST(Windows, JudgeTheSignOfACurrentWithoutItsBias) {
+  const auto robot = testing::nomad();
+  WindowSettings settings;
+  EXPECT_GT(make_windows(start_from_rest(robot), robot, settings).back().current_sign[0], 0.5);
+  settings.motor_current_bias_a = 0.8;
+  EXPECT_LT(make_windows(start_from_rest(robot), robot, settings).back().current_sign[0], -0.5);
+}
+
+TEST(Windows, KnowTheStepOfACoarseConverter) {
+  const auto robot = testing::nomad();
+  EXPECT_DOUBLE_EQ(make_windows(start_from_rest(robot), robot).front().battery_voltage_step_v, 0.5);
+}
+
+TEST(Windows, RememberHowMuchTheRobotMoved) {
+  const auto robot = testing::nomad();
+  const auto windows = make_windows(start_from_rest(robot), robot);
+  EXPECT_EQ(windows.front().recent_rad_s[0], 0);
+  for (std::size_t k = 1; k < windows.size(); ++k) {
+    EXPECT_GE(windows[k].recent_rad_s[0], windows[k - 1].recent_rad_s[0]);
+    // The shorter memory follows closer.
+    EXPECT_GE(windows[k].recent_rad_s[0], windows[k].recent_rad_s[2]);
+  }
+  EXPECT_GT(windows.back().recent_rad_s[0], 0.3);
+}
+
 }  // namespace
 }  // namespace joulecast::gap
