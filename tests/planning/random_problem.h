@@ -119,7 +119,8 @@ inline RandomProblem random_problem(std::uint64_t seed) {
         adopt("gear_efficiency", {{"loss", between(0.02, 0.2)}});
         break;
       case 3:
-        adopt("stribeck_friction", {{"ratio", between(0.2, 1)}, {"speed_rad_s", between(0.5, 3)}, {"exponent", between(1, 2)}});
+        adopt("stribeck_friction",
+              {{"ratio", between(0.2, 1)}, {"speed_rad_s", between(0.5, 3)}, {"exponent", between(1, 2)}});
         break;
       case 4:
         adopt("driver_loss", {{"fraction", between(0.02, 0.1)}});
