@@ -43,27 +43,32 @@ dynamics::Instant instant_of(const dynamics::BasicDriveModel<S>& model, const Wi
   return at;
 }
 
-// Mean of a function of the motion under a window. Friction bends with speed: where the speed changes under
-// the window, its begin, middle and end are taken apart.
-template <class Function>
-auto mean_under(const Window& w, const dynamics::Instant& middle, const Function& f) {
-  constexpr double least_change_rad_s = 0.05;  // from begin to end
-  const auto changes = [&](std::size_t s) {
-    return !w.resting[s] &&
-           std::fabs(w.part_speed_rad_s[2][s] - w.part_speed_rad_s[0][s]) > least_change_rad_s;
-  };
-  const bool whole = std::ranges::all_of(w.part_weight, [](double weight) { return weight > 0; });
-  if (!whole || (!changes(0) && !changes(1))) return f(middle);
-  auto mean = f(middle) * 0.0;
-  for (std::size_t part = 0; part < w.part_weight.size(); ++part) {
-    dynamics::Instant at = middle;
-    for (std::size_t s : {0u, 1u}) {
-      if (!w.resting[s]) at.wheel_speed_rad_s[s] = w.part_speed_rad_s[part][s];
+// Motions that stand for a window. Friction bends with speed: where the speed changes under the window, its
+// begin, middle and end are taken apart.
+struct Nodes {
+  std::array<dynamics::Instant, 3> at;
+  std::array<double, 3> weight{1, 0, 0};
+  std::size_t count = 1;
+
+  Nodes(const Window& w, const dynamics::Instant& middle) {
+    constexpr double least_change_rad_s = 0.05;  // from begin to end
+    const auto changes = [&](std::size_t s) {
+      return !w.resting[s] &&
+             std::fabs(w.part_speed_rad_s[2][s] - w.part_speed_rad_s[0][s]) > least_change_rad_s;
+    };
+    at[0] = middle;
+    const bool whole = std::ranges::all_of(w.part_weight, [](double part) { return part > 0; });
+    if (!whole || (!changes(0) && !changes(1))) return;
+    at.fill(middle);
+    weight = w.part_weight;
+    count = at.size();
+    for (std::size_t part = 0; part < count; ++part) {
+      for (std::size_t s : {0u, 1u}) {
+        if (!w.resting[s]) at[part].wheel_speed_rad_s[s] = w.part_speed_rad_s[part][s];
+      }
     }
-    mean += f(at) * w.part_weight[part];
   }
-  return mean;
-}
+};
 
 }  // namespace
 
@@ -97,8 +102,10 @@ S metered_power(const dynamics::BasicDriveModel<S>& model, const Window& w) {
   if (w.resting[0] && w.resting[1]) {
     return model.metered_battery_power(model.battery_power_for({S(0), S(0)}), w.battery_voltage_v);
   }
-  const S power =
-      mean_under(w, at, [&](const dynamics::Instant& node) { return model.flow(node).battery_power_w; });
+  const Nodes nodes(w, at);
+  S power = 0;
+  for (std::size_t n = 0; n < nodes.count; ++n)
+    power += model.flow(nodes.at[n]).battery_power_w * nodes.weight[n];
   return model.metered_battery_power(power, w.battery_voltage_v) -
          (model.parameters().sensor_delay_s - w.electrical_shift_s) *
              (std::isfinite(w.battery_power_slope_w_s) ? w.battery_power_slope_w_s : 0.0);
@@ -131,10 +138,14 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
   ChannelValues<S> r;
   r.fill(S(missing));
   const dynamics::Instant at = instant_of(model, w);
-  const auto balance = model.balance(at);
-  const auto torque_nm = [&](std::size_t s) {
-    return mean_under(w, at, [&](const dynamics::Instant& node) { return model.balance(node).total_nm[s]; });
-  };
+  const Nodes nodes(w, at);
+  std::array<S, 2> torque_nm{};
+  S yaw_rate_rad_s = 0;
+  for (std::size_t n = 0; n < nodes.count; ++n) {
+    const auto balance = model.balance(nodes.at[n]);
+    for (std::size_t s : {0u, 1u}) torque_nm[s] += balance.total_nm[s] * nodes.weight[n];
+    yaw_rate_rad_s += balance.body.yaw_rate_rad_s * nodes.weight[n];
+  }
   std::array<S, 2> motor_power{};
   S motor_abs = 0, braking = 0;
   for (std::size_t s : {0u, 1u}) {
@@ -153,7 +164,7 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
     }
     if (w.moving[s]) {
       r[index_of(Channel::torque_right) + s] =
-          reading - (S(1) + p.motor_current.gain) * model.current_for(torque_nm(s)) - p.motor_current.bias;
+          reading - (S(1) + p.motor_current.gain) * model.current_for(torque_nm[s]) - p.motor_current.bias;
     }
     const S gain = (S(1) + p.motor_current.gain) * (S(1) + p.motor_voltage.gain);
     motor_power[s] = (S(w.motor_power_w[s]) - p.motor_current.bias * w.voltage_v[s]) / gain;
@@ -171,7 +182,7 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
       S(w.battery_voltage_v) - (S(1) + p.battery_voltage.gain) * p.battery_voltage_v +
       p.battery_resistance_ohm * (S(w.battery_current_a) - p.battery_current.bias) /
           (S(1) + p.battery_current.gain);
-  r[index_of(Channel::gyro)] = S(w.yaw_rate_rad_s) - balance.body.yaw_rate_rad_s;
+  r[index_of(Channel::gyro)] = S(w.yaw_rate_rad_s) - yaw_rate_rad_s;
   const S grip = S(1) - p.slip;
   const S right = p.wheel_radius_m[0] * grip * w.span_angle_rad[0],
           left = p.wheel_radius_m[1] * grip * w.span_angle_rad[1];
