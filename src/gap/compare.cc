@@ -18,6 +18,8 @@ constexpr double log_prior = -4.0;  // of an effect to be there, and again of it
 // Groups may be far from the model and from each other: an effect may be as large as this share of the power.
 constexpr double expected_share = 0.5;
 constexpr double likely_chance = 0.01;
+// Hours of driving, before windows are left out: which they are depends on the order of the groups in time.
+constexpr std::size_t most_windows = 40'000;
 constexpr std::size_t fewest_windows = 20;  // of a group
 
 // Coefficients of all columns with some of them free to differ between groups.
@@ -201,7 +203,9 @@ Result<Comparison> compare_groups(const RecordingSet& recordings,
     ++c.groups[group[m]].missions;
     c.groups[group[m]].samples += recordings.missions[m].samples.size();
   }
-  const std::vector<Window> windows = make_windows(recordings, robot);
+  WindowSettings many;
+  many.most_windows = most_windows;
+  const std::vector<Window> windows = make_windows(recordings, robot, many);
   std::vector<std::size_t> count(c.groups.size(), 0);
   for (const Window& w : windows) ++count[group[w.mission]];
   for (std::size_t g = 0; g < count.size(); ++g) {
