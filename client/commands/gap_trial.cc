@@ -35,11 +35,9 @@ Exit run(Options& options) {
     t.only = trial::kind_of(options.only == "double" ? "pair" : options.only);
     const auto known = virtual_robot::effect_table();
     if (!t.only && std::ranges::find(known, options.only, &virtual_robot::EffectEntry::id) == known.end()) {
-      std::vector<std::string> ids;
-      for (const virtual_robot::EffectEntry& each : known) ids.emplace_back(each.id);
-      return report(
-          {Fault::invalid, "--only",
-           options.only + " is neither a kind of case nor an effect" + did_you_mean(options.only, ids)});
+      return report({Fault::invalid, "--only",
+                     options.only + " is neither a kind of case nor an effect" +
+                         did_you_mean(options.only, known, &virtual_robot::EffectEntry::id)});
     }
     if (!t.only) t.only_effect = options.only;
   }

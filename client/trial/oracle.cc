@@ -79,9 +79,7 @@ std::optional<double> oracle_shrinkage(const gap::RecordingSet& recordings, cons
     const auto active = true_effect(sealed);
     if (!active) return std::nullopt;
     // A delay is taken out of the recording, not out of the power.
-    if (sealed.id == "sensor_delay") settings.electrical_delay_s = active->values[0];
-    if (sealed.id == "current_sensor_bias")
-      settings.motor_current_bias_a = active->values[0] * active->values[1];
+    gap::take_out(*active, settings);
     effects.push_back(*active);
   }
   if (effects.empty() || effects.size() > most_effects) return std::nullopt;

@@ -72,10 +72,8 @@ Result<Imperfections> make_imperfections(const std::vector<EffectStrength>& effe
   for (const auto& [id, strength] : effects) {
     const auto* entry = std::find_if(table.begin(), table.end(), [&](const auto& e) { return e.id == id; });
     if (entry == table.end()) {
-      std::vector<std::string> ids;
-      for (const EffectEntry& each : table) ids.emplace_back(each.id);
-      return invalid("--effect",
-                     "no effect is called " + id + "; --list-effects names them" + did_you_mean(id, ids));
+      return invalid("--effect", "no effect is called " + id + "; --list-effects names them" +
+                                     did_you_mean(id, table, &EffectEntry::id));
     }
     if (!std::isfinite(strength) || std::abs(strength) > entry->search_limit) {
       std::ostringstream text;

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/median.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::server {
@@ -38,12 +39,6 @@ std::string kind_of(const robot::RobotModel& robot) {
   json text = robot::robot_to_json(robot);
   for (const char* own : {"robot_id", "idle_power_w", "effects", "note"}) text.erase(own);
   return text.dump();
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
 }
 
 json mark_json(const gap::DriftMark& mark) {
@@ -192,7 +187,7 @@ void GapWatch::look() {
   } else {
     counts.ratio_min = std::ranges::min(now);
     counts.ratio_max = std::ranges::max(now);
-    counts.ratio_median = median(std::move(now));
+    counts.ratio_median = upper_median(std::move(now));
   }
   const std::lock_guard lock(mutex_);
   counts.rounds = counts_.rounds + 1;

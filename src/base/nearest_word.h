@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -12,5 +13,13 @@ std::optional<std::string> nearest_word(std::string_view word, const std::vector
 
 // "; did you mean X?", or nothing.
 std::string did_you_mean(std::string_view word, const std::vector<std::string>& candidates);
+
+// The same among what has a name.
+template <class Range, class Name>
+std::string did_you_mean(std::string_view word, const Range& known, Name name) {
+  std::vector<std::string> names;
+  for (const auto& each : known) names.emplace_back(std::invoke(name, each));
+  return did_you_mean(word, names);
+}
 
 }  // namespace joulecast

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "base/median.h"
 #include "battery/circuit.h"
 #include "battery/curve.h"
 #include "robot/robot_file.h"
@@ -235,9 +237,7 @@ double first_resistance_ohm(const std::vector<Target>& targets, double capacity_
     }
   std::erase_if(ratios, [](double ratio) { return !(ratio > 0); });
   if (ratios.empty()) return 0.1 / capacity_ah;  // a tenth of a volt at 1 C
-  std::nth_element(ratios.begin(), ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2),
-                   ratios.end());
-  return ratios[ratios.size() / 2];
+  return upper_median(std::move(ratios));
 }
 
 // From the lowest charge under load up, closer together towards empty.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <string>
-#include <vector>
 
 #include "base/nearest_word.h"
 #include "dynamics/effects/accessory_load.h"
@@ -106,9 +105,8 @@ Result<ActiveEffect> activate(const robot::AdoptedEffect& adopted) {
   const std::string at = "/effects/" + adopted.id;
   const Effect* effect = find_effect(adopted.id);
   if (effect == nullptr) {
-    std::vector<std::string> ids;
-    for (const Effect* known : catalogue()) ids.emplace_back(known->info().id);
-    return invalid(at, "is not an effect of the catalogue" + did_you_mean(adopted.id, ids));
+    const auto id = [](const Effect* known) { return known->info().id; };
+    return invalid(at, "is not an effect of the catalogue" + did_you_mean(adopted.id, catalogue(), id));
   }
   ActiveEffect active = initial(*effect);
   const auto& parameters = effect->info().parameters;

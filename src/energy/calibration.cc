@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "base/median.h"
 #include "dynamics/drive_model.h"
 #include "energy/acceleration_filter.h"
 #include "telemetry/payload.h"
@@ -476,9 +477,7 @@ double half_window_for(std::span<const DriveRun> runs) {
     for (std::size_t k = 1; k < run.samples.size(); ++k)
       intervals.push_back(1e-6 * static_cast<double>(run.samples[k].utime_us - run.samples[k - 1].utime_us));
   if (intervals.empty()) return default_half_window_s;
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return std::max(default_half_window_s, 2.5 * *middle);
+  return std::max(default_half_window_s, 2.5 * upper_median(std::move(intervals)));
 }
 
 Result<DriveCalibration> calibrate_drive(const robot::RobotModel& robot, std::span<const DriveRun> runs,

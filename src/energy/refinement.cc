@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "base/median.h"
+
 namespace joulecast::energy {
 namespace {
 
@@ -58,12 +60,10 @@ Solution solve(std::span<const DriveEquation> equations, const Row& prior_mean,
     for (const DriveEquation& e : equations)
       sizes[static_cast<std::size_t>(e.kind)].push_back(std::abs(e.value - row_of(e).dot(out.value)));
     for (std::size_t kind = 0; kind < kinds; ++kind) {
-      auto& of_kind = sizes[kind];
+      const auto& of_kind = sizes[kind];
       if (of_kind.empty()) continue;
-      const auto middle = of_kind.begin() + static_cast<std::ptrdiff_t>(of_kind.size() / 2);
-      std::nth_element(of_kind.begin(), middle, of_kind.end());
       // The median of |x| is 0.6745 standard deviations of a normal variable.
-      if (pass > 0) noise[kind] = std::max(*middle / 0.6745, 1e-9);
+      if (pass > 0) noise[kind] = std::max(upper_median(of_kind) / 0.6745, 1e-9);
       noise[kind] = std::max(noise[kind], 1e-9);
     }
     for (std::size_t k = 0; k < equations.size(); ++k) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "base/median.h"
+
 namespace joulecast::forecast {
 namespace {
 
@@ -15,12 +17,6 @@ constexpr std::array<double, 4> node{0.06943184420297371, 0.33000947820757187, 0
                                      0.9305681557970263};
 constexpr std::array<double, 4> weight{0.17392742256872692, 0.32607257743127307, 0.32607257743127307,
                                        0.17392742256872692};
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 }  // namespace
 
@@ -60,7 +56,7 @@ Pace usual_pace(const robot::RobotModel& robot, std::span<const Leg> past) {
     }
   }
   const auto take = [](std::vector<double>& shown, double& into) {
-    if (shown.size() >= least_legs) into = median(shown);
+    if (shown.size() >= least_legs) into = upper_median(shown);
   };
   take(speed, pace.speed_m_s);
   take(acceleration, pace.acceleration_m_s2);

@@ -245,13 +245,12 @@ Result<Comparison> compare_groups(const RecordingSet& recordings,
   const std::vector<Information> all = grouped(missions.size());
 
   // Chosen twice: what the first choice explains says how far the formulas themselves can be believed.
-  Choice choice = choose(columns, all, candidates);
-  std::vector<Information> believed = all;
-  for (Information& sum : believed) sum *= coarsening_for(choice.explained);
+  const double coarsening = coarsening_for(choose(columns, all, candidates).explained);
   if (progress && !progress(0.6)) return fail(Fault::conflict, "", "comparison cancelled");
-  choice = choose(columns, believed, candidates);
+  std::vector<Information> believed = all;
+  for (Information& sum : believed) sum *= coarsening;
+  const auto [common, differing, gains, explained] = choose(columns, believed, candidates);
   if (progress && !progress(0.8)) return fail(Fault::conflict, "", "comparison cancelled");
-  const auto& [common, differing, gains, explained] = choice;
   for (const std::size_t h : common) c.common.push_back(columns.hypotheses()[h].id());
 
   // Common effects are read in each group too, so that what does not differ is seen beside what does.

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "base/median.h"
 
 namespace joulecast::gap {
 namespace {
@@ -17,9 +20,7 @@ struct Autoregression {
 double spread_of(const Eigen::VectorXd& e) {
   std::vector<double> size(static_cast<std::size_t>(e.size()));
   for (Eigen::Index k = 0; k < e.size(); ++k) size[static_cast<std::size_t>(k)] = std::fabs(e[k]);
-  const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
-  std::ranges::nth_element(size, middle);
-  return 1.4826 * *middle;
+  return 1.4826 * upper_median(std::move(size));
 }
 
 // y minus the best fit of everything, with every coefficient held by what is expected of it.

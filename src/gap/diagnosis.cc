@@ -55,16 +55,6 @@ std::vector<robot::AdoptedEffect> adoptable_of(std::span<const DiagnosedEffect> 
   return adoptable;
 }
 
-// What the sensors were found to do to a motor's readings: what windows take out of them.
-void take_out_of(const FitResult& result, WindowSettings& settings) {
-  settings.electrical_delay_s = settings.motor_current_bias_a = 0;
-  for (const dynamics::ActiveEffect& effect : result.fit.columns->effects_of(result.chosen)) {
-    const std::string_view id = effect.effect->info().id;
-    if (id == "sensor_delay") settings.electrical_delay_s = effect.values[0];
-    if (id == "current_sensor_bias") settings.motor_current_bias_a = effect.values[0] * effect.values[1];
-  }
-}
-
 }  // namespace
 
 std::string_view name_of(PowerSource source) {
@@ -142,7 +132,9 @@ Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotMod
     result = fit_windows(robot, judged, gap_share, settings.progress, settings.parts);
     if (!result) return fail(Fault::conflict, "", "diagnosis cancelled");
     const WindowSettings before = taken_out;
-    take_out_of(*result, taken_out);
+    taken_out.electrical_delay_s = taken_out.motor_current_bias_a = 0;
+    for (const dynamics::ActiveEffect& effect : result->fit.columns->effects_of(result->chosen))
+      take_out(effect, taken_out);
     const bool settled =
         std::fabs(taken_out.electrical_delay_s - before.electrical_delay_s) < settled_delay_s &&
         std::fabs(taken_out.motor_current_bias_a - before.motor_current_bias_a) < settled_bias_a;

@@ -9,10 +9,10 @@
 
 namespace joulecast::gap {
 
-// One linearisation of everything and what it says.
 // How much of the data to believe when an explanation has these log odds: formulas err as well as readings.
 double coarsening_for(double log_odds);
 
+// One linearisation of everything and what it says.
 struct Fit {
   std::unique_ptr<ColumnSet> columns;
   Design design;

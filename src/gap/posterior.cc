@@ -117,9 +117,9 @@ void name_by_catalogue(const Fit& fit, std::vector<std::size_t>& set) {
 }
 
 // Whether the members of an explanation undo most of what each other does.
-bool to_and_fro(const Fit& fit, const MovedShares& moved, const Explanation& e, double power_gap) {
+bool to_and_fro(const Fit& fit, const MovedShares& moved, const Explanation& e,
+                const Evidence::Estimate& estimate, double power_gap) {
   constexpr double most = 3;  // power that they move, over the gap
-  const Evidence::Estimate estimate = fit.evidence->estimate(e.hypotheses);
   double sum = 0;
   for (const std::size_t h : e.hypotheses) sum += moved(fit.columns->hypotheses()[h], estimate.mean);
   return sum > most * power_gap;
@@ -146,12 +146,13 @@ Posterior posterior_of(const Fit& fit, const MovedShares& moved, double gap_shar
   std::size_t looked_at = 0;
   for (const Explanation& e : fit.explanations) {
     if (e.log_odds < fit.explanations.front().log_odds - leading || ++looked_at > 60) break;
-    const double held_against = to_and_fro(fit, moved, e, power_gap) ? against_to_and_fro : 0;
+    Evidence::Estimate estimate = fit.evidence->estimate(e.hypotheses);
+    const double held_against = to_and_fro(fit, moved, e, estimate, power_gap) ? against_to_and_fro : 0;
     const double weight = std::exp(e.log_odds - fit.explanations.front().log_odds - held_against);
     // Families that bend an effect are taken out first: what then is left of the effect has to matter.
     std::vector<std::size_t> straight = e.hypotheses;
     name_by_catalogue(fit, straight);
-    Evidence::Estimate estimate = fit.evidence->estimate(straight);
+    if (straight != e.hypotheses) estimate = fit.evidence->estimate(straight);
     std::erase_if(straight, [&](std::size_t k) {
       const Hypothesis& h = fit.columns->hypotheses()[k];
       return h.outside() && std::ranges::any_of(e.hypotheses, [&](std::size_t other) {

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
+#include "base/median.h"
 #include "gap/shapley.h"
 
 namespace joulecast::gap {
@@ -65,9 +67,7 @@ double noise_floor(std::span<const Window> windows, std::span<const double> meas
     if (std::isfinite(d)) second.push_back(std::fabs(d));
   }
   if (second.empty() || size <= 0) return 0;
-  const auto middle = second.begin() + static_cast<std::ptrdiff_t>(second.size() / 2);
-  std::ranges::nth_element(second, middle);
-  const double sigma = 1.4826 * *middle / std::sqrt(6.0);
+  const double sigma = 1.4826 * upper_median(std::move(second)) / std::sqrt(6.0);
   return sigma * std::sqrt(2 / std::numbers::pi) * static_cast<double>(count) / size;
 }
 

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "base/median.h"
 #include "gap/power_gap.h"
 
 namespace joulecast::gap {
@@ -77,10 +78,8 @@ class Spectrum {
     }
     std::vector<double> power(sum.size());
     std::ranges::transform(sum, power.begin(), [&](const auto& s) { return std::norm(2.0 * s / total); });
-    auto sorted = power;
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::ranges::nth_element(sorted, middle);
-    const double noise = *middle / std::numbers::ln2;  // the median of an exponential distribution
+    const double noise =
+        upper_median(power) / std::numbers::ln2;  // the median of an exponential distribution
     if (!(noise > 0)) return;
     for (std::size_t n = 0; n < power.size(); ++n) {
       relative_[n] += power[n] / noise;

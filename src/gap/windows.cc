@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string_view>
+#include <utility>
 
+#include "base/median.h"
 #include "dynamics/parameters.h"
 #include "telemetry/payload.h"
 
@@ -39,10 +42,7 @@ double step_of(std::vector<double> readings) {
   for (std::size_t k = 1; k < readings.size(); ++k) {
     if (readings[k] > readings[k - 1]) steps.push_back(readings[k] - readings[k - 1]);
   }
-  if (steps.empty()) return 0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::ranges::nth_element(steps, middle);
-  return *middle;
+  return steps.empty() ? 0 : upper_median(std::move(steps));
 }
 
 // Centred mean over samples within +-half_s.
@@ -166,9 +166,7 @@ double median_period(const telemetry::Recording& mission) {
     steps.push_back(1e-6 *
                     static_cast<double>(mission.samples[k].utime_us - mission.samples[k - 1].utime_us));
   }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::ranges::nth_element(steps, middle);
-  return *middle;
+  return upper_median(std::move(steps));
 }
 
 // What the past leaves at every sample.
@@ -349,6 +347,12 @@ Window window_at(const Columns& c, const Memory& memory, std::size_t first, std:
 }
 
 }  // namespace
+
+void take_out(const dynamics::ActiveEffect& effect, WindowSettings& settings) {
+  const std::string_view id = effect.effect->info().id;
+  if (id == "sensor_delay") settings.electrical_delay_s = effect.values[0];
+  if (id == "current_sensor_bias") settings.motor_current_bias_a = effect.values[0] * effect.values[1];
+}
 
 std::vector<Window> make_windows(const RecordingSet& set, const robot::RobotModel& robot,
                                  const WindowSettings& settings) {

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "dynamics/catalogue.h"
 #include "gap/recordings.h"
 #include "robot/robot_model.h"
 
@@ -63,6 +64,10 @@ struct WindowSettings {
   double motor_current_bias_a = 0;  // of the reading, when the sign of a current is asked for
   std::size_t most_windows = 8000;  // beyond it, blocks of windows are left out evenly
 };
+
+// Puts what a sensor effect does to a motor's readings into the settings that take it out of windows; other
+// effects change nothing.
+void take_out(const dynamics::ActiveEffect& effect, WindowSettings& settings);
 
 // A single mission is judged as this many, so that a part can be held out.
 inline constexpr double single_mission_parts = 4;
