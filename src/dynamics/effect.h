@@ -22,6 +22,7 @@ struct EffectParameter {
   double minimum;
   double maximum;
   std::string_view meaning;
+  bool strength = false;  // beside the first: acts by itself, and adds up over repeated findings
 };
 
 // What an effect is, for people and for tools; the numbers are contracts of bounds.

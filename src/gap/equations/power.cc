@@ -1,0 +1,40 @@
+#include "gap/equations/power.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace joulecast::gap {
+
+std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot, bool of_motors) {
+  std::vector<double> power(windows.size());
+  std::ranges::transform(windows, power.begin(), [&](const Window& w) {
+    return of_motors ? robot.idle_power_w + w.motor_power_w[0] + w.motor_power_w[1] : w.battery_power_w;
+  });
+  return power;
+}
+
+std::vector<double> modelled_power(const robot::RobotModel& robot, std::span<const dynamics::ActiveEffect> effects,
+                                   std::span<const Window> windows) {
+  const dynamics::DriveModel model(robot, effects);
+  std::vector<double> power(windows.size());
+  std::ranges::transform(windows, power.begin(), [&](const Window& w) { return metered_power(model, w); });
+  return power;
+}
+
+GapSize gap_size(std::span<const double> measured_w, std::span<const double> modelled_w) {
+  double difference = 0, absolute = 0, total = 0, size = 0;
+  for (std::size_t k = 0; k < measured_w.size(); ++k) {
+    const double e = measured_w[k] - modelled_w[k];
+    if (!std::isfinite(e)) continue;
+    difference += e;
+    absolute += std::fabs(e);
+    total += measured_w[k];
+    size += std::fabs(measured_w[k]);
+  }
+  GapSize gap;
+  gap.energy_relative = total != 0 ? difference / total : 0;
+  gap.absolute_relative = size > 0 ? absolute / size : 0;
+  return gap;
+}
+
+}  // namespace joulecast::gap

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "gap/equations/channels.h"
+
+namespace joulecast::gap {
+
+// Battery power of every window [W]; NaN where the battery was not read. `of_motors`: what the motors take and the
+// idle power of the robot file in its place.
+std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot, bool of_motors);
+
+// By the robot file with these effects in force (its own among them), as the robot's meter would read it.
+std::vector<double> modelled_power(const robot::RobotModel& robot, std::span<const dynamics::ActiveEffect> effects,
+                                   std::span<const Window> windows);
+
+struct GapSize {
+  double energy_relative = 0;    // (E_measured - E_model) / E_measured
+  double absolute_relative = 0;  // integral of |P_measured - P_model| over that of |P_measured|
+};
+
+GapSize gap_size(std::span<const double> measured_w, std::span<const double> modelled_w);
+
+}  // namespace joulecast::gap
