@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace joulecast::gap {
 namespace {
@@ -97,12 +98,16 @@ Mixture::Estimate Mixture::estimate(const HypothesisSet& set) const {
   return e;
 }
 
-std::vector<double> Mixture::wander(const HypothesisSet& set, std::size_t member) const {
+const Mixture::Part& Mixture::likeliest(const HypothesisSet& set) const {
   const std::vector<double> logs = log_terms(set);
-  const auto best = static_cast<std::size_t>(std::ranges::max_element(logs) - logs.begin());
-  const Circumstances& now = *parts_[best].circumstances;
+  return parts_[static_cast<std::size_t>(std::ranges::max_element(logs) - logs.begin())];
+}
+
+std::vector<double> Mixture::wander(const HypothesisSet& set, std::size_t member) const {
+  const Part& part = likeliest(set);
+  const Circumstances& now = *part.circumstances;
   const auto candidates = candidates_of(*problem_, set);
-  const Evidence::Estimate estimate = parts_[best].evidence.estimate(candidates);
+  const Evidence::Estimate estimate = part.evidence.estimate(candidates);
   const Candidate& own = problem_->hypotheses[set[member]].candidate;
   Eigen::Index first = 0;
   for (std::size_t k = 0; k < member; ++k)
@@ -139,11 +144,40 @@ std::vector<double> Mixture::wander(const HypothesisSet& set, std::size_t member
   return result;
 }
 
+std::vector<double> Mixture::by_block(const HypothesisSet& set, std::size_t member) const {
+  const std::vector<double> likely = wander(set, member);
+  const double relative = wander_grid[static_cast<std::size_t>(std::ranges::max_element(likely) - likely.begin())];
+  const Part& part = likeliest(set);
+  const Evidence::Estimate estimate = part.evidence.estimate(candidates_of(*problem_, set));
+  // All other coefficients as they are found for all blocks.
+  Eigen::VectorXd others = Eigen::VectorXd::Zero(part.circumstances->tolerance.size());
+  Eigen::Index at = 0, own = 0;
+  for (std::size_t k = 0; k < set.size(); ++k) {
+    for (const std::size_t column : problem_->hypotheses[set[k]].candidate.columns) {
+      if (k == member && column == problem_->hypotheses[set[k]].candidate.columns.front()) own = at;
+      others[static_cast<Eigen::Index>(column)] = estimate.mean[at++];
+    }
+  }
+  const double mean = estimate.mean[own];
+  const auto column = static_cast<Eigen::Index>(problem_->hypotheses[set[member]].candidate.columns.front());
+  others[column] = 0;
+  const double precision = 1 / std::max(std::pow(relative * mean, 2), 1e-300);
+  std::vector<double> strengths;
+  const auto& blocks = problem_->blocks[part.circumstances->noise];
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    if (!left_out_.empty() && left_out_[b]) {
+      strengths.push_back(std::numeric_limits<double>::quiet_NaN());
+      continue;
+    }
+    const double says = blocks[b].xy[column] - blocks[b].xx.col(column).dot(others), weight = blocks[b].xx(column, column);
+    strengths.push_back(relative > 0 ? (says + precision * mean) / (weight + precision) : mean);
+  }
+  return strengths;
+}
+
 double Mixture::separation(std::size_t a, std::size_t b, double strength) const {
   const Candidate &first = problem_->hypotheses[a].candidate, &second = problem_->hypotheses[b].candidate;
-  const std::vector<double> logs = log_terms({a});
-  const auto best = static_cast<std::size_t>(std::ranges::max_element(logs) - logs.begin());
-  return parts_[best].evidence.separation(first.columns[0], strength, second.columns[0], second.expected);
+  return likeliest({a}).evidence.separation(first.columns[0], strength, second.columns[0], second.expected);
 }
 
 }  // namespace joulecast::gap

@@ -34,6 +34,10 @@ class Mixture {
   // is distributed: probabilities of the values in wander_grid.
   std::vector<double> wander(const HypothesisSet& set, std::size_t member) const;
 
+  // First coefficient of one member in every block, as far as each block says something beyond what all together do:
+  // the strength of all, drawn to what the block alone would have, with the wander that is likeliest. NaN: left out.
+  std::vector<double> by_block(const HypothesisSet& set, std::size_t member) const;
+
   // Expected log odds of one hypothesis' first coefficient at a strength over another in its place.
   double separation(std::size_t a, std::size_t b, double strength) const;
 
@@ -44,6 +48,7 @@ class Mixture {
     statistics::Evidence evidence;
   };
   std::vector<double> log_terms(const HypothesisSet& set) const;
+  const Part& likeliest(const HypothesisSet& set) const;
 
   const Problem* problem_;
   std::vector<bool> left_out_;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "gap/checks/ripple.h"
+#include "gap/diagnose/channel_gaps.h"
 #include "gap/diagnose/controls.h"
 #include "gap/diagnose/held_out.h"
 #include "gap/diagnose/referee.h"
@@ -16,6 +17,7 @@
 #include "gap/verdict/where.h"
 #include "gap/verdict/words.h"
 #include "statistics/bootstrap.h"
+#include "statistics/robust.h"
 #include "statistics/shapley.h"
 
 namespace joulecast::gap {
@@ -25,7 +27,6 @@ constexpr std::size_t fewest_windows = 40;
 constexpr double large_gap = 0.15, huge_gap = 0.25;
 constexpr double usual_share = 0.07, large_share = 0.3;  // of the mean power, that an effect which is there may move
 constexpr std::size_t more_members = 6;
-constexpr double gate = 1.05;                  // error on held-out parts, over the better of referee and unchanged
 constexpr double least_necessary_part = 0.05;  // of the gap, that comes back when an effect is left out
 constexpr std::size_t most_shared = 6;         // effects between which the gap is shared
 constexpr double settled_delay_s = 0.006, settled_bias = 0.1;
@@ -35,7 +36,39 @@ constexpr std::size_t ripple_surrogates = 20;
 // Progress of the stages, as parts of the whole.
 constexpr double after_fit = 0.35, after_parts = 0.6;
 
-struct Cancelled {};
+// What these effects do to when and how electrical readings are taken is taken out of the windows.
+void take_out(std::span<const dynamics::ActiveEffect> effects, windows::WindowSettings& settings) {
+  settings.electrical_delay_s = settings.motor_current_bias_a = 0;
+  for (const dynamics::ActiveEffect& e : effects) {
+    const std::string_view id = e.effect->info().id;
+    if (id == "sensor_delay") settings.electrical_delay_s = e.values[0];
+    if (id == "current_sensor_bias") settings.motor_current_bias_a = e.values[0] * e.values[1];
+  }
+}
+
+// Effects that only the motors' readings show, not battery power.
+bool moves_motors_alone(const Hypothesis& h) {
+  const std::string id = h.id();
+  return (id == "current_sensor_gain" || id == "current_sensor_bias" || id == "voltage_sensor_gain") &&
+         h.effect.values[2] == 0;
+}
+
+// Share of the power that an effect has to move to be surely seen here: the median over effects of what is so many
+// standard deviations of each by itself.
+double detectable_share(const Problem& problem) {
+  constexpr double deviations = 3.5;
+  const Mixture mixture(problem);
+  std::vector<std::string> seen;
+  std::vector<double> shares;
+  for (std::size_t h = 0; h < problem.hypotheses.size(); ++h) {
+    const Hypothesis& hypothesis = problem.hypotheses[h];
+    if (hypothesis.outside() || !shows_in_power(hypothesis.id())) continue;
+    if (std::ranges::find(seen, hypothesis.id()) != seen.end()) continue;
+    seen.push_back(hypothesis.id());
+    shares.push_back(problem.moved(hypothesis, deviations * mixture.estimate({h}).sd));
+  }
+  return shares.empty() ? missing : statistics::median(shares);
+}
 
 class Diagnoser {
  public:
@@ -134,6 +167,7 @@ bool Diagnoser::prepare() {
 
 void Diagnoser::measure() {
   plain_model_w_ = modelled_power(robot_, adopted_, plain_.windows);
+  d_.channels = channel_gaps(material());
   if (d_.power == PowerSource::none) {
     d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
     return;
@@ -141,7 +175,9 @@ void Diagnoser::measure() {
   const GapSize size = gap_size(plain_.power_w, plain_model_w_);
   d_.energy_relative = size.energy_relative;
   d_.power_absolute_relative = size.absolute_relative;
-  d_.noise_floor = noise_floor(material(), plain_.power_w);
+  const std::string_view channel = d_.power == PowerSource::battery ? "battery_power" : "motor_power";
+  const auto gap = std::ranges::find(d_.channels, channel, &ChannelGap::channel);
+  d_.noise_floor = gap == d_.channels.end() ? missing : gap->noise_floor;
   d_.where = localise(plain_.windows, robot_, adopted_, plain_.power_w, plain_model_w_, d_.noise_floor);
 }
 
@@ -165,8 +201,7 @@ bool Diagnoser::fit() {
     }
     if (!fit_) return false;
     const windows::WindowSettings before = taken_out_;
-    taken_out_.electrical_delay_s = taken_out_.motor_current_bias_a = 0;
-    for (const dynamics::ActiveEffect& e : fit_->effects) take_out(e, taken_out_);
+    take_out(fit_->effects, taken_out_);
     const bool settled = std::fabs(taken_out_.electrical_delay_s - before.electrical_delay_s) < settled_delay_s &&
                          std::fabs(taken_out_.motor_current_bias_a - before.motor_current_bias_a) < settled_bias_a;
     if (settled || round >= most_delay_rounds) return goes_on(after_fit);

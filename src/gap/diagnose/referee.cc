@@ -1,6 +1,10 @@
 #include "gap/diagnose/referee.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
+
+#include "gap/verdict/words.h"
 
 namespace joulecast::gap {
 
@@ -31,6 +35,10 @@ Referee::Referee(std::span<const Window> windows, std::span<const double> power_
 
 double Referee::predict(const Window& w) const {
   return fit_.coefficients.dot(terms_of(w));
+}
+
+std::string referee_words(const RefereeTerm& term, double data, double model) {
+  return sentence(fmt::format("the data have {} {}; the model has {}", brief(data), term.words, brief(model)));
 }
 
 }  // namespace joulecast::gap

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -13,13 +14,14 @@ namespace joulecast::gap {
 
 // The terms of a plain regression of power on motion: what anybody would try before a model.
 struct RefereeTerm {
-  std::string_view name, unit, words;
+  std::string_view name, unit;
+  std::string_view words;  // "so many W ..."
 };
 inline constexpr auto referee_terms = std::to_array<RefereeTerm>({
-    {"constant", "W", "whatever the robot does"},
-    {"speed", "W/(m/s)", "per m/s of speed"},
-    {"side_difference", "W/(m/s)", "per m/s of difference between the sides"},
-    {"acceleration", "W/(m/s)/(m/s^2)", "per m/s of speed and m/s^2 of acceleration"},
+    {"constant", "W", "W whatever the robot does"},
+    {"speed", "W/(m/s)", "W per m/s of speed"},
+    {"side_difference", "W/(m/s)", "W per m/s of difference between the sides"},
+    {"acceleration", "kg", "W per m/s of speed and m/s² of acceleration, as of so many kg"},
 });
 
 // P = c0 + c1 |v| + c2 |v_right - v_left| + c3 v a, fitted robustly. The referee of a diagnosis: what predicts held-out
@@ -38,5 +40,8 @@ class Referee {
   double wheel_radius_m_;
   statistics::Regression fit_;
 };
+
+// One term as the data have it, beside what the model comes to in the same term.
+std::string referee_words(const RefereeTerm& term, double data, double model);
 
 }  // namespace joulecast::gap
