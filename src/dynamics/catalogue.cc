@@ -17,6 +17,7 @@
 #include "dynamics/effects/floor_resistance_zone.h"
 #include "dynamics/effects/friction_asymmetry.h"
 #include "dynamics/effects/gear_efficiency.h"
+#include "dynamics/effects/grade.h"
 #include "dynamics/effects/inductance.h"
 #include "dynamics/effects/linear_inertia_error.h"
 #include "dynamics/effects/load_rolling_resistance.h"
@@ -55,6 +56,7 @@ const std::array table = {
     entry<LoadRollingResistance>(),
     entry<FloorResistanceZone>(),
     entry<Slope>(),
+    entry<Grade>(),
     entry<AerodynamicDrag>(),
     entry<TurningScrub>(),
     entry<GearEfficiency>(),
