@@ -14,11 +14,13 @@ constexpr double slope_of_grain =
 constexpr double standing_m_s = 0.01;  // encoders of a standing robot show less
 constexpr std::int64_t gap_us = 1'000'000;
 constexpr double jump_grains = 10;   // usual changes: more at once, beyond the way, is the sensor's
-constexpr double finest = 1.0 / 64;  // of a stretch: heights closer together are averaged
+constexpr double finest = 1.0 / 64;  // of the reach: heights closer together are averaged
 constexpr std::size_t most_knots = 1024;
 
-double stretch_m(double speed_m_s, double grain_m) {
-  return std::max({shortest_stretch_m, stretch_s * std::fabs(speed_m_s), grain_m / slope_of_grain});
+// To each of so many sides of the robot.
+double reach_m(double speed_m_s, double grain_m, int sides) {
+  return std::max(
+      {shortest_stretch_m / sides, stretch_s * std::fabs(speed_m_s) / sides, grain_m / slope_of_grain});
 }
 
 bool stands(const ClimbReading& reading) {
@@ -68,7 +70,7 @@ void HeightProfile::add(double way_m, bool standing, double height_m, double gra
   } else if (height != last_height_m_) {
     const Knot here{0.5 * (last_way_m_ + way_m), 0.5 * (last_height_m_ + height)};
     Knot& last = knots_.back();
-    if (knots_.size() > 1 && here.way_m - last.way_m < finest * stretch_m(0, grain_m)) {
+    if (knots_.size() > 1 && here.way_m - last.way_m < finest * reach_m(0, grain_m, 1)) {
       ++last.count;
       last.way_m += (here.way_m - last.way_m) / last.count;
       last.height_m += (here.height_m - last.height_m) / last.count;
@@ -146,13 +148,13 @@ double ClimbTracker::add(const ClimbReading& reading) {
     if (way > 0) climb_rad_ = unknown;
   } else {
     profile_.add(way_m_, way == 0, reading.height_m, grain_m_);
-    const double stretch = stretch_m(reading.speed_m_s, grain_m_);
-    const double from = std::max(profile_.begin_m(), way_m_ - stretch);
-    if (way > 0 && way_m_ - from >= 0.5 * stretch) {
+    const double reach = reach_m(reading.speed_m_s, grain_m_, 1);
+    const double from = std::max(profile_.begin_m(), way_m_ - reach);
+    if (way > 0 && way_m_ - from >= 0.5 * reach) {
       const double climb = climb_over(direction_ * profile_.slope(from, way_m_), 1);
       if (std::isfinite(climb)) climb_rad_ = climb;
     }
-    profile_.forget_before(way_m_ - stretch);
+    profile_.forget_before(way_m_ - reach);
   }
   if (std::isfinite(reading.pitch_rad)) climb_rad_ = reading.pitch_rad;
   return climb_rad_;
@@ -199,10 +201,9 @@ void climb_of_run(std::span<const ClimbReading> readings, const Run& run, double
     profile.add(way[k], k > 0 && way[k] == way[k - 1], readings[k].height_m, grain_m);
   }
   for (std::size_t k = 0; k < readings.size(); ++k) {
-    const double stretch = stretch_m(readings[k].speed_m_s, grain_m);
-    const double from = std::max(0.0, way[k] - 0.5 * stretch),
-                 to = std::min(way.back(), way[k] + 0.5 * stretch);
-    if (to - from >= 0.5 * stretch) climb_rad[k] = climb_over(run.direction * profile.slope(from, to), 1);
+    const double reach = reach_m(readings[k].speed_m_s, grain_m, 2);
+    const double from = std::max(0.0, way[k] - reach), to = std::min(way.back(), way[k] + reach);
+    if (to - from >= reach) climb_rad[k] = climb_over(run.direction * profile.slope(from, to), 1);
   }
 }
 

@@ -14,9 +14,9 @@
 // Heights are held and rounded readings: of a height that changes by a metre at a time, a metre may lie
 // between two samples. So the height is taken as a broken line over the distance driven that passes half way
 // between two readings half way between their places, and the climb as the slope of the straight line that
-// fits it best over a stretch: half a metre, what the robot drives in a second, or as far as one usual change
-// of the reading makes 1 % of slope, whichever is longest. What the height does while the robot stands, and
-// where it jumps, is the sensor's and not the floor's.
+// fits it best over a stretch: half a metre, or what the robot drives in a second, or so far to each side
+// (online: behind the robot) that one usual change of the reading makes 1 % of slope, whichever is longest.
+// What the height does while the robot stands, and where it jumps, is the sensor's and not the floor's.
 namespace joulecast::dynamics {
 
 struct ClimbReading {
@@ -55,8 +55,8 @@ class HeightProfile {
   double drift_m_ = 0;  // of the readings while the robot stood, and their jumps
 };
 
-// The climb online, from what came before: the stretch lies behind the robot. Its result is unknown until
-// half a stretch is driven; at standstill, and until half a stretch is driven anew, it stays as it was.
+// The climb online, from what lies behind the robot. Its result is unknown until half a stretch is driven; at
+// standstill, and until half a stretch is driven anew, it stays as it was.
 class ClimbTracker {
  public:
   // Readings in order of time; a second without one begins anew.
