@@ -16,6 +16,7 @@
 #include "dynamics/effects/floor_resistance_zone.h"
 #include "dynamics/effects/friction_asymmetry.h"
 #include "dynamics/effects/gear_efficiency.h"
+#include "dynamics/effects/grade.h"
 #include "dynamics/effects/inductance.h"
 #include "dynamics/effects/linear_inertia_error.h"
 #include "dynamics/effects/load_rolling_resistance.h"
@@ -46,7 +47,7 @@ struct EffectList {
 // Every effect of the catalogue, in the order in which they are applied. One name an effect.
 using AllEffects =
     EffectList<CoulombFriction, ViscousFriction, StribeckFriction, FrictionAsymmetry, LoadRollingResistance,
-               FloorResistanceZone, Slope, AerodynamicDrag, TurningScrub, GearEfficiency, ChassisMassError,
+               FloorResistanceZone, Slope, Grade, AerodynamicDrag, TurningScrub, GearEfficiency, ChassisMassError,
                PayloadMassError, YawInertiaError, LinearInertiaError, ComOffset, ResistanceError,
                WindingTemperature, BrushDrop, TorqueConstantLoss, Inductance, AccessoryLoad, DriverLoss,
                NoRegeneration, BatteryResistance, WheelRadiusError, WheelRadiusAsymmetry, TrackError,

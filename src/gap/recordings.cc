@@ -25,6 +25,21 @@ class Collector {
     if (step.belongs && open_) open_->samples.push_back(sample);
   }
   void add(const telemetry::MissionEvent& event) { carry_out(tracker_.on_event(event)); }
+  // How many of its values are refused.
+  std::size_t add(const telemetry::CovariateMessage& message) {
+    using Verdict = telemetry::CovariateTracker::Verdict;
+    if (telemetry::check_plausible(message)) return 1;
+    std::size_t refused = 0;
+    for (const telemetry::Covariate& covariate : message.covariates) {
+      telemetry::CovariateChange change;
+      const Verdict verdict = telemetry::check_plausible(covariate)
+                                  ? Verdict::late
+                                  : covariates_.take(message.utime_us, covariate, change);
+      if (verdict == Verdict::late || verdict == Verdict::no_room) ++refused;
+      if (verdict == Verdict::news && open_) changes_.push_back(std::move(change));
+    }
+    return refused;
+  }
 
   std::vector<telemetry::Recording> finish() {
     close();
@@ -39,15 +54,21 @@ class Collector {
       open_.emplace();
       open_->mission_id = action.mission_id;
       open_->payload_kg = action.payload_kg;
+      changes_ = covariates_.begin_mission(action.utime_us);
     }
   }
   void close() {
-    if (open_) missions_.push_back(std::move(*open_));
+    if (open_) {
+      open_->covariates = telemetry::series_of(changes_);
+      missions_.push_back(std::move(*open_));
+    }
     open_.reset();
   }
 
   telemetry::MissionTracker tracker_;
+  telemetry::CovariateTracker covariates_;
   std::optional<telemetry::Recording> open_;
+  std::vector<telemetry::CovariateChange> changes_;  // of the open one
   std::vector<telemetry::Recording> missions_;
 };
 
@@ -109,6 +130,9 @@ Result<RecordingSet> load_recordings(std::span<const std::string> paths, const s
       } else {
         ++unreadable;
       }
+    } else if (channel->subject == telemetry::Subject::covariates) {
+      const auto decoded = telemetry::decode_covariates(event.data);
+      unreadable += decoded ? robot.add(decoded->message) : 1;
     } else if (const auto decoded = telemetry::decode_mission_event(event.data);
                decoded && !telemetry::check_plausible(decoded->event)) {
       robot.add(decoded->event);

@@ -60,6 +60,8 @@ inline constexpr auto traits_table = std::to_array<Traits>({
     {"floor_resistance_zone", 0, 0, 0, false, false, false, "floor",
      "the floor at that place: carpet, dirt, damage"},
     {"slope", 0, 0, 0, false, false, false, "floor", "the level of the floor; the pitch sensor's zero"},
+    {"grade", 0, 0, 0, false, false, false, "floor",
+     "ramps and slopes of the floor; the zero of the pitch sensor"},
     {"aerodynamic_drag", 0, 0, 0, false, false, false, "load",
      "what the robot carries into the wind; its covers"},
     {"turning_scrub", 0, 0, 0, false, false, true, "floor",
