@@ -7,6 +7,7 @@
 #include "dynamics/parameters.h"
 #include "statistics/robust.h"
 #include "telemetry/payload.h"
+#include "telemetry/recording_climb.h"
 
 namespace joulecast::windows {
 namespace {
@@ -71,9 +72,9 @@ std::vector<double> low_passed(const std::vector<double>& t, double time_constan
 
 class Builder {
  public:
-  Builder(const telemetry::Recording& mission, const robot::RobotModel& robot, double period_s,
-          const WindowSettings& settings)
-      : mission_(mission), robot_(robot), settings_(settings), smooth_s_(2.2 * period_s) {}
+  Builder(const telemetry::Recording& mission, const robot::RobotModel& robot,
+          std::span<const std::string> covariates, double period_s, const WindowSettings& settings)
+      : mission_(mission), robot_(robot), covariates_(covariates), settings_(settings), smooth_s_(2.2 * period_s) {}
 
   Track build() {
     const std::int64_t start = mission_.samples.front().utime_us;
@@ -83,6 +84,7 @@ class Builder {
     add_battery();
     add_pose();
     add_payload();
+    add_covariates();
     add_memory(copper_w);
     return std::move(track_);
   }
@@ -152,7 +154,7 @@ class Builder {
   void add_pose() {
     Track& c = track_;
     c.yaw_rate = column([](const Sample& s) { return s.yaw_rate_rad_s; });
-    c.pitch = column([](const Sample& s) { return s.pitch_rad; });
+    c.climb = telemetry::climb_of(mission_, dynamics::nominal_parameters<double>(robot_));
     c.x = column([](const Sample& s) { return s.pose[0]; });
     c.y = column([](const Sample& s) { return s.pose[1]; });
     for (const Sample& s : mission_.samples) {
@@ -170,6 +172,13 @@ class Builder {
     });
   }
 
+  void add_covariates() {
+    for (const std::string& name : covariates_) {
+      telemetry::CovariateReader reader(telemetry::find_series(mission_.covariates, name));
+      track_.covariates.push_back(column([&](const Sample& s) { return reader.at(s.utime_us); }));
+    }
+  }
+
   void add_memory(const std::array<std::vector<double>, 2>& copper_w) {
     Track& c = track_;
     for (std::size_t q = 0; q < c.heat.size(); ++q) {
@@ -185,6 +194,7 @@ class Builder {
 
   const telemetry::Recording& mission_;
   const robot::RobotModel& robot_;
+  std::span<const std::string> covariates_;
   const WindowSettings& settings_;
   double smooth_s_;
   Track track_;
@@ -199,9 +209,9 @@ double median_period_s(const telemetry::Recording& mission) {
   return statistics::median(std::move(steps));
 }
 
-Track make_track(const telemetry::Recording& mission, const robot::RobotModel& robot, double period_s,
-                 const WindowSettings& settings) {
-  return Builder(mission, robot, period_s, settings).build();
+Track make_track(const telemetry::Recording& mission, const robot::RobotModel& robot,
+                 std::span<const std::string> covariates, double period_s, const WindowSettings& settings) {
+  return Builder(mission, robot, covariates, period_s, settings).build();
 }
 
 }  // namespace joulecast::windows

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <array>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "robot/robot_model.h"
@@ -15,7 +17,8 @@ struct Track {
   std::array<std::vector<double>, 2> speed, smooth_speed, voltage, current, power, power_abs, braking, angle,
       current_sign;
   std::array<std::vector<double>, 2> slid;  // angle turned since the wheel stood [rad]
-  std::vector<double> battery_voltage, battery_current, battery_power, yaw_rate, pitch, x, y, heading, payload, charge;
+  std::vector<double> battery_voltage, battery_current, battery_power, yaw_rate, climb, x, y, heading, payload, charge;
+  std::vector<std::vector<double>> covariates;
   double battery_voltage_step_v = 0;
   // Copper heat and mean |wheel speed|, low-passed on every time constant.
   std::array<std::array<std::vector<double>, 2>, heat_time_constants_s.size()> heat;
@@ -24,8 +27,8 @@ struct Track {
 
 double median_period_s(const telemetry::Recording& mission);
 
-Track make_track(const telemetry::Recording& mission, const robot::RobotModel& robot, double period_s,
-                 const WindowSettings& settings);
+Track make_track(const telemetry::Recording& mission, const robot::RobotModel& robot,
+                 std::span<const std::string> covariates, double period_s, const WindowSettings& settings);
 
 inline constexpr double moving_rad_s = 0.10;   // slowest wheel that surely turns
 inline constexpr double resting_rad_s = 0.03;  // fastest wheel that surely stands

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "statistics/updates.h"
 #include "windows/kernel.h"
@@ -95,7 +97,8 @@ Window window_at(const Track& c, const Place& at) {
   w.battery_current_slope_a_s = kernel.slope(c.battery_current);
   w.charge_as = kernel.mean(c.charge);
   w.yaw_rate_rad_s = kernel.mean(c.yaw_rate);
-  w.pitch_rad = kernel.mean(c.pitch);
+  w.climb_rad = kernel.mean(c.climb);
+  for (const std::vector<double>& covariate : c.covariates) w.covariates.push_back(kernel.mean(covariate));
   w.x_m = kernel.mean(c.x);
   w.y_m = kernel.mean(c.y);
   w.heading_rad = kernel.mean(c.heading);
@@ -134,14 +137,14 @@ void read_motors(const Track& c, std::size_t row, Window& w) {
 class MissionWindows {
  public:
   MissionWindows(const telemetry::Recording& mission, std::size_t number, const robot::RobotModel& robot,
-                 const Readings& readings, const WindowSettings& settings)
+                 std::span<const std::string> covariates, const Readings& readings, const WindowSettings& settings)
       : robot_(robot),
         readings_(readings),
         settings_(settings),
         number_(number),
         period_s_(median_period_s(mission)),
         longest_gap_s_(std::max(settings.longest_gap_s, 2.5 * period_s_)),
-        track_(make_track(mission, robot, period_s_, settings)) {}
+        track_(make_track(mission, robot, covariates, period_s_, settings)) {}
 
   // `position` counts windows over all missions, kept or not.
   void add_regular(std::vector<Window>& windows, std::size_t& position, std::size_t keep_every) const {
@@ -216,7 +219,7 @@ class MissionWindows {
     w.mission = number_;
     w.electrical_shift_s = settings_.electrical_delay_s;
     w.continues = continues;
-    windows.push_back(w);
+    windows.push_back(std::move(w));
   }
 
   const robot::RobotModel& robot_;
@@ -229,6 +232,30 @@ class MissionWindows {
 
 }  // namespace
 
+std::vector<std::string> covariate_names(std::span<const telemetry::Recording> missions) {
+  struct Values {
+    double first = missing;
+    bool differ = false;
+  };
+  std::map<std::string, Values> names;
+  for (const telemetry::Recording& mission : missions) {
+    for (const telemetry::CovariateSeries& series : mission.covariates) {
+      if (series.name == telemetry::height_covariate) continue;
+      Values& values = names[series.name];
+      for (const double v : series.value) {
+        if (!std::isfinite(v)) continue;
+        if (!std::isfinite(values.first)) values.first = v;
+        values.differ = values.differ || v != values.first;
+      }
+    }
+  }
+  std::vector<std::string> differing;
+  for (const auto& [name, values] : names) {
+    if (values.differ) differing.push_back(name);
+  }
+  return differing;
+}
+
 std::vector<Window> make_windows(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot,
                                  const Readings& readings, const WindowSettings& settings) {
   double total_s = 0;
@@ -237,10 +264,11 @@ std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
   const double expected = 2 * total_s / settings.length_s;
   const auto keep_every =
       static_cast<std::size_t>(std::max(1.0, std::ceil(expected / static_cast<double>(settings.most_windows))));
+  const std::vector<std::string> covariates = covariate_names(missions);
   std::vector<Window> windows;
   std::size_t position = 0;
   for (std::size_t m = 0; m < missions.size(); ++m) {
-    const MissionWindows mission(missions[m], m, robot, readings, settings);
+    const MissionWindows mission(missions[m], m, robot, covariates, readings, settings);
     mission.add_regular(windows, position, keep_every);
     if (readings.held()) mission.add_readings(windows);
   }

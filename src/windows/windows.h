@@ -52,7 +52,9 @@ struct Window {
   double electrical_shift_s = 0;  // by which electrical readings were moved back before windowing
   double charge_as = 0;           // drawn since the mission began
   double yaw_rate_rad_s = missing;
-  double pitch_rad = missing, x_m = missing, y_m = missing, heading_rad = missing;
+  double x_m = missing, y_m = missing, heading_rad = missing;
+  double climb_rad = missing;              // of the floor along the heading (dynamics/climb.h)
+  std::vector<double> covariates;          // in the order of covariate_names()
   // Progress by the map over a span that starts here; NaN except once a span.
   double forward_m = missing, turn_rad = missing;
   double chord = 1;                        // straight distance over path length in that span
@@ -83,6 +85,10 @@ struct Readings {
 // How these recordings were read. Where rows repeat readings, the delay and the averaging are taken with which a
 // plain regression of power on motion (constant, |speed|, |yaw rate|, power of acceleration) misses least.
 Readings find_readings(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot);
+
+// Names of all covariates of these missions that differ anywhere, in order; height, from which the climb follows, is not
+// among them.
+std::vector<std::string> covariate_names(std::span<const telemetry::Recording> missions);
 
 // Windows of all missions, half overlapping; channels whose readings are held speak in windows of their own, one a
 // reading, after the others of their mission.

@@ -36,6 +36,7 @@ dynamics::Instant instant_of(const dynamics::BasicDriveModel<S>& model, const Wi
   at.x_m = w.x_m;
   at.y_m = w.y_m;
   at.heading_rad = w.heading_rad;
+  at.climb_rad = w.climb_rad;
   at.copper_heat_w = heat_at(w, model.parameters().thermal_time_constant_s);
   for (std::size_t s : {0u, 1u}) {
     // A wheel at rest bears what its friction holds; the drive asks nothing of its motor.

@@ -219,6 +219,7 @@ Ranges ranges_of(std::span<const Window> windows, const robot::RobotModel& robot
       r.position = true;
     }
     if (std::isfinite(w.heading_rad)) r.heading = true;
+    if (std::fabs(w.climb_rad) > 0) r.climb = true;
   }
   const auto or_one = [](double v) { return v > 0 ? v : 1.0; };
   r.speed_m_s = or_one(most.speed_m_s);

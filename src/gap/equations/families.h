@@ -15,7 +15,7 @@ struct Ranges {
   double speed_m_s = 1, wheel_speed_rad_s = 1, acceleration_m_s2 = 1, yaw_rate_rad_s = 1, payload_kg = 1;
   double duration_s = 1, current_a = 1, battery_current_a = 1, battery_voltage_step_v = 0;
   double x_low_m = 0, x_high_m = 1, y_low_m = 0, y_high_m = 1;
-  bool position = false, heading = false, payload_varies = false;
+  bool position = false, heading = false, climb = false, payload_varies = false;
   double wheel_radius_m = 1, half_track_m = 1, idle_power_w = 0;
 };
 

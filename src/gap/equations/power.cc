@@ -5,6 +5,11 @@
 
 namespace joulecast::gap {
 
+double Modulation::of(const Window& w) const {
+  const double value = covariate < w.covariates.size() ? w.covariates[covariate] : missing;
+  return std::isfinite(value) ? value - centre : 0;
+}
+
 std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot, bool of_motors) {
   std::vector<double> power(windows.size());
   std::ranges::transform(windows, power.begin(), [&](const Window& w) {
@@ -13,11 +18,28 @@ std::vector<double> measured_power(std::span<const Window> windows, const robot:
   return power;
 }
 
-std::vector<double> modelled_power(const robot::RobotModel& robot, std::span<const dynamics::ActiveEffect> effects,
-                                   std::span<const Window> windows) {
-  const dynamics::DriveModel model(robot, effects);
+std::vector<double> modelled_power(const robot::RobotModel& robot, std::span<const dynamics::ActiveEffect> adopted,
+                                   std::span<const Cause> causes, std::span<const Window> windows) {
+  std::vector<dynamics::ActiveEffect> effects(adopted.begin(), adopted.end());
+  for (const Cause& cause : causes) {
+    if (!cause.by) effects.push_back(cause.effect);
+  }
+  const std::size_t steady = effects.size();
   std::vector<double> power(windows.size());
-  std::ranges::transform(windows, power.begin(), [&](const Window& w) { return metered_power(model, w); });
+  std::optional<dynamics::DriveModel> model;
+  for (std::size_t k = 0; k < windows.size(); ++k) {
+    if (steady - adopted.size() < causes.size()) {
+      effects.resize(steady);
+      for (const Cause& cause : causes) {
+        if (!cause.by) continue;
+        effects.push_back(cause.effect);
+        effects.back().values[cause.parameter] *= cause.by->of(windows[k]);
+      }
+      model.reset();
+    }
+    if (!model) model.emplace(robot, effects);
+    power[k] = metered_power(*model, windows[k]);
+  }
   return power;
 }
 

@@ -84,6 +84,7 @@ std::vector<Variant> variants_of(const dynamics::Effect& effect, const ShapeSett
     if (!s.ranges.heading) return {};
     return {{v, 0, 1, true}};
   }
+  if (id == "grade" && !s.ranges.climb) return {};
   if (id == "coulomb_friction") {
     const auto& torque = s.robot.motor.friction_torque_nm;
     return ratio_or_own(v, (torque[0] + torque[1]) * s.ranges.mean_wheel_speed_rad_s, s);
