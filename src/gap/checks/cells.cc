@@ -7,8 +7,8 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr double cell_s = 0.5;
-constexpr std::size_t cell_rows = 5;
+constexpr double cell_s = 0.4;
+constexpr std::size_t cell_rows = 4;
 constexpr double longest_gap_s = 1.0;   // within a cell or span, but for slower recordings
 constexpr double moving_part = 0.02;    // of the fastest wheel speed
 constexpr double resting_part = 0.005;
@@ -134,9 +134,10 @@ std::optional<Span> SpanCutter::add(const telemetry::Sample& sample) {
   span_.sideways = dy * std::cos(heading) - dx * std::sin(heading);
   span_.distance = std::hypot(dx, dy);
   const auto mean = [](const telemetry::Sample& s) {
-    return std::fabs(0.5 * (s.wheel_velocity_rad_s[0] + s.wheel_velocity_rad_s[1]));
+    return 0.5 * (s.wheel_velocity_rad_s[0] + s.wheel_velocity_rad_s[1]);
   };
-  span_.speed_change_rad_s = mean(sample) - mean(*first_);
+  span_.begin_rad_s = mean(*first_);
+  span_.end_rad_s = mean(sample);
   const Span done = span_;
   begin(sample);
   return done;

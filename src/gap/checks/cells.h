@@ -64,7 +64,7 @@ struct Span {
   double heading_rad = 0, heading_deg = 0;  // turned, by the map, read as radians and as degrees
   double forward = 0, sideways = 0;     // moved, by the map, along and across the mean heading
   double distance = 0;                  // straight
-  double speed_change_rad_s = 0;        // of the wheels' mean, magnitude at the end less that at the begin
+  double begin_rad_s = 0, end_rad_s = 0;  // mean of the wheels at both ends
 };
 
 class SpanCutter {

@@ -8,6 +8,7 @@
 
 #include "gap/checks/evaluation.h"
 #include "gap/checks/evidence.h"
+#include "gap/checks/motors.h"
 #include "gap/checks/readings.h"
 #include "statistics/robust.h"
 
@@ -35,6 +36,10 @@ bool CheckContext::heard(std::initializer_list<std::size_t> readings) const {
   return std::ranges::none_of(readings, [&](std::size_t k) {
     return std::ranges::any_of(silent, [&](const auto& s) { return belongs_to(reading_names[k], s); });
   });
+}
+
+bool CheckContext::has(std::initializer_list<std::size_t> readings) const {
+  return heard(readings) && std::ranges::all_of(readings, [&](std::size_t k) { return tally(k).known() > 0; });
 }
 
 ValueTally CheckContext::tally(std::size_t reading) const {
@@ -77,7 +82,7 @@ std::vector<Check> check_observations(std::span<const Observation> observations,
   if (observations.empty()) return {};
   const auto effects = dynamics::active_effects(robot);
   const dynamics::DriveModel model(robot, effects.value_or(std::vector<dynamics::ActiveEffect>{}));
-  CheckContext context{observations, robot, model, {}};
+  CheckContext context{observations, robot, model, motor_delay(observations).value_or(Delay{}).value_s, {}};
   std::vector<Check> checks;
   const auto take = [&](std::vector<Check> found) {
     for (Check& check : found) {
@@ -96,6 +101,7 @@ std::vector<Check> check_observations(std::span<const Observation> observations,
   take(check_motors(context));
   take(check_robot_file(context));
   take(check_kinematics(context));
+  take(check_delays(context));
   take(check_steps(context));
   take(check_readings(context));
   shorten(checks);

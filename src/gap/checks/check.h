@@ -33,15 +33,14 @@ struct Check {
   std::optional<std::size_t> first_mission{};
 };
 
-// Most fundamental first, about a dozen at most; what follows from another check is not repeated. All checks
-// but delays need no more than the sums of a single pass over each mission (observation.h); delays (delays.h)
-// go over the rows of a whole mission.
+// Most fundamental first, about a dozen at most; what follows from another check is not repeated. None needs more
+// than the sums of a single pass over each mission (observation.h), so that all can be asked while it goes on.
 //
 // A battery voltage that never moves is told as `constant_channel` and not contradicted where it is near the
 // nominal voltage: power is still the current times it, but nothing may be learnt from the voltage itself.
 std::vector<Check> check_recordings(const RecordingSet& recordings, const robot::RobotModel& robot);
 
-// The same from observations made before, in the order of the missions, without delays.
+// The same from observations made before, in the order of the missions.
 std::vector<Check> check_observations(std::span<const Observation> observations,
                                       const robot::RobotModel& robot);
 

@@ -17,9 +17,13 @@ struct CheckContext {
   std::span<const Observation> seen;
   const robot::RobotModel& robot;
   const dynamics::DriveModel& model;
+  double motor_delay_s = 0;  // motor_delay()
   std::vector<std::string> silent;  // channels contradicted so far: what they say is not asked again
 
+  // None is contradicted.
   bool heard(std::initializer_list<std::size_t> readings) const;
+  // ... and all are measured.
+  bool has(std::initializer_list<std::size_t> readings) const;
   ValueTally tally(std::size_t reading) const;  // of all missions
   std::vector<Products::Block> blocks(Relation relation) const;
   double period_s() const;  // between rows, of the usual mission
@@ -32,6 +36,7 @@ std::vector<Check> check_signs_and_units(const CheckContext& c);  // one source 
 std::vector<Check> check_motors(const CheckContext& c);           // each motor against its sibling
 std::vector<Check> check_robot_file(const CheckContext& c);
 std::vector<Check> check_kinematics(const CheckContext& c);  // gyro and map against wheels
+std::vector<Check> check_delays(const CheckContext& c);
 std::vector<Check> check_steps(const CheckContext& c);       // lasting changes between missions
 std::vector<Check> check_readings(const CheckContext& c);    // held, coarse, clipped, thrown, missing
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "gap/checks/motors.h"
 #include "gap/checks/readings.h"
 #include "statistics/robust.h"
 
@@ -32,8 +33,8 @@ constexpr double unused_off = 1.5;  // limits need not be reached
 class Gatherer {
  public:
   Gatherer(std::span<const Observation> observations, const robot::RobotModel& robot,
-           const dynamics::DriveModel& model, std::span<const std::string> silent)
-      : seen_(observations), robot_(robot), p_(model.parameters()), silent_(silent) {}
+           const dynamics::DriveModel& model, double delay_s, std::span<const std::string> silent)
+      : seen_(observations), robot_(robot), p_(model.parameters()), delay_s_(delay_s), silent_(silent) {}
 
   std::vector<Evidence> gather() {
     armatures();
@@ -92,6 +93,7 @@ class Gatherer {
   std::span<const Observation> seen_;
   const robot::RobotModel& robot_;
   const dynamics::Parameters<double>& p_;
+  double delay_s_;
   std::span<const std::string> silent_;
   std::vector<Evidence> found_;
 };
@@ -101,7 +103,7 @@ void Gatherer::armatures() {
   for (std::size_t k : {0u, 1u}) {
     if (!heard({reading::wheel_velocity + k, reading::motor_voltage + k, reading::motor_current + k})) continue;
     const auto relation = k == 0 ? Relation::armature_right : Relation::armature_left;
-    const BlockFit fit = fit_blocks(blocks(relation), 0, terms);
+    const BlockFit fit = fit_blocks(armature_blocks(seen_, relation, delay_s_), 0, terms);
     const std::string side = side_name[k];
     add("the " + side + " motor's voltage constant, from its voltage, current and speed, is", "the file's",
         estimate(fit, 1) * (1 / p_.voltage_constant_v_s_rad), constant_off, constant_off, 12,
@@ -112,7 +114,7 @@ void Gatherer::armatures() {
   }
   if (!heard({0, 1, 2, 3, 4, 5})) return;
   constexpr std::array<std::size_t, 2> difference{1, 2};
-  const BlockFit fit = fit_blocks(blocks(Relation::armature_difference), 0, difference);
+  const BlockFit fit = fit_blocks(armature_blocks(seen_, Relation::armature_difference, delay_s_), 0, difference);
   const auto sides = [&](Evidence* e, std::uint32_t pairs) {
     if (e == nullptr) return;
     e->turned_by = pairs;
@@ -332,8 +334,9 @@ std::vector<Products::Block> blocks_of(std::span<const Observation> observations
 }
 
 std::vector<Evidence> gather_evidence(std::span<const Observation> observations, const robot::RobotModel& robot,
-                                      const dynamics::DriveModel& model, std::span<const std::string> silent) {
-  return Gatherer(observations, robot, model, silent).gather();
+                                      const dynamics::DriveModel& model, double delay_s,
+                                      std::span<const std::string> silent) {
+  return Gatherer(observations, robot, model, delay_s, silent).gather();
 }
 
 }  // namespace joulecast::gap

@@ -54,9 +54,11 @@ struct Evidence {
   Sources<bool> lost_by{};
 };
 
-// Of everything that is recorded. `silent`: channels that are known to be wrong already.
+// Of everything that is recorded. `delay_s`: of the electrical channels; `silent`: channels that are known to be
+// wrong already.
 std::vector<Evidence> gather_evidence(std::span<const Observation> observations, const robot::RobotModel& robot,
-                                      const dynamics::DriveModel& model, std::span<const std::string> silent);
+                                      const dynamics::DriveModel& model, double delay_s,
+                                      std::span<const std::string> silent);
 
 // Blocks of one relation of all missions.
 std::vector<Products::Block> blocks_of(std::span<const Observation> observations, Relation relation);

@@ -84,7 +84,7 @@ void check_track(const CheckContext& c, std::vector<Check>& checks) {
 void check_travel(const CheckContext& c, std::vector<Check>& checks) {
   if (!c.heard({0, 1, reading::x, reading::y})) return;
   constexpr std::array<std::size_t, 1> path{1};
-  constexpr std::array<std::size_t, 3> phases{1, 2, 3};
+  constexpr std::array<std::size_t, 4> phases{1, 2, 3, 4};  // the last stands for a map that comes late
   const bool heading = c.heard({reading::heading});
   const BlockFit slip = heading ? fit_blocks(c.blocks(Relation::slip), 0, phases) : BlockFit{};
   const Estimate radius = slip.known() ? estimate(slip, 0)

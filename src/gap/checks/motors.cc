@@ -19,12 +19,12 @@ constexpr double winding_off = 0.10, load_off = 0.5;
 constexpr double agree = 0.35;       // logarithms of one sensor's factor from different constants
 constexpr double useless = 0.5;      // logarithm of a sensor's factor beyond which it is no sensor
 
-MotorConstants constants_of(std::span<const Observation> seen, std::size_t side) {
+MotorConstants constants_of(std::span<const Observation> seen, std::size_t side, double delay_s) {
   constexpr std::array<std::size_t, 3> armature{1, 2, 3};
   constexpr std::array<std::size_t, 5> torque{1, 2, 3, 4, 5};
   MotorConstants m;
-  const BlockFit electric =
-      fit_blocks(blocks_of(seen, side == 0 ? Relation::armature_right : Relation::armature_left), 0, armature);
+  const auto relation = side == 0 ? Relation::armature_right : Relation::armature_left;
+  const BlockFit electric = fit_blocks(armature_blocks(seen, relation, delay_s), 0, armature);
   m.resistance_ohm = estimate(electric, 0);
   m.constant_v_s_rad = estimate(electric, 1);
   m.drop_v = estimate(electric, 2);
@@ -82,19 +82,36 @@ std::size_t worse_side(const std::array<MotorConstants, 2>& m, double file_ohm) 
 
 }  // namespace
 
-std::array<MotorConstants, 2> motor_constants(std::span<const Observation> observations) {
-  return {constants_of(observations, 0), constants_of(observations, 1)};
+std::optional<Delay> motor_delay(std::span<const Observation> observations) {
+  for (const auto& channels : {std::vector{Late::current_right, Late::current_left}, std::vector{Late::current_right},
+                               std::vector{Late::current_left}}) {
+    if (const auto delay = delay_of(observations, channels)) {
+      const double least = least_delay_s(observations, {4, 5});
+      return delay->interval[0] > least ? delay : std::nullopt;
+    }
+  }
+  return std::nullopt;
+}
+
+std::vector<Products::Block> armature_blocks(std::span<const Observation> observations, Relation relation,
+                                             double delay_s) {
+  const std::size_t acceleration = relation == Relation::armature_difference ? 3 : 4;
+  return with_part_of(blocks_of(observations, relation), 2, acceleration, -delay_s);
+}
+
+std::array<MotorConstants, 2> motor_constants(std::span<const Observation> observations, double delay_s) {
+  return {constants_of(observations, 0, delay_s), constants_of(observations, 1, delay_s)};
 }
 
 std::array<MotorConstants, 2> motor_constants(const RecordingSet& recordings, const robot::RobotModel& robot) {
   std::vector<Observation> observations;
   for (const telemetry::Recording& mission : recordings.missions) observations.push_back(observe(mission, robot));
-  return motor_constants(observations);
+  return motor_constants(observations, motor_delay(observations).value_or(Delay{}).value_s);
 }
 
 std::vector<Check> check_motors(const CheckContext& c) {
   if (!c.heard({0, 1, 2, 3, 4, 5})) return {};
-  const auto m = motor_constants(c.seen);
+  const auto m = motor_constants(c.seen, c.motor_delay_s);
   const Pair p{log_ratio(m[0].resistance_ohm, m[1].resistance_ohm),
                log_ratio(m[0].constant_v_s_rad, m[1].constant_v_s_rad),
                log_ratio(m[0].steady_current_a, m[1].steady_current_a),

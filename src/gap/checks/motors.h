@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "gap/checks/observation.h"
 #include "gap/checks/products.h"
@@ -20,8 +22,18 @@ struct MotorConstants {
   double mean_speed_rad_s = 0;     // while it turns
 };
 
+// By how much the motors' currents surely lag the wheel speeds: beyond a row and a half and half the time that
+// readings are held. Currents that lead are no delay: they do at every start, as contacts bend and gears wind up.
+std::optional<Delay> motor_delay(std::span<const Observation> observations);
+
+// Blocks of V, i, w, sign and acceleration of one motor (or their differences, without the sign), with the speed of
+// when the electrical readings were taken: w - delay a.
+std::vector<Products::Block> armature_blocks(std::span<const Observation> observations, Relation relation,
+                                             double delay_s);
+
 // [0] right, [1] left. The same of every robot of a kind are its siblings' to compare with.
-std::array<MotorConstants, 2> motor_constants(std::span<const Observation> observations);
+std::array<MotorConstants, 2> motor_constants(std::span<const Observation> observations,
+                                              double delay_s);
 std::array<MotorConstants, 2> motor_constants(const RecordingSet& recordings, const robot::RobotModel& robot);
 
 }  // namespace joulecast::gap

@@ -9,7 +9,7 @@ namespace {
 
 using telemetry::Sample;
 
-constexpr std::size_t block_cells = 8;
+constexpr std::size_t block_cells = 5;
 constexpr double hold_s = 1.0;          // positions and yaw rates between those that are missing
 constexpr double alike = 0.2;           // as in ValueTally: a spike has like neighbours ...
 constexpr double thrown = 0.8;          // ... and is this far from them
@@ -19,8 +19,8 @@ constexpr double turning_rad = 0.3;     // difference of the wheels' angles in a
 constexpr double braking_share = 0.05;  // of the fastest wheel speed, lost in a span
 constexpr double widest_turn_rad = 1.0; // of a span whose chord is compared with its path
 
-constexpr std::array<std::size_t, relation_count> quantities{4, 4, 3, 6, 6, 4, 4, 3, 3, 3,
-                                                             2, 3, 4, 2, 2, 4, 4, 4, 2, 4};
+constexpr std::array<std::size_t, relation_count> quantities{5, 5, 4, 6, 6, 4, 4, 3, 3, 3,
+                                                             2, 3, 4, 2, 2, 4, 4, 4, 2, 5};
 
 std::array<Products, relation_count> no_products() {
   std::array<Products, relation_count> products;
@@ -62,6 +62,7 @@ void Observer::add(const Sample& sample) {
   const auto readings = readings_of(sample);
   for (std::size_t k = 0; k < reading_count; ++k) seen_.values[k].add(*readings[k]);
   if (!std::isfinite(sample.wheel_velocity_rad_s[0] + sample.wheel_velocity_rad_s[1])) return;
+  seen_.lags.add(sample);
   if (waiting_) {
     Sample s = *waiting_;
     if (before_) {
@@ -103,14 +104,14 @@ void Observer::take(const Cell& c) {
     if (c.way[k] == 0) continue;
     const double w = c.speed_rad_s[k], i = c.current_a[k], v = c.voltage_v[k], way = c.way[k];
     const double slip = !turning ? 0.0 : w > c.speed_rad_s[1 - k] ? 1.0 : -1.0;
-    of(right_or_left(Relation::armature_right, k)).add({v, i, w, way});
+    of(right_or_left(Relation::armature_right, k)).add({v, i, w, way, c.acceleration_rad_s2[k]});
     of(right_or_left(Relation::torque_right, k)).add({i, way, w, common, k == 0 ? difference : -difference, slip});
     of(right_or_left(Relation::ways_right, k)).add({i, v, way > 0 ? 1.0 : 0.0, way < 0 ? 1.0 : 0.0});
   }
   const bool moves = c.way[0] != 0 || c.way[1] != 0;
   if (moves) {
     of(Relation::armature_difference)
-        .add({c.voltage_v[0] - c.voltage_v[1], c.current_a[0] - c.current_a[1], right - left});
+        .add({c.voltage_v[0] - c.voltage_v[1], c.current_a[0] - c.current_a[1], right - left, 2 * difference});
   }
   if (!c.resting) of(Relation::gyro).add({c.yaw_rate_rad_s, right, left, 1.0});
   const dynamics::Parameters<double>& p = model_.parameters();
@@ -161,15 +162,34 @@ void Observer::take(const Span& s) {
   of(Relation::travel).add({s.forward / chord, s.sideways / chord, right, left});
   of(Relation::distance).add({s.distance / chord, std::fabs(path)});
   const bool turns = std::fabs(right - left) > turning_rad;
-  const bool brakes = s.speed_change_rad_s < -braking_share * limit_rad_s_;
-  of(Relation::slip).add({s.forward / chord, path, turns ? path : 0.0, brakes ? path : 0.0});
+  const bool brakes = std::fabs(s.end_rad_s) < std::fabs(s.begin_rad_s) - braking_share * limit_rad_s_;
+  of(Relation::slip)
+      .add({s.forward / chord, path, turns ? path : 0.0, brakes ? path : 0.0,
+            robot_.kinematics.wheel_radius_m * (s.end_rad_s - s.begin_rad_s)});
 }
 
 Observation Observer::finish() {
   if (waiting_) take(*waiting_);
   waiting_.reset();
   for (Products& products : seen_.relations) products.finish();
+  seen_.lags.finish();
   return std::move(seen_);
+}
+
+std::optional<Delay> delay_of(std::span<const Observation> observations, std::span<const Late> channels) {
+  std::vector<const LagSums*> sums;
+  for (const Observation& o : observations) sums.push_back(&o.lags);
+  return delay_between(sums, channels);
+}
+
+double least_delay_s(std::span<const Observation> observations, std::initializer_list<std::size_t> readings) {
+  double least = 0;
+  for (const Observation& o : observations) {
+    std::size_t held = std::max(o.of(0).held_rows(), o.of(1).held_rows());
+    for (const std::size_t k : readings) held = std::max(held, o.of(k).held_rows());
+    least = std::max(least, o.clock.period_s() * (1.5 + (held > 1 ? 0.5 * static_cast<double>(held) : 0)));
+  }
+  return least;
 }
 
 Observation observe(const telemetry::Recording& mission, const robot::RobotModel& robot) {

@@ -2,11 +2,14 @@
 
 #include <array>
 #include <cstddef>
+#include <initializer_list>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "dynamics/drive_model.h"
 #include "gap/checks/cells.h"
+#include "gap/checks/delays.h"
 #include "gap/checks/products.h"
 #include "gap/checks/readings.h"
 #include "gap/checks/tally.h"
@@ -18,9 +21,9 @@ namespace joulecast::gap {
 // Relations between channels of which an observation keeps Products; their quantities in order. `sign`: the way
 // a wheel turns, 0 while it starts or stops. Sides [0] right, [1] left.
 enum class Relation : std::size_t {
-  armature_right,       // V, i, w, sign; the wheel turning
+  armature_right,       // V, i, w, sign, acceleration; the wheel turning
   armature_left,
-  armature_difference,  // V, i, w: right minus left
+  armature_difference,  // V, i, w, acceleration: right minus left
   torque_right,         // i, sign, w, common and differential acceleration, side slip; the wheel turning
   torque_left,
   ways_right,           // i, V, 1 forward, 1 backward
@@ -37,17 +40,18 @@ enum class Relation : std::size_t {
   heading_wheels,       // turned by the map in rad, in degrees, by the right wheel, by the left
   travel,               // moved by the map along and across the heading, turned by the wheels
   distance,             // moved by the map, by the wheels
-  slip                  // moved by the map along the heading, by the wheels, the same turning, braking
+  slip                  // moved by the map along the heading, by the wheels, the same turning, braking; speed change
 };
 inline constexpr std::size_t relation_count = static_cast<std::size_t>(Relation::slip) + 1;
 
-// What one mission looked like: enough for every check but delays. Some hundred kilobytes at most, whatever
-// the mission's length.
+// What one mission looked like: enough for every check. Some hundred kilobytes at most, whatever the mission's
+// length.
 struct Observation {
   std::string mission_id;
   ClockTally clock;
   std::array<ValueTally, reading_count> values;
   std::array<Products, relation_count> relations;
+  LagSums lags;
   double moving_s = 0;            // some wheel turning
   double fastest_m_s = 0;         // of half a second, by the file's wheel radius
   double fastest_turn_rad_s = 0;  // of half a second, by the gyro
@@ -84,6 +88,12 @@ class Observer {
   telemetry::Sample known_;                            // last known position and yaw rate ...
   std::int64_t known_us_ = 0;                          // ... of then
 };
+
+// By how much channels lag the wheel speeds.
+std::optional<Delay> delay_of(std::span<const Observation> observations, std::span<const Late> channels);
+// What a delay must be to be one: a row and a half, and half of the time that these readings or the wheel speeds
+// are held.
+double least_delay_s(std::span<const Observation> observations, std::initializer_list<std::size_t> readings);
 
 Observation observe(const telemetry::Recording& mission, const robot::RobotModel& robot);
 

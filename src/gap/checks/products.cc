@@ -83,6 +83,16 @@ void Products::finish() {
   blocks_.push_back(std::exchange(open_, std::move(next)));
 }
 
+std::vector<Products::Block> with_part_of(std::vector<Products::Block> blocks, std::size_t k, std::size_t j,
+                                          double factor) {
+  if (blocks.empty()) return blocks;
+  const Eigen::Index n = blocks.front().sums.rows();
+  Eigen::MatrixXd change = Eigen::MatrixXd::Identity(n, n);
+  change(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(j)) += factor;
+  for (Products::Block& block : blocks) block.sums = change * block.sums * change.transpose();
+  return blocks;
+}
+
 double BlockFit::sd(Eigen::Index k) const {
   return std::sqrt(std::max(covariance(k, k), 0.0));
 }

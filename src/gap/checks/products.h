@@ -39,6 +39,10 @@ class Products {
   std::size_t stride_ = 1, waited_ = 0;  // a block is ended every stride_-th time
 };
 
+// The same blocks with quantity[k] + factor * quantity[j] in place of quantity[k].
+std::vector<Products::Block> with_part_of(std::vector<Products::Block> blocks, std::size_t k, std::size_t j,
+                                          double factor);
+
 // A linear relation between the quantities of Products, fitted to blocks.
 struct BlockFit {
   Eigen::VectorXd coefficient;

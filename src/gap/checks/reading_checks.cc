@@ -15,7 +15,7 @@ constexpr std::array<double, 2> no_interval{std::numeric_limits<double>::quiet_N
 // Readings that equations are built from.
 constexpr std::size_t used = reading::battery_current + 1;
 constexpr std::size_t fewest_spikes = 3;
-constexpr double coarse = 0.5;  // step over the standard deviation: rounding adds a seventh of it as noise
+constexpr double coarse = 1;  // step over the standard deviation: rounding adds a third of it as noise
 constexpr double clipped_share = 0.01;
 constexpr std::size_t fewest_clips = 3, longest_plateau = 3;  // runs; usual repetitions of a value
 constexpr double lost_share = 0.5;

@@ -43,8 +43,8 @@ Estimate nearer(const Estimate& right, const Estimate& left) {
 std::vector<Check> check_robot_file(const CheckContext& c) {
   List list;
   const dynamics::Parameters<double>& p = c.model.parameters();
-  const auto m = motor_constants(c.seen);
-  const bool motors = c.heard({0, 1, 2, 3, 4, 5}), currents = c.heard({0, 1, 4, 5});
+  const auto m = motor_constants(c.seen, c.motor_delay_s);
+  const bool motors = c.has({0, 1, 2, 3, 4, 5}), currents = c.has({0, 1, 4, 5});
   const bool battery = c.heard({reading::battery_voltage, reading::battery_current});
   if (motors) {
     list.add("motor resistance", nearer(m[0].resistance_ohm * (1 / p.resistance_ohm[0]),

@@ -47,7 +47,7 @@ constexpr double fits = 2.0;  // standard deviations of what sound robots differ
 }  // namespace
 
 std::vector<Check> check_signs_and_units(const CheckContext& c) {
-  const std::vector<Evidence> evidence = gather_evidence(c.seen, c.robot, c.model, c.silent);
+  const std::vector<Evidence> evidence = gather_evidence(c.seen, c.robot, c.model, c.motor_delay_s, c.silent);
   const std::vector<Fault> faults = known_faults(c.robot);
   const Explanation explanation = explain(evidence, faults);
   std::vector<Check> checks;

@@ -101,7 +101,7 @@ std::vector<Series> levels_of(const CheckContext& c) {
       const bool known = e.known() && e.sd < most_unsure * std::fabs(e.value);
       return known ? e.value : std::numeric_limits<double>::quiet_NaN();
     };
-    const auto m = motor_constants(one);
+    const auto m = motor_constants(one, c.motor_delay_s);
     auto next = series.begin();
     const auto push = [&](const Estimate& e) { (next++)->levels.push_back(level(e)); };
     if (battery && c.heard({0, 1})) push(ratio_of_sums(o.of(Relation::driving).blocks(), 0, 1, 2));
