@@ -98,6 +98,7 @@ std::vector<Check> check_observations(std::span<const Observation> observations,
     checks.push_back(make_check("robot_file", "", {},
                                 "The robot file's effects are left out: " + describe(effects.error()) + "."));
   }
+  take(check_limits(context));
   take(check_motors(context));
   take(check_robot_file(context));
   take(check_kinematics(context));

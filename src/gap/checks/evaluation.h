@@ -31,10 +31,11 @@ struct CheckContext {
 };
 
 std::vector<Check> check_clock(const CheckContext& c);            // utime, sequence, mission lengths
-std::vector<Check> check_silence(const CheckContext& c);          // dead and constant channels
+std::vector<Check> check_silence(const CheckContext& c);          // dead, constant, unsigned channels
 std::vector<Check> check_signs_and_units(const CheckContext& c);  // one source against the others
 std::vector<Check> check_motors(const CheckContext& c);           // each motor against its sibling
 std::vector<Check> check_robot_file(const CheckContext& c);
+std::vector<Check> check_limits(const CheckContext& c);
 std::vector<Check> check_kinematics(const CheckContext& c);  // gyro and map against wheels
 std::vector<Check> check_delays(const CheckContext& c);
 std::vector<Check> check_steps(const CheckContext& c);       // lasting changes between missions

@@ -27,6 +27,7 @@ S side_of(S right, std::size_t side) {
 constexpr double constant_off = 0.35, resistance_off = 0.7, load_off = 1.1, inertia_off = 0.7;
 constexpr double skid = 0.7, track_off = 0.2, travel_off = 0.2, heading_off = 0.1, command_off = 0.3;
 constexpr double driver_off = 0.5, regeneration_off = 0.3, voltage_off = 0.25, limit_off = 0.3;
+constexpr double anything = 1e3;
 constexpr double steepest_rad = 0.35;
 constexpr double unused_off = 1.5;  // limits need not be reached
 
@@ -85,6 +86,7 @@ class Gatherer {
   void armatures();
   void torques();
   void turning();
+  void turning_by_wheels(const BlockFit& fit, const std::string& turner, S source);
   void moving();
   void batteries();
   void loads();
@@ -121,12 +123,12 @@ void Gatherer::armatures() {
     e->both_sides = true;
   };
   sides(add("the voltage constant, from the differences of the sides, is", "the file's",
-            estimate(fit, 1) * (1 / p_.voltage_constant_v_s_rad), constant_off, constant_off, 8,
+            estimate(fit, 1) * (1 / p_.voltage_constant_v_s_rad), constant_off, constant_off, 12,
             {{S::voltage_right, 1}, {S::wheel_right, -1}}),
         1 | 2);
   sides(add("the resistance, from the differences of the sides, is", "the file's",
             estimate(fit, 0) * (2 / (p_.resistance_ohm[0] + p_.resistance_ohm[1])), resistance_off,
-            resistance_off, 6, {{S::voltage_right, 1}, {S::current_right, -1}}),
+            resistance_off, 10, {{S::voltage_right, 1}, {S::current_right, -1}}),
         2 | 4);
 }
 
@@ -159,41 +161,37 @@ void Gatherer::torques() {
   }
 }
 
-void Gatherer::turning() {
+// The turning of one wheel, by the gyro or the map.
+void Gatherer::turning_by_wheels(const BlockFit& fit, const std::string& turner, S source) {
   const double share = 0.5 / p_.half_track_m;
-  const bool wheels = heard({0, 1}), gyro = heard({reading::yaw_rate}), heading = heard({reading::heading});
-  constexpr std::array<std::size_t, 3> sides_and_one{1, 2, 3};
-  constexpr std::array<std::size_t, 2> sides{2, 3}, gyro_and_time{2, 3};
-  const BlockFit turn = fit_blocks(blocks(Relation::gyro), 0, sides_and_one);
-  const BlockFit map = fit_blocks(blocks(Relation::heading_wheels), 0, sides);
-  const BlockFit map_degrees = fit_blocks(blocks(Relation::heading_wheels), 1, sides);
   for (std::size_t k : {0u, 1u}) {
     const double expected = (k == 0 ? share : -share) * p_.wheel_radius_m[k];
-    const auto index = static_cast<Eigen::Index>(k);
-    const std::string says = std::string("over the turning of the ") + side_name[k] + " wheel ";
-    if (wheels && gyro) {
-      if (Evidence* e = add(says + "the gyro reads", "what the file's track asks",
-                            estimate(turn, index) * (1 / expected), skid, track_off, 8,
-                            {{S::yaw_rate, 1}, {side_of(S::wheel_right, k), -1}})) {
-        e->turned_by = 1;
-      }
-    }
-    if (wheels && heading) {
-      if (Evidence* e = add(says + "the map's heading turns", "what the file's track asks",
-                            estimate(map, index) * (1 / expected), skid, track_off, 8,
-                            {{S::heading, 1}, {side_of(S::wheel_right, k), -1}})) {
-        e->turned_by = 1;
-      }
-    }
+    Evidence* e = add(std::string("over the turning of the ") + side_name[k] + " wheel " + turner,
+                      "what the file's track asks", estimate(fit, static_cast<Eigen::Index>(k)) * (1 / expected), skid,
+                      track_off, 8, {{source, 1}, {side_of(S::wheel_right, k), -1}});
+    if (e != nullptr) e->turned_by = 1;
   }
-  if (!gyro || !heading) return;
-  const BlockFit radians = fit_blocks(blocks(Relation::heading_gyro), 0, gyro_and_time);
-  const BlockFit degrees = fit_blocks(blocks(Relation::heading_gyro), 1, gyro_and_time);
-  // Whichever of the two readings follows the gyro better is the heading's unit.
-  const Estimate r = estimate(radians, 0), d = estimate(degrees, 0);
-  const bool by_degrees = d.known() && (!r.known() || std::fabs(d.sd / d.value) < 0.5 * std::fabs(r.sd / r.value));
-  add("the map's heading turns", "what the gyro reads", by_degrees ? d : r, heading_off, heading_off, 12,
-      {{S::heading, 1}, {S::yaw_rate, -1}});
+}
+
+void Gatherer::turning() {
+  const bool wheels = heard({0, 1}), gyro = heard({reading::yaw_rate}), heading = heard({reading::heading});
+  constexpr std::array<std::size_t, 3> sides_and_one{1, 2, 3};
+  constexpr std::array<std::size_t, 2> others{2, 3};
+  if (wheels && gyro) {
+    turning_by_wheels(fit_blocks(blocks(Relation::gyro), 0, sides_and_one), "the gyro reads", S::yaw_rate);
+  }
+  if (!heading) return;
+  // Headings jump by a turn, of one unit or the other: whichever reading follows better is the heading's.
+  const auto follow = [&](Relation relation) {
+    const BlockFit radians = fit_blocks(blocks(relation), 0, others), degrees = fit_blocks(blocks(relation), 1, others);
+    const auto unsure = [](const BlockFit& fit) { return fit.known() ? std::fabs(fit.sd(0) / fit.coefficient[0]) : 1e9; };
+    return unsure(degrees) < 0.5 * unsure(radians) ? degrees : radians;
+  };
+  if (wheels) turning_by_wheels(follow(Relation::heading_wheels), "the map's heading turns", S::heading);
+  if (gyro) {
+    add("the map's heading turns", "what the gyro reads", estimate(follow(Relation::heading_gyro), 0), heading_off,
+        heading_off, 12, {{S::heading, 1}, {S::yaw_rate, -1}});
+  }
 }
 
 void Gatherer::moving() {
@@ -221,6 +219,10 @@ void Gatherer::moving() {
     both(e);
     if (e != nullptr) e->magnitude = true;
   }
+  // Which way a robot mostly goes is a weak hint at what it calls forward.
+  Evidence* forward = add("the way forward, less that backward, is", "all the way that the wheels make",
+                          ratio_of_sums(blocks(Relation::way), 0, 1, 2), anything, anything, 1, {{S::wheel_right, 1}});
+  both(forward);
   if (heard({reading::command_speed})) {
     both(add("the wheels drive at", "the commanded speed",
              estimate(fit_blocks(blocks(Relation::command), 0, one), 0), command_off, command_off, 8,

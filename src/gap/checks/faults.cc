@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 namespace joulecast::gap {
@@ -11,10 +12,10 @@ using S = Source;
 
 constexpr double sign_surprise = 4, unit_surprise = 4, swap_surprise = 4.5, odd_surprise = 5.5;
 constexpr double lost_surprise = 1;  // of evidence that a fault would make meaningless
+constexpr double least_support = 1;  // nats beyond its surprise that what a fault predicts must speak for it
 constexpr double least_gain = 4;     // nats, beyond the fault's own surprise
 constexpr double nearly = 1.5;       // nats between explanations that do as well
 constexpr double telling = 2.0;      // factors nearer to 1 than this are errors of calibration, not of units
-constexpr std::size_t most_faults = 3;
 constexpr double degrees = 180 / std::numbers::pi, rpm = 30 / std::numbers::pi;
 
 using Set = std::vector<const Fault*>;
@@ -68,6 +69,19 @@ double surprise_of(std::span<const Evidence> evidence, const Set& set) {
   return total;
 }
 
+// Whether each fault foretells what is seen, and not only takes away the meaning of what speaks against it.
+bool supported(std::span<const Evidence> evidence, const Set& set) {
+  return std::ranges::all_of(set, [&](const Fault* fault) {
+    Set others;
+    std::ranges::copy_if(set, std::back_inserter(others), [&](const Fault* f) { return f != fault; });
+    double support = 0;
+    for (const Evidence& e : evidence) {
+      if (predicted(e, set)) support += surprise_of(e, others) - surprise_of(e, set);
+    }
+    return support >= fault->surprise + least_support;
+  });
+}
+
 class Table {
  public:
   void add(std::string id, std::string channel, std::string cause, std::initializer_list<S> sources, double factor,
@@ -95,8 +109,8 @@ void add_motor_faults(Table& t) {
     std::uint32_t swap;
     const char* milli;
   };
-  for (const Pair& p : {Pair{"motor_voltage", S::voltage_right, S::voltage_left, 2, "in mV"},
-                        Pair{"motor_current", S::current_right, S::current_left, 4, "in mA"}}) {
+  for (const Pair& p : {Pair{"motor_voltage", S::voltage_right, S::voltage_left, 2, "given in mV"},
+                        Pair{"motor_current", S::current_right, S::current_left, 4, "given in mA"}}) {
     const std::string field = p.field;
     t.add(field + "_reversed", field, "reversed on both sides", {p.right, p.left}, -1, sign_surprise);
     t.add(field + "_reversed", field + ".right", "reversed", {p.right}, -1, sign_surprise);
@@ -105,27 +119,28 @@ void add_motor_faults(Table& t) {
     t.add(field + "_scale", field + ".right", p.milli, {p.right}, 1000, odd_surprise);
     t.add(field + "_scale", field + ".left", p.milli, {p.left}, 1000, odd_surprise);
     t.add(field + "_scale", field, "divided by 1000 once too often", {p.right, p.left}, 0.001, odd_surprise);
-    t.add(field + "_sides_swapped", field, "with right and left swapped", {}, 1, swap_surprise, p.swap);
+    t.add(field + "_sides_swapped", field, "swapped between right and left", {}, 1, swap_surprise, p.swap);
   }
-  t.add("motor_sides_swapped", "motor_voltage, motor_current", "with right and left swapped", {}, 1, swap_surprise,
+  t.add("motor_sides_swapped", "motor_voltage, motor_current", "swapped between right and left", {}, 1, swap_surprise,
         2 | 4);
 }
 
 void add_wheel_faults(Table& t, const robot::RobotModel& robot) {
   const std::initializer_list<S> both{S::wheel_right, S::wheel_left};
   const double gear = robot.motor.gear_ratio, radius = robot.kinematics.wheel_radius_m;
-  t.add("wheel_velocity_reversed", "wheel_velocity", "reversed on both sides", both, -1, sign_surprise);
+  // A robot that reads so drives backwards for whoever looks at it.
+  t.add("wheel_velocity_reversed", "wheel_velocity", "reversed on both sides", both, -1, sign_surprise + 0.5);
   t.add("wheel_velocity_reversed", "wheel_velocity.right", "reversed", {S::wheel_right}, -1, sign_surprise);
   t.add("wheel_velocity_reversed", "wheel_velocity.left", "reversed", {S::wheel_left}, -1, sign_surprise);
-  t.add("wheel_velocity_sides_swapped", "wheel_velocity", "with right and left swapped", {}, 1, swap_surprise, 1);
-  t.add("wheel_velocity_scale", "wheel_velocity", "in rpm", both, rpm, unit_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "in degrees a second", both, degrees, unit_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "in m/s at the rim", both, radius, unit_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "that of the motor shaft", both, gear, unit_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "that of the motor shaft, in rpm", both, gear * rpm, odd_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "in mm/s at the rim", both, 1000 * radius, odd_surprise);
+  t.add("wheel_velocity_sides_swapped", "wheel_velocity", "swapped between right and left", {}, 1, swap_surprise, 1);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given in rpm", both, rpm, unit_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given in degrees a second", both, degrees, unit_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given in m/s at the rim", both, radius, unit_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given at the motor shaft", both, gear, unit_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given at the motor shaft in rpm", both, gear * rpm, odd_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given in mm/s at the rim", both, 1000 * radius, odd_surprise);
   t.add("wheel_velocity_scale", "wheel_velocity", "converted from rpm once too often", both, 1 / rpm, odd_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "in turns a second", both, 0.5 / std::numbers::pi, odd_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given in turns a second", both, 0.5 / std::numbers::pi, odd_surprise);
   t.add("wheel_velocity_scale", "wheel_velocity", "divided by the gear ratio once too often", both, 1 / gear,
         odd_surprise);
 }
@@ -137,59 +152,56 @@ std::vector<Fault> known_faults(const robot::RobotModel& robot) {
   add_wheel_faults(t, robot);
   add_motor_faults(t);
   t.add("battery_current_reversed", "battery_current", "reversed", {S::battery_current}, -1, sign_surprise);
-  t.add("battery_current_scale", "battery_current", "in mA", {S::battery_current}, 1000, unit_surprise);
-  t.add("battery_current_scale", "battery_current", "in mA and reversed", {S::battery_current}, -1000,
+  t.add("battery_current_scale", "battery_current", "given in mA", {S::battery_current}, 1000, unit_surprise);
+  t.add("battery_current_scale", "battery_current", "given in mA and reversed", {S::battery_current}, -1000,
         unit_surprise + 1);
   t.add("battery_current_scale", "battery_current", "divided by 1000 once too often", {S::battery_current}, 0.001,
         odd_surprise);
-  t.add("battery_voltage_scale", "battery_voltage", "in mV", {S::battery_voltage}, 1000, unit_surprise);
+  t.add("battery_voltage_scale", "battery_voltage", "given in mV", {S::battery_voltage}, 1000, unit_surprise);
   t.add("battery_voltage_scale", "battery_voltage", "divided by 1000 once too often", {S::battery_voltage}, 0.001,
         odd_surprise);
   t.add("yaw_rate_reversed", "yaw_rate", "reversed", {S::yaw_rate}, -1, sign_surprise - 0.5);
-  t.add("yaw_rate_scale", "yaw_rate", "in degrees a second", {S::yaw_rate}, degrees, unit_surprise);
-  t.add("yaw_rate_scale", "yaw_rate", "in degrees a second and reversed", {S::yaw_rate}, -degrees, unit_surprise + 1);
+  t.add("yaw_rate_scale", "yaw_rate", "given in degrees a second", {S::yaw_rate}, degrees, unit_surprise);
+  t.add("yaw_rate_scale", "yaw_rate", "given in degrees a second and reversed", {S::yaw_rate}, -degrees, unit_surprise + 1);
   t.add("yaw_rate_scale", "yaw_rate", "converted from degrees once too often", {S::yaw_rate}, 1 / degrees,
         odd_surprise);
   t.add("pose_heading_reversed", "pose.heading", "reversed, as in frames with z down", {S::heading}, -1,
         sign_surprise);
-  t.add("pose_heading_scale", "pose.heading", "in degrees", {S::heading}, degrees, unit_surprise);
-  t.add("pose_heading_scale", "pose.heading", "in degrees and reversed", {S::heading}, -degrees, unit_surprise + 1);
-  t.add("pose_scale", "pose.x, pose.y", "in mm", {S::position}, 1000, unit_surprise);
-  t.add("pose_scale", "pose.x, pose.y", "in cm", {S::position}, 100, odd_surprise);
+  t.add("pose_heading_scale", "pose.heading", "given in degrees", {S::heading}, degrees, unit_surprise);
+  t.add("pose_heading_scale", "pose.heading", "given in degrees and reversed", {S::heading}, -degrees, unit_surprise + 1);
+  t.add("pose_scale", "pose.x, pose.y", "given in mm", {S::position}, 1000, unit_surprise);
+  t.add("pose_scale", "pose.x, pose.y", "given in cm", {S::position}, 100, odd_surprise);
   t.add("pose_reversed", "pose.x, pose.y", "reversed against its heading", {S::position}, -1, sign_surprise);
-  t.add("velocity_command_scale", "velocity_command", "in mm/s", {S::command_speed}, 1000, unit_surprise);
+  t.add("velocity_command_scale", "velocity_command", "given in mm/s", {S::command_speed}, 1000, unit_surprise);
   t.add("velocity_command_reversed", "velocity_command.speed", "reversed", {S::command_speed}, -1, sign_surprise - 0.5);
   t.add("velocity_command_reversed", "velocity_command.turn", "reversed", {S::command_turn}, -1, sign_surprise - 0.5);
   t.add("pitch_reversed", "pitch", "reversed", {S::pitch}, -1, sign_surprise);
-  t.add("pitch_scale", "pitch", "in degrees", {S::pitch}, degrees, unit_surprise);
-  t.add("payload_scale", "payload_mass", "in g", {S::payload}, 1000, unit_surprise);
+  t.add("pitch_scale", "pitch", "given in degrees", {S::pitch}, degrees, unit_surprise);
+  t.add("payload_scale", "payload_mass", "given in g", {S::payload}, 1000, unit_surprise);
   return t.take();
 }
 
 Explanation explain(std::span<const Evidence> evidence, std::span<const Fault> faults) {
   Explanation best;
   Set set;
-  double least = surprise_of(evidence, set);
-  const double none = least;
-  while (set.size() < most_faults) {
-    const Fault* next = nullptr;
-    double reached = least;
-    for (const Fault& fault : faults) {
-      Set with = set;
-      with.push_back(&fault);
-      if (const double s = surprise_of(evidence, with); s < reached) reached = s, next = &fault;
-    }
-    if (next == nullptr) break;
-    set.push_back(next);
-    least = reached;
-  }
-  // A pair may be needed where neither helps alone; and what came first may have been a detour.
+  const double none = surprise_of(evidence, set);
+  double least = none;
+  if (none < least_gain) return best;
+  const auto try_set = [&](const Set& candidate) {
+    const double s = surprise_of(evidence, candidate);
+    if (!(s < least - 1e-9) || !supported(evidence, candidate)) return;
+    least = s;
+    set = candidate;
+  };
   for (const Fault& one : faults) {
+    try_set({&one});
     for (const Fault& two : faults) {
-      if (&two <= &one) continue;
-      const Set pair{&one, &two};
-      if (const double s = surprise_of(evidence, pair); s < least - 1e-9) least = s, set = pair;
+      if (&two > &one) try_set({&one, &two});
     }
+  }
+  if (set.size() == 2) {
+    const Set pair = set;
+    for (const Fault& third : faults) try_set({pair[0], pair[1], &third});
   }
   if (set.empty() || none - least < least_gain * static_cast<double>(set.size())) return best;
   best.gain = none - least;
@@ -199,7 +211,8 @@ Explanation explain(std::span<const Evidence> evidence, std::span<const Fault> f
     for (const Fault& fault : faults) {
       Set with = set;
       with[k] = &fault;
-      if (&fault != set[k] && surprise_of(evidence, with) < least + nearly) others.push_back(&fault);
+      if (&fault == set[k] || surprise_of(evidence, with) > least + nearly) continue;
+      if (supported(evidence, with)) others.push_back(&fault);
     }
   }
   return best;

@@ -9,7 +9,7 @@ namespace {
 
 using telemetry::Sample;
 
-constexpr std::size_t block_cells = 5;
+constexpr std::size_t block_cells = 3;
 constexpr double hold_s = 1.0;          // positions and yaw rates between those that are missing
 constexpr double alike = 0.2;           // as in ValueTally: a spike has like neighbours ...
 constexpr double thrown = 0.8;          // ... and is this far from them
@@ -19,8 +19,8 @@ constexpr double turning_rad = 0.3;     // difference of the wheels' angles in a
 constexpr double braking_share = 0.05;  // of the fastest wheel speed, lost in a span
 constexpr double widest_turn_rad = 1.0; // of a span whose chord is compared with its path
 
-constexpr std::array<std::size_t, relation_count> quantities{5, 5, 4, 6, 6, 4, 4, 3, 3, 3,
-                                                             2, 3, 4, 2, 2, 4, 4, 4, 2, 5};
+constexpr std::array<std::size_t, relation_count> quantities{5, 5, 4, 6, 6, 4, 4, 3, 3, 3, 2,
+                                                             3, 4, 3, 2, 2, 4, 4, 4, 2, 5};
 
 std::array<Products, relation_count> no_products() {
   std::array<Products, relation_count> products;
@@ -117,6 +117,7 @@ void Observer::take(const Cell& c) {
   const dynamics::Parameters<double>& p = model_.parameters();
   const double speed = 0.5 * (p.wheel_radius_m[0] * right + p.wheel_radius_m[1] * left);
   const double turn = (p.wheel_radius_m[0] * right - p.wheel_radius_m[1] * left) / (2 * p.half_track_m);
+  of(Relation::way).add({speed, std::fabs(speed), 1.0});
   of(Relation::command).add({speed, c.command[0]});
   of(Relation::command_turn).add({turn, c.command[1]});
   take_power(c);

@@ -34,6 +34,7 @@ enum class Relation : std::size_t {
   idle,                 // battery power, 1; standing
   climb,                // battery power less the model's, m g v sin(pitch), 1
   gyro,                 // yaw rate, w right, w left, 1
+  way,                  // speed of the robot by the wheels, its magnitude, 1
   command,              // speed of the wheels, of the command
   command_turn,         // turning of the wheels, of the command
   heading_gyro,         // turned by the map in rad, in degrees, by the gyro, time

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "statistics/distributions.h"
@@ -101,18 +102,25 @@ std::array<double, 2> BlockFit::interval(Eigen::Index k) const {
   return estimate(*this, k).interval();
 }
 
-BlockFit fit_blocks(std::span<const Products::Block> blocks, std::size_t y, std::span<const std::size_t> x) {
+namespace {
+
+// Weighted least squares; empty where the terms cannot be told apart.
+std::optional<Eigen::VectorXd> solve(const Eigen::MatrixXd& xx, const Eigen::VectorXd& xy) {
+  const Eigen::VectorXd unit = xx.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::LDLT<Eigen::MatrixXd> factor(unit.asDiagonal() * xx * unit.asDiagonal());
+  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > least_part)) return std::nullopt;
+  return unit.asDiagonal() * factor.solve(unit.asDiagonal() * xy);
+}
+
+BlockFit fit_terms(std::span<const Products::Block> blocks, std::size_t y, std::span<const std::size_t> x) {
   const auto n = static_cast<Eigen::Index>(x.size());
   BlockFit fit;
-  fit.coefficient = Eigen::VectorXd::Zero(n);
-  fit.covariance = Eigen::MatrixXd::Zero(n, n);
-  fit.freedom = static_cast<double>(blocks.size()) - static_cast<double>(x.size());
-  if (!fit.known()) return fit;
+  const double freedom = static_cast<double>(blocks.size()) - static_cast<double>(x.size());
+  if (!(freedom > 0)) return fit;
   std::vector<Normal> normals;
   normals.reserve(blocks.size());
   for (const Products::Block& block : blocks) normals.push_back(normal_of(block, y, x));
   std::vector<double> weight(blocks.size(), 1.0);
-  Eigen::LDLT<Eigen::MatrixXd> factor;
   Eigen::MatrixXd xx;
   for (int round = 0; round < rounds; ++round) {
     xx = Eigen::MatrixXd::Zero(n, n);
@@ -121,16 +129,11 @@ BlockFit fit_blocks(std::span<const Products::Block> blocks, std::size_t y, std:
       xx += weight[k] * normals[k].xx;
       xy += weight[k] * normals[k].xy;
     }
-    // Quantities in units of their own size; what the others say already is not asked again.
-    const Eigen::VectorXd size = xx.diagonal().cwiseMax(0.0).cwiseSqrt();
-    if (!(size.minCoeff() > 0)) return fit.freedom = 0, fit;
-    const Eigen::VectorXd unit = size.cwiseInverse();
-    factor.compute(unit.asDiagonal() * xx * unit.asDiagonal());
-    if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > least_part)) {
-      return fit.freedom = 0, fit;
-    }
-    fit.coefficient = unit.asDiagonal() * factor.solve(unit.asDiagonal() * xy);
+    const auto solved = solve(xx, xy);
+    if (!solved) return fit;
+    fit.coefficient = *solved;
     std::vector<double> misfits;
+    misfits.reserve(blocks.size());
     for (const Products::Block& block : blocks) misfits.push_back(misfit(block, y, x, fit.coefficient));
     const double usual = statistics::median(misfits);
     for (std::size_t k = 0; k < blocks.size() && usual > 0; ++k) {
@@ -143,8 +146,35 @@ BlockFit fit_blocks(std::span<const Products::Block> blocks, std::size_t y, std:
     middle += score * score.transpose();
   }
   const Eigen::MatrixXd inverse = xx.inverse();
-  const double few = static_cast<double>(blocks.size()) / fit.freedom;
-  fit.covariance = few * inverse * middle * inverse;
+  fit.covariance = static_cast<double>(blocks.size()) / freedom * inverse * middle * inverse;
+  fit.freedom = freedom;
+  return fit;
+}
+
+}  // namespace
+
+BlockFit fit_blocks(std::span<const Products::Block> blocks, std::size_t y, std::span<const std::size_t> x) {
+  // What never moves tells nothing of its own coefficient, and all of the others'.
+  std::vector<std::size_t> terms;
+  std::vector<Eigen::Index> place;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(x[k]);
+    if (std::ranges::none_of(blocks, [&](const auto& block) { return block.sums(at, at) > 0; })) continue;
+    terms.push_back(x[k]);
+    place.push_back(static_cast<Eigen::Index>(k));
+  }
+  BlockFit some = terms.empty() ? BlockFit{} : fit_terms(blocks, y, terms);
+  if (!some.known() || terms.size() == x.size()) return some;
+  const auto n = static_cast<Eigen::Index>(x.size());
+  BlockFit fit{Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n), some.freedom};
+  fit.covariance.diagonal().setConstant(std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    fit.coefficient[place[i]] = some.coefficient[static_cast<Eigen::Index>(i)];
+    for (std::size_t k = 0; k < place.size(); ++k) {
+      fit.covariance(place[i], place[k]) =
+          some.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
+    }
+  }
   return fit;
 }
 
@@ -165,8 +195,13 @@ bool Estimate::sure() const {
 
 Estimate estimate(const BlockFit& fit, const Eigen::VectorXd& combination) {
   if (!fit.known()) return {};
-  return {combination.dot(fit.coefficient),
-          std::sqrt(std::max(combination.dot(fit.covariance * combination), 0.0)), fit.freedom};
+  double variance = 0;
+  for (Eigen::Index i = 0; i < combination.size(); ++i) {
+    for (Eigen::Index k = 0; k < combination.size(); ++k) {
+      if (combination[i] * combination[k] != 0) variance += combination[i] * combination[k] * fit.covariance(i, k);
+    }
+  }
+  return {combination.dot(fit.coefficient), std::sqrt(std::max(variance, 0.0)), fit.freedom};
 }
 
 Estimate estimate(const BlockFit& fit, Eigen::Index coefficient) {

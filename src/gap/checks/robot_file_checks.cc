@@ -15,8 +15,8 @@ class List {
  public:
   // `ratio` over the file's value; told where its whole interval is far from 1.
   void add(const char* name, const Estimate& ratio) {
-    if (!ratio.sure() || ratio.value <= 0) return;
     const auto interval = ratio.interval();
+    if (!ratio.known() || !(ratio.value > 0)) return;
     if (!(interval[0] > far || interval[1] < 1 / far)) return;
     text_ += fmt::format("{}{} {:.3g} times", text_.empty() ? "" : ", ", name, ratio.value);
     const double size = std::fabs(std::log(ratio.value));
@@ -33,8 +33,7 @@ class List {
 
 // Of the side that is nearer to the file, as the other may have a fault of its own.
 Estimate nearer(const Estimate& right, const Estimate& left) {
-  if (!right.sure()) return left;
-  if (!left.sure()) return right;
+  if (!right.known() || !left.known()) return right.known() ? right : left;
   return std::fabs(std::log(std::fabs(right.value))) < std::fabs(std::log(std::fabs(left.value))) ? right : left;
 }
 

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "gap/checks/evaluation.h"
 #include "gap/checks/faults.h"
+#include "statistics/robust.h"
 
 namespace joulecast::gap {
 namespace {
@@ -36,13 +38,12 @@ std::string_view contract_of(std::string_view channel) {
 std::string also(const std::vector<const Fault*>& alternatives) {
   std::string text;
   for (const Fault* f : alternatives) {
-    text += fmt::format("{}{} {}", text.empty() ? "; it would be the same with " : " or ", f->channel, f->cause);
+    text += fmt::format("{}{} {}", text.empty() ? "; " : " or ", f->channel, f->cause);
   }
-  return text;
+  return text.empty() ? text : text + " would look the same";
 }
 
-// More of the same kind than this come from one mistake.
-constexpr double fits = 2.0;  // standard deviations of what sound robots differ by
+constexpr double over_limit = 1.5;
 
 }  // namespace
 
@@ -62,6 +63,31 @@ std::vector<Check> check_signs_and_units(const CheckContext& c) {
                              also(explanation.alternatives[k]));
     checks.push_back(std::move(check));
   }
+  return checks;
+}
+
+// Beyond the file's limits, where nothing else says why.
+std::vector<Check> check_limits(const CheckContext& c) {
+  std::vector<double> speed, turn;
+  for (const Observation& o : c.seen) {
+    if (o.fastest_m_s > 0) speed.push_back(o.fastest_m_s);
+    if (o.fastest_turn_rad_s > 0) turn.push_back(o.fastest_turn_rad_s);
+  }
+  std::vector<Check> checks;
+  const auto look = [&](const char* id, const char* channel, std::vector<double>& fastest, double limit,
+                        const char* what) {
+    const std::size_t at = std::string_view(channel) == "yaw_rate" ? reading::yaw_rate : reading::wheel_velocity;
+    if (fastest.empty() || !c.heard({at}) || !(limit > 0)) return;
+    const double ratio = statistics::median(fastest) / limit;
+    if (ratio < over_limit) return;
+    checks.push_back({id, channel, ratio, {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()},
+                      fmt::format("{} reaches {:.3g} times the file's {} in the usual mission: is it {}? joulecast wants {}.",
+                                  channel, ratio, what, at == reading::yaw_rate ? "in degrees" : "in rpm, or of the motor",
+                                  contract_of(channel)),
+                      false});
+  };
+  look("speed_over_limit", "wheel_velocity", speed, c.robot.limits.speed_m_s, "limits.speed_m_s");
+  look("yaw_rate_over_limit", "yaw_rate", turn, c.robot.limits.yaw_rate_rad_s, "limits.yaw_rate_rad_s");
   return checks;
 }
 

@@ -13,8 +13,9 @@ namespace {
 constexpr std::array<double, 2> no_interval{std::numeric_limits<double>::quiet_NaN(),
                                             std::numeric_limits<double>::quiet_NaN()};
 constexpr double enough_moving_s = 3;   // less says nothing of what should have moved
-constexpr double least_swing = 0.005;   // of a battery's voltage: what any converter resolves
+constexpr double least_swing = 0.002;   // of a battery's voltage: what any converter resolves
 constexpr double near_nominal = 0.25;
+constexpr double supply_share = 0.5;  // of the nominal voltage: lower ones come with every halt
 
 // A channel, or a group of readings that one channel holds.
 struct Group {
@@ -77,11 +78,52 @@ Check constant_check(const CheckContext& c, const std::string& channel, double v
   }
   check.contradicted = std::fabs(value / c.robot.battery.nominal_voltage_v - 1) > near_nominal;
   check.says = fmt::format("battery_voltage is {:.5g} V all the time where the current must move it by {:.2g} V: a "
-                           "constant written in, no measurement. {}.",
+                           "constant written in, or a converter that cannot tell. {}.",
                            value, expected_swing(c) * c.robot.battery.nominal_voltage_v,
                            check.contradicted ? "It is far from the file's nominal voltage, so that power is not known"
                                               : "Power is the current times it; nothing is learnt from the voltage");
   return check;
+}
+
+// Motor voltages that stay near the battery's whatever the wheels do.
+void check_supply(const CheckContext& c, std::vector<Check>& checks) {
+  for (std::size_t k : {0u, 1u}) {
+    const ValueTally t = c.tally(reading::motor_voltage + k);
+    const double nominal = c.robot.battery.nominal_voltage_v;
+    if (t.known() == 0 || t.constant() || t.low() < supply_share * nominal) return;
+  }
+  const double volts = c.tally(reading::motor_voltage).mean();
+  checks.push_back({"supply_for_motor_voltage", "motor_voltage", volts, no_interval,
+                    fmt::format("motor_voltage stays near {:.3g} V however the wheels turn: it looks read at the supply; "
+                                "joulecast wants V at the armature, positive driving forward.",
+                                volts),
+                    true});
+}
+
+// Currents or voltages that are positive whichever way the wheel turns.
+void check_unsigned(const CheckContext& c, std::vector<Check>& checks) {
+  constexpr std::array<std::size_t, 2> ways{2, 3};
+  for (const std::size_t quantity : {0u, 1u}) {
+    const std::string field = quantity == 0 ? "motor_current" : "motor_voltage";
+    std::string channels;
+    Estimate backward;
+    for (std::size_t k : {0u, 1u}) {
+      const std::size_t at = (quantity == 0 ? reading::motor_current : reading::motor_voltage) + k;
+      if (!c.has({at}) || c.tally(at).low() < 0) continue;
+      const BlockFit fit = fit_blocks(c.blocks(k == 0 ? Relation::ways_right : Relation::ways_left), quantity, ways);
+      const Estimate forward = estimate(fit, 0);
+      backward = estimate(fit, 1);
+      if (!forward.sure() || !backward.sure() || forward.value < 0 || backward.value < 0) continue;
+      channels += (channels.empty() ? "" : ", ") + std::string(reading_names[at]);
+    }
+    if (channels.empty()) continue;
+    if (channels.find(", ") != std::string::npos) channels = field;
+    checks.push_back(make_check(field + "_unsigned", channels, backward,
+                                fmt::format("{} is positive whichever way the wheel turns, {} on the average while it "
+                                            "turns backward: its sign is lost; joulecast wants it positive driving forward.",
+                                            channels, with_interval(backward.value, backward.interval()))));
+    checks.back().contradicted = true;
+  }
 }
 
 }  // namespace
@@ -105,6 +147,8 @@ std::vector<Check> check_silence(const CheckContext& c) {
       checks.push_back(constant_check(c, name, t.low()));
     }
   }
+  check_supply(c, checks);
+  check_unsigned(c, checks);
   return checks;
 }
 
