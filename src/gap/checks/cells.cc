@@ -9,8 +9,8 @@ namespace {
 
 constexpr double cell_s = 0.4;
 constexpr std::size_t cell_rows = 4;
-constexpr double longest_gap_s = 1.0;   // within a cell or span, but for slower recordings
-constexpr double moving_part = 0.02;    // of the fastest wheel speed
+constexpr double longest_gap_s = 1.0;  // within a cell or span, but for slower recordings
+constexpr double moving_part = 0.02;   // of the fastest wheel speed
 constexpr double resting_part = 0.005;
 constexpr double span_s = 2.0;
 
@@ -66,8 +66,8 @@ Cell CellCutter::cell() const {
     if (sums_.low[k] > moving_part * limit_rad_s_) c.way[k] = 1;
     if (sums_.high[k] < -moving_part * limit_rad_s_) c.way[k] = -1;
     const double rest = resting_part * limit_rad_s_;
-    c.resting = c.resting && std::fabs(c.speed_rad_s[k]) < rest &&
-                std::max(sums_.high[k], -sums_.low[k]) < 4 * rest;
+    c.resting =
+        c.resting && std::fabs(c.speed_rad_s[k]) < rest && std::max(sums_.high[k], -sums_.low[k]) < 4 * rest;
     c.voltage_v[k] = sums_.voltage[k].get();
     c.current_a[k] = sums_.current[k].get();
     c.command[k] = sums_.command[k].get();
@@ -75,8 +75,8 @@ Cell CellCutter::cell() const {
   c.battery_voltage_v = sums_.battery_voltage.get();
   c.battery_current_a = sums_.battery_current.get();
   // Where the two never come in one row their means stand for them.
-  c.battery_power_w = sums_.battery_power.count > 0 ? sums_.battery_power.get()
-                                                    : c.battery_voltage_v * c.battery_current_a;
+  c.battery_power_w =
+      sums_.battery_power.count > 0 ? sums_.battery_power.get() : c.battery_voltage_v * c.battery_current_a;
   c.motor_power_w = sums_.motor_power.count > 0
                         ? sums_.motor_power.get()
                         : c.voltage_v[0] * c.current_a[0] + c.voltage_v[1] * c.current_a[1];
@@ -90,7 +90,8 @@ std::optional<Cell> CellCutter::add(const telemetry::Sample& sample) {
   std::optional<Cell> done;
   if (sums_.rows > 0) {
     const double since = seconds(begin_us_, sample.utime_us), step = seconds(last_us_, sample.utime_us);
-    const double usual = seconds(begin_us_, last_us_) / static_cast<double>(std::max<std::size_t>(sums_.rows - 1, 1));
+    const double usual =
+        seconds(begin_us_, last_us_) / static_cast<double>(std::max<std::size_t>(sums_.rows - 1, 1));
     const bool gap = step < 0 || (step > longest_gap_s && sums_.rows > 1 && step > 5 * usual);
     if (since >= cell_s && sums_.rows >= cell_rows && !gap) done = cell();
     if (gap || done) sums_ = {};

@@ -59,12 +59,12 @@ class CellCutter {
 // A stretch of a mission between two positions, some seconds apart.
 struct Span {
   double length_s = 0;
-  std::array<double, 2> turned_rad{};   // by each wheel
-  double gyro_rad = 0;                  // turned, by the gyro; NaN: none
+  std::array<double, 2> turned_rad{};       // by each wheel
+  double gyro_rad = 0;                      // turned, by the gyro; NaN: none
   double heading_rad = 0, heading_deg = 0;  // turned, by the map, read as radians and as degrees
-  double forward = 0, sideways = 0;     // moved, by the map, along and across the mean heading
-  double distance = 0;                  // straight
-  double begin_rad_s = 0, end_rad_s = 0;  // mean of the wheels at both ends
+  double forward = 0, sideways = 0;         // moved, by the map, along and across the mean heading
+  double distance = 0;                      // straight
+  double begin_rad_s = 0, end_rad_s = 0;    // mean of the wheels at both ends
 };
 
 class SpanCutter {

@@ -24,7 +24,8 @@ bool contradicts_clock(const std::vector<Check>& checks) {
 // Contradictions first come, and stay; of the rest the least fundamental give way.
 void shorten(std::vector<Check>& checks) {
   while (checks.size() > most_checks) {
-    const auto last = std::ranges::find_if(checks.rbegin(), checks.rend(), [](const Check& c) { return !c.contradicted; });
+    const auto last =
+        std::ranges::find_if(checks.rbegin(), checks.rend(), [](const Check& c) { return !c.contradicted; });
     if (last == checks.rend()) return;
     checks.erase(std::next(last).base());
   }
@@ -39,7 +40,8 @@ bool CheckContext::heard(std::initializer_list<std::size_t> readings) const {
 }
 
 bool CheckContext::has(std::initializer_list<std::size_t> readings) const {
-  return heard(readings) && std::ranges::all_of(readings, [&](std::size_t k) { return tally(k).known() > 0; });
+  return heard(readings) &&
+         std::ranges::all_of(readings, [&](std::size_t k) { return tally(k).known() > 0; });
 }
 
 ValueTally CheckContext::tally(std::size_t reading) const {

@@ -43,20 +43,24 @@ std::vector<Check> check_unit(const CheckContext& c) {
   if (!sane(period) || year > latest_year) {
     for (const Unit& unit : units) {
       const double then = year_of(begin_us * unit.factor);
-      if (!sane(period * unit.factor) || (year > latest_year && !(then > earliest_year && then < latest_year))) continue;
-      return {clock_check("utime_scale", 1 / unit.factor,
-                          fmt::format("utime looks given in {}: its rows would come every {:.3g} s, in {} every {:.3g} "
-                                      "s; joulecast wants us since 1970.",
-                                      unit.name, period, unit.name, period * unit.factor),
-                          true)};
+      if (!sane(period * unit.factor) ||
+          (year > latest_year && !(then > earliest_year && then < latest_year)))
+        continue;
+      return {clock_check(
+          "utime_scale", 1 / unit.factor,
+          fmt::format("utime looks given in {}: its rows would come every {:.3g} s, in {} every {:.3g} "
+                      "s; joulecast wants us since 1970.",
+                      unit.name, period, unit.name, period * unit.factor),
+          true)};
     }
   }
   if (year > latest_year) {
-    return {clock_check("utime_year", std::floor(year),
-                        fmt::format("utime puts the recordings into the year {:.0f}, with rows every {:.3g} s: is it in "
-                                    "ns, or from another epoch? joulecast wants us since 1970.",
-                                    std::floor(year), period),
-                        false)};
+    return {clock_check(
+        "utime_year", std::floor(year),
+        fmt::format("utime puts the recordings into the year {:.0f}, with rows every {:.3g} s: is it in "
+                    "ns, or from another epoch? joulecast wants us since 1970.",
+                    std::floor(year), period),
+        false)};
   }
   return {};
 }
@@ -83,33 +87,35 @@ std::vector<Check> check_clock(const CheckContext& c) {
   }
   const double n = static_cast<double>(rows);
   if (counts && static_cast<double>(disordered) > disordered_share * n) {
-    checks.push_back(clock_check(
-        "two_senders", static_cast<double>(disordered) / n,
-        fmt::format("In {:.0f} % of the rows the sequence number does not go up: two senders under one robot id? Each "
-                    "robot needs its own id and channel.",
-                    100 * static_cast<double>(disordered) / n),
-        true));
+    checks.push_back(clock_check("two_senders", static_cast<double>(disordered) / n,
+                                 fmt::format("In {:.0f} % of the rows the sequence number does not go up: "
+                                             "two senders under one robot id? Each "
+                                             "robot needs its own id and channel.",
+                                             100 * static_cast<double>(disordered) / n),
+                                 true));
   }
   if (static_cast<double>(repeated + backward) > repeated_share * n) {
-    checks.push_back(clock_check("utime_order", static_cast<double>(repeated + backward),
-                                 fmt::format("{} rows are stamped like the row before and {} before it: utime must be "
-                                             "the instant of sampling, and only go forward.",
-                                             repeated, backward),
-                                 false));
+    checks.push_back(
+        clock_check("utime_order", static_cast<double>(repeated + backward),
+                    fmt::format("{} rows are stamped like the row before and {} before it: utime must be "
+                                "the instant of sampling, and only go forward.",
+                                repeated, backward),
+                    false));
   }
   if (gap_s > gap_share * length_s) {
-    checks.push_back(clock_check("utime_gaps", gap_s,
-                                 fmt::format("{} silences within missions make up {:.0f} s of {:.0f} s; nothing is known "
-                                             "of what happened in them.",
-                                             gaps, gap_s, length_s),
-                                 false));
+    checks.push_back(
+        clock_check("utime_gaps", gap_s,
+                    fmt::format("{} silences within missions make up {:.0f} s of {:.0f} s; nothing is known "
+                                "of what happened in them.",
+                                gaps, gap_s, length_s),
+                    false));
   }
   if (short_ones > 0) {
-    checks.push_back(clock_check("short_missions", static_cast<double>(short_ones),
-                                 fmt::format("{} of {} missions are shorter than {:g} s and say nothing: {}{}.",
-                                             short_ones, c.seen.size(), shortest_mission_s, names,
-                                             short_ones > 3 ? ", ..." : ""),
-                                 false));
+    checks.push_back(clock_check(
+        "short_missions", static_cast<double>(short_ones),
+        fmt::format("{} of {} missions are shorter than {:g} s and say nothing: {}{}.", short_ones,
+                    c.seen.size(), shortest_mission_s, names, short_ones > 3 ? ", ..." : ""),
+        false));
     checks.back().channel.clear();
   }
   return checks;

@@ -12,11 +12,11 @@ namespace joulecast::gap {
 namespace {
 
 constexpr std::size_t rows_for_step = 40;
-constexpr double finest_s = 0.04;        // step: as fine as delays of some ten ms need
-constexpr double longest_gap = 3;        // steps
-constexpr double slope_s = 0.1;          // to each side, for accelerations
-constexpr double start_s = 0.3;          // to each side without a standstill, where currents build up before motion
-constexpr double moving_rad_s = 0.4;     // of both wheels together
+constexpr double finest_s = 0.04;  // step: as fine as delays of some ten ms need
+constexpr double longest_gap = 3;  // steps
+constexpr double slope_s = 0.1;    // to each side, for accelerations
+constexpr double start_s = 0.3;    // to each side without a standstill, where currents build up before motion
+constexpr double moving_rad_s = 0.4;  // of both wheels together
 constexpr std::size_t block_rows = 100;
 constexpr std::size_t most_blocks = 16;
 constexpr double least_explained = 0.1;  // of the variance, at the best lag
@@ -143,9 +143,12 @@ void LagSums::correlate() {
   const auto way = [](double x) { return std::tanh(5 * x); };
   const auto x_of = [&](std::size_t late) {
     Eigen::VectorXd x(terms[late]);
-    if (late < 2) x << way(w[late]), w[late], slope[late], slope[1 - late], way(w[late] - w[1 - late]), 1.0;
-    else if (late == 2) x << std::fabs(speed), speed * speed, speed * (slope[0] + slope[1]), std::fabs(turn), 1.0;
-    else x << w[0], w[1], 1.0;
+    if (late < 2)
+      x << way(w[late]), w[late], slope[late], slope[1 - late], way(w[late] - w[1 - late]), 1.0;
+    else if (late == 2)
+      x << std::fabs(speed), speed * speed, speed * (slope[0] + slope[1]), std::fabs(turn), 1.0;
+    else
+      x << w[0], w[1], 1.0;
     return x;
   };
   const bool moves = moving();
@@ -217,8 +220,8 @@ std::optional<Delay> delay_between(std::span<const LagSums* const> missions, std
   const Eigen::VectorXd part = parts(once);
   const double lag = best_lag(part);
   if (!std::isfinite(lag) || part.maxCoeff() < least_explained) return std::nullopt;
-  const auto interval =
-      statistics::bootstrap_interval(count, [&](std::span<const int> w) { return step * best_lag(parts(w)); }, draws);
+  const auto interval = statistics::bootstrap_interval(
+      count, [&](std::span<const int> w) { return step * best_lag(parts(w)); }, draws);
   return Delay{step * lag, interval};
 }
 

@@ -26,8 +26,8 @@ struct LagBlock {
   Eigen::VectorXd yy;  // by lags
 };
 
-// Correlates one mission's channels with its motion over lags of up to a second or so, in bounded memory. Rows
-// are put on an even grid first; its step comes from the first rows.
+// Correlates one mission's channels with its motion over lags of up to a second or so, in bounded memory.
+// Rows are put on an even grid first; its step comes from the first rows.
 class LagSums {
  public:
   void add(const telemetry::Sample& sample);
@@ -61,7 +61,8 @@ class LagSums {
   std::size_t in_block_ = 0, stride_ = 1, waited_ = 0;
 };
 
-// By how much a channel lags the motion [s]; negative: it leads. With its 95 % interval by a bootstrap of blocks.
+// By how much a channel lags the motion [s]; negative: it leads. With its 95 % interval by a bootstrap of
+// blocks.
 struct Delay {
   double value_s = 0;
   std::array<double, 2> interval{};

@@ -17,7 +17,7 @@ struct CheckContext {
   std::span<const Observation> seen;
   const robot::RobotModel& robot;
   const dynamics::DriveModel& model;
-  double motor_delay_s = 0;  // motor_delay()
+  double motor_delay_s = 0;         // motor_delay()
   std::vector<std::string> silent;  // channels contradicted so far: what they say is not asked again
 
   // None is contradicted.
@@ -38,8 +38,8 @@ std::vector<Check> check_robot_file(const CheckContext& c);
 std::vector<Check> check_limits(const CheckContext& c);
 std::vector<Check> check_kinematics(const CheckContext& c);  // gyro and map against wheels
 std::vector<Check> check_delays(const CheckContext& c);
-std::vector<Check> check_steps(const CheckContext& c);       // lasting changes between missions
-std::vector<Check> check_readings(const CheckContext& c);    // held, coarse, clipped, thrown, missing
+std::vector<Check> check_steps(const CheckContext& c);     // lasting changes between missions
+std::vector<Check> check_readings(const CheckContext& c);  // held, coarse, clipped, thrown, missing
 
 // "0.93 (0.91 to 0.95)", or the number alone where it has no interval.
 std::string with_interval(double value, const std::array<double, 2>& interval);

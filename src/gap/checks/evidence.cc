@@ -21,9 +21,9 @@ S side_of(S right, std::size_t side) {
 }
 
 // How far sound robots are from their file, as standard deviations of logarithms. Electrical constants of
-// another motor of the size: a third; its resistance with leads, brushes and heat: a factor of two; friction and
-// power: a factor of three, the spread between floors of the Husky recordings. Skid-steered robots turn a third
-// as much as their wheels say (Mandow and others 2007: tracks look 1.5 to 3 times as wide as they are).
+// another motor of the size: a third; its resistance with leads, brushes and heat: a factor of two; friction
+// and power: a factor of three, the spread between floors of the Husky recordings. Skid-steered robots turn a
+// third as much as their wheels say (Mandow and others 2007: tracks look 1.5 to 3 times as wide as they are).
 constexpr double constant_off = 0.35, resistance_off = 0.7, load_off = 1.1, inertia_off = 0.7;
 constexpr double skid = 0.7, track_off = 0.2, travel_off = 0.2, heading_off = 0.1, command_off = 0.3;
 constexpr double driver_off = 0.5, regeneration_off = 0.3, voltage_off = 0.25, limit_off = 0.3;
@@ -103,7 +103,8 @@ class Gatherer {
 void Gatherer::armatures() {
   constexpr std::array<std::size_t, 3> terms{1, 2, 3};
   for (std::size_t k : {0u, 1u}) {
-    if (!heard({reading::wheel_velocity + k, reading::motor_voltage + k, reading::motor_current + k})) continue;
+    if (!heard({reading::wheel_velocity + k, reading::motor_voltage + k, reading::motor_current + k}))
+      continue;
     const auto relation = k == 0 ? Relation::armature_right : Relation::armature_left;
     const BlockFit fit = fit_blocks(armature_blocks(seen_, relation, delay_s_), 0, terms);
     const std::string side = side_name[k];
@@ -116,7 +117,8 @@ void Gatherer::armatures() {
   }
   if (!heard({0, 1, 2, 3, 4, 5})) return;
   constexpr std::array<std::size_t, 2> difference{1, 2};
-  const BlockFit fit = fit_blocks(armature_blocks(seen_, Relation::armature_difference, delay_s_), 0, difference);
+  const BlockFit fit =
+      fit_blocks(armature_blocks(seen_, Relation::armature_difference, delay_s_), 0, difference);
   const auto sides = [&](Evidence* e, std::uint32_t pairs) {
     if (e == nullptr) return;
     e->turned_by = pairs;
@@ -166,9 +168,10 @@ void Gatherer::turning_by_wheels(const BlockFit& fit, const std::string& turner,
   const double share = 0.5 / p_.half_track_m;
   for (std::size_t k : {0u, 1u}) {
     const double expected = (k == 0 ? share : -share) * p_.wheel_radius_m[k];
-    Evidence* e = add(std::string("over the turning of the ") + side_name[k] + " wheel " + turner,
-                      "what the file's track asks", estimate(fit, static_cast<Eigen::Index>(k)) * (1 / expected), skid,
-                      track_off, 8, {{source, 1}, {side_of(S::wheel_right, k), -1}});
+    Evidence* e =
+        add(std::string("over the turning of the ") + side_name[k] + " wheel " + turner,
+            "what the file's track asks", estimate(fit, static_cast<Eigen::Index>(k)) * (1 / expected), skid,
+            track_off, 8, {{source, 1}, {side_of(S::wheel_right, k), -1}});
     if (e != nullptr) e->turned_by = 1;
   }
 }
@@ -183,14 +186,17 @@ void Gatherer::turning() {
   if (!heading) return;
   // Headings jump by a turn, of one unit or the other: whichever reading follows better is the heading's.
   const auto follow = [&](Relation relation) {
-    const BlockFit radians = fit_blocks(blocks(relation), 0, others), degrees = fit_blocks(blocks(relation), 1, others);
-    const auto unsure = [](const BlockFit& fit) { return fit.known() ? std::fabs(fit.sd(0) / fit.coefficient[0]) : 1e9; };
+    const BlockFit radians = fit_blocks(blocks(relation), 0, others),
+                   degrees = fit_blocks(blocks(relation), 1, others);
+    const auto unsure = [](const BlockFit& fit) {
+      return fit.known() ? std::fabs(fit.sd(0) / fit.coefficient[0]) : 1e9;
+    };
     return unsure(degrees) < 0.5 * unsure(radians) ? degrees : radians;
   };
   if (wheels) turning_by_wheels(follow(Relation::heading_wheels), "the map's heading turns", S::heading);
   if (gyro) {
-    add("the map's heading turns", "what the gyro reads", estimate(follow(Relation::heading_gyro), 0), heading_off,
-        heading_off, 12, {{S::heading, 1}, {S::yaw_rate, -1}});
+    add("the map's heading turns", "what the gyro reads", estimate(follow(Relation::heading_gyro), 0),
+        heading_off, heading_off, 12, {{S::heading, 1}, {S::yaw_rate, -1}});
   }
 }
 
@@ -202,10 +208,11 @@ void Gatherer::moving() {
   if (map && heard({reading::heading})) {
     const BlockFit fit = fit_blocks(blocks(Relation::travel), 0, sides);
     for (std::size_t k : {0u, 1u}) {
-      Evidence* e = add(std::string("the map moves forward over the turning of the ") + side_name[k] + " wheel",
-                        "what the file's wheel radius asks",
-                        estimate(fit, static_cast<Eigen::Index>(k)) * (2 / p_.wheel_radius_m[k]), travel_off,
-                        travel_off, 8, {{S::position, 1}, {side_of(S::wheel_right, k), -1}});
+      Evidence* e =
+          add(std::string("the map moves forward over the turning of the ") + side_name[k] + " wheel",
+              "what the file's wheel radius asks",
+              estimate(fit, static_cast<Eigen::Index>(k)) * (2 / p_.wheel_radius_m[k]), travel_off,
+              travel_off, 8, {{S::position, 1}, {side_of(S::wheel_right, k), -1}});
       if (e != nullptr) lost(e, {S::heading});
     }
   }
@@ -220,8 +227,9 @@ void Gatherer::moving() {
     if (e != nullptr) e->magnitude = true;
   }
   // Which way a robot mostly goes is a weak hint at what it calls forward.
-  Evidence* forward = add("the way forward, less that backward, is", "all the way that the wheels make",
-                          ratio_of_sums(blocks(Relation::way), 0, 1, 2), anything, anything, 1, {{S::wheel_right, 1}});
+  Evidence* forward =
+      add("the way forward, less that backward, is", "all the way that the wheels make",
+          ratio_of_sums(blocks(Relation::way), 0, 1, 2), anything, anything, 1, {{S::wheel_right, 1}});
   both(forward);
   if (heard({reading::command_speed})) {
     both(add("the wheels drive at", "the commanded speed",
@@ -247,10 +255,10 @@ void Gatherer::batteries() {
   if (!heard({reading::battery_current})) return;
   constexpr std::array<std::size_t, 2> with_one{1, 2};
   if (heard({2, 3, 4, 5})) {
-    Evidence* e = add("the battery's power follows that of the motors", "what it should",
-                      estimate(fit_blocks(blocks(Relation::motors), 0, with_one), 0), regeneration_off, driver_off,
-                      12,
-                      {{S::battery_voltage, 1}, {S::battery_current, 1}, {S::voltage_right, -1}, {S::current_right, -1}});
+    Evidence* e = add(
+        "the battery's power follows that of the motors", "what it should",
+        estimate(fit_blocks(blocks(Relation::motors), 0, with_one), 0), regeneration_off, driver_off, 12,
+        {{S::battery_voltage, 1}, {S::battery_current, 1}, {S::voltage_right, -1}, {S::current_right, -1}});
     if (e != nullptr) e->both_sides = true;
   }
   const Estimate driving = ratio_of_sums(blocks(Relation::driving), 0, 1, 2);
@@ -274,12 +282,13 @@ void Gatherer::loads() {
     Evidence* e = add("uphill and downhill, the battery's power changes by", "what the pitch asks",
                       estimate(fit_blocks(blocks(Relation::climb), 0, with_one), 0), load_off, load_off, 8,
                       {{S::pitch, -1}, {S::battery_voltage, 1}, {S::battery_current, 1}});
-    if (e != nullptr) lost(e, {S::pitch, S::wheel_right, S::wheel_left, S::battery_current, S::battery_voltage});
+    if (e != nullptr)
+      lost(e, {S::pitch, S::wheel_right, S::wheel_left, S::battery_current, S::battery_voltage});
   }
   if (const ValueTally pitch = tally(reading::pitch); pitch.known() > 1) {
     Evidence* e = add("the pitch usually is", "the steepest that robots climb, 20 degrees",
-                      {std::hypot(pitch.mean(), pitch.deviation()) / steepest_rad, 1e-6, 1e6}, 0, limit_off, 10,
-                      {{S::pitch, 1}});
+                      {std::hypot(pitch.mean(), pitch.deviation()) / steepest_rad, 1e-6, 1e6}, 0, limit_off,
+                      10, {{S::pitch, 1}});
     if (e != nullptr) e->magnitude = true;
   }
 }
@@ -297,8 +306,8 @@ void Gatherer::limits() {
     if (e != nullptr) e->magnitude = true, e->both_sides = both_sides;
   };
   if (!speed.empty() && heard({0, 1})) {
-    most("the fastest half second of a mission is usually", "the file's speed limit", statistics::median(speed),
-         robot_.limits.speed_m_s, 6, S::wheel_right, true);
+    most("the fastest half second of a mission is usually", "the file's speed limit",
+         statistics::median(speed), robot_.limits.speed_m_s, 6, S::wheel_right, true);
   }
   if (!turn.empty() && heard({reading::yaw_rate})) {
     most("the fastest turn of a mission is usually", "the file's yaw rate limit", statistics::median(turn),
@@ -335,9 +344,9 @@ std::vector<Products::Block> blocks_of(std::span<const Observation> observations
   return blocks;
 }
 
-std::vector<Evidence> gather_evidence(std::span<const Observation> observations, const robot::RobotModel& robot,
-                                      const dynamics::DriveModel& model, double delay_s,
-                                      std::span<const std::string> silent) {
+std::vector<Evidence> gather_evidence(std::span<const Observation> observations,
+                                      const robot::RobotModel& robot, const dynamics::DriveModel& model,
+                                      double delay_s, std::span<const std::string> silent) {
   return Gatherer(observations, robot, model, delay_s, silent).gather();
 }
 

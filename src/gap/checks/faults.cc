@@ -84,8 +84,8 @@ bool supported(std::span<const Evidence> evidence, const Set& set) {
 
 class Table {
  public:
-  void add(std::string id, std::string channel, std::string cause, std::initializer_list<S> sources, double factor,
-           double surprise, std::uint32_t swaps = 0) {
+  void add(std::string id, std::string channel, std::string cause, std::initializer_list<S> sources,
+           double factor, double surprise, std::uint32_t swaps = 0) {
     if (swaps == 0 && factor > 0 && std::fabs(std::log(factor)) < std::log(telling)) return;
     Fault& f = faults_.emplace_back();
     f.id = std::move(id);
@@ -121,8 +121,8 @@ void add_motor_faults(Table& t) {
     t.add(field + "_scale", field, "divided by 1000 once too often", {p.right, p.left}, 0.001, odd_surprise);
     t.add(field + "_sides_swapped", field, "swapped between right and left", {}, 1, swap_surprise, p.swap);
   }
-  t.add("motor_sides_swapped", "motor_voltage, motor_current", "swapped between right and left", {}, 1, swap_surprise,
-        2 | 4);
+  t.add("motor_sides_swapped", "motor_voltage, motor_current", "swapped between right and left", {}, 1,
+        swap_surprise, 2 | 4);
 }
 
 void add_wheel_faults(Table& t, const robot::RobotModel& robot) {
@@ -132,15 +132,20 @@ void add_wheel_faults(Table& t, const robot::RobotModel& robot) {
   t.add("wheel_velocity_reversed", "wheel_velocity", "reversed on both sides", both, -1, sign_surprise + 0.5);
   t.add("wheel_velocity_reversed", "wheel_velocity.right", "reversed", {S::wheel_right}, -1, sign_surprise);
   t.add("wheel_velocity_reversed", "wheel_velocity.left", "reversed", {S::wheel_left}, -1, sign_surprise);
-  t.add("wheel_velocity_sides_swapped", "wheel_velocity", "swapped between right and left", {}, 1, swap_surprise, 1);
+  t.add("wheel_velocity_sides_swapped", "wheel_velocity", "swapped between right and left", {}, 1,
+        swap_surprise, 1);
   t.add("wheel_velocity_scale", "wheel_velocity", "given in rpm", both, rpm, unit_surprise);
   t.add("wheel_velocity_scale", "wheel_velocity", "given in degrees a second", both, degrees, unit_surprise);
   t.add("wheel_velocity_scale", "wheel_velocity", "given in m/s at the rim", both, radius, unit_surprise);
   t.add("wheel_velocity_scale", "wheel_velocity", "given at the motor shaft", both, gear, unit_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "given at the motor shaft in rpm", both, gear * rpm, odd_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "given in mm/s at the rim", both, 1000 * radius, odd_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "converted from rpm once too often", both, 1 / rpm, odd_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "given in turns a second", both, 0.5 / std::numbers::pi, odd_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given at the motor shaft in rpm", both, gear * rpm,
+        odd_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given in mm/s at the rim", both, 1000 * radius,
+        odd_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "converted from rpm once too often", both, 1 / rpm,
+        odd_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given in turns a second", both, 0.5 / std::numbers::pi,
+        odd_surprise);
   t.add("wheel_velocity_scale", "wheel_velocity", "divided by the gear ratio once too often", both, 1 / gear,
         odd_surprise);
 }
@@ -155,26 +160,31 @@ std::vector<Fault> known_faults(const robot::RobotModel& robot) {
   t.add("battery_current_scale", "battery_current", "given in mA", {S::battery_current}, 1000, unit_surprise);
   t.add("battery_current_scale", "battery_current", "given in mA and reversed", {S::battery_current}, -1000,
         unit_surprise + 1);
-  t.add("battery_current_scale", "battery_current", "divided by 1000 once too often", {S::battery_current}, 0.001,
-        odd_surprise);
+  t.add("battery_current_scale", "battery_current", "divided by 1000 once too often", {S::battery_current},
+        0.001, odd_surprise);
   t.add("battery_voltage_scale", "battery_voltage", "given in mV", {S::battery_voltage}, 1000, unit_surprise);
-  t.add("battery_voltage_scale", "battery_voltage", "divided by 1000 once too often", {S::battery_voltage}, 0.001,
-        odd_surprise);
+  t.add("battery_voltage_scale", "battery_voltage", "divided by 1000 once too often", {S::battery_voltage},
+        0.001, odd_surprise);
   t.add("yaw_rate_reversed", "yaw_rate", "reversed", {S::yaw_rate}, -1, sign_surprise - 0.5);
   t.add("yaw_rate_scale", "yaw_rate", "given in degrees a second", {S::yaw_rate}, degrees, unit_surprise);
-  t.add("yaw_rate_scale", "yaw_rate", "given in degrees a second and reversed", {S::yaw_rate}, -degrees, unit_surprise + 1);
+  t.add("yaw_rate_scale", "yaw_rate", "given in degrees a second and reversed", {S::yaw_rate}, -degrees,
+        unit_surprise + 1);
   t.add("yaw_rate_scale", "yaw_rate", "converted from degrees once too often", {S::yaw_rate}, 1 / degrees,
         odd_surprise);
   t.add("pose_heading_reversed", "pose.heading", "reversed, as in frames with z down", {S::heading}, -1,
         sign_surprise);
   t.add("pose_heading_scale", "pose.heading", "given in degrees", {S::heading}, degrees, unit_surprise);
-  t.add("pose_heading_scale", "pose.heading", "given in degrees and reversed", {S::heading}, -degrees, unit_surprise + 1);
+  t.add("pose_heading_scale", "pose.heading", "given in degrees and reversed", {S::heading}, -degrees,
+        unit_surprise + 1);
   t.add("pose_scale", "pose.x, pose.y", "given in mm", {S::position}, 1000, unit_surprise);
   t.add("pose_scale", "pose.x, pose.y", "given in cm", {S::position}, 100, odd_surprise);
   t.add("pose_reversed", "pose.x, pose.y", "reversed against its heading", {S::position}, -1, sign_surprise);
-  t.add("velocity_command_scale", "velocity_command", "given in mm/s", {S::command_speed}, 1000, unit_surprise);
-  t.add("velocity_command_reversed", "velocity_command.speed", "reversed", {S::command_speed}, -1, sign_surprise - 0.5);
-  t.add("velocity_command_reversed", "velocity_command.turn", "reversed", {S::command_turn}, -1, sign_surprise - 0.5);
+  t.add("velocity_command_scale", "velocity_command", "given in mm/s", {S::command_speed}, 1000,
+        unit_surprise);
+  t.add("velocity_command_reversed", "velocity_command.speed", "reversed", {S::command_speed}, -1,
+        sign_surprise - 0.5);
+  t.add("velocity_command_reversed", "velocity_command.turn", "reversed", {S::command_turn}, -1,
+        sign_surprise - 0.5);
   t.add("pitch_reversed", "pitch", "reversed", {S::pitch}, -1, sign_surprise);
   t.add("pitch_scale", "pitch", "given in degrees", {S::pitch}, degrees, unit_surprise);
   t.add("payload_scale", "payload_mass", "given in g", {S::payload}, 1000, unit_surprise);
@@ -218,7 +228,8 @@ Explanation explain(std::span<const Evidence> evidence, std::span<const Fault> f
   return best;
 }
 
-Measured measured_factor(std::span<const Evidence> evidence, const Explanation& explanation, const Fault& fault) {
+Measured measured_factor(std::span<const Evidence> evidence, const Explanation& explanation,
+                         const Fault& fault) {
   Set others;
   for (const Fault* f : explanation.faults) {
     if (f != &fault) others.push_back(f);

@@ -25,9 +25,10 @@ std::vector<Fault> known_faults(const robot::RobotModel& robot);
 
 // The least surprising way to account for all evidence at once.
 struct Explanation {
-  std::vector<const Fault*> faults;          // none: all is well
-  std::vector<std::vector<const Fault*>> alternatives;  // of each fault: others in its place that do nearly as well
-  double gain = 0;                           // nats by which it is better than none
+  std::vector<const Fault*> faults;  // none: all is well
+  std::vector<std::vector<const Fault*>>
+      alternatives;  // of each fault: others in its place that do nearly as well
+  double gain = 0;   // nats by which it is better than none
 };
 
 Explanation explain(std::span<const Evidence> evidence, std::span<const Fault> faults);
@@ -38,6 +39,7 @@ struct Measured {
   double factor = 1;
   std::array<double, 2> interval{};
 };
-Measured measured_factor(std::span<const Evidence> evidence, const Explanation& explanation, const Fault& fault);
+Measured measured_factor(std::span<const Evidence> evidence, const Explanation& explanation,
+                         const Fault& fault);
 
 }  // namespace joulecast::gap

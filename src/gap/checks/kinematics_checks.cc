@@ -63,21 +63,22 @@ void check_track(const CheckContext& c, std::vector<Check>& checks) {
   const double half_track = c.robot.kinematics.half_track_m;
   if (beyond(turning.track, 1, track_off)) {
     const double k = turning.track.value;
-    checks.push_back(make_check(
-        "track_against_gyro", turning.channel, turning.track,
-        fmt::format("Where {} turns by 1 rad the wheels say {:.3g} rad by the file: half_track_m of {:.3g} m would have to "
-                    "be {} m, {:.3g} times as much{}.",
-                    turning.against, k, half_track,
-                    with_interval(k * half_track,
-                                  {half_track * turning.track.interval()[0], half_track * turning.track.interval()[1]}),
-                    k, k > 1 ? "; skid-steered robots turn so" : "")));
+    checks.push_back(
+        make_check("track_against_gyro", turning.channel, turning.track,
+                   fmt::format("Where {} turns by 1 rad the wheels say {:.3g} rad by the file: half_track_m "
+                               "of {:.3g} m would have to "
+                               "be {} m, {:.3g} times as much{}.",
+                               turning.against, k, half_track,
+                               with_interval(k * half_track, {half_track * turning.track.interval()[0],
+                                                              half_track * turning.track.interval()[1]}),
+                               k, k > 1 ? "; skid-steered robots turn so" : "")));
   }
   if (beyond(turning.sides, 0, sides_off)) {
-    checks.push_back(make_check("sides_against_gyro", turning.channel, turning.sides,
-                                fmt::format("By {} the robot turns while both wheels turn alike: the right wheel moves it "
-                                            "{} of the radius more than the left one.",
-                                            turning.against,
-                                            with_interval(turning.sides.value, turning.sides.interval()))));
+    checks.push_back(make_check(
+        "sides_against_gyro", turning.channel, turning.sides,
+        fmt::format("By {} the robot turns while both wheels turn alike: the right wheel moves it "
+                    "{} of the radius more than the left one.",
+                    turning.against, with_interval(turning.sides.value, turning.sides.interval()))));
   }
 }
 
@@ -87,25 +88,26 @@ void check_travel(const CheckContext& c, std::vector<Check>& checks) {
   constexpr std::array<std::size_t, 4> phases{1, 2, 3, 4};  // the last stands for a map that comes late
   const bool heading = c.heard({reading::heading});
   const BlockFit slip = heading ? fit_blocks(c.blocks(Relation::slip), 0, phases) : BlockFit{};
-  const Estimate radius = slip.known() ? estimate(slip, 0)
-                                       : estimate(fit_blocks(c.blocks(Relation::distance), 0, path), 0);
+  const Estimate radius =
+      slip.known() ? estimate(slip, 0) : estimate(fit_blocks(c.blocks(Relation::distance), 0, path), 0);
   const double file = c.robot.kinematics.wheel_radius_m;
   if (radius.sure() && beyond(radius, 1, radius_off)) {
-    checks.push_back(make_check("radius_against_pose", "pose", radius,
-                                fmt::format("The map moves {} times as far as the wheels say: wheel_radius_m of {:.3g} m "
-                                            "would have to be {:.3g} m, or the wheels slip.",
-                                            with_interval(radius.value, radius.interval()), file, radius.value * file)));
+    checks.push_back(
+        make_check("radius_against_pose", "pose", radius,
+                   fmt::format("The map moves {} times as far as the wheels say: wheel_radius_m of {:.3g} m "
+                               "would have to be {:.3g} m, or the wheels slip.",
+                               with_interval(radius.value, radius.interval()), file, radius.value * file)));
   }
   if (!slip.known() || !radius.sure()) return;
   constexpr std::array names{"turns", "braking"};
   for (const Eigen::Index k : {1, 2}) {
     const Estimate part = estimate(slip, k) * (1 / radius.value);
     if (!beyond(part, 0, slip_off)) continue;
-    checks.push_back(make_check(k == 1 ? "slip_in_turns" : "slip_in_braking", "pose", part,
-                                fmt::format("In {} the map moves {} of the wheels' way {} than otherwise: the wheels slip.",
-                                            names[static_cast<std::size_t>(k - 1)],
-                                            with_interval(std::fabs(part.value), {NAN, NAN}),
-                                            part.value < 0 ? "less" : "more")));
+    checks.push_back(make_check(
+        k == 1 ? "slip_in_turns" : "slip_in_braking", "pose", part,
+        fmt::format("In {} the map moves {} of the wheels' way {} than otherwise: the wheels slip.",
+                    names[static_cast<std::size_t>(k - 1)], with_interval(std::fabs(part.value), {NAN, NAN}),
+                    part.value < 0 ? "less" : "more")));
   }
 }
 

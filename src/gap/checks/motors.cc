@@ -16,8 +16,8 @@ constexpr std::array side_name{"right", "left"};
 constexpr double surely = 6;  // standard deviations between siblings
 // Motors of a pair differ so much without being worth a word: magnets and windings; grease and load.
 constexpr double winding_off = 0.10, load_off = 0.5;
-constexpr double agree = 0.35;       // logarithms of one sensor's factor from different constants
-constexpr double useless = 0.5;      // logarithm of a sensor's factor beyond which it is no sensor
+constexpr double agree = 0.35;   // logarithms of one sensor's factor from different constants
+constexpr double useless = 0.5;  // logarithm of a sensor's factor beyond which it is no sensor
 
 MotorConstants constants_of(std::span<const Observation> seen, std::size_t side, double delay_s) {
   constexpr std::array<std::size_t, 3> armature{1, 2, 3};
@@ -76,15 +76,17 @@ std::string part(const char* name, const Estimate& right, const Estimate& left, 
 
 // The side whose resistance is farther from the file's.
 std::size_t worse_side(const std::array<MotorConstants, 2>& m, double file_ohm) {
-  const auto off = [&](std::size_t k) { return std::fabs(std::log(std::fabs(m[k].resistance_ohm.value / file_ohm))); };
+  const auto off = [&](std::size_t k) {
+    return std::fabs(std::log(std::fabs(m[k].resistance_ohm.value / file_ohm)));
+  };
   return off(0) >= off(1) ? 0 : 1;
 }
 
 }  // namespace
 
 std::optional<Delay> motor_delay(std::span<const Observation> observations) {
-  for (const auto& channels : {std::vector{Late::current_right, Late::current_left}, std::vector{Late::current_right},
-                               std::vector{Late::current_left}}) {
+  for (const auto& channels : {std::vector{Late::current_right, Late::current_left},
+                               std::vector{Late::current_right}, std::vector{Late::current_left}}) {
     if (const auto delay = delay_of(observations, channels)) {
       const double least = least_delay_s(observations, {4, 5});
       return delay->interval[0] > least ? delay : std::nullopt;
@@ -103,9 +105,11 @@ std::array<MotorConstants, 2> motor_constants(std::span<const Observation> obser
   return {constants_of(observations, 0, delay_s), constants_of(observations, 1, delay_s)};
 }
 
-std::array<MotorConstants, 2> motor_constants(const RecordingSet& recordings, const robot::RobotModel& robot) {
+std::array<MotorConstants, 2> motor_constants(const RecordingSet& recordings,
+                                              const robot::RobotModel& robot) {
   std::vector<Observation> observations;
-  for (const telemetry::Recording& mission : recordings.missions) observations.push_back(observe(mission, robot));
+  for (const telemetry::Recording& mission : recordings.missions)
+    observations.push_back(observe(mission, robot));
   return motor_constants(observations, motor_delay(observations).value_or(Delay{}).value_s);
 }
 
@@ -119,7 +123,8 @@ std::vector<Check> check_motors(const CheckContext& c) {
   std::string parts;
   const auto add = [&](const std::string& text) { parts += (parts.empty() ? "" : ", ") + text; };
   if (differs(p.resistance, winding_off)) add(part("R", m[0].resistance_ohm, m[1].resistance_ohm, "ohm"));
-  if (differs(p.constant, winding_off)) add(part("K", m[0].constant_v_s_rad, m[1].constant_v_s_rad, "V s/rad"));
+  if (differs(p.constant, winding_off))
+    add(part("K", m[0].constant_v_s_rad, m[1].constant_v_s_rad, "V s/rad"));
   if (differs(p.steady, load_off) || (current_sensor(p) && p.steady.known())) {
     add(part("steady current", m[0].steady_current_a, m[1].steady_current_a, "A"));
   }
@@ -128,9 +133,10 @@ std::vector<Check> check_motors(const CheckContext& c) {
   const double sign = side == 0 ? 1 : -1;
   const std::string both = fmt::format("The right motor against the left: {}", parts);
   const auto sensor = [&](const char* field, const Estimate& log, double direction) {
-    const Estimate gain{std::exp(direction * sign * log.value), std::exp(direction * sign * log.value) * log.sd,
-                        log.freedom};
-    Check check = make_check(std::string(field) + "_against_sibling", fmt::format("{}.{}", field, side_name[side]), gain,
+    const Estimate gain{std::exp(direction * sign * log.value),
+                        std::exp(direction * sign * log.value) * log.sd, log.freedom};
+    Check check = make_check(std::string(field) + "_against_sibling",
+                             fmt::format("{}.{}", field, side_name[side]), gain,
                              fmt::format("{}; all would agree if {}.{} read {} times the truth.", both, field,
                                          side_name[side], with_interval(gain.value, gain.interval())));
     check.contradicted = std::fabs(log.value) > useless;

@@ -10,14 +10,14 @@ namespace {
 using telemetry::Sample;
 
 constexpr std::size_t block_cells = 3;
-constexpr double hold_s = 1.0;          // positions and yaw rates between those that are missing
-constexpr double alike = 0.2;           // as in ValueTally: a spike has like neighbours ...
-constexpr double thrown = 0.8;          // ... and is this far from them
-constexpr double turning_share = 0.1;   // difference of the wheels over their sum, from which on a robot turns
-constexpr double least_way_rad = 0.2;   // of a span, by the wheels together
-constexpr double turning_rad = 0.3;     // difference of the wheels' angles in a span
-constexpr double braking_share = 0.05;  // of the fastest wheel speed, lost in a span
-constexpr double widest_turn_rad = 1.0; // of a span whose chord is compared with its path
+constexpr double hold_s = 1.0;         // positions and yaw rates between those that are missing
+constexpr double alike = 0.2;          // as in ValueTally: a spike has like neighbours ...
+constexpr double thrown = 0.8;         // ... and is this far from them
+constexpr double turning_share = 0.1;  // difference of the wheels over their sum, from which on a robot turns
+constexpr double least_way_rad = 0.2;  // of a span, by the wheels together
+constexpr double turning_rad = 0.3;    // difference of the wheels' angles in a span
+constexpr double braking_share = 0.05;   // of the fastest wheel speed, lost in a span
+constexpr double widest_turn_rad = 2.0;  // of a span whose chord is compared with its path
 
 constexpr std::array<std::size_t, relation_count> quantities{5, 5, 4, 6, 6, 4, 4, 3, 3, 3, 2,
                                                              3, 4, 3, 2, 2, 4, 4, 4, 2, 5};
@@ -32,6 +32,11 @@ bool spike(double before, double value, double after) {
   const double level = 0.5 * (before + after);
   return before * after > 0 && std::fabs(before - after) < alike * std::fabs(level) &&
          std::fabs(value - level) > thrown * std::fabs(level);
+}
+
+// One of two quantities that are looked at apart may be missing.
+double or_zero(double value) {
+  return std::isfinite(value) ? value : 0.0;
 }
 
 Relation right_or_left(Relation right, std::size_t side) {
@@ -105,13 +110,16 @@ void Observer::take(const Cell& c) {
     const double w = c.speed_rad_s[k], i = c.current_a[k], v = c.voltage_v[k], way = c.way[k];
     const double slip = !turning ? 0.0 : w > c.speed_rad_s[1 - k] ? 1.0 : -1.0;
     of(right_or_left(Relation::armature_right, k)).add({v, i, w, way, c.acceleration_rad_s2[k]});
-    of(right_or_left(Relation::torque_right, k)).add({i, way, w, common, k == 0 ? difference : -difference, slip});
-    of(right_or_left(Relation::ways_right, k)).add({i, v, way > 0 ? 1.0 : 0.0, way < 0 ? 1.0 : 0.0});
+    of(right_or_left(Relation::torque_right, k))
+        .add({i, way, w, common, k == 0 ? difference : -difference, slip});
+    of(right_or_left(Relation::ways_right, k))
+        .add({or_zero(i), or_zero(v), way > 0 ? 1.0 : 0.0, way < 0 ? 1.0 : 0.0});
   }
   const bool moves = c.way[0] != 0 || c.way[1] != 0;
   if (moves) {
     of(Relation::armature_difference)
-        .add({c.voltage_v[0] - c.voltage_v[1], c.current_a[0] - c.current_a[1], right - left, 2 * difference});
+        .add(
+            {c.voltage_v[0] - c.voltage_v[1], c.current_a[0] - c.current_a[1], right - left, 2 * difference});
   }
   if (!c.resting) of(Relation::gyro).add({c.yaw_rate_rad_s, right, left, 1.0});
   const dynamics::Parameters<double>& p = model_.parameters();
@@ -155,8 +163,11 @@ void Observer::take(const Span& s) {
   of(Relation::heading_gyro).add({s.heading_rad, s.heading_deg, s.gyro_rad, s.length_s});
   of(Relation::heading_wheels).add({s.heading_rad, s.heading_deg, right, left});
   const double path = 0.5 * robot_.kinematics.wheel_radius_m * (right + left);
-  const double by_wheels = robot_.kinematics.wheel_radius_m * (right - left) / (2 * robot_.kinematics.half_track_m);
-  const double turn = std::isfinite(s.gyro_rad) ? s.gyro_rad : std::isfinite(s.heading_rad) ? s.heading_rad : by_wheels;
+  const double by_wheels =
+      robot_.kinematics.wheel_radius_m * (right - left) / (2 * robot_.kinematics.half_track_m);
+  const double turn = std::isfinite(s.gyro_rad)      ? s.gyro_rad
+                      : std::isfinite(s.heading_rad) ? s.heading_rad
+                                                     : by_wheels;
   if (std::fabs(turn) > widest_turn_rad) return;
   // Of an arc the chord is shorter than the path by sin(x)/x, x half the turn.
   const double half = 0.5 * turn, chord = std::fabs(half) > 1e-6 ? std::sin(half) / half : 1.0;

@@ -18,35 +18,35 @@
 
 namespace joulecast::gap {
 
-// Relations between channels of which an observation keeps Products; their quantities in order. `sign`: the way
-// a wheel turns, 0 while it starts or stops. Sides [0] right, [1] left.
+// Relations between channels of which an observation keeps Products; their quantities in order. `sign`: the
+// way a wheel turns, 0 while it starts or stops. Sides [0] right, [1] left.
 enum class Relation : std::size_t {
-  armature_right,       // V, i, w, sign, acceleration; the wheel turning
+  armature_right,  // V, i, w, sign, acceleration; the wheel turning
   armature_left,
   armature_difference,  // V, i, w, acceleration: right minus left
   torque_right,         // i, sign, w, common and differential acceleration, side slip; the wheel turning
   torque_left,
-  ways_right,           // i, V, 1 forward, 1 backward
+  ways_right,  // i, V, 1 forward, 1 backward
   ways_left,
-  motors,               // battery power, power of both motors, 1
-  driving,              // battery power, the model's, 1; where the model sees no braking
-  motion,               // battery power, the model's but for the idle power, 1
-  idle,                 // battery power, 1; standing
-  climb,                // battery power less the model's, m g v sin(pitch), 1
-  gyro,                 // yaw rate, w right, w left, 1
-  way,                  // speed of the robot by the wheels, its magnitude, 1
-  command,              // speed of the wheels, of the command
-  command_turn,         // turning of the wheels, of the command
-  heading_gyro,         // turned by the map in rad, in degrees, by the gyro, time
-  heading_wheels,       // turned by the map in rad, in degrees, by the right wheel, by the left
-  travel,               // moved by the map along and across the heading, turned by the wheels
-  distance,             // moved by the map, by the wheels
-  slip                  // moved by the map along the heading, by the wheels, the same turning, braking; speed change
+  motors,          // battery power, power of both motors, 1
+  driving,         // battery power, the model's, 1; where the model sees no braking
+  motion,          // battery power, the model's but for the idle power, 1
+  idle,            // battery power, 1; standing
+  climb,           // battery power less the model's, m g v sin(pitch), 1
+  gyro,            // yaw rate, w right, w left, 1
+  way,             // speed of the robot by the wheels, its magnitude, 1
+  command,         // speed of the wheels, of the command
+  command_turn,    // turning of the wheels, of the command
+  heading_gyro,    // turned by the map in rad, in degrees, by the gyro, time
+  heading_wheels,  // turned by the map in rad, in degrees, by the right wheel, by the left
+  travel,          // moved by the map along and across the heading, turned by the wheels
+  distance,        // moved by the map, by the wheels
+  slip  // moved by the map along the heading, by the wheels, the same turning, braking; speed change
 };
 inline constexpr std::size_t relation_count = static_cast<std::size_t>(Relation::slip) + 1;
 
-// What one mission looked like: enough for every check. Some hundred kilobytes at most, whatever the mission's
-// length.
+// What one mission looked like: enough for every check. Some hundred kilobytes at most, whatever the
+// mission's length.
 struct Observation {
   std::string mission_id;
   ClockTally clock;
@@ -92,8 +92,8 @@ class Observer {
 
 // By how much channels lag the wheel speeds.
 std::optional<Delay> delay_of(std::span<const Observation> observations, std::span<const Late> channels);
-// What a delay must be to be one: a row and a half, and half of the time that these readings or the wheel speeds
-// are held.
+// What a delay must be to be one: a row and a half, and half of the time that these readings or the wheel
+// speeds are held.
 double least_delay_s(std::span<const Observation> observations, std::initializer_list<std::size_t> readings);
 
 Observation observe(const telemetry::Recording& mission, const robot::RobotModel& robot);

@@ -13,9 +13,9 @@ namespace {
 
 constexpr std::size_t most_blocks = 64;
 constexpr int rounds = 12;
-constexpr double bound = 2.5;         // usual misfits of a block beyond which it counts less
-constexpr double least_part = 1e-9;   // of a quantity's own square: what is below is not in the data
-constexpr double surely = 0.9995;     // one side of 99.9 %
+constexpr double bound = 2.5;        // usual misfits of a block beyond which it counts less
+constexpr double least_part = 1e-9;  // of a quantity's own square: what is below is not in the data
+constexpr double surely = 0.9995;    // one side of 99.9 %
 
 double misfit(const Products::Block& block, std::size_t y, std::span<const std::size_t> x,
               const Eigen::VectorXd& b) {
@@ -198,7 +198,8 @@ Estimate estimate(const BlockFit& fit, const Eigen::VectorXd& combination) {
   double variance = 0;
   for (Eigen::Index i = 0; i < combination.size(); ++i) {
     for (Eigen::Index k = 0; k < combination.size(); ++k) {
-      if (combination[i] * combination[k] != 0) variance += combination[i] * combination[k] * fit.covariance(i, k);
+      if (combination[i] * combination[k] != 0)
+        variance += combination[i] * combination[k] * fit.covariance(i, k);
     }
   }
   return {combination.dot(fit.coefficient), std::sqrt(std::max(variance, 0.0)), fit.freedom};

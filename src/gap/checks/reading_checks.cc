@@ -45,37 +45,42 @@ void check_held(const CheckContext& c, std::vector<Check>& checks) {
     longest = std::max(longest, period);
   });
   if (channels.empty()) return;
-  checks.push_back({"held_samples", channels, longest, no_interval,
-                    fmt::format("Readings are repeated in rows that come every {:.3g} s: {} is new; what lies between is "
-                                "no measurement.",
-                                c.period_s(), says),
-                    false});
+  checks.push_back(
+      {"held_samples", channels, longest, no_interval,
+       fmt::format("Readings are repeated in rows that come every {:.3g} s: {} is new; what lies between is "
+                   "no measurement.",
+                   c.period_s(), says),
+       false});
 }
 
 void check_coarse(const CheckContext& c, std::vector<Check>& checks) {
   each_reading(c, [&](std::size_t k, const ValueTally& t) {
     if (t.constant() || t.quantum() < coarse * t.deviation()) return;
-    checks.push_back({"coarse_channel", std::string(reading_names[k]), t.quantum(), no_interval,
-                      fmt::format("{} comes in steps of {:.3g}, and moves by only {:.2g} of a step (standard deviation).",
-                                  reading_names[k], t.quantum(), t.deviation() / t.quantum()),
-                      false});
+    checks.push_back(
+        {"coarse_channel", std::string(reading_names[k]), t.quantum(), no_interval,
+         fmt::format("{} comes in steps of {:.3g}, and moves by only {:.2g} of a step (standard deviation).",
+                     reading_names[k], t.quantum(), t.deviation() / t.quantum()),
+         false});
   });
 }
 
 void check_clipped(const CheckContext& c, std::vector<Check>& checks) {
   each_reading(c, [&](std::size_t k, const ValueTally& t) {
-    if (k < reading::motor_current || k == reading::battery_voltage || t.levels() <= ValueTally::most_levels) return;
+    if (k < reading::motor_current || k == reading::battery_voltage || t.levels() <= ValueTally::most_levels)
+      return;
     const ValueTally::Extreme e = t.extreme();
     const double share = static_cast<double>(e.rows) / static_cast<double>(t.known());
     if (e.value == 0 || share < clipped_share || e.runs < fewest_clips ||
         e.rows < longest_plateau * t.held_rows() * e.runs) {
       return;
     }
-    checks.push_back({"clipped_channel", std::string(reading_names[k]), e.value, no_interval,
-                      fmt::format("{} reads exactly {:.4g} in {:.1f} % of the rows and never beyond: clipped by the sensor, "
-                                  "or held there by the driver.",
-                                  reading_names[k], e.value, 100 * share),
-                      false});
+    checks.push_back(
+        {"clipped_channel", std::string(reading_names[k]), e.value, no_interval,
+         fmt::format(
+             "{} reads exactly {:.4g} in {:.1f} % of the rows and never beyond: clipped by the sensor, "
+             "or held there by the driver.",
+             reading_names[k], e.value, 100 * share),
+         false});
   });
 }
 
@@ -83,11 +88,11 @@ void check_thrown(const CheckContext& c, std::vector<Check>& checks) {
   each_reading(c, [&](std::size_t k, const ValueTally& t) {
     const bool steady = k < reading::motor_voltage || k == reading::battery_voltage;
     if (!steady || t.spikes() < fewest_spikes) return;
-    checks.push_back({"thrown_readings", std::string(reading_names[k]), static_cast<double>(t.spikes()), no_interval,
-                      fmt::format("{} jumps away and back within one row {} times, as no {} can: lost or mixed messages.",
-                                  reading_names[k], t.spikes(),
-                                  k == reading::battery_voltage ? "battery" : "wheel"),
-                      false});
+    checks.push_back(
+        {"thrown_readings", std::string(reading_names[k]), static_cast<double>(t.spikes()), no_interval,
+         fmt::format("{} jumps away and back within one row {} times, as no {} can: lost or mixed messages.",
+                     reading_names[k], t.spikes(), k == reading::battery_voltage ? "battery" : "wheel"),
+         false});
   });
 }
 
@@ -97,15 +102,17 @@ void check_missing(const CheckContext& c, std::vector<Check>& checks) {
   for (std::size_t k = 0; k < reading_count; ++k) {
     const ValueTally t = c.tally(k);
     if (t.known() == 0 && k != reading::wheel_velocity && k != reading::wheel_velocity + 1) continue;
-    const double share = static_cast<double>(t.lost()) / static_cast<double>(std::max<std::size_t>(t.rows(), 1));
+    const double share =
+        static_cast<double>(t.lost()) / static_cast<double>(std::max<std::size_t>(t.rows(), 1));
     if (share <= lost_share) continue;
     add_to(channels, reading_names[k]);
     most = std::max(most, share);
   }
   if (channels.empty()) return;
-  checks.push_back({"mostly_missing", channels, most, no_interval,
-                    fmt::format("{} missing in up to {:.0f} % of the rows, for long stretches.", channels, 100 * most),
-                    false});
+  checks.push_back(
+      {"mostly_missing", channels, most, no_interval,
+       fmt::format("{} missing in up to {:.0f} % of the rows, for long stretches.", channels, 100 * most),
+       false});
 }
 
 }  // namespace

@@ -34,7 +34,8 @@ class List {
 // Of the side that is nearer to the file, as the other may have a fault of its own.
 Estimate nearer(const Estimate& right, const Estimate& left) {
   if (!right.known() || !left.known()) return right.known() ? right : left;
-  return std::fabs(std::log(std::fabs(right.value))) < std::fabs(std::log(std::fabs(left.value))) ? right : left;
+  return std::fabs(std::log(std::fabs(right.value))) < std::fabs(std::log(std::fabs(left.value))) ? right
+                                                                                                  : left;
 }
 
 }  // namespace

@@ -58,9 +58,9 @@ std::vector<Check> check_signs_and_units(const CheckContext& c) {
     if (measured.evidence == nullptr) continue;
     const Evidence& e = *measured.evidence;
     Check check{fault.id, fault.channel, measured.factor, measured.interval, {}, true};
-    check.says = fmt::format("{} looks {}: {} {} times {}; joulecast wants {}{}.", fault.channel, fault.cause, e.says,
-                             with_interval(e.ratio.value, e.ratio.interval()), e.against, contract_of(fault.channel),
-                             also(explanation.alternatives[k]));
+    check.says = fmt::format("{} looks {}: {} {} times {}; joulecast wants {}{}.", fault.channel, fault.cause,
+                             e.says, with_interval(e.ratio.value, e.ratio.interval()), e.against,
+                             contract_of(fault.channel), also(explanation.alternatives[k]));
     checks.push_back(std::move(check));
   }
   return checks;
@@ -76,15 +76,21 @@ std::vector<Check> check_limits(const CheckContext& c) {
   std::vector<Check> checks;
   const auto look = [&](const char* id, const char* channel, std::vector<double>& fastest, double limit,
                         const char* what) {
-    const std::size_t at = std::string_view(channel) == "yaw_rate" ? reading::yaw_rate : reading::wheel_velocity;
+    const std::size_t at =
+        std::string_view(channel) == "yaw_rate" ? reading::yaw_rate : reading::wheel_velocity;
     if (fastest.empty() || !c.heard({at}) || !(limit > 0)) return;
     const double ratio = statistics::median(fastest) / limit;
     if (ratio < over_limit) return;
-    checks.push_back({id, channel, ratio, {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()},
-                      fmt::format("{} reaches {:.3g} times the file's {} in the usual mission: is it {}? joulecast wants {}.",
-                                  channel, ratio, what, at == reading::yaw_rate ? "in degrees" : "in rpm, or of the motor",
-                                  contract_of(channel)),
-                      false});
+    checks.push_back(
+        {id,
+         channel,
+         ratio,
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()},
+         fmt::format(
+             "{} reaches {:.3g} times the file's {} in the usual mission: is it {}? joulecast wants {}.",
+             channel, ratio, what, at == reading::yaw_rate ? "in degrees" : "in rpm, or of the motor",
+             contract_of(channel)),
+         false});
   };
   look("speed_over_limit", "wheel_velocity", speed, c.robot.limits.speed_m_s, "limits.speed_m_s");
   look("yaw_rate_over_limit", "yaw_rate", turn, c.robot.limits.yaw_rate_rad_s, "limits.yaw_rate_rad_s");

@@ -21,7 +21,7 @@ constexpr double false_alarms = 0.002;      // of one series of levels, over all
 struct Step {
   std::size_t first = 0;  // mission after it
   double before = 0, after = 0;
-  Estimate change;        // over the level before
+  Estimate change;  // over the level before
 };
 
 double mean(std::span<const double> values) {
@@ -47,8 +47,8 @@ double squares_about_line(std::span<const double> values) {
   return squares_about(values, centre) - slope * slope / spread;
 }
 
-// The strongest lasting change of level: beyond the scatter of missions at every place looked at (Bonferroni), and
-// no mere trend.
+// The strongest lasting change of level: beyond the scatter of missions at every place looked at
+// (Bonferroni), and no mere trend.
 std::optional<Step> find_step(std::span<const double> levels) {
   const std::size_t n = levels.size();
   if (n < 2 * fewest_missions) return std::nullopt;
@@ -71,7 +71,8 @@ std::optional<Step> find_step(std::span<const double> levels) {
     }
   }
   const double places = static_cast<double>(n - 2 * fewest_missions + 1);
-  const double bound = statistics::student_t_quantile(1 - 0.5 * false_alarms / places, static_cast<double>(n - 2));
+  const double bound =
+      statistics::student_t_quantile(1 - 0.5 * false_alarms / places, static_cast<double>(n - 2));
   if (strongest < bound || std::fabs(best->change.value) < least_step) return std::nullopt;
   if (least_squares > squares_about_line(levels)) return std::nullopt;
   return best;
@@ -90,9 +91,15 @@ std::vector<Series> levels_of(const CheckContext& c) {
   if (battery && c.heard({0, 1})) series.push_back({"battery power over the model's", "battery_current", {}});
   if (battery) series.push_back({"idle power", "battery_current", {}});
   for (const char* side : {"right", "left"}) {
-    if (motors) series.push_back({fmt::format("resistance of the {} motor", side), fmt::format("motor_voltage.{}", side), {}});
-    if (motors) series.push_back({fmt::format("voltage constant of the {} motor", side), fmt::format("motor_voltage.{}", side), {}});
-    if (currents) series.push_back({fmt::format("steady current of the {} motor", side), fmt::format("motor_current.{}", side), {}});
+    if (motors)
+      series.push_back(
+          {fmt::format("resistance of the {} motor", side), fmt::format("motor_voltage.{}", side), {}});
+    if (motors)
+      series.push_back(
+          {fmt::format("voltage constant of the {} motor", side), fmt::format("motor_voltage.{}", side), {}});
+    if (currents)
+      series.push_back(
+          {fmt::format("steady current of the {} motor", side), fmt::format("motor_current.{}", side), {}});
   }
   constexpr double most_unsure = 0.1;  // standard deviation over the level
   for (const Observation& o : c.seen) {
@@ -132,11 +139,13 @@ std::vector<Check> check_steps(const CheckContext& c) {
     strongest = step;
     const Observation& last = c.seen[mission[step->first - 1]];
     const Observation& first = c.seen[mission[step->first]];
-    check = make_check("step_between_missions", series.channel, step->change,
-                       fmt::format("From mission {} on, the {} is {:.4g} instead of {:.4g} ({:+.1f} %), and was so until {}: "
-                                   "judge the missions on each side alone.",
-                                   first.mission_id, series.name, step->after, step->before, 100 * step->change.value,
-                                   last.mission_id));
+    check = make_check(
+        "step_between_missions", series.channel, step->change,
+        fmt::format(
+            "From mission {} on, the {} is {:.4g} instead of {:.4g} ({:+.1f} %), and was so until {}: "
+            "judge the missions on each side alone.",
+            first.mission_id, series.name, step->after, step->before, 100 * step->change.value,
+            last.mission_id));
     check.first_mission = mission[step->first];
   }
   if (!strongest) return {};

@@ -80,8 +80,10 @@ void ValueTally::add(double value) {
 
 void ValueTally::append(const ValueTally& other) {
   const std::size_t rows = rows_ + other.rows_, lost = this->lost() + other.lost();
-  if (known_ == 0) *this = other;
-  else if (other.known_ > 0) join(other);
+  if (known_ == 0)
+    *this = other;
+  else if (other.known_ > 0)
+    join(other);
   rows_ = rows;
   lost_ = lost;
   missing_ = 0;
@@ -99,8 +101,10 @@ void ValueTally::join(const ValueTally& other) {
   zeros_ += other.zeros_;
   for (std::size_t k = 0; k < spikes_.size(); ++k) spikes_[k] += other.spikes_[k];
   const auto widen = [](Extreme& mine, const Extreme& theirs, bool beyond) {
-    if (beyond) mine = theirs;
-    else if (mine.value == theirs.value) mine.rows += theirs.rows, mine.runs += theirs.runs;
+    if (beyond)
+      mine = theirs;
+    else if (mine.value == theirs.value)
+      mine.rows += theirs.rows, mine.runs += theirs.runs;
   };
   widen(lowest_, other.lowest_, other.lowest_.value < lowest_.value);
   widen(highest_, other.highest_, other.highest_.value > highest_.value);

@@ -70,7 +70,7 @@ class ClockTally {
   std::int64_t first_us() const { return first_us_; }
   std::int64_t last_us() const { return last_us_; }
   double length_s() const { return 1e-6 * static_cast<double>(last_us_ - first_us_); }
-  double period_s() const;  // between rows, usual; 0 without two that differ
+  double period_s() const;                            // between rows, usual; 0 without two that differ
   std::size_t repeated() const { return repeated_; }  // stamped like the row before
   std::size_t backward() const { return backward_; }  // stamped before it
   // Silences of more than ten usual periods and a second.
