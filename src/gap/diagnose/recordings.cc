@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "gap/checks/ripple.h"
+#include "gap/diagnose/ripple.h"
 #include "gap/diagnose/channel_gaps.h"
 #include "gap/diagnose/controls.h"
 #include "gap/diagnose/held_out.h"
@@ -72,7 +72,7 @@ double detectable_share(const Problem& problem) {
 
 class Diagnoser {
  public:
-  Diagnoser(const RecordingSet& recordings, const robot::RobotModel& robot, const DiagnosisSettings& settings)
+  Diagnoser(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot, const DiagnosisSettings& settings)
       : recordings_(recordings), robot_(robot), settings_(settings) {}
 
   Result<Diagnosis> run();
@@ -107,7 +107,7 @@ class Diagnoser {
   void add_baseline();
   void add_shrinkage();
 
-  const RecordingSet& recordings_;
+  const telemetry::RecordingSet& recordings_;
   const robot::RobotModel& robot_;
   const DiagnosisSettings& settings_;
   std::vector<dynamics::ActiveEffect> adopted_;
@@ -380,10 +380,10 @@ Result<Diagnosis> Diagnoser::run() {
 
 }  // namespace
 
-Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotModel& robot,
+Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
                            const DiagnosisSettings& settings) {
   std::vector<Check> checks = check_recordings(recordings, robot);
-  RecordingSet trusted = recordings;
+  telemetry::RecordingSet trusted = recordings;
   silence_contradicted(trusted, checks);
   Result<Diagnosis> d = Diagnoser(trusted, robot, settings).run();
   if (d) d->checks = std::move(checks);

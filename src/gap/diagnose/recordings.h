@@ -3,7 +3,7 @@
 #include <functional>
 
 #include "base/error.h"
-#include "gap/recordings.h"
+#include "telemetry/recording_set.h"
 #include "gap/verdict/diagnosis.h"
 
 namespace joulecast::gap {
@@ -16,7 +16,7 @@ struct DiagnosisSettings {
 
 // From recordings of one robot. Fault::invalid for unusable recordings or a robot file whose effects the catalogue
 // rejects, Fault::conflict when cancelled.
-Result<Diagnosis> diagnose(const RecordingSet& recordings, const robot::RobotModel& robot,
+Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
                            const DiagnosisSettings& settings = {});
 
 }  // namespace joulecast::gap

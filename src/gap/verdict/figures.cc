@@ -88,7 +88,7 @@ class Collector {
   }
 
   // The stretch of time whose power the model misses most.
-  void power(Figures& figures, const RecordingSet& recordings) const {
+  void power(Figures& figures, const telemetry::RecordingSet& recordings) const {
     std::map<std::pair<std::size_t, int>, double> halves;
     for (std::size_t k = 0; k < windows_.size(); ++k) {
       if (known(k))
@@ -113,7 +113,7 @@ class Collector {
     }
   }
 
-  void missions(Figures& figures, const RecordingSet& recordings) const {
+  void missions(Figures& figures, const telemetry::RecordingSet& recordings) const {
     struct Total {
       double measured = 0, gap = 0, rest = 0, absolute = 0, absolute_after = 0, size = 0;
     };
@@ -176,7 +176,7 @@ class Collector {
 }  // namespace
 
 Figures figures_of(std::span<const Window> windows, std::span<const double> measured_w,
-                   std::span<const double> before_w, std::span<const double> after_w, const RecordingSet& recordings,
+                   std::span<const double> before_w, std::span<const double> after_w, const telemetry::RecordingSet& recordings,
                    const robot::RobotModel& robot) {
   const double r = robot.kinematics.wheel_radius_m, l = robot.kinematics.half_track_m;
   const Collector collect(windows, measured_w, before_w, after_w);

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "gap/checks/ripple.h"
+#include "gap/diagnose/ripple.h"
 #include "gap/diagnose/held_out.h"
 #include "gap/verdict/diagnosis.h"
 

@@ -1,4 +1,4 @@
-#include "gap/checks/ripple.h"
+#include "gap/diagnose/ripple.h"
 
 #include <algorithm>
 #include <array>
@@ -253,7 +253,7 @@ struct Search {
 
 }  // namespace
 
-std::optional<Ripple> find_ripple(const RecordingSet& set, const robot::RobotModel& robot,
+std::optional<Ripple> find_ripple(const telemetry::RecordingSet& set, const robot::RobotModel& robot,
                                   std::span<const dynamics::ActiveEffect> effects, bool motors,
                                   double delay_s, std::size_t surrogates) {
   const dynamics::DriveModel model(robot, effects);

@@ -4,7 +4,7 @@
 #include <span>
 
 #include "dynamics/catalogue.h"
-#include "gap/recordings.h"
+#include "telemetry/recording_set.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::gap {
@@ -24,7 +24,7 @@ struct Ripple {
 // wheel's angle, in stretches of a few turns, on a grid of frequencies. Nothing when no frequency stands out of its
 // neighbours beyond chance. What comes back when the leftovers are moved along the mission by seconds does not belong
 // to the wheel: `surrogates` of such moves are tried.
-std::optional<Ripple> find_ripple(const RecordingSet& set, const robot::RobotModel& robot,
+std::optional<Ripple> find_ripple(const telemetry::RecordingSet& set, const robot::RobotModel& robot,
                                   std::span<const dynamics::ActiveEffect> effects, bool motors,
                                   double delay_s, std::size_t surrogates);
 
