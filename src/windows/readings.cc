@@ -96,7 +96,7 @@ Readings find_readings(std::span<const telemetry::Recording> missions, const rob
   const WindowSettings plain;
   for (const telemetry::Recording& mission : missions) {
     rows.push_back(median_period_s(mission));
-    tracks.push_back(make_track(mission, robot, rows.back(), plain));
+    tracks.push_back(make_track(mission, robot, {}, rows.back(), plain));
     const Track& track = tracks.back();
     const auto battery = statistics::find_updates(track.time_s, track.battery_current);
     const auto motors = statistics::find_updates(track.time_s, track.current[0]);
