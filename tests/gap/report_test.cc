@@ -24,6 +24,13 @@ using ::testing::Not;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
+DiagnosedEffect effect_of(std::string id, std::vector<DiagnosedParameter> parameters) {
+  DiagnosedEffect e;
+  e.id = std::move(id);
+  e.parameters = std::move(parameters);
+  return e;
+}
+
 Diagnosis full_diagnosis() {
   Diagnosis d;
   d.robot_id = "amr";
@@ -61,11 +68,10 @@ Diagnosis full_diagnosis() {
                 .varies = 0.253,
                 .alternatives = {"accessory_load"},
                 .controls = Controls{19, 3},
-                .calibrates = ""},
-               {.id = "covariate:cpu_load",
-                .probability = 0.876,
-                .parameters = {{"coefficient", "W", 8.64, 0.31}},
-                .share = 0.152}};
+                .calibrates = ""}};
+  d.effects.push_back(effect_of("covariate:cpu_load", {{"coefficient", "W", 8.64, 0.31}}));
+  d.effects[1].probability = 0.876;
+  d.effects[1].share = 0.152;
   d.outside = {.probability = 0.338,
                .channel = "battery_power_from_motion",
                .follows = "time",
@@ -84,10 +90,21 @@ Diagnosis full_diagnosis() {
   d.adoptable = {{"slope", {{"angle_rad", 0.01633}, {"uphill_rad", 2.912}}}};
   d.refusal = "slope is not told from accessory_load";
   d.figures.mean_power_w = 254.3;
-  d.figures.maps = {
-      {"speed, m/s",
-       {{.from = 0, .to = 0.7, .before_w = 41.6, .after_w = 3.87, .half_width_w = 5, .windows = 66},
-        {.from = 0.7, .to = 1.4, .before_w = 58.8, .after_w = 6.1, .half_width_w = nan, .windows = 49}}}};
+  d.figures.maps = {{"speed, m/s",
+                     {{.from = 0,
+                       .to = 0.7,
+                       .before_w = 41.6,
+                       .after_w = 3.87,
+                       .half_width_w = 5,
+                       .windows = 66,
+                       .label = ""},
+                      {.from = 0.7,
+                       .to = 1.4,
+                       .before_w = 58.8,
+                       .after_w = 6.1,
+                       .half_width_w = nan,
+                       .windows = 49,
+                       .label = ""}}}};
   d.figures.cell_m = 2;
   for (const double x : {0.0, 2.0, 4.0, 6.0}) d.figures.floor.push_back({x, 0, 78.4, 11.3, 37});
   d.figures.stretch_of = "tour";
@@ -308,20 +325,20 @@ TEST(Report, ShowsWhatTheDiagnosisHolds) {
 TEST(Report, PutsDegreesBesideRadians) {
   const std::string html = html_of(full_diagnosis());
   EXPECT_THAT(html, HasSubstr("0.01633 ± 0.00082 rad (0.936 ± 0.047°)"));
-  EXPECT_THAT(html, HasSubstr("0.41 to 0.59 rad/s (24 to 34°/s)"));
+  EXPECT_THAT(html, HasSubstr("0.41 to 0.59 rad/s (23.7 to 33.6°/s)"));
 }
 
 TEST(Report, NamesWhatToCheckForEveryEffectOfTheCatalogue) {
   for (const dynamics::Effect* effect : dynamics::catalogue()) {
     Diagnosis d;
-    d.effects = {{.id = std::string(effect->info().id), .parameters = {{"strength", "1", 0.1, 0.01}}}};
+    d.effects = {effect_of(std::string(effect->info().id), {{"strength", "1", 0.1, 0.01}})};
     const std::string_view line = traits_of(effect->info().id).workshop;
     EXPECT_GT(line.size(), 5U) << effect->info().id;
     EXPECT_THAT(html_of(d), HasSubstr("<b>To check in the workshop:</b> " + xml_escaped(line)))
         << effect->info().id;
   }
   Diagnosis d;
-  d.effects = {{.id = "covariate:driver", .parameters = {{"coefficient", "W", 3, 1}}}};
+  d.effects = {effect_of("covariate:driver", {{"coefficient", "W", 3, 1}})};
   EXPECT_THAT(html_of(d), Not(HasSubstr("To check in the workshop")));
 }
 
