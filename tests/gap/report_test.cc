@@ -325,7 +325,7 @@ TEST(Report, ShowsWhatTheDiagnosisHolds) {
 TEST(Report, PutsDegreesBesideRadians) {
   const std::string html = html_of(full_diagnosis());
   EXPECT_THAT(html, HasSubstr("0.01633 ± 0.00082 rad (0.936 ± 0.047°)"));
-  EXPECT_THAT(html, HasSubstr("0.41 to 0.59 rad/s (23.7 to 33.6°/s)"));
+  EXPECT_THAT(html, HasSubstr("<td>yaw rate</td><td>0.41 to 0.59 rad/s (23.7 to 33.6°/s)"));
 }
 
 TEST(Report, NamesWhatToCheckForEveryEffectOfTheCatalogue) {
@@ -385,7 +385,7 @@ TEST(Report, HasADashForWhatIsNotKnown) {
 TEST(Report, LeavesOutWhatIsEmpty) {
   const std::string html = html_of(Diagnosis{});
   for (const char* heading :
-       {"Why the verdict", "What the recordings themselves say", "What the robot file may take",
+       {"Reasons for the verdict", "What the recordings themselves say", "What the robot file may take",
         "Held against a plain regression", "The gap of each kind", "Where the model misses",
         "Where on the floor", "Power over time", "What to drive next"})
     EXPECT_THAT(html, Not(HasSubstr(heading)));

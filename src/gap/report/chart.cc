@@ -137,7 +137,7 @@ std::string Chart::str() const {
 }
 
 std::string bars(std::span<const BarRow> rows, std::string_view unit, std::string_view name) {
-  constexpr double width = 480, value_px = 150, row_px = 42;
+  constexpr double width = 400, value_px = 150, row_px = 44;
   double low = 0, high = 0;
   for (const BarRow& r : rows) {
     for (const double v : {r.value, r.interval[0], r.interval[1], r.mark}) {
@@ -157,21 +157,21 @@ std::string bars(std::span<const BarRow> rows, std::string_view unit, std::strin
     const double value = std::isfinite(r.value) ? r.value : 0;
     const double a = px(std::min(0.0, value)), b = px(std::max(0.0, value));
     fmt::format_to(to, "<rect class=\"{}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"15\">{}</rect>", r.style,
-                   px_text(a), px_text(y + 19), px_text(std::max(1.0, b - a)), title(r.hint));
+                   px_text(a), px_text(y + 21), px_text(std::max(1.0, b - a)), title(r.hint));
     double end = b;
     if (r.interval[1] > r.interval[0]) {
       fmt::format_to(to, "<line class=\"whisker\" x1=\"{}\" x2=\"{}\" y1=\"{}\" y2=\"{}\"/>",
-                     px_text(px(r.interval[0])), px_text(px(r.interval[1])), px_text(y + 26.5),
-                     px_text(y + 26.5));
+                     px_text(px(r.interval[0])), px_text(px(r.interval[1])), px_text(y + 28.5),
+                     px_text(y + 28.5));
       end = std::max(end, px(r.interval[1]));
     }
     if (std::isfinite(r.mark)) {
       fmt::format_to(to, "<line class=\"mark\" x1=\"{0}\" x2=\"{0}\" y1=\"{1}\" y2=\"{2}\"/>",
-                     px_text(px(r.mark)), px_text(y + 17), px_text(y + 36));
+                     px_text(px(r.mark)), px_text(y + 18), px_text(y + 39));
       end = std::max(end, px(r.mark));
     }
     const std::string text = r.text.empty() ? brief(r.value) + std::string(unit) : r.text;
-    fmt::format_to(to, "<text class=\"row\" x=\"{}\" y=\"{}\">{}</text>", px_text(end + 8), px_text(y + 31),
+    fmt::format_to(to, "<text class=\"row\" x=\"{}\" y=\"{}\">{}</text>", px_text(end + 8), px_text(y + 33),
                    xml_escaped(text));
     y += row_px;
   }

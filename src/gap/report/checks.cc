@@ -48,13 +48,14 @@ std::string shrinkage_text(const Shrinkage& s) {
     text += " The interval holds zero: that the effects help is not sure.";
   }
   if (s.parts > 0)
-    text += fmt::format(" Without each of {} parts the same is named {} times.", s.parts, s.agreeing);
+    text += fmt::format(" With one part left out at a time, the same is named in {} of {} cases.", s.agreeing,
+                        s.parts);
   if (std::isfinite(s.remaining_over_noise_floor))
     text += fmt::format(" What remains is {} times the noise floor.", brief(s.remaining_over_noise_floor, 2));
   return text;
 }
 
-void baseline_terms(Page& page, const Baseline& b) {
+void baseline_terms(Page& page, const Baseline& b, std::span<const std::string> told) {
   const bool models =
       std::ranges::any_of(b.terms, [](const BaselineTerm& t) { return std::isfinite(t.model); });
   std::vector<std::vector<std::string>> rows;
@@ -65,10 +66,13 @@ void baseline_terms(Page& page, const Baseline& b) {
   std::vector<std::string> header{"Term of the regression", "in the data"};
   if (models) header.emplace_back("in the model");
   if (!rows.empty()) page.table(header, rows, 1);
-  if (!b.says.empty()) {
-    page.paragraph("Where the data and the model differ in these terms:");
-    page.list(b.says);
+  std::vector<std::string> says;
+  for (const std::string& text : b.says) {
+    if (std::ranges::find(told, text) == told.end()) says.push_back(text);
   }
+  if (says.empty()) return;
+  page.paragraph("Where the data and the model differ in these terms:");
+  page.list(says);
 }
 
 }  // namespace
@@ -118,7 +122,7 @@ void held_out_section(Page& page, const Diagnosis& d) {
         bars(shares, "", "share of the gap that each effect closes"),
         "What each effect takes off the gap, averaged over the orders of adding them (Shapley shares).");
   }
-  if (d.baseline) baseline_terms(page, *d.baseline);
+  if (d.baseline) baseline_terms(page, *d.baseline, d.reasons);
 }
 
 void channels_section(Page& page, std::span<const ChannelGap> channels) {

@@ -13,6 +13,8 @@
 namespace joulecast::gap {
 namespace {
 
+constexpr double least_told = 0.01;  // of a strength, that its wander along the recordings is worth a word
+
 std::string paragraph(std::string_view text) {
   return fmt::format("<p>{}</p>", xml_escaped(text));
 }
@@ -65,10 +67,10 @@ std::string card_of(const DiagnosedEffect& e, double mean_power_w) {
   sure += fmt::format("; it closes {} of the gap", share_text(e.share));
   if (e.power_w > 0) {
     sure += fmt::format("; it moves {} W on average", brief(e.power_w));
-    if (mean_power_w > 0) sure += fmt::format(" of {} W", brief(mean_power_w));
+    if (mean_power_w > 0) sure += fmt::format(", where the mean power is {} W", brief(mean_power_w));
   }
   card += paragraph(sure + '.');
-  if (e.varies > 0)
+  if (e.varies >= least_told)
     card += paragraph(
         fmt::format("Its strength varies along the recordings by {} of itself.", share_text(e.varies)));
   if (e.controls) card += paragraph(controls_text(*e.controls));

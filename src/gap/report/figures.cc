@@ -64,9 +64,7 @@ void regions_table(Page& page, std::span<const WhereRegion> where) {
   std::vector<std::vector<std::string>> rows;
   for (const WhereRegion& w : where) {
     const std::string_view unit = unit_of(w.variable);
-    std::string_view variable = w.variable;
-    if (!unit.empty()) variable = variable.substr(0, variable.size() - unit.size() - 1);
-    rows.push_back({xml_escaped(words_of(w.channel)), xml_escaped(words_of(variable)),
+    rows.push_back({xml_escaped(words_of(w.channel)), xml_escaped(words_of(without_unit(w.variable))),
                     xml_escaped(w.label.empty() ? quantity_range(w.from, w.to, unit) : w.label),
                     share_text(w.share, w.interval), share_text(w.time_share)});
   }

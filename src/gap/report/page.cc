@@ -27,11 +27,12 @@ p{margin:8px 0}
 .figures b{display:block;font-size:23px;font-weight:600;font-variant-numeric:tabular-nums}
 .figures span{color:var(--quiet);font-size:13px;line-height:1.3;display:block}
 .card{background:var(--card);border:1px solid var(--rule);border-radius:6px;padding:14px 16px;margin:12px 0}
+.card p:first-child{margin-top:0}.card p:last-child{margin-bottom:0}
 .strength{font-size:18px;font-variant-numeric:tabular-nums;margin:4px 0}
 figure{margin:14px 0}
 .grid2{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,360px),1fr));gap:8px 20px}
 svg{width:100%;height:auto;display:block}
-svg.bars{max-width:560px}
+svg.bars{max-width:460px}
 .wide svg{min-width:640px}
 svg text{font:12px system-ui,"DejaVu Sans",Helvetica,Arial,sans-serif;fill:var(--text)}
 svg text.tick{fill:var(--quiet);font-size:11px}
@@ -59,6 +60,7 @@ i.measured{background:var(--measured)}i.before,i.more{background:var(--before)}i
 i.floor{background:var(--floor)}i.mark{background:var(--text);width:2px;height:12px;vertical-align:-2px}i.less{background:var(--less)}
 .scroll,.wide{overflow-x:auto}
 table{border-collapse:collapse;width:100%;font-size:14px;margin:10px 0}
+table.many{min-width:540px}
 th,td{text-align:left;padding:5px 10px 5px 0;border-bottom:1px solid var(--rule);vertical-align:top}
 th{color:var(--quiet);font-weight:500}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
@@ -68,7 +70,7 @@ code{font:13px ui-monospace,"DejaVu Sans Mono",monospace;background:var(--shade)
 .warn{border-left:4px solid var(--before)}
 @media(max-width:480px){main{padding:24px 16px 40px}h1{font-size:23px}.verdict{font-size:16px}}
 @media print{main{max-width:none;padding:0}h2{break-after:avoid}figure,.card,tr,li{break-inside:avoid}
-.scroll,.wide{overflow:visible}.wide svg{min-width:0}}
+.scroll,.wide{overflow:visible}.wide svg,table.many{min-width:0}}
 )";
 
 }  // namespace
@@ -125,7 +127,8 @@ void Page::list(std::span<const std::string> items) {
 void Page::table(std::span<const std::string> header, std::span<const std::vector<std::string>> rows,
                  std::size_t first_number) {
   const auto number = [&](std::size_t column) { return column >= first_number ? " class=\"n\"" : ""; };
-  body_ += "<div class=\"scroll\"><table><thead><tr>";
+  body_ +=
+      fmt::format("<div class=\"scroll\"><table{}><thead><tr>", header.size() > 3 ? " class=\"many\"" : "");
   for (std::size_t c = 0; c < header.size(); ++c)
     body_ += fmt::format("<th scope=\"col\"{}>{}</th>", number(c), xml_escaped(header[c]));
   body_ += "</tr></thead><tbody>";

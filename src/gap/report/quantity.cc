@@ -49,6 +49,13 @@ std::string_view unit_of(std::string_view name) {
   return {};
 }
 
+std::string_view without_unit(std::string_view name) {
+  for (const auto& [end, unit] : units) {
+    if (name.ends_with(end)) return name.substr(0, name.size() - end.size());
+  }
+  return name;
+}
+
 std::string quantity(double value, double deviation, std::string_view unit) {
   if (!std::isfinite(value)) return std::string(unknown);
   std::string text = with_deviation(value, deviation, unit);

@@ -17,6 +17,7 @@ std::string_view degrees_of(std::string_view unit);
 double in_degrees(double radians);
 // Unit that the end of a name says: "m/s" of "speed_m_s"; empty where it says none.
 std::string_view unit_of(std::string_view name);
+std::string_view without_unit(std::string_view name);  // "speed" of "speed_m_s"
 
 std::string share_text(double fraction);                                         // "12 %"
 std::string share_text(double fraction, const std::array<double, 2>& interval);  // "12 % [8 %, 16 %]"

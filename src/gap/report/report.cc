@@ -161,11 +161,11 @@ std::string report_html(const Diagnosis& d, const robot::RobotModel& robot, cons
             "Diagnosis of recorded missions",
             fmt::format("On {} {}. {}", count_text(d.missions, "mission"), gap_text(d), verdict_text(d)));
   page.figures(tiles_of(d));
+  checks_section(page, d.checks);
   if (!d.reasons.empty()) {
-    page.section("Why the verdict is not more");
+    page.section("Reasons for the verdict");
     page.list(d.reasons);
   }
-  checks_section(page, d.checks);
   effects_section(page, d.effects, d.figures.mean_power_w);
   outside_card(page, d.outside);
   adoption_section(page, d);
