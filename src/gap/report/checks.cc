@@ -39,8 +39,8 @@ std::vector<BarRow> error_rows(const Diagnosis& d) {
 
 std::string shrinkage_text(const Shrinkage& s) {
   std::string text = fmt::format(
-      "On parts that had no part in finding the effects the gap falls from {} to {}: by {}, "
-      "95 % interval by a bootstrap over blocks.",
+      "On parts that had no part in finding the effects the gap falls from {} to {}: by {}, 95 % interval by "
+      "a bootstrap over blocks.",
       share_text(s.before), share_text(s.after), share_text(s.fraction, s.interval));
   if (s.interval[1] < 0) {
     text += " It grows: these effects are no explanation.";
@@ -79,10 +79,9 @@ void baseline_terms(Page& page, const Baseline& b, std::span<const std::string> 
 
 void checks_section(Page& page, std::span<const Check> checks) {
   if (checks.empty()) return;
-  page.section(
-      "What the recordings themselves say",
-      "Found before any effect was judged: signs, units, scales, channels, motors, clock and the robot file. "
-      "A channel that is contradicted takes no part in the diagnosis.");
+  page.section("What the recordings themselves say",
+               "Found before any effect was judged: signs, units, scales, channels, motors, clock and the "
+               "robot file. A channel that is contradicted takes no part in the diagnosis.");
   for (const Check& c : checks) {
     page.card(fmt::format("<p>{}</p><p class=\"quiet\">{}{}</p>", xml_escaped(c.says), small_print(c),
                           c.contradicted ? "; <b>takes no part in the diagnosis</b>" : ""),
@@ -92,23 +91,18 @@ void checks_section(Page& page, std::span<const Check> checks) {
 
 void held_out_section(Page& page, const Diagnosis& d) {
   if (!d.baseline && !d.shrinkage) return;
-  page.section(
-      "Held against a plain regression",
-      "Mean absolute error over mean absolute power, on parts that were left out: effects, their shapes and "
-      "the regression are found anew without each part.");
-  page.chart(
-      bars(error_rows(d), "", "errors on parts left out"),
-      std::isfinite(d.noise_floor)
-          ? fmt::format(
-                "The upright mark is the noise floor, {}: what an unstructured model of the data cannot "
-                "remove.",
-                share_text(d.noise_floor))
-          : std::string());
+  page.section("Held against a plain regression",
+               "Mean absolute error over mean absolute power, on parts that were left out: effects, their "
+               "shapes and the regression are found anew without each part.");
+  page.chart(bars(error_rows(d), "", "errors on parts left out"),
+             std::isfinite(d.noise_floor) ? fmt::format("The upright mark is the noise floor, {}: what an "
+                                                        "unstructured model of the data cannot remove.",
+                                                        share_text(d.noise_floor))
+                                          : std::string());
   if (d.baseline && d.baseline->wins()) {
     page.card(
         "<p><b>The explanation predicts what was left out worse</b> than the better of the regression and "
-        "the "
-        "unchanged model. It does not stand.</p>",
+        "the unchanged model. It does not stand.</p>",
         true);
   }
   if (d.shrinkage) page.paragraph(xml_escaped(shrinkage_text(*d.shrinkage)));
@@ -140,10 +134,9 @@ void channels_section(Page& page, std::span<const ChannelGap> channels) {
       rows.back().text += fmt::format(" (noise {})", share_text(c.noise_floor));
   }
   if (rows.empty()) return;
-  page.section(
-      "The gap of each kind of reading",
-      "Mean absolute difference between readings and the model as it is, over the mean size of the reading. "
-      "The upright mark is the noise floor.");
+  page.section("The gap of each kind of reading",
+               "Mean absolute difference between readings and the model as it is, over the mean size of the "
+               "reading. The upright mark is the noise floor.");
   page.chart(bars(rows, "", "gap of each kind of reading"));
 }
 

@@ -25,6 +25,7 @@ std::string quiet(std::string_view text) {
 
 std::string names_of(const std::vector<std::string>& ids) {
   std::vector<std::string> names;
+  names.reserve(ids.size());
   for (const std::string& id : ids) names.push_back(words_of(id));
   return enumerate(names);
 }
@@ -91,8 +92,7 @@ void corrections_table(Page& page, std::span<const FileCorrection> corrections) 
   if (corrections.empty()) return;
   page.paragraph(
       "The robot file is not this robot's, or not as it ran here. These values would fit; take them as a "
-      "proposal "
-      "for a calibration.");
+      "proposal for a calibration.");
   std::vector<std::vector<std::string>> rows;
   for (const FileCorrection& c : corrections) {
     const std::string_view unit = degrees_of(unit_of(c.parameter)).empty() ? "" : unit_of(c.parameter);

@@ -78,8 +78,7 @@ std::vector<std::string> limits_of(const Diagnosis& d) {
   if (!d.motor_channels) {
     limits.emplace_back(
         "The motors' currents were not recorded. The judgement rests on battery power and motion, so that "
-        "effects in "
-        "the motors, the drivers and friction are harder to tell apart.");
+        "effects in the motors, the drivers and friction are harder to tell apart.");
   }
   if (d.power == PowerSource::motors)
     limits.emplace_back(
@@ -93,29 +92,29 @@ std::vector<std::string> limits_of(const Diagnosis& d) {
   }
   limits.emplace_back(
       "Effects are named from a catalogue; several small ones can look like one of it. Strengths hold for "
-      "the "
-      "conditions driven.");
+      "the conditions driven.");
   return limits;
 }
 
 void method_section(Page& page) {
   page.section("Method");
-  const std::vector<std::string> method{
-      "Signs, units, scales and channels are checked first; what is contradicted takes no part.",
+  std::vector<std::string> method;
+  method.emplace_back(
+      "Signs, units, scales and channels are checked first; what is contradicted takes no part.");
+  method.emplace_back(
       "Recordings are averaged under smooth windows; slopes are taken under the windows' slopes, so that no "
-      "noisy "
-      "signal is differentiated.",
+      "noisy signal is differentiated.");
+  method.emplace_back(
       "Each equation between measured channels is compared with the drive model; each effect of the "
-      "catalogue has its "
-      "own trace in them. How much an equation counts, by its update rate, colour and tails, is learnt from "
-      "the data.",
+      "catalogue has its own trace in them. How much an equation counts, by its update rate, colour and "
+      "tails, is learnt from the data.");
+  method.emplace_back(
       "Sets of effects are compared by their evidence and by how well they predict parts that were left out; "
-      "flexible "
-      "functions stand for what the catalogue does not know, and a strength that wanders along the run is no "
-      "effect.",
+      "flexible functions stand for what the catalogue does not know, and a strength that wanders along the "
+      "run is no effect.");
+  method.emplace_back(
       "Negative controls: the recorded motion with power made without the finding and with the recordings' "
-      "own "
-      "residuals, in blocks, tells how often the same would be named there."};
+      "own residuals, in blocks, tells how often the same would be named there.");
   page.list(method);
 }
 
@@ -144,8 +143,7 @@ void origin_section(Page& page, const ReportOrigin& origin, const robot::RobotMo
                                            : "; effects adopted before: " + enumerate(adopted) + "."));
   lines.push_back(
       fmt::format("Mass {} kg without payload, wheel radius {} m, half track {} m, friction torque {} and {} "
-                  "N m (right, left), idle "
-                  "power {} W.",
+                  "N m (right, left), idle power {} W.",
                   brief(robot.total_mass_kg(0)), brief(robot.kinematics.wheel_radius_m),
                   brief(robot.kinematics.half_track_m), brief(robot.motor.friction_torque_nm[0]),
                   brief(robot.motor.friction_torque_nm[1]), brief(robot.idle_power_w)));
