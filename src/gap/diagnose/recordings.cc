@@ -231,9 +231,9 @@ void Diagnoser::add_baseline() {
     const auto at = static_cast<Eigen::Index>(k);
     const double data = referee.fit().coefficients[at], sd = referee.fit().sd[at];
     const double ours = model.fit().coefficients[at];  // what the model itself comes to in the same term
-    b.terms.push_back({term.name, term.unit, data, sd});
+    b.terms.push_back({term.name, term.unit, data, sd, ours});
     constexpr double clear = 3, notable = 0.2;
-    if (std::fabs(data - ours) < clear * sd || std::fabs(data - ours) < notable * std::fabs(data)) continue;
+    if (!(sd > 0) || std::fabs(data - ours) < clear * sd || std::fabs(data - ours) < notable * std::fabs(data)) continue;
     b.says.push_back(referee_words(term, data, ours));
   }
   d_.baseline = std::move(b);
