@@ -16,20 +16,26 @@ bool bounded(const Candidate& c) {
 
 }  // namespace
 
-Evidence::Evidence(const Information& data, const Eigen::VectorXd& tolerance) {
-  const Eigen::Index p = data.xx.rows();
-  const Eigen::MatrixXd half = tolerance.asDiagonal() * data.xx;
-  Eigen::MatrixXd a = half * tolerance.asDiagonal();
+Evidence::Evidence(const Information& data, const Eigen::VectorXd& tolerance, std::span<const std::size_t> asked)
+    : place_(static_cast<std::size_t>(data.xx.rows()), -1) {
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index k = 0; k < data.xx.rows(); ++k) {
+    if (!asked.empty() && !std::ranges::binary_search(asked, static_cast<std::size_t>(k))) continue;
+    place_[static_cast<std::size_t>(k)] = static_cast<Eigen::Index>(kept.size());
+    kept.push_back(k);
+  }
+  Eigen::MatrixXd a = tolerance.asDiagonal() * data.xx * tolerance.asDiagonal();
   a.diagonal().array() += 1.0;
   const Eigen::LLT<Eigen::MatrixXd> factor(a);
   // L^-1 T X'X and L^-1 T X'y, so that what is subtracted is symmetric to the last digit.
-  const Eigen::MatrixXd solved = factor.matrixL().solve(half);
+  Eigen::MatrixXd solved = tolerance.asDiagonal() * data.xx(Eigen::all, kept);
+  factor.matrixL().solveInPlace(solved);
   const Eigen::VectorXd solved_y = factor.matrixL().solve(tolerance.asDiagonal() * data.xy);
-  xx_ = data.xx;
+  xx_ = data.xx(kept, kept);
   xx_.triangularView<Eigen::Lower>() -= solved.transpose() * solved;
   xx_.triangularView<Eigen::StrictlyUpper>() = xx_.transpose();
-  xy_ = data.xy - solved.transpose() * solved_y;
-  for (Eigen::Index k = 0; k < p; ++k) xx_(k, k) = std::max(0.0, xx_(k, k));
+  xy_ = data.xy(kept) - solved.transpose() * solved_y;
+  for (Eigen::Index k = 0; k < xx_.rows(); ++k) xx_(k, k) = std::max(0.0, xx_(k, k));
   log_density_ = data.log_scale - 0.5 * (data.yy - solved_y.squaredNorm()) -
                  factor.matrixLLT().diagonal().array().log().sum();
 }
@@ -39,7 +45,7 @@ bool Evidence::solve(std::span<const Candidate* const> set, Posterior& posterior
   std::vector<double> unit;
   for (const Candidate* c : set) {
     for (const std::size_t k : c->columns) {
-      index.push_back(static_cast<Eigen::Index>(k));
+      index.push_back(place_[k]);
       unit.push_back(c->expected);
     }
   }
@@ -98,7 +104,7 @@ Evidence::Estimate Evidence::estimate(std::span<const Candidate* const> set) con
 }
 
 double Evidence::separation(std::size_t column, double strength, std::size_t other, double expected) const {
-  const auto i = static_cast<Eigen::Index>(column), j = static_cast<Eigen::Index>(other);
+  const Eigen::Index i = place_[column], j = place_[other];
   const double followed = xx_(i, j) * xx_(i, j) / (xx_(j, j) + 1 / (expected * expected));
   return 0.5 * strength * strength * std::max(0.0, xx_(i, i) - followed);
 }

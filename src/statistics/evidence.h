@@ -23,8 +23,9 @@ struct Candidate {
 // truncated normal as prior; the posterior's mass within the bounds is taken coefficient by coefficient.
 class Evidence {
  public:
-  // `tolerance`: sd of each column's coefficient where nothing is there; 0 holds it at zero.
-  Evidence(const Information& data, const Eigen::VectorXd& tolerance);
+  // `tolerance`: sd of each column's coefficient where nothing is there; 0 holds it at zero. `asked`: the columns
+  // that candidates may have, ascending; empty: any.
+  Evidence(const Information& data, const Eigen::VectorXd& tolerance, std::span<const std::size_t> asked = {});
 
   // Log density of the data when none is there.
   double log_density() const { return log_density_; }
@@ -41,10 +42,6 @@ class Evidence {
   // the squared distance that the other cannot follow.
   double separation(std::size_t column, double strength, std::size_t other, double expected) const;
 
-  // X'K X and X'K y, K the inverse covariance of the data with the tolerances in it.
-  const Eigen::MatrixXd& free_xx() const { return xx_; }
-  const Eigen::VectorXd& free_xy() const { return xy_; }
-
  private:
   struct Posterior {
     Eigen::VectorXd mean;  // in units of what is expected
@@ -53,6 +50,8 @@ class Evidence {
   };
   bool solve(std::span<const Candidate* const> set, Posterior& posterior) const;
 
+  std::vector<Eigen::Index> place_;  // of each column among those asked for
+  // X'K X and X'K y, K the inverse covariance of the data with the tolerances in it; of the columns asked for.
   Eigen::MatrixXd xx_;
   Eigen::VectorXd xy_;
   double log_density_ = 0;

@@ -103,7 +103,7 @@ std::vector<Check> check_observations(std::span<const Observation> observations,
   return checks;
 }
 
-std::vector<Check> check_recordings(const RecordingSet& recordings, const robot::RobotModel& robot) {
+std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
   std::vector<Observation> observations;
   observations.reserve(recordings.missions.size());
   for (const telemetry::Recording& mission : recordings.missions) {
@@ -112,7 +112,7 @@ std::vector<Check> check_recordings(const RecordingSet& recordings, const robot:
   return check_observations(observations, robot);
 }
 
-void silence_contradicted(RecordingSet& recordings, std::span<const Check> checks) {
+void silence_contradicted(telemetry::RecordingSet& recordings, std::span<const Check> checks) {
   std::array<bool, reading_count> silent{};
   for (const Check& check : checks) {
     for (std::size_t k = 0; k < reading_count; ++k) {

@@ -82,7 +82,7 @@ std::vector<Check> check_clock(const CheckContext& c) {
     gaps += o.clock.gaps().count;
     gap_s += o.clock.gaps().seconds;
     length_s += o.clock.length_s();
-    if (o.clock.length_s() >= shortest_mission_s || !checks.empty()) continue;
+    if (o.clock.length_s() >= telemetry::shortest_mission_s || !checks.empty()) continue;
     if (++short_ones <= 3) names += (names.empty() ? "" : ", ") + o.mission_id;
   }
   const double n = static_cast<double>(rows);
@@ -114,7 +114,7 @@ std::vector<Check> check_clock(const CheckContext& c) {
     checks.push_back(clock_check(
         "short_missions", static_cast<double>(short_ones),
         fmt::format("{} of {} missions are shorter than {:g} s and say nothing: {}{}.", short_ones,
-                    c.seen.size(), shortest_mission_s, names, short_ones > 3 ? ", ..." : ""),
+                    c.seen.size(), telemetry::shortest_mission_s, names, short_ones > 3 ? ", ..." : ""),
         false));
     checks.back().channel.clear();
   }

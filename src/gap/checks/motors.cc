@@ -104,7 +104,7 @@ std::array<MotorConstants, 2> motor_constants(std::span<const Observation> obser
   return {constants_of(observations, 0, delay_s), constants_of(observations, 1, delay_s)};
 }
 
-std::array<MotorConstants, 2> motor_constants(const RecordingSet& recordings,
+std::array<MotorConstants, 2> motor_constants(const telemetry::RecordingSet& recordings,
                                               const robot::RobotModel& robot) {
   std::vector<Observation> observations;
   for (const telemetry::Recording& mission : recordings.missions)

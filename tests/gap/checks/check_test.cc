@@ -28,7 +28,7 @@ const made::Robot& scout() {
 }
 
 TEST(SilenceContradicted, TakesAwayTheReadingsOfTheChannelAndNoOther) {
-  RecordingSet set = scout().recordings;
+  telemetry::RecordingSet set = scout().recordings;
   const std::vector<Check> checks{{"dead_channel", "motor_current.left, pose", 0, {}, "", true, {}},
                                   {"held_samples", "yaw_rate", 0, {}, "", false, {}}};
   silence_contradicted(set, checks);
@@ -40,7 +40,7 @@ TEST(SilenceContradicted, TakesAwayTheReadingsOfTheChannelAndNoOther) {
 }
 
 TEST(CheckRecordings, AWrongClockLeavesNothingElseToSay) {
-  RecordingSet set = scout().recordings;
+  telemetry::RecordingSet set = scout().recordings;
   mistakes::scale_clock(set, 1e3);
   const auto checks = check_recordings(set, scout().model);
   ASSERT_EQ(checks.size(), 1u);
@@ -49,7 +49,7 @@ TEST(CheckRecordings, AWrongClockLeavesNothingElseToSay) {
 }
 
 TEST(CheckRecordings, ShortMissionsAreNamed) {
-  RecordingSet set = scout().recordings;
+  telemetry::RecordingSet set = scout().recordings;
   set.missions.push_back(set.missions.front());
   set.missions.back().mission_id = "stub";
   set.missions.back().samples.resize(60);
@@ -60,7 +60,7 @@ TEST(CheckRecordings, ShortMissionsAreNamed) {
 }
 
 TEST(CheckRecordings, DisorderAndGapsOfTheClockAreTold) {
-  RecordingSet set = scout().recordings;
+  telemetry::RecordingSet set = scout().recordings;
   for (auto& mission : set.missions) {
     for (std::size_t k = 1; k < mission.samples.size(); ++k) {
       if (k % 20 == 0) mission.samples[k].utime_us = mission.samples[k - 1].utime_us;
@@ -76,7 +76,7 @@ TEST(CheckRecordings, DisorderAndGapsOfTheClockAreTold) {
 }
 
 TEST(CheckRecordings, AYearThatNobodyLivesInIsTold) {
-  RecordingSet set = scout().recordings;
+  telemetry::RecordingSet set = scout().recordings;
   mistakes::each_sample(set, [](telemetry::Sample& s) { s.utime_us += 10'000'000'000'000'000; });
   const auto checks = check_recordings(set, scout().model);
   ASSERT_TRUE(find(checks, "utime_year"));
@@ -84,10 +84,10 @@ TEST(CheckRecordings, AYearThatNobodyLivesInIsTold) {
 }
 
 TEST(CheckRecordings, PitchAndPayloadHaveTheirUnits) {
-  RecordingSet degrees = scout().recordings;
+  telemetry::RecordingSet degrees = scout().recordings;
   mistakes::each_sample(degrees, [](telemetry::Sample& s) { s.pitch_rad = 12 + 57.3 * s.pitch_rad; });
   ASSERT_TRUE(find(check_recordings(degrees, scout().model), "pitch_scale"));
-  RecordingSet grams = scout().recordings;
+  telemetry::RecordingSet grams = scout().recordings;
   mistakes::multiply(grams, {reading::payload}, 1000);
   ASSERT_TRUE(find(check_recordings(grams, scout().model), "payload_scale"));
   EXPECT_FALSE(find(check_recordings(scout().recordings, scout().model), "payload_scale"));
@@ -105,11 +105,11 @@ TEST(CheckRecordings, ASpeedOverTheLimitIsToldWhereNothingElseSaysWhy) {
 }
 
 TEST(CheckRecordings, ClippedAndCoarseChannelsAreTold) {
-  RecordingSet clipped = scout().recordings;
+  telemetry::RecordingSet clipped = scout().recordings;
   mistakes::clip(clipped, {reading::motor_current}, 0.5);
   ASSERT_TRUE(find(check_recordings(clipped, scout().model), "clipped_channel"));
   EXPECT_NEAR(find(check_recordings(clipped, scout().model), "clipped_channel")->value, 0.5, 1e-9);
-  RecordingSet coarse = scout().recordings;
+  telemetry::RecordingSet coarse = scout().recordings;
   mistakes::round_to(coarse, {reading::battery_current}, 1.0);
   ASSERT_TRUE(find(check_recordings(coarse, scout().model), "coarse_channel"));
   EXPECT_EQ(find(check_recordings(coarse, scout().model), "coarse_channel")->channel, "battery_current");
@@ -118,7 +118,7 @@ TEST(CheckRecordings, ClippedAndCoarseChannelsAreTold) {
 }
 
 TEST(CheckRecordings, AChannelThatIsMostlyMissingIsTold) {
-  RecordingSet set = scout().recordings;
+  telemetry::RecordingSet set = scout().recordings;
   for (auto& mission : set.missions) {
     for (std::size_t k = 200; k < mission.samples.size(); ++k) {
       mission.samples[k].yaw_rate_rad_s = std::numeric_limits<double>::quiet_NaN();
@@ -143,7 +143,7 @@ TEST(CheckRecordings, AFileOfAnotherRobotIsTold) {
 }
 
 TEST(CheckRecordings, AStepIsSplitBetweenItsMissions) {
-  RecordingSet set = scout().recordings;
+  telemetry::RecordingSet set = scout().recordings;
   mistakes::step(set, {reading::battery_current}, 1.25);
   const auto checks = check_recordings(set, scout().model);
   ASSERT_TRUE(find(checks, "step_between_missions"));
@@ -164,7 +164,7 @@ TEST(Observer, GivesWhatTheWholeRecordingGives) {
     for (const auto& sample : mission.samples) observer.add(sample);
     observations.push_back(observer.finish());
   }
-  RecordingSet wrong = robot.recordings;
+  telemetry::RecordingSet wrong = robot.recordings;
   mistakes::multiply(wrong, {reading::battery_current}, -1);
   EXPECT_EQ(check_observations(observations, robot.model).size(),
             check_recordings(robot.recordings, robot.model).size());

@@ -18,13 +18,13 @@ struct World {
 };
 
 // A robot without any electrical channel in a world of these kinematics.
-RecordingSet drive(const robot::RobotModel& robot, const World& world, bool map = true) {
+telemetry::RecordingSet drive(const robot::RobotModel& robot, const World& world, bool map = true) {
   std::mt19937_64 random(4);
   std::normal_distribution<double> normal;
   double x = 0, y = 0, heading = 0, last = 0;
   const double right = robot.kinematics.wheel_radius_m * world.radius * world.right_radius;
   const double left = robot.kinematics.wheel_radius_m * world.radius;
-  return *make_recording_set(
+  return *telemetry::make_recording_set(
       "made", {made::mission(200, 20, [&](double t, telemetry::Sample& s) {
         const made::Motion m = made::motion(t);
         const double yaw =

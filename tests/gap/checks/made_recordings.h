@@ -9,7 +9,7 @@
 
 #include "client/virtual_robot/fleet.h"
 #include "client/virtual_robot/simulate.h"
-#include "gap/recordings.h"
+#include "telemetry/recording_set.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::gap::made {
@@ -18,7 +18,7 @@ namespace vr = virtual_robot;
 
 struct Robot {
   robot::RobotModel model;
-  RecordingSet recordings;
+  telemetry::RecordingSet recordings;
 };
 
 // Missions of a shipped robot's plant, which shares no physics with the model.
@@ -47,7 +47,7 @@ inline Robot virtual_robot(std::string_view kind, std::uint64_t seed,
       missions.back().samples.push_back(run.samples[next++]);
     }
   }
-  robot.recordings = *make_recording_set(robot.model.robot_id, std::move(missions));
+  robot.recordings = *telemetry::make_recording_set(robot.model.robot_id, std::move(missions));
   return robot;
 }
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "gap/checks/readings.h"
-#include "gap/recordings.h"
+#include "telemetry/recording_set.h"
 #include "robot/robot_model.h"
 
 // What integrators get wrong, done to sound recordings in memory.
@@ -20,26 +20,26 @@ namespace joulecast::gap::mistakes {
 using telemetry::Recording;
 using telemetry::Sample;
 
-inline void each_sample(RecordingSet& set, const std::function<void(Sample&)>& change) {
+inline void each_sample(telemetry::RecordingSet& set, const std::function<void(Sample&)>& change) {
   for (Recording& mission : set.missions) {
     for (Sample& s : mission.samples) change(s);
   }
 }
 
-inline void multiply(RecordingSet& set, std::initializer_list<std::size_t> readings, double factor) {
+inline void multiply(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double factor) {
   each_sample(set, [&](Sample& s) {
     for (const std::size_t k : readings) *readings_of(s)[k] *= factor;
   });
 }
 
-inline void fill(RecordingSet& set, std::initializer_list<std::size_t> readings, double value) {
+inline void fill(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double value) {
   each_sample(set, [&](Sample& s) {
     for (const std::size_t k : readings) *readings_of(s)[k] = value;
   });
 }
 
 // Unmeasured readings too.
-inline void zero_unmeasured(RecordingSet& set) {
+inline void zero_unmeasured(telemetry::RecordingSet& set) {
   each_sample(set, [](Sample& s) {
     for (double* reading : readings_of(s)) {
       if (std::isnan(*reading)) *reading = 0;
@@ -47,14 +47,14 @@ inline void zero_unmeasured(RecordingSet& set) {
   });
 }
 
-inline void swap_sides(RecordingSet& set, std::initializer_list<std::size_t> pairs) {
+inline void swap_sides(telemetry::RecordingSet& set, std::initializer_list<std::size_t> pairs) {
   each_sample(set, [&](Sample& s) {
     for (const std::size_t k : pairs) std::swap(*readings_of(s)[k], *readings_of(s)[k + 1]);
   });
 }
 
 // Read anew only every period.
-inline void hold(RecordingSet& set, std::initializer_list<std::size_t> readings, double period_s) {
+inline void hold(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double period_s) {
   for (Recording& mission : set.missions) {
     for (const std::size_t k : readings) {
       std::int64_t next_us = mission.samples.front().utime_us;
@@ -71,20 +71,20 @@ inline void hold(RecordingSet& set, std::initializer_list<std::size_t> readings,
   }
 }
 
-inline void round_to(RecordingSet& set, std::initializer_list<std::size_t> readings, double step) {
+inline void round_to(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double step) {
   each_sample(set, [&](Sample& s) {
     for (const std::size_t k : readings) *readings_of(s)[k] = step * std::round(*readings_of(s)[k] / step);
   });
 }
 
-inline void clip(RecordingSet& set, std::initializer_list<std::size_t> readings, double most) {
+inline void clip(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double most) {
   each_sample(set, [&](Sample& s) {
     for (const std::size_t k : readings) *readings_of(s)[k] = std::clamp(*readings_of(s)[k], -most, most);
   });
 }
 
 // Readings that come late by this time.
-inline void delay(RecordingSet& set, std::initializer_list<std::size_t> readings, double delay_s) {
+inline void delay(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double delay_s) {
   for (Recording& mission : set.missions) {
     const std::vector<Sample> before = mission.samples;
     std::size_t from = 0;
@@ -97,7 +97,7 @@ inline void delay(RecordingSet& set, std::initializer_list<std::size_t> readings
 }
 
 // Every n-th row the readings fall to nothing.
-inline void drop_out(RecordingSet& set, std::initializer_list<std::size_t> readings, std::size_t n) {
+inline void drop_out(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, std::size_t n) {
   for (Recording& mission : set.missions) {
     for (std::size_t row = n / 2; row < mission.samples.size(); row += n) {
       for (const std::size_t k : readings) *readings_of(mission.samples[row])[k] = 0;
@@ -105,14 +105,14 @@ inline void drop_out(RecordingSet& set, std::initializer_list<std::size_t> readi
   }
 }
 
-inline void scale_clock(RecordingSet& set, double factor) {
+inline void scale_clock(telemetry::RecordingSet& set, double factor) {
   each_sample(set, [&](Sample& s) {
     s.utime_us = static_cast<std::int64_t>(static_cast<double>(s.utime_us) * factor);
   });
 }
 
 // A second robot of the same id, which does what this one did in its last mission.
-inline void add_second_sender(RecordingSet& set) {
+inline void add_second_sender(telemetry::RecordingSet& set) {
   const std::vector<Sample> other = set.missions.back().samples;
   for (Recording& mission : set.missions) {
     const std::size_t n = std::min(other.size(), mission.samples.size());
@@ -129,7 +129,7 @@ inline void add_second_sender(RecordingSet& set) {
 }
 
 // From the middle mission on.
-inline void step(RecordingSet& set, std::initializer_list<std::size_t> readings, double factor) {
+inline void step(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double factor) {
   for (std::size_t m = set.missions.size() / 2; m < set.missions.size(); ++m) {
     for (Sample& s : set.missions[m].samples) {
       for (const std::size_t k : readings) *readings_of(s)[k] *= factor;
@@ -143,14 +143,14 @@ struct Mistake {
   std::string channel;  // that the check is about, or where it begins
   bool contradicts = true;
   std::vector<std::size_t> needs;  // readings that must be there
-  std::function<void(RecordingSet&, const robot::RobotModel&)> make;
+  std::function<void(telemetry::RecordingSet&, const robot::RobotModel&)> make;
 };
 
 inline std::vector<Mistake> all_mistakes() {
   using namespace reading;
   constexpr std::size_t w = wheel_velocity, v = motor_voltage, i = motor_current;
   const auto times = [](std::vector<std::size_t> readings, double factor) {
-    return [readings, factor](RecordingSet& set, const robot::RobotModel&) {
+    return [readings, factor](telemetry::RecordingSet& set, const robot::RobotModel&) {
       for (const std::size_t k : readings) multiply(set, {k}, factor);
     };
   };
@@ -185,7 +185,7 @@ inline std::vector<Mistake> all_mistakes() {
        "battery_voltage",
        false,
        {battery_voltage, battery_current},
-       [](RecordingSet& set, const robot::RobotModel& r) {
+       [](telemetry::RecordingSet& set, const robot::RobotModel& r) {
          fill(set, {battery_voltage}, r.battery.nominal_voltage_v);
        }},
       {"battery channels 0",
@@ -193,7 +193,7 @@ inline std::vector<Mistake> all_mistakes() {
        "battery_voltage, battery_current",
        true,
        {battery_voltage, battery_current},
-       [](RecordingSet& set, const robot::RobotModel&) {
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) {
          fill(set, {battery_voltage, battery_current}, 0);
        }},
       {"wheels in rpm", "wheel_velocity_scale", "wheel_velocity", true, {}, times({w, w + 1}, rpm)},
@@ -208,7 +208,7 @@ inline std::vector<Mistake> all_mistakes() {
        "wheel_velocity",
        true,
        {},
-       [](RecordingSet& set, const robot::RobotModel& r) {
+       [](telemetry::RecordingSet& set, const robot::RobotModel& r) {
          multiply(set, {w, w + 1}, r.motor.gear_ratio > 2 ? r.motor.gear_ratio : rpm);
        }},
       {"wheels in m/s",
@@ -216,7 +216,7 @@ inline std::vector<Mistake> all_mistakes() {
        "wheel_velocity",
        true,
        {},
-       [](RecordingSet& set, const robot::RobotModel& r) {
+       [](telemetry::RecordingSet& set, const robot::RobotModel& r) {
          multiply(set, {w, w + 1}, r.kinematics.wheel_radius_m);
        }},
       {"left wheel reversed", "wheel_velocity_reversed", "wheel_velocity.left", true, {}, times({w + 1}, -1)},
@@ -227,7 +227,7 @@ inline std::vector<Mistake> all_mistakes() {
        "wheel_velocity",
        true,
        {},
-       [](RecordingSet& set, const robot::RobotModel&) { swap_sides(set, {w}); }},
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) { swap_sides(set, {w}); }},
       {"left wheel 0", "dead_channel", "wheel_velocity.left", true, {}, times({w + 1}, 0)},
       {"motor currents reversed",
        "motor_current_reversed",
@@ -258,7 +258,7 @@ inline std::vector<Mistake> all_mistakes() {
        "motor_current",
        true,
        {v, v + 1, i, i + 1},
-       [](RecordingSet& set, const robot::RobotModel&) { swap_sides(set, {i}); }},
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) { swap_sides(set, {i}); }},
       {"right motor current 0", "dead_channel", "motor_current.right", true, {i, i + 1}, times({i}, 0)},
       {"right motor current weak",
        "motor_current_against_sibling",
@@ -283,13 +283,13 @@ inline std::vector<Mistake> all_mistakes() {
        "motor_voltage",
        true,
        {v, v + 1, i, i + 1},
-       [](RecordingSet& set, const robot::RobotModel&) { swap_sides(set, {v}); }},
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) { swap_sides(set, {v}); }},
       {"motors swapped",
        "motor_sides_swapped",
        "motor_voltage",
        true,
        {v, v + 1, i, i + 1},
-       [](RecordingSet& set, const robot::RobotModel&) {
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) {
          swap_sides(set, {v, i});
        }},
       {"motor voltages in mV",
@@ -303,7 +303,7 @@ inline std::vector<Mistake> all_mistakes() {
        "motor_current",
        true,
        {i, i + 1},
-       [](RecordingSet& set, const robot::RobotModel&) {
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) {
          each_sample(set, [](Sample& s) {
            for (double& a : s.motor_current_a) a = std::fabs(a);
          });
@@ -313,7 +313,7 @@ inline std::vector<Mistake> all_mistakes() {
        "motor_voltage",
        true,
        {v, v + 1, battery_voltage},
-       [](RecordingSet& set, const robot::RobotModel&) {
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) {
          each_sample(set, [](Sample& s) { s.motor_voltage_v = {s.battery_voltage_v, s.battery_voltage_v}; });
        }},
       {"gyro reversed", "yaw_rate_reversed", "yaw_rate", true, {yaw_rate}, times({yaw_rate}, -1)},
@@ -332,7 +332,7 @@ inline std::vector<Mistake> all_mistakes() {
        "",
        true,
        {},
-       [](RecordingSet& set, const robot::RobotModel&) {
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) {
          fill(set, {v, v + 1, i, i + 1}, 0);
          zero_unmeasured(set);
        }},
@@ -341,31 +341,31 @@ inline std::vector<Mistake> all_mistakes() {
        "utime",
        true,
        {},
-       [](RecordingSet& set, const robot::RobotModel&) { scale_clock(set, 1e-3); }},
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) { scale_clock(set, 1e-3); }},
       {"utime in ns",
        "utime_scale",
        "utime",
        true,
        {},
-       [](RecordingSet& set, const robot::RobotModel&) { scale_clock(set, 1e3); }},
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) { scale_clock(set, 1e3); }},
       {"two senders",
        "two_senders",
        "utime",
        true,
        {},
-       [](RecordingSet& set, const robot::RobotModel&) { add_second_sender(set); }},
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) { add_second_sender(set); }},
       {"battery current held 1 s",
        "held_samples",
        "battery_current",
        false,
        {battery_current},
-       [](RecordingSet& set, const robot::RobotModel&) { hold(set, {battery_current}, 1.0); }},
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) { hold(set, {battery_current}, 1.0); }},
       {"motor currents late by 0.25 s",
        "electrical_delay",
        "motor_current",
        false,
        {v, v + 1, i, i + 1},
-       [](RecordingSet& set, const robot::RobotModel&) {
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) {
          delay(set, {v, v + 1, i, i + 1, battery_voltage, battery_current}, 0.25);
        }},
       {"gyro late by 0.25 s",
@@ -373,13 +373,13 @@ inline std::vector<Mistake> all_mistakes() {
        "yaw_rate",
        false,
        {yaw_rate},
-       [](RecordingSet& set, const robot::RobotModel&) { delay(set, {yaw_rate}, 0.25); }},
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) { delay(set, {yaw_rate}, 0.25); }},
       {"wheels fall to 0 for a row",
        "thrown_readings",
        "wheel_velocity.right",
        false,
        {},
-       [](RecordingSet& set, const robot::RobotModel&) {
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) {
          drop_out(set, {w, w + 1}, 57);
        }},
       {"battery power up by 30 % half-way",
@@ -387,7 +387,7 @@ inline std::vector<Mistake> all_mistakes() {
        "battery_current",
        false,
        {battery_voltage, battery_current},
-       [](RecordingSet& set, const robot::RobotModel&) { step(set, {battery_current}, 1.3); }},
+       [](telemetry::RecordingSet& set, const robot::RobotModel&) { step(set, {battery_current}, 1.3); }},
   };
 }
 

@@ -29,7 +29,7 @@ class Mistakes : public testing::TestWithParam<mistakes::Mistake> {};
 
 TEST_P(Mistakes, AreFoundAndNothingElseIsBlamed) {
   const mistakes::Mistake& mistake = GetParam();
-  RecordingSet set = carrier().recordings;
+  telemetry::RecordingSet set = carrier().recordings;
   mistake.make(set, carrier().model);
   const auto checks = check_recordings(set, carrier().model);
   const auto found = std::ranges::find_if(checks, [&](const Check& c) {

@@ -17,7 +17,7 @@ struct Truth {
 };
 
 // A drive of two motors that obey the equations, loads beside the motion included.
-RecordingSet drive(const Truth& right, const Truth& left, double delay_s = 0) {
+telemetry::RecordingSet drive(const Truth& right, const Truth& left, double delay_s = 0) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
   std::vector<telemetry::Recording> missions;
@@ -39,7 +39,7 @@ RecordingSet drive(const Truth& right, const Truth& left, double delay_s = 0) {
     }));
     missions.back().mission_id = "m" + std::to_string(m);
   }
-  return *make_recording_set("made", std::move(missions));
+  return *telemetry::make_recording_set("made", std::move(missions));
 }
 
 robot::RobotModel robot() {
@@ -84,7 +84,7 @@ TEST(MotorChecks, AreSilentOnLikeMotors) {
 
 TEST(MotorChecks, FindAWeakCurrentSensorByItsSibling) {
   for (const double gain : {0.75, 0.4}) {
-    RecordingSet set = drive({}, {});
+    telemetry::RecordingSet set = drive({}, {});
     for (auto& mission : set.missions) {
       for (auto& s : mission.samples) s.motor_current_a[1] *= gain;
     }
@@ -97,7 +97,7 @@ TEST(MotorChecks, FindAWeakCurrentSensorByItsSibling) {
 }
 
 TEST(MotorChecks, FindAWeakVoltageSensorByItsSibling) {
-  RecordingSet set = drive({}, {});
+  telemetry::RecordingSet set = drive({}, {});
   for (auto& mission : set.missions) {
     for (auto& s : mission.samples) s.motor_voltage_v[0] *= 0.7;
   }

@@ -28,7 +28,7 @@ const Check* find(const std::vector<Check>& checks, std::string_view id) {
   return at == checks.end() ? nullptr : &*at;
 }
 
-RecordingSet imported(const std::vector<fs::path>& tables, const std::string& mapping) {
+telemetry::RecordingSet imported(const std::vector<fs::path>& tables, const std::string& mapping) {
   std::vector<telemetry::Recording> missions;
   std::int64_t start = 1'700'000'000'000'000;
   for (const fs::path& table : tables) {
@@ -39,7 +39,7 @@ RecordingSet imported(const std::vector<fs::path>& tables, const std::string& ma
                                                .start_utime_us = start += 600'000'000});
     if (import) missions.push_back(import->recording);
   }
-  return *make_recording_set("imported", std::move(missions));
+  return *telemetry::make_recording_set("imported", std::move(missions));
 }
 
 std::vector<fs::path> tables_in(const fs::path& folder, std::string_view ending) {
@@ -58,7 +58,7 @@ TEST_P(PracticeLogs, AreNotContradicted) {
   if (!fs::exists(folder)) GTEST_SKIP() << "no practice log " << folder;
   const std::string log = folder / "telemetry.lcmlog";
   const auto checks =
-      check_recordings(*load_recordings({&log, 1}), *robot::load_robot(folder / "robot.json"));
+      check_recordings(*telemetry::load_recordings({&log, 1}), *robot::load_robot(folder / "robot.json"));
   EXPECT_TRUE(std::ranges::none_of(checks, &Check::contradicted));
   EXPECT_LE(checks.size(), 1u);
 }
