@@ -35,9 +35,8 @@ class Collector {
     std::size_t refused = 0;
     for (const Covariate& covariate : message.covariates) {
       CovariateChange change;
-      const Verdict verdict = check_plausible(covariate)
-                                  ? Verdict::late
-                                  : covariates_.take(message.utime_us, covariate, change);
+      const Verdict verdict =
+          check_plausible(covariate) ? Verdict::late : covariates_.take(message.utime_us, covariate, change);
       if (verdict == Verdict::late || verdict == Verdict::no_room) ++refused;
       if (verdict == Verdict::news && open_) changes_.push_back(std::move(change));
     }
@@ -94,7 +93,8 @@ double length_s(const Recording& mission) {
   return 1e-6 * static_cast<double>(mission.samples.back().utime_us - mission.samples.front().utime_us);
 }
 
-// Short missions in a row with one payload become one recording. A pause between them is a gap in its samples.
+// Short missions in a row with one payload become one recording. A pause between them is a gap in its
+// samples.
 std::vector<Recording> joined(std::vector<Recording> missions, std::vector<std::string>& notes) {
   std::vector<Recording> result;
   std::vector<std::string> names;  // joined into the last of the result
@@ -117,8 +117,10 @@ std::vector<Recording> joined(std::vector<Recording> missions, std::vector<std::
       told();
       result.push_back(std::move(mission));
     }
-    if (is_short) names.push_back(result.back().mission_id);
-    else told();
+    if (is_short)
+      names.push_back(result.back().mission_id);
+    else
+      told();
   }
   told();
   return result;
@@ -142,8 +144,8 @@ Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<Record
   std::ranges::stable_sort(missions, {}, [](const Recording& m) { return m.samples.front().utime_us; });
   for (Recording& mission : joined(std::move(missions), set.notes)) {
     if (length_s(mission) < shortest_mission_s) {
-      set.notes.push_back(fmt::format("mission {} lasts {:.3g} s, less than {:g} s, and was left out", mission.mission_id,
-                                      length_s(mission), shortest_mission_s));
+      set.notes.push_back(fmt::format("mission {} lasts {:.3g} s, less than {:g} s, and was left out",
+                                      mission.mission_id, length_s(mission), shortest_mission_s));
       continue;
     }
     set.samples += mission.samples.size();

@@ -15,7 +15,7 @@ struct RecordingSet {
   std::string robot_id;
   std::vector<Recording> missions;
   std::size_t samples = 0;
-  std::size_t unreadable = 0;  // messages that no sample, event or covariate could be read from
+  std::size_t unreadable = 0;      // messages that no sample, event or covariate could be read from
   std::vector<std::string> notes;  // sentences: missions that were joined or left out, messages not read
 };
 
@@ -27,8 +27,8 @@ inline constexpr double shortest_mission_s = 5.0;
 // Fault::not_found for a file that cannot be opened, Fault::invalid without a usable mission.
 Result<RecordingSet> load_recordings(std::span<const std::string> paths, const std::string& robot_id = {});
 
-// The same from samples in memory: sorted, duplicates dropped. Short missions that follow each other with the same
-// payload are joined; what is still too short is left out; `notes` names both.
+// The same from samples in memory: sorted, duplicates dropped. Short missions that follow each other with the
+// same payload are joined; what is still too short is left out; `notes` names both.
 Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<Recording> missions);
 
 }  // namespace joulecast::telemetry

@@ -103,7 +103,8 @@ std::vector<Check> check_observations(std::span<const Observation> observations,
   return checks;
 }
 
-std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
+std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
+                                    const robot::RobotModel& robot) {
   std::vector<Observation> observations;
   observations.reserve(recordings.missions.size());
   for (const telemetry::Recording& mission : recordings.missions) {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "gap/checks/observation.h"
-#include "telemetry/recording_set.h"
 #include "robot/robot_model.h"
+#include "telemetry/recording_set.h"
 
 // What is wrong with a robot's recordings before any effect is judged: signs, units, scales, channels,
 // motors, kinematics, clock and the robot file.
@@ -40,7 +40,8 @@ struct Check {
 //
 // A battery voltage that never moves is told as `constant_channel` and not contradicted where it is near the
 // nominal voltage: power is still the current times it, but nothing may be learnt from the voltage itself.
-std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot);
+std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
+                                    const robot::RobotModel& robot);
 
 // The same from observations made before, in the order of the missions.
 std::vector<Check> check_observations(std::span<const Observation> observations,
