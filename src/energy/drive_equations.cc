@@ -10,6 +10,7 @@ namespace {
 
 constexpr double stretch_s = 10;              // of samples whose windows are made together
 constexpr double longest_gap_s = 2.0;         // between samples of one stretch
+constexpr double moving_share = 0.03;         // of the fastest wheel speed: slower wheels may stick
 constexpr std::size_t most_equations = 6000;  // half an hour of driving
 
 double seconds_between(const telemetry::Sample& from, const telemetry::Sample& to) {
@@ -85,7 +86,10 @@ Result<DriveEquations> DriveEquations::make(const robot::RobotModel& robot) {
 }
 
 DriveEquations::DriveEquations(const robot::RobotModel& robot, dynamics::DriveModel model)
-    : robot_(robot), model_(std::move(model)), torque_per_a_(model_.parameters().torque_constant_nm_a) {}
+    : robot_(robot),
+      model_(std::move(model)),
+      torque_per_a_(model_.parameters().torque_constant_nm_a),
+      moving_rad_s_(moving_share * robot.limits.speed_m_s / robot.kinematics.wheel_radius_m) {}
 
 std::vector<DriveEquation> DriveEquations::take() {
   interrupt();
@@ -120,7 +124,13 @@ void DriveEquations::close_windows() {
   if (samples.size() < 2) return;
   const std::vector<windows::Window> made = windows::make_windows({&recording_, 1}, robot_, {});
   if (made.empty()) return samples.clear();
-  for (const windows::Window& window : made) add(window);
+  for (windows::Window window : made) {
+    for (std::size_t side : {0u, 1u}) {
+      for (const auto& speed : window.part_speed_rad_s)
+        window.moving[side] = window.moving[side] && std::abs(speed[side]) > moving_rad_s_;
+    }
+    add(window);
+  }
   std::erase_if(samples, [&, begin = samples.front()](const telemetry::Sample& s) {
     return seconds_between(begin, s) < made.back().t_s;
   });

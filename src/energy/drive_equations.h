@@ -94,6 +94,7 @@ class DriveEquations {
   dynamics::DriveModel model_;
   std::vector<Varied> varied_;
   double torque_per_a_ = 1;
+  double moving_rad_s_ = 0;
   double payload_sum_kg_ = 0, windows_ = 0, mean_payload_kg_ = 0;
   telemetry::Recording recording_;  // of which windows are to be made
   std::vector<DriveEquation> equations_;
