@@ -16,7 +16,7 @@ std::vector<std::vector<int>> bootstrap_counts(std::size_t n, int draws = bootst
                                                std::uint64_t seed = 20240229);
 
 // 95 % interval of a statistic of weighted blocks: quantiles of its values over the draws. Values that are not
-// finite are left out; {NaN, NaN} where none is left.
+// finite are left out; {NaN, NaN} where none is left, or of fewer than two blocks, which say nothing of scatter.
 std::array<double, 2> bootstrap_interval(std::size_t blocks,
                                          const std::function<double(std::span<const int>)>& statistic,
                                          int draws = bootstrap_draws);
