@@ -32,7 +32,9 @@ void whiten_any(Rows& rows, const std::vector<bool>& continues, const Autoregres
 
 Autoregression fit_autoregression(const Eigen::VectorXd& residual, const std::vector<bool>& continues,
                                   double spread, double bound) {
-  const auto clipped = [&](Eigen::Index k) { return std::clamp(residual[k], -bound * spread, bound * spread); };
+  const auto clipped = [&](Eigen::Index k) {
+    return std::clamp(residual[k], -bound * spread, bound * spread);
+  };
   std::array<double, 3> product{};
   std::array<std::size_t, 3> count{};
   for (Eigen::Index k = 0; k < residual.size(); ++k) {

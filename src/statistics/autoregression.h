@@ -17,8 +17,8 @@ struct Autoregression {
 Autoregression fit_autoregression(const Eigen::VectorXd& residual, const std::vector<bool>& continues,
                                   double spread, double bound);
 
-// rows(k) - one rows(k - 1) - two rows(k - 2) within runs; the first two rows of a run, of which less is known, are
-// scaled to the same variance (Box and Jenkins, Time Series Analysis, A7.4).
+// rows(k) - one rows(k - 1) - two rows(k - 2) within runs; the first two rows of a run, of which less is
+// known, are scaled to the same variance (Box and Jenkins, Time Series Analysis, A7.4).
 void whiten(Eigen::MatrixXd& rows, const std::vector<bool>& continues, const Autoregression& ar);
 void whiten(Eigen::VectorXd& rows, const std::vector<bool>& continues, const Autoregression& ar);
 

@@ -13,7 +13,8 @@ double log_normal_cdf(double z) {
   if (z > -30) return std::log(0.5 * std::erfc(-z / std::numbers::sqrt2));
   // Abramowitz and Stegun 26.2.12: the tail itself underflows.
   const double q = 1 / (z * z);
-  return -0.5 * z * z - std::log(-z * std::sqrt(2 * std::numbers::pi)) + std::log1p(-q * (1 - 3 * q * (1 - 5 * q)));
+  return -0.5 * z * z - std::log(-z * std::sqrt(2 * std::numbers::pi)) +
+         std::log1p(-q * (1 - 3 * q * (1 - 5 * q)));
 }
 
 double log_normal_within(double mean, double sd, double least, double most) {

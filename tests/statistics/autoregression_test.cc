@@ -58,7 +58,8 @@ TEST(Whiten, IsTheInverseOfTheCovariance) {
       const auto continues = runs(13, run);
       Eigen::MatrixXd w = Eigen::MatrixXd::Identity(13, 13);
       whiten(w, continues, ar);
-      EXPECT_NEAR((w * covariance(ar, continues) * w.transpose() - Eigen::MatrixXd::Identity(13, 13)).norm(), 0, 1e-12)
+      EXPECT_NEAR((w * covariance(ar, continues) * w.transpose() - Eigen::MatrixXd::Identity(13, 13)).norm(),
+                  0, 1e-12)
           << ar.one << " " << ar.two << " " << run;
     }
   }
@@ -73,8 +74,8 @@ TEST(Whiten, TreatsVectorsAsColumns) {
   EXPECT_EQ((x.col(0) - y).norm(), 0);
 }
 
-// The variance of the mean of a first-order process is (1 + phi)/(1 - phi) times that of as many independent values
-// (Box and Jenkins 2.1.13).
+// The variance of the mean of a first-order process is (1 + phi)/(1 - phi) times that of as many independent
+// values (Box and Jenkins 2.1.13).
 TEST(Whiten, AMeanIsKnownLessByTheProcessesCorrelation) {
   for (const double phi : {0.6, -0.4}) {
     constexpr Eigen::Index n = 4000;
@@ -95,7 +96,8 @@ TEST(FitAutoregression, FindsTheCoefficientsAndLeavesWhiteNoise) {
     EXPECT_NEAR(fit.one, ar.one, three_sd);
     EXPECT_NEAR(fit.two, ar.two, three_sd);
     whiten(y, runs(n), fit);
-    for (const Eigen::Index lag : {1, 2, 3, 7}) EXPECT_NEAR(correlation(y, lag), 0, 1.2 * three_sd) << ar.one << " " << lag;
+    for (const Eigen::Index lag : {1, 2, 3, 7})
+      EXPECT_NEAR(correlation(y, lag), 0, 1.2 * three_sd) << ar.one << " " << lag;
     EXPECT_NEAR(y.squaredNorm() / static_cast<double>(n), 1, 1.5 * three_sd);
   }
 }
@@ -114,7 +116,8 @@ TEST(FitAutoregression, KeepsRunsApart) {
   std::mt19937_64 random(8);
   std::normal_distribution<double> normal;
   Eigen::VectorXd y(n);
-  for (Eigen::Index k = 0; k < n; ++k) y[k] = k % 4 == 0 ? normal(random) : 0.9 * y[k - 1] + std::sqrt(0.19) * normal(random);
+  for (Eigen::Index k = 0; k < n; ++k)
+    y[k] = k % 4 == 0 ? normal(random) : 0.9 * y[k - 1] + std::sqrt(0.19) * normal(random);
   const Autoregression fit = fit_autoregression(y, runs(n, 4), 1, 10);
   EXPECT_NEAR(fit.one, 0.9, 0.03);
   EXPECT_NEAR(fit.two, 0, 0.03);
@@ -123,7 +126,8 @@ TEST(FitAutoregression, KeepsRunsApart) {
 TEST(FitAutoregression, StaysStationaryAndKeepsRows) {
   // A drift and an alternation are next to what no filter may take away.
   Eigen::VectorXd drift(500), swing(500);
-  for (Eigen::Index k = 0; k < 500; ++k) drift[k] = 1 + 1e-3 * static_cast<double>(k), swing[k] = k % 2 == 0 ? 1 : -1;
+  for (Eigen::Index k = 0; k < 500; ++k)
+    drift[k] = 1 + 1e-3 * static_cast<double>(k), swing[k] = k % 2 == 0 ? 1 : -1;
   for (const Eigen::VectorXd& y : {drift, swing}) {
     const Autoregression fit = fit_autoregression(y, runs(500), 1, 10);
     EXPECT_GT(std::fabs(fit.one) + fit.two, 0.9);

@@ -43,8 +43,8 @@ TEST(BootstrapInterval, OfAMeanIsAsWideAsItsNormalOne) {
   const double mean = std::accumulate(values.begin(), values.end(), 0.0) / 200;
   double square = 0;
   for (const double v : values) square += (v - mean) * (v - mean);
-  const auto interval =
-      bootstrap_interval(200, [&](std::span<const int> draw) { return mean_of(values, draw); }, 4000);
+  const auto interval = bootstrap_interval(
+      200, [&](std::span<const int> draw) { return mean_of(values, draw); }, 4000);
   const double half = 1.96 * std::sqrt(square) / 200;
   EXPECT_NEAR(interval[0], mean - half, 0.06 * half);
   EXPECT_NEAR(interval[1], mean + half, 0.06 * half);
@@ -68,7 +68,8 @@ TEST(BootstrapInterval, CoversTheMeanOfGaussiansInNineteenOfTwentyCases) {
 
 TEST(BootstrapInterval, LeavesOutWhatIsNotFinite) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  const auto some = bootstrap_interval(5, [&](std::span<const int> draw) { return draw[0] == 0 ? nan : 2.0; });
+  const auto some =
+      bootstrap_interval(5, [&](std::span<const int> draw) { return draw[0] == 0 ? nan : 2.0; });
   EXPECT_EQ(some[0], 2);
   EXPECT_EQ(some[1], 2);
   const auto none = bootstrap_interval(5, [&](std::span<const int>) { return nan; });

@@ -13,7 +13,8 @@ Eigen::MatrixXd numbers(Eigen::Index rows, Eigen::Index columns, double seed) {
   Eigen::MatrixXd m(rows, columns);
   for (Eigen::Index r = 0; r < rows; ++r) {
     for (Eigen::Index c = 0; c < columns; ++c)
-      m(r, c) = std::sin(seed + 1.7 * static_cast<double>(r) + 2.9 * static_cast<double>(c * c) + 0.3 * static_cast<double>(r * c));
+      m(r, c) = std::sin(seed + 1.7 * static_cast<double>(r) + 2.9 * static_cast<double>(c * c) +
+                         0.3 * static_cast<double>(r * c));
   }
   return m;
 }
@@ -72,14 +73,16 @@ TEST(Information, AddsUpAndTakesAway) {
   expect_same(sum, a);
 }
 
-// With y = X b + Z u + e, u ~ N(0, D^2), e ~ N(0, 1), Z the columns that deviate, y has the covariance 1 + Z D^2 Z'.
+// With y = X b + Z u + e, u ~ N(0, D^2), e ~ N(0, 1), Z the columns that deviate, y has the covariance 1 + Z
+// D^2 Z'.
 TEST(Information, IntegratesOutADeviationAsTheMarginalGaussianDoes) {
   const Eigen::MatrixXd x = numbers(10, 4, 9);
   const Eigen::VectorXd y = numbers(10, 1, 10), sd = Eigen::Vector4d(0.5, 0, 2, 30);
   Information info = of(x, y);
   info.log_scale = -1.5;
   info.integrate_out(sd);
-  const Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(10, 10) + x * sd.cwiseAbs2().asDiagonal() * x.transpose();
+  const Eigen::MatrixXd covariance =
+      Eigen::MatrixXd::Identity(10, 10) + x * sd.cwiseAbs2().asDiagonal() * x.transpose();
   Information marginal(4);
   marginal.xx = x.transpose() * covariance.inverse() * x;
   marginal.xy = x.transpose() * covariance.inverse() * y;

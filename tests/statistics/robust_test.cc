@@ -36,7 +36,8 @@ std::vector<double> normal_sample(std::size_t n, double sd) {
 }
 
 TEST(SpreadAboutZero, IsTheStandardDeviationOfNormalValues) {
-  for (const double sd : {0.01, 1.0, 300.0}) EXPECT_NEAR(spread_about_zero(normal_sample(10000, sd)) / sd, 1, 1e-3);
+  for (const double sd : {0.01, 1.0, 300.0})
+    EXPECT_NEAR(spread_about_zero(normal_sample(10000, sd)) / sd, 1, 1e-3);
 }
 
 TEST(SpreadAboutZero, GrowsByAFifthForATenthOfOutliersOfAnySize) {

@@ -8,8 +8,10 @@
 namespace joulecast::statistics {
 namespace {
 
-// Scores of the first model are 0; the others differ from it by `ahead` a block, in turn more and less by `scatter`.
-Eigen::MatrixXd scores(Eigen::Index blocks, const std::vector<double>& ahead, const std::vector<double>& scatter) {
+// Scores of the first model are 0; the others differ from it by `ahead` a block, in turn more and less by
+// `scatter`.
+Eigen::MatrixXd scores(Eigen::Index blocks, const std::vector<double>& ahead,
+                       const std::vector<double>& scatter) {
   Eigen::MatrixXd score = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(ahead.size()) + 1, blocks);
   for (Eigen::Index m = 1; m < score.rows(); ++m) {
     const auto at = static_cast<std::size_t>(m - 1);
@@ -18,13 +20,13 @@ Eigen::MatrixXd scores(Eigen::Index blocks, const std::vector<double>& ahead, co
   return score;
 }
 
-// Of 10 paired differences d +- s the sum is 10 d, and its standard error sqrt(10 * 10 s^2/9) = 3.333 s... s = 3: 10.54.
+// Of 10 paired differences d +- s the sum is 10 d, and its standard error sqrt(10 * 10 s^2/9) = 10 for s = 3.
 TEST(Selection, TakesTheSmallestWithinOneStandardError) {
   const std::vector<std::size_t> size{0, 1};
-  const Selection within = select_within_error(scores(10, {1.05}, {3}), size);
+  const Selection within = select_within_error(scores(10, {0.99}, {3}), size);
   EXPECT_EQ(within.best, 1u);
   EXPECT_EQ(within.chosen, 0u);
-  const Selection beyond = select_within_error(scores(10, {1.06}, {3}), size);
+  const Selection beyond = select_within_error(scores(10, {1.01}, {3}), size);
   EXPECT_EQ(beyond.best, 1u);
   EXPECT_EQ(beyond.chosen, 1u);
 }
@@ -40,14 +42,15 @@ TEST(Selection, TakesTheBetterOfTwoAsSmall) {
 TEST(Selection, PairsErrorsByBlock) {
   // Blocks differ much, but the larger model is ahead in every one of them by the same.
   Eigen::MatrixXd score(2, 8);
-  for (Eigen::Index b = 0; b < 8; ++b) score.col(b) << -100.0 * static_cast<double>(b), -100.0 * static_cast<double>(b) + 0.1;
+  for (Eigen::Index b = 0; b < 8; ++b)
+    score.col(b) << -100.0 * static_cast<double>(b), -100.0 * static_cast<double>(b) + 0.1;
   const Selection s = select_within_error(score, std::vector<std::size_t>{0, 1});
   EXPECT_EQ(s.chosen, 1u);
   EXPECT_NEAR(s.probability[1], 1, 1e-12);
 }
 
 TEST(Selection, ProbabilitiesSayHowOftenEachIsChosen) {
-  const Selection close = select_within_error(scores(10, {1.05}, {3}), std::vector<std::size_t>{0, 1});
+  const Selection close = select_within_error(scores(10, {0.99}, {3}), std::vector<std::size_t>{0, 1});
   EXPECT_NEAR(std::accumulate(close.probability.begin(), close.probability.end(), 0.0), 1, 1e-9);
   // At the edge of one error: about every second draw.
   EXPECT_NEAR(close.probability[0], 0.5, 0.15);

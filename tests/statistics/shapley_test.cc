@@ -61,7 +61,8 @@ TEST(Shapley, AsksForEverySubsetOnceWithItsMembersInOrder) {
 
 TEST(Shapley, NothingToShare) {
   EXPECT_TRUE(shapley_shares(0, [](const Members&) { return 1.0; }).empty());
-  const auto shares = shapley_shares(2, [](const Members& members) { return static_cast<double>(members.size()); });
+  const auto shares =
+      shapley_shares(2, [](const Members& members) { return static_cast<double>(members.size()); });
   EXPECT_EQ(shares, (std::vector<double>{0, 0}));
 }
 
