@@ -11,13 +11,15 @@
 
 namespace joulecast::windows {
 
-// One mission's channels as columns, with what needs every sample worked out. Only this room's own sources use it.
+// One mission's channels as columns, with what needs every sample worked out. Only this room's own sources
+// use it.
 struct Track {
   std::vector<double> time_s;  // since the first sample
   std::array<std::vector<double>, 2> speed, smooth_speed, voltage, current, power, power_abs, braking, angle,
       current_sign;
   std::array<std::vector<double>, 2> slid;  // angle turned since the wheel stood [rad]
-  std::vector<double> battery_voltage, battery_current, battery_power, yaw_rate, climb, x, y, heading, payload, charge;
+  std::vector<double> battery_voltage, battery_current, battery_power, yaw_rate, climb, x, y, heading,
+      payload, charge;
   std::vector<std::vector<double>> covariates;
   double battery_voltage_step_v = 0;
   // Copper heat and mean |wheel speed|, low-passed on every time constant.

@@ -26,7 +26,9 @@ double mean_near(const Track& c, const std::vector<double>& v, double t, double 
 void add_span(const Track& c, const WindowSettings& settings, const robot::RobotModel& robot, Window& w) {
   const double from = w.t_s, to = w.t_s + settings.span_s, half = 0.1;
   if (to + half > c.time_s.back() || from - half < c.time_s.front()) return;
-  const auto change = [&](const std::vector<double>& v) { return mean_near(c, v, to, half) - mean_near(c, v, from, half); };
+  const auto change = [&](const std::vector<double>& v) {
+    return mean_near(c, v, to, half) - mean_near(c, v, from, half);
+  };
   const double dx = change(c.x), dy = change(c.y), turn = change(c.heading);
   for (const std::size_t s : {0u, 1u}) w.span_angle_rad[s] = change(c.angle[s]);
   w.turn_rad = turn;
@@ -134,10 +136,15 @@ void read_motors(const Track& c, std::size_t row, Window& w) {
   w.voltage_slope_v_s = w.current_slope_a_s = {};
 }
 
+double window_length_s(const WindowSettings& settings, double period_s) {
+  return std::max(settings.length_s, static_cast<double>(settings.fewest_samples) * period_s);
+}
+
 class MissionWindows {
  public:
   MissionWindows(const telemetry::Recording& mission, std::size_t number, const robot::RobotModel& robot,
-                 std::span<const std::string> covariates, const Readings& readings, const WindowSettings& settings)
+                 std::span<const std::string> covariates, const Readings& readings,
+                 const WindowSettings& settings)
       : robot_(robot),
         readings_(readings),
         settings_(settings),
@@ -149,7 +156,7 @@ class MissionWindows {
   // `position` counts windows over all missions, kept or not.
   void add_regular(std::vector<Window>& windows, std::size_t& position, std::size_t keep_every) const {
     const std::vector<double>& t = track_.time_s;
-    const double length = std::max(settings_.length_s, static_cast<double>(settings_.fewest_samples) * period_s_);
+    const double length = window_length_s(settings_, period_s_);
     const double hop = 0.5 * length;
     const auto windows_a_span = static_cast<std::size_t>(std::max(1.0, std::round(settings_.span_s / hop)));
     if (t.back() < length) return;
@@ -211,7 +218,9 @@ class MissionWindows {
       if (at.last > at.first) gap = std::max(gap, t[at.last] - t[at.last - 1]);
       ++at.last;
     }
-    const auto fewest = std::min(settings_.fewest_samples / 2, static_cast<std::size_t>(at.length_s / period_s_));
+    if (at.last > at.first) gap = std::max(gap, to - t[at.last - 1]);
+    const auto fewest =
+        std::min(settings_.fewest_samples / 2, static_cast<std::size_t>(at.length_s / period_s_));
     return at.last - at.first >= std::max<std::size_t>(3, fewest) && gap <= longest_gap_s_;
   }
 
@@ -256,14 +265,16 @@ std::vector<std::string> covariate_names(std::span<const telemetry::Recording> m
   return differing;
 }
 
-std::vector<Window> make_windows(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot,
-                                 const Readings& readings, const WindowSettings& settings) {
-  double total_s = 0;
-  for (const telemetry::Recording& mission : missions)
-    total_s += 1e-6 * static_cast<double>(mission.samples.back().utime_us - mission.samples.front().utime_us);
-  const double expected = 2 * total_s / settings.length_s;
-  const auto keep_every =
-      static_cast<std::size_t>(std::max(1.0, std::ceil(expected / static_cast<double>(settings.most_windows))));
+std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
+                                 const robot::RobotModel& robot, const Readings& readings,
+                                 const WindowSettings& settings) {
+  double expected = 0;
+  for (const telemetry::Recording& mission : missions) {
+    const auto us = static_cast<double>(mission.samples.back().utime_us - mission.samples.front().utime_us);
+    expected += 2e-6 * us / window_length_s(settings, median_period_s(mission));
+  }
+  const auto keep_every = static_cast<std::size_t>(
+      std::max(1.0, std::ceil(expected / static_cast<double>(settings.most_windows))));
   const std::vector<std::string> covariates = covariate_names(missions);
   std::vector<Window> windows;
   std::size_t position = 0;
