@@ -13,7 +13,6 @@ namespace {
 // Another time of reading is believed where it lets the regression miss by this much less.
 constexpr double clearly_less = 0.97;
 constexpr std::size_t fewest_readings = 40;
-constexpr double fewest_rows = 4;            // in a window, the outermost of which have no weight
 constexpr std::size_t most_readings = 4000;  // a regression of more says nothing new
 
 // Motion of one mission with its integrals, so that the mean over any stretch costs two look-ups.

@@ -187,7 +187,7 @@ class MissionWindows {
         statistics::find_updates(t, readings_.motors_held ? track_.current[0] : track_.battery_current);
     double last_s = -1e300;
     for (const std::size_t row : updates.at) {
-      Place at{0, 0, t[row] - readings_.delay_s, readings_.averaged_s};
+      Place at{0, 0, t[row] - readings_.delay_s, std::max(readings_.averaged_s, fewest_rows * period_s_)};
       const double from = at.centre_s - 0.5 * at.length_s;
       if (from < t.front() || at.centre_s + 0.5 * at.length_s > t.back()) continue;
       at.first = static_cast<std::size_t>(std::ranges::lower_bound(t, from) - t.begin());
@@ -219,9 +219,11 @@ class MissionWindows {
       ++at.last;
     }
     if (at.last > at.first) gap = std::max(gap, to - t[at.last - 1]);
-    const auto fewest =
-        std::min(settings_.fewest_samples / 2, static_cast<std::size_t>(at.length_s / period_s_));
-    return at.last - at.first >= std::max<std::size_t>(3, fewest) && gap <= longest_gap_s_;
+    // One row may come too late.
+    const double fewest =
+        std::min(0.5 * static_cast<double>(settings_.fewest_samples), at.length_s / period_s_ - 1);
+    return static_cast<double>(at.last - at.first) >= std::max(3.0, std::floor(fewest)) &&
+           gap <= longest_gap_s_;
   }
 
   void add(std::vector<Window>& windows, Window& w, bool continues) const {

@@ -72,7 +72,7 @@ INSTANTIATE_TEST_SUITE_P(Rates, AnyRate, ::testing::Values(1.0, 10.0, 50.0, 200.
 TEST(Windows, AllFiniteChannelsStayFinite) {
   // Standing still for a third, constant channels, uneven sampling.
   Recording mission = testing::recorded(3000, 50, [](double t, Sample& s) {
-    straight_lines(std::floor(t), s);
+    straight_lines(t, s);
     if (t > 20 && t < 40) s.wheel_velocity_rad_s = {0, 0};
     s.battery_voltage_v = 24;
     s.motor_voltage_v = {0, 0};
