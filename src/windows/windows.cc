@@ -16,10 +16,10 @@ constexpr std::size_t kept_together = 50;  // windows, where some are left out
 
 // Mean of a column within +-half_s of an instant.
 double mean_near(const Track& c, const std::vector<double>& v, double t, double half_s) {
-  auto k = static_cast<std::size_t>(std::ranges::lower_bound(c.time_s, t - half_s) - c.time_s.begin());
+  auto k = static_cast<std::size_t>(std::ranges::lower_bound(c.time_s, t - half_s - 1e-9) - c.time_s.begin());
   double sum = 0;
   std::size_t count = 0;
-  for (; k < c.time_s.size() && c.time_s[k] <= t + half_s; ++k, ++count) sum += v[k];
+  for (; k < c.time_s.size() && c.time_s[k] <= t + half_s + 1e-9; ++k, ++count) sum += v[k];
   return count > 0 ? sum / static_cast<double>(count) : missing;
 }
 
