@@ -22,11 +22,12 @@ std::vector<std::vector<int>> bootstrap_counts(std::size_t n, int draws, std::ui
 std::array<double, 2> bootstrap_interval(std::size_t blocks,
                                          const std::function<double(std::span<const int>)>& statistic,
                                          int draws) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  if (blocks < 2) return {nan, nan};
   std::vector<double> values;
   for (const std::vector<int>& draw : bootstrap_counts(blocks, draws)) {
     if (const double v = statistic(draw); std::isfinite(v)) values.push_back(v);
   }
-  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   if (values.empty()) return {nan, nan};
   return {quantile(values, 0.025), quantile(values, 0.975)};
 }

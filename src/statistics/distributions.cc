@@ -1,7 +1,6 @@
 #include "statistics/distributions.h"
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
@@ -9,14 +8,13 @@
 
 namespace joulecast::statistics {
 
-double normal_cdf(double z) {
-  return 0.5 * std::erfc(-z / std::numbers::sqrt2);
-}
-
 double log_normal_cdf(double z) {
-  if (z > -20) return std::log(normal_cdf(z));
+  if (z > 0) return std::log1p(-0.5 * std::erfc(z / std::numbers::sqrt2));
+  if (z > -30) return std::log(0.5 * std::erfc(-z / std::numbers::sqrt2));
   // Abramowitz and Stegun 26.2.12: the tail itself underflows.
-  return -0.5 * z * z - std::log(-z * std::sqrt(2 * std::numbers::pi)) + std::log1p(-1 / (z * z));
+  const double q = 1 / (z * z);
+  return -0.5 * z * z - std::log(-z * std::sqrt(2 * std::numbers::pi)) +
+         std::log1p(-q * (1 - 3 * q * (1 - 5 * q)));
 }
 
 double log_normal_within(double mean, double sd, double least, double most) {
@@ -34,20 +32,6 @@ double normal_quantile(double probability) {
 
 double student_t_quantile(double probability, double freedom) {
   return boost::math::quantile(boost::math::students_t_distribution<double>(freedom), probability);
-}
-
-double chi_squared_tail(double x, double freedom) {
-  if (!(x > 0)) return 1;
-  return boost::math::cdf(boost::math::complement(boost::math::chi_squared_distribution<double>(freedom), x));
-}
-
-std::array<double, 2> wilson_interval(std::size_t hits, std::size_t tries) {
-  if (tries == 0) return {0, 1};
-  const double n = static_cast<double>(tries), p = static_cast<double>(hits) / n;
-  const double z = 1.959963984540054, spread = z * z / n;
-  const double centre = (p + 0.5 * spread) / (1 + spread);
-  const double half = std::sqrt(spread * p * (1 - p) + 0.25 * spread * spread) / (1 + spread);
-  return {std::max(0.0, centre - half), std::min(1.0, centre + half)};
 }
 
 }  // namespace joulecast::statistics

@@ -16,7 +16,8 @@ bool bounded(const Candidate& c) {
 
 }  // namespace
 
-Evidence::Evidence(const Information& data, const Eigen::VectorXd& tolerance, std::span<const std::size_t> asked)
+Evidence::Evidence(const Information& data, const Eigen::VectorXd& tolerance,
+                   std::span<const std::size_t> asked)
     : place_(static_cast<std::size_t>(data.xx.rows()), -1) {
   std::vector<Eigen::Index> kept;
   for (Eigen::Index k = 0; k < data.xx.rows(); ++k) {
@@ -98,7 +99,8 @@ Evidence::Estimate Evidence::estimate(std::span<const Candidate* const> set) con
   e.sd = e.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   at = 0;
   for (const Candidate* c : set) {
-    for (std::size_t k = 0; k < c->columns.size(); ++k, ++at) e.mean[at] = std::clamp(e.mean[at], c->least, c->most);
+    for (std::size_t k = 0; k < c->columns.size(); ++k, ++at)
+      e.mean[at] = std::clamp(e.mean[at], c->least, c->most);
   }
   return e;
 }

@@ -12,20 +12,21 @@ namespace joulecast::statistics {
 // Coefficients that are there together or not at all.
 struct Candidate {
   std::vector<std::size_t> columns;
-  double expected = 1;  // sd of each coefficient where it is there
+  double expected = 1;                                      // sd of each coefficient where it is there
   double least = -std::numeric_limits<double>::infinity();  // bounds of each coefficient
   double most = std::numeric_limits<double>::infinity();
   double log_prior = 0;  // log odds of being there, before any data
 };
 
-// The evidence of whitened Gaussian data for sets of candidates, where every coefficient departs from zero by its
-// tolerance already (MacKay, Information Theory, chapter 28). Strengths that are bounded on one side have the
-// truncated normal as prior; the posterior's mass within the bounds is taken coefficient by coefficient.
+// The evidence of whitened Gaussian data for sets of candidates, where every coefficient departs from zero by
+// its tolerance already (MacKay, Information Theory, chapter 28). Strengths that are bounded on one side have
+// the truncated normal as prior; the posterior's mass within the bounds is taken coefficient by coefficient.
 class Evidence {
  public:
-  // `tolerance`: sd of each column's coefficient where nothing is there; 0 holds it at zero. `asked`: the columns
-  // that candidates may have, ascending; empty: any.
-  Evidence(const Information& data, const Eigen::VectorXd& tolerance, std::span<const std::size_t> asked = {});
+  // `tolerance`: sd of each column's coefficient where nothing is there; 0 holds it at zero. `asked`: the
+  // columns that candidates may have, ascending; empty: any.
+  Evidence(const Information& data, const Eigen::VectorXd& tolerance,
+           std::span<const std::size_t> asked = {});
 
   // Log density of the data when none is there.
   double log_density() const { return log_density_; }
@@ -38,8 +39,8 @@ class Evidence {
   };
   Estimate estimate(std::span<const Candidate* const> set) const;
 
-  // Expected log odds of one coefficient at this strength over the best strength of another in its place: half
-  // the squared distance that the other cannot follow.
+  // Expected log odds of one coefficient at this strength over the best strength of another in its place:
+  // half the squared distance that the other cannot follow.
   double separation(std::size_t column, double strength, std::size_t other, double expected) const;
 
  private:
@@ -51,7 +52,8 @@ class Evidence {
   bool solve(std::span<const Candidate* const> set, Posterior& posterior) const;
 
   std::vector<Eigen::Index> place_;  // of each column among those asked for
-  // X'K X and X'K y, K the inverse covariance of the data with the tolerances in it; of the columns asked for.
+  // X'K X and X'K y, K the inverse covariance of the data with the tolerances in it; of the columns asked
+  // for.
   Eigen::MatrixXd xx_;
   Eigen::VectorXd xy_;
   double log_density_ = 0;

@@ -35,7 +35,8 @@ Information& Information::operator*=(double factor) {
   return *this;
 }
 
-void Information::add(const Eigen::Ref<const Eigen::MatrixXd>& x, const Eigen::Ref<const Eigen::VectorXd>& y) {
+void Information::add(const Eigen::Ref<const Eigen::MatrixXd>& x,
+                      const Eigen::Ref<const Eigen::VectorXd>& y) {
   xx.triangularView<Eigen::Lower>() += x.transpose() * x;
   xx.triangularView<Eigen::StrictlyUpper>() = xx.transpose();
   xy += x.transpose() * y;

@@ -5,11 +5,12 @@
 
 namespace joulecast::statistics {
 
-// What whitened equations y = X b + e, e ~ N(0, 1), say of their coefficients: all that Gaussian inference needs.
+// What whitened equations y = X b + e, e ~ N(0, 1), say of their coefficients: all that Gaussian inference
+// needs.
 struct Information {
-  Eigen::MatrixXd xx;  // X'X
-  Eigen::VectorXd xy;  // X'y
-  double yy = 0;       // y'y
+  Eigen::MatrixXd xx;    // X'X
+  Eigen::VectorXd xy;    // X'y
+  double yy = 0;         // y'y
   double log_scale = 0;  // log of the density's factor that whitening took out, -sum log sigma
 
   Information() = default;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <map>
 
 #include "statistics/robust.h"
 
@@ -35,31 +37,31 @@ Regression robust_regression(const Eigen::MatrixXd& x, const Eigen::VectorXd& y,
       });
   const Eigen::MatrixXd scaled = x * size.asDiagonal();
   Eigen::VectorXd weight = Eigen::VectorXd::Ones(n), e = y, b = Eigen::VectorXd::Zero(p);
-  Eigen::MatrixXd covariance;
   for (int round = 0; round < most_rounds; ++round) {
     const Eigen::MatrixXd weighted = weight.asDiagonal() * scaled;
-    covariance = inverse(weighted.transpose() * scaled);
     const Eigen::VectorXd before = b;
-    b = covariance * (weighted.transpose() * y);
+    b = inverse(weighted.transpose() * scaled) * (weighted.transpose() * y);
     e = y - scaled * b;
     r.spread = spread_about_zero({e.data(), static_cast<std::size_t>(n)});
     if (!(r.spread > 0) || (b - before).norm() <= settled * b.norm()) break;
     for (Eigen::Index k = 0; k < n; ++k) weight[k] = huber_weight(e[k], r.spread, bound);
   }
-  // Sandwich over blocks: Liang and Zeger 1986.
-  Eigen::MatrixXd middle = Eigen::MatrixXd::Zero(p, p);
-  Eigen::VectorXd score = Eigen::VectorXd::Zero(p);
-  std::size_t blocks = 0;
+  // Huber's sandwich, section 7.6; scores summed over blocks: Liang and Zeger 1986.
+  const bool one_block = std::ranges::adjacent_find(block, std::ranges::not_equal_to()) == block.end();
+  std::map<std::size_t, Eigen::VectorXd> scores;
+  Eigen::VectorXd inside(n);
   for (Eigen::Index k = 0; k < n; ++k) {
-    score += weight[k] * e[k] * scaled.row(k).transpose();
     const auto at = static_cast<std::size_t>(k);
-    if (k + 1 < n && block[at + 1] == block[at]) continue;
-    middle += score * score.transpose();
-    score.setZero();
-    ++blocks;
+    const auto found = scores.try_emplace(one_block ? at : block[at], Eigen::VectorXd::Zero(p)).first;
+    found->second += weight[k] * e[k] * scaled.row(k).transpose();
+    inside[k] = weight[k] < 1 ? 0 : 1;
   }
-  const double few = blocks > 1 ? static_cast<double>(blocks) / static_cast<double>(blocks - 1) : 1.0;
-  r.sd = (few * (covariance * middle * covariance).diagonal()).cwiseMax(0.0).cwiseSqrt().cwiseProduct(size);
+  Eigen::MatrixXd middle = Eigen::MatrixXd::Zero(p, p);
+  for (const auto& [number, score] : scores) middle += score * score.transpose();
+  const auto blocks = static_cast<double>(scores.size());
+  const double few = blocks > 1 ? blocks / (blocks - 1) : 1.0;
+  const Eigen::MatrixXd bread = inverse(scaled.transpose() * inside.asDiagonal() * scaled);
+  r.sd = (few * (bread * middle * bread).diagonal()).cwiseMax(0.0).cwiseSqrt().cwiseProduct(size);
   r.coefficients = size.asDiagonal() * b;
   return r;
 }

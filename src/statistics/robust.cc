@@ -27,10 +27,12 @@ double spread_about_zero(std::span<const double> values) {
   if (values.empty()) return 0;
   std::vector<double> sizes(values.size());
   std::ranges::transform(values, sizes.begin(), [](double v) { return std::fabs(v); });
-  const auto kept = std::max<std::size_t>(1, static_cast<std::size_t>(0.9 * static_cast<double>(sizes.size())));
+  const auto kept =
+      std::max<std::size_t>(1, static_cast<std::size_t>(0.9 * static_cast<double>(sizes.size())));
   const auto end = sizes.begin() + static_cast<std::ptrdiff_t>(kept);
   std::ranges::nth_element(sizes, end - 1);
-  // The mean of |z| below its quantile of 90 %, for a standard normal z, is 2 (phi(0) - phi(1.645))/0.9 = 0.6573.
+  // The mean of |z| below its quantile of 90 %, for a standard normal z, is 2 (phi(0) - phi(1.645))/0.9 =
+  // 0.6573.
   return std::accumulate(sizes.begin(), end, 0.0) / static_cast<double>(kept) / 0.6573;
 }
 

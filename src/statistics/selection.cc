@@ -1,6 +1,8 @@
 #include "statistics/selection.h"
 
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "statistics/bootstrap.h"
 

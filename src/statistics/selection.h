@@ -7,8 +7,8 @@
 
 namespace joulecast::statistics {
 
-// The smallest model that predicts as well as any, within one standard error (Breiman and others, Classification
-// and Regression Trees, 1984, section 3.4.3; errors paired by block).
+// The smallest model that predicts as well as any, within one standard error (Breiman and others,
+// Classification and Regression Trees, 1984, section 3.4.3; errors paired by block).
 struct Selection {
   std::size_t best = 0;             // highest mean score
   std::size_t chosen = 0;           // the smallest within one standard error of it; of those, the best

@@ -15,8 +15,9 @@ std::vector<double> shapley_shares(std::size_t n,
     }
     left[set] = gap(members);
   }
-  const auto factorial = [](std::size_t k) { return std::tgamma(static_cast<double>(k) + 1); };
   std::vector<double> share(n, 0.0);
+  if (!(left[0] > 0)) return share;
+  const auto factorial = [](std::size_t k) { return std::tgamma(static_cast<double>(k) + 1); };
   for (std::size_t k = 0; k < n; ++k) {
     for (std::size_t set = 0; set < left.size(); ++set) {
       if (set >> k & 1) continue;
@@ -24,7 +25,7 @@ std::vector<double> shapley_shares(std::size_t n,
       share[k] += factorial(size) * factorial(n - size - 1) / factorial(n) *
                   (left[set] - left[set | std::size_t{1} << k]);
     }
-    if (left[0] > 0) share[k] /= left[0];
+    share[k] /= left[0];
   }
   return share;
 }

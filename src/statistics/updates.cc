@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "statistics/robust.h"
 
@@ -12,43 +11,71 @@ namespace {
 constexpr std::size_t fewest_changes = 8;  // fewer say nothing of how a channel is read
 // Repetitions longer than this many times the longer ones are a steady state, not a way of reading.
 constexpr double steady = 4;
-// Of the time in repetitions this part has to be in such as are a whole number of periods long, each to
-// within a quarter of a period. Where a coarse converter repeats values by chance, lengths are geometric and
-// less than half is.
-constexpr double regular_part = 0.7, off_period = 0.25;
+// Mean square of what repetitions miss whole numbers of periods by, in periods. Where values repeat by chance
+// it is that of a uniform variable or more; a held channel's is to be well below it, by so many standard
+// deviations of a mean of chances (0.0745 is that of one) that no choice of a period makes up for it.
+constexpr double by_chance = 1.0 / 12, most_missed = 0.05, surely = 3 * 0.0745;
 
-// The first length up to which, in order, this part of all is met. `part_of`: what one entry counts for.
-std::size_t length_at(std::span<const Repetitions> lengths, double part, const auto& part_of) {
-  double total = 0, sum = 0;
-  for (const Repetitions& r : lengths) total += part_of(r);
-  for (const Repetitions& r : lengths) {
-    sum += part_of(r);
-    if (sum >= part * total) return r.rows;
+constexpr double fewest_settled = 0.4;  // of the changes, of which two sensors make a half
+
+// Changes after which the value stood for half a period or longer, and the last one. Two sensors summed into
+// one channel change it twice a period, shortly after each other: the reading is there when both have.
+std::vector<std::size_t> settled(const std::vector<std::size_t>& changes, double period) {
+  std::vector<std::size_t> kept;
+  for (std::size_t c = 0; c < changes.size(); ++c) {
+    if (c + 1 == changes.size() || static_cast<double>(changes[c + 1] - changes[c]) >= 0.5 * period)
+      kept.push_back(changes[c]);
   }
-  return 1;
+  return kept;
+}
+
+struct Fit {
+  double period = 1, missed = 1;  // rows; mean square in periods
+  std::size_t count = 0;
+};
+
+// How well changes lie whole numbers of about `period` rows apart; the period that fits best there.
+Fit fit_period(const std::vector<std::size_t>& changes, double period, double longest) {
+  const std::vector<std::size_t> kept = settled(changes, period);
+  Fit fit;
+  if (static_cast<double>(kept.size()) < fewest_settled * static_cast<double>(changes.size())) return fit;
+  double nn = 0, nt = 0, tt = 0;
+  for (std::size_t c = 1; c < kept.size(); ++c) {
+    const auto rows = static_cast<double>(kept[c] - kept[c - 1]);
+    if (rows > longest) continue;
+    const double times = std::max(1.0, std::round(rows / period));
+    nn += rows * rows, nt += rows * times, tt += times * times;
+    ++fit.count;
+  }
+  if (fit.count < fewest_changes) return fit;
+  fit.period = nt / tt;
+  // A row is as wide as 1/12 of variance: of periods that fit as well the longest.
+  const auto n = static_cast<double>(fit.count);
+  fit.missed = ((nn - nt * fit.period) / n + 1.0 / 12) / (fit.period * fit.period);
+  return fit;
+}
+
+// The period of repeated readings in rows, or 1: none are repeated.
+double period_of(const std::vector<std::size_t>& changes) {
+  if (changes.size() <= fewest_changes) return 1;
+  std::vector<double> lengths;
+  for (std::size_t c = 1; c < changes.size(); ++c)
+    lengths.push_back(static_cast<double>(changes[c] - changes[c - 1]));
+  const double longest = steady * quantile(lengths, 0.75);
+  std::ranges::sort(lengths);
+  const auto same = std::ranges::unique(lengths);
+  lengths.erase(same.begin(), same.end());
+  Fit best;
+  for (const double length : lengths) {
+    if (length < 2 || length > longest) continue;
+    const Fit fit = fit_period(changes, length, longest);
+    if (fit.period >= 2 && fit.missed < best.missed) best = fit;
+  }
+  const double most = std::min(most_missed, by_chance - surely / std::sqrt(static_cast<double>(best.count)));
+  return best.count > 0 && best.missed < most ? best.period : 1;
 }
 
 }  // namespace
-
-std::size_t rows_held(std::span<const Repetitions> lengths) {
-  const auto count_of = [](const Repetitions& r) { return static_cast<double>(r.count); };
-  const auto time_of = [](const Repetitions& r) { return static_cast<double>(r.count * r.rows); };
-  std::size_t count = 0;
-  for (const Repetitions& r : lengths) count += r.count;
-  if (count < fewest_changes) return 1;
-  const double longest = steady * static_cast<double>(length_at(lengths, 0.75, count_of));
-  while (static_cast<double>(lengths.back().rows) > longest) lengths = lengths.first(lengths.size() - 1);
-  const std::size_t held = length_at(lengths, 0.5, time_of);
-  if (held < 2) return 1;
-  const double period = static_cast<double>(held);
-  double total = 0, regular = 0;
-  for (const Repetitions& r : lengths) {
-    const double rows = static_cast<double>(r.rows), times = std::max(1.0, std::round(rows / period));
-    total += time_of(r);
-    if (std::fabs(rows - times * period) <= off_period * period + 0.5) regular += time_of(r);
-  }
-  return regular >= regular_part * total ? held : 1;
-}
 
 Updates find_updates(std::span<const double> time_s, std::span<const double> value) {
   std::vector<std::size_t> known, changes;  // changes: places in `known`
@@ -62,28 +89,24 @@ Updates find_updates(std::span<const double> time_s, std::span<const double> val
     updates.at = std::move(known);
     return updates;
   }
-  std::vector<double> row_steps;
-  for (std::size_t k = 1; k < known.size(); ++k) row_steps.push_back(time_s[known[k]] - time_s[known[k - 1]]);
-  std::map<std::size_t, std::size_t> count;  // by length
-  for (std::size_t c = 1; c < changes.size(); ++c) ++count[changes[c] - changes[c - 1]];
-  std::vector<Repetitions> lengths;
-  for (const auto& [length, times] : count) lengths.push_back({length, times});
-  const double rows = static_cast<double>(rows_held(lengths));
-  updates.period_s = rows * median(std::move(row_steps));
-  updates.held = rows > 1;
-  if (!updates.held) {
+  std::vector<double> row_steps, known_steps;
+  for (std::size_t k = 1; k < time_s.size(); ++k) row_steps.push_back(time_s[k] - time_s[k - 1]);
+  for (std::size_t k = 1; k < known.size(); ++k)
+    known_steps.push_back(time_s[known[k]] - time_s[known[k - 1]]);
+  const double rows = period_of(changes);
+  updates.period_s = rows * median(std::move(known_steps));
+  updates.held = updates.period_s > 1.5 * median(std::move(row_steps));
+  if (rows == 1) {
     updates.at = std::move(known);
     return updates;
   }
-  // Two sensors summed into one channel change it twice a period, shortly after each other: the reading is
-  // there when both have. The first row may repeat a reading of before the table began.
-  for (std::size_t c = 0; c < changes.size(); ++c) {
-    const std::size_t end = c + 1 < changes.size() ? changes[c + 1] : known.size();
-    const double stood = static_cast<double>(end - changes[c]);
-    if (stood < 0.5 * rows && c + 1 < changes.size()) continue;
-    const auto readings = std::max(1.0, std::round(stood / rows));
+  // The first row may repeat a reading of before the table began.
+  const std::vector<std::size_t> kept = settled(changes, rows);
+  for (std::size_t c = 0; c < kept.size(); ++c) {
+    const auto stood = static_cast<double>((c + 1 < kept.size() ? kept[c + 1] : known.size()) - kept[c]);
+    const double readings = std::max(1.0, std::round(stood / rows));
     for (double n = 0; n < readings; ++n)
-      updates.at.push_back(known[changes[c] + static_cast<std::size_t>(n * stood / readings)]);
+      updates.at.push_back(known[kept[c] + static_cast<std::size_t>(n * stood / readings)]);
   }
   return updates;
 }

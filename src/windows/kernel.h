@@ -7,13 +7,14 @@
 
 namespace joulecast::windows {
 
-// A smooth window (raised cosine) over samples first <= k < last: weights for means, and weights that give the
-// slope of what they are applied to without a derivative of it, -integral of phi' v (weak form).
+// A smooth window (raised cosine) over samples first <= k < last: weights for means, and weights that give
+// the slope of what they are applied to without a derivative of it, -integral of phi' v (weak form).
 class Kernel {
  public:
   static constexpr std::size_t parts = 3;  // begin, middle and end of the window
 
-  Kernel(std::span<const double> time_s, std::size_t first, std::size_t last, double centre_s, double length_s);
+  Kernel(std::span<const double> time_s, std::size_t first, std::size_t last, double centre_s,
+         double length_s);
 
   double mean(std::span<const double> v) const { return sum(weight_, v); }
   // Gain one on a straight line, zero on a constant.

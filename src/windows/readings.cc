@@ -30,7 +30,9 @@ class Motion {
     for (auto& sum : sums_) sum.assign(n, 0.0);
     for (std::size_t k = 1; k < n; ++k) {
       const double step = time_s_[k] - time_s_[k - 1];
-      const auto mean = [&](const std::vector<double>& v) { return 0.5 * (std::fabs(v[k]) + std::fabs(v[k - 1])); };
+      const auto mean = [&](const std::vector<double>& v) {
+        return 0.5 * (std::fabs(v[k]) + std::fabs(v[k - 1]));
+      };
       // v a dt is the change of v^2/2.
       const std::array<double, terms> add{step, mean(speed) * step, mean(turning) * step,
                                           0.5 * (speed[k] * speed[k] - speed[k - 1] * speed[k - 1])};
@@ -63,8 +65,8 @@ struct Taken {
 };
 
 // How much of the readings the regression misses, mean absolute, if they are of this stretch of motion.
-double missed(std::span<const Motion> motions, std::span<const Taken> readings, double delay_s, double averaged_s,
-              double margin_s) {
+double missed(std::span<const Motion> motions, std::span<const Taken> readings, double delay_s,
+              double averaged_s, double margin_s) {
   Eigen::MatrixXd x(static_cast<Eigen::Index>(readings.size()), static_cast<Eigen::Index>(Motion::terms));
   Eigen::VectorXd y(x.rows());
   std::vector<std::size_t> block;
@@ -103,7 +105,8 @@ Readings find_readings(std::span<const telemetry::Recording> missions, const rob
     if (battery.held) battery_periods.push_back(battery.period_s);
     if (motors.held) motor_periods.push_back(motors.period_s);
     for (const std::size_t k : battery.at) {
-      if (std::isfinite(track.battery_power[k])) taken.push_back({tracks.size() - 1, track.time_s[k], track.battery_power[k]});
+      if (std::isfinite(track.battery_power[k]))
+        taken.push_back({tracks.size() - 1, track.time_s[k], track.battery_power[k]});
     }
   }
   readings.row_s = statistics::median(std::move(rows));
@@ -117,7 +120,7 @@ Readings find_readings(std::span<const telemetry::Recording> missions, const rob
   readings.battery_held = battery_s > 0;
   readings.motors_held = motors_s > 0;
   readings.period_s = std::max({battery_s, motors_s, readings.row_s});
-  readings.averaged_s = std::max(plain.length_s, 2 * readings.row_s);
+  readings.averaged_s = std::max(plain.length_s, fewest_rows * readings.row_s);
   if (!readings.battery_held) return readings;
 
   const std::size_t stride = taken.size() / most_readings + 1;
@@ -127,7 +130,7 @@ Readings find_readings(std::span<const telemetry::Recording> missions, const rob
   for (const Track& track : tracks) motions.emplace_back(track, robot.kinematics.wheel_radius_m);
   const double p = readings.period_s, margin_s = p + 0.5 * std::max(p, readings.averaged_s);
   double least = clearly_less * missed(motions, some, 0, readings.averaged_s, margin_s);
-  for (const double averaged_s : {readings.averaged_s, p}) {
+  for (const double averaged_s : {readings.averaged_s, std::max(readings.averaged_s, p)}) {
     for (const double periods : {0.0, -0.5, -0.25, 0.25, 0.5, 1.0}) {
       const double error = missed(motions, some, periods * p, averaged_s, margin_s);
       if (!(error < least)) continue;

@@ -14,8 +14,8 @@ namespace {
 
 using telemetry::Sample;
 
-// Median distance between neighbouring values among readings that differ: the step of a coarse converter, next to
-// nothing for a fine one.
+// Median distance between neighbouring values among readings that differ: the step of a coarse converter,
+// next to nothing for a fine one.
 double step_of(std::vector<double> readings) {
   std::erase_if(readings, [](double v) { return !std::isfinite(v); });
   std::ranges::sort(readings);
@@ -74,7 +74,11 @@ class Builder {
  public:
   Builder(const telemetry::Recording& mission, const robot::RobotModel& robot,
           std::span<const std::string> covariates, double period_s, const WindowSettings& settings)
-      : mission_(mission), robot_(robot), covariates_(covariates), settings_(settings), smooth_s_(2.2 * period_s) {}
+      : mission_(mission),
+        robot_(robot),
+        covariates_(covariates),
+        settings_(settings),
+        smooth_s_(2.2 * period_s) {}
 
   Track build() {
     const std::int64_t start = mission_.samples.front().utime_us;
@@ -99,7 +103,8 @@ class Builder {
   template <class Get>
   std::vector<double> electrical(const Get& get) const {
     std::vector<double> values = column(get);
-    return settings_.electrical_delay_s == 0 ? values : shifted(track_.time_s, values, settings_.electrical_delay_s);
+    return settings_.electrical_delay_s == 0 ? values
+                                             : shifted(track_.time_s, values, settings_.electrical_delay_s);
   }
   double friction_current_a(std::size_t s) const {
     return robot_.motor.friction_torque_nm[s] / (robot_.motor.torque_constant_nm_a * robot_.motor.gear_ratio);
@@ -114,7 +119,8 @@ class Builder {
     c.current[s] = electrical([s](const Sample& x) { return x.motor_current_a[s]; });
     const std::vector<double> volts = smoothed(c.time_s, c.voltage[s], smooth_s_);
     const std::vector<double> amps = smoothed(c.time_s, c.current[s], smooth_s_);
-    for (auto* values : {&c.power[s], &c.power_abs[s], &c.braking[s], &c.current_sign[s], &c.angle[s], &c.slid[s]})
+    for (auto* values :
+         {&c.power[s], &c.power_abs[s], &c.braking[s], &c.current_sign[s], &c.angle[s], &c.slid[s]})
       values->resize(n);
     copper_w.resize(n);
     const double soft_a = 0.1 * friction_current_a(s) + dynamics::brush_width_a;
@@ -126,7 +132,9 @@ class Builder {
       const bool known = std::isfinite(amps[k]);
       c.current_sign[s][k] = known ? std::tanh((amps[k] - settings_.motor_current_bias_a) / soft_a) : 0.0;
       // Where the motor's current is not measured, the nominal friction's heats the winding.
-      const double heating_a = known ? amps[k] : std::fabs(speed) > resting_rad_s ? friction_current_a(s) : 0.0;
+      const double heating_a = known                              ? amps[k]
+                               : std::fabs(speed) > resting_rad_s ? friction_current_a(s)
+                                                                  : 0.0;
       copper_w[k] = robot_.motor.resistance_ohm * heating_a * heating_a;
       const double step = k == 0 ? 0.0 : c.time_s[k] - c.time_s[k - 1];
       c.angle[s][k] = k == 0 ? 0.0 : c.angle[s][k - 1] + 0.5 * step * (c.speed[s][k] + c.speed[s][k - 1]);
@@ -160,7 +168,8 @@ class Builder {
     for (const Sample& s : mission_.samples) {
       // Unwound: map headings may jump by a turn.
       const double h = s.pose[2], last = c.heading.empty() ? missing : c.heading.back();
-      c.heading.push_back(std::isfinite(last + h) ? last + std::remainder(h - last, 2 * std::numbers::pi) : h);
+      c.heading.push_back(std::isfinite(last + h) ? last + std::remainder(h - last, 2 * std::numbers::pi)
+                                                  : h);
     }
   }
 
@@ -183,7 +192,8 @@ class Builder {
     Track& c = track_;
     for (std::size_t q = 0; q < c.heat.size(); ++q) {
       for (const std::size_t s : {0u, 1u})
-        c.heat[q][s] = low_passed(c.time_s, heat_time_constants_s[q], [&](std::size_t k) { return copper_w[s][k]; });
+        c.heat[q][s] =
+            low_passed(c.time_s, heat_time_constants_s[q], [&](std::size_t k) { return copper_w[s][k]; });
     }
     for (std::size_t q = 0; q < c.motion.size(); ++q) {
       c.motion[q] = low_passed(c.time_s, motion_time_constants_s[q], [&](std::size_t k) {
@@ -205,7 +215,8 @@ class Builder {
 double median_period_s(const telemetry::Recording& mission) {
   std::vector<double> steps;
   for (std::size_t k = 1; k < mission.samples.size(); ++k)
-    steps.push_back(1e-6 * static_cast<double>(mission.samples[k].utime_us - mission.samples[k - 1].utime_us));
+    steps.push_back(1e-6 *
+                    static_cast<double>(mission.samples[k].utime_us - mission.samples[k - 1].utime_us));
   return statistics::median(std::move(steps));
 }
 

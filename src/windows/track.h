@@ -11,13 +11,15 @@
 
 namespace joulecast::windows {
 
-// One mission's channels as columns, with what needs every sample worked out. Only this room's own sources use it.
+// One mission's channels as columns, with what needs every sample worked out. Only this room's own sources
+// use it.
 struct Track {
   std::vector<double> time_s;  // since the first sample
   std::array<std::vector<double>, 2> speed, smooth_speed, voltage, current, power, power_abs, braking, angle,
       current_sign;
   std::array<std::vector<double>, 2> slid;  // angle turned since the wheel stood [rad]
-  std::vector<double> battery_voltage, battery_current, battery_power, yaw_rate, climb, x, y, heading, payload, charge;
+  std::vector<double> battery_voltage, battery_current, battery_power, yaw_rate, climb, x, y, heading,
+      payload, charge;
   std::vector<std::vector<double>> covariates;
   double battery_voltage_step_v = 0;
   // Copper heat and mean |wheel speed|, low-passed on every time constant.
@@ -30,6 +32,7 @@ double median_period_s(const telemetry::Recording& mission);
 Track make_track(const telemetry::Recording& mission, const robot::RobotModel& robot,
                  std::span<const std::string> covariates, double period_s, const WindowSettings& settings);
 
+inline constexpr double fewest_rows = 4;       // a window lasts, as its outermost have no weight
 inline constexpr double moving_rad_s = 0.10;   // slowest wheel that surely turns
 inline constexpr double resting_rad_s = 0.03;  // fastest wheel that surely stands
 // Turned since it stood, from which on a wheel slides: before that dry friction builds up as contacts bend

@@ -16,17 +16,19 @@ constexpr std::size_t kept_together = 50;  // windows, where some are left out
 
 // Mean of a column within +-half_s of an instant.
 double mean_near(const Track& c, const std::vector<double>& v, double t, double half_s) {
-  auto k = static_cast<std::size_t>(std::ranges::lower_bound(c.time_s, t - half_s) - c.time_s.begin());
+  auto k = static_cast<std::size_t>(std::ranges::lower_bound(c.time_s, t - half_s - 1e-9) - c.time_s.begin());
   double sum = 0;
   std::size_t count = 0;
-  for (; k < c.time_s.size() && c.time_s[k] <= t + half_s; ++k, ++count) sum += v[k];
+  for (; k < c.time_s.size() && c.time_s[k] <= t + half_s + 1e-9; ++k, ++count) sum += v[k];
   return count > 0 ? sum / static_cast<double>(count) : missing;
 }
 
 void add_span(const Track& c, const WindowSettings& settings, const robot::RobotModel& robot, Window& w) {
   const double from = w.t_s, to = w.t_s + settings.span_s, half = 0.1;
   if (to + half > c.time_s.back() || from - half < c.time_s.front()) return;
-  const auto change = [&](const std::vector<double>& v) { return mean_near(c, v, to, half) - mean_near(c, v, from, half); };
+  const auto change = [&](const std::vector<double>& v) {
+    return mean_near(c, v, to, half) - mean_near(c, v, from, half);
+  };
   const double dx = change(c.x), dy = change(c.y), turn = change(c.heading);
   for (const std::size_t s : {0u, 1u}) w.span_angle_rad[s] = change(c.angle[s]);
   w.turn_rad = turn;
@@ -134,10 +136,15 @@ void read_motors(const Track& c, std::size_t row, Window& w) {
   w.voltage_slope_v_s = w.current_slope_a_s = {};
 }
 
+double window_length_s(const WindowSettings& settings, double period_s) {
+  return std::max(settings.length_s, static_cast<double>(settings.fewest_samples) * period_s);
+}
+
 class MissionWindows {
  public:
   MissionWindows(const telemetry::Recording& mission, std::size_t number, const robot::RobotModel& robot,
-                 std::span<const std::string> covariates, const Readings& readings, const WindowSettings& settings)
+                 std::span<const std::string> covariates, const Readings& readings,
+                 const WindowSettings& settings)
       : robot_(robot),
         readings_(readings),
         settings_(settings),
@@ -149,7 +156,7 @@ class MissionWindows {
   // `position` counts windows over all missions, kept or not.
   void add_regular(std::vector<Window>& windows, std::size_t& position, std::size_t keep_every) const {
     const std::vector<double>& t = track_.time_s;
-    const double length = std::max(settings_.length_s, static_cast<double>(settings_.fewest_samples) * period_s_);
+    const double length = window_length_s(settings_, period_s_);
     const double hop = 0.5 * length;
     const auto windows_a_span = static_cast<std::size_t>(std::max(1.0, std::round(settings_.span_s / hop)));
     if (t.back() < length) return;
@@ -180,7 +187,7 @@ class MissionWindows {
         statistics::find_updates(t, readings_.motors_held ? track_.current[0] : track_.battery_current);
     double last_s = -1e300;
     for (const std::size_t row : updates.at) {
-      Place at{0, 0, t[row] - readings_.delay_s, readings_.averaged_s};
+      Place at{0, 0, t[row] - readings_.delay_s, std::max(readings_.averaged_s, fewest_rows * period_s_)};
       const double from = at.centre_s - 0.5 * at.length_s;
       if (from < t.front() || at.centre_s + 0.5 * at.length_s > t.back()) continue;
       at.first = static_cast<std::size_t>(std::ranges::lower_bound(t, from) - t.begin());
@@ -211,8 +218,12 @@ class MissionWindows {
       if (at.last > at.first) gap = std::max(gap, t[at.last] - t[at.last - 1]);
       ++at.last;
     }
-    const auto fewest = std::min(settings_.fewest_samples / 2, static_cast<std::size_t>(at.length_s / period_s_));
-    return at.last - at.first >= std::max<std::size_t>(3, fewest) && gap <= longest_gap_s_;
+    if (at.last > at.first) gap = std::max(gap, to - t[at.last - 1]);
+    // One row may come too late.
+    const double fewest =
+        std::min(0.5 * static_cast<double>(settings_.fewest_samples), at.length_s / period_s_ - 1);
+    return static_cast<double>(at.last - at.first) >= std::max(3.0, std::floor(fewest)) &&
+           gap <= longest_gap_s_;
   }
 
   void add(std::vector<Window>& windows, Window& w, bool continues) const {
@@ -256,14 +267,16 @@ std::vector<std::string> covariate_names(std::span<const telemetry::Recording> m
   return differing;
 }
 
-std::vector<Window> make_windows(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot,
-                                 const Readings& readings, const WindowSettings& settings) {
-  double total_s = 0;
-  for (const telemetry::Recording& mission : missions)
-    total_s += 1e-6 * static_cast<double>(mission.samples.back().utime_us - mission.samples.front().utime_us);
-  const double expected = 2 * total_s / settings.length_s;
-  const auto keep_every =
-      static_cast<std::size_t>(std::max(1.0, std::ceil(expected / static_cast<double>(settings.most_windows))));
+std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
+                                 const robot::RobotModel& robot, const Readings& readings,
+                                 const WindowSettings& settings) {
+  double expected = 0;
+  for (const telemetry::Recording& mission : missions) {
+    const auto us = static_cast<double>(mission.samples.back().utime_us - mission.samples.front().utime_us);
+    expected += 2e-6 * us / window_length_s(settings, median_period_s(mission));
+  }
+  const auto keep_every = static_cast<std::size_t>(
+      std::max(1.0, std::ceil(expected / static_cast<double>(settings.most_windows))));
   const std::vector<std::string> covariates = covariate_names(missions);
   std::vector<Window> windows;
   std::size_t position = 0;

@@ -20,16 +20,16 @@ inline constexpr std::array<double, 6> heat_time_constants_s{30, 60, 120, 240, 4
 // Time constants on which the motion is low-passed [s].
 inline constexpr std::array<double, 3> motion_time_constants_s{8, 25, 80};
 
-// What one smooth window of a recording says: averages of every channel, and slopes in weak form, so that linear
-// equations between channels hold exactly and no noisy derivative is taken. NaN: not measured, or not read anew in
-// this window. Sides [0] right, [1] left.
+// What one smooth window of a recording says: averages of every channel, and slopes in weak form, so that
+// linear equations between channels hold exactly and no noisy derivative is taken. NaN: not measured, or not
+// read anew in this window. Sides [0] right, [1] left.
 struct Window {
   std::size_t mission = 0;
-  std::size_t block = 0;   // of assign_blocks()
-  bool continues = false;  // begins half a window (or one reading) after the previous one
-  bool reading = false;    // placed at one reading of a held channel
+  std::size_t block = 0;      // of assign_blocks()
+  bool continues = false;     // begins half a window (or one reading) after the previous one
+  bool reading = false;       // placed at one reading of a held channel
   bool motors_apart = false;  // the motors' own equations speak in other windows
-  double t_s = 0;          // since the mission began
+  double t_s = 0;             // since the mission began
   double length_s = 0;
   double payload_kg = 0;
   std::array<double, 2> speed_rad_s{}, acceleration_rad_s2{};
@@ -53,8 +53,8 @@ struct Window {
   double charge_as = 0;           // drawn since the mission began
   double yaw_rate_rad_s = missing;
   double x_m = missing, y_m = missing, heading_rad = missing;
-  double climb_rad = missing;              // of the floor along the heading (dynamics/climb.h)
-  std::vector<double> covariates;          // in the order of covariate_names()
+  double climb_rad = missing;      // of the floor along the heading (dynamics/climb.h)
+  std::vector<double> covariates;  // in the order of covariate_names()
   // Progress by the map over a span that starts here; NaN except once a span.
   double forward_m = missing, turn_rad = missing;
   double chord = 1;                        // straight distance over path length in that span
@@ -73,31 +73,33 @@ struct WindowSettings {
 
 // How the electrical channels were read: their true rate, and where in time a reading belongs.
 struct Readings {
-  double row_s = 0;             // median time between rows
-  bool battery_held = false;    // rows repeat the battery's readings,
-  bool motors_held = false;     // or the motors'
-  double period_s = 0;          // between readings of what is held
-  double delay_s = 0;           // of a held reading behind the middle of the motion that it speaks of
-  double averaged_s = 0;        // length of that motion
+  double row_s = 0;           // median time between rows
+  bool battery_held = false;  // rows repeat the battery's readings,
+  bool motors_held = false;   // or the motors'
+  double period_s = 0;        // between readings of what is held
+  double delay_s = 0;         // of a held reading behind the middle of the motion that it speaks of
+  double averaged_s = 0;      // length of that motion
   bool held() const { return battery_held || motors_held; }
 };
 
-// How these recordings were read. Where rows repeat readings, the delay and the averaging are taken with which a
-// plain regression of power on motion (constant, |speed|, |yaw rate|, power of acceleration) misses least.
+// How these recordings were read. Where rows repeat readings, the delay and the averaging are taken with
+// which a plain regression of power on motion (constant, |speed|, |yaw rate|, power of acceleration) misses
+// least.
 Readings find_readings(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot);
 
-// Names of all covariates of these missions that differ anywhere, in order; height, from which the climb follows, is not
-// among them.
+// Names of all covariates of these missions that differ anywhere, in order; height, from which the climb
+// follows, is not among them.
 std::vector<std::string> covariate_names(std::span<const telemetry::Recording> missions);
 
-// Windows of all missions, half overlapping; channels whose readings are held speak in windows of their own, one a
-// reading, after the others of their mission.
-std::vector<Window> make_windows(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot,
-                                 const Readings& readings, const WindowSettings& settings = {});
+// Windows of all missions, half overlapping; channels whose readings are held speak in windows of their own,
+// one a reading, after the others of their mission.
+std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
+                                 const robot::RobotModel& robot, const Readings& readings,
+                                 const WindowSettings& settings = {});
 
-// Parts of the recordings that are left out together, ascending with the windows: whole missions where there are
-// enough of them, several where there are many, stretches of one where there are few. Sets Window::block and returns
-// how many there are.
+// Parts of the recordings that are left out together, ascending with time: whole missions where there are
+// enough of them, several where there are many, stretches of one where there are few. Sets Window::block and
+// returns how many there are.
 std::size_t assign_blocks(std::span<Window> windows, std::span<const double> mission_length_s);
 
 }  // namespace joulecast::windows

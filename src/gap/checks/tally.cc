@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "statistics/updates.h"
+#include "gap/checks/repetitions.h"
 
 namespace joulecast::gap {
 namespace {
@@ -136,11 +136,11 @@ ValueTally::Extreme ValueTally::extreme() const {
 }
 
 std::size_t ValueTally::held_rows() const {
-  std::vector<statistics::Repetitions> lengths;
+  std::vector<Repetitions> lengths;
   for (std::size_t k = 0; k < runs_.size(); ++k) {
     if (runs_[k] > 0) lengths.push_back({k, runs_[k]});
   }
-  return statistics::rows_held(lengths);
+  return rows_held(lengths);
 }
 
 double ValueTally::quantum() const {
