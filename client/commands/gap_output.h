@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "client/commands/outcome.h"
-#include "gap/diagnosis.h"
 #include "gap/report.h"
 #include "robot/robot_model.h"
 
