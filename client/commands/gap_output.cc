@@ -198,6 +198,15 @@ void print_diagnosis(const json& d) {
   print_adoption(d);
 }
 
+Error of_option(Error error, const std::string& option) {
+  if (error.fault == Fault::conflict) {
+    error.message = "refused: " + error.message;
+    if (error.field.empty()) error.message += "; --force overrides it";
+  }
+  error.field = error.field == "effect" ? "--effect" : option;
+  return error;
+}
+
 Exit write_adopted(std::span<const robot::AdoptedEffect> found, robot::RobotModel robot,
                    const std::string& path) {
   const auto extended = gap::with_effects(std::move(robot), found);

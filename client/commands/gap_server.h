@@ -4,6 +4,7 @@
 #include <string>
 
 #include "client/commands/outcome.h"
+#include "gap/verdict/offer.h"
 
 namespace joulecast::client {
 
@@ -13,9 +14,9 @@ struct GapServerOptions {
   std::size_t max_missions = 200;
   std::string report;  // file for the HTML report; empty: none
   std::string apply;   // file for the robot file with the effects found; empty: none
+  gap::Choice choice;  // of effects that cannot be told apart; by force also what is refused
   bool json = false;
   bool adopt = false;  // in the daemon, after a back-test
-  bool force = false;  // adopt even when the back-test shows no improvement
 };
 
 // Has a daemon diagnose its own history of a robot, follows the job and tells what came of it. An interrupt

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -66,6 +67,7 @@ struct ChannelGap {
 struct BaselineTerm {
   std::string name, unit;
   double value = 0, deviation = 0;
+  double model = std::numeric_limits<double>::quiet_NaN();  // what the robot file's model comes to in the same term
 };
 
 // A plain regression of power on motion, the referee: no explanation stands that predicts what it was not fitted to

@@ -52,8 +52,10 @@ ordered_json checks_to_json(const Diagnosis& d) {
 ordered_json baseline_to_json(const std::optional<Baseline>& baseline) {
   if (!baseline) return nullptr;
   ordered_json terms = ordered_json::object();
-  for (const BaselineTerm& term : baseline->terms)
+  for (const BaselineTerm& term : baseline->terms) {
     terms[term.name] = value_to_json(term.value, term.deviation, term.unit);
+    terms[term.name]["model"] = json_number(term.model);
+  }
   return {{"terms", std::move(terms)},
           {"held_out", json_number(baseline->held_out)},
           {"unchanged_model_held_out", json_number(baseline->unchanged_model_held_out)},
