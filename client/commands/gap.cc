@@ -39,7 +39,7 @@ struct Options {
   std::vector<std::string> test;
   std::string server;
   std::size_t max_missions = 200;
-  std::size_t controls = gap::DiagnosisSettings{}.controls;
+  std::optional<std::size_t> controls;
   std::vector<std::string> effect;
   bool adopt = false;
   bool force = false;
@@ -85,7 +85,7 @@ Result<Judged> judge(const Options& options, const telemetry::RecordingSet& reco
   Result<gap::Diagnosis> diagnosis = [&] {
     Progress progress("diagnosing", "%", 100);
     gap::DiagnosisSettings settings;
-    settings.controls = options.controls;
+    settings.controls = options.controls.value_or(settings.controls);
     settings.threads = std::max(1U, std::thread::hardware_concurrency());
     settings.progress = progress.shares();
     return gap::diagnose(recordings, robot, settings);
@@ -141,7 +141,7 @@ Exit run(const Options& options) {
     if (const auto may = may_write(option, *file, options.force); !may) return report(may.error());
   if (!options.server.empty()) {
     return gap_from_server({options.server, options.robot_id, options.max_missions, options.report, options.apply,
-                            {options.effect, options.force}, options.json, options.adopt});
+                            options.controls, {options.effect, options.force}, options.json, options.adopt});
   }
   const auto robot = robot::load_robot(options.robot_file);
   if (!robot) return report(robot.error());
@@ -186,8 +186,7 @@ void add_gap(CLI::App& program, Exit& exit) {
       ->excludes(missions);
   command
       ->add_option("--controls", options->controls,
-                   "surrogates of the recordings on which every finding is tried; 0: none")
-      ->capture_default_str()
+                   "surrogates of the recordings on which every finding is tried (default: 20); 0: none")
       ->check(CLI::Range(0, 1000))
       ->excludes(missions);
   command->add_option("--apply", options->apply,

@@ -129,8 +129,9 @@ Result<Exit> carry_out(const GapServerOptions& options) {
   const auto address = parse_server_url(options.server);
   if (!address) return tl::unexpected(address.error());
   const Daemon daemon{*address};
-  auto begun = daemon.json_of(HttpMethod::post, "/v1/diagnoses",
-                              {{"robot_id", options.robot_id}, {"max_missions", options.max_missions}});
+  json wanted = {{"robot_id", options.robot_id}, {"max_missions", options.max_missions}};
+  if (options.controls) wanted["controls"] = *options.controls;
+  auto begun = daemon.json_of(HttpMethod::post, "/v1/diagnoses", wanted);
   if (!begun) return tl::unexpected(begun.error());
   const auto job = follow(daemon, std::move(*begun));
   if (!job) return tl::unexpected(job.error());
