@@ -2,12 +2,12 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "gap/verdict/offer.h"
 #include "robot/robot_file.h"
 #include "server/api/common_parameters.h"
 #include "server/api/fields.h"
 #include "server/api/json_writer.h"
 #include "server/api/services.h"
+#include "server/diagnosis/diagnosed_model.h"
 #include "server/diagnosis/model_adoption.h"
 #include "server/http/problem.h"
 
@@ -82,33 +82,6 @@ Result<robot::RobotModel> candidate_of(const std::string& model_json, const std:
   return robot::parse_robot(model_json);
 }
 
-// What the diagnosis offers to the model that it was made with.
-Result<robot::RobotModel> diagnosed_model(const Services& services, const history::DiagnosisRecord& diagnosis,
-                                          const std::string& robot_id, const ModelRequest& r,
-                                          server::AdoptionRequest& adoption) {
-  if (diagnosis.robot_id != robot_id)
-    return invalid("/diagnosis_id", "belongs to robot " + diagnosis.robot_id + ", not to " + robot_id);
-  if (diagnosis.result_json.empty() || !diagnosis.model_version)
-    return fail(Fault::conflict, "/diagnosis_id", "holds nothing to adopt");
-  const Result<gap::Offer> offer = gap::offer_from_json(json::parse(diagnosis.result_json));
-  if (!offer) return tl::unexpected(offer.error());
-  const Result<history::ModelVersion> version = services.store.model(robot_id, diagnosis.model_version);
-  if (!version) return tl::unexpected(version.error());
-  const Result<robot::RobotModel> robot = robot::parse_robot(version->model_json);
-  if (!robot) return robot;
-  if (!offer->choice_settles) adoption.overridden = offer->refusal;
-  // To be tested it need not be fit for adoption.
-  Result<robot::RobotModel> model = gap::take(*offer, *robot, {r.effects, r.force || r.dry_run});
-  if (model) return model;
-  Error error = model.error();
-  if (error.field == "effect") error.field = "/effect";
-  if (error.field.empty()) {
-    error.field = "/diagnosis_id";
-    error.message = "Not adopted: " + error.message + (offer->effects.empty() ? "." : ". To adopt it all the same, set force.");
-  }
-  return tl::unexpected(std::move(error));
-}
-
 Result<server::AdoptionRequest> adoption_of(const Services& services, const std::string& robot_id,
                                             const ModelRequest& r) {
   server::AdoptionRequest adoption;
@@ -130,7 +103,14 @@ Result<server::AdoptionRequest> adoption_of(const Services& services, const std:
   } else if (r.diagnosis_id) {
     Result<history::DiagnosisRecord> diagnosis = services.store.diagnosis(*r.diagnosis_id);
     if (!diagnosis) return tl::unexpected(std::move(diagnosis.error()));
-    model = diagnosed_model(services, *diagnosis, robot_id, r, adoption);
+    if (diagnosis->robot_id != robot_id)
+      return invalid("/diagnosis_id", "belongs to robot " + diagnosis->robot_id + ", not to " + robot_id);
+    // To be tested it need not be fit for adoption.
+    Result<server::DiagnosedModel> diagnosed =
+        server::diagnosed_model(services.store, *diagnosis, {r.effects, r.force || r.dry_run});
+    if (!diagnosed) return tl::unexpected(std::move(diagnosed.error()));
+    model = std::move(diagnosed->model);
+    adoption.overridden = std::move(diagnosed->overridden);
     adoption.origin = history::ModelOrigin::diagnosis;
     adoption.note = r.note.value_or("diagnosis " + std::to_string(*r.diagnosis_id));
     fitted_on = std::move(diagnosis->fitted_on);
