@@ -92,7 +92,8 @@ Result<Judged> judge(const Options& options, const telemetry::RecordingSet& reco
   }();
   if (!diagnosis) return tl::unexpected(diagnosis.error());
   const gap::Offer offer = gap::offer_of(*diagnosis);
-  Judged judged{std::move(*diagnosis), gap::take(offer, robot, {options.effect, options.force}), std::nullopt};
+  Judged judged{std::move(*diagnosis), gap::take(offer, robot, {options.effect, options.force}),
+                std::nullopt};
   if (options.test.empty()) return judged;
   // A test asks what is found, whether or not it may be adopted.
   const Result<robot::RobotModel> tried =
@@ -140,8 +141,15 @@ Exit run(const Options& options) {
   for (const auto& [option, file] : {std::pair{"--report", &options.report}, {"--apply", &options.apply}})
     if (const auto may = may_write(option, *file, options.force); !may) return report(may.error());
   if (!options.server.empty()) {
-    return gap_from_server({options.server, options.robot_id, options.max_missions, options.report, options.apply,
-                            options.controls, {options.effect, options.force}, options.json, options.adopt});
+    return gap_from_server({options.server,
+                            options.robot_id,
+                            options.max_missions,
+                            options.report,
+                            options.apply,
+                            options.controls,
+                            {options.effect, options.force},
+                            options.json,
+                            options.adopt});
   }
   const auto robot = robot::load_robot(options.robot_file);
   if (!robot) return report(robot.error());
@@ -189,9 +197,10 @@ void add_gap(CLI::App& program, Exit& exit) {
                    "surrogates of the recordings on which every finding is tried (default: 20); 0: none")
       ->check(CLI::Range(0, 1000))
       ->excludes(missions);
-  command->add_option("--apply", options->apply,
-                      "write the robot file with what was found, or corrected where it is not this robot's; refused, "
-                      "with the reason, where the diagnosis does not bear it out");
+  command->add_option(
+      "--apply", options->apply,
+      "write the robot file with what was found, or corrected where it is not this robot's; refused, "
+      "with the reason, where the diagnosis does not bear it out");
   command->add_option("--effect", options->effect,
                       "with --apply or --adopt: the one to take of effects that cannot be told apart");
   command
@@ -214,7 +223,8 @@ void add_gap(CLI::App& program, Exit& exit) {
                  "with --server: adopt what is found, after the daemon's back-test")
       ->needs(server);
   command->add_flag("--force", options->force,
-                    "adopt or apply in spite of the diagnosis's refusal or a back-test without improvement; write over files that are "
+                    "adopt or apply in spite of the diagnosis's refusal or a back-test without improvement; "
+                    "write over files that are "
                     "there");
   command->footer(run_columns_help());
   add_gap_trial(*command, exit);

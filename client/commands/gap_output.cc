@@ -60,12 +60,14 @@ json array_of(const json& d, const char* name) {
 }
 
 void print_checks(const json& d) {
-  for (const json& note : array_of(d, "notes")) fmt::print("note: {}\n", wrapped(text(note), help_width(), 2));
+  for (const json& note : array_of(d, "notes"))
+    fmt::print("note: {}\n", wrapped(text(note), help_width(), 2));
   const json checks = array_of(d, "checks");
   if (checks.empty()) return;
   fmt::print("checks of the recordings:\n");
   for (const json& check : checks)
-    print_item(text(check["says"]) + (check["contradicted"] == true ? " It takes no part in what follows." : ""));
+    print_item(text(check["says"]) +
+               (check["contradicted"] == true ? " It takes no part in what follows." : ""));
 }
 
 void print_gap(const json& d) {
@@ -103,7 +105,8 @@ void print_shrinkage(const json& s) {
   if (s["remaining_over_noise_floor"].is_number())
     fmt::print("; remaining is {:.1f} noise floors", number(s["remaining_over_noise_floor"]));
   if (s.value("parts", 0) > 0)
-    fmt::print("; the same is named without {} of {} parts", s["agreeing"].get<int>(), s["parts"].get<int>());
+    fmt::print("; named alike in {} of {} fits that leave a part out", s["agreeing"].get<int>(),
+               s["parts"].get<int>());
   fmt::print("\n");
   if (low < 0 && high >= 0) fmt::print("  that the effects help on missions left out is not sure\n");
 }
@@ -111,10 +114,12 @@ void print_shrinkage(const json& s) {
 void print_baseline(const json& d) {
   const json baseline = d.value("baseline", json());
   if (!baseline.is_object()) return;
-  fmt::print("on parts left out: a plain regression misses {:.1f} % of the power, this explanation {:.1f} %, the robot "
-             "file {:.1f} %\n",
-             100 * number(baseline["held_out"]), 100 * number(baseline["explanation_held_out"]),
-             100 * number(baseline["unchanged_model_held_out"]));
+  fmt::print(
+      "on parts left out: a plain regression misses {:.1f} % of the power, this explanation {:.1f} %, the "
+      "robot "
+      "file {:.1f} %\n",
+      100 * number(baseline["held_out"]), 100 * number(baseline["explanation_held_out"]),
+      100 * number(baseline["unchanged_model_held_out"]));
   const json reasons = array_of(d, "reasons");
   for (const json& says : baseline["says"])
     if (std::ranges::find(reasons, says) == reasons.end()) print_item(text(says));
@@ -125,8 +130,8 @@ void print_corrections(const json& d) {
   if (corrections.empty()) return;
   fmt::print("what would fit in the robot file:\n");
   for (const json& c : corrections)
-    fmt::print("  {} {:.4g} +- {:.2g} instead of {:.4g}\n", text(c["parameter"]), number(c["fits"]), number(c["sd"]),
-               number(c["file"]));
+    fmt::print("  {} {:.4g} +- {:.2g} instead of {:.4g}\n", text(c["parameter"]), number(c["fits"]),
+               number(c["sd"]), number(c["file"]));
 }
 
 void print_where(const json& regions) {

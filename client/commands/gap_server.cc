@@ -144,7 +144,8 @@ Result<Exit> carry_out(const GapServerOptions& options) {
   out["diagnosis_id"] = (*job)["id"];
   std::vector<Error> refusals;
   if (!options.apply.empty()) {
-    if (const auto written = write_model(daemon, options, *job); !written) refusals.push_back(written.error());
+    if (const auto written = write_model(daemon, options, *job); !written)
+      refusals.push_back(written.error());
   }
   if (options.adopt) {
     const auto adoption = adopt(daemon, options, *job);

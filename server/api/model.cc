@@ -41,7 +41,8 @@ std::vector<std::string> read_effects(Fields& fields) {
   const json ids = given->is_string() ? json::array({*given}) : *given;
   const auto is_text = [](const json& id) { return id.is_string(); };
   if (!ids.is_array() || ids.size() > most_effects || !std::ranges::all_of(ids, is_text)) {
-    fields.fault("effect", "must be the id of an effect, or an array of at most " + std::to_string(most_effects));
+    fields.fault("effect",
+                 "must be the id of an effect, or an array of at most " + std::to_string(most_effects));
     return {};
   }
   return ids.get<std::vector<std::string>>();

@@ -295,7 +295,8 @@ class DiagnosisService::Impl {
       }
     }
     history->missions.clear();
-    Result<telemetry::RecordingSet> set = telemetry::make_recording_set(record.robot_id, std::move(recordings));
+    Result<telemetry::RecordingSet> set =
+        telemetry::make_recording_set(record.robot_id, std::move(recordings));
     if (!set) return tl::unexpected(std::move(set.error()));
     gap::DiagnosisSettings settings;
     settings.controls = request.controls.value_or(options_.controls);
@@ -320,7 +321,8 @@ class DiagnosisService::Impl {
     record.result_json = result.dump();
     record.summary_json = summary_of(result).dump();
     gap::ReportOrigin origin;
-    for (const telemetry::Recording& mission : recordings.missions) origin.sources.push_back(mission.mission_id);
+    for (const telemetry::Recording& mission : recordings.missions)
+      origin.sources.push_back(mission.mission_id);
     origin.model = "version " + std::to_string(model.version) + " of " + record.robot_id;
     origin.made_at = utc_text(now_utime_us_());
     origin.software = "joulecastd " JOULECAST_VERSION;

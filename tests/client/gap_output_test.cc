@@ -28,15 +28,27 @@ TEST(GapOutput, TellsChecksThenVerdictThenEffectsThenTheRefereeThenWhere) {
   const std::string text = printed(gap::diagnosis_to_json(made_diagnosis()));
   std::size_t at = 0;
   for (const char* next :
-       {"amr-07: 12 missions, 34000 samples", "note: 1 message could not be read", "checks of the recordings:",
-        "It is reversed. It takes no part in what follows.", "gap: energy +10.1 %, absolute power 20.2 % (noise floor 3.3 %)",
-        "other readings: yaw_rate 5.2 %", "verdict: effects (probability 0.93)", "These data do not tell slope from grade.",
-        "coulomb_friction: probability 0.96, closes 72 % of the gap, 19.5 W", "ratio = 0.41 +- 0.02",
-        "named in 1 of 20 surrogates", "to check: bearings", "covariate:cpu_load: probability 0.81",
-        "outside the catalogue: wheel_torque follows time", "named in 0 of 20 surrogates",
-        "held-out gap: 20.3 % -> 6.5 %", "the same is named without 4 of 5 parts",
+       {"amr-07: 12 missions, 34000 samples",
+        "note: 1 message could not be read",
+        "checks of the recordings:",
+        "It is reversed. It takes no part in what follows.",
+        "gap: energy +10.1 %, absolute power 20.2 % (noise floor 3.3 %)",
+        "other readings: yaw_rate 5.2 %",
+        "verdict: effects (probability 0.93)",
+        "These data do not tell slope from grade.",
+        "coulomb_friction: probability 0.96, closes 72 % of the gap, 19.5 W",
+        "ratio = 0.41 +- 0.02",
+        "named in 1 of 20 surrogates",
+        "to check: bearings",
+        "covariate:cpu_load: probability 0.81",
+        "outside the catalogue: wheel_torque follows time",
+        "named in 0 of 20 surrogates",
+        "held-out gap: 20.3 % -> 6.5 %",
+        "named alike in 4 of 5 fits that leave a part out",
         "on parts left out: a plain regression misses 11.5 % of the power, this explanation 6.4 %",
-        "Turning costs 1150 W per m/s; the model has 90.", "motor.friction_torque_nm 1.69 +- 0.03 instead of 1.2", "where:",
+        "Turning costs 1150 W per m/s; the model has 90.",
+        "motor.friction_torque_nm 1.69 +- 0.03 instead of 1.2",
+        "where:",
         "battery_power, phase turning: +61 % of the gap [51, 71] in 17 % of the time",
         "next drive, to tell a from b: drive fast (log evidence +7.5)"}) {
     const std::size_t found = text.find(next, at);
@@ -65,8 +77,10 @@ TEST(GapOutput, PutsDegreesBesideRadians) {
 // What a daemon of an earlier version stored.
 TEST(GapOutput, ReadsADiagnosisOfAnEarlierVersion) {
   json old = gap::diagnosis_to_json(made_diagnosis());
-  for (const char* later : {"notes", "checks", "channels", "baseline", "corrections", "adoption"}) old.erase(later);
-  for (const char* later : {"controls", "power_w", "varies", "calibrates", "workshop"}) old["effects"][0].erase(later);
+  for (const char* later : {"notes", "checks", "channels", "baseline", "corrections", "adoption"})
+    old.erase(later);
+  for (const char* later : {"controls", "power_w", "varies", "calibrates", "workshop"})
+    old["effects"][0].erase(later);
   for (const char* later : {"like", "power_w", "controls", "says"}) old["outside"].erase(later);
   for (const char* later : {"parts", "agreeing"}) old["shrinkage"].erase(later);
   old["where"][0].erase("time_share");
@@ -79,7 +93,8 @@ TEST(GapOutput, ARefusalNamesItsOptionAndEndsWithOne) {
   EXPECT_EQ(refused.field, "--apply");
   EXPECT_THAT(refused.message, HasSubstr("--force"));
   EXPECT_EQ(exit_of(refused.fault), Exit::fault);
-  const Error open = of_option({Fault::conflict, "effect", "a is not told from b: name the one to adopt"}, "--apply");
+  const Error open =
+      of_option({Fault::conflict, "effect", "a is not told from b: name the one to adopt"}, "--apply");
   EXPECT_EQ(open.field, "--effect");
   EXPECT_THAT(open.message, Not(HasSubstr("--force")));
 }

@@ -8,12 +8,13 @@
 
 namespace joulecast::testing {
 
-// Holds JSON against a schema of schemas/: types, enumerations, required and unknown members, items, `$ref` within the
-// file and `anyOf`. What it does not know of a schema it does not check.
+// Holds JSON against a schema of schemas/: types, enumerations, required and unknown members, items, `$ref`
+// within the file and `anyOf`. What it does not know of a schema it does not check.
 class SchemaCheck {
  public:
   explicit SchemaCheck(const std::string& name)
-      : root_(nlohmann::json::parse(std::ifstream(JOULECAST_SOURCE_DIR "/schemas/" + name + ".schema.json"))) {}
+      : root_(
+            nlohmann::json::parse(std::ifstream(JOULECAST_SOURCE_DIR "/schemas/" + name + ".schema.json"))) {}
 
   // What is wrong, each with its place; empty: nothing.
   std::vector<std::string> faults(const nlohmann::json& value) const {
@@ -30,7 +31,8 @@ class SchemaCheck {
     return type == value.type_name();
   }
 
-  void check(const json& schema, const json& value, const std::string& at, std::vector<std::string>& found) const {
+  void check(const json& schema, const json& value, const std::string& at,
+             std::vector<std::string>& found) const {
     if (schema.contains("$ref"))
       return check(root_[json::json_pointer(schema["$ref"].get<std::string>().substr(1))], value, at, found);
     if (schema.contains("anyOf")) {
@@ -53,8 +55,10 @@ class SchemaCheck {
       found.push_back(at + " is " + value.dump());
     if (value.is_object()) check_members(schema, value, at, found);
     if (!value.is_array()) return;
-    if (schema.contains("minItems") && value.size() < schema["minItems"]) found.push_back(at + " is too short");
-    if (schema.contains("maxItems") && value.size() > schema["maxItems"]) found.push_back(at + " is too long");
+    if (schema.contains("minItems") && value.size() < schema["minItems"])
+      found.push_back(at + " is too short");
+    if (schema.contains("maxItems") && value.size() > schema["maxItems"])
+      found.push_back(at + " is too long");
     for (std::size_t k = 0; schema.contains("items") && k < value.size(); ++k)
       check(schema["items"], value[k], at + "/" + std::to_string(k), found);
   }
@@ -63,7 +67,8 @@ class SchemaCheck {
                      std::vector<std::string>& found) const {
     for (const json& name : schema.value("required", json::array()))
       if (!value.contains(name)) found.push_back(at + "/" + name.get<std::string>() + " is missing");
-    const json named = schema.value("properties", json::object()), rest = schema.value("additionalProperties", json(true));
+    const json named = schema.value("properties", json::object()),
+               rest = schema.value("additionalProperties", json(true));
     for (const auto& [name, member] : value.items()) {
       if (named.contains(name)) {
         check(named[name], member, at + "/" + name, found);

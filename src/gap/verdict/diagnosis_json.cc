@@ -89,7 +89,8 @@ ordered_json effects_to_json(const Diagnosis& d) {
   ordered_json effects = ordered_json::array();
   for (const DiagnosedEffect& e : d.effects) {
     ordered_json parameters = ordered_json::object();
-    for (const DiagnosedParameter& p : e.parameters) parameters[p.name] = value_to_json(p.value, p.deviation, p.unit);
+    for (const DiagnosedParameter& p : e.parameters)
+      parameters[p.name] = value_to_json(p.value, p.deviation, p.unit);
     effects.push_back({{"id", e.id},
                        {"probability", json_number(e.probability)},
                        {"parameters", std::move(parameters)},
@@ -110,7 +111,8 @@ ordered_json outside_to_json(const Outside& o) {
           {"channel", text_or_null(o.channel)},
           {"follows", text_or_null(o.follows)},
           {"like", text_or_null(o.like)},
-          {"power_w", o.power_w[0] != o.power_w[1] ? ordered_json(json_interval(o.power_w)) : ordered_json(nullptr)},
+          {"power_w",
+           o.power_w[0] != o.power_w[1] ? ordered_json(json_interval(o.power_w)) : ordered_json(nullptr)},
           {"controls", controls_to_json(o.controls)},
           {"says", text_or_null(stands_out ? outside_words(o) : "")}};
 }

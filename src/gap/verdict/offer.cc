@@ -45,7 +45,8 @@ Offer offer_told(const json& adoption) {
   }
   offer.corrects_file = adoption.at("corrects_file").get<bool>();
   offer.choice_settles = adoption.at("choice_settles").get<bool>();
-  if (const json& refusal = adoption.at("refusal"); refusal.is_string()) offer.refusal = refusal.get<std::string>();
+  if (const json& refusal = adoption.at("refusal"); refusal.is_string())
+    offer.refusal = refusal.get<std::string>();
   return offer;
 }
 
@@ -95,7 +96,8 @@ Result<std::vector<AdoptedEffect>> choose(const Offer& offer, const std::vector<
                   fmt::format("{} is not told from {}: name the one to adopt", ids.front(),
                               enumerate(std::span(ids).subspan(1))));
     }
-    const auto other = std::ranges::find(offered.instead, named.empty() ? "" : named.front(), &AdoptedEffect::id);
+    const auto other =
+        std::ranges::find(offered.instead, named.empty() ? "" : named.front(), &AdoptedEffect::id);
     chosen.push_back(other == offered.instead.end() ? offered.effect : *other);
     if (chosen.back().parameters.empty()) {
       return fail(Fault::conflict, "effect",
@@ -108,7 +110,8 @@ Result<std::vector<AdoptedEffect>> choose(const Offer& offer, const std::vector<
   for (const OfferedEffect& offered : offer.effects) {
     for (std::string& id : ids_of(offered)) known.push_back(std::move(id));
   }
-  return invalid("effect", fmt::format("{} is not among what was found: {}", *unused.begin(), enumerate(known)));
+  return invalid("effect",
+                 fmt::format("{} is not among what was found: {}", *unused.begin(), enumerate(known)));
 }
 
 }  // namespace

@@ -15,8 +15,8 @@ namespace {
 
 using joulecast::testing::SchemaCheck;
 using nlohmann::json;
-using testing::made_diagnosis;
 using ::testing::IsEmpty;
+using testing::made_diagnosis;
 
 TEST(DiagnosisJson, TellsEveryField) {
   const Diagnosis d = made_diagnosis();
@@ -102,7 +102,8 @@ TEST(DiagnosisJson, TellsEveryField) {
         {"explanation_held_out", 0.064},
         {"wins", false},
         {"says", {"Turning costs 1150 W per m/s; the model has 90."}}}},
-      {"corrections", {{{"parameter", "motor.friction_torque_nm"}, {"file", 1.2}, {"fits", 1.69}, {"sd", 0.03}}}},
+      {"corrections",
+       {{{"parameter", "motor.friction_torque_nm"}, {"file", 1.2}, {"fits", 1.69}, {"sd", 0.03}}}},
       {"where",
        {{{"channel", "battery_power"},
          {"variable", "phase"},
@@ -125,7 +126,8 @@ TEST(DiagnosisJson, TellsEveryField) {
        {{"refusal", nullptr},
         {"choice_settles", false},
         {"corrects_file", false},
-        {"effects", {{{"id", "coulomb_friction"}, {"parameters", {{"ratio", 0.41}}}, {"instead", json::array()}}}}}}};
+        {"effects",
+         {{{"id", "coulomb_friction"}, {"parameters", {{"ratio", 0.41}}}, {"instead", json::array()}}}}}}};
   EXPECT_EQ(told, wanted) << json::diff(wanted, told).dump(1);
 }
 

@@ -22,9 +22,13 @@ inline Diagnosis made_diagnosis() {
   d.noise_floor = 0.033;
   d.detectable_share = 0.014;
   d.channels = {{"battery_power", 0.21, 0.031}, {"yaw_rate", 0.052, unknown}};
-  d.checks = {{"battery_current_reversed", "battery_current", -1.02, {-1.05, -0.99}, "It is reversed.", true, {}},
-              {"step_between_missions", "", 1.3, {unknown, unknown}, "It changes.", false, 4}};
-  d.baseline = Baseline{{{"turning", "W/(m/s)", 1150, 12, 90}, {"constant", "W", 80, unknown}}, 0.115, 0.205, 0.064,
+  d.checks = {
+      {"battery_current_reversed", "battery_current", -1.02, {-1.05, -0.99}, "It is reversed.", true, {}},
+      {"step_between_missions", "", 1.3, {unknown, unknown}, "It changes.", false, 4}};
+  d.baseline = Baseline{{{"turning", "W/(m/s)", 1150, 12, 90}, {"constant", "W", 80, unknown}},
+                        0.115,
+                        0.205,
+                        0.064,
                         {"Turning costs 1150 W per m/s; the model has 90."}};
   d.where = {{"battery_power", "phase", "turning", 0, 0, 0.61, 0.17, {0.51, 0.71}},
              {"wheel_torque", "speed_m_s", "", 0.2, 0.4, -0.12, 0.09, {-0.19, -0.05}}};

@@ -16,10 +16,11 @@ namespace joulecast::gap {
 namespace {
 
 using nlohmann::json;
-using testing::made_diagnosis;
 using ::testing::HasSubstr;
+using testing::made_diagnosis;
 
-const std::vector<std::string> friction{"coulomb_friction ratio 0.41"}, viscous{"viscous_friction ratio 3.00"};
+const std::vector<std::string> friction{"coulomb_friction ratio 0.41"},
+    viscous{"viscous_friction ratio 3.00"};
 
 // Coulomb friction that the data do not tell from viscous friction.
 Diagnosis undecided() {
@@ -34,7 +35,8 @@ Diagnosis undecided() {
 std::vector<std::string> effects_of(const robot::RobotModel& model) {
   std::vector<std::string> texts;
   for (const robot::AdoptedEffect& e : model.effects)
-    texts.push_back(fmt::format("{} {} {:.2f}", e.id, e.parameters.front().first, e.parameters.front().second));
+    texts.push_back(
+        fmt::format("{} {} {:.2f}", e.id, e.parameters.front().first, e.parameters.front().second));
   return texts;
 }
 
