@@ -24,6 +24,13 @@ bool shows_in_power(const Hypothesis& hypothesis) {
   return !hypothesis.is_effect() || !traits_of(hypothesis.id()).elsewhere;
 }
 
+std::vector<Cause> joined(std::vector<Cause> base, std::span<const Cause> named) {
+  for (const Cause& cause : named) {
+    if (std::ranges::none_of(base, [&](const Cause& b) { return b.same_kind(cause); })) base.push_back(cause);
+  }
+  return base;
+}
+
 std::vector<Cause> strengths_of(const ColumnSet& columns, const Problem& problem, const HypothesisSet& named,
                                 const std::vector<bool>& left_out) {
   if (named.empty()) return {};
