@@ -1,5 +1,6 @@
 #include "client/files.h"
 
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <sstream>
@@ -15,6 +16,11 @@ Result<std::string> read_file(const std::string& path) {
   if (std::cin.peek() != std::istream::traits_type::eof()) text << std::cin.rdbuf();
   if (std::cin.bad() || text.fail()) return fail(Fault::unavailable, path, "cannot be read");
   return std::move(text).str();
+}
+
+Result<void> may_write(const std::string& option, const std::string& path, bool force) {
+  if (force || !std::filesystem::is_regular_file(path)) return {};
+  return fail(Fault::conflict, option, path + " is there already; --force writes over it");
 }
 
 Result<void> write_file(const std::string& path, const std::string& text) {

@@ -83,6 +83,8 @@ server::DiagnosisOptions diagnosis_options(const Settings& settings) {
   options.queue = static_cast<std::size_t>(settings.integer("diagnosis.queue"));
   options.max_missions = static_cast<std::size_t>(settings.integer("diagnosis.max_missions"));
   options.max_samples = static_cast<std::size_t>(settings.integer("diagnosis.max_samples"));
+  options.controls = static_cast<std::size_t>(settings.integer("diagnosis.controls"));
+  options.threads = static_cast<std::size_t>(settings.integer("diagnosis.threads"));
   return options;
 }
 

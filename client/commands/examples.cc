@@ -40,7 +40,8 @@ constexpr Examples table[] = {
     {"gap",
      "joulecast gap amr.lcmlog --robot amr.json\n"
      "joulecast gap amr.lcmlog --robot amr.json --apply amr-adopted.json --json\n"
-     "joulecast gap amr.lcmlog --robot amr.json --test fresh.lcmlog"},
+     "joulecast gap amr.lcmlog --robot amr.json --test fresh.lcmlog\n"
+     "joulecast gap amr.lcmlog --robot amr.json --controls 0 --report amr-gap.html --force"},
     {"gap trial", "joulecast gap trial --count 2 --seed 1"},
     {"effects", "joulecast effects"},
     {"explore",

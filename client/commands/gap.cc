@@ -1,12 +1,15 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include "client/commands/gap_compare.h"
@@ -18,9 +21,9 @@
 #include "client/progress.h"
 #include "energy/back_test.h"
 #include "energy/back_test_json.h"
-#include "gap/adopt.h"
-#include "gap/diagnosis.h"
-#include "gap/diagnosis_json.h"
+#include "gap/diagnose/recordings.h"
+#include "gap/verdict/diagnosis_json.h"
+#include "gap/verdict/offer.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::client {
@@ -36,6 +39,8 @@ struct Options {
   std::vector<std::string> test;
   std::string server;
   std::size_t max_missions = 200;
+  std::optional<std::size_t> controls;
+  std::vector<std::string> effect;
   bool adopt = false;
   bool force = false;
   bool json = false;
@@ -68,60 +73,93 @@ Result<energy::BackTest> test_of(const Options& options, const robot::RobotModel
   return energy::back_test(runs, robot, extended);
 }
 
-Exit run(const Options& options) {
-  if (!options.server.empty()) {
-    return gap_from_server({options.server, options.robot_id, options.max_missions, options.report,
-                            options.apply, options.json, options.adopt, options.force});
-  }
-  const auto robot = robot::load_robot(options.robot_file);
-  if (!robot) return report(robot.error());
-  if (!options.missions.runs.empty()) {
-    GapMissionsOptions missions = options.missions;
-    missions.robot_file = options.robot_file;
-    missions.json = options.json;
-    missions.report = options.report;
-    missions.apply = options.apply;
-    return gap_from_missions(missions, *robot);
-  }
-  const auto recordings =
-      telemetry::load_recordings(options.logs, options.robot_id.empty() ? robot->robot_id : options.robot_id);
-  if (!recordings) return report(recordings.error());
-  if (!options.compare_by.empty())
-    return gap_between_groups(*recordings, *robot, options.compare_by, options.json, options.report,
-                              report_origin(options.logs, options.robot_file));
-  const auto diagnosis = [&] {
+// Of logs: the diagnosis, and what came of trying it on other missions.
+struct Judged {
+  gap::Diagnosis diagnosis;
+  Result<robot::RobotModel> extended;  // the robot file with what was found, or why it is not to be adopted
+  std::optional<energy::BackTest> test;
+};
+
+Result<Judged> judge(const Options& options, const telemetry::RecordingSet& recordings,
+                     const robot::RobotModel& robot) {
+  Result<gap::Diagnosis> diagnosis = [&] {
     Progress progress("diagnosing", "%", 100);
     gap::DiagnosisSettings settings;
+    settings.controls = options.controls.value_or(settings.controls);
+    settings.threads = std::max(1U, std::thread::hardware_concurrency());
     settings.progress = progress.shares();
-    return gap::diagnose(*recordings, *robot, settings);
+    return gap::diagnose(recordings, robot, settings);
   }();
-  if (!diagnosis) return report(diagnosis.error());
-  const auto extended = gap::with_effects(*robot, diagnosis->adoptable);
-  if (!extended) return report(extended.error());
-  std::optional<energy::BackTest> test;
-  if (!options.test.empty()) {
-    auto tested = test_of(options, *robot, *extended);
-    if (!tested) return report(tested.error());
-    test = std::move(*tested);
-  }
-  nlohmann::json document = gap::diagnosis_to_json(*diagnosis);
+  if (!diagnosis) return tl::unexpected(diagnosis.error());
+  const gap::Offer offer = gap::offer_of(*diagnosis);
+  Judged judged{std::move(*diagnosis), gap::take(offer, robot, {options.effect, options.force}),
+                std::nullopt};
+  if (options.test.empty()) return judged;
+  // A test asks what is found, whether or not it may be adopted.
+  const Result<robot::RobotModel> tried =
+      offer.effects.empty() ? robot : gap::take(offer, robot, {options.effect, true});
+  if (!tried) return tl::unexpected(of_option(tried.error(), "--test"));
+  auto tested = test_of(options, robot, *tried);
+  if (!tested) return tl::unexpected(tested.error());
+  judged.test = std::move(*tested);
+  return judged;
+}
+
+Exit apply(const Options& options, const Judged& judged) {
+  if (!judged.extended) return report(of_option(judged.extended.error(), "--apply"));
+  if (judged.test && !judged.test->improves() && !options.force)
+    return report(
+        {Fault::conflict, "--apply", "the back-test shows no improvement; --force writes it all the same"});
+  return write_robot(*judged.extended, options.apply);
+}
+
+Exit gap_of_logs(const Options& options, const robot::RobotModel& robot) {
+  const auto recordings =
+      telemetry::load_recordings(options.logs, options.robot_id.empty() ? robot.robot_id : options.robot_id);
+  if (!recordings) return report(recordings.error());
+  const gap::ReportOrigin origin = report_origin(options.logs, options.robot_file);
+  if (!options.compare_by.empty())
+    return gap_between_groups(*recordings, robot, options.compare_by, options.json, options.report, origin);
+  const Result<Judged> judged = judge(options, *recordings, robot);
+  if (!judged) return report(judged.error());
+  nlohmann::ordered_json document = gap::diagnosis_to_json(judged->diagnosis);
   if (options.json) {
-    if (test) document["back_test"] = energy::back_test_to_json(*test);
+    if (judged->test) document["back_test"] = energy::back_test_to_json(*judged->test);
     std::printf("%s\n", document.dump(2).c_str());
   } else {
     print_diagnosis(document);
-    if (test) print(*test);
+    if (judged->test) print(*judged->test);
   }
   if (!options.report.empty()) {
-    const auto page =
-        gap::report_html(*diagnosis, *recordings, *robot, report_origin(options.logs, options.robot_file));
+    const auto page = gap::report_html(judged->diagnosis, robot, origin);
     if (const auto written = write_file(options.report, page); !written) return report(written.error());
   }
-  if (options.apply.empty()) return Exit::ok;
-  if (test && !test->improves() && !options.force)
-    return report(
-        {Fault::infeasible, "--apply", "the back-test shows no improvement; --force writes it all the same"});
-  return write_robot(*extended, options.apply);
+  return options.apply.empty() ? Exit::ok : apply(options, *judged);
+}
+
+Exit run(const Options& options) {
+  for (const auto& [option, file] : {std::pair{"--report", &options.report}, {"--apply", &options.apply}})
+    if (const auto may = may_write(option, *file, options.force); !may) return report(may.error());
+  if (!options.server.empty()) {
+    return gap_from_server({options.server,
+                            options.robot_id,
+                            options.max_missions,
+                            options.report,
+                            options.apply,
+                            options.controls,
+                            {options.effect, options.force},
+                            options.json,
+                            options.adopt});
+  }
+  const auto robot = robot::load_robot(options.robot_file);
+  if (!robot) return report(robot.error());
+  if (options.missions.runs.empty()) return gap_of_logs(options, *robot);
+  GapMissionsOptions missions = options.missions;
+  missions.robot_file = options.robot_file;
+  missions.json = options.json;
+  missions.report = options.report;
+  missions.apply = options.apply;
+  return gap_from_missions(missions, *robot);
 }
 
 }  // namespace
@@ -154,7 +192,17 @@ void add_gap(CLI::App& program, Exit& exit) {
           "the mission id, up to its first '-', or of one suffix, from its last '_'")
       ->check(CLI::IsMember({"prefix", "suffix"}))
       ->excludes(missions);
-  command->add_option("--apply", options->apply, "write the robot file with the effects found");
+  command
+      ->add_option("--controls", options->controls,
+                   "surrogates of the recordings on which every finding is tried (default: 20); 0: none")
+      ->check(CLI::Range(0, 1000))
+      ->excludes(missions);
+  command->add_option(
+      "--apply", options->apply,
+      "write the robot file with what was found, or corrected where it is not this robot's; refused, "
+      "with the reason, where the diagnosis does not bear it out");
+  command->add_option("--effect", options->effect,
+                      "with --apply or --adopt: the one to take of effects that cannot be told apart");
   command
       ->add_option(
           "--test", options->test,
@@ -174,7 +222,10 @@ void add_gap(CLI::App& program, Exit& exit) {
       ->add_flag("--adopt", options->adopt,
                  "with --server: adopt what is found, after the daemon's back-test")
       ->needs(server);
-  command->add_flag("--force", options->force, "adopt or apply even when the back-test shows no improvement");
+  command->add_flag("--force", options->force,
+                    "adopt or apply in spite of the diagnosis's refusal or a back-test without improvement; "
+                    "write over files that are "
+                    "there");
   command->footer(run_columns_help());
   add_gap_trial(*command, exit);
   command->callback([options, command, logs, missions, robot, server, &exit] {

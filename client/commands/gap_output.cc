@@ -2,15 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <ctime>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "client/files.h"
 #include "client/wrapped.h"
-#include "gap/adopt.h"
-#include "gap/chart.h"
+#include "gap/verdict/adopt.h"
+#include "gap/verdict/diagnosis.h"
+#include "gap/verdict/words.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::client {
@@ -29,47 +32,45 @@ std::string text(const json& value) {
   return value.is_string() ? value.get<std::string>() : "";
 }
 
-std::string range_of(const json& region) {
-  if (region["from"].is_string()) return text(region["from"]);
-  std::string range = gap::brief_range(number(region["from"]), number(region["to"]));
+std::string degrees(double rad) {
+  return fmt::format("{:.3g} deg", rad * 180 / std::numbers::pi);
+}
+
+// "phase turning", "speed_m_s 0.2 to 0.4", with degrees where the variable is an angle.
+std::string region_words(const json& w) {
+  const std::string variable = text(w["variable"]);
+  if (w["from"].is_string()) return variable + " " + text(w["from"]);
+  const double from = number(w["from"]), to = number(w["to"]);
+  std::string range = gap::brief_range(from, to);
   constexpr std::string_view minus = "−";  // other figures of the command line have a hyphen
   for (auto at = range.find(minus); at != std::string::npos; at = range.find(minus, at))
     range.replace(at, minus.size(), "-");
-  return range;
+  if (variable.ends_with("_rad")) range += fmt::format(" ({} to {})", degrees(from), degrees(to));
+  if (variable.ends_with("_rad_s")) range += fmt::format(" ({} to {}/s)", degrees(from), degrees(to));
+  return variable + " " + range;
 }
 
-void print_shrinkage(const json& s) {
-  const double low = number(s["ci"][0]), high = number(s["ci"][1]);
-  fmt::print("held-out gap: {:.1f} % -> {:.1f} %, shrinks by {:.0f} % [{:.0f}, {:.0f}]",
-             100 * number(s["held_out_before"]), 100 * number(s["held_out_after"]),
-             100 * number(s["fraction"]), 100 * low, 100 * high);
-  if (s["remaining_over_noise_floor"].is_number())
-    fmt::print("; remaining is {:.1f} noise floors", number(s["remaining_over_noise_floor"]));
-  fmt::print("\n");
-  if (low < 0 && high >= 0) fmt::print("  that the effects help on missions left out is not sure\n");
+// A sentence as an item of a list.
+void print_item(const std::string& sentence) {
+  fmt::print("  - {}\n", wrapped(sentence, help_width(), 4));
 }
 
-}  // namespace
-
-void print_effect(const json& e) {
-  fmt::print("  {}: probability {:.2f}, closes {:.0f} % of the gap\n", text(e["id"]),
-             number(e["probability"]), 100 * number(e["share"]));
-  for (const bool estimated : {true, false}) {
-    for (const auto& [name, p] : e["parameters"].items()) {
-      if (p["sd"].is_number() != estimated) continue;
-      fmt::print("    {} = {:.4g}{}{}\n", name, number(p["value"]),
-                 estimated ? fmt::format(" +- {:.2g}", number(p["sd"])) : "",
-                 p["unit"] == "1" ? "" : " " + text(p["unit"]));
-    }
-  }
-  for (const json& other : e["alternatives"]) fmt::print("    cannot be told from {}\n", text(other));
+json array_of(const json& d, const char* name) {
+  return d.value(name, json::array());
 }
 
-void print_diagnosis(const json& d) {
-  fmt::print(
-      "{}: {} missions, {} samples{}\n", text(d["robot_id"]), d["missions"].get<std::size_t>(),
-      d["samples"].get<std::size_t>(),
-      d["motor_channels"] == true ? "" : " (no motor channels: judged from battery power and motion alone)");
+void print_checks(const json& d) {
+  for (const json& note : array_of(d, "notes"))
+    fmt::print("note: {}\n", wrapped(text(note), help_width(), 2));
+  const json checks = array_of(d, "checks");
+  if (checks.empty()) return;
+  fmt::print("checks of the recordings:\n");
+  for (const json& check : checks)
+    print_item(text(check["says"]) +
+               (check["contradicted"] == true ? " It takes no part in what follows." : ""));
+}
+
+void print_gap(const json& d) {
   if (d["power"] == gap::name_of(gap::PowerSource::none)) {
     fmt::print("gap: no power was recorded; judged from torques\n");
   } else {
@@ -80,23 +81,135 @@ void print_diagnosis(const json& d) {
                    ? ", of the motors' power with the file's idle power"
                    : "");
   }
-  fmt::print("verdict: {} (probability {:.2f})\n", text(d["verdict"]), number(d["verdict_probability"]));
-  for (const json& reason : d.value("reasons", json::array()))
-    fmt::print("  {}\n", wrapped(text(reason), help_width(), 2));
-  for (const json& e : d["effects"]) print_effect(e);
-  if (!d["effects"].empty()) print_shrinkage(d["shrinkage"]);
-  if (!d["where"].empty()) fmt::print("where:\n");
-  for (std::size_t k = 0; k < d["where"].size() && k < most_regions; ++k) {
-    const json& w = d["where"][k];
-    fmt::print("  {}, {} {}: {:+.0f} % of the gap [{:.0f}, {:.0f}]\n", text(w["channel"]),
-               text(w["variable"]), range_of(w), 100 * number(w["share"]), 100 * number(w["ci"][0]),
-               100 * number(w["ci"][1]));
+  std::string others;
+  const json channels = d.value("channels", json::object());
+  for (const auto& [name, gap] : channels.items()) {
+    if (name == "battery_power") continue;
+    others += fmt::format("{}{} {:.1f} % ({:.1f} %)", others.empty() ? "" : ", ", name,
+                          100 * number(gap["absolute_relative"]), 100 * number(gap["noise_floor"]));
   }
+  if (!others.empty()) fmt::print("other readings: {}\n", others);
+}
+
+void print_controls(const json& controls) {
+  if (!controls.is_object()) return;
+  fmt::print("    named in {} of {} surrogates of these recordings without it\n",
+             controls["named_in"].get<std::size_t>(), controls["surrogates"].get<std::size_t>());
+}
+
+void print_shrinkage(const json& s) {
+  const double low = number(s["ci"][0]), high = number(s["ci"][1]);
+  fmt::print("held-out gap: {:.1f} % -> {:.1f} %, shrinks by {:.0f} % [{:.0f}, {:.0f}]",
+             100 * number(s["held_out_before"]), 100 * number(s["held_out_after"]),
+             100 * number(s["fraction"]), 100 * low, 100 * high);
+  if (s["remaining_over_noise_floor"].is_number())
+    fmt::print("; remaining is {:.1f} noise floors", number(s["remaining_over_noise_floor"]));
+  if (s.value("parts", 0) > 0)
+    fmt::print("; named alike in {} of {} fits that leave a part out", s["agreeing"].get<int>(),
+               s["parts"].get<int>());
+  fmt::print("\n");
+  if (low < 0 && high >= 0) fmt::print("  that the effects help on missions left out is not sure\n");
+}
+
+void print_baseline(const json& d) {
+  const json baseline = d.value("baseline", json());
+  if (!baseline.is_object()) return;
+  fmt::print(
+      "on parts left out: a plain regression misses {:.1f} % of the power, this explanation {:.1f} %, the "
+      "robot "
+      "file {:.1f} %\n",
+      100 * number(baseline["held_out"]), 100 * number(baseline["explanation_held_out"]),
+      100 * number(baseline["unchanged_model_held_out"]));
+  const json reasons = array_of(d, "reasons");
+  for (const json& says : baseline["says"])
+    if (std::ranges::find(reasons, says) == reasons.end()) print_item(text(says));
+}
+
+void print_corrections(const json& d) {
+  const json corrections = array_of(d, "corrections");
+  if (corrections.empty()) return;
+  fmt::print("what would fit in the robot file:\n");
+  for (const json& c : corrections)
+    fmt::print("  {} {:.4g} +- {:.2g} instead of {:.4g}\n", text(c["parameter"]), number(c["fits"]),
+               number(c["sd"]), number(c["file"]));
+}
+
+void print_where(const json& regions) {
+  if (!regions.empty()) fmt::print("where:\n");
+  for (std::size_t k = 0; k < regions.size() && k < most_regions; ++k) {
+    const json& w = regions[k];
+    fmt::print("  {}, {}: {:+.0f} % of the gap [{:.0f}, {:.0f}]", text(w["channel"]), region_words(w),
+               100 * number(w["share"]), 100 * number(w["ci"][0]), 100 * number(w["ci"][1]));
+    if (w.contains("time_share")) fmt::print(" in {:.0f} % of the time", 100 * number(w["time_share"]));
+    fmt::print("\n");
+  }
+}
+
+void print_adoption(const json& d) {
+  const json adoption = d.value("adoption", json());
+  if (!adoption.is_object() || adoption["effects"].empty()) return;
+  if (adoption["refusal"].is_string())
+    fmt::print("not to be adopted: {}{}\n", wrapped(text(adoption["refusal"]), help_width(), 2),
+               adoption["choice_settles"] == true ? " with --effect" : "");
+}
+
+}  // namespace
+
+void print_effect(const json& e) {
+  fmt::print("  {}: probability {:.2f}, closes {:.0f} % of the gap", text(e["id"]), number(e["probability"]),
+             100 * number(e["share"]));
+  if (number(e.value("power_w", json())) > 0) fmt::print(", {:.3g} W", number(e["power_w"]));
+  fmt::print("\n");
+  for (const bool estimated : {true, false}) {
+    for (const auto& [name, p] : e["parameters"].items()) {
+      if (p["sd"].is_number() != estimated) continue;
+      const double value = number(p["value"]);
+      fmt::print("    {} = {:.4g}{}{}{}\n", name, value,
+                 estimated ? fmt::format(" +- {:.2g}", number(p["sd"])) : "",
+                 p["unit"] == "1" ? "" : " " + text(p["unit"]),
+                 p["unit"] == "rad" ? fmt::format(" ({})", degrees(value)) : "");
+    }
+  }
+  print_controls(e.value("controls", json()));
+  for (const json& other : e["alternatives"]) fmt::print("    cannot be told from {}\n", text(other));
+  if (const std::string look = text(e.value("workshop", json())); !look.empty())
+    fmt::print("    to check: {}\n", wrapped(look, help_width(), 6));
+}
+
+void print_diagnosis(const json& d) {
+  fmt::print(
+      "{}: {} missions, {} samples{}\n", text(d["robot_id"]), d["missions"].get<std::size_t>(),
+      d["samples"].get<std::size_t>(),
+      d["motor_channels"] == true ? "" : " (no motor channels: judged from battery power and motion alone)");
+  print_checks(d);
+  print_gap(d);
+  fmt::print("verdict: {} (probability {:.2f})\n", text(d["verdict"]), number(d["verdict_probability"]));
+  for (const json& reason : array_of(d, "reasons")) print_item(text(reason));
+  for (const json& e : d["effects"]) print_effect(e);
+  if (text(d["outside"]["channel"]) != "") {
+    fmt::print("  outside the catalogue: {} follows {}, probability {:.2f}\n", text(d["outside"]["channel"]),
+               text(d["outside"]["follows"]), number(d["outside"]["probability"]));
+    print_controls(d["outside"].value("controls", json()));
+  }
+  if (!d["effects"].empty()) print_shrinkage(d["shrinkage"]);
+  print_baseline(d);
+  print_corrections(d);
+  print_where(d["where"]);
   for (const json& n : d["next_drive"]) {
     const json& evidence = n["expected_log_evidence"];
     fmt::print("next drive, to tell {}: {}{}\n", text(n["separates"]), text(n["manoeuvre"]),
                evidence.is_null() ? "" : fmt::format(" (log evidence +{:.1f})", number(evidence)));
   }
+  print_adoption(d);
+}
+
+Error of_option(Error error, const std::string& option) {
+  if (error.fault == Fault::conflict) {
+    error.message = "refused: " + error.message;
+    if (error.field.empty()) error.message += "; --force overrides it";
+  }
+  error.field = error.field == "effect" ? "--effect" : option;
+  return error;
 }
 
 Exit write_adopted(std::span<const robot::AdoptedEffect> found, robot::RobotModel robot,

@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "client/commands/outcome.h"
-#include "gap/diagnosis.h"
-#include "gap/report.h"
+#include "gap/report/report.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::client {
@@ -17,6 +16,9 @@ void print_effect(const nlohmann::json& effect);
 
 // A diagnosis of recordings as its JSON tells it, offline or by a daemon.
 void print_diagnosis(const nlohmann::json& diagnosis);
+
+// What is wrong with adopting, as of the option that asked for it; a choice among effects is --effect's.
+Error of_option(Error error, const std::string& option);
 
 // Writes the robot file with the effects found next to those it has.
 Exit write_adopted(std::span<const robot::AdoptedEffect> found, robot::RobotModel robot,

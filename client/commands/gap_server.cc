@@ -6,13 +6,15 @@
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
 
 #include "client/commands/gap_output.h"
-#include "client/commands/table.h"
 #include "client/files.h"
 #include "client/http_client.h"
 #include "client/interrupt.h"
 #include "client/progress.h"
+#include "robot/robot_file.h"
 
 namespace joulecast::client {
 namespace {
@@ -46,10 +48,14 @@ double number(const json& value) {
   return value.is_number() ? value.get<double>() : std::nan("");
 }
 
+std::string target_of(const json& job, const char* part = "") {
+  return fmt::format("/v1/diagnoses/{}{}", job["id"].get<std::int64_t>(), part);
+}
+
 Result<json> follow(const Daemon& daemon, json job) {
   InterruptGuard interrupt;
   Progress progress("diagnosing", "%", 100);
-  const std::string target = fmt::format("/v1/diagnoses/{}", job["id"].get<std::int64_t>());
+  const std::string target = target_of(job);
   while (job["state"] == "queued" || job["state"] == "running") {
     progress.reach(static_cast<std::uint64_t>(100 * number(job["progress"])));
     if (interrupt.wait_until(std::chrono::steady_clock::now() + between_looks)) {
@@ -86,50 +92,72 @@ void print_test(const json& test) {
              100 * number(test["power_gap_before"]), 100 * number(test["power_gap_after"]));
 }
 
+Result<void> write_report(const Daemon& daemon, const json& job, const std::string& path) {
+  const auto page = daemon.ask(HttpMethod::get, target_of(job, "/report"));
+  return page ? write_file(path, page->body) : tl::unexpected(page.error());
+}
+
+// The robot file that was diagnosed, with what was found.
+Result<void> write_model(const Daemon& daemon, const GapServerOptions& options, const json& job) {
+  const Result<gap::Offer> offer = gap::offer_from_json(job["result"]);
+  if (!offer) return tl::unexpected(offer.error());
+  const auto now = daemon.json_of(HttpMethod::get, "/v1/robots/" + options.robot_id);
+  if (!now) return tl::unexpected(now.error());
+  if ((*now)["model_version"] != job["model_version"])
+    return fail(Fault::conflict, "--apply", "another version of the model came in force meanwhile");
+  const auto robot = robot::read_robot((*now)["model"]);
+  if (!robot) return tl::unexpected(robot.error());
+  const auto extended = gap::take(*offer, *robot, options.choice);
+  if (!extended) return tl::unexpected(of_option(extended.error(), "--apply"));
+  return write_file(options.apply, robot::to_json_text(*extended) + '\n');
+}
+
+// What came of adopting; Fault::conflict where the daemon refuses.
 Result<json> adopt(const Daemon& daemon, const GapServerOptions& options, const json& job) {
-  return daemon.json_of(HttpMethod::post, "/v1/robots/" + options.robot_id + "/model",
-                        {{"diagnosis_id", job["id"]}, {"force", options.force}});
+  json wanted = {{"diagnosis_id", job["id"]}, {"force", options.choice.force}};
+  if (!options.choice.effects.empty()) wanted["effect"] = options.choice.effects;
+  return daemon.json_of(HttpMethod::post, "/v1/robots/" + options.robot_id + "/model", wanted);
+}
+
+void print_adoption(const json& adoption) {
+  if (adoption.contains("back_test")) print_test(adoption["back_test"]);
+  if (adoption.value("adopted", false))
+    fmt::print("adopted as model version {}\n", adoption["model_version"].get<std::int64_t>());
 }
 
 Result<Exit> carry_out(const GapServerOptions& options) {
   const auto address = parse_server_url(options.server);
   if (!address) return tl::unexpected(address.error());
   const Daemon daemon{*address};
-  auto begun = daemon.json_of(HttpMethod::post, "/v1/diagnoses",
-                              {{"robot_id", options.robot_id}, {"max_missions", options.max_missions}});
+  json wanted = {{"robot_id", options.robot_id}, {"max_missions", options.max_missions}};
+  if (options.controls) wanted["controls"] = *options.controls;
+  auto begun = daemon.json_of(HttpMethod::post, "/v1/diagnoses", wanted);
   if (!begun) return tl::unexpected(begun.error());
-  auto job = follow(daemon, std::move(*begun));
+  const auto job = follow(daemon, std::move(*begun));
   if (!job) return tl::unexpected(job.error());
   if (!options.report.empty()) {
-    const auto page =
-        daemon.ask(HttpMethod::get, fmt::format("/v1/diagnoses/{}/report", (*job)["id"].get<std::int64_t>()));
-    if (!page) return tl::unexpected(page.error());
-    if (const auto written = write_file(options.report, page->body); !written)
+    if (const auto written = write_report(daemon, *job, options.report); !written)
       return tl::unexpected(written.error());
   }
-  if (!options.apply.empty()) {
-    if ((*job)["model"].is_null()) return fail(Fault::infeasible, "--apply", "nothing was found to adopt");
-    if (const auto written = write_file(options.apply, (*job)["model"].dump(2) + '\n'); !written)
-      return tl::unexpected(written.error());
-  }
+  if (!options.json) print_result(*job);
   json out = (*job)["result"];
   out["diagnosis_id"] = (*job)["id"];
-  if (!options.json) print_result(*job);
-  Exit exit = Exit::ok;
+  std::vector<Error> refusals;
+  if (!options.apply.empty()) {
+    if (const auto written = write_model(daemon, options, *job); !written)
+      refusals.push_back(written.error());
+  }
   if (options.adopt) {
-    if ((*job)["model"].is_null()) return fail(Fault::infeasible, "--adopt", "nothing was found to adopt");
     const auto adoption = adopt(daemon, options, *job);
     if (!adoption) return tl::unexpected(adoption.error());
-    out["adoption"] = *adoption;
-    const bool adopted = adoption->value("adopted", false);
-    if (!adopted) exit = report({Fault::infeasible, "--adopt", adoption->value("detail", "was refused")});
-    if (!options.json) {
-      if (adoption->contains("back_test")) print_test((*adoption)["back_test"]);
-      if (adopted)
-        fmt::print("adopted as model version {}\n", (*adoption)["model_version"].get<std::int64_t>());
-    }
+    out["adopted"] = *adoption;
+    if (!options.json) print_adoption(*adoption);
+    if (!adoption->value("adopted", false))
+      refusals.push_back({Fault::conflict, "--adopt", adoption->value("detail", "was refused")});
   }
   if (options.json) std::puts(out.dump(2).c_str());
+  Exit exit = Exit::ok;
+  for (const Error& refusal : refusals) exit = report(refusal);
   return exit;
 }
 
@@ -141,6 +169,7 @@ Exit gap_from_server(const GapServerOptions& options) {
   Error error = done.error();
   if (error.field == "/robot_id") error.field = "--robot-id";
   if (error.field == "/max_missions") error.field = "--max-missions";
+  if (error.field == "/effect") error.field = "--effect";
   return report(error);
 }
 

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 
 #include "client/commands/outcome.h"
+#include "gap/verdict/offer.h"
 
 namespace joulecast::client {
 
@@ -11,11 +13,12 @@ struct GapServerOptions {
   std::string server;
   std::string robot_id;
   std::size_t max_missions = 200;
-  std::string report;  // file for the HTML report; empty: none
-  std::string apply;   // file for the robot file with the effects found; empty: none
+  std::string report;                   // file for the HTML report; empty: none
+  std::string apply;                    // file for the robot file with the effects found; empty: none
+  std::optional<std::size_t> controls;  // absent: as the daemon's settings have it
+  gap::Choice choice;                   // of effects that cannot be told apart; by force also what is refused
   bool json = false;
   bool adopt = false;  // in the daemon, after a back-test
-  bool force = false;  // adopt even when the back-test shows no improvement
 };
 
 // Has a daemon diagnose its own history of a robot, follows the job and tells what came of it. An interrupt

@@ -275,8 +275,7 @@ Exit run(const Options& options, bool lcm_asked) {
          "above 1 needs an end, so that no stamp lies in the future: give --duration or --missions"});
   }
   for (const auto& [flag, file] : {std::pair{"--log", &options.log}, {"--truth", &options.truth}})
-    if (!options.force && std::filesystem::is_regular_file(*file))
-      return report({Fault::conflict, flag, *file + " is there already; --force writes over it"});
+    if (const auto may = may_write(flag, *file, options.force); !may) return report(may.error());
   auto members = assemble(options);
   if (!members) return report(members.error());
 

@@ -42,6 +42,7 @@ constexpr auto table = std::to_array<Named>({
     {"simulate", "--truth", "FILE", "*.json"},
     {"gap", "--missions", "FILE", "*.csv"},
     {"gap", "--apply", "FILE", "*.json"},
+    {"gap", "--effect", "ID", ""},
     {"gap", "--report", "FILE", "*.html"},
     {"gap", "--test", "FILE", "*.lcmlog"},
     {"gap trial", "--keep", "FOLDER", "/"},
@@ -87,6 +88,7 @@ std::vector<std::string> ids(std::span<const virtual_robot::EffectEntry> effects
 
 std::vector<std::string> special_words(std::string_view command, std::string_view option) {
   if (command == "simulate" && option == "--effect") return ids(virtual_robot::all_effects(), "=");
+  if (command == "gap" && option == "--effect") return ids(virtual_robot::effect_table(), "");
   if (command == "gap trial" && option == "--only") {
     std::vector<std::string> words = ids(virtual_robot::effect_table(), "");
     words.insert(words.begin(), {"none", "single", "double", "outside"});

@@ -59,7 +59,7 @@ def cell(text):
 def fields(document, schema, prefix="", depth=3):
     """Rows of a table of an object's fields, those of objects within it after theirs; nothing for what is no object."""
     schema = resolve(document, schema)
-    if not prefix and "anyOf" in schema:  # the first form of several answers is the one described
+    if "anyOf" in schema:  # the first form of several, or of what may be null, is the one described
         schema = resolve(document, schema["anyOf"][0])
     required = set(schema.get("required", ()))
     rows = []

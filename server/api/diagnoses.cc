@@ -19,6 +19,7 @@ using http::Response;
 using nlohmann::json;
 
 constexpr std::size_t most_missions = 1000;  // of one request
+constexpr std::size_t most_controls = 1000;
 constexpr double most_held_back = 0.9;
 
 enum class Detail { list, whole };
@@ -81,6 +82,8 @@ Result<Response> start(Services& services, const Request& request) {
   wanted.since_utime_us = fields.optional_integer("since_utime_us", 0, std::int64_t{1} << 53);
   wanted.max_missions = static_cast<std::size_t>(
       fields.integer("max_missions", 1, static_cast<std::int64_t>(most_missions), 200));
+  if (const auto controls = fields.optional_integer("controls", 0, static_cast<std::int64_t>(most_controls)))
+    wanted.controls = static_cast<std::size_t>(*controls);
   wanted.hold_back = fields.number("hold_back", {0, most_held_back}, wanted.hold_back);
   if (Result<void> read = fields.finish(); !read) return tl::unexpected(std::move(read.error()));
   if (const auto known = model_of(services, wanted.robot_id, "/robot_id"); !known)

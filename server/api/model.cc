@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -6,6 +7,7 @@
 #include "server/api/fields.h"
 #include "server/api/json_writer.h"
 #include "server/api/services.h"
+#include "server/diagnosis/diagnosed_model.h"
 #include "server/diagnosis/model_adoption.h"
 #include "server/http/problem.h"
 
@@ -21,21 +23,37 @@ using nlohmann::json;
 
 constexpr std::int64_t greatest_id = std::int64_t{1} << 53;  // what JSON numbers hold exactly
 constexpr std::size_t longest_note = 1000;
+constexpr std::size_t most_effects = 16;
 
 // The body of POST /v1/robots/{id}/model: what to adopt, one of four, and how.
 struct ModelRequest {
   const json* model = nullptr;
   std::optional<std::int64_t> diagnosis_id, proposal_id, version;
+  std::vector<std::string> effects;  // of those that the diagnosis does not tell apart, the ones to adopt
   std::optional<std::string> note;
   std::optional<std::int64_t> since_utime_us, expected_version;
   bool force = false, dry_run = false;
 };
+
+std::vector<std::string> read_effects(Fields& fields) {
+  const json* given = fields.member("effect");
+  if (given == nullptr) return {};
+  const json ids = given->is_string() ? json::array({*given}) : *given;
+  const auto is_text = [](const json& id) { return id.is_string(); };
+  if (!ids.is_array() || ids.size() > most_effects || !std::ranges::all_of(ids, is_text)) {
+    fields.fault("effect",
+                 "must be the id of an effect, or an array of at most " + std::to_string(most_effects));
+    return {};
+  }
+  return ids.get<std::vector<std::string>>();
+}
 
 Result<ModelRequest> read_request(const json& body) {
   Fields fields(body);
   ModelRequest r;
   r.model = fields.member("model");
   r.diagnosis_id = fields.optional_integer("diagnosis_id", 1, greatest_id);
+  r.effects = read_effects(fields);
   r.proposal_id = fields.optional_integer("proposal_id", 1, greatest_id);
   r.version = fields.optional_integer("version", 1, greatest_id);
   r.since_utime_us = fields.optional_integer("since_utime_us", 0, greatest_id);
@@ -48,6 +66,8 @@ Result<ModelRequest> read_request(const json& body) {
   if (fields.ok() && given != 1)
     fields.fault("model", "exactly one of model, diagnosis_id, proposal_id and version must be given, not " +
                               std::to_string(given));
+  if (fields.ok() && !r.effects.empty() && !r.diagnosis_id)
+    fields.fault("effect", "goes with diagnosis_id alone");
   if (fields.ok() && r.version && (r.force || r.dry_run || r.since_utime_us))
     fields.fault("version",
                  "is put in force without a back-test: leave out force, dry_run and since_utime_us");
@@ -84,7 +104,14 @@ Result<server::AdoptionRequest> adoption_of(const Services& services, const std:
   } else if (r.diagnosis_id) {
     Result<history::DiagnosisRecord> diagnosis = services.store.diagnosis(*r.diagnosis_id);
     if (!diagnosis) return tl::unexpected(std::move(diagnosis.error()));
-    model = candidate_of(diagnosis->model_json, robot_id, diagnosis->robot_id, "diagnosis_id");
+    if (diagnosis->robot_id != robot_id)
+      return invalid("/diagnosis_id", "belongs to robot " + diagnosis->robot_id + ", not to " + robot_id);
+    // To be tested it need not be fit for adoption.
+    Result<server::DiagnosedModel> diagnosed =
+        server::diagnosed_model(services.store, *diagnosis, {r.effects, r.force || r.dry_run});
+    if (!diagnosed) return tl::unexpected(std::move(diagnosed.error()));
+    model = std::move(diagnosed->model);
+    adoption.overridden = std::move(diagnosed->overridden);
     adoption.origin = history::ModelOrigin::diagnosis;
     adoption.note = r.note.value_or("diagnosis " + std::to_string(*r.diagnosis_id));
     fitted_on = std::move(diagnosis->fitted_on);

@@ -14,10 +14,10 @@
 #include <thread>
 #include <utility>
 
-#include "gap/adopt.h"
-#include "gap/diagnosis.h"
-#include "gap/diagnosis_json.h"
-#include "gap/report.h"
+#include "gap/diagnose/recordings.h"
+#include "gap/report/report.h"
+#include "gap/verdict/diagnosis_json.h"
+#include "gap/verdict/offer.h"
 #include "robot/robot_file.h"
 #include "server/diagnosis/gap_watch.h"
 #include "server/diagnosis/mission_recordings.h"
@@ -28,6 +28,7 @@ namespace {
 using history::DiagnosisRecord;
 using history::DiagnosisState;
 using nlohmann::json;
+using nlohmann::ordered_json;
 
 // Nice level of the working thread: everything that answers somebody goes first.
 constexpr int low_priority = 10;
@@ -44,13 +45,14 @@ json request_json(const DiagnosisRequest& request) {
   json text = {{"max_missions", request.max_missions}, {"hold_back", request.hold_back}};
   if (!request.missions.empty()) text["missions"] = request.missions;
   if (request.since_utime_us) text["since_utime_us"] = *request.since_utime_us;
+  if (request.controls) text["controls"] = *request.controls;
   return text;
 }
 
 // What lists show of a result: the verdict, the effects and how far the gap shrinks.
-json summary_of(const json& result) {
+json summary_of(const ordered_json& result) {
   json effects = json::array();
-  for (const json& effect : result["effects"])
+  for (const ordered_json& effect : result["effects"])
     effects.push_back(
         {{"id", effect["id"]}, {"probability", effect["probability"]}, {"share", effect["share"]}});
   return {{"verdict", result["verdict"]},
@@ -293,35 +295,47 @@ class DiagnosisService::Impl {
       }
     }
     history->missions.clear();
-    Result<telemetry::RecordingSet> set = telemetry::make_recording_set(record.robot_id, std::move(recordings));
+    Result<telemetry::RecordingSet> set =
+        telemetry::make_recording_set(record.robot_id, std::move(recordings));
     if (!set) return tl::unexpected(std::move(set.error()));
     gap::DiagnosisSettings settings;
+    settings.controls = request.controls.value_or(options_.controls);
+    settings.threads = options_.threads;
     settings.progress = [&job](double fraction) {
       job.fraction = fraction;
       return !job.cancelled.load();
     };
     Result<gap::Diagnosis> diagnosis = gap::diagnose(*set, model->robot, settings);
     if (!diagnosis) return tl::unexpected(std::move(diagnosis.error()));
-    json result = gap::diagnosis_to_json(*diagnosis);
-    result["model_version"] = model->version;
-    result["since_utime_us"] = wanted.since_utime_us ? json(*wanted.since_utime_us) : json(nullptr);
+    tell(job, *diagnosis, *set, *model, wanted.since_utime_us);
+    return {};
+  }
+
+  // Result, summary, report and model of a diagnosis.
+  void tell(Job& job, const gap::Diagnosis& diagnosis, const telemetry::RecordingSet& recordings,
+            const ModelInForce& model, std::optional<std::int64_t> since_utime_us) {
+    DiagnosisRecord& record = job.record;
+    ordered_json result = gap::diagnosis_to_json(diagnosis);
+    result["model_version"] = model.version;
+    result["since_utime_us"] = since_utime_us ? ordered_json(*since_utime_us) : ordered_json(nullptr);
     record.result_json = result.dump();
     record.summary_json = summary_of(result).dump();
     gap::ReportOrigin origin;
-    for (const telemetry::Recording& mission : set->missions) origin.sources.push_back(mission.mission_id);
-    origin.model = "version " + std::to_string(model->version) + " of " + record.robot_id;
+    for (const telemetry::Recording& mission : recordings.missions)
+      origin.sources.push_back(mission.mission_id);
+    origin.model = "version " + std::to_string(model.version) + " of " + record.robot_id;
     origin.made_at = utc_text(now_utime_us_());
     origin.software = "joulecastd " JOULECAST_VERSION;
-    report_ = gap::report_html(*diagnosis, *set, model->robot, origin);
-    if (!diagnosis->adoptable.empty()) {
-      Result<robot::RobotModel> extended = gap::with_effects(model->robot, diagnosis->adoptable);
-      if (extended) {
-        record.model_json = robot::to_json_text(*extended);
-      } else {
-        on_error_(extended.error());
-      }
+    report_ = gap::report_html(diagnosis, model.robot, origin);
+    // What a person who insists would get; of effects that are not told apart nobody has chosen one yet.
+    const gap::Offer offer = gap::offer_of(diagnosis);
+    if (offer.effects.empty()) return;
+    const Result<robot::RobotModel> extended = gap::take(offer, model.robot, {{}, true});
+    if (extended) {
+      record.model_json = robot::to_json_text(*extended);
+    } else if (extended.error().fault != Fault::conflict) {
+      on_error_(extended.error());
     }
-    return {};
   }
 
   void finish(Job& job, DiagnosisState state, std::string error, std::string report) {

@@ -19,6 +19,8 @@ struct DiagnosisOptions {
   std::size_t queue = 32;             // jobs that may wait; beyond: Fault::unavailable
   std::size_t max_missions = 200;     // of one job, newest first
   std::size_t max_samples = 500'000;  // of one job: bounds its memory and time
+  std::size_t controls = 20;          // surrogates on which every finding is tried, unless a request says so
+  std::size_t threads = 1;            // that these may take
 };
 
 struct DiagnosisRequest {
@@ -27,6 +29,7 @@ struct DiagnosisRequest {
   // Of the newest, those that started from then on; absent: from the robot's last drift on, where it had one.
   std::optional<std::int64_t> since_utime_us;
   std::size_t max_missions = 200;
+  std::optional<std::size_t> controls;
   double hold_back = 0.25;  // share of the missions left for a back-test; one at least of three or more
   history::DiagnosisCause cause = history::DiagnosisCause::request;
 };

@@ -149,7 +149,9 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
   if (request.dry_run) return adoption;
   if (!adoption.refusal.empty() && !request.force) return ++refused_, adoption;
 
-  json evidence = {{"back_test", report}, {"forced", !adoption.refusal.empty()}};
+  const bool forced = !adoption.refusal.empty() || !request.overridden.empty();
+  json evidence = {{"back_test", report}, {"forced", forced}};
+  if (!request.overridden.empty()) evidence["overridden"] = request.overridden;
   if (request.diagnosis_id) evidence["diagnosis_id"] = *request.diagnosis_id;
   if (request.proposal_id) evidence["proposal_id"] = *request.proposal_id;
   history::AddModel command;
@@ -169,7 +171,7 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
     adoption.version = *version;
   }
   adoption.adopted = true;
-  ++(adoption.refusal.empty() ? adopted_ : forced_);
+  ++(forced ? forced_ : adopted_);
   evidence.erase("back_test");
   evidence.update({{"model_version", adoption.version},
                    {"previous_version", adoption.previous_version},

@@ -103,6 +103,7 @@ TEST_F(CommandLine, CompletesEffectsUpToTheirStrength) {
   EXPECT_THAT(complete({"simulate", "--effect", ""}), Each(EndsWith("=")));
   EXPECT_THAT(complete({"simulate", "--effect", "coul"}), ElementsAre("coulomb_friction="));
   EXPECT_THAT(complete({"gap", "trial", "--only", "coul"}), ElementsAre("coulomb_friction"));
+  EXPECT_THAT(complete({"gap", "--effect", "coul"}), ElementsAre("coulomb_friction"));
 }
 
 TEST_F(CommandLine, CompletesFilesOfTheKindThatIsAsked) {

@@ -468,8 +468,47 @@ await check('a diagnosis is started by keyboard, followed and read', async () =>
   equal(held_back.length, 2, 'missions held back');
   const row = page.locator('.effects tbody tr').first();
   await row.getByText('coulomb friction').waitFor();
-  equal(number((await row.locator('td.figure').last().textContent())), Math.round(100 * result.effects[0].share), 'what it closes');
+  equal(number((await row.locator('td.figure').nth(1).textContent())), Math.round(100 * result.effects[0].share), 'what it closes');
+  equal(await row.locator('td.figure').last().textContent(), `${result.effects[0].controls.named_in} of ${result.effects[0].controls.surrogates}`, 'controls');
+  const misses = (await page.locator('.referee td.figure').allTextContents()).map(number);
+  equal(misses.join(), [result.baseline.held_out, result.baseline.explanation_held_out, result.baseline.unchanged_model_held_out].map((v) => Math.round(1000 * v) / 10).join(), 'beside a plain regression');
   expect((await page.locator('.where tbody tr').count()) >= 5, 'regions');
+});
+
+await check('a diagnosis shows its checks, what would fit, and effects to choose among', async () => {
+  const job = await get(`/v1/diagnoses/${diagnosis}`);
+  const refused = { ...job, result: { ...job.result, verdict: 'not_this_robot',
+    checks: [{ id: 'battery_current_reversed', channel: 'battery_current', value: -1, interval: [-1.1, -0.9], says: 'The battery current is reversed.', contradicted: true }],
+    corrections: [{ parameter: 'idle_power_w', file: 20, fits: 31, sd: 0.4 }],
+    adoption: { refusal: 'coulomb_friction is not told from viscous_friction: name the one to adopt', choice_settles: true, corrects_file: true,
+      effects: [{ id: 'coulomb_friction', parameters: { ratio: 0.5 }, instead: [{ id: 'viscous_friction', parameters: { ratio: 3 } }, { id: 'turning_scrub', parameters: {} }] }] } } };
+  await page.route(`**/v1/diagnoses/${diagnosis}`, (route) => route.fulfill({ json: refused }));
+  await go(page, '#/gap');
+  await go(page, `#/gap/${diagnosis}`);
+  await page.getByText('The battery current is reversed.').waitFor();
+  await page.getByText('It takes no part in what follows.').waitFor();
+  await page.getByText('31.00 ± 0.40').waitFor();
+  const choice = page.getByRole('combobox', { name: 'Which of those not told apart' });
+  equal((await choice.locator('option').allTextContents()).join(), 'choose one,coulomb friction,viscous friction', 'effects of known strength');
+  expect(await page.getByRole('button', { name: 'Adopt', exact: true }).isDisabled(), 'nothing is adopted before one is chosen');
+  await choice.selectOption('viscous_friction');
+  const asked = page.waitForRequest(`**/v1/robots/worn-01/model`);
+  await page.route(`**/v1/robots/worn-01/model`, (route) => route.fulfill({ status: 409, json: { status: 409, title: 'Conflict', detail: 'told by the test' } }));
+  faults_wanted = true;
+  await page.getByRole('button', { name: 'Adopt', exact: true }).click();
+  equal((await asked).postDataJSON().effect.join(), 'viscous_friction', 'what is asked for');
+  await page.getByText('told by the test').waitFor();
+  faults_wanted = false;
+  await page.unroute(`**/v1/robots/worn-01/model`);
+  Object.assign(refused.result.adoption, { refusal: 'the verdict is inconclusive', choice_settles: false });
+  refused.result.adoption.effects[0].instead = [];
+  await go(page, '#/gap');
+  await go(page, `#/gap/${diagnosis}`);
+  await page.getByText('Not to be adopted:').waitFor();
+  equal(await page.getByRole('button', { name: 'Adopt', exact: true }).count(), 0, 'buttons to adopt what is refused');
+  await page.getByRole('button', { name: 'Adopt all the same' }).waitFor();
+  await page.unroute(`**/v1/diagnoses/${diagnosis}`);
+  await go(page, '#/gap');
 });
 
 let outside = 0;
@@ -479,7 +518,7 @@ await check('a diagnosis says why it is not sure', async () => {
   await page.getByText('Outside the catalogue').waitFor({ timeout: 120_000 });
   const { result } = await get(`/v1/diagnoses/${outside}`);
   equal(result.outside.follows, 'wheel_angle', 'what it follows');
-  equal(await page.locator('.reasons li').first().textContent(), result.reasons[0], 'the reason');
+  equal(await page.locator('.verdict-box .reasons li').first().textContent(), result.reasons[0], 'the reason');
   expect(result.reasons[0].includes('repeats with the turning of a wheel'), result.reasons[0]);
 });
 

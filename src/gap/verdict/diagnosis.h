@@ -43,6 +43,8 @@ struct DiagnosedEffect {
   double power_w = 0;                     // mean |change of battery power|
   double varies = 0;                      // of its strength along the recordings, sd over the strength
   std::vector<std::string> alternatives;  // that these data cannot tell from it
+  // Those of them that a robot file can take, each with the strength that it has in this one's place.
+  std::vector<robot::AdoptedEffect> instead;
   std::optional<Controls> controls;
   std::string calibrates;  // parameter of the robot file that it would correct; empty: none
 };

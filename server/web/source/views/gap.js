@@ -97,16 +97,20 @@ function unit_of(name) {
   return [name.slice(0, name.length - suffix.length), unit];
 }
 
+const in_degrees = (rad) => `${format.digits(rad * 180 / Math.PI)}°`;
+
 // A ratio changes what the model has by a part of it; the others stand in their unit.
 function strength(name, { value, sd, unit }) {
-  if (name !== 'ratio') return `${format.with_deviation(value, sd)}${unit === '1' ? '' : ` ${unit}`}`;
+  if (name !== 'ratio') return `${format.with_deviation(value, sd)}${unit === '1' ? '' : ` ${unit}`}${unit === 'rad' ? ` (${in_degrees(value)})` : ''}`;
   return `${value < 0 ? '' : '+'}${format.with_deviation(100 * value, format.known(sd) ? 100 * sd : sd)} %`;
 }
 
 // "speed_m_s" from 0.2 to 0.4 -> ["speed", "0.2 to 0.4 m/s"]
 function region(w) {
   const [plain, unit] = unit_of(w.variable), name = format.words(plain);
-  return [name, typeof w.from === 'string' ? w.from : `${format.range(w.from, w.to)}${unit && ` ${unit}`}`];
+  if (typeof w.from === 'string') return [name, w.from];
+  const angle = unit.startsWith('rad') ? ` (${in_degrees(w.from)} to ${in_degrees(w.to)}${unit.slice(3)})` : '';
+  return [name, `${format.range(w.from, w.to)}${unit && ` ${unit}`}${angle}`];
 }
 
 function Where({ regions }) {
@@ -120,11 +124,33 @@ function Where({ regions }) {
     <p class="note foot">Share of the integral of |measured − modelled| power; line: 95 % interval, widened for the number of regions looked at. Regions overlap.</p>`;
 }
 
+const named = (id) => (id.startsWith('covariate:') ? `covariate ${format.words(id.slice(10))}` : format.words(id));
+const surrogates = (controls) => (controls ? `${controls.named_in} of ${controls.surrogates}` : '–');
+
 function Effects({ effects }) {
-  return html`<table class="grid effects"><thead><tr><th scope="col">Effect</th><th scope="col" class="figure">Probability</th><th scope="col">Strength</th><th scope="col" class="figure">Closes of the gap</th><th scope="col">Cannot be told from</th></tr></thead>
-    <tbody>${effects.map((e) => html`<tr key=${e.id}><th scope="row">${format.words(e.id)}</th><td class="figure">${share(e.probability, 0)}</td>
+  return html`<table class="grid effects"><thead><tr><th scope="col">Effect</th><th scope="col" class="figure">Probability</th><th scope="col">Strength</th><th scope="col" class="figure">Closes of the gap</th><th scope="col" class="figure">In surrogates</th><th scope="col">Cannot be told from</th></tr></thead>
+    <tbody>${effects.map((e) => html`<tr key=${e.id}><th scope="row">${named(e.id)}${e.workshop && html`<span class="note check">check: ${e.workshop}</span>`}</th><td class="figure">${share(e.probability, 0)}</td>
       <td>${Object.entries(e.parameters).map(([name, p]) => html`<div key=${name}><span class="note">${name === 'ratio' ? 'by' : format.words(unit_of(name)[0])}</span> ${strength(name, p)}</div>`)}</td>
-      <td class="figure">${share(e.share, 0)}</td><td>${e.alternatives.map(format.words).join(', ') || '–'}</td></tr>`)}</tbody></table>`;
+      <td class="figure">${share(e.share, 0)}</td><td class="figure">${surrogates(e.controls)}</td><td>${e.alternatives.map(named).join(', ') || '–'}</td></tr>`)}</tbody></table>`;
+}
+
+function Checks({ checks }) {
+  return html`<${Panel} title="What is wrong with the recordings"><ul class="reasons">${checks.map((c, k) => html`<li key=${k}>${c.says}${c.contradicted && html` <b>It takes no part in what follows.</b>`}</li>`)}</ul><//>`;
+}
+
+// The plain regression beside what was found, on the same parts left out.
+function Referee({ of }) {
+  const rows = [['A plain regression', of.held_out], ['What is found here', of.explanation_held_out], ['The robot file', of.unchanged_model_held_out]];
+  const most = Math.max(...rows.map(([, v]) => v ?? 0), 1e-9);
+  return html`<${Panel} title="Beside a plain regression" aside=${of.wins && html`<b>It is not beaten</b>`}><table class="bars referee"><tbody>${rows.map(([name, v]) => html`<tr key=${name}><th scope="row">${name} misses</th>
+    <td class="bar-cell"><svg width="100%" height="12" aria-hidden="true"><rect height="8" y="2" width=${`${Math.max(0.5, 100 * (v ?? 0) / most)}%`} class="account plain" /></svg></td><td class="figure">${share(v)}</td></tr>`)}</tbody></table>
+    ${of.says.length > 0 && html`<ul class="reasons">${of.says.map((says) => html`<li key=${says}>${says}</li>`)}</ul>`}
+    <p class="note foot">Of the power, on parts that had no part in the fit.</p><//>`;
+}
+
+function Corrections({ of }) {
+  return html`<${Panel} title="What would fit in the robot file"><div class="scroll"><table class="grid effects"><thead><tr><th scope="col">Parameter</th><th scope="col" class="figure">In the file</th><th scope="col" class="figure">Would fit</th></tr></thead>
+    <tbody>${of.map((c) => html`<tr key=${c.parameter}><th scope="row">${c.parameter}</th><td class="figure">${format.digits(c.file)}</td><td class="figure">${format.with_deviation(c.fits, c.sd)}</td></tr>`)}</tbody></table></div><//>`;
 }
 
 function TestTable({ test }) {
@@ -145,32 +171,46 @@ function BackTest({ test }) {
     <div class="scroll"><${TestTable} test=${test} /></div>`;
 }
 
+// One of several effects that the data do not tell apart.
+function ChooseEffect({ of, value, onChange }) {
+  const ids = [of.id, ...of.instead.filter((e) => Object.keys(e.parameters).length > 0).map((e) => e.id)];
+  return html`<label class="field"><span>Which of those not told apart</span><select value=${value} onChange=${(e) => onChange(e.currentTarget.value)}>
+    <option value="">choose one</option>${ids.map((id) => html`<option key=${id} value=${id}>${named(id)}</option>`)}</select></label>`;
+}
+
 function Adopt({ job }) {
+  const offer = job.result.adoption, groups = offer?.effects.filter((e) => e.instead.length > 0) ?? [];
+  const refusal = offer && !offer.choice_settles ? offer.refusal : null;
+  const [chosen, set_chosen] = useState({});
+  const effect = groups.map((g) => chosen[g.id] ?? ''), open = effect.includes('');
   const [told, set_told] = useState({ test: null, error: null, busy: '', adopted: null });
   const ask = async (doing, body) => {
     set_told((t) => ({ ...t, busy: doing, error: null }));
     try {
-      const answer = await post(`/v1/robots/${encodeURIComponent(job.robot_id)}/model`, { diagnosis_id: job.id, ...body });
+      const answer = await post(`/v1/robots/${encodeURIComponent(job.robot_id)}/model`, { diagnosis_id: job.id, ...(effect.length > 0 && { effect }), ...body });
       set_told((t) => ({ test: answer.back_test, error: null, busy: '', adopted: answer.adopted ? answer.model_version : t.adopted }));
     } catch (error) {
       set_told((t) => ({ ...t, test: error.told?.back_test ?? t.test, error, busy: '' }));
     }
   };
-  const { test, error, busy, adopted } = told, refused = error?.status === 409 && test !== null;
+  const { test, error, busy, adopted } = told, refused = error?.status === 409 && error.told?.back_test != null;
+  const hold = busy !== '' || open;
   return html`${adopted !== null && html`<p class="adopted" role="status">Version ${adopted} is in force for <a href=${robot_link(job.robot_id)}>${job.robot_id}</a>: planning and autonomy use it now, the meter from the next mission on.</p>`}
+    ${refusal && html`<p class="failure"><b>Not to be adopted:</b> ${refusal}.</p>`}
     ${test && html`<${BackTest} test=${test} />`}
     ${refused ? html`<p class="failure" role="alert"><b>Not adopted:</b> it does not bring the model closer on these missions.</p>` : error && html`<${Failure} error=${error} />`}
     ${adopted === null && html`<div class="tools adopt">
-      <button type="button" disabled=${busy !== ''} onClick=${() => ask('test', { dry_run: true })}>${busy === 'test' ? 'Testing …' : test ? 'Test again' : 'Test on other missions'}</button>
-      <button type="button" class="primary" disabled=${busy !== ''} onClick=${() => ask('adopt', {})}>${busy === 'adopt' ? 'Testing and adopting …' : 'Adopt'}</button>
-      ${refused && html`<button type="button" disabled=${busy !== ''} onClick=${() => ask('adopt', { force: true })}>Adopt all the same</button>`}
+      ${groups.map((g) => html`<${ChooseEffect} key=${g.id} of=${g} value=${chosen[g.id] ?? ''} onChange=${(id) => set_chosen((c) => ({ ...c, [g.id]: id }))} />`)}
+      <button type="button" disabled=${hold} onClick=${() => ask('test', { dry_run: true })}>${busy === 'test' ? 'Testing …' : test ? 'Test again' : 'Test on other missions'}</button>
+      ${!refusal && html`<button type="button" class="primary" disabled=${hold} onClick=${() => ask('adopt', {})}>${busy === 'adopt' ? 'Testing and adopting …' : 'Adopt'}</button>`}
+      ${(refused || refusal) && html`<button type="button" disabled=${hold} onClick=${() => ask('adopt', { force: true })}>Adopt all the same</button>`}
       <span class="note">Adopting makes the next model version, after a test on missions that this was not found on.</span></div>`}`;
 }
 
 function Result({ job }) {
   const r = job.result, [name, words] = verdicts[r.verdict] ?? [r.verdict, ''];
-  const s = r.shrinkage;
-  return html`<div class=${`verdict-box ${r.verdict === 'none' || r.verdict === 'effects' ? '' : 'fails'}`}><p class="verdict"><b>${name}</b>${r.effects.length > 0 && html`${r.verdict === 'effects' ? ':' : '; likeliest'} ${r.effects.map((e) => format.words(e.id)).join(', ')}`}</p><p class="note">${words}</p>${r.reasons?.length > 0 && html`<ul class="reasons">${r.reasons.map((reason) => html`<li key=${reason}>${reason}</li>`)}</ul>`}</div>
+  const s = r.shrinkage, something = r.adoption ? r.adoption.effects.length > 0 : job.model !== null;
+  return html`${r.checks?.length > 0 && html`<${Checks} checks=${r.checks} />`}<div class=${`verdict-box ${r.verdict === 'none' || r.verdict === 'effects' ? '' : 'fails'}`}><p class="verdict"><b>${name}</b>${r.effects.length > 0 && html`${r.verdict === 'effects' ? ':' : '; likeliest'} ${r.effects.map((e) => named(e.id)).join(', ')}`}</p><p class="note">${words}</p>${r.reasons?.length > 0 && html`<ul class="reasons">${r.reasons.map((reason) => html`<li key=${reason}>${reason}</li>`)}</ul>`}</div>
     <dl class="readouts">
       <${Readout} large label="Gap in power" of=${format.percent(r.gap.power_absolute_relative, 1)} note=${`noise ${share(r.gap.noise_floor)}`} />
       <${Readout} large label="Gap in energy" of=${format.percent(r.gap.energy_relative, 1)} />
@@ -179,10 +219,12 @@ function Result({ job }) {
       <${Readout} large label="Missions" of=${`${r.missions}`} note=${`${format.fixed(r.samples)} samples`} />
     </dl>
     ${r.effects.length > 0 && html`<${Panel} title="Which effect"><div class="scroll"><${Effects} effects=${r.effects} /></div><//>`}
+    ${r.baseline && html`<${Referee} of=${r.baseline} />`}
+    ${r.corrections?.length > 0 && html`<${Corrections} of=${r.corrections} />`}
     <div class="columns"><${Panel} title="Where measured power leaves the model"><${Where} regions=${r.where} /><//>
       <${Panel} title="What to drive next">${r.next_drive.length === 0 ? html`<${Empty} title=${r.verdict === 'effects' || r.verdict === 'none' ? 'Nothing more is needed' : 'No drive would tell more'} />`
         : html`<ol class="next">${r.next_drive.map((n, k) => html`<li key=${k}><b>${n.manoeuvre}</b> <span class="note">to tell ${format.words(n.separates)}</span></li>`)}</ol>`}<//></div>
-    <${Panel} title="Adopt">${job.model === null ? html`<${Empty} title="Nothing to adopt" />` : html`<${Adopt} job=${job} />`}<//>`;
+    <${Panel} title="Adopt">${!something ? html`<${Empty} title="Nothing to adopt" />` : html`<${Adopt} job=${job} />`}<//>`;
 }
 
 function One({ id }) {

@@ -10,6 +10,7 @@ export const verdicts = {
   none: ['No gap', 'What is measured agrees with the model, as far as these missions tell.'],
   effects: ['Effects found', 'The model leaves out what is listed here.'],
   outside: ['Outside the catalogue', 'Something is at work that no known effect describes.'],
+  not_this_robot: ['Not this robot', 'The robot file is not this robot’s, or not as it ran here.'],
   inconclusive: ['Inconclusive', 'These missions do not decide what causes the gap.'],
 };
 
@@ -19,7 +20,7 @@ export function State({ of }) {
 
 function found_words(summary) {
   if (!summary) return '–';
-  const verdict = verdicts[summary.verdict][0].toLowerCase(), effects = summary.effects.map((e) => format.words(e.id)).join(', ');
+  const verdict = (verdicts[summary.verdict]?.[0] ?? summary.verdict).toLowerCase(), effects = summary.effects.map((e) => format.words(e.id)).join(', ');
   if (effects === '') return verdict;
   return summary.verdict === 'effects' ? effects : `${verdict}; likeliest ${effects}`;
 }

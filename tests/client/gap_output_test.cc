@@ -1,0 +1,103 @@
+#include "client/commands/gap_output.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "gap/verdict/diagnosis_json.h"
+#include "gap/verdict/offer.h"
+#include "tests/gap/verdict/made_diagnosis.h"
+
+namespace joulecast::client {
+namespace {
+
+using gap::testing::made_diagnosis;
+using nlohmann::json;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+std::string printed(const json& diagnosis) {
+  ::testing::internal::CaptureStdout();
+  print_diagnosis(diagnosis);
+  return ::testing::internal::GetCapturedStdout();
+}
+
+TEST(GapOutput, TellsChecksThenVerdictThenEffectsThenTheRefereeThenWhere) {
+  const std::string text = printed(gap::diagnosis_to_json(made_diagnosis()));
+  std::size_t at = 0;
+  for (const char* next :
+       {"amr-07: 12 missions, 34000 samples",
+        "note: 1 message could not be read",
+        "checks of the recordings:",
+        "It is reversed. It takes no part in what follows.",
+        "gap: energy +10.1 %, absolute power 20.2 % (noise floor 3.3 %)",
+        "other readings: yaw_rate 5.2 %",
+        "verdict: effects (probability 0.93)",
+        "These data do not tell slope from grade.",
+        "coulomb_friction: probability 0.96, closes 72 % of the gap, 19.5 W",
+        "ratio = 0.41 +- 0.02",
+        "named in 1 of 20 surrogates",
+        "to check: bearings",
+        "covariate:cpu_load: probability 0.81",
+        "outside the catalogue: wheel_torque follows time",
+        "named in 0 of 20 surrogates",
+        "held-out gap: 20.3 % -> 6.5 %",
+        "named alike in 4 of 5 fits that leave a part out",
+        "on parts left out: a plain regression misses 11.5 % of the power, this explanation 6.4 %",
+        "Turning costs 1150 W per m/s; the model has 90.",
+        "motor.friction_torque_nm 1.69 +- 0.03 instead of 1.2",
+        "where:",
+        "battery_power, phase turning: +61 % of the gap [51, 71] in 17 % of the time",
+        "next drive, to tell a from b: drive fast (log evidence +7.5)"}) {
+    const std::size_t found = text.find(next, at);
+    ASSERT_NE(found, std::string::npos) << next << "\n" << text;
+    at = found;
+  }
+  EXPECT_THAT(text, Not(HasSubstr("not to be adopted")));
+}
+
+TEST(GapOutput, SaysWhatIsRefusedAndWhatAChoiceSettles) {
+  gap::Diagnosis d = made_diagnosis();
+  d.refusal = "the verdict is inconclusive";
+  d.verdict = gap::Verdict::inconclusive;
+  EXPECT_THAT(printed(gap::diagnosis_to_json(d)),
+              AllOf(HasSubstr("not to be adopted: the verdict is inconclusive\n")));
+}
+
+TEST(GapOutput, PutsDegreesBesideRadians) {
+  gap::Diagnosis d = made_diagnosis();
+  d.effects[0].parameters = {{"tilt", "rad", 0.1, 0.01}};
+  d.where = {{"battery_power", "heading_rad", "", 0, 1.5707963, 0.3, 0.1, {0.2, 0.4}}};
+  EXPECT_THAT(printed(gap::diagnosis_to_json(d)),
+              AllOf(HasSubstr("tilt = 0.1 +- 0.01 rad (5.73 deg)"), HasSubstr("(0 deg to 90 deg)")));
+}
+
+// What a daemon of an earlier version stored.
+TEST(GapOutput, ReadsADiagnosisOfAnEarlierVersion) {
+  json old = gap::diagnosis_to_json(made_diagnosis());
+  for (const char* later : {"notes", "checks", "channels", "baseline", "corrections", "adoption"})
+    old.erase(later);
+  for (const char* later : {"controls", "power_w", "varies", "calibrates", "workshop"})
+    old["effects"][0].erase(later);
+  for (const char* later : {"like", "power_w", "controls", "says"}) old["outside"].erase(later);
+  for (const char* later : {"parts", "agreeing"}) old["shrinkage"].erase(later);
+  old["where"][0].erase("time_share");
+  EXPECT_THAT(printed(old), AllOf(HasSubstr("coulomb_friction: probability 0.96, closes 72 % of the gap\n"),
+                                  HasSubstr("phase turning: +61 % of the gap [51, 71]\n")));
+}
+
+TEST(GapOutput, ARefusalNamesItsOptionAndEndsWithOne) {
+  const Error refused = of_option({Fault::conflict, "", "the verdict is outside"}, "--apply");
+  EXPECT_EQ(refused.field, "--apply");
+  EXPECT_THAT(refused.message, HasSubstr("--force"));
+  EXPECT_EQ(exit_of(refused.fault), Exit::fault);
+  const Error open =
+      of_option({Fault::conflict, "effect", "a is not told from b: name the one to adopt"}, "--apply");
+  EXPECT_EQ(open.field, "--effect");
+  EXPECT_THAT(open.message, Not(HasSubstr("--force")));
+}
+
+}  // namespace
+}  // namespace joulecast::client

@@ -1,0 +1,153 @@
+#include "gap/verdict/offer.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "gap/verdict/diagnosis_json.h"
+#include "gap/verdict/text.h"
+#include "robot/robot_file.h"
+#include "tests/gap/verdict/made_diagnosis.h"
+#include "tests/support/sample_robots.h"
+
+namespace joulecast::gap {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+using testing::made_diagnosis;
+
+const std::vector<std::string> friction{"coulomb_friction ratio 0.41"},
+    viscous{"viscous_friction ratio 3.00"};
+
+// Coulomb friction that the data do not tell from viscous friction.
+Diagnosis undecided() {
+  Diagnosis d = made_diagnosis();
+  d.effects[0].alternatives = {"viscous_friction", "turning_scrub"};
+  d.effects[0].instead = {{"viscous_friction", {{"ratio", 3.0}}}};
+  d.refusal = refusal_of(d, false, false);
+  return d;
+}
+
+// Effects of a robot file with their first parameters.
+std::vector<std::string> effects_of(const robot::RobotModel& model) {
+  std::vector<std::string> texts;
+  for (const robot::AdoptedEffect& e : model.effects)
+    texts.push_back(
+        fmt::format("{} {} {:.2f}", e.id, e.parameters.front().first, e.parameters.front().second));
+  return texts;
+}
+
+std::vector<std::string> taken(const Diagnosis& d, const Choice& choice) {
+  const auto model = take(offer_of(d), joulecast::testing::nomad(), choice);
+  if (!model) ADD_FAILURE() << describe(model.error());
+  return model ? effects_of(*model) : std::vector<std::string>{};
+}
+
+Error refused(const Diagnosis& d, const Choice& choice = {}) {
+  const auto model = take(offer_of(d), joulecast::testing::nomad(), choice);
+  EXPECT_FALSE(model);
+  return model ? Error{} : model.error();
+}
+
+TEST(Offer, IsTakenWhereNothingSpeaksAgainstIt) {
+  EXPECT_EQ(taken(made_diagnosis(), {}), friction);
+}
+
+TEST(Offer, OfNothingIsRefusedEvenByForce) {
+  Diagnosis d = made_diagnosis();
+  d.adoptable.clear();
+  d.refusal = refusal_of(d, false, false);
+  const Error error = refused(d, {{}, true});
+  EXPECT_EQ(error.fault, Fault::conflict);
+  EXPECT_EQ(error.message, d.refusal);
+  EXPECT_FALSE(error.message.empty());
+}
+
+TEST(Offer, ThatIsRefusedIsTakenByForceAlone) {
+  for (const Verdict verdict : {Verdict::outside, Verdict::inconclusive}) {
+    Diagnosis d = made_diagnosis();
+    d.verdict = verdict;
+    d.refusal = refusal_of(d, false, false);
+    EXPECT_EQ(refused(d).message, d.refusal);
+    EXPECT_EQ(refused(d, {{"coulomb_friction"}, false}).message, d.refusal);
+    EXPECT_EQ(taken(d, {{}, true}), friction);
+  }
+}
+
+TEST(Offer, WorseThanTheRefereeIsRefused) {
+  Diagnosis d = made_diagnosis();
+  d.baseline->explanation_held_out = 0.2;
+  ASSERT_TRUE(d.baseline->wins());
+  d.refusal = refusal_of(d, true, true);
+  EXPECT_THAT(refused(d).message, HasSubstr("plain regression"));
+}
+
+TEST(Offer, OfAGroupNeedsAChoiceWhichForceDoesNotReplace) {
+  const Diagnosis d = undecided();
+  EXPECT_TRUE(offer_of(d).choice_settles);
+  for (const bool force : {false, true}) {
+    const Error error = refused(d, {{}, force});
+    EXPECT_EQ(error.fault, Fault::conflict);
+    EXPECT_THAT(error.message, HasSubstr("viscous_friction and turning_scrub"));
+  }
+  EXPECT_EQ(taken(d, {{"coulomb_friction"}, false}), friction);
+  EXPECT_EQ(taken(d, {{"viscous_friction"}, false}), viscous);
+}
+
+TEST(Offer, ChoosesOnlyWhatIsThereAndHasAStrength) {
+  const Diagnosis d = undecided();
+  EXPECT_THAT(refused(d, {{"turning_scrub"}, false}).message, HasSubstr("no strength of turning_scrub"));
+  Error error = refused(d, {{"brush_drop"}, false});
+  EXPECT_EQ(error.fault, Fault::conflict);  // the group is still open
+  error = refused(d, {{"brush_drop", "coulomb_friction"}, false});
+  EXPECT_EQ(error.fault, Fault::invalid);
+  EXPECT_EQ(error.field, "effect");
+  EXPECT_THAT(error.message, HasSubstr("brush_drop is not among"));
+  error = refused(d, {{"viscous_friction", "coulomb_friction"}, false});
+  EXPECT_EQ(error.fault, Fault::invalid);
+}
+
+TEST(Offer, ToAFileThatIsNotThisRobotsCorrectsIt) {
+  Diagnosis d = made_diagnosis();
+  d.verdict = Verdict::not_this_robot;
+  const robot::RobotModel before = joulecast::testing::nomad();
+  const auto after = take(offer_of(d), before);
+  ASSERT_TRUE(after) << describe(after.error());
+  EXPECT_TRUE(after->effects.empty());
+  EXPECT_NEAR(after->motor.friction_torque_nm[0], 1.41 * before.motor.friction_torque_nm[0], 1e-9);
+}
+
+TEST(Offer, OutlivesJson) {
+  for (const Diagnosis& d : {made_diagnosis(), undecided()}) {
+    const Offer offer = offer_of(d);
+    const auto again = offer_from_json(json::parse(diagnosis_to_json(d).dump()));
+    ASSERT_TRUE(again) << describe(again.error());
+    EXPECT_EQ(offer_to_json(*again), offer_to_json(offer));
+  }
+}
+
+// What version 1 of the JSON stored.
+TEST(Offer, OfADiagnosisOfAnEarlierVersionIsMadeFromItsEffects) {
+  json old = {{"verdict", "effects"},
+              {"effects",
+               {{{"id", "coulomb_friction"},
+                 {"parameters", {{"ratio", {{"value", 0.41}, {"sd", 0.01}, {"unit", "1"}}}}},
+                 {"alternatives", json::array()}}}}};
+  const auto model = take(*offer_from_json(old), joulecast::testing::nomad());
+  ASSERT_TRUE(model) << describe(model.error());
+  EXPECT_EQ(effects_of(*model), friction);
+  old["effects"][0]["alternatives"] = {"viscous_friction"};
+  EXPECT_EQ(take(*offer_from_json(old), joulecast::testing::nomad()).error().fault, Fault::conflict);
+  EXPECT_TRUE(take(*offer_from_json(old), joulecast::testing::nomad(), {{"coulomb_friction"}, false}));
+  old["effects"][0]["alternatives"] = json::array();
+  old["verdict"] = "inconclusive";
+  EXPECT_EQ(take(*offer_from_json(old), joulecast::testing::nomad()).error().message,
+            "the verdict is inconclusive");
+  EXPECT_EQ(offer_from_json(json::object()).error().fault, Fault::corrupt);
+}
+
+}  // namespace
+}  // namespace joulecast::gap
