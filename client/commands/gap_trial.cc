@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/nearest_word.h"
+#include "client/commands/gap_trial_motion.h"
 #include "client/commands/table.h"
 #include "client/trial/run.h"
 #include "client/trial/score_text.h"
@@ -19,7 +20,8 @@ struct Options {
   trial::RunSettings run;
   std::string only;
   std::string channels = "mixed";
-  std::string keep, again;
+  std::string keep, again, motion;
+  std::size_t controls = 0;
   bool json = false;
   bool usual_plant = false;
 };
@@ -31,6 +33,11 @@ void show(const trial::CaseOutcome& outcome, std::size_t finished, std::size_t c
 
 Exit run(Options& options) {
   trial::TrialSettings& t = options.run.trial;
+  if (!options.motion.empty()) {
+    return run_motion({options.motion, options.only, options.again.empty() ? options.keep : options.again,
+                       !options.again.empty(), t.seed, t.count, options.run.jobs, options.controls,
+                       options.json});
+  }
   if (!options.only.empty()) {
     t.only = trial::kind_of(options.only == "double" ? "pair" : options.only);
     const auto known = virtual_robot::effect_table();
@@ -73,8 +80,9 @@ Exit run(Options& options) {
 
 void add_gap_trial(CLI::App& gap, Exit& exit) {
   auto options = std::make_shared<Options>();
-  auto* command = gap.add_subcommand(
-      "trial", "Put known effects into virtual robots, diagnose their logs blindly and score the answers");
+  auto* command = gap.add_subcommand("trial",
+                                     "Put known effects into virtual robots or into recorded motion, "
+                                     "diagnose the logs blindly and score the answers");
   command->add_option("--count", options->run.trial.count, "cases")
       ->check(CLI::Range(1, 100'000))
       ->capture_default_str();
@@ -83,14 +91,30 @@ void add_gap_trial(CLI::App& gap, Exit& exit) {
   command->add_option("--jobs", options->run.jobs, "cases at work at once")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
-  command->add_option("--only", options->only, "none, single, double, outside, or the id of one effect");
-  command->add_option("--channels", options->channels, "full, battery (no motor channels) or mixed")
-      ->check(CLI::IsMember({"full", "battery", "mixed"}))
-      ->capture_default_str();
-  command->add_flag("--usual-plant", options->usual_plant,
-                    "leave out the sensors, drives and missions unlike the usual");
-  command->add_flag("--compare", options->run.compare,
-                    "judge every log by simpler methods too, and with each part of the method left out");
+  command->add_option("--only", options->only,
+                      "none, single, double, outside, or the id of one effect or load");
+  auto* channels =
+      command->add_option("--channels", options->channels, "full, battery (no motor channels) or mixed")
+          ->check(CLI::IsMember({"full", "battery", "mixed"}))
+          ->capture_default_str();
+  auto* usual = command->add_flag("--usual-plant", options->usual_plant,
+                                  "leave out the sensors, drives and missions unlike the usual");
+  auto* compare =
+      command->add_flag("--compare", options->run.compare,
+                        "judge every log by simpler methods too, and with each part of the method left out");
+  auto* motion =
+      command
+          ->add_option("--motion", options->motion,
+                       "folder of event logs with battery power: effects are planted into their motion; "
+                       "NAME.json beside NAME.lcmlog gives the robot's wheels")
+          ->excludes(channels)
+          ->excludes(usual)
+          ->excludes(compare);
+  command
+      ->add_option("--controls", options->controls,
+                   "with --motion: surrogates that the diagnosis makes of each log")
+      ->check(CLI::Range(1, 1000))
+      ->needs(motion);
   command->add_option("--keep", options->keep, "folder that keeps robot files, logs and truths of all cases");
   command
       ->add_option(

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "client/commands/table.h"
+
+namespace joulecast::client {
+
+struct MotionTrialOptions {
+  std::string logs;  // folder
+  std::string only;  // kind of case or id; empty: all
+  std::string keep;  // folder of the cases
+  bool again = false;
+  std::uint64_t seed = 1;
+  std::size_t count = 0, jobs = 1, controls = 0;
+  bool json = false;
+};
+
+// `joulecast gap trial --motion FOLDER`.
+Exit run_motion(const MotionTrialOptions& options);
+
+}  // namespace joulecast::client
