@@ -33,7 +33,7 @@ void show(const trial::CaseOutcome& outcome, std::size_t finished, std::size_t c
 
 Exit run(Options& options) {
   trial::TrialSettings& t = options.run.trial;
-  if (!options.motion.empty()) {
+  if (!options.motion.empty() || holds_motion_cases(options.again)) {
     return run_motion({options.motion, options.only, options.again.empty() ? options.keep : options.again,
                        !options.again.empty(), t.seed, t.count, options.run.jobs, options.controls,
                        options.json});

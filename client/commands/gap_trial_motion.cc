@@ -7,12 +7,17 @@
 #include <vector>
 
 #include "base/nearest_word.h"
+#include "client/trial/case_pool.h"
 #include "client/trial/motion/motion_run.h"
 #include "client/trial/motion/motion_text.h"
 
 namespace joulecast::client {
 
 namespace motion = trial::motion;
+
+bool holds_motion_cases(const std::string& folder) {
+  return !folder.empty() && motion::open_motion_truth(trial::case_files_in(folder, 0).truth()).has_value();
+}
 
 Exit run_motion(const MotionTrialOptions& options) {
   motion::MotionRunSettings run;
@@ -33,18 +38,22 @@ Exit run_motion(const MotionTrialOptions& options) {
     if (!run.trial.only) run.trial.only_effect = options.only;
   }
   std::vector<std::string> skipped;
-  const auto logs = motion::read_base_logs(options.logs, skipped);
-  if (!logs) return report(logs.error());
-  const std::string about = motion::base_logs_text(*logs, skipped);
+  std::vector<motion::BaseLog> logs;
+  if (!options.again) {
+    auto read = motion::read_base_logs(options.logs, skipped);
+    if (!read) return report(read.error());
+    logs = std::move(*read);
+  }
   std::size_t finished = 0;
   run.done = [&](const motion::MotionOutcome& outcome) {
     std::fprintf(stderr, "[%zu/%zu] %s\n", ++finished, options.count,
                  motion::motion_case_text(outcome).c_str());
   };
-  const auto outcomes = motion::run_motion_trial(run, *logs);
+  const auto outcomes = motion::run_motion_trial(run, logs);
   if (!outcomes) return report(outcomes.error());
   const motion::MotionScore score = motion::motion_score_of(*outcomes);
   if (!options.json) {
+    const std::string about = options.again ? "" : motion::base_logs_text(logs, skipped);
     std::printf("%s%s", about.c_str(), motion::motion_score_text(score).c_str());
     return Exit::ok;
   }
@@ -52,7 +61,7 @@ Exit run_motion(const MotionTrialOptions& options) {
   for (const auto& outcome : *outcomes) cases.push_back(motion::motion_case_json(outcome));
   const nlohmann::json answer{{"seed", options.seed},
                               {"count", options.count},
-                              {"logs", motion::base_logs_json(*logs)},
+                              {"logs", motion::base_logs_json(logs)},
                               {"left_out", skipped},
                               {"score", motion::motion_score_json(score)},
                               {"cases", cases}};

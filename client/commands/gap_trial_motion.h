@@ -9,7 +9,7 @@
 namespace joulecast::client {
 
 struct MotionTrialOptions {
-  std::string logs;  // folder
+  std::string logs;  // folder; not read when judging again
   std::string only;  // kind of case or id; empty: all
   std::string keep;  // folder of the cases
   bool again = false;
@@ -17,6 +17,9 @@ struct MotionTrialOptions {
   std::size_t count = 0, jobs = 1, controls = 0;
   bool json = false;
 };
+
+// Whether an earlier --keep of such a trial left its cases in this folder.
+bool holds_motion_cases(const std::string& folder);
 
 // `joulecast gap trial --motion FOLDER`.
 Exit run_motion(const MotionTrialOptions& options);

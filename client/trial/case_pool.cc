@@ -15,6 +15,12 @@ double thread_cpu_s() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
+CaseFiles case_files_in(const std::filesystem::path& folder, std::size_t index) {
+  char name[32];
+  std::snprintf(name, sizeof name, "case-%04zu", index);
+  return {folder / name};
+}
+
 Result<CaseFolder> CaseFolder::open(const std::filesystem::path& keep) {
   if (!keep.empty()) return CaseFolder(keep, true);
   std::string pattern = (std::filesystem::temp_directory_path() / "joulecast-trial-XXXXXX").string();
@@ -30,12 +36,6 @@ CaseFolder::CaseFolder(CaseFolder&& other) noexcept
 CaseFolder::~CaseFolder() {
   std::error_code ignored;
   if (!kept_) std::filesystem::remove_all(root_, ignored);
-}
-
-CaseFiles CaseFolder::files_of(std::size_t index) const {
-  char name[32];
-  std::snprintf(name, sizeof name, "case-%04zu", index);
-  return {root_ / name};
 }
 
 void CaseFolder::done_with(const CaseFiles& files) const {

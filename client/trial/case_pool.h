@@ -16,6 +16,9 @@ namespace joulecast::trial {
 // Processor time of the calling thread.
 [[nodiscard]] double thread_cpu_s();
 
+// Where a case lies in a folder of cases.
+[[nodiscard]] CaseFiles case_files_in(const std::filesystem::path& folder, std::size_t index);
+
 // The folder of all cases: `keep`, or one of its own that goes with the object.
 class CaseFolder {
  public:
@@ -25,7 +28,7 @@ class CaseFolder {
   CaseFolder(const CaseFolder&) = delete;
   CaseFolder& operator=(const CaseFolder&) = delete;
 
-  CaseFiles files_of(std::size_t index) const;
+  CaseFiles files_of(std::size_t index) const { return case_files_in(root_, index); }
   // Removes the files of a case unless they are kept.
   void done_with(const CaseFiles& files) const;
 

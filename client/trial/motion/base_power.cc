@@ -51,7 +51,7 @@ std::string_view name_of(Term term) {
 BaseForm base_form_of(const MotionLog& log) {
   constexpr double viscous_share = 0.02;  // of friction at the usual speed
   constexpr double fast_m_s = 5;          // below it air takes next to nothing
-  constexpr double turning_share = 0.05;  // of the wheels' speed
+  constexpr double turning_share = 0.02;  // of the wheels' speed
   const std::vector<Instant> instants = log.all_instants();
   std::vector<double> speeds, sides;
   double mean_w = 0, sum = 0, squares = 0;
