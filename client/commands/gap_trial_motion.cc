@@ -29,11 +29,12 @@ Exit run_motion(const MotionTrialOptions& options) {
   run.again = options.again;
   if (!options.only.empty()) {
     run.trial.only = trial::kind_of(options.only == "double" ? "pair" : options.only);
-    const auto known = motion::motion_effect_ids();
+    const auto ids = motion::motion_effect_ids();
+    const std::vector<std::string> known(ids.begin(), ids.end());
     if (!run.trial.only && std::ranges::find(known, options.only) == known.end()) {
       return report({Fault::invalid, "--only",
                      options.only + " is neither a kind of case nor an effect of the trial on real motion" +
-                         did_you_mean(options.only, known, std::identity{})});
+                         did_you_mean(options.only, known)});
     }
     if (!run.trial.only) run.trial.only_effect = options.only;
   }

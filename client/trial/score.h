@@ -8,21 +8,9 @@
 #include <vector>
 
 #include "client/trial/outcome.h"
+#include "client/trial/rate.h"
 
 namespace joulecast::trial {
-
-// Hits of a number of tries.
-struct Rate {
-  std::size_t hits = 0, tries = 0;
-
-  void count(bool hit) {
-    hits += hit ? 1 : 0;
-    ++tries;
-  }
-  double value() const { return tries > 0 ? static_cast<double>(hits) / static_cast<double>(tries) : 0; }
-  // 95 % interval (Wilson 1927); [0, 1] without a try.
-  std::array<double, 2> interval() const;
-};
 
 inline constexpr std::size_t strength_classes = 4;
 
@@ -42,12 +30,6 @@ struct StrengthRow {
   Rate strength_within;  // within 10 %
   Rate interval_covers;  // 95 % interval holds the truth
   ShrinkageScore shrinkage;
-};
-
-struct ReliabilityBin {
-  double sum = 0;  // of the probabilities stated
-  Rate right;
-  double mean() const { return right.tries > 0 ? sum / static_cast<double>(right.tries) : 0; }
 };
 
 struct VariantRow {

@@ -81,21 +81,6 @@ std::string short_list(const std::vector<std::string>& items, const char* separa
 
 }  // namespace
 
-std::string rate_text(const Rate& rate) {
-  if (rate.tries == 0) return "-";
-  const auto [low, high] = rate.interval();
-  return fmt::format("{}/{} {:.0f} % [{:.0f}, {:.0f}]", rate.hits, rate.tries, 100 * rate.value(), 100 * low,
-                     100 * high);
-}
-
-json rate_json(const Rate& rate) {
-  const auto [low, high] = rate.interval();
-  return {{"hits", rate.hits},
-          {"of", rate.tries},
-          {"rate", rate.tries > 0 ? json(rate.value()) : json()},
-          {"ci", {low, high}}};
-}
-
 std::string score_text(const Score& score) {
   std::string out;
   add_rows(out, "all channels", score.rows[0]);

@@ -9,10 +9,6 @@
 
 namespace joulecast::trial {
 
-// "18/20 90 % [70, 97]", the interval being Wilson's; "-" without a try.
-[[nodiscard]] std::string rate_text(const Rate& rate);
-[[nodiscard]] nlohmann::json rate_json(const Rate& rate);
-
 // The score table, confusions, reliability and variants for people.
 [[nodiscard]] std::string score_text(const Score& score);
 [[nodiscard]] std::string comparison_text(const std::vector<ComparisonRow>& rows);

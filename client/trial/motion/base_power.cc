@@ -7,7 +7,9 @@
 namespace joulecast::trial::motion {
 namespace {
 
-constexpr double huber = 2.5;  // spreads
+// Spreads from which a residual weighs less. For the base power single glitches are held down, loads that are
+// often high are not; the referee, judged by absolute errors, fits nearly those.
+constexpr double base_huber = 2.5, referee_huber = 0.5;
 constexpr int reweightings = 30;
 constexpr int sweeps = 2000;
 constexpr std::size_t blocks = 20;
@@ -34,18 +36,18 @@ Terms solve_bounded(const Equations& e, const BaseForm& form, Terms c) {
   return c;
 }
 
-double quantile_of(std::vector<double> values, double q) {
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-  std::ranges::nth_element(values, at);
-  return *at;
-}
-
 }  // namespace
 
 std::string_view name_of(Term term) {
   constexpr std::array<std::string_view, term_count> names{"idle_w", "friction_n", "turning_nm", "inertia_kg",
                                                            "drag_n_s2_m2"};
   return names[static_cast<std::size_t>(term)];
+}
+
+double quantile_of(std::vector<double> values, double q) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+  std::ranges::nth_element(values, at);
+  return *at;
 }
 
 BaseForm base_form_of(const MotionLog& log) {
@@ -100,7 +102,8 @@ double base_power_w(const BaseForm& form, const Terms& coefficients, const Insta
   return power;
 }
 
-Terms fit_base(const BaseForm& form, std::span<const Instant> instants, std::span<const double> power_w) {
+Terms fit_base(const BaseForm& form, std::span<const Instant> instants, std::span<const double> power_w,
+               double huber) {
   std::vector<Terms> rows;
   for (const Instant& at : instants) rows.push_back(regressors(form, at));
   std::vector<double> left(rows.size()), weight(rows.size(), 1.0);
@@ -137,8 +140,9 @@ BaseFit fit_log(const MotionLog& log) {
   fit.form = base_form_of(log);
   const std::vector<Instant> instants = log.all_instants();
   std::vector<double> power_w;
+  power_w.reserve(instants.size());
   for (const Instant& at : instants) power_w.push_back(at.power_w());
-  fit.base = fit_base(fit.form, instants, power_w);
+  fit.base = fit_base(fit.form, instants, power_w, base_huber);
   // Scrub grows with weight: who turns so heavily is at least so heavy.
   constexpr auto turning = static_cast<std::size_t>(Term::turning),
                  inertia = static_cast<std::size_t>(Term::inertia);
@@ -147,7 +151,7 @@ BaseFit fit_log(const MotionLog& log) {
   if (fit.base[turning] > scrub_nm_kg * fit.base[inertia]) {
     fit.form.least[inertia] = fit.base[turning] / scrub_nm_kg;
     fit.form.most[inertia] = std::max(fit.form.most[inertia], fit.form.least[inertia]);
-    fit.base = fit_base(fit.form, instants, power_w);
+    fit.base = fit_base(fit.form, instants, power_w, base_huber);
   }
   double mean_w = 0;
   for (std::size_t n = 0; n < instants.size(); ++n) {
@@ -177,7 +181,7 @@ double referee_error(const BaseForm& form, std::span<const Instant> instants,
       seen.push_back(instants[n]);
       seen_w.push_back(power_w[n]);
     }
-    const Terms c = fit_base(form, seen, seen_w);
+    const Terms c = fit_base(form, seen, seen_w, referee_huber);
     for (std::size_t n = 0; n < instants.size(); ++n) {
       if (fold_of(n) != fold) continue;
       missed += std::fabs(power_w[n] - base_power_w(form, c, instants[n]));

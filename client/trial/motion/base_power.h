@@ -18,6 +18,9 @@ enum class Term : std::size_t { idle, friction, turning, inertia, drag };
 inline constexpr std::size_t term_count = 5;
 using Terms = std::array<double, term_count>;
 [[nodiscard]] std::string_view name_of(Term term);
+inline double of(const Terms& terms, Term term) {
+  return terms[static_cast<std::size_t>(term)];
+}
 
 // Which terms a recording can tell, what fixes their shapes, and between what the coefficients may be.
 struct BaseForm {
@@ -41,10 +44,13 @@ struct BaseFit {
 [[nodiscard]] Terms regressors(const BaseForm& form, const Instant& at);
 [[nodiscard]] double base_power_w(const BaseForm& form, const Terms& coefficients, const Instant& at);
 
-// Coefficients within their bounds, by Huber's weights from 2.5 spreads on: single glitches are held down,
-// loads that are often high are not. `power_w` has one value for each instant.
+// The value below which a share q of the values lies; there must be one.
+[[nodiscard]] double quantile_of(std::vector<double> values, double q);
+
+// Coefficients within their bounds, by Huber's weights from `huber` spreads on. `power_w` has one value for
+// each instant.
 [[nodiscard]] Terms fit_base(const BaseForm& form, std::span<const Instant> instants,
-                             std::span<const double> power_w);
+                             std::span<const double> power_w, double huber);
 
 // Fitted to every second of some twenty blocks and asked of the others, both ways: the sum of the absolute
 // errors over that of the absolute powers. What the best plain regression leaves of these data.

@@ -11,10 +11,6 @@ namespace {
 constexpr double copper_share = 0.0005;
 constexpr double headroom = 1.2;  // of limits above what the log did
 
-double of(const Terms& terms, Term term) {
-  return terms[static_cast<std::size_t>(term)];
-}
-
 double parameter(const robot::RobotModel& file, std::string_view id, std::string_view name) {
   for (const robot::AdoptedEffect& effect : file.effects) {
     if (effect.id != id) continue;

@@ -32,6 +32,7 @@ Result<void> measure_errors(const CaseFiles& files, MotionOutcome& outcome) {
   log.instants = instants_of(log.missions, robot->kinematics, log.battery.period_s);
   const std::vector<Instant> instants = log.all_instants();
   std::vector<double> power_w;
+  power_w.reserve(instants.size());
   for (const Instant& at : instants) power_w.push_back(at.power_w());
   outcome.referee_error = referee_error(base_form_of(log), instants, power_w);
   const auto unchanged_w = modelled_power_w(*robot, instants);

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "client/trial/motion/motion_run.h"
-#include "client/trial/score.h"
+#include "client/trial/rate.h"
 
 namespace joulecast::trial::motion {
 

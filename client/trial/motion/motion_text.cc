@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include "base/json_number.h"
-#include "client/trial/score_text.h"
 
 namespace joulecast::trial::motion {
 namespace {

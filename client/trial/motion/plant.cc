@@ -150,7 +150,7 @@ constexpr auto
                  0.6, nullptr},
                 {"driver_loss", "share of the motors' power", true, Stage::battery,
                  [](S, M m, N) { return absolute_motor_w(m); }, 0.6, nullptr},
-                {"driver_loss", "and as much again by a third at any time", false, Stage::battery,
+                {"driver_loss", "and a third of its mean at any time", false, Stage::battery,
                  [](S s, M m, N) { return absolute_motor_w(m) + s.motor_power_w / 3; }, 0.6, nullptr},
                 {"no_regeneration", "share of the braking power", true, Stage::battery,
                  [](S, M m, N) { return braking_w(m); }, 1, nullptr},
@@ -196,12 +196,6 @@ double added_w(const Scene& s, std::span<const Planted> planted, Stage stage, co
     if (p.form->stage == stage) power_w += p.strength * p.form->unit(s, m, 0);
   }
   return power_w;
-}
-
-double quantile_of(std::vector<double> values, double q) {
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-  std::ranges::nth_element(values, at);
-  return *at;
 }
 
 }  // namespace
