@@ -1,4 +1,4 @@
--- The history of a fleet, schema version 5 (user_version; src/history/schema.cc lists the migrations to it).
+-- The history of a fleet, schema version 6 (user_version; src/history/schema.cc lists the migrations to it).
 -- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a REAL column: not measured.
 -- Energy leaving the battery is positive. Sides: right, left.
 
@@ -78,6 +78,8 @@ CREATE TABLE mission (
   ledger_unexplained_j REAL,
   telemetry_samples INTEGER NOT NULL DEFAULT 0,  -- raw samples ever stored; the next one's ordinal
   findings_json TEXT CHECK (findings_json IS NULL OR json_valid(findings_json)),  -- of payload and friction
+  covariate_changes INTEGER NOT NULL DEFAULT 0,  -- changes of covariates ever stored; the next one's ordinal
+  covariates_json TEXT CHECK (covariates_json IS NULL OR json_valid(covariates_json)),  -- [[name, mean, min, max, known_s, counted_utime_us, value, value_utime_us], ...]
   UNIQUE (robot_id, mission_id, start_utime_us),
   FOREIGN KEY (robot_id, model_version) REFERENCES model (robot_id, version)
 ) STRICT;
@@ -125,6 +127,24 @@ CREATE TABLE telemetry_chunk (
 
 CREATE INDEX telemetry_chunk_by_age ON telemetry_chunk (stored_utime_us, sealed, bytes);
 CREATE INDEX telemetry_chunk_tail ON telemetry_chunk (mission_key, first_ordinal) WHERE sealed = 0;
+
+-- What changed of a mission's covariates, in the same way.
+CREATE TABLE covariate_chunk (
+  chunk_key INTEGER NOT NULL PRIMARY KEY,
+  mission_key INTEGER NOT NULL REFERENCES mission (mission_key) ON DELETE CASCADE,
+  first_ordinal INTEGER NOT NULL,
+  changes INTEGER NOT NULL CHECK (changes > 0),
+  start_utime_us INTEGER NOT NULL,
+  end_utime_us INTEGER NOT NULL,
+  stored_utime_us INTEGER NOT NULL,
+  sealed INTEGER NOT NULL CHECK (sealed IN (0, 1)),
+  bytes INTEGER NOT NULL CHECK (bytes = length(body)),
+  body BLOB NOT NULL,  -- src/history/covariate_chunk.h
+  UNIQUE (mission_key, first_ordinal)
+) STRICT;
+
+CREATE INDEX covariate_chunk_by_age ON covariate_chunk (stored_utime_us, sealed, bytes);
+CREATE INDEX covariate_chunk_tail ON covariate_chunk (mission_key, first_ordinal) WHERE sealed = 0;
 
 CREATE TABLE event (
   event_id INTEGER NOT NULL PRIMARY KEY,

@@ -14,9 +14,11 @@ static_assert(history::MissionState{} == history::MissionState::open);
 void export_metrics(Metrics& metrics, const IngestCounters& counters, const IngestService& ingest,
                     const FleetView& fleet, const history::Writer& writer, const history::Store& store,
                     const http::EventHub& events, std::function<std::int64_t()> now_utime_us) {
-  const Counter messages = metrics.counter("joulecast_ingest_messages_total",
-                                           "Messages received on the telemetry and mission channels");
+  const Counter messages =
+      metrics.counter("joulecast_ingest_messages_total", "Messages received on the robots' channels");
   const Counter samples = metrics.counter("joulecast_ingest_samples_total", "Samples accounted for");
+  const Counter covariates =
+      metrics.counter("joulecast_ingest_covariate_changes_total", "Changes of covariates within missions");
   const std::vector<Counter> started = metrics.counters("joulecast_missions_started_total", "Missions begun",
                                                         "kind", {"announced", "implicit"});
   std::vector<std::string> states;  // but for the first one, open
@@ -40,7 +42,8 @@ void export_metrics(Metrics& metrics, const IngestCounters& counters, const Inge
   const Gauge healthy = metrics.gauge("joulecast_store_healthy", "1 while commits succeed");
   const Gauge database = metrics.gauge("joulecast_store_bytes", "Size of the database file");
   const Gauge journal = metrics.gauge("joulecast_store_journal_bytes", "Size of the write-ahead log");
-  const Gauge telemetry = metrics.gauge("joulecast_store_telemetry_bytes", "Encoded raw telemetry kept");
+  const Gauge telemetry =
+      metrics.gauge("joulecast_store_telemetry_bytes", "Encoded raw telemetry and covariates kept");
   const Counter commits = metrics.counter("joulecast_store_commits_total", "Transactions committed");
   const Counter failed = metrics.counter("joulecast_store_failed_commits_total",
                                          "Commit attempts that failed and were tried again");
@@ -56,6 +59,7 @@ void export_metrics(Metrics& metrics, const IngestCounters& counters, const Inge
       [=, &counters, &ingest, &fleet, &writer, &store, &events, now = std::move(now_utime_us)] {
         messages.raise_to(static_cast<double>(counters.messages));
         samples.raise_to(static_cast<double>(counters.samples));
+        covariates.raise_to(static_cast<double>(counters.covariate_changes));
         for (std::size_t k = 0; k < started.size(); ++k)
           started[k].raise_to(static_cast<double>(counters.missions_started[k]));
         for (std::size_t k = 0; k < ended.size(); ++k)

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <deque>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -14,9 +15,11 @@
 #include "base/json_number.h"
 #include "client/commands/table.h"
 #include "client/files.h"
+#include "dynamics/drive_model.h"
 #include "energy/calibration.h"
 #include "robot/robot_file.h"
 #include "telemetry/log_recordings.h"
+#include "telemetry/recording_climb.h"
 
 namespace joulecast::client {
 namespace {
@@ -79,9 +82,13 @@ Result<Outcome> calibrate(const Options& options) {
   const auto recordings = load(options, robot->robot_id);
   if (!recordings) return tl::unexpected(recordings.error());
   const std::set<std::string> train(options.train.begin(), options.train.end());
+  const auto drive = dynamics::drive_model(*robot);
+  if (!drive) return tl::unexpected(drive.error());
   std::vector<energy::DriveRun> all, chosen;
+  std::deque<std::vector<double>> climbs;
   for (const telemetry::Recording& r : *recordings) {
-    all.push_back({r.mission_id, r.samples, r.payload_kg});
+    climbs.push_back(telemetry::climb_of(r, drive->parameters()));
+    all.push_back({r.mission_id, r.samples, r.payload_kg, climbs.back()});
     if (train.empty() || train.contains(r.mission_id)) chosen.push_back(all.back());
   }
   auto calibration = energy::calibrate_drive(*robot, chosen, options.calibration);

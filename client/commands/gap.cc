@@ -59,7 +59,7 @@ void print(const energy::BackTest& test) {
 // The robot file and the one with the effects found, on missions of other logs.
 Result<energy::BackTest> test_of(const Options& options, const robot::RobotModel& robot,
                                  const robot::RobotModel& extended) {
-  const auto recordings = gap::load_recordings(options.test, options.robot_id);
+  const auto recordings = telemetry::load_recordings(options.test, options.robot_id);
   if (!recordings) return tl::unexpected(recordings.error());
   std::vector<energy::DriveRun> runs;
   for (const telemetry::Recording& mission : recordings->missions)
@@ -84,7 +84,7 @@ Exit run(const Options& options) {
     return gap_from_missions(missions, *robot);
   }
   const auto recordings =
-      gap::load_recordings(options.logs, options.robot_id.empty() ? robot->robot_id : options.robot_id);
+      telemetry::load_recordings(options.logs, options.robot_id.empty() ? robot->robot_id : options.robot_id);
   if (!recordings) return report(recordings.error());
   if (!options.compare_by.empty())
     return gap_between_groups(*recordings, *robot, options.compare_by, options.json, options.report,

@@ -41,7 +41,7 @@ void print(const gap::Comparison& c) {
 
 }  // namespace
 
-Exit gap_between_groups(const gap::RecordingSet& recordings, const robot::RobotModel& robot,
+Exit gap_between_groups(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
                         const std::string& by, bool json, const std::string& report_file,
                         const gap::ReportOrigin& origin) {
   std::vector<std::string> groups;

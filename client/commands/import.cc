@@ -89,6 +89,9 @@ nlohmann::json to_json(const Imported& one) {
   nlohmann::json glitches = nlohmann::json::array();
   for (const telemetry::Glitch& g : report.glitches)
     glitches.push_back({{"line", g.line}, {"column", g.column}, {"value", g.value}, {"action", g.action}});
+  nlohmann::json covariates = nlohmann::json::array();
+  for (const telemetry::CovariateSeries& series : recording.covariates)
+    covariates.push_back({{"name", series.name}, {"changes", series.value.size()}});
   return {{"table", one.table},
           {"robot_id", recording.robot_id},
           {"mission_id", recording.mission_id},
@@ -100,6 +103,7 @@ nlohmann::json to_json(const Imported& one) {
           {"rows_out_of_time", report.rows_out_of_time},
           {"rows_glitched", report.rows_glitched},
           {"cells_filled", report.cells_filled},
+          {"covariates", covariates},
           {"glitches", glitches}};
 }
 

@@ -64,6 +64,8 @@ struct Options {
   bool no_gyro = false;
   bool no_pose = false;
   bool temperature = false;
+  bool pitch = false;
+  double covariates_hz = 0;
   bool list_effects = false;
   bool quiet = false;
   bool force = false;
@@ -161,6 +163,8 @@ Result<std::vector<Member>> assemble(const Options& options) {
     spec.sensors.gyro = !options.no_gyro;
     spec.sensors.pose = !options.no_pose;
     spec.sensors.temperature = options.temperature;
+    spec.sensors.pitch = options.pitch;
+    spec.sensors.covariates_hz = options.covariates_hz;
     spec.sensors.sampling_jitter = options.jitter;
     spec.sensors.loss_probability = options.loss;
     members.push_back(std::move(*member));
@@ -180,18 +184,28 @@ Result<void> introduce(const std::vector<Member>& members, const std::string& ur
   return {};
 }
 
+using Encoded = Result<std::vector<std::uint8_t>>;
+Encoded encoded(const std::string& robot_id, const telemetry::MissionEvent& event) {
+  return telemetry::encode_mission_event(robot_id, event);
+}
+Encoded encoded(const std::string& robot_id, const telemetry::Sample& sample) {
+  return telemetry::encode_telemetry(robot_id, sample);
+}
+Encoded encoded(const std::string& robot_id, const telemetry::CovariateMessage& covariates) {
+  return telemetry::encode_covariates(robot_id, covariates);
+}
+
 struct Outlets {
   std::optional<telemetry::LcmLink> link;
   std::optional<telemetry::EventLogWriter> log;
 
   Result<void> send(const std::string& robot_id, const vr::Emission& emission) {
-    const auto* sample = std::get_if<telemetry::Sample>(&emission.message);
-    const auto bytes = sample != nullptr ? telemetry::encode_telemetry(robot_id, *sample)
-                                         : telemetry::encode_mission_event(
-                                               robot_id, std::get<telemetry::MissionEvent>(emission.message));
+    const auto bytes =
+        std::visit([&](const auto& message) { return encoded(robot_id, message); }, emission.message);
     if (!bytes) return tl::unexpected<Error>(bytes.error());
-    const std::string channel = telemetry::channel_of(
-        sample != nullptr ? telemetry::Subject::telemetry : telemetry::Subject::mission_event, robot_id);
+    constexpr telemetry::Subject subjects[] = {telemetry::Subject::mission_event,
+                                               telemetry::Subject::telemetry, telemetry::Subject::covariates};
+    const std::string channel = telemetry::channel_of(subjects[emission.message.index()], robot_id);
     if (link) {
       if (auto sent = link->publish(channel, *bytes); !sent) return sent;
     }
@@ -203,7 +217,7 @@ struct Outlets {
 };
 
 void print_effects() {
-  for (const auto& entry : vr::effect_table()) {
+  for (const auto& entry : vr::all_effects()) {
     std::printf("%-26s %-10s up to %g%s\n", std::string(entry.id).c_str(), std::string(entry.unit).c_str(),
                 entry.search_limit, entry.outside ? "  (outside the catalogue)" : "");
   }
@@ -428,6 +442,12 @@ void add_simulate(CLI::App& program, Exit& exit) {
   command->add_flag("--no-gyro", options->no_gyro, "robots without gyro");
   command->add_flag("--no-pose", options->no_pose, "robots without localisation");
   command->add_flag("--temperature", options->temperature, "robots with winding temperature sensors");
+  command->add_flag("--pitch", options->pitch, "robots with an inclinometer");
+  command
+      ->add_option("--covariates", options->covariates_hz,
+                   "robots that publish the covariates cpu_load and height_m so often, Hz; 0 = not")
+      ->check(CLI::Range(0.0, 200.0))
+      ->capture_default_str();
   command->add_flag("--quiet", options->quiet, "no summary");
   command->callback([options, robots, files, url, &exit] {
     if (files->count() > 0 && robots->count() == 0) options->robots = options->robot_files.size();

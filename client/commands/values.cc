@@ -80,17 +80,16 @@ std::vector<std::string> ends(std::string_view type) {
           std::string(type.substr(dash + 3, close - dash - 3))};
 }
 
-std::vector<std::string> ids(std::string_view end) {
+std::vector<std::string> ids(std::span<const virtual_robot::EffectEntry> effects, std::string_view end) {
   std::vector<std::string> words;
-  for (const auto& effect : virtual_robot::effect_table())
-    words.push_back(std::string(effect.id) + std::string(end));
+  for (const auto& effect : effects) words.push_back(std::string(effect.id) + std::string(end));
   return words;
 }
 
 std::vector<std::string> special_words(std::string_view command, std::string_view option) {
-  if (command == "simulate" && option == "--effect") return ids("=");
+  if (command == "simulate" && option == "--effect") return ids(virtual_robot::all_effects(), "=");
   if (command == "gap trial" && option == "--only") {
-    std::vector<std::string> words = ids("");
+    std::vector<std::string> words = ids(virtual_robot::effect_table(), "");
     words.insert(words.begin(), {"none", "single", "double", "outside"});
     return words;
   }

@@ -20,13 +20,13 @@ std::string_view name_of(Ablation ablation) {
   return "";
 }
 
-Result<gap::Diagnosis> diagnose_without(Ablation ablation, const gap::RecordingSet& recordings,
+Result<gap::Diagnosis> diagnose_without(Ablation ablation, const telemetry::RecordingSet& recordings,
                                         const robot::RobotModel& robot) {
   gap::DiagnosisSettings settings;
   gap::MethodParts& parts = settings.parts;
   switch (ablation) {
     case Ablation::channels: {
-      gap::RecordingSet poorer = recordings;
+      telemetry::RecordingSet poorer = recordings;
       for (auto& mission : poorer.missions) {
         for (telemetry::Sample& sample : mission.samples) {
           sample.motor_voltage_v.fill(telemetry::unmeasured);

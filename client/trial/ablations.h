@@ -14,7 +14,7 @@ inline constexpr std::array ablations{Ablation::channels, Ablation::weak_form,  
                                       Ablation::scatter,  Ablation::tolerances, Ablation::open_set};
 [[nodiscard]] std::string_view name_of(Ablation ablation);
 
-[[nodiscard]] Result<gap::Diagnosis> diagnose_without(Ablation ablation, const gap::RecordingSet& recordings,
+[[nodiscard]] Result<gap::Diagnosis> diagnose_without(Ablation ablation, const telemetry::RecordingSet& recordings,
                                                       const robot::RobotModel& robot);
 
 }  // namespace joulecast::trial

@@ -88,7 +88,7 @@ std::vector<std::vector<Shape>> shapes_of(const dynamics::Effect& effect, const 
   return {{shape}};
 }
 
-Problem make_problem(const gap::RecordingSet& recordings, const robot::RobotModel& robot) {
+Problem make_problem(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
   auto windows = gap::make_windows(recordings, robot);
   const auto nominal = gap::modelled_power(robot, {}, windows);
   Problem problem;
@@ -300,7 +300,7 @@ std::string_view name_of(Baseline baseline) {
   return "";
 }
 
-gap::Diagnosis diagnose_by(Baseline baseline, const gap::RecordingSet& recordings,
+gap::Diagnosis diagnose_by(Baseline baseline, const telemetry::RecordingSet& recordings,
                            const robot::RobotModel& robot) {
   const Problem problem = make_problem(recordings, robot);
   if (problem.mission.empty()) return {};

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "gap/diagnosis.h"
-#include "gap/recordings.h"
+#include "telemetry/recording_set.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::trial {
@@ -20,7 +20,7 @@ inline constexpr std::array baselines{Baseline::multiplier, Baseline::stepwise_b
 [[nodiscard]] std::string_view name_of(Baseline baseline);
 
 // Verdict, effects with strengths, and held-out shrinkage; the other fields stay empty.
-[[nodiscard]] gap::Diagnosis diagnose_by(Baseline baseline, const gap::RecordingSet& recordings,
+[[nodiscard]] gap::Diagnosis diagnose_by(Baseline baseline, const telemetry::RecordingSet& recordings,
                                          const robot::RobotModel& robot);
 
 }  // namespace joulecast::trial

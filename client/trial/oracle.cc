@@ -70,7 +70,7 @@ Coefficients fit_without(const std::vector<Row>& rows, std::size_t left_out) {
 
 }  // namespace
 
-std::optional<double> oracle_shrinkage(const gap::RecordingSet& recordings, const robot::RobotModel& robot,
+std::optional<double> oracle_shrinkage(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
                                        const SealedTruth& truth) {
   if (recordings.missions.size() < 2) return std::nullopt;
   std::vector<dynamics::ActiveEffect> effects;

@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "client/trial/case_files.h"
-#include "gap/recordings.h"
+#include "telemetry/recording_set.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::trial {
@@ -12,7 +12,7 @@ namespace joulecast::trial {
 // shapes, and only their strengths are fitted to the other missions (least absolute deviations). What a
 // diagnosis can at best reach. Empty without an effect of the catalogue, with fewer than two missions, or
 // without battery power.
-[[nodiscard]] std::optional<double> oracle_shrinkage(const gap::RecordingSet& recordings,
+[[nodiscard]] std::optional<double> oracle_shrinkage(const telemetry::RecordingSet& recordings,
                                                      const robot::RobotModel& robot,
                                                      const SealedTruth& truth);
 

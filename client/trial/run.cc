@@ -24,7 +24,7 @@ Result<CaseOutcome> run_case(const RunSettings& settings, std::size_t index, con
   const auto robot = robot::load_robot(files.robot());
   if (!robot) return tl::unexpected<Error>(robot.error());
   const std::string log = files.log().string();
-  const auto recordings = gap::load_recordings({&log, 1});
+  const auto recordings = telemetry::load_recordings({&log, 1});
   if (!recordings) return tl::unexpected<Error>(recordings.error());
   auto diagnosis = gap::diagnose(*recordings, *robot);
   if (!diagnosis) return tl::unexpected<Error>(diagnosis.error());

@@ -59,11 +59,19 @@ constexpr auto table = std::to_array<EffectEntry>({
     {"x_payload_speed", &I::x_payload_speed, "1", 0.6, true},
     {"x_turn_lamp", &I::x_turn_lamp, "W", 600, true},
     {"x_warm_fan", &I::x_warm_fan, "1", 5, true},
+    // Whose cause the robot can publish.
+    {"grade", &I::grade, "1", 0.2, false},
+    {"x_cpu_load", &I::x_cpu_load, "W", 600, true},
 });
+constexpr std::size_t published = 2;
 
 }  // namespace
 
 std::span<const EffectEntry> effect_table() {
+  return std::span(table).first(table.size() - published);
+}
+
+std::span<const EffectEntry> all_effects() {
   return table;
 }
 

@@ -68,6 +68,9 @@ struct Imperfections {
   double x_payload_speed = 0;  // F = c m_p g |v| / v_max: tyres that flex under load
   double x_turn_lamp = 0;      // W while the robot turns
   double x_warm_fan = 0;       // W per W of motor power, low-passed with World::burst_time_s
+  // Whose cause the robot can publish.
+  double grade = 0;       // steepest rise of a floor of hills; F = m g dh/ds, h = a/k sin(k x) cos(k y)
+  double x_cpu_load = 0;  // W per unit of the on-board computer's load, which wanders between 0 and 1
 };
 
 // Shapes that the strengths do not say.
@@ -83,6 +86,7 @@ struct World {
   double period_s = 24;
   double burst_time_s = 20;
   double patch_m = 1.2;
+  double hill_m = 8;          // from top to top, k = 2 pi / hill_m
   double brush_softness = 1;  // of the current over which the brush drop builds up
   double motor_sensor_share = 1, battery_sensor_share = 1;  // of gains and biases of electrical sensors
 };
@@ -95,8 +99,10 @@ struct EffectEntry {
   bool outside;           // beyond the catalogue
 };
 
-// Every injectable effect.
+// The effects that are put in without a word, from which trials draw.
 [[nodiscard]] std::span<const EffectEntry> effect_table();
+// Those and the ones whose cause the robot can publish: every injectable effect.
+[[nodiscard]] std::span<const EffectEntry> all_effects();
 
 using EffectStrength = std::pair<std::string, double>;
 

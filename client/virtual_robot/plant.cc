@@ -113,6 +113,26 @@ double Plant::patch_share(double x_m, double y_m) const {
   return 0.5 * (1 + std::sin(k * x_m) * std::sin(k * y_m));
 }
 
+// Of the hills, over the way along the heading.
+double Plant::hill_rise(double x_m, double y_m, double heading_rad) const {
+  const double k = 2 * std::numbers::pi / world_.hill_m;
+  return effect_.grade * (std::cos(k * x_m) * std::cos(k * y_m) * std::cos(heading_rad) -
+                          std::sin(k * x_m) * std::sin(k * y_m) * std::sin(heading_rad));
+}
+
+double Plant::climb_rad() const {
+  const PlantState& s = state_;
+  const double plane = std::sin(effect_.slope) * std::cos(s.heading_rad - world_.slope_direction_rad);
+  return std::asin(plane + hill_rise(s.x_m, s.y_m, s.heading_rad));
+}
+
+double Plant::height_m() const {
+  const PlantState& s = state_;
+  const double k = 2 * std::numbers::pi / world_.hill_m, d = world_.slope_direction_rad;
+  return std::sin(effect_.slope) * (s.x_m * std::cos(d) + s.y_m * std::sin(d)) +
+         effect_.grade / k * std::sin(k * s.x_m) * std::cos(k * s.y_m);
+}
+
 // Two periods that never meet again, so that no clock foretells the spells.
 bool Plant::brake_holds() const {
   const double turn = 2 * std::numbers::pi * time_s_ / world_.period_s;
@@ -138,9 +158,10 @@ Plant::Rates Plant::rates(const PlantState& s, const std::array<double, 2>& volt
 
   // Forces on the body, positive against forward motion and against a turn to the left.
   const double drag_n = effect_.aerodynamic_drag * v * std::abs(v);
-  const double slope_n = effect_.slope == 0 ? 0
-                                            : weight_n_ * std::sin(effect_.slope) *
-                                                  std::cos(s.heading_rad - world_.slope_direction_rad);
+  double slope_n = effect_.slope == 0 ? 0
+                                      : weight_n_ * std::sin(effect_.slope) *
+                                            std::cos(s.heading_rad - world_.slope_direction_rad);
+  if (effect_.grade != 0) slope_n += weight_n_ * hill_rise(s.x_m, s.y_m, s.heading_rad);
   const double scrub_nm =
       effect_.turning_scrub == 0
           ? 0

@@ -69,6 +69,8 @@ class Plant {
 
   double speed_m_s() const;
   double yaw_rate_rad_s() const;
+  double climb_rad() const;  // of the floor along the heading, nose up positive
+  double height_m() const;   // of the floor, above where x = y = 0
   std::array<double, 2> wheel_acceleration_rad_s2(const std::array<double, 2>& voltage_v) const;
   double motor_power_w(const std::array<double, 2>& voltage_v) const;  // V i of both
   double bus_power_w(const std::array<double, 2>& voltage_v) const;    // drawn by the drivers
@@ -83,6 +85,7 @@ class Plant {
   double driver_power_w(double motor_power_w) const;
   double zone_share(double x_m, double y_m) const;
   double patch_share(double x_m, double y_m) const;
+  double hill_rise(double x_m, double y_m, double heading_rad) const;
   bool brake_holds() const;
   void update_inertia();
 

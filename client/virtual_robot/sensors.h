@@ -36,6 +36,9 @@ struct SensorSuite {
   double heading_noise_rad = 0.010;
   double temperature_noise_k = 0.4;
   double pitch_noise_rad = 0.003;
+  double covariates_hz = 0;  // how often cpu_load and height_m are published; 0: not
+  double height_noise_m = 0.01;
+  double height_step_m = 0;  // of the height as published
 
   double sampling_jitter = 0.0;   // of the sampling period, uniform to either side
   double loss_probability = 0.0;  // of a sample that never reaches the network

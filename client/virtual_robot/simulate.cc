@@ -17,6 +17,8 @@ Simulation simulate_missions(const SimulationSpec& spec, std::uint64_t seed) {
   while (robot.next(emission)) {
     if (auto* event = std::get_if<telemetry::MissionEvent>(&emission.message)) {
       out.events.push_back(std::move(*event));
+    } else if (auto* covariates = std::get_if<telemetry::CovariateMessage>(&emission.message)) {
+      out.covariates.push_back(std::move(*covariates));
     } else {
       out.samples.push_back(std::get<telemetry::Sample>(emission.message));
     }
@@ -108,7 +110,7 @@ PowerGap power_gap(const SimulationSpec& spec, std::uint64_t seed) {
 
 Result<double> strength_for_gap(const SimulationSpec& spec, std::uint64_t seed, std::string_view effect_id,
                                 double added_gap, double sign) {
-  const auto entries = effect_table();
+  const auto entries = all_effects();
   const auto entry =
       std::find_if(entries.begin(), entries.end(), [&](const auto& e) { return e.id == effect_id; });
   if (entry == entries.end()) return invalid("effect", "no effect is called " + std::string(effect_id));

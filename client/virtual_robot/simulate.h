@@ -31,6 +31,7 @@ struct Truth {
 struct Simulation {
   std::vector<telemetry::MissionEvent> events;
   std::vector<telemetry::Sample> samples;  // in order of time
+  std::vector<telemetry::CovariateMessage> covariates;
   Truth truth;
 };
 

@@ -1,5 +1,6 @@
 #include "client/virtual_robot/virtual_robot.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <utility>
@@ -7,7 +8,7 @@
 namespace joulecast::virtual_robot {
 namespace {
 
-enum Stream : std::uint64_t { missions_stream, scatter_stream, sensors_stream };
+enum Stream : std::uint64_t { missions_stream, scatter_stream, sensors_stream, computer_stream };
 
 constexpr double ambient_c = 24;
 constexpr double usual_thermal_resistance_k_w =
@@ -17,6 +18,9 @@ constexpr double scatter_friction = 0.025;
 constexpr double scatter_viscous = 0.04;
 constexpr double scatter_resistance = 0.008;
 constexpr double scatter_idle = 0.010;
+constexpr std::int64_t load_periods = 400;  // control periods after which the computer's load is another one
+constexpr double load_pull = 0.1;           // back to one half
+constexpr double load_step = 0.15;
 
 PlantAccounts difference(const PlantAccounts& a, const PlantAccounts& b) {
   using Flat = std::array<double, sizeof(PlantAccounts) / sizeof(double)>;
@@ -32,6 +36,7 @@ VirtualRobot::VirtualRobot(const SimulationSpec& spec, std::uint64_t seed)
     : spec_(spec),
       mission_rng_(Rng::stream(seed, missions_stream)),
       scatter_rng_(Rng::stream(seed, scatter_stream)),
+      computer_rng_(Rng::stream(seed, computer_stream)),
       plant_(spec.robot, spec.imperfections, spec.world),
       pack_(spec.robot, spec.imperfections.battery_resistance, spec.initial_charge),
       controller_(spec.robot, spec.controller),
@@ -121,6 +126,7 @@ double VirtualRobot::load_power_w() const {
     const auto driven = pack_.terminals(plant_.bus_power_w(voltage_v_) + spec_.robot.idle_power_w);
     load_w += spec_.imperfections.x_sag_load * 100 * (1 - driven.voltage_v / pack_.open_circuit_voltage_v());
   }
+  if (spec_.imperfections.x_cpu_load != 0) load_w += spec_.imperfections.x_cpu_load * cpu_load_;
   return load_w;
 }
 
@@ -142,7 +148,7 @@ void VirtualRobot::run_charger() {
   if (!charging_) rested_s_ += SpeedController::period_s;
   history_[static_cast<std::size_t>(period_) % history_length] = electrical();
   for (int k = 0; k < steps_per_period_; ++k) {
-    if (step_s_ * static_cast<double>(step_) >= next_sample_s_ - 0.5 * step_s_) take_sample();
+    take_what_is_due();
     ++step_;
   }
   pack_.advance(battery_power_w(), SpeedController::period_s);
@@ -187,12 +193,39 @@ Reading VirtualRobot::reading() const {
   r.battery_current_a = e.battery_current_a;
   r.command = {command_.speed_m_s, command_.yaw_rate_rad_s};
   r.yaw_rate_rad_s = plant_.yaw_rate_rad_s();
-  r.pitch_rad = spec_.imperfections.slope * std::cos(s.heading_rad - spec_.world.slope_direction_rad);
+  r.pitch_rad = plant_.climb_rad();
   r.pose = {s.x_m, s.y_m, s.heading_rad};
   r.winding_c = {ambient_c + winding_rise_k_[0], ambient_c + winding_rise_k_[1]};
   r.declared_payload_kg = pilot_.payload_kg();
   r.time_s = step_s_ * static_cast<double>(step_);
   return r;
+}
+
+void VirtualRobot::take_what_is_due() {
+  const double now_s = step_s_ * static_cast<double>(step_);
+  const double covariates_hz = spec_.sensors.covariates_hz;
+  if (covariates_hz > 0 && now_s >= static_cast<double>(covariate_index_) / covariates_hz - 0.5 * step_s_)
+    publish_covariates();
+  if (now_s >= next_sample_s_ - 0.5 * step_s_) take_sample();
+}
+
+void VirtualRobot::publish_covariates() {
+  const bool noise = sensors_.suite().noise;
+  double height_m = plant_.height_m();
+  if (noise) height_m += spec_.sensors.height_noise_m * computer_rng_.normal();
+  outbox_.push_back(
+      {now_us(), telemetry::CovariateMessage{now_us(),
+                                             {{"cpu_load", cpu_load_},
+                                              {std::string(telemetry::height_covariate),
+                                               quantised(height_m, spec_.sensors.height_step_m)}}}});
+  ++covariate_index_;
+}
+
+// Tasks come and go some times a minute.
+void VirtualRobot::wander_load() {
+  if (period_ % load_periods != 0) return;
+  cpu_load_ += load_pull * (0.5 - cpu_load_) + load_step * computer_rng_.normal();
+  cpu_load_ = std::clamp(cpu_load_, 0.0, 1.0);
 }
 
 void VirtualRobot::take_sample() {
@@ -243,11 +276,12 @@ void VirtualRobot::run_period() {
       {quantised(s.wheel_speed_rad_s[0], encoder_step), quantised(s.wheel_speed_rad_s[1], encoder_step)},
       before.battery_voltage_v);
 
+  wander_load();
   history_[static_cast<std::size_t>(period_) % history_length] = electrical();
 
   const double bus_before_j = plant_.accounts().bus;
   for (int k = 0; k < steps_per_period_; ++k) {
-    if (step_s_ * static_cast<double>(step_) >= next_sample_s_ - 0.5 * step_s_) take_sample();
+    take_what_is_due();
     plant_.advance(voltage_v_, step_s_);
     ++step_;
   }

@@ -15,6 +15,7 @@
 #include "client/virtual_robot/plant.h"
 #include "client/virtual_robot/robot_parameters.h"
 #include "client/virtual_robot/sensors.h"
+#include "telemetry/covariates.h"
 #include "telemetry/sample.h"
 
 namespace joulecast::virtual_robot {
@@ -63,7 +64,7 @@ struct MissionTruth {
 
 struct Emission {
   std::int64_t utime_us = 0;
-  std::variant<telemetry::MissionEvent, telemetry::Sample> message;
+  std::variant<telemetry::MissionEvent, telemetry::Sample, telemetry::CovariateMessage> message;
 };
 
 // What a perfect logger would have seen at the instant of the last sample, systematic sensor errors included.
@@ -103,7 +104,10 @@ class VirtualRobot {
   void run_period();
   void start_mission();
   void finish_mission();
+  void take_what_is_due();
   void take_sample();
+  void publish_covariates();
+  void wander_load();
   double load_power_w() const;
   double battery_power_w() const;  // out of the pack
   bool wants_charging() const;
@@ -117,6 +121,7 @@ class VirtualRobot {
   SimulationSpec spec_;
   Rng mission_rng_;
   Rng scatter_rng_;
+  Rng computer_rng_;
   Plant plant_;
   Pack pack_;
   SpeedController controller_;
@@ -138,6 +143,8 @@ class VirtualRobot {
   std::int64_t period_ = 0;  // control periods since the beginning
   std::int64_t sample_index_ = 0;
   double next_sample_s_ = 0;
+  std::int64_t covariate_index_ = 0;
+  double cpu_load_ = 0.4;
   int missions_begun_ = 0;
   bool under_way_ = false;
   bool charging_ = false;  // at the charger

@@ -11,8 +11,11 @@
 #include <limits>
 #include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "joulecast/mission_event_t.hpp"
+#include "joulecast/robot_covariates_t.hpp"
 #include "joulecast/robot_telemetry_t.hpp"
 
 namespace {
@@ -61,6 +64,26 @@ joulecast::robot_telemetry_t read_sensors(const std::string& robot_id, std::int6
   return s;
 }
 
+// What else may explain the power; a value holds until the next one of its name.
+joulecast::robot_covariates_t covariates(const std::string& robot_id,
+                                         const std::vector<std::pair<std::string, double>>& values) {
+  joulecast::robot_covariates_t c{};
+  c.utime = now_us();
+  c.robot_id = robot_id;
+  c.n = static_cast<std::int32_t>(values.size());
+  for (const auto& [name, value] : values) {
+    c.name.push_back(name);
+    c.value.push_back(value);
+  }
+  return c;
+}
+
+double cpu_load() {
+  double load = not_measured;
+  getloadavg(&load, 1);
+  return load / std::thread::hardware_concurrency();
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -75,8 +98,14 @@ int main(int argc, char** argv) {
   const std::string mission_id = "tour-" + std::to_string(now_us());
   const auto started = mission_event(robot_id, mission_id, mission_event_t::STARTED);
   lcm.publish("MISSION_EVENT." + robot_id, &started);
+  const auto around = covariates(robot_id, {{"surface=concrete", 1}, {"heater_w", 0}});
+  lcm.publish("ROBOT_COVARIATES." + robot_id, &around);
   auto next = std::chrono::steady_clock::now();
   for (std::int64_t sequence = 0; sequence < std::int64_t{rate_hz} * duration_s; ++sequence) {
+    if (sequence % rate_hz == 0) {
+      const auto load = covariates(robot_id, {{"cpu_load", cpu_load()}});
+      lcm.publish("ROBOT_COVARIATES." + robot_id, &load);
+    }
     const auto sample = read_sensors(robot_id, sequence);
     lcm.publish("ROBOT_TELEMETRY." + robot_id, &sample);
     std::this_thread::sleep_until(next += std::chrono::milliseconds(1000 / rate_hz));

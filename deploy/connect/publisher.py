@@ -7,10 +7,11 @@ The drive below is made up; put your own readings in its place.
 """
 
 import math
+import os
 import sys
 import time
 
-from joulecast import mission_event_t, robot_telemetry_t
+from joulecast import mission_event_t, robot_covariates_t, robot_telemetry_t
 from lcm_udp import Publisher
 
 NOT_MEASURED = math.nan
@@ -53,14 +54,29 @@ def sample(robot_id, sequence):
     return message.encode()
 
 
+def covariates(robot_id, values):
+    """What else may explain the power; a value holds until the next one of its name."""
+    message = robot_covariates_t()
+    message.utime = now_us()
+    message.robot_id = robot_id
+    message.n = len(values)
+    message.name = list(values)
+    message.value = [float(value) for value in values.values()]
+    return message.encode()
+
+
 def main():
     robot_id = sys.argv[1] if len(sys.argv) > 1 else "amr"
     duration_s = int(sys.argv[2]) if len(sys.argv) > 2 else 5
     lcm = Publisher()
     mission_id = f"tour-{now_us()}"
     lcm.publish(f"MISSION_EVENT.{robot_id}", mission_event(robot_id, mission_id, mission_event_t.STARTED))
+    lcm.publish(f"ROBOT_COVARIATES.{robot_id}", covariates(robot_id, {"surface=concrete": 1, "heater_w": 0}))
     begin = time.monotonic()
     for sequence in range(RATE_HZ * duration_s):
+        if sequence % RATE_HZ == 0:
+            load = os.getloadavg()[0] / os.cpu_count()
+            lcm.publish(f"ROBOT_COVARIATES.{robot_id}", covariates(robot_id, {"cpu_load": load}))
         lcm.publish(f"ROBOT_TELEMETRY.{robot_id}", sample(robot_id, sequence))
         time.sleep(max(0.0, begin + (sequence + 1) / RATE_HZ - time.monotonic()))
     lcm.publish(f"MISSION_EVENT.{robot_id}", mission_event(robot_id, mission_id, mission_event_t.FINISHED))

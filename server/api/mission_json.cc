@@ -69,6 +69,12 @@ void write_mission(JsonWriter& json, const history::Mission& m) {
   json.field("gap_s", m.gap_s);
   json.key("findings");
   m.findings_json.empty() ? json.null() : json.raw(m.findings_json);
+  json.key("covariates").begin_array();
+  for (const history::CovariateSummary& c : m.covariates) {
+    json.begin_object().field("name", c.name).field("mean", c.mean).field("min", c.min).field("max", c.max);
+    json.field("known_s", c.known_s).end_object();
+  }
+  json.end_array();
   json.end_object();
 }
 

@@ -278,6 +278,30 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
   return http::json_response(json.take());
 }
 
+Result<Response> covariates(const Services& services, const Request& request) {
+  const Result<history::MissionKey> key = path_id(request, "mission");
+  if (!key) return tl::unexpected(key.error());
+  history::PageRequest page;
+  page.limit = request.query_integer("limit").value_or(1000);
+  page.cursor = std::string(request.query_value("cursor").value_or(""));
+  const Result<history::CovariatePage> found = services.store.covariates(*key, range_of(request), page);
+  if (!found) return tl::unexpected(found.error());
+  JsonWriter json;
+  json.begin_object();
+  json.field("id", *key);
+  json.key("covariates").begin_array();
+  for (const telemetry::CovariateSeries& series : telemetry::series_of(found->changes)) {
+    json.begin_object().field("name", series.name).array("utime_us", series.utime_us);
+    json.key("value").begin_array();
+    for (const double value : series.value) json.exact(value);
+    json.end_array().end_object();
+  }
+  json.end_array();
+  write_cursor(json, found->next_cursor);
+  json.end_object();
+  return http::json_response(json.take());
+}
+
 }  // namespace
 
 std::vector<TableRow> mission_rows() {
@@ -347,6 +371,15 @@ std::vector<TableRow> mission_rows() {
         .response_schema = "mission-telemetry",
         .error_statuses = {404}},
        answered_by(raw_telemetry)});
+  rows.push_back(
+      {{.method = Method::get,
+        .path = "/v1/missions/{id}/covariates",
+        .operation_id = "getMissionCovariates",
+        .summary = "What changed of a mission's covariates, as far as the retention keeps them",
+        .parameters = with(span, {limit_parameter("changes a page", history::max_telemetry_samples), cursor}),
+        .response_schema = "mission-covariates",
+        .error_statuses = {404}},
+       answered_by(covariates)});
   return rows;
 }
 

@@ -109,6 +109,7 @@ planning::Profile series_of(const dynamics::DriveModel& drive, const std::vector
     const double span = b.time_s - a.time_s;
     const double slope = (b.speed_m_s - a.speed_m_s) / span,
                  bend = (b.yaw_rate_rad_s - a.yaw_rate_rad_s) / span;
+    const std::array<double, 2> climb = *energy::climb_of_span(a, b);  // estimate_motion() accepted it
     const bool in_place = a.speed_m_s == 0 && b.speed_m_s == 0;
     planning::Peaks here;
     here.peak_speed_m_s = std::max(std::fabs(a.speed_m_s), std::fabs(b.speed_m_s));
@@ -122,6 +123,7 @@ planning::Profile series_of(const dynamics::DriveModel& drive, const std::vector
       at.wheel_acceleration_rad_s2 = dynamics::wheels_of_body(drive.parameters(), slope, bend);
       at.payload_kg = payload_kg;
       at.x_m = pose.x_m, at.y_m = pose.y_m, at.heading_rad = pose.heading_rad;
+      at.climb_rad = climb[0] + (climb[1] - climb[0]) * t / span;
       const auto flow = drive.flow(at);
       peaks.reach(at.wheel_speed_rad_s, flow);
       return flow.battery_power_w;
@@ -253,6 +255,17 @@ Result<std::string> estimate_answer(const nlohmann::json& body, const server::Mo
     if (profile.has("yaw_rate_rad_s")) yaw = profile.numbers("yaw_rate_rad_s", 2, max_profile_points, speed);
     if (profile.ok() && (v.size() != t.size() || yaw.size() != t.size()))
       profile.fault("speed_m_s", "must have as many entries as time_s");
+    const auto column_of = [&](std::string_view name, const Bounds& bounds) {
+      std::vector<double> unknown(t.size(), dynamics::unknown);
+      return profile.has(name) ? profile.numbers(name, 2, max_profile_points, bounds) : unknown;
+    };
+    const std::vector<double> climb = column_of("climb_rad", {.minimum = -0.785, .maximum = 0.785});
+    const std::vector<double> height = column_of("height_m", {.minimum = -1e5, .maximum = 1e5});
+    if (profile.has("climb_rad") && profile.has("height_m"))
+      profile.fault("climb_rad", "must not be given beside height_m, from which it follows");
+    for (const auto& [name, column] : {std::pair{"climb_rad", &climb}, {"height_m", &height}})
+      if (profile.ok() && column->size() != t.size())
+        profile.fault(name, "must have as many entries as time_s");
     if (Result<void> done = profile.finish(); !done) fields.fault(std::move(done.error()));
     const double payload =
         fields.number("payload_kg", {.minimum = 0, .maximum = model.robot.limits.payload_kg}, 0);
@@ -260,7 +273,7 @@ Result<std::string> estimate_answer(const nlohmann::json& body, const server::Mo
     if (const auto pose = read_start_pose(fields)) start = {pose->x_m, pose->y_m, pose->heading_rad};
     if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
     std::vector<energy::MotionPoint> points(t.size());
-    for (std::size_t k = 0; k < t.size(); ++k) points[k] = {t[k], v[k], yaw[k]};
+    for (std::size_t k = 0; k < t.size(); ++k) points[k] = {t[k], v[k], yaw[k], climb[k], height[k]};
     Result<energy::Accounts> priced = energy::estimate_motion(model.drive, points, payload, start);
     if (!priced) return tl::unexpected(std::move(priced.error()));
     accounts = *priced;

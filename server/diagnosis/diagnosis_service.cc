@@ -293,7 +293,7 @@ class DiagnosisService::Impl {
       }
     }
     history->missions.clear();
-    Result<gap::RecordingSet> set = gap::make_recording_set(record.robot_id, std::move(recordings));
+    Result<telemetry::RecordingSet> set = telemetry::make_recording_set(record.robot_id, std::move(recordings));
     if (!set) return tl::unexpected(std::move(set.error()));
     gap::DiagnosisSettings settings;
     settings.progress = [&job](double fraction) {

@@ -28,6 +28,21 @@ Result<std::vector<telemetry::Sample>> samples_of(const history::Store& store, h
   return samples;
 }
 
+Result<std::vector<telemetry::CovariateSeries>> covariates_of(const history::Store& store,
+                                                              history::MissionKey key) {
+  std::vector<telemetry::CovariateChange> changes;
+  history::PageRequest page;
+  page.limit = history::max_telemetry_samples;
+  do {
+    Result<history::CovariatePage> got = store.covariates(key, {}, page);
+    if (!got) return tl::unexpected(std::move(got.error()));
+    changes.insert(changes.end(), std::make_move_iterator(got->changes.begin()),
+                   std::make_move_iterator(got->changes.end()));
+    page.cursor = std::move(got->next_cursor);
+  } while (!page.cursor.empty());
+  return telemetry::series_of(changes);
+}
+
 class Reader {
  public:
   Reader(const history::Store& store, const RecordingsWanted& wanted) : store_(store), wanted_(wanted) {}
@@ -50,11 +65,13 @@ class Reader {
         charging != mission.sample_faults.end() && charging->second > 0)
       out.charging_samples += drop_charging(wanted_.battery_capacity_ah, *samples);
     if (samples->size() < 2) return ++out.no_telemetry, Result<void>{};
+    Result<std::vector<telemetry::CovariateSeries>> covariates = covariates_of(store_, mission.key);
+    if (!covariates) return tl::unexpected(std::move(covariates.error()));
     result_.samples += samples->size();
-    result_.missions.push_back(
-        {mission.key,
-         mission.start_utime_us,
-         {mission.robot_id, mission.mission_id, mission.payload_kg, std::move(*samples)}});
+    result_.missions.push_back({mission.key,
+                                mission.start_utime_us,
+                                {mission.robot_id, mission.mission_id, mission.payload_kg,
+                                 std::move(*samples), std::move(*covariates)}});
     return {};
   }
 

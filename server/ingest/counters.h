@@ -19,31 +19,48 @@ enum class IngestFault : std::size_t {
   unknown_robot,    // no model: its samples are not accounted
   implausible,      // a value is missing, infinite or absurd
   duplicate,
-  late,     // out of order; older than what was accounted
+  late,     // out of order; older than what was accounted. Of a covariate: than the value that holds
   missing,  // sequence numbers that never came (or came late)
   restart,  // the robot's sequence began anew
   clock_backward,
   clock_forward,
-  clock_ahead,        // stamped well after the daemon's time; accounted for all the same
-  gap,                // a silence too long to be bridged
-  zero_payload,       // said 0 where the mission's start declared a load: accounted with that
-  outside_mission,    // belongs to no mission: just after an end, or before a start
-  bad_event,          // duplicate, out-of-order or unknown mission event
-  reused_mission_id,  // a mission began under an id that an earlier one had
-  solver              // CVODE failed on an interval; its chord stood in
+  clock_ahead,          // stamped well after the daemon's time; accounted for all the same
+  gap,                  // a silence too long to be bridged
+  zero_payload,         // said 0 where the mission's start declared a load: accounted with that
+  outside_mission,      // belongs to no mission: just after an end, or before a start
+  bad_event,            // duplicate, out-of-order or unknown mission event
+  reused_mission_id,    // a mission began under an id that an earlier one had
+  too_many_covariates,  // a value of a name beyond those that a mission may have
+  solver                // CVODE failed on an interval; its chord stood in
 };
-inline constexpr std::size_t ingest_fault_count = 19;
+inline constexpr std::size_t ingest_fault_count = 20;
 
-inline constexpr std::array<std::string_view, ingest_fault_count> ingest_fault_names = {
-    "undecodable", "wrong_channel", "queue_full",   "too_many_robots", "unknown_robot",  "implausible",
-    "duplicate",   "late",          "missing",      "restart",         "clock_backward", "clock_forward",
-    "clock_ahead", "gap",           "zero_payload", "outside_mission", "bad_event",      "reused_mission_id",
-    "solver"};
+inline constexpr std::array<std::string_view, ingest_fault_count> ingest_fault_names = {"undecodable",
+                                                                                        "wrong_channel",
+                                                                                        "queue_full",
+                                                                                        "too_many_robots",
+                                                                                        "unknown_robot",
+                                                                                        "implausible",
+                                                                                        "duplicate",
+                                                                                        "late",
+                                                                                        "missing",
+                                                                                        "restart",
+                                                                                        "clock_backward",
+                                                                                        "clock_forward",
+                                                                                        "clock_ahead",
+                                                                                        "gap",
+                                                                                        "zero_payload",
+                                                                                        "outside_mission",
+                                                                                        "bad_event",
+                                                                                        "reused_mission_id",
+                                                                                        "too_many_covariates",
+                                                                                        "solver"};
 
 // Written by the ingest threads, read by the metrics.
 struct IngestCounters {
   std::atomic<std::uint64_t> messages = 0;                       // received on our channels
   std::atomic<std::uint64_t> samples = 0;                        // accounted for
+  std::atomic<std::uint64_t> covariate_changes = 0;              // of missions
   std::array<std::atomic<std::uint64_t>, 2> missions_started{};  // announced, implicit
   std::array<std::atomic<std::uint64_t>, history::mission_state_count> missions_ended{};  // by state
   std::array<std::atomic<std::uint64_t>, ingest_fault_count> faults{};

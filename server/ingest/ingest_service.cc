@@ -41,7 +41,8 @@ class IngestService::Impl {
           decode_message(received.channel, received.data, received.recv_utime_us, outputs_.counters);
       if (message) batch_.push_back(std::move(*message));
     };
-    for (telemetry::Subject subject : {telemetry::Subject::telemetry, telemetry::Subject::mission_event}) {
+    for (telemetry::Subject subject :
+         {telemetry::Subject::telemetry, telemetry::Subject::mission_event, telemetry::Subject::covariates}) {
       if (Result<void> done = link_->subscribe(telemetry::channel_pattern(subject), handler, 100'000); !done)
         return done;
     }

@@ -20,6 +20,12 @@ std::optional<InboundMessage> decode_message(std::string_view channel, std::span
     if (decoded->robot_id != name->robot_id) return refuse(IngestFault::wrong_channel);
     return InboundMessage{std::move(decoded->robot_id), decoded->sample, host_utime_us};
   }
+  if (name->subject == telemetry::Subject::covariates) {
+    Result<telemetry::DecodedCovariates> decoded = telemetry::decode_covariates(data);
+    if (!decoded) return refuse(IngestFault::undecodable);
+    if (decoded->robot_id != name->robot_id) return refuse(IngestFault::wrong_channel);
+    return InboundMessage{std::move(decoded->robot_id), std::move(decoded->message), host_utime_us};
+  }
   Result<telemetry::DecodedMissionEvent> decoded = telemetry::decode_mission_event(data);
   if (!decoded) return refuse(IngestFault::undecodable);
   if (decoded->robot_id != name->robot_id) return refuse(IngestFault::wrong_channel);
@@ -66,6 +72,8 @@ void Pipeline::handle(const InboundMessage& message) {
   if (robot == nullptr) return;
   if (const auto* sample = std::get_if<telemetry::Sample>(&message.content)) {
     robot->on_sample(*sample, message.host_utime_us);
+  } else if (const auto* covariates = std::get_if<telemetry::CovariateMessage>(&message.content)) {
+    robot->on_covariates(*covariates);
   } else {
     robot->on_event(std::get<telemetry::MissionEvent>(message.content), message.host_utime_us);
   }

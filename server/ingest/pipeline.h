@@ -18,7 +18,7 @@ namespace joulecast::server {
 // A message off the wire that passed the guard.
 struct InboundMessage {
   std::string robot_id;
-  std::variant<telemetry::Sample, telemetry::MissionEvent> content;
+  std::variant<telemetry::Sample, telemetry::MissionEvent, telemetry::CovariateMessage> content;
   std::int64_t host_utime_us = 0;
 };
 

@@ -23,8 +23,8 @@ class RefinementWatch {
   void use(const robot::RobotModel& robot, std::int64_t version);
 
   void begin_mission();
-  // Samples of the mission in order of time, without those at a charger.
-  void add(const telemetry::Sample& sample) { windows_.add(sample); }
+  // Samples of the mission in order of time, without those at a charger, and the climb there.
+  void add(const telemetry::Sample& sample, double climb_rad) { windows_.add(sample, climb_rad); }
   void interrupt() { windows_.interrupt(); }
 
   struct Judgement {

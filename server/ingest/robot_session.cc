@@ -65,7 +65,8 @@ RobotSession::RobotSession(std::string robot_id, const SessionSettings& settings
       settings_(settings),
       outputs_(std::move(outputs)),
       sequence_(settings.sequence),
-      missions_(settings.mission) {
+      missions_(settings.mission),
+      covariates_(settings.mission.reorder_us) {
   snapshot_.robot_id = robot_id_;
   if (const auto stored = outputs_.store.energy_state(robot_id_); stored && stored->has_value()) {
     snapshot_.state_of_charge = (*stored)->state_of_charge;
@@ -146,6 +147,7 @@ void RobotSession::resume(const history::Mission& mission) {
   const auto zeros = mission.sample_faults.find(name_of(IngestFault::zero_payload));
   const std::int64_t contradicted = zeros == mission.sample_faults.end() ? 0 : zeros->second;
   open_->payload = telemetry::MissionPayload(mission.payload_kg, mission.samples > contradicted);
+  covariates_.resume(mission);
   missions_.resume({mission.mission_id, mission.start_utime_us, mission.end_utime_us, mission.payload_kg,
                     mission.implicit});
   snapshot_.mission_id = mission.mission_id;
@@ -185,6 +187,7 @@ void RobotSession::on_sample(const telemetry::Sample& sample, std::int64_t host_
     flush_meter();
     meter_->interrupt();
     missions_.on_clock_step(sample.utime_us);
+    covariates_.on_clock_step(sample.utime_us);
     if (open_ != nullptr && open_->record.samples > 0) {
       open_->record.incomplete = true;
       open_->record.incomplete_reason = "the robot's clock was set during the mission";
@@ -327,11 +330,12 @@ void RobotSession::on_own_sample(const telemetry::Sample& sample) {
   if (open_->payload.contradicts(sample.payload_kg)) on_fault(IngestFault::zero_payload);
   telemetry::Sample counted = sample;
   counted.payload_kg = open_->payload.take(sample.payload_kg);
-  if (const Result<void> metered = meter_->add(counted); !metered) {
+  const double climb_rad = covariates_.climb_at(model_->drive.parameters(), counted);
+  if (const Result<void> metered = meter_->add(counted, climb_rad); !metered) {
     on_fault(IngestFault::solver);
     outputs_.warn(robot_id_, describe(metered.error()));
   }
-  refinement_->add(counted);
+  refinement_->add(counted, climb_rad);
   keep(sample);  // as it came
   changed_ = true;
 }
@@ -357,6 +361,14 @@ void RobotSession::on_event(const telemetry::MissionEvent& event, std::int64_t h
   changed_ = true;
 }
 
+void RobotSession::on_covariates(const telemetry::CovariateMessage& message) {
+  if (telemetry::check_plausible(message)) return on_fault(IngestFault::implausible);
+  const std::size_t before = covariates_.pending();
+  covariates_.take(message, [this](IngestFault fault) { on_fault(fault); });
+  outputs_.counters.covariate_changes.fetch_add(covariates_.pending() - before, std::memory_order_relaxed);
+  if (open_ != nullptr && covariates_.pending() >= settings_.checkpoint_samples) checkpoint();
+}
+
 void RobotSession::carry_out(const telemetry::MissionActions& actions) {
   for (const telemetry::MissionAction& action : actions) {
     action.kind == telemetry::MissionAction::Kind::open ? open(action) : close(action);
@@ -370,6 +382,7 @@ void RobotSession::open(const telemetry::MissionAction& action) {
   refinement_->begin_mission();
   trace_.begin();
   legs_->begin();
+  covariates_.begin_mission(action.utime_us);
   open_ = std::make_unique<OpenMission>();
   history::Mission& record = open_->record;
   record.robot_id = robot_id_;
@@ -437,6 +450,7 @@ void RobotSession::close(const telemetry::MissionAction& action) {
   if (outputs_.mission_ended && model_ != nullptr)
     outputs_.mission_ended(model_, {record.start_utime_us, legs_->take()});
   open_.reset();
+  covariates_.end_mission();
   snapshot_.mission_id.clear();
   snapshot_.mission_key = 0;
   changed_ = true;
@@ -466,6 +480,7 @@ void RobotSession::refresh_record() {
 void RobotSession::checkpoint() {
   refresh_record();
   history::CheckpointMission command;
+  command.covariates = covariates_.settle(open_->record);
   command.mission = open_->record;
   command.trace = trace_.take();
   command.samples = std::exchange(open_->samples, {});
@@ -499,7 +514,7 @@ void RobotSession::on_tick(std::int64_t host_utime_us) {
   } else if (open_ != nullptr) {
     snapshot_.received_utime_us = host_utime_us;  // a resumed mission's silence counts from the restart
   }
-  if (open_ != nullptr && open_->unsaved > 0) checkpoint();
+  if (open_ != nullptr && (open_->unsaved > 0 || covariates_.pending() > 0)) checkpoint();
   publish();
 }
 

@@ -14,6 +14,7 @@
 #include "history/store.h"
 #include "server/ingest/charge_watch.h"
 #include "server/ingest/counters.h"
+#include "server/ingest/covariate_watch.h"
 #include "server/ingest/fleet_view.h"
 #include "server/ingest/model_registry.h"
 #include "server/ingest/refinement_watch.h"
@@ -64,6 +65,8 @@ class RobotSession {
 
   void on_sample(const telemetry::Sample& sample, std::int64_t host_utime_us);
   void on_event(const telemetry::MissionEvent& event, std::int64_t host_utime_us);
+  // Opens no mission and is no sign that the robot's telemetry lives.
+  void on_covariates(const telemetry::CovariateMessage& message);
   void on_fault(IngestFault fault, std::uint64_t count = 1);
 
   // Call about once a second: ends missions that fell silent, checkpoints the open one, publishes what
@@ -116,6 +119,7 @@ class RobotSession {
   std::int64_t remembered_utime_us_ = 0;
   std::deque<telemetry::Sample> held_;  // until it is clear whether a charger feeds the robot
   bool at_charger_ = false;
+  CovariateWatch covariates_;
   TraceBuilder trace_;
   std::optional<forecast::LegTracker> legs_;
   std::unique_ptr<OpenMission> open_;

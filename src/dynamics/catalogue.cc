@@ -2,85 +2,21 @@
 
 #include <algorithm>
 #include <string>
+#include <tuple>
 
 #include "base/nearest_word.h"
-#include "dynamics/effects/accessory_load.h"
-#include "dynamics/effects/aerodynamic_drag.h"
-#include "dynamics/effects/battery_resistance.h"
-#include "dynamics/effects/brush_drop.h"
-#include "dynamics/effects/chassis_mass_error.h"
-#include "dynamics/effects/com_offset.h"
-#include "dynamics/effects/coulomb_friction.h"
-#include "dynamics/effects/current_sensor_bias.h"
-#include "dynamics/effects/current_sensor_gain.h"
-#include "dynamics/effects/driver_loss.h"
-#include "dynamics/effects/floor_resistance_zone.h"
-#include "dynamics/effects/friction_asymmetry.h"
-#include "dynamics/effects/gear_efficiency.h"
-#include "dynamics/effects/inductance.h"
-#include "dynamics/effects/linear_inertia_error.h"
-#include "dynamics/effects/load_rolling_resistance.h"
-#include "dynamics/effects/no_regeneration.h"
-#include "dynamics/effects/payload_mass_error.h"
-#include "dynamics/effects/resistance_error.h"
-#include "dynamics/effects/sensor_delay.h"
-#include "dynamics/effects/slope.h"
-#include "dynamics/effects/stribeck_friction.h"
-#include "dynamics/effects/torque_constant_loss.h"
-#include "dynamics/effects/track_error.h"
-#include "dynamics/effects/turning_scrub.h"
-#include "dynamics/effects/viscous_friction.h"
-#include "dynamics/effects/voltage_sensor_gain.h"
-#include "dynamics/effects/wheel_radius_asymmetry.h"
-#include "dynamics/effects/wheel_radius_error.h"
-#include "dynamics/effects/wheel_slip.h"
-#include "dynamics/effects/winding_temperature.h"
-#include "dynamics/effects/yaw_inertia_error.h"
+#include "dynamics/effect_list.h"
 
 namespace joulecast::dynamics {
 namespace {
 
-template <class E>
-const Effect* entry() {
-  static const EffectOf<E> effect;
-  return &effect;
+template <class... Effects>
+std::array<const Effect*, sizeof...(Effects)> table_of(EffectList<Effects...>) {
+  static const std::tuple<EffectOf<Effects>...> effects;
+  return {&std::get<EffectOf<Effects>>(effects)...};
 }
 
-// One line an effect.
-const std::array table = {
-    entry<CoulombFriction>(),
-    entry<ViscousFriction>(),
-    entry<StribeckFriction>(),
-    entry<FrictionAsymmetry>(),
-    entry<LoadRollingResistance>(),
-    entry<FloorResistanceZone>(),
-    entry<Slope>(),
-    entry<AerodynamicDrag>(),
-    entry<TurningScrub>(),
-    entry<GearEfficiency>(),
-    entry<ChassisMassError>(),
-    entry<PayloadMassError>(),
-    entry<YawInertiaError>(),
-    entry<LinearInertiaError>(),
-    entry<ComOffset>(),
-    entry<ResistanceError>(),
-    entry<WindingTemperature>(),
-    entry<BrushDrop>(),
-    entry<TorqueConstantLoss>(),
-    entry<Inductance>(),
-    entry<AccessoryLoad>(),
-    entry<DriverLoss>(),
-    entry<NoRegeneration>(),
-    entry<BatteryResistance>(),
-    entry<WheelRadiusError>(),
-    entry<WheelRadiusAsymmetry>(),
-    entry<TrackError>(),
-    entry<WheelSlip>(),
-    entry<CurrentSensorGain>(),
-    entry<CurrentSensorBias>(),
-    entry<VoltageSensorGain>(),
-    entry<SensorDelay>(),
-};
+const std::array table = table_of(AllEffects{});
 
 }  // namespace
 

@@ -46,6 +46,7 @@ void add_entry(std::string& out, const EffectInfo& info) {
   out += "\nHolds for: " + std::string(info.validity) + ".";
   if (info.needs_position) out += " Needs the position on the map.";
   if (info.needs_heading) out += " Needs the heading.";
+  if (info.needs_climb) out += " Needs the climb: `pitch`, or the covariate `height_m`.";
   out += "\nSource: " + std::string(info.source) + ".\n\n";
 }
 

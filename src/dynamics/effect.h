@@ -22,6 +22,7 @@ struct EffectParameter {
   double minimum;
   double maximum;
   std::string_view meaning;
+  bool strength = false;  // beside the first: acts by itself, and adds up over repeated findings
 };
 
 // What an effect is, for people and for tools; the numbers are contracts of bounds.
@@ -34,6 +35,7 @@ struct EffectInfo {
   std::span<const EffectParameter> parameters;
   bool needs_position = false;  // does nothing while the map position is unknown
   bool needs_heading = false;   // does nothing while the heading is unknown
+  bool needs_climb = false;     // does nothing while the climb is unknown
 };
 
 // Torques on the wheels that the motors must overcome, apart from inertia: [N m] at the wheel, positive

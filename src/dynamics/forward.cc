@@ -15,6 +15,7 @@ Instant instant_of(const DriveState& state, double payload_kg) {
   at.x_m = state.x_m;
   at.y_m = state.y_m;
   at.heading_rad = state.heading_rad;
+  at.climb_rad = state.climb_rad;
   at.copper_heat_w = state.copper_heat_w;
   return at;
 }
@@ -84,6 +85,7 @@ DriveState derivative(const DriveModel& model, const DriveState& state, double p
       model, state, payload_kg, {p.torque_constant_nm_a * current[0], p.torque_constant_nm_a * current[1]});
   const Body<double> body = body_of_wheels(p, state.wheel_speed_rad_s, acceleration);
   DriveState rate;
+  rate.climb_rad = 0;
   rate.x_m = body.speed_m_s * std::cos(state.heading_rad);
   rate.y_m = body.speed_m_s * std::sin(state.heading_rad);
   rate.heading_rad = body.yaw_rate_rad_s;

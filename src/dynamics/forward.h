@@ -10,6 +10,7 @@ namespace joulecast::dynamics {
 // wheel speeds.
 struct DriveState {
   double x_m = 0, y_m = 0, heading_rad = 0;
+  double climb_rad = unknown;  // of the floor there: given, not moved
   std::array<double, 2> wheel_angle_rad{};
   std::array<double, 2> wheel_speed_rad_s{};
   std::array<double, 2> current_a{};

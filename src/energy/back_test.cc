@@ -67,9 +67,11 @@ Result<Replay> replay(const dynamics::DriveModel& model, const DriveRun& run, bo
   Meter meter(model, metering, take);
   source = &meter;
   telemetry::MissionPayload payload(run.payload_kg);
-  for (telemetry::Sample sample : run.samples) {
+  for (std::size_t k = 0; k < run.samples.size(); ++k) {
+    telemetry::Sample sample = run.samples[k];
     sample.payload_kg = payload.take(sample.payload_kg);
-    if (Result<void> added = meter.add(sample); !added) return tl::unexpected(std::move(added.error()));
+    if (Result<void> added = meter.add(sample, run.climb_at(k)); !added)
+      return tl::unexpected(std::move(added.error()));
   }
   if (Result<void> flushed = meter.flush(); !flushed) return tl::unexpected(std::move(flushed.error()));
   for (Span& bin : result.bins) {

@@ -181,7 +181,8 @@ class Calibrator {
       const bool fit = inside && usable(run.samples[k], acceleration);
       if (gap || !fit || (!stretch.empty() && seconds(k) - stretch.front().t_s >= length))
         close(stretch, seconds(k) - (stretch.empty() ? 0 : stretch.front().t_s));
-      if (fit) stretch.push_back(observe(run.samples[k], acceleration, seconds(k), payload_kg));
+      if (fit)
+        stretch.push_back(observe(run.samples[k], run.climb_at(k), acceleration, seconds(k), payload_kg));
     }
     if (!stretch.empty()) close(stretch, stretch.back().t_s - stretch.front().t_s);
   }
@@ -197,8 +198,8 @@ class Calibrator {
            std::fabs(right - left) < options_.straight_fraction * std::fabs(right + left) / 2;
   }
 
-  Moment observe(const telemetry::Sample& s, const std::array<double, 2>& acceleration, double t_s,
-                 double payload_kg) {
+  Moment observe(const telemetry::Sample& s, double climb_rad, const std::array<double, 2>& acceleration,
+                 double t_s, double payload_kg) {
     dynamics::Instant at;
     at.wheel_speed_rad_s = s.wheel_velocity_rad_s;
     at.wheel_acceleration_rad_s2 = acceleration;
@@ -206,6 +207,7 @@ class Calibrator {
     at.x_m = s.pose[0];
     at.y_m = s.pose[1];
     at.heading_rad = s.pose[2];
+    at.climb_rad = climb_rad;
     const auto total = known_.balance(at).total_nm;
     const double mean = (acceleration[0] + acceleration[1]) / 2,
                  difference = (acceleration[0] - acceleration[1]) / 2;
@@ -495,9 +497,10 @@ Result<Accounts> metered(const robot::RobotModel& robot, const DriveRun& run, co
   if (!drive) return tl::unexpected(std::move(drive.error()));
   Meter meter(std::move(*drive), settings, [](const MeterPoint&) {});
   telemetry::MissionPayload payload(run.payload_kg);
-  for (telemetry::Sample sample : run.samples) {
+  for (std::size_t k = 0; k < run.samples.size(); ++k) {
+    telemetry::Sample sample = run.samples[k];
     sample.payload_kg = payload.take(sample.payload_kg);
-    if (Result<void> added = meter.add(sample); !added) return tl::unexpected(added.error());
+    if (Result<void> added = meter.add(sample, run.climb_at(k)); !added) return tl::unexpected(added.error());
   }
   if (Result<void> flushed = meter.flush(); !flushed) return tl::unexpected(flushed.error());
   return meter.accounts();

@@ -50,6 +50,9 @@ struct DriveRun {
   std::string name;
   std::span<const telemetry::Sample> samples;  // in order of time
   double payload_kg = 0;
+  std::span<const double> climb_rad = {};  // at each sample (dynamics/climb.h); empty: their pitch
+
+  double climb_at(std::size_t k) const { return climb_rad.empty() ? samples[k].pitch_rad : climb_rad[k]; }
 };
 
 struct ParameterEstimate {

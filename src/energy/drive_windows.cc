@@ -94,35 +94,36 @@ std::vector<DriveEquation> DriveWindows::take() {
   return std::exchange(equations_, {});
 }
 
-void DriveWindows::add(const telemetry::Sample& sample) {
+void DriveWindows::add(const telemetry::Sample& sample, double climb_rad) {
   if (!buffer_.empty()) {
-    const double interval_s = static_cast<double>(sample.utime_us - buffer_.back().utime_us) * microseconds;
+    const double interval_s =
+        static_cast<double>(sample.utime_us - buffer_.back().sample.utime_us) * microseconds;
     if (!(interval_s > 0) || interval_s > longest_gap_s) buffer_.clear();
   }
-  buffer_.push_back(sample);
+  buffer_.push_back({sample, climb_rad});
   if (std::isfinite(sample.payload_kg)) last_payload_kg_ = sample.payload_kg;
-  const double span_s = static_cast<double>(sample.utime_us - buffer_.front().utime_us) * microseconds;
+  const double span_s = static_cast<double>(sample.utime_us - buffer_.front().sample.utime_us) * microseconds;
   if (span_s < window_s || buffer_.size() < fewest_samples) return;
   close_window(buffer_.size());
   // The next window begins in the middle of this one.
   const double half_us = 0.5 * span_s / microseconds;
-  const std::int64_t begun_us = buffer_.front().utime_us;
-  while (static_cast<double>(buffer_.front().utime_us - begun_us) < half_us) buffer_.pop_front();
+  const std::int64_t begun_us = buffer_.front().sample.utime_us;
+  while (static_cast<double>(buffer_.front().sample.utime_us - begun_us) < half_us) buffer_.pop_front();
 }
 
 void DriveWindows::close_window(std::size_t count) {
   if (equations_.size() >= most_equations) return;
   const auto time_s = [&](std::size_t k) {
-    return static_cast<double>(buffer_[k].utime_us - buffer_.front().utime_us) * microseconds;
+    return static_cast<double>(buffer_[k].sample.utime_us - buffer_.front().sample.utime_us) * microseconds;
   };
   const double length_s = time_s(count - 1);
   std::array<double, 2> speed{}, current{}, least{1e9, 1e9}, greatest{-1e9, -1e9};
   std::array<double, 2> slope_speed{};
-  double slope_sum = 0, slope_time = 0, middle_s = 0;
+  double slope_sum = 0, slope_time = 0, middle_s = 0, climb = 0;
   double weight = 0, battery_w = 0, motors_w = 0, motors_abs_w = 0, battery_beside_w = 0;
   bool motors = true, battery = true, same_payload = true;
   for (std::size_t k = 0; k < count; ++k) {
-    const telemetry::Sample& s = buffer_[k];
+    const telemetry::Sample& s = buffer_[k].sample;
     // The window 1 - cos(2 pi t / T), by the trapezoid rule over uneven samples.
     const double before = k > 0 ? time_s(k) - time_s(k - 1) : 0,
                  after = k + 1 < count ? time_s(k + 1) - time_s(k) : 0;
@@ -130,6 +131,7 @@ void DriveWindows::close_window(std::size_t count) {
     const double w = 0.5 * (before + after) * (1 - std::cos(phase));
     const double slope = 0.5 * (before + after) * 2 * std::numbers::pi / length_s * std::sin(phase);
     weight += w;
+    climb += w * buffer_[k].climb_rad;
     middle_s += w * time_s(k);
     slope_sum += slope;
     slope_time += slope * time_s(k);
@@ -151,13 +153,13 @@ void DriveWindows::close_window(std::size_t count) {
     motors_abs_w += w * (std::abs(power_w[0]) + std::abs(power_w[1]));
     battery_beside_w += w * (total_w - model_.battery_power_for({power_w[0], power_w[1]}));
     same_payload =
-        same_payload && (s.payload_kg == buffer_.front().payload_kg || !std::isfinite(s.payload_kg));
+        same_payload && (s.payload_kg == buffer_.front().sample.payload_kg || !std::isfinite(s.payload_kg));
   }
   if (!same_payload || !(weight > 0)) return;
 
   // Scaled so that it is exact for speeds that are straight lines, whatever the samples' times.
   const double scale = slope_time - slope_sum * middle_s / weight;
-  const telemetry::Sample& middle = buffer_[count / 2];
+  const telemetry::Sample& middle = buffer_[count / 2].sample;
   dynamics::Instant at;
   std::array<bool, 2> moving{}, resting{};
   for (std::size_t side : {0u, 1u}) {
@@ -171,6 +173,7 @@ void DriveWindows::close_window(std::size_t count) {
   at.x_m = middle.pose[0];
   at.y_m = middle.pose[1];
   at.heading_rad = middle.pose[2];
+  at.climb_rad = climb / weight;
 
   payload_sum_kg_ += last_payload_kg_;
   ++windows_;

@@ -66,8 +66,9 @@ class DriveWindows {
   // Fault::invalid when the catalogue rejects an effect of the robot file.
   static Result<DriveWindows> make(const robot::RobotModel& robot);
 
-  // In order of time.
-  void add(const telemetry::Sample& sample);
+  // In order of time, with the climb there (dynamics/climb.h).
+  void add(const telemetry::Sample& sample, double climb_rad);
+  void add(const telemetry::Sample& sample) { add(sample, sample.pitch_rad); }
   // Forgets the samples of an unfinished window: the robot's time or what it did is interrupted.
   void interrupt() { buffer_.clear(); }
 
@@ -95,7 +96,11 @@ class DriveWindows {
   double moving_rad_s_ = 0;
   double last_payload_kg_ = 0;
   double payload_sum_kg_ = 0, windows_ = 0;  // since the last take()
-  std::deque<telemetry::Sample> buffer_;
+  struct Placed {
+    telemetry::Sample sample;
+    double climb_rad = dynamics::unknown;
+  };
+  std::deque<Placed> buffer_;
   std::vector<DriveEquation> equations_;
 };
 

@@ -122,12 +122,15 @@ bool Meter::window_complete(std::size_t index) const {
   if (later == 0) return false;
   const double usual = std::max(1.0, std::round(settings_.half_window_s / usual_interval_s_));
   return static_cast<double>(later) >= usual ||
-         static_cast<double>(waiting_.back().utime_us - waiting_[index].utime_us) * microseconds > reach_s();
+         static_cast<double>(waiting_.back().sample.utime_us - waiting_[index].sample.utime_us) *
+                 microseconds >
+             reach_s();
 }
 
-Result<void> Meter::add(const telemetry::Sample& sample) {
+Result<void> Meter::add(const telemetry::Sample& sample, double climb_rad) {
   if (!waiting_.empty()) {
-    const double interval_s = static_cast<double>(sample.utime_us - waiting_.back().utime_us) * microseconds;
+    const double interval_s =
+        static_cast<double>(sample.utime_us - waiting_.back().sample.utime_us) * microseconds;
     // A missing sample or a silence is not the robot's rate.
     if (usual_interval_s_ == 0) {
       usual_interval_s_ = std::min(interval_s, settings_.gap_bridge_s);
@@ -135,15 +138,15 @@ Result<void> Meter::add(const telemetry::Sample& sample) {
       usual_interval_s_ += (std::min(interval_s, 2 * usual_interval_s_) - usual_interval_s_) / 16;
     }
   }
-  waiting_.push_back(sample);
+  waiting_.push_back({sample, climb_rad});
   Result<void> outcome;
   while (next_ < waiting_.size() && window_complete(next_)) {
     if (Result<void> settled = settle(next_++); !settled) outcome = settled;
   }
   // Done with: history older than the window of the next sample to settle, but for the neighbour before it.
-  const auto keep_from =
-      static_cast<double>(waiting_[std::min(next_, waiting_.size() - 1)].utime_us) - reach_s() / microseconds;
-  while (next_ > 1 && static_cast<double>(waiting_.front().utime_us) < keep_from) {
+  const auto keep_from = static_cast<double>(waiting_[std::min(next_, waiting_.size() - 1)].sample.utime_us) -
+                         reach_s() / microseconds;
+  while (next_ > 1 && static_cast<double>(waiting_.front().sample.utime_us) < keep_from) {
     waiting_.pop_front();
     --next_;
   }
@@ -159,10 +162,10 @@ Result<void> Meter::flush() {
 }
 
 Result<void> Meter::settle(std::size_t index) {
-  const telemetry::Sample& sample = waiting_[index];
+  const telemetry::Sample& sample = waiting_[index].sample;
   const double reach_us = reach_s() / microseconds, bridge_us = settings_.gap_bridge_s / microseconds;
   const auto span_us = [&](std::size_t from, std::size_t to) {
-    return static_cast<double>(waiting_[to].utime_us - waiting_[from].utime_us);
+    return static_cast<double>(waiting_[to].sample.utime_us - waiting_[from].sample.utime_us);
   };
 
   // The filter's window: samples within reach and the neighbours, not across a gap.
@@ -175,16 +178,17 @@ Result<void> Meter::settle(std::size_t index) {
     ++last;
   window_.clear();
   for (std::size_t k = first; k <= last; ++k) {
-    window_.push_back({static_cast<double>(waiting_[k].utime_us - sample.utime_us) * microseconds,
-                       waiting_[k].wheel_velocity_rad_s});
+    window_.push_back({static_cast<double>(waiting_[k].sample.utime_us - sample.utime_us) * microseconds,
+                       waiting_[k].sample.wheel_velocity_rad_s});
   }
   if (std::isfinite(sample.payload_kg)) payload_kg_ = sample.payload_kg;
 
   MeterPoint point;
   point.sample = sample;
+  point.climb_rad = waiting_[index].climb_rad;
   point.wheel_acceleration_rad_s2 = fitted_acceleration(window_, index - first);
   Node node{sample.utime_us,
-            reading_of(sample, point.wheel_acceleration_rad_s2, payload_kg_, copper_heat_w_),
+            reading_of(sample, point.wheel_acceleration_rad_s2, payload_kg_, point.climb_rad, copper_heat_w_),
             {std::isfinite(sample.battery_voltage_v) && std::isfinite(sample.battery_current_a),
              std::isfinite(sample.motor_voltage_v[0]) && std::isfinite(sample.motor_voltage_v[1]) &&
                  std::isfinite(sample.motor_current_a[0]) && std::isfinite(sample.motor_current_a[1])}};
@@ -200,8 +204,11 @@ Result<void> Meter::settle(std::size_t index) {
                           node.coverage.motors && last_->coverage.motors};
       Reading from = last_->reading;
       from.motion.copper_heat_w = copper_heat_w_;
-      Result<Rates> integrated =
-          segment_->integrate(from, node.reading, both, point.interval_s, copper_heat_w_);
+      Reading to = node.reading;
+      // Known at one end only, the climb would enter with a jump.
+      if (std::isnan(from.motion.climb_rad) || std::isnan(to.motion.climb_rad))
+        from.motion.climb_rad = to.motion.climb_rad = dynamics::unknown;
+      Result<Rates> integrated = segment_->integrate(from, to, both, point.interval_s, copper_heat_w_);
       if (!integrated) outcome = tl::unexpected(integrated.error());
       const Rates increment = integrated ? *integrated : segment_->chord();
 

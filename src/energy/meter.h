@@ -31,6 +31,7 @@ struct MeterPoint {
   double interval_s = 0;  // since the previous point; 0 for the first
   bool bridged = true;    // false: the interval was longer than gap_bridge_s and was not integrated
   std::array<double, 2> wheel_acceleration_rad_s2{};
+  double climb_rad = dynamics::unknown;
   double speed_m_s = 0;
   double yaw_rate_rad_s = 0;
   double measured_power_w = telemetry::unmeasured;
@@ -56,10 +57,11 @@ class Meter {
   Meter& operator=(const Meter&) = delete;
 
   // Takes the next sample: later than the previous one, finite where measured (src/telemetry/validation
-  // refuses others). A payload of NaN counts as the last one since begin(),
-  // at first 0. An error is CVODE's; the interval's
-  // chord then stands for it.
-  Result<void> add(const telemetry::Sample& sample);
+  // refuses others), and the climb there (dynamics/climb.h; NaN: unknown). A payload of NaN counts as the
+  // last one since begin(), at first 0. An error is CVODE's; the interval's chord then stands for it.
+  Result<void> add(const telemetry::Sample& sample, double climb_rad);
+  // The climb is the pitch, where that is measured.
+  Result<void> add(const telemetry::Sample& sample) { return add(sample, sample.pitch_rad); }
 
   // Processes the samples that still wait for the filter, with one-sided windows.
   Result<void> flush();
@@ -82,6 +84,10 @@ class Meter {
  private:
   class Segment;
   struct Node;
+  struct Waiting {
+    telemetry::Sample sample;
+    double climb_rad = dynamics::unknown;
+  };
 
   // How far the filter's window reaches to each side: half_window_s and half a usual interval, so that a
   // shaking clock does not push samples out of it.
@@ -93,8 +99,8 @@ class Meter {
   dynamics::DriveModel model_;
   MeterSettings settings_;
   std::function<void(const MeterPoint&)> emit_;
-  std::deque<telemetry::Sample> waiting_;  // the filter's window; samples before next_ are history
-  std::size_t next_ = 0;                   // first sample not yet settled
+  std::deque<Waiting> waiting_;  // the filter's window; samples before next_ are history
+  std::size_t next_ = 0;         // first sample not yet settled
   std::unique_ptr<Node> last_;
   std::unique_ptr<Segment> segment_;
   std::vector<SpeedSample> window_;

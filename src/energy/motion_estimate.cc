@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "dynamics/climb.h"
 #include "energy/cvode.h"
 #include "energy/rates.h"
 
@@ -22,8 +23,9 @@ class Span final : public InitialValueProblem {
   Span(const dynamics::DriveModel& model, double payload_kg, bool pose_known)
       : model_(model), payload_kg_(payload_kg), pose_known_(pose_known) {}
 
-  void begin(const MotionPoint& a, const MotionPoint& b) {
+  void begin(const MotionPoint& a, const MotionPoint& b, const std::array<double, 2>& climb_rad) {
     a_ = a;
+    climb_rad_ = climb_rad;
     duration_s_ = b.time_s - a.time_s;
     acceleration_ = (b.speed_m_s - a.speed_m_s) / duration_s_;
     yaw_acceleration_ = (b.yaw_rate_rad_s - a.yaw_rate_rad_s) / duration_s_;
@@ -57,6 +59,7 @@ class Span final : public InitialValueProblem {
         model_.parameters(), a_.speed_m_s + acceleration_ * t, a_.yaw_rate_rad_s + yaw_acceleration_ * t);
     reading.motion.wheel_acceleration_rad_s2 = wheel_acceleration_;
     reading.motion.payload_kg = payload_kg_;
+    reading.motion.climb_rad = climb_rad_[0] + (climb_rad_[1] - climb_rad_[0]) * t / duration_s_;
     if (!state.empty()) {
       if (pose_known_) {
         reading.motion.x_m = state[pose_index];
@@ -75,11 +78,25 @@ class Span final : public InitialValueProblem {
   double payload_kg_;
   bool pose_known_;
   MotionPoint a_;
+  std::array<double, 2> climb_rad_{};
   double duration_s_ = 0, acceleration_ = 0, yaw_acceleration_ = 0, scale_ = 1;
   std::array<double, 2> wheel_acceleration_{};
 };
 
 }  // namespace
+
+Result<std::array<double, 2>> climb_of_span(const MotionPoint& a, const MotionPoint& b) {
+  const double rise = b.height_m - a.height_m;
+  if (std::isnan(rise)) return std::array{a.climb_rad, b.climb_rad};
+  const double way = 0.5 * (a.speed_m_s + b.speed_m_s) * (b.time_s - a.time_s);
+  if (rise == 0) return std::array{0.0, 0.0};
+  const double climb = dynamics::climb_over(rise, way);
+  if (std::isnan(climb)) {
+    return invalid("height_m", "changes by " + std::to_string(rise) + " m over " + std::to_string(way) +
+                                   " m of way, steeper than 45 degrees");
+  }
+  return std::array{climb, climb};
+}
 
 Result<Accounts> estimate_motion(const dynamics::DriveModel& model, std::span<const MotionPoint> points,
                                  double payload_kg, const std::optional<StartPose>& start) {
@@ -95,7 +112,9 @@ Result<Accounts> estimate_motion(const dynamics::DriveModel& model, std::span<co
   for (std::size_t k = 1; k < points.size(); ++k) {
     if (!(points[k].time_s > points[k - 1].time_s))
       return invalid("/profile/time_s/" + std::to_string(k), "must be later than the one before");
-    span.begin(points[k - 1], points[k]);
+    const auto climb = climb_of_span(points[k - 1], points[k]);
+    if (!climb) return invalid("/profile/height_m/" + std::to_string(k), climb.error().message);
+    span.begin(points[k - 1], points[k], *climb);
     const double duration = points[k].time_s - points[k - 1].time_s;
     const double fastest = std::max(std::fabs(points[k].speed_m_s), std::fabs(points[k - 1].speed_m_s));
     cvode.limit_step(start && fastest > 0 ? finest_floor_m / fastest : 0);

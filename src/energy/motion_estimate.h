@@ -11,12 +11,21 @@
 
 namespace joulecast::energy {
 
-// A motion to be priced: speeds at times, linear in between, so that acceleration is constant over each span.
+// A motion to be priced: speeds and climb at times, linear in between, so that acceleration is constant over
+// each span.
 struct MotionPoint {
   double time_s = 0;
   double speed_m_s = 0;
   double yaw_rate_rad_s = 0;
+  double climb_rad = dynamics::unknown;  // unknown at either end of a span: unknown over it
+  // Above any fixed datum. Where both ends of a span have it, it counts before their climb: the floor rises
+  // evenly over the way between them.
+  double height_m = dynamics::unknown;
 };
+
+// The climb at both ends of the span between two points. Fault::invalid where the height changes by more than
+// climb_over() allows for the way driven.
+Result<std::array<double, 2>> climb_of_span(const MotionPoint& a, const MotionPoint& b);
 
 // Where the motion begins; needed only for effects tied to the floor.
 struct StartPose {

@@ -23,7 +23,7 @@ double lerp_angle(double a, double b, double s) {
 }  // namespace
 
 Reading reading_of(const telemetry::Sample& sample, const std::array<double, 2>& wheel_acceleration_rad_s2,
-                   double payload_kg, const std::array<double, 2>& copper_heat_w) {
+                   double payload_kg, double climb_rad, const std::array<double, 2>& copper_heat_w) {
   Reading r;
   r.motion.wheel_speed_rad_s = sample.wheel_velocity_rad_s;
   r.motion.wheel_acceleration_rad_s2 = wheel_acceleration_rad_s2;
@@ -31,6 +31,7 @@ Reading reading_of(const telemetry::Sample& sample, const std::array<double, 2>&
   r.motion.x_m = sample.pose[0];
   r.motion.y_m = sample.pose[1];
   r.motion.heading_rad = sample.pose[2];
+  r.motion.climb_rad = climb_rad;
   r.motion.copper_heat_w = copper_heat_w;
   for (std::size_t s : {0u, 1u}) {
     r.motor_voltage_v[s] = measured_or_zero(sample.motor_voltage_v[s]);
@@ -55,6 +56,7 @@ Reading between(const Reading& a, const Reading& b, double s) {
   r.motion.x_m = lerp(a.motion.x_m, b.motion.x_m, s);
   r.motion.y_m = lerp(a.motion.y_m, b.motion.y_m, s);
   r.motion.heading_rad = lerp_angle(a.motion.heading_rad, b.motion.heading_rad, s);
+  r.motion.climb_rad = lerp(a.motion.climb_rad, b.motion.climb_rad, s);
   r.battery_voltage_v = lerp(a.battery_voltage_v, b.battery_voltage_v, s);
   r.battery_current_a = lerp(a.battery_current_a, b.battery_current_a, s);
   return r;

@@ -44,9 +44,9 @@ struct Coverage {
 
 // The reading of a sample; unmeasured electrical channels are zero (the coverage says so).
 Reading reading_of(const telemetry::Sample& sample, const std::array<double, 2>& wheel_acceleration_rad_s2,
-                   double payload_kg, const std::array<double, 2>& copper_heat_w);
+                   double payload_kg, double climb_rad, const std::array<double, 2>& copper_heat_w);
 
-// The reading at fraction s in [0, 1] between two.
+// The reading at fraction s in [0, 1] between two. What is unknown at either end is unknown in between.
 Reading between(const Reading& a, const Reading& b, double s);
 
 // All account rates at one instant. `copper_heat_rate` receives R i^2 of each motor [W].

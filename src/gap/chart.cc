@@ -23,33 +23,6 @@ std::string title(std::string_view hint) {
 
 }  // namespace
 
-std::string brief(double value, int digits) {
-  if (!std::isfinite(value)) return "–";
-  const double size = std::fabs(value);
-  if (size != 0 && (size < 1e-4 || size >= 1e7)) return fmt::format("{:.{}e}", value, digits - 1);
-  const int before = size < 1e-12 ? 1 : static_cast<int>(std::floor(std::log10(size))) + 1;
-  std::string text = fmt::format("{:.{}f}", value, std::clamp(digits - before, 0, 8));
-  if (text.find('.') != std::string::npos) {
-    text.erase(text.find_last_not_of('0') + 1);
-    if (text.back() == '.') text.pop_back();
-  }
-  if (text == "-0") text = "0";
-  if (text.front() == '-') text.replace(0, 1, "−");
-  return text;
-}
-
-std::string brief_range(double low, double high) {
-  const double width = std::fabs(high - low);
-  const int places = width > 0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(width))), 0, 6) : 3;
-  const auto end = [&](double value) {
-    std::string text = fmt::format("{:.{}f}", value, places);
-    if (text.front() == '-')
-      text = text.find_first_not_of("-0.") == std::string::npos ? text.substr(1) : "−" + text.substr(1);
-    return text;
-  };
-  return end(low) + " to " + end(high);
-}
-
 std::vector<double> ticks_of(double low, double high, int about) {
   const double raw = (high - low) / about;
   const double power = std::pow(10, std::floor(std::log10(raw)));

@@ -8,11 +8,6 @@
 
 namespace joulecast::gap {
 
-// A number in a few digits: 0.0123, 4.5, 1200.
-std::string brief(double value, int digits = 3);
-// "0.02 to 0.60": both ends as finely as the range is wide.
-std::string brief_range(double low, double high);
-
 struct ChartPoint {
   double x = 0, y = 0;
 };

@@ -182,7 +182,7 @@ std::string group_of(const std::string& mission_id, GroupBy by) {
   return at == std::string::npos ? mission_id : mission_id.substr(at + 1);
 }
 
-Result<Comparison> compare_groups(const RecordingSet& recordings,
+Result<Comparison> compare_groups(const telemetry::RecordingSet& recordings,
                                   std::span<const std::string> group_of_mission,
                                   const robot::RobotModel& robot,
                                   const std::function<bool(double)>& progress) {

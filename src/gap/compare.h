@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/recordings.h"
+#include "telemetry/recording_set.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::gap {
@@ -51,7 +51,7 @@ std::string group_of(const std::string& mission_id, GroupBy by);
 // Finds the effects at the wheels that these recordings show, and which of them need a strength of their own
 // in each group. Motors, masses and sensors are taken to be the same in all groups. Fault::invalid for fewer
 // than two groups with motion.
-Result<Comparison> compare_groups(const RecordingSet& recordings,
+Result<Comparison> compare_groups(const telemetry::RecordingSet& recordings,
                                   std::span<const std::string> group_of_mission,
                                   const robot::RobotModel& robot,
                                   const std::function<bool(double)>& progress = {});

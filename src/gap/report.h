@@ -19,7 +19,7 @@ struct ReportOrigin {
 
 // A diagnosis as one HTML page that needs nothing else: verdict, effects, maps, power over time, method,
 // limits and origin of the data, for a reader who was not there.
-std::string report_html(const Diagnosis& diagnosis, const RecordingSet& recordings,
+std::string report_html(const Diagnosis& diagnosis, const telemetry::RecordingSet& recordings,
                         const robot::RobotModel& robot, const ReportOrigin& origin);
 
 // The same for a diagnosis from energies of runs.

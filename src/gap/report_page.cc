@@ -147,47 +147,6 @@ std::string Page::str() const {
       xml_escaped(title_), style, body_, open_ ? "</section>" : "");
 }
 
-std::string words_of(std::string_view id) {
-  constexpr std::string_view outside = "outside:";
-  if (id.starts_with(outside)) return "something unknown that follows " + words_of(id.substr(outside.size()));
-  std::string words(id);
-  std::ranges::replace(words, '_', ' ');
-  return words;
-}
-
-std::string with_deviation(double value, double deviation, std::string_view unit) {
-  std::string text;
-  if (std::isfinite(deviation) && deviation > 0) {
-    // As many digits as the deviation has to say, two.
-    const int places = std::clamp(1 - static_cast<int>(std::floor(std::log10(deviation))), 0, 6);
-    text = fmt::format("{:.{}f} ± {:.{}f}", value, places, deviation, places);
-    if (text.front() == '-') text.replace(0, 1, "−");
-  } else {
-    text = brief(value);
-  }
-  if (unit != "1" && !unit.empty()) text += fmt::format(" {}", unit);
-  return text;
-}
-
-std::string percent(double fraction, int digits) {
-  return brief(100 * fraction, digits) + "\u00a0%";
-}
-
-std::string probability_text(double p) {
-  if (p > 0.995) return "above 0.99";
-  if (p < 0.005) return "below 0.01";
-  return fmt::format("{:.2f}", p);
-}
-
-std::string enumerate(std::span<const std::string> items) {
-  std::string text;
-  for (std::size_t k = 0; k < items.size(); ++k) {
-    if (k > 0) text += k + 1 == items.size() ? " and " : ", ";
-    text += items[k];
-  }
-  return text;
-}
-
 void effects_section(Page& page, std::span<const DiagnosedEffect> effects,
                      std::span<const std::string> costs) {
   page.section(

@@ -41,15 +41,6 @@ class Page {
   std::string title_;
 };
 
-// An id as words: "load rolling resistance".
-std::string words_of(std::string_view id);
-// "0.0182 ± 0.0011", with the unit where there is one.
-std::string with_deviation(double value, double deviation, std::string_view unit);
-std::string percent(double fraction, int digits = 2);  // "12 %"
-std::string probability_text(double probability);      // "0.93", "above 0.99"
-// "a", "a and b", "a, b and c".
-std::string enumerate(std::span<const std::string> items);
-
 // The effects found, each with what it means, how strong it is and what it cannot be told from.
 // `cost_w_or_j` is what each adds on average, with its unit; empty: not shown.
 void effects_section(Page& page, std::span<const DiagnosedEffect> effects,

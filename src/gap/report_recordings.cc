@@ -38,7 +38,7 @@ struct Powers {
   double rest(std::size_t k) const { return measured[k] - after[k]; }
 };
 
-Powers powers_of(const Diagnosis& d, const RecordingSet& recordings, const robot::RobotModel& robot) {
+Powers powers_of(const Diagnosis& d, const telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
   Powers p;
   p.windows = make_windows(recordings, robot);
   p.measured = measured_power(p.windows);
@@ -336,13 +336,13 @@ void floor_map(Page& page, const Powers& p) {
   page.charts(pictures);
 }
 
-std::string mission_name(const RecordingSet& set, std::size_t mission) {
+std::string mission_name(const telemetry::RecordingSet& set, std::size_t mission) {
   if (set.missions.size() == 1) return "part " + std::to_string(mission + 1);
   return set.missions[mission].mission_id;
 }
 
 // The stretch of time whose power the model misses most.
-void power_section(Page& page, const Powers& p, const RecordingSet& set) {
+void power_section(Page& page, const Powers& p, const telemetry::RecordingSet& set) {
   std::map<std::pair<std::size_t, int>, double> halves;  // half stretches of missions
   for (std::size_t k = 0; k < p.windows.size(); ++k) {
     if (p.known(k))
@@ -422,7 +422,7 @@ void where_section(Page& page, const Diagnosis& d, const Powers& p, const robot:
   page.table(header, rows, 3);
 }
 
-void missions_table(Page& page, const Powers& p, const RecordingSet& set) {
+void missions_table(Page& page, const Powers& p, const telemetry::RecordingSet& set) {
   struct Total {
     double measured = 0, gap = 0, rest = 0, absolute = 0, absolute_after = 0, size = 0;
   };
@@ -505,7 +505,7 @@ std::vector<std::string> limits_of(const Diagnosis& d, const Powers& p) {
 
 }  // namespace
 
-std::string report_html(const Diagnosis& d, const RecordingSet& recordings, const robot::RobotModel& robot,
+std::string report_html(const Diagnosis& d, const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
                         const ReportOrigin& origin) {
   const Powers p = powers_of(d, recordings, robot);
   Page page("Why robot " + d.robot_id + " takes other power than its model says",

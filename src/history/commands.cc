@@ -16,6 +16,8 @@ std::size_t content_bytes(const Mission& mission) {
                       mission.incomplete_reason.size() + mission.findings_json.size();
   for (const auto& [reason, count] : mission.sample_faults)
     bytes += reason.size() + sizeof(reason) + sizeof(count) + map_node;
+  for (const CovariateSummary& covariate : mission.covariates)
+    bytes += covariate.name.size() + sizeof(covariate);
   return bytes;
 }
 std::size_t content_bytes(const StartMission& c) {
@@ -25,6 +27,8 @@ std::size_t content_bytes(const StartMission& c) {
 std::size_t content_bytes(const CheckpointMission& c) {
   return content_bytes(c.mission) + c.trace.capacity() * sizeof(TraceBucket) +
          c.samples.capacity() * sizeof(telemetry::Sample) +
+         c.covariates.capacity() *
+             (sizeof(telemetry::CovariateChange) + telemetry::max_covariate_name_length) +
          (c.energy_state ? c.energy_state->robot_id.size() : 0);
 }
 std::size_t content_bytes(const PutEnergyState& c) {

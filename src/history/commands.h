@@ -39,13 +39,14 @@ struct StartMission {
 
 // Brings a started mission up to date, ends it (by its state), and appends what came since the last
 // checkpoint, all in one transaction. `mission` replaces the stored record but for its identity (key, robot,
-// mission_id, start). Buckets replace stored ones of the same start; samples are appended in the order given.
-// Outcome: the key.
+// mission_id, start). Buckets replace stored ones of the same start; samples and changes of covariates are
+// appended in the order given. Outcome: the key.
 struct CheckpointMission {
   Mission mission;
   std::vector<TraceBucket> trace;
   std::vector<telemetry::Sample> samples;
   std::optional<EnergyState> energy_state;
+  std::vector<telemetry::CovariateChange> covariates = {};
 };
 
 // Replaces a robot's energy state, for robots outside missions. The robot is created when new. Outcome: 0.
@@ -63,15 +64,15 @@ struct AppendEvent {
   Event event;
 };
 
-// How much raw telemetry to keep; an absent bound does not bind.
+// How much raw telemetry, covariates among it, to keep; an absent bound does not bind.
 struct Retention {
   std::optional<std::int64_t> telemetry_max_age_us;  // since it was stored: a replayed old log is young
   std::optional<std::int64_t> telemetry_max_bytes;   // of encoded chunks, oldest dropped first
 };
 
-// Drops raw telemetry beyond the retention, oldest first, at most `max_chunks` of it. Missions, ledgers and
-// traces stay. Outcome: the number of chunks dropped; less than max_chunks means that the retention now
-// holds.
+// Drops raw telemetry and covariates beyond the retention, oldest first, at most `max_chunks` of it.
+// Missions, ledgers and traces stay. Outcome: the number of chunks dropped; less than max_chunks means that
+// the retention now holds.
 struct Prune {
   Retention retention;
   std::int64_t max_chunks = 1000;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "energy/ledger.h"
+#include "telemetry/covariates.h"
 #include "telemetry/sample.h"
 
 // What the store keeps. Times are microseconds since the Unix epoch (the robot's clock for missions, traces
@@ -54,6 +55,19 @@ inline constexpr std::size_t mission_state_count = 6;
 std::string_view name(MissionState state);
 std::optional<MissionState> mission_state_from(std::string_view text);
 
+// What a mission says of one covariate, in its own unit.
+struct CovariateSummary {
+  std::string name;
+  double mean =
+      telemetry::unmeasured;  // over the time in which it was known; of a label the share in which it held
+  double min = telemetry::unmeasured;
+  double max = telemetry::unmeasured;
+  double known_s = 0;                    // the mean counts over so long, up to counted_utime_us
+  std::int64_t counted_utime_us = 0;     // robot's clock
+  double value = telemetry::unmeasured;  // the last one
+  std::int64_t value_utime_us = 0;       // from which on it holds
+};
+
 struct Mission {
   MissionKey key = 0;
   std::string robot_id;
@@ -73,6 +87,7 @@ struct Mission {
   std::int64_t gap_count = 0;
   double gap_s = 0;           // time without samples, bridged or not
   std::string findings_json;  // what its motion says of payload and friction; empty: nothing
+  std::vector<CovariateSummary> covariates;
 };
 
 // Least, mean and greatest of a quantity; all NaN when it was not measured.

@@ -8,7 +8,7 @@ extern const std::string_view store_sql;  // schemas/store.sql, embedded at buil
 
 namespace {
 
-constexpr std::int64_t store_version = 5;
+constexpr std::int64_t store_version = 6;
 constexpr Migration store_migrations[] = {
     {1, R"(
 CREATE TABLE learned (
@@ -78,6 +78,26 @@ UPDATE diagnosis SET summary_json = json_object(
               FROM json_each(result_json, '$.effects')),
   'gap', result_json -> 'gap', 'shrinkage', result_json -> 'shrinkage', 'verdict', result_json -> 'verdict')
 WHERE json_type(result_json) = 'object';
+)sql"},
+    {5, R"sql(
+ALTER TABLE mission ADD COLUMN covariate_changes INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE mission ADD COLUMN covariates_json TEXT CHECK (covariates_json IS NULL OR json_valid(covariates_json));
+CREATE TABLE covariate_chunk (
+  chunk_key INTEGER NOT NULL PRIMARY KEY,
+  mission_key INTEGER NOT NULL REFERENCES mission (mission_key) ON DELETE CASCADE,
+  first_ordinal INTEGER NOT NULL,
+  changes INTEGER NOT NULL CHECK (changes > 0),
+  start_utime_us INTEGER NOT NULL,
+  end_utime_us INTEGER NOT NULL,
+  stored_utime_us INTEGER NOT NULL,
+  sealed INTEGER NOT NULL CHECK (sealed IN (0, 1)),
+  bytes INTEGER NOT NULL CHECK (bytes = length(body)),
+  body BLOB NOT NULL,
+  UNIQUE (mission_key, first_ordinal)
+) STRICT;
+
+CREATE INDEX covariate_chunk_by_age ON covariate_chunk (stored_utime_us, sealed, bytes);
+CREATE INDEX covariate_chunk_tail ON covariate_chunk (mission_key, first_ordinal) WHERE sealed = 0;
 )sql"},
 };
 

@@ -1,20 +1,13 @@
 #include "history/sqlite_changes.h"
 
-#include <algorithm>
 #include <string>
 #include <utility>
 
+#include "history/sqlite_chunks.h"
 #include "history/sqlite_rows.h"
-#include "history/telemetry_chunk.h"
 
 namespace joulecast::history {
 namespace {
-
-using telemetry::Sample;
-
-// zstd levels: a tail chunk is soon written again, a sealed one is kept.
-constexpr int tail_level = 1;
-constexpr int sealed_level = 3;
 
 tl::unexpected<Error> no_mission(MissionKey key) {
   return fail(Fault::not_found, "mission", "no mission has key " + std::to_string(key));
@@ -31,6 +24,13 @@ Result<void> check_trace(const std::vector<TraceBucket>& trace) {
       return invalid("/trace/" + std::to_string(i) + "/start_utime_us",
                      std::to_string(trace[i].start_utime_us) + " is not a multiple of " +
                          std::to_string(trace_bucket_us));
+  return {};
+}
+
+Result<void> check_covariates(const std::vector<telemetry::CovariateChange>& changes) {
+  for (std::size_t i = 0; i < changes.size(); ++i)
+    if (!telemetry::is_valid_covariate_name(changes[i].name))
+      return invalid("/covariates/" + std::to_string(i) + "/name", "is no name of a covariate");
   return {};
 }
 
@@ -145,10 +145,10 @@ Outcome SqliteChanges::run(const StartMission& c) {
                                     mission_content_columns() + ") VALUES (" +
                                     placeholders(mission_identity_columns) + ", " +
                                     placeholders(mission_content_columns()) + ")";
-  const std::string faults = sample_faults_json(m);
+  const std::string faults = sample_faults_json(m), covariates = covariates_json(m);
   Rows rows(database_.statement(insert));
   bind_mission_identity(rows, m);
-  bind_mission_content(rows, m, faults);
+  bind_mission_content(rows, m, faults, covariates);
   rows.run();
   return m.key;
 }
@@ -156,12 +156,13 @@ Outcome SqliteChanges::run(const StartMission& c) {
 Outcome SqliteChanges::run(const CheckpointMission& c) {
   const Mission& m = c.mission;
   if (auto ok = check_trace(c.trace); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_covariates(c.covariates); !ok) return tl::unexpected(ok.error());
   static const std::string update = "UPDATE mission SET (" + mission_content_columns() + ") = (" +
                                     placeholders(mission_content_columns()) + ") WHERE mission_key = ?";
   {
-    const std::string faults = sample_faults_json(m);
+    const std::string faults = sample_faults_json(m), covariates = covariates_json(m);
     Rows rows(database_.statement(update));
-    bind_mission_content(rows, m, faults);
+    bind_mission_content(rows, m, faults, covariates);
     if (rows.bind(m.key).run() == 0) return no_mission(m.key);
   }
   static const std::string replace = "INSERT OR REPLACE INTO trace (mission_key, " +
@@ -173,91 +174,11 @@ Outcome SqliteChanges::run(const CheckpointMission& c) {
     bind_bucket(rows, bucket);
     rows.run();
   }
-  append_samples(m.key, c.samples, m.state != MissionState::open);
+  const bool ended = m.state != MissionState::open;
+  chunks::append(database_, m.key, c.samples, ended, now_utime_us_());
+  chunks::append(database_, m.key, c.covariates, ended, now_utime_us_());
   if (c.energy_state) put(*c.energy_state);
   return m.key;
-}
-
-void SqliteChanges::append_samples(MissionKey key, std::span<const Sample> samples, bool ended) {
-  if (samples.empty() && !ended) return;
-  std::int64_t next_ordinal = 0;
-  {
-    Rows rows(database_.statement("SELECT telemetry_samples FROM mission WHERE mission_key = ?"));
-    if (rows.bind(key).next()) next_ordinal = rows.integer();
-  }
-  std::int64_t tail_samples = 0;
-  {
-    Rows rows(database_.statement(
-        "SELECT coalesce(sum(samples), 0) FROM telemetry_chunk WHERE mission_key = ? AND sealed = 0"));
-    if (rows.bind(key).next()) tail_samples = rows.integer();
-  }
-  if (samples.empty() && tail_samples == 0) return;
-  const std::size_t unsealed = static_cast<std::size_t>(tail_samples) + samples.size();
-  if (!ended && unsealed < sealed_chunk_samples) {
-    insert_chunk(key, next_ordinal, samples, false);
-  } else {
-    std::vector<Sample> all = take_tail(key);
-    std::int64_t ordinal = next_ordinal - static_cast<std::int64_t>(all.size());
-    all.insert(all.end(), samples.begin(), samples.end());
-    for (std::span<const Sample> rest = all; !rest.empty();) {
-      const auto piece = rest.first(std::min(rest.size(), sealed_chunk_samples));
-      insert_chunk(key, ordinal, piece, ended || piece.size() == sealed_chunk_samples);
-      ordinal += static_cast<std::int64_t>(piece.size());
-      rest = rest.subspan(piece.size());
-    }
-  }
-  Rows(database_.statement("UPDATE mission SET telemetry_samples = ? WHERE mission_key = ?"))
-      .bind(next_ordinal + static_cast<std::int64_t>(samples.size()))
-      .bind(key)
-      .run();
-}
-
-std::vector<Sample> SqliteChanges::take_tail(MissionKey key) {
-  std::vector<Sample> all;
-  bool readable = true;
-  {
-    Rows rows(
-        database_.statement("SELECT body FROM telemetry_chunk WHERE mission_key = ? AND sealed = 0 "
-                            "ORDER BY first_ordinal"));
-    rows.bind(key);
-    while (readable && rows.next()) {
-      const auto samples = decode_chunk(rows.blob());
-      readable = samples.has_value();
-      if (readable) all.insert(all.end(), samples->begin(), samples->end());
-    }
-  }
-  if (!readable) {
-    // Damaged on disk: left as it is for the reader to report, and out of the way of what still comes.
-    Rows(database_.statement("UPDATE telemetry_chunk SET sealed = 1 WHERE mission_key = ? AND sealed = 0"))
-        .bind(key)
-        .run();
-    return {};
-  }
-  Rows(database_.statement("DELETE FROM telemetry_chunk WHERE mission_key = ? AND sealed = 0"))
-      .bind(key)
-      .run();
-  return all;
-}
-
-void SqliteChanges::insert_chunk(MissionKey key, std::int64_t first_ordinal, std::span<const Sample> samples,
-                                 bool sealed) {
-  const auto [first, last] =
-      std::minmax_element(samples.begin(), samples.end(),
-                          [](const Sample& a, const Sample& b) { return a.utime_us < b.utime_us; });
-  const std::vector<std::byte> body = encode_chunk(samples, sealed ? sealed_level : tail_level);
-  Rows(database_.statement(
-           "INSERT INTO telemetry_chunk (mission_key, first_ordinal, samples, start_utime_us, "
-           "end_utime_us, stored_utime_us, sealed, bytes, body) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)"))
-      .bind(key)
-      .bind(first_ordinal)
-      .bind(static_cast<std::int64_t>(samples.size()))
-      .bind(first->utime_us)
-      .bind(last->utime_us)
-      .bind(now_utime_us_())
-      .bind(sealed)
-      .bind(static_cast<std::int64_t>(body.size()))
-      .bind(std::span<const std::byte>(body))
-      .run();
 }
 
 void SqliteChanges::put(const EnergyState& state) {
@@ -301,32 +222,7 @@ Outcome SqliteChanges::run(const AppendEvent& c) {
 Outcome SqliteChanges::run(const Prune& c) {
   const Retention& keep = c.retention;
   if (c.max_chunks < 1) return invalid("max_chunks", "must be at least 1");
-  std::int64_t total_bytes = 0;
-  {
-    Rows rows(database_.statement("SELECT coalesce(sum(bytes), 0) FROM telemetry_chunk"));
-    if (rows.next()) total_bytes = rows.integer();
-  }
-  std::vector<std::int64_t> dropped;
-  {
-    // Only sealed chunks: a tail stays whole until it is merged.
-    Rows rows(
-        database_.statement("SELECT chunk_key, stored_utime_us, bytes FROM telemetry_chunk WHERE sealed = 1 "
-                            "ORDER BY stored_utime_us, chunk_key LIMIT ?"));
-    rows.bind(c.max_chunks);
-    const std::int64_t now = now_utime_us_();
-    while (rows.next()) {
-      const std::int64_t key = rows.integer();
-      const std::int64_t stored = rows.integer();
-      const bool too_old = keep.telemetry_max_age_us && now - stored > *keep.telemetry_max_age_us;
-      const bool too_much = keep.telemetry_max_bytes && total_bytes > *keep.telemetry_max_bytes;
-      if (!too_old && !too_much) break;
-      total_bytes -= rows.integer();
-      dropped.push_back(key);
-    }
-  }
-  for (const std::int64_t key : dropped)
-    Rows(database_.statement("DELETE FROM telemetry_chunk WHERE chunk_key = ?")).bind(key).run();
-  return static_cast<std::int64_t>(dropped.size());
+  return chunks::prune(database_, keep, c.max_chunks, now_utime_us_());
 }
 
 }  // namespace joulecast::history

@@ -12,10 +12,6 @@
 
 namespace joulecast::history {
 
-// Samples of a sealed chunk: large enough to compress well, small enough to decode in a fraction of a
-// millisecond.
-inline constexpr std::size_t sealed_chunk_samples = 1024;
-
 // The commands as SQL, on the one writing connection.
 class SqliteChanges {
  public:
@@ -43,12 +39,6 @@ class SqliteChanges {
 
   void make_robot(const std::string& robot_id);
   void put(const EnergyState& state);
-  // Appends to the mission's unsealed tail and seals it in full chunks, or all of it when the mission has
-  // ended.
-  void append_samples(MissionKey key, std::span<const telemetry::Sample> samples, bool ended);
-  std::vector<telemetry::Sample> take_tail(MissionKey key);
-  void insert_chunk(MissionKey key, std::int64_t first_ordinal, std::span<const telemetry::Sample> samples,
-                    bool sealed);
 
   Database& database_;
   std::function<std::int64_t()> now_utime_us_;

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "history/cursor.h"
+#include "history/sqlite_chunks.h"
 #include "history/sqlite_rows.h"
-#include "history/telemetry_chunk.h"
 #include "history/trace_merge.h"
 
 namespace joulecast::history::queries {
@@ -286,42 +286,16 @@ Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange ra
   if (auto ok = check_limit("limit", page.limit, max_telemetry_samples); !ok)
     return tl::unexpected(ok.error());
   if (!has_mission(database, key)) return no_mission(key);
-  const std::string query = "telemetry|" + std::to_string(key) + '|' + std::to_string(range.from_utime_us) +
-                            '|' + std::to_string(range.to_utime_us);
-  std::int64_t from_ordinal = 0;
-  if (!page.cursor.empty()) {
-    const auto place = decode_cursor(query, page.cursor);
-    if (!place) return tl::unexpected(place.error());
-    from_ordinal = (*place)[0];
-  }
-  Rows rows(database.statement(
-      "SELECT first_ordinal, body FROM telemetry_chunk WHERE mission_key = ?1 AND first_ordinal >= "
-      "coalesce((SELECT max(first_ordinal) FROM telemetry_chunk WHERE mission_key = ?1 AND first_ordinal <= "
-      "?2), 0) "
-      "AND end_utime_us >= ?3 AND start_utime_us < ?4 ORDER BY first_ordinal"));
-  rows.bind(key).bind(from_ordinal).bind(range.from_utime_us).bind(range.to_utime_us);
-  TelemetryPage result;
-  while (rows.next()) {
-    std::int64_t ordinal = rows.integer();
-    const auto samples = decode_chunk(rows.blob());
-    if (!samples) return tl::unexpected(samples.error());
-    for (const telemetry::Sample& sample : *samples) {
-      const std::int64_t at = ordinal++;
-      if (at < from_ordinal || sample.utime_us < range.from_utime_us || sample.utime_us >= range.to_utime_us)
-        continue;
-      if (static_cast<std::int64_t>(result.samples.size()) == page.limit) {
-        result.next_cursor = encode_cursor(query, {at, 0});
-        return result;
-      }
-      result.samples.push_back(sample);
-    }
-  }
-  return result;
+  return chunks::telemetry(database, key, range, page);
 }
 
-std::int64_t telemetry_bytes(Database& database) {
-  Rows rows(database.statement("SELECT coalesce(sum(bytes), 0) FROM telemetry_chunk"));
-  return rows.next() ? rows.integer() : 0;
+Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange range,
+                                 const PageRequest& page) {
+  if (auto ok = check_range(range); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_limit("limit", page.limit, max_telemetry_samples); !ok)
+    return tl::unexpected(ok.error());
+  if (!has_mission(database, key)) return no_mission(key);
+  return chunks::covariates(database, key, range, page);
 }
 
 Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std::int64_t limit,

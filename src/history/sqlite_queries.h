@@ -51,7 +51,8 @@ MissionKey greatest_key(Database& database);
 
 Result<Trace> trace(Database& database, MissionKey key, TimeRange range, std::int64_t max_points);
 Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range, const PageRequest& page);
-std::int64_t telemetry_bytes(Database& database);
+Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange range,
+                                 const PageRequest& page);
 
 Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std::int64_t limit,
                                   const std::optional<std::string>& robot_id);

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::string_view plain_content_columns =
     "end_utime_us, state, implicit, incomplete, incomplete_reason, payload_kg, note, model_version, samples, "
-    "sample_faults, gap_count, gap_s, findings_json";
+    "sample_faults, gap_count, gap_s, findings_json, covariates_json";
 
 // Visits the doubles of the accounts in the order of accounts_columns().
 template <class A, class Visit>
@@ -52,6 +52,24 @@ bool parse_faults(const std::string& text, std::map<std::string, std::int64_t>& 
   return true;
 }
 
+// False when the text is not what covariates_json() writes.
+bool parse_covariates(const std::string& text, std::vector<CovariateSummary>& covariates) {
+  if (text.empty()) return true;
+  const auto json = nlohmann::json::parse(text, nullptr, false);
+  if (!json.is_array()) return false;
+  const auto real = [](const nlohmann::json& value) {
+    return value.is_number() ? value.get<double>() : telemetry::unmeasured;
+  };
+  for (const auto& row : json) {
+    if (!row.is_array() || row.size() != 8 || !row[0].is_string() || !row[5].is_number_integer() ||
+        !row[7].is_number_integer())
+      return false;
+    covariates.push_back({row[0].get<std::string>(), real(row[1]), real(row[2]), real(row[3]), real(row[4]),
+                          row[5].get<std::int64_t>(), real(row[6]), row[7].get<std::int64_t>()});
+  }
+  return true;
+}
+
 }  // namespace
 
 const std::string& accounts_columns() {
@@ -75,17 +93,27 @@ void bind_mission_identity(Rows& rows, const Mission& m) {
   rows.bind(m.key).bind(m.robot_id).bind(m.mission_id).bind(m.start_utime_us);
 }
 
-void bind_mission_content(Rows& rows, const Mission& m, const std::string& faults_json) {
+void bind_mission_content(Rows& rows, const Mission& m, const std::string& faults_json,
+                          const std::string& covariates_json) {
   rows.bind(m.end_utime_us).bind(name(m.state)).bind(m.implicit).bind(m.incomplete).bind(m.incomplete_reason);
   rows.bind(m.payload_kg).bind(m.note).bind(m.model_version).bind(m.samples).bind(faults_json);
   rows.bind(m.gap_count).bind(m.gap_s);
   m.findings_json.empty() ? rows.bind_null() : rows.bind(m.findings_json);
+  covariates_json.empty() ? rows.bind_null() : rows.bind(covariates_json);
   visit_accounts(m.accounts, [&](double value) { rows.bind(value); });
 }
 
 std::string sample_faults_json(const Mission& mission) {
   // Reasons are our own words, but a stray byte in one must not throw.
   return nlohmann::json(mission.sample_faults).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::string covariates_json(const Mission& mission) {
+  if (mission.covariates.empty()) return {};
+  nlohmann::json all = nlohmann::json::array();
+  for (const CovariateSummary& c : mission.covariates)
+    all.push_back({c.name, c.mean, c.min, c.max, c.known_s, c.counted_utime_us, c.value, c.value_utime_us});
+  return all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 Result<Mission> read_mission(Rows& rows) {
@@ -111,6 +139,8 @@ Result<Mission> read_mission(Rows& rows) {
   m.gap_count = rows.integer();
   m.gap_s = rows.real();
   m.findings_json = rows.text();
+  if (!parse_covariates(rows.text(), m.covariates))
+    return fail(Fault::corrupt, "mission.covariates_json", "not a list of covariates");
   m.accounts = read_accounts(rows);
   return m;
 }

@@ -15,9 +15,11 @@ inline constexpr std::string_view mission_identity_columns =
     "mission_key, robot_id, mission_id, start_utime_us";
 const std::string& mission_content_columns();
 void bind_mission_identity(Rows& rows, const Mission& mission);
-// `faults_json` is sample_faults_json() of the mission and must outlive the rows.
-void bind_mission_content(Rows& rows, const Mission& mission, const std::string& faults_json);
+// The texts are sample_faults_json() and covariates_json() of the mission and must outlive the rows.
+void bind_mission_content(Rows& rows, const Mission& mission, const std::string& faults_json,
+                          const std::string& covariates_json);
 std::string sample_faults_json(const Mission& mission);
+std::string covariates_json(const Mission& mission);  // empty: none
 // Reads identity and content columns. Fault::corrupt when a column's text has no meaning.
 Result<Mission> read_mission(Rows& rows);
 

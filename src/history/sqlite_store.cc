@@ -17,6 +17,7 @@
 #include "history/schema.h"
 #include "history/sqlite.h"
 #include "history/sqlite_changes.h"
+#include "history/sqlite_chunks.h"
 #include "history/sqlite_queries.h"
 
 namespace joulecast::history {
@@ -193,6 +194,10 @@ class SqliteStore final : public Store {
     return read([&](Database& database) { return queries::telemetry(database, key, range, page); });
   }
 
+  Result<CovariatePage> covariates(MissionKey key, TimeRange range, const PageRequest& page) const override {
+    return read([&](Database& database) { return queries::covariates(database, key, range, page); });
+  }
+
   Result<std::vector<Event>> events(std::int64_t after_id, std::int64_t limit,
                                     std::optional<std::string> robot_id) const override {
     return read([&](Database& database) { return queries::events(database, after_id, limit, robot_id); });
@@ -236,7 +241,7 @@ class SqliteStore final : public Store {
       std::error_code absent;
       const auto journal = std::filesystem::file_size(path_ + "-wal", absent);
       size.journal_bytes = absent ? 0 : static_cast<std::int64_t>(journal);
-      size.telemetry_bytes = queries::telemetry_bytes(database);
+      size.telemetry_bytes = chunks::encoded_bytes(database);
       return size;
     });
   }

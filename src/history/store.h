@@ -72,10 +72,16 @@ struct TelemetryPage {
   std::string next_cursor;  // empty: nothing follows
 };
 
+// In the order of arrival, which is not always that of utime.
+struct CovariatePage {
+  std::vector<telemetry::CovariateChange> changes;
+  std::string next_cursor;  // empty: nothing follows
+};
+
 struct StoreSize {
   std::int64_t database_bytes = 0;   // pages in use and free
   std::int64_t journal_bytes = 0;    // committed, not yet in the database's pages
-  std::int64_t telemetry_bytes = 0;  // encoded raw telemetry
+  std::int64_t telemetry_bytes = 0;  // encoded raw telemetry and covariates
 };
 
 // What came of one command: a number that its description names, or why it was refused.
@@ -125,6 +131,12 @@ class Store {
   // At most `page.limit` samples (1 to max_telemetry_samples). Empty when the retention dropped them;
   // not_found when the mission is unknown.
   virtual Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const = 0;
+
+  // What changed of the covariates: at most `page.limit` changes (1 to max_telemetry_samples). What holds at
+  // the range's beginning changed before it. Empty when the retention dropped them; not_found when the
+  // mission is unknown.
+  virtual Result<CovariatePage> covariates(MissionKey key, TimeRange range,
+                                           const PageRequest& page) const = 0;
 
   // Events with id > after_id, ascending, at most `limit` (1 to max_page_size); of one robot when given.
   virtual Result<std::vector<Event>> events(std::int64_t after_id, std::int64_t limit,

@@ -8,6 +8,7 @@ namespace {
 
 constexpr std::pair<Subject, std::string_view> prefixes[] = {{Subject::telemetry, "ROBOT_TELEMETRY."},
                                                              {Subject::mission_event, "MISSION_EVENT."},
+                                                             {Subject::covariates, "ROBOT_COVARIATES."},
                                                              {Subject::energy_state, "ENERGY_STATE."}};
 
 std::string_view prefix_of(Subject subject) noexcept {

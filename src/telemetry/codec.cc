@@ -4,6 +4,7 @@
 #include <cstring>
 #include <joulecast/energy_state_t.hpp>
 #include <joulecast/mission_event_t.hpp>
+#include <joulecast/robot_covariates_t.hpp>
 #include <joulecast/robot_telemetry_t.hpp>
 #include <limits>
 #include <utility>
@@ -25,7 +26,7 @@ bool is_id(std::string_view id, std::size_t max_length) noexcept {
   return !id.empty() && id.size() <= max_length && std::all_of(id.begin(), id.end(), is_id_character);
 }
 
-enum class Text { id, optional_id, note };
+enum class Text { id, optional_id, note, covariate_name };
 
 // What is wrong with a string of the contract, empty when nothing is.
 std::string fault_of(std::string_view text, Text kind, std::size_t max_length) {
@@ -38,6 +39,12 @@ std::string fault_of(std::string_view text, Text kind, std::size_t max_length) {
     return is_utf8(text) ? "" : "is not UTF-8";
   }
   if (text.empty()) return kind == Text::optional_id ? "" : "is empty";
+  if (kind == Text::covariate_name) {
+    return is_valid_covariate_name(text)
+               ? ""
+               : "must be 1 to " + std::to_string(max_covariate_name_length) +
+                     " of letters, digits, '.', '_' and '-', which '=' and as many more may follow";
+  }
   return is_id(text, max_length) ? "" : "may contain only letters, digits, '.', '_' and '-'";
 }
 
@@ -84,6 +91,24 @@ class Guard {
                                    static_cast<std::size_t>(declared) - 1);
     if (std::string fault = fault_of(content, kind, max_length); !fault.empty())
       refuse(field, std::move(fault));
+  }
+
+  // An int32 of at least 0 and at most `most`; 0 where it is not that.
+  std::size_t count(const char* field, std::size_t most) {
+    const std::uint8_t* at = take(4, field);
+    if (at == nullptr) return 0;
+    const auto value = static_cast<std::int32_t>(read_big_endian(at, 4));
+    if (value >= 0 && static_cast<std::size_t>(value) <= most) return static_cast<std::size_t>(value);
+    refuse(field, "is " + std::to_string(value) + "; 0 to " + std::to_string(most) + " are allowed");
+    return 0;
+  }
+
+  // `count` strings in a row; a fault names the one that it is in.
+  void texts(const char* field, std::size_t count, Text kind, std::size_t max_length) {
+    for (std::size_t k = 0; k < count && !error_; ++k) {
+      text(field, kind, max_length);
+      if (error_) error_->field.append("[").append(std::to_string(k)).append("]");
+    }
   }
 
   void one_of(const char* field, std::int8_t low, std::int8_t high) {
@@ -161,6 +186,7 @@ void copy(const std::array<double, N>& from, double (&to)[N]) {
 }
 
 constexpr std::size_t real = sizeof(double);
+constexpr std::size_t max_covariate_text = 2 * max_covariate_name_length + 1;  // name, '=', label
 
 }  // namespace
 
@@ -219,6 +245,26 @@ Result<DecodedMissionEvent> decode_mission_event(std::span<const std::uint8_t> b
   result.event.phase = static_cast<MissionPhase>(decoded->event);
   result.event.payload_kg = decoded->payload_mass;
   result.event.note = std::move(decoded->note);
+  return result;
+}
+
+Result<DecodedCovariates> decode_covariates(std::span<const std::uint8_t> bytes) {
+  static const std::int64_t fingerprint = robot_covariates_t::getHash();
+  Guard guard(bytes, fingerprint);
+  guard.fixed(8, "utime");
+  guard.text("robot_id", Text::id, max_covariates_robot_id_length);
+  const std::size_t count = guard.count("n", max_covariates);
+  guard.texts("name", count, Text::covariate_name, max_covariate_text);
+  guard.fixed(count * real, "value");
+  auto decoded = decode_guarded<robot_covariates_t>(bytes, guard);
+  if (!decoded) return tl::unexpected<Error>(std::move(decoded.error()));
+
+  DecodedCovariates result;
+  result.robot_id = std::move(decoded->robot_id);
+  result.message.utime_us = decoded->utime;
+  result.message.covariates.reserve(count);
+  for (std::size_t k = 0; k < count; ++k)
+    result.message.covariates.push_back({std::move(decoded->name[k]), decoded->value[k]});
   return result;
 }
 
@@ -290,6 +336,30 @@ Result<std::vector<std::uint8_t>> encode_mission_event(std::string_view robot_id
   message.payload_mass = event.payload_kg;
   message.note = event.note;
   return encode(message);
+}
+
+Result<std::vector<std::uint8_t>> encode_covariates(std::string_view robot_id,
+                                                    const CovariateMessage& message) {
+  if (auto fault = check_text("robot_id", robot_id, Text::id, max_covariates_robot_id_length))
+    return tl::unexpected<Error>(std::move(*fault));
+  const std::size_t count = message.covariates.size();
+  if (count > max_covariates) {
+    return invalid(
+        "n", "is " + std::to_string(count) + "; 0 to " + std::to_string(max_covariates) + " are allowed");
+  }
+  robot_covariates_t out;
+  out.utime = message.utime_us;
+  out.robot_id = robot_id;
+  out.n = static_cast<std::int32_t>(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto& [name, value] = message.covariates[k];
+    const std::string field = "name[" + std::to_string(k) + "]";
+    if (auto fault = check_text(field.c_str(), name, Text::covariate_name, max_covariate_text))
+      return tl::unexpected<Error>(std::move(*fault));
+    out.name.push_back(name);
+    out.value.push_back(value);
+  }
+  return encode(out);
 }
 
 Result<std::vector<std::uint8_t>> encode_energy_state(const EnergyState& state) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "telemetry/covariates.h"
 #include "telemetry/sample.h"
 
 // The only door between datagrams and the rest: every length that a datagram declares is checked against the
@@ -19,6 +20,7 @@ namespace joulecast::telemetry {
 
 // LCM refuses channels over 63 characters, of which "ROBOT_TELEMETRY." takes 16.
 inline constexpr std::size_t max_robot_id_length = 47;
+inline constexpr std::size_t max_covariates_robot_id_length = 46;  // "ROBOT_COVARIATES." takes 17
 inline constexpr std::size_t max_mission_id_length = 128;
 inline constexpr std::size_t max_note_length = 1024;
 
@@ -34,6 +36,11 @@ struct DecodedTelemetry {
 struct DecodedMissionEvent {
   std::string robot_id;
   MissionEvent event;
+};
+
+struct DecodedCovariates {
+  std::string robot_id;
+  CovariateMessage message;
 };
 
 // energy_state_t, free of LCM. Energies in J since the mission began, leaving the battery positive; NaN = not
@@ -61,17 +68,20 @@ struct EnergyState {
 // Fault::corrupt with the offending field when the bytes are not exactly one message of the type.
 [[nodiscard]] Result<DecodedTelemetry> decode_telemetry(std::span<const std::uint8_t> bytes);
 [[nodiscard]] Result<DecodedMissionEvent> decode_mission_event(std::span<const std::uint8_t> bytes);
+[[nodiscard]] Result<DecodedCovariates> decode_covariates(std::span<const std::uint8_t> bytes);
 [[nodiscard]] Result<EnergyState> decode_energy_state(std::span<const std::uint8_t> bytes);
 
-// Bytes that the matching decode accepts; Fault::invalid naming the string that breaks its limit.
+// Bytes that the matching decode accepts; Fault::invalid naming the string or count that breaks its limit.
 [[nodiscard]] Result<std::vector<std::uint8_t>> encode_telemetry(std::string_view robot_id,
                                                                  const Sample& sample);
 [[nodiscard]] Result<std::vector<std::uint8_t>> encode_mission_event(std::string_view robot_id,
                                                                      const MissionEvent& event);
+[[nodiscard]] Result<std::vector<std::uint8_t>> encode_covariates(std::string_view robot_id,
+                                                                  const CovariateMessage& message);
 [[nodiscard]] Result<std::vector<std::uint8_t>> encode_energy_state(const EnergyState& state);
 
 // What a channel of the contract carries, and whose it is.
-enum class Subject { telemetry, mission_event, energy_state };
+enum class Subject { telemetry, mission_event, covariates, energy_state };
 
 struct ChannelName {
   Subject subject;

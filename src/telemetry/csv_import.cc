@@ -9,6 +9,7 @@
 
 #include "telemetry/codec.h"
 #include "telemetry/csv_table.h"
+#include "telemetry/import_covariates.h"
 #include "telemetry/import_mapping.h"
 
 namespace joulecast::telemetry {
@@ -74,11 +75,21 @@ struct Reference {
   bool negate = false;
 };
 
-struct BoundTarget {
-  const FieldTarget* target = nullptr;
+struct BoundExpression {
+  const FieldExpression* expression = nullptr;
   std::string name;  // of the number it gives, e.g. motor_current[1]
   std::vector<Reference> terms;
   std::vector<Reference> sign_from;
+};
+
+struct BoundTarget {
+  const FieldTarget* target = nullptr;
+  BoundExpression value;
+};
+
+struct BoundLabels {
+  const LabelTarget* target = nullptr;
+  std::size_t place = 0;
 };
 
 class Importer {
@@ -92,12 +103,14 @@ class Importer {
   Result<void> bind();
   Result<std::size_t> place_of(const std::string& column) const;
   Result<Reference> bind_term(const ColumnTerm& term);
+  Result<BoundExpression> bind_expression(const FieldExpression& expression, std::string name);
   Result<std::vector<Reference>> bind_terms(const std::vector<ColumnTerm>& terms);
   Result<void> check_required(const std::vector<std::string_view>& row) const;
   Result<std::int64_t> time_of(const std::vector<std::string_view>& row);
   Result<void> take_cells(const std::vector<std::string_view>& row);
+  Result<void> take_covariates(const std::vector<std::string_view>& row);
   double limited(double value, const ValueLimits& limits, double held, const std::string& name);
-  double evaluate(const BoundTarget& bound);
+  double evaluate(const BoundExpression& bound);
   Result<Recording> name_recording() const;
 
   [[nodiscard]] tl::unexpected<Error> refuse(const std::string& column, std::string_view text,
@@ -116,6 +129,9 @@ class Importer {
   std::vector<Column> columns_;
   std::unordered_map<std::string, std::size_t> column_index_;
   std::vector<BoundTarget> targets_;
+  std::vector<BoundExpression> covariate_targets_;
+  std::vector<BoundLabels> label_targets_;
+  ImportedCovariates covariates_;
   std::vector<std::pair<std::size_t, const std::string*>> required_;
   std::size_t time_place_ = 0;
   std::optional<std::int64_t> shift_us_;
@@ -156,6 +172,14 @@ Result<std::vector<Reference>> Importer::bind_terms(const std::vector<ColumnTerm
   return references;
 }
 
+Result<BoundExpression> Importer::bind_expression(const FieldExpression& expression, std::string name) {
+  auto terms = bind_terms(expression.terms);
+  if (!terms) return tl::unexpected<Error>(std::move(terms.error()));
+  auto signs = bind_terms(expression.sign_from);
+  if (!signs) return tl::unexpected<Error>(std::move(signs.error()));
+  return BoundExpression{&expression, std::move(name), std::move(*terms), std::move(*signs)};
+}
+
 Result<void> Importer::bind() {
   auto time_place = place_of(mapping_.time_column);
   if (!time_place) return tl::unexpected<Error>(std::move(time_place.error()));
@@ -166,17 +190,25 @@ Result<void> Importer::bind() {
     required_.emplace_back(*place, &wanted);
   }
   for (const FieldTarget& target : mapping_.targets) {
-    auto terms = bind_terms(target.expression.terms);
-    if (!terms) return tl::unexpected<Error>(std::move(terms.error()));
-    auto signs = bind_terms(target.expression.sign_from);
-    if (!signs) return tl::unexpected<Error>(std::move(signs.error()));
     std::string name(target.slot->field);
     if (target.slot->size > 1) name.append("[").append(std::to_string(target.element)).append("]");
-    targets_.push_back({&target, std::move(name), std::move(*terms), std::move(*signs)});
+    auto bound = bind_expression(target.expression, std::move(name));
+    if (!bound) return tl::unexpected<Error>(std::move(bound.error()));
+    targets_.push_back({&target, std::move(*bound)});
+  }
+  for (const CovariateTarget& target : mapping_.covariates) {
+    auto bound = bind_expression(target.expression, target.name);
+    if (!bound) return tl::unexpected<Error>(std::move(bound.error()));
+    covariate_targets_.push_back(std::move(*bound));
+  }
+  for (const LabelTarget& target : mapping_.labels) {
+    auto place = place_of(target.column);
+    if (!place) return tl::unexpected<Error>(std::move(place.error()));
+    label_targets_.push_back({&target, *place});
   }
   for (const auto& [column, limits] : mapping_.column_limits) {
     if (!column_index_.contains(column)) {
-      return invalid("/column_limits/" + column, "no field uses this column");
+      return invalid("/column_limits/" + column, "no field and no covariate uses this column");
     }
   }
   return {};
@@ -250,8 +282,22 @@ Result<void> Importer::take_cells(const std::vector<std::string_view>& row) {
   return {};
 }
 
-double Importer::evaluate(const BoundTarget& bound) {
-  const FieldExpression& expression = bound.target->expression;
+Result<void> Importer::take_covariates(const std::vector<std::string_view>& row) {
+  for (const BoundExpression& bound : covariate_targets_) covariates_.set(bound.name, evaluate(bound));
+  for (const BoundLabels& bound : label_targets_) {
+    const std::string_view text = trimmed(row[bound.place]);
+    if (!text.empty()) {
+      if (auto set = covariates_.set_label(bound.target->quantity, text); !set)
+        return refuse(bound.target->column, text, set.error().message);
+    } else if (!mapping_.hold_empty_cells) {
+      covariates_.forget_labels(bound.target->quantity);
+    }
+  }
+  return {};
+}
+
+double Importer::evaluate(const BoundExpression& bound) {
+  const FieldExpression& expression = *bound.expression;
   const auto value_of = [&](const Reference& reference) {
     const double value = columns_[reference.column].value;
     return reference.negate ? -value : value;
@@ -330,8 +376,9 @@ Result<Import> Importer::run() {
     sample.sequence = static_cast<std::int64_t>(samples.size());
     sample.payload_kg = mapping_.payload_kg;
     for (const BoundTarget& bound : targets_) {
-      bound.target->slot->place(sample)[bound.target->element] = evaluate(bound);
+      bound.target->slot->place(sample)[bound.target->element] = evaluate(bound.value);
     }
+    if (auto taken = take_covariates(row); !taken) return tl::unexpected<Error>(std::move(taken.error()));
     if (drop_row_) {
       ++report.rows_glitched;
     } else if (std::isnan(sample.wheel_velocity_rad_s[0]) || std::isnan(sample.wheel_velocity_rad_s[1])) {
@@ -340,6 +387,7 @@ Result<Import> Importer::run() {
       ++report.rows_out_of_time;
     } else {
       samples.push_back(sample);
+      covariates_.commit(*utime_us);
     }
   }
   report.samples = samples.size();
@@ -347,6 +395,9 @@ Result<Import> Importer::run() {
     return fail(Fault::corrupt, options_.source_name,
                 "none of " + std::to_string(report.rows) + " rows gives a sample");
   }
+  auto covariates = covariates_.finish();
+  if (!covariates) return located(std::move(covariates.error()));
+  result_.recording.covariates = std::move(*covariates);
   return std::move(result_);
 }
 

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "telemetry/codec.h"
+#include "telemetry/covariates.h"
 
 namespace joulecast::telemetry {
 namespace {
@@ -178,6 +180,39 @@ class Reader {
     return targets;
   }
 
+  // Members of an object whose keys are names of covariates, without a label.
+  void each_covariate(const json& value, const std::string& pointer,
+                      const std::function<void(const std::string& name, const json& member,
+                                               const std::string& pointer)>& take) {
+    if (!value.is_object()) return refuse(pointer, "must be an object");
+    for (const auto& [name, member] : value.items()) {
+      const std::string here = pointer + "/" + name;
+      if (!is_valid_covariate_name(name) || is_label(name))
+        refuse(here, "must be called by 1 to " + std::to_string(max_covariate_name_length) +
+                         " of letters, digits, '.', '_', '-'");
+      take(name, member, here);
+    }
+  }
+
+  void covariates(const json& value, ImportMapping::Content& content) {
+    if (value.contains("covariates")) {
+      each_covariate(value["covariates"], "/covariates",
+                     [&](const std::string& name, const json& member, const std::string& here) {
+                       content.covariates.push_back({name, expression(member, here)});
+                     });
+    }
+    if (value.contains("labels")) {
+      each_covariate(
+          value["labels"], "/labels",
+          [&](const std::string& name, const json& member, const std::string& here) {
+            if (!object(member, here, {"column"})) return;
+            content.labels.push_back({name, text(member.value("column", json()), here + "/column")});
+          });
+    }
+    if (content.covariates.size() + content.labels.size() > max_covariates)
+      refuse("/covariates", "must be at most " + std::to_string(max_covariates) + ", labels among them");
+  }
+
   void time(const json& value, ImportMapping::Content& content) {
     if (!object(value, "/time", {"column", "unit", "epoch_us"})) return;
     content.time_column = text(value.value("column", json()), "/time/column");
@@ -195,9 +230,10 @@ class Reader {
 
   ImportMapping::Content mapping(const json& value) {
     ImportMapping::Content content;
-    if (!object(value, "",
-                {"$schema", "description", "robot_id", "mission_id", "payload_kg", "separator",
-                 "column_prefix", "time", "empty_cells", "require", "column_limits", "fields"})) {
+    if (!object(
+            value, "",
+            {"$schema", "description", "robot_id", "mission_id", "payload_kg", "separator", "column_prefix",
+             "time", "empty_cells", "require", "column_limits", "fields", "covariates", "labels"})) {
       return content;
     }
     content.robot_id = text(value.value("robot_id", json()), "/robot_id");
@@ -239,6 +275,7 @@ class Reader {
       refuse("/column_limits", "must be an object");
     }
     content.targets = fields(value.value("fields", json()), "/fields");
+    covariates(value, content);
     return content;
   }
 };

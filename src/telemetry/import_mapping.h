@@ -77,6 +77,17 @@ struct FieldTarget {
   FieldExpression expression;
 };
 
+struct CovariateTarget {
+  std::string name;
+  FieldExpression expression;
+};
+
+// A column of texts, each of which becomes the label quantity=text.
+struct LabelTarget {
+  std::string quantity;
+  std::string column;
+};
+
 struct ImportMapping::Content {
   std::string robot_id;
   std::string mission_id = "{stem}";
@@ -90,6 +101,8 @@ struct ImportMapping::Content {
   std::map<std::string, std::string> require;  // every non-empty cell of the column reads exactly this
   std::map<std::string, ValueLimits> column_limits;
   std::vector<FieldTarget> targets;
+  std::vector<CovariateTarget> covariates;
+  std::vector<LabelTarget> labels;
 };
 
 }  // namespace joulecast::telemetry

@@ -13,8 +13,8 @@ namespace joulecast::telemetry {
 struct LogRecordings {
   std::vector<Recording> recordings;
   std::uint64_t samples_outside = 0;  // of no declared mission
-  std::uint64_t unreadable = 0;       // messages that decode to nothing or break a plausibility limit
-  std::uint64_t skipped_bytes = 0;    // damage in the file
+  std::uint64_t unreadable = 0;  // messages and covariates that decode to nothing, break a limit or come late
+  std::uint64_t skipped_bytes = 0;  // damage in the file
 };
 
 // Reads a log back into the recordings that write_recording() makes of it. Samples that do not advance the

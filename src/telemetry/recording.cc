@@ -1,5 +1,9 @@
 #include "telemetry/recording.h"
 
+#include <algorithm>
+#include <cmath>
+#include <span>
+
 #include "telemetry/codec.h"
 
 namespace joulecast::telemetry {
@@ -14,21 +18,56 @@ Result<void> write_event(EventLogWriter& log, const Recording& recording, Missio
       });
 }
 
+// Changes in order of time: one message an instant, or several where it changes more than one holds.
+Result<void> write_changes(EventLogWriter& log, const std::string& robot_id,
+                           std::span<const CovariateChange> changes) {
+  const std::string channel = channel_of(Subject::covariates, robot_id);
+  for (std::size_t k = 0; k < changes.size();) {
+    CovariateMessage message{changes[k].utime_us, {}};
+    for (; k < changes.size() && changes[k].utime_us == message.utime_us &&
+           message.covariates.size() < max_covariates;
+         ++k)
+      message.covariates.push_back({changes[k].name, changes[k].value});
+    auto written = encode_covariates(robot_id, message).and_then([&](const std::vector<std::uint8_t>& bytes) {
+      return log.write(message.utime_us, channel, bytes);
+    });
+    if (!written) return written;
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<void> write_recording(EventLogWriter& log, const Recording& recording) {
   if (recording.samples.empty()) return invalid("samples", "a recording needs one sample at least");
   const std::string channel = channel_of(Subject::telemetry, recording.robot_id);
+  const std::vector<CovariateChange> changes = changes_of(recording.covariates);
+  std::span<const CovariateChange> left = changes;
   auto written = write_event(log, recording, MissionPhase::started, recording.samples.front().utime_us);
+  const auto write_up_to = [&](std::int64_t utime_us) {
+    std::size_t count = 0;
+    while (count < left.size() && left[count].utime_us <= utime_us) ++count;
+    if (written) written = write_changes(log, recording.robot_id, left.first(count));
+    left = left.subspan(count);
+  };
   for (const Sample& sample : recording.samples) {
+    write_up_to(sample.utime_us);
     if (!written) return written;
     written =
         encode_telemetry(recording.robot_id, sample).and_then([&](const std::vector<std::uint8_t>& bytes) {
           return log.write(sample.utime_us, channel, bytes);
         });
+    if (!written) return written;
   }
+  const std::int64_t end_us = recording.samples.back().utime_us;
+  written = write_event(log, recording, MissionPhase::finished, end_us);
   if (!written) return written;
-  return write_event(log, recording, MissionPhase::finished, recording.samples.back().utime_us);
+  std::vector<CovariateChange> unknown;
+  for (const CovariateSeries& series : recording.covariates) {
+    if (!series.value.empty() && !std::isnan(series.value.back()))
+      unknown.push_back({std::max(end_us, series.utime_us.back()) + 1, series.name, unmeasured});
+  }
+  return write_changes(log, recording.robot_id, unknown);
 }
 
 }  // namespace joulecast::telemetry

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "telemetry/covariates.h"
 #include "telemetry/event_log.h"
 #include "telemetry/sample.h"
 
@@ -15,11 +16,13 @@ struct Recording {
   std::string mission_id;
   double payload_kg = unmeasured;
   std::vector<Sample> samples;
+  std::vector<CovariateSeries> covariates = {};
 };
 
-// Append to the log as the robot would have published it: STARTED at the first sample, every sample, FINISHED
-// at the last, stamped with the robot's clock. Fault::invalid for a recording without samples or with ids out
-// of bounds.
+// Append to the log as the robot would have published it: STARTED at the first sample, every sample with the
+// covariates that change by then before it, FINISHED at the last, and that the covariates are unknown from
+// there on, so that they do not hold in the recording that follows; stamped with the robot's clock.
+// Fault::invalid for a recording without samples or with ids or names out of bounds.
 Result<void> write_recording(EventLogWriter& log, const Recording& recording);
 
 }  // namespace joulecast::telemetry

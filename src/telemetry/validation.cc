@@ -92,6 +92,18 @@ std::optional<Implausible> check_plausible(const MissionEvent& event) noexcept {
   return check_value(event.payload_kg, ranges.back(), false);
 }
 
+std::optional<Implausible> check_plausible(const CovariateMessage& message) noexcept {
+  return check_clock(message.utime_us);
+}
+
+std::optional<Implausible> check_plausible(const Covariate& covariate) noexcept {
+  const double value = covariate.value;
+  if (std::isinf(value)) return Implausible{Implausibility::infinite, "value", value};
+  if (is_label(covariate.name) && !std::isnan(value) && value != 0 && value != 1)
+    return Implausible{Implausibility::out_of_range, "value", value};
+  return std::nullopt;
+}
+
 std::string_view name_of(Implausibility why) noexcept {
   switch (why) {
     case Implausibility::missing:
@@ -128,8 +140,9 @@ std::string describe(const Implausible& fault) {
     std::snprintf(numbers, sizeof numbers, " is %.6g; no robot reports values outside %g to %g", fault.value,
                   range.low, range.high);
     text += numbers;
+    return text;
   }
-  return text;
+  return text + " of a label is neither 0 nor 1";
 }
 
 }  // namespace joulecast::telemetry

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "telemetry/covariates.h"
 #include "telemetry/sample.h"
 
 namespace joulecast::telemetry {
@@ -23,7 +24,7 @@ struct PlausibleRange {
 enum class Implausibility {
   missing,       // NaN in wheel_velocity, the one channel that every robot must measure
   infinite,      // an infinity, in any field
-  out_of_range,  // beyond plausible_ranges()
+  out_of_range,  // beyond plausible_ranges(); of a label neither 0 nor 1
   bad_clock,     // utime before 1970 or after 2200
   bad_sequence   // negative sequence number
 };
@@ -37,6 +38,9 @@ struct Implausible {
 // What is wrong with the sample taken alone; empty when nothing is.
 [[nodiscard]] std::optional<Implausible> check_plausible(const Sample& sample) noexcept;
 [[nodiscard]] std::optional<Implausible> check_plausible(const MissionEvent& event) noexcept;
+// Of the message its clock; of each value that it is finite or NaN, of a label's 0, 1 or NaN.
+[[nodiscard]] std::optional<Implausible> check_plausible(const CovariateMessage& message) noexcept;
+[[nodiscard]] std::optional<Implausible> check_plausible(const Covariate& covariate) noexcept;
 [[nodiscard]] std::string describe(const Implausible& fault);
 [[nodiscard]] std::string_view name_of(Implausibility why) noexcept;
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -121,6 +122,35 @@ TEST(Estimate, TellsTheLimitsThatAMotionBreaks) {
   EXPECT_EQ(turn.contains("acceleration"), rim > a);
   const json path = {{{"kind", "straight"}, {"length_m", 3}}};
   EXPECT_TRUE(answer(estimate_answer, {{"path", path}})["beyond_limits"].empty());
+}
+
+TEST(Estimate, PricesTheFloorOfAGivenProfile) {
+  robot::RobotModel climber = testing::nomad();
+  climber.effects = {{"grade", {{"share", 1}}}};
+  const server::ModelInForce with = **server::model_in_force(climber, 1);
+  json motion = {{"time_s", {0, 2, 12, 14}}, {"speed_m_s", {0, 0.5, 0.5, 0}}};
+  const auto priced = [&](const json& profile) {
+    const auto text = estimate_answer({{"profile", profile}, {"columns", true}}, with);
+    EXPECT_TRUE(text) << describe(text.error());
+    return text ? json::parse(*text) : json();
+  };
+  const double level = priced(motion)["energy_j"].get<double>();
+  json uphill = motion, tilted = motion;
+  uphill["height_m"] = {0, 0.02, 0.22, 0.24};
+  tilted["climb_rad"] = {0.04, 0.04, 0.04, 0.04};
+  const json a = priced(uphill), b = priced(tilted);
+  const double weight = climber.total_mass_kg(0) * robot::standard_gravity_m_s2;
+  EXPECT_NEAR(a["ledger"]["terms_j"]["potential"].get<double>(), weight * 0.24, 1e-4 * weight);
+  EXPECT_NEAR(b["ledger"]["terms_j"]["potential"].get<double>(), weight * 6 * std::sin(0.04), 1e-4 * weight);
+  for (const json& e : {a, b}) {
+    const double energy = e["energy_j"].get<double>();
+    EXPECT_GT(energy, level + weight * 0.23);
+    EXPECT_NEAR(e["profile"]["energy_j"].back().get<double>(), energy, 1e-4 * energy);
+  }
+  uphill["climb_rad"] = tilted["climb_rad"];
+  EXPECT_EQ(fault(estimate_answer, {{"profile", uphill}}).field, "/profile/climb_rad");
+  tilted["climb_rad"] = {0, 0};
+  EXPECT_EQ(fault(estimate_answer, {{"profile", tilted}}).field, "/profile/climb_rad");
 }
 
 TEST(Profile, StartPosesAreReadAlikeEverywhere) {

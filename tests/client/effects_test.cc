@@ -79,6 +79,7 @@ TEST(Effects, EveryEffectOfTheTableIsCostlyOrHasATestOfItsOwn) {
                                                    "x_oval_wheel"};
   // 38 costly ones above.
   EXPECT_EQ(effect_table().size(), 38 + others.size());
+  EXPECT_EQ(all_effects().size(), effect_table().size() + 2);  // grade and x_cpu_load, below
   for (const auto id : others) {
     EXPECT_TRUE(std::any_of(effect_table().begin(), effect_table().end(), [&](const auto& e) {
       return e.id == id;
@@ -149,6 +150,65 @@ TEST(Effects, SlopeTakesAndGivesBackItsPotentialEnergy) {
   const double mass_kg = spec.robot.chassis_kg + 2 * spec.robot.wheel_kg + first.payload_kg;
   EXPECT_NEAR(first.accounts.potential, mass_kg * 9.80665 * std::sin(0.02) * (ends.second - ends.first),
               0.05);
+}
+
+TEST(Effects, HillsTakeAndGiveBackTheirPotentialEnergyAndShowInPitchAndHeight) {
+  SimulationSpec spec = quiet_spec("amr");
+  spec.missions = 1;
+  spec.sensors.pitch = true;
+  spec.sensors.covariates_hz = 50;
+  const Simulation run = with(spec, "grade", 0.06);
+  const auto& mission = run.truth.missions.front();
+  ASSERT_EQ(run.covariates.size(), run.samples.size());
+  const auto height = [&](std::size_t k) { return run.covariates[k].covariates[1].value; };
+  EXPECT_EQ(run.covariates[0].covariates[1].name, "height_m");
+  const double pi = 3.14159265358979323846, k = 2 * pi / spec.world.hill_m;
+  double steepest = 0, climbed_m = 0;
+  for (std::size_t i = 0; i < run.samples.size(); ++i) {
+    const auto& s = run.samples[i];
+    EXPECT_NEAR(height(i), 0.06 / k * std::sin(k * s.pose[0]) * std::cos(k * s.pose[1]), 1e-9);
+    steepest = std::max(steepest, std::abs(s.pitch_rad));
+    if (i == 0) continue;
+    const double way =
+        std::hypot(s.pose[0] - run.samples[i - 1].pose[0], s.pose[1] - run.samples[i - 1].pose[1]);
+    climbed_m += 0.5 * (std::sin(s.pitch_rad) + std::sin(run.samples[i - 1].pitch_rad)) * way;
+  }
+  EXPECT_GT(steepest, 0.03);
+  EXPECT_LT(steepest, 0.061);
+  EXPECT_NEAR(climbed_m, height(run.samples.size() - 1) - height(0), 2e-3);
+  const double mass_kg = spec.robot.chassis_kg + 2 * spec.robot.wheel_kg + mission.payload_kg;
+  EXPECT_NEAR(mission.accounts.potential, mass_kg * 9.80665 * (height(run.samples.size() - 1) - height(0)),
+              0.1);
+}
+
+TEST(Effects, TheComputerDrawsByItsLoadWhichTheRobotMayPublish) {
+  SimulationSpec spec = quiet_spec("amr");
+  spec.sensors.covariates_hz = 10;
+  const Simulation idle = with(spec, "x_cpu_load", 0), busy = with(spec, "x_cpu_load", 40);
+  ASSERT_EQ(idle.samples.size(), busy.samples.size());
+  double least = 1, most = 0;
+  std::size_t next = 0;
+  for (std::size_t k = 0; k < busy.samples.size(); ++k) {
+    while (next < busy.covariates.size() && busy.covariates[next].utime_us <= busy.samples[k].utime_us)
+      ++next;
+    const auto& [name, load] = busy.covariates[next - 1].covariates[0];
+    ASSERT_EQ(name, "cpu_load");
+    least = std::min(least, load);
+    most = std::max(most, load);
+    if (busy.covariates[next - 1].utime_us != busy.samples[k].utime_us) continue;
+    const auto power = [](const telemetry::Sample& s) { return s.battery_voltage_v * s.battery_current_a; };
+    // The sag of the bus under the load changes what the drives make of it a little.
+    EXPECT_NEAR(power(busy.samples[k]) - power(idle.samples[k]), 40 * load, 0.5);
+  }
+  EXPECT_GE(least, 0);
+  EXPECT_LE(most, 1);
+  EXPECT_GT(most - least, 0.3);
+}
+
+TEST(Effects, NothingIsPublishedBesideTelemetryUnlessAsked) {
+  const Simulation run = with(quiet_spec("amr"), "grade", 0.05);
+  EXPECT_TRUE(run.covariates.empty());
+  for (const auto& s : run.samples) ASSERT_TRUE(std::isnan(s.pitch_rad));
 }
 
 TEST(Effects, DelayShiftsTheElectricalChannelsAlone) {

@@ -131,6 +131,7 @@ TEST_P(EveryEffect, ForwardMotionInvertsTheBalance) {
     state.x_m = at.x_m;
     state.y_m = at.y_m;
     state.heading_rad = at.heading_rad;
+    state.climb_rad = at.climb_rad;
     state.wheel_speed_rad_s = at.wheel_speed_rad_s;
     state.copper_heat_w = at.copper_heat_w;
     const auto torque = model.balance(at).total_nm;
@@ -172,12 +173,13 @@ TEST(Dissipation, CostsPowerInDriving) {
   at.payload_kg = 8;
   at.x_m = at.y_m = 0;
   at.heading_rad = 0;
+  at.climb_rad = 0.05;
   at.copper_heat_w = {10, 10};
   const double nominal = DriveModel(robot, {}).flow(at).battery_power_w;
   for (const char* id : {"coulomb_friction", "viscous_friction", "stribeck_friction", "friction_asymmetry",
-                         "load_rolling_resistance", "floor_resistance_zone", "slope", "aerodynamic_drag",
-                         "turning_scrub", "gear_efficiency", "resistance_error", "winding_temperature",
-                         "brush_drop", "accessory_load", "driver_loss"}) {
+                         "load_rolling_resistance", "floor_resistance_zone", "slope", "grade",
+                         "aerodynamic_drag", "turning_scrub", "gear_efficiency", "resistance_error",
+                         "winding_temperature", "brush_drop", "accessory_load", "driver_loss"}) {
     ActiveEffect active = moderate(*find_effect(id));
     EXPECT_GT(DriveModel(robot, {&active, 1}).flow(at).battery_power_w, nominal) << id;
   }
@@ -187,7 +189,7 @@ TEST(Catalogue, HoldsEachIdOnceAndNamesUnknownOnes) {
   std::set<std::string_view> ids;
   for (const Effect* effect : catalogue()) ids.insert(effect->info().id);
   EXPECT_EQ(ids.size(), catalogue().size());
-  EXPECT_EQ(ids.size(), 32u);
+  EXPECT_EQ(ids.size(), 33u);
   const auto unknown = activate({"warp_drive", {}});
   ASSERT_FALSE(unknown);
   EXPECT_EQ(unknown.error().field, "/effects/warp_drive");

@@ -20,6 +20,7 @@ inline dynamics::Instant random_motion(std::mt19937& random) {
   at.heading_rad = between(-7, 7);
   at.current_slope_a_s = {between(-5, 5), between(-5, 5)};
   at.copper_heat_w = {between(0, 20), between(0, 20)};
+  at.climb_rad = between(-0.1, 0.1);
   return at;
 }
 

@@ -68,6 +68,7 @@ const std::map<std::string_view, Answers>& answers() {
       {"load_rolling_resistance", {{Term::friction_rolling, Answer::loses}}},
       {"floor_resistance_zone", {{Term::friction_zone, Answer::loses}}},
       {"slope", {{Term::potential, Answer::exchanges}}},
+      {"grade", {{Term::potential, Answer::exchanges}}},
       {"aerodynamic_drag", {{Term::drag, Answer::loses}}},
       {"turning_scrub", {{Term::friction_scrub, Answer::loses}}},
       {"gear_efficiency", {{Term::friction_internal, Answer::loses}}},
@@ -157,6 +158,7 @@ TEST_P(EffectEverywhere, DrivesForwardByTheVoltagesThatItAsksFor) {
     const auto flow = model.flow(at);
     dynamics::DriveState state;
     state.x_m = at.x_m, state.y_m = at.y_m, state.heading_rad = at.heading_rad;
+    state.climb_rad = at.climb_rad;
     state.wheel_speed_rad_s = at.wheel_speed_rad_s;
     state.copper_heat_w = at.copper_heat_w;
     state.current_a = flow.current_a;  // what inductance keeps flowing
@@ -185,6 +187,7 @@ std::vector<telemetry::Sample> a_drive() {
     s.battery_voltage_v = 24.3;
     s.battery_current_a = 1.5;
     s.pose = {x, y, heading};
+    s.pitch_rad = 0.06 * std::sin(0.7 * t);
     x += 0.1 * w * std::cos(heading) / rate_hz;
     y += 0.1 * w * std::sin(heading) / rate_hz;
     heading += 0.1 * turn / 0.165 / rate_hz;
@@ -213,6 +216,7 @@ TEST_P(EffectEverywhere, IsMeteredAsTheInverseModelHasIt) {
     at.wheel_acceleration_rad_s2 = point.wheel_acceleration_rad_s2;
     at.payload_kg = point.sample.payload_kg;
     at.x_m = point.sample.pose[0], at.y_m = point.sample.pose[1], at.heading_rad = point.sample.pose[2];
+    at.climb_rad = point.sample.pitch_rad;
     at.copper_heat_w = heat_w;
     const double expected_w =
         model.metered_battery_power(model.flow(at).battery_power_w, point.sample.battery_voltage_v);

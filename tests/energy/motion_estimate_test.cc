@@ -56,6 +56,57 @@ TEST(MotionEstimate, KnowsTheFloorOnlyFromAStartPose) {
   EXPECT_NEAR(placed->ledger[Term::friction_zone], 0.05 * weight * 2, 1e-3 * weight);
 }
 
+// There and back over a hill, forward and in reverse: the weight's energy is that of the height, to rounding.
+TEST(MotionEstimate, PaysForEveryMetreOfHeightOnce) {
+  robot::RobotModel robot = testing::nomad();
+  robot.effects.push_back({"grade", {{"share", 1}}});
+  const auto model = *dynamics::drive_model(robot);
+  const double weight = robot.total_mass_kg(3) * robot::standard_gravity_m_s2;
+  const double none = dynamics::unknown;
+  for (const double way : {1.0, -1.0}) {
+    const std::vector<MotionPoint> points = {{0, 0, 0, none, 7},
+                                             {2, way * 1, 0, none, 7.05},
+                                             {10, way * 1, 0.1, none, 7.5},
+                                             {12, 0, 0, none, 7.4}};
+    const auto accounts = estimate_motion(model, points, 3);
+    ASSERT_TRUE(accounts) << describe(accounts.error());
+    EXPECT_NEAR(accounts->ledger[Term::potential], weight * 0.4, 1e-5 * weight);
+    EXPECT_NEAR(accounts->ledger.total(), accounts->battery_j, 1e-9 * accounts->battery_j);
+  }
+  // Without the effect the height says nothing, without a height the effect.
+  const std::vector<MotionPoint> up = {{0, 0.5, 0, none, 0}, {10, 0.5, 0, none, 0.3}};
+  const std::vector<MotionPoint> blind = {{0, 0.5, 0}, {10, 0.5, 0}};
+  const dynamics::DriveModel nominal(testing::nomad(), {});
+  EXPECT_EQ(estimate_motion(nominal, up, 3)->battery_j, estimate_motion(nominal, blind, 3)->battery_j);
+  EXPECT_EQ(estimate_motion(model, blind, 3)->ledger[Term::potential], 0);
+}
+
+TEST(MotionEstimate, TakesTheClimbLinearInBetween) {
+  robot::RobotModel robot = testing::nomad();
+  robot.effects.push_back({"grade", {{"share", 0.5}}});
+  const auto model = *dynamics::drive_model(robot);
+  const double weight = robot.total_mass_kg(0) * robot::standard_gravity_m_s2;
+  const std::vector<MotionPoint> points = {
+      {0, 0.5, 0, 0}, {10, 0.5, 0, 0.04}, {20, 0.5, 0, dynamics::unknown}};
+  const auto accounts = estimate_motion(model, points, 0);
+  ASSERT_TRUE(accounts);
+  // Half the weight over 5 m at 0.02 on the average; the last span's climb is unknown.
+  EXPECT_NEAR(accounts->ledger[Term::potential], 0.5 * weight * 5 * 0.02, 1e-3 * weight * 0.05);
+}
+
+TEST(MotionEstimate, RefusesHeightsThatNoRobotDrives) {
+  const dynamics::DriveModel model(testing::nomad(), {});
+  const double none = dynamics::unknown;
+  for (const double speed : {0.5, 0.0}) {
+    const auto refused = estimate_motion(
+        model,
+        std::vector<MotionPoint>{{0, speed, 0, none, 0}, {1, speed, 0, none, 0}, {2, speed, 0, none, 0.4}},
+        0);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().field, "/profile/height_m/2");
+  }
+}
+
 TEST(MotionEstimate, RefusesTimesThatDoNotIncrease) {
   const dynamics::DriveModel model(testing::nomad(), {});
   const auto refused = estimate_motion(model, std::vector<MotionPoint>{{0, 0, 0}, {1, 1, 0}, {1, 0, 0}}, 0);

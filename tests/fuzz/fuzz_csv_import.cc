@@ -15,7 +15,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     "column_limits": {"a": {"low": -10, "high": 10, "outside": "hold"}},
     "fields": {"wheel_velocity": [{"column": "a"}, {"columns": ["a", {"column": "b", "negate": true}], "combine": "mean"}],
                "motor_current": [{"column": "b", "abs": true, "sign_from": ["a"]}, null],
-               "pose": [null, null, {"quaternion_yaw": ["a", "b", "a", "b"]}]}})")
+               "pose": [null, null, {"quaternion_yaw": ["a", "b", "a", "b"]}]},
+    "covariates": {"load": {"column": "b", "scale": 2}}, "labels": {"floor": {"column": "c"}}})")
                                            .value();
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   const auto nul = text.find('\0');
@@ -34,6 +35,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (const t::Sample& sample : import->recording.samples) {
       if (sample.utime_us <= before || std::isnan(sample.wheel_velocity_rad_s[0])) std::abort();
       before = sample.utime_us;
+    }
+    for (const t::CovariateSeries& series : import->recording.covariates) {
+      if (!t::is_valid_covariate_name(series.name) || series.value.size() != series.utime_us.size())
+        std::abort();
+      if (!std::is_sorted(series.utime_us.begin(), series.utime_us.end())) std::abort();
     }
   }
   return 0;

@@ -32,7 +32,7 @@ telemetry::Recording rolling(double duration_s, bool power) {
 }
 
 TEST(FewData, AreInconclusiveAndAskForADrive) {
-  const auto set = make_recording_set("r", {rolling(6, true)});
+  const auto set = telemetry::make_recording_set("r", {rolling(6, true)});
   ASSERT_TRUE(set);
   const auto d = diagnose(*set, shipped());
   ASSERT_TRUE(d);
@@ -45,7 +45,7 @@ TEST(FewData, AreInconclusiveAndAskForADrive) {
 }
 
 TEST(FewData, WithoutElectricalReadingsNothingIsSaid) {
-  const auto set = make_recording_set("r", {rolling(60, false)});
+  const auto set = telemetry::make_recording_set("r", {rolling(60, false)});
   ASSERT_TRUE(set);
   const auto d = diagnose(*set, shipped());
   ASSERT_TRUE(d);
@@ -54,7 +54,7 @@ TEST(FewData, WithoutElectricalReadingsNothingIsSaid) {
 }
 
 TEST(FewData, AMissionTooShortIsRefused) {
-  const auto set = make_recording_set("r", {rolling(3, true)});
+  const auto set = telemetry::make_recording_set("r", {rolling(3, true)});
   ASSERT_FALSE(set);
   EXPECT_EQ(set.error().fault, Fault::invalid);
 }
@@ -62,7 +62,7 @@ TEST(FewData, AMissionTooShortIsRefused) {
 TEST(FewData, AnEndlessStandstillNamesNothing) {
   telemetry::Recording r = rolling(60, true);
   for (auto& s : r.samples) s.wheel_velocity_rad_s = {0, 0};
-  const auto set = make_recording_set("r", {r});
+  const auto set = telemetry::make_recording_set("r", {r});
   const auto d = diagnose(*set, shipped());
   ASSERT_TRUE(d);
   for (const DiagnosedEffect& e : d->effects) {

@@ -24,7 +24,7 @@ TEST_P(Practice, GetsTheRightVerdict) {
   const auto robot = robot::load_robot(folder / "robot.json");
   ASSERT_TRUE(robot);
   const std::string log = folder / "telemetry.lcmlog";
-  const auto recordings = load_recordings({&log, 1});
+  const auto recordings = telemetry::load_recordings({&log, 1});
   ASSERT_TRUE(recordings);
   const auto diagnosis = diagnose(*recordings, *robot);
   ASSERT_TRUE(diagnosis);

@@ -40,7 +40,7 @@ std::vector<telemetry::Recording> virtual_missions(const std::vector<vr::EffectS
 
 Diagnosis diagnose_missions(std::vector<telemetry::Recording> recordings) {
   const auto robot = *robot::parse_robot(vr::shipped_robots()[1].json_text);
-  return *diagnose(*make_recording_set(robot.robot_id, std::move(recordings)), robot);
+  return *diagnose(*telemetry::make_recording_set(robot.robot_id, std::move(recordings)), robot);
 }
 
 Diagnosis diagnose_virtual(const std::vector<vr::EffectStrength>& effects, std::uint64_t seed, bool motors,

@@ -11,7 +11,7 @@ namespace joulecast::gap {
 namespace {
 
 // A mission in which both wheels speed up steadily and the drive obeys the nominal model.
-RecordingSet steady_ramp(const robot::RobotModel& robot, double rate_hz, bool motors) {
+telemetry::RecordingSet steady_ramp(const robot::RobotModel& robot, double rate_hz, bool motors) {
   const dynamics::DriveModel model(robot, {});
   telemetry::Recording mission;
   mission.mission_id = "ramp";
@@ -36,7 +36,7 @@ RecordingSet steady_ramp(const robot::RobotModel& robot, double rate_hz, bool mo
     s.payload_kg = 2;
     mission.samples.push_back(s);
   }
-  return *make_recording_set(robot.robot_id, {mission});
+  return *telemetry::make_recording_set(robot.robot_id, {mission});
 }
 
 class AnyRate : public ::testing::TestWithParam<double> {};
@@ -78,7 +78,7 @@ TEST_P(AnyRate, TheModelLeavesNoResidualOfItself) {
 INSTANTIATE_TEST_SUITE_P(Rates, AnyRate, ::testing::Values(10.0, 50.0, 200.0));
 
 // A wheel that starts from rest; one side only, so that the other stays at rest.
-RecordingSet start_from_rest(const robot::RobotModel& robot) {
+telemetry::RecordingSet start_from_rest(const robot::RobotModel& robot) {
   telemetry::Recording mission;
   mission.mission_id = "start";
   for (int k = 0; k < 500; ++k) {
@@ -91,7 +91,7 @@ RecordingSet start_from_rest(const robot::RobotModel& robot) {
     s.battery_voltage_v = k % 2 == 0 ? 24.0 : 24.5;
     mission.samples.push_back(s);
   }
-  return *make_recording_set(robot.robot_id, {mission});
+  return *telemetry::make_recording_set(robot.robot_id, {mission});
 }
 
 TEST(Windows, AWheelSlidesOnceItsContactsHaveBent) {

@@ -47,6 +47,7 @@ constexpr std::int64_t samples_a_checkpoint = 10;
     TraceBucket bucket;
     bucket.start_utime_us = m.samples / samples_a_checkpoint * trace_bucket_us;
     checkpoint.trace = {bucket};
+    checkpoint.covariates = {{m.samples, "load", m.accounts.distance_m}};
     checkpoint.energy_state = EnergyState{"amr-1", m.samples, m.samples, 0.5, {}};
     if (tells == Tells::committed) {
       need(writer.execute(std::move(checkpoint)));
@@ -116,6 +117,9 @@ std::int64_t stored_samples(const std::string& path) {
     page.cursor = got.next_cursor;
   } while (!page.cursor.empty());
   EXPECT_EQ(next, m.samples);
+  const CovariatePage covariates = need(store->covariates(m.key, {}, {max_telemetry_samples, {}}));
+  EXPECT_EQ(static_cast<std::int64_t>(covariates.changes.size()), m.samples / samples_a_checkpoint);
+  EXPECT_EQ(covariates.changes.back().value, m.accounts.distance_m);
   return m.samples;
 }
 

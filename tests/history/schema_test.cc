@@ -160,6 +160,29 @@ TEST_F(SchemaTest, DiagnosesOfVersionFourGetTheirSummaries) {
   EXPECT_EQ(database.integer("SELECT summary_json IS NULL FROM diagnosis WHERE diagnosis_id = 2"), 1);
 }
 
+TEST_F(SchemaTest, MissionsOfVersionFiveHaveNoCovariates) {
+  std::ifstream file(JOULECAST_SOURCE_DIR "/tests/history/store_v1.sql");
+  std::stringstream text;
+  text << file.rdbuf();
+  Database database = open();
+  database.execute(text.str());
+  database.execute("PRAGMA application_id = " + std::to_string(store_application_id));
+  database.execute("PRAGMA user_version = 1");
+  ASSERT_TRUE(bring_to_schema(database, Schema{5, {}, store_schema().migrations.first(4)}));
+  database.execute(
+      "INSERT INTO robot VALUES ('amr-1', 1, NULL);"
+      "INSERT INTO mission (mission_key, robot_id, mission_id, start_utime_us, end_utime_us, state, "
+      "implicit, "
+      "incomplete, incomplete_reason, note, samples, sample_faults, gap_count) VALUES (3, 'amr-1', 'm', 1, "
+      "2, "
+      "'open', 0, 0, '', '', 0, '{}', 0)");
+  const auto brought = bring_to_schema(database, store_schema());
+  ASSERT_TRUE(brought) << describe(brought.error());
+  EXPECT_EQ(database.integer("SELECT covariates_json IS NULL FROM mission"), 1);
+  EXPECT_EQ(database.integer("SELECT covariate_changes FROM mission"), 0);
+  EXPECT_EQ(database.integer("SELECT count(*) FROM covariate_chunk"), 0);
+}
+
 TEST_F(SchemaTest, EmbedsTheSchemaFile) {
   std::ifstream file(JOULECAST_SOURCE_DIR "/schemas/store.sql");
   std::stringstream text;

@@ -17,6 +17,7 @@
 namespace joulecast::history {
 namespace {
 
+using telemetry::CovariateChange;
 using telemetry::Sample;
 
 struct StoreKind {
@@ -85,6 +86,18 @@ class StoreConformance : public testing::TestWithParam<StoreKind> {
     return samples;
   }
 
+  std::vector<CovariateChange> all_changes(MissionKey key, TimeRange range = {},
+                                           std::int64_t limit = 100'000) {
+    std::vector<CovariateChange> changes;
+    PageRequest page{limit, {}};
+    do {
+      const CovariatePage got = need(store_->covariates(key, range, page));
+      changes.insert(changes.end(), got.changes.begin(), got.changes.end());
+      page.cursor = got.next_cursor;
+    } while (!page.cursor.empty());
+    return changes;
+  }
+
   static std::vector<std::int64_t> sequences(const std::vector<Sample>& samples) {
     std::vector<std::int64_t> numbers;
     for (const Sample& s : samples) numbers.push_back(s.sequence);
@@ -129,6 +142,38 @@ void expect_same_mission(const Mission& a, const Mission& b) {
   EXPECT_PRED2(same_bits, a.gap_s, b.gap_s);
   EXPECT_EQ(a.findings_json, b.findings_json);
   expect_same_accounts(a.accounts, b.accounts);
+  ASSERT_EQ(a.covariates.size(), b.covariates.size());
+  for (std::size_t k = 0; k < a.covariates.size(); ++k) {
+    const CovariateSummary &x = a.covariates[k], &y = b.covariates[k];
+    EXPECT_EQ(x.name, y.name);
+    EXPECT_PRED2(same_bits, x.mean, y.mean);
+    EXPECT_PRED2(same_bits, x.min, y.min);
+    EXPECT_PRED2(same_bits, x.max, y.max);
+    EXPECT_PRED2(same_bits, x.known_s, y.known_s);
+    EXPECT_EQ(x.counted_utime_us, y.counted_utime_us);
+    EXPECT_PRED2(same_bits, x.value, y.value);
+    EXPECT_EQ(x.value_utime_us, y.value_utime_us);
+  }
+}
+
+// Changes of three names in turn, a hundredth of a second apart; every ninth tells that nothing is known.
+std::vector<CovariateChange> some_changes(std::int64_t first, std::size_t count) {
+  const std::array<std::string, 3> names{"cpu_load", "surface=ice", "height_m"};
+  std::vector<CovariateChange> changes;
+  for (std::int64_t k = first; k < first + static_cast<std::int64_t>(count); ++k) {
+    changes.push_back({10'000 * k, names[static_cast<std::size_t>(k) % 3],
+                       k % 9 == 8 ? telemetry::unmeasured : 0.1 * static_cast<double>(k)});
+  }
+  return changes;
+}
+
+void expect_same_changes(const std::vector<CovariateChange>& a, const std::vector<CovariateChange>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    EXPECT_EQ(a[k].utime_us, b[k].utime_us) << k;
+    EXPECT_EQ(a[k].name, b[k].name) << k;
+    EXPECT_PRED2(same_bits, a[k].value, b[k].value) << k;
+  }
 }
 
 // Every number differs from every other.
@@ -213,7 +258,7 @@ TEST_P(StoreConformance, NamesWhatIsAbsent) {
   for (const Fault fault :
        {store_->model("nobody").error().fault, store_->model_versions("nobody").error().fault,
         store_->mission(7).error().fault, store_->trace(7, {}, 10).error().fault,
-        store_->telemetry(7, {}, {}).error().fault})
+        store_->telemetry(7, {}, {}).error().fault, store_->covariates(7, {}, {}).error().fault})
     EXPECT_EQ(fault, Fault::not_found);
   Mission unknown;
   unknown.key = 7;
@@ -354,6 +399,8 @@ TEST_P(StoreConformance, KeepsEveryNumberOfAMission) {
   m.gap_s = 12.75;
   m.findings_json = R"({"payload":{"verdict":"as_declared"}})";
   m.accounts = distinct_accounts();
+  m.covariates = {{"cpu_load", 0.1, 1e-300, 3.5, 12.25, 223'456'789, 0.3, 200'000'000},
+                  {"surface=ice", telemetry::unmeasured, 0, 1, 0, 5, telemetry::unmeasured, 6}};
   need(apply(CheckpointMission{m, {}, {}, {}}));
   expect_same_mission(need(store_->mission(m.key)), m);
   reopen();
@@ -422,14 +469,16 @@ TEST_P(StoreConformance, StartingAnewReplacesAllThatWasStored) {
   m.state = MissionState::finished;
   m.samples = 10;
   TraceBucket bucket;
-  need(apply(CheckpointMission{m, {bucket}, some_samples(0, 0, 10), {}}));
+  need(apply(CheckpointMission{m, {bucket}, some_samples(0, 0, 10), {}, some_changes(0, 7)}));
   EXPECT_EQ(all_samples(m.key).size(), 10U);
+  EXPECT_EQ(all_changes(m.key).size(), 7U);
 
   const Mission again = start_mission(*store_, "amr-1", "m", 0);
   EXPECT_EQ(again.key, m.key);
   EXPECT_EQ(need(store_->mission(m.key)).samples, 0);
   EXPECT_TRUE(need(store_->trace(m.key, {}, 10)).buckets.empty());
   EXPECT_TRUE(all_samples(m.key).empty());
+  EXPECT_TRUE(all_changes(m.key).empty());
 }
 
 TEST_P(StoreConformance, RefusesAMissionOfAModelVersionThatIsNot) {
@@ -530,6 +579,8 @@ TEST_P(StoreConformance, RefusesBadQueries) {
   refuses(f, {1, {}}, "payload_min_kg");
   EXPECT_EQ(store_->trace(1, {}, 0).error().field, "points");
   EXPECT_EQ(store_->telemetry(1, {5, 4}, {}).error().field, "from_utime_us");
+  EXPECT_EQ(store_->covariates(1, {5, 4}, {}).error().field, "from_utime_us");
+  EXPECT_EQ(store_->covariates(1, {}, {0, {}}).error().field, "limit");
   EXPECT_EQ(store_->events(0, 0).error().field, "limit");
 }
 
@@ -564,7 +615,8 @@ TEST_P(StoreConformance, RecoversOpenMissionsWithTheirState) {
   open.accounts = distinct_accounts();
   open.samples = 3;
   EnergyState state{"amr-2", 930, 17, 0.75, {41.5, telemetry::unmeasured}};
-  need(apply(CheckpointMission{open, {}, some_samples(900, 15, 3), state}));
+  open.covariates = {{"cpu_load", 0.5, 0.25, 0.75, 2, 930, 0.75, 920}};
+  need(apply(CheckpointMission{open, {}, some_samples(900, 15, 3), state, some_changes(0, 5)}));
   reopen();
 
   const auto left = need(store_->recover());
@@ -580,8 +632,9 @@ TEST_P(StoreConformance, RecoversOpenMissionsWithTheirState) {
   EXPECT_FALSE(need(store_->energy_state("amr-1")));
 
   // Resumed: it goes on where it was.
-  need(apply(CheckpointMission{left[0], {}, some_samples(1000, 18, 2), {}}));
+  need(apply(CheckpointMission{left[0], {}, some_samples(1000, 18, 2), {}, some_changes(5, 4)}));
   EXPECT_THAT(sequences(all_samples(open.key)), testing::ElementsAre(15, 16, 17, 18, 19));
+  expect_same_changes(all_changes(open.key), some_changes(0, 9));
   open.state = MissionState::interrupted;
   need(apply(CheckpointMission{open, {}, {}, {}}));
   EXPECT_TRUE(need(store_->recover()).empty());
@@ -741,6 +794,62 @@ TEST_P(StoreConformance, PrunesByBytesOldestFirstInMeasure) {
   EXPECT_EQ(rest.front().sequence, 1024 * dropped);
   // No more than needed: with one chunk more the bound would not hold. Chunks differ by far less than a half.
   EXPECT_GT(need(store_->size()).telemetry_bytes, full / 2 - full / 7);
+}
+
+// ---- covariates
+
+TEST_P(StoreConformance, ReturnsChangesInOrderOfArrivalHoweverTheyCame) {
+  Mission m = start_mission(*store_, "amr-1", "m", 0);
+  std::size_t stored = 0;
+  for (const std::size_t size : {1U, 10U, 1012U, 1U, 1023U, 1024U, 1U, 3000U, 3U}) {
+    need(apply(CheckpointMission{m, {}, {}, {}, some_changes(static_cast<std::int64_t>(stored), size)}));
+    stored += size;
+    expect_same_changes(all_changes(m.key), some_changes(0, stored));
+  }
+  m.state = MissionState::finished;
+  need(apply(CheckpointMission{m, {}, {}, {}}));
+  expect_same_changes(all_changes(m.key, {}, 777), some_changes(0, stored));
+  reopen();
+  expect_same_changes(all_changes(m.key), some_changes(0, stored));
+  EXPECT_EQ(all_changes(m.key, {1'000'000, 1'030'000}).size(), 3U);
+  EXPECT_TRUE(all_changes(m.key, {500'000'000, 600'000'000}).empty());
+  const std::string cursor = need(store_->covariates(m.key, {}, {10, {}})).next_cursor;
+  EXPECT_EQ(store_->covariates(m.key, {0, 5}, {10, cursor}).error().field, "cursor");
+  EXPECT_EQ(store_->telemetry(m.key, {}, {10, cursor}).error().field, "cursor");
+}
+
+TEST_P(StoreConformance, RefusesWhatIsNoNameWithAllOfItsCheckpoint) {
+  Mission m = start_mission(*store_, "amr-1", "m", 0);
+  m.samples = 5;
+  for (const std::string& name : {std::string(), std::string("a b"), std::string(48, 'a')}) {
+    const Outcome refused =
+        apply(CheckpointMission{m, {}, some_samples(0, 0, 5), {}, {{1, "good", 1}, {2, name, 1}}});
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().field, "/covariates/1/name");
+  }
+  EXPECT_EQ(need(store_->mission(m.key)).samples, 0);
+  EXPECT_TRUE(all_changes(m.key).empty());
+}
+
+TEST_P(StoreConformance, PrunesCovariatesWithTelemetry) {
+  Mission m = start_mission(*store_, "amr-1", "m", 0);
+  now_utime_us_ = 100'000'000;
+  need(apply(CheckpointMission{m, {}, some_samples(0, 0, 1024), {}, some_changes(0, 1024)}));
+  now_utime_us_ = 200'000'000;
+  need(apply(CheckpointMission{m, {}, some_samples(0, 1024, 1024), {}, some_changes(1024, 1030)}));
+  const std::int64_t full = need(store_->size()).telemetry_bytes;
+  now_utime_us_ = 260'000'000;
+  EXPECT_EQ(apply(Prune{{150'000'000, {}}, 1000}), 2);
+  EXPECT_EQ(all_samples(m.key).front().sequence, 1024);
+  EXPECT_EQ(all_changes(m.key).front().utime_us, 10'240'000);
+  EXPECT_LT(need(store_->size()).telemetry_bytes, full);
+  EXPECT_EQ(apply(Prune{{{}, 0}, 1000}), 2);  // the tail stays
+  EXPECT_EQ(all_changes(m.key).size(), 6U);
+  m.state = MissionState::finished;
+  need(apply(CheckpointMission{m, {}, {}, {}}));
+  EXPECT_EQ(apply(Prune{{{}, 0}, 1000}), 1);
+  EXPECT_TRUE(all_changes(m.key).empty());
+  EXPECT_EQ(need(store_->size()).telemetry_bytes, 0);
 }
 
 // ---- events

@@ -57,6 +57,9 @@ class FailingStore final : public Store {
   Result<Trace> trace(MissionKey k, TimeRange r, std::int64_t n) const override {
     return store_->trace(k, r, n);
   }
+  Result<CovariatePage> covariates(MissionKey k, TimeRange r, const PageRequest& p) const override {
+    return store_->covariates(k, r, p);
+  }
   Result<TelemetryPage> telemetry(MissionKey k, TimeRange r, const PageRequest& p) const override {
     return store_->telemetry(k, r, p);
   }

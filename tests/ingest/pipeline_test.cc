@@ -41,6 +41,15 @@ class PipelineTest : public ::testing::Test {
 
   void send(const Sample& s) { harness.pipeline->handle({"nomad", s, s.utime_us}); }
   void send(const MissionEvent& e) { harness.pipeline->handle({"nomad", e, e.utime_us}); }
+  void send(std::int64_t sequence, std::vector<telemetry::Covariate> covariates) {
+    const std::int64_t at_us = start_us + sequence * 20'000;
+    harness.pipeline->handle({"nomad", telemetry::CovariateMessage{at_us, std::move(covariates)}, at_us});
+  }
+  std::vector<telemetry::CovariateChange> changes(history::MissionKey key) {
+    const auto page = harness.store->covariates(key, {}, {.limit = 10'000, .cursor = {}});
+    EXPECT_TRUE(page);
+    return page ? page->changes : std::vector<telemetry::CovariateChange>{};
+  }
   void send_range(std::int64_t from, std::int64_t to) {
     for (std::int64_t k = from; k < to; ++k) send(sample(k));
   }
@@ -70,6 +79,120 @@ TEST_F(PipelineTest, AccountsAMissionFromStartToFinish) {
   ASSERT_TRUE(raw);
   EXPECT_EQ(raw->samples.size(), 501u);
   EXPECT_TRUE(harness.warnings.empty());
+}
+
+TEST_F(PipelineTest, KeepsTheCovariatesOfAMissionWithTheirMeanAndRange) {
+  send(-100, {{"ambient_c", 21}, {"surface=ice", 0}});
+  send(event(MissionPhase::started, 0));
+  send_range(0, 100);
+  send(100, {{"cpu_load", 0.25}, {"ambient_c", 21}, {"surface=ice", 1}});
+  send_range(100, 400);
+  send(400, {{"cpu_load", 1}, {"surface=ice", 0}, {"ambient_c", telemetry::unmeasured}});
+  send_range(400, 501);
+  send(event(MissionPhase::finished, 501));
+  const auto missions = harness.missions();
+  ASSERT_EQ(missions.size(), 1u);
+  const auto& covariates = missions[0].covariates;
+  ASSERT_EQ(covariates.size(), 3u);
+  EXPECT_EQ(covariates[0].name, "ambient_c");  // it held before the mission began
+  EXPECT_EQ(covariates[0].mean, 21);
+  EXPECT_NEAR(covariates[0].known_s, 8.005, 1e-9);
+  EXPECT_EQ(covariates[1].name, "cpu_load");
+  EXPECT_EQ(covariates[1].min, 0.25);
+  EXPECT_EQ(covariates[1].max, 1);
+  EXPECT_NEAR(covariates[1].known_s, 8.015, 1e-9);
+  EXPECT_NEAR(covariates[1].mean, (6 * 0.25 + 2.015 * 1) / 8.015, 1e-9);
+  EXPECT_EQ(covariates[2].name, "surface=ice");
+  EXPECT_NEAR(covariates[2].mean, 6 / 8.015, 1e-9);
+  const auto series = telemetry::series_of(changes(missions[0].key));
+  ASSERT_EQ(series.size(), 3u);
+  EXPECT_EQ(series[0].utime_us, (std::vector<std::int64_t>{start_us - 5'000, start_us + 8'000'000}));
+  EXPECT_EQ(series[1].value, (std::vector<double>{0.25, 1}));
+  EXPECT_EQ(harness.counters.covariate_changes, 5u);
+
+  // What holds goes on into the next mission; what does not is no covariate of it.
+  send(event(MissionPhase::started, 1000, "m2"));
+  send_range(1000, 1100);
+  send(event(MissionPhase::finished, 1100, "m2"));
+  const auto next = harness.missions().back().covariates;
+  ASSERT_EQ(next.size(), 1u);
+  EXPECT_EQ(next[0].name, "cpu_load");
+  EXPECT_EQ(next[0].mean, 1);
+}
+
+TEST_F(PipelineTest, CountsCovariatesThatItTurnsAway) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 10);
+  send(10, {{"load", INFINITY}, {"floor=ice", 0.5}, {"load", 1}});
+  send(9, {{"load", 2}});
+  for (int k = 0; k < 70; ++k) send(11, {{"c" + std::to_string(k), 1}});
+  harness.pipeline->handle({"nomad", telemetry::CovariateMessage{-1, {{"load", 1}}}, start_us});
+  send(event(MissionPhase::finished, 12));
+  EXPECT_EQ(harness.faults(IngestFault::implausible), 3u);
+  EXPECT_EQ(harness.faults(IngestFault::late), 1u);
+  EXPECT_EQ(harness.faults(IngestFault::too_many_covariates), 7u);
+  const auto missions = harness.missions();
+  EXPECT_EQ(missions[0].covariates.size(), telemetry::max_covariates);
+  EXPECT_EQ(missions[0].sample_faults.at("too_many_covariates"), 7);
+  harness.pipeline->publish();
+  EXPECT_EQ(harness.fleet.find("nomad")->faults.at("too_many_covariates"), 7u);
+}
+
+TEST_F(PipelineTest, CovariatesOfARestartedDaemonGoOnWhereTheyWere) {
+  send(event(MissionPhase::started, 0));
+  send(0, {{"cpu_load", 0.5}});
+  send_range(0, 100);
+  harness.pipeline->tick(start_us + 2'000'000);
+  harness.restart();
+  send(100, {{"cpu_load", 0.5}});  // as it was
+  send_range(100, 200);
+  send(200, {{"cpu_load", 0.75}});
+  send_range(200, 301);
+  send(event(MissionPhase::finished, 301));
+  const auto missions = harness.missions();
+  ASSERT_EQ(missions.size(), 1u);
+  EXPECT_EQ(changes(missions[0].key).size(), 2u);
+  ASSERT_EQ(missions[0].covariates.size(), 1u);
+  EXPECT_NEAR(missions[0].covariates[0].mean, (4 * 0.5 + 2.015 * 0.75) / 6.015, 1e-6);
+}
+
+TEST_F(PipelineTest, CovariatesAloneAreBoundedAndOpenNoMission) {
+  for (int k = 0; k < 5; ++k) send(k, {{"load", 1.0 * k}});
+  EXPECT_TRUE(harness.missions().empty());
+  send(event(MissionPhase::started, 10));
+  send_range(10, 20);
+  for (int k = 0; k < 3000; ++k) send(20 + k, {{"load", 1.0 * k}});
+  // Without a tick: what adds up is stored.
+  EXPECT_GE(changes(harness.missions()[0].key).size(), 2048u);
+  harness.pipeline->tick(start_us);
+  EXPECT_EQ(harness.store->covariates(harness.missions()[0].key, {}, {.limit = 10'000, .cursor = {}})
+                ->changes.size(),
+            3001u);
+}
+
+TEST_F(PipelineTest, TheClimbOfAHeightFeedsTheGradeOfTheModel) {
+  robot::RobotModel robot = testing::nomad();
+  robot.robot_id = "climber";
+  robot.effects = {{"grade", {{"share", 1}}}};
+  harness.add_robot(robot);
+  const auto handle = [&](auto message, std::int64_t at_us) {
+    harness.pipeline->handle({"climber", std::move(message), at_us});
+  };
+  handle(event(MissionPhase::started, 0), start_us);
+  const double speed = 3 * robot.kinematics.wheel_radius_m, slope = 0.05;
+  for (std::int64_t k = 0; k <= 1000; ++k) {  // 20 s up an even ramp, height ten times a second
+    const double way = speed * 0.02 * static_cast<double>(k);
+    const std::int64_t at_us = start_us + 20'000 * k;
+    if (k % 5 == 0) handle(telemetry::CovariateMessage{at_us, {{"height_m", 100 + slope * way}}}, at_us);
+    handle(sample(k), at_us);
+  }
+  handle(event(MissionPhase::finished, 1001), start_us + 20'020'000);
+  const history::Mission mission = harness.missions().back();
+  const double raised_j =
+      robot.total_mass_kg(2) * robot::standard_gravity_m_s2 * slope * mission.accounts.distance_m;
+  // But for the stretch until the climb is known.
+  EXPECT_NEAR(mission.accounts.ledger[energy::Term::potential], raised_j, 0.08 * raised_j);
+  EXPECT_NEAR(mission.accounts.ledger.total(), mission.accounts.battery_j, 1e-9 * 1000);
 }
 
 TEST_F(PipelineTest, TelemetryWithoutAnEventIsAnImplicitMission) {

@@ -163,7 +163,7 @@ def hold_bounds(checker, name):
     """The bounds of numbers in requests are those that the service keeps."""
     requests = {
         "/v1/robots/{id}/profile": {**DRIVE, "pareto_points": 0},
-        "/v1/robots/{id}/estimate": {"profile": {"time_s": [0, 1], "speed_m_s": [0, 1], "yaw_rate_rad_s": [0, 1]}, "payload_kg": 0, "start_pose": POSE},
+        "/v1/robots/{id}/estimate": {"profile": {"time_s": [0, 1], "speed_m_s": [0, 1], "yaw_rate_rad_s": [0, 1], "climb_rad": [0, 0.1]}, "payload_kg": 0, "start_pose": POSE},
         "/v1/robots/{id}/autonomy": AUTONOMY,
         "/v1/autonomy": {"request": AUTONOMY},
         "/v1/energy-matrix": {"robots": [{"robot_id": name, "pose": POSE, "state_of_charge": 0.5}], "value_of_time_w": 0,
@@ -302,6 +302,14 @@ def exercise(checker, source):
         checker.fault("joulecast_missions_ended_total counts missions that are open, or none")
     fast = {"profile": {"time_s": [0, 1, 2], "speed_m_s": [0, 9, 0]}}  # beyond the robot's limits
     checker.check("POST", "/v1/robots/{id}/estimate", f"/v1/robots/{name}/estimate", fast, expect=200)
+    ramp = {"time_s": [0, 10, 20], "speed_m_s": [0, 0.5, 0], "height_m": [0, 0.1, 0.2]}
+    checker.check("POST", "/v1/robots/{id}/estimate", f"/v1/robots/{name}/estimate", {"profile": ramp}, expect=200)
+    for change, field, constraint in (({"height_m": [0, 0.1]}, "/profile/height_m", "as many entries as time_s"),
+                                      ({"climb_rad": [0, 0, 0]}, "/profile/climb_rad", "beside height_m"),
+                                      ({"height_m": [0, 0.1, 9]}, "/profile/height_m/2", "steeper than 45 degrees")):
+        told = checker.check("POST", "/v1/robots/{id}/estimate", f"/v1/robots/{name}/estimate", {"profile": {**ramp, **change}}, expect=422) or {}
+        if told.get("field") != field or constraint not in told.get("constraint", ""):
+            checker.fault(f"estimate {change}: {told.get('field')}: {told.get('constraint')}, not {field}: {constraint}")
     errand = {"task_id": "t", "payload_kg": 1, "empty": {"distance_m": 3}, "loaded": {"distances_m": [2, 4], "turns_rad": [1.6]}}
     matrix = {"robots": [{"robot_id": name, "pose": {"x_m": 0, "y_m": 0}}],
               "tasks": [errand, {**errand, "payload_kg": 1e5}, {"task_id": "u", "pickup": {"x_m": 1, "y_m": 2}, "dropoff": {"x_m": 3, "y_m": 0}}]}

@@ -6,6 +6,7 @@
 
 #include <joulecast/energy_state_t.hpp>
 #include <joulecast/mission_event_t.hpp>
+#include <joulecast/robot_covariates_t.hpp>
 #include <joulecast/robot_telemetry_t.hpp>
 #include <limits>
 
@@ -27,6 +28,11 @@ Bytes telemetry_bytes() {
 
 Bytes mission_bytes() {
   return encode_mission_event("amr-07", {5, "m-1", MissionPhase::finished, 3.5, "über die Rampe"}).value();
+}
+
+Bytes covariate_bytes() {
+  return encode_covariates("amr-07", {5, {{"cpu_load", 0.25}, {"surface=ice", 1}, {"height_m", unmeasured}}})
+      .value();
 }
 
 Bytes state_bytes() {
@@ -87,6 +93,66 @@ TEST(Codec, MissionEventRoundTrip) {
   EXPECT_EQ(decoded->event.note, "über die Rampe");
 }
 
+TEST(Codec, CovariatesRoundTrip) {
+  const auto m = generated_decode<robot_covariates_t>(covariate_bytes());
+  EXPECT_EQ(m.utime, 5);
+  EXPECT_EQ(m.robot_id, "amr-07");
+  EXPECT_THAT(m.name, testing::ElementsAre("cpu_load", "surface=ice", "height_m"));
+  EXPECT_THAT(m.value, testing::ElementsAre(0.25, 1, testing::IsNan()));
+  const auto decoded = decode_covariates(covariate_bytes());
+  ASSERT_TRUE(decoded) << describe(decoded.error());
+  EXPECT_EQ(decoded->robot_id, "amr-07");
+  EXPECT_EQ(decoded->message.utime_us, 5);
+  ASSERT_EQ(decoded->message.covariates.size(), 3u);
+  EXPECT_EQ(decoded->message.covariates[0], (Covariate{"cpu_load", 0.25}));
+  EXPECT_EQ(decoded->message.covariates[1], (Covariate{"surface=ice", 1}));
+  EXPECT_TRUE(std::isnan(decoded->message.covariates[2].value));
+  EXPECT_TRUE(decode_covariates(encode_covariates("a", {}).value()));  // none is a message too
+}
+
+TEST(Codec, RefusesCovariatesBeyondTheirLimits) {
+  CovariateMessage message;
+  for (std::size_t k = 0; k < max_covariates; ++k) message.covariates.push_back({"c" + std::to_string(k), 1});
+  ASSERT_TRUE(decode_covariates(encode_covariates("a", message).value()));
+  message.covariates.push_back({"one_more", 1});
+  EXPECT_EQ(encode_covariates("a", message).error().field, "n");
+  EXPECT_TRUE(encode_covariates(std::string(max_covariates_robot_id_length, 'a'), {}));
+  EXPECT_EQ(encode_covariates(std::string(max_covariates_robot_id_length + 1, 'a'), {}).error().field,
+            "robot_id");
+  const std::string part(max_covariate_name_length, 'a');
+  for (const std::string& name : {part, part + "=" + part, std::string("a.b_c-9=Z")})
+    EXPECT_TRUE(encode_covariates("a", {0, {{name, 1}}})) << name;
+  for (const std::string& name :
+       {std::string(), part + "a", "a=" + part + "a", std::string("="), std::string("a="), std::string("=a"),
+        std::string("a=b=c"), std::string("a b"), std::string("\xC3\xA4"), std::string("a\0b", 3)}) {
+    EXPECT_EQ(encode_covariates("a", {0, {{"b", 1}, {name, 1}}}).error().field, "name[1]") << name;
+  }
+}
+
+// A generated decoder would allocate and read whatever n says.
+TEST(Codec, RefusesHostileCounts) {
+  constexpr std::size_t count_at = 8 + 8 + 4 + 7;
+  for (const std::uint32_t count : {65u, 1000u, 0x7FFFFFFFu, 0x80000000u, 0xFFFFFFFFu}) {
+    Bytes bytes = covariate_bytes();
+    put_length(bytes, count_at, count);
+    EXPECT_EQ(decode_covariates(bytes).error().field, "n") << count;
+  }
+  for (const std::uint32_t count : {4u, 64u}) {  // more names than there are
+    Bytes bytes = covariate_bytes();
+    put_length(bytes, count_at, count);
+    EXPECT_EQ(decode_covariates(bytes).error().field, "name[3]") << count;
+  }
+  Bytes fewer = covariate_bytes();
+  put_length(fewer, count_at, 2);
+  EXPECT_EQ(decode_covariates(fewer).error().fault, Fault::corrupt);
+  constexpr std::size_t name_at = count_at + 4;
+  for (const std::uint32_t length : {0u, 97u, 0x7FFFFFFFu, 0xFFFFFFFFu}) {
+    Bytes bytes = covariate_bytes();
+    put_length(bytes, name_at, length);
+    EXPECT_EQ(decode_covariates(bytes).error().field, "name[0]") << length;
+  }
+}
+
 TEST(Codec, EnergyStateRoundTrip) {
   EnergyState state{7, "amr-07", "", 3, 1, 2, 3, 4, 5, 6, 0.5, 0.01, 8, {6, 10}, 9, {7, 11}, {10, 11}};
   const auto bytes = encode_energy_state(state);
@@ -135,12 +201,14 @@ TEST(Codec, RefusesEveryTruncation) {
   expect_exact_size(telemetry_bytes(), [](const Bytes& b) { return decode_telemetry(b); });
   expect_exact_size(mission_bytes(), [](const Bytes& b) { return decode_mission_event(b); });
   expect_exact_size(state_bytes(), [](const Bytes& b) { return decode_energy_state(b); });
+  expect_exact_size(covariate_bytes(), [](const Bytes& b) { return decode_covariates(b); });
 }
 
 TEST(Codec, RefusesAnotherType) {
   EXPECT_EQ(decode_telemetry(mission_bytes()).error().field, "fingerprint");
   EXPECT_EQ(decode_mission_event(telemetry_bytes()).error().field, "fingerprint");
   EXPECT_EQ(decode_energy_state(mission_bytes()).error().field, "fingerprint");
+  EXPECT_EQ(decode_covariates(mission_bytes()).error().field, "fingerprint");
 }
 
 TEST(Codec, RefusesHostileLengths) {
@@ -186,20 +254,29 @@ TEST(Codec, RefusesUnknownPhasesAndBadNotes) {
   EXPECT_EQ(decode_mission_event(bytes).error().field, "note");
 }
 
-TEST(Codec, SurvivesAnyByteChange) {
-  // Whatever one byte becomes, the message is refused or decodes to something that encodes to the same bytes.
-  const Bytes whole = mission_bytes();
+// Whatever one byte becomes, the message is refused or decodes to something that encodes to the same bytes.
+template <class Decode, class Encode>
+void expect_any_byte_change_survived(const Bytes& whole, Decode decode, Encode encode) {
   for (std::size_t at = 0; at < whole.size(); ++at) {
     for (int value = 0; value < 256; ++value) {
       Bytes bytes = whole;
       bytes[at] = static_cast<std::uint8_t>(value);
-      const auto decoded = decode_mission_event(bytes);
+      const auto decoded = decode(bytes);
       if (!decoded) continue;
-      const auto again = encode_mission_event(decoded->robot_id, decoded->event);
+      const auto again = encode(*decoded);
       ASSERT_TRUE(again);
       EXPECT_EQ(*again, bytes) << "byte " << at << " = " << value;
     }
   }
+}
+
+TEST(Codec, SurvivesAnyByteChange) {
+  expect_any_byte_change_survived(
+      mission_bytes(), [](const Bytes& b) { return decode_mission_event(b); },
+      [](const DecodedMissionEvent& d) { return encode_mission_event(d.robot_id, d.event); });
+  expect_any_byte_change_survived(
+      covariate_bytes(), [](const Bytes& b) { return decode_covariates(b); },
+      [](const DecodedCovariates& d) { return encode_covariates(d.robot_id, d.message); });
 }
 
 TEST(Codec, AnySampleSurvives) {
@@ -234,7 +311,8 @@ TEST(Codec, ArbitraryBytesAreRefusedOrExact) {
 }
 
 TEST(Channel, NamesAndBack) {
-  for (const Subject subject : {Subject::telemetry, Subject::mission_event, Subject::energy_state}) {
+  for (const Subject subject :
+       {Subject::telemetry, Subject::mission_event, Subject::covariates, Subject::energy_state}) {
     const std::string channel = channel_of(subject, "r2.d2_x-1");
     const auto parsed = parse_channel(channel);
     ASSERT_TRUE(parsed);

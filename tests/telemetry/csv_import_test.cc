@@ -206,6 +206,66 @@ TEST(CsvImport, BadCellsNameLineColumnAndText) {
   EXPECT_THAT(import_csv("t,r,l\n0,,\n", mapping_of("")).error().message, HasSubstr("none of 1 rows"));
 }
 
+const CovariateSeries& series_called(const Recording& recording, const std::string& name) {
+  static const CovariateSeries none;
+  const CovariateSeries* found = find_series(recording.covariates, name);
+  EXPECT_NE(found, nullptr) << name;
+  return found == nullptr ? none : *found;
+}
+
+TEST(CsvImport, CovariatesAreWrittenWhereTheyChange) {
+  const std::string csv =
+      "t,r,l,load,z\n0,1,1,,7\n1,1,1,50,7\n2,1,1,50,7.5\n3,1,1,nan,7.5\n4,1,1,75,\n5,1,1,75,9\n";
+  const auto import =
+      import_csv(csv, mapping_of(R"("covariates": {"cpu_load": {"column": "load", "divide_by": 100},
+                                         "height_m": {"column": "z"}, "ambient_c": {"constant": 21}}, )"));
+  ASSERT_TRUE(import) << describe(import.error());
+  const Recording& recording = import->recording;
+  EXPECT_EQ(recording.covariates.size(), 3u);
+  const CovariateSeries& load = series_called(recording, "cpu_load");
+  EXPECT_THAT(load.utime_us, testing::ElementsAre(1'000'000, 3'000'000, 4'000'000));
+  EXPECT_THAT(load.value, testing::ElementsAre(0.5, testing::IsNan(), 0.75));
+  EXPECT_THAT(series_called(recording, "height_m").utime_us, testing::ElementsAre(0, 2'000'000, 5'000'000));
+  EXPECT_THAT(series_called(recording, "ambient_c").value, testing::ElementsAre(21));
+}
+
+TEST(CsvImport, EveryTextOfAColumnBecomesALabel) {
+  const std::string csv =
+      "t,r,l,terrain\n0,1,1,\n1,1,1,ice\n2,1,1,wet gräss!\n3,1,1,\n4,1,1,ice\n5,9,9,mud\n";
+  const std::string labels =
+      R"("labels": {"surface": {"column": "terrain"}}, "column_limits": {"r": {"high": 5, "outside": "drop_row"}}, )";
+  const auto import = import_csv(csv, mapping_of(labels));
+  ASSERT_TRUE(import) << describe(import.error());
+  const Recording& recording = import->recording;
+  EXPECT_EQ(recording.covariates.size(), 2u);  // the row of the mud gave no sample
+  const CovariateSeries& ice = series_called(recording, "surface=ice");
+  EXPECT_THAT(ice.utime_us, testing::ElementsAre(1'000'000, 2'000'000, 4'000'000));
+  EXPECT_THAT(ice.value, testing::ElementsAre(1, 0, 1));
+  const CovariateSeries& grass = series_called(recording, "surface=wet_gr_ss_");
+  EXPECT_THAT(grass.utime_us, testing::ElementsAre(1'000'000, 2'000'000, 4'000'000));
+  EXPECT_THAT(grass.value, testing::ElementsAre(0, 1, 0));  // it did not hold before it was read
+
+  const auto unmeasured_cells = import_csv(csv, mapping_of(R"("empty_cells": "unmeasured", )" + labels));
+  ASSERT_TRUE(unmeasured_cells);
+  EXPECT_THAT(series_called(unmeasured_cells->recording, "surface=wet_gr_ss_").value,
+              testing::ElementsAre(0, 1, testing::IsNan(), 0));
+}
+
+TEST(CsvImport, RefusesLabelsBeyondTheirLimits) {
+  const ImportMapping mapping = mapping_of(R"("labels": {"driver": {"column": "who"}}, )");
+  std::string csv = "t,r,l,who\n";
+  for (int k = 0; k < 16; ++k) csv += std::to_string(k) + ",1,1,person " + std::to_string(k) + "\n";
+  EXPECT_TRUE(import_csv(csv, mapping));
+  const auto refused = import_csv(csv + "16,1,1,one more\n", mapping, {"x.csv", {}, {}, {}});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().field, "x.csv: line 18");
+  EXPECT_EQ(refused.error().message,
+            "column 'who': 'one more' is one label of driver too many; at most 16 are allowed");
+  EXPECT_THAT(import_csv("t,r,l,who\n0,1,1," + std::string(48, 'a') + "\n", mapping).error().message,
+              HasSubstr("longer than the 47 characters"));
+  EXPECT_THAT(import_csv("t,r,l\n0,1,1\n", mapping).error().message, HasSubstr("'who' is missing"));
+}
+
 TEST(ImportMapping, FaultsPointToTheMember) {
   EXPECT_EQ(mapping_fault("{"), "");
   EXPECT_EQ(mapping_fault(mapping_text(R"("robt_id": 1, )")), "/robt_id");
@@ -218,6 +278,17 @@ TEST(ImportMapping, FaultsPointToTheMember) {
       "/column_limits/r");
   EXPECT_EQ(mapping_fault(mapping_text(R"("column_limits": {"r": {"low": 2}}, )")),
             "/column_limits/r/outside");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("covariates": [], )")), "/covariates");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("covariates": {"a b": {"constant": 1}}, )")), "/covariates/a b");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("covariates": {"a=b": {"constant": 1}}, )")), "/covariates/a=b");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("covariates": {"a": {}}, )")), "/covariates/a");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("labels": {"": {"column": "a"}}, )")), "/labels/");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("labels": {"a": "b"}, )")), "/labels/a");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("labels": {"a": {}}, )")), "/labels/a/column");
+  std::string many;
+  for (int k = 0; k < 65; ++k)
+    many += (k > 0 ? ", \"c" : "\"c") + std::to_string(k) + R"(": {"constant": 1})";
+  EXPECT_EQ(mapping_fault(mapping_text("\"covariates\": {" + many + "}, ")), "/covariates");
   EXPECT_EQ(mapping_fault(mapping_text("", R"(, "speed": {"column": "r"})")), "/fields/speed");
   EXPECT_EQ(mapping_fault(mapping_text("", R"(, "pose": [null])")), "/fields/pose");
   EXPECT_EQ(mapping_fault(mapping_text("", R"(, "pitch": {})")), "/fields/pitch");

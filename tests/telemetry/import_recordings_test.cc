@@ -8,6 +8,7 @@
 #include "telemetry/codec.h"
 #include "telemetry/csv_import.h"
 #include "telemetry/csv_table.h"
+#include "telemetry/recording_climb.h"
 #include "telemetry/validation.h"
 #include "temporary_file.h"
 
@@ -218,6 +219,90 @@ TEST(ImportWarthog, TheTableGivesPlausibleSamplesAtItsOwnTimes) {
   }
   // Only the first second or so, before the drives report.
   EXPECT_LT(without_voltage, 100u);
+}
+
+// The robot of a mapping that divides speeds by its wheels' radius.
+dynamics::Parameters<double> wheels_of(double radius_m) {
+  dynamics::Parameters<double> parameters;
+  parameters.wheel_radius_m = {radius_m, radius_m};
+  parameters.half_track_m = 0.5;
+  return parameters;
+}
+
+// Elevation in steps of a metre at 5 Hz.
+TEST(ImportMotives, TheClimbOfATripFollowsItsElevationWithoutSpikes) {
+  const fs::path folder = real_data / "motives_bev/road";
+  if (!fs::exists(folder)) GTEST_SKIP() << "the motives_bev recordings are not beside the project";
+  for (const char* trip : {"trip075", "trip085", "trip095"}) {
+    SCOPED_TRACE(trip);
+    ImportOptions options{trip, {}, {}, 1'700'000'000'000'000};
+    const std::string csv = test::read_packed_text(folder / (std::string(trip) + ".csv.gz"));
+    const auto import = import_csv(csv, shipped("motives_road.json"), options);
+    ASSERT_TRUE(import) << describe(import.error());
+    const Recording& recording = import->recording;
+    EXPECT_EQ(recording.samples.size(), import->report.rows);
+    ASSERT_EQ(recording.covariates.size(), 2u);
+    CovariateReader elevation(find_series(recording.covariates, height_covariate));
+    const auto climb = climb_of(recording, wheels_of(0.33));
+    const auto speed = column(csv, "v_mps");
+    double height_m = elevation.at(recording.samples[0].utime_us), steepest = 0, furthest_m = 0, moved_s = 0;
+    std::size_t steep = 0;
+    for (std::size_t k = 1; k < climb.size(); ++k) {
+      const auto& [a, b] = std::pair{recording.samples[k - 1], recording.samples[k]};
+      const double interval_s = 1e-6 * static_cast<double>(b.utime_us - a.utime_us);
+      ASSERT_TRUE(std::isfinite(climb[k]));
+      height_m += std::sin(climb[k]) * speed[k] * interval_s;
+      furthest_m = std::max(furthest_m, std::abs(height_m - elevation.at(b.utime_us)));
+      steepest = std::max(steepest, std::abs(climb[k]));
+      steep += std::abs(climb[k]) > 0.04;
+      if (speed[k] > 0) moved_s += interval_s;
+    }
+    EXPECT_GT(moved_s, 600);
+    // A road, not a staircase; and the way up adds up to the elevation, step and all.
+    EXPECT_LT(steepest, 0.06);
+    EXPECT_LT(static_cast<double>(steep), 0.02 * static_cast<double>(climb.size()));
+    EXPECT_LT(furthest_m, 3.5);
+  }
+}
+
+TEST(ImportMotives, TheDynamometerIsFlat) {
+  const fs::path path = real_data / "motives_bev/lab/CLTC_CSS__06_CS_20_1.csv.gz";
+  if (!fs::exists(path)) GTEST_SKIP() << "the motives_bev recordings are not beside the project";
+  ImportOptions options{path.string(), {}, "m", 1'700'000'000'000'000};
+  const auto import = import_csv(test::read_packed_text(path), shipped("motives_lab.json"), options);
+  ASSERT_TRUE(import) << describe(import.error());
+  for (const double climb : climb_of(import->recording, wheels_of(0.33))) ASSERT_EQ(climb, 0);
+  EXPECT_NE(find_series(import->recording.covariates, "auxiliary_a"), nullptr);
+}
+
+TEST(ImportEvPino, PowerIsWhatWasRecorded) {
+  const fs::path path = real_data / "evpino_tesla3/Tesla3_full.csv.gz";
+  if (!fs::exists(path)) GTEST_SKIP() << "the evpino_tesla3 recording is not beside the project";
+  ImportOptions options{path.string(), {}, "m", 1'700'000'000'000'000};
+  const std::string csv = test::read_packed_text(path);
+  const auto import = import_csv(csv, shipped("evpino_tesla3.json"), options);
+  ASSERT_TRUE(import) << describe(import.error());
+  const auto power = column(csv, "BatteryPower");
+  ASSERT_EQ(import->recording.samples.size(), power.size());
+  for (std::size_t k = 0; k < power.size(); ++k) {
+    const Sample& s = import->recording.samples[k];
+    ASSERT_NEAR(s.battery_voltage_v * s.battery_current_a, power[k], 1e-6);
+    ASSERT_EQ(s.wheel_velocity_rad_s[0], s.wheel_velocity_rad_s[1]);
+  }
+}
+
+TEST(ImportWarthog, TheScanMatchersHeightGivesAClimb) {
+  const fs::path path = real_data / "warthog_grass/warthog_wheels_grass_2024-07-18_a.csv";
+  if (!fs::exists(path)) GTEST_SKIP() << "the warthog_grass recording is not beside the project";
+  ImportOptions options;
+  options.source_name = path.string();
+  const auto import = import_csv(test::read_text(path), shipped("warthog_grass.json"), options);
+  ASSERT_TRUE(import) << describe(import.error());
+  double steepest = 0;
+  for (const double climb : climb_of(import->recording, wheels_of(0.3)))
+    if (std::isfinite(climb)) steepest = std::max(steepest, std::abs(climb));
+  EXPECT_GT(steepest, 0.02);
+  EXPECT_LT(steepest, 0.15);
 }
 
 }  // namespace

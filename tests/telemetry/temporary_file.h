@@ -1,6 +1,7 @@
 #pragma once
 
 #include <unistd.h>
+#include <zlib.h>
 
 #include <cstdint>
 #include <filesystem>
@@ -42,6 +43,18 @@ class TemporaryFile {
 inline std::string read_text(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
+}
+
+// Of a file that gzip packed; empty when it cannot be read.
+inline std::string read_packed_text(const std::filesystem::path& path) {
+  std::string text;
+  gzFile file = gzopen(path.c_str(), "rb");
+  if (file == nullptr) return text;
+  char piece[65536];
+  for (int got = 0; (got = gzread(file, piece, sizeof piece)) > 0;)
+    text.append(piece, static_cast<std::size_t>(got));
+  gzclose(file);
+  return text;
 }
 
 }  // namespace joulecast::telemetry::test

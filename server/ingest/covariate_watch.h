@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include "dynamics/climb.h"
+#include "dynamics/parameters.h"
+#include "history/records.h"
+#include "server/ingest/counters.h"
+#include "telemetry/covariates.h"
+#include "telemetry/sample.h"
+
+namespace joulecast::server {
+
+// One robot's covariates: what holds, what the open mission has of them and is to be stored, and the climb
+// that follows from its pitch or its height.
+class CovariateWatch {
+ public:
+  // Values behind the last one of their name by more than `reorder_us` tell of a clock set back.
+  explicit CovariateWatch(std::int64_t reorder_us) : tracker_(reorder_us) {}
+
+  // Takes a message with a plausible clock; `fault` is told of every value turned away.
+  void take(const telemetry::CovariateMessage& message, const std::function<void(IngestFault)>& fault);
+
+  // What holds goes on into the mission.
+  void begin_mission(std::int64_t start_utime_us);
+  void end_mission() { in_mission_ = false; }
+  // Goes on with a mission that an earlier run of the daemon began.
+  void resume(const history::Mission& mission);
+
+  // Changes of the open mission that settle() has not handed over.
+  std::size_t pending() const { return pending_.size(); }
+  // Brings the record's summaries up to its end and hands over what changed since the last call.
+  std::vector<telemetry::CovariateChange> settle(history::Mission& record);
+
+  // The climb at the next sample in order of time.
+  double climb_at(const dynamics::Parameters<double>& parameters, const telemetry::Sample& sample);
+  // The robot's clock was set: what holds goes on in the new time.
+  void on_clock_step(std::int64_t utime_us);
+
+ private:
+  void note(telemetry::CovariateChange change);
+  void hear_height(std::int64_t utime_us, double height_m);
+
+  telemetry::CovariateTracker tracker_;
+  bool in_mission_ = false;
+  std::vector<history::CovariateSummary> summaries_;  // of the open mission
+  std::vector<telemetry::CovariateChange> pending_;
+  dynamics::ClimbTracker climb_;
+  std::deque<std::pair<std::int64_t, double>> heights_;  // of times that no sample has reached
+  double height_m_ = telemetry::unmeasured;
+};
+
+}  // namespace joulecast::server

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "dynamics/motion.h"
+
+// The climb: the angle of the floor along a robot's heading [rad], nose up positive. Where the robot measures
+// its pitch it is that; else it follows from the height over the distance driven.
+//
+// Heights are held and rounded readings: of a height that changes by a metre at a time, a metre may lie
+// between two samples. So the height is taken as a broken line over the distance driven that passes half way
+// between two readings half way between their places, and the climb as the slope of the straight line that
+// fits it best over a stretch: half a metre, or what the robot drives in a second, or so far to each side
+// (online: behind the robot) that one usual change of the reading makes 1 % of slope, whichever is longest.
+// What the height does while the robot stands, and where it jumps, is the sensor's and not the floor's.
+namespace joulecast::dynamics {
+
+struct ClimbReading {
+  std::int64_t utime_us = 0;
+  double speed_m_s = 0;        // of the axle's middle, forward positive
+  double pitch_rad = unknown;  // nose up positive
+  double height_m = unknown;   // above any fixed datum, the last one read
+};
+
+// The angle whose sine is rise over way, both along the heading; unknown above 45 degrees, which no robot
+// drives: there the height jumped.
+double climb_over(double rise_m, double way_m);
+
+// The height over the way of one run, in which the robot neither turns back nor is lost sight of.
+class HeightProfile {
+ public:
+  // `grain_m` of the heights decides how finely they are kept.
+  void add(double way_m, bool standing, double height_m, double grain_m);
+  void clear();
+
+  double begin_m() const { return knots_.empty() ? 0 : knots_.front().way_m; }
+  double end_m() const { return last_way_m_; }
+  // The slope of the straight line that fits the profile best over [from, to]; from < to, both within it.
+  double slope(double from_m, double to_m) const;
+  // Forgets what lies before, and more where it is more than a thousand heights.
+  void forget_before(double way_m);
+
+ private:
+  struct Knot {
+    double way_m = 0, height_m = 0;
+    double count = 1;  // readings that it is the mean of
+  };
+
+  std::vector<Knot> knots_;  // by way
+  double last_way_m_ = 0, last_height_m_ = 0;
+  double drift_m_ = 0;  // of the readings while the robot stood, and their jumps
+};
+
+// The climb online, from what lies behind the robot. Its result is unknown until half a stretch is driven; at
+// standstill, and until half a stretch is driven anew, it stays as it was.
+class ClimbTracker {
+ public:
+  // Readings in order of time; a second without one begins anew.
+  double add(const ClimbReading& reading);
+  void reset();
+
+ private:
+  void learn(double step_m);
+
+  static constexpr std::size_t remembered_steps = 63;
+  HeightProfile profile_;
+  std::array<double, remembered_steps> steps_m_{};
+  std::size_t steps_ = 0;
+  double grain_m_ = 0;
+  std::int64_t last_utime_us_ = 0;
+  double last_speed_m_s_ = 0, last_height_m_ = unknown;
+  double way_m_ = 0;
+  int direction_ = 0;  // of the run: 1 forward, -1 backward, 0 not begun
+  double climb_rad_ = unknown;
+};
+
+// The climb at each reading of a recording, in order of time: the stretch lies to both sides, one-sided at
+// the ends of a run. Unknown before the first place at which it is known.
+std::vector<double> climb_along(std::span<const ClimbReading> readings);
+
+}  // namespace joulecast::dynamics

@@ -1,0 +1,57 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "gap/checks/evaluation.h"
+#include "gap/checks/motors.h"
+
+namespace joulecast::gap {
+namespace {
+
+Check delay_check(const char* id, const char* channel, const char* name, const Delay& delay) {
+  return {id,
+          channel,
+          delay.value_s,
+          delay.interval,
+          fmt::format("{} {} the wheel speeds by {:.0f} ms ({:.0f} to {:.0f}): joulecast wants the readings "
+                      "of one message "
+                      "to be of one instant.",
+                      name, delay.value_s > 0 ? "lag" : "lead", 1e3 * std::fabs(delay.value_s),
+                      1e3 * std::min(std::fabs(delay.interval[0]), std::fabs(delay.interval[1])),
+                      1e3 * std::max(std::fabs(delay.interval[0]), std::fabs(delay.interval[1]))),
+          false};
+}
+
+}  // namespace
+
+std::vector<Check> check_delays(const CheckContext& c) {
+  std::vector<Check> checks;
+  if (!c.heard({0, 1})) return checks;
+  constexpr std::array motors{Late::current_right, Late::current_left};
+  constexpr std::array battery{Late::battery_power}, yaw{Late::yaw_rate};
+  if (c.heard({4, 5})) {
+    if (const auto d = motor_delay(c.seen)) {
+      checks.push_back(delay_check("electrical_delay", "motor_current", "The motor currents", *d));
+    }
+  }
+  if (checks.empty() && c.heard({reading::battery_voltage, reading::battery_current})) {
+    const double least = least_delay_s(c.seen, {reading::battery_voltage, reading::battery_current});
+    // Where the motors' currents say the contrary it is the form of the load that looks like a delay.
+    const auto own = c.has({4, 5}) ? delay_of(c.seen, motors) : std::nullopt;
+    const auto d = delay_of(c.seen, battery);
+    if (d && d->interval[0] > least && !(own && own->interval[1] < 0)) {
+      checks.push_back(
+          delay_check("electrical_delay", "battery_current", "Voltage and current of the battery", *d));
+    }
+  }
+  if (!c.heard({reading::yaw_rate})) return checks;
+  const double least = least_delay_s(c.seen, {reading::yaw_rate});
+  if (const auto d = delay_of(c.seen, yaw); d && (d->interval[0] > least || d->interval[1] < -least)) {
+    checks.push_back(delay_check("yaw_rate_delay", "yaw_rate", "The gyro's readings", *d));
+  }
+  return checks;
+}
+
+}  // namespace joulecast::gap

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <initializer_list>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dynamics/drive_model.h"
+#include "gap/checks/check.h"
+#include "gap/checks/observation.h"
+
+// The parts of check_recordings: each looks at one kind of thing.
+namespace joulecast::gap {
+
+// What all of them go by.
+struct CheckContext {
+  std::span<const Observation> seen;
+  const robot::RobotModel& robot;
+  const dynamics::DriveModel& model;
+  double motor_delay_s = 0;         // motor_delay()
+  std::vector<std::string> silent;  // channels contradicted so far: what they say is not asked again
+
+  // None is contradicted.
+  bool heard(std::initializer_list<std::size_t> readings) const;
+  // ... and all are measured.
+  bool has(std::initializer_list<std::size_t> readings) const;
+  ValueTally tally(std::size_t reading) const;  // of all missions
+  std::vector<Products::Block> blocks(Relation relation) const;
+  double period_s() const;  // between rows, of the usual mission
+  double moving_s() const;
+};
+
+std::vector<Check> check_clock(const CheckContext& c);            // utime, sequence, mission lengths
+std::vector<Check> check_silence(const CheckContext& c);          // dead, constant, unsigned channels
+std::vector<Check> check_signs_and_units(const CheckContext& c);  // one source against the others
+std::vector<Check> check_motors(const CheckContext& c);           // each motor against its sibling
+std::vector<Check> check_robot_file(const CheckContext& c);
+std::vector<Check> check_limits(const CheckContext& c);
+std::vector<Check> check_kinematics(const CheckContext& c);  // gyro and map against wheels
+std::vector<Check> check_delays(const CheckContext& c);
+std::vector<Check> check_steps(const CheckContext& c);     // lasting changes between missions
+std::vector<Check> check_readings(const CheckContext& c);  // held, coarse, clipped, thrown, missing
+
+// "0.93 (0.91 to 0.95)", or the number alone where it has no interval.
+std::string with_interval(double value, const std::array<double, 2>& interval);
+Check make_check(std::string id, std::string channel, const Estimate& value, std::string says);
+
+}  // namespace joulecast::gap

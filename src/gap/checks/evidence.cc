@@ -1,0 +1,353 @@
+#include "gap/checks/evidence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "gap/checks/motors.h"
+#include "gap/checks/readings.h"
+#include "statistics/robust.h"
+
+namespace joulecast::gap {
+namespace {
+
+using S = Source;
+
+constexpr std::array side_name{"right", "left"};
+
+S side_of(S right, std::size_t side) {
+  return static_cast<S>(static_cast<std::size_t>(right) + side);
+}
+
+// How far sound robots are from their file, as standard deviations of logarithms. Electrical constants of
+// another motor of the size: a third; its resistance with leads, brushes and heat: a factor of two; friction
+// and power: a factor of three, the spread between floors of the Husky recordings. Skid-steered robots turn a
+// third as much as their wheels say (Mandow and others 2007: tracks look 1.5 to 3 times as wide as they are).
+constexpr double constant_off = 0.35, resistance_off = 0.7, load_off = 1.1, inertia_off = 0.7;
+constexpr double skid = 0.7, track_off = 0.2, travel_off = 0.2, heading_off = 0.1, command_off = 0.3;
+constexpr double driver_off = 0.5, regeneration_off = 0.3, voltage_off = 0.25, limit_off = 0.3;
+constexpr double anything = 1e3;
+constexpr double steepest_rad = 0.35;
+constexpr double unused_off = 1.5;  // limits need not be reached
+
+class Gatherer {
+ public:
+  Gatherer(std::span<const Observation> observations, const robot::RobotModel& robot,
+           const dynamics::DriveModel& model, double delay_s, std::span<const std::string> silent)
+      : seen_(observations), robot_(robot), p_(model.parameters()), delay_s_(delay_s), silent_(silent) {}
+
+  std::vector<Evidence> gather() {
+    armatures();
+    torques();
+    turning();
+    moving();
+    batteries();
+    loads();
+    limits();
+    return std::move(found_);
+  }
+
+ private:
+  std::vector<Products::Block> blocks(Relation r) const { return blocks_of(seen_, r); }
+  bool heard(std::initializer_list<std::size_t> readings) const {
+    return std::ranges::none_of(readings, [&](std::size_t k) {
+      return std::ranges::any_of(silent_, [&](const auto& s) { return belongs_to(reading_names[k], s); });
+    });
+  }
+  // Kept only where the ratio is surely not 0.
+  Evidence* add(std::string says, std::string against, const Estimate& ratio, double below, double above,
+                double trust, std::initializer_list<std::pair<S, int>> exponents) {
+    if (!ratio.sure()) return nullptr;
+    Evidence& e = found_.emplace_back();
+    e.says = std::move(says);
+    e.against = std::move(against);
+    e.ratio = ratio;
+    e.below = below;
+    e.above = above;
+    e.trust = trust;
+    for (const auto& [source, power] : exponents) e.exponent[static_cast<std::size_t>(source)] = power;
+    return &e;
+  }
+  static void lost(Evidence* e, std::initializer_list<S> sources) {
+    for (const S s : sources) e->lost_by[static_cast<std::size_t>(s)] = true;
+  }
+
+  ValueTally tally(std::size_t k) const {
+    ValueTally all;
+    for (const Observation& o : seen_) all.append(o.of(k));
+    return all;
+  }
+  std::optional<double> mean_of(std::size_t k) const {
+    const ValueTally all = tally(k);
+    return all.known() > 1 ? std::optional(all.mean()) : std::nullopt;
+  }
+
+  void armatures();
+  void torques();
+  void turning();
+  void turning_by_wheels(const BlockFit& fit, const std::string& turner, S source);
+  void moving();
+  void batteries();
+  void loads();
+  void limits();
+
+  std::span<const Observation> seen_;
+  const robot::RobotModel& robot_;
+  const dynamics::Parameters<double>& p_;
+  double delay_s_;
+  std::span<const std::string> silent_;
+  std::vector<Evidence> found_;
+};
+
+void Gatherer::armatures() {
+  constexpr std::array<std::size_t, 3> terms{1, 2, 3};
+  for (std::size_t k : {0u, 1u}) {
+    if (!heard({reading::wheel_velocity + k, reading::motor_voltage + k, reading::motor_current + k}))
+      continue;
+    const auto relation = k == 0 ? Relation::armature_right : Relation::armature_left;
+    const BlockFit fit = fit_blocks(armature_blocks(seen_, relation, delay_s_), 0, terms);
+    const std::string side = side_name[k];
+    add("the " + side + " motor's voltage constant, from its voltage, current and speed, is", "the file's",
+        estimate(fit, 1) * (1 / p_.voltage_constant_v_s_rad), constant_off, constant_off, 12,
+        {{side_of(S::voltage_right, k), 1}, {side_of(S::wheel_right, k), -1}});
+    add("the " + side + " motor's resistance, from its voltage, current and speed, is", "the file's",
+        estimate(fit, 0) * (1 / p_.resistance_ohm[k]), resistance_off, resistance_off, 8,
+        {{side_of(S::voltage_right, k), 1}, {side_of(S::current_right, k), -1}});
+  }
+  if (!heard({0, 1, 2, 3, 4, 5})) return;
+  constexpr std::array<std::size_t, 2> difference{1, 2};
+  const BlockFit fit =
+      fit_blocks(armature_blocks(seen_, Relation::armature_difference, delay_s_), 0, difference);
+  const auto sides = [&](Evidence* e, std::uint32_t pairs) {
+    if (e == nullptr) return;
+    e->turned_by = pairs;
+    e->both_sides = true;
+  };
+  sides(add("the voltage constant, from the differences of the sides, is", "the file's",
+            estimate(fit, 1) * (1 / p_.voltage_constant_v_s_rad), constant_off, constant_off, 12,
+            {{S::voltage_right, 1}, {S::wheel_right, -1}}),
+        1 | 2);
+  sides(add("the resistance, from the differences of the sides, is", "the file's",
+            estimate(fit, 0) * (2 / (p_.resistance_ohm[0] + p_.resistance_ohm[1])), resistance_off,
+            resistance_off, 10, {{S::voltage_right, 1}, {S::current_right, -1}}),
+        2 | 4);
+}
+
+void Gatherer::torques() {
+  constexpr std::array<std::size_t, 5> terms{1, 2, 3, 4, 5};
+  const double radius = 0.5 * (p_.wheel_radius_m[0] + p_.wheel_radius_m[1]);
+  const double load = mean_of(reading::payload).value_or(0);
+  const double inertia = 0.5 * robot_.total_mass_kg(load) * radius * radius + p_.wheel_inertia_kg_m2;
+  for (std::size_t k : {0u, 1u}) {
+    if (!heard({reading::wheel_velocity + k, reading::motor_current + k})) continue;
+    const auto b = blocks(k == 0 ? Relation::torque_right : Relation::torque_left);
+    const BlockFit fit = fit_blocks(b, 0, terms);
+    const std::string side = side_name[k];
+    add("the " + side + " motor's current for acceleration is", "what the file's inertia asks",
+        estimate(fit, 2) * (p_.torque_constant_nm_a / inertia), inertia_off, inertia_off, 6,
+        {{side_of(S::current_right, k), 1}, {side_of(S::wheel_right, k), -1}});
+    double rows = 0, speed = 0;
+    for (const auto& block : b) rows += block.rows, speed += block.sums(1, 2);
+    if (rows == 0) continue;
+    speed /= rows;
+    Eigen::VectorXd steady = Eigen::VectorXd::Zero(5);
+    steady[0] = 1;
+    steady[1] = speed;
+    const double torque = p_.friction_torque_nm[k] + p_.viscous_friction_nm_s_rad * speed;
+    if (!(torque > 0)) continue;
+    Evidence* e = add("the " + side + " motor's current at steady speed is", "what the file's friction asks",
+                      estimate(fit, steady) * (p_.torque_constant_nm_a / torque), load_off, load_off, 4,
+                      {{side_of(S::current_right, k), 1}, {side_of(S::wheel_right, k), -1}});
+    if (e != nullptr) lost(e, {side_of(S::wheel_right, k)});
+  }
+}
+
+// The turning of one wheel, by the gyro or the map.
+void Gatherer::turning_by_wheels(const BlockFit& fit, const std::string& turner, S source) {
+  const double share = 0.5 / p_.half_track_m;
+  for (std::size_t k : {0u, 1u}) {
+    const double expected = (k == 0 ? share : -share) * p_.wheel_radius_m[k];
+    Evidence* e =
+        add(std::string("over the turning of the ") + side_name[k] + " wheel " + turner,
+            "what the file's track asks", estimate(fit, static_cast<Eigen::Index>(k)) * (1 / expected), skid,
+            track_off, 8, {{source, 1}, {side_of(S::wheel_right, k), -1}});
+    if (e != nullptr) e->turned_by = 1;
+  }
+}
+
+void Gatherer::turning() {
+  const bool wheels = heard({0, 1}), gyro = heard({reading::yaw_rate}), heading = heard({reading::heading});
+  constexpr std::array<std::size_t, 3> sides_and_one{1, 2, 3};
+  constexpr std::array<std::size_t, 2> others{2, 3};
+  if (wheels && gyro) {
+    turning_by_wheels(fit_blocks(blocks(Relation::gyro), 0, sides_and_one), "the gyro reads", S::yaw_rate);
+  }
+  if (!heading) return;
+  // Headings jump by a turn, of one unit or the other: whichever reading follows better is the heading's.
+  const auto follow = [&](Relation relation) {
+    const BlockFit radians = fit_blocks(blocks(relation), 0, others),
+                   degrees = fit_blocks(blocks(relation), 1, others);
+    const auto unsure = [](const BlockFit& fit) {
+      return fit.known() ? std::fabs(fit.sd(0) / fit.coefficient[0]) : 1e9;
+    };
+    return unsure(degrees) < 0.5 * unsure(radians) ? degrees : radians;
+  };
+  if (wheels) turning_by_wheels(follow(Relation::heading_wheels), "the map's heading turns", S::heading);
+  if (gyro) {
+    add("the map's heading turns", "what the gyro reads", estimate(follow(Relation::heading_gyro), 0),
+        heading_off, heading_off, 12, {{S::heading, 1}, {S::yaw_rate, -1}});
+  }
+}
+
+void Gatherer::moving() {
+  constexpr std::array<std::size_t, 2> sides{2, 3};
+  constexpr std::array<std::size_t, 1> one{1};
+  if (!heard({0, 1})) return;
+  const bool map = heard({reading::x, reading::y});
+  if (map && heard({reading::heading})) {
+    const BlockFit fit = fit_blocks(blocks(Relation::travel), 0, sides);
+    for (std::size_t k : {0u, 1u}) {
+      Evidence* e =
+          add(std::string("the map moves forward over the turning of the ") + side_name[k] + " wheel",
+              "what the file's wheel radius asks",
+              estimate(fit, static_cast<Eigen::Index>(k)) * (2 / p_.wheel_radius_m[k]), travel_off,
+              travel_off, 8, {{S::position, 1}, {side_of(S::wheel_right, k), -1}});
+      if (e != nullptr) lost(e, {S::heading});
+    }
+  }
+  const auto both = [](Evidence* e) {
+    if (e != nullptr) e->both_sides = true;
+  };
+  if (map) {
+    Evidence* e = add("the map moves", "what the wheels say by the file's radius",
+                      estimate(fit_blocks(blocks(Relation::distance), 0, one), 0), travel_off, travel_off, 12,
+                      {{S::position, 1}, {S::wheel_right, -1}});
+    both(e);
+    if (e != nullptr) e->magnitude = true;
+  }
+  // Which way a robot mostly goes is a weak hint at what it calls forward.
+  Evidence* forward =
+      add("the way forward, less that backward, is", "all the way that the wheels make",
+          ratio_of_sums(blocks(Relation::way), 0, 1, 2), anything, anything, 1, {{S::wheel_right, 1}});
+  both(forward);
+  if (heard({reading::command_speed})) {
+    both(add("the wheels drive at", "the commanded speed",
+             estimate(fit_blocks(blocks(Relation::command), 0, one), 0), command_off, command_off, 8,
+             {{S::wheel_right, 1}, {S::command_speed, -1}}));
+  }
+  if (heard({reading::command_turn})) {
+    Evidence* e = add("the wheels turn the robot at", "the commanded yaw rate",
+                      estimate(fit_blocks(blocks(Relation::command_turn), 0, one), 0), track_off, skid, 6,
+                      {{S::wheel_right, 1}, {S::command_turn, -1}});
+    both(e);
+    if (e != nullptr) e->turned_by = 1;
+  }
+}
+
+void Gatherer::batteries() {
+  if (!heard({reading::battery_voltage})) return;
+  if (const auto volts = mean_of(reading::battery_voltage)) {
+    add("the battery's voltage is", "the file's nominal one",
+        {*volts / robot_.battery.nominal_voltage_v, 1e-6, 1e6}, voltage_off, voltage_off, 15,
+        {{S::battery_voltage, 1}});
+  }
+  if (!heard({reading::battery_current})) return;
+  constexpr std::array<std::size_t, 2> with_one{1, 2};
+  if (heard({2, 3, 4, 5})) {
+    Evidence* e = add(
+        "the battery's power follows that of the motors", "what it should",
+        estimate(fit_blocks(blocks(Relation::motors), 0, with_one), 0), regeneration_off, driver_off, 12,
+        {{S::battery_voltage, 1}, {S::battery_current, 1}, {S::voltage_right, -1}, {S::current_right, -1}});
+    if (e != nullptr) e->both_sides = true;
+  }
+  const Estimate driving = ratio_of_sums(blocks(Relation::driving), 0, 1, 2);
+  const Estimate motion = estimate(fit_blocks(blocks(Relation::motion), 0, with_one), 0);
+  if (!heard({0, 1})) return;
+  for (const bool mean : {true, false}) {
+    Evidence* e = add(mean ? "while the robot drives, the battery's power is"
+                           : "with the motion, the battery's power changes by",
+                      "what the model asks", mean ? driving : motion, load_off, load_off, mean ? 8 : 6,
+                      {{S::battery_voltage, 1}, {S::battery_current, 1}});
+    if (e == nullptr) continue;
+    lost(e, {S::wheel_right, S::wheel_left, S::payload});
+    e->both_sides = true;
+  }
+}
+
+void Gatherer::loads() {
+  constexpr std::array<std::size_t, 2> with_one{1, 2};
+  if (!heard({reading::pitch})) return;
+  if (heard({0, 1, reading::battery_voltage, reading::battery_current})) {
+    Evidence* e = add("uphill and downhill, the battery's power changes by", "what the pitch asks",
+                      estimate(fit_blocks(blocks(Relation::climb), 0, with_one), 0), load_off, load_off, 8,
+                      {{S::pitch, -1}, {S::battery_voltage, 1}, {S::battery_current, 1}});
+    if (e != nullptr)
+      lost(e, {S::pitch, S::wheel_right, S::wheel_left, S::battery_current, S::battery_voltage});
+  }
+  if (const ValueTally pitch = tally(reading::pitch); pitch.known() > 1) {
+    Evidence* e = add("the pitch usually is", "the steepest that robots climb, 20 degrees",
+                      {std::hypot(pitch.mean(), pitch.deviation()) / steepest_rad, 1e-6, 1e6}, 0, limit_off,
+                      10, {{S::pitch, 1}});
+    if (e != nullptr) e->magnitude = true;
+  }
+}
+
+void Gatherer::limits() {
+  std::vector<double> speed, turn;
+  for (const Observation& o : seen_) {
+    if (o.fastest_m_s > 0) speed.push_back(o.fastest_m_s);
+    if (o.fastest_turn_rad_s > 0) turn.push_back(o.fastest_turn_rad_s);
+  }
+  const auto most = [&](const std::string& says, const char* limit, double value, double bound, double trust,
+                        S source, bool both_sides = false) {
+    if (!(bound > 0)) return;
+    Evidence* e = add(says, limit, {value / bound, 1e-6, 1e6}, unused_off, limit_off, trust, {{source, 1}});
+    if (e != nullptr) e->magnitude = true, e->both_sides = both_sides;
+  };
+  if (!speed.empty() && heard({0, 1})) {
+    most("the fastest half second of a mission is usually", "the file's speed limit",
+         statistics::median(speed), robot_.limits.speed_m_s, 6, S::wheel_right, true);
+  }
+  if (!turn.empty() && heard({reading::yaw_rate})) {
+    most("the fastest turn of a mission is usually", "the file's yaw rate limit", statistics::median(turn),
+         robot_.limits.yaw_rate_rad_s, 6, S::yaw_rate);
+  }
+  if (const ValueTally load = tally(reading::payload); load.known() > 0 && heard({reading::payload})) {
+    most("the heaviest payload declared is", "the file's payload limit", load.high(),
+         std::max(robot_.limits.payload_kg, 1.0), 10, S::payload);
+  }
+  for (std::size_t k : {0u, 1u}) {
+    const ValueTally volts = tally(reading::motor_voltage + k), amps = tally(reading::motor_current + k);
+    const std::string side = side_name[k];
+    if (volts.known() > 1 && heard({reading::motor_voltage + k})) {
+      most("the " + side + " motor's voltage usually is", "the battery's nominal voltage",
+           std::hypot(volts.mean(), volts.deviation()), robot_.battery.nominal_voltage_v, 8,
+           side_of(S::voltage_right, k));
+    }
+    if (amps.known() > 1 && heard({reading::motor_current + k})) {
+      most("the " + side + " motor's current usually is", "the file's current limit",
+           std::hypot(amps.mean(), amps.deviation()), robot_.limits.current_a, 6,
+           side_of(S::current_right, k));
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Products::Block> blocks_of(std::span<const Observation> observations, Relation relation) {
+  std::vector<Products::Block> blocks;
+  for (const Observation& o : observations) {
+    const auto& some = o.of(relation).blocks();
+    blocks.insert(blocks.end(), some.begin(), some.end());
+  }
+  return blocks;
+}
+
+std::vector<Evidence> gather_evidence(std::span<const Observation> observations,
+                                      const robot::RobotModel& robot, const dynamics::DriveModel& model,
+                                      double delay_s, std::span<const std::string> silent) {
+  return Gatherer(observations, robot, model, delay_s, silent).gather();
+}
+
+}  // namespace joulecast::gap

@@ -1,0 +1,260 @@
+#include "gap/checks/faults.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <numbers>
+
+namespace joulecast::gap {
+namespace {
+
+using S = Source;
+
+constexpr double sign_surprise = 4, unit_surprise = 4, swap_surprise = 4.5, odd_surprise = 5.5;
+constexpr double lost_surprise = 1;  // of evidence that a fault would make meaningless
+constexpr double least_support = 1;  // nats beyond its surprise that what a fault predicts must speak for it
+constexpr double least_gain = 4;     // nats, beyond the fault's own surprise
+constexpr double nearly = 1.5;       // nats between explanations that do as well
+constexpr double telling = 2.0;      // factors nearer to 1 than this are errors of calibration, not of units
+constexpr double degrees = 180 / std::numbers::pi, rpm = 30 / std::numbers::pi;
+
+using Set = std::vector<const Fault*>;
+
+Sources<double> combined_factor(const Set& set) {
+  Sources<double> factor;
+  factor.fill(1);
+  for (const Fault* fault : set) {
+    for (std::size_t k = 0; k < source_count; ++k) factor[k] *= fault->factor[k];
+  }
+  return factor;
+}
+
+// What the set makes of this evidence's ratio; empty where it makes it meaningless.
+std::optional<double> predicted(const Evidence& e, const Set& set) {
+  const Sources<double> factor = combined_factor(set);
+  std::uint32_t swaps = 0;
+  for (const Fault* fault : set) swaps ^= fault->swaps;
+  double ratio = 1;
+  for (std::size_t k = 0; k < source_count; ++k) {
+    if (e.lost_by[k] && std::fabs(factor[k]) != 1) return std::nullopt;
+    if (e.exponent[k] != 0) ratio *= std::pow(factor[k], e.exponent[k]);
+  }
+  if (e.both_sides) {
+    for (const S right : {S::wheel_right, S::voltage_right, S::current_right}) {
+      const auto r = static_cast<std::size_t>(right);
+      if (factor[r] != factor[r + 1] && (e.exponent[r] != 0 || e.lost_by[r])) return std::nullopt;
+    }
+  }
+  for (std::uint32_t bit = 1; bit <= 4; bit *= 2) {
+    if ((swaps & e.turned_by & bit) != 0) ratio = -ratio;
+  }
+  return e.magnitude ? std::fabs(ratio) : ratio;
+}
+
+double surprise_of(const Evidence& e, const Set& set) {
+  const auto expected = predicted(e, set);
+  if (!expected) return std::min(lost_surprise, e.trust);
+  const double ratio = e.ratio.value / *expected;
+  if (ratio < 0) return e.trust;
+  const double log_sd = e.ratio.sd / std::fabs(e.ratio.value);
+  const double off = std::log(ratio), tolerance = off < 0 ? e.below : e.above;
+  if (tolerance == 0) return 0;
+  return std::min(0.5 * off * off / (tolerance * tolerance + log_sd * log_sd), e.trust);
+}
+
+double surprise_of(std::span<const Evidence> evidence, const Set& set) {
+  double total = 0;
+  for (const Fault* fault : set) total += fault->surprise;
+  for (const Evidence& e : evidence) total += surprise_of(e, set);
+  return total;
+}
+
+// Whether each fault foretells what is seen, and not only takes away the meaning of what speaks against it.
+bool supported(std::span<const Evidence> evidence, const Set& set) {
+  return std::ranges::all_of(set, [&](const Fault* fault) {
+    Set others;
+    std::ranges::copy_if(set, std::back_inserter(others), [&](const Fault* f) { return f != fault; });
+    double support = 0;
+    for (const Evidence& e : evidence) {
+      if (predicted(e, set)) support += surprise_of(e, others) - surprise_of(e, set);
+    }
+    return support >= fault->surprise + least_support;
+  });
+}
+
+class Table {
+ public:
+  void add(std::string id, std::string channel, std::string cause, std::initializer_list<S> sources,
+           double factor, double surprise, std::uint32_t swaps = 0) {
+    if (swaps == 0 && factor > 0 && std::fabs(std::log(factor)) < std::log(telling)) return;
+    Fault& f = faults_.emplace_back();
+    f.id = std::move(id);
+    f.channel = std::move(channel);
+    f.cause = std::move(cause);
+    f.factor.fill(1);
+    for (const S s : sources) f.factor[static_cast<std::size_t>(s)] = factor;
+    f.surprise = surprise;
+    f.swaps = swaps;
+  }
+  std::vector<Fault> take() { return std::move(faults_); }
+
+ private:
+  std::vector<Fault> faults_;
+};
+
+void add_motor_faults(Table& t) {
+  struct Pair {
+    const char* field;
+    S right, left;
+    std::uint32_t swap;
+    const char* milli;
+  };
+  for (const Pair& p : {Pair{"motor_voltage", S::voltage_right, S::voltage_left, 2, "given in mV"},
+                        Pair{"motor_current", S::current_right, S::current_left, 4, "given in mA"}}) {
+    const std::string field = p.field;
+    t.add(field + "_reversed", field, "reversed on both sides", {p.right, p.left}, -1, sign_surprise);
+    t.add(field + "_reversed", field + ".right", "reversed", {p.right}, -1, sign_surprise);
+    t.add(field + "_reversed", field + ".left", "reversed", {p.left}, -1, sign_surprise);
+    t.add(field + "_scale", field, p.milli, {p.right, p.left}, 1000, unit_surprise);
+    t.add(field + "_scale", field + ".right", p.milli, {p.right}, 1000, odd_surprise);
+    t.add(field + "_scale", field + ".left", p.milli, {p.left}, 1000, odd_surprise);
+    t.add(field + "_scale", field, "divided by 1000 once too often", {p.right, p.left}, 0.001, odd_surprise);
+    t.add(field + "_sides_swapped", field, "swapped between right and left", {}, 1, swap_surprise, p.swap);
+  }
+  t.add("motor_sides_swapped", "motor_voltage, motor_current", "swapped between right and left", {}, 1,
+        swap_surprise, 2 | 4);
+}
+
+void add_wheel_faults(Table& t, const robot::RobotModel& robot) {
+  const std::initializer_list<S> both{S::wheel_right, S::wheel_left};
+  const double gear = robot.motor.gear_ratio, radius = robot.kinematics.wheel_radius_m;
+  // A robot that reads so drives backwards for whoever looks at it.
+  t.add("wheel_velocity_reversed", "wheel_velocity", "reversed on both sides", both, -1, sign_surprise + 0.5);
+  t.add("wheel_velocity_reversed", "wheel_velocity.right", "reversed", {S::wheel_right}, -1, sign_surprise);
+  t.add("wheel_velocity_reversed", "wheel_velocity.left", "reversed", {S::wheel_left}, -1, sign_surprise);
+  t.add("wheel_velocity_sides_swapped", "wheel_velocity", "swapped between right and left", {}, 1,
+        swap_surprise, 1);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given in rpm", both, rpm, unit_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given in degrees a second", both, degrees, unit_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given in m/s at the rim", both, radius, unit_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given at the motor shaft", both, gear, unit_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given at the motor shaft in rpm", both, gear * rpm,
+        odd_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given in mm/s at the rim", both, 1000 * radius,
+        odd_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "converted from rpm once too often", both, 1 / rpm,
+        odd_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "given in turns a second", both, 0.5 / std::numbers::pi,
+        odd_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "divided by the gear ratio once too often", both, 1 / gear,
+        odd_surprise);
+}
+
+}  // namespace
+
+std::vector<Fault> known_faults(const robot::RobotModel& robot) {
+  Table t;
+  add_wheel_faults(t, robot);
+  add_motor_faults(t);
+  t.add("battery_current_reversed", "battery_current", "reversed", {S::battery_current}, -1, sign_surprise);
+  t.add("battery_current_scale", "battery_current", "given in mA", {S::battery_current}, 1000, unit_surprise);
+  t.add("battery_current_scale", "battery_current", "given in mA and reversed", {S::battery_current}, -1000,
+        unit_surprise + 1);
+  t.add("battery_current_scale", "battery_current", "divided by 1000 once too often", {S::battery_current},
+        0.001, odd_surprise);
+  t.add("battery_voltage_scale", "battery_voltage", "given in mV", {S::battery_voltage}, 1000, unit_surprise);
+  t.add("battery_voltage_scale", "battery_voltage", "divided by 1000 once too often", {S::battery_voltage},
+        0.001, odd_surprise);
+  t.add("yaw_rate_reversed", "yaw_rate", "reversed", {S::yaw_rate}, -1, sign_surprise - 0.5);
+  t.add("yaw_rate_scale", "yaw_rate", "given in degrees a second", {S::yaw_rate}, degrees, unit_surprise);
+  t.add("yaw_rate_scale", "yaw_rate", "given in degrees a second and reversed", {S::yaw_rate}, -degrees,
+        unit_surprise + 1);
+  t.add("yaw_rate_scale", "yaw_rate", "converted from degrees once too often", {S::yaw_rate}, 1 / degrees,
+        odd_surprise);
+  t.add("pose_heading_reversed", "pose.heading", "reversed, as in frames with z down", {S::heading}, -1,
+        sign_surprise);
+  t.add("pose_heading_scale", "pose.heading", "given in degrees", {S::heading}, degrees, unit_surprise);
+  t.add("pose_heading_scale", "pose.heading", "given in degrees and reversed", {S::heading}, -degrees,
+        unit_surprise + 1);
+  t.add("pose_scale", "pose.x, pose.y", "given in mm", {S::position}, 1000, unit_surprise);
+  t.add("pose_scale", "pose.x, pose.y", "given in cm", {S::position}, 100, odd_surprise);
+  t.add("pose_reversed", "pose.x, pose.y", "reversed against its heading", {S::position}, -1, sign_surprise);
+  t.add("velocity_command_scale", "velocity_command", "given in mm/s", {S::command_speed}, 1000,
+        unit_surprise);
+  t.add("velocity_command_reversed", "velocity_command.speed", "reversed", {S::command_speed}, -1,
+        sign_surprise - 0.5);
+  t.add("velocity_command_reversed", "velocity_command.turn", "reversed", {S::command_turn}, -1,
+        sign_surprise - 0.5);
+  t.add("pitch_reversed", "pitch", "reversed", {S::pitch}, -1, sign_surprise);
+  t.add("pitch_scale", "pitch", "given in degrees", {S::pitch}, degrees, unit_surprise);
+  t.add("payload_scale", "payload_mass", "given in g", {S::payload}, 1000, unit_surprise);
+  return t.take();
+}
+
+Explanation explain(std::span<const Evidence> evidence, std::span<const Fault> faults) {
+  Explanation best;
+  Set set;
+  const double none = surprise_of(evidence, set);
+  double least = none;
+  if (none < least_gain) return best;
+  const auto try_set = [&](const Set& candidate) {
+    const double s = surprise_of(evidence, candidate);
+    if (!(s < least - 1e-9) || !supported(evidence, candidate)) return;
+    least = s;
+    set = candidate;
+  };
+  for (const Fault& one : faults) {
+    try_set({&one});
+    for (const Fault& two : faults) {
+      if (&two > &one) try_set({&one, &two});
+    }
+  }
+  if (set.size() == 2) {
+    const Set pair = set;
+    for (const Fault& third : faults) try_set({pair[0], pair[1], &third});
+  }
+  if (set.empty() || none - least < least_gain * static_cast<double>(set.size())) return best;
+  best.gain = none - least;
+  best.faults = set;
+  for (std::size_t k = 0; k < set.size(); ++k) {
+    auto& others = best.alternatives.emplace_back();
+    for (const Fault& fault : faults) {
+      Set with = set;
+      with[k] = &fault;
+      if (&fault == set[k] || surprise_of(evidence, with) > least + nearly) continue;
+      if (supported(evidence, with)) others.push_back(&fault);
+    }
+  }
+  return best;
+}
+
+Measured measured_factor(std::span<const Evidence> evidence, const Explanation& explanation,
+                         const Fault& fault) {
+  Set others;
+  for (const Fault* f : explanation.faults) {
+    if (f != &fault) others.push_back(f);
+  }
+  Measured best;
+  double most = 0;
+  for (const Evidence& e : evidence) {
+    const auto without = predicted(e, others), with = predicted(e, explanation.faults);
+    if (!without || !with || *without == *with) continue;
+    const double tells = surprise_of(e, others) - surprise_of(e, explanation.faults);
+    if (tells <= most) continue;
+    most = tells;
+    // The exponent by which the fault's own factor enters: swaps turn the sign alone.
+    int exponent = 1;
+    for (std::size_t k = 0; k < source_count; ++k) {
+      if (fault.factor[k] != 1 && e.exponent[k] != 0) exponent = e.exponent[k];
+    }
+    const auto factor = [&](double ratio) { return std::pow(ratio / *without, exponent); };
+    best.evidence = &e;
+    best.factor = factor(e.ratio.value);
+    const auto interval = e.ratio.interval();
+    best.interval = {factor(interval[0]), factor(interval[1])};
+    if (best.interval[0] > best.interval[1]) std::swap(best.interval[0], best.interval[1]);
+  }
+  return best;
+}
+
+}  // namespace joulecast::gap

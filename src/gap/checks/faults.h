@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "gap/checks/evidence.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::gap {
+
+// A wrong sign or unit of one channel: what its source is multiplied by, or sides that are swapped.
+struct Fault {
+  std::string id, channel;
+  std::string cause;  // "in rpm"
+  Sources<double> factor;
+  std::uint32_t swaps = 0;  // bits as in Evidence::turned_by
+  double surprise = 0;      // how unlikely it is before any evidence, in nats
+};
+
+// Every sign and unit mistake that is known for a robot of these dimensions.
+std::vector<Fault> known_faults(const robot::RobotModel& robot);
+
+// The least surprising way to account for all evidence at once.
+struct Explanation {
+  std::vector<const Fault*> faults;  // none: all is well
+  std::vector<std::vector<const Fault*>>
+      alternatives;  // of each fault: others in its place that do nearly as well
+  double gain = 0;   // nats by which it is better than none
+};
+
+Explanation explain(std::span<const Evidence> evidence, std::span<const Fault> faults);
+
+// What a fault's channel is multiplied by, by the evidence that tells it best, the other faults taken out.
+struct Measured {
+  const Evidence* evidence = nullptr;
+  double factor = 1;
+  std::array<double, 2> interval{};
+};
+Measured measured_factor(std::span<const Evidence> evidence, const Explanation& explanation,
+                         const Fault& fault);
+
+}  // namespace joulecast::gap

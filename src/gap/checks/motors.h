@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "gap/checks/observation.h"
+#include "gap/checks/products.h"
+#include "telemetry/recording_set.h"
+
+namespace joulecast::gap {
+
+// One motor by itself, all at the wheel: V = R i + K w + c sgn(w), and the current that it takes at a steady
+// mean speed. Robust over blocks of some seconds; unknown where its channels or the motion do not tell.
+struct MotorConstants {
+  Estimate resistance_ohm;        // R
+  Estimate constant_v_s_rad;      // K, gear included
+  Estimate drop_v;                // c
+  Estimate steady_current_a;      // at mean_speed_rad_s, driving the way the wheel turns
+  Estimate current_per_rad_s2_a;  // for accelerating both wheels alike
+  double mean_speed_rad_s = 0;    // while it turns
+};
+
+// By how much the motors' currents surely lag the wheel speeds: beyond a row and a half and half the time
+// that readings are held. Currents that lead are no delay: they do at every start, as contacts bend and gears
+// wind up.
+std::optional<Delay> motor_delay(std::span<const Observation> observations);
+
+// Blocks of V, i, w, sign and acceleration of one motor (or their differences, without the sign), with the
+// speed of when the electrical readings were taken: w - delay a.
+std::vector<Products::Block> armature_blocks(std::span<const Observation> observations, Relation relation,
+                                             double delay_s);
+
+// [0] right, [1] left. The same of every robot of a kind are its siblings' to compare with.
+std::array<MotorConstants, 2> motor_constants(std::span<const Observation> observations, double delay_s);
+std::array<MotorConstants, 2> motor_constants(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot);
+
+}  // namespace joulecast::gap

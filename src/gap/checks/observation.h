@@ -1,0 +1,101 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <initializer_list>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "dynamics/drive_model.h"
+#include "gap/checks/cells.h"
+#include "gap/checks/delays.h"
+#include "gap/checks/products.h"
+#include "gap/checks/readings.h"
+#include "gap/checks/tally.h"
+#include "robot/robot_model.h"
+#include "telemetry/recording.h"
+
+namespace joulecast::gap {
+
+// Relations between channels of which an observation keeps Products; their quantities in order. `sign`: the
+// way a wheel turns, 0 while it starts or stops. Sides [0] right, [1] left.
+enum class Relation : std::size_t {
+  armature_right,  // V, i, w, sign, acceleration; the wheel turning
+  armature_left,
+  armature_difference,  // V, i, w, acceleration: right minus left
+  torque_right,         // i, sign, w, common and differential acceleration, side slip; the wheel turning
+  torque_left,
+  ways_right,  // i, V, 1 forward, 1 backward
+  ways_left,
+  motors,          // battery power, power of both motors, 1
+  driving,         // battery power, the model's, 1; where the model sees no braking
+  motion,          // battery power, the model's but for the idle power, 1
+  idle,            // battery power, 1; standing
+  climb,           // battery power less the model's, m g v sin(pitch), 1
+  gyro,            // yaw rate, w right, w left, 1
+  way,             // speed of the robot by the wheels, its magnitude, 1
+  command,         // speed of the wheels, of the command
+  command_turn,    // turning of the wheels, of the command
+  heading_gyro,    // turned by the map in rad, in degrees, by the gyro, time
+  heading_wheels,  // turned by the map in rad, in degrees, by the right wheel, by the left
+  travel,          // moved by the map along and across the heading, turned by the wheels
+  distance,        // moved by the map, by the wheels
+  slip  // moved by the map along the heading, by the wheels, the same turning, braking; speed change
+};
+inline constexpr std::size_t relation_count = static_cast<std::size_t>(Relation::slip) + 1;
+
+// What one mission looked like: enough for every check. Some hundred kilobytes at most, whatever the
+// mission's length.
+struct Observation {
+  std::string mission_id;
+  ClockTally clock;
+  std::array<ValueTally, reading_count> values;
+  std::array<Products, relation_count> relations;
+  LagSums lags;
+  double moving_s = 0;            // some wheel turning
+  double fastest_m_s = 0;         // of half a second, by the file's wheel radius
+  double fastest_turn_rad_s = 0;  // of half a second, by the gyro
+
+  const ValueTally& of(std::size_t reading) const { return values[reading]; }
+  const Products& of(Relation r) const { return relations[static_cast<std::size_t>(r)]; }
+};
+
+// Makes an observation from a mission's samples as they come. Work and memory a sample do not grow.
+class Observer {
+ public:
+  // Effects of the file that the catalogue rejects are left out.
+  explicit Observer(const robot::RobotModel& robot);
+
+  void begin(std::string mission_id, double declared_payload_kg);
+  void add(const telemetry::Sample& sample);
+  Observation finish();
+
+ private:
+  void take(telemetry::Sample sample);
+  void take(const Cell& cell);
+  void take_power(const Cell& cell);
+  void take(const Span& span);
+  Products& of(Relation r) { return seen_.relations[static_cast<std::size_t>(r)]; }
+
+  robot::RobotModel robot_;
+  dynamics::DriveModel model_;
+  double limit_rad_s_;
+  Observation seen_;
+  std::optional<CellCutter> cells_;
+  SpanCutter spans_;
+  std::size_t cells_in_block_ = 0;
+  std::optional<telemetry::Sample> before_, waiting_;  // a spike is known by what follows
+  telemetry::Sample known_;                            // last known position and yaw rate ...
+  std::int64_t known_us_ = 0;                          // ... of then
+};
+
+// By how much channels lag the wheel speeds.
+std::optional<Delay> delay_of(std::span<const Observation> observations, std::span<const Late> channels);
+// What a delay must be to be one: a row and a half, and half of the time that these readings or the wheel
+// speeds are held.
+double least_delay_s(std::span<const Observation> observations, std::initializer_list<std::size_t> readings);
+
+Observation observe(const telemetry::Recording& mission, const robot::RobotModel& robot);
+
+}  // namespace joulecast::gap

@@ -1,0 +1,130 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "gap/checks/evaluation.h"
+
+namespace joulecast::gap {
+namespace {
+
+constexpr std::array<double, 2> no_interval{std::numeric_limits<double>::quiet_NaN(),
+                                            std::numeric_limits<double>::quiet_NaN()};
+// Readings that equations are built from.
+constexpr std::size_t used = reading::battery_current + 1;
+constexpr std::size_t fewest_spikes = 3;
+constexpr double coarse = 1;  // step over the standard deviation: rounding adds a third of it as noise
+constexpr double clipped_share = 0.01;
+constexpr std::size_t fewest_clips = 3, longest_plateau = 3;  // runs; usual repetitions of a value
+constexpr double lost_share = 0.5;
+
+// Used readings and the yaw rate.
+template <class Do>
+void each_reading(const CheckContext& c, Do look) {
+  for (std::size_t k = 0; k < reading_count; ++k) {
+    if ((k >= used && k != reading::yaw_rate) || !c.heard({k})) continue;
+    if (const ValueTally t = c.tally(k); t.known() > 0) look(k, t);
+  }
+}
+
+void add_to(std::string& list, std::string_view text) {
+  if (!list.empty()) list += ", ";
+  list += text;
+}
+
+void check_held(const CheckContext& c, std::vector<Check>& checks) {
+  std::string channels, says;
+  double longest = 0;
+  each_reading(c, [&](std::size_t k, const ValueTally& t) {
+    if (t.held_rows() < 2) return;
+    const double period = static_cast<double>(t.held_rows()) * c.period_s();
+    add_to(channels, reading_names[k]);
+    add_to(says, fmt::format("{} every {:.3g} s", reading_names[k], period));
+    longest = std::max(longest, period);
+  });
+  if (channels.empty()) return;
+  checks.push_back(
+      {"held_samples", channels, longest, no_interval,
+       fmt::format("Readings are repeated in rows that come every {:.3g} s: {} is new; what lies between is "
+                   "no measurement.",
+                   c.period_s(), says),
+       false});
+}
+
+void check_coarse(const CheckContext& c, std::vector<Check>& checks) {
+  each_reading(c, [&](std::size_t k, const ValueTally& t) {
+    if (t.constant() || t.quantum() < coarse * t.deviation()) return;
+    checks.push_back(
+        {"coarse_channel", std::string(reading_names[k]), t.quantum(), no_interval,
+         fmt::format("{} comes in steps of {:.3g}, and moves by only {:.2g} of a step (standard deviation).",
+                     reading_names[k], t.quantum(), t.deviation() / t.quantum()),
+         false});
+  });
+}
+
+void check_clipped(const CheckContext& c, std::vector<Check>& checks) {
+  each_reading(c, [&](std::size_t k, const ValueTally& t) {
+    if (k < reading::motor_current || k == reading::battery_voltage || t.levels() <= ValueTally::most_levels)
+      return;
+    const ValueTally::Extreme e = t.extreme();
+    const double share = static_cast<double>(e.rows) / static_cast<double>(t.known());
+    if (e.value == 0 || share < clipped_share || e.runs < fewest_clips ||
+        e.rows < longest_plateau * t.held_rows() * e.runs) {
+      return;
+    }
+    checks.push_back(
+        {"clipped_channel", std::string(reading_names[k]), e.value, no_interval,
+         fmt::format(
+             "{} reads exactly {:.4g} in {:.1f} % of the rows and never beyond: clipped by the sensor, "
+             "or held there by the driver.",
+             reading_names[k], e.value, 100 * share),
+         false});
+  });
+}
+
+void check_thrown(const CheckContext& c, std::vector<Check>& checks) {
+  each_reading(c, [&](std::size_t k, const ValueTally& t) {
+    const bool steady = k < reading::motor_voltage || k == reading::battery_voltage;
+    if (!steady || t.spikes() < fewest_spikes) return;
+    checks.push_back(
+        {"thrown_readings", std::string(reading_names[k]), static_cast<double>(t.spikes()), no_interval,
+         fmt::format("{} jumps away and back within one row {} times, as no {} can: lost or mixed messages.",
+                     reading_names[k], t.spikes(), k == reading::battery_voltage ? "battery" : "wheel"),
+         false});
+  });
+}
+
+void check_missing(const CheckContext& c, std::vector<Check>& checks) {
+  std::string channels;
+  double most = 0;
+  for (std::size_t k = 0; k < reading_count; ++k) {
+    const ValueTally t = c.tally(k);
+    if (t.known() == 0 && k != reading::wheel_velocity && k != reading::wheel_velocity + 1) continue;
+    const double share =
+        static_cast<double>(t.lost()) / static_cast<double>(std::max<std::size_t>(t.rows(), 1));
+    if (share <= lost_share) continue;
+    add_to(channels, reading_names[k]);
+    most = std::max(most, share);
+  }
+  if (channels.empty()) return;
+  checks.push_back(
+      {"mostly_missing", channels, most, no_interval,
+       fmt::format("{} missing in up to {:.0f} % of the rows, for long stretches.", channels, 100 * most),
+       false});
+}
+
+}  // namespace
+
+std::vector<Check> check_readings(const CheckContext& c) {
+  std::vector<Check> checks;
+  check_missing(c, checks);
+  check_thrown(c, checks);
+  check_held(c, checks);
+  check_coarse(c, checks);
+  check_clipped(c, checks);
+  return checks;
+}
+
+}  // namespace joulecast::gap

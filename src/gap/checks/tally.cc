@@ -1,0 +1,214 @@
+#include "gap/checks/tally.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace joulecast::gap {
+namespace {
+
+constexpr double alike = 0.2;     // neighbours that differ by less are the same level
+constexpr double thrown = 0.8;    // a value this far from the level of both its neighbours is a spike
+constexpr double well_off = 0.2;  // of the largest value: levels below say nothing of spikes
+constexpr std::size_t fewest_runs = 8;
+constexpr double short_fraction = 0.1;  // as in statistics::find_updates
+constexpr double single_reading = 1.5;
+
+std::size_t octave(double value) {
+  return static_cast<std::size_t>(std::clamp(std::ilogb(value) + 32, 0, 63));
+}
+
+}  // namespace
+
+void ValueTally::note_level(double value) {
+  if (fine_) return;
+  const auto at = std::ranges::lower_bound(levels_, value);
+  if (at != levels_.end() && *at == value) return;
+  if (levels_.size() == most_levels) {
+    fine_ = true;
+    levels_.clear();
+    levels_.shrink_to_fit();
+    return;
+  }
+  levels_.insert(at, value);
+}
+
+void ValueTally::note_run() {
+  if (changed_) ++runs_[std::min(run_, longest_run)];
+  changed_ = true;
+  run_ = 0;
+}
+
+void ValueTally::add(double value) {
+  ++rows_;
+  if (!std::isfinite(value)) {
+    ++missing_;
+    return;
+  }
+  if (missing_ > slowest) lost_ += missing_;
+  missing_ = 0;
+  if (known_ == 0) {
+    low_ = high_ = origin_ = value;
+    lowest_ = highest_ = {value, 0, 0};
+  } else if (value != last_[0]) {
+    note_run();
+  }
+  if (known_ >= 2) {
+    const double before = last_[1], level = 0.5 * (before + value);
+    if (before * value > 0 && std::fabs(before - value) < alike * std::fabs(level) &&
+        std::fabs(last_[0] - level) > thrown * std::fabs(level)) {
+      ++spikes_[octave(level)];
+    }
+  }
+  const bool stays = known_ > 0 && value == last_[0];
+  for (Extreme* extreme : {&lowest_, &highest_}) {
+    const bool beyond = extreme == &lowest_ ? value < extreme->value : value > extreme->value;
+    if (beyond) *extreme = {value, 0, 0};
+    if (value != extreme->value) continue;
+    ++extreme->rows;
+    if (!stays || extreme->runs == 0) ++extreme->runs;
+  }
+  low_ = lowest_.value;
+  high_ = highest_.value;
+  last_ = {value, last_[0]};
+  ++known_;
+  ++run_;
+  if (value == 0) ++zeros_;
+  sum_ += value - origin_;
+  square_ += (value - origin_) * (value - origin_);
+  note_level(value);
+}
+
+void ValueTally::append(const ValueTally& other) {
+  const std::size_t rows = rows_ + other.rows_, lost = this->lost() + other.lost();
+  if (known_ == 0)
+    *this = other;
+  else if (other.known_ > 0)
+    join(other);
+  rows_ = rows;
+  lost_ = lost;
+  missing_ = 0;
+}
+
+std::size_t ValueTally::lost() const {
+  return lost_ + (missing_ > slowest ? missing_ : 0);
+}
+
+void ValueTally::join(const ValueTally& other) {
+  const double shift = other.origin_ - origin_, count = static_cast<double>(other.known_);
+  square_ += other.square_ + 2 * shift * other.sum_ + count * shift * shift;
+  sum_ += other.sum_ + count * shift;
+  known_ += other.known_;
+  zeros_ += other.zeros_;
+  for (std::size_t k = 0; k < spikes_.size(); ++k) spikes_[k] += other.spikes_[k];
+  const auto widen = [](Extreme& mine, const Extreme& theirs, bool beyond) {
+    if (beyond)
+      mine = theirs;
+    else if (mine.value == theirs.value)
+      mine.rows += theirs.rows, mine.runs += theirs.runs;
+  };
+  widen(lowest_, other.lowest_, other.lowest_.value < lowest_.value);
+  widen(highest_, other.highest_, other.highest_.value > highest_.value);
+  low_ = lowest_.value;
+  high_ = highest_.value;
+  for (std::size_t k = 0; k < runs_.size(); ++k) runs_[k] += other.runs_[k];
+  fine_ = fine_ || other.fine_;
+  if (fine_) levels_.clear();
+  for (const double level : other.levels_) note_level(level);
+}
+
+double ValueTally::mean() const {
+  return origin_ + sum_ / static_cast<double>(known_);
+}
+
+double ValueTally::deviation() const {
+  const double n = static_cast<double>(known_), mean = sum_ / n;
+  return std::sqrt(std::max(square_ / n - mean * mean, 0.0));
+}
+
+std::size_t ValueTally::spikes() const {
+  const double least = well_off * std::max(std::fabs(low_), std::fabs(high_));
+  std::size_t count = 0;
+  for (std::size_t k = octave(least) + 1; k < spikes_.size(); ++k) count += spikes_[k];
+  return count;
+}
+
+ValueTally::Extreme ValueTally::extreme() const {
+  return highest_.rows >= lowest_.rows ? highest_ : lowest_;
+}
+
+std::size_t ValueTally::held_rows() const {
+  std::size_t count = 0;
+  for (const std::uint32_t n : runs_) count += n;
+  if (count < fewest_runs) return 1;
+  const auto quantile = [&](double fraction, std::size_t end) {
+    double total = 0;
+    for (std::size_t k = 0; k < end; ++k) total += runs_[k];
+    double below = 0;
+    for (std::size_t k = 0; k < end; ++k) {
+      below += runs_[k];
+      if (below > 0 && below >= fraction * total) return k;
+    }
+    return end - 1;
+  };
+  const std::size_t shortest = quantile(short_fraction, runs_.size());
+  if (shortest < 2) return 1;
+  const auto end = static_cast<std::size_t>(std::ceil(single_reading * static_cast<double>(shortest)));
+  return quantile(0.5, std::min(end, runs_.size()));
+}
+
+double ValueTally::quantum() const {
+  if (fine_ || levels_.size() < 2) return 0;
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < levels_.size(); ++k) steps.push_back(levels_[k] - levels_[k - 1]);
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::ranges::nth_element(steps, middle);
+  return *middle;
+}
+
+void ClockTally::add(std::int64_t utime_us, std::int64_t sequence) {
+  if (rows_ == 0) {
+    first_us_ = last_us_ = utime_us;
+    low_sequence_ = high_sequence_ = sequence;
+  } else {
+    const std::int64_t step = utime_us - before_us_;
+    if (step == 0) ++repeated_;
+    if (step < 0) ++backward_;
+    if (step > 0) {
+      const double place = 16 * std::log10(static_cast<double>(step));
+      Class& c = steps_[std::min(static_cast<std::size_t>(place), classes - 1)];
+      ++c.count;
+      c.seconds += 1e-6 * static_cast<double>(step);
+    }
+    if (sequence <= sequence_) ++disordered_;
+  }
+  ++rows_;
+  first_us_ = std::min(first_us_, utime_us);
+  last_us_ = std::max(last_us_, utime_us);
+  low_sequence_ = std::min(low_sequence_, sequence);
+  high_sequence_ = std::max(high_sequence_, sequence);
+  before_us_ = utime_us;
+  sequence_ = sequence;
+}
+
+double ClockTally::period_s() const {
+  std::size_t total = 0, below = 0;
+  for (const Class& c : steps_) total += c.count;
+  for (const Class& c : steps_) {
+    below += c.count;
+    if (c.count > 0 && 2 * below >= total) return c.seconds / static_cast<double>(c.count);
+  }
+  return 0;
+}
+
+ClockTally::Gaps ClockTally::gaps() const {
+  const double longest = std::max(1.0, 10 * period_s());
+  Gaps gaps;
+  for (const Class& c : steps_) {
+    if (c.count == 0 || c.seconds / static_cast<double>(c.count) < longest) continue;
+    gaps.count += c.count;
+    gaps.seconds += c.seconds;
+  }
+  return gaps;
+}
+
+}  // namespace joulecast::gap

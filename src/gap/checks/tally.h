@@ -1,0 +1,100 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace joulecast::gap {
+
+// What one reading's values looked like over a mission, in bounded memory.
+class ValueTally {
+ public:
+  static constexpr std::size_t longest_run = 256;  // rows; longer ones count as this long
+  static constexpr std::size_t slowest = 100;      // rows between values of a sensor that works
+  static constexpr std::size_t most_levels = 64;   // different values that are remembered
+
+  void add(double value);
+  // As if the other's rows had followed, but for the runs and spikes across the joint.
+  void append(const ValueTally& other);
+
+  std::size_t rows() const { return rows_; }
+  std::size_t known() const { return known_; }  // not NaN
+  std::size_t zeros() const { return zeros_; }
+  std::size_t lost() const;  // rows of stretches without a value that are longer than any slow sensor makes
+  double low() const { return low_; }
+  double high() const { return high_; }
+  bool constant() const { return known_ > 0 && low_ == high_; }
+  double mean() const;
+  double deviation() const;  // standard
+  // Rows with the highest or lowest value of all, whichever are more, and the runs that they form.
+  struct Extreme {
+    double value = 0;
+    std::size_t rows = 0, runs = 0;
+  };
+  Extreme extreme() const;
+  // Rows in which the value fell to nothing, or jumped up, and was back in the next.
+  // Small values' are left out: noise about zero does so all the time.
+  std::size_t spikes() const;
+
+  // Rows for which a value usually stood before the next one was read; 1 where it is read anew in each. The
+  // rule is that of statistics::find_updates.
+  std::size_t held_rows() const;
+  // Distance of neighbouring values where there are few different ones; 0 where there are many.
+  double quantum() const;
+  std::size_t levels() const { return fine_ ? most_levels + 1 : levels_.size(); }
+
+ private:
+  void join(const ValueTally& other);  // neither empty; but for rows and lost
+  void note_run();
+  void note_level(double value);
+
+  std::size_t rows_ = 0, known_ = 0, zeros_ = 0, lost_ = 0, missing_ = 0;
+  std::array<std::uint32_t, 64> spikes_{};  // by the power of two of the level
+  double low_ = 0, high_ = 0, origin_ = 0, sum_ = 0, square_ = 0;
+  Extreme lowest_, highest_;
+  std::array<std::uint32_t, longest_run + 1> runs_{};
+  std::size_t run_ = 0;
+  bool changed_ = false;  // a run that begins the mission has an unknown length
+  std::array<double, 2> last_{};
+  bool fine_ = false;
+  std::vector<double> levels_;  // ascending
+};
+
+// The clock and the sequence numbers of a mission.
+class ClockTally {
+ public:
+  void add(std::int64_t utime_us, std::int64_t sequence);
+
+  std::size_t rows() const { return rows_; }
+  std::int64_t first_us() const { return first_us_; }
+  std::int64_t last_us() const { return last_us_; }
+  double length_s() const { return 1e-6 * static_cast<double>(last_us_ - first_us_); }
+  double period_s() const;                            // between rows, usual; 0 without two that differ
+  std::size_t repeated() const { return repeated_; }  // stamped like the row before
+  std::size_t backward() const { return backward_; }  // stamped before it
+  // Silences of more than ten usual periods and a second.
+  struct Gaps {
+    std::size_t count = 0;
+    double seconds = 0;
+  };
+  Gaps gaps() const;
+  // Rows whose sequence number is not above that of the row before.
+  std::size_t disordered() const { return disordered_; }
+  bool counts() const { return low_sequence_ != high_sequence_; }
+
+ private:
+  // Steps of a clock by size, 16 classes a factor of ten from 1 us on.
+  static constexpr std::size_t classes = 16 * 10;
+  struct Class {
+    std::size_t count = 0;
+    double seconds = 0;
+  };
+
+  std::size_t rows_ = 0, repeated_ = 0, backward_ = 0, disordered_ = 0;
+  std::int64_t first_us_ = 0, last_us_ = 0, before_us_ = 0, sequence_ = 0;
+  std::int64_t low_sequence_ = 0, high_sequence_ = 0;
+  std::array<Class, classes> steps_{};
+};
+
+}  // namespace joulecast::gap

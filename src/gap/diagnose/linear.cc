@@ -1,0 +1,200 @@
+#include "gap/diagnose/linear.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace joulecast::gap {
+namespace {
+
+// How well a robot keeps to its file, as a factor on tolerances and scatter, and how far formulas are off, as a part
+// of the mean power. Both are averaged over; the factor is taken to lie near one.
+constexpr std::array keeping{0.5, 1.0, 2.0};
+constexpr std::array formulas{0.0, 0.001, 0.003};
+
+// Mean change that hypotheses make, of each channel and of the power.
+class Moved {
+ public:
+  Moved(const ColumnSet& columns, const Rows& rows) : columns_(columns.columns()) {
+    constexpr Eigen::Index most = 400;
+    for (const ChannelRows& r : rows) {
+      if (r.y.size() == 0) continue;
+      Sampled sampled;
+      sampled.place.assign(columns.size(), -1);
+      for (std::size_t k = 0; k < r.columns.size(); ++k) sampled.place[r.columns[k]] = static_cast<Eigen::Index>(k);
+      const Eigen::Index stride = std::max<Eigen::Index>(1, r.y.size() / most);
+      sampled.x = r.x(Eigen::seq(0, r.y.size() - 1, stride), Eigen::all);
+      sampled.size = std::max(r.y(Eigen::seq(0, r.y.size() - 1, stride)).cwiseAbs().mean(), 1e-12);
+      channels_.push_back(std::move(sampled));
+    }
+  }
+
+  double operator()(const Hypothesis& h, const Eigen::VectorXd& coefficients) const {
+    const auto& own = h.candidate.columns;
+    if (h.outside()) {
+      // Of a pair of channels the right-hand one stands for both.
+      for (const Sampled& c : channels_) {
+        if (const Eigen::VectorXd moved = c.moved(own, coefficients); moved.size() > 0)
+          return moved.cwiseAbs().mean() * columns_[own.front()].power_share;
+      }
+      return 0;
+    }
+    double square = 0;
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      const double share = std::max(columns_[own[k]].power_share, columns_[own[k]].motor_share);
+      square += std::pow(coefficients[static_cast<Eigen::Index>(k)] * share, 2);
+    }
+    return std::sqrt(square);
+  }
+
+  // The largest ratio, over channels in which they matter, of what members move one by one to what they move together.
+  double cancelling(const std::vector<Hypothesis>& hypotheses, const HypothesisSet& set,
+                    const Eigen::VectorXd& coefficients) const {
+    constexpr double matters = 0.1;  // of what the channel's response is
+    double most = 1;
+    for (const Sampled& c : channels_) {
+      double apart = 0;
+      Eigen::VectorXd together = Eigen::VectorXd::Zero(c.x.rows());
+      Eigen::Index at = 0;
+      for (const std::size_t h : set) {
+        const auto& own = hypotheses[h].candidate.columns;
+        const auto n = static_cast<Eigen::Index>(own.size());
+        if (const Eigen::VectorXd moved = c.moved(own, coefficients.segment(at, n)); moved.size() > 0) {
+          apart += moved.cwiseAbs().mean();
+          together += moved;
+        }
+        at += n;
+      }
+      if (apart > matters * c.size) most = std::max(most, apart / std::max(together.cwiseAbs().mean(), 1e-12));
+    }
+    return most;
+  }
+
+ private:
+  struct Sampled {
+    Eigen::MatrixXd x;
+    double size = 1;                   // mean |response|
+    std::vector<Eigen::Index> place;   // of each column, -1: does not speak here
+
+    Eigen::VectorXd moved(const std::vector<std::size_t>& columns, const Eigen::VectorXd& coefficients) const {
+      Eigen::VectorXd sum;
+      for (std::size_t k = 0; k < columns.size(); ++k) {
+        const Eigen::Index at = place[columns[k]];
+        if (at < 0) continue;
+        if (sum.size() == 0) sum = Eigen::VectorXd::Zero(x.rows());
+        sum += coefficients[static_cast<Eigen::Index>(k)] * x.col(at);
+      }
+      return sum;
+    }
+  };
+  std::vector<Column> columns_;
+  std::vector<Sampled> channels_;
+};
+
+}  // namespace
+
+std::vector<Window> thinned(std::span<const Window> windows) {
+  constexpr std::size_t enough = 1600, stretch = 40;
+  const std::size_t every = (windows.size() + enough - 1) / enough;
+  std::vector<Window> some;
+  for (std::size_t k = 0; k < windows.size(); ++k) {
+    if (k / stretch % every != 0) continue;
+    some.push_back(windows[k]);
+    if (k % stretch == 0) some.back().continues = false;
+  }
+  return some;
+}
+
+Linear linearise(const Material& m, const Shapes& shapes, std::span<const double> shares,
+                 std::span<const dynamics::ActiveEffect> around) {
+  Linear linear;
+  linear.columns = std::make_unique<ColumnSet>(m, shapes, shares);
+  for (const dynamics::ActiveEffect& effect : around) {
+    if (auto c = linear.columns->coordinates_of(effect)) linear.around.push_back(std::move(*c));
+  }
+  if (!linear.around.empty()) linear.columns->linearise_around(linear.around);
+  linear.rows = make_rows(*linear.columns, m.windows);
+  linear.noise = learn_noise(*linear.columns, linear.rows);
+  return linear;
+}
+
+Problem make_problem(const ColumnSet& columns, const Rows& rows, const Noise& noise, std::size_t blocks,
+                     const Responses* response) {
+  Problem problem;
+  problem.hypotheses = columns.hypotheses();
+  const auto moved = std::make_shared<const Moved>(columns, rows);
+  problem.moved = [moved](const Hypothesis& h, const Eigen::VectorXd& c) { return (*moved)(h, c); };
+  problem.cancelling = [moved, &columns](const HypothesisSet& set, const Eigen::VectorXd& c) {
+    return moved->cancelling(columns.hypotheses(), set, c);
+  };
+  const auto plain = block_information(columns, rows, noise, blocks, response);
+  const auto p = static_cast<Eigen::Index>(columns.size());
+  Eigen::VectorXd tolerance(p), scatter(p), discrepancy(p);
+  for (Eigen::Index k = 0; k < p; ++k) {
+    const Column& c = columns.columns()[static_cast<std::size_t>(k)];
+    tolerance[k] = c.tolerance;
+    scatter[k] = c.scatter;
+    discrepancy[k] = c.discrepancy;
+  }
+  for (const double factor : keeping) {
+    problem.blocks.push_back(plain);
+    for (statistics::Information& block : problem.blocks.back()) block.integrate_out(factor * scatter);
+    if (factor == 1) {
+      problem.plain.tolerance = tolerance;
+      problem.plain.noise = problem.blocks.size() - 1;
+    }
+    for (const double off : formulas) {
+      Circumstances c;
+      c.log_prior = -0.5 * std::pow(std::log2(factor), 2);
+      c.tolerance = ((factor * tolerance).array().square() + (off * discrepancy).array().square()).sqrt();
+      c.noise = problem.blocks.size() - 1;
+      problem.circumstances.push_back(std::move(c));
+    }
+  }
+  for (const Hypothesis& h : problem.hypotheses) {
+    for (const std::size_t k : h.candidate.columns) problem.plain.tolerance[static_cast<Eigen::Index>(k)] = 0;
+  }
+  return problem;
+}
+
+double misfit(const Linear& linear, const Noise& noise) {
+  double sum = 0;
+  for (std::size_t c = 0; c < channel_count; ++c) {
+    const ChannelRows& rows = linear.rows[c];
+    if (!(noise[c].sigma > 0) || rows.y.size() == 0) continue;
+    Eigen::VectorXd residual = rows.y;
+    for (const Chosen& chosen : linear.around) {
+      const auto& own = linear.columns->hypotheses()[chosen.hypothesis].candidate.columns;
+      for (std::size_t k = 0; k < own.size(); ++k) {
+        const auto local = std::ranges::find(rows.columns, own[k]);
+        if (local != rows.columns.end())
+          residual -= chosen.coefficients[k] * rows.x.col(local - rows.columns.begin());
+      }
+    }
+    sum += residual.cwiseAbs().sum() / noise[c].sigma;
+  }
+  return sum;
+}
+
+std::vector<dynamics::ActiveEffect> half_way(std::span<const dynamics::ActiveEffect> from,
+                                             std::vector<dynamics::ActiveEffect> to) {
+  const auto halve = [](dynamics::ActiveEffect& effect, const dynamics::EffectValues<double>& other) {
+    const auto& parameters = effect.effect->info().parameters;
+    for (std::size_t k = 0; k < parameters.size(); ++k) {
+      if (k == 0 || parameters[k].strength) effect.values[k] = 0.5 * (effect.values[k] + other[k]);
+    }
+  };
+  const std::size_t named = to.size();
+  for (const dynamics::ActiveEffect& effect : from) {
+    if (std::ranges::find(to, effect.effect, &dynamics::ActiveEffect::effect) != to.end()) continue;
+    to.push_back(effect);
+    halve(to.back(), {});
+  }
+  for (std::size_t k = 0; k < named; ++k) {
+    const auto before = std::ranges::find(from, to[k].effect, &dynamics::ActiveEffect::effect);
+    halve(to[k], before == from.end() ? dynamics::EffectValues<double>{} : before->values);
+  }
+  return to;
+}
+
+}  // namespace joulecast::gap

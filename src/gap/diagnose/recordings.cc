@@ -1,0 +1,393 @@
+#include "gap/diagnose/recordings.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "gap/diagnose/ripple.h"
+#include "gap/diagnose/channel_gaps.h"
+#include "gap/diagnose/controls.h"
+#include "gap/diagnose/held_out.h"
+#include "gap/diagnose/referee.h"
+#include "gap/diagnose/refit.h"
+#include "gap/equations/power.h"
+#include "gap/traits.h"
+#include "gap/verdict/figures.h"
+#include "gap/verdict/judge.h"
+#include "gap/verdict/next_drive.h"
+#include "gap/verdict/where.h"
+#include "gap/verdict/words.h"
+#include "statistics/bootstrap.h"
+#include "statistics/robust.h"
+#include "statistics/shapley.h"
+
+namespace joulecast::gap {
+namespace {
+
+constexpr std::size_t fewest_windows = 40;
+constexpr double large_gap = 0.15, huge_gap = 0.25;
+constexpr double usual_share = 0.07, large_share = 0.3;  // of the mean power, that an effect which is there may move
+constexpr std::size_t more_members = 6;
+constexpr double least_necessary_part = 0.05;  // of the gap, that comes back when an effect is left out
+constexpr std::size_t most_shared = 6;         // effects between which the gap is shared
+constexpr double settled_delay_s = 0.006, settled_bias = 0.1;
+constexpr int most_delay_rounds = 3;
+constexpr std::size_t ripple_surrogates = 20;
+
+// Progress of the stages, as parts of the whole.
+constexpr double after_fit = 0.35, after_parts = 0.6;
+
+// What these effects do to when and how electrical readings are taken is taken out of the windows.
+void take_out(std::span<const dynamics::ActiveEffect> effects, windows::WindowSettings& settings) {
+  settings.electrical_delay_s = settings.motor_current_bias_a = 0;
+  for (const dynamics::ActiveEffect& e : effects) {
+    const std::string_view id = e.effect->info().id;
+    if (id == "sensor_delay") settings.electrical_delay_s = e.values[0];
+    if (id == "current_sensor_bias") settings.motor_current_bias_a = e.values[0] * e.values[1];
+  }
+}
+
+// Effects that only the motors' readings show, not battery power.
+bool moves_motors_alone(const Hypothesis& h) {
+  const std::string id = h.id();
+  return (id == "current_sensor_gain" || id == "current_sensor_bias" || id == "voltage_sensor_gain") &&
+         h.effect.values[2] == 0;
+}
+
+// Share of the power that an effect has to move to be surely seen here: the median over effects of what is so many
+// standard deviations of each by itself.
+double detectable_share(const Problem& problem) {
+  constexpr double deviations = 3.5;
+  const Mixture mixture(problem);
+  std::vector<std::string> seen;
+  std::vector<double> shares;
+  for (std::size_t h = 0; h < problem.hypotheses.size(); ++h) {
+    const Hypothesis& hypothesis = problem.hypotheses[h];
+    if (hypothesis.outside() || !shows_in_power(hypothesis.id())) continue;
+    if (std::ranges::find(seen, hypothesis.id()) != seen.end()) continue;
+    seen.push_back(hypothesis.id());
+    shares.push_back(problem.moved(hypothesis, deviations * mixture.estimate({h}).sd));
+  }
+  return shares.empty() ? missing : statistics::median(shares);
+}
+
+class Diagnoser {
+ public:
+  Diagnoser(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot, const DiagnosisSettings& settings)
+      : recordings_(recordings), robot_(robot), settings_(settings) {}
+
+  Result<Diagnosis> run();
+
+ private:
+  // The recordings as equations, with what sensor effects do to readings taken out.
+  struct View {
+    std::vector<Window> windows;
+    std::vector<double> power_w;
+  };
+
+  bool goes_on(double part) const { return !settings_.progress || settings_.progress(part); }
+  Material material() const {
+    return {robot_, adopted_, view_.windows, blocks_, from_motion_, readings_.row_s};
+  }
+  std::vector<dynamics::ActiveEffect> with(std::span<const dynamics::ActiveEffect> more) const {
+    std::vector<dynamics::ActiveEffect> all = adopted_;
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+  double gap_with(std::span<const dynamics::ActiveEffect> effects) const {
+    return gap_size(view_.power_w, modelled_power(robot_, with(effects), view_.windows)).absolute_relative;
+  }
+
+  View view_of(const windows::WindowSettings& settings) const;
+  bool prepare();
+  void measure();
+  bool fit();
+  void name(const Problem& problem, Explanation& explanation);
+  bool judge_all();
+  void add_wander(const Problem& problem, const Explanation& explanation, Findings& findings) const;
+  void add_baseline();
+  void add_shrinkage();
+
+  const telemetry::RecordingSet& recordings_;
+  const robot::RobotModel& robot_;
+  const DiagnosisSettings& settings_;
+  std::vector<dynamics::ActiveEffect> adopted_;
+  windows::Readings readings_;
+  windows::WindowSettings taken_out_;
+  View view_, plain_;
+  std::vector<double> plain_model_w_;  // by the robot file, of the plain windows
+  std::size_t blocks_ = 0;
+  FromMotion from_motion_;
+  FitSettings fit_settings_;
+  std::optional<FitResult> fit_;
+  std::optional<HeldOut> held_out_;
+  HypothesisSet named_;
+  std::vector<dynamics::ActiveEffect> strengths_;
+  std::vector<double> opened_;
+  Diagnosis d_;
+};
+
+Diagnoser::View Diagnoser::view_of(const windows::WindowSettings& settings) const {
+  View view;
+  view.windows = windows::make_windows(recordings_.missions, robot_, readings_, settings);
+  mark_turning_power(view.windows, dynamics::DriveModel(robot_, adopted_));
+  std::vector<double> lengths;
+  for (const telemetry::Recording& m : recordings_.missions)
+    lengths.push_back(1e-6 * static_cast<double>(m.samples.back().utime_us - m.samples.front().utime_us));
+  windows::assign_blocks(view.windows, lengths);
+  view.power_w = measured_power(view.windows, robot_, d_.power == PowerSource::motors);
+  return view;
+}
+
+// Whether there is anything to judge by.
+bool Diagnoser::prepare() {
+  readings_ = windows::find_readings(recordings_.missions, robot_);
+  plain_ = view_of({});
+  const auto known = [](double p) { return std::isfinite(p); };
+  std::size_t currents = 0, voltages = 0, turns = 0;
+  for (const Window& w : plain_.windows) {
+    currents += std::isfinite(w.current_a[0] + w.current_a[1]) ? 1 : 0;
+    voltages += std::isfinite(w.voltage_v[0] + w.voltage_v[1]) ? 1 : 0;
+    turns += std::isfinite(w.yaw_rate_rad_s) || std::isfinite(w.turn_rad) ? 1 : 0;
+    blocks_ = std::max(blocks_, w.block + 1);
+  }
+  const std::size_t few = plain_.windows.size() / 5;
+  d_.motor_channels = currents > few;
+  from_motion_.power = !d_.motor_channels;
+  from_motion_.voltage = !d_.motor_channels && voltages > few;
+  d_.power = PowerSource::battery;
+  if (std::ranges::none_of(plain_.power_w, known)) {
+    d_.power = PowerSource::motors;
+    plain_.power_w = measured_power(plain_.windows, robot_, true);
+    if (std::ranges::none_of(plain_.power_w, known)) d_.power = PowerSource::none;
+  }
+  view_ = plain_;
+  return plain_.windows.size() >= fewest_windows &&
+         (d_.power == PowerSource::battery || d_.motor_channels || from_motion_.voltage || turns > few);
+}
+
+void Diagnoser::measure() {
+  plain_model_w_ = modelled_power(robot_, adopted_, plain_.windows);
+  d_.channels = channel_gaps(material());
+  if (d_.power == PowerSource::none) {
+    d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
+    return;
+  }
+  const GapSize size = gap_size(plain_.power_w, plain_model_w_);
+  d_.energy_relative = size.energy_relative;
+  d_.power_absolute_relative = size.absolute_relative;
+  const std::string_view channel = d_.power == PowerSource::battery ? "battery_power" : "motor_power";
+  const auto gap = std::ranges::find(d_.channels, channel, &ChannelGap::channel);
+  d_.noise_floor = gap == d_.channels.end() ? missing : gap->noise_floor;
+  d_.where = localise(plain_.windows, robot_, adopted_, plain_.power_w, plain_model_w_, d_.noise_floor);
+}
+
+bool Diagnoser::fit() {
+  fit_settings_.shares = {usual_share};
+  if (d_.power_absolute_relative > large_gap) {
+    fit_settings_.shares.push_back(large_share);
+    fit_settings_.explain.most_members = more_members;
+  }
+  const double settled_bias_a = settled_bias * robot_.motor.friction_torque_nm[0] /
+                                (robot_.motor.torque_constant_nm_a * robot_.motor.gear_ratio);
+  // A delay is linear only while it is short beside the window, a bias only while it turns no current's sign: what is
+  // found is taken out of the windows and fitted again.
+  for (int round = 0;; ++round) {
+    const auto still = [&] { return goes_on(after_fit * 0.5); };
+    fit_ = fit_windows(material(), {}, fit_settings_, still);
+    if (fit_ && d_.power_absolute_relative > huge_gap && round == 0) {
+      auto far = fit_windows(material(), base_fit(material(), view_.power_w), fit_settings_, still);
+      if (!far) return false;
+      if (far->log_joint > fit_->log_joint) fit_ = std::move(far);
+    }
+    if (!fit_) return false;
+    const windows::WindowSettings before = taken_out_;
+    take_out(fit_->effects, taken_out_);
+    const bool settled = std::fabs(taken_out_.electrical_delay_s - before.electrical_delay_s) < settled_delay_s &&
+                         std::fabs(taken_out_.motor_current_bias_a - before.motor_current_bias_a) < settled_bias_a;
+    if (settled || round >= most_delay_rounds) return goes_on(after_fit);
+    view_ = view_of(taken_out_);
+  }
+}
+
+// The named effects with the strengths that they have by themselves; those that the gap does not need are left out.
+void Diagnoser::name(const Problem& problem, Explanation& explanation) {
+  named_ = named_effects(problem, explanation);
+  const auto gap_without = [&](HypothesisSet set, std::size_t h) {
+    std::erase(set, h);
+    return gap_with(strengths_of(*fit_->linear.columns, problem, set, {}));
+  };
+  while (d_.power != PowerSource::none) {
+    const double all = gap_with(strengths_of(*fit_->linear.columns, problem, named_, {}));
+    double least = least_necessary_part * d_.power_absolute_relative;
+    std::optional<std::size_t> spare;
+    opened_.clear();
+    for (const std::size_t h : named_) {
+      opened_.push_back(gap_without(named_, h) - all);
+      if (!shows_in_power(problem.hypotheses[h].id()) || moves_motors_alone(problem.hypotheses[h])) continue;
+      if (opened_.back() < least && named_.size() > 1) least = opened_.back(), spare = h;
+    }
+    if (!spare) break;
+    std::erase(named_, *spare);
+  }
+  opened_.resize(named_.size(), 0);
+  strengths_ = refit(material(), strengths_of(*fit_->linear.columns, problem, named_, {}));
+}
+
+void Diagnoser::add_wander(const Problem& problem, const Explanation& explanation, Findings& f) const {
+  double most = 0;
+  for (std::size_t k = 0; k < explanation.members.size(); ++k) {
+    const Member& m = explanation.members[k];
+    if (!problem.hypotheses[m.hypothesis].is_effect() || m.group_probability() < least_named ||
+        m.wander < most_wander || m.share <= most)
+      continue;
+    most = m.share;
+    f.wandering = k;
+  }
+  if (!f.wandering) return;
+  const Member& m = explanation.members[*f.wandering];
+  const std::vector<double> by_block = Mixture(problem).by_block(explanation.whole, m.hypothesis);
+  const double mean_w = m.share * fit_->linear.columns->mean_power_w() / std::max(std::fabs(m.coefficients[0]), 1e-12);
+  const std::size_t third = std::max<std::size_t>(1, by_block.size() / 3);
+  for (std::size_t b = 0; b < third; ++b) {
+    f.wandering_power_w[0] += by_block[b] * mean_w / static_cast<double>(third);
+    f.wandering_power_w[1] += by_block[by_block.size() - 1 - b] * mean_w / static_cast<double>(third);
+  }
+}
+
+void Diagnoser::add_baseline() {
+  if (!held_out_ || d_.power == PowerSource::none) return;
+  Baseline b;
+  const Referee referee(view_.windows, view_.power_w, robot_);
+  for (std::size_t k = 0; k < referee_terms.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    b.terms.push_back({std::string(referee_terms[k].name), std::string(referee_terms[k].unit),
+                       referee.fit().coefficients[at], referee.fit().sd[at]});
+  }
+  b.held_out = held_out_->referee();
+  b.unchanged_model_held_out = held_out_->unchanged();
+  b.explanation_held_out = held_out_->explained();
+  // What the model itself comes to in the same terms.
+  const Referee model(view_.windows, modelled_power(robot_, adopted_, view_.windows), robot_);
+  for (std::size_t k = 0; k < referee_terms.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    const double data = referee.fit().coefficients[at], sd = referee.fit().sd[at], ours = model.fit().coefficients[at];
+    constexpr double clear = 3, notable = 0.2;
+    if (std::fabs(data - ours) < clear * sd || std::fabs(data - ours) < notable * std::fabs(data)) continue;
+    b.says.push_back(referee_words(referee_terms[k], data, ours));
+  }
+  d_.baseline = std::move(b);
+}
+
+void Diagnoser::add_shrinkage() {
+  if (!held_out_ || named_.empty() || d_.power == PowerSource::none) return;
+  Shrinkage s;
+  s.before = held_out_->unchanged();
+  s.after = held_out_->explained();
+  s.fraction = 1 - s.after / s.before;
+  s.interval = statistics::bootstrap_interval(held_out_->blocks.size(), [&](std::span<const int> draw) {
+    double before = 0, after = 0;
+    for (std::size_t b = 0; b < draw.size(); ++b) {
+      before += draw[b] * held_out_->blocks[b].unchanged;
+      after += draw[b] * held_out_->blocks[b].explained;
+    }
+    return 1 - after / before;
+  });
+  s.remaining_over_noise_floor = d_.noise_floor > 0 ? s.after / d_.noise_floor : missing;
+  s.parts = held_out_->parts;
+  std::vector<std::string> ids;
+  for (const dynamics::ActiveEffect& e : strengths_) ids.emplace_back(e.effect->info().id);
+  std::ranges::sort(ids);
+  for (std::vector<std::string> part : held_out_->named) {
+    std::ranges::sort(part);
+    s.agreeing += part == ids ? 1 : 0;
+  }
+  d_.shrinkage = s;
+}
+
+bool Diagnoser::judge_all() {
+  const Problem problem =
+      make_problem(*fit_->linear.columns, fit_->linear.rows, fit_->linear.noise, blocks_);
+  Explanation explanation = explain(problem, {}, fit_settings_.explain);
+  d_.detectable_share = detectable_share(problem);
+  name(problem, explanation);
+  held_out_ = hold_out(material(), *fit_, view_.power_w, fit_settings_, [&](double part) {
+    return goes_on(std::lerp(after_fit, after_parts, part));
+  });
+  if (!held_out_) return false;
+  const ControlSettings controls{fit_settings_.explain, settings_.controls, settings_.threads};
+  auto made = control(material(), fit_->linear, problem, explanation, controls,
+                      [&](double part) { return goes_on(std::lerp(after_parts, 1.0, part)); });
+  if (!made) return false;
+  std::optional<Ripple> ripple;
+  const std::vector<dynamics::ActiveEffect> all = with(strengths_);
+  // Where readings are repeated over rows, what repeats with the wheel is the rows.
+  if (!readings_.held())
+    ripple = find_ripple(recordings_, robot_, all, d_.motor_channels, taken_out_.electrical_delay_s, ripple_surrogates);
+
+  Findings f{problem, explanation, settings_.controls > 0 ? std::move(*made) : std::vector<Controls>{}, named_,
+             strengths_, opened_, {}, {}, held_out_, ripple, std::nullopt, {}};
+  const std::vector<double> after = modelled_power(robot_, all, view_.windows);
+  f.shares = statistics::shapley_shares(std::min(strengths_.size(), most_shared), [&](const auto& members) {
+    std::vector<dynamics::ActiveEffect> some;
+    for (const std::size_t k : members) some.push_back(strengths_[k]);
+    return d_.power == PowerSource::none ? 0 : gap_with(some);
+  });
+  f.shares.resize(strengths_.size(), 0);
+  for (std::size_t k = 0; k < strengths_.size(); ++k) {
+    std::vector<dynamics::ActiveEffect> others = strengths_;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+    const std::vector<double> without = modelled_power(robot_, with(others), view_.windows);
+    double change = 0;
+    for (std::size_t n = 0; n < after.size(); ++n) change += std::fabs(after[n] - without[n]);
+    f.power_w.push_back(change / static_cast<double>(after.size()));
+  }
+  add_wander(problem, explanation, f);
+  add_baseline();
+  add_shrinkage();
+  judge(d_, f, robot_);
+  if (d_.effects.empty()) d_.shrinkage.reset();
+  d_.next_drive = next_drives(fit_->linear, problem, robot_, d_.effects);
+  if (!d_.outside.channel.empty()) {
+    const auto more = drives_for(d_.outside);
+    d_.next_drive.insert(d_.next_drive.begin(), more.begin(), more.end());
+  }
+  d_.channels = channel_gaps(fit_->linear, view_.windows, view_.power_w, d_, robot_, adopted_);
+  if (d_.power != PowerSource::none) {
+    const std::vector<double> before = modelled_power(robot_, adopted_, view_.windows);
+    d_.figures = figures_of(view_.windows, view_.power_w, before, after, recordings_, robot_);
+  }
+  return true;
+}
+
+Result<Diagnosis> Diagnoser::run() {
+  d_.robot_id = recordings_.robot_id;
+  d_.missions = recordings_.missions.size();
+  d_.samples = recordings_.samples;
+  d_.notes = recordings_.notes;
+  auto adopted = dynamics::active_effects(robot_);
+  if (!adopted) return tl::unexpected(adopted.error());
+  adopted_ = std::move(*adopted);
+  if (!prepare()) {
+    d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
+    d_.next_drive = first_drives(robot_);
+    d_.refusal = "nothing was found that a robot file could take";
+    return std::move(d_);
+  }
+  measure();
+  if (!fit() || !judge_all()) return fail(Fault::conflict, "", "diagnosis cancelled");
+  return std::move(d_);
+}
+
+}  // namespace
+
+Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
+                           const DiagnosisSettings& settings) {
+  std::vector<Check> checks = check_recordings(recordings, robot);
+  telemetry::RecordingSet trusted = recordings;
+  silence_contradicted(trusted, checks);
+  Result<Diagnosis> d = Diagnoser(trusted, robot, settings).run();
+  if (d) d->checks = std::move(checks);
+  return d;
+}
+
+}  // namespace joulecast::gap

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <functional>
+
+#include "base/error.h"
+#include "telemetry/recording_set.h"
+#include "gap/verdict/diagnosis.h"
+
+namespace joulecast::gap {
+
+struct DiagnosisSettings {
+  std::size_t controls = 20;             // surrogates for each finding; 0: none are made
+  std::size_t threads = 1;               // that controls may take
+  std::function<bool(double)> progress;  // called with 0..1; false cancels
+};
+
+// From recordings of one robot. Fault::invalid for unusable recordings or a robot file whose effects the catalogue
+// rejects, Fault::conflict when cancelled.
+Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
+                           const DiagnosisSettings& settings = {});
+
+}  // namespace joulecast::gap

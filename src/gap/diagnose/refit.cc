@@ -1,0 +1,151 @@
+#include "gap/diagnose/refit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "gap/diagnose/referee.h"
+#include "gap/traits.h"
+#include "statistics/evidence.h"
+
+namespace joulecast::gap {
+namespace {
+
+constexpr int most_steps = 12, most_halvings = 4;
+constexpr double better = 0.998;     // misfit, over the one before: a step that gains less is the last
+constexpr double wide_share = 1;     // of the mean power, that a strength is held by
+constexpr double noticed_share = 0.002;
+
+Shapes shapes_of(std::span<const dynamics::ActiveEffect> effects, const robot::RobotModel& robot) {
+  Shapes shapes;
+  for (const dynamics::ActiveEffect& e : effects) {
+    if (e.effect->info().id == "floor_resistance_zone") {
+      shapes.zones = {{e.values[1], e.values[2], e.values[3]}};
+    } else {
+      shapes.only(e, robot.kinematics.wheel_radius_m);
+    }
+  }
+  return shapes;
+}
+
+// One Gauss-Newton step: the strengths that these effects would have where everything is linear.
+std::vector<dynamics::ActiveEffect> step(const Material& material, const Linear& linear,
+                                         std::span<const dynamics::ActiveEffect> effects) {
+  const ColumnSet& columns = *linear.columns;
+  Eigen::VectorXd sd(static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    sd[static_cast<Eigen::Index>(k)] = std::hypot(columns.columns()[k].tolerance, columns.columns()[k].scatter);
+  for (const Hypothesis& h : columns.hypotheses()) {
+    for (const std::size_t k : h.candidate.columns) sd[static_cast<Eigen::Index>(k)] = 0;
+  }
+  std::vector<std::size_t> free;
+  for (const dynamics::ActiveEffect& e : effects) {
+    const auto at = columns.coordinates_of(e);
+    if (!at) continue;
+    free.push_back(at->hypothesis);
+    const auto& candidate = columns.hypotheses()[at->hypothesis].candidate;
+    for (const std::size_t k : candidate.columns) sd[static_cast<Eigen::Index>(k)] = candidate.expected;
+  }
+  statistics::Information total;
+  for (const auto& block : block_information(columns, linear.rows, linear.noise, material.blocks)) total += block;
+  const statistics::Ridge ridge = statistics::ridge(total, sd);
+  std::vector<Chosen> chosen;
+  for (const std::size_t h : free) {
+    const auto& candidate = columns.hypotheses()[h].candidate;
+    Chosen c{h, {}};
+    for (const std::size_t k : candidate.columns)
+      c.coefficients.push_back(std::clamp(ridge.mean[static_cast<Eigen::Index>(k)], candidate.least, candidate.most));
+    chosen.push_back(std::move(c));
+  }
+  return columns.effects_of(chosen);
+}
+
+// The effects that make the robot file's model the plain regression.
+std::vector<dynamics::ActiveEffect> as_regression(const Material& m, std::span<const double> power_w,
+                                                  const ColumnSet& columns, std::span<const std::string_view> ids) {
+  const Referee referee(m.windows, power_w, m.robot);
+  const auto& c = referee.fit().coefficients;
+  const auto& k = m.robot.kinematics;
+  const auto& mass = m.robot.mass;
+  const double inertia_kg = 2 * (mass.wheel_inertia_kg_m2 + m.robot.motor.rotor_inertia_kg_m2) /
+                            (k.wheel_radius_m * k.wheel_radius_m);
+  const double chassis_kg = std::max(0.2 * mass.chassis_kg, c[3] - inertia_kg - 2 * mass.wheel_kg);
+  const double weight_n = (chassis_kg + 2 * mass.wheel_kg) * robot::standard_gravity_m_s2;
+  const double torque_nm = 0.5 * std::max(0.0, c[1]) * k.wheel_radius_m;
+  const double scrub = std::max(0.0, c[2]) * 2 * k.half_track_m / (0.5 * weight_n * k.half_track_m);
+  const double file_nm = 0.5 * (m.robot.motor.friction_torque_nm[0] + m.robot.motor.friction_torque_nm[1]);
+  double file_scrub = 0;
+  for (const dynamics::ActiveEffect& e : m.adopted) {
+    if (e.effect->info().id == "turning_scrub") file_scrub += e.values[0];
+  }
+  std::vector<Chosen> chosen;
+  for (std::size_t h = 0; h < columns.hypotheses().size(); ++h) {
+    const Hypothesis& hypothesis = columns.hypotheses()[h];
+    const std::string id = hypothesis.id();
+    if (std::ranges::find(ids, id) == ids.end()) continue;
+    const bool ratio = hypothesis.parameter == 0;
+    const double value = id == "accessory_load"       ? c[0] - m.robot.idle_power_w
+                         : id == "coulomb_friction"   ? (ratio ? torque_nm / file_nm - 1 : torque_nm - file_nm)
+                         : id == "turning_scrub"      ? scrub - file_scrub
+                         : id == "chassis_mass_error" ? chassis_kg / mass.chassis_kg - 1
+                         : id == "resistance_error"   ? hypothesis.candidate.least
+                                                      : 0.0;
+    chosen.push_back({h, {std::clamp(value, hypothesis.candidate.least, hypothesis.candidate.most)}});
+  }
+  return columns.effects_of(chosen);
+}
+
+std::vector<dynamics::ActiveEffect> rest(const Material& whole, const Shapes& shapes,
+                                         std::vector<dynamics::ActiveEffect> effects) {
+  const std::vector<Window> some = thinned(whole.windows);
+  Material material = whole;
+  material.windows = some;
+  std::vector<dynamics::ActiveEffect> next = effects;
+  std::optional<Noise> noise;
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0, halved = 0; k < most_steps; ++k) {
+    const Linear linear = linearise(material, shapes, std::array{wide_share}, next);
+    if (!noise) noise = linear.noise;
+    const double now = misfit(linear, *noise);
+    if (now > better * least) {
+      if (now < least) effects = next;
+      if (++halved > most_halvings) break;
+      next = half_way(effects, std::move(next));
+      continue;
+    }
+    halved = 0;
+    least = now;
+    effects = next;
+    next = step(material, linear, effects);
+  }
+  return effects;
+}
+
+}  // namespace
+
+std::vector<dynamics::ActiveEffect> refit(const Material& material, std::vector<dynamics::ActiveEffect> effects) {
+  if (effects.empty()) return effects;
+  const Shapes shapes = shapes_of(effects, material.robot);
+  return rest(material, shapes, std::move(effects));
+}
+
+std::vector<dynamics::ActiveEffect> base_fit(const Material& material, std::span<const double> power_w) {
+  constexpr std::array<std::string_view, 7> ids{"accessory_load", "coulomb_friction", "viscous_friction",
+                                                "chassis_mass_error", "turning_scrub", "aerodynamic_drag",
+                                                "resistance_error"};
+  constexpr double scrub_rate_rad_s = 0.05;
+  Shapes shapes;
+  shapes.scrub_rates_rad_s = {scrub_rate_rad_s};
+  const ColumnSet columns(material, shapes, std::array{wide_share});
+  std::vector<dynamics::ActiveEffect> effects =
+      rest(material, shapes, as_regression(material, power_w, columns, ids));
+  std::erase_if(effects, [&](const dynamics::ActiveEffect& e) {
+    const auto at = columns.coordinates_of(e);
+    const std::size_t k = columns.hypotheses()[at->hypothesis].candidate.columns.front();
+    return std::fabs(at->coefficients[0]) * columns.columns()[k].power_share < noticed_share &&
+           !traits_of(e.effect->info().id).elsewhere;
+  });
+  return effects;
+}
+
+}  // namespace joulecast::gap

@@ -1,0 +1,236 @@
+#include "gap/equations/channels.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+namespace joulecast::gap {
+namespace {
+
+using dynamics::Dual;
+
+// Where a current changes sign within a window, nobody knows what the brushes drop.
+constexpr double clear_sign = 0.9;
+
+// Copper heat for any time constant, between the ones that windows carry.
+std::array<double, 2> heat_at(const Window& w, double time_constant_s) {
+  const auto& grid = windows::heat_time_constants_s;
+  const double tau = std::clamp(time_constant_s, grid.front(), grid.back());
+  std::size_t k = 0;
+  while (k + 2 < grid.size() && grid[k + 1] < tau) ++k;
+  const double part = std::log(tau / grid[k]) / std::log(grid[k + 1] / grid[k]);
+  std::array<double, 2> heat{};
+  for (std::size_t s : {0u, 1u}) {
+    heat[s] = (1 - part) * w.copper_heat_w[k][s] + part * w.copper_heat_w[k + 1][s];
+  }
+  return heat;
+}
+
+template <class S>
+dynamics::Instant instant_of(const dynamics::BasicDriveModel<S>& model, const Window& w) {
+  dynamics::Instant at;
+  at.wheel_speed_rad_s = w.speed_rad_s;
+  at.wheel_acceleration_rad_s2 = w.acceleration_rad_s2;
+  at.payload_kg = w.payload_kg;
+  at.x_m = w.x_m;
+  at.y_m = w.y_m;
+  at.heading_rad = w.heading_rad;
+  at.climb_rad = w.climb_rad;
+  at.copper_heat_w = heat_at(w, model.parameters().thermal_time_constant_s);
+  for (std::size_t s : {0u, 1u}) {
+    // A wheel at rest bears what its friction holds; the drive asks nothing of its motor.
+    if (w.resting[s]) at.wheel_speed_rad_s[s] = at.wheel_acceleration_rad_s2[s] = 0;
+    at.current_slope_a_s[s] = std::isfinite(w.current_slope_a_s[s]) ? w.current_slope_a_s[s] : 0.0;
+  }
+  return at;
+}
+
+// Motions that stand for a window. Friction bends with speed: where the speed changes under the window, its
+// begin, middle and end are taken apart.
+struct Nodes {
+  std::array<dynamics::Instant, 3> at;
+  std::array<double, 3> weight{1, 0, 0};
+  std::size_t count = 1;
+
+  Nodes(const Window& w, const dynamics::Instant& middle) {
+    constexpr double least_change_rad_s = 0.05;  // from begin to end
+    const auto changes = [&](std::size_t s) {
+      return !w.resting[s] &&
+             std::fabs(w.part_speed_rad_s[2][s] - w.part_speed_rad_s[0][s]) > least_change_rad_s;
+    };
+    at[0] = middle;
+    const bool whole = std::ranges::all_of(w.part_weight, [](double part) { return part > 0; });
+    if (!whole || (!changes(0) && !changes(1))) return;
+    at.fill(middle);
+    weight = w.part_weight;
+    count = at.size();
+    for (std::size_t part = 0; part < count; ++part) {
+      for (std::size_t s : {0u, 1u}) {
+        if (!w.resting[s]) at[part].wheel_speed_rad_s[s] = w.part_speed_rad_s[part][s];
+      }
+    }
+  }
+};
+
+}  // namespace
+
+std::string_view name_of(Channel channel) {
+  switch (channel) {
+    case Channel::voltage_right:
+    case Channel::voltage_left:
+      return "motor_voltage";
+    case Channel::torque_right:
+    case Channel::torque_left:
+      return "wheel_torque";
+    case Channel::drive_right:
+    case Channel::drive_left:
+      return "motor_voltage_from_motion";
+    case Channel::bus:
+      return "battery_power_from_motors";
+    case Channel::power:
+      return "battery_power_from_motion";
+    case Channel::battery_voltage:
+      return "battery_voltage";
+    case Channel::gyro:
+      return "yaw_rate";
+    case Channel::travel:
+      return "map_travel";
+    case Channel::turn:
+      return "map_turn";
+  }
+  return "";
+}
+
+template <class S>
+MeteredPower<S> metered_powers(const dynamics::BasicDriveModel<S>& model, const Window& w) {
+  const auto& p = model.parameters();
+  const dynamics::Instant at = instant_of(model, w);
+  if (w.resting[0] && w.resting[1])
+    return {model.metered_battery_power(model.battery_power_for({S(0), S(0)}), w.battery_voltage_v), S(0)};
+  const Nodes nodes(w, at);
+  S battery = 0, motors = 0;
+  for (std::size_t n = 0; n < nodes.count; ++n) {
+    const auto flow = model.flow(nodes.at[n]);
+    battery += flow.battery_power_w * nodes.weight[n];
+    for (std::size_t s : {0u, 1u}) {
+      motors += ((S(1) + p.motor_voltage.gain) * flow.voltage_v[s] + p.motor_voltage.bias) *
+                ((S(1) + p.motor_current.gain) * flow.current_a[s] + p.motor_current.bias) * nodes.weight[n];
+    }
+  }
+  battery = model.metered_battery_power(battery, w.battery_voltage_v) -
+            (p.sensor_delay_s - w.electrical_shift_s) *
+                (std::isfinite(w.battery_power_slope_w_s) ? w.battery_power_slope_w_s : 0.0);
+  return {battery, motors};
+}
+
+template <class S>
+S metered_power(const dynamics::BasicDriveModel<S>& model, const Window& w) {
+  return metered_powers(model, w).battery_w;
+}
+
+void mark_turning_power(std::span<Window> windows, const dynamics::DriveModel& model) {
+  const auto motor_power = [&](const dynamics::Instant& at) {
+    const auto flow = model.flow(at);
+    return flow.motor_power_w[0] + flow.motor_power_w[1];
+  };
+  std::vector<double> least(windows.size(), 0.0), most(windows.size(), 0.0);
+  for (std::size_t k = 0; k < windows.size(); ++k) {
+    const Window& w = windows[k];
+    if (w.resting[0] && w.resting[1]) continue;
+    const Nodes nodes(w, instant_of(model, w));
+    least[k] = std::numeric_limits<double>::infinity();
+    most[k] = -least[k];
+    // Regular windows have neighbours half a window away, which say more than their own parts.
+    for (std::size_t n = 0; n < (w.reading ? nodes.count : 1); ++n) {
+      const double power = motor_power(w.reading ? nodes.at[n] : instant_of(model, w));
+      least[k] = std::min(least[k], power);
+      most[k] = std::max(most[k], power);
+    }
+  }
+  for (std::size_t k = 0; k < windows.size(); ++k) {
+    double low = least[k], high = most[k];
+    const auto with = [&](std::size_t other) {
+      low = std::min(low, least[other]);
+      high = std::max(high, most[other]);
+    };
+    if (!windows[k].reading && windows[k].continues && k > 0) with(k - 1);
+    if (!windows[k].reading && k + 1 < windows.size() && windows[k + 1].continues) with(k + 1);
+    windows[k].power_turns = low < 0 && high > 0;
+  }
+}
+
+template <class S>
+ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w,
+                           const FromMotion& from_motion) {
+  const auto& p = model.parameters();
+  const S delay = p.sensor_delay_s - w.electrical_shift_s;  // that the windows still carry
+  ChannelValues<S> r;
+  r.fill(S(missing));
+  const dynamics::Instant at = instant_of(model, w);
+  const Nodes nodes(w, at);
+  std::array<S, 2> torque_nm{};
+  S yaw_rate_rad_s = 0;
+  for (std::size_t n = 0; n < nodes.count; ++n) {
+    const auto balance = model.balance(nodes.at[n]);
+    for (std::size_t s : {0u, 1u}) torque_nm[s] += balance.total_nm[s] * nodes.weight[n];
+    yaw_rate_rad_s += balance.body.yaw_rate_rad_s * nodes.weight[n];
+  }
+  std::array<S, 2> motor_power{};
+  S motor_abs = 0, braking = 0;
+  for (std::size_t s : {0u, 1u}) {
+    // Readings against what the sensors would read of the model, so that no regressor carries their noise
+    // except the measured current in the voltage's.
+    const S reading = w.current_a[s] + delay * w.current_slope_a_s[s];
+    const S current = (reading - p.motor_current.bias) / (S(1) + p.motor_current.gain);
+    // The brushes' share by the mean sign under the window, not by the sign of the mean.
+    const S voltage =
+        model.voltage_for(s, current, at) +
+        p.brush_drop_v * (S(w.current_sign[s]) - dynamics::smooth_sign(current, dynamics::brush_width_a));
+    if (!w.motors_apart && (w.resting[s] || std::fabs(w.current_sign[s]) > clear_sign)) {
+      r[index_of(Channel::voltage_right) + s] = w.voltage_v[s] + delay * w.voltage_slope_v_s[s] -
+                                                (S(1) + p.motor_voltage.gain) * voltage -
+                                                p.motor_voltage.bias;
+    }
+    if (w.moving[s] && !w.motors_apart) {
+      r[index_of(Channel::torque_right) + s] =
+          reading - (S(1) + p.motor_current.gain) * model.current_for(torque_nm[s]) - p.motor_current.bias;
+    }
+    if (from_motion.voltage && !w.motors_apart && (w.moving[s] || w.resting[s])) {
+      const S asked = w.resting[s] ? S(0) : model.voltage_for(s, model.current_for(torque_nm[s]), at);
+      r[index_of(Channel::drive_right) + s] = w.voltage_v[s] + delay * w.voltage_slope_v_s[s] -
+                                              (S(1) + p.motor_voltage.gain) * asked - p.motor_voltage.bias;
+    }
+    const S gain = (S(1) + p.motor_current.gain) * (S(1) + p.motor_voltage.gain);
+    motor_power[s] = (S(w.motor_power_w[s]) - p.motor_current.bias * w.voltage_v[s]) / gain;
+    motor_abs += S(w.motor_power_abs_w[s]) / gain;
+    braking += S(w.braking_w[s]) / gain;
+  }
+  const S bus = p.idle_power_w + p.accessory_power_w + motor_power[0] + motor_power[1] +
+                p.driver_loss * motor_abs + p.unreturned * braking;
+  r[index_of(Channel::bus)] = S(w.battery_power_w) - model.metered_battery_power(bus, w.battery_voltage_v);
+  const auto settled = [&](std::size_t s) { return w.moving[s] || w.resting[s]; };
+  if (from_motion.power && settled(0) && settled(1) && !w.power_turns)
+    r[index_of(Channel::power)] = S(w.battery_power_w) - metered_power(model, w);
+  // How far the open-circuit voltage is from the nominal one is a nuisance of its own.
+  r[index_of(Channel::battery_voltage)] =
+      S(w.battery_voltage_v) - (S(1) + p.battery_voltage.gain) * p.battery_voltage_v +
+      p.battery_resistance_ohm * (S(w.battery_current_a) - p.battery_current.bias) /
+          (S(1) + p.battery_current.gain);
+  r[index_of(Channel::gyro)] = S(w.yaw_rate_rad_s) - yaw_rate_rad_s;
+  const S grip = S(1) - p.slip;
+  const S right = p.wheel_radius_m[0] * grip * w.span_angle_rad[0],
+          left = p.wheel_radius_m[1] * grip * w.span_angle_rad[1];
+  r[index_of(Channel::travel)] = S(w.forward_m) - w.chord * 0.5 * (right + left);
+  r[index_of(Channel::turn)] = S(w.turn_rad) - (right - left) / (2.0 * p.half_track_m);
+  return r;
+}
+
+template double metered_power(const dynamics::BasicDriveModel<double>&, const Window&);
+template Dual metered_power(const dynamics::BasicDriveModel<Dual>&, const Window&);
+template MeteredPower<double> metered_powers(const dynamics::BasicDriveModel<double>&, const Window&);
+template MeteredPower<Dual> metered_powers(const dynamics::BasicDriveModel<Dual>&, const Window&);
+template ChannelValues<double> residuals(const dynamics::BasicDriveModel<double>&, const Window&, const FromMotion&);
+template ChannelValues<Dual> residuals(const dynamics::BasicDriveModel<Dual>&, const Window&, const FromMotion&);
+
+}  // namespace joulecast::gap

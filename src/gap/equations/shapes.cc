@@ -1,0 +1,137 @@
+#include "gap/equations/shapes.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string_view>
+
+namespace joulecast::gap {
+namespace {
+
+using dynamics::EffectValues;
+using Variants = std::vector<Variant>;
+
+// Strengths that are ratios to a parameter of the robot file say nothing where that is next to zero: there the
+// effect's own parameter stands in. Next to zero is what could not move this part of the mean power even tenfold.
+constexpr double least_share = 0.01, tenfold = 10;
+
+EffectValues<double> initial_values(const dynamics::Effect& effect) {
+  EffectValues<double> v = dynamics::initial(effect).values;
+  v[0] = 0;
+  return v;
+}
+
+Variants ratio_or_own(const EffectValues<double>& v, double nominal_w, const ShapeSetting& s) {
+  return {{v, tenfold * nominal_w > least_share * s.ranges.mean_power_w ? std::size_t{0} : std::size_t{1}}};
+}
+
+// One variant for each value of the second parameter.
+Variants by_second(EffectValues<double> v, std::span<const double> values, double against) {
+  Variants variants;
+  for (const double value : values) {
+    v[1] = value;
+    variants.push_back({v, 0, against});
+  }
+  return variants;
+}
+
+Variants zones(EffectValues<double> v, const ShapeSetting& s) {
+  // Where it lies was searched for: that costs.
+  constexpr double searched = 50;
+  Variants variants;
+  if (!s.ranges.position) return variants;
+  for (const Zone& zone : s.shapes.zones) {
+    v = {0, zone.x_m, zone.y_m, zone.radius_m, 0};
+    variants.push_back({v, 0, searched * static_cast<double>(s.shapes.zones.size())});
+  }
+  return variants;
+}
+
+Variants stribeck(EffectValues<double> v, const ShapeSetting& s) {
+  Variants variants;
+  for (const double speed_m_s : s.shapes.stribeck_speeds_m_s) {
+    for (const double exponent : s.shapes.stribeck_exponents) {
+      v[1] = speed_m_s / s.robot.kinematics.wheel_radius_m;
+      v[2] = exponent;
+      variants.push_back({v, 0, 6});
+    }
+  }
+  return variants;
+}
+
+// Of both motors' and the battery's sensors, the motors' alone and the battery's alone.
+Variants sensors(EffectValues<double> v, const ShapeSetting& s) {
+  // The battery's sensor alone wrong, the motors' right, looks like a load that follows the current.
+  constexpr double battery_alone = 40, motors = 3;
+  Variants variants;
+  for (const auto& [of_motors, of_battery] : {std::pair{1.0, 1.0}, {1.0, 0.0}, {0.0, 1.0}}) {
+    v[1] = of_motors;
+    v[2] = of_battery;
+    if (s.power_from_motion && of_motors * of_battery == 0) continue;  // only the battery's sensor is seen
+    variants.push_back({v, 0, s.power_from_motion ? 1 : of_motors > 0 ? motors : battery_alone});
+  }
+  return variants;
+}
+
+}  // namespace
+
+std::vector<Variant> variants_of(const dynamics::Effect& effect, const ShapeSetting& s) {
+  const std::string_view id = effect.info().id;
+  const EffectValues<double> v = initial_values(effect);
+  if (id == "floor_resistance_zone") return zones(v, s);
+  if (id == "slope") {
+    if (!s.ranges.heading) return {};
+    return {{v, 0, 1, true}};
+  }
+  if (id == "grade" && !s.ranges.climb) return {};
+  if (id == "coulomb_friction") {
+    const auto& torque = s.robot.motor.friction_torque_nm;
+    return ratio_or_own(v, (torque[0] + torque[1]) * s.ranges.mean_wheel_speed_rad_s, s);
+  }
+  if (id == "viscous_friction") {
+    const double speed = s.ranges.mean_wheel_speed_rad_s;
+    return ratio_or_own(v, 2 * s.robot.motor.viscous_friction_nm_s_rad * speed * speed, s);
+  }
+  if (id == "stribeck_friction") return stribeck(v, s);
+  if (id == "turning_scrub") return by_second(v, s.shapes.scrub_rates_rad_s, 4);
+  if (id == "winding_temperature") return by_second(v, s.shapes.winding_time_constants_s, 6);
+  if (id == "friction_asymmetry" || id == "torque_constant_loss" || id == "gear_efficiency")
+    return by_second(v, std::array{1.0, 0.0}, 2);
+  if (id == "payload_mass_error") {
+    std::vector<Variant> variants{{v, 1, 8}};
+    if (s.ranges.payload_kg > 1) variants.push_back({v, 0, 1});
+    return variants;
+  }
+  if (id == "current_sensor_gain" || id == "current_sensor_bias" || id == "voltage_sensor_gain")
+    return sensors(v, s);
+  if (id == "load_rolling_resistance" && !(s.ranges.payload_kg > 1)) return {};
+  return {{v}};
+}
+
+void Shapes::only(const dynamics::ActiveEffect& effect, double wheel_radius_m) {
+  const std::string_view id = effect.effect->info().id;
+  if (id == "turning_scrub") {
+    scrub_rates_rad_s = {effect.values[1]};
+  } else if (id == "stribeck_friction") {
+    stribeck_speeds_m_s = {effect.values[1] * wheel_radius_m};
+    stribeck_exponents = {effect.values[2]};
+  } else if (id == "winding_temperature") {
+    winding_time_constants_s = {effect.values[1]};
+  }
+}
+
+void Shapes::narrow(const dynamics::ActiveEffect& effect, double wheel_radius_m, double factor) {
+  const std::string_view id = effect.effect->info().id;
+  const double at = effect.values[1];
+  if (id == "turning_scrub") {
+    scrub_rates_rad_s = {at / factor, at, at * factor};
+  } else if (id == "stribeck_friction") {
+    const double speed = at * wheel_radius_m;
+    stribeck_speeds_m_s = {speed / factor, speed, speed * factor};
+  } else if (id == "winding_temperature") {
+    winding_time_constants_s = {at / factor, at, at * factor};
+  }
+}
+
+}  // namespace joulecast::gap

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "dynamics/catalogue.h"
+#include "gap/equations/families.h"
+#include "robot/robot_model.h"
+#include "windows/windows.h"
+
+namespace joulecast::gap {
+
+struct Zone {
+  double x_m = 0, y_m = 0, radius_m = 0;
+};
+
+// The shapes that effects are tried with; each is a variant of its effect.
+struct Shapes {
+  std::vector<Zone> zones;  // found for floor_resistance_zone
+  std::vector<double> scrub_rates_rad_s{0.01, 0.03, 0.1, 0.3};
+  std::vector<double> stribeck_speeds_m_s{0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4};
+  std::vector<double> stribeck_exponents{1, 2};
+  std::vector<double> winding_time_constants_s{windows::heat_time_constants_s.begin(),
+                                               windows::heat_time_constants_s.end()};
+
+  // Closer values around those of a chosen effect, `factor` apart.
+  void narrow(const dynamics::ActiveEffect& effect, double wheel_radius_m, double factor);
+  // The shape that it has alone.
+  void only(const dynamics::ActiveEffect& effect, double wheel_radius_m);
+};
+
+// What variants depend on.
+struct ShapeSetting {
+  const robot::RobotModel& robot;
+  const Ranges& ranges;
+  const Shapes& shapes;
+  bool power_from_motion = false;
+};
+
+// One way in which an effect may be there.
+struct Variant {
+  dynamics::EffectValues<double> values;  // of all parameters but the strength
+  std::size_t parameter = 0;              // that is its strength
+  double against = 1;                     // of how many it is one: prior odds are divided by it
+  bool two_components = false;            // strength and direction: two columns, a quarter turn apart
+};
+
+// The ways in which these recordings could show an effect; none where they cannot.
+std::vector<Variant> variants_of(const dynamics::Effect& effect, const ShapeSetting& setting);
+
+}  // namespace joulecast::gap

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "gap/equations/whitening.h"
+
+namespace joulecast::gap {
+
+// A zone that holds every place: its column, masked by position, is the column of any other zone.
+inline constexpr Zone everywhere{0, 0, 90};
+
+// The disc of the floor in which the column of the zone effect, tried everywhere, explains most of what other
+// coefficients cannot, by a grid over the visited floor, then by pattern search. Empty without positions or where no
+// disc explains anything.
+std::optional<Zone> find_zone(const ColumnSet& columns, const Rows& rows, const Noise& noise,
+                              std::span<const Window> windows);
+
+}  // namespace joulecast::gap

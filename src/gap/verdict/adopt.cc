@@ -1,0 +1,124 @@
+#include "gap/verdict/adopt.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "dynamics/catalogue.h"
+#include "gap/traits.h"
+#include "robot/robot_file.h"
+
+namespace joulecast::gap {
+namespace {
+
+using nlohmann::json;
+
+// An effect with its numbers, whatever the catalogue's bounds: what is found may take off some of what the file has.
+Result<dynamics::ActiveEffect> as_found(const robot::AdoptedEffect& adopted) {
+  const dynamics::Effect* effect = dynamics::find_effect(adopted.id);
+  if (effect == nullptr) return invalid("/effects/" + adopted.id, "is not an effect of the catalogue");
+  dynamics::ActiveEffect active = dynamics::initial(*effect);
+  const auto& parameters = effect->info().parameters;
+  for (const auto& [name, value] : adopted.parameters) {
+    const auto at = std::ranges::find(parameters, name, &dynamics::EffectParameter::name);
+    if (at != parameters.end()) active.values[static_cast<std::size_t>(at - parameters.begin())] = value;
+  }
+  return active;
+}
+
+// How an effect changes a parameter of the robot file: (1 + times) * value + plus.
+struct Change {
+  std::string pointer;
+  double times = 0, plus = 0;
+};
+
+std::optional<Change> change_of(const dynamics::ActiveEffect& effect) {
+  const Traits& traits = traits_of(effect.effect->info().id);
+  if (traits.calibrates.empty()) return std::nullopt;
+  const auto& parameters = effect.effect->info().parameters;
+  Change change{std::string(traits.calibrates), traits.adds ? 0 : effect.values[0], traits.adds ? effect.values[0] : 0};
+  for (std::size_t k = 1; k < parameters.size(); ++k) {
+    if (parameters[k].strength) change.plus += effect.values[k];
+  }
+  return change;
+}
+
+void apply(json& value, const Change& change) {
+  if (value.is_array()) {
+    for (json& one : value) apply(one, change);
+  } else {
+    value = (1 + change.times) * value.get<double>() + change.plus;
+  }
+}
+
+double mean_of(const json& value) {
+  if (!value.is_array()) return value.get<double>();
+  double sum = 0;
+  for (const json& one : value) sum += one.get<double>();
+  return sum / static_cast<double>(value.size());
+}
+
+}  // namespace
+
+Result<robot::RobotModel> with_effects(robot::RobotModel robot, std::span<const robot::AdoptedEffect> found) {
+  for (const robot::AdoptedEffect& effect : found) {
+    Result<dynamics::ActiveEffect> more = as_found(effect);
+    if (!more) return tl::unexpected(std::move(more.error()));
+    auto present = std::ranges::find(robot.effects, effect.id, &robot::AdoptedEffect::id);
+    if (present == robot.effects.end()) {
+      robot.effects.push_back(dynamics::adopt(*more));
+      present = robot.effects.end() - 1;
+    } else {
+      const Result<dynamics::ActiveEffect> had = dynamics::activate(*present);
+      if (!had) return tl::unexpected(had.error());
+      const double a = std::fabs(had->values[0]), b = std::fabs(more->values[0]);
+      const double weight = a + b > 0 ? b / (a + b) : 0;
+      const auto& parameters = more->effect->info().parameters;
+      for (std::size_t k = 0; k < parameters.size(); ++k) {
+        more->values[k] = k == 0 || parameters[k].strength ? had->values[k] + more->values[k]
+                                                           : std::lerp(had->values[k], more->values[k], weight);
+      }
+      *present = dynamics::adopt(*more);
+    }
+    if (const auto valid = dynamics::activate(*present); !valid) return tl::unexpected(valid.error());
+  }
+  return robot;
+}
+
+Result<robot::RobotModel> with_corrections(robot::RobotModel robot, std::span<const robot::AdoptedEffect> found) {
+  json file = robot::robot_to_json(robot);
+  std::vector<robot::AdoptedEffect> others;
+  for (const robot::AdoptedEffect& effect : found) {
+    const Result<dynamics::ActiveEffect> active = as_found(effect);
+    if (!active) return tl::unexpected(active.error());
+    if (const auto change = change_of(*active)) {
+      apply(file[json::json_pointer(change->pointer)], *change);
+    } else {
+      others.push_back(effect);
+    }
+  }
+  Result<robot::RobotModel> corrected = robot::parse_robot(file.dump());
+  if (!corrected) return corrected;
+  return with_effects(std::move(*corrected), others);
+}
+
+std::vector<FileCorrection> corrections_of(const robot::RobotModel& robot, std::span<const robot::AdoptedEffect> found,
+                                           std::span<const double> deviations) {
+  const json file = robot::robot_to_json(robot);
+  std::vector<FileCorrection> corrections;
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    const Result<dynamics::ActiveEffect> active = as_found(found[k]);
+    if (!active) continue;
+    const auto change = change_of(*active);
+    if (!change) continue;
+    const double value = mean_of(file[json::json_pointer(change->pointer)]);
+    std::string name = change->pointer.substr(1);
+    std::ranges::replace(name, '/', '.');
+    const bool scales = change->times != 0;
+    corrections.push_back({std::move(name), value, (1 + change->times) * value + change->plus,
+                           scales ? deviations[k] * std::fabs(value) : deviations[k]});
+  }
+  return corrections;
+}
+
+}  // namespace joulecast::gap

@@ -1,0 +1,174 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "gap/checks/check.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::gap {
+
+// A region of one variable in which measured battery power departs from the model.
+struct WhereRegion {
+  std::string channel;   // which equation it shows in
+  std::string variable;  // phase, speed_m_s, ..., floor_m
+  std::string label;     // for phases and floor cells; empty for numbers
+  double from = 0, to = 0;
+  double share = 0;                  // of the integral of |P_measured - P_model|, signed: positive spends more
+  double time_share = 0;             // of the time: what it would hold if the gap were spread evenly
+  std::array<double, 2> interval{};  // of the share, 95 %, widened for the number of regions looked at
+};
+
+struct DiagnosedParameter {
+  std::string name, unit;
+  double value = 0;
+  double deviation = 0;  // one standard deviation; NaN for a shape that was not estimated
+};
+
+// How often the method names the same on surrogates of the very recordings in which it is not.
+struct Controls {
+  std::size_t surrogates = 0, named_in = 0;
+};
+
+struct DiagnosedEffect {
+  std::string id;          // of the catalogue, or "covariate:<name>"
+  double probability = 0;  // that it is there, as such names came true in trials
+  double posterior = 0;    // by the data alone
+  std::vector<DiagnosedParameter> parameters;  // as the catalogue names them; the first is the strength
+  double share = 0;                       // Shapley: fraction of the gap that it closes on held-out blocks
+  double power_w = 0;                     // mean |change of battery power|
+  double varies = 0;                      // of its strength along the recordings, sd over the strength
+  std::vector<std::string> alternatives;  // that these data cannot tell from it
+  std::optional<Controls> controls;
+  std::string calibrates;  // parameter of the robot file that it would correct; empty: none
+};
+
+// Something that no effect of the catalogue describes.
+struct Outside {
+  double probability = 0;
+  std::string channel, follows;  // empty: none stands out
+  std::string like;              // the effect whose form it has, where its strength does not stand still
+  std::array<double, 2> power_w{};  // of that form, at the beginning and at the end of a mission
+  std::optional<Controls> controls;
+};
+
+// How large the gap of one kind of reading is.
+struct ChannelGap {
+  std::string channel;  // battery_power, motor_power, battery_voltage, yaw_rate
+  double absolute_relative = 0, noise_floor = 0;
+};
+
+struct BaselineTerm {
+  std::string name, unit;
+  double value = 0, deviation = 0;
+};
+
+// A plain regression of power on motion, the referee: no explanation stands that predicts what it was not fitted to
+// worse than this, or than the unchanged model. Errors are mean |error| over mean |power|, on the same held-out blocks.
+struct Baseline {
+  std::vector<BaselineTerm> terms;
+  double held_out = 0;                  // of the regression
+  double unchanged_model_held_out = 0;  // of the robot file
+  double explanation_held_out = 0;      // of what is found anew without each part
+  std::vector<std::string> says;        // its terms beside what the model has, in words
+  bool wins() const;                    // over the explanation, by more than the gate allows
+};
+
+// What a found explanation does on parts that had no part in finding it: effects, shapes, zone and noise are chosen
+// anew without each part.
+struct Shrinkage {
+  double before = 0, after = 0;      // integral of |P_measured - P_model| over that of |P_measured|, held out
+  double fraction = 0;               // 1 - after/before
+  std::array<double, 2> interval{};  // of the fraction, 95 %, bootstrap over blocks
+  double remaining_over_noise_floor = 0;
+  std::size_t parts = 0, agreeing = 0;  // parts left out, and those without which the same was named
+};
+
+struct NextDrive {
+  std::string manoeuvre;             // what to drive
+  std::string separates;             // "a from b"
+  double expected_log_evidence = 0;  // that it adds for telling them apart; NaN: not known
+};
+
+// One parameter of the robot file as these recordings would have it.
+struct FileCorrection {
+  std::string parameter;  // as "motor.friction_torque_nm"; its name says the unit
+  double file = 0, fits = 0, deviation = 0;
+};
+
+// Where the power of the gap comes from; `motors`: their V i, with the idle power of the robot file.
+enum class PowerSource { battery, motors, none };
+std::string_view name_of(PowerSource source);
+
+enum class Verdict { none, effects, outside, inconclusive, not_this_robot };
+std::string_view name_of(Verdict verdict);
+
+// What a report draws, so that it computes nothing.
+struct Figures {
+  struct Bin {
+    double from = 0, to = 0;
+    double before_w = 0, after_w = 0;  // mean missed power
+    double half_width_w = 0;           // half of a 95 % interval of before_w; NaN: too few blocks
+    std::size_t windows = 0;
+    std::string label;
+  };
+  struct Map {
+    std::string axis;
+    std::vector<Bin> bins;
+  };
+  struct Cell {
+    double x_m = 0, y_m = 0;  // lower corner
+    double before_w = 0, after_w = 0;
+    std::size_t windows = 0;
+  };
+  struct Point {
+    double t_s = 0, measured_w = 0, before_w = 0, after_w = 0;  // NaN breaks the line
+  };
+  struct Mission {
+    std::string mission_id;
+    std::int64_t start_utime_us = 0;
+    double length_s = 0, payload_kg = 0;
+    // Relative to the measured energy or |power|: model as it is, and with what was found.
+    double energy_before = 0, energy_after = 0, power_before = 0, power_after = 0;
+  };
+  std::vector<Map> maps;
+  double cell_m = 0;
+  std::vector<Cell> floor;
+  std::string stretch_of;  // mission of the stretch of power over time
+  std::vector<Point> power;
+  std::vector<Mission> missions;
+  double mean_power_w = 0;
+};
+
+// The answer to: where does measured power depart from the model, why, and how much of it goes away.
+struct Diagnosis {
+  std::string robot_id;
+  std::size_t missions = 0, samples = 0;
+  std::vector<std::string> notes;  // missions joined or left out, messages that could not be read
+  bool motor_channels = true;      // false: judged from battery power and motion alone
+  PowerSource power = PowerSource::battery;
+  double energy_relative = 0;          // (E_measured - E_model) / E_measured
+  double power_absolute_relative = 0;  // integral of |P_measured - P_model| over that of |P_measured|
+  double noise_floor = 0;              // the part of it that nothing unstructured removes either
+  double detectable_share = 0;         // of the power, that an effect has to move to be seen here
+  std::vector<ChannelGap> channels;
+  std::vector<Check> checks;
+  std::optional<Baseline> baseline;
+  std::vector<WhereRegion> where;  // worst first
+  Verdict verdict = Verdict::inconclusive;
+  double verdict_probability = 0;
+  std::vector<std::string> reasons;  // sentences on why the verdict is not more
+  std::vector<DiagnosedEffect> effects;
+  Outside outside;
+  std::optional<Shrinkage> shrinkage;
+  std::vector<FileCorrection> corrections;  // verdict not_this_robot: what would fit in the robot file
+  std::vector<NextDrive> next_drive;
+  std::vector<robot::AdoptedEffect> adoptable;  // the effects as a robot file takes them
+  std::string refusal;                          // why they are not to be adopted; empty: they may be
+  Figures figures;
+};
+
+}  // namespace joulecast::gap

@@ -1,0 +1,257 @@
+#include "gap/verdict/judge.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "gap/traits.h"
+#include "gap/verdict/adopt.h"
+#include "gap/verdict/probability.h"
+#include "gap/verdict/text.h"
+
+namespace joulecast::gap {
+namespace {
+
+// Of the mean power, beyond the noise floor.
+constexpr double largest_unnamed = 0.012;               // what may be left over while nothing is named
+constexpr double largest_left = 0.014, of_gap = 0.1;    // and beside names, with a part of the gap
+constexpr double far_off = 0.30;                        // a gap from which on the file is another robot's
+constexpr double closes_nothing = 0.95;                 // of the gap on held-out parts, that still is left
+constexpr double mostly_outside = 0.25;                 // of what moves power, outside the catalogue
+constexpr double beyond_usual = 3;                      // strengths that no robot has, over the usual ones
+constexpr double doubtful = 0.6;                        // factor on names beside which something speaks against all
+constexpr double varying = 0.7;                         // most that a name whose strength varies may have
+constexpr double most_detectable = 0.08;                // share below which effects must be seen for "none"
+
+// A battery sensor that reads too much while the motors' are right: a load that follows the current would read the
+// same.
+bool like_a_load(const dynamics::ActiveEffect& e) {
+  const std::string_view id = e.effect->info().id;
+  return (id == "current_sensor_gain" || id == "voltage_sensor_gain") && e.values[1] == 0;
+}
+
+bool implausible(const dynamics::ActiveEffect& e) {
+  const Traits& traits = traits_of(e.effect->info().id);
+  return traits.usual > 0 && std::fabs(e.values[0]) > beyond_usual * traits.usual;
+}
+
+std::vector<DiagnosedParameter> parameters_of(const dynamics::ActiveEffect& active, const Hypothesis& h,
+                                              const Member& member) {
+  constexpr double formula_accuracy = 0.015;
+  std::vector<DiagnosedParameter> parameters;
+  const auto& info = active.effect->info().parameters;
+  for (std::size_t k = 0; k < info.size(); ++k) {
+    if (info[k].strength && k != h.parameter) continue;  // a strength of its own that was not asked for
+    parameters.push_back({std::string(info[k].name), std::string(info[k].unit), active.values[k], missing});
+  }
+  const auto own = std::ranges::find(parameters, info[h.parameter].name, &DiagnosedParameter::name);
+  double& deviation = own->deviation;
+  if (member.sd.size() == 2) {
+    const double c = std::cos(active.values[1]), s = std::sin(active.values[1]);
+    deviation = std::hypot(c * member.sd[0], s * member.sd[1]);
+    parameters[1].deviation =
+        std::hypot(s * member.sd[0], c * member.sd[1]) / std::max(std::fabs(active.values[0]), 1e-9);
+  } else {
+    // What the equations say of the strength, and where the two ways of estimating it differ.
+    deviation = std::hypot(member.sd[0], 0.5 * (member.coefficients[0] - active.values[h.parameter]));
+  }
+  deviation = std::hypot(deviation, formula_accuracy * active.values[h.parameter]);
+  return parameters;
+}
+
+// What speaks against the names as a whole.
+struct Doubts {
+  bool far = false;         // the gap is so large that the file is another robot's
+  bool strange = false;     // strengths that no robot has
+  bool idle = false;        // on held-out parts they close nothing
+  bool worse = false;       // than the referee or the unchanged model, on held-out parts
+  bool unexplained = false; // held-out parts keep more of the gap than right names leave
+  bool like_load = false;
+  bool any_against() const { return idle || worse || unexplained || like_load; }
+};
+
+class Judge {
+ public:
+  Judge(Diagnosis& d, const Findings& f, const robot::RobotModel& robot)
+      : d_(d), f_(f), robot_(robot), beyond_noise_(d.power_absolute_relative - d.noise_floor) {}
+
+  void run() {
+    name_effects();
+    find_outside();
+    weigh_doubts();
+    decide();
+    state_probabilities();
+    settle_adoption();
+    d_.reasons = reasons_for(d_, doubts_.worse, doubts_.unexplained);
+  }
+
+ private:
+  const Hypothesis& hypothesis(std::size_t h) const { return f_.problem.hypotheses[h]; }
+  const Member& member_of(std::size_t h) const {
+    return *std::ranges::find(f_.explanation.members, h, &Member::hypothesis);
+  }
+  std::optional<Controls> controls_of(const Member& m) const {
+    if (f_.controls.empty()) return std::nullopt;
+    return f_.controls[static_cast<std::size_t>(&m - f_.explanation.members.data())];
+  }
+
+  void name_effects() {
+    for (std::size_t k = 0; k < f_.named.size(); ++k) {
+      const Hypothesis& h = hypothesis(f_.named[k]);
+      const Member& m = member_of(f_.named[k]);
+      DiagnosedEffect e;
+      e.id = h.id();
+      e.posterior = m.probability();
+      if (m.wander > steady_wander) e.posterior = std::min(e.posterior, varying);
+      e.controls = controls_of(m);
+      // Found where it is not: no surer than the surrogates allow.
+      if (e.controls && e.controls->surrogates > 0) {
+        const double n = static_cast<double>(e.controls->surrogates);
+        e.posterior = std::min(e.posterior, 1 - static_cast<double>(e.controls->named_in) / n);
+      }
+      e.parameters = parameters_of(f_.strengths[k], h, m);
+      e.share = f_.shares[k];
+      e.power_w = f_.power_w[k];
+      e.varies = m.wander;
+      for (const Alternative& a : m.alternatives) e.alternatives.push_back(hypothesis(a.hypothesis).id());
+      e.calibrates = traits_of(e.id).calibrates;
+      weakest_ = std::min(weakest_, e.alternatives.empty() ? e.posterior : std::max(e.posterior, group_of(m, e)));
+      named_share_ += m.share;
+      d_.effects.push_back(std::move(e));
+    }
+  }
+  static double group_of(const Member& m, const DiagnosedEffect& e) {
+    return m.wander > steady_wander ? e.posterior : m.group_probability();
+  }
+
+  // The largest thing outside the catalogue that both judges see and that surrogates do not show.
+  void find_outside() {
+    const double least = least_outside_share(std::max(0.0, beyond_noise_));
+    double largest = 0;
+    const auto passes = [](const std::optional<Controls>& c) {
+      return !c || c->surrogates == 0 || 10 * c->named_in <= c->surrogates;
+    };
+    for (const Member& m : f_.explanation.members) {
+      const Hypothesis& h = hypothesis(m.hypothesis);
+      if (!h.outside() || std::min(m.by_evidence, m.by_prediction) < least_named || m.share < least) continue;
+      const auto controls = controls_of(m);
+      if (!passes(controls)) continue;
+      outside_share_ += m.share;
+      if (m.share <= largest) continue;
+      largest = m.share;
+      d_.outside = {std::min(m.by_evidence, m.by_prediction), h.channel, h.variable, "", {}, controls};
+      if (h.variable == "time" && h.channel.starts_with("battery_power")) d_.outside.like = "accessory_load";
+    }
+    if (f_.wandering) {
+      const Member& m = f_.explanation.members[*f_.wandering];
+      const auto controls = controls_of(m);
+      outside_share_ += m.share;
+      if (m.share > largest && passes(controls)) {
+        largest = m.share;
+        const std::string channel = d_.motor_channels ? "battery_power_from_motors" : "battery_power_from_motion";
+        d_.outside = {m.group_probability(), channel, "time", hypothesis(m.hypothesis).id(), f_.wandering_power_w,
+                      controls};
+      }
+    }
+    if (f_.ripple && f_.ripple->power_share > least) {
+      const Controls controls{f_.ripple->surrogates, f_.ripple->found_in};
+      if (!passes(controls)) return;
+      outside_share_ += f_.ripple->power_share;
+      rippled_ = true;
+      if (f_.ripple->power_share > largest) {
+        d_.outside = {1, d_.motor_channels ? "wheel_torque" : "battery_power_from_motion", "wheel_angle", "", {},
+                      controls};
+      }
+    }
+    if (d_.outside.channel.empty())
+      d_.outside.probability = std::min(f_.explanation.outside, f_.explanation.outside_by_prediction);
+  }
+
+  void weigh_doubts() {
+    doubts_.far = d_.power_absolute_relative > far_off;
+    doubts_.strange = std::ranges::any_of(f_.strengths, implausible);
+    doubts_.like_load = d_.motor_channels && std::ranges::any_of(f_.strengths, like_a_load);
+    if (!f_.held_out || d_.effects.empty() || d_.power == PowerSource::none) return;
+    const double after = f_.held_out->explained();
+    const bool by_power = std::ranges::all_of(d_.effects, [](const auto& e) { return shows_in_power(e.id); });
+    doubts_.idle = by_power && after > closes_nothing * f_.held_out->unchanged();
+    doubts_.worse = d_.baseline && d_.baseline->wins();
+    doubts_.unexplained = after - d_.noise_floor > largest_left + of_gap * d_.power_absolute_relative;
+  }
+
+  void decide() {
+    const bool outside = !d_.outside.channel.empty() &&
+                         (rippled_ || outside_share_ > mostly_outside * (named_share_ + outside_share_));
+    const bool open = beyond_noise_ > largest_unnamed;
+    if (outside) {
+      d_.verdict = Verdict::outside;
+      d_.verdict_probability = d_.outside.probability;
+    } else if (d_.effects.empty() || doubts_.idle) {
+      const bool blind = d_.detectable_share > most_detectable;
+      d_.verdict = !open && !blind ? Verdict::none : Verdict::inconclusive;
+      d_.verdict_probability = open ? 1 : std::max(f_.explanation.none, least_named);
+      if (d_.verdict == Verdict::none) d_.effects.clear();
+    } else if (!doubts_.any_against() && weakest_ >= least_named) {
+      d_.verdict = Verdict::effects;
+      d_.verdict_probability = weakest_;
+    } else {
+      d_.verdict = Verdict::inconclusive;
+      d_.verdict_probability = weakest_;
+    }
+    if (d_.verdict != Verdict::none && (doubts_.far || (doubts_.strange && open))) d_.verdict = Verdict::not_this_robot;
+  }
+
+  void state_probabilities() {
+    const double trust = named_share_ > 0 ? named_share_ / (named_share_ + outside_share_) : 1;
+    for (DiagnosedEffect& e : d_.effects) {
+      e.posterior *= trust;
+      if (doubts_.any_against()) e.posterior *= doubtful;
+      const Standing standing = d_.verdict == Verdict::outside ? Standing::outside
+                                : doubts_.any_against()        ? Standing::inconclusive
+                                : e.alternatives.empty()       ? Standing::alone
+                                                               : Standing::grouped;
+      e.probability = stated_probability(e.posterior, standing);
+    }
+    d_.verdict_probability = std::min(d_.verdict_probability, surest_verdict);
+    std::ranges::stable_sort(d_.effects, std::greater{}, [](const DiagnosedEffect& e) { return e.share; });
+  }
+
+  void settle_adoption() {
+    std::vector<double> deviations;
+    for (std::size_t k = 0; k < f_.strengths.size(); ++k) {
+      const std::string_view id = f_.strengths[k].effect->info().id;
+      const auto named = std::ranges::find(d_.effects, id, &DiagnosedEffect::id);
+      if (named == d_.effects.end()) continue;
+      d_.adoptable.push_back(dynamics::adopt(f_.strengths[k]));
+      const auto own = std::ranges::find_if(named->parameters, [](const auto& p) { return std::isfinite(p.deviation); });
+      deviations.push_back(own == named->parameters.end() ? 0 : own->deviation);
+    }
+    if (d_.verdict == Verdict::not_this_robot) d_.corrections = corrections_of(robot_, d_.adoptable, deviations);
+    d_.refusal = refusal_of(d_, doubts_.worse, doubts_.any_against());
+  }
+
+  Diagnosis& d_;
+  const Findings& f_;
+  const robot::RobotModel& robot_;
+  double beyond_noise_;
+  double weakest_ = 1, named_share_ = 0, outside_share_ = 0;
+  bool rippled_ = false;
+  Doubts doubts_;
+};
+
+}  // namespace
+
+bool shows_in_power(std::string_view id) {
+  return id.starts_with("covariate:") || !traits_of(id).elsewhere;
+}
+
+double least_outside_share(double gap_share) {
+  constexpr double without_a_gap = 0.016, closed = 0.01, usual = 0.012, part_of_gap = 0.2, most_gap = 0.12;
+  if (gap_share < closed) return without_a_gap;
+  return std::max(usual, part_of_gap * std::min(gap_share, most_gap));
+}
+
+void judge(Diagnosis& d, const Findings& findings, const robot::RobotModel& robot) {
+  Judge(d, findings, robot).run();
+}
+
+}  // namespace joulecast::gap

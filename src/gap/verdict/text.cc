@@ -1,0 +1,188 @@
+#include "gap/verdict/text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "gap/verdict/words.h"
+
+namespace joulecast::gap {
+namespace {
+
+constexpr double notable_outside = 0.3;  // probability of something unknown that is worth a word
+constexpr double notable_rest = 2;       // what is left over noise, the same
+
+std::string channel_words(std::string_view channel) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 9> words{
+      {{"wheel_torque", "the torque at the wheels"},
+       {"motor_voltage", "the voltage of the motors"},
+       {"battery_voltage", "the voltage of the battery"},
+       {"motor_voltage_from_motion", "the voltage of the motors"},
+       {"battery_power_from_motors", "battery power beside what the motors take"},
+       {"battery_power_from_motion", "battery power"},
+       {"yaw_rate", "how fast the robot turns for its wheels' speeds"},
+       {"map_travel", "how far the robot comes for its wheels' turns"},
+       {"map_turn", "how far the robot turns for its wheels' turns"}}};
+  const auto* found =
+      std::ranges::find(words, channel, &std::pair<std::string_view, std::string_view>::first);
+  return found == words.end() ? words_of(channel) : std::string(found->second);
+}
+
+std::string follows_words(std::string_view variable) {
+  if (variable == "wheel_angle")
+    return "repeats with the turning of a wheel, as of a wheel out of round, a bent axle, a damaged tooth "
+           "or a motor that cogs";
+  if (variable == "time") return "changes with the time since the mission began";
+  if (variable == "recent_motion")
+    return "grows or falls with how much the robot moved of late, as of what warms up in use";
+  if (variable == "position") return "depends on where the robot is";
+  return "follows the " + words_of(variable);
+}
+
+std::vector<std::string> names_of(const std::vector<std::string>& ids) {
+  std::vector<std::string> names;
+  for (const std::string& id : ids) names.push_back(words_of(id));
+  return names;
+}
+
+void say_shrinkage(const Diagnosis& d, bool unexplained, std::vector<std::string>& reasons) {
+  if (!d.shrinkage || !std::isfinite(d.shrinkage->after)) return;
+  const Shrinkage& s = *d.shrinkage;
+  const bool one = d.effects.size() == 1;
+  if (s.interval[1] < 0) {
+    reasons.push_back(sentence(
+        fmt::format("on parts left out {}, {} instead of {}, and is no explanation",
+                    one ? "it makes the gap larger" : "what they do makes the gap larger", percent(s.after),
+                    percent(s.before))));
+  } else if (s.interval[0] < 0) {
+    reasons.push_back(sentence(fmt::format("that {} on parts left out is not sure: the gap shrinks by {} to {} there",
+                                           one ? "it helps" : "they help", percent(s.interval[0]),
+                                           percent(s.interval[1]))));
+  } else if (unexplained || s.after > notable_rest * d.noise_floor) {
+    reasons.push_back(sentence(fmt::format(
+        "with {} {} of the power is still missed on parts left out, where nothing could remove {}",
+        one ? "it" : "them", percent(s.after), percent(d.noise_floor))));
+  }
+}
+
+void say_effects(const Diagnosis& d, std::vector<std::string>& reasons) {
+  for (const DiagnosedEffect& e : d.effects) {
+    if (!e.alternatives.empty()) {
+      reasons.push_back(sentence(
+          fmt::format("these data do not tell {} from {}", words_of(e.id), enumerate(names_of(e.alternatives)))));
+    }
+    if (e.controls && e.controls->named_in > 0) {
+      reasons.push_back(sentence(fmt::format("{} is also found in {} of {} surrogates of these recordings without it",
+                                             words_of(e.id), e.controls->named_in, e.controls->surrogates)));
+    }
+    constexpr double notable_wander = 0.45;
+    if (e.varies > notable_wander) {
+      reasons.push_back(sentence(fmt::format("the strength of {} varies along the recordings by {} of itself",
+                                             words_of(e.id), percent(e.varies))));
+    }
+    if ((e.id == "current_sensor_gain" || e.id == "voltage_sensor_gain") && d.motor_channels)
+      reasons.push_back(sentence(fmt::format("a load that follows the current would look like {}", words_of(e.id))));
+  }
+}
+
+void say_referee(const Diagnosis& d, std::vector<std::string>& reasons) {
+  if (!d.baseline) return;
+  const Baseline& b = *d.baseline;
+  if (b.unchanged_model_held_out < b.held_out) {
+    reasons.push_back(sentence(fmt::format(
+        "on parts left out the model as it is misses {}, with what is found it misses {}",
+        percent(b.unchanged_model_held_out), percent(b.explanation_held_out))));
+    return;
+  }
+  reasons.push_back(sentence(
+      fmt::format("a plain regression of power on speed, turning and acceleration misses {} on parts left out, this "
+                  "explanation {}",
+                  percent(b.held_out), percent(b.explanation_held_out))));
+  reasons.insert(reasons.end(), b.says.begin(), b.says.end());
+}
+
+}  // namespace
+
+std::string outside_words(const Outside& o) {
+  if (!o.like.empty() && o.power_w[0] != o.power_w[1]) {
+    const std::string what = o.like == "accessory_load" ? "a load independent of motion" : "something like " + words_of(o.like);
+    return sentence(fmt::format("{} that follows time or place: from {} W to {} W", what, brief(o.power_w[0]),
+                                brief(o.power_w[1])));
+  }
+  return sentence(fmt::format("it shows in {} and {}", channel_words(o.channel), follows_words(o.follows)));
+}
+
+std::vector<std::string> reasons_for(const Diagnosis& d, bool worse, bool unexplained) {
+  std::vector<std::string> reasons;
+  if (!std::isfinite(d.power_absolute_relative)) {
+    reasons.emplace_back(
+        d.motor_channels && d.power == PowerSource::none
+            ? "No power was recorded, and the torques alone do not decide it."
+            : "There is too little to judge by: too few seconds of motion, or neither power nor the motors' "
+              "voltage or current.");
+    if (d.effects.empty() && d.verdict == Verdict::inconclusive) return reasons;
+    reasons.clear();
+  }
+  if (d.verdict == Verdict::none) return reasons;
+  if (d.verdict == Verdict::not_this_robot) {
+    reasons.push_back(sentence(
+        fmt::format("the robot file misses {} of the power: it is not this robot's, or not as it ran here{}",
+                    percent(d.power_absolute_relative),
+                    d.corrections.empty() ? "" : "; what would fit is said below as a calibration proposal")));
+  }
+  if (!d.outside.channel.empty()) reasons.push_back(outside_words(d.outside));
+  if (worse) say_referee(d, reasons);
+  if (d.verdict == Verdict::effects) {
+    say_effects(d, reasons);
+    return reasons;
+  }
+  say_shrinkage(d, unexplained, reasons);
+  say_effects(d, reasons);
+  if (d.outside.channel.empty() && d.outside.probability >= notable_outside) {
+    reasons.push_back(sentence(fmt::format(
+        "something that no effect of the catalogue describes may be at work as well (probability {})",
+        probability_text(d.outside.probability))));
+  }
+  if (d.effects.empty() && d.verdict == Verdict::inconclusive) {
+    if (d.power_absolute_relative - d.noise_floor > 0.012) {
+      reasons.push_back(sentence(
+          fmt::format("{} of the power is missed where nothing could remove {}, and no effect of the catalogue "
+                      "accounts for it well enough to be named",
+                      percent(d.power_absolute_relative), percent(d.noise_floor))));
+    } else {
+      reasons.push_back(sentence(fmt::format(
+          "an effect that moves less than {} of the power could not have been seen in these recordings, so that "
+          "finding nothing says little",
+          percent(d.detectable_share))));
+    }
+  }
+  if (reasons.empty() && !d.effects.empty()) {
+    const auto least = std::ranges::min(d.effects, {}, &DiagnosedEffect::probability);
+    reasons.push_back(sentence(fmt::format("{} has a probability of {} only", words_of(least.id),
+                                           probability_text(least.probability))));
+  }
+  return reasons;
+}
+
+std::string refusal_of(const Diagnosis& d, bool worse, bool against) {
+  if (d.adoptable.empty()) return "nothing was found that a robot file could take";
+  if (d.verdict == Verdict::outside) return "the verdict is outside: something that no effect of the catalogue describes";
+  if (worse) {
+    return fmt::format("on parts left out it misses {} of the power, the better of the model as it is and a plain "
+                       "regression {}",
+                       percent(d.baseline->explanation_held_out, 3),
+                       percent(std::min(d.baseline->held_out, d.baseline->unchanged_model_held_out), 3));
+  }
+  if (d.verdict == Verdict::inconclusive || against) return "the verdict is inconclusive";
+  for (const DiagnosedEffect& e : d.effects) {
+    if (e.alternatives.empty()) continue;
+    return fmt::format("{} is not told from {}: name the one to adopt", e.id, enumerate(e.alternatives));
+  }
+  return {};
+}
+
+}  // namespace joulecast::gap

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "gap/verdict/diagnosis.h"
+
+// What a diagnosis says in sentences, for the report, the page and the command line alike.
+namespace joulecast::gap {
+
+// Where something outside the catalogue shows, what it follows and how large it is, where that stands out.
+std::string outside_words(const Outside& outside);
+
+// Why a verdict is not more than it is: what speaks against the effects that are likeliest, where and by what something
+// outside the catalogue shows, what the plain regression says better. Empty where nothing does.
+std::vector<std::string> reasons_for(const Diagnosis& diagnosis, bool worse_than_referee, bool unexplained);
+
+// Why what was found is not to be adopted; empty: it may be. `against`: something speaks against the names as a whole.
+std::string refusal_of(const Diagnosis& diagnosis, bool worse_than_referee, bool against);
+
+}  // namespace joulecast::gap

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+// How numbers, ids and lists are put for people.
+namespace joulecast::gap {
+
+// A number in a few digits: 0.0123, 4.5, 1200; a dash where it is not known.
+std::string brief(double value, int digits = 3);
+// "0.02 to 0.60": both ends as finely as the range is wide.
+std::string brief_range(double low, double high);
+// An id as words: "load rolling resistance", "the covariate cpu load".
+std::string words_of(std::string_view id);
+// "0.0182 ± 0.0011", with the unit where there is one.
+std::string with_deviation(double value, double deviation, std::string_view unit);
+std::string percent(double fraction, int digits = 2);  // "12 %"
+std::string probability_text(double probability);      // "0.93", "above 0.99"
+// "a", "a and b", "a, b and c".
+std::string enumerate(std::span<const std::string> items);
+std::string sentence(std::string text);  // with a capital and a full stop
+
+}  // namespace joulecast::gap

@@ -1,0 +1,241 @@
+#include "history/sqlite_chunks.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "history/covariate_chunk.h"
+#include "history/cursor.h"
+#include "history/telemetry_chunk.h"
+
+namespace joulecast::history::chunks {
+namespace {
+
+using telemetry::CovariateChange;
+using telemetry::Sample;
+
+// zstd levels: a tail chunk is soon written again, a sealed one is kept.
+constexpr int tail_level = 1;
+constexpr int sealed_level = 3;
+
+// One of the two tables: its name, the mission's column that counts what ever went in, and its chunks' codec.
+template <class Item>
+struct Table;
+
+template <>
+struct Table<Sample> {
+  static constexpr const char* name = "telemetry_chunk";
+  static constexpr const char* items = "samples";
+  static constexpr const char* counter = "telemetry_samples";
+  static auto encode(std::span<const Sample> samples, int level) { return encode_chunk(samples, level); }
+  static auto decode(std::span<const std::byte> bytes) { return decode_chunk(bytes); }
+};
+
+template <>
+struct Table<CovariateChange> {
+  static constexpr const char* name = "covariate_chunk";
+  static constexpr const char* items = "changes";
+  static constexpr const char* counter = "covariate_changes";
+  static auto encode(std::span<const CovariateChange> changes, int level) {
+    return encode_covariates(changes, level);
+  }
+  static auto decode(std::span<const std::byte> bytes) { return decode_covariates(bytes); }
+};
+
+// The text with the table's names in it: $table, $items, $counter.
+template <class Item>
+std::string sql_of(std::string text) {
+  for (const auto& [place, name] : {std::pair<std::string, std::string>{"$table", Table<Item>::name},
+                                    {"$items", Table<Item>::items},
+                                    {"$counter", Table<Item>::counter}}) {
+    for (std::size_t at = 0; (at = text.find(place, at)) != std::string::npos; at += name.size())
+      text.replace(at, place.size(), name);
+  }
+  return text;
+}
+
+template <class Item>
+void insert_chunk(Database& database, MissionKey key, std::int64_t first_ordinal, std::span<const Item> items,
+                  bool sealed, std::int64_t now_utime_us) {
+  const auto [first, last] = std::minmax_element(
+      items.begin(), items.end(), [](const Item& a, const Item& b) { return a.utime_us < b.utime_us; });
+  const std::vector<std::byte> body = Table<Item>::encode(items, sealed ? sealed_level : tail_level);
+  static const std::string sql = sql_of<Item>(
+      "INSERT INTO $table (mission_key, first_ordinal, $items, start_utime_us, end_utime_us, "
+      "stored_utime_us, sealed, bytes, body) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  Rows(database.statement(sql))
+      .bind(key)
+      .bind(first_ordinal)
+      .bind(static_cast<std::int64_t>(items.size()))
+      .bind(first->utime_us)
+      .bind(last->utime_us)
+      .bind(now_utime_us)
+      .bind(sealed)
+      .bind(static_cast<std::int64_t>(body.size()))
+      .bind(std::span<const std::byte>(body))
+      .run();
+}
+
+template <class Item>
+std::vector<Item> take_tail(Database& database, MissionKey key) {
+  static const std::string select =
+      sql_of<Item>("SELECT body FROM $table WHERE mission_key = ? AND sealed = 0 ORDER BY first_ordinal");
+  static const std::string seal =
+      sql_of<Item>("UPDATE $table SET sealed = 1 WHERE mission_key = ? AND sealed = 0");
+  static const std::string drop = sql_of<Item>("DELETE FROM $table WHERE mission_key = ? AND sealed = 0");
+  std::vector<Item> all;
+  bool readable = true;
+  {
+    Rows rows(database.statement(select));
+    rows.bind(key);
+    while (readable && rows.next()) {
+      const auto items = Table<Item>::decode(rows.blob());
+      readable = items.has_value();
+      if (readable) all.insert(all.end(), items->begin(), items->end());
+    }
+  }
+  // Damaged on disk: left as it is for the reader to report, and out of the way of what still comes.
+  Rows(database.statement(readable ? drop : seal)).bind(key).run();
+  if (!readable) all.clear();
+  return all;
+}
+
+template <class Item>
+void append_items(Database& database, MissionKey key, std::span<const Item> items, bool ended,
+                  std::int64_t now_utime_us) {
+  if (items.empty() && !ended) return;
+  static const std::string count = sql_of<Item>(
+      "SELECT $counter, (SELECT coalesce(sum($items), 0) FROM $table WHERE mission_key = ?1 AND sealed = 0) "
+      "FROM mission WHERE mission_key = ?1");
+  std::int64_t next_ordinal = 0, in_tail = 0;
+  {
+    Rows rows(database.statement(count));
+    if (rows.bind(key).next()) {
+      next_ordinal = rows.integer();
+      in_tail = rows.integer();
+    }
+  }
+  if (items.empty() && in_tail == 0) return;
+  const std::size_t unsealed = static_cast<std::size_t>(in_tail) + items.size();
+  if (!ended && unsealed < sealed_items) {
+    insert_chunk<Item>(database, key, next_ordinal, items, false, now_utime_us);
+  } else {
+    std::vector<Item> all = take_tail<Item>(database, key);
+    std::int64_t ordinal = next_ordinal - static_cast<std::int64_t>(all.size());
+    all.insert(all.end(), items.begin(), items.end());
+    for (std::span<const Item> rest = all; !rest.empty();) {
+      const auto piece = rest.first(std::min(rest.size(), sealed_items));
+      insert_chunk<Item>(database, key, ordinal, piece, ended || piece.size() == sealed_items, now_utime_us);
+      ordinal += static_cast<std::int64_t>(piece.size());
+      rest = rest.subspan(piece.size());
+    }
+  }
+  static const std::string advance = sql_of<Item>("UPDATE mission SET $counter = ? WHERE mission_key = ?");
+  Rows(database.statement(advance))
+      .bind(next_ordinal + static_cast<std::int64_t>(items.size()))
+      .bind(key)
+      .run();
+}
+
+// A page of items of the range in order of arrival, into `out`; answers the cursor of the next page.
+template <class Item>
+Result<std::string> read_page(Database& database, MissionKey key, TimeRange range, const PageRequest& page,
+                              std::vector<Item>& out) {
+  const std::string query = std::string(Table<Item>::name) + '|' + std::to_string(key) + '|' +
+                            std::to_string(range.from_utime_us) + '|' + std::to_string(range.to_utime_us);
+  std::int64_t from_ordinal = 0;
+  if (!page.cursor.empty()) {
+    const auto place = decode_cursor(query, page.cursor);
+    if (!place) return tl::unexpected(place.error());
+    from_ordinal = (*place)[0];
+  }
+  static const std::string select = sql_of<Item>(
+      "SELECT first_ordinal, body FROM $table WHERE mission_key = ?1 AND first_ordinal >= "
+      "coalesce((SELECT max(first_ordinal) FROM $table WHERE mission_key = ?1 AND first_ordinal <= ?2), 0) "
+      "AND end_utime_us >= ?3 AND start_utime_us < ?4 ORDER BY first_ordinal");
+  Rows rows(database.statement(select));
+  rows.bind(key).bind(from_ordinal).bind(range.from_utime_us).bind(range.to_utime_us);
+  while (rows.next()) {
+    std::int64_t ordinal = rows.integer();
+    const auto items = Table<Item>::decode(rows.blob());
+    if (!items) return tl::unexpected(items.error());
+    for (const Item& item : *items) {
+      const std::int64_t at = ordinal++;
+      if (at < from_ordinal || item.utime_us < range.from_utime_us || item.utime_us >= range.to_utime_us)
+        continue;
+      if (static_cast<std::int64_t>(out.size()) == page.limit) return encode_cursor(query, {at, 0});
+      out.push_back(item);
+    }
+  }
+  return std::string();
+}
+
+}  // namespace
+
+void append(Database& database, MissionKey key, std::span<const Sample> samples, bool ended,
+            std::int64_t now_utime_us) {
+  append_items(database, key, samples, ended, now_utime_us);
+}
+
+void append(Database& database, MissionKey key, std::span<const CovariateChange> changes, bool ended,
+            std::int64_t now_utime_us) {
+  append_items(database, key, changes, ended, now_utime_us);
+}
+
+Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range,
+                                const PageRequest& page) {
+  TelemetryPage result;
+  Result<std::string> next = read_page(database, key, range, page, result.samples);
+  if (!next) return tl::unexpected(std::move(next.error()));
+  result.next_cursor = std::move(*next);
+  return result;
+}
+
+Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange range,
+                                 const PageRequest& page) {
+  CovariatePage result;
+  Result<std::string> next = read_page(database, key, range, page, result.changes);
+  if (!next) return tl::unexpected(std::move(next.error()));
+  result.next_cursor = std::move(*next);
+  return result;
+}
+
+std::int64_t encoded_bytes(Database& database) {
+  return database.integer(
+      "SELECT (SELECT coalesce(sum(bytes), 0) FROM telemetry_chunk) + "
+      "(SELECT coalesce(sum(bytes), 0) FROM covariate_chunk)");
+}
+
+std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_chunks,
+                   std::int64_t now_utime_us) {
+  std::int64_t total_bytes = encoded_bytes(database);
+  std::vector<std::pair<bool, std::int64_t>> dropped;  // of covariates, and the key
+  {
+    // Only sealed chunks: a tail stays whole until it is merged.
+    Rows rows(database.statement(
+        "SELECT 0, chunk_key, stored_utime_us AS stored, bytes FROM telemetry_chunk WHERE sealed = 1 "
+        "UNION ALL SELECT 1, chunk_key, stored_utime_us, bytes FROM covariate_chunk WHERE sealed = 1 "
+        "ORDER BY stored, chunk_key LIMIT ?"));
+    rows.bind(max_chunks);
+    while (rows.next()) {
+      const bool of_covariates = rows.boolean();
+      const std::int64_t key = rows.integer();
+      const std::int64_t stored = rows.integer();
+      const bool too_old = keep.telemetry_max_age_us && now_utime_us - stored > *keep.telemetry_max_age_us;
+      const bool too_much = keep.telemetry_max_bytes && total_bytes > *keep.telemetry_max_bytes;
+      if (!too_old && !too_much) break;
+      total_bytes -= rows.integer();
+      dropped.emplace_back(of_covariates, key);
+    }
+  }
+  for (const auto& [of_covariates, key] : dropped) {
+    Rows(database.statement(of_covariates ? "DELETE FROM covariate_chunk WHERE chunk_key = ?"
+                                          : "DELETE FROM telemetry_chunk WHERE chunk_key = ?"))
+        .bind(key)
+        .run();
+  }
+  return static_cast<std::int64_t>(dropped.size());
+}
+
+}  // namespace joulecast::history::chunks

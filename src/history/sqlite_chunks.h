@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "base/error.h"
+#include "history/commands.h"
+#include "history/sqlite.h"
+#include "history/store.h"
+
+// Raw telemetry and covariates as SQL: two tables of one shape (schemas/store.sql). They throw SqliteError.
+namespace joulecast::history::chunks {
+
+// Samples or changes of a sealed chunk: large enough to compress well, small enough to decode in a fraction
+// of a millisecond.
+inline constexpr std::size_t sealed_items = 1024;
+
+// Appends to the mission's unsealed tail and seals it in full chunks, or all of it when the mission has
+// ended.
+void append(Database& database, MissionKey key, std::span<const telemetry::Sample> samples, bool ended,
+            std::int64_t now_utime_us);
+void append(Database& database, MissionKey key, std::span<const telemetry::CovariateChange> changes,
+            bool ended, std::int64_t now_utime_us);
+
+// As Store's; the mission is known to be there.
+Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range, const PageRequest& page);
+Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange range,
+                                 const PageRequest& page);
+
+std::int64_t encoded_bytes(Database& database);
+
+// Drops chunks beyond the retention, oldest first, at most `max_chunks`; answers how many.
+std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_chunks,
+                   std::int64_t now_utime_us);
+
+}  // namespace joulecast::history::chunks

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+namespace joulecast::statistics {
+
+// The middle value, of an even number the mean of the two in the middle; `values` must not be empty.
+double median(std::vector<double> values);
+
+// The value below which this fraction of the values lies, linear between neighbours; not of nothing.
+double quantile(std::vector<double> values, double fraction);
+
+// A standard deviation of values about zero that a tenth of outliers does not move: from the mean size of the other
+// nine. (The median of sizes would be zero where most of what a sensor reads is a resting robot's nothing.) 0 of
+// nothing.
+double spread_about_zero(std::span<const double> values);
+
+// Weight of a residual in Huber's estimator: 1 within `bound` spreads, falling as their inverse beyond it.
+double huber_weight(double residual, double spread, double bound);
+
+}  // namespace joulecast::statistics

@@ -1,0 +1,112 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "telemetry/sample.h"
+
+// robot_covariates_t, free of LCM: named quantities beside a robot's telemetry that may explain its power.
+namespace joulecast::telemetry {
+
+inline constexpr std::size_t max_covariates = 64;             // names in a message, and in a mission
+inline constexpr std::size_t max_covariate_name_length = 47;  // of a name, and of the label after its '='
+
+// The covariate from which the climb follows: height above any fixed datum, m.
+inline constexpr std::string_view height_covariate = "height_m";
+
+// "name" or "name=label", each part 1 to 47 of letters, digits, '.', '_' and '-'.
+[[nodiscard]] bool is_valid_covariate_name(std::string_view name) noexcept;
+[[nodiscard]] bool is_label(std::string_view covariate_name) noexcept;
+
+struct Covariate {
+  std::string name;
+  double value = unmeasured;  // of a label 1 or 0; NaN: unknown from now on
+
+  friend bool operator==(const Covariate&, const Covariate&) = default;
+};
+
+struct CovariateMessage {
+  std::int64_t utime_us = 0;
+  std::vector<Covariate> covariates;
+};
+
+// A value that is another than the one before it, and the robot's time from which on it holds.
+struct CovariateChange {
+  std::int64_t utime_us = 0;
+  std::string name;
+  double value = unmeasured;
+};
+
+// One covariate over a mission: value[k] holds from utime_us[k] until utime_us[k + 1]. Times increase; before
+// the first the covariate is unknown.
+struct CovariateSeries {
+  std::string name;
+  std::vector<std::int64_t> utime_us;
+  std::vector<double> value;
+};
+
+// Changes in any order as series, in the order in which the names first come; of two values of one name and
+// time the later in the list holds.
+[[nodiscard]] std::vector<CovariateSeries> series_of(std::span<const CovariateChange> changes);
+
+// The series as changes in order of time.
+[[nodiscard]] std::vector<CovariateChange> changes_of(std::span<const CovariateSeries> series);
+
+// The series of that name, or null.
+[[nodiscard]] const CovariateSeries* find_series(std::span<const CovariateSeries> series,
+                                                 std::string_view name);
+
+// Reads a series at times that do not go back. NaN: unknown.
+class CovariateReader {
+ public:
+  // A null series is unknown throughout.
+  explicit CovariateReader(const CovariateSeries* series) : series_(series) {}
+  double at(std::int64_t utime_us);
+
+ private:
+  const CovariateSeries* series_;
+  std::size_t next_ = 0;
+};
+
+// One robot's covariates as its messages arrive: which of their values are news, and what holds when a
+// mission begins. Holds max_covariates names at most.
+class CovariateTracker {
+ public:
+  enum class Verdict {
+    news,     // the value changed
+    repeat,   // it is the one that holds
+    late,     // older than the one that holds
+    no_room,  // a name beyond max_covariates
+  };
+
+  // A value older by more than `reorder_us` than the one that holds tells of a clock set back, and is news.
+  explicit CovariateTracker(std::int64_t reorder_us = 5'000'000) : reorder_us_(reorder_us) {}
+
+  // Takes one value of a message; `change` is set where it is news. Within a mission no change is earlier
+  // than the mission's start.
+  Verdict take(std::int64_t utime_us, const Covariate& covariate, CovariateChange& change);
+
+  // A mission begins: what holds, as changes at its start. Forgets the names that hold nothing.
+  std::vector<CovariateChange> begin_mission(std::int64_t start_utime_us);
+
+  // Goes on with what held when an earlier run of the program stopped within a mission.
+  void resume(std::int64_t mission_start_utime_us, std::span<const CovariateChange> held);
+
+ private:
+  struct Held {
+    std::int64_t utime_us = 0;
+    double value = unmeasured;
+  };
+
+  std::int64_t reorder_us_;
+  std::int64_t mission_start_us_ = INT64_MIN;
+  std::map<std::string, Held, std::less<>> held_;
+};
+
+}  // namespace joulecast::telemetry

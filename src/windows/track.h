@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "robot/robot_model.h"
+#include "telemetry/recording.h"
+#include "windows/windows.h"
+
+namespace joulecast::windows {
+
+// One mission's channels as columns, with what needs every sample worked out. Only this room's own sources use it.
+struct Track {
+  std::vector<double> time_s;  // since the first sample
+  std::array<std::vector<double>, 2> speed, smooth_speed, voltage, current, power, power_abs, braking, angle,
+      current_sign;
+  std::array<std::vector<double>, 2> slid;  // angle turned since the wheel stood [rad]
+  std::vector<double> battery_voltage, battery_current, battery_power, yaw_rate, climb, x, y, heading, payload, charge;
+  std::vector<std::vector<double>> covariates;
+  double battery_voltage_step_v = 0;
+  // Copper heat and mean |wheel speed|, low-passed on every time constant.
+  std::array<std::array<std::vector<double>, 2>, heat_time_constants_s.size()> heat;
+  std::array<std::vector<double>, motion_time_constants_s.size()> motion;
+};
+
+double median_period_s(const telemetry::Recording& mission);
+
+Track make_track(const telemetry::Recording& mission, const robot::RobotModel& robot,
+                 std::span<const std::string> covariates, double period_s, const WindowSettings& settings);
+
+inline constexpr double moving_rad_s = 0.10;   // slowest wheel that surely turns
+inline constexpr double resting_rad_s = 0.03;  // fastest wheel that surely stands
+// Turned since it stood, from which on a wheel slides: before that dry friction builds up as contacts bend
+// (Canudas de Wit and others 1995).
+inline constexpr double sliding_rad = 0.1;
+
+}  // namespace joulecast::windows

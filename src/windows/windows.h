@@ -1,0 +1,103 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "robot/robot_model.h"
+#include "telemetry/recording.h"
+
+namespace joulecast::windows {
+
+inline constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+
+// Time constants on which the copper heat is low-passed [s].
+inline constexpr std::array<double, 6> heat_time_constants_s{30, 60, 120, 240, 480, 960};
+
+// Time constants on which the motion is low-passed [s].
+inline constexpr std::array<double, 3> motion_time_constants_s{8, 25, 80};
+
+// What one smooth window of a recording says: averages of every channel, and slopes in weak form, so that linear
+// equations between channels hold exactly and no noisy derivative is taken. NaN: not measured, or not read anew in
+// this window. Sides [0] right, [1] left.
+struct Window {
+  std::size_t mission = 0;
+  std::size_t block = 0;   // of assign_blocks()
+  bool continues = false;  // begins half a window (or one reading) after the previous one
+  bool reading = false;    // placed at one reading of a held channel
+  bool motors_apart = false;  // the motors' own equations speak in other windows
+  double t_s = 0;          // since the mission began
+  double length_s = 0;
+  double payload_kg = 0;
+  std::array<double, 2> speed_rad_s{}, acceleration_rad_s2{};
+  // Begin, middle and end of the window: their parts of the mean and the mean speeds in them; a part without
+  // samples has no weight.
+  std::array<double, 3> part_weight{0, 1, 0};
+  std::array<std::array<double, 2>, 3> part_speed_rad_s{};
+  std::array<bool, 2> moving{}, resting{};  // throughout the window; neither: starting or stopping
+  std::array<double, 2> voltage_v{missing, missing}, current_a{missing, missing};
+  std::array<double, 2> voltage_slope_v_s{}, current_slope_a_s{};
+  std::array<double, 2> motor_power_w{missing, missing};
+  std::array<double, 2> motor_power_abs_w{}, braking_w{};  // mean |V i| and mean of -V i while negative
+  std::array<double, 2> current_sign{};  // mean sign of the current, soft below a tenth of the friction's
+  std::array<std::array<double, 2>, heat_time_constants_s.size()> copper_heat_w{};
+  std::array<double, motion_time_constants_s.size()> recent_rad_s{};  // mean |wheel speed|, low-passed
+  bool power_turns = false;  // the motors may brake in one part of it and drive in another
+  double battery_voltage_v = missing, battery_current_a = missing, battery_power_w = missing;
+  double battery_voltage_step_v = 0;  // between readings that differ, of the whole mission
+  double battery_power_slope_w_s = 0, battery_current_slope_a_s = 0;
+  double electrical_shift_s = 0;  // by which electrical readings were moved back before windowing
+  double charge_as = 0;           // drawn since the mission began
+  double yaw_rate_rad_s = missing;
+  double x_m = missing, y_m = missing, heading_rad = missing;
+  double climb_rad = missing;              // of the floor along the heading (dynamics/climb.h)
+  std::vector<double> covariates;          // in the order of covariate_names()
+  // Progress by the map over a span that starts here; NaN except once a span.
+  double forward_m = missing, turn_rad = missing;
+  double chord = 1;                        // straight distance over path length in that span
+  std::array<double, 2> span_angle_rad{};  // turned by each wheel in that span
+};
+
+struct WindowSettings {
+  double length_s = 0.4;
+  std::size_t fewest_samples = 8;   // in a window; slow recordings get longer windows
+  double longest_gap_s = 0.25;      // between samples inside a window
+  double span_s = 1.0;              // over which progress by the map is compared
+  double electrical_delay_s = 0;    // by which electrical channels lag; taken out before windowing
+  double motor_current_bias_a = 0;  // of the reading, when the sign of a current is asked for
+  std::size_t most_windows = 8000;  // beyond it, stretches of windows are left out evenly
+};
+
+// How the electrical channels were read: their true rate, and where in time a reading belongs.
+struct Readings {
+  double row_s = 0;             // median time between rows
+  bool battery_held = false;    // rows repeat the battery's readings,
+  bool motors_held = false;     // or the motors'
+  double period_s = 0;          // between readings of what is held
+  double delay_s = 0;           // of a held reading behind the middle of the motion that it speaks of
+  double averaged_s = 0;        // length of that motion
+  bool held() const { return battery_held || motors_held; }
+};
+
+// How these recordings were read. Where rows repeat readings, the delay and the averaging are taken with which a
+// plain regression of power on motion (constant, |speed|, |yaw rate|, power of acceleration) misses least.
+Readings find_readings(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot);
+
+// Names of all covariates of these missions that differ anywhere, in order; height, from which the climb follows, is not
+// among them.
+std::vector<std::string> covariate_names(std::span<const telemetry::Recording> missions);
+
+// Windows of all missions, half overlapping; channels whose readings are held speak in windows of their own, one a
+// reading, after the others of their mission.
+std::vector<Window> make_windows(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot,
+                                 const Readings& readings, const WindowSettings& settings = {});
+
+// Parts of the recordings that are left out together, ascending with the windows: whole missions where there are
+// enough of them, several where there are many, stretches of one where there are few. Sets Window::block and returns
+// how many there are.
+std::size_t assign_blocks(std::span<Window> windows, std::span<const double> mission_length_s);
+
+}  // namespace joulecast::windows

@@ -1,0 +1,175 @@
+#include "gap/checks/check.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "tests/gap/checks/made_recordings.h"
+#include "tests/gap/checks/mistakes.h"
+#include "tests/support/sample_robots.h"
+
+namespace joulecast::gap {
+namespace {
+
+namespace vr = virtual_robot;
+
+const Check* find(const std::vector<Check>& checks, std::string_view id) {
+  const auto at = std::ranges::find(checks, id, &Check::id);
+  return at == checks.end() ? nullptr : &*at;
+}
+
+const made::Robot& scout() {
+  static const made::Robot robot =
+      made::virtual_robot("nomad", 31, [](vr::SimulationSpec& s) { s.sensors.pitch = true; });
+  return robot;
+}
+
+TEST(SilenceContradicted, TakesAwayTheReadingsOfTheChannelAndNoOther) {
+  telemetry::RecordingSet set = scout().recordings;
+  const std::vector<Check> checks{{"dead_channel", "motor_current.left, pose", 0, {}, "", true, {}},
+                                  {"held_samples", "yaw_rate", 0, {}, "", false, {}}};
+  silence_contradicted(set, checks);
+  const telemetry::Sample& s = set.missions[1].samples[7];
+  EXPECT_TRUE(std::isnan(s.motor_current_a[1]));
+  EXPECT_TRUE(std::isnan(s.pose[0]) && std::isnan(s.pose[1]) && std::isnan(s.pose[2]));
+  EXPECT_TRUE(std::isfinite(s.motor_current_a[0]));
+  EXPECT_TRUE(std::isfinite(s.yaw_rate_rad_s));
+}
+
+TEST(CheckRecordings, AWrongClockLeavesNothingElseToSay) {
+  telemetry::RecordingSet set = scout().recordings;
+  mistakes::scale_clock(set, 1e3);
+  const auto checks = check_recordings(set, scout().model);
+  ASSERT_EQ(checks.size(), 1u);
+  EXPECT_EQ(checks[0].id, "utime_scale");
+  EXPECT_EQ(checks[0].channel, "utime");
+}
+
+TEST(CheckRecordings, ShortMissionsAreNamed) {
+  telemetry::RecordingSet set = scout().recordings;
+  set.missions.push_back(set.missions.front());
+  set.missions.back().mission_id = "stub";
+  set.missions.back().samples.resize(60);
+  const auto checks = check_recordings(set, scout().model);
+  ASSERT_TRUE(find(checks, "short_missions"));
+  EXPECT_EQ(find(checks, "short_missions")->value, 1);
+  EXPECT_NE(find(checks, "short_missions")->says.find("stub"), std::string::npos);
+}
+
+TEST(CheckRecordings, DisorderAndGapsOfTheClockAreTold) {
+  telemetry::RecordingSet set = scout().recordings;
+  for (auto& mission : set.missions) {
+    for (std::size_t k = 1; k < mission.samples.size(); ++k) {
+      if (k % 20 == 0) mission.samples[k].utime_us = mission.samples[k - 1].utime_us;
+    }
+    for (std::size_t k = mission.samples.size() / 2; k < mission.samples.size(); ++k) {
+      mission.samples[k].utime_us += 20'000'000;
+    }
+  }
+  const auto checks = check_recordings(set, scout().model);
+  ASSERT_TRUE(find(checks, "utime_order"));
+  ASSERT_TRUE(find(checks, "utime_gaps"));
+  EXPECT_NEAR(find(checks, "utime_gaps")->value, 20.0 * static_cast<double>(set.missions.size()), 3);
+}
+
+TEST(CheckRecordings, AYearThatNobodyLivesInIsTold) {
+  telemetry::RecordingSet set = scout().recordings;
+  mistakes::each_sample(set, [](telemetry::Sample& s) { s.utime_us += 10'000'000'000'000'000; });
+  const auto checks = check_recordings(set, scout().model);
+  ASSERT_TRUE(find(checks, "utime_year"));
+  EXPECT_GT(find(checks, "utime_year")->value, 2300);
+}
+
+TEST(CheckRecordings, PitchAndPayloadHaveTheirUnits) {
+  telemetry::RecordingSet degrees = scout().recordings;
+  mistakes::each_sample(degrees, [](telemetry::Sample& s) { s.pitch_rad = 12 + 57.3 * s.pitch_rad; });
+  ASSERT_TRUE(find(check_recordings(degrees, scout().model), "pitch_scale"));
+  telemetry::RecordingSet grams = scout().recordings;
+  mistakes::multiply(grams, {reading::payload}, 1000);
+  ASSERT_TRUE(find(check_recordings(grams, scout().model), "payload_scale"));
+  EXPECT_FALSE(find(check_recordings(scout().recordings, scout().model), "payload_scale"));
+}
+
+TEST(CheckRecordings, ASpeedOverTheLimitIsToldWhereNothingElseSaysWhy) {
+  robot::RobotModel slow = scout().model;
+  slow.limits.speed_m_s /= 2.2;
+  slow.limits.yaw_rate_rad_s /= 3;
+  const auto checks = check_recordings(scout().recordings, slow);
+  ASSERT_TRUE(find(checks, "speed_over_limit"));
+  EXPECT_GT(find(checks, "speed_over_limit")->value, 1.5);
+  ASSERT_TRUE(find(checks, "yaw_rate_over_limit"));
+  EXPECT_TRUE(std::ranges::none_of(checks, &Check::contradicted));
+}
+
+TEST(CheckRecordings, ClippedAndCoarseChannelsAreTold) {
+  telemetry::RecordingSet clipped = scout().recordings;
+  mistakes::clip(clipped, {reading::motor_current}, 0.5);
+  ASSERT_TRUE(find(check_recordings(clipped, scout().model), "clipped_channel"));
+  EXPECT_NEAR(find(check_recordings(clipped, scout().model), "clipped_channel")->value, 0.5, 1e-9);
+  telemetry::RecordingSet coarse = scout().recordings;
+  mistakes::round_to(coarse, {reading::battery_current}, 1.0);
+  ASSERT_TRUE(find(check_recordings(coarse, scout().model), "coarse_channel"));
+  EXPECT_EQ(find(check_recordings(coarse, scout().model), "coarse_channel")->channel, "battery_current");
+  EXPECT_FALSE(find(check_recordings(scout().recordings, scout().model), "clipped_channel"));
+  EXPECT_FALSE(find(check_recordings(scout().recordings, scout().model), "coarse_channel"));
+}
+
+TEST(CheckRecordings, AChannelThatIsMostlyMissingIsTold) {
+  telemetry::RecordingSet set = scout().recordings;
+  for (auto& mission : set.missions) {
+    for (std::size_t k = 200; k < mission.samples.size(); ++k) {
+      mission.samples[k].yaw_rate_rad_s = std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+  const auto checks = check_recordings(set, scout().model);
+  ASSERT_TRUE(find(checks, "mostly_missing"));
+  EXPECT_EQ(find(checks, "mostly_missing")->channel, "yaw_rate");
+}
+
+// What the file says and what the robot is, apart.
+TEST(CheckRecordings, AFileOfAnotherRobotIsTold) {
+  robot::RobotModel other = scout().model;
+  other.motor.resistance_ohm *= 2;
+  for (double& t : other.motor.friction_torque_nm) t /= 2;
+  const auto checks = check_recordings(scout().recordings, other);
+  ASSERT_TRUE(find(checks, "robot_file"));
+  const std::string& says = find(checks, "robot_file")->says;
+  EXPECT_NE(says.find("resistance 0.5"), std::string::npos) << says;
+  EXPECT_NE(says.find("friction"), std::string::npos) << says;
+  EXPECT_TRUE(std::ranges::none_of(checks, &Check::contradicted));
+}
+
+TEST(CheckRecordings, AStepIsSplitBetweenItsMissions) {
+  telemetry::RecordingSet set = scout().recordings;
+  mistakes::step(set, {reading::battery_current}, 1.25);
+  const auto checks = check_recordings(set, scout().model);
+  ASSERT_TRUE(find(checks, "step_between_missions"));
+  const Check& step = *find(checks, "step_between_missions");
+  EXPECT_EQ(step.first_mission, set.missions.size() / 2);
+  EXPECT_NEAR(step.value, 0.25, 0.03);
+  EXPECT_NE(step.says.find(set.missions[set.missions.size() / 2].mission_id), std::string::npos);
+  EXPECT_LT(step.interval[0], 0.25);
+}
+
+// As they come to a daemon: one at a time, mission after mission.
+TEST(Observer, GivesWhatTheWholeRecordingGives) {
+  const made::Robot& robot = scout();
+  Observer observer(robot.model);
+  std::vector<Observation> observations;
+  for (const auto& mission : robot.recordings.missions) {
+    observer.begin(mission.mission_id, mission.payload_kg);
+    for (const auto& sample : mission.samples) observer.add(sample);
+    observations.push_back(observer.finish());
+  }
+  telemetry::RecordingSet wrong = robot.recordings;
+  mistakes::multiply(wrong, {reading::battery_current}, -1);
+  EXPECT_EQ(check_observations(observations, robot.model).size(),
+            check_recordings(robot.recordings, robot.model).size());
+  EXPECT_FALSE(check_recordings(wrong, robot.model).empty());
+}
+
+}  // namespace
+}  // namespace joulecast::gap

@@ -1,0 +1,107 @@
+#include "gap/checks/faults.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/support/sample_robots.h"
+
+namespace joulecast::gap {
+namespace {
+
+Evidence evidence(double ratio, std::initializer_list<std::pair<Source, int>> exponents, double off,
+                  double trust) {
+  Evidence e;
+  e.ratio = {ratio, 0.01 * std::fabs(ratio), 50};
+  for (const auto& [source, power] : exponents) e.exponent[static_cast<std::size_t>(source)] = power;
+  e.below = e.above = off;
+  e.trust = trust;
+  return e;
+}
+
+// Two things that the gyro and the wheels determine, and one that the wheels and the map do.
+std::vector<Evidence> kinematics(double gyro, double wheels) {
+  return {evidence(gyro / wheels, {{Source::yaw_rate, 1}, {Source::wheel_right, -1}}, 0.3, 8),
+          evidence(gyro / wheels, {{Source::yaw_rate, 1}, {Source::wheel_left, -1}}, 0.3, 8),
+          evidence(1 / wheels, {{Source::position, 1}, {Source::wheel_right, -1}}, 0.2, 8),
+          evidence(1 / wheels, {{Source::position, 1}, {Source::wheel_left, -1}}, 0.2, 8),
+          evidence(1 / gyro, {{Source::heading, 1}, {Source::yaw_rate, -1}}, 0.1, 12)};
+}
+
+class Faults : public ::testing::Test {
+ protected:
+  robot::RobotModel robot_ = testing::nomad();
+  std::vector<Fault> faults_ = known_faults(robot_);
+};
+
+TEST_F(Faults, SoundEvidenceNeedsNone) {
+  for (const double off : {0.75, 1.0, 1.3}) {
+    const auto some = kinematics(off, 1);
+    EXPECT_TRUE(explain(some, faults_).faults.empty()) << off;
+  }
+}
+
+TEST_F(Faults, TheOneThatAccountsForAllIsBlamed) {
+  struct Case {
+    double gyro, wheels;
+    const char* id;
+    double factor;
+  };
+  const double degrees = 180 / std::numbers::pi, rpm = 30 / std::numbers::pi;
+  for (const Case& c : {Case{1.1 * degrees, 1, "yaw_rate_scale", 1.1 * degrees},
+                        Case{-1, 1, "yaw_rate_reversed", -1}, Case{1, rpm, "wheel_velocity_scale", rpm},
+                        Case{0.95, 1.05 * robot_.kinematics.wheel_radius_m, "wheel_velocity_scale", 0.105}}) {
+    const auto some = kinematics(c.gyro, c.wheels);
+    const Explanation explanation = explain(some, faults_);
+    ASSERT_EQ(explanation.faults.size(), 1u) << c.id;
+    EXPECT_EQ(explanation.faults[0]->id, c.id);
+    const Measured measured = measured_factor(some, explanation, *explanation.faults[0]);
+    EXPECT_NEAR(measured.factor, c.factor, 0.15 * std::fabs(c.factor));
+    EXPECT_LE(measured.interval[0], measured.factor);
+    EXPECT_GE(measured.interval[1], measured.factor);
+  }
+}
+
+TEST_F(Faults, TwoAtOnceAreFound) {
+  const auto some = kinematics(-1, 30 / std::numbers::pi);
+  const Explanation explanation = explain(some, faults_);
+  ASSERT_EQ(explanation.faults.size(), 2u);
+  std::vector<std::string> ids{explanation.faults[0]->id, explanation.faults[1]->id};
+  std::ranges::sort(ids);
+  EXPECT_EQ(ids, (std::vector<std::string>{"wheel_velocity_scale", "yaw_rate_reversed"}));
+}
+
+// Far from the file by a factor that no unit makes.
+TEST_F(Faults, AnOddFactorIsNoUnit) {
+  const std::vector<Evidence> some{evidence(3.3, {{Source::battery_current, 1}}, 1.1, 8),
+                                   evidence(2.9, {{Source::battery_current, 1}}, 1.1, 6)};
+  EXPECT_TRUE(explain(some, faults_).faults.empty());
+}
+
+// A fault that only takes the meaning from what speaks against it accounts for nothing.
+TEST_F(Faults, MeaninglessEvidenceBlamesNobody) {
+  Evidence odd = evidence(0.02, {{Source::battery_voltage, 1}}, 0.5, 12);
+  odd.lost_by[static_cast<std::size_t>(Source::wheel_right)] = true;
+  odd.both_sides = true;
+  const std::vector<Evidence> some{odd};
+  for (const Fault* fault : explain(some, faults_).faults) {
+    EXPECT_FALSE(fault->channel.starts_with("wheel_velocity")) << fault->cause;
+  }
+}
+
+TEST_F(Faults, WhatCannotBeToldApartIsNamed) {
+  // Gyro and wheels alone: either may have the sign.
+  const auto all = kinematics(-1, 1);
+  const std::span<const Evidence> some(all.data(), 2);
+  const Explanation explanation = explain(some, faults_);
+  ASSERT_EQ(explanation.faults.size(), 1u);
+  ASSERT_EQ(explanation.alternatives.size(), 1u);
+  std::vector<std::string> names{explanation.faults[0]->id};
+  for (const Fault* f : explanation.alternatives[0]) names.push_back(f->id);
+  EXPECT_NE(std::ranges::find(names, "yaw_rate_reversed"), names.end());
+  EXPECT_NE(std::ranges::find(names, "wheel_velocity_reversed"), names.end());
+}
+
+}  // namespace
+}  // namespace joulecast::gap

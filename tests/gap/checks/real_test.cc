@@ -1,0 +1,102 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "gap/checks/check.h"
+#include "robot/robot_file.h"
+#include "telemetry/csv_import.h"
+
+// Recordings that nobody made for these checks.
+namespace joulecast::gap {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path data = JOULECAST_SHARED "/data";
+const fs::path robots = JOULECAST_SOURCE_DIR "/deploy/robots";
+
+std::string text_of(const fs::path& path) {
+  std::ifstream in(path);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+const Check* find(const std::vector<Check>& checks, std::string_view id) {
+  const auto at = std::ranges::find(checks, id, &Check::id);
+  return at == checks.end() ? nullptr : &*at;
+}
+
+telemetry::RecordingSet imported(const std::vector<fs::path>& tables, const std::string& mapping) {
+  std::vector<telemetry::Recording> missions;
+  std::int64_t start = 1'700'000'000'000'000;
+  for (const fs::path& table : tables) {
+    const auto import = telemetry::import_csv(text_of(table), *telemetry::ImportMapping::parse(mapping),
+                                              {.source_name = table.string(),
+                                               .robot_id = {},
+                                               .mission_id = {},
+                                               .start_utime_us = start += 600'000'000});
+    if (import) missions.push_back(import->recording);
+  }
+  return *telemetry::make_recording_set("imported", std::move(missions));
+}
+
+std::vector<fs::path> tables_in(const fs::path& folder, std::string_view ending) {
+  std::vector<fs::path> found;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.path().string().ends_with(ending)) found.push_back(entry.path());
+  }
+  std::ranges::sort(found);
+  return found;
+}
+
+class PracticeLogs : public testing::TestWithParam<const char*> {};
+
+TEST_P(PracticeLogs, AreNotContradicted) {
+  const fs::path folder = data / "practice" / GetParam();
+  if (!fs::exists(folder)) GTEST_SKIP() << "no practice log " << folder;
+  const std::string log = folder / "telemetry.lcmlog";
+  const auto checks =
+      check_recordings(*telemetry::load_recordings({&log, 1}), *robot::load_robot(folder / "robot.json"));
+  EXPECT_TRUE(std::ranges::none_of(checks, &Check::contradicted));
+  EXPECT_LE(checks.size(), 1u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Logs, PracticeLogs,
+                         testing::Values("01_load_rolling", "03_no_regeneration", "04_accessory", "06_two",
+                                         "07_none"),
+                         [](const auto& log) { return std::string(log.param).substr(3); });
+
+// The left current is negative where the left wheel is the inner one and is driven back through the ground.
+TEST(Warthog, NoCurrentIsCalledReversed) {
+  const fs::path folder = data / "real/warthog_grass";
+  if (!fs::exists(folder)) GTEST_SKIP() << "no recordings " << folder;
+  const auto robot = robot::load_robot(robots / "warthog-grass.json");
+  ASSERT_TRUE(robot);
+  std::string mapping = text_of(JOULECAST_SOURCE_DIR "/deploy/import/warthog_grass.json");
+  const std::string sides =
+      R"("motor_current": [{"column": "right_wheel_current"}, {"column": "left_wheel_current"}],
+                               "motor_voltage": [{"column": "right_wheel_voltage"}, {"column": "left_wheel_voltage"}],)";
+  const auto fields = mapping.find("\"fields\": {") + 11;
+  mapping.insert(fields, sides);
+  const auto checks = check_recordings(imported(tables_in(folder, ".csv"), mapping), *robot);
+  for (const Check& c : checks) EXPECT_EQ(c.id.find("reversed"), std::string::npos) << c.says;
+  ASSERT_TRUE(find(checks, "supply_for_motor_voltage"));
+  ASSERT_TRUE(find(checks, "held_samples"));
+  EXPECT_NEAR(find(checks, "held_samples")->value, 1.0, 0.1);
+}
+
+TEST(Frc, TheFileOfTheOtherGearIsFarFromTheRobot) {
+  const fs::path folder = data / "real/frc3314_drivetrain";
+  if (!fs::exists(folder)) GTEST_SKIP() << "no recordings " << folder;
+  const auto set = imported(tables_in(folder, "_low.csv"),
+                            text_of(JOULECAST_SOURCE_DIR "/deploy/import/frc3314_low.json"));
+  const auto checks = check_recordings(set, *robot::load_robot(robots / "frc3314-high.json"));
+  EXPECT_TRUE(std::ranges::none_of(checks, &Check::contradicted));
+  ASSERT_TRUE(find(checks, "robot_file"));
+  EXPECT_NE(find(checks, "robot_file")->says.find("voltage constant"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace joulecast::gap

@@ -1,0 +1,192 @@
+#include "telemetry/covariates.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "telemetry/codec.h"
+#include "telemetry/log_recordings.h"
+#include "telemetry/validation.h"
+#include "temporary_file.h"
+
+namespace joulecast::telemetry {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsNan;
+using Verdict = CovariateTracker::Verdict;
+
+Verdict take(CovariateTracker& tracker, std::int64_t utime_us, const std::string& name, double value) {
+  CovariateChange change;
+  return tracker.take(utime_us, {name, value}, change);
+}
+
+TEST(Covariates, OnlyChangesAreNews) {
+  CovariateTracker tracker;
+  CovariateChange change;
+  EXPECT_EQ(tracker.take(10, {"load", 0.5}, change), Verdict::news);
+  EXPECT_EQ(change.utime_us, 10);
+  EXPECT_EQ(change.name, "load");
+  EXPECT_EQ(change.value, 0.5);
+  EXPECT_EQ(take(tracker, 20, "load", 0.5), Verdict::repeat);
+  EXPECT_EQ(take(tracker, 15, "load", 0.7), Verdict::late);  // 0.5 was said at 20 again
+  EXPECT_EQ(take(tracker, 20, "load", 0.7), Verdict::late);
+  EXPECT_EQ(take(tracker, 30, "load", unmeasured), Verdict::news);
+  EXPECT_EQ(take(tracker, 40, "load", unmeasured), Verdict::repeat);
+  EXPECT_EQ(take(tracker, 40, "heater", unmeasured), Verdict::repeat);  // nothing was known of it
+  EXPECT_EQ(take(tracker, 50, "load", 0.7), Verdict::news);
+}
+
+TEST(Covariates, AClockSetBackIsNoLateness) {
+  CovariateTracker tracker(5'000'000);
+  EXPECT_EQ(take(tracker, 3'600'000'000, "load", 0.5), Verdict::news);
+  EXPECT_EQ(take(tracker, 3'596'000'000, "load", 0.6), Verdict::late);
+  EXPECT_EQ(take(tracker, 1'000'000, "load", 0.7), Verdict::news);
+  EXPECT_EQ(take(tracker, 2'000'000, "load", 0.8), Verdict::news);
+}
+
+TEST(Covariates, HoldFromOneMissionToTheNext) {
+  CovariateTracker tracker;
+  take(tracker, 10, "load", 0.5);
+  take(tracker, 10, "floor=ice", 1);
+  take(tracker, 10, "floor=grip", 0);
+  take(tracker, 10, "heater", 3);
+  take(tracker, 20, "heater", unmeasured);
+  const auto held = tracker.begin_mission(100);
+  ASSERT_EQ(held.size(), 2u);  // what is unknown or a label that does not hold is forgotten
+  EXPECT_EQ(held[0].name, "floor=ice");
+  EXPECT_EQ(held[1].name, "load");
+  EXPECT_EQ(held[1].value, 0.5);
+  EXPECT_EQ(held[1].utime_us, 100);
+  // What comes late of the time before the start counts from the start on.
+  CovariateChange change;
+  EXPECT_EQ(tracker.take(50, {"load", 0.6}, change), Verdict::news);
+  EXPECT_EQ(change.utime_us, 100);
+}
+
+TEST(Covariates, AreBounded) {
+  CovariateTracker tracker;
+  for (std::size_t k = 0; k < max_covariates; ++k)
+    EXPECT_EQ(take(tracker, 1, "c" + std::to_string(k), 1), Verdict::news);
+  EXPECT_EQ(take(tracker, 1, "more", 1), Verdict::no_room);
+  EXPECT_EQ(take(tracker, 2, "c0", 2), Verdict::news);
+  EXPECT_EQ(take(tracker, 3, "c0", unmeasured), Verdict::news);
+  EXPECT_EQ(take(tracker, 4, "more", 1), Verdict::no_room);  // c0 is a name of this mission
+  tracker.begin_mission(5);
+  EXPECT_EQ(take(tracker, 6, "more", 1), Verdict::news);
+}
+
+TEST(Covariates, GoOnAfterARestart) {
+  CovariateTracker tracker;
+  tracker.resume(100, std::vector<CovariateChange>{{150, "load", 0.5}});
+  EXPECT_EQ(take(tracker, 160, "load", 0.5), Verdict::repeat);
+  EXPECT_EQ(take(tracker, 170, "load", 0.6), Verdict::news);
+  CovariateChange change;
+  EXPECT_EQ(tracker.take(90, {"heater", 1}, change), Verdict::news);
+  EXPECT_EQ(change.utime_us, 100);
+}
+
+TEST(Covariates, SeriesAreSortedByTimeAndReadBack) {
+  const std::vector<CovariateChange> changes{
+      {10, "b", 1}, {30, "a", 3}, {20, "a", 2}, {20, "a", 4}, {40, "b", unmeasured}};
+  const auto series = series_of(changes);
+  ASSERT_EQ(series.size(), 2u);
+  EXPECT_EQ(series[0].name, "b");
+  EXPECT_THAT(series[0].value, ElementsAre(1, IsNan()));
+  EXPECT_THAT(series[1].utime_us, ElementsAre(20, 30));
+  EXPECT_THAT(series[1].value, ElementsAre(4, 3));  // of two at one time the later in the list
+  const auto again = changes_of(series);
+  ASSERT_EQ(again.size(), 4u);
+  EXPECT_EQ(again[1].name, "a");
+  EXPECT_EQ(again[1].utime_us, 20);
+
+  CovariateReader reader(find_series(series, "a"));
+  EXPECT_THAT(reader.at(19), IsNan());
+  EXPECT_EQ(reader.at(20), 4);
+  EXPECT_EQ(reader.at(29), 4);
+  EXPECT_EQ(reader.at(1000), 3);
+  EXPECT_THAT(CovariateReader(find_series(series, "c")).at(5), IsNan());
+}
+
+TEST(Covariates, PlausibleAreFiniteNumbersAndLabelsOfTwoValues) {
+  EXPECT_FALSE(check_plausible(Covariate{"load", -1e300}));
+  EXPECT_FALSE(check_plausible(Covariate{"load", unmeasured}));
+  EXPECT_EQ(check_plausible(Covariate{"load", INFINITY})->why, Implausibility::infinite);
+  EXPECT_FALSE(check_plausible(Covariate{"floor=ice", 0}));
+  EXPECT_FALSE(check_plausible(Covariate{"floor=ice", 1}));
+  EXPECT_FALSE(check_plausible(Covariate{"floor=ice", unmeasured}));
+  const auto half = check_plausible(Covariate{"floor=ice", 0.5});
+  ASSERT_TRUE(half);
+  EXPECT_EQ(half->why, Implausibility::out_of_range);
+  EXPECT_EQ(describe(*half), "value of a label is neither 0 nor 1");
+  EXPECT_EQ(check_plausible(CovariateMessage{-1, {}})->why, Implausibility::bad_clock);
+}
+
+Recording with_covariates(const std::string& mission, std::int64_t start_utime_us,
+                          std::vector<CovariateSeries> covariates) {
+  Recording made{"a", mission, unmeasured, {}};
+  for (int k = 0; k < 5; ++k) {
+    made.samples.emplace_back();
+    made.samples.back().utime_us = start_utime_us + 100'000 * k;
+    made.samples.back().sequence = k;
+  }
+  made.covariates = std::move(covariates);
+  return made;
+}
+
+TEST(Covariates, TravelWithARecordingThroughALog) {
+  const test::TemporaryFile file;
+  auto log = EventLogWriter::create(file.path());
+  ASSERT_TRUE(log);
+  const std::vector<Recording> written{
+      with_covariates(
+          "m-1", 1'000'000,
+          {{"load", {1'000'000, 1'150'000, 1'400'000}, {0.5, 0.75, 1.5}}, {"floor=ice", {1'200'000}, {1}}}),
+      with_covariates("m-2", 2'000'000, {{"load", {2'200'000}, {1.5}}}),
+      with_covariates("m-3", 3'000'000, {})};
+  for (const Recording& r : written) ASSERT_TRUE(write_recording(*log, r));
+  ASSERT_TRUE(log->close());
+
+  const auto read = read_recordings(file.path());
+  ASSERT_TRUE(read) << describe(read.error());
+  EXPECT_EQ(read->unreadable, 0u);
+  ASSERT_EQ(read->recordings.size(), written.size());
+  for (std::size_t k = 0; k < written.size(); ++k) {
+    const auto &a = read->recordings[k].covariates, &b = written[k].covariates;
+    ASSERT_EQ(a.size(), b.size()) << k;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      EXPECT_EQ(a[i].name, b[i].name);
+      EXPECT_EQ(a[i].utime_us, b[i].utime_us);
+      EXPECT_EQ(a[i].value, b[i].value);
+    }
+  }
+}
+
+TEST(Covariates, OfALogThatBreakTheRulesAreCounted) {
+  const test::TemporaryFile file;
+  auto log = EventLogWriter::create(file.path());
+  ASSERT_TRUE(log);
+  const Recording recording = with_covariates("m-1", 1'000'000, {});
+  const auto put = [&](std::int64_t utime_us, std::vector<Covariate> covariates) {
+    const auto bytes = encode_covariates("a", {utime_us, std::move(covariates)});
+    ASSERT_TRUE(bytes);
+    ASSERT_TRUE(log->write(utime_us, channel_of(Subject::covariates, "a"), *bytes));
+  };
+  put(900'000, {{"load", 0.5}});  // before the mission: it holds on
+  ASSERT_TRUE(log->write(0, "ROBOT_COVARIATES.a", std::vector<std::uint8_t>{1, 2, 3}));
+  put(950'000, {{"load", 0.6}, {"floor=ice", 0.5}, {"heater", INFINITY}});
+  put(940'000, {{"load", 0.7}});
+  ASSERT_TRUE(write_recording(*log, recording));
+  ASSERT_TRUE(log->close());
+  const auto read = read_recordings(file.path());
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->unreadable, 4u);
+  ASSERT_EQ(read->recordings.size(), 1u);
+  ASSERT_EQ(read->recordings[0].covariates.size(), 1u);
+  EXPECT_EQ(read->recordings[0].covariates[0].value, std::vector<double>{0.6});
+  EXPECT_EQ(read->recordings[0].covariates[0].utime_us, std::vector<std::int64_t>{1'000'000});
+}
+
+}  // namespace
+}  // namespace joulecast::telemetry
