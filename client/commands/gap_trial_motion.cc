@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/nearest_word.h"
+#include "client/commands/outcome_lines.h"
 #include "client/trial/case_pool.h"
 #include "client/trial/motion/motion_run.h"
 #include "client/trial/motion/motion_text.h"
@@ -23,7 +24,7 @@ Exit run_motion(const MotionTrialOptions& options) {
   motion::MotionRunSettings run;
   run.trial.seed = options.seed;
   run.trial.count = options.count;
-  run.judge.controls = options.controls;
+  run.judge = {options.controls, options.prior_factor};
   run.jobs = options.jobs;
   run.keep = options.keep;
   run.again = options.again;
@@ -45,13 +46,17 @@ Exit run_motion(const MotionTrialOptions& options) {
     if (!read) return report(read.error());
     logs = std::move(*read);
   }
+  auto lines = OutcomeLines::open(options.outcomes);
+  if (!lines) return report(lines.error());
   std::size_t finished = 0;
   run.done = [&](const motion::MotionOutcome& outcome) {
     std::fprintf(stderr, "[%zu/%zu] %s\n", ++finished, options.count,
                  motion::motion_case_text(outcome).c_str());
+    lines->add(motion::motion_case_json(outcome));
   };
   const auto outcomes = motion::run_motion_trial(run, logs);
   if (!outcomes) return report(outcomes.error());
+  if (auto done = lines->close(); !done) return report(done.error());
   const motion::MotionScore score = motion::motion_score_of(*outcomes);
   if (!options.json) {
     const std::string about = options.again ? "" : motion::base_logs_text(logs, skipped);

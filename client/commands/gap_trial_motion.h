@@ -15,6 +15,8 @@ struct MotionTrialOptions {
   bool again = false;
   std::uint64_t seed = 1;
   std::size_t count = 0, jobs = 1, controls = 0;
+  double prior_factor = 1;
+  std::string outcomes;  // file that takes a line for each case; empty: none
   bool json = false;
 };
 

@@ -96,9 +96,10 @@ Score score_of(std::span<const CaseOutcome> outcomes) {
     const gap::Diagnosis& d = o.diagnosis;
     const bool right = exactly_right(o);
     StrengthRow& row = score.rows[o.truth.motor_channels ? 0 : 1][static_cast<std::size_t>(o.truth.strength)];
+    score.not_this_robot.count(d.verdict == gap::Verdict::not_this_robot);
     switch (o.truth.kind) {
       case Kind::none:
-        score.none_alarm.count(d.verdict == gap::Verdict::effects || d.verdict == gap::Verdict::outside);
+        score.none_alarm.count(d.verdict != gap::Verdict::none && d.verdict != gap::Verdict::inconclusive);
         score.none_inconclusive.count(d.verdict == gap::Verdict::inconclusive);
         break;
       case Kind::outside:

@@ -39,7 +39,8 @@ struct VariantRow {
 struct Score {
   // [0] with motor channels, [1] without
   std::array<std::array<StrengthRow, strength_classes>, 2> rows;
-  Rate none_alarm;  // verdict "effects" or "outside"
+  Rate not_this_robot;  // that verdict, in all cases
+  Rate none_alarm;      // verdict "effects", "outside" or "not_this_robot"
   Rate none_inconclusive;
   Rate outside_called;                                 // "outside" or "inconclusive"
   Rate outside_misled;                                 // a name with a probability above 0.9

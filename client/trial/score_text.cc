@@ -89,6 +89,7 @@ std::string score_text(const Score& score) {
     if (rate.tries > 0) fmt::format_to(std::back_inserter(out), "{:<34} {}\n", what, rate_text(rate));
   };
   out += '\n';
+  line("verdict not_this_robot", score.not_this_robot);
   line("no gap: false alarm", score.none_alarm);
   line("no gap: inconclusive", score.none_inconclusive);
   line("outside: outside or inconclusive", score.outside_called);
@@ -198,6 +199,7 @@ json score_json(const Score& score) {
   for (const auto& [name, row] : score.variants) variants[name] = rate_json(row.with);
   return {
       {"by_strength", channels},
+      {"not_this_robot", rate_json(score.not_this_robot)},
       {"none_false_alarm", rate_json(score.none_alarm)},
       {"none_inconclusive", rate_json(score.none_inconclusive)},
       {"outside_called", rate_json(score.outside_called)},
@@ -223,12 +225,15 @@ json case_json(const CaseOutcome& o) {
     named.push_back({{"id", effect.id},
                      {"probability", effect.probability},
                      {"posterior", effect.posterior},
+                     {"standing", gap::name_of(effect.standing)},
+                     {"there", holds(o.truth, effect.id)},
                      {"strength", effect.parameters.front().value},
                      {"sd", json_number(effect.parameters.front().deviation)},
                      {"share", json_number(effect.share)},
                      {"alternatives", effect.alternatives}});
   }
-  return {{"case", o.index},
+  return {{"trial", "virtual"},
+          {"case", o.index},
           {"digest", fmt::format("{:016x}", o.digest)},
           {"kind", name_of(o.truth.kind)},
           {"strength", name_of(o.truth.strength)},

@@ -1,79 +1,60 @@
 #include "client/trial/motion/judged.h"
 
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "client/trial/case_pool.h"
 #include "dynamics/drive_model.h"
-#include "gap/adopt.h"
-#include "gap/diagnosis.h"
-#include "gap/diagnosis_json.h"
-#include "gap/recordings.h"
+#include "gap/diagnose/recordings.h"
+#include "gap/verdict/adopt.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::trial::motion {
 namespace {
 
-using nlohmann::json;
-
-// A template, so that a diagnosis that has no surrogates compiles too.
-template <class Settings>
-Result<void> ask_controls(Settings& settings, std::size_t controls) {
-  if (controls == 0) return {};
-  if constexpr (requires { settings.controls = controls; }) {
-    settings.controls = controls;
-    return {};
-  } else {
-    return invalid("--controls", "is given, and this diagnosis makes no surrogates");
-  }
-}
-
-double number_or(const json& object, const char* name, double otherwise) {
-  const auto found = object.find(name);
-  return found != object.end() && found->is_number() ? found->get<double>() : otherwise;
-}
-
-std::string text_of(const json& object, const char* name) {
-  const auto found = object.find(name);
-  return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
-}
-
-NamedEffect named(const json& effect, const std::vector<gap::DiagnosedParameter>& parameters) {
+NamedEffect named(const gap::DiagnosedEffect& effect) {
   NamedEffect out;
-  out.id = effect.at("id").get<std::string>();
-  out.probability = number_or(effect, "probability", 0);
-  out.alternatives = effect.value("alternatives", std::vector<std::string>{});
-  if (!parameters.empty()) {
-    out.strength = parameters.front().value;
-    out.deviation = parameters.front().deviation;
+  out.id = effect.id;
+  out.probability = effect.probability;
+  out.alternatives = effect.alternatives;
+  if (!effect.parameters.empty()) {
+    out.strength = effect.parameters.front().value;
+    out.deviation = effect.parameters.front().deviation;
   }
+  out.posterior = effect.posterior;
+  out.standing = gap::name_of(effect.standing);
   return out;
 }
 
 Answer answer_of(const gap::Diagnosis& diagnosis) {
-  const json document = gap::diagnosis_to_json(diagnosis);
   Answer answer;
-  answer.verdict = text_of(document, "verdict");
-  answer.verdict_probability = number_or(document, "verdict_probability", 0);
-  for (std::size_t k = 0; k < diagnosis.effects.size(); ++k) {
-    answer.effects.push_back(named(document.at("effects").at(k), diagnosis.effects[k].parameters));
-  }
-  answer.outside_channel = text_of(document.at("outside"), "channel");
-  answer.outside_follows = text_of(document.at("outside"), "follows");
-  answer.gap = number_or(document.at("gap"), "power_absolute_relative", 0);
-  answer.noise_floor = number_or(document.at("gap"), "noise_floor", 0);
-  if (const auto referee = document.find("baseline"); referee != document.end() && referee->is_object()) {
-    answer.referee_error = number_or(*referee, "held_out", 0);
-    answer.explanation_error = number_or(document.at("shrinkage"), "held_out_after", 0);
+  answer.verdict = gap::name_of(diagnosis.verdict);
+  answer.verdict_probability = diagnosis.verdict_probability;
+  for (const gap::DiagnosedEffect& effect : diagnosis.effects) answer.effects.push_back(named(effect));
+  answer.outside_channel = diagnosis.outside.channel;
+  answer.outside_follows = diagnosis.outside.follows;
+  answer.gap = diagnosis.power_absolute_relative;
+  answer.noise_floor = diagnosis.noise_floor;
+  if (diagnosis.baseline) {
+    answer.referee_error = diagnosis.baseline->held_out;
+    answer.explanation_error = diagnosis.baseline->explanation_held_out;
+    answer.unchanged_error = diagnosis.baseline->unchanged_model_held_out;
   }
   return answer;
+}
+
+// The robot file with what may be adopted. What does not fit into a robot file explains nothing.
+robot::RobotModel explained(const robot::RobotModel& robot, const gap::Diagnosis& diagnosis) {
+  const auto adopted = diagnosis.verdict == gap::Verdict::not_this_robot
+                           ? gap::with_corrections(robot, diagnosis.adoptable)
+                           : gap::with_effects(robot, diagnosis.adoptable);
+  return adopted.value_or(robot);
 }
 
 }  // namespace
 
 Result<std::vector<telemetry::Recording>> recorded_missions(const std::filesystem::path& log) {
   const std::string path = log.string();
-  auto set = gap::load_recordings({&path, 1});
+  auto set = telemetry::load_recordings({&path, 1});
   if (!set) return tl::unexpected(std::move(set.error()));
   for (telemetry::Recording& mission : set->missions) mission.robot_id = set->robot_id;
   return std::move(set->missions);
@@ -82,13 +63,13 @@ Result<std::vector<telemetry::Recording>> recorded_missions(const std::filesyste
 Result<Answer> judge(const std::filesystem::path& log, const std::filesystem::path& robot_file,
                      const JudgeSettings& asked) {
   gap::DiagnosisSettings settings;
-  if (auto done = ask_controls(settings, asked.controls); !done)
-    return tl::unexpected(std::move(done.error()));
+  settings.controls = asked.controls;
+  settings.prior_factor = asked.prior_factor;
   const double began_s = thread_cpu_s();
   const auto robot = robot::load_robot(robot_file);
   if (!robot) return tl::unexpected(robot.error());
   const std::string path = log.string();
-  const auto recordings = gap::load_recordings({&path, 1});
+  const auto recordings = telemetry::load_recordings({&path, 1});
   if (!recordings) return tl::unexpected(recordings.error());
   const auto diagnosis = gap::diagnose(*recordings, *robot, settings);
   Answer answer;
@@ -98,8 +79,7 @@ Result<Answer> judge(const std::filesystem::path& log, const std::filesystem::pa
     answer.refused = describe(diagnosis.error());
   }
   answer.processor_s = thread_cpu_s() - began_s;
-  // What does not fit into a robot file explains nothing.
-  answer.explained = diagnosis ? gap::with_effects(*robot, diagnosis->adoptable).value_or(*robot) : *robot;
+  answer.explained = diagnosis ? explained(*robot, *diagnosis) : *robot;
   return answer;
 }
 

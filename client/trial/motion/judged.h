@@ -11,8 +11,7 @@
 #include "robot/robot_model.h"
 #include "telemetry/recording.h"
 
-// All that the trial on real motion knows of the diagnosis that it judges. The diagnosis is read by the names
-// of its JSON contract, so that fields which it begins to state are taken up where they are asked for.
+// All that the trial on real motion knows of the diagnosis that it judges.
 namespace joulecast::trial::motion {
 
 struct NamedEffect {
@@ -20,6 +19,8 @@ struct NamedEffect {
   double probability = 0;
   std::vector<std::string> alternatives;  // that the data cannot tell from it
   double strength = 0, deviation = 0;
+  double posterior = 0;  // before the table of probabilities
+  std::string standing;
 };
 
 struct Answer {
@@ -30,20 +31,22 @@ struct Answer {
   std::string outside_channel, outside_follows;
   double gap = 0, noise_floor = 0;          // absolute, relative to the power measured
   std::optional<double> referee_error;      // of its own plain regression, on data held out
-  std::optional<double> explanation_error;  // of its explanation, on the same
+  std::optional<double> explanation_error;  // of what it found, on the same
+  std::optional<double> unchanged_error;    // of the robot file, on the same
   robot::RobotModel explained;              // the robot file with what may be adopted
   double processor_s = 0;
 };
 
 struct JudgeSettings {
-  std::size_t controls = 0;  // surrogates asked of the diagnosis; 0: as many as it takes by itself
+  std::size_t controls = 20;  // surrogates that the diagnosis makes
+  double prior_factor = 1;    // on its tolerances and scatter
 };
 
 // The missions of a log as the diagnosis reads them.
 [[nodiscard]] Result<std::vector<telemetry::Recording>> recorded_missions(const std::filesystem::path& log);
 
 // As `joulecast gap LOG --robot FILE` answers: nothing else is read. A log that the diagnosis refuses is an
-// answer too; Fault::invalid where the settings ask for what this diagnosis does not have.
+// answer too.
 [[nodiscard]] Result<Answer> judge(const std::filesystem::path& log, const std::filesystem::path& robot_file,
                                    const JudgeSettings& settings);
 

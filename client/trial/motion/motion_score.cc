@@ -47,6 +47,13 @@ std::string answer_label(const MotionOutcome& o) {
   return label;
 }
 
+void count_errors(std::optional<double> explained, std::optional<double> referee, ReferenceScore& score,
+                  std::vector<double>& ratios) {
+  if (!explained || !referee || !(*referee > 0)) return;
+  ratios.push_back(*explained / *referee);
+  score.within.count(ratios.back() <= referee_margin);
+}
+
 double median_of(std::vector<double> values) {
   if (values.empty()) return 0;
   std::ranges::sort(values);
@@ -100,13 +107,32 @@ bool stands_for(const NamedEffect& reported, std::string_view id) {
          std::ranges::find(reported.alternatives, id) != reported.alternatives.end();
 }
 
+bool holds(const MotionTruth& truth, std::string_view id) {
+  return std::ranges::any_of(truth.effects, [&](const TrueEffect& e) { return e.id == id; });
+}
+
 bool is_there(const MotionTruth& truth, const NamedEffect& reported) {
   return std::ranges::any_of(truth.effects, [&](const TrueEffect& e) { return stands_for(reported, e.id); });
 }
 
+bool verdict_right(const MotionOutcome& o) {
+  const Answer& a = o.answer;
+  switch (o.truth.kind) {
+    case Kind::none:
+      return a.verdict == "none";
+    case Kind::outside:
+      return a.verdict == "outside" || a.verdict == "inconclusive";
+    case Kind::single:
+      return a.verdict == "effects" && a.effects.size() == 1 && is_there(o.truth, a.effects[0]);
+    case Kind::pair:
+      return a.verdict == "effects" && a.effects.size() == 2 && both_named(o.truth, a.effects);
+  }
+  return false;
+}
+
 MotionScore motion_score_of(std::span<const MotionOutcome> outcomes) {
   MotionScore score;
-  std::vector<double> ratios, ratios_found, seconds;
+  std::vector<double> stated, stated_found, own, own_found, seconds;
   for (const MotionOutcome& o : outcomes) {
     count_kind(o, score);
     score.misled.count(misled(o));
@@ -115,25 +141,23 @@ MotionScore motion_score_of(std::span<const MotionOutcome> outcomes) {
       const auto above = std::ranges::upper_bound(reliability_from, e.probability);
       ReliabilityBin& bin = score.reliability[static_cast<std::size_t>(above - reliability_from.begin()) - 1];
       bin.sum += e.probability;
-      bin.right.count(is_there(o.truth, e));
+      bin.right.count(holds(o.truth, e.id));
     }
-    // Its own figures, held out both, where the diagnosis states them.
-    const double referee = o.answer.referee_error.value_or(o.referee_error);
-    const double explained = o.answer.explanation_error.value_or(o.explanation_error);
-    if (referee > 0) {
-      ratios.push_back(explained / referee);
-      score.referee_all.within.count(ratios.back() <= referee_margin);
-      if (o.answer.verdict == "effects") {
-        ratios_found.push_back(ratios.back());
-        score.referee_found.within.count(ratios.back() <= referee_margin);
-      }
-    }
+    const Answer& a = o.answer;
+    const bool found = a.verdict == "effects";
+    count_errors(a.explanation_error, a.referee_error, score.stated_all, stated);
+    count_errors(o.explanation_error, o.referee_error, score.own_all, own);
+    if (found) count_errors(a.explanation_error, a.referee_error, score.stated_found, stated_found);
+    if (found) count_errors(o.explanation_error, o.referee_error, score.own_found, own_found);
+    score.not_this_robot.count(a.verdict == "not_this_robot");
     ++score.confusion[truth_label(o.truth)][answer_label(o)];
     score.refused += o.answer.refused.empty() ? 0 : 1;
     seconds.push_back(o.answer.processor_s);
   }
-  score.referee_all.median = median_of(ratios);
-  score.referee_found.median = median_of(ratios_found);
+  score.stated_all.median = median_of(std::move(stated));
+  score.stated_found.median = median_of(std::move(stated_found));
+  score.own_all.median = median_of(std::move(own));
+  score.own_found.median = median_of(std::move(own_found));
   score.median_s = median_of(seconds);
   score.longest_s = seconds.empty() ? 0 : std::ranges::max(seconds);
   return score;

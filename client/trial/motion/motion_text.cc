@@ -55,6 +55,10 @@ json row_json(const GapRow& r) {
           {"pair_both", rate_json(r.pair_both)},      {"pair_exact", rate_json(r.pair_exact)}};
 }
 
+json errors_json(const ReferenceScore& s) {
+  return {{"within_1.05", rate_json(s.within)}, {"median", json_number(s.median)}};
+}
+
 }  // namespace
 
 std::string base_logs_text(std::span<const BaseLog> logs, const std::vector<std::string>& skipped) {
@@ -117,12 +121,18 @@ std::string motion_score_text(const MotionScore& score) {
   add_rate(out, "load of its own: outside or inconclusive", score.outside_called);
   add_rate(out, "named at 0.9 and not there", score.misled);
   for (const auto& [kind, rate] : score.misled_by_kind) add_rate(out, "  " + kind, rate);
-  add_rate(out, "error within 1.05 of the plain regression's", score.referee_all.within);
-  add_rate(out, "  where the verdict is effects", score.referee_found.within);
-  fmt::format_to(std::back_inserter(out),
-                 "median error over the plain regression's: {:.2f}; with effects {:.2f}\n",
-                 score.referee_all.median, score.referee_found.median);
-  out += "\nstated probability of a name against how often it is there\n";
+  add_rate(out, "verdict not_this_robot", score.not_this_robot);
+  const auto errors = [&](std::string_view what, const ReferenceScore& s) {
+    if (s.within.tries == 0) return;
+    fmt::format_to(std::back_inserter(out), "{:<58} {}, median ratio {:.2f}\n", what, rate_text(s.within),
+                   s.median);
+  };
+  out += "error at most 1.05 of the plain regression's\n";
+  errors("  stated by the diagnosis, held out", score.stated_all);
+  errors("    where the verdict is effects", score.stated_found);
+  errors("  by the trial's own regression", score.own_all);
+  errors("    where the verdict is effects", score.own_found);
+  out += "\nstated probability of a name against how often that very effect is there\n";
   for (std::size_t k = 0; k < reliability_from.size(); ++k) {
     const double to = k + 1 < reliability_from.size() ? reliability_from[k + 1] : 1;
     fmt::format_to(std::back_inserter(out), "  {:.1f} to {:.1f}: stated {:.2f}, there {}\n",
@@ -159,9 +169,11 @@ json motion_score_json(const MotionScore& score) {
           {"outside_called", rate_json(score.outside_called)},
           {"misled", rate_json(score.misled)},
           {"misled_by_kind", misled},
-          {"within_referee", rate_json(score.referee_all.within)},
-          {"within_referee_where_effects", rate_json(score.referee_found.within)},
-          {"median_over_referee", json_number(score.referee_all.median)},
+          {"not_this_robot", rate_json(score.not_this_robot)},
+          {"stated_error_over_referee", errors_json(score.stated_all)},
+          {"stated_error_over_referee_where_effects", errors_json(score.stated_found)},
+          {"own_error_over_referee", errors_json(score.own_all)},
+          {"own_error_over_referee_where_effects", errors_json(score.own_found)},
           {"reliability", bins},
           {"confusion", score.confusion},
           {"refused", score.refused},
@@ -206,12 +218,16 @@ json motion_case_json(const MotionOutcome& o) {
   for (const NamedEffect& e : o.answer.effects) {
     named.push_back({{"id", e.id},
                      {"probability", e.probability},
+                     {"posterior", json_number(e.posterior)},
+                     {"standing", e.standing},
                      {"strength", json_number(e.strength)},
                      {"sd", json_number(e.deviation)},
                      {"alternatives", e.alternatives},
-                     {"there", is_there(o.truth, e)}});
+                     {"there", holds(o.truth, e.id)},
+                     {"group_there", is_there(o.truth, e)}});
   }
-  json out{{"case", o.index},
+  json out{{"trial", "motion"},
+           {"case", o.index},
            {"digest", fmt::format("{:016x}", o.digest)},
            {"motion", o.truth.log},
            {"kind", name_of(o.truth.kind)},
@@ -225,10 +241,12 @@ json motion_case_json(const MotionOutcome& o) {
            {"noise_floor", json_number(o.answer.noise_floor)},
            {"referee_error", json_number(o.referee_error)},
            {"explanation_error", json_number(o.explanation_error)},
-           {"unchanged_error", json_number(o.unchanged_error)}};
+           {"unchanged_error", json_number(o.unchanged_error)},
+           {"right", verdict_right(o)}};
   if (!o.answer.refused.empty()) out["refused"] = o.answer.refused;
   if (o.answer.referee_error) out["stated_referee_error"] = json_number(*o.answer.referee_error);
   if (o.answer.explanation_error) out["stated_explanation_error"] = json_number(*o.answer.explanation_error);
+  if (o.answer.unchanged_error) out["stated_unchanged_error"] = json_number(*o.answer.unchanged_error);
   return out;
 }
 

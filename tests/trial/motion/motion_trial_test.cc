@@ -149,9 +149,10 @@ TEST(MotionScore, CountsGroupsOfThreeAndConfidentWrongNames) {
   EXPECT_EQ(score.misled_by_kind.at("outside").hits, 1u);
   EXPECT_EQ(score.outside_called.hits, 1u);
   EXPECT_EQ(score.reliability[3].right.tries, 4u);
-  EXPECT_EQ(score.reliability[3].right.hits, 2u);
+  EXPECT_EQ(score.reliability[3].right.hits, 1u);  // of names, not groups
   EXPECT_EQ(score.reliability[0].right.tries, 3u);
-  EXPECT_EQ(score.referee_all.within.hits, 6u);
+  EXPECT_EQ(score.own_all.within.hits, 6u);
+  EXPECT_EQ(score.stated_all.within.tries, 0u);
   EXPECT_NE(motion_score_text(score).find("2/4 50 %"), std::string::npos);
 }
 
@@ -168,13 +169,32 @@ TEST(MotionScore, AsksForBothOfAPairByNamesOfTheirOwn) {
   EXPECT_EQ(score.rows[3].pair_exact.hits, 1u);
 }
 
-TEST(MotionScore, PrefersTheErrorsThatTheDiagnosisStates) {
-  MotionOutcome o = said(Kind::none, 0, {}, "none", {});
+TEST(MotionScore, KeepsTheErrorsThatTheDiagnosisStatesApart) {
+  MotionOutcome o = said(Kind::none, 0, {}, "effects", {});
   o.explanation_error = 0.2;
-  EXPECT_EQ(motion_score_of(std::vector{o}).referee_all.within.hits, 0u);
   o.answer.referee_error = 0.1;
-  o.answer.explanation_error = 0.1;
-  EXPECT_EQ(motion_score_of(std::vector{o}).referee_all.within.hits, 1u);
+  o.answer.explanation_error = 0.104;
+  const MotionScore score = motion_score_of(std::vector{o, said(Kind::none, 0, {}, "none", {})});
+  EXPECT_EQ(score.own_all.within.hits, 1u);
+  EXPECT_EQ(score.own_all.within.tries, 2u);
+  EXPECT_EQ(score.own_found.within.hits, 0u);
+  EXPECT_EQ(score.stated_all.within.hits, 1u);
+  EXPECT_EQ(score.stated_found.within.tries, 1u);
+  EXPECT_NEAR(score.stated_found.median, 1.04, 1e-12);
+}
+
+TEST(MotionScore, CallsAVerdictRightThatNamesAllAndNoMore) {
+  const NamedEffect coulomb{"coulomb_friction", 0.9, {}, 1, 0.1}, slope{"slope", 0.9, {}, 1, 0.1};
+  EXPECT_TRUE(verdict_right(said(Kind::none, 0, {}, "none", {})));
+  EXPECT_FALSE(verdict_right(said(Kind::none, 0, {}, "inconclusive", {})));
+  EXPECT_TRUE(verdict_right(said(Kind::outside, 0.1, {"x_bursts"}, "inconclusive", {slope})));
+  EXPECT_FALSE(verdict_right(said(Kind::outside, 0.1, {"x_bursts"}, "not_this_robot", {})));
+  EXPECT_TRUE(verdict_right(said(Kind::single, 0.1, {"slope"}, "effects", {slope})));
+  EXPECT_FALSE(verdict_right(said(Kind::single, 0.1, {"slope"}, "effects", {slope, coulomb})));
+  EXPECT_FALSE(verdict_right(said(Kind::single, 0.1, {"slope"}, "inconclusive", {slope})));
+  EXPECT_TRUE(
+      verdict_right(said(Kind::pair, 0.1, {"slope", "coulomb_friction"}, "effects", {coulomb, slope})));
+  EXPECT_FALSE(verdict_right(said(Kind::pair, 0.1, {"slope", "coulomb_friction"}, "effects", {coulomb})));
 }
 
 }  // namespace
