@@ -20,7 +20,7 @@ struct NamedEffect {
   std::vector<std::string> alternatives;  // that the data cannot tell from it
   double strength = 0, deviation = 0;
   double posterior = 0;  // before the table of probabilities
-  std::string standing;
+  std::string standing{};
 };
 
 struct Answer {
