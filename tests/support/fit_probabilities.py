@@ -93,7 +93,8 @@ def count(paths):
     for outcome in outcomes.values():
         trial = outcome["trial"]
         cases[trial] = cases.get(trial, 0) + 1
-        if outcome["verdict_probability"] >= SURE_VERDICT:
+        # "inconclusive" claims nothing that could come true.
+        if outcome["verdict"] in ("none", "effects", "outside") and outcome["verdict_probability"] >= SURE_VERDICT:
             sure["named"] += 1
             sure["right"] += outcome["right"]
         for name in outcome["effects"]:

@@ -70,14 +70,15 @@ class Files(unittest.TestCase):
 
     def test_counts_each_case_once_by_its_last_line(self):
         name = {"standing": "grouped", "posterior": 0.97, "there": True}
-        case = {"trial": "motion", "digest": "1", "verdict_probability": 0.96, "right": True, "effects": [name]}
-        lines = [case | {"effects": []}, case, case | {"digest": "2", "effects": [name | {"there": False}], "right": False}]
+        case = {"trial": "motion", "digest": "1", "verdict": "effects", "verdict_probability": 0.96, "right": True, "effects": [name]}
+        lines = [case | {"effects": []}, case, case | {"digest": "2", "effects": [name | {"there": False}], "right": False},
+                 case | {"digest": "3", "verdict": "inconclusive", "effects": []}]
         path = self.root / "outcomes"
         path.write_text("\n".join(json.dumps(line) for line in lines))
         cells, sure, cases = fp.count([path])
         self.assertEqual([(c["standing"], c["from"], c["named"], c["right"]) for c in cells], [("grouped", 0.95, 2, 1)])
         self.assertEqual(sure, {"named": 2, "right": 1})
-        self.assertEqual(cases, {"motion": 2})
+        self.assertEqual(cases, {"motion": 3})
 
     def test_digest_is_of_code_alone(self):
         path = self.root / "src/windows/windows.cc"
