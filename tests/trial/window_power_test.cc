@@ -33,7 +33,7 @@ TEST(WindowPower, IsFrictionAndCopperAtConstantSpeed) {
   const robot::RobotModel robot = testing::nomad();
   const std::vector windows{driving(5)};
   EXPECT_NEAR(window_powers_w(robot, {}, windows)[0], steady_power_w(robot, 5),
-              1e-9 * steady_power_w(robot, 5));
+              1e-6 * steady_power_w(robot, 5));
 }
 
 TEST(WindowPower, IsIdlePowerAtRest) {
