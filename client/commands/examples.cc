@@ -42,7 +42,9 @@ constexpr Examples table[] = {
      "joulecast gap amr.lcmlog --robot amr.json --apply amr-adopted.json --json\n"
      "joulecast gap amr.lcmlog --robot amr.json --test fresh.lcmlog\n"
      "joulecast gap amr.lcmlog --robot amr.json --controls 0 --report amr-gap.html --force"},
-    {"gap trial", "joulecast gap trial --count 2 --seed 1"},
+    {"gap trial",
+     "joulecast gap trial --count 2 --seed 1\n"
+     "joulecast gap trial --motion . --count 2 --seed 1"},
     {"effects", "joulecast effects"},
     {"explore",
      "joulecast explore --case 1 --plot case1.svg\n"

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "base/nearest_word.h"
+#include "client/commands/gap_trial_motion.h"
+#include "client/commands/outcome_lines.h"
 #include "client/commands/table.h"
 #include "client/trial/run.h"
 #include "client/trial/score_text.h"
@@ -19,7 +21,7 @@ struct Options {
   trial::RunSettings run;
   std::string only;
   std::string channels = "mixed";
-  std::string keep, again;
+  std::string keep, again, motion, outcomes;
   bool json = false;
   bool usual_plant = false;
 };
@@ -31,6 +33,12 @@ void show(const trial::CaseOutcome& outcome, std::size_t finished, std::size_t c
 
 Exit run(Options& options) {
   trial::TrialSettings& t = options.run.trial;
+  if (!options.motion.empty() || holds_motion_cases(options.again)) {
+    return run_motion({options.motion, options.only, options.again.empty() ? options.keep : options.again,
+                       !options.again.empty(), t.seed, t.count, options.run.jobs,
+                       options.run.diagnosis.controls, options.run.diagnosis.prior_factor, options.outcomes,
+                       options.json});
+  }
   if (!options.only.empty()) {
     t.only = trial::kind_of(options.only == "double" ? "pair" : options.only);
     const auto known = virtual_robot::effect_table();
@@ -48,11 +56,17 @@ Exit run(Options& options) {
   options.run.keep = options.keep;
   options.run.again = !options.again.empty();
   if (options.run.again) options.run.keep = options.again;
+  auto lines = OutcomeLines::open(options.outcomes);
+  if (!lines) return report(lines.error());
   std::size_t finished = 0;
-  options.run.done = [&](const trial::CaseOutcome& outcome) { show(outcome, ++finished, t.count); };
+  options.run.done = [&](const trial::CaseOutcome& outcome) {
+    show(outcome, ++finished, t.count);
+    lines->add(trial::case_json(outcome));
+  };
 
   const auto outcomes = trial::run_trial(options.run);
   if (!outcomes) return report(outcomes.error());
+  if (auto done = lines->close(); !done) return report(done.error());
   const trial::Score score = trial::score_of(*outcomes);
   const auto rows = options.run.compare ? trial::compare(*outcomes) : std::vector<trial::ComparisonRow>{};
   if (options.json) {
@@ -73,8 +87,9 @@ Exit run(Options& options) {
 
 void add_gap_trial(CLI::App& gap, Exit& exit) {
   auto options = std::make_shared<Options>();
-  auto* command = gap.add_subcommand(
-      "trial", "Put known effects into virtual robots, diagnose their logs blindly and score the answers");
+  auto* command = gap.add_subcommand("trial",
+                                     "Put known effects into virtual robots or into recorded motion, "
+                                     "diagnose the logs blindly and score the answers");
   command->add_option("--count", options->run.trial.count, "cases")
       ->check(CLI::Range(1, 100'000))
       ->capture_default_str();
@@ -83,14 +98,37 @@ void add_gap_trial(CLI::App& gap, Exit& exit) {
   command->add_option("--jobs", options->run.jobs, "cases at work at once")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
-  command->add_option("--only", options->only, "none, single, double, outside, or the id of one effect");
-  command->add_option("--channels", options->channels, "full, battery (no motor channels) or mixed")
-      ->check(CLI::IsMember({"full", "battery", "mixed"}))
+  command->add_option("--only", options->only,
+                      "none, single, double, outside, or the id of one effect or load");
+  auto* channels =
+      command->add_option("--channels", options->channels, "full, battery (no motor channels) or mixed")
+          ->check(CLI::IsMember({"full", "battery", "mixed"}))
+          ->capture_default_str();
+  auto* usual = command->add_flag("--usual-plant", options->usual_plant,
+                                  "leave out the sensors, drives and missions unlike the usual");
+  auto* compare =
+      command->add_flag("--compare", options->run.compare,
+                        "judge every log by simpler methods too, and by the method with parts left out");
+  command
+      ->add_option("--motion", options->motion,
+                   "folder of event logs with battery power: effects are planted into their motion; "
+                   "NAME.json beside NAME.lcmlog gives the robot's wheels")
+      ->excludes(channels)
+      ->excludes(usual)
+      ->excludes(compare);
+  command
+      ->add_option("--controls", options->run.diagnosis.controls,
+                   "surrogates that the diagnosis makes of each log")
+      ->check(CLI::Range(0, 1000))
       ->capture_default_str();
-  command->add_flag("--usual-plant", options->usual_plant,
-                    "leave out the sensors, drives and missions unlike the usual");
-  command->add_flag("--compare", options->run.compare,
-                    "judge every log by simpler methods too, and with each part of the method left out");
+  command
+      ->add_option(
+          "--prior-factor", options->run.diagnosis.prior_factor,
+          "multiplies the tolerances and scatter that the diagnosis expects of a robot as its file says")
+      ->check(CLI::Range(0.1, 10.0))
+      ->capture_default_str();
+  command->add_option("--outcomes", options->outcomes,
+                      "file to which a line of JSON is added as each case ends");
   command->add_option("--keep", options->keep, "folder that keeps robot files, logs and truths of all cases");
   command
       ->add_option(

@@ -48,6 +48,7 @@ constexpr auto table = std::to_array<Named>({
     {"gap trial", "--keep", "FOLDER", "/"},
     {"gap trial", "--again", "FOLDER", "/"},
     {"gap trial", "--only", "KIND", ""},
+    {"gap trial", "--motion", "FOLDER", "/"},
     {"simulate", "--effect", "ID=STRENGTH", ""},
     {"missions", "--from", "TIME", ""},
     {"missions", "--to", "TIME", ""},

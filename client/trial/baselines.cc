@@ -8,11 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "client/trial/window_power.h"
 #include "dynamics/catalogue.h"
-#include "gap/channels.h"
-#include "gap/outside.h"
-#include "gap/power_gap.h"
-#include "gap/windows.h"
+#include "windows/windows.h"
 
 namespace joulecast::trial {
 namespace {
@@ -33,6 +31,7 @@ struct Problem {
   std::vector<std::size_t> mission;  // of each row
   std::size_t missions = 0;
   Eigen::VectorXd measured_w, nominal_w;
+  Eigen::MatrixXd motion;  // regressors of a plain regression
   std::vector<Term> terms;
 
   Eigen::VectorXd residual_w() const { return measured_w - nominal_w; }
@@ -51,25 +50,42 @@ struct Problem {
 
 using Shape = dynamics::EffectValues<double>;
 
+// Where the robot was.
+struct Floor {
+  bool position = false, heading = false;
+  double x_low_m = 0, x_high_m = 0, y_low_m = 0, y_high_m = 0;
+
+  void cover(const windows::Window& w) {
+    heading = heading || std::isfinite(w.heading_rad);
+    if (!std::isfinite(w.x_m + w.y_m)) return;
+    if (!position) x_low_m = x_high_m = w.x_m, y_low_m = y_high_m = w.y_m;
+    position = true;
+    x_low_m = std::min(x_low_m, w.x_m);
+    x_high_m = std::max(x_high_m, w.x_m);
+    y_low_m = std::min(y_low_m, w.y_m);
+    y_high_m = std::max(y_high_m, w.y_m);
+  }
+};
+
 // The shapes that an effect is tried in: its initial ones, a net of places, two creeping speeds.
-std::vector<std::vector<Shape>> shapes_of(const dynamics::Effect& effect, const gap::Ranges& ranges,
+std::vector<std::vector<Shape>> shapes_of(const dynamics::Effect& effect, const Floor& floor,
                                           double wheel_radius_m) {
   Shape shape = dynamics::initial(effect).values;
   const std::string_view id = effect.info().id;
   if (id == "floor_resistance_zone") {
     std::vector<std::vector<Shape>> places;
-    if (!ranges.position) return places;
-    const double width = ranges.x_high_m - ranges.x_low_m, height = ranges.y_high_m - ranges.y_low_m;
+    if (!floor.position) return places;
+    const double width = floor.x_high_m - floor.x_low_m, height = floor.y_high_m - floor.y_low_m;
     for (const double x : {0.2, 0.5, 0.8}) {
       for (const double y : {0.2, 0.5, 0.8}) {
-        places.push_back({{0, ranges.x_low_m + x * width, ranges.y_low_m + y * height,
+        places.push_back({{0, floor.x_low_m + x * width, floor.y_low_m + y * height,
                            std::clamp(0.25 * std::min(width, height), 0.2, 100.0), 0}});
       }
     }
     return places;
   }
   if (id == "slope") {
-    if (!ranges.heading) return {};
+    if (!floor.heading) return {};
     Shape other = shape;
     other[1] = std::numbers::pi / 2;
     return {{shape, other}};
@@ -89,14 +105,17 @@ std::vector<std::vector<Shape>> shapes_of(const dynamics::Effect& effect, const 
 }
 
 Problem make_problem(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
-  auto windows = gap::make_windows(recordings, robot);
-  const auto nominal = gap::modelled_power(robot, {}, windows);
+  const auto windows =
+      windows::make_windows(recordings.missions, robot, windows::find_readings(recordings.missions, robot));
+  const std::vector<double> nominal = window_powers_w(robot, {}, windows);
   Problem problem;
-  std::vector<gap::Window> usable;
+  Floor floor;
+  std::vector<windows::Window> usable;
   std::vector<double> measured_w, nominal_w;
   for (std::size_t k = 0; k < windows.size(); ++k) {
     if (!std::isfinite(windows[k].battery_power_w + nominal[k])) continue;
     usable.push_back(windows[k]);
+    floor.cover(windows[k]);
     problem.mission.push_back(windows[k].mission);
     problem.missions = std::max(problem.missions, windows[k].mission + 1);
     measured_w.push_back(windows[k].battery_power_w);
@@ -105,15 +124,21 @@ Problem make_problem(const telemetry::RecordingSet& recordings, const robot::Rob
   const auto n = static_cast<Eigen::Index>(usable.size());
   problem.measured_w = Eigen::Map<const Eigen::VectorXd>(measured_w.data(), n);
   problem.nominal_w = Eigen::Map<const Eigen::VectorXd>(nominal_w.data(), n);
-  const gap::Ranges ranges = gap::ranges_of(usable, robot);
+  problem.motion.resize(n, 4);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const windows::Window& w = usable[static_cast<std::size_t>(k)];
+    const double speed = 0.5 * (w.speed_rad_s[0] + w.speed_rad_s[1]);
+    problem.motion.row(k) << 1, std::fabs(speed), std::fabs(w.speed_rad_s[0] - w.speed_rad_s[1]),
+        speed * 0.5 * (w.acceleration_rad_s2[0] + w.acceleration_rad_s2[1]);
+  }
   for (const dynamics::Effect* effect : dynamics::catalogue()) {
-    for (const auto& shapes : shapes_of(*effect, ranges, robot.kinematics.wheel_radius_m)) {
+    for (const auto& shapes : shapes_of(*effect, floor, robot.kinematics.wheel_radius_m)) {
       Term term{effect, Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(shapes.size()))};
       for (std::size_t column = 0; column < shapes.size(); ++column) {
         const dynamics::ActiveEffect active{effect, shapes[column]};
         const dynamics::BasicDriveModel<dynamics::Dual> model(robot, {&active, 1}, 0, 0);
         for (Eigen::Index k = 0; k < n; ++k) {
-          const double slope = gap::metered_power(model, usable[static_cast<std::size_t>(k)]).slope;
+          const double slope = window_power_w(model, usable[static_cast<std::size_t>(k)]).slope;
           term.power_w(k, static_cast<Eigen::Index>(column)) = std::isfinite(slope) ? slope : 0;
         }
       }
@@ -252,6 +277,19 @@ gap::Diagnosis by_multiplier(const Problem& p) {
   return d;
 }
 
+gap::Diagnosis by_regression(const Problem& p) {
+  gap::Diagnosis d;
+  add_shrinkage(
+      p,
+      [&](const std::vector<Eigen::Index>& rows) -> Eigen::VectorXd {
+        const Eigen::MatrixXd seen = p.motion(rows, Eigen::all);
+        const Eigen::VectorXd seen_w = p.measured_w(rows);
+        return p.motion * least_squares(seen, seen_w, 0);
+      },
+      d);
+  return d;
+}
+
 gap::Diagnosis by_terms(const Problem& p, const std::vector<std::size_t>& chosen) {
   gap::Diagnosis d;
   d.verdict = chosen.empty() ? gap::Verdict::none : gap::Verdict::effects;
@@ -269,7 +307,7 @@ gap::Diagnosis by_terms(const Problem& p, const std::vector<std::size_t>& chosen
     effect.probability = 1;
     effect.share = moved_w(p, k, own);
     effect.parameters = {{std::string(info.parameters[0].name), std::string(info.parameters[0].unit),
-                          width == 1 ? own[0] : own.norm(), gap::missing}};
+                          width == 1 ? own[0] : own.norm(), windows::missing}};
     d.effects.push_back(std::move(effect));
     at += width;
   }
@@ -292,6 +330,8 @@ std::string_view name_of(Baseline baseline) {
   switch (baseline) {
     case Baseline::multiplier:
       return "one factor on energy";
+    case Baseline::regression:
+      return "plain regression on motion";
     case Baseline::stepwise_bic:
       return "stepwise regression, BIC";
     case Baseline::thresholded_squares:
@@ -307,6 +347,8 @@ gap::Diagnosis diagnose_by(Baseline baseline, const telemetry::RecordingSet& rec
   switch (baseline) {
     case Baseline::multiplier:
       return by_multiplier(problem);
+    case Baseline::regression:
+      return by_regression(problem);
     case Baseline::stepwise_bic:
       return by_terms(problem, stepwise(problem));
     case Baseline::thresholded_squares:

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
+#include "client/trial/window_power.h"
 #include "dynamics/catalogue.h"
-#include "gap/power_gap.h"
-#include "gap/windows.h"
+#include "windows/windows.h"
 
 namespace joulecast::trial {
 namespace {
@@ -70,41 +70,40 @@ Coefficients fit_without(const std::vector<Row>& rows, std::size_t left_out) {
 
 }  // namespace
 
-std::optional<double> oracle_shrinkage(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
-                                       const SealedTruth& truth) {
+std::optional<double> oracle_shrinkage(const telemetry::RecordingSet& recordings,
+                                       const robot::RobotModel& robot, const SealedTruth& truth) {
   if (recordings.missions.size() < 2) return std::nullopt;
   std::vector<dynamics::ActiveEffect> effects;
-  gap::WindowSettings settings;
+  windows::WindowSettings settings;
   for (const robot::AdoptedEffect& sealed : truth.effects) {
     const auto active = true_effect(sealed);
     if (!active) return std::nullopt;
     // A delay is taken out of the recording, not out of the power.
-    gap::take_out(*active, settings);
+    if (sealed.id == "sensor_delay") settings.electrical_delay_s = active->values[0];
     effects.push_back(*active);
   }
   if (effects.empty() || effects.size() > most_effects) return std::nullopt;
 
-  const auto plain = gap::make_windows(recordings, robot);
-  const auto plain_measured = gap::measured_power(plain);
-  const auto nominal = gap::modelled_power(robot, {}, plain);
+  const windows::Readings readings = windows::find_readings(recordings.missions, robot);
+  const auto plain = windows::make_windows(recordings.missions, robot, readings);
+  const auto nominal = window_powers_w(robot, {}, plain);
   double before = 0;
   for (std::size_t k = 0; k < plain.size(); ++k) {
-    const double e = plain_measured[k] - nominal[k];
+    const double e = plain[k].battery_power_w - nominal[k];
     if (std::isfinite(e)) before += std::fabs(e);
   }
 
-  const auto windows = gap::make_windows(recordings, robot, settings);
-  const auto measured = gap::measured_power(windows);
-  const auto modelled = gap::modelled_power(robot, effects, windows);
+  const auto windows = windows::make_windows(recordings.missions, robot, readings, settings);
+  const auto modelled = window_powers_w(robot, effects, windows);
   std::vector<std::vector<double>> moved;
   for (std::size_t k = 0; k < effects.size(); ++k) {
     auto stepped = effects;
     stepped[k].values[0] *= 1 + relative_step;
-    moved.push_back(gap::modelled_power(robot, stepped, windows));
+    moved.push_back(window_powers_w(robot, stepped, windows));
   }
   std::vector<Row> rows;
   for (std::size_t w = 0; w < windows.size(); ++w) {
-    Row row{windows[w].mission, measured[w] - modelled[w], {}};
+    Row row{windows[w].mission, windows[w].battery_power_w - modelled[w], {}};
     bool finite = std::isfinite(row.residual_w);
     for (std::size_t k = 0; k < effects.size(); ++k) {
       row.slope_w[k] = (moved[k][w] - modelled[w]) / relative_step;

@@ -3,8 +3,8 @@
 #include <optional>
 
 #include "client/trial/case_files.h"
-#include "telemetry/recording_set.h"
 #include "robot/robot_model.h"
+#include "telemetry/recording_set.h"
 
 namespace joulecast::trial {
 

@@ -55,7 +55,8 @@ bool exactly_right(const CaseOutcome& o) {
 
 bool first_right(const CaseOutcome& o) {
   const gap::Diagnosis& d = o.diagnosis;
-  const bool named = d.verdict == gap::Verdict::effects || d.verdict == gap::Verdict::inconclusive;
+  const bool named = d.verdict == gap::Verdict::effects || d.verdict == gap::Verdict::inconclusive ||
+                     d.verdict == gap::Verdict::not_this_robot;
   return named && !d.effects.empty() && !o.truth.effects.empty() &&
          std::ranges::any_of(o.truth.effects,
                              [&](const auto& effect) { return stands_for(d.effects.front(), effect.id); });

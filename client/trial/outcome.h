@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "client/trial/case_files.h"
-#include "gap/diagnosis.h"
+#include "gap/verdict/diagnosis.h"
 
 namespace joulecast::trial {
 

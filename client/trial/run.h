@@ -7,15 +7,17 @@
 #include "base/error.h"
 #include "client/trial/outcome.h"
 #include "client/trial/trial_case.h"
+#include "gap/diagnose/recordings.h"
 
 namespace joulecast::trial {
 
 struct RunSettings {
   TrialSettings trial;
+  gap::DiagnosisSettings diagnosis;
   std::size_t jobs = 1;
   std::filesystem::path keep;  // folder that takes robot files, logs and truths; empty: all are removed
   bool again = false;          // judge the cases that `keep` holds already; nothing is drawn or driven
-  bool compare = false;        // judge every log by the baselines and with each part of the method left out
+  bool compare = false;        // judge every log by the baselines and by the method with parts left out
   std::function<void(const CaseOutcome&)> done;  // called after each case, by one thread at a time
 };
 

@@ -57,16 +57,6 @@ std::string answer_label(const CaseOutcome& o) {
 
 }  // namespace
 
-std::array<double, 2> Rate::interval() const {
-  if (tries == 0) return {0, 1};
-  const double n = static_cast<double>(tries);
-  const double p = value();
-  const double z2 = normal_95 * normal_95;
-  const double middle = (p + z2 / (2 * n)) / (1 + z2 / n);
-  const double half = normal_95 * std::sqrt(p * (1 - p) / n + z2 / (4 * n * n)) / (1 + z2 / n);
-  return {std::max(0.0, middle - half), std::min(1.0, middle + half)};
-}
-
 std::vector<ComparisonRow> compare(std::span<const CaseOutcome> outcomes) {
   std::vector<ComparisonRow> rows;
   const std::size_t others = outcomes.empty() ? 0 : outcomes.front().others.size();
@@ -106,9 +96,10 @@ Score score_of(std::span<const CaseOutcome> outcomes) {
     const gap::Diagnosis& d = o.diagnosis;
     const bool right = exactly_right(o);
     StrengthRow& row = score.rows[o.truth.motor_channels ? 0 : 1][static_cast<std::size_t>(o.truth.strength)];
+    score.not_this_robot.count(d.verdict == gap::Verdict::not_this_robot);
     switch (o.truth.kind) {
       case Kind::none:
-        score.none_alarm.count(d.verdict == gap::Verdict::effects || d.verdict == gap::Verdict::outside);
+        score.none_alarm.count(d.verdict != gap::Verdict::none && d.verdict != gap::Verdict::inconclusive);
         score.none_inconclusive.count(d.verdict == gap::Verdict::inconclusive);
         break;
       case Kind::outside:

@@ -8,21 +8,9 @@
 #include <vector>
 
 #include "client/trial/outcome.h"
+#include "client/trial/rate.h"
 
 namespace joulecast::trial {
-
-// Hits of a number of tries.
-struct Rate {
-  std::size_t hits = 0, tries = 0;
-
-  void count(bool hit) {
-    hits += hit ? 1 : 0;
-    ++tries;
-  }
-  double value() const { return tries > 0 ? static_cast<double>(hits) / static_cast<double>(tries) : 0; }
-  // 95 % interval (Wilson 1927); [0, 1] without a try.
-  std::array<double, 2> interval() const;
-};
 
 inline constexpr std::size_t strength_classes = 4;
 
@@ -44,12 +32,6 @@ struct StrengthRow {
   ShrinkageScore shrinkage;
 };
 
-struct ReliabilityBin {
-  double sum = 0;  // of the probabilities stated
-  Rate right;
-  double mean() const { return right.tries > 0 ? sum / static_cast<double>(right.tries) : 0; }
-};
-
 struct VariantRow {
   Rate with, without;  // exactly right, in cases with that variant and in cases without any
 };
@@ -57,7 +39,8 @@ struct VariantRow {
 struct Score {
   // [0] with motor channels, [1] without
   std::array<std::array<StrengthRow, strength_classes>, 2> rows;
-  Rate none_alarm;  // verdict "effects" or "outside"
+  Rate not_this_robot;  // that verdict, in all cases
+  Rate none_alarm;      // verdict "effects", "outside" or "not_this_robot"
   Rate none_inconclusive;
   Rate outside_called;                                 // "outside" or "inconclusive"
   Rate outside_misled;                                 // a name with a probability above 0.9

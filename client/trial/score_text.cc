@@ -16,13 +16,6 @@ using nlohmann::json;
 constexpr std::array<Strength, strength_classes> strongest_first{Strength::strong, Strength::medium,
                                                                  Strength::weak, Strength::slight};
 
-std::string cell(const Rate& rate) {
-  if (rate.tries == 0) return "-";
-  const auto [low, high] = rate.interval();
-  return fmt::format("{}/{} {:.0f} % [{:.0f}, {:.0f}]", rate.hits, rate.tries, 100 * rate.value(), 100 * low,
-                     100 * high);
-}
-
 template <class Pick>
 void add_line(std::string& out, const char* what, const std::array<StrengthRow, strength_classes>& rows,
               Pick pick) {
@@ -39,14 +32,18 @@ void add_rows(std::string& out, const char* title, const std::array<StrengthRow,
   if (!any) return;
   fmt::format_to(std::back_inserter(out), "\n{:<34} {:<24} {:<24} {:<24} {:<24}\n", title,
                  "strong (from 8 %)", "medium (4 to 8 %)", "weak (2 to 4 %)", "slight (below 2 %)");
-  add_line(out, "single: named first", rows, [](const StrengthRow& r) { return cell(r.single_first); });
-  add_line(out, "single: exactly it", rows, [](const StrengthRow& r) { return cell(r.single_exact); });
-  add_line(out, "two: both, nothing false", rows, [](const StrengthRow& r) { return cell(r.pair_exact); });
-  add_line(out, "two: first is one of them", rows, [](const StrengthRow& r) { return cell(r.pair_first); });
+  add_line(out, "single: named first", rows, [](const StrengthRow& r) { return rate_text(r.single_first); });
+  add_line(out, "single: exactly it", rows, [](const StrengthRow& r) { return rate_text(r.single_exact); });
+  add_line(out, "two: both, nothing false", rows,
+           [](const StrengthRow& r) { return rate_text(r.pair_exact); });
+  add_line(out, "two: first is one of them", rows,
+           [](const StrengthRow& r) { return rate_text(r.pair_first); });
   add_line(out, "strength within 10 % or covered", rows,
-           [](const StrengthRow& r) { return cell(r.strength_close); });
-  add_line(out, "strength within 10 %", rows, [](const StrengthRow& r) { return cell(r.strength_within); });
-  add_line(out, "95 % interval covers", rows, [](const StrengthRow& r) { return cell(r.interval_covers); });
+           [](const StrengthRow& r) { return rate_text(r.strength_close); });
+  add_line(out, "strength within 10 %", rows,
+           [](const StrengthRow& r) { return rate_text(r.strength_within); });
+  add_line(out, "95 % interval covers", rows,
+           [](const StrengthRow& r) { return rate_text(r.interval_covers); });
   add_line(out, "shrinkage over the oracle's", rows, [](const StrengthRow& r) {
     const Rate& reached = r.shrinkage.reached;
     return reached.tries == 0
@@ -61,16 +58,8 @@ void add_reliability(std::string& out, const char* title, const std::array<Relia
     if (bins[k].right.tries == 0) continue;
     fmt::format_to(std::back_inserter(out), "  {:.1f} to {:.1f}: stated {:.2f}, right {}\n",
                    0.1 * static_cast<double>(k), 0.1 * static_cast<double>(k + 1), bins[k].mean(),
-                   cell(bins[k].right));
+                   rate_text(bins[k].right));
   }
-}
-
-json rate_json(const Rate& rate) {
-  const auto [low, high] = rate.interval();
-  return {{"hits", rate.hits},
-          {"of", rate.tries},
-          {"rate", rate.tries > 0 ? json(rate.value()) : json()},
-          {"ci", {low, high}}};
 }
 
 json reliability_json(const std::array<ReliabilityBin, 10>& bins) {
@@ -97,9 +86,10 @@ std::string score_text(const Score& score) {
   add_rows(out, "all channels", score.rows[0]);
   add_rows(out, "battery and motion only", score.rows[1]);
   const auto line = [&](const char* what, const Rate& rate) {
-    if (rate.tries > 0) fmt::format_to(std::back_inserter(out), "{:<34} {}\n", what, cell(rate));
+    if (rate.tries > 0) fmt::format_to(std::back_inserter(out), "{:<34} {}\n", what, rate_text(rate));
   };
   out += '\n';
+  line("verdict not_this_robot", score.not_this_robot);
   line("no gap: false alarm", score.none_alarm);
   line("no gap: inconclusive", score.none_inconclusive);
   line("outside: outside or inconclusive", score.outside_called);
@@ -109,9 +99,9 @@ std::string score_text(const Score& score) {
   add_reliability(out, "probability of a verdict against how often it is right", score.verdict_reliability);
   if (!score.variants.empty()) {
     fmt::format_to(std::back_inserter(out), "\nplant unlike the usual (usual: {} right)\n",
-                   cell(score.variants.begin()->second.without));
+                   rate_text(score.variants.begin()->second.without));
     for (const auto& [name, row] : score.variants) {
-      fmt::format_to(std::back_inserter(out), "  {:<20} {}\n", name, cell(row.with));
+      fmt::format_to(std::back_inserter(out), "  {:<20} {}\n", name, rate_text(row.with));
     }
   }
   out += "\nwrong answers by what was there\n";
@@ -209,6 +199,7 @@ json score_json(const Score& score) {
   for (const auto& [name, row] : score.variants) variants[name] = rate_json(row.with);
   return {
       {"by_strength", channels},
+      {"not_this_robot", rate_json(score.not_this_robot)},
       {"none_false_alarm", rate_json(score.none_alarm)},
       {"none_inconclusive", rate_json(score.none_inconclusive)},
       {"outside_called", rate_json(score.outside_called)},
@@ -234,12 +225,15 @@ json case_json(const CaseOutcome& o) {
     named.push_back({{"id", effect.id},
                      {"probability", effect.probability},
                      {"posterior", effect.posterior},
+                     {"standing", gap::name_of(effect.standing)},
+                     {"there", holds(o.truth, effect.id)},
                      {"strength", effect.parameters.front().value},
                      {"sd", json_number(effect.parameters.front().deviation)},
                      {"share", json_number(effect.share)},
                      {"alternatives", effect.alternatives}});
   }
-  return {{"case", o.index},
+  return {{"trial", "virtual"},
+          {"case", o.index},
           {"digest", fmt::format("{:016x}", o.digest)},
           {"kind", name_of(o.truth.kind)},
           {"strength", name_of(o.truth.strength)},

@@ -119,11 +119,14 @@ TEST(Score, CountsFalseAlarmsAndConfidentWrongNames) {
   outcomes.push_back(outcome(Kind::none, {}, Verdict::none, {}));
   outcomes.push_back(outcome(Kind::none, {}, Verdict::outside, {}));
   outcomes.push_back(outcome(Kind::none, {}, Verdict::inconclusive, {}));
+  outcomes.push_back(outcome(Kind::none, {}, Verdict::not_this_robot, {}));
   const auto unknown = truth("x_cogging", 1);
   outcomes.push_back(outcome(Kind::outside, {unknown}, Verdict::outside, {named("slope", 0.02, 0.01, 0.95)}));
   outcomes.push_back(outcome(Kind::outside, {unknown}, Verdict::effects, {named("slope", 0.02, 0.01, 0.85)}));
   const Score score = score_of(outcomes);
-  EXPECT_EQ(score.none_alarm.hits, 1u);
+  EXPECT_EQ(score.none_alarm.hits, 2u);
+  EXPECT_EQ(score.not_this_robot.hits, 1u);
+  EXPECT_EQ(score.not_this_robot.tries, 6u);
   EXPECT_EQ(score.none_inconclusive.hits, 1u);
   EXPECT_EQ(score.outside_called.hits, 1u);
   EXPECT_EQ(score.outside_misled.hits, 1u);

@@ -151,7 +151,6 @@ ChannelNoise learn_channel(const ChannelRows& rows, const Eigen::VectorXd& sd, c
   const double used = std::sqrt(part.sum() / fit.freedom);
   noise.sigma = spread_of(fit.residual, part) * used;
   Eigen::VectorXd filtered = fit.residual.cwiseQuotient(spread);
-  if (std::getenv("GAPWHITE")) noise.autoregression = statistics::fit_autoregression(filtered, rows.continues, 1, outlier);
   statistics::whiten(filtered, rows.continues, noise.autoregression);
   const double scale = spread_of(filtered, part) * used;
   noise.weight.resize(n);

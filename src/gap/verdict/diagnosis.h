@@ -34,10 +34,20 @@ struct Controls {
   std::size_t surrogates = 0, named_in = 0;
 };
 
+// How the answer that names an effect stands.
+enum class Standing {
+  alone,         // nothing speaks against it, and nothing else would do in its place
+  grouped,       // the same, with others that the data cannot tell from it
+  inconclusive,  // something speaks against the answer as a whole
+  outside        // named beside something that the catalogue does not know
+};
+std::string_view name_of(Standing standing);
+
 struct DiagnosedEffect {
   std::string id;          // of the catalogue, or "covariate:<name>"
   double probability = 0;  // that it is there, as such names came true in trials
   double posterior = 0;    // by the data alone
+  Standing standing = Standing::inconclusive;
   std::vector<DiagnosedParameter> parameters;  // as the catalogue names them; the first is the strength
   double share = 0;                       // Shapley: fraction of the gap that it closes on held-out blocks
   double power_w = 0;                     // mean |change of battery power|

@@ -1,0 +1,27 @@
+#include "client/commands/outcome_lines.h"
+
+#include <nlohmann/json.hpp>
+
+namespace joulecast::client {
+
+Result<OutcomeLines> OutcomeLines::open(const std::string& path) {
+  OutcomeLines lines;
+  lines.path_ = path;
+  if (path.empty()) return lines;
+  lines.out_.open(path, std::ios::app);
+  if (!lines.out_) return fail(Fault::unavailable, path, "cannot be opened for writing");
+  return lines;
+}
+
+void OutcomeLines::add(const nlohmann::json& outcome) {
+  if (!path_.empty()) out_ << outcome.dump() << std::endl;
+}
+
+Result<void> OutcomeLines::close() {
+  if (path_.empty()) return {};
+  out_.close();
+  if (!out_) return fail(Fault::unavailable, path_, "not every line could be written");
+  return {};
+}
+
+}  // namespace joulecast::client
