@@ -6,7 +6,7 @@
 
 #include "gap/diagnose/problem.h"
 #include "gap/equations/columns.h"
-#include "gap/equations/whitening.h"
+#include "gap/equations/noise.h"
 
 namespace joulecast::gap {
 

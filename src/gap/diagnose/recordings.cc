@@ -14,6 +14,7 @@
 #include "gap/verdict/figures.h"
 #include "gap/verdict/judge.h"
 #include "gap/verdict/next_drive.h"
+#include "gap/verdict/text.h"
 #include "gap/verdict/where.h"
 #include "gap/verdict/words.h"
 #include "statistics/bootstrap.h"
@@ -77,7 +78,7 @@ class Diagnoser {
 
   bool goes_on(double part) const { return !settings_.progress || settings_.progress(part); }
   Material material() const {
-    return {robot_, adopted_, view_.windows, blocks_, from_motion_, readings_.row_s, covariates_};
+    return {robot_, adopted_, view_.windows, blocks_, from_motion_, readings_.row_s, covariates_, settings_.prior_factor};
   }
   std::vector<double> modelled(std::span<const Cause> causes) const {
     return modelled_power(robot_, adopted_, causes, view_.windows);
@@ -88,6 +89,7 @@ class Diagnoser {
   void measure();
   bool fit();
   bool judge_all();
+  std::vector<dynamics::ActiveEffect> instead_of(const Problem& problem, const Member& member) const;
   void add_wander(const Problem& problem, const Explanation& explanation, Findings& findings) const;
   void add_baseline();
   void add_shrinkage();
@@ -197,6 +199,24 @@ bool Diagnoser::fit() {
   }
 }
 
+// What each alternative of a named member would be in its place.
+std::vector<dynamics::ActiveEffect> Diagnoser::instead_of(const Problem& problem, const Member& member) const {
+  std::vector<dynamics::ActiveEffect> effects;
+  for (const Alternative& a : member.alternatives) {
+    if (!problem.hypotheses[a.hypothesis].is_effect()) continue;
+    HypothesisSet set = named_;
+    std::ranges::replace(set, member.hypothesis, a.hypothesis);
+    std::ranges::sort(set);
+    const auto place = std::ranges::find(set, a.hypothesis) - set.begin();
+    const std::vector<Cause> causes = strengths_of(*fit_->linear.columns, problem, set, {});
+    const Cause own = causes[static_cast<std::size_t>(place)];
+    for (const Cause& cause : refit(material(), joined(fit_->base, causes))) {
+      if (cause.same_kind(own)) effects.push_back(cause.effect);
+    }
+  }
+  return effects;
+}
+
 void Diagnoser::add_wander(const Problem& problem, const Explanation& explanation, Findings& f) const {
   double most = 0;
   for (std::size_t k = 0; k < explanation.members.size(); ++k) {
@@ -298,7 +318,7 @@ bool Diagnoser::judge_all() {
     ripple = find_ripple(recordings_, robot_, all, d_.motor_channels, taken_out_.electrical_delay_s, ripple_surrogates);
 
   Findings f{problem, explanation, settings_.controls > 0 ? std::move(*made) : std::vector<Controls>{}, named_, {}, {},
-             {}, {}, held_out_, ripple, std::nullopt, {}};
+             {}, {}, {}, held_out_, ripple, std::nullopt, {}};
   const std::vector<double> after = modelled(causes_);
   f.shares = held_out_shares(material(), *fit_, problem, named_, view_.power_w);
   f.base = causes_;
@@ -313,6 +333,8 @@ bool Diagnoser::judge_all() {
     for (std::size_t n = 0; n < after.size(); ++n) change += std::fabs(after[n] - without[n]);
     f.power_w.push_back(change / static_cast<double>(after.size()));
   }
+  for (const std::size_t h : named_)
+    f.instead.push_back(instead_of(problem, *std::ranges::find(explanation.members, h, &Member::hypothesis)));
   add_wander(problem, explanation, f);
   add_baseline();
   add_shrinkage();
@@ -354,8 +376,22 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   std::vector<Check> checks = check_recordings(recordings, robot);
   telemetry::RecordingSet trusted = recordings;
   silence_contradicted(trusted, checks);
+  // Where a sensor or the robot changed between missions each side is judged alone: the later one is today's.
+  std::string before;
+  if (auto sides = split_at_step(trusted, checks)) {
+    DiagnosisSettings quick = settings;
+    quick.controls = 0;
+    const Result<Diagnosis> earlier = Diagnoser((*sides)[0], robot, quick).run();
+    if (!earlier) return earlier;
+    before = earlier_words(*earlier, (*sides)[1].missions.front().mission_id);
+    const std::vector<std::string> notes = std::move(trusted.notes);
+    trusted = std::move((*sides)[1]);
+    trusted.notes = notes;
+  }
   Result<Diagnosis> d = Diagnoser(trusted, robot, settings).run();
-  if (d) d->checks = std::move(checks);
+  if (!d) return d;
+  d->checks = std::move(checks);
+  if (!before.empty()) d->notes.push_back(std::move(before));
   return d;
 }
 

@@ -72,6 +72,10 @@ ColumnSet::ColumnSet(const Material& m, const Shapes& shapes, std::span<const do
   scale_effects(shares);
   scale_covariates(shares);
   scale_families(shares);
+  for (Column& c : columns_) {
+    c.tolerance *= m.prior_factor;
+    c.scatter *= m.prior_factor;
+  }
 }
 
 void ColumnSet::add_effects(const Shapes& shapes, std::span<const double> shares) {

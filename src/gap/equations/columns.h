@@ -24,6 +24,7 @@ struct Material {
   FromMotion from_motion;
   double row_s = 0;  // between rows of the recordings
   std::span<const std::string> covariates{};  // names, in the order of Window::covariates
+  double prior_factor = 1;                    // on tolerances and scatter
 };
 
 // A chosen cause in the coordinates of its hypothesis: (strength), or for slope (angle cos, angle sin).

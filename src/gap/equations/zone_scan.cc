@@ -39,8 +39,6 @@ class Scanner {
       const Eigen::VectorXd by_spread = noise[c].spread.cwiseInverse();
       Eigen::MatrixXd x = by_spread.asDiagonal() * r.x;
       y[c] = by_spread.cwiseProduct(r.y);
-      statistics::whiten(x, r.continues, noise[c].autoregression);
-      statistics::whiten(y[c], r.continues, noise[c].autoregression);
       x = noise[c].weight.asDiagonal() * x;
       y[c] = noise[c].weight.asDiagonal() * y[c];
       own[c] = x.col(local - r.columns.begin());

@@ -3,7 +3,7 @@
 #include <optional>
 #include <span>
 
-#include "gap/equations/whitening.h"
+#include "gap/equations/noise.h"
 
 namespace joulecast::gap {
 

@@ -117,6 +117,7 @@ class Judge {
       e.power_w = f_.power_w[k];
       e.varies = m.wander;
       for (const Alternative& a : m.alternatives) e.alternatives.push_back(hypothesis(a.hypothesis).id());
+      for (const dynamics::ActiveEffect& effect : f_.instead[k]) e.instead.push_back(dynamics::adopt(effect));
       if (h.is_effect()) e.calibrates = traits_of(e.id).calibrates;
       weakest_ = std::min(weakest_, e.alternatives.empty() ? e.posterior : std::max(e.posterior, group_of(m, e)));
       named_share_ += m.share;
@@ -217,6 +218,7 @@ class Judge {
                                 : doubts_.any_against()        ? Standing::inconclusive
                                 : e.alternatives.empty()       ? Standing::alone
                                                                : Standing::grouped;
+      e.standing = standing;
       e.probability = stated_probability(e.posterior, standing);
     }
     d_.verdict_probability = std::min(d_.verdict_probability, surest_verdict);

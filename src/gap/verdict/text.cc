@@ -116,6 +116,18 @@ std::string outside_words(const Outside& o) {
   return sentence(fmt::format("it shows in {} and {}", channel_words(o.channel), follows_words(o.follows)));
 }
 
+std::string earlier_words(const Diagnosis& earlier, std::string_view first_mission) {
+  std::vector<std::string> found;
+  for (const DiagnosedEffect& e : earlier.effects) {
+    const DiagnosedParameter& p = e.parameters.front();
+    found.push_back(fmt::format("{} {} (probability {})", words_of(e.id), with_deviation(p.value, p.deviation, p.unit),
+                                probability_text(e.probability)));
+  }
+  return sentence(fmt::format(
+      "judged from mission {} on, after the step; the {} missions before it, judged alone, say {}{}{}", first_mission,
+      earlier.missions, words_of(name_of(earlier.verdict)), found.empty() ? "" : ": ", enumerate(found)));
+}
+
 std::vector<std::string> reasons_for(const Diagnosis& d, bool worse, bool unexplained) {
   std::vector<std::string> reasons;
   if (!std::isfinite(d.power_absolute_relative)) {

@@ -1,4 +1,4 @@
-#include "gap/equations/whitening.h"
+#include "gap/equations/noise.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,10 +13,6 @@ constexpr double outlier = 3.5;  // in spreads; beyond it the weight falls
 constexpr std::size_t fewest_rows = 20;
 constexpr std::size_t fewest_blocks = 6;  // to learn from how blocks scatter
 constexpr std::size_t most_probed = 1500;  // windows, to learn which columns speak
-
-bool is_span(std::size_t channel) {
-  return channel == index_of(Channel::travel) || channel == index_of(Channel::turn);
-}
 
 // Standard deviation that each coefficient may have, there or not.
 std::vector<double> possible_sd(const ColumnSet& columns) {
@@ -141,7 +137,7 @@ ChannelNoise learn_channel(const ChannelRows& rows, const Eigen::VectorXd& sd, c
   for (int pass = 0; pass < 3; ++pass) {
     fit = fit_everything(rows, weight, sd);
     // What follows a formula to the last digit was computed, or never moved: it is no measurement.
-    if (spread_of(fit.residual, part) < 1e-9 * size) return noise;
+    if (spread_of(fit.residual, part) <= std::max(1e-9, 1e-6 * size)) return noise;
     spread = spreads(rows, fit.residual, part);
     for (Eigen::Index k = 0; k < n; ++k)
       weight[k] = part[k] * statistics::huber_weight(fit.residual[k], spread[k], outlier) / (spread[k] * spread[k]);
@@ -151,14 +147,12 @@ ChannelNoise learn_channel(const ChannelRows& rows, const Eigen::VectorXd& sd, c
   const double used = std::sqrt(part.sum() / fit.freedom);
   noise.sigma = spread_of(fit.residual, part) * used;
   Eigen::VectorXd filtered = fit.residual.cwiseQuotient(spread);
-  statistics::whiten(filtered, rows.continues, noise.autoregression);
   const double scale = spread_of(filtered, part) * used;
   noise.weight.resize(n);
   for (Eigen::Index k = 0; k < n; ++k)
     noise.weight[k] = part[k] * std::sqrt(statistics::huber_weight(filtered[k], scale, outlier)) / scale;
   noise.spread = spread;
   Eigen::MatrixXd x = spread.cwiseInverse().asDiagonal() * rows.x;
-  statistics::whiten(x, rows.continues, noise.autoregression);
   noise.inflation = block_inflation(rows, noise.weight.asDiagonal() * x, noise.weight.cwiseProduct(filtered), part);
   noise.weight /= std::sqrt(noise.inflation);
   return noise;
@@ -199,8 +193,6 @@ Rows make_rows(const ColumnSet& columns, std::span<const Window> windows) {
       rows.y[row] = values[c];
       for (std::size_t j = 0; j < rows.columns.size(); ++j)
         rows.x(row, static_cast<Eigen::Index>(j)) = cells[c * p + rows.columns[j]];
-      const bool next = !rows.window.empty() && rows.window.back() + 1 == k && rows.block.back() == windows[k].block;
-      rows.continues.push_back(windows[k].continues && next && !is_span(c));
       rows.window.push_back(k);
       rows.block.push_back(windows[k].block);
       rows.resting.push_back(windows[k].resting[0] && windows[k].resting[1]);
@@ -242,8 +234,6 @@ std::vector<statistics::Information> block_information(const ColumnSet& columns,
     const Eigen::VectorXd by_spread = n.spread.cwiseInverse();
     Eigen::MatrixXd x = by_spread.asDiagonal() * r.x;
     Eigen::VectorXd y = by_spread.cwiseProduct(response == nullptr ? r.y : (*response)[c]);
-    statistics::whiten(x, r.continues, n.autoregression);
-    statistics::whiten(y, r.continues, n.autoregression);
     x = n.weight.asDiagonal() * x;
     y = n.weight.asDiagonal() * y;
     std::size_t from = 0;

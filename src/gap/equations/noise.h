@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "gap/equations/columns.h"
-#include "statistics/autoregression.h"
 #include "statistics/information.h"
 
 namespace joulecast::gap {
@@ -16,7 +15,6 @@ struct ChannelRows {
   std::vector<std::size_t> columns;    // global column of each of ours
   std::vector<std::size_t> window;     // of each row
   std::vector<std::size_t> block;      // of each row
-  std::vector<bool> continues;         // the row follows the one before it
   std::vector<bool> resting;           // both wheels stand
   Eigen::MatrixXd x;                   // rows by columns
   Eigen::VectorXd y;
@@ -27,14 +25,13 @@ using Rows = std::array<ChannelRows, channel_count>;
 Rows make_rows(const ColumnSet& columns, std::span<const Window> windows);
 
 // How one channel's equations err: learnt from what a fit of everything leaves over, with every coefficient held by
-// what is expected of it (Huber weights, a second-order autoregression, a robust spread), and, for what stays
-// correlated over seconds, from how much more the scores of whole blocks scatter than those of single rows.
+// what is expected of it (Huber weights, a robust spread by class of size), and from how much more the scores of whole
+// blocks scatter than those of single rows: the inflation is the factor by which correlated rows count for less.
 struct ChannelNoise {
-  double sigma = 0;      // of one row before whitening, in the channel's unit; 0: the channel is silent
+  double sigma = 0;      // of one row, in the channel's unit; 0: the channel is silent
   double inflation = 1;  // of the variance, by blocks
-  statistics::Autoregression autoregression;
   Eigen::VectorXd spread;    // of each row, in the channel's unit
-  Eigen::VectorXd weight;    // of each whitened row in units of its spread, less for outliers
+  Eigen::VectorXd weight;    // of each row in units of its spread, less for outliers
   Eigen::VectorXd residual;  // of the fit of everything, in the channel's unit
 };
 using Noise = std::array<ChannelNoise, channel_count>;
@@ -45,7 +42,7 @@ Noise learn_noise(const ColumnSet& columns, const Rows& rows, const std::vector<
 // Responses of every channel in place of the rows' own; empty: the channel is silent.
 using Responses = std::array<Eigen::VectorXd, channel_count>;
 
-// Whitened rows as information, one a block; rows of left out blocks give none. `response`: in place of the rows'
+// Weighted rows as information, one a block; rows of left out blocks give none. `response`: in place of the rows'
 // own, if given.
 std::vector<statistics::Information> block_information(const ColumnSet& columns, const Rows& rows, const Noise& noise,
                                                        std::size_t blocks, const Responses* response = nullptr);
