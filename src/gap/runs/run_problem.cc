@@ -1,0 +1,246 @@
+#include "gap/runs/run_problem.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numeric>
+
+#include "statistics/robust.h"
+
+namespace joulecast::gap {
+namespace {
+
+using statistics::Information;
+
+constexpr double anything = 0.3;           // share of the energy that each cause may move in the fit of everything
+constexpr double least_scatter = 0.002;    // rounding, and conditions that no table lists
+constexpr double outlier = 2.5;            // spreads from which on a run counts less
+constexpr std::size_t most_blocks = 24;
+constexpr double usual_shift = 0.02;       // from day to day and floor to floor
+
+// What is averaged over: the scatter over what was learnt, how well the robot keeps to its file, how far formulas are
+// off as a part of the energy, and shifts between tables.
+constexpr std::array scatters{0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.2};
+constexpr double scatter_known_to = 0.4;  // sd of its logarithm
+constexpr std::array keeping{0.5, 1.0, 2.0};
+constexpr std::array formulas{0.0, 0.003};
+constexpr std::array shifts{0.005, 0.01, 0.02, 0.04, 0.08};
+
+// Rows with everything relative to the size of their run.
+struct Relative {
+  Eigen::MatrixXd x;
+  Eigen::VectorXd y;
+};
+
+Relative relative(const RunColumns& columns, const Eigen::VectorXd& size_j) {
+  const auto& rows = columns.rows();
+  Relative r{Eigen::MatrixXd(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(columns.size())),
+             Eigen::VectorXd(static_cast<Eigen::Index>(rows.size()))};
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    const double size = size_j[static_cast<Eigen::Index>(rows[k].run)];
+    r.x.row(at) = rows[k].x.transpose();
+    for (std::size_t c = 0; c < columns.size() && !columns.relative(c); ++c)
+      r.x(at, static_cast<Eigen::Index>(c)) /= size;
+    r.y[at] = rows[k].y / size;
+  }
+  return r;
+}
+
+// sd of every coefficient in a fit of everything.
+Eigen::VectorXd freedom(const RunColumns& columns) {
+  Eigen::VectorXd sd(static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    const Column& column = columns.columns()[c];
+    const bool cause = column.discrepancy > 0;
+    const double shift = c >= columns.first_shift() ? usual_shift : column.tolerance;
+    sd[static_cast<Eigen::Index>(c)] = cause ? anything / column.power_share : shift;
+  }
+  return sd;
+}
+
+// Mean change that hypotheses make, over the energies.
+class Moved {
+ public:
+  Moved(const RunColumns& columns, Relative rows) : columns_(columns.columns()), rows_(std::move(rows)) {}
+
+  double operator()(const Hypothesis& h, const Eigen::VectorXd& coefficients) const {
+    if (h.outside()) return change(h, coefficients).cwiseAbs().mean();
+    const std::size_t own = h.candidate.columns.front();
+    return std::fabs(coefficients[0]) * columns_[own].power_share;
+  }
+
+  double cancelling(const std::vector<Hypothesis>& hypotheses, const HypothesisSet& set,
+                    const Eigen::VectorXd& coefficients) const {
+    constexpr double matters = 0.1;  // of what the response is
+    double apart = 0;
+    Eigen::VectorXd together = Eigen::VectorXd::Zero(rows_.y.size());
+    Eigen::Index at = 0;
+    for (const std::size_t h : set) {
+      const auto n = static_cast<Eigen::Index>(hypotheses[h].candidate.columns.size());
+      const Eigen::VectorXd own = change(hypotheses[h], coefficients.segment(at, n));
+      apart += own.cwiseAbs().mean();
+      together += own;
+      at += n;
+    }
+    if (apart <= matters * rows_.y.cwiseAbs().mean()) return 1;
+    return apart / std::max(together.cwiseAbs().mean(), 1e-12);
+  }
+
+ private:
+  Eigen::VectorXd change(const Hypothesis& h, const Eigen::VectorXd& coefficients) const {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(rows_.y.size());
+    for (std::size_t k = 0; k < h.candidate.columns.size(); ++k)
+      sum += coefficients[static_cast<Eigen::Index>(k)] * rows_.x.col(static_cast<Eigen::Index>(h.candidate.columns[k]));
+    return sum;
+  }
+  std::vector<Column> columns_;
+  Relative rows_;
+};
+
+}  // namespace
+
+RunScatter learn_scatter(const RunColumns& columns, const std::vector<bool>& left_out) {
+  constexpr int passes = 2, rounds = 25;
+  const auto& rows = columns.rows();
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  const auto out = [&](const RunRow& row) { return !left_out.empty() && left_out[row.run]; };
+  RunScatter s;
+  s.size_j.resize(static_cast<Eigen::Index>(columns.runs().size()));
+  for (std::size_t k = 0; k < columns.runs().size(); ++k)
+    s.size_j[static_cast<Eigen::Index>(k)] = columns.runs()[k].measured_j();
+  s.run = s.difference = 0.05;
+  s.weight = Eigen::VectorXd::Ones(n);
+  const Eigen::VectorXd sd = freedom(columns);
+  for (int pass = 0; pass < passes; ++pass) {
+    const Relative r = relative(columns, s.size_j);
+    const Eigen::MatrixXd x = r.x * sd.asDiagonal();
+    Eigen::VectorXd left = r.y;
+    // The most likely scatter under the fit's own prior: E[r^2] = sigma^2 (1 - h) at that scatter.
+    for (int round = 0; round < rounds; ++round) {
+      Eigen::VectorXd precision(n);
+      for (Eigen::Index k = 0; k < n; ++k) {
+        const RunRow& row = rows[static_cast<std::size_t>(k)];
+        const double sigma = row.difference ? s.difference : s.run;
+        precision[k] = out(row) ? 0 : s.weight[k] / (sigma * sigma);
+      }
+      Eigen::MatrixXd a = x.transpose() * precision.asDiagonal() * x;
+      a.diagonal().array() += 1.0;
+      const Eigen::LLT<Eigen::MatrixXd> factor(a);
+      left = r.y - x * factor.solve(x.transpose() * precision.cwiseProduct(r.y));
+      const Eigen::MatrixXd half = factor.matrixL().solve(x.transpose());
+      std::array<std::vector<double>, 2> z;
+      s.residual = Eigen::VectorXd::Zero(n);
+      for (Eigen::Index k = 0; k < n; ++k) {
+        const RunRow& row = rows[static_cast<std::size_t>(k)];
+        if (out(row)) continue;
+        s.residual[k] = left[k] / std::sqrt(std::max(1 - precision[k] * half.col(k).squaredNorm(), 0.02));
+        z[row.difference ? 1 : 0].push_back(s.residual[k]);
+      }
+      s.run = std::max(least_scatter, statistics::spread_about_zero(z[0]));
+      s.difference = std::max(least_scatter, statistics::spread_about_zero(z[1]));
+      for (Eigen::Index k = 0; k < n; ++k) {
+        const RunRow& row = rows[static_cast<std::size_t>(k)];
+        s.residual[k] /= row.difference ? s.difference : s.run;
+        s.weight[k] = out(row) ? 0 : statistics::huber_weight(s.residual[k], 1, outlier);
+      }
+    }
+    if (pass + 1 == passes) break;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const RunRow& row = rows[static_cast<std::size_t>(k)];
+      const auto run = static_cast<Eigen::Index>(row.run);
+      const double measured = columns.runs()[row.run].measured_j();
+      if (!row.difference) s.size_j[run] = measured * std::clamp(1 - left[k], 0.5, 2.0);
+    }
+  }
+  return s;
+}
+
+std::vector<std::size_t> blocks_of(std::span<const MissionRun> runs, std::span<const std::string> groups) {
+  std::vector<std::size_t> order(runs.size()), block(runs.size());
+  std::iota(order.begin(), order.end(), 0u);
+  const auto place = [&](std::size_t k) {
+    return std::pair<std::string_view, std::string_view>(groups.empty() ? "" : std::string_view(groups[k]),
+                                                         runs[k].table);
+  };
+  std::ranges::stable_sort(order, {}, place);
+  const std::size_t most = (runs.size() + most_blocks - 1) / most_blocks;
+  std::size_t next = 0, length = 0;
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    if (k > 0 && (length == most || place(order[k]) != place(order[k - 1]))) {
+      ++next;
+      length = 0;
+    }
+    block[order[k]] = next;
+    ++length;
+  }
+  return block;
+}
+
+Problem make_problem(const RunColumns& columns, const RunScatter& scatter, std::span<const std::size_t> block,
+                     const Eigen::VectorXd* response) {
+  const auto p = static_cast<Eigen::Index>(columns.size());
+  Relative r = relative(columns, scatter.size_j);
+  if (response != nullptr) {
+    for (Eigen::Index k = 0; k < r.y.size(); ++k)
+      r.y[k] = (*response)[k] / scatter.size_j[static_cast<Eigen::Index>(columns.rows()[static_cast<std::size_t>(k)].run)];
+  }
+  Problem problem;
+  problem.hypotheses = columns.hypotheses();
+  std::vector<Information> plain(1 + *std::ranges::max_element(block), Information(p));
+  for (std::size_t k = 0; k < columns.rows().size(); ++k) {
+    const RunRow& row = columns.rows()[k];
+    const auto at = static_cast<Eigen::Index>(k);
+    if (!(scatter.weight[at] > 0)) continue;
+    const double by = std::sqrt(scatter.weight[at]) / (row.difference ? scatter.difference : scatter.run);
+    plain[block[row.run]].add(by * r.x.row(at), by * r.y.segment(at, 1));
+    plain[block[row.run]].log_scale += std::log(by);
+  }
+  std::vector<double> rows_of(plain.size(), 0);
+  for (std::size_t k = 0; k < columns.rows().size(); ++k)
+    rows_of[block[columns.rows()[k].run]] += scatter.weight[static_cast<Eigen::Index>(k)] > 0 ? 1 : 0;
+  Eigen::VectorXd tolerance(p), discrepancy(p);
+  for (Eigen::Index k = 0; k < p; ++k) {
+    tolerance[k] = columns.columns()[static_cast<std::size_t>(k)].tolerance;
+    discrepancy[k] = columns.columns()[static_cast<std::size_t>(k)].discrepancy;
+  }
+  const Eigen::Index first_shift = static_cast<Eigen::Index>(columns.first_shift()), tables = p - first_shift;
+  for (const double wider : scatters) {
+    problem.blocks.push_back(plain);
+    for (std::size_t b = 0; b < plain.size(); ++b) {
+      Information& block_info = problem.blocks.back()[b];
+      block_info *= 1 / (wider * wider);
+      block_info.log_scale = plain[b].log_scale - rows_of[b] * std::log(wider);
+    }
+    if (wider == 1) {
+      problem.plain.tolerance = tolerance;
+      problem.plain.tolerance.tail(tables).setConstant(usual_shift);
+      problem.plain.noise = problem.blocks.size() - 1;
+    }
+    for (const double factor : keeping) {
+      for (const double off : formulas) {
+        for (const double shift : shifts) {
+          if (tables == 0 && shift != usual_shift) continue;
+          Circumstances c;
+          c.log_prior = -0.5 * (std::pow(std::log(wider) / scatter_known_to, 2) + std::pow(std::log2(factor), 2) +
+                                std::pow(shift / usual_shift, 2));
+          c.tolerance = ((factor * tolerance).array().square() + (off * discrepancy).array().square()).sqrt();
+          c.tolerance.tail(tables).setConstant(shift);
+          c.noise = problem.blocks.size() - 1;
+          problem.circumstances.push_back(std::move(c));
+        }
+      }
+    }
+  }
+  for (const Hypothesis& h : problem.hypotheses) {
+    for (const std::size_t k : h.candidate.columns) problem.plain.tolerance[static_cast<Eigen::Index>(k)] = 0;
+  }
+  const auto moved = std::make_shared<const Moved>(columns, std::move(r));
+  problem.moved = [moved](const Hypothesis& h, const Eigen::VectorXd& c) { return (*moved)(h, c); };
+  problem.cancelling = [moved, hypotheses = problem.hypotheses](const HypothesisSet& set, const Eigen::VectorXd& c) {
+    return moved->cancelling(hypotheses, set, c);
+  };
+  return problem;
+}
+
+}  // namespace joulecast::gap
