@@ -28,9 +28,9 @@ struct Traits {
   bool one_shape = false;
   // Why it changes over a robot's life: wear, floor, battery, load, sensors, model.
   std::string_view cause = "model";
-  std::string_view workshop;  // what to check on the robot
+  std::string_view workshop{};  // what to check on the robot
   // Parameter of the robot file that its strength corrects, as a JSON pointer, and how; empty: none.
-  std::string_view calibrates;
+  std::string_view calibrates{};
   bool adds = false;  // strength is added to the parameter; otherwise it is (1 + strength) times the file's
 };
 

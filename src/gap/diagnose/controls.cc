@@ -8,7 +8,7 @@
 #include <set>
 #include <thread>
 
-#include "gap/diagnose/held_out.h"
+#include "gap/diagnose/naming.h"
 #include "statistics/evidence.h"
 
 namespace joulecast::gap {

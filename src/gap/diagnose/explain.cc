@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <set>
 
 #include "gap/traits.h"
@@ -201,17 +199,6 @@ class Explainer {
       total += weight;
     }
     for (auto& [set, kept] : sets_) kept.probability /= total;
-    if (std::getenv("GAPFOUND")) {
-      for (std::size_t k = 0; k < std::min<std::size_t>(12, found_.size()); ++k) {
-        const auto est = mixture_.estimate(found_[k].set);
-        std::fprintf(stderr, "found %.1f:", found_[k].log_odds);
-        long at = 0;
-        for (auto h : found_[k].set) { std::fprintf(stderr, " %s=%.3g+-%.2g(%.3f)", hypothesis(h).id().c_str(), est.mean[at], est.sd[at], share(found_[k].set, est, h)); at += (long)hypothesis(h).candidate.columns.size(); }
-        const auto simp = simplified(found_[k].set).kept;
-        std::fprintf(stderr, " -> %zu%s\n", simp.size(), "");
-      }
-      std::fprintf(stderr, "\n");
-    }
   }
 
   // Sets that are worth predicting with: the likeliest, all parts of the best, and nothing.
@@ -270,16 +257,6 @@ class Explainer {
     std::vector<std::size_t> size;
     for (const HypothesisSet& set : models_) size.push_back(set.size());
     selection_ = statistics::select_within_error(score, size);
-    if (std::getenv("GAPDEBUG")) {
-      for (std::size_t m = 0; m < models_.size(); ++m) {
-        if (selection_->probability[m] < 0.05 && m != selection_->best && m!=selection_->chosen) continue;
-        std::fprintf(stderr, "%s%s p %.2f total %.1f odds %.1f:", m == selection_->best ? "BEST " : "", m == selection_->chosen ? "CHOSEN " : "", selection_->probability[m], score.row((long)m).sum()-score.row((long)selection_->best).sum(), mixture_.log_odds(models_[m]));
-        for (auto h : models_[m]) std::fprintf(stderr, " %s", hypothesis(h).id().c_str());
-        std::fprintf(stderr, "\n      ");
-        for (long k = 0; k < score.cols(); ++k) std::fprintf(stderr, " %.0f", score((long)selection_->best, k) - score((long)m, k));
-        std::fprintf(stderr, "\n");
-      }
-    }
   }
 
   // Probability by prediction that a set holds what the test says.

@@ -17,19 +17,24 @@ constexpr double worse = 1.02;        // misfit, over the one before
 std::vector<Chosen> chosen_of(const ColumnSet& columns, const Explanation& explanation) {
   std::vector<Chosen> chosen;
   for (const Member& m : explanation.members) {
-    if (columns.hypotheses()[m.hypothesis].is_effect()) chosen.push_back({m.hypothesis, m.coefficients});
+    if (!columns.hypotheses()[m.hypothesis].outside()) chosen.push_back({m.hypothesis, m.coefficients});
   }
   return chosen;
 }
 
-bool same(std::span<const dynamics::ActiveEffect> a, std::span<const dynamics::ActiveEffect> b) {
-  return std::ranges::equal(a, b, [](const auto& x, const auto& y) {
-    if (x.effect != y.effect) return false;
-    for (std::size_t k = 0; k < x.values.size(); ++k) {
-      if (std::fabs(x.values[k] - y.values[k]) > settled * std::fabs(x.values[k]) + 1e-12) return false;
+bool same(std::span<const Cause> a, std::span<const Cause> b) {
+  return std::ranges::equal(a, b, [](const Cause& x, const Cause& y) {
+    if (!x.same_kind(y)) return false;
+    for (std::size_t k = 0; k < x.effect.values.size(); ++k) {
+      const double here = x.effect.values[k], there = y.effect.values[k];
+      if (std::fabs(here - there) > settled * std::fabs(here) + 1e-12) return false;
     }
     return true;
   });
+}
+
+void narrow(Shapes& shapes, std::span<const Cause> causes, const robot::RobotModel& robot, double factor) {
+  for (const Cause& cause : causes) shapes.narrow(cause.effect, robot.kinematics.wheel_radius_m, factor);
 }
 
 // Where on the floor something brakes, if anything does.
@@ -43,21 +48,20 @@ std::optional<Zone> zone_of(const Material& m, std::span<const double> shares) {
 
 }  // namespace
 
-std::optional<FitResult> fit_windows(const Material& whole, std::span<const dynamics::ActiveEffect> start,
+std::optional<FitResult> fit_windows(const Material& whole, std::span<const Cause> start,
                                      const FitSettings& settings, const std::function<bool()>& goes_on) {
   const std::vector<Window> some = thinned(whole.windows);
   Material material = whole;
   material.windows = some;
   FitResult result;
   if (const auto zone = zone_of(material, settings.shares)) result.shapes.zones = {*zone};
-  for (const dynamics::ActiveEffect& effect : start)
-    result.shapes.narrow(effect, material.robot.kinematics.wheel_radius_m, first_factor);
+  narrow(result.shapes, start, material.robot, first_factor);
   if (!goes_on()) return std::nullopt;
   ExplainSettings quick = settings.explain;
   quick.predictive = false;
   std::optional<Noise> first_noise;
   double reached = std::numeric_limits<double>::infinity(), factor = first_factor;
-  std::vector<dynamics::ActiveEffect> next(start.begin(), start.end());
+  std::vector<Cause> next(start.begin(), start.end());
   for (int round = 0, halved = 0; round < most_rounds; ++round) {
     Linear linear = linearise(material, result.shapes, settings.shares, next);
     if (!goes_on()) return std::nullopt;
@@ -66,26 +70,25 @@ std::optional<FitResult> fit_windows(const Material& whole, std::span<const dyna
     const double now = misfit(linear, *first_noise);
     if (now > worse * reached) {
       if (++halved > most_halvings) break;
-      next = half_way(result.effects, std::move(next));
+      next = half_way(result.causes, std::move(next));
       continue;
     }
     halved = 0;
     reached = std::min(reached, now);
     result.linear = std::move(linear);
-    result.effects = next;
+    result.causes = next;
     const Problem problem = make_problem(*result.linear.columns, result.linear.rows, result.linear.noise, material.blocks);
     const Mixture mixture(problem);
     const Explanation explanation = explain(mixture, {}, quick);
     result.log_joint = mixture.log_joint(explanation.whole);
-    next = result.linear.columns->effects_of(chosen_of(*result.linear.columns, explanation));
-    result.rests = same(next, result.effects);
+    next = result.linear.columns->causes_of(chosen_of(*result.linear.columns, explanation));
+    result.rests = same(next, result.causes);
     if (result.rests) break;
-    for (const dynamics::ActiveEffect& effect : next)
-      result.shapes.narrow(effect, material.robot.kinematics.wheel_radius_m, factor);
+    narrow(result.shapes, next, material.robot, factor);
     factor = std::sqrt(factor);
   }
   if (some.size() < whole.windows.size())
-    result.linear = linearise(whole, result.shapes, settings.shares, result.effects);
+    result.linear = linearise(whole, result.shapes, settings.shares, result.causes);
   return result;
 }
 

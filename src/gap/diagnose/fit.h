@@ -18,14 +18,14 @@ struct FitSettings {
 struct FitResult {
   Linear linear;
   Shapes shapes;
-  std::vector<dynamics::ActiveEffect> effects;  // around which it rests
+  std::vector<Cause> causes;  // around which it rests
   double log_joint = 0;                         // of the best explanation, to compare starts by
   bool rests = false;                           // false: it would go on to something worse
 };
 
 // Searches from `start`, linearises around what it finds, narrows shapes and searches again until the set and its
 // strengths rest. Empty when `goes_on` returns false.
-std::optional<FitResult> fit_windows(const Material& material, std::span<const dynamics::ActiveEffect> start,
+std::optional<FitResult> fit_windows(const Material& material, std::span<const Cause> start,
                                      const FitSettings& settings, const std::function<bool()>& goes_on);
 
 }  // namespace joulecast::gap

@@ -4,14 +4,17 @@
 #include <cmath>
 #include <limits>
 
+#include "gap/diagnose/naming.h"
 #include "gap/diagnose/referee.h"
 #include "gap/equations/power.h"
 #include "gap/equations/zone_scan.h"
+#include "statistics/shapley.h"
 
 namespace joulecast::gap {
 namespace {
 
 constexpr std::size_t most_parts = 6;
+constexpr std::size_t most_shared = 6;
 
 // Which blocks belong to a part.
 std::vector<bool> blocks_of(std::size_t part, std::size_t parts, std::size_t blocks) {
@@ -36,7 +39,7 @@ Linear with_zones(const Material& m, const FitResult& fit, const FitSettings& se
     zone_of_part.push_back(zone ? shapes.zones.size() : 0);
     if (zone) shapes.zones.push_back(*zone);
   }
-  return linearise(m, shapes, settings.shares, fit.effects);
+  return linearise(m, shapes, settings.shares, fit.causes);
 }
 
 // Only one of the zones may be there; the others were found with other parts left out.
@@ -59,37 +62,6 @@ double HeldOut::relative(double BlockErrors::*error) const {
   return size > 0 ? sum / size : std::numeric_limits<double>::quiet_NaN();
 }
 
-HypothesisSet named_effects(const Problem& problem, const Explanation& explanation) {
-  HypothesisSet named;
-  for (const Member& m : explanation.members) {
-    if (problem.hypotheses[m.hypothesis].is_effect() && m.group_probability() >= least_named && m.wander < most_wander)
-      named.push_back(m.hypothesis);
-  }
-  std::ranges::sort(named);
-  return named;
-}
-
-std::vector<dynamics::ActiveEffect> strengths_of(const ColumnSet& columns, const Problem& problem,
-                                                 const HypothesisSet& named, const std::vector<bool>& left_out) {
-  if (named.empty()) return {};
-  std::vector<std::size_t> own;
-  for (const std::size_t h : named) {
-    const auto& more = problem.hypotheses[h].candidate.columns;
-    own.insert(own.end(), more.begin(), more.end());
-  }
-  std::ranges::sort(own);
-  const Mixture::Estimate estimate = Mixture(problem, left_out, own).estimate(named);
-  std::vector<Chosen> chosen;
-  Eigen::Index at = 0;
-  for (const std::size_t h : named) {
-    Chosen c{h, {}};
-    for (std::size_t k = 0; k < problem.hypotheses[h].candidate.columns.size(); ++k)
-      c.coefficients.push_back(estimate.mean[at++]);
-    chosen.push_back(std::move(c));
-  }
-  return columns.effects_of(chosen);
-}
-
 std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::span<const double> power_w,
                                 const FitSettings& settings, const std::function<bool(double)>& goes_on) {
   HeldOut held;
@@ -99,34 +71,65 @@ std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::sp
   std::optional<Linear> zoned;
   if (!fit.shapes.zones.empty()) zoned = with_zones(m, fit, settings, held.parts, zone_of_part);
   const Linear& linear = zoned ? *zoned : fit.linear;
-  const std::vector<double> unchanged = modelled_power(m.robot, m.adopted, m.windows);
+  const std::vector<double> unchanged = modelled_power(m.robot, m.adopted, {}, m.windows);
   for (std::size_t part = 0; part < held.parts; ++part) {
     const std::vector<bool> out = blocks_of(part, held.parts, m.blocks);
     const Noise noise = learn_noise(*linear.columns, linear.rows, out);
     Problem problem = make_problem(*linear.columns, linear.rows, noise, m.blocks);
     if (zoned) keep_zone(problem, zone_of_part[part], settings.shares.size());
     const Explanation explanation = explain(problem, out, settings.explain);
-    const HypothesisSet named = named_effects(problem, explanation);
+    const Named named = name_causes(m, *linear.columns, problem, explanation, power_w, out);
     std::vector<std::string> ids;
-    for (const std::size_t h : named) ids.push_back(problem.hypotheses[h].id());
+    for (const std::size_t h : named.set) ids.push_back(problem.hypotheses[h].id());
     held.named.push_back(std::move(ids));
-    std::vector<dynamics::ActiveEffect> effects(m.adopted.begin(), m.adopted.end());
-    for (const auto& effect : strengths_of(*linear.columns, problem, named, out)) effects.push_back(effect);
-    const dynamics::DriveModel model(m.robot, effects);
+    const std::vector<double> explained = modelled_power(m.robot, m.adopted, named.causes, m.windows);
     std::vector<bool> others(m.windows.size());
     for (std::size_t k = 0; k < m.windows.size(); ++k) others[k] = !out[m.windows[k].block];
-    const Referee referee(m.windows, power_w, m.robot, others);
+    const Referee referee(m, power_w, others);
     for (std::size_t k = 0; k < m.windows.size(); ++k) {
       if (others[k] || !std::isfinite(power_w[k] + unchanged[k])) continue;
       BlockErrors& b = held.blocks[m.windows[k].block];
       b.unchanged += std::fabs(power_w[k] - unchanged[k]);
-      b.explained += std::fabs(power_w[k] - metered_power(model, m.windows[k]));
+      b.explained += std::fabs(power_w[k] - explained[k]);
       b.referee += std::fabs(power_w[k] - referee.predict(m.windows[k]));
       b.size += std::fabs(power_w[k]);
     }
     if (!goes_on(static_cast<double>(part + 1) / static_cast<double>(held.parts))) return std::nullopt;
   }
   return held;
+}
+
+std::vector<double> held_out_shares(const Material& m, const ColumnSet& columns, const Problem& problem,
+                                    const HypothesisSet& named, std::span<const double> power_w) {
+  struct Part {
+    std::vector<Window> windows;
+    std::vector<double> measured;
+    std::vector<Cause> causes;
+  };
+  const std::size_t parts = std::min(most_parts, m.blocks);
+  std::vector<Part> all(parts);
+  for (std::size_t part = 0; part < parts; ++part) {
+    const std::vector<bool> out = blocks_of(part, parts, m.blocks);
+    all[part].causes = strengths_of(columns, problem, named, out);
+    for (std::size_t k = 0; k < m.windows.size(); ++k) {
+      if (!out[m.windows[k].block] || !std::isfinite(power_w[k])) continue;
+      all[part].windows.push_back(m.windows[k]);
+      all[part].measured.push_back(power_w[k]);
+    }
+  }
+  std::vector<double> shares = statistics::shapley_shares(
+      std::min(named.size(), most_shared), [&](const std::vector<std::size_t>& members) {
+        double missed = 0;
+        for (const Part& part : all) {
+          std::vector<Cause> some;
+          for (const std::size_t k : members) some.push_back(part.causes[k]);
+          const std::vector<double> modelled = modelled_power(m.robot, m.adopted, some, part.windows);
+          for (std::size_t k = 0; k < modelled.size(); ++k) missed += std::fabs(part.measured[k] - modelled[k]);
+        }
+        return missed;
+      });
+  shares.resize(named.size(), 0);
+  return shares;
 }
 
 }  // namespace joulecast::gap

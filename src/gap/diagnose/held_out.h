@@ -36,16 +36,9 @@ struct HeldOut {
 std::optional<HeldOut> hold_out(const Material& material, const FitResult& fit, std::span<const double> power_w,
                                 const FitSettings& settings, const std::function<bool(double)>& goes_on);
 
-// Effects of an explanation that are named: those that are there, or one of their group, with even odds or better, by
-// both judges, and that stand still.
-HypothesisSet named_effects(const Problem& problem, const Explanation& explanation);
-
-// The strengths with which these effects alone leave least where everything is linear, of all blocks not left out.
-std::vector<dynamics::ActiveEffect> strengths_of(const ColumnSet& columns, const Problem& problem,
-                                                 const HypothesisSet& named, const std::vector<bool>& left_out);
-
-inline constexpr double least_named = 0.5;   // probability of a name
-inline constexpr double most_wander = 0.8;   // of a strength, over the strength, that still is that effect
-inline constexpr double steady_wander = 0.45;  // up to which it stands still
+// How much of the gap each of these causes closes on held-out parts (Shapley), strengths fitted without each part. All
+// are 0 where power was not measured; at most the first six share.
+std::vector<double> held_out_shares(const Material& material, const ColumnSet& columns, const Problem& problem,
+                                    const HypothesisSet& named, std::span<const double> power_w);
 
 }  // namespace joulecast::gap

@@ -106,11 +106,11 @@ std::vector<Window> thinned(std::span<const Window> windows) {
 }
 
 Linear linearise(const Material& m, const Shapes& shapes, std::span<const double> shares,
-                 std::span<const dynamics::ActiveEffect> around) {
+                 std::span<const Cause> around) {
   Linear linear;
   linear.columns = std::make_unique<ColumnSet>(m, shapes, shares);
-  for (const dynamics::ActiveEffect& effect : around) {
-    if (auto c = linear.columns->coordinates_of(effect)) linear.around.push_back(std::move(*c));
+  for (const Cause& cause : around) {
+    if (auto c = linear.columns->coordinates_of(cause)) linear.around.push_back(std::move(*c));
   }
   if (!linear.around.empty()) linear.columns->linearise_around(linear.around);
   linear.rows = make_rows(*linear.columns, m.windows);
@@ -176,23 +176,25 @@ double misfit(const Linear& linear, const Noise& noise) {
   return sum;
 }
 
-std::vector<dynamics::ActiveEffect> half_way(std::span<const dynamics::ActiveEffect> from,
-                                             std::vector<dynamics::ActiveEffect> to) {
-  const auto halve = [](dynamics::ActiveEffect& effect, const dynamics::EffectValues<double>& other) {
-    const auto& parameters = effect.effect->info().parameters;
+std::vector<Cause> half_way(std::span<const Cause> from, std::vector<Cause> to) {
+  const auto halve = [](Cause& cause, const dynamics::EffectValues<double>& other) {
+    const auto& parameters = cause.effect.effect->info().parameters;
     for (std::size_t k = 0; k < parameters.size(); ++k) {
-      if (k == 0 || parameters[k].strength) effect.values[k] = 0.5 * (effect.values[k] + other[k]);
+      if (k == 0 || parameters[k].strength) cause.effect.values[k] = 0.5 * (cause.effect.values[k] + other[k]);
     }
   };
+  const auto find = [](auto& among, const Cause& cause) {
+    return std::ranges::find_if(among, [&](const Cause& other) { return other.same_kind(cause); });
+  };
   const std::size_t named = to.size();
-  for (const dynamics::ActiveEffect& effect : from) {
-    if (std::ranges::find(to, effect.effect, &dynamics::ActiveEffect::effect) != to.end()) continue;
-    to.push_back(effect);
+  for (const Cause& cause : from) {
+    if (find(to, cause) != to.end()) continue;
+    to.push_back(cause);
     halve(to.back(), {});
   }
   for (std::size_t k = 0; k < named; ++k) {
-    const auto before = std::ranges::find(from, to[k].effect, &dynamics::ActiveEffect::effect);
-    halve(to[k], before == from.end() ? dynamics::EffectValues<double>{} : before->values);
+    const auto before = find(from, to[k]);
+    halve(to[k], before == from.end() ? dynamics::EffectValues<double>{} : before->effect.values);
   }
   return to;
 }

@@ -22,7 +22,7 @@ struct Linear {
 std::vector<Window> thinned(std::span<const Window> windows);
 
 Linear linearise(const Material& material, const Shapes& shapes, std::span<const double> shares,
-                 std::span<const dynamics::ActiveEffect> around);
+                 std::span<const Cause> around);
 
 // The problem that rows come to under a noise; `response`: in place of the rows' own. `columns` must outlive it.
 Problem make_problem(const ColumnSet& columns, const Rows& rows, const Noise& noise, std::size_t blocks,
@@ -32,8 +32,7 @@ Problem make_problem(const ColumnSet& columns, const Rows& rows, const Noise& no
 // by sizes, not squares, so that what one window does decides nothing.
 double misfit(const Linear& linear, const Noise& noise);
 
-// Half way from one set of effects to another.
-std::vector<dynamics::ActiveEffect> half_way(std::span<const dynamics::ActiveEffect> from,
-                                             std::vector<dynamics::ActiveEffect> to);
+// Half way from one set of causes to another.
+std::vector<Cause> half_way(std::span<const Cause> from, std::vector<Cause> to);
 
 }  // namespace joulecast::gap

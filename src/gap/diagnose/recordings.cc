@@ -7,10 +7,10 @@
 #include "gap/diagnose/channel_gaps.h"
 #include "gap/diagnose/controls.h"
 #include "gap/diagnose/held_out.h"
+#include "gap/diagnose/naming.h"
 #include "gap/diagnose/referee.h"
 #include "gap/diagnose/refit.h"
 #include "gap/equations/power.h"
-#include "gap/traits.h"
 #include "gap/verdict/figures.h"
 #include "gap/verdict/judge.h"
 #include "gap/verdict/next_drive.h"
@@ -18,7 +18,6 @@
 #include "gap/verdict/words.h"
 #include "statistics/bootstrap.h"
 #include "statistics/robust.h"
-#include "statistics/shapley.h"
 
 namespace joulecast::gap {
 namespace {
@@ -27,8 +26,6 @@ constexpr std::size_t fewest_windows = 40;
 constexpr double large_gap = 0.15, huge_gap = 0.25;
 constexpr double usual_share = 0.07, large_share = 0.3;  // of the mean power, that an effect which is there may move
 constexpr std::size_t more_members = 6;
-constexpr double least_necessary_part = 0.05;  // of the gap, that comes back when an effect is left out
-constexpr std::size_t most_shared = 6;         // effects between which the gap is shared
 constexpr double settled_delay_s = 0.006, settled_bias = 0.1;
 constexpr int most_delay_rounds = 3;
 constexpr std::size_t ripple_surrogates = 20;
@@ -37,20 +34,14 @@ constexpr std::size_t ripple_surrogates = 20;
 constexpr double after_fit = 0.35, after_parts = 0.6;
 
 // What these effects do to when and how electrical readings are taken is taken out of the windows.
-void take_out(std::span<const dynamics::ActiveEffect> effects, windows::WindowSettings& settings) {
+void take_out(std::span<const Cause> causes, windows::WindowSettings& settings) {
   settings.electrical_delay_s = settings.motor_current_bias_a = 0;
-  for (const dynamics::ActiveEffect& e : effects) {
-    const std::string_view id = e.effect->info().id;
-    if (id == "sensor_delay") settings.electrical_delay_s = e.values[0];
-    if (id == "current_sensor_bias") settings.motor_current_bias_a = e.values[0] * e.values[1];
+  for (const Cause& cause : causes) {
+    const std::string_view id = cause.effect.effect->info().id;
+    const auto& values = cause.effect.values;
+    if (id == "sensor_delay") settings.electrical_delay_s = values[0];
+    if (id == "current_sensor_bias") settings.motor_current_bias_a = values[0] * values[1];
   }
-}
-
-// Effects that only the motors' readings show, not battery power.
-bool moves_motors_alone(const Hypothesis& h) {
-  const std::string id = h.id();
-  return (id == "current_sensor_gain" || id == "current_sensor_bias" || id == "voltage_sensor_gain") &&
-         h.effect.values[2] == 0;
 }
 
 // Share of the power that an effect has to move to be surely seen here: the median over effects of what is so many
@@ -62,7 +53,7 @@ double detectable_share(const Problem& problem) {
   std::vector<double> shares;
   for (std::size_t h = 0; h < problem.hypotheses.size(); ++h) {
     const Hypothesis& hypothesis = problem.hypotheses[h];
-    if (hypothesis.outside() || !shows_in_power(hypothesis.id())) continue;
+    if (!hypothesis.is_effect() || !shows_in_power(hypothesis)) continue;
     if (std::ranges::find(seen, hypothesis.id()) != seen.end()) continue;
     seen.push_back(hypothesis.id());
     shares.push_back(problem.moved(hypothesis, deviations * mixture.estimate({h}).sd));
@@ -86,22 +77,16 @@ class Diagnoser {
 
   bool goes_on(double part) const { return !settings_.progress || settings_.progress(part); }
   Material material() const {
-    return {robot_, adopted_, view_.windows, blocks_, from_motion_, readings_.row_s};
+    return {robot_, adopted_, view_.windows, blocks_, from_motion_, readings_.row_s, covariates_};
   }
-  std::vector<dynamics::ActiveEffect> with(std::span<const dynamics::ActiveEffect> more) const {
-    std::vector<dynamics::ActiveEffect> all = adopted_;
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
-  }
-  double gap_with(std::span<const dynamics::ActiveEffect> effects) const {
-    return gap_size(view_.power_w, modelled_power(robot_, with(effects), view_.windows)).absolute_relative;
+  std::vector<double> modelled(std::span<const Cause> causes) const {
+    return modelled_power(robot_, adopted_, causes, view_.windows);
   }
 
   View view_of(const windows::WindowSettings& settings) const;
   bool prepare();
   void measure();
   bool fit();
-  void name(const Problem& problem, Explanation& explanation);
   bool judge_all();
   void add_wander(const Problem& problem, const Explanation& explanation, Findings& findings) const;
   void add_baseline();
@@ -111,6 +96,7 @@ class Diagnoser {
   const robot::RobotModel& robot_;
   const DiagnosisSettings& settings_;
   std::vector<dynamics::ActiveEffect> adopted_;
+  std::vector<std::string> covariates_;
   windows::Readings readings_;
   windows::WindowSettings taken_out_;
   View view_, plain_;
@@ -121,8 +107,7 @@ class Diagnoser {
   std::optional<FitResult> fit_;
   std::optional<HeldOut> held_out_;
   HypothesisSet named_;
-  std::vector<dynamics::ActiveEffect> strengths_;
-  std::vector<double> opened_;
+  std::vector<Cause> causes_;  // the named, with their own strengths
   Diagnosis d_;
 };
 
@@ -140,6 +125,7 @@ Diagnoser::View Diagnoser::view_of(const windows::WindowSettings& settings) cons
 
 // Whether there is anything to judge by.
 bool Diagnoser::prepare() {
+  covariates_ = windows::covariate_names(recordings_.missions);
   readings_ = windows::find_readings(recordings_.missions, robot_);
   plain_ = view_of({});
   const auto known = [](double p) { return std::isfinite(p); };
@@ -166,7 +152,7 @@ bool Diagnoser::prepare() {
 }
 
 void Diagnoser::measure() {
-  plain_model_w_ = modelled_power(robot_, adopted_, plain_.windows);
+  plain_model_w_ = modelled_power(robot_, adopted_, {}, plain_.windows);
   d_.channels = channel_gaps(material());
   if (d_.power == PowerSource::none) {
     d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
@@ -201,7 +187,7 @@ bool Diagnoser::fit() {
     }
     if (!fit_) return false;
     const windows::WindowSettings before = taken_out_;
-    take_out(fit_->effects, taken_out_);
+    take_out(fit_->causes, taken_out_);
     const bool settled = std::fabs(taken_out_.electrical_delay_s - before.electrical_delay_s) < settled_delay_s &&
                          std::fabs(taken_out_.motor_current_bias_a - before.motor_current_bias_a) < settled_bias_a;
     if (settled || round >= most_delay_rounds) return goes_on(after_fit);
@@ -209,35 +195,11 @@ bool Diagnoser::fit() {
   }
 }
 
-// The named effects with the strengths that they have by themselves; those that the gap does not need are left out.
-void Diagnoser::name(const Problem& problem, Explanation& explanation) {
-  named_ = named_effects(problem, explanation);
-  const auto gap_without = [&](HypothesisSet set, std::size_t h) {
-    std::erase(set, h);
-    return gap_with(strengths_of(*fit_->linear.columns, problem, set, {}));
-  };
-  while (d_.power != PowerSource::none) {
-    const double all = gap_with(strengths_of(*fit_->linear.columns, problem, named_, {}));
-    double least = least_necessary_part * d_.power_absolute_relative;
-    std::optional<std::size_t> spare;
-    opened_.clear();
-    for (const std::size_t h : named_) {
-      opened_.push_back(gap_without(named_, h) - all);
-      if (!shows_in_power(problem.hypotheses[h].id()) || moves_motors_alone(problem.hypotheses[h])) continue;
-      if (opened_.back() < least && named_.size() > 1) least = opened_.back(), spare = h;
-    }
-    if (!spare) break;
-    std::erase(named_, *spare);
-  }
-  opened_.resize(named_.size(), 0);
-  strengths_ = refit(material(), strengths_of(*fit_->linear.columns, problem, named_, {}));
-}
-
 void Diagnoser::add_wander(const Problem& problem, const Explanation& explanation, Findings& f) const {
   double most = 0;
   for (std::size_t k = 0; k < explanation.members.size(); ++k) {
     const Member& m = explanation.members[k];
-    if (!problem.hypotheses[m.hypothesis].is_effect() || m.group_probability() < least_named ||
+    if (problem.hypotheses[m.hypothesis].outside() || m.group_probability() < least_named ||
         m.wander < most_wander || m.share <= most)
       continue;
     most = m.share;
@@ -257,23 +219,19 @@ void Diagnoser::add_wander(const Problem& problem, const Explanation& explanatio
 void Diagnoser::add_baseline() {
   if (!held_out_ || d_.power == PowerSource::none) return;
   Baseline b;
-  const Referee referee(view_.windows, view_.power_w, robot_);
-  for (std::size_t k = 0; k < referee_terms.size(); ++k) {
-    const auto at = static_cast<Eigen::Index>(k);
-    b.terms.push_back({std::string(referee_terms[k].name), std::string(referee_terms[k].unit),
-                       referee.fit().coefficients[at], referee.fit().sd[at]});
-  }
+  const Referee referee(material(), view_.power_w), model(material(), modelled({}));
   b.held_out = held_out_->referee();
   b.unchanged_model_held_out = held_out_->unchanged();
   b.explanation_held_out = held_out_->explained();
-  // What the model itself comes to in the same terms.
-  const Referee model(view_.windows, modelled_power(robot_, adopted_, view_.windows), robot_);
-  for (std::size_t k = 0; k < referee_terms.size(); ++k) {
+  for (std::size_t k = 0; k < referee.terms().size(); ++k) {
+    const RefereeTerm& term = referee.terms()[k];
     const auto at = static_cast<Eigen::Index>(k);
-    const double data = referee.fit().coefficients[at], sd = referee.fit().sd[at], ours = model.fit().coefficients[at];
+    const double data = referee.fit().coefficients[at], sd = referee.fit().sd[at];
+    const double ours = model.fit().coefficients[at];  // what the model itself comes to in the same term
+    b.terms.push_back({term.name, term.unit, data, sd});
     constexpr double clear = 3, notable = 0.2;
     if (std::fabs(data - ours) < clear * sd || std::fabs(data - ours) < notable * std::fabs(data)) continue;
-    b.says.push_back(referee_words(referee_terms[k], data, ours));
+    b.says.push_back(referee_words(term, data, ours));
   }
   d_.baseline = std::move(b);
 }
@@ -295,7 +253,7 @@ void Diagnoser::add_shrinkage() {
   s.remaining_over_noise_floor = d_.noise_floor > 0 ? s.after / d_.noise_floor : missing;
   s.parts = held_out_->parts;
   std::vector<std::string> ids;
-  for (const dynamics::ActiveEffect& e : strengths_) ids.emplace_back(e.effect->info().id);
+  for (const std::size_t h : named_) ids.push_back(fit_->linear.columns->hypotheses()[h].id());
   std::ranges::sort(ids);
   for (std::vector<std::string> part : held_out_->named) {
     std::ranges::sort(part);
@@ -309,7 +267,9 @@ bool Diagnoser::judge_all() {
       make_problem(*fit_->linear.columns, fit_->linear.rows, fit_->linear.noise, blocks_);
   Explanation explanation = explain(problem, {}, fit_settings_.explain);
   d_.detectable_share = detectable_share(problem);
-  name(problem, explanation);
+  Named named = name_causes(material(), *fit_->linear.columns, problem, explanation, view_.power_w, {});
+  named_ = named.set;
+  causes_ = refit(material(), std::move(named.causes));
   held_out_ = hold_out(material(), *fit_, view_.power_w, fit_settings_, [&](double part) {
     return goes_on(std::lerp(after_fit, after_parts, part));
   });
@@ -318,25 +278,23 @@ bool Diagnoser::judge_all() {
   auto made = control(material(), fit_->linear, problem, explanation, controls,
                       [&](double part) { return goes_on(std::lerp(after_parts, 1.0, part)); });
   if (!made) return false;
+  std::vector<dynamics::ActiveEffect> all = adopted_;
+  for (const Cause& cause : causes_) {
+    if (!cause.by) all.push_back(cause.effect);
+  }
   std::optional<Ripple> ripple;
-  const std::vector<dynamics::ActiveEffect> all = with(strengths_);
   // Where readings are repeated over rows, what repeats with the wheel is the rows.
   if (!readings_.held())
     ripple = find_ripple(recordings_, robot_, all, d_.motor_channels, taken_out_.electrical_delay_s, ripple_surrogates);
 
   Findings f{problem, explanation, settings_.controls > 0 ? std::move(*made) : std::vector<Controls>{}, named_,
-             strengths_, opened_, {}, {}, held_out_, ripple, std::nullopt, {}};
-  const std::vector<double> after = modelled_power(robot_, all, view_.windows);
-  f.shares = statistics::shapley_shares(std::min(strengths_.size(), most_shared), [&](const auto& members) {
-    std::vector<dynamics::ActiveEffect> some;
-    for (const std::size_t k : members) some.push_back(strengths_[k]);
-    return d_.power == PowerSource::none ? 0 : gap_with(some);
-  });
-  f.shares.resize(strengths_.size(), 0);
-  for (std::size_t k = 0; k < strengths_.size(); ++k) {
-    std::vector<dynamics::ActiveEffect> others = strengths_;
+             causes_, {}, {}, held_out_, ripple, std::nullopt, {}};
+  const std::vector<double> after = modelled(causes_);
+  f.shares = held_out_shares(material(), *fit_->linear.columns, problem, named_, view_.power_w);
+  for (std::size_t k = 0; k < causes_.size(); ++k) {
+    std::vector<Cause> others = causes_;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-    const std::vector<double> without = modelled_power(robot_, with(others), view_.windows);
+    const std::vector<double> without = modelled(others);
     double change = 0;
     for (std::size_t n = 0; n < after.size(); ++n) change += std::fabs(after[n] - without[n]);
     f.power_w.push_back(change / static_cast<double>(after.size()));
@@ -351,11 +309,8 @@ bool Diagnoser::judge_all() {
     const auto more = drives_for(d_.outside);
     d_.next_drive.insert(d_.next_drive.begin(), more.begin(), more.end());
   }
-  d_.channels = channel_gaps(fit_->linear, view_.windows, view_.power_w, d_, robot_, adopted_);
-  if (d_.power != PowerSource::none) {
-    const std::vector<double> before = modelled_power(robot_, adopted_, view_.windows);
-    d_.figures = figures_of(view_.windows, view_.power_w, before, after, recordings_, robot_);
-  }
+  if (d_.power != PowerSource::none)
+    d_.figures = figures_of(view_.windows, view_.power_w, modelled({}), after, recordings_, robot_);
   return true;
 }
 

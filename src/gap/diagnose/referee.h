@@ -1,43 +1,37 @@
 #pragma once
 
-#include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "gap/equations/channels.h"
-#include "robot/robot_model.h"
+#include "gap/equations/columns.h"
 #include "statistics/regression.h"
 
 namespace joulecast::gap {
 
-// The terms of a plain regression of power on motion: what anybody would try before a model.
+// One term of a plain regression of power on motion: what anybody would try before a model.
 struct RefereeTerm {
-  std::string_view name, unit;
-  std::string_view words;  // "so many W ..."
+  std::string name, unit;
+  std::string words;  // "so many W ..."
 };
-inline constexpr auto referee_terms = std::to_array<RefereeTerm>({
-    {"constant", "W", "W whatever the robot does"},
-    {"speed", "W/(m/s)", "W per m/s of speed"},
-    {"side_difference", "W/(m/s)", "W per m/s of difference between the sides"},
-    {"acceleration", "kg", "W per m/s of speed and m/s² of acceleration, as of so many kg"},
-});
 
-// P = c0 + c1 |v| + c2 |v_right - v_left| + c3 v a, fitted robustly. The referee of a diagnosis: what predicts held-out
-// data worse than this is no explanation.
+// P = c0 + c1 |v| + c2 |v_right - v_left| + c3 v a, with climb c v sin(climb), with covariates c for each, fitted
+// robustly. The referee of a diagnosis: what predicts held-out data worse than this is no explanation.
 class Referee {
  public:
   // On the windows in which `use` holds and power is known.
-  Referee(std::span<const Window> windows, std::span<const double> power_w, const robot::RobotModel& robot,
-          const std::vector<bool>& use = {});
+  Referee(const Material& material, std::span<const double> power_w, const std::vector<bool>& use = {});
 
-  double predict(const Window& w) const;
+  double predict(const Window& w) const { return fit_.coefficients.dot(values_of(w)); }
+  const std::vector<RefereeTerm>& terms() const { return terms_; }
   const statistics::Regression& fit() const { return fit_; }
 
  private:
-  Eigen::VectorXd terms_of(const Window& w) const;
+  Eigen::VectorXd values_of(const Window& w) const;
   double wheel_radius_m_;
+  bool climb_;
+  std::vector<Modulation> covariates_;
+  std::vector<RefereeTerm> terms_;
   statistics::Regression fit_;
 };
 

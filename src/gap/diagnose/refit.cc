@@ -16,9 +16,10 @@ constexpr double better = 0.998;     // misfit, over the one before: a step that
 constexpr double wide_share = 1;     // of the mean power, that a strength is held by
 constexpr double noticed_share = 0.002;
 
-Shapes shapes_of(std::span<const dynamics::ActiveEffect> effects, const robot::RobotModel& robot) {
+Shapes shapes_of(std::span<const Cause> causes, const robot::RobotModel& robot) {
   Shapes shapes;
-  for (const dynamics::ActiveEffect& e : effects) {
+  for (const Cause& cause : causes) {
+    const dynamics::ActiveEffect& e = cause.effect;
     if (e.effect->info().id == "floor_resistance_zone") {
       shapes.zones = {{e.values[1], e.values[2], e.values[3]}};
     } else {
@@ -28,9 +29,8 @@ Shapes shapes_of(std::span<const dynamics::ActiveEffect> effects, const robot::R
   return shapes;
 }
 
-// One Gauss-Newton step: the strengths that these effects would have where everything is linear.
-std::vector<dynamics::ActiveEffect> step(const Material& material, const Linear& linear,
-                                         std::span<const dynamics::ActiveEffect> effects) {
+// One Gauss-Newton step: the strengths that these causes would have where everything is linear.
+std::vector<Cause> step(const Material& material, const Linear& linear, std::span<const Cause> causes) {
   const ColumnSet& columns = *linear.columns;
   Eigen::VectorXd sd(static_cast<Eigen::Index>(columns.size()));
   for (std::size_t k = 0; k < columns.size(); ++k)
@@ -39,8 +39,8 @@ std::vector<dynamics::ActiveEffect> step(const Material& material, const Linear&
     for (const std::size_t k : h.candidate.columns) sd[static_cast<Eigen::Index>(k)] = 0;
   }
   std::vector<std::size_t> free;
-  for (const dynamics::ActiveEffect& e : effects) {
-    const auto at = columns.coordinates_of(e);
+  for (const Cause& cause : causes) {
+    const auto at = columns.coordinates_of(cause);
     if (!at) continue;
     free.push_back(at->hypothesis);
     const auto& candidate = columns.hypotheses()[at->hypothesis].candidate;
@@ -57,13 +57,13 @@ std::vector<dynamics::ActiveEffect> step(const Material& material, const Linear&
       c.coefficients.push_back(std::clamp(ridge.mean[static_cast<Eigen::Index>(k)], candidate.least, candidate.most));
     chosen.push_back(std::move(c));
   }
-  return columns.effects_of(chosen);
+  return columns.causes_of(chosen);
 }
 
 // The effects that make the robot file's model the plain regression.
-std::vector<dynamics::ActiveEffect> as_regression(const Material& m, std::span<const double> power_w,
+std::vector<Cause> as_regression(const Material& m, std::span<const double> power_w,
                                                   const ColumnSet& columns, std::span<const std::string_view> ids) {
-  const Referee referee(m.windows, power_w, m.robot);
+  const Referee referee(m, power_w);
   const auto& c = referee.fit().coefficients;
   const auto& k = m.robot.kinematics;
   const auto& mass = m.robot.mass;
@@ -92,15 +92,14 @@ std::vector<dynamics::ActiveEffect> as_regression(const Material& m, std::span<c
                                                       : 0.0;
     chosen.push_back({h, {std::clamp(value, hypothesis.candidate.least, hypothesis.candidate.most)}});
   }
-  return columns.effects_of(chosen);
+  return columns.causes_of(chosen);
 }
 
-std::vector<dynamics::ActiveEffect> rest(const Material& whole, const Shapes& shapes,
-                                         std::vector<dynamics::ActiveEffect> effects) {
+std::vector<Cause> rest(const Material& whole, const Shapes& shapes, std::vector<Cause> causes) {
   const std::vector<Window> some = thinned(whole.windows);
   Material material = whole;
   material.windows = some;
-  std::vector<dynamics::ActiveEffect> next = effects;
+  std::vector<Cause> next = causes;
   std::optional<Noise> noise;
   double least = std::numeric_limits<double>::infinity();
   for (int k = 0, halved = 0; k < most_steps; ++k) {
@@ -108,28 +107,28 @@ std::vector<dynamics::ActiveEffect> rest(const Material& whole, const Shapes& sh
     if (!noise) noise = linear.noise;
     const double now = misfit(linear, *noise);
     if (now > better * least) {
-      if (now < least) effects = next;
+      if (now < least) causes = next;
       if (++halved > most_halvings) break;
-      next = half_way(effects, std::move(next));
+      next = half_way(causes, std::move(next));
       continue;
     }
     halved = 0;
     least = now;
-    effects = next;
-    next = step(material, linear, effects);
+    causes = next;
+    next = step(material, linear, causes);
   }
-  return effects;
+  return causes;
 }
 
 }  // namespace
 
-std::vector<dynamics::ActiveEffect> refit(const Material& material, std::vector<dynamics::ActiveEffect> effects) {
-  if (effects.empty()) return effects;
-  const Shapes shapes = shapes_of(effects, material.robot);
-  return rest(material, shapes, std::move(effects));
+std::vector<Cause> refit(const Material& material, std::vector<Cause> causes) {
+  if (causes.empty()) return causes;
+  const Shapes shapes = shapes_of(causes, material.robot);
+  return rest(material, shapes, std::move(causes));
 }
 
-std::vector<dynamics::ActiveEffect> base_fit(const Material& material, std::span<const double> power_w) {
+std::vector<Cause> base_fit(const Material& material, std::span<const double> power_w) {
   constexpr std::array<std::string_view, 7> ids{"accessory_load", "coulomb_friction", "viscous_friction",
                                                 "chassis_mass_error", "turning_scrub", "aerodynamic_drag",
                                                 "resistance_error"};
@@ -137,15 +136,14 @@ std::vector<dynamics::ActiveEffect> base_fit(const Material& material, std::span
   Shapes shapes;
   shapes.scrub_rates_rad_s = {scrub_rate_rad_s};
   const ColumnSet columns(material, shapes, std::array{wide_share});
-  std::vector<dynamics::ActiveEffect> effects =
-      rest(material, shapes, as_regression(material, power_w, columns, ids));
-  std::erase_if(effects, [&](const dynamics::ActiveEffect& e) {
-    const auto at = columns.coordinates_of(e);
+  std::vector<Cause> causes = rest(material, shapes, as_regression(material, power_w, columns, ids));
+  std::erase_if(causes, [&](const Cause& cause) {
+    const auto at = columns.coordinates_of(cause);
     const std::size_t k = columns.hypotheses()[at->hypothesis].candidate.columns.front();
     return std::fabs(at->coefficients[0]) * columns.columns()[k].power_share < noticed_share &&
-           !traits_of(e.effect->info().id).elsewhere;
+           !traits_of(cause.effect.effect->info().id).elsewhere;
   });
-  return effects;
+  return causes;
 }
 
 }  // namespace joulecast::gap

@@ -1,11 +1,15 @@
 #include "gap/equations/columns.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <string_view>
 
 #include "gap/traits.h"
+#include "telemetry/covariates.h"
 
 namespace joulecast::gap {
 namespace {
@@ -60,11 +64,13 @@ ColumnSet::ColumnSet(const Material& m, const Shapes& shapes, std::span<const do
       from_motion_(m.from_motion),
       row_s_(m.row_s) {
   add_effects(shapes, shares);
+  add_covariates(m, shares);
   add_nuisances();
   add_families(shares);
   linearise_around({});
   measure(m.windows);
   scale_effects(shares);
+  scale_covariates(shares);
   scale_families(shares);
 }
 
@@ -102,6 +108,30 @@ void ColumnSet::add_effects(const Shapes& shapes, std::span<const double> shares
   }
 }
 
+// A covariate may be a load's or a friction's cause.
+void ColumnSet::add_covariates(const Material& m, std::span<const double> shares) {
+  constexpr std::array<std::string_view, 2> carriers{"accessory_load", "coulomb_friction"};
+  const std::vector<Hypothesis> effects = hypotheses_;
+  for (const Modulation& by : modulations_of(m.windows)) {
+    for (const std::string_view id : carriers) {
+      const auto carrier = std::ranges::find_if(effects, [&](const Hypothesis& h) { return h.id() == id; });
+      if (carrier == effects.end()) continue;
+      Hypothesis h;
+      h.effect = carrier->effect;
+      h.parameter = carrier->parameter;
+      h.covariate = m.covariates[by.covariate];
+      h.by = by;
+      const std::string_view unit = h.effect.effect->info().parameters[h.parameter].unit;
+      h.unit = telemetry::is_label(h.covariate) ? std::string(unit) : fmt::format("{}/unit", unit.empty() ? "1" : unit);
+      h.candidate.log_prior = effect_log_prior - std::log(static_cast<double>(carriers.size() * shares.size()));
+      h.candidate.columns = {columns_.size()};
+      followed_.push_back({columns_.size(), carrier->candidate.columns.front(), by});
+      columns_.emplace_back();
+      for (std::size_t k = 0; k < shares.size(); ++k) hypotheses_.push_back(h);
+    }
+  }
+}
+
 void ColumnSet::add_nuisances() {
   first_nuisance_ = columns_.size();
   columns_.resize(columns_.size() + nuisance_count);
@@ -133,52 +163,52 @@ void ColumnSet::add_families(std::span<const double> shares) {
   }
 }
 
-std::vector<ActiveEffect> ColumnSet::effects_of(std::span<const Chosen> chosen) const {
-  std::vector<ActiveEffect> effects;
+std::vector<Cause> ColumnSet::causes_of(std::span<const Chosen> chosen) const {
+  std::vector<Cause> causes;
   for (const Chosen& c : chosen) {
     const Hypothesis& h = hypotheses_[c.hypothesis];
-    if (!h.is_effect()) continue;
-    ActiveEffect active = h.effect;
+    if (h.outside()) continue;
+    Cause cause = h.cause();
+    auto& values = cause.effect.values;
     if (h.candidate.columns.size() == 2) {
-      active.values[0] = std::hypot(c.coefficients[0], c.coefficients[1]);
-      active.values[1] = std::atan2(c.coefficients[1], c.coefficients[0]);
+      values[0] = std::hypot(c.coefficients[0], c.coefficients[1]);
+      values[1] = std::atan2(c.coefficients[1], c.coefficients[0]);
     } else {
-      active.values[h.parameter] = c.coefficients[0];
+      values[h.parameter] = c.coefficients[0];
     }
-    for (std::size_t k = 0; k < active.effect->info().parameters.size(); ++k) {
-      const auto& p = active.effect->info().parameters[k];
+    for (std::size_t k = 0; !cause.by && k < cause.effect.effect->info().parameters.size(); ++k) {
+      const auto& p = cause.effect.effect->info().parameters[k];
       // A strength may be what takes off some of the robot file's.
       const bool bounded = k == h.parameter && h.candidate.columns.size() == 1;
-      active.values[k] = std::clamp(active.values[k], bounded ? h.candidate.least : p.minimum,
-                                    bounded ? h.candidate.most : p.maximum);
+      values[k] = std::clamp(values[k], bounded ? h.candidate.least : p.minimum, bounded ? h.candidate.most : p.maximum);
     }
-    effects.push_back(active);
+    causes.push_back(cause);
   }
-  return effects;
+  return causes;
 }
 
-std::optional<Chosen> ColumnSet::coordinates_of(const ActiveEffect& effect) const {
+std::optional<Chosen> ColumnSet::coordinates_of(const Cause& cause) const {
+  const auto& values = cause.effect.values;
   for (std::size_t h = 0; h < hypotheses_.size(); ++h) {
     const Hypothesis& hypothesis = hypotheses_[h];
-    if (hypothesis.effect.effect != effect.effect) continue;
-    if (hypothesis.candidate.columns.size() == 2) {
-      return Chosen{
-          h, {effect.values[0] * std::cos(effect.values[1]), effect.values[0] * std::sin(effect.values[1])}};
-    }
+    if (hypothesis.outside() || !hypothesis.cause().same_kind(cause)) continue;
+    if (hypothesis.candidate.columns.size() == 2)
+      return Chosen{h, {values[0] * std::cos(values[1]), values[0] * std::sin(values[1])}};
     bool same = true;
-    for (std::size_t k = 0; k < effect.effect->info().parameters.size(); ++k) {
+    for (std::size_t k = 0; k < cause.effect.effect->info().parameters.size(); ++k) {
       const double shape = hypothesis.effect.values[k];
-      if (k != hypothesis.parameter)
-        same = same && std::fabs(shape - effect.values[k]) <= 1e-6 * (1 + std::fabs(shape));
+      if (k != hypothesis.parameter) same = same && std::fabs(shape - values[k]) <= 1e-6 * (1 + std::fabs(shape));
     }
-    if (same) return Chosen{h, {effect.values[hypothesis.parameter]}};
+    if (same) return Chosen{h, {values[hypothesis.parameter]}};
   }
   return std::nullopt;
 }
 
 void ColumnSet::linearise_around(std::span<const Chosen> chosen) {
   std::vector<ActiveEffect> effects = adopted_;
-  for (const ActiveEffect& effect : effects_of(chosen)) effects.push_back(effect);
+  for (const Cause& cause : causes_of(chosen)) {
+    if (!cause.by) effects.push_back(cause.effect);
+  }
   base_.assign(1, dynamics::DriveModel(robot_, effects));
   offset_.assign(columns_.size(), 0.0);
   derivatives_.clear();
@@ -186,7 +216,7 @@ void ColumnSet::linearise_around(std::span<const Chosen> chosen) {
   std::size_t at = adopted_.size();
   for (const Chosen& c : chosen) {
     const Hypothesis& h = hypotheses_[c.hypothesis];
-    if (!h.is_effect()) continue;
+    if (!h.is_effect()) continue;  // what follows a covariate stays in the response by itself
     const auto& own = h.candidate.columns;
     for (std::size_t k = 0; k < own.size(); ++k) offset_[own[k]] = c.coefficients[k];
     if (own.size() == 1) seeded[own[0]] = at;
@@ -215,6 +245,10 @@ void ColumnSet::evaluate(const Window& w, ChannelValues<double>& values, std::sp
     for (std::size_t c = 0; c < channel_count; ++c) {
       if (std::isfinite(values[c]) && std::isfinite(r[c].slope)) rows[c * n + d.column] = -r[c].slope;
     }
+  }
+  for (const Followed& f : followed_) {
+    const double by = f.by.of(w);
+    for (std::size_t c = 0; c < channel_count; ++c) rows[c * n + f.column] = by * rows[c * n + f.carrier];
   }
   const auto nuisance = [&](Channel channel, Nuisance e) -> double& {
     return cell(channel, first_nuisance_ + static_cast<std::size_t>(e));
@@ -280,9 +314,15 @@ void ColumnSet::measure(std::span<const Window> windows) {
     }
     for (const Derivative& d : derivatives_) {
       const auto power = metered_powers(d.model, w);
-      if (std::isfinite(power.battery_w.slope)) columns_[d.column].power_share += std::fabs(power.battery_w.slope);
-      if (std::isfinite(power.motors_w.slope) && !from_motion_.power)
-        columns_[d.column].motor_share += std::fabs(power.motors_w.slope);
+      const auto add = [&](std::size_t column, double times) {
+        if (std::isfinite(power.battery_w.slope)) columns_[column].power_share += times * std::fabs(power.battery_w.slope);
+        if (std::isfinite(power.motors_w.slope) && !from_motion_.power)
+          columns_[column].motor_share += times * std::fabs(power.motors_w.slope);
+      };
+      add(d.column, 1);
+      for (const Followed& f : followed_) {
+        if (f.carrier == d.column) add(f.column, std::fabs(f.by.of(w)));
+      }
     }
     ++count;
   }
@@ -339,6 +379,19 @@ void ColumnSet::scale_effects(std::span<const double> shares) {
         column_effect_, [&](const ActiveEffect& other) { return other.effect == column_effect_[k].effect; });
     columns_[k].tolerance /= std::sqrt(static_cast<double>(shapes));
     columns_[k].discrepancy /= std::sqrt(static_cast<double>(shapes));
+  }
+}
+
+void ColumnSet::scale_covariates(std::span<const double> shares) {
+  std::size_t turn = 0;
+  for (Hypothesis& h : hypotheses_) {
+    if (!h.by) continue;
+    const double share = shares[turn++ % shares.size()];
+    Column& c = columns_[h.candidate.columns.front()];
+    const double by_power = 1 / std::max(c.power_share, 1e-12);
+    c.tolerance = unnoticed_outside * by_power;
+    c.discrepancy = by_power;
+    h.candidate.expected = share * by_power;
   }
 }
 

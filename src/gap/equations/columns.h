@@ -23,9 +23,10 @@ struct Material {
   std::size_t blocks = 0;
   FromMotion from_motion;
   double row_s = 0;  // between rows of the recordings
+  std::span<const std::string> covariates{};  // names, in the order of Window::covariates
 };
 
-// A chosen effect in the coordinates of its hypothesis: (strength), or for slope (angle cos, angle sin).
+// A chosen cause in the coordinates of its hypothesis: (strength), or for slope (angle cos, angle sin).
 struct Chosen {
   std::size_t hypothesis = 0;
   std::vector<double> coefficients;
@@ -37,7 +38,7 @@ class ColumnSet {
   // `shares`: of the mean power, that an effect which is there may move; hypotheses come once for each.
   ColumnSet(const Material& material, const Shapes& shapes, std::span<const double> shares);
 
-  // Differentiates around these effects from now on; at first around none.
+  // Differentiates around these from now on, at first around none; in covariates everything is linear anyway.
   void linearise_around(std::span<const Chosen> chosen);
 
   std::size_t size() const { return columns_.size(); }
@@ -47,11 +48,11 @@ class ColumnSet {
   const FromMotion& from_motion() const { return from_motion_; }
   double mean_power_w() const { return mean_power_w_; }
 
-  // The effects of a choice, ready for a drive model; what is not of the catalogue is left out.
-  std::vector<dynamics::ActiveEffect> effects_of(std::span<const Chosen> chosen) const;
+  // What was chosen, with its strengths within their bounds; functions outside the catalogue are left out.
+  std::vector<Cause> causes_of(std::span<const Chosen> chosen) const;
 
-  // Where an effect stands among the hypotheses: the variant with its shapes, or nothing.
-  std::optional<Chosen> coordinates_of(const dynamics::ActiveEffect& effect) const;
+  // Where a cause stands among the hypotheses: the variant with its shapes, or nothing.
+  std::optional<Chosen> coordinates_of(const Cause& cause) const;
 
   // Responses of one window: values[channel] = residual at the linearisation point plus what the chosen
   // coefficients explain, rows(column, channel) the derivatives of the modelled reading. Both NaN / 0 where the
@@ -64,10 +65,12 @@ class ColumnSet {
     dynamics::BasicDriveModel<dynamics::Dual> model;
   };
   void add_effects(const Shapes& shapes, std::span<const double> shares);
+  void add_covariates(const Material& material, std::span<const double> shares);
   void add_nuisances();
   void add_families(std::span<const double> shares);
   void measure(std::span<const Window> windows);
   void scale_effects(std::span<const double> shares);
+  void scale_covariates(std::span<const double> shares);
   void scale_families(std::span<const double> shares);
 
   robot::RobotModel robot_;
@@ -80,6 +83,11 @@ class ColumnSet {
   std::vector<Column> columns_;
   std::vector<dynamics::ActiveEffect> column_effect_;  // of effect columns
   std::vector<std::size_t> column_parameter_;
+  struct Followed {  // a column that is another one times a covariate
+    std::size_t column, carrier;
+    Modulation by;
+  };
+  std::vector<Followed> followed_;
   std::vector<Hypothesis> hypotheses_;
   std::vector<OutsideFamily> families_;
   std::vector<std::size_t> family_first_;

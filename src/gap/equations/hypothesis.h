@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "dynamics/catalogue.h"
+#include "gap/equations/cause.h"
 #include "statistics/evidence.h"
 
 namespace joulecast::gap {
@@ -28,13 +28,15 @@ struct Hypothesis {
   statistics::Candidate candidate;
   dynamics::ActiveEffect effect;  // strength as in the robot file's model; null effect: of no effect
   std::size_t parameter = 0;      // whose coefficient the first column has
-  std::string covariate;          // name of what it follows; no effect
+  std::string covariate;          // name of what the effect's strength follows; empty: it stands still
   std::string unit;               // of a covariate's coefficient
+  std::optional<Modulation> by;   // the covariate in recordings
   std::string channel, variable;  // outside only
   bool one_shape = false;         // variants are one thing in other shapes
 
-  bool is_effect() const { return effect.effect != nullptr; }
-  bool outside() const { return !is_effect() && covariate.empty(); }
+  bool is_effect() const { return effect.effect != nullptr && covariate.empty(); }
+  bool outside() const { return effect.effect == nullptr && covariate.empty(); }
+  Cause cause() const { return {effect, parameter, by}; }
   std::string id() const {
     if (is_effect()) return std::string(effect.effect->info().id);
     return outside() ? "outside:" + channel + ":" + variable : "covariate:" + covariate;

@@ -5,11 +5,6 @@
 
 namespace joulecast::gap {
 
-double Modulation::of(const Window& w) const {
-  const double value = covariate < w.covariates.size() ? w.covariates[covariate] : missing;
-  return std::isfinite(value) ? value - centre : 0;
-}
-
 std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot, bool of_motors) {
   std::vector<double> power(windows.size());
   std::ranges::transform(windows, power.begin(), [&](const Window& w) {

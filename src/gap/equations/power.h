@@ -1,30 +1,12 @@
 #pragma once
 
-#include <cstddef>
-#include <optional>
 #include <span>
 #include <vector>
 
+#include "gap/equations/cause.h"
 #include "gap/equations/channels.h"
 
 namespace joulecast::gap {
-
-// What a cause follows beside what its effect follows: a covariate, by how far it is from `centre`.
-struct Modulation {
-  std::size_t covariate = 0;  // index in Window::covariates
-  double centre = 0;
-
-  // 0 where the covariate is not known, as if it were at its centre.
-  double of(const Window& w) const;
-};
-
-// Something found, with its strength: an effect in force, or one whose strength, parameter `parameter`, is so much a
-// unit of a covariate.
-struct Cause {
-  dynamics::ActiveEffect effect;
-  std::size_t parameter = 0;
-  std::optional<Modulation> by;
-};
 
 // Battery power of every window [W]; NaN where the battery was not read. `of_motors`: what the motors take and the
 // idle power of the robot file in its place.

@@ -24,19 +24,23 @@ constexpr double most_detectable = 0.08;                // share below which eff
 
 // A battery sensor that reads too much while the motors' are right: a load that follows the current would read the
 // same.
-bool like_a_load(const dynamics::ActiveEffect& e) {
-  const std::string_view id = e.effect->info().id;
-  return (id == "current_sensor_gain" || id == "voltage_sensor_gain") && e.values[1] == 0;
+bool like_a_load(const Cause& cause) {
+  const std::string_view id = cause.effect.effect->info().id;
+  return (id == "current_sensor_gain" || id == "voltage_sensor_gain") && cause.effect.values[1] == 0;
 }
 
-bool implausible(const dynamics::ActiveEffect& e) {
-  const Traits& traits = traits_of(e.effect->info().id);
-  return traits.usual > 0 && std::fabs(e.values[0]) > beyond_usual * traits.usual;
+bool implausible(const Cause& cause) {
+  const Traits& traits = traits_of(cause.effect.effect->info().id);
+  return !cause.by && traits.usual > 0 && std::fabs(cause.effect.values[0]) > beyond_usual * traits.usual;
 }
 
-std::vector<DiagnosedParameter> parameters_of(const dynamics::ActiveEffect& active, const Hypothesis& h,
-                                              const Member& member) {
+std::vector<DiagnosedParameter> parameters_of(const Cause& cause, const Hypothesis& h, const Member& member) {
   constexpr double formula_accuracy = 0.015;
+  const dynamics::ActiveEffect& active = cause.effect;
+  if (cause.by) {
+    const double value = active.values[h.parameter];
+    return {{"coefficient", h.unit, value, std::hypot(member.sd[0], 0.5 * (member.coefficients[0] - value))}};
+  }
   std::vector<DiagnosedParameter> parameters;
   const auto& info = active.effect->info().parameters;
   for (std::size_t k = 0; k < info.size(); ++k) {
@@ -108,12 +112,12 @@ class Judge {
         const double n = static_cast<double>(e.controls->surrogates);
         e.posterior = std::min(e.posterior, 1 - static_cast<double>(e.controls->named_in) / n);
       }
-      e.parameters = parameters_of(f_.strengths[k], h, m);
+      e.parameters = parameters_of(f_.causes[k], h, m);
       e.share = f_.shares[k];
       e.power_w = f_.power_w[k];
       e.varies = m.wander;
       for (const Alternative& a : m.alternatives) e.alternatives.push_back(hypothesis(a.hypothesis).id());
-      e.calibrates = traits_of(e.id).calibrates;
+      if (h.is_effect()) e.calibrates = traits_of(e.id).calibrates;
       weakest_ = std::min(weakest_, e.alternatives.empty() ? e.posterior : std::max(e.posterior, group_of(m, e)));
       named_share_ += m.share;
       d_.effects.push_back(std::move(e));
@@ -168,11 +172,11 @@ class Judge {
 
   void weigh_doubts() {
     doubts_.far = d_.power_absolute_relative > far_off;
-    doubts_.strange = std::ranges::any_of(f_.strengths, implausible);
-    doubts_.like_load = d_.motor_channels && std::ranges::any_of(f_.strengths, like_a_load);
+    doubts_.strange = std::ranges::any_of(f_.causes, implausible);
+    doubts_.like_load = d_.motor_channels && std::ranges::any_of(f_.causes, like_a_load);
     if (!f_.held_out || d_.effects.empty() || d_.power == PowerSource::none) return;
     const double after = f_.held_out->explained();
-    const bool by_power = std::ranges::all_of(d_.effects, [](const auto& e) { return shows_in_power(e.id); });
+    const bool by_power = std::ranges::all_of(f_.named, [&](std::size_t h) { return shows_in_power(hypothesis(h)); });
     doubts_.idle = by_power && after > closes_nothing * f_.held_out->unchanged();
     doubts_.worse = d_.baseline && d_.baseline->wins();
     doubts_.unexplained = after - d_.noise_floor > largest_left + of_gap * d_.power_absolute_relative;
@@ -217,11 +221,12 @@ class Judge {
 
   void settle_adoption() {
     std::vector<double> deviations;
-    for (std::size_t k = 0; k < f_.strengths.size(); ++k) {
-      const std::string_view id = f_.strengths[k].effect->info().id;
+    for (const Cause& cause : f_.causes) {
+      if (cause.by) continue;  // a robot file has no covariates
+      const std::string_view id = cause.effect.effect->info().id;
       const auto named = std::ranges::find(d_.effects, id, &DiagnosedEffect::id);
       if (named == d_.effects.end()) continue;
-      d_.adoptable.push_back(dynamics::adopt(f_.strengths[k]));
+      d_.adoptable.push_back(dynamics::adopt(cause.effect));
       const auto own = std::ranges::find_if(named->parameters, [](const auto& p) { return std::isfinite(p.deviation); });
       deviations.push_back(own == named->parameters.end() ? 0 : own->deviation);
     }
@@ -239,10 +244,6 @@ class Judge {
 };
 
 }  // namespace
-
-bool shows_in_power(std::string_view id) {
-  return id.starts_with("covariate:") || !traits_of(id).elsewhere;
-}
 
 double least_outside_share(double gap_share) {
   constexpr double without_a_gap = 0.016, closed = 0.01, usual = 0.012, part_of_gap = 0.2, most_gap = 0.12;

@@ -1,0 +1,87 @@
+#include "gap/diagnose/naming.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "gap/equations/power.h"
+#include "gap/traits.h"
+
+namespace joulecast::gap {
+namespace {
+
+constexpr double least_necessary_part = 0.05;  // of the gap, that comes back when a cause is left out
+
+// Causes that only the motors' readings show, not battery power.
+bool moves_motors_alone(const Hypothesis& h) {
+  const std::string id = h.id();
+  return (id == "current_sensor_gain" || id == "current_sensor_bias" || id == "voltage_sensor_gain") &&
+         h.effect.values[2] == 0;
+}
+
+}  // namespace
+
+bool shows_in_power(const Hypothesis& hypothesis) {
+  return !hypothesis.is_effect() || !traits_of(hypothesis.id()).elsewhere;
+}
+
+std::vector<Cause> strengths_of(const ColumnSet& columns, const Problem& problem, const HypothesisSet& named,
+                                const std::vector<bool>& left_out) {
+  if (named.empty()) return {};
+  std::vector<std::size_t> own;
+  for (const std::size_t h : named) {
+    const auto& more = problem.hypotheses[h].candidate.columns;
+    own.insert(own.end(), more.begin(), more.end());
+  }
+  std::ranges::sort(own);
+  const Mixture::Estimate estimate = Mixture(problem, left_out, own).estimate(named);
+  std::vector<Chosen> chosen;
+  Eigen::Index at = 0;
+  for (const std::size_t h : named) {
+    Chosen c{h, {}};
+    for (std::size_t k = 0; k < problem.hypotheses[h].candidate.columns.size(); ++k)
+      c.coefficients.push_back(estimate.mean[at++]);
+    chosen.push_back(std::move(c));
+  }
+  return columns.causes_of(chosen);
+}
+
+Named name_causes(const Material& m, const ColumnSet& columns, const Problem& problem, const Explanation& explanation,
+                  std::span<const double> power_w, const std::vector<bool>& left_out) {
+  HypothesisSet set;
+  for (const Member& member : explanation.members) {
+    if (!problem.hypotheses[member.hypothesis].outside() && member.group_probability() >= least_named &&
+        member.wander < most_wander)
+      set.push_back(member.hypothesis);
+  }
+  std::ranges::sort(set);
+  std::vector<double> measured;
+  std::vector<Window> windows;
+  for (std::size_t k = 0; k < m.windows.size(); ++k) {
+    if (!std::isfinite(power_w[k]) || (!left_out.empty() && left_out[m.windows[k].block])) continue;
+    windows.push_back(m.windows[k]);
+    measured.push_back(power_w[k]);
+  }
+  const auto gap_with = [&](const HypothesisSet& some) {
+    const std::vector<Cause> causes = strengths_of(columns, problem, some, left_out);
+    return gap_size(measured, modelled_power(m.robot, m.adopted, causes, windows)).absolute_relative;
+  };
+  if (!windows.empty() && set.size() > 1) {
+    const double least = least_necessary_part * gap_with({});
+    while (set.size() > 1) {
+      const double all = gap_with(set);
+      double opened = least;
+      std::optional<std::size_t> spare;
+      for (const std::size_t h : set) {
+        if (!shows_in_power(problem.hypotheses[h]) || moves_motors_alone(problem.hypotheses[h])) continue;
+        HypothesisSet others = set;
+        std::erase(others, h);
+        if (const double o = gap_with(others) - all; o < opened) opened = o, spare = h;
+      }
+      if (!spare) break;
+      std::erase(set, *spare);
+    }
+  }
+  return {set, strengths_of(columns, problem, set, left_out)};
+}
+
+}  // namespace joulecast::gap

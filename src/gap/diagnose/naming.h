@@ -1,0 +1,34 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "gap/diagnose/explain.h"
+#include "gap/diagnose/linear.h"
+
+namespace joulecast::gap {
+
+inline constexpr double least_named = 0.5;     // probability of a name
+inline constexpr double most_wander = 0.8;     // of a strength, over the strength, that still is that cause
+inline constexpr double steady_wander = 0.45;  // up to which it stands still
+
+// Whether a cause has to show in battery power (or in the motors') to be worth a name. The others are seen by other
+// channels however little power they move.
+bool shows_in_power(const Hypothesis& hypothesis);
+
+// Causes to name, with the strengths that they have by themselves where everything is linear.
+struct Named {
+  HypothesisSet set;
+  std::vector<Cause> causes;  // in the order of the set
+};
+
+// Of an explanation, those that are there, or one of their group, with even odds or better by both judges, that stand
+// still, and that the gap needs. All of it without the blocks left out; `power_w`: measured, of the windows.
+Named name_causes(const Material& material, const ColumnSet& columns, const Problem& problem,
+                  const Explanation& explanation, std::span<const double> power_w, const std::vector<bool>& left_out);
+
+// The strengths with which these causes alone leave least where everything is linear, of all blocks not left out.
+std::vector<Cause> strengths_of(const ColumnSet& columns, const Problem& problem, const HypothesisSet& named,
+                                const std::vector<bool>& left_out);
+
+}  // namespace joulecast::gap
