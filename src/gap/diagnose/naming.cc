@@ -24,6 +24,17 @@ bool shows_in_power(const Hypothesis& hypothesis) {
   return !hypothesis.is_effect() || !traits_of(hypothesis.id()).elsewhere;
 }
 
+HypothesisSet likely_causes(const Problem& problem, const Explanation& explanation) {
+  HypothesisSet set;
+  for (const Member& member : explanation.members) {
+    if (!problem.hypotheses[member.hypothesis].outside() && member.group_probability() >= least_named &&
+        member.wander < most_wander)
+      set.push_back(member.hypothesis);
+  }
+  std::ranges::sort(set);
+  return set;
+}
+
 std::vector<Cause> strengths_of(const ColumnSet& columns, const Problem& problem, const HypothesisSet& named,
                                 const std::vector<bool>& left_out) {
   if (named.empty()) return {};
@@ -47,13 +58,7 @@ std::vector<Cause> strengths_of(const ColumnSet& columns, const Problem& problem
 
 Named name_causes(const Material& m, const ColumnSet& columns, const Problem& problem, const Explanation& explanation,
                   std::span<const double> power_w, const std::vector<bool>& left_out) {
-  HypothesisSet set;
-  for (const Member& member : explanation.members) {
-    if (!problem.hypotheses[member.hypothesis].outside() && member.group_probability() >= least_named &&
-        member.wander < most_wander)
-      set.push_back(member.hypothesis);
-  }
-  std::ranges::sort(set);
+  HypothesisSet set = likely_causes(problem, explanation);
   std::vector<double> measured;
   std::vector<Window> windows;
   for (std::size_t k = 0; k < m.windows.size(); ++k) {

@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <random>
 #include <set>
 
-#include "gap/diagnose/held_out.h"
+#include "gap/diagnose/naming.h"
 
 namespace joulecast::gap {
 namespace {
