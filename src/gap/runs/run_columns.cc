@@ -37,8 +37,12 @@ std::vector<Cause> variants_of(const dynamics::Effect& effect, bool by_motor) {
     if (shape > 0) variant.effect.values[shape] = value;
     variants.push_back(variant);
   };
-  if (id == "friction_asymmetry" || id == "torque_constant_loss") {
-    add(1, 1);
+  if (id == "friction_asymmetry" || id == "wheel_radius_asymmetry") {
+    // Right against left is seen where the motors are measured singly.
+    if (by_motor) add(1, 1);
+    if (by_motor && id == "friction_asymmetry") add(1, 0);
+  } else if (id == "torque_constant_loss") {
+    if (by_motor) add(1, 1);
     add(1, 0);
   } else if (id == "payload_mass_error") {
     add(0, 0);
@@ -160,6 +164,7 @@ void RunColumns::add_effects() {
   for (const dynamics::Effect* effect : dynamics::catalogue()) {
     const Traits& traits = traits_of(effect->info().id);
     const std::vector<Cause> variants = variants_of(*effect, by_motor_);
+    if (variants.empty()) unseen.insert(std::string(effect->info().id));
     for (const Cause& variant : variants) {
       const dynamics::EffectParameter& info = effect->info().parameters[variant.parameter];
       double in_file = 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <numeric>
 
@@ -12,8 +13,10 @@ namespace {
 
 using statistics::Information;
 
-constexpr double anything = 0.3;           // share of the energy that each cause may move in the fit of everything
+constexpr double anything = 0.3;           // most share of the energy that each cause may move in the fit of everything
 constexpr double least_scatter = 0.002;    // rounding, and conditions that no table lists
+constexpr double most_scatter = 0.5, scatter_step = 1.15;  // of the search
+constexpr std::array widths{0.003, 0.01, 0.03, 0.1, 0.3, 1.0};  // of the prior of the fit of everything
 constexpr double outlier = 2.5;            // spreads from which on a run counts less
 constexpr std::size_t most_blocks = 24;
 constexpr double usual_shift = 0.02;       // from day to day and floor to floor
@@ -98,59 +101,96 @@ class Moved {
   Relative rows_;
 };
 
+// A fit of every cause and trend at once, each held by one prior; the scatter and the prior's width are those under which
+// the energies are likeliest.
+struct FitOfAll {
+  std::array<double, 2> scatter{};     // of the energy, of right minus left
+  Eigen::VectorXd left, residual;      // relative; the same over what it is expected to scatter by
+
+  FitOfAll(const Relative& r, const std::vector<RunRow>& rows, const Eigen::VectorXd& freedom, const RunScatter& start)
+      : scatter{start.run, start.difference} {
+    double width = 1, best = -std::numeric_limits<double>::infinity();
+    const bool differences = std::ranges::any_of(rows, &RunRow::difference);
+    // One after the other, as each depends little on the other.
+    for (const std::size_t which : differences ? std::vector<std::size_t>{0, 1, 0, 1} : std::vector<std::size_t>{0}) {
+      best = -std::numeric_limits<double>::infinity();
+      std::array<double, 2> now = scatter;
+      for (double sigma = least_scatter; sigma < most_scatter; sigma *= scatter_step) {
+        now[which] = sigma;
+        for (const double w : widths) {
+          const double density = solve(r, rows, w * freedom, start.weight, now);
+          if (density <= best) continue;
+          best = density;
+          scatter[which] = sigma;
+          width = w;
+        }
+      }
+    }
+    solve(r, rows, width * freedom, start.weight, scatter);
+  }
+
+ private:
+  double solve(const Relative& r, const std::vector<RunRow>& rows, const Eigen::VectorXd& sd,
+               const Eigen::VectorXd& weight, const std::array<double, 2>& sigma) {
+    const Eigen::Index n = r.y.size();
+    Eigen::VectorXd root(n);
+    double density = 0;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      root[k] = std::sqrt(weight[k]) / sigma[rows[static_cast<std::size_t>(k)].difference ? 1 : 0];
+      if (root[k] > 0) density += std::log(root[k]);
+    }
+    const Eigen::MatrixXd x = root.asDiagonal() * r.x * sd.asDiagonal();
+    const Eigen::VectorXd y = root.cwiseProduct(r.y);
+    // Whichever is smaller: coefficients or runs.
+    Eigen::MatrixXd a = n < x.cols() ? Eigen::MatrixXd(x * x.transpose()) : Eigen::MatrixXd(x.transpose() * x);
+    a.diagonal().array() += 1.0;
+    const Eigen::LLT<Eigen::MatrixXd> factor(a);
+    density -= factor.matrixLLT().diagonal().array().log().sum();
+    Eigen::VectorXd whitened, kept;  // what the fit leaves, and the part of each row's variance that it leaves
+    if (n < x.cols()) {
+      whitened = factor.solve(y);
+      kept = factor.solve(Eigen::MatrixXd::Identity(n, n)).diagonal();
+    } else {
+      whitened = y - x * factor.solve(x.transpose() * y);
+      kept = 1 - factor.matrixL().solve(x.transpose()).colwise().squaredNorm().transpose().array();
+    }
+    density -= 0.5 * y.dot(whitened);
+    residual = whitened.cwiseQuotient(kept.cwiseMax(0.02).cwiseSqrt());
+    left = Eigen::VectorXd::Zero(n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      if (root[k] > 0) left[k] = whitened[k] / root[k];
+    }
+    return density;
+  }
+};
+
 }  // namespace
 
 RunScatter learn_scatter(const RunColumns& columns, const std::vector<bool>& left_out) {
-  constexpr int passes = 2, rounds = 25;
   const auto& rows = columns.rows();
   const auto n = static_cast<Eigen::Index>(rows.size());
-  const auto out = [&](const RunRow& row) { return !left_out.empty() && left_out[row.run]; };
   RunScatter s;
   s.size_j.resize(static_cast<Eigen::Index>(columns.runs().size()));
   for (std::size_t k = 0; k < columns.runs().size(); ++k)
     s.size_j[static_cast<Eigen::Index>(k)] = columns.runs()[k].measured_j();
-  s.run = s.difference = 0.05;
-  s.weight = Eigen::VectorXd::Ones(n);
-  const Eigen::VectorXd sd = freedom(columns);
-  for (int pass = 0; pass < passes; ++pass) {
+  s.run = s.difference = least_scatter;
+  s.weight = Eigen::VectorXd::Zero(n);
+  for (Eigen::Index k = 0; k < n; ++k)
+    s.weight[k] = !left_out.empty() && left_out[rows[static_cast<std::size_t>(k)].run] ? 0 : 1;
+  const Eigen::VectorXd use = s.weight;
+  for (int pass = 0; pass < 3; ++pass) {
     const Relative r = relative(columns, s.size_j);
-    const Eigen::MatrixXd x = r.x * sd.asDiagonal();
-    Eigen::VectorXd left = r.y;
-    // The most likely scatter under the fit's own prior: E[r^2] = sigma^2 (1 - h) at that scatter.
-    for (int round = 0; round < rounds; ++round) {
-      Eigen::VectorXd precision(n);
-      for (Eigen::Index k = 0; k < n; ++k) {
-        const RunRow& row = rows[static_cast<std::size_t>(k)];
-        const double sigma = row.difference ? s.difference : s.run;
-        precision[k] = out(row) ? 0 : s.weight[k] / (sigma * sigma);
-      }
-      Eigen::MatrixXd a = x.transpose() * precision.asDiagonal() * x;
-      a.diagonal().array() += 1.0;
-      const Eigen::LLT<Eigen::MatrixXd> factor(a);
-      left = r.y - x * factor.solve(x.transpose() * precision.cwiseProduct(r.y));
-      const Eigen::MatrixXd half = factor.matrixL().solve(x.transpose());
-      std::array<std::vector<double>, 2> z;
-      s.residual = Eigen::VectorXd::Zero(n);
-      for (Eigen::Index k = 0; k < n; ++k) {
-        const RunRow& row = rows[static_cast<std::size_t>(k)];
-        if (out(row)) continue;
-        s.residual[k] = left[k] / std::sqrt(std::max(1 - precision[k] * half.col(k).squaredNorm(), 0.02));
-        z[row.difference ? 1 : 0].push_back(s.residual[k]);
-      }
-      s.run = std::max(least_scatter, statistics::spread_about_zero(z[0]));
-      s.difference = std::max(least_scatter, statistics::spread_about_zero(z[1]));
-      for (Eigen::Index k = 0; k < n; ++k) {
-        const RunRow& row = rows[static_cast<std::size_t>(k)];
-        s.residual[k] /= row.difference ? s.difference : s.run;
-        s.weight[k] = out(row) ? 0 : statistics::huber_weight(s.residual[k], 1, outlier);
-      }
-    }
-    if (pass + 1 == passes) break;
+    const FitOfAll fit(r, rows, freedom(columns), s);
+    s.run = fit.scatter[0];
+    s.difference = fit.scatter[1];
+    s.weight = use;
     for (Eigen::Index k = 0; k < n; ++k) {
       const RunRow& row = rows[static_cast<std::size_t>(k)];
-      const auto run = static_cast<Eigen::Index>(row.run);
+      if (use[k] == 0) continue;
+      s.weight[k] = statistics::huber_weight(fit.residual[k], 1, outlier);
       const double measured = columns.runs()[row.run].measured_j();
-      if (!row.difference) s.size_j[run] = measured * std::clamp(1 - left[k], 0.5, 2.0);
+      if (!row.difference)
+        s.size_j[static_cast<Eigen::Index>(row.run)] = measured * std::clamp(1 - fit.left[k], 0.5, 2.0);
     }
   }
   return s;

@@ -15,7 +15,6 @@ struct RunScatter {
   double run = 0, difference = 0;  // sd relative to a run's energy: of the energy, of right minus left
   Eigen::VectorXd size_j;          // of each run, what is relative is relative to: its energy, smoothed by the fit
   Eigen::VectorXd weight;          // of each row, less for outliers; 0: left out
-  Eigen::VectorXd residual;        // of each row, relative, over its scatter
 };
 RunScatter learn_scatter(const RunColumns& columns, const std::vector<bool>& left_out = {});
 
