@@ -39,10 +39,10 @@ std::vector<Cause> variants_of(const dynamics::Effect& effect, bool by_motor) {
   };
   if (id == "friction_asymmetry" || id == "wheel_radius_asymmetry") {
     // Right against left is seen where the motors are measured singly.
-    if (by_motor) add(1, 1);
-    if (by_motor && id == "friction_asymmetry") add(1, 0);
+    if (by_motor) add(0, 0);
+    if (by_motor && id == "friction_asymmetry") add(1, 1);
   } else if (id == "torque_constant_loss") {
-    if (by_motor) add(1, 1);
+    add(1, 1);
     add(1, 0);
   } else if (id == "payload_mass_error") {
     add(0, 0);

@@ -8,6 +8,7 @@ namespace joulecast::gap {
 RunReferee::RunReferee(const RunColumns& columns) {
   const auto& runs = columns.runs();
   const auto n = static_cast<Eigen::Index>(runs.size());
+  for (const MissionRun& run : runs) size_.push_back(run.measured_j());
   const std::size_t most_terms = std::max<std::size_t>(2, runs.size() / 4);
   const auto take = [&](Term term, auto&& value, bool always) {
     Eigen::VectorXd column(n);
@@ -41,8 +42,8 @@ RunReferee::Fit RunReferee::fit(const std::vector<double>& energy_j, const std::
   Eigen::Index rows = 0;
   for (std::size_t k = 0; k < energy_j.size(); ++k) {
     if (!left_out.empty() && left_out[k]) continue;
-    x.row(rows) = x_.row(static_cast<Eigen::Index>(k)) / energy_j[k];
-    y[rows++] = 1;
+    x.row(rows) = x_.row(static_cast<Eigen::Index>(k)) / size_[k];
+    y[rows++] = energy_j[k] / size_[k];
     block.push_back(k);
   }
   Fit fit{statistics::robust_regression(x.topRows(rows), y.head(rows), block), {}};

@@ -19,7 +19,7 @@ class RunReferee {
   };
   const std::vector<Term>& terms() const { return terms_; }
 
-  // Energies of all runs by the terms, fitted to the runs that are not left out, errors relative to the energies.
+  // Energies of all runs by the terms, fitted to the runs that are not left out, errors relative to the measured ones.
   struct Fit {
     statistics::Regression regression;
     std::vector<double> energy_j;
@@ -28,7 +28,8 @@ class RunReferee {
 
  private:
   std::vector<Term> terms_;
-  Eigen::MatrixXd x_;  // runs by terms
+  Eigen::MatrixXd x_;         // runs by terms
+  std::vector<double> size_;  // measured energies
 };
 
 }  // namespace joulecast::gap

@@ -24,6 +24,7 @@ struct Findings {
   const std::optional<Ripple>& ripple;
   std::optional<std::size_t> wandering;  // member whose strength does not stand still, the one that moves most
   std::array<double, 2> wandering_power_w{};
+  bool of_groups = false;  // strengths are differences between groups: large ones make no other robot
 };
 
 // Share of the mean power that something outside the catalogue has to move to be told, beside a gap that noise does
