@@ -16,6 +16,10 @@ inline constexpr double steady_wander = 0.45;  // up to which it stands still
 // channels however little power they move.
 bool shows_in_power(const Hypothesis& hypothesis);
 
+// Share of the power that a cause has to move to be surely seen: the median over causes that show in power of what is so
+// many standard deviations of each by itself.
+double seen_share(const Problem& problem);
+
 // Of an explanation, those that are there, or one of their group, with even odds or better by both judges, and that
 // stand still.
 HypothesisSet likely_causes(const Problem& problem, const Explanation& explanation);

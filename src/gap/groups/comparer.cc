@@ -8,7 +8,6 @@
 #include "gap/diagnose/naming.h"
 #include "gap/verdict/judge.h"
 #include "statistics/bootstrap.h"
-#include "statistics/robust.h"
 #include "statistics/shapley.h"
 
 namespace joulecast::gap {
@@ -342,6 +341,7 @@ void Comparer::judge_all() {
 bool Comparer::run() {
   problem_ = contrast(data_.base, data_.group_of_block, groups_);
   explanation_ = explain(problem_, {}, data_.explain);
+  c_.diagnosis.detectable_share = seen_share(problem_);
   named_ = likely_causes(problem_, explanation_);
   causes_ = contrasted(problem_, named_, {});
   if (!hold_out()) return false;

@@ -9,12 +9,12 @@
 #include <set>
 
 #include "gap/diagnose/held_out.h"
+#include "gap/diagnose/naming.h"
 #include "gap/runs/run_referee.h"
 #include "gap/runs/run_search.h"
 #include "gap/verdict/judge.h"
 #include "gap/verdict/words.h"
 #include "statistics/bootstrap.h"
-#include "statistics/robust.h"
 #include "statistics/shapley.h"
 
 namespace joulecast::gap {
@@ -53,22 +53,6 @@ std::vector<std::pair<std::string, std::vector<bool>>> levels_of(const RunSet& s
     return std::string(r.at.turn_rad == 0 ? "straight" : r.at.turn_rad > 0 ? "turn left" : "turn right");
   });
   return levels;
-}
-
-// Share of the energy that an effect has to move to be surely seen here: the median over effects of what is so many
-// standard deviations of each by itself.
-double detectable_share(const Problem& problem) {
-  constexpr double deviations = 3.5;
-  const Mixture mixture(problem);
-  std::map<std::string, double> shares;
-  for (std::size_t h = 0; h < problem.hypotheses.size(); ++h) {
-    const Hypothesis& hypothesis = problem.hypotheses[h];
-    if (hypothesis.is_effect() && !shares.contains(hypothesis.id()))
-      shares[hypothesis.id()] = problem.moved(hypothesis, deviations * mixture.estimate({h}).sd);
-  }
-  std::vector<double> values;
-  for (const auto& [id, share] : shares) values.push_back(share);
-  return values.empty() ? missing : statistics::median(std::move(values));
 }
 
 class RunDiagnoser {
@@ -131,7 +115,7 @@ void RunDiagnoser::measure() {
   d.power_absolute_relative = columns_.error({});
   d.noise_floor = std::min(mean_absolute_normal(r_.scatter), d.power_absolute_relative);
   d.channels = {{columns_.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
-  d.detectable_share = detectable_share(finding_.problem);
+  d.detectable_share = seen_share(finding_.problem);
 }
 
 bool RunDiagnoser::hold_out_parts() {
