@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -42,6 +43,8 @@ struct DiagnosedEffect {
   double power_w = 0;                     // mean |change of battery power|
   double varies = 0;                      // of its strength along the recordings, sd over the strength
   std::vector<std::string> alternatives;  // that these data cannot tell from it
+  // Those of them that a robot file can take, each with the strength that it has in this one's place.
+  std::vector<robot::AdoptedEffect> instead;
   std::optional<Controls> controls;
   std::string calibrates;  // parameter of the robot file that it would correct; empty: none
 };
@@ -64,6 +67,7 @@ struct ChannelGap {
 struct BaselineTerm {
   std::string name, unit;
   double value = 0, deviation = 0;
+  double model = std::numeric_limits<double>::quiet_NaN();  // what the robot file's model comes to in the same term
 };
 
 // A plain regression of power on motion, the referee: no explanation stands that predicts what it was not fitted to

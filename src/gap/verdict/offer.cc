@@ -1,0 +1,168 @@
+#include "gap/verdict/offer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "base/json_number.h"
+#include "gap/verdict/adopt.h"
+#include "gap/verdict/text.h"
+#include "gap/verdict/words.h"
+
+namespace joulecast::gap {
+namespace {
+
+using nlohmann::json;
+using nlohmann::ordered_json;
+using robot::AdoptedEffect;
+
+ordered_json effect_to_json(const AdoptedEffect& effect) {
+  ordered_json parameters = ordered_json::object();
+  for (const auto& [name, value] : effect.parameters) parameters[name] = json_number(value);
+  return {{"id", effect.id}, {"parameters", std::move(parameters)}};
+}
+
+// `value_of` takes the number of one parameter.
+template <class ValueOf>
+AdoptedEffect effect_from(const json& told, ValueOf value_of) {
+  AdoptedEffect effect{told.at("id").get<std::string>(), {}};
+  for (const auto& [name, value] : told.at("parameters").items()) {
+    if (const json& number = value_of(value); number.is_number())
+      effect.parameters.emplace_back(name, number.template get<double>());
+  }
+  return effect;
+}
+
+Offer offer_told(const json& adoption) {
+  const auto itself = [](const json& value) -> const json& { return value; };
+  Offer offer;
+  for (const json& e : adoption.at("effects")) {
+    OfferedEffect& offered = offer.effects.emplace_back();
+    offered.effect = effect_from(e, itself);
+    for (const json& other : e.at("instead")) offered.instead.push_back(effect_from(other, itself));
+  }
+  offer.corrects_file = adoption.at("corrects_file").get<bool>();
+  offer.choice_settles = adoption.at("choice_settles").get<bool>();
+  if (const json& refusal = adoption.at("refusal"); refusal.is_string()) offer.refusal = refusal.get<std::string>();
+  return offer;
+}
+
+// Of a diagnosis that was made before it said what may be adopted.
+Offer offer_derived(const json& diagnosis) {
+  Offer offer;
+  bool alternatives = false;
+  for (const json& e : diagnosis.at("effects")) {
+    OfferedEffect& offered = offer.effects.emplace_back();
+    offered.effect = effect_from(e, [](const json& value) -> const json& { return value.at("value"); });
+    for (const json& other : e.at("alternatives")) offered.instead.push_back({other.get<std::string>(), {}});
+    alternatives = alternatives || !offered.instead.empty();
+  }
+  const std::string verdict = diagnosis.at("verdict").get<std::string>();
+  if (offer.effects.empty()) {
+    offer.refusal = "nothing was found that a robot file could take";
+  } else if (verdict != name_of(Verdict::effects)) {
+    offer.refusal = "the verdict is " + verdict;
+  } else if (alternatives) {
+    offer.refusal = "some effects are not told from others: name the ones to adopt";
+    offer.choice_settles = true;
+  }
+  return offer;
+}
+
+std::vector<std::string> ids_of(const OfferedEffect& offered) {
+  std::vector<std::string> ids{offered.effect.id};
+  for (const AdoptedEffect& other : offered.instead) ids.push_back(other.id);
+  return ids;
+}
+
+// What is not chosen though it has to be.
+Result<std::vector<AdoptedEffect>> choose(const Offer& offer, const std::vector<std::string>& wanted) {
+  std::set<std::string> unused(wanted.begin(), wanted.end());
+  std::vector<AdoptedEffect> chosen;
+  for (const OfferedEffect& offered : offer.effects) {
+    const std::vector<std::string> ids = ids_of(offered);
+    std::vector<std::string> named;
+    for (const std::string& id : ids) {
+      if (std::ranges::find(wanted, id) != wanted.end()) named.push_back(id);
+      unused.erase(id);
+    }
+    if (named.size() > 1)
+      return invalid("effect", fmt::format("{} stand for one thing: name one of them", enumerate(named)));
+    if (named.empty() && !offered.instead.empty()) {
+      return fail(Fault::conflict, "effect",
+                  fmt::format("{} is not told from {}: name the one to adopt", ids.front(),
+                              enumerate(std::span(ids).subspan(1))));
+    }
+    const auto other = std::ranges::find(offered.instead, named.empty() ? "" : named.front(), &AdoptedEffect::id);
+    chosen.push_back(other == offered.instead.end() ? offered.effect : *other);
+    if (chosen.back().parameters.empty()) {
+      return fail(Fault::conflict, "effect",
+                  fmt::format("the diagnosis has no strength of {}: of these only {} can be adopted",
+                              chosen.back().id, offered.effect.id));
+    }
+  }
+  if (unused.empty()) return chosen;
+  std::vector<std::string> known;
+  for (const OfferedEffect& offered : offer.effects) {
+    for (std::string& id : ids_of(offered)) known.push_back(std::move(id));
+  }
+  return invalid("effect", fmt::format("{} is not among what was found: {}", *unused.begin(), enumerate(known)));
+}
+
+}  // namespace
+
+Offer offer_of(const Diagnosis& d) {
+  Offer offer;
+  for (const AdoptedEffect& effect : d.adoptable) {
+    OfferedEffect& offered = offer.effects.emplace_back();
+    offered.effect = effect;
+    const auto diagnosed = std::ranges::find(d.effects, effect.id, &DiagnosedEffect::id);
+    if (diagnosed == d.effects.end()) continue;
+    for (const std::string& id : diagnosed->alternatives) {
+      const auto known = std::ranges::find(diagnosed->instead, id, &AdoptedEffect::id);
+      offered.instead.push_back(known == diagnosed->instead.end() ? AdoptedEffect{id, {}} : *known);
+    }
+  }
+  offer.corrects_file = d.verdict == Verdict::not_this_robot;
+  offer.refusal = d.refusal;
+  // What is refused just as it would be with nothing against it is refused for its alternatives alone.
+  offer.choice_settles = !d.refusal.empty() && !d.adoptable.empty() &&
+                         (d.verdict == Verdict::effects || d.verdict == Verdict::not_this_robot) &&
+                         d.refusal == refusal_of(d, false, false);
+  return offer;
+}
+
+ordered_json offer_to_json(const Offer& offer) {
+  ordered_json effects = ordered_json::array();
+  for (const OfferedEffect& offered : offer.effects) {
+    ordered_json one = effect_to_json(offered.effect);
+    one["instead"] = ordered_json::array();
+    for (const AdoptedEffect& other : offered.instead) one["instead"].push_back(effect_to_json(other));
+    effects.push_back(std::move(one));
+  }
+  return {{"refusal", offer.refusal.empty() ? ordered_json(nullptr) : ordered_json(offer.refusal)},
+          {"choice_settles", offer.choice_settles},
+          {"corrects_file", offer.corrects_file},
+          {"effects", std::move(effects)}};
+}
+
+Result<Offer> offer_from_json(const json& diagnosis) {
+  try {
+    return diagnosis.contains("adoption") ? offer_told(diagnosis["adoption"]) : offer_derived(diagnosis);
+  } catch (const json::exception&) {
+    return fail(Fault::corrupt, "", "the diagnosis does not say what may be adopted");
+  }
+}
+
+Result<robot::RobotModel> take(const Offer& offer, const robot::RobotModel& robot, const Choice& choice) {
+  if (offer.effects.empty()) return fail(Fault::conflict, "", offer.refusal);
+  if (!offer.refusal.empty() && !offer.choice_settles && !choice.force)
+    return fail(Fault::conflict, "", offer.refusal);
+  const Result<std::vector<AdoptedEffect>> chosen = choose(offer, choice.effects);
+  if (!chosen) return tl::unexpected(chosen.error());
+  return offer.corrects_file ? with_corrections(robot, *chosen) : with_effects(robot, *chosen);
+}
+
+}  // namespace joulecast::gap
