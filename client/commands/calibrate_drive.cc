@@ -58,22 +58,21 @@ struct Outcome {
 };
 
 Result<std::vector<telemetry::Recording>> load(const Options& options, const std::string& robot_id) {
-  std::vector<telemetry::Recording> all;
-  for (const std::string& log : options.logs) {
-    auto read = telemetry::read_recordings(log);
-    if (!read) return tl::unexpected(read.error());
-    for (telemetry::Recording& r : read->recordings) {
-      if (r.robot_id != robot_id) continue;
-      if (!std::isfinite(r.payload_kg)) r.payload_kg = 0;
-      all.push_back(std::move(r));
-    }
+  auto log = telemetry::read_recordings(options.logs, robot_id);
+  if (!log) return tl::unexpected(log.error());
+  std::vector<telemetry::Recording>& all = log->recordings;
+  // What a robot does between its missions counts only where it declares none.
+  const bool declared = std::ranges::any_of(all, [](const auto& r) { return !r.implicit; });
+  std::erase_if(all, [&](const auto& r) { return r.samples.empty() || (declared && r.implicit); });
+  if (all.empty()) return invalid("log", "no telemetry of robot " + robot_id + " in the logs");
+  for (telemetry::Recording& r : all) {
+    if (!std::isfinite(r.payload_kg)) r.payload_kg = 0;
   }
-  if (all.empty()) return invalid("log", "no declared mission of robot " + robot_id + " in the logs");
   for (const std::string& wanted : options.train) {
     if (std::ranges::none_of(all, [&](const auto& r) { return r.mission_id == wanted; }))
       return invalid("--train", "no mission " + wanted + " of robot " + robot_id + " in the logs");
   }
-  return all;
+  return std::move(all);
 }
 
 Result<Outcome> calibrate(const Options& options) {

@@ -21,10 +21,10 @@ constexpr double least_significance = 3;      // standard deviations from the mo
 constexpr double least_change = 0.02;         // of the friction torque or the idle power
 constexpr std::size_t most_remembered = 100;  // missions learned from
 
-energy::DriveWindows windows_of(const robot::RobotModel& robot) {
-  auto windows = energy::DriveWindows::make(robot);
-  assert(windows);
-  return std::move(*windows);
+energy::DriveEquations equations_of(const robot::RobotModel& robot) {
+  auto equations = energy::DriveEquations::make(robot);
+  assert(equations);
+  return std::move(*equations);
 }
 
 constexpr std::array<std::string_view, energy::refined_count> units{"N m", "N m", "N m s/rad", "W", "kg"};
@@ -32,25 +32,23 @@ constexpr std::array<std::string_view, energy::refined_count> units{"N m", "N m"
 }  // namespace
 
 RefinementWatch::RefinementWatch(const robot::RobotModel& robot, std::int64_t version)
-    : robot_(robot), version_(version), windows_(windows_of(robot)), refinement_(robot) {}
+    : robot_(robot), version_(version), equations_(equations_of(robot)), refinement_(robot) {}
 
 void RefinementWatch::use(const robot::RobotModel& robot, std::int64_t version) {
   robot_ = robot;
   version_ = version;
-  windows_ = windows_of(robot);
+  equations_ = equations_of(robot);
   refinement_.rebase(robot);
 }
 
 void RefinementWatch::begin_mission() {
-  windows_.interrupt();
-  windows_.take();
+  equations_.take();
 }
 
 RefinementWatch::Judgement RefinementWatch::end_mission(const history::Mission& mission) {
   Judgement out;
-  windows_.interrupt();
-  const double declared_kg = windows_.mean_payload_kg();
-  const std::vector<energy::DriveEquation> equations = windows_.take();
+  const std::vector<energy::DriveEquation> equations = equations_.take();
+  const double declared_kg = equations_.mean_payload_kg();
   const bool learn = judged_ % held_out_every != held_out_every - 1;
   const energy::MissionFinding finding = refinement_.judge(equations, declared_kg, learn);
   if (!finding.enough) return out;

@@ -24,8 +24,8 @@ class RefinementWatch {
 
   void begin_mission();
   // Samples of the mission in order of time, without those at a charger, and the climb there.
-  void add(const telemetry::Sample& sample, double climb_rad) { windows_.add(sample, climb_rad); }
-  void interrupt() { windows_.interrupt(); }
+  void add(const telemetry::Sample& sample, double climb_rad) { equations_.add(sample, climb_rad); }
+  void interrupt() { equations_.interrupt(); }
 
   struct Judgement {
     std::string findings_json;       // for the mission's record; empty: its motion says nothing
@@ -44,7 +44,7 @@ class RefinementWatch {
 
   robot::RobotModel robot_;
   std::int64_t version_;
-  energy::DriveWindows windows_;
+  energy::DriveEquations equations_;
   energy::Refinement refinement_;
   std::int64_t judged_ = 0;
   std::size_t proposed_at_ = 0;  // missions learned from at the last proposal

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "energy/drive_windows.h"
+#include "energy/drive_equations.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::energy {

@@ -1,11 +1,12 @@
 #include "telemetry/log_recordings.h"
 
-#include <algorithm>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "telemetry/codec.h"
 #include "telemetry/event_log.h"
+#include "telemetry/mission_tracker.h"
 #include "telemetry/validation.h"
 
 namespace joulecast::telemetry {
@@ -13,89 +14,106 @@ namespace {
 
 class Collector {
  public:
+  explicit Collector(const std::string& wanted) : wanted_(wanted) {}
+
   void take(const LogEvent& event) {
     const auto channel = parse_channel(event.channel);
-    if (!channel) return;
+    if (!channel || channel->subject == Subject::energy_state) return;
+    result_.robots.emplace(channel->robot_id);
+    if (!wanted_.empty() && channel->robot_id != wanted_) return;
+    const std::string id(channel->robot_id);
     if (channel->subject == Subject::telemetry) {
       const auto decoded = decode_telemetry(event.data);
-      decoded ? add(decoded->robot_id, decoded->sample) : refuse();
-    } else if (channel->subject == Subject::mission_event) {
-      const auto decoded = decode_mission_event(event.data);
-      decoded ? follow(decoded->robot_id, decoded->event) : refuse();
+      decoded ? add(id, decoded->sample) : refuse();
     } else if (channel->subject == Subject::covariates) {
       const auto decoded = decode_covariates(event.data);
-      decoded ? add(decoded->robot_id, decoded->message) : refuse();
+      decoded ? add(id, decoded->message) : refuse();
+    } else {
+      const auto decoded = decode_mission_event(event.data);
+      decoded ? add(id, decoded->event) : refuse();
     }
   }
 
-  LogRecordings finish(std::uint64_t skipped_bytes) {
-    for (std::size_t k = 0; k < changes_.size(); ++k)
+  LogRecordings finish(std::size_t damaged_places) {
+    result_.unreadable += damaged_places;
+    for (const auto& [id, robot] : robots_)
+      result_.samples_outside += robot.missions.counters().samples_outside;
+    for (std::size_t k = 0; k < changes_.size(); ++k) {
       result_.recordings[k].covariates = series_of(changes_[k]);
-    std::erase_if(result_.recordings, [](const Recording& r) { return r.samples.empty(); });
-    result_.skipped_bytes = skipped_bytes;
+      result_.unreadable += put_in_order(result_.recordings[k].samples);
+    }
     return std::move(result_);
   }
 
  private:
+  struct Robot {
+    MissionTracker missions;
+    CovariateTracker covariates;
+    std::optional<std::size_t> open;  // its mission among the recordings
+  };
+
   void refuse() { ++result_.unreadable; }
 
-  void follow(const std::string& robot_id, const MissionEvent& event) {
-    open_.erase(robot_id);
-    if (event.phase != MissionPhase::started) return;
-    open_[robot_id] = result_.recordings.size();
-    result_.recordings.push_back({robot_id, event.mission_id, event.payload_kg, {}});
-    changes_.push_back(covariates_[robot_id].begin_mission(event.utime_us));
+  void add(const std::string& id, const Sample& sample) {
+    if (check_plausible(sample)) return refuse();
+    Robot& robot = robots_[id];
+    const SampleStep step = robot.missions.on_sample(sample.utime_us, sample.payload_kg);
+    carry_out(id, robot, step.actions);
+    if (step.belongs) result_.recordings[*robot.open].samples.push_back(sample);
   }
 
-  void add(const std::string& robot_id, const CovariateMessage& message) {
+  void add(const std::string& id, const MissionEvent& event) {
+    if (check_plausible(event)) return refuse();
+    Robot& robot = robots_[id];
+    carry_out(id, robot, robot.missions.on_event(event));
+  }
+
+  void add(const std::string& id, const CovariateMessage& message) {
+    using Verdict = CovariateTracker::Verdict;
     if (check_plausible(message)) return refuse();
-    CovariateTracker& tracker = covariates_[robot_id];
-    const auto open = open_.find(robot_id);
+    Robot& robot = robots_[id];
     for (const Covariate& covariate : message.covariates) {
       CovariateChange change;
-      if (check_plausible(covariate)) {
-        refuse();
-        continue;
-      }
-      const CovariateTracker::Verdict verdict = tracker.take(message.utime_us, covariate, change);
-      if (verdict == CovariateTracker::Verdict::news) {
-        if (open != open_.end()) changes_[open->second].push_back(std::move(change));
-      } else if (verdict != CovariateTracker::Verdict::repeat) {
-        refuse();
-      }
+      const Verdict verdict = check_plausible(covariate)
+                                  ? Verdict::late
+                                  : robot.covariates.take(message.utime_us, covariate, change);
+      if (verdict == Verdict::late || verdict == Verdict::no_room) refuse();
+      if (verdict == Verdict::news && robot.open) changes_[*robot.open].push_back(std::move(change));
     }
   }
 
-  void add(const std::string& robot_id, const Sample& sample) {
-    const auto open = open_.find(robot_id);
-    if (open == open_.end()) {
-      ++result_.samples_outside;
-      return;
+  void carry_out(const std::string& id, Robot& robot, const MissionActions& actions) {
+    for (const MissionAction& action : actions) {
+      robot.open.reset();
+      if (action.kind != MissionAction::Kind::open) continue;
+      robot.open = result_.recordings.size();
+      result_.recordings.push_back({id, action.mission_id, action.payload_kg, {}, {}, action.implicit});
+      changes_.push_back(robot.covariates.begin_mission(action.utime_us));
     }
-    std::vector<Sample>& samples = result_.recordings[open->second].samples;
-    if (check_plausible(sample) || (!samples.empty() && sample.utime_us <= samples.back().utime_us))
-      return refuse();
-    samples.push_back(sample);
   }
 
+  const std::string& wanted_;
   LogRecordings result_;
-  std::map<std::string, std::size_t> open_;  // robot -> its open mission among the recordings
-  std::map<std::string, CovariateTracker> covariates_;
+  std::map<std::string, Robot> robots_;
   std::vector<std::vector<CovariateChange>> changes_;  // of each recording
 };
 
 }  // namespace
 
-Result<LogRecordings> read_recordings(const std::string& log_path) {
-  Collector collector;
+Result<LogRecordings> read_recordings(std::span<const std::string> paths, const std::string& robot_id) {
+  Collector collector(robot_id);
   LogTally tally;
   const auto take = [&](const LogEvent& event) -> Result<bool> {
     collector.take(event);
     return true;
   };
-  if (const Result<bool> read = read_events(log_path, take, tally); !read)
-    return tl::unexpected(read.error());
-  return collector.finish(tally.skipped_bytes);
+  for (const std::string& path : paths) {
+    const std::uint64_t before = tally.events;
+    if (Result<bool> read = read_events(path, take, tally); !read)
+      return tl::unexpected(std::move(read.error()));
+    if (tally.events == before) return invalid("log", path + " is no LCM event log, or an empty one");
+  }
+  return collector.finish(tally.damaged_places);
 }
 
 }  // namespace joulecast::telemetry

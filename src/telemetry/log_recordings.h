@@ -1,6 +1,9 @@
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
+#include <functional>
+#include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -9,16 +12,19 @@
 
 namespace joulecast::telemetry {
 
-// The declared missions of an event log, in the order in which they began.
+// The missions of event logs, in the order in which they began.
 struct LogRecordings {
-  std::vector<Recording> recordings;
-  std::uint64_t samples_outside = 0;  // of no declared mission
-  std::uint64_t unreadable = 0;  // messages and covariates that decode to nothing, break a limit or come late
-  std::uint64_t skipped_bytes = 0;  // damage in the file
+  std::vector<Recording> recordings;          // their samples in order of time; a mission may hold none
+  std::set<std::string, std::less<>> robots;  // all that were heard, wanted or not
+  std::size_t samples_outside = 0;            // of no mission: before its start, or just after an end
+  // Messages and covariates that decode to nothing, break a limit or come late, samples of one time, and
+  // damaged places of the files.
+  std::size_t unreadable = 0;
 };
 
-// Reads a log back into the recordings that write_recording() makes of it. Samples that do not advance the
-// robot's clock are dropped as unreadable. Fault::not_found when the file cannot be opened.
-Result<LogRecordings> read_recordings(const std::string& log_path);
+// Reads LCM event logs, one going on where the other ends, into missions as the daemon would follow them
+// (MissionTracker): telemetry outside declared missions forms implicit ones. `robot_id` picks one robot;
+// empty: all. Fault::not_found for a file that cannot be opened, Fault::invalid for one that holds no event.
+Result<LogRecordings> read_recordings(std::span<const std::string> paths, const std::string& robot_id = {});
 
 }  // namespace joulecast::telemetry

@@ -38,6 +38,14 @@ Result<void> write_changes(EventLogWriter& log, const std::string& robot_id,
 
 }  // namespace
 
+std::size_t put_in_order(std::vector<Sample>& samples) {
+  std::ranges::stable_sort(samples, {}, &Sample::utime_us);
+  const auto same = std::ranges::unique(samples, {}, &Sample::utime_us);
+  const std::size_t dropped = same.size();
+  samples.erase(same.begin(), same.end());
+  return dropped;
+}
+
 Result<void> write_recording(EventLogWriter& log, const Recording& recording) {
   if (recording.samples.empty()) return invalid("samples", "a recording needs one sample at least");
   const std::string channel = channel_of(Subject::telemetry, recording.robot_id);

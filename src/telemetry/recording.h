@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -17,7 +18,11 @@ struct Recording {
   double payload_kg = unmeasured;
   std::vector<Sample> samples;
   std::vector<CovariateSeries> covariates = {};
+  bool implicit = false;  // no STARTED declared it
 };
+
+// Sorts samples by time and drops those whose time is that of another; returns how many.
+std::size_t put_in_order(std::vector<Sample>& samples);
 
 // Append to the log as the robot would have published it: STARTED at the first sample, every sample with the
 // covariates that change by then before it, FINISHED at the last, and that the covariates are unknown from

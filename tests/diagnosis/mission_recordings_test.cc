@@ -39,7 +39,7 @@ TEST(MissionRecordings, HaveTheCovariatesOfTheLogThatTheyCameFrom) {
   for (const auto& one : {recording("m1", start_us), recording("m2", start_us + 100'000'000)})
     ASSERT_TRUE(telemetry::write_recording(*log, one));
   ASSERT_TRUE(log->close());
-  const auto read = telemetry::read_recordings(path);
+  const auto read = telemetry::read_recordings({&path, 1});
   ASSERT_TRUE(read) << describe(read.error());
   ASSERT_EQ(read->recordings.size(), 2u);
 

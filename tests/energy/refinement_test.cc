@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "client/virtual_robot/fleet.h"
-#include "energy/drive_windows.h"
+#include "energy/drive_equations.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::energy {
@@ -55,17 +55,16 @@ History work(const virtual_robot::ShippedRobot& shipped, std::uint64_t seed, con
                robot.motor.viscous_friction_nm_s_rad * (1 + viscous), robot.idle_power_w + idle_w, 0};
 
   Refinement refinement(robot);
-  DriveWindows windows = DriveWindows::make(robot).value();
+  DriveEquations equations = DriveEquations::make(robot).value();
   virtual_robot::VirtualRobot machine(spec, seed);
   virtual_robot::Emission emission;
   while (machine.next(emission)) {
     if (const auto* sample = std::get_if<telemetry::Sample>(&emission.message)) {
-      windows.add(*sample);
+      equations.add(*sample);
     } else if (std::get<telemetry::MissionEvent>(emission.message).phase !=
                telemetry::MissionPhase::started) {
-      windows.interrupt();
-      const double declared_kg = windows.mean_payload_kg();
-      out.findings.push_back(refinement.judge(windows.take(), declared_kg, true));
+      const auto of_mission = equations.take();
+      out.findings.push_back(refinement.judge(of_mission, equations.mean_payload_kg(), true));
       out.undeclared_kg.push_back(machine.finished().back().undeclared_kg);
     }
   }
@@ -193,7 +192,7 @@ TEST(Refinement, SaysWhenPayloadIsNotToldFromFriction) {
   robot::RobotModel heavy = robot;
   heavy.motor.friction_torque_nm = {1.0, 1.0};
   const auto truth = dynamics::drive_model(heavy).value();
-  DriveWindows windows = DriveWindows::make(robot).value();
+  DriveEquations equations = DriveEquations::make(robot).value();
   dynamics::Instant at;
   at.wheel_speed_rad_s = {8, 8};
   const auto flow = truth.flow(at);
@@ -205,10 +204,10 @@ TEST(Refinement, SaysWhenPayloadIsNotToldFromFriction) {
                          flow.current_a[1] + 0.05 * std::cos(1.7 * k)};
     s.motor_voltage_v = flow.voltage_v;
     s.payload_kg = 0;
-    windows.add(s);
+    equations.add(s);
   }
   Refinement refinement(robot);
-  const MissionFinding finding = refinement.judge(windows.take(), 0, true);
+  const MissionFinding finding = refinement.judge(equations.take(), 0, true);
   EXPECT_TRUE(finding.enough);
   EXPECT_TRUE(finding.inseparable);
   EXPECT_FALSE(finding.undeclared);

@@ -148,7 +148,7 @@ TEST(Covariates, TravelWithARecordingThroughALog) {
   for (const Recording& r : written) ASSERT_TRUE(write_recording(*log, r));
   ASSERT_TRUE(log->close());
 
-  const auto read = read_recordings(file.path());
+  const auto read = read_recordings({&file.path(), 1});
   ASSERT_TRUE(read) << describe(read.error());
   EXPECT_EQ(read->unreadable, 0u);
   ASSERT_EQ(read->recordings.size(), written.size());
@@ -179,7 +179,7 @@ TEST(Covariates, OfALogThatBreakTheRulesAreCounted) {
   put(940'000, {{"load", 0.7}});
   ASSERT_TRUE(write_recording(*log, recording));
   ASSERT_TRUE(log->close());
-  const auto read = read_recordings(file.path());
+  const auto read = read_recordings({&file.path(), 1});
   ASSERT_TRUE(read);
   EXPECT_EQ(read->unreadable, 4u);
   ASSERT_EQ(read->recordings.size(), 1u);

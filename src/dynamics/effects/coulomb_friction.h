@@ -12,7 +12,7 @@ struct CoulombFriction {
                                    ActsOn::wheel_torque,
                                    "T = ((1 + a) T_m + b) sgn(w)",
                                    "any speed above creep",
-                                   "thesis (2-32), T_m; FACTS, notation",
+                                   "thesis (2-32), T_m",
                                    parameters};
 
   template <class S>

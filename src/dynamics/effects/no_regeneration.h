@@ -11,7 +11,7 @@ struct NoRegeneration {
                                    ActsOn::battery_side,
                                    "braking power of each motor reaches the battery as (1 - a)",
                                    "a = 1: all burnt in a resistor or blocked",
-                                   "FACTS: the thesis returns all of it, (2-46)",
+                                   "the thesis returns all of it, (2-46)",
                                    parameters};
 
   template <class S>

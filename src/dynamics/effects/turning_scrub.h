@@ -13,7 +13,7 @@ struct TurningScrub {
       ActsOn::wheel_torque,
       "M = a (m g l / 2) tanh(yaw / b), opposing the turn",
       "tyres and castors twisting on the floor; saturated above creeping yaw rates",
-      "Morales et al., Power analysis for a skid-steered tracked mobile robot, 2006; FACTS, open points",
+      "Morales et al., Power analysis for a skid-steered tracked mobile robot, 2006",
       parameters};
 
   template <class S>

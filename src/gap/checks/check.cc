@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "gap/checks/evaluation.h"
-#include "gap/checks/evidence.h"
 #include "gap/checks/motors.h"
 #include "gap/checks/readings.h"
 #include "statistics/robust.h"
@@ -44,16 +43,6 @@ bool CheckContext::has(std::initializer_list<std::size_t> readings) const {
          std::ranges::all_of(readings, [&](std::size_t k) { return tally(k).known() > 0; });
 }
 
-ValueTally CheckContext::tally(std::size_t reading) const {
-  ValueTally all;
-  for (const Observation& o : seen) all.append(o.of(reading));
-  return all;
-}
-
-std::vector<Products::Block> CheckContext::blocks(Relation relation) const {
-  return blocks_of(seen, relation);
-}
-
 double CheckContext::period_s() const {
   std::vector<double> periods;
   for (const Observation& o : seen) {
@@ -84,7 +73,10 @@ std::vector<Check> check_observations(std::span<const Observation> observations,
   if (observations.empty()) return {};
   const auto effects = dynamics::active_effects(robot);
   const dynamics::DriveModel model(robot, effects.value_or(std::vector<dynamics::ActiveEffect>{}));
-  CheckContext context{observations, robot, model, motor_delay(observations).value_or(Delay{}).value_s, {}};
+  CheckContext context{observations, robot, model, motor_delay(observations).value_or(Delay{}).value_s};
+  for (const Observation& o : observations) {
+    for (std::size_t k = 0; k < reading_count; ++k) context.tallies[k].append(o.of(k));
+  }
   std::vector<Check> checks;
   const auto take = [&](std::vector<Check> found) {
     for (Check& check : found) {
@@ -111,7 +103,8 @@ std::vector<Check> check_observations(std::span<const Observation> observations,
   return checks;
 }
 
-std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
+std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
+                                    const robot::RobotModel& robot) {
   std::vector<Observation> observations;
   observations.reserve(recordings.missions.size());
   for (const telemetry::Recording& mission : recordings.missions) {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "gap/checks/observation.h"
-#include "telemetry/recording_set.h"
 #include "robot/robot_model.h"
+#include "telemetry/recording_set.h"
 
 // What is wrong with a robot's recordings before any effect is judged: signs, units, scales, channels,
 // motors, kinematics, clock and the robot file.
@@ -40,11 +40,18 @@ struct Check {
 //
 // A battery voltage that never moves is told as `constant_channel` and not contradicted where it is near the
 // nominal voltage: power is still the current times it, but nothing may be learnt from the voltage itself.
-std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot);
+std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
+                                    const robot::RobotModel& robot);
 
 // The same from observations made before, in the order of the missions.
 std::vector<Check> check_observations(std::span<const Observation> observations,
                                       const robot::RobotModel& robot);
+
+// Missions before a `step_between_missions` and from it on, each side with three at least; empty where no
+// check tells of a step. `checks` are of these recordings. Notes and what could not be read belong to the
+// whole and stay out.
+std::optional<std::array<telemetry::RecordingSet, 2>> split_at_step(telemetry::RecordingSet recordings,
+                                                                    std::span<const Check> checks);
 
 // NaN for every reading of a contradicted channel. "utime" is left as it is.
 void silence_contradicted(telemetry::RecordingSet& recordings, std::span<const Check> checks);

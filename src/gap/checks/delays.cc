@@ -19,6 +19,7 @@ constexpr double start_s = 0.3;    // to each side without a standstill, where c
 constexpr double moving_rad_s = 0.4;  // of both wheels together
 constexpr std::size_t block_rows = 100;
 constexpr std::size_t most_blocks = 16;
+constexpr std::size_t fewest_blocks = 3, most_groups = 64;
 constexpr double least_explained = 0.1;  // of the variance, at the best lag
 constexpr std::array<Eigen::Index, late_count> terms{6, 6, 5, 3};
 constexpr int draws = 100;
@@ -205,23 +206,33 @@ std::optional<Delay> delay_between(std::span<const LagSums* const> missions, std
     if (n == 0) return std::nullopt;
     count = count == 0 ? n : std::min(count, n);
   }
-  if (count < 3) return std::nullopt;
+  if (count < fewest_blocks) return std::nullopt;
+  // Many blocks together: draws of some dozen scatter as much as those of thousands.
+  const std::size_t groups = std::min(count, most_groups);
+  std::array<std::vector<LagBlock>, late_count> grouped;
+  for (const Late late : channels) {
+    const auto k = static_cast<std::size_t>(late);
+    grouped[k].assign(groups, empty(k));
+    for (std::size_t n = 0; n < count; ++n) join(grouped[k][n * groups / count], *blocks[k][n]);
+  }
   const auto parts = [&](std::span<const int> weights) {
     Eigen::VectorXd part = Eigen::VectorXd::Zero(2 * LagSums::reach() + 1);
     for (const Late late : channels) {
       const auto k = static_cast<std::size_t>(late);
       LagBlock sums = empty(k);
-      for (std::size_t n = 0; n < count; ++n) join(sums, *blocks[k][n], weights[n]);
+      for (std::size_t n = 0; n < groups; ++n) {
+        if (weights[n] > 0) join(sums, grouped[k][n], weights[n]);
+      }
       part += explained(sums) / static_cast<double>(channels.size());
     }
     return part;
   };
-  const std::vector<int> once(count, 1);
+  const std::vector<int> once(groups, 1);
   const Eigen::VectorXd part = parts(once);
   const double lag = best_lag(part);
   if (!std::isfinite(lag) || part.maxCoeff() < least_explained) return std::nullopt;
   const auto interval = statistics::bootstrap_interval(
-      count, [&](std::span<const int> w) { return step * best_lag(parts(w)); }, draws);
+      groups, [&](std::span<const int> w) { return step * best_lag(parts(w)); }, draws);
   return Delay{step * lag, interval};
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <initializer_list>
 #include <span>
 #include <string>
@@ -17,15 +18,16 @@ struct CheckContext {
   std::span<const Observation> seen;
   const robot::RobotModel& robot;
   const dynamics::DriveModel& model;
-  double motor_delay_s = 0;         // motor_delay()
-  std::vector<std::string> silent;  // channels contradicted so far: what they say is not asked again
+  double motor_delay_s = 0;                         // motor_delay()
+  std::array<ValueTally, reading_count> tallies{};  // of all missions
+  std::vector<std::string> silent{};  // channels contradicted so far: what they say is not asked again
 
   // None is contradicted.
   bool heard(std::initializer_list<std::size_t> readings) const;
   // ... and all are measured.
   bool has(std::initializer_list<std::size_t> readings) const;
-  ValueTally tally(std::size_t reading) const;  // of all missions
-  std::vector<Products::Block> blocks(Relation relation) const;
+  const ValueTally& tally(std::size_t reading) const { return tallies[reading]; }
+  std::vector<Products::Block> blocks(Relation relation) const { return blocks_of(seen, relation); }
   double period_s() const;  // between rows, of the usual mission
   double moving_s() const;
 };

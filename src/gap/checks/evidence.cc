@@ -33,9 +33,8 @@ constexpr double unused_off = 1.5;  // limits need not be reached
 
 class Gatherer {
  public:
-  Gatherer(std::span<const Observation> observations, const robot::RobotModel& robot,
-           const dynamics::DriveModel& model, double delay_s, std::span<const std::string> silent)
-      : seen_(observations), robot_(robot), p_(model.parameters()), delay_s_(delay_s), silent_(silent) {}
+  explicit Gatherer(const CheckContext& context)
+      : c_(context), robot_(context.robot), p_(context.model.parameters()) {}
 
   std::vector<Evidence> gather() {
     armatures();
@@ -49,12 +48,8 @@ class Gatherer {
   }
 
  private:
-  std::vector<Products::Block> blocks(Relation r) const { return blocks_of(seen_, r); }
-  bool heard(std::initializer_list<std::size_t> readings) const {
-    return std::ranges::none_of(readings, [&](std::size_t k) {
-      return std::ranges::any_of(silent_, [&](const auto& s) { return belongs_to(reading_names[k], s); });
-    });
-  }
+  std::vector<Products::Block> blocks(Relation r) const { return c_.blocks(r); }
+  bool heard(std::initializer_list<std::size_t> readings) const { return c_.heard(readings); }
   // Kept only where the ratio is surely not 0.
   Evidence* add(std::string says, std::string against, const Estimate& ratio, double below, double above,
                 double trust, std::initializer_list<std::pair<S, int>> exponents) {
@@ -73,14 +68,9 @@ class Gatherer {
     for (const S s : sources) e->lost_by[static_cast<std::size_t>(s)] = true;
   }
 
-  ValueTally tally(std::size_t k) const {
-    ValueTally all;
-    for (const Observation& o : seen_) all.append(o.of(k));
-    return all;
-  }
+  const ValueTally& tally(std::size_t k) const { return c_.tally(k); }
   std::optional<double> mean_of(std::size_t k) const {
-    const ValueTally all = tally(k);
-    return all.known() > 1 ? std::optional(all.mean()) : std::nullopt;
+    return tally(k).known() > 1 ? std::optional(tally(k).mean()) : std::nullopt;
   }
 
   void armatures();
@@ -92,11 +82,9 @@ class Gatherer {
   void loads();
   void limits();
 
-  std::span<const Observation> seen_;
+  const CheckContext& c_;
   const robot::RobotModel& robot_;
   const dynamics::Parameters<double>& p_;
-  double delay_s_;
-  std::span<const std::string> silent_;
   std::vector<Evidence> found_;
 };
 
@@ -106,7 +94,7 @@ void Gatherer::armatures() {
     if (!heard({reading::wheel_velocity + k, reading::motor_voltage + k, reading::motor_current + k}))
       continue;
     const auto relation = k == 0 ? Relation::armature_right : Relation::armature_left;
-    const BlockFit fit = fit_blocks(armature_blocks(seen_, relation, delay_s_), 0, terms);
+    const BlockFit fit = fit_blocks(armature_blocks(c_.seen, relation, c_.motor_delay_s), 0, terms);
     const std::string side = side_name[k];
     add("the " + side + " motor's voltage constant, from its voltage, current and speed, is", "the file's",
         estimate(fit, 1) * (1 / p_.voltage_constant_v_s_rad), constant_off, constant_off, 12,
@@ -118,7 +106,7 @@ void Gatherer::armatures() {
   if (!heard({0, 1, 2, 3, 4, 5})) return;
   constexpr std::array<std::size_t, 2> difference{1, 2};
   const BlockFit fit =
-      fit_blocks(armature_blocks(seen_, Relation::armature_difference, delay_s_), 0, difference);
+      fit_blocks(armature_blocks(c_.seen, Relation::armature_difference, c_.motor_delay_s), 0, difference);
   const auto sides = [&](Evidence* e, std::uint32_t pairs) {
     if (e == nullptr) return;
     e->turned_by = pairs;
@@ -285,7 +273,7 @@ void Gatherer::loads() {
     if (e != nullptr)
       lost(e, {S::pitch, S::wheel_right, S::wheel_left, S::battery_current, S::battery_voltage});
   }
-  if (const ValueTally pitch = tally(reading::pitch); pitch.known() > 1) {
+  if (const ValueTally& pitch = tally(reading::pitch); pitch.known() > 1) {
     Evidence* e = add("the pitch usually is", "the steepest that robots climb, 20 degrees",
                       {std::hypot(pitch.mean(), pitch.deviation()) / steepest_rad, 1e-6, 1e6}, 0, limit_off,
                       10, {{S::pitch, 1}});
@@ -295,7 +283,7 @@ void Gatherer::loads() {
 
 void Gatherer::limits() {
   std::vector<double> speed, turn;
-  for (const Observation& o : seen_) {
+  for (const Observation& o : c_.seen) {
     if (o.fastest_m_s > 0) speed.push_back(o.fastest_m_s);
     if (o.fastest_turn_rad_s > 0) turn.push_back(o.fastest_turn_rad_s);
   }
@@ -313,12 +301,12 @@ void Gatherer::limits() {
     most("the fastest turn of a mission is usually", "the file's yaw rate limit", statistics::median(turn),
          robot_.limits.yaw_rate_rad_s, 6, S::yaw_rate);
   }
-  if (const ValueTally load = tally(reading::payload); load.known() > 0 && heard({reading::payload})) {
+  if (const ValueTally& load = tally(reading::payload); load.known() > 0 && heard({reading::payload})) {
     most("the heaviest payload declared is", "the file's payload limit", load.high(),
          std::max(robot_.limits.payload_kg, 1.0), 10, S::payload);
   }
   for (std::size_t k : {0u, 1u}) {
-    const ValueTally volts = tally(reading::motor_voltage + k), amps = tally(reading::motor_current + k);
+    const ValueTally &volts = tally(reading::motor_voltage + k), &amps = tally(reading::motor_current + k);
     const std::string side = side_name[k];
     if (volts.known() > 1 && heard({reading::motor_voltage + k})) {
       most("the " + side + " motor's voltage usually is", "the battery's nominal voltage",
@@ -335,19 +323,8 @@ void Gatherer::limits() {
 
 }  // namespace
 
-std::vector<Products::Block> blocks_of(std::span<const Observation> observations, Relation relation) {
-  std::vector<Products::Block> blocks;
-  for (const Observation& o : observations) {
-    const auto& some = o.of(relation).blocks();
-    blocks.insert(blocks.end(), some.begin(), some.end());
-  }
-  return blocks;
-}
-
-std::vector<Evidence> gather_evidence(std::span<const Observation> observations,
-                                      const robot::RobotModel& robot, const dynamics::DriveModel& model,
-                                      double delay_s, std::span<const std::string> silent) {
-  return Gatherer(observations, robot, model, delay_s, silent).gather();
+std::vector<Evidence> gather_evidence(const CheckContext& context) {
+  return Gatherer(context).gather();
 }
 
 }  // namespace joulecast::gap

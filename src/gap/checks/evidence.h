@@ -3,13 +3,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <string>
 #include <vector>
 
-#include "dynamics/drive_model.h"
-#include "gap/checks/observation.h"
-#include "robot/robot_model.h"
+#include "gap/checks/evaluation.h"
 
 namespace joulecast::gap {
 
@@ -56,13 +53,7 @@ struct Evidence {
   Sources<bool> lost_by{};
 };
 
-// Of everything that is recorded. `delay_s`: of the electrical channels; `silent`: channels that are known to
-// be wrong already.
-std::vector<Evidence> gather_evidence(std::span<const Observation> observations,
-                                      const robot::RobotModel& robot, const dynamics::DriveModel& model,
-                                      double delay_s, std::span<const std::string> silent);
-
-// Blocks of one relation of all missions.
-std::vector<Products::Block> blocks_of(std::span<const Observation> observations, Relation relation);
+// Of everything that is recorded and not contradicted yet.
+std::vector<Evidence> gather_evidence(const CheckContext& context);
 
 }  // namespace joulecast::gap

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "gap/checks/evaluation.h"
-#include "gap/checks/evidence.h"
 #include "gap/checks/readings.h"
 
 namespace joulecast::gap {

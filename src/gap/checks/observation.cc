@@ -10,9 +10,10 @@ namespace {
 using telemetry::Sample;
 
 constexpr std::size_t block_cells = 3;
-constexpr double hold_s = 1.0;         // positions and yaw rates between those that are missing
-constexpr double alike = 0.2;          // as in ValueTally: a spike has like neighbours ...
-constexpr double thrown = 0.8;         // ... and is this far from them
+constexpr std::size_t most_fitted = 512;  // blocks; more tell no more of how they scatter
+constexpr double hold_s = 1.0;            // positions and yaw rates between those that are missing
+constexpr double alike = 0.2;             // as in ValueTally: a spike has like neighbours ...
+constexpr double thrown = 0.8;            // ... and is this far from them
 constexpr double turning_share = 0.1;  // difference of the wheels over their sum, from which on a robot turns
 constexpr double least_way_rad = 0.2;  // of a span, by the wheels together
 constexpr double turning_rad = 0.3;    // difference of the wheels' angles in a span
@@ -186,6 +187,25 @@ Observation Observer::finish() {
   for (Products& products : seen_.relations) products.finish();
   seen_.lags.finish();
   return std::move(seen_);
+}
+
+std::vector<Products::Block> blocks_of(std::span<const Observation> observations, Relation relation) {
+  std::size_t count = 0;
+  for (const Observation& o : observations) count += o.of(relation).blocks().size();
+  const std::size_t together = std::max<std::size_t>(1, (count + most_fitted - 1) / most_fitted);
+  std::vector<Products::Block> blocks;
+  std::size_t k = 0;
+  for (const Observation& o : observations) {
+    for (const Products::Block& block : o.of(relation).blocks()) {
+      if (k++ % together == 0) {
+        blocks.push_back(block);
+      } else {
+        blocks.back().rows += block.rows;
+        blocks.back().sums += block.sums;
+      }
+    }
+  }
+  return blocks;
 }
 
 std::optional<Delay> delay_of(std::span<const Observation> observations, std::span<const Late> channels) {

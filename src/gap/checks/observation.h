@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "dynamics/drive_model.h"
 #include "gap/checks/cells.h"
@@ -89,6 +90,9 @@ class Observer {
   telemetry::Sample known_;                            // last known position and yaw rate ...
   std::int64_t known_us_ = 0;                          // ... of then
 };
+
+// Blocks of one relation of all missions, neighbours together where they are many.
+std::vector<Products::Block> blocks_of(std::span<const Observation> observations, Relation relation);
 
 // By how much channels lag the wheel speeds.
 std::optional<Delay> delay_of(std::span<const Observation> observations, std::span<const Late> channels);

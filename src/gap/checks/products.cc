@@ -98,10 +98,6 @@ double BlockFit::sd(Eigen::Index k) const {
   return std::sqrt(std::max(covariance(k, k), 0.0));
 }
 
-std::array<double, 2> BlockFit::interval(Eigen::Index k) const {
-  return estimate(*this, k).interval();
-}
-
 namespace {
 
 // Weighted least squares; empty where the terms cannot be told apart.

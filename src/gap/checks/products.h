@@ -51,8 +51,6 @@ struct BlockFit {
 
   bool known() const { return freedom > 0; }
   double sd(Eigen::Index k) const;
-  // Of one coefficient, 95 %, Student's t.
-  std::array<double, 2> interval(Eigen::Index k) const;
 };
 
 // quantity[y] on quantity[x...]. Blocks that fit far worse than the others count less (Huber); the covariance

@@ -25,7 +25,7 @@ template <class Do>
 void each_reading(const CheckContext& c, Do look) {
   for (std::size_t k = 0; k < reading_count; ++k) {
     if ((k >= used && k != reading::yaw_rate) || !c.heard({k})) continue;
-    if (const ValueTally t = c.tally(k); t.known() > 0) look(k, t);
+    if (const ValueTally& t = c.tally(k); t.known() > 0) look(k, t);
   }
 }
 
@@ -100,7 +100,7 @@ void check_missing(const CheckContext& c, std::vector<Check>& checks) {
   std::string channels;
   double most = 0;
   for (std::size_t k = 0; k < reading_count; ++k) {
-    const ValueTally t = c.tally(k);
+    const ValueTally& t = c.tally(k);
     if (t.known() == 0 && k != reading::wheel_velocity && k != reading::wheel_velocity + 1) continue;
     const double share =
         static_cast<double>(t.lost()) / static_cast<double>(std::max<std::size_t>(t.rows(), 1));

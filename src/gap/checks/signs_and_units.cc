@@ -48,7 +48,7 @@ constexpr double over_limit = 1.5;
 }  // namespace
 
 std::vector<Check> check_signs_and_units(const CheckContext& c) {
-  const std::vector<Evidence> evidence = gather_evidence(c.seen, c.robot, c.model, c.motor_delay_s, c.silent);
+  const std::vector<Evidence> evidence = gather_evidence(c);
   const std::vector<Fault> faults = known_faults(c.robot);
   const Explanation explanation = explain(evidence, faults);
   std::vector<Check> checks;

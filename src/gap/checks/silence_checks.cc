@@ -69,7 +69,7 @@ Check dead_check(const std::vector<std::string>& dead) {
 
 // The voltage that the battery's resistance must take off somewhere, over the voltage.
 double expected_swing(const CheckContext& c) {
-  const ValueTally current = c.tally(reading::battery_current);
+  const ValueTally& current = c.tally(reading::battery_current);
   if (current.known() == 0) return 0;
   return c.robot.battery.internal_resistance_ohm * (current.high() - current.low()) /
          c.robot.battery.nominal_voltage_v;
@@ -97,7 +97,7 @@ Check constant_check(const CheckContext& c, const std::string& channel, double v
 // Motor voltages that stay near the battery's whatever the wheels do.
 bool check_supply(const CheckContext& c, std::vector<Check>& checks) {
   for (std::size_t k : {0u, 1u}) {
-    const ValueTally t = c.tally(reading::motor_voltage + k);
+    const ValueTally& t = c.tally(reading::motor_voltage + k);
     if (t.known() == 0 || t.constant() || t.low() < supply_share * c.robot.battery.nominal_voltage_v)
       return false;
   }
@@ -117,7 +117,7 @@ void check_unsigned(const CheckContext& c, std::size_t first, std::vector<Check>
   std::vector<std::string> sides;
   Estimate backward;
   for (std::size_t k : {0u, 1u}) {
-    const ValueTally t = c.tally(first + k);
+    const ValueTally& t = c.tally(first + k);
     if (!c.has({first + k}) || t.constant() || t.low() < -noise_share * t.high()) continue;
     const BlockFit fit = fit_blocks(c.blocks(k == 0 ? Relation::ways_right : Relation::ways_left),
                                     first == reading::motor_current ? 0 : 1, ways);
@@ -154,7 +154,7 @@ std::vector<Check> check_silence(const CheckContext& c) {
     const auto level = [](const ValueTally& t) { return t.constant() && t.low() != 0; };
     for (const std::string& name : silent_channels(c, group, level)) {
       const auto at = std::ranges::find_if(reading_names, [&](auto r) { return belongs_to(r, name); });
-      const ValueTally t = c.tally(static_cast<std::size_t>(at - reading_names.begin()));
+      const ValueTally& t = c.tally(static_cast<std::size_t>(at - reading_names.begin()));
       checks.push_back(constant_check(c, name, t.low()));
     }
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "gap/checks/evaluation.h"
 #include "gap/checks/motors.h"
@@ -150,6 +151,20 @@ std::vector<Check> check_steps(const CheckContext& c) {
   }
   if (!strongest) return {};
   return {check};
+}
+
+std::optional<std::array<telemetry::RecordingSet, 2>> split_at_step(telemetry::RecordingSet recordings,
+                                                                    std::span<const Check> checks) {
+  const auto step = std::ranges::find_if(checks, [](const Check& c) { return c.first_mission.has_value(); });
+  if (step == checks.end()) return std::nullopt;
+  std::array<telemetry::RecordingSet, 2> sides;
+  for (std::size_t m = 0; m < recordings.missions.size(); ++m) {
+    telemetry::RecordingSet& side = sides[m < *step->first_mission ? 0 : 1];
+    side.samples += recordings.missions[m].samples.size();
+    side.missions.push_back(std::move(recordings.missions[m]));
+  }
+  for (telemetry::RecordingSet& side : sides) side.robot_id = recordings.robot_id;
+  return sides;
 }
 
 }  // namespace joulecast::gap

@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "statistics/updates.h"
+
 namespace joulecast::gap {
 namespace {
 
 constexpr double alike = 0.2;     // neighbours that differ by less are the same level
 constexpr double thrown = 0.8;    // a value this far from the level of both its neighbours is a spike
 constexpr double well_off = 0.2;  // of the largest value: levels below say nothing of spikes
-constexpr std::size_t fewest_runs = 8;
-constexpr double short_fraction = 0.1;  // as in statistics::find_updates
-constexpr double single_reading = 1.5;
 
 std::size_t octave(double value) {
   return static_cast<std::size_t>(std::clamp(std::ilogb(value) + 32, 0, 63));
@@ -137,23 +136,11 @@ ValueTally::Extreme ValueTally::extreme() const {
 }
 
 std::size_t ValueTally::held_rows() const {
-  std::size_t count = 0;
-  for (const std::uint32_t n : runs_) count += n;
-  if (count < fewest_runs) return 1;
-  const auto quantile = [&](double fraction, std::size_t end) {
-    double total = 0;
-    for (std::size_t k = 0; k < end; ++k) total += runs_[k];
-    double below = 0;
-    for (std::size_t k = 0; k < end; ++k) {
-      below += runs_[k];
-      if (below > 0 && below >= fraction * total) return k;
-    }
-    return end - 1;
-  };
-  const std::size_t shortest = quantile(short_fraction, runs_.size());
-  if (shortest < 2) return 1;
-  const auto end = static_cast<std::size_t>(std::ceil(single_reading * static_cast<double>(shortest)));
-  return quantile(0.5, std::min(end, runs_.size()));
+  std::vector<statistics::Repetitions> lengths;
+  for (std::size_t k = 0; k < runs_.size(); ++k) {
+    if (runs_[k] > 0) lengths.push_back({k, runs_[k]});
+  }
+  return statistics::rows_held(lengths);
 }
 
 double ValueTally::quantum() const {

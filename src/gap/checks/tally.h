@@ -37,8 +37,8 @@ class ValueTally {
   // Small values' are left out: noise about zero does so all the time.
   std::size_t spikes() const;
 
-  // Rows for which a value usually stood before the next one was read; 1 where it is read anew in each. The
-  // rule is that of statistics::find_updates.
+  // Rows for which a value usually stood before the next one was read; 1 where it is read anew in each
+  // (statistics::rows_held).
   std::size_t held_rows() const;
   // Distance of neighbouring values where there are few different ones; 0 where there are many.
   double quantum() const;

@@ -19,6 +19,8 @@ struct FitResult {
   Linear linear;
   Shapes shapes;
   std::vector<Cause> causes;  // around which it rests
+  // What every robot has (base_fit), where the file is so far off that all of it is estimated anew; empty: not so.
+  std::vector<Cause> base;
   double log_joint = 0;                         // of the best explanation, to compare starts by
   bool rests = false;                           // false: it would go on to something worse
 };

@@ -6,6 +6,7 @@
 
 #include "gap/diagnose/naming.h"
 #include "gap/diagnose/referee.h"
+#include "gap/diagnose/refit.h"
 #include "gap/equations/power.h"
 #include "gap/equations/zone_scan.h"
 #include "statistics/shapley.h"
@@ -22,6 +23,18 @@ std::vector<bool> blocks_of(std::size_t part, std::size_t parts, std::size_t blo
   for (std::size_t b = 0; b < blocks; ++b) out[b] = b * parts / blocks == part;
   return out;
 }
+
+// Material of the other blocks alone.
+struct Rest {
+  std::vector<Window> windows;
+  Material material;
+  Rest(const Material& m, const std::vector<bool>& out) : material(m) {
+    for (const Window& w : m.windows) {
+      if (!out[w.block]) windows.push_back(w);
+    }
+    material.windows = windows;
+  }
+};
 
 // The same point of linearisation with a zone more for each part, where the rest of the floor says that one is. In the
 // order of the parts; a part without its own zone has the first.
@@ -83,6 +96,11 @@ std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::sp
     for (const std::size_t h : named.set) ids.push_back(problem.hypotheses[h].id());
     held.named.push_back(std::move(ids));
     const std::vector<double> explained = modelled_power(m.robot, m.adopted, named.causes, m.windows);
+    std::vector<double> based;
+    if (!fit.base.empty()) {
+      const std::vector<Cause> all = refit(Rest(m, out).material, joined(fit.base, named.causes));
+      based = modelled_power(m.robot, m.adopted, all, m.windows);
+    }
     std::vector<bool> others(m.windows.size());
     for (std::size_t k = 0; k < m.windows.size(); ++k) others[k] = !out[m.windows[k].block];
     const Referee referee(m, power_w, others);
@@ -91,6 +109,7 @@ std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::sp
       BlockErrors& b = held.blocks[m.windows[k].block];
       b.unchanged += std::fabs(power_w[k] - unchanged[k]);
       b.explained += std::fabs(power_w[k] - explained[k]);
+      if (!based.empty()) b.based += std::fabs(power_w[k] - based[k]);
       b.referee += std::fabs(power_w[k] - referee.predict(m.windows[k]));
       b.size += std::fabs(power_w[k]);
     }
@@ -99,30 +118,37 @@ std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::sp
   return held;
 }
 
-std::vector<double> held_out_shares(const Material& m, const ColumnSet& columns, const Problem& problem,
+std::vector<double> held_out_shares(const Material& m, const FitResult& fit, const Problem& problem,
                                     const HypothesisSet& named, std::span<const double> power_w) {
   struct Part {
     std::vector<Window> windows;
     std::vector<double> measured;
-    std::vector<Cause> causes;
+    std::vector<Cause> named, others;
   };
   const std::size_t parts = std::min(most_parts, m.blocks);
   std::vector<Part> all(parts);
   for (std::size_t part = 0; part < parts; ++part) {
     const std::vector<bool> out = blocks_of(part, parts, m.blocks);
-    all[part].causes = strengths_of(columns, problem, named, out);
+    Part& p = all[part];
+    p.named = strengths_of(*fit.linear.columns, problem, named, out);
+    if (!fit.base.empty()) {
+      for (const Cause& cause : refit(Rest(m, out).material, joined(fit.base, p.named))) {
+        const auto own = std::ranges::find_if(p.named, [&](const Cause& n) { return n.same_kind(cause); });
+        own == p.named.end() ? p.others.push_back(cause) : void(*own = cause);
+      }
+    }
     for (std::size_t k = 0; k < m.windows.size(); ++k) {
       if (!out[m.windows[k].block] || !std::isfinite(power_w[k])) continue;
-      all[part].windows.push_back(m.windows[k]);
-      all[part].measured.push_back(power_w[k]);
+      p.windows.push_back(m.windows[k]);
+      p.measured.push_back(power_w[k]);
     }
   }
   std::vector<double> shares = statistics::shapley_shares(
       std::min(named.size(), most_shared), [&](const std::vector<std::size_t>& members) {
         double missed = 0;
         for (const Part& part : all) {
-          std::vector<Cause> some;
-          for (const std::size_t k : members) some.push_back(part.causes[k]);
+          std::vector<Cause> some = part.others;
+          for (const std::size_t k : members) some.push_back(part.named[k]);
           const std::vector<double> modelled = modelled_power(m.robot, m.adopted, some, part.windows);
           for (std::size_t k = 0; k < modelled.size(); ++k) missed += std::fabs(part.measured[k] - modelled[k]);
         }

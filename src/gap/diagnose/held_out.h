@@ -13,6 +13,7 @@ namespace joulecast::gap {
 struct BlockErrors {
   double unchanged = 0;  // of the robot file's model
   double explained = 0;  // of what was found without the part that the block belongs to
+  double based = 0;      // of the same with what every robot has estimated anew (FitResult::base)
   double referee = 0;    // of a plain regression without it
   double size = 0;       // of |power|
 };
@@ -24,6 +25,7 @@ struct HeldOut {
 
   double unchanged() const { return relative(&BlockErrors::unchanged); }
   double explained() const { return relative(&BlockErrors::explained); }
+  double based() const { return relative(&BlockErrors::based); }
   double referee() const { return relative(&BlockErrors::referee); }
 
  private:
@@ -36,9 +38,9 @@ struct HeldOut {
 std::optional<HeldOut> hold_out(const Material& material, const FitResult& fit, std::span<const double> power_w,
                                 const FitSettings& settings, const std::function<bool(double)>& goes_on);
 
-// How much of the gap each of these causes closes on held-out parts (Shapley), strengths fitted without each part. All
-// are 0 where power was not measured; at most the first six share.
-std::vector<double> held_out_shares(const Material& material, const ColumnSet& columns, const Problem& problem,
+// How much of the gap each named cause closes on held-out parts (Shapley), strengths fitted without each part; what else
+// is estimated (FitResult::base) is there throughout. All are 0 where power was not measured; at most the first six share.
+std::vector<double> held_out_shares(const Material& material, const FitResult& fit, const Problem& problem,
                                     const HypothesisSet& named, std::span<const double> power_w);
 
 }  // namespace joulecast::gap

@@ -52,6 +52,13 @@ HypothesisSet likely_causes(const Problem& problem, const Explanation& explanati
   return set;
 }
 
+std::vector<Cause> joined(std::vector<Cause> base, std::span<const Cause> named) {
+  for (const Cause& cause : named) {
+    if (std::ranges::none_of(base, [&](const Cause& b) { return b.same_kind(cause); })) base.push_back(cause);
+  }
+  return base;
+}
+
 std::vector<Cause> strengths_of(const ColumnSet& columns, const Problem& problem, const HypothesisSet& named,
                                 const std::vector<bool>& left_out) {
   if (named.empty()) return {};

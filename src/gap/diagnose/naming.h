@@ -34,8 +34,11 @@ struct Named {
 Named name_causes(const Material& material, const ColumnSet& columns, const Problem& problem,
                   const Explanation& explanation, std::span<const double> power_w, const std::vector<bool>& left_out);
 
-// The strengths with which these causes alone leave least where everything is linear, of all blocks not left out.
+// The strengths with which these causes alone leave least, of all blocks not left out.
 std::vector<Cause> strengths_of(const ColumnSet& columns, const Problem& problem, const HypothesisSet& named,
                                 const std::vector<bool>& left_out);
+
+// The named beside what every robot has; of one effect in both the shape of the base stays.
+std::vector<Cause> joined(std::vector<Cause> base, std::span<const Cause> named);
 
 }  // namespace joulecast::gap

@@ -23,7 +23,7 @@ namespace joulecast::gap {
 namespace {
 
 constexpr std::size_t fewest_windows = 40;
-constexpr double large_gap = 0.15, huge_gap = 0.25;
+constexpr double large_gap = 0.15, huge_gap = 0.25;  // of the power: where more may be there, and another start
 constexpr double usual_share = 0.07, large_share = 0.3;  // of the mean power, that an effect which is there may move
 constexpr std::size_t more_members = 6;
 constexpr double settled_delay_s = 0.006, settled_bias = 0.1;
@@ -107,7 +107,7 @@ class Diagnoser {
   std::optional<FitResult> fit_;
   std::optional<HeldOut> held_out_;
   HypothesisSet named_;
-  std::vector<Cause> causes_;  // the named, with their own strengths
+  std::vector<Cause> causes_;  // with their own strengths; beside the named, FitResult::base
   Diagnosis d_;
 };
 
@@ -181,9 +181,11 @@ bool Diagnoser::fit() {
     const auto still = [&] { return goes_on(after_fit * 0.5); };
     fit_ = fit_windows(material(), {}, fit_settings_, still);
     if (fit_ && d_.power_absolute_relative > huge_gap && round == 0) {
-      auto far = fit_windows(material(), base_fit(material(), view_.power_w), fit_settings_, still);
+      const std::vector<Cause> base = base_fit(material(), view_.power_w);
+      auto far = fit_windows(material(), base, fit_settings_, still);
       if (!far) return false;
       if (far->log_joint > fit_->log_joint) fit_ = std::move(far);
+      if (d_.power_absolute_relative > far_off) fit_->base = base;
     }
     if (!fit_) return false;
     const windows::WindowSettings before = taken_out_;
@@ -207,7 +209,8 @@ void Diagnoser::add_wander(const Problem& problem, const Explanation& explanatio
   }
   if (!f.wandering) return;
   const Member& m = explanation.members[*f.wandering];
-  const std::vector<double> by_block = Mixture(problem).by_block(explanation.whole, m.hypothesis);
+  const auto place = static_cast<std::size_t>(std::ranges::find(explanation.whole, m.hypothesis) - explanation.whole.begin());
+  const std::vector<double> by_block = Mixture(problem).by_block(explanation.whole, place);
   const double mean_w = m.share * fit_->linear.columns->mean_power_w() / std::max(std::fabs(m.coefficients[0]), 1e-12);
   const std::size_t third = std::max<std::size_t>(1, by_block.size() / 3);
   for (std::size_t b = 0; b < third; ++b) {
@@ -228,9 +231,9 @@ void Diagnoser::add_baseline() {
     const auto at = static_cast<Eigen::Index>(k);
     const double data = referee.fit().coefficients[at], sd = referee.fit().sd[at];
     const double ours = model.fit().coefficients[at];  // what the model itself comes to in the same term
-    b.terms.push_back({term.name, term.unit, data, sd});
+    b.terms.push_back({term.name, term.unit, data, sd, ours});
     constexpr double clear = 3, notable = 0.2;
-    if (std::fabs(data - ours) < clear * sd || std::fabs(data - ours) < notable * std::fabs(data)) continue;
+    if (!(sd > 0) || std::fabs(data - ours) < clear * sd || std::fabs(data - ours) < notable * std::fabs(data)) continue;
     b.says.push_back(referee_words(term, data, ours));
   }
   d_.baseline = std::move(b);
@@ -269,11 +272,18 @@ bool Diagnoser::judge_all() {
   d_.detectable_share = detectable_share(problem);
   Named named = name_causes(material(), *fit_->linear.columns, problem, explanation, view_.power_w, {});
   named_ = named.set;
-  causes_ = refit(material(), std::move(named.causes));
   held_out_ = hold_out(material(), *fit_, view_.power_w, fit_settings_, [&](double part) {
     return goes_on(std::lerp(after_fit, after_parts, part));
   });
   if (!held_out_) return false;
+  if (!fit_->base.empty()) {
+    if (held_out_->based() < held_out_->explained()) {
+      for (BlockErrors& b : held_out_->blocks) b.explained = b.based;
+    } else {
+      fit_->base.clear();
+    }
+  }
+  causes_ = refit(material(), joined(fit_->base, named.causes));
   const ControlSettings controls{fit_settings_.explain, settings_.controls, settings_.threads};
   auto made = control(material(), fit_->linear, problem, explanation, controls,
                       [&](double part) { return goes_on(std::lerp(after_parts, 1.0, part)); });
@@ -287,13 +297,17 @@ bool Diagnoser::judge_all() {
   if (!readings_.held())
     ripple = find_ripple(recordings_, robot_, all, d_.motor_channels, taken_out_.electrical_delay_s, ripple_surrogates);
 
-  Findings f{problem, explanation, settings_.controls > 0 ? std::move(*made) : std::vector<Controls>{}, named_,
-             causes_, {}, {}, held_out_, ripple, std::nullopt, {}};
+  Findings f{problem, explanation, settings_.controls > 0 ? std::move(*made) : std::vector<Controls>{}, named_, {}, {},
+             {}, {}, held_out_, ripple, std::nullopt, {}};
   const std::vector<double> after = modelled(causes_);
-  f.shares = held_out_shares(material(), *fit_->linear.columns, problem, named_, view_.power_w);
-  for (std::size_t k = 0; k < causes_.size(); ++k) {
+  f.shares = held_out_shares(material(), *fit_, problem, named_, view_.power_w);
+  f.base = causes_;
+  for (const Cause& name : named.causes) {
+    const auto own = std::ranges::find_if(f.base, [&](const Cause& c) { return c.same_kind(name); });
+    f.causes.push_back(*own);
+    f.base.erase(own);
     std::vector<Cause> others = causes_;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+    std::erase_if(others, [&](const Cause& c) { return c.same_kind(name); });
     const std::vector<double> without = modelled(others);
     double change = 0;
     for (std::size_t n = 0; n < after.size(); ++n) change += std::fabs(after[n] - without[n]);

@@ -100,6 +100,9 @@ void ColumnSet::add_effects(const Shapes& shapes, std::span<const double> shares
         }
         h.candidate.least = (traits.nonnegative ? 0 : info.minimum) - in_file;
         h.candidate.most = info.maximum - in_file;
+        // A friction of its own stands in where the robot file's is next to none: less than none it cannot be.
+        if (h.parameter == 1 && (effect->info().id == "viscous_friction" || effect->info().id == "coulomb_friction"))
+          h.candidate.least = -in_file;
         if (effect->info().id == "accessory_load")
           h.candidate.least = std::max(h.candidate.least, -robot_.idle_power_w - in_file);
       }

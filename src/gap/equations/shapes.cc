@@ -61,15 +61,16 @@ Variants stribeck(EffectValues<double> v, const ShapeSetting& s) {
 }
 
 // Of both motors' and the battery's sensors, the motors' alone and the battery's alone.
-Variants sensors(EffectValues<double> v, const ShapeSetting& s) {
+Variants sensors(EffectValues<double> v, bool is_bias, const ShapeSetting& s) {
   // The battery's sensor alone wrong, the motors' right, looks like a load that follows the current.
-  constexpr double battery_alone = 40, motors = 3;
+  // Where only the battery's is seen, a bias is a load, and a load that no file has is the more usual.
+  constexpr double battery_alone = 40, motors = 3, bias = 3;
   Variants variants;
   for (const auto& [of_motors, of_battery] : {std::pair{1.0, 1.0}, {1.0, 0.0}, {0.0, 1.0}}) {
     v[1] = of_motors;
     v[2] = of_battery;
     if (s.power_from_motion && of_motors * of_battery == 0) continue;  // only the battery's sensor is seen
-    variants.push_back({v, 0, s.power_from_motion ? 1 : of_motors > 0 ? motors : battery_alone});
+    variants.push_back({v, 0, s.power_from_motion ? (is_bias ? bias : 1) : of_motors > 0 ? motors : battery_alone});
   }
   return variants;
 }
@@ -104,7 +105,7 @@ std::vector<Variant> variants_of(const dynamics::Effect& effect, const ShapeSett
     return variants;
   }
   if (id == "current_sensor_gain" || id == "current_sensor_bias" || id == "voltage_sensor_gain")
-    return sensors(v, s);
+    return sensors(v, id == "current_sensor_bias", s);
   if (id == "load_rolling_resistance" && !(s.ranges.payload_kg > 1)) return {};
   return {{v}};
 }

@@ -1,5 +1,7 @@
 #include "gap/verdict/adopt.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -110,7 +112,14 @@ std::vector<FileCorrection> corrections_of(const robot::RobotModel& robot, std::
     const Result<dynamics::ActiveEffect> active = as_found(found[k]);
     if (!active) continue;
     const auto change = change_of(*active);
-    if (!change) continue;
+    if (!change) {
+      const auto had = std::ranges::find(robot.effects, found[k].id, &robot::AdoptedEffect::id);
+      const auto in_file = had == robot.effects.end() ? std::nullopt : std::optional(as_found(*had));
+      const double before = in_file && *in_file ? (**in_file).values[0] : 0;
+      corrections.push_back({fmt::format("effects.{}.{}", found[k].id, active->effect->info().parameters[0].name), before,
+                             before + active->values[0], deviations[k]});
+      continue;
+    }
     const double value = mean_of(file[json::json_pointer(change->pointer)]);
     std::string name = change->pointer.substr(1);
     std::ranges::replace(name, '/', '.');

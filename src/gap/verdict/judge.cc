@@ -14,9 +14,9 @@ namespace {
 // Of the mean power, beyond the noise floor.
 constexpr double largest_unnamed = 0.012;               // what may be left over while nothing is named
 constexpr double largest_left = 0.014, of_gap = 0.1;    // and beside names, with a part of the gap
-constexpr double far_off = 0.30;                        // a gap from which on the file is another robot's
 constexpr double closes_nothing = 0.95;                 // of the gap on held-out parts, that still is left
 constexpr double mostly_outside = 0.25;                 // of what moves power, outside the catalogue
+constexpr double mostly_closed = 0.5;                   // of what held-out parts can be closed by
 constexpr double beyond_usual = 3;                      // strengths that no robot has, over the usual ones
 constexpr double doubtful = 0.6;                        // factor on names beside which something speaks against all
 constexpr double varying = 0.7;                         // most that a name whose strength varies may have
@@ -176,15 +176,19 @@ class Judge {
     doubts_.like_load = d_.motor_channels && std::ranges::any_of(f_.causes, like_a_load);
     if (!f_.held_out || d_.effects.empty() || d_.power == PowerSource::none) return;
     const double after = f_.held_out->explained();
+    closed_ = (f_.held_out->unchanged() - after) / (f_.held_out->unchanged() - d_.noise_floor);
     const bool by_power = std::ranges::all_of(f_.named, [&](std::size_t h) { return shows_in_power(hypothesis(h)); });
     doubts_.idle = by_power && after > closes_nothing * f_.held_out->unchanged();
     doubts_.worse = d_.baseline && d_.baseline->wins();
-    doubts_.unexplained = after - d_.noise_floor > largest_left + of_gap * d_.power_absolute_relative;
+    doubts_.unexplained = !(closed_ > mostly_closed) &&
+                          after - d_.noise_floor > largest_left + of_gap * d_.power_absolute_relative;
   }
 
   void decide() {
+    // What was named beside something outside still is the answer where it closes most of what can be closed.
     const bool outside = !d_.outside.channel.empty() &&
-                         (rippled_ || outside_share_ > mostly_outside * (named_share_ + outside_share_));
+                         (rippled_ || (outside_share_ > mostly_outside * (named_share_ + outside_share_) &&
+                                       !(closed_ > mostly_closed)));
     const bool open = beyond_noise_ > largest_unnamed;
     if (outside) {
       d_.verdict = Verdict::outside;
@@ -216,7 +220,10 @@ class Judge {
       e.probability = stated_probability(e.posterior, standing);
     }
     d_.verdict_probability = std::min(d_.verdict_probability, surest_verdict);
-    std::ranges::stable_sort(d_.effects, std::greater{}, [](const DiagnosedEffect& e) { return e.share; });
+    // What a file that is not this robot's has wrong is told as its corrections; what no file could say comes first.
+    std::ranges::stable_sort(d_.effects, std::greater{}, [&](const DiagnosedEffect& e) {
+      return std::pair(d_.verdict == Verdict::not_this_robot && e.calibrates.empty(), e.share);
+    });
   }
 
   void settle_adoption() {
@@ -230,6 +237,13 @@ class Judge {
       const auto own = std::ranges::find_if(named->parameters, [](const auto& p) { return std::isfinite(p.deviation); });
       deviations.push_back(own == named->parameters.end() ? 0 : own->deviation);
     }
+    if (d_.verdict == Verdict::not_this_robot) {
+      for (std::size_t k = 0; k < f_.base.size(); ++k) {
+        if (f_.base[k].by) continue;
+        d_.adoptable.push_back(dynamics::adopt(f_.base[k].effect));
+        deviations.push_back(missing);
+      }
+    }
     if (d_.verdict == Verdict::not_this_robot) d_.corrections = corrections_of(robot_, d_.adoptable, deviations);
     d_.refusal = refusal_of(d_, doubts_.worse, doubts_.any_against());
   }
@@ -239,6 +253,7 @@ class Judge {
   const robot::RobotModel& robot_;
   double beyond_noise_;
   double weakest_ = 1, named_share_ = 0, outside_share_ = 0;
+  double closed_ = missing;  // part of the gap beyond noise that goes away on held-out parts
   bool rippled_ = false;
   Doubts doubts_;
 };

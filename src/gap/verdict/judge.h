@@ -18,6 +18,7 @@ struct Findings {
   std::vector<Controls> controls;  // of each member of the explanation; empty: not made
   HypothesisSet named;
   std::vector<Cause> causes;    // the named, with their own strengths
+  std::vector<Cause> base;      // what else was estimated where the robot file is far off
   std::vector<double> shares;   // of the gap, Shapley
   std::vector<double> power_w;  // mean |change of battery power|
   const std::optional<HeldOut>& held_out;
@@ -26,6 +27,9 @@ struct Findings {
   std::array<double, 2> wandering_power_w{};
   bool of_groups = false;  // strengths are differences between groups: large ones make no other robot
 };
+
+// A gap, of the power, from which on the file is another robot's.
+inline constexpr double far_off = 0.30;
 
 // Share of the mean power that something outside the catalogue has to move to be told, beside a gap that noise does
 // not make of this size.

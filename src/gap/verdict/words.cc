@@ -59,10 +59,12 @@ std::string with_deviation(double value, double deviation, std::string_view unit
 }
 
 std::string percent(double fraction, int digits) {
+  if (!std::isfinite(fraction)) return brief(fraction);
   return brief(100 * fraction, digits) + "\u00a0%";
 }
 
 std::string probability_text(double p) {
+  if (!std::isfinite(p)) return brief(p);
   if (p > 0.995) return "above 0.99";
   if (p < 0.005) return "below 0.01";
   return fmt::format("{:.2f}", p);

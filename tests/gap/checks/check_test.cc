@@ -152,6 +152,49 @@ TEST(CheckRecordings, AStepIsSplitBetweenItsMissions) {
   EXPECT_NEAR(step.value, 0.25, 0.03);
   EXPECT_NE(step.says.find(set.missions[set.missions.size() / 2].mission_id), std::string::npos);
   EXPECT_LT(step.interval[0], 0.25);
+  EXPECT_FALSE(split_at_step(scout().recordings, check_recordings(scout().recordings, scout().model)));
+  const auto sides = split_at_step(set, checks);
+  ASSERT_TRUE(sides);
+  EXPECT_EQ((*sides)[0].missions.size(), set.missions.size() / 2);
+  EXPECT_EQ((*sides)[0].missions.size() + (*sides)[1].missions.size(), set.missions.size());
+  EXPECT_EQ((*sides)[0].samples + (*sides)[1].samples, set.samples);
+  EXPECT_EQ((*sides)[1].missions.front().mission_id, set.missions[*step.first_mission].mission_id);
+  // Before it the channel reads as it did without the mistake, after it a quarter more.
+  for (const std::size_t side : {0u, 1u}) {
+    const auto& original = scout().recordings.missions[side == 0 ? 0 : *step.first_mission];
+    const auto& kept = (*sides)[side].missions.front();
+    EXPECT_EQ((*sides)[side].robot_id, set.robot_id);
+    EXPECT_NEAR(kept.samples[200].battery_current_a,
+                (side == 0 ? 1 : 1.25) * original.samples[200].battery_current_a, 1e-9);
+  }
+}
+
+// The plant's own delay, of every electrical channel.
+TEST(CheckRecordings, ADelayOfTheElectricalChannelsIsMeasured) {
+  for (const vr::ShippedRobot& shipped : vr::shipped_robots()) {
+    for (const bool motors : {true, false}) {
+      for (const double delay_s : {0.0, 0.2}) {
+        const made::Robot robot = made::virtual_robot(shipped.kind, 5, [&](vr::SimulationSpec& spec) {
+          spec.imperfections.sensor_delay = delay_s;
+          spec.sensors.motor_channels = motors;
+        });
+        SCOPED_TRACE(std::string(shipped.kind) + (motors ? " with" : " without") + " motor channels, " +
+                     std::to_string(delay_s));
+        const auto checks = check_recordings(robot.recordings, robot.model);
+        const Check* check = find(checks, "electrical_delay");
+        EXPECT_FALSE(find(checks, "yaw_rate_delay"));
+        EXPECT_TRUE(std::ranges::none_of(checks, &Check::contradicted));
+        if (delay_s == 0) {
+          EXPECT_FALSE(check);
+          continue;
+        }
+        EXPECT_TRUE(check);
+        if (!check) continue;
+        EXPECT_NEAR(check->value, delay_s, 0.015);
+        EXPECT_EQ(check->channel, motors ? "motor_current" : "battery_current");
+      }
+    }
+  }
 }
 
 // As they come to a daemon: one at a time, mission after mission.

@@ -9,8 +9,8 @@
 
 #include "client/virtual_robot/fleet.h"
 #include "client/virtual_robot/simulate.h"
-#include "telemetry/recording_set.h"
 #include "robot/robot_file.h"
+#include "telemetry/recording_set.h"
 
 namespace joulecast::gap::made {
 

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "gap/checks/readings.h"
-#include "telemetry/recording_set.h"
 #include "robot/robot_model.h"
+#include "telemetry/recording_set.h"
 
 // What integrators get wrong, done to sound recordings in memory.
 namespace joulecast::gap::mistakes {
@@ -26,7 +26,8 @@ inline void each_sample(telemetry::RecordingSet& set, const std::function<void(S
   }
 }
 
-inline void multiply(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double factor) {
+inline void multiply(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings,
+                     double factor) {
   each_sample(set, [&](Sample& s) {
     for (const std::size_t k : readings) *readings_of(s)[k] *= factor;
   });
@@ -97,7 +98,8 @@ inline void delay(telemetry::RecordingSet& set, std::initializer_list<std::size_
 }
 
 // Every n-th row the readings fall to nothing.
-inline void drop_out(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, std::size_t n) {
+inline void drop_out(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings,
+                     std::size_t n) {
   for (Recording& mission : set.missions) {
     for (std::size_t row = n / 2; row < mission.samples.size(); row += n) {
       for (const std::size_t k : readings) *readings_of(mission.samples[row])[k] = 0;

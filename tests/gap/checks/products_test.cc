@@ -31,7 +31,7 @@ TEST(Products, ItsIntervalsHoldTheTruthAsOftenAsTheySay) {
   int covered = 0;
   for (int k = 0; k < 400; ++k) {
     const Products products = relation(random, 30, 1.0);
-    const auto interval = fit_blocks(products.blocks(), 0, both).interval(0);
+    const auto interval = estimate(fit_blocks(products.blocks(), 0, both), 0).interval();
     covered += interval[0] < 2 && 2 < interval[1];
   }
   // 95 % of 400 are 380, with a standard deviation of 4.4.

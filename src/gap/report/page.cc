@@ -1,14 +1,8 @@
-#include "gap/report_page.h"
+#include "gap/report/page.h"
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-#include <iterator>
-
 #include "base/xml_text.h"
-#include "dynamics/catalogue.h"
-#include "gap/chart.h"
 
 namespace joulecast::gap {
 namespace {
@@ -33,10 +27,13 @@ p{margin:8px 0}
 .figures b{display:block;font-size:23px;font-weight:600;font-variant-numeric:tabular-nums}
 .figures span{color:var(--quiet);font-size:13px;line-height:1.3;display:block}
 .card{background:var(--card);border:1px solid var(--rule);border-radius:6px;padding:14px 16px;margin:12px 0}
+.card p:first-child{margin-top:0}.card p:last-child{margin-bottom:0}
 .strength{font-size:18px;font-variant-numeric:tabular-nums;margin:4px 0}
 figure{margin:14px 0}
-.grid2{display:grid;grid-template-columns:repeat(auto-fit,minmax(360px,1fr));gap:8px 20px}
+.grid2{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,360px),1fr));gap:8px 20px}
 svg{width:100%;height:auto;display:block}
+svg.bars{max-width:460px}
+.wide svg{min-width:640px}
 svg text{font:12px system-ui,"DejaVu Sans",Helvetica,Arial,sans-serif;fill:var(--text)}
 svg text.tick{fill:var(--quiet);font-size:11px}
 svg text.axis{fill:var(--quiet)}
@@ -53,21 +50,27 @@ svg polyline.after{stroke:var(--after)}
 svg rect.before,svg circle.before{fill:var(--before)}
 svg rect.after,svg circle.after{fill:var(--after)}
 svg rect.floor{fill:var(--floor)}
+svg rect.measured{fill:var(--measured)}
+svg .mark{stroke:var(--text);stroke-width:2}
 svg rect.more{fill:var(--before)}
 svg rect.less{fill:var(--less)}
 .legend{display:flex;flex-wrap:wrap;gap:4px 18px;font-size:13px;color:var(--quiet);margin:10px 0 0}
 .legend i{display:inline-block;width:14px;height:10px;border-radius:2px;margin-right:6px}
 i.measured{background:var(--measured)}i.before,i.more{background:var(--before)}i.after{background:var(--after)}
-i.floor{background:var(--floor)}i.less{background:var(--less)}
-.scroll{overflow-x:auto}
+i.floor{background:var(--floor)}i.mark{background:var(--text);width:2px;height:12px;vertical-align:-2px}i.less{background:var(--less)}
+.scroll,.wide{overflow-x:auto}
 table{border-collapse:collapse;width:100%;font-size:14px;margin:10px 0}
+table.many{min-width:540px}
 th,td{text-align:left;padding:5px 10px 5px 0;border-bottom:1px solid var(--rule);vertical-align:top}
 th{color:var(--quiet);font-weight:500}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 td:last-child,th:last-child{padding-right:0}
 ul{padding-left:20px;margin:8px 0}li{margin:5px 0}
 code{font:13px ui-monospace,"DejaVu Sans Mono",monospace;background:var(--shade);padding:1px 4px;border-radius:3px}
-@media print{main{max-width:none}h2{break-after:avoid}figure,.card{break-inside:avoid}}
+.warn{border-left:4px solid var(--before)}
+@media(max-width:480px){main{padding:24px 16px 40px}h1{font-size:23px}.verdict{font-size:16px}}
+@media print{main{max-width:none;padding:0}h2{break-after:avoid}figure,.card,tr,li{break-inside:avoid}
+.scroll,.wide{overflow:visible}.wide svg,table.many{min-width:0}}
 )";
 
 }  // namespace
@@ -95,14 +98,18 @@ void Page::paragraph(std::string_view html) {
   body_ += fmt::format("<p>{}</p>", html);
 }
 
-void Page::card(std::string_view html) {
-  body_ += fmt::format("<div class=\"card\">{}</div>", html);
+void Page::card(std::string_view html, bool warns) {
+  body_ += fmt::format("<div class=\"card{}\">{}</div>", warns ? " warn" : "", html);
 }
 
 void Page::chart(std::string_view svg, std::string_view caption) {
   body_ += fmt::format("<figure>{}", svg);
   if (!caption.empty()) body_ += fmt::format("<figcaption>{}</figcaption>", xml_escaped(caption));
   body_ += "</figure>";
+}
+
+void Page::wide_chart(std::string_view svg) {
+  body_ += fmt::format("<figure class=\"wide\" tabindex=\"0\">{}</figure>", svg);
 }
 
 void Page::charts(std::span<const std::pair<std::string, std::string>> svg_and_caption) {
@@ -120,9 +127,10 @@ void Page::list(std::span<const std::string> items) {
 void Page::table(std::span<const std::string> header, std::span<const std::vector<std::string>> rows,
                  std::size_t first_number) {
   const auto number = [&](std::size_t column) { return column >= first_number ? " class=\"n\"" : ""; };
-  body_ += "<div class=\"scroll\"><table><thead><tr>";
+  body_ +=
+      fmt::format("<div class=\"scroll\"><table{}><thead><tr>", header.size() > 3 ? " class=\"many\"" : "");
   for (std::size_t c = 0; c < header.size(); ++c)
-    body_ += fmt::format("<th{}>{}</th>", number(c), xml_escaped(header[c]));
+    body_ += fmt::format("<th scope=\"col\"{}>{}</th>", number(c), xml_escaped(header[c]));
   body_ += "</tr></thead><tbody>";
   for (const auto& row : rows) {
     body_ += "<tr>";
@@ -145,72 +153,6 @@ std::string Page::str() const {
       "content=\"width=device-width,initial-scale=1\"><meta name=\"color-scheme\" content=\"light dark\">"
       "<title>{}</title><style>{}</style></head><body><main>{}{}</main></body></html>\n",
       xml_escaped(title_), style, body_, open_ ? "</section>" : "");
-}
-
-void effects_section(Page& page, std::span<const DiagnosedEffect> effects,
-                     std::span<const std::string> costs) {
-  page.section(
-      "What is missing from the model",
-      "Each effect with its strength, one standard deviation, and how sure it is that it is at work.");
-  for (std::size_t k = 0; k < effects.size(); ++k) {
-    const DiagnosedEffect& e = effects[k];
-    const dynamics::Effect* known = dynamics::find_effect(e.id);
-    std::string name = words_of(e.id);
-    name.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(name.front())));
-    std::string card = fmt::format("<h3>{} <code>{}</code></h3>", xml_escaped(name), xml_escaped(e.id));
-    for (const DiagnosedParameter& p : e.parameters) {
-      std::string_view meaning = p.name;
-      if (known != nullptr) {
-        for (const auto& info : known->info().parameters) {
-          if (info.name == p.name) meaning = info.meaning;
-        }
-      }
-      if (&p == &e.parameters.front() || std::isfinite(p.deviation)) {
-        card += fmt::format("<p class=\"strength\">{} <span class=\"quiet\">{}</span></p>",
-                            xml_escaped(with_deviation(p.value, p.deviation, p.unit)), xml_escaped(meaning));
-      } else {
-        card += fmt::format("<p class=\"quiet\">{} (a shape, taken from a grid): {}</p>",
-                            xml_escaped(meaning), xml_escaped(with_deviation(p.value, p.deviation, p.unit)));
-      }
-    }
-    card += fmt::format("<p>Probability {}; it closes {} of the gap{}.</p>", probability_text(e.probability),
-                        percent(e.share), k < costs.size() && !costs[k].empty() ? "; " + costs[k] : "");
-    if (known != nullptr) {
-      card += fmt::format("<p class=\"quiet\">Formula: {}. Valid for: {}. Source: {}.</p>",
-                          xml_escaped(known->info().formula), xml_escaped(known->info().validity),
-                          xml_escaped(known->info().source));
-    }
-    if (!e.alternatives.empty()) {
-      std::vector<std::string> others;
-      for (const std::string& id : e.alternatives) others.push_back(words_of(id));
-      card += fmt::format("<p><b>These data do not tell it from</b> {}.</p>", xml_escaped(enumerate(others)));
-    }
-    page.card(card);
-  }
-  if (effects.empty()) page.paragraph("No effect of the catalogue is named.");
-}
-
-void origin_section(Page& page, const ReportOrigin& origin, const robot::RobotModel& robot) {
-  page.section("Origin of the data");
-  std::vector<std::string> lines;
-  if (!origin.sources.empty()) lines.push_back("Read from: " + enumerate(origin.sources) + ".");
-  std::string model = "Model: robot " + robot.robot_id;
-  if (!origin.model.empty()) model += ", " + origin.model;
-  std::vector<std::string> adopted;
-  for (const robot::AdoptedEffect& e : robot.effects) adopted.push_back(words_of(e.id));
-  lines.push_back(model + (adopted.empty() ? "; no effect was adopted before."
-                                           : "; effects adopted before: " + enumerate(adopted) + "."));
-  lines.push_back(fmt::format(
-      "Mass {} kg without payload, wheel radius {} m, half track {} m, friction torque {} and {} N m (right, "
-      "left), idle power {} W.",
-      brief(robot.total_mass_kg(0)), brief(robot.kinematics.wheel_radius_m),
-      brief(robot.kinematics.half_track_m), brief(robot.motor.friction_torque_nm[0]),
-      brief(robot.motor.friction_torque_nm[1]), brief(robot.idle_power_w)));
-  if (!origin.made_at.empty() || !origin.software.empty()) {
-    lines.push_back("Report made" + (origin.made_at.empty() ? "" : " " + origin.made_at + " UTC") +
-                    (origin.software.empty() ? "" : " by " + origin.software) + ".");
-  }
-  page.list(lines);
 }
 
 }  // namespace joulecast::gap

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -20,6 +21,7 @@ class Chart {
     double low = 0, high = 1;
     std::string label;
     bool ticks = true;
+    std::string_view degrees = {};  // what degrees beside the axis's radians are called; empty: it has none
   };
   // `name` is read out by screen readers.
   Chart(double width, double height, Axis x, Axis y, std::string_view name);
@@ -52,9 +54,12 @@ struct BarRow {
   double value = 0;
   std::array<double, 2> interval{};  // equal ends: none
   std::string style;
+  double mark = std::numeric_limits<double>::quiet_NaN();  // a value to hold it against; NaN: none
+  std::string text = {};                                   // what stands at its end; empty: the value
 };
 
-// Horizontal bars from zero with their values beside them; `unit` follows each value.
+// Horizontal bars from zero, each under its label and with its value at its end; `unit` follows each value.
+// Rows whose value is not known have a dash.
 std::string bars(std::span<const BarRow> rows, std::string_view unit, std::string_view name);
 
 struct ChangeRow {

@@ -2,14 +2,14 @@
 
 #include <array>
 #include <cstddef>
-#include <deque>
 #include <string_view>
 #include <vector>
 
 #include "base/error.h"
 #include "dynamics/drive_model.h"
 #include "robot/robot_model.h"
-#include "telemetry/sample.h"
+#include "telemetry/recording.h"
+#include "windows/windows.h"
 
 namespace joulecast::energy {
 
@@ -53,28 +53,27 @@ struct DriveEquation {
   std::array<double, unknown_count> row{};
 };
 
-// Turns a mission's samples into equations in weak form: means under smooth windows of 0.4 s (a raised
-// cosine, half overlapping; longer where samples are sparse) and, for accelerations, the speed under the
-// window's derivative, so that no noisy derivative is taken and noise does not bias the masses. The rows are
+// Turns a mission's samples into equations, one or two a smooth window (windows/windows.h). The rows are
 // differences of the robot's own drive model, so that payloads and effects count as they do there.
 //
 // With motor currents: the torque balance of each moving wheel, K_t n i against the model's torque, and the
 // battery's power less the motors'. With battery power alone: all of it against the model's. Windows in which
 // a wheel starts, stops or reverses, the payload changes, or samples miss, are left out.
-class DriveWindows {
+class DriveEquations {
  public:
   // Fault::invalid when the catalogue rejects an effect of the robot file.
-  static Result<DriveWindows> make(const robot::RobotModel& robot);
+  static Result<DriveEquations> make(const robot::RobotModel& robot);
 
   // In order of time, with the climb there (dynamics/climb.h).
   void add(const telemetry::Sample& sample, double climb_rad);
   void add(const telemetry::Sample& sample) { add(sample, sample.pitch_rad); }
-  // Forgets the samples of an unfinished window: the robot's time or what it did is interrupted.
-  void interrupt() { buffer_.clear(); }
+  // The robot's time or what it did is interrupted: no window holds samples of both sides.
+  void interrupt();
 
-  const std::vector<DriveEquation>& equations() const { return equations_; }
+  // What was added since the last take(), which interrupts.
   std::vector<DriveEquation> take();
-  double mean_payload_kg() const { return windows_ > 0 ? payload_sum_kg_ / windows_ : 0; }  // declared
+  // Declared, over the windows of what the last take() gave.
+  double mean_payload_kg() const { return mean_payload_kg_; }
   double torque_per_a() const { return torque_per_a_; }
 
  private:
@@ -84,23 +83,20 @@ class DriveWindows {
     dynamics::DriveModel model;
   };
 
-  DriveWindows(const robot::RobotModel& robot, dynamics::DriveModel model);
-  void close_window(std::size_t count);
-  void torque_equations(const dynamics::Instant& at, const std::array<double, 2>& current_a,
-                        const std::array<bool, 2>& moving);
+  DriveEquations(const robot::RobotModel& robot, dynamics::DriveModel model);
+  void close_windows();
+  void add(const windows::Window& window);
+  void torque_equations(const dynamics::Instant& at, const windows::Window& window);
+  void idle_equation(const windows::Window& window);
   void power_equation(const dynamics::Instant& at, double power_w);
 
+  robot::RobotModel robot_;
   dynamics::DriveModel model_;
   std::vector<Varied> varied_;
   double torque_per_a_ = 1;
   double moving_rad_s_ = 0;
-  double last_payload_kg_ = 0;
-  double payload_sum_kg_ = 0, windows_ = 0;  // since the last take()
-  struct Placed {
-    telemetry::Sample sample;
-    double climb_rad = dynamics::unknown;
-  };
-  std::deque<Placed> buffer_;
+  double payload_sum_kg_ = 0, windows_ = 0, mean_payload_kg_ = 0;
+  telemetry::Recording recording_;  // of which windows are to be made
   std::vector<DriveEquation> equations_;
 };
 

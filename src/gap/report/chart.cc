@@ -1,4 +1,4 @@
-#include "gap/chart.h"
+#include "gap/report/chart.h"
 
 #include <fmt/format.h>
 
@@ -7,6 +7,8 @@
 #include <iterator>
 
 #include "base/xml_text.h"
+#include "gap/report/quantity.h"
+#include "gap/verdict/words.h"
 
 namespace joulecast::gap {
 namespace {
@@ -54,8 +56,10 @@ Chart::Chart(double width, double height, Axis x, Axis y, std::string_view name)
   }
   if (x_.ticks) {
     for (const double x_tick : ticks_of(x_.low, x_.high, static_cast<int>(width / 75))) {
-      fmt::format_to(out, "<text class=\"tick mid\" x=\"{}\" y=\"{}\">{}</text>", px_text(px(x_tick)),
-                     px_text(height - bottom_px + 15), brief(x_tick));
+      const std::string also =
+          x_.degrees.empty() ? "" : fmt::format(" ({}{})", brief(in_degrees(x_tick), 2), x_.degrees);
+      fmt::format_to(out, "<text class=\"tick mid\" x=\"{}\" y=\"{}\">{}{}</text>", px_text(px(x_tick)),
+                     px_text(height - bottom_px + 15), brief(x_tick), also);
     }
   }
   fmt::format_to(out, "<text class=\"axis mid\" x=\"{}\" y=\"{}\">{}</text>",
@@ -133,33 +137,42 @@ std::string Chart::str() const {
 }
 
 std::string bars(std::span<const BarRow> rows, std::string_view unit, std::string_view name) {
-  constexpr double width = 720, label = 190, row_px = 26, value_px = 120;
+  constexpr double width = 400, value_px = 150, row_px = 44;
   double low = 0, high = 0;
   for (const BarRow& r : rows) {
-    low = std::min({low, r.value, r.interval[0]});
-    high = std::max({high, r.value, r.interval[1]});
+    for (const double v : {r.value, r.interval[0], r.interval[1], r.mark}) {
+      if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
+    }
   }
   if (!(high > low)) high = low + 1;
-  const auto px = [&](double v) { return label + (v - low) / (high - low) * (width - label - value_px); };
-  std::string out = fmt::format("<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">", width,
-                                row_px * static_cast<double>(rows.size()) + 6, xml_escaped(name));
+  const auto px = [&](double v) { return (v - low) / (high - low) * (width - value_px); };
+  std::string out =
+      fmt::format("<svg class=\"bars\" viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">", width,
+                  row_px * static_cast<double>(rows.size()), xml_escaped(name));
   auto to = std::back_inserter(out);
-  double y = 3;
+  double y = 0;
   for (const BarRow& r : rows) {
-    const double a = px(std::min(0.0, r.value)), b = px(std::max(0.0, r.value));
-    fmt::format_to(to, "<text class=\"row end\" x=\"{}\" y=\"{}\">{}</text>", label - 8, px_text(y + 16),
+    fmt::format_to(to, "<text class=\"row\" x=\"0\" y=\"{}\">{}</text>", px_text(y + 14),
                    xml_escaped(r.label));
-    fmt::format_to(to, "<rect class=\"{}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"16\">{}</rect>", r.style,
-                   px_text(a), px_text(y + 3), px_text(std::max(1.0, b - a)), title(r.hint));
+    const double value = std::isfinite(r.value) ? r.value : 0;
+    const double a = px(std::min(0.0, value)), b = px(std::max(0.0, value));
+    fmt::format_to(to, "<rect class=\"{}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"15\">{}</rect>", r.style,
+                   px_text(a), px_text(y + 21), px_text(std::max(1.0, b - a)), title(r.hint));
     double end = b;
     if (r.interval[1] > r.interval[0]) {
       fmt::format_to(to, "<line class=\"whisker\" x1=\"{}\" x2=\"{}\" y1=\"{}\" y2=\"{}\"/>",
-                     px_text(px(r.interval[0])), px_text(px(r.interval[1])), px_text(y + 11),
-                     px_text(y + 11));
+                     px_text(px(r.interval[0])), px_text(px(r.interval[1])), px_text(y + 28.5),
+                     px_text(y + 28.5));
       end = std::max(end, px(r.interval[1]));
     }
-    fmt::format_to(to, "<text class=\"row\" x=\"{}\" y=\"{}\">{}{}</text>", px_text(end + 8), px_text(y + 16),
-                   brief(r.value), xml_escaped(unit));
+    if (std::isfinite(r.mark)) {
+      fmt::format_to(to, "<line class=\"mark\" x1=\"{0}\" x2=\"{0}\" y1=\"{1}\" y2=\"{2}\"/>",
+                     px_text(px(r.mark)), px_text(y + 18), px_text(y + 39));
+      end = std::max(end, px(r.mark));
+    }
+    const std::string text = r.text.empty() ? brief(r.value) + std::string(unit) : r.text;
+    fmt::format_to(to, "<text class=\"row\" x=\"{}\" y=\"{}\">{}</text>", px_text(end + 8), px_text(y + 33),
+                   xml_escaped(text));
     y += row_px;
   }
   return out + "</svg>";

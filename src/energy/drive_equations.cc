@@ -1,0 +1,208 @@
+#include "energy/drive_equations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace joulecast::energy {
+namespace {
+
+constexpr double stretch_s = 10;              // of samples whose windows are made together
+constexpr double longest_gap_s = 2.0;         // between samples of one stretch
+constexpr double moving_share = 0.03;         // of the fastest wheel speed: slower wheels may stick
+constexpr std::size_t most_equations = 6000;  // half an hour of driving
+
+double seconds_between(const telemetry::Sample& from, const telemetry::Sample& to) {
+  return 1e-6 * static_cast<double>(to.utime_us - from.utime_us);
+}
+
+constexpr std::size_t index(Unknown unknown) {
+  return static_cast<std::size_t>(unknown);
+}
+
+// Changes a robot by `step` in one unknown.
+robot::RobotModel varied(robot::RobotModel robot, Unknown unknown, double step) {
+  const auto effect = [&](const char* id, std::vector<std::pair<std::string, double>> parameters) {
+    robot.effects.push_back({id, std::move(parameters)});
+  };
+  switch (unknown) {
+    case Unknown::friction_right:
+      robot.motor.friction_torque_nm[robot::right] += step;
+      break;
+    case Unknown::friction_left:
+      robot.motor.friction_torque_nm[robot::left] += step;
+      break;
+    case Unknown::viscous:
+      robot.motor.viscous_friction_nm_s_rad += step;
+      break;
+    case Unknown::idle_power:
+      robot.idle_power_w += step;
+      break;
+    case Unknown::mass:
+      robot.mass.chassis_kg += step;
+      break;
+    case Unknown::slope_cos:
+      effect("slope", {{"angle_rad", step}, {"uphill_rad", 0}});
+      break;
+    case Unknown::slope_sin:
+      effect("slope", {{"angle_rad", step}, {"uphill_rad", std::numbers::pi / 2}});
+      break;
+    case Unknown::scrub:
+      effect("turning_scrub", {{"coefficient", step}});
+      break;
+    case Unknown::yaw_inertia:
+      effect("yaw_inertia_error", {{"ratio", step}});
+      break;
+    case Unknown::payload:
+    case Unknown::current_bias:
+    case Unknown::driver_loss:
+      break;
+  }
+  return robot;
+}
+
+}  // namespace
+
+Result<DriveEquations> DriveEquations::make(const robot::RobotModel& robot) {
+  auto model = dynamics::drive_model(robot);
+  if (!model) return tl::unexpected(std::move(model.error()));
+  DriveEquations equations(robot, std::move(*model));
+  const std::pair<Unknown, double> steps[] = {{Unknown::friction_right, 0.01},
+                                              {Unknown::friction_left, 0.01},
+                                              {Unknown::viscous, 1e-3},
+                                              {Unknown::idle_power, 1},
+                                              {Unknown::mass, 0.01 * robot.mass.chassis_kg},
+                                              {Unknown::slope_cos, 1e-3},
+                                              {Unknown::slope_sin, 1e-3},
+                                              {Unknown::scrub, 1e-2},
+                                              {Unknown::yaw_inertia, 1e-2}};
+  for (const auto& [unknown, step] : steps) {
+    auto changed = dynamics::drive_model(varied(robot, unknown, step));
+    if (!changed) return tl::unexpected(std::move(changed.error()));
+    equations.varied_.push_back({index(unknown), step, std::move(*changed)});
+  }
+  return equations;
+}
+
+DriveEquations::DriveEquations(const robot::RobotModel& robot, dynamics::DriveModel model)
+    : robot_(robot),
+      model_(std::move(model)),
+      torque_per_a_(model_.parameters().torque_constant_nm_a),
+      moving_rad_s_(moving_share * robot.limits.speed_m_s / robot.kinematics.wheel_radius_m) {}
+
+std::vector<DriveEquation> DriveEquations::take() {
+  interrupt();
+  mean_payload_kg_ = windows_ > 0 ? payload_sum_kg_ / windows_ : 0;
+  payload_sum_kg_ = windows_ = 0;
+  recording_.payload_kg = 0;
+  return std::exchange(equations_, {});
+}
+
+void DriveEquations::add(const telemetry::Sample& sample, double climb_rad) {
+  std::vector<telemetry::Sample>& samples = recording_.samples;
+  const bool another_payload = std::isfinite(sample.payload_kg) && sample.payload_kg != recording_.payload_kg;
+  if (!samples.empty()) {
+    const double interval_s = seconds_between(samples.back(), sample);
+    if (!(interval_s > 0) || interval_s > longest_gap_s || another_payload) interrupt();
+  }
+  if (another_payload) recording_.payload_kg = sample.payload_kg;
+  samples.push_back(sample);
+  samples.back().payload_kg = recording_.payload_kg;
+  samples.back().pitch_rad = climb_rad;
+  if (seconds_between(samples.front(), sample) > stretch_s) close_windows();
+}
+
+void DriveEquations::interrupt() {
+  close_windows();
+  recording_.samples.clear();
+}
+
+// The next stretch begins where the windows of this one would have gone on. One without any is of no use.
+void DriveEquations::close_windows() {
+  std::vector<telemetry::Sample>& samples = recording_.samples;
+  if (samples.size() < 2) return;
+  const std::vector<windows::Window> made = windows::make_windows({&recording_, 1}, robot_, {});
+  if (made.empty()) return samples.clear();
+  for (windows::Window window : made) {
+    for (std::size_t side : {0u, 1u}) {
+      for (const auto& speed : window.part_speed_rad_s)
+        window.moving[side] = window.moving[side] && std::abs(speed[side]) > moving_rad_s_;
+    }
+    add(window);
+  }
+  std::erase_if(samples, [&, begin = samples.front()](const telemetry::Sample& s) {
+    return seconds_between(begin, s) < made.back().t_s;
+  });
+}
+
+void DriveEquations::add(const windows::Window& w) {
+  if (equations_.size() >= most_equations) return;
+  dynamics::Instant at;
+  at.wheel_speed_rad_s = w.speed_rad_s;
+  at.wheel_acceleration_rad_s2 = w.acceleration_rad_s2;
+  at.payload_kg = w.payload_kg;
+  at.x_m = w.x_m;
+  at.y_m = w.y_m;
+  at.heading_rad = w.heading_rad;
+  at.climb_rad = w.climb_rad;
+  payload_sum_kg_ += w.payload_kg;
+  ++windows_;
+  const bool motors = std::isfinite(w.current_a[0] + w.current_a[1]);
+  const bool battery = std::isfinite(w.battery_power_w);
+  const bool whole = (w.moving[0] || w.resting[0]) && (w.moving[1] || w.resting[1]);
+  if (motors) torque_equations(at, w);
+  if (battery && std::isfinite(w.motor_power_w[0] + w.motor_power_w[1])) {
+    idle_equation(w);
+  } else if (battery && whole) {
+    if (w.resting[0] && w.resting[1]) at.wheel_speed_rad_s = at.wheel_acceleration_rad_s2 = {};
+    power_equation(at, w.battery_power_w);
+  }
+}
+
+void DriveEquations::torque_equations(const dynamics::Instant& at, const windows::Window& w) {
+  if (!w.moving[0] && !w.moving[1]) return;
+  const dynamics::TorqueBalance<double> base = model_.balance(at);
+  std::array<DriveEquation, 2> e{};
+  for (std::size_t side : {0u, 1u}) {
+    e[side].value = torque_per_a_ * w.current_a[side] - base.total_nm[side];
+    e[side].row[index(Unknown::current_bias)] = torque_per_a_;
+  }
+  const auto fill = [&](std::size_t unknown, const dynamics::TorqueBalance<double>& changed, double step) {
+    for (std::size_t side : {0u, 1u})
+      e[side].row[unknown] = (changed.total_nm[side] - base.total_nm[side]) / step;
+  };
+  for (const Varied& v : varied_) fill(v.unknown, v.model.balance(at), v.step);
+  dynamics::Instant heavier = at;
+  heavier.payload_kg += 1;
+  fill(index(Unknown::payload), model_.balance(heavier), 1);
+  for (std::size_t side : {0u, 1u})
+    if (w.moving[side]) equations_.push_back(e[side]);
+}
+
+// The battery's power beside what the motors take and give back.
+void DriveEquations::idle_equation(const windows::Window& w) {
+  const dynamics::Parameters<double>& p = model_.parameters();
+  double modelled_w = p.idle_power_w + p.accessory_power_w;
+  for (std::size_t side : {0u, 1u})
+    modelled_w +=
+        w.motor_power_w[side] + p.driver_loss * w.motor_power_abs_w[side] + p.unreturned * w.braking_w[side];
+  DriveEquation e{DriveEquation::Kind::idle, w.battery_power_w - modelled_w, {}};
+  e.row[index(Unknown::idle_power)] = 1;
+  e.row[index(Unknown::driver_loss)] = w.motor_power_abs_w[0] + w.motor_power_abs_w[1];
+  equations_.push_back(e);
+}
+
+void DriveEquations::power_equation(const dynamics::Instant& at, double power_w) {
+  const dynamics::PowerFlow<double> base = model_.flow(at);
+  DriveEquation e{DriveEquation::Kind::power, power_w - base.battery_power_w, {}};
+  for (const Varied& v : varied_)
+    e.row[v.unknown] = (v.model.flow(at).battery_power_w - base.battery_power_w) / v.step;
+  dynamics::Instant heavier = at;
+  heavier.payload_kg += 1;
+  e.row[index(Unknown::payload)] = model_.flow(heavier).battery_power_w - base.battery_power_w;
+  e.row[index(Unknown::driver_loss)] = std::abs(base.motor_power_w[0]) + std::abs(base.motor_power_w[1]);
+  equations_.push_back(e);
+}
+
+}  // namespace joulecast::energy
