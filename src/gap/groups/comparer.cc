@@ -309,8 +309,20 @@ void Comparer::judge_all() {
   for (const Member& m : explanation_.members) members.push_back(m.hypothesis);
   std::ranges::sort(members);
   const Explanation explanation = told(contrasted(problem_, members, {}));
-  Findings f{problem_, explanation, controls_, named_, {}, {}, {}, held_out_, std::nullopt, std::nullopt, {}};
-  f.of_groups = true;
+  const std::optional<Ripple> no_ripple;
+  Findings f{.problem = problem_,
+             .explanation = explanation,
+             .controls = controls_,
+             .named = named_,
+             .causes = {},
+             .base = {},
+             .shares = {},
+             .power_w = {},
+             .held_out = held_out_,
+             .ripple = no_ripple,
+             .wandering = std::nullopt,
+             .wandering_power_w = {},
+             .of_groups = true};
   for (const Contrasted& c : causes_) {
     const auto low = static_cast<Eigen::Index>(c.low), high = static_cast<Eigen::Index>(c.high);
     f.causes.push_back(data_.cause(c.hypothesis, (c.strengths.row(high) - c.strengths.row(low)).transpose()));
