@@ -35,13 +35,15 @@ Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> 
   columns.linearise_around(shared.causes);
   const RunReferee referee(columns);
 
+  std::vector<std::size_t> group;
+  for (std::size_t k = 0; k < block.size(); ++k) group.push_back(index(k));
   GroupedData data{robot, {}, std::vector<std::size_t>(1 + *std::ranges::max_element(block)), {}, {}, {}, {}, {}, {}};
   data.without = [&](const std::vector<bool>& out) {
     std::vector<bool> runs_out(out.empty() ? 0 : block.size());
     for (std::size_t k = 0; k < runs_out.size(); ++k) runs_out[k] = out[block[k]];
-    return make_problem(columns, learn_scatter(columns, runs_out), block);
+    return make_problem(columns, learn_scatter(columns, runs_out, group), block);
   };
-  const RunScatter scatter = learn_scatter(columns);
+  const RunScatter scatter = learn_scatter(columns, {}, group);
   data.base = make_problem(columns, scatter, block);
   data.explain.most_families = 1;
   data.explain.most_members = 2;

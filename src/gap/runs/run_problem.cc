@@ -101,6 +101,19 @@ class Moved {
   Relative rows_;
 };
 
+// Adds columns of their own for each group but the first.
+void in_groups(Relative& r, Eigen::VectorXd& sd, const std::vector<RunRow>& rows, std::span<const std::size_t> group) {
+  const Eigen::Index p = r.x.cols();
+  const auto more = static_cast<Eigen::Index>(*std::ranges::max_element(group));
+  r.x.conservativeResize(Eigen::NoChange, p * (more + 1));
+  r.x.rightCols(p * more).setZero();
+  for (Eigen::Index k = 0; k < r.x.rows(); ++k) {
+    const auto own = static_cast<Eigen::Index>(group[rows[static_cast<std::size_t>(k)].run]);
+    if (own > 0) r.x.row(k).segment(p * own, p) = r.x.row(k).head(p).eval();
+  }
+  sd = sd.replicate(more + 1, 1).eval();
+}
+
 // A fit of every cause and trend at once, each held by one prior; the scatter and the prior's width are those under which
 // the energies are likeliest.
 struct FitOfAll {
@@ -166,7 +179,8 @@ struct FitOfAll {
 
 }  // namespace
 
-RunScatter learn_scatter(const RunColumns& columns, const std::vector<bool>& left_out) {
+RunScatter learn_scatter(const RunColumns& columns, const std::vector<bool>& left_out,
+                         std::span<const std::size_t> group) {
   const auto& rows = columns.rows();
   const auto n = static_cast<Eigen::Index>(rows.size());
   RunScatter s;
@@ -179,8 +193,10 @@ RunScatter learn_scatter(const RunColumns& columns, const std::vector<bool>& lef
     s.weight[k] = !left_out.empty() && left_out[rows[static_cast<std::size_t>(k)].run] ? 0 : 1;
   const Eigen::VectorXd use = s.weight;
   for (int pass = 0; pass < 3; ++pass) {
-    const Relative r = relative(columns, s.size_j);
-    const FitOfAll fit(r, rows, freedom(columns), s);
+    Relative r = relative(columns, s.size_j);
+    Eigen::VectorXd sd = freedom(columns);
+    if (!group.empty()) in_groups(r, sd, rows, group);
+    const FitOfAll fit(r, rows, sd, s);
     s.run = fit.scatter[0];
     s.difference = fit.scatter[1];
     s.weight = use;

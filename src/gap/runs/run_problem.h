@@ -16,7 +16,9 @@ struct RunScatter {
   Eigen::VectorXd size_j;          // of each run, what is relative is relative to: its energy, smoothed by the fit
   Eigen::VectorXd weight;          // of each row, less for outliers; 0: left out
 };
-RunScatter learn_scatter(const RunColumns& columns, const std::vector<bool>& left_out = {});
+// `group` of each run: what differs between groups is no scatter; empty: all are one.
+RunScatter learn_scatter(const RunColumns& columns, const std::vector<bool>& left_out = {},
+                         std::span<const std::size_t> group = {});
 
 // The block of each run: runs that follow each other in one table and in one group (empty: all are one), a couple of
 // dozen blocks altogether.
