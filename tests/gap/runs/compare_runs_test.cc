@@ -11,8 +11,8 @@ namespace {
 using testing::Departure;
 
 // Runs of two groups in turns, each with its own departure from the robot file.
-RunSet two_groups(const Departure& one, const Departure& other, std::size_t runs, double scatter, unsigned seed) {
-  const robot::RobotModel robot = testing::nomad();
+RunSet two_groups(const Departure& one, const Departure& other, std::size_t runs, double scatter, unsigned seed,
+                  const robot::RobotModel& robot = testing::nomad()) {
   std::mt19937_64 random(seed);
   RunSet set;
   set.labels = {"surface"};
@@ -24,10 +24,10 @@ RunSet two_groups(const Departure& one, const Departure& other, std::size_t runs
   return set;
 }
 
-Comparison compared(const RunSet& set) {
+Comparison compared(const RunSet& set, const robot::RobotModel& robot = testing::nomad()) {
   const auto groups = set.groups_by("surface");
   EXPECT_TRUE(groups);
-  auto comparison = compare_runs(set, *groups, testing::nomad());
+  auto comparison = compare_runs(set, *groups, robot);
   EXPECT_TRUE(comparison) << (comparison ? "" : describe(comparison.error()));
   return *comparison;
 }
@@ -59,12 +59,22 @@ TEST(CompareRuns, FindsTheFrictionOfASurface) {
   }
 }
 
-TEST(CompareRuns, FindsTheDriverLossOfAGroup) {
-  const Comparison c = compared(two_groups({}, {.driver_loss = 0.8}, 80, 0.005, 6));
-  ASSERT_FALSE(c.diagnosis.effects.empty());
-  const DiagnosedEffect& e = c.diagnosis.effects.front();
-  EXPECT_EQ(std::ranges::count(group_of(e), "driver_loss"), 1) << e.id;
-  EXPECT_GT(c.difference->by_effect_j.front(), 0);
+// Energies of whole runs hardly tell a loss in the drivers from friction or a weaker magnet: it stands in the group that
+// is stated, mostly, and nothing else is stated as sure.
+TEST(CompareRuns, FindsTheDriverLossOfAGroupOrWhatDoesTheSame) {
+  robot::RobotModel robot = testing::nomad();
+  robot.idle_power_w = 1;
+  int right = 0;
+  for (const unsigned seed : {6u, 7u, 8u, 9u}) {
+    const Comparison c = compared(two_groups({}, {.driver_loss = 0.4}, 80, 0.01, seed, robot), robot);
+    ASSERT_FALSE(c.diagnosis.effects.empty());
+    const DiagnosedEffect& e = c.diagnosis.effects.front();
+    const bool there = std::ranges::count(group_of(e), "driver_loss") > 0;
+    right += there ? 1 : 0;
+    EXPECT_TRUE(there || e.probability < 0.9) << e.id;
+    EXPECT_GT(c.difference->by_effect_j.front(), 0);
+  }
+  EXPECT_GE(right, 3);
 }
 
 TEST(CompareRuns, FindsTheLoadOfAGroup) {
