@@ -257,8 +257,9 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   add_limits(g, c);
 
   GroupedData data{robot, problem_of(fit->linear, g, names.size(), {}), g.group_of_block, measure(g, robot, common_w, c),
-                   {}, {}, {}, {}, {}};
+                   {}, {}, {}, {}, {}, {}};
   data.explain.most_members = 2;
+  data.shared = fit->causes;
   data.explain.most_families = 1;
   data.explain.beam = 5;
   data.without = [&](const std::vector<bool>& out) { return problem_of(fit->linear, g, names.size(), out); };

@@ -37,7 +37,7 @@ Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> 
 
   std::vector<std::size_t> group;
   for (std::size_t k = 0; k < block.size(); ++k) group.push_back(index(k));
-  GroupedData data{robot, {}, std::vector<std::size_t>(1 + *std::ranges::max_element(block)), {}, {}, {}, {}, {}, {}};
+  GroupedData data{robot, {}, std::vector<std::size_t>(1 + *std::ranges::max_element(block)), {}, {}, {}, {}, {}, {}, {}};
   data.without = [&](const std::vector<bool>& out) {
     std::vector<bool> runs_out(out.empty() ? 0 : block.size());
     for (std::size_t k = 0; k < runs_out.size(); ++k) runs_out[k] = out[block[k]];
@@ -47,6 +47,7 @@ Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> 
   data.base = make_problem(columns, scatter, block);
   data.explain.most_families = 1;
   data.explain.most_members = 2;
+  data.shared = shared.causes;
   double measured_j = 0, modelled_j = 0;
   for (std::size_t k = 0; k < block.size(); ++k) {
     data.group_of_block[block[k]] = index(k);

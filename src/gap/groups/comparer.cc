@@ -19,7 +19,8 @@ constexpr double after_parts = 0.7;  // of the progress
 // A cause in all groups.
 struct Contrasted {
   std::size_t hypothesis = 0;
-  Eigen::MatrixXd strengths, deviations;  // groups by coefficients
+  Eigen::MatrixXd strengths, deviations;  // groups by coefficients, beside the mean over all
+  Eigen::VectorXd mean;                   // beyond what all groups are known to share
   std::size_t low = 0, high = 0;          // the groups that are furthest apart
 };
 
@@ -35,9 +36,11 @@ class Comparer {
   bool power_known() const { return c_.diagnosis.power != PowerSource::none; }
   Eigen::VectorXd coefficients_of(const Problem& problem, const HypothesisSet& set, const std::vector<bool>& out,
                                   Eigen::VectorXd* sd = nullptr) const;
-  std::vector<Contrasted> contrasted(const Problem& problem, const HypothesisSet& set, const std::vector<bool>& out) const;
+  std::vector<Contrasted> contrasted(const Problem& base, const Problem& problem, const HypothesisSet& set,
+                                     const std::vector<bool>& out) const;
   std::vector<double> predict(const std::vector<Contrasted>& causes) const;
   double error(const std::vector<double>& predicted) const;
+  Problem alike(Problem base, const HypothesisSet& set, const Eigen::VectorXd& differences) const;
   std::vector<Controls> permuted(const Problem& problem, const Explanation& explanation) const;
   bool hold_out();
   Explanation told(const std::vector<Contrasted>& members) const;
@@ -71,10 +74,12 @@ Eigen::VectorXd Comparer::coefficients_of(const Problem& problem, const Hypothes
   return estimate.mean;
 }
 
-std::vector<Contrasted> Comparer::contrasted(const Problem& problem, const HypothesisSet& set,
+std::vector<Contrasted> Comparer::contrasted(const Problem& base, const Problem& problem, const HypothesisSet& set,
                                              const std::vector<bool>& out) const {
   Eigen::VectorXd sd;
   const Eigen::VectorXd mean = coefficients_of(problem, set, out, &sd);
+  const Eigen::VectorXd level = set.empty() ? Eigen::VectorXd() : coefficients_of(alike(base, set, mean), set, out);
+  Eigen::Index level_at = 0;
   std::vector<Contrasted> result;
   Eigen::Index at = 0;
   for (const std::size_t h : set) {
@@ -82,6 +87,11 @@ std::vector<Contrasted> Comparer::contrasted(const Problem& problem, const Hypot
     const auto own = n / static_cast<Eigen::Index>(groups_ - 1);
     Contrasted c;
     c.hypothesis = h;
+    c.mean = level.segment(level_at, own);
+    level_at += own;
+    if (const Cause cause = base.hypotheses[h].cause();
+        std::ranges::any_of(data_.shared, [&](const Cause& other) { return other.same_kind(cause); }))
+      c.mean.setZero();
     c.strengths = by_group(mean.segment(at, n), data_.group_of_block, groups_);
     c.deviations = Eigen::MatrixXd::Zero(c.strengths.rows(), own);
     for (Eigen::Index g = 1; g < c.strengths.rows(); ++g)
@@ -108,7 +118,7 @@ std::vector<double> Comparer::predict(const std::vector<Contrasted>& causes) con
   std::vector<std::vector<Cause>> by_group(groups_);
   for (std::size_t g = 0; g < groups_; ++g) {
     for (const Contrasted& c : causes)
-      by_group[g].push_back(data_.cause(c.hypothesis, c.strengths.row(static_cast<Eigen::Index>(g)).transpose()));
+      by_group[g].push_back(data_.cause(c.hypothesis, c.mean + c.strengths.row(static_cast<Eigen::Index>(g)).transpose()));
   }
   return data_.predict(by_group);
 }
@@ -124,33 +134,32 @@ double Comparer::error(const std::vector<double>& predicted) const {
   return size > 0 ? sum / size : missing;
 }
 
+// The base problem as it would be if all groups were the mean one: what these hypotheses explain of each block by its
+// group has left its response.
+Problem Comparer::alike(Problem base, const HypothesisSet& set, const Eigen::VectorXd& differences) const {
+  for (std::size_t g = 0; g < groups_; ++g) {
+    Eigen::VectorXd own(0);
+    Eigen::Index at = 0;
+    for (const std::size_t h : set) {
+      const auto n = static_cast<Eigen::Index>(base.hypotheses[h].candidate.columns.size());
+      const auto all = n * static_cast<Eigen::Index>(groups_ - 1);
+      const Eigen::MatrixXd strengths = by_group(differences.segment(at, all), data_.group_of_block, groups_);
+      own.conservativeResize(own.size() + n);
+      own.tail(n) = strengths.row(static_cast<Eigen::Index>(g)).transpose();
+      at += all;
+    }
+    std::vector<bool> of_group;
+    for (const std::size_t block_group : data_.group_of_block) of_group.push_back(block_group == g);
+    take_out(base, set, own, of_group);
+  }
+  return base;
+}
+
 // Takes all differences out, and shuffles which block is of which group: how often is the same found?
 std::vector<Controls> Comparer::permuted(const Problem& problem, const Explanation& explanation) const {
   std::vector<Controls> controls(explanation.members.size(), Controls{settings_.controls, 0});
   if (explanation.members.empty()) return controls;
-  // In terms of the base: what a block's own group explains leaves its response.
-  Problem rest = data_.base;
-  const Eigen::VectorXd all = Mixture(problem).estimate(explanation.whole).mean;
-  for (auto& blocks : rest.blocks) {
-    for (std::size_t b = 0; b < blocks.size(); ++b) {
-      Problem one;
-      one.plain.tolerance = rest.plain.tolerance;
-      one.hypotheses = data_.base.hypotheses;
-      one.blocks = {{blocks[b]}};
-      Eigen::VectorXd own(0);
-      Eigen::Index at = 0;
-      for (const std::size_t h : explanation.whole) {
-        const auto n = static_cast<Eigen::Index>(problem.hypotheses[h].candidate.columns.size());
-        const Eigen::MatrixXd strengths = by_group(all.segment(at, n), data_.group_of_block, groups_);
-        const Eigen::VectorXd here = strengths.row(static_cast<Eigen::Index>(data_.group_of_block[b])).transpose();
-        own.conservativeResize(own.size() + here.size());
-        own.tail(here.size()) = here;
-        at += n;
-      }
-      take_out(one, explanation.whole, own);
-      blocks[b] = one.blocks[0][0];
-    }
-  }
+  const Problem rest = alike(data_.base, explanation.whole, Mixture(problem).estimate(explanation.whole).mean);
   for (std::size_t s = 0; s < settings_.controls; ++s) {
     std::mt19937_64 random(s + 1);
     std::vector<std::size_t> order = data_.group_of_block;
@@ -187,13 +196,14 @@ bool Comparer::hold_out() {
     std::vector<bool> out(blocks), use(data_.items.size());
     for (std::size_t b = 0; b < blocks; ++b) out[b] = part_of[b] == part;
     for (std::size_t k = 0; k < use.size(); ++k) use[k] = !out[data_.items[k].block];
-    const Problem problem = contrast(data_.without(out), data_.group_of_block, groups_);
+    const Problem base = data_.without(out);
+    const Problem problem = contrast(base, data_.group_of_block, groups_);
     const HypothesisSet named = likely_causes(problem, explain(problem, out, data_.explain));
     std::vector<std::string> ids;
     for (const std::size_t h : named) ids.push_back(problem.hypotheses[h].id());
     held.named.push_back(std::move(ids));
     if (power_known()) {
-      const std::vector<double> predicted = predict(contrasted(problem, named, out));
+      const std::vector<double> predicted = predict(contrasted(base, problem, named, out));
       std::vector<double> missed;
       for (const Item& item : data_.items) missed.push_back(item.measured - item.common);
       const std::vector<double> refereed = data_.referee(missed, use);
@@ -308,7 +318,7 @@ void Comparer::judge_all() {
   HypothesisSet members;
   for (const Member& m : explanation_.members) members.push_back(m.hypothesis);
   std::ranges::sort(members);
-  const Explanation explanation = told(contrasted(problem_, members, {}));
+  const Explanation explanation = told(contrasted(data_.base, problem_, members, {}));
   const std::optional<Ripple> no_ripple;
   Findings f{.problem = problem_,
              .explanation = explanation,
@@ -355,7 +365,7 @@ bool Comparer::run() {
   explanation_ = explain(problem_, {}, data_.explain);
   c_.diagnosis.detectable_share = seen_share(problem_);
   named_ = likely_causes(problem_, explanation_);
-  causes_ = contrasted(problem_, named_, {});
+  causes_ = contrasted(data_.base, problem_, named_, {});
   if (!hold_out()) return false;
   controls_ = permuted(problem_, explanation_);
   if (controls_.size() != explanation_.members.size()) return false;

@@ -26,6 +26,7 @@ struct GroupedData {
   std::vector<std::size_t> group_of_block;
   std::vector<Item> items;
   ExplainSettings explain;
+  std::vector<Cause> shared;  // by all groups, around which the problem is linear
   // The cause that a hypothesis is with these coefficients.
   std::function<Cause(std::size_t hypothesis, const Eigen::VectorXd& coefficients)> cause;
   // Of every item, by the model with what all share and more causes in its group.

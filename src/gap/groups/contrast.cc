@@ -150,14 +150,17 @@ Problem contrast(const Problem& base, std::span<const std::size_t> group_of_bloc
   return problem;
 }
 
-void take_out(Problem& problem, const HypothesisSet& set, const Eigen::VectorXd& coefficients) {
+void take_out(Problem& problem, const HypothesisSet& set, const Eigen::VectorXd& coefficients,
+              const std::vector<bool>& which) {
   Eigen::VectorXd all = Eigen::VectorXd::Zero(problem.plain.tolerance.size());
   Eigen::Index at = 0;
   for (const std::size_t h : set) {
     for (const std::size_t k : problem.hypotheses[h].candidate.columns) all[static_cast<Eigen::Index>(k)] = coefficients[at++];
   }
   for (auto& blocks : problem.blocks) {
-    for (Information& block : blocks) {
+    for (std::size_t b = 0; b < blocks.size(); ++b) {
+      if (!which[b]) continue;
+      Information& block = blocks[b];
       const Eigen::VectorXd explained = block.xx * all;
       block.yy += all.dot(explained - 2 * block.xy);
       block.xy -= explained;

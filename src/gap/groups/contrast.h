@@ -17,7 +17,8 @@ Problem contrast(const Problem& base, std::span<const std::size_t> group_of_bloc
 Eigen::MatrixXd by_group(const Eigen::VectorXd& differences, std::span<const std::size_t> group_of_block,
                          std::size_t groups);
 
-// Takes what these hypotheses explain out of the response of every block.
-void take_out(Problem& problem, const HypothesisSet& set, const Eigen::VectorXd& coefficients);
+// Takes what these hypotheses explain out of the response of these blocks.
+void take_out(Problem& problem, const HypothesisSet& set, const Eigen::VectorXd& coefficients,
+              const std::vector<bool>& blocks);
 
 }  // namespace joulecast::gap

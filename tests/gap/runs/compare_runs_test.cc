@@ -43,7 +43,7 @@ TEST(CompareRuns, FindsTheFrictionOfASurface) {
   ASSERT_EQ(c.diagnosis.effects.size(), 1u);
   const DiagnosedEffect& e = c.diagnosis.effects.front();
   EXPECT_EQ(std::ranges::count(group_of(e), "coulomb_friction"), 1) << e.id;
-  EXPECT_EQ(c.diagnosis.verdict, Verdict::effects);
+  EXPECT_EQ(c.diagnosis.verdict, Verdict::effects) << name_of(c.diagnosis.verdict);
   ASSERT_TRUE(e.controls);
   EXPECT_LE(e.controls->named_in, 2u);
   EXPECT_LT(c.diagnosis.baseline->explanation_held_out, 0.6 * c.diagnosis.baseline->unchanged_model_held_out);
