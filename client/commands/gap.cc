@@ -172,7 +172,7 @@ void add_gap(CLI::App& program, Exit& exit) {
   auto* logs = command->add_option("log", options->logs, "LCM event logs of one robot");
   auto* missions = command
                        ->add_option("--missions", options->missions.runs,
-                                    "instead of logs: a CSV table of runs of which only energies are known, "
+                                    "instead of logs: CSV tables of runs of which only energies are known, "
                                     "with the columns below")
                        ->excludes(logs);
   command
@@ -188,15 +188,13 @@ void add_gap(CLI::App& program, Exit& exit) {
   command
       ->add_option(
           "--compare-by", options->compare_by,
-          "instead of one diagnosis say what changes between groups of missions: those of one prefix of "
-          "the mission id, up to its first '-', or of one suffix, from its last '_'")
-      ->check(CLI::IsMember({"prefix", "suffix"}))
-      ->excludes(missions);
+          "instead of one diagnosis say what changes between groups of missions: 'prefix' of the mission id, up to its "
+          "first '-'; 'suffix', from its last '_'; or a label, as surface of the covariates surface=...; of runs a "
+          "label or 'table'");
   command
       ->add_option("--controls", options->controls,
                    "surrogates of the recordings on which every finding is tried (default: 20); 0: none")
-      ->check(CLI::Range(0, 1000))
-      ->excludes(missions);
+      ->check(CLI::Range(0, 1000));
   command->add_option(
       "--apply", options->apply,
       "write the robot file with what was found, or corrected where it is not this robot's; refused, "
@@ -235,6 +233,8 @@ void add_gap(CLI::App& program, Exit& exit) {
     if (logs->empty() && missions->empty() && server->empty())
       throw CLI::RequiredError("log, --missions or --server");
     if (robot->empty() && server->empty()) throw CLI::RequiredError(robot->get_name());
+    options->missions.compare_by = options->compare_by;
+    options->missions.force = options->force;
     exit = run(*options);
   });
 }

@@ -1,67 +1,75 @@
 #include "client/commands/gap_compare.h"
 
-#include <cmath>
-#include <cstdio>
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
+#include "client/commands/gap_output.h"
 #include "client/files.h"
 #include "client/progress.h"
-#include "gap/compare.h"
+#include "client/wrapped.h"
+#include "gap/groups/comparison_json.h"
+#include "gap/groups/comparison_report.h"
 
 namespace joulecast::client {
 namespace {
 
-void print(const gap::Comparison& c) {
-  std::printf("%s: %zu groups", c.robot_id.c_str(), c.groups.size());
-  for (const gap::ComparedGroup& g : c.groups)
-    std::printf("%s %s (%zu missions, %zu samples)", &g == &c.groups.front() ? ":" : ",", g.name.c_str(),
-                g.missions, g.samples);
-  std::printf("\nalike in all groups:");
-  for (const std::string& id : c.common) std::printf(" %s", id.c_str());
-  std::printf("%s\n", c.common.empty() ? " nothing" : "");
-  for (const gap::ComparedEffect& e : c.effects) {
-    std::printf("%s %s\n", e.id.c_str(),
-                e.differs    ? "differs between the groups"
-                : e.gain > 0 ? "may differ between the groups"
-                             : "is the same, as far as these data tell");
-    for (std::size_t g = 0; g < e.groups.size(); ++g) {
-      const std::string unit = e.unit == "1" ? "" : " " + e.unit;
-      std::printf("  %-14s %s = %.4g", c.groups[g].name.c_str(), e.parameter.c_str(), e.groups[g].value);
-      if (std::isfinite(e.groups[g].deviation)) std::printf(" +- %.2g", e.groups[g].deviation);
-      std::printf("%s\n", unit.c_str());
-    }
-    if (!e.possible)
-      std::printf("  beyond what this effect can be: it stands for something else of the same kind\n");
-    std::printf("  log odds %+.1f of strengths of their own; chance that equal ones differ so %.2g\n", e.gain,
-                e.chance);
+void print_rest(const gap::Comparison& c) {
+  fmt::print("groups:\n");
+  for (const gap::ComparedGroup& g : c.groups) {
+    fmt::print("  {:<14} {} missions, {:.4g} m: {:.4g} J/m, by the model with what all share {:.4g} J/m\n", g.name,
+               g.missions, g.way_m, g.energy_per_m_j, g.model_per_m_j);
   }
-  std::printf("limits:\n");
-  for (const std::string& limit : c.limits) std::printf("  - %s\n", limit.c_str());
+  for (const gap::ComparedEffect& e : c.effects) {
+    fmt::print("{} {} beside the mean over all groups:\n", e.id, e.parameter);
+    for (std::size_t g = 0; g < e.groups.size(); ++g) {
+      const gap::GroupStrength& s = e.groups[g];
+      fmt::print("  {:<14} {:+.4g} +- {:.2g}{} ({:+.3g} J/m)\n", c.groups[g].name, s.value, s.deviation,
+                 e.unit == "1" ? "" : " " + e.unit, s.energy_per_m_j);
+    }
+  }
+  if (c.difference) {
+    const gap::GroupDifference& d = *c.difference;
+    fmt::print("{} takes {:.4g} J/m more than {}: {:+.4g} by motion and load", c.groups[d.to].name, d.energy_per_m_j,
+               c.groups[d.from].name, d.by_motion_j);
+    for (std::size_t k = 0; k < c.effects.size(); ++k) fmt::print(", {:+.4g} by {}", d.by_effect_j[k], c.effects[k].id);
+    fmt::print(", {:+.4g} unexplained\n", d.unexplained_j);
+  }
+  fmt::print("alike in all groups:");
+  for (const std::string& id : c.common) fmt::print(" {}", id);
+  fmt::print("{}\nlimits:\n", c.common.empty() ? " nothing" : "");
+  for (const std::string& limit : c.limits) fmt::print("  - {}\n", wrapped(limit, help_width(), 4));
 }
 
 }  // namespace
 
+Exit tell(const gap::Comparison& comparison, const robot::RobotModel& robot, bool json, const std::string& report_file,
+          const gap::ReportOrigin& origin) {
+  const nlohmann::ordered_json document = gap::comparison_to_json(comparison);
+  if (json) {
+    fmt::print("{}\n", document.dump(2));
+  } else {
+    print_diagnosis(document);
+    print_rest(comparison);
+  }
+  if (report_file.empty()) return Exit::ok;
+  const auto written = write_file(report_file, gap::report_html(comparison, robot, origin));
+  return written ? Exit::ok : report(written.error());
+}
+
 Exit gap_between_groups(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
                         const std::string& by, bool json, const std::string& report_file,
                         const gap::ReportOrigin& origin) {
-  std::vector<std::string> groups;
-  for (const auto& mission : recordings.missions) {
-    groups.push_back(
-        gap::group_of(mission.mission_id, by == "suffix" ? gap::GroupBy::suffix : gap::GroupBy::prefix));
-  }
+  const auto groups = gap::groups_of(recordings, by);
+  if (!groups) return report(groups.error());
   const auto comparison = [&] {
     Progress progress("comparing", "%", 100);
-    return gap::compare_groups(recordings, groups, robot, progress.shares());
+    gap::CompareSettings settings;
+    settings.progress = progress.shares();
+    return gap::compare_recordings(recordings, *groups, robot, settings);
   }();
   if (!comparison) return report(comparison.error());
-  if (json) {
-    std::printf("%s\n", gap::to_json(*comparison).dump(2).c_str());
-  } else {
-    print(*comparison);
-  }
-  if (report_file.empty()) return Exit::ok;
-  const auto written = write_file(report_file, gap::report_html(*comparison, robot, origin));
-  return written ? Exit::ok : report(written.error());
+  return tell(*comparison, robot, json, report_file, origin);
 }
 
 }  // namespace joulecast::client

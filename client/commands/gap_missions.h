@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "client/commands/outcome.h"
 #include "robot/robot_model.h"
@@ -8,12 +9,15 @@
 namespace joulecast::client {
 
 struct GapMissionsOptions {
-  std::string runs;  // CSV file
+  std::vector<std::string> runs;  // CSV files
+  std::string compare_by;         // label between whose groups to compare; empty: one diagnosis
   std::string robot_file;
   bool robot_model = false;  // judge the robot file, not the energies of a model in the table
   bool json = false;
-  std::string report;  // HTML file to write; empty: none
-  std::string apply;   // robot file to write; empty: none
+  std::string report;               // HTML file to write; empty: none
+  std::string apply;                // robot file to write; empty: none
+  std::vector<std::string> effect;  // to take of those that are not told apart
+  bool force = false;               // write in spite of the diagnosis's refusal
 };
 
 // The gap judged from energies of whole runs.

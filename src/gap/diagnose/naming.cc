@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <string>
 
 #include "gap/equations/power.h"
 #include "gap/traits.h"
+#include "statistics/robust.h"
 
 namespace joulecast::gap {
 namespace {
@@ -22,6 +25,31 @@ bool moves_motors_alone(const Hypothesis& h) {
 
 bool shows_in_power(const Hypothesis& hypothesis) {
   return !hypothesis.is_effect() || !traits_of(hypothesis.id()).elsewhere;
+}
+
+double seen_share(const Problem& problem) {
+  constexpr double deviations = 3.5;
+  const Mixture mixture(problem);
+  std::map<std::string, double> shares;
+  for (std::size_t h = 0; h < problem.hypotheses.size(); ++h) {
+    const Hypothesis& hypothesis = problem.hypotheses[h];
+    if (hypothesis.outside() || !shows_in_power(hypothesis) || shares.contains(hypothesis.id())) continue;
+    shares[hypothesis.id()] = problem.moved(hypothesis, deviations * mixture.estimate({h}).sd);
+  }
+  std::vector<double> values;
+  for (const auto& [id, share] : shares) values.push_back(share);
+  return values.empty() ? missing : statistics::median(std::move(values));
+}
+
+HypothesisSet likely_causes(const Problem& problem, const Explanation& explanation) {
+  HypothesisSet set;
+  for (const Member& member : explanation.members) {
+    if (!problem.hypotheses[member.hypothesis].outside() && member.group_probability() >= least_named &&
+        member.wander < most_wander)
+      set.push_back(member.hypothesis);
+  }
+  std::ranges::sort(set);
+  return set;
 }
 
 std::vector<Cause> joined(std::vector<Cause> base, std::span<const Cause> named) {
@@ -54,13 +82,7 @@ std::vector<Cause> strengths_of(const ColumnSet& columns, const Problem& problem
 
 Named name_causes(const Material& m, const ColumnSet& columns, const Problem& problem, const Explanation& explanation,
                   std::span<const double> power_w, const std::vector<bool>& left_out) {
-  HypothesisSet set;
-  for (const Member& member : explanation.members) {
-    if (!problem.hypotheses[member.hypothesis].outside() && member.group_probability() >= least_named &&
-        member.wander < most_wander)
-      set.push_back(member.hypothesis);
-  }
-  std::ranges::sort(set);
+  HypothesisSet set = likely_causes(problem, explanation);
   std::vector<double> measured;
   std::vector<Window> windows;
   for (std::size_t k = 0; k < m.windows.size(); ++k) {

@@ -16,14 +16,21 @@ inline constexpr double steady_wander = 0.45;  // up to which it stands still
 // channels however little power they move.
 bool shows_in_power(const Hypothesis& hypothesis);
 
+// Share of the power that a cause has to move to be surely seen: the median over causes that show in power of what is so
+// many standard deviations of each by itself.
+double seen_share(const Problem& problem);
+
+// Of an explanation, those that are there, or one of their group, with even odds or better by both judges, and that
+// stand still.
+HypothesisSet likely_causes(const Problem& problem, const Explanation& explanation);
+
 // Causes to name, with the strengths that they have by themselves where everything is linear.
 struct Named {
   HypothesisSet set;
   std::vector<Cause> causes;  // in the order of the set
 };
 
-// Of an explanation, those that are there, or one of their group, with even odds or better by both judges, that stand
-// still, and that the gap needs. All of it without the blocks left out; `power_w`: measured, of the windows.
+// The likely causes that the gap needs. All of it without the blocks left out; `power_w`: measured, of the windows.
 Named name_causes(const Material& material, const ColumnSet& columns, const Problem& problem,
                   const Explanation& explanation, std::span<const double> power_w, const std::vector<bool>& left_out);
 

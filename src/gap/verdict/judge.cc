@@ -172,8 +172,8 @@ class Judge {
   }
 
   void weigh_doubts() {
-    doubts_.far = d_.power_absolute_relative > far_off;
-    doubts_.strange = std::ranges::any_of(f_.causes, implausible);
+    doubts_.far = !f_.of_groups && d_.power_absolute_relative > far_off;
+    doubts_.strange = !f_.of_groups && std::ranges::any_of(f_.causes, implausible);
     doubts_.like_load = d_.motor_channels && std::ranges::any_of(f_.causes, like_a_load);
     if (!f_.held_out || d_.effects.empty() || d_.power == PowerSource::none) return;
     const double after = f_.held_out->explained();

@@ -27,6 +27,7 @@ struct Findings {
   const std::optional<Ripple>& ripple;
   std::optional<std::size_t> wandering;  // member whose strength does not stand still, the one that moves most
   std::array<double, 2> wandering_power_w{};
+  bool of_groups = false;  // strengths are differences between groups: large ones make no other robot
 };
 
 // A gap, of the power, from which on the file is another robot's.

@@ -16,6 +16,7 @@ struct RunConditions {
   double turn_rad = 0;           // change of heading, positive to the left; 0: straight
   double turn_radius_m = 0;      // mean radius of the arc; of no meaning without a turn
   double standstill_s = 0;       // with the robot on, before or after
+  double climb_m = dynamics::unknown;  // by which it ends higher, evenly over the distance
 };
 
 struct RunEnergy {

@@ -1,4 +1,4 @@
-#include "gap/run_energy.h"
+#include "gap/runs/run_energy.h"
 
 #include <algorithm>
 #include <cmath>
@@ -27,7 +27,10 @@ Bend bend_at(const RunConditions& run, double s) {
 class Integral {
  public:
   Integral(const dynamics::DriveModel& model, const RunConditions& run, double turning_factor)
-      : model_(model), run_(run), turning_factor_(turning_factor) {}
+      : model_(model),
+        run_(run),
+        turning_factor_(turning_factor),
+        climb_rad_(std::asin(std::clamp(run.climb_m / run.distance_m, -1.0, 1.0))) {}
 
   void drive(double duration_s, double speed, double acceleration) {
     const double step = duration_s / steps_a_phase;
@@ -56,6 +59,7 @@ class Integral {
     at.wheel_speed_rad_s = dynamics::wheels_of_body(p, speed, yaw);
     at.wheel_acceleration_rad_s2 = dynamics::wheels_of_body(p, acceleration, yaw_acceleration);
     at.payload_kg = run_.payload_kg;
+    at.climb_rad = climb_rad_;
     at.copper_heat_w = heat_w_;
     const dynamics::PowerFlow<double> flow = model_.flow(at);
     for (std::size_t side : {0u, 1u}) {
@@ -71,6 +75,7 @@ class Integral {
   const dynamics::DriveModel& model_;
   const RunConditions& run_;
   double turning_factor_;
+  double climb_rad_;  // NaN: not known
   double s_ = 0;
   std::array<double, 2> heat_w_{};
   RunEnergy energy_;

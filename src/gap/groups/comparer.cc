@@ -1,0 +1,385 @@
+#include "gap/groups/comparer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <set>
+
+#include "gap/diagnose/naming.h"
+#include "gap/verdict/judge.h"
+#include "statistics/bootstrap.h"
+#include "statistics/shapley.h"
+
+namespace joulecast::gap {
+namespace {
+
+constexpr std::size_t most_parts = 6;
+constexpr double after_parts = 0.7;  // of the progress
+
+// A cause in all groups.
+struct Contrasted {
+  std::size_t hypothesis = 0;
+  Eigen::MatrixXd strengths, deviations;  // groups by coefficients, beside the mean over all
+  Eigen::VectorXd mean;                   // beyond what all groups are known to share
+  std::size_t low = 0, high = 0;          // the groups that are furthest apart
+};
+
+class Comparer {
+ public:
+  Comparer(const GroupedData& data, const CompareSettings& settings, Comparison& comparison)
+      : data_(data), settings_(settings), c_(comparison), groups_(comparison.groups.size()) {}
+
+  bool run();
+
+ private:
+  bool goes_on(double part) const { return !settings_.progress || settings_.progress(part); }
+  bool power_known() const { return c_.diagnosis.power != PowerSource::none; }
+  Eigen::VectorXd coefficients_of(const Problem& problem, const HypothesisSet& set, const std::vector<bool>& out,
+                                  Eigen::VectorXd* sd = nullptr) const;
+  std::vector<Contrasted> contrasted(const Problem& base, const Problem& problem, const HypothesisSet& set,
+                                     const std::vector<bool>& out) const;
+  std::vector<double> predict(const std::vector<Contrasted>& causes) const;
+  double error(const std::vector<double>& predicted) const;
+  Problem alike(Problem base, const HypothesisSet& set, const Eigen::VectorXd& differences) const;
+  std::vector<Controls> permuted(const Problem& problem, const Explanation& explanation) const;
+  bool hold_out();
+  Explanation told(const std::vector<Contrasted>& members) const;
+  void add_differences();
+  void add_baseline();
+  void judge_all();
+
+  const GroupedData& data_;
+  const CompareSettings& settings_;
+  Comparison& c_;
+  std::size_t groups_;
+  Problem problem_;
+  Explanation explanation_;
+  HypothesisSet named_;
+  std::vector<Contrasted> causes_;
+  std::optional<HeldOut> held_out_;
+  std::vector<Controls> controls_;
+};
+
+Eigen::VectorXd Comparer::coefficients_of(const Problem& problem, const HypothesisSet& set,
+                                          const std::vector<bool>& out, Eigen::VectorXd* sd) const {
+  std::vector<std::size_t> own;
+  for (const std::size_t h : set) {
+    const auto& more = problem.hypotheses[h].candidate.columns;
+    own.insert(own.end(), more.begin(), more.end());
+  }
+  if (own.empty()) return {};
+  std::ranges::sort(own);
+  const Mixture::Estimate estimate = Mixture(problem, out, own).estimate(set);
+  if (sd != nullptr) *sd = estimate.sd;
+  return estimate.mean;
+}
+
+std::vector<Contrasted> Comparer::contrasted(const Problem& base, const Problem& problem, const HypothesisSet& set,
+                                             const std::vector<bool>& out) const {
+  Eigen::VectorXd sd;
+  const Eigen::VectorXd mean = coefficients_of(problem, set, out, &sd);
+  const Eigen::VectorXd level = set.empty() ? Eigen::VectorXd() : coefficients_of(alike(base, set, mean), set, out);
+  Eigen::Index level_at = 0;
+  std::vector<Contrasted> result;
+  Eigen::Index at = 0;
+  for (const std::size_t h : set) {
+    const auto n = static_cast<Eigen::Index>(problem.hypotheses[h].candidate.columns.size());
+    const auto own = n / static_cast<Eigen::Index>(groups_ - 1);
+    Contrasted c;
+    c.hypothesis = h;
+    c.mean = level.segment(level_at, own);
+    level_at += own;
+    if (const Cause cause = base.hypotheses[h].cause();
+        std::ranges::any_of(data_.shared, [&](const Cause& other) { return other.same_kind(cause); }))
+      c.mean.setZero();
+    c.strengths = by_group(mean.segment(at, n), data_.group_of_block, groups_);
+    c.deviations = Eigen::MatrixXd::Zero(c.strengths.rows(), own);
+    for (Eigen::Index g = 1; g < c.strengths.rows(); ++g)
+      c.deviations.row(g) = sd.segment(at + (g - 1) * own, own).transpose();
+    // The first group is known as well as the others are beside it.
+    c.deviations.row(0) = c.deviations.bottomRows(c.deviations.rows() - 1).colwise().mean();
+    double furthest = -1;
+    for (std::size_t a = 0; a < groups_; ++a) {
+      for (std::size_t b = 0; b < groups_; ++b) {
+        const auto ga = static_cast<Eigen::Index>(a), gb = static_cast<Eigen::Index>(b);
+        const double apart = (c.strengths.row(gb) - c.strengths.row(ga)).norm();
+        if (apart <= furthest || (own == 1 && c.strengths(gb, 0) < c.strengths(ga, 0))) continue;
+        furthest = apart;
+        c.low = a, c.high = b;
+      }
+    }
+    result.push_back(std::move(c));
+    at += n;
+  }
+  return result;
+}
+
+std::vector<double> Comparer::predict(const std::vector<Contrasted>& causes) const {
+  std::vector<std::vector<Cause>> by_group(groups_);
+  for (std::size_t g = 0; g < groups_; ++g) {
+    for (const Contrasted& c : causes)
+      by_group[g].push_back(data_.cause(c.hypothesis, c.mean + c.strengths.row(static_cast<Eigen::Index>(g)).transpose()));
+  }
+  return data_.predict(by_group);
+}
+
+double Comparer::error(const std::vector<double>& predicted) const {
+  double sum = 0, size = 0;
+  for (std::size_t k = 0; k < data_.items.size(); ++k) {
+    const Item& item = data_.items[k];
+    if (!std::isfinite(item.measured + predicted[k])) continue;
+    sum += item.weight * std::fabs(item.measured - predicted[k]);
+    size += item.weight * std::fabs(item.measured);
+  }
+  return size > 0 ? sum / size : missing;
+}
+
+// The base problem as it would be if all groups were the mean one: what these hypotheses explain of each block by its
+// group has left its response.
+Problem Comparer::alike(Problem base, const HypothesisSet& set, const Eigen::VectorXd& differences) const {
+  for (std::size_t g = 0; g < groups_; ++g) {
+    Eigen::VectorXd own(0);
+    Eigen::Index at = 0;
+    for (const std::size_t h : set) {
+      const auto n = static_cast<Eigen::Index>(base.hypotheses[h].candidate.columns.size());
+      const auto all = n * static_cast<Eigen::Index>(groups_ - 1);
+      const Eigen::MatrixXd strengths = by_group(differences.segment(at, all), data_.group_of_block, groups_);
+      own.conservativeResize(own.size() + n);
+      own.tail(n) = strengths.row(static_cast<Eigen::Index>(g)).transpose();
+      at += all;
+    }
+    std::vector<bool> of_group;
+    for (const std::size_t block_group : data_.group_of_block) of_group.push_back(block_group == g);
+    take_out(base, set, own, of_group);
+  }
+  return base;
+}
+
+// Takes all differences out, and shuffles which block is of which group: how often is the same found?
+std::vector<Controls> Comparer::permuted(const Problem& problem, const Explanation& explanation) const {
+  std::vector<Controls> controls(explanation.members.size(), Controls{settings_.controls, 0});
+  if (explanation.members.empty()) return controls;
+  const Problem rest = alike(data_.base, explanation.whole, Mixture(problem).estimate(explanation.whole).mean);
+  for (std::size_t s = 0; s < settings_.controls; ++s) {
+    std::mt19937_64 random(s + 1);
+    std::vector<std::size_t> order = data_.group_of_block;
+    std::ranges::shuffle(order, random);
+    const Problem surrogate = contrast(rest, order, groups_);
+    const Explanation answer = explain(surrogate, {}, data_.explain);
+    for (std::size_t m = 0; m < controls.size(); ++m) {
+      const Member& member = explanation.members[m];
+      std::set<std::string> group{problem.hypotheses[member.hypothesis].id()};
+      for (const Alternative& a : member.alternatives) group.insert(problem.hypotheses[a.hypothesis].id());
+      const bool found = std::ranges::any_of(answer.members, [&](const Member& other) {
+        return group.contains(surrogate.hypotheses[other.hypothesis].id()) && other.group_probability() >= least_named;
+      });
+      controls[m].named_in += found ? 1 : 0;
+    }
+    if (!goes_on(std::lerp(after_parts, 1.0, static_cast<double>(s + 1) / static_cast<double>(settings_.controls))))
+      return {};
+  }
+  return controls;
+}
+
+bool Comparer::hold_out() {
+  HeldOut held;
+  const std::size_t blocks = data_.group_of_block.size();
+  held.blocks.resize(blocks);
+  // Every part has blocks of every group where there are enough.
+  std::vector<std::size_t> part_of(blocks), seen(groups_, 0);
+  std::size_t most = 0;
+  for (std::size_t b = 0; b < blocks; ++b) most = std::max(most, ++seen[data_.group_of_block[b]]);
+  held.parts = std::clamp<std::size_t>(most, 2, most_parts);
+  std::ranges::fill(seen, 0u);
+  for (std::size_t b = 0; b < blocks; ++b) part_of[b] = seen[data_.group_of_block[b]]++ % held.parts;
+  for (std::size_t part = 0; part < held.parts; ++part) {
+    std::vector<bool> out(blocks), use(data_.items.size());
+    for (std::size_t b = 0; b < blocks; ++b) out[b] = part_of[b] == part;
+    for (std::size_t k = 0; k < use.size(); ++k) use[k] = !out[data_.items[k].block];
+    const Problem base = data_.without(out);
+    const Problem problem = contrast(base, data_.group_of_block, groups_);
+    const HypothesisSet named = likely_causes(problem, explain(problem, out, data_.explain));
+    std::vector<std::string> ids;
+    for (const std::size_t h : named) ids.push_back(problem.hypotheses[h].id());
+    held.named.push_back(std::move(ids));
+    if (power_known()) {
+      const std::vector<double> predicted = predict(contrasted(base, problem, named, out));
+      std::vector<double> missed;
+      for (const Item& item : data_.items) missed.push_back(item.measured - item.common);
+      const std::vector<double> refereed = data_.referee(missed, use);
+      for (std::size_t k = 0; k < use.size(); ++k) {
+        const Item& item = data_.items[k];
+        if (use[k] || !std::isfinite(item.measured + item.common)) continue;
+        BlockErrors& b = held.blocks[item.block];
+        b.unchanged += item.weight * std::fabs(missed[k]);
+        b.explained += item.weight * std::fabs(item.measured - predicted[k]);
+        b.referee += item.weight * std::fabs(missed[k] - refereed[k]);
+        b.size += item.weight * std::fabs(item.measured);
+      }
+    }
+    if (!goes_on(after_parts * static_cast<double>(part + 1) / static_cast<double>(held.parts))) return false;
+  }
+  held_out_ = std::move(held);
+  return true;
+}
+
+void Comparer::add_differences() {
+  std::vector<double> per_m(groups_, missing);
+  for (std::size_t g = 0; g < groups_; ++g) per_m[g] = c_.groups[g].energy_per_m_j;
+  std::optional<GroupDifference> d;
+  if (power_known() && std::ranges::all_of(per_m, [](double e) { return std::isfinite(e); })) {
+    d.emplace();
+    d->from = static_cast<std::size_t>(std::ranges::min_element(per_m) - per_m.begin());
+    d->to = static_cast<std::size_t>(std::ranges::max_element(per_m) - per_m.begin());
+    d->energy_per_m_j = per_m[d->to] - per_m[d->from];
+    d->by_motion_j = c_.groups[d->to].model_per_m_j - c_.groups[d->from].model_per_m_j;
+    d->unexplained_j = d->energy_per_m_j - d->by_motion_j;
+  }
+  std::vector<double> common;
+  for (const Item& item : data_.items) common.push_back(item.common);
+  for (const Contrasted& c : causes_) {
+    const Hypothesis& h = data_.base.hypotheses[c.hypothesis];
+    ComparedEffect e;
+    e.id = h.id();
+    const auto& info = h.effect.effect->info().parameters[h.parameter];
+    e.parameter = h.is_effect() ? std::string(info.name) : "coefficient";
+    e.unit = h.is_effect() ? std::string(info.unit) : h.unit;
+    const std::vector<double> with = power_known() ? predict({c}) : common;
+    std::vector<double> energy(groups_, 0);
+    for (std::size_t k = 0; k < with.size(); ++k) {
+      const Item& item = data_.items[k];
+      if (std::isfinite(item.measured + item.common)) energy[item.group] += item.energy_per_unit * (with[k] - common[k]);
+    }
+    for (std::size_t g = 0; g < groups_; ++g) {
+      const auto at = static_cast<Eigen::Index>(g);
+      e.groups.push_back({c.strengths.cols() == 1 ? c.strengths(at, 0) : c.strengths.row(at).norm(),
+                          c.deviations.row(at).norm(), power_known() ? energy[g] / c_.groups[g].way_m : missing});
+    }
+    if (d) {
+      d->by_effect_j.push_back(e.groups[d->to].energy_per_m_j - e.groups[d->from].energy_per_m_j);
+      d->unexplained_j -= d->by_effect_j.back();
+    }
+    c_.effects.push_back(std::move(e));
+  }
+  c_.difference = std::move(d);
+}
+
+// The explanation as one of single strengths: the stronger group less the weaker.
+Explanation Comparer::told(const std::vector<Contrasted>& members) const {
+  Explanation e = explanation_;
+  for (Member& m : e.members) {
+    const auto c = std::ranges::find(members, m.hypothesis, &Contrasted::hypothesis);
+    const auto low = static_cast<Eigen::Index>(c->low), high = static_cast<Eigen::Index>(c->high);
+    const Eigen::VectorXd apart = (c->strengths.row(high) - c->strengths.row(low)).transpose();
+    const Eigen::VectorXd sd = groups_ == 2 ? Eigen::VectorXd(c->deviations.row(1).transpose())
+                                            : Eigen::VectorXd((c->deviations.row(high).cwiseAbs2() +
+                                                               c->deviations.row(low).cwiseAbs2())
+                                                                  .cwiseSqrt()
+                                                                  .transpose());
+    m.coefficients.assign(apart.begin(), apart.end());
+    m.sd.assign(sd.begin(), sd.end());
+  }
+  return e;
+}
+
+void Comparer::add_baseline() {
+  if (!power_known()) return;
+  Diagnosis& d = c_.diagnosis;
+  d.baseline.emplace();
+  d.baseline->held_out = held_out_->referee();
+  d.baseline->unchanged_model_held_out = held_out_->unchanged();
+  d.baseline->explanation_held_out = held_out_->explained();
+  if (named_.empty()) return;
+  Shrinkage s;
+  s.before = held_out_->unchanged();
+  s.after = held_out_->explained();
+  s.fraction = 1 - s.after / s.before;
+  s.interval = statistics::bootstrap_interval(held_out_->blocks.size(), [&](std::span<const int> draw) {
+    double before = 0, after = 0;
+    for (std::size_t b = 0; b < draw.size(); ++b) {
+      before += draw[b] * held_out_->blocks[b].unchanged;
+      after += draw[b] * held_out_->blocks[b].explained;
+    }
+    return 1 - after / before;
+  });
+  s.remaining_over_noise_floor = d.noise_floor > 0 ? s.after / d.noise_floor : missing;
+  s.parts = held_out_->parts;
+  std::vector<std::string> ids;
+  for (const std::size_t h : named_) ids.push_back(problem_.hypotheses[h].id());
+  std::ranges::sort(ids);
+  for (std::vector<std::string> part : held_out_->named) {
+    std::ranges::sort(part);
+    s.agreeing += part == ids ? 1 : 0;
+  }
+  d.shrinkage = s;
+}
+
+void Comparer::judge_all() {
+  HypothesisSet members;
+  for (const Member& m : explanation_.members) members.push_back(m.hypothesis);
+  std::ranges::sort(members);
+  const Explanation explanation = told(contrasted(data_.base, problem_, members, {}));
+  const std::optional<Ripple> no_ripple;
+  Findings f{.problem = problem_,
+             .explanation = explanation,
+             .controls = controls_,
+             .named = named_,
+             .causes = {},
+             .base = {},
+             .shares = {},
+             .power_w = {},
+             .held_out = held_out_,
+             .ripple = no_ripple,
+             .wandering = std::nullopt,
+             .wandering_power_w = {},
+             .of_groups = true};
+  for (const Contrasted& c : causes_) {
+    const auto low = static_cast<Eigen::Index>(c.low), high = static_cast<Eigen::Index>(c.high);
+    f.causes.push_back(data_.cause(c.hypothesis, (c.strengths.row(high) - c.strengths.row(low)).transpose()));
+    double change = 0, time_s = 0;
+    if (power_known()) {
+      const std::vector<double> with = predict({c});
+      for (std::size_t k = 0; k < with.size(); ++k) {
+        const Item& item = data_.items[k];
+        if (!std::isfinite(with[k] + item.common)) continue;
+        change += item.energy_per_unit * std::fabs(with[k] - item.common);
+        time_s += item.time_s;
+      }
+    }
+    f.power_w.push_back(time_s > 0 ? change / time_s : missing);
+  }
+  f.shares = statistics::shapley_shares(causes_.size(), [&](const std::vector<std::size_t>& some) {
+    std::vector<Contrasted> own;
+    for (const std::size_t k : some) own.push_back(causes_[k]);
+    return power_known() ? error(predict(own)) : 0;
+  });
+  judge(c_.diagnosis, f, data_.robot);
+  c_.diagnosis.adoptable.clear();
+  c_.diagnosis.corrections.clear();
+  c_.diagnosis.refusal = "a robot file has one strength for all groups";
+  if (c_.diagnosis.effects.empty()) c_.diagnosis.shrinkage.reset();
+}
+
+bool Comparer::run() {
+  problem_ = contrast(data_.base, data_.group_of_block, groups_);
+  explanation_ = explain(problem_, {}, data_.explain);
+  c_.diagnosis.detectable_share = seen_share(problem_);
+  named_ = likely_causes(problem_, explanation_);
+  causes_ = contrasted(data_.base, problem_, named_, {});
+  if (!hold_out()) return false;
+  controls_ = permuted(problem_, explanation_);
+  if (controls_.size() != explanation_.members.size()) return false;
+  if (settings_.controls == 0) controls_.clear();
+  add_baseline();
+  judge_all();
+  add_differences();
+  return true;
+}
+
+}  // namespace
+
+bool compare_groups(const GroupedData& data, const CompareSettings& settings, Comparison& comparison) {
+  return Comparer(data, settings, comparison).run();
+}
+
+}  // namespace joulecast::gap

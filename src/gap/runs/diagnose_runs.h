@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "gap/runs/run_table.h"
+#include "gap/runs/turning_term.h"
+#include "gap/verdict/diagnosis.h"
+
+namespace joulecast::gap {
+
+// Runs of one condition, predicted by a diagnosis made without any of them.
+struct LeftOut {
+  std::string what;  // "payload_kg 8.25", "surface carpet"
+  std::size_t runs = 0;
+  double before = 0, after = 0, referee = 0;  // mean absolute error, relative to the measured energy
+  std::array<double, 2> interval{};           // of the fall 1 - after/before, 95 %, bootstrap over runs
+  std::vector<std::string> effects;           // named without them
+};
+
+// One run, what the model says and what it says with what was found.
+struct JudgedRun {
+  MissionRun run;
+  double model_j = 0;
+  double after_j = 0;     // with the causes, fitted to all runs
+  double held_out_j = 0;  // with the causes named and fitted without this run
+};
+
+// The answer where nothing is known but the energies of runs and their conditions.
+struct RunDiagnosis {
+  // As of recordings: power stands for the mean power of runs, so that gap, noise floor and errors are those of the
+  // energies of runs, relative to the measured ones; samples are runs.
+  Diagnosis diagnosis;
+  bool model_given = false;  // the table gave the model's energies; otherwise the robot file was asked
+  double model_ratio = 1;    // of the given energies to those of the robot file under the conditions
+  double scatter = 0, side_scatter = 0;  // from run to run, sd relative to a run's energy; of right minus left
+  std::vector<LeftOut> conditions;       // condition by condition, label by label, and table by table
+  std::optional<TurningTerm> turning;
+  std::vector<std::string> limits;       // what these energies cannot tell, in sentences
+  std::vector<std::string> not_visible;  // effects that move none of these energies
+  std::vector<JudgedRun> runs;
+};
+
+struct RunSettings {
+  bool robot_file_model = false;         // judge the robot file even where runs bring a model's energies
+  std::size_t controls = 20;             // surrogate tables for each finding; 0: none
+  std::function<bool(double)> progress;  // called with 0..1; false cancels
+};
+
+// Fault::invalid for a robot whose adopted effects the catalogue rejects, Fault::conflict when cancelled.
+Result<RunDiagnosis> diagnose_runs(const RunSet& runs, const robot::RobotModel& robot, const RunSettings& settings = {});
+
+}  // namespace joulecast::gap
