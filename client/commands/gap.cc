@@ -185,12 +185,12 @@ void add_gap(CLI::App& program, Exit& exit) {
   command->add_flag("--json", options->json, "print the diagnosis as JSON");
   command->add_option("--report", options->report,
                       "write the diagnosis as one HTML page with its maps and plots");
-  command
-      ->add_option(
-          "--compare-by", options->compare_by,
-          "instead of one diagnosis say what changes between groups of missions: 'prefix' of the mission id, up to its "
-          "first '-'; 'suffix', from its last '_'; or a label, as surface of the covariates surface=...; of runs a "
-          "label or 'table'");
+  command->add_option("--compare-by", options->compare_by,
+                      "instead of one diagnosis say what changes between groups of missions: 'prefix' of the "
+                      "mission id, up to its "
+                      "first '-'; 'suffix', from its last '_'; or a label, as surface of the covariates "
+                      "surface=...; of runs a "
+                      "label or 'table'");
   command
       ->add_option("--controls", options->controls,
                    "surrogates of the recordings on which every finding is tried (default: 20); 0: none")

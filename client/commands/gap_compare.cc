@@ -17,8 +17,8 @@ namespace {
 void print_rest(const gap::Comparison& c) {
   fmt::print("groups:\n");
   for (const gap::ComparedGroup& g : c.groups) {
-    fmt::print("  {:<14} {} missions, {:.4g} m: {:.4g} J/m, by the model with what all share {:.4g} J/m\n", g.name,
-               g.missions, g.way_m, g.energy_per_m_j, g.model_per_m_j);
+    fmt::print("  {:<14} {} missions, {:.4g} m: {:.4g} J/m, by the model with what all share {:.4g} J/m\n",
+               g.name, g.missions, g.way_m, g.energy_per_m_j, g.model_per_m_j);
   }
   for (const gap::ComparedEffect& e : c.effects) {
     fmt::print("{} {} beside the mean over all groups:\n", e.id, e.parameter);
@@ -30,9 +30,10 @@ void print_rest(const gap::Comparison& c) {
   }
   if (c.difference) {
     const gap::GroupDifference& d = *c.difference;
-    fmt::print("{} takes {:.4g} J/m more than {}: {:+.4g} by motion and load", c.groups[d.to].name, d.energy_per_m_j,
-               c.groups[d.from].name, d.by_motion_j);
-    for (std::size_t k = 0; k < c.effects.size(); ++k) fmt::print(", {:+.4g} by {}", d.by_effect_j[k], c.effects[k].id);
+    fmt::print("{} takes {:.4g} J/m more than {}: {:+.4g} by motion and load", c.groups[d.to].name,
+               d.energy_per_m_j, c.groups[d.from].name, d.by_motion_j);
+    for (std::size_t k = 0; k < c.effects.size(); ++k)
+      fmt::print(", {:+.4g} by {}", d.by_effect_j[k], c.effects[k].id);
     fmt::print(", {:+.4g} unexplained\n", d.unexplained_j);
   }
   fmt::print("alike in all groups:");
@@ -43,8 +44,8 @@ void print_rest(const gap::Comparison& c) {
 
 }  // namespace
 
-Exit tell(const gap::Comparison& comparison, const robot::RobotModel& robot, bool json, const std::string& report_file,
-          const gap::ReportOrigin& origin) {
+Exit tell(const gap::Comparison& comparison, const robot::RobotModel& robot, bool json,
+          const std::string& report_file, const gap::ReportOrigin& origin) {
   const nlohmann::ordered_json document = gap::comparison_to_json(comparison);
   if (json) {
     fmt::print("{}\n", document.dump(2));

@@ -18,9 +18,10 @@ namespace joulecast::client {
 namespace {
 
 void print_rest(const gap::RunDiagnosis& r) {
-  fmt::print("model by {}; runs scatter by {:.1f} % beside any cause\n", r.model_given ? "the table" : "the robot file",
-             100 * r.scatter);
-  if (!r.conditions.empty()) fmt::print("mean error of runs of one condition, everything done without them:\n");
+  fmt::print("model by {}; runs scatter by {:.1f} % beside any cause\n",
+             r.model_given ? "the table" : "the robot file", 100 * r.scatter);
+  if (!r.conditions.empty())
+    fmt::print("mean error of runs of one condition, everything done without them:\n");
   for (const gap::LeftOut& l : r.conditions) {
     fmt::print("  {:<22} {:3} runs: {:5.1f} % -> {:5.1f} % (regression {:.1f} %), named:", l.what, l.runs,
                100 * l.before, 100 * l.after, 100 * l.referee);
@@ -30,7 +31,8 @@ void print_rest(const gap::RunDiagnosis& r) {
   if (r.turning) {
     const gap::TurningTerm& t = *r.turning;
     fmt::print(
-        "turning term: wheel speeds by (2v +- l yaw)/(2r) would shift the sides of {} turning runs by {:.1f} % of\n"
+        "turning term: wheel speeds by (2v +- l yaw)/(2r) would shift the sides of {} turning runs by {:.1f} "
+        "% of\n"
         "  their energy and the sum by {:+.2f} %; found is {:.2f} +- {:.2f} of that (1: halved, 0: right)\n",
         t.runs, 100 * t.side_difference, 100 * t.sum, t.share, t.share_sd);
   }
@@ -64,7 +66,8 @@ Exit compare(const GapMissionsOptions& options, const gap::RunSet& runs, const r
     return gap::compare_runs(runs, *groups, robot, settings);
   }();
   if (!comparison) return report(comparison.error());
-  return tell(*comparison, robot, options.json, options.report, report_origin(options.runs, options.robot_file));
+  return tell(*comparison, robot, options.json, options.report,
+              report_origin(options.runs, options.robot_file));
 }
 
 }  // namespace
@@ -105,7 +108,8 @@ Exit gap_from_missions(const GapMissionsOptions& options, const robot::RobotMode
     if (const auto written = write_file(options.report, page); !written) return report(written.error());
   }
   if (options.apply.empty()) return Exit::ok;
-  const auto extended = gap::take(gap::offer_of(diagnosis->diagnosis), robot, {options.effect, options.force});
+  const auto extended =
+      gap::take(gap::offer_of(diagnosis->diagnosis), robot, {options.effect, options.force});
   return extended ? write_robot(*extended, options.apply) : report(of_option(extended.error(), "--apply"));
 }
 

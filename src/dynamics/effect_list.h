@@ -47,11 +47,11 @@ struct EffectList {
 // Every effect of the catalogue, in the order in which they are applied. One name an effect.
 using AllEffects =
     EffectList<CoulombFriction, ViscousFriction, StribeckFriction, FrictionAsymmetry, LoadRollingResistance,
-               FloorResistanceZone, Slope, Grade, AerodynamicDrag, TurningScrub, GearEfficiency, ChassisMassError,
-               PayloadMassError, YawInertiaError, LinearInertiaError, ComOffset, ResistanceError,
-               WindingTemperature, BrushDrop, TorqueConstantLoss, Inductance, AccessoryLoad, DriverLoss,
-               NoRegeneration, BatteryResistance, WheelRadiusError, WheelRadiusAsymmetry, TrackError,
-               WheelSlip, CurrentSensorGain, CurrentSensorBias, VoltageSensorGain, SensorDelay>;
+               FloorResistanceZone, Slope, Grade, AerodynamicDrag, TurningScrub, GearEfficiency,
+               ChassisMassError, PayloadMassError, YawInertiaError, LinearInertiaError, ComOffset,
+               ResistanceError, WindingTemperature, BrushDrop, TorqueConstantLoss, Inductance, AccessoryLoad,
+               DriverLoss, NoRegeneration, BatteryResistance, WheelRadiusError, WheelRadiusAsymmetry,
+               TrackError, WheelSlip, CurrentSensorGain, CurrentSensorBias, VoltageSensorGain, SensorDelay>;
 
 // Whether a table with a row for each effect (a range of structs with an `id`) lacks none and has no other.
 template <class Table>

@@ -17,7 +17,7 @@ struct Instant {
   double x_m = unknown;   // unknown position: effects tied to the floor do nothing
   double y_m = unknown;
   double heading_rad = unknown;
-  double climb_rad = unknown;               // of the floor along the heading, nose up positive (climb.h)
+  double climb_rad = unknown;                 // of the floor along the heading, nose up positive (climb.h)
   std::array<double, 2> current_slope_a_s{};  // di/dt of the armature, for the inductance effect
   std::array<double, 2> copper_heat_w{};      // R i^2 low-passed with the thermal time constant
 };

@@ -54,7 +54,7 @@ TEST(MissionRecordings, HaveTheCovariatesOfTheLogThatTheyCameFrom) {
         return true;
       },
       tally));
-  for (const auto count : harness.counters.faults) EXPECT_EQ(count, 0u);
+  for (const auto& count : harness.counters.faults) EXPECT_EQ(count, 0u);
   RecordingsWanted wanted;
   wanted.robot_id = "nomad";
   const auto stored = read_recordings(*harness.store, wanted);

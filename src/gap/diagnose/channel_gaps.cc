@@ -30,7 +30,8 @@ struct Sums {
   }
 };
 
-// One equation's residual, as it is and after the fit of everything, of every window; NaN where it does not speak.
+// One equation's residual, as it is and after the fit of everything, of every window; NaN where it does not
+// speak.
 struct Leftover {
   std::vector<double> before, after;
 };
@@ -59,7 +60,8 @@ std::vector<ChannelGap> channel_gaps(const Material& whole) {
   material.from_motion.power = true;
   const Linear linear = linearise(material, {}, std::array{anything}, {});
   const auto left = [&](Channel c) { return leftover(linear, c, some.size()); };
-  const Leftover power = left(Channel::power), volts = left(Channel::battery_voltage), gyro = left(Channel::gyro);
+  const Leftover power = left(Channel::power), volts = left(Channel::battery_voltage),
+                 gyro = left(Channel::gyro);
   const std::array torque{left(Channel::torque_right), left(Channel::torque_left)};
   const std::array voltage{left(Channel::voltage_right), left(Channel::voltage_left)};
   const dynamics::DriveModel model(whole.robot, whole.adopted);

@@ -67,7 +67,8 @@ class Surrogates {
       told_.fitted[c] = fitted(r, coefficients_);
       told_.left[c] = r.y - told_.fitted[c];
       row_of_[c].assign(m.windows.size(), -1);
-      for (std::size_t k = 0; k < r.window.size(); ++k) row_of_[c][r.window[k]] = static_cast<Eigen::Index>(k);
+      for (std::size_t k = 0; k < r.window.size(); ++k)
+        row_of_[c][r.window[k]] = static_cast<Eigen::Index>(k);
     }
   }
 
@@ -82,7 +83,8 @@ class Surrogates {
     std::set<std::string> group{own.id()};
     for (const Alternative& a : m.alternatives) group.insert(problem_.hypotheses[a.hypothesis].id());
     return std::ranges::any_of(answer.members, [&](const Member& other) {
-      return group.contains(surrogate.hypotheses[other.hypothesis].id()) && other.group_probability() >= least_named;
+      return group.contains(surrogate.hypotheses[other.hypothesis].id()) &&
+             other.group_probability() >= least_named;
     });
   }
 
@@ -128,8 +130,9 @@ class Surrogates {
 
 }  // namespace
 
-std::optional<std::vector<Controls>> control(const Material& material, const Linear& linear, const Problem& problem,
-                                             const Explanation& explanation, const ControlSettings& settings,
+std::optional<std::vector<Controls>> control(const Material& material, const Linear& linear,
+                                             const Problem& problem, const Explanation& explanation,
+                                             const ControlSettings& settings,
                                              const std::function<bool(double)>& goes_on) {
   const std::size_t members = explanation.members.size(), n = settings.surrogates;
   std::vector<Controls> controls(members, Controls{n, 0});

@@ -10,8 +10,8 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr double leading = 14;            // sets this far below the best in log odds are dropped
-constexpr std::size_t most_sets = 60;     // that are looked at closer
+constexpr double leading = 14;         // sets this far below the best in log odds are dropped
+constexpr std::size_t most_sets = 60;  // that are looked at closer
 constexpr std::size_t most_sets_a_size = 40;
 constexpr std::size_t most_predicted = 40;
 constexpr double certain = 50;            // log odds of a member
@@ -51,8 +51,10 @@ class Explainer {
   const Hypothesis& hypothesis(std::size_t h) const { return problem_.hypotheses[h]; }
   bool fits(const HypothesisSet& set, std::size_t h) const {
     const bool outside = hypothesis(h).outside();
-    const auto alike = std::ranges::count_if(set, [&](std::size_t o) { return hypothesis(o).outside() == outside; });
-    if (static_cast<std::size_t>(alike) >= (outside ? settings_.most_families : settings_.most_members)) return false;
+    const auto alike =
+        std::ranges::count_if(set, [&](std::size_t o) { return hypothesis(o).outside() == outside; });
+    if (static_cast<std::size_t>(alike) >= (outside ? settings_.most_families : settings_.most_members))
+      return false;
     return std::ranges::none_of(set, [&](std::size_t o) { return hypothesis(o).excludes(hypothesis(h)); });
   }
 
@@ -60,7 +62,8 @@ class Explainer {
     found_ = {{{}, 0.0}};
     std::vector<Found> front = found_;
     std::set<HypothesisSet> seen;
-    for (std::size_t size = 1; size <= settings_.most_members + settings_.most_families && !front.empty(); ++size) {
+    for (std::size_t size = 1; size <= settings_.most_members + settings_.most_families && !front.empty();
+         ++size) {
       std::vector<Found> next;
       for (const Found& base : front) {
         for (std::size_t h = 0; h < problem_.hypotheses.size(); ++h) {
@@ -109,13 +112,15 @@ class Explainer {
     const Hypothesis& h = hypothesis(family);
     return h.outside() && std::ranges::any_of(bends, [&](const Bend& b) {
              if (b.channel != h.channel || b.variable != h.variable) return false;
-             const auto effect = std::ranges::find_if(set, [&](std::size_t o) { return hypothesis(o).id() == b.effect; });
-             return effect != set.end() && share(set, estimate, family) < b.most * share(set, estimate, *effect);
+             const auto effect =
+                 std::ranges::find_if(set, [&](std::size_t o) { return hypothesis(o).id() == b.effect; });
+             return effect != set.end() &&
+                    share(set, estimate, family) < b.most * share(set, estimate, *effect);
            });
   }
 
-  // A flexible law bends to noise and to how a formula ends: where one effect of the catalogue says nearly as much,
-  // it stands for the law.
+  // A flexible law bends to noise and to how a formula ends: where one effect of the catalogue says nearly as
+  // much, it stands for the law.
   HypothesisSet named_by_catalogue(HypothesisSet set) {
     constexpr double nearly_all_of_stribeck = 0.85, nearly_all = 0.92;  // of the log odds that the law brings
     constexpr double close = 4;                                         // in log odds
@@ -194,7 +199,8 @@ class Explainer {
       if (f.log_odds < found_.front().log_odds - leading || ++looked_at > most_sets) break;
       const double weight = std::exp(f.log_odds - found_.front().log_odds);
       Simplified simple = simplified(f.set);
-      const auto [entry, first] = sets_.try_emplace(std::move(simple.kept), Kept{std::move(simple.whole), 0.0});
+      const auto [entry, first] =
+          sets_.try_emplace(std::move(simple.kept), Kept{std::move(simple.whole), 0.0});
       entry->second.probability += weight;
       total += weight;
     }
@@ -240,19 +246,24 @@ class Explainer {
     for (std::size_t b = 0; b < problem_.block_count(); ++b) {
       if (left_out_.empty() || !left_out_[b]) blocks.push_back(b);
     }
-    const std::vector<std::size_t> asked = columns.empty() ? std::vector<std::size_t>{0}
-                                                           : std::vector<std::size_t>(columns.begin(), columns.end());
-    Eigen::MatrixXd score(static_cast<Eigen::Index>(models_.size()), static_cast<Eigen::Index>(blocks.size()));
+    const std::vector<std::size_t> asked = columns.empty()
+                                               ? std::vector<std::size_t>{0}
+                                               : std::vector<std::size_t>(columns.begin(), columns.end());
+    Eigen::MatrixXd score(static_cast<Eigen::Index>(models_.size()),
+                          static_cast<Eigen::Index>(blocks.size()));
     Eigen::VectorXd whole(score.rows());
-    const std::vector<bool> none = left_out_.empty() ? std::vector<bool>(problem_.block_count(), false) : left_out_;
+    const std::vector<bool> none =
+        left_out_.empty() ? std::vector<bool>(problem_.block_count(), false) : left_out_;
     const Mixture all(problem_, none, asked);
-    for (Eigen::Index m = 0; m < score.rows(); ++m) whole[m] = all.log_joint(models_[static_cast<std::size_t>(m)]);
+    for (Eigen::Index m = 0; m < score.rows(); ++m)
+      whole[m] = all.log_joint(models_[static_cast<std::size_t>(m)]);
     for (std::size_t k = 0; k < blocks.size(); ++k) {
       std::vector<bool> out = none;
       out[blocks[k]] = true;
       const Mixture rest(problem_, out, asked);
       for (Eigen::Index m = 0; m < score.rows(); ++m)
-        score(m, static_cast<Eigen::Index>(k)) = whole[m] - rest.log_joint(models_[static_cast<std::size_t>(m)]);
+        score(m, static_cast<Eigen::Index>(k)) =
+            whole[m] - rest.log_joint(models_[static_cast<std::size_t>(m)]);
     }
     std::vector<std::size_t> size;
     for (const HypothesisSet& set : models_) size.push_back(set.size());
@@ -278,7 +289,8 @@ class Explainer {
     return p;
   }
 
-  // Other causes that would explain the data nearly as well in the place of one of the set, each by its best variant.
+  // Other causes that would explain the data nearly as well in the place of one of the set, each by its best
+  // variant.
   std::vector<Alternative> alternatives(const HypothesisSet& set, std::size_t member) const {
     const HypothesisSet rest = without(set, member);
     const double reference = mixture_.log_joint(set);
@@ -308,7 +320,8 @@ class Explainer {
     e.none_by_prediction = predicted([](const HypothesisSet& set) { return set.empty(); });
     e.outside = believed(has_outside);
     e.outside_by_prediction = predicted(has_outside);
-    const auto& best = *std::ranges::max_element(sets_, {}, [](const auto& entry) { return entry.second.probability; });
+    const auto& best =
+        *std::ranges::max_element(sets_, {}, [](const auto& entry) { return entry.second.probability; });
     // What does not matter by itself still belongs to what the data were fitted with.
     const HypothesisSet& set = best.second.whole;
     e.log_odds = odds(set);
@@ -350,13 +363,13 @@ class Explainer {
   const Problem& problem_;
   const std::vector<bool>& left_out_;
   const ExplainSettings& settings_;
-  std::vector<Found> found_;                  // best first
-  std::map<HypothesisSet, double> odds_;      // of sets asked for more than once
+  std::vector<Found> found_;              // best first
+  std::map<HypothesisSet, double> odds_;  // of sets asked for more than once
   struct Kept {
     HypothesisSet whole;  // of the likeliest set that comes to it
     double probability;   // by evidence, of all that do
   };
-  std::map<HypothesisSet, Kept> sets_;        // by what matters
+  std::map<HypothesisSet, Kept> sets_;  // by what matters
   std::vector<HypothesisSet> models_;
   std::optional<statistics::Selection> selection_;
 };
@@ -370,11 +383,13 @@ HypothesisSet Explanation::set() const {
   return set;
 }
 
-Explanation explain(const Mixture& mixture, const std::vector<bool>& left_out, const ExplainSettings& settings) {
+Explanation explain(const Mixture& mixture, const std::vector<bool>& left_out,
+                    const ExplainSettings& settings) {
   return Explainer(mixture, left_out, settings).run();
 }
 
-Explanation explain(const Problem& problem, const std::vector<bool>& left_out, const ExplainSettings& settings) {
+Explanation explain(const Problem& problem, const std::vector<bool>& left_out,
+                    const ExplainSettings& settings) {
   return explain(Mixture(problem, left_out), left_out, settings);
 }
 

@@ -13,8 +13,8 @@ struct ExplainSettings {
   std::size_t most_members = 4;   // of the catalogue and covariates
   std::size_t most_families = 2;  // of functions outside them
   std::size_t beam = 10;
-  // Whether a set says something that matters: members move less than this share of the mean power, unless the data
-  // leave no doubt.
+  // Whether a set says something that matters: members move less than this share of the mean power, unless
+  // the data leave no doubt.
   double least_share = 0.011, least_share_for_certain = 0.007;
   double least_outside_share = 0.012;
   bool predictive = true;  // false: evidence alone, while a linearisation is sought
@@ -29,12 +29,12 @@ struct Alternative {
 // One member of an explanation.
 struct Member {
   std::size_t hypothesis = 0;
-  // Probability that it is there: by the evidence of all data, and by how blocks are predicted that have no part in
-  // the fit. `group`: that it or one of its alternatives is.
+  // Probability that it is there: by the evidence of all data, and by how blocks are predicted that have no
+  // part in the fit. `group`: that it or one of its alternatives is.
   double by_evidence = 0, by_prediction = 0;
   double group_by_evidence = 0, group_by_prediction = 0;
-  double wander = 0;         // of its strength from block to block: posterior mean of the standard deviation over it
-  double share = 0;          // of the mean power that it moves
+  double wander = 0;  // of its strength from block to block: posterior mean of the standard deviation over it
+  double share = 0;   // of the mean power that it moves
   std::vector<double> coefficients, sd;
   std::vector<Alternative> alternatives;  // likeliest first
 
@@ -43,24 +43,26 @@ struct Member {
   double probability() const { return std::min(by_evidence, group_probability()); }
 };
 
-// What the data prefer, by two judges that share no assumption on noise: the evidence of all blocks, and how well each
-// block is predicted by the others (the smallest set within one standard error of the best).
+// What the data prefer, by two judges that share no assumption on noise: the evidence of all blocks, and how
+// well each block is predicted by the others (the smallest set within one standard error of the best).
 struct Explanation {
   std::vector<Member> members;  // of the likeliest set
   double none = 0;              // probability that nothing that matters is there, by evidence
   double none_by_prediction = 0;
-  double outside = 0;           // that something outside the catalogue is, by evidence
+  double outside = 0;  // that something outside the catalogue is, by evidence
   double outside_by_prediction = 0;
-  double log_odds = 0;          // of the set over nothing
-  HypothesisSet whole;          // the set with what does not matter by itself
+  double log_odds = 0;  // of the set over nothing
+  HypothesisSet whole;  // the set with what does not matter by itself
 
   HypothesisSet set() const;
 };
 
 // Of all blocks that are not left out.
-Explanation explain(const Problem& problem, const std::vector<bool>& left_out = {}, const ExplainSettings& settings = {});
+Explanation explain(const Problem& problem, const std::vector<bool>& left_out = {},
+                    const ExplainSettings& settings = {});
 
 // The same with the evidence at hand.
-Explanation explain(const Mixture& mixture, const std::vector<bool>& left_out, const ExplainSettings& settings);
+Explanation explain(const Mixture& mixture, const std::vector<bool>& left_out,
+                    const ExplainSettings& settings);
 
 }  // namespace joulecast::gap

@@ -77,7 +77,8 @@ std::optional<FitResult> fit_windows(const Material& whole, std::span<const Caus
     reached = std::min(reached, now);
     result.linear = std::move(linear);
     result.causes = next;
-    const Problem problem = make_problem(*result.linear.columns, result.linear.rows, result.linear.noise, material.blocks);
+    const Problem problem =
+        make_problem(*result.linear.columns, result.linear.rows, result.linear.noise, material.blocks);
     const Mixture mixture(problem);
     const Explanation explanation = explain(mixture, {}, quick);
     result.log_joint = mixture.log_joint(explanation.whole);

@@ -19,14 +19,15 @@ struct FitResult {
   Linear linear;
   Shapes shapes;
   std::vector<Cause> causes;  // around which it rests
-  // What every robot has (base_fit), where the file is so far off that all of it is estimated anew; empty: not so.
+  // What every robot has (base_fit), where the file is so far off that all of it is estimated anew; empty:
+  // not so.
   std::vector<Cause> base;
-  double log_joint = 0;                         // of the best explanation, to compare starts by
-  bool rests = false;                           // false: it would go on to something worse
+  double log_joint = 0;  // of the best explanation, to compare starts by
+  bool rests = false;    // false: it would go on to something worse
 };
 
-// Searches from `start`, linearises around what it finds, narrows shapes and searches again until the set and its
-// strengths rest. Empty when `goes_on` returns false.
+// Searches from `start`, linearises around what it finds, narrows shapes and searches again until the set and
+// its strengths rest. Empty when `goes_on` returns false.
 std::optional<FitResult> fit_windows(const Material& material, std::span<const Cause> start,
                                      const FitSettings& settings, const std::function<bool()>& goes_on);
 

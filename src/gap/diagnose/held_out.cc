@@ -36,8 +36,8 @@ struct Rest {
   }
 };
 
-// The same point of linearisation with a zone more for each part, where the rest of the floor says that one is. In the
-// order of the parts; a part without its own zone has the first.
+// The same point of linearisation with a zone more for each part, where the rest of the floor says that one
+// is. In the order of the parts; a part without its own zone has the first.
 Linear with_zones(const Material& m, const FitResult& fit, const FitSettings& settings, std::size_t parts,
                   std::vector<std::size_t>& zone_of_part) {
   Shapes scan, shapes = fit.shapes;
@@ -150,7 +150,8 @@ std::vector<double> held_out_shares(const Material& m, const FitResult& fit, con
           std::vector<Cause> some = part.others;
           for (const std::size_t k : members) some.push_back(part.named[k]);
           const std::vector<double> modelled = modelled_power(m.robot, m.adopted, some, part.windows);
-          for (std::size_t k = 0; k < modelled.size(); ++k) missed += std::fabs(part.measured[k] - modelled[k]);
+          for (std::size_t k = 0; k < modelled.size(); ++k)
+            missed += std::fabs(part.measured[k] - modelled[k]);
         }
         return missed;
       });

@@ -32,14 +32,16 @@ struct HeldOut {
   double relative(double BlockErrors::*error) const;
 };
 
-// Leaves out a part of the blocks at a time and does everything again without it: zone, noise, effects with their
-// shapes, strengths; then predicts it. Only the point around which everything is linear stays. `power_w`: measured,
-// of the windows. Empty when `goes_on` returns false.
-std::optional<HeldOut> hold_out(const Material& material, const FitResult& fit, std::span<const double> power_w,
-                                const FitSettings& settings, const std::function<bool(double)>& goes_on);
+// Leaves out a part of the blocks at a time and does everything again without it: zone, noise, effects with
+// their shapes, strengths; then predicts it. Only the point around which everything is linear stays.
+// `power_w`: measured, of the windows. Empty when `goes_on` returns false.
+std::optional<HeldOut> hold_out(const Material& material, const FitResult& fit,
+                                std::span<const double> power_w, const FitSettings& settings,
+                                const std::function<bool(double)>& goes_on);
 
-// How much of the gap each named cause closes on held-out parts (Shapley), strengths fitted without each part; what else
-// is estimated (FitResult::base) is there throughout. All are 0 where power was not measured; at most the first six share.
+// How much of the gap each named cause closes on held-out parts (Shapley), strengths fitted without each
+// part; what else is estimated (FitResult::base) is there throughout. All are 0 where power was not measured;
+// at most the first six share.
 std::vector<double> held_out_shares(const Material& material, const FitResult& fit, const Problem& problem,
                                     const HypothesisSet& named, std::span<const double> power_w);
 

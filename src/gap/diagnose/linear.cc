@@ -7,8 +7,8 @@
 namespace joulecast::gap {
 namespace {
 
-// How well a robot keeps to its file, as a factor on tolerances and scatter, and how far formulas are off, as a part
-// of the mean power. Both are averaged over; the factor is taken to lie near one.
+// How well a robot keeps to its file, as a factor on tolerances and scatter, and how far formulas are off, as
+// a part of the mean power. Both are averaged over; the factor is taken to lie near one.
 constexpr std::array keeping{0.5, 1.0, 2.0};
 constexpr std::array formulas{0.0, 0.001, 0.003};
 
@@ -21,7 +21,8 @@ class Moved {
       if (r.y.size() == 0) continue;
       Sampled sampled;
       sampled.place.assign(columns.size(), -1);
-      for (std::size_t k = 0; k < r.columns.size(); ++k) sampled.place[r.columns[k]] = static_cast<Eigen::Index>(k);
+      for (std::size_t k = 0; k < r.columns.size(); ++k)
+        sampled.place[r.columns[k]] = static_cast<Eigen::Index>(k);
       const Eigen::Index stride = std::max<Eigen::Index>(1, r.y.size() / most);
       sampled.x = r.x(Eigen::seq(0, r.y.size() - 1, stride), Eigen::all);
       sampled.size = std::max(r.y(Eigen::seq(0, r.y.size() - 1, stride)).cwiseAbs().mean(), 1e-12);
@@ -47,7 +48,8 @@ class Moved {
     return std::sqrt(square);
   }
 
-  // The largest ratio, over channels in which they matter, of what members move one by one to what they move together.
+  // The largest ratio, over channels in which they matter, of what members move one by one to what they move
+  // together.
   double cancelling(const std::vector<Hypothesis>& hypotheses, const HypothesisSet& set,
                     const Eigen::VectorXd& coefficients) const {
     constexpr double matters = 0.1;  // of what the channel's response is
@@ -65,7 +67,8 @@ class Moved {
         }
         at += n;
       }
-      if (apart > matters * c.size) most = std::max(most, apart / std::max(together.cwiseAbs().mean(), 1e-12));
+      if (apart > matters * c.size)
+        most = std::max(most, apart / std::max(together.cwiseAbs().mean(), 1e-12));
     }
     return most;
   }
@@ -73,10 +76,11 @@ class Moved {
  private:
   struct Sampled {
     Eigen::MatrixXd x;
-    double size = 1;                   // mean |response|
-    std::vector<Eigen::Index> place;   // of each column, -1: does not speak here
+    double size = 1;                  // mean |response|
+    std::vector<Eigen::Index> place;  // of each column, -1: does not speak here
 
-    Eigen::VectorXd moved(const std::vector<std::size_t>& columns, const Eigen::VectorXd& coefficients) const {
+    Eigen::VectorXd moved(const std::vector<std::size_t>& columns,
+                          const Eigen::VectorXd& coefficients) const {
       Eigen::VectorXd sum;
       for (std::size_t k = 0; k < columns.size(); ++k) {
         const Eigen::Index at = place[columns[k]];
@@ -180,7 +184,8 @@ std::vector<Cause> half_way(std::span<const Cause> from, std::vector<Cause> to) 
   const auto halve = [](Cause& cause, const dynamics::EffectValues<double>& other) {
     const auto& parameters = cause.effect.effect->info().parameters;
     for (std::size_t k = 0; k < parameters.size(); ++k) {
-      if (k == 0 || parameters[k].strength) cause.effect.values[k] = 0.5 * (cause.effect.values[k] + other[k]);
+      if (k == 0 || parameters[k].strength)
+        cause.effect.values[k] = 0.5 * (cause.effect.values[k] + other[k]);
     }
   };
   const auto find = [](auto& among, const Cause& cause) {

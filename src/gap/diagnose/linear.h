@@ -24,12 +24,13 @@ std::vector<Window> thinned(std::span<const Window> windows);
 Linear linearise(const Material& material, const Shapes& shapes, std::span<const double> shares,
                  std::span<const Cause> around);
 
-// The problem that rows come to under a noise; `response`: in place of the rows' own. `columns` must outlive it.
+// The problem that rows come to under a noise; `response`: in place of the rows' own. `columns` must outlive
+// it.
 Problem make_problem(const ColumnSet& columns, const Rows& rows, const Noise& noise, std::size_t blocks,
                      const Responses* response = nullptr);
 
-// How far the equations are from zero where a linearisation stands, as a multiple of what `noise` says of each channel:
-// by sizes, not squares, so that what one window does decides nothing.
+// How far the equations are from zero where a linearisation stands, as a multiple of what `noise` says of
+// each channel: by sizes, not squares, so that what one window does decides nothing.
 double misfit(const Linear& linear, const Noise& noise);
 
 // Half way from one set of causes to another.

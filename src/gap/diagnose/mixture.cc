@@ -62,7 +62,8 @@ Mixture::Mixture(const Problem& problem, const std::vector<bool>& left_out)
   }
 }
 
-Mixture::Mixture(const Problem& problem, const std::vector<bool>& left_out, const std::vector<std::size_t>& columns)
+Mixture::Mixture(const Problem& problem, const std::vector<bool>& left_out,
+                 const std::vector<std::size_t>& columns)
     : problem_(&problem), left_out_(left_out) {
   const Circumstances& now = problem.plain;
   Evidence evidence(sum_of(problem.blocks[now.noise], left_out), now.tolerance, columns);
@@ -112,8 +113,7 @@ std::vector<double> Mixture::wander(const HypothesisSet& set, std::size_t member
   Eigen::Index first = 0;
   for (std::size_t k = 0; k < member; ++k)
     first += static_cast<Eigen::Index>(problem_->hypotheses[set[k]].candidate.columns.size());
-  const double strength =
-      estimate.mean.segment(first, static_cast<Eigen::Index>(own.columns.size())).norm();
+  const double strength = estimate.mean.segment(first, static_cast<Eigen::Index>(own.columns.size())).norm();
   std::vector<std::size_t> columns;
   for (const Candidate* c : candidates) columns.insert(columns.end(), c->columns.begin(), c->columns.end());
   std::ranges::sort(columns);
@@ -146,7 +146,8 @@ std::vector<double> Mixture::wander(const HypothesisSet& set, std::size_t member
 
 std::vector<double> Mixture::by_block(const HypothesisSet& set, std::size_t member) const {
   const std::vector<double> likely = wander(set, member);
-  const double relative = wander_grid[static_cast<std::size_t>(std::ranges::max_element(likely) - likely.begin())];
+  const double relative =
+      wander_grid[static_cast<std::size_t>(std::ranges::max_element(likely) - likely.begin())];
   const Part& part = likeliest(set);
   const Evidence::Estimate estimate = part.evidence.estimate(candidates_of(*problem_, set));
   // All other coefficients as they are found for all blocks.
@@ -169,7 +170,8 @@ std::vector<double> Mixture::by_block(const HypothesisSet& set, std::size_t memb
       strengths.push_back(std::numeric_limits<double>::quiet_NaN());
       continue;
     }
-    const double says = blocks[b].xy[column] - blocks[b].xx.col(column).dot(others), weight = blocks[b].xx(column, column);
+    const double says = blocks[b].xy[column] - blocks[b].xx.col(column).dot(others),
+                 weight = blocks[b].xx(column, column);
     strengths.push_back(relative > 0 ? (says + precision * mean) / (weight + precision) : mean);
   }
   return strengths;

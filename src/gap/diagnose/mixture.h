@@ -10,11 +10,11 @@ namespace joulecast::gap {
 // Evidence of some blocks of a problem, averaged over its circumstances.
 class Mixture {
  public:
-  // Of all blocks that are not left out. Circumstances that neither nothing nor any single hypothesis makes plausible
-  // are dropped.
+  // Of all blocks that are not left out. Circumstances that neither nothing nor any single hypothesis makes
+  // plausible are dropped.
   explicit Mixture(const Problem& problem, const std::vector<bool>& left_out = {});
-  // The same under plain circumstances alone, for sets of these columns (ascending): what each set predicts by itself,
-  // without what formulas that are off could add to it.
+  // The same under plain circumstances alone, for sets of these columns (ascending): what each set predicts
+  // by itself, without what formulas that are off could add to it.
   Mixture(const Problem& problem, const std::vector<bool>& left_out, const std::vector<std::size_t>& columns);
 
   const Problem& problem() const { return *problem_; }
@@ -30,12 +30,13 @@ class Mixture {
   };
   Estimate estimate(const HypothesisSet& set) const;
 
-  // How the wander of one member's strength from block to block, as a standard deviation over the strength itself,
-  // is distributed: probabilities of the values in wander_grid.
+  // How the wander of one member's strength from block to block, as a standard deviation over the strength
+  // itself, is distributed: probabilities of the values in wander_grid.
   std::vector<double> wander(const HypothesisSet& set, std::size_t member) const;
 
-  // First coefficient of one member in every block, as far as each block says something beyond what all together do:
-  // the strength of all, drawn to what the block alone would have, with the wander that is likeliest. NaN: left out.
+  // First coefficient of one member in every block, as far as each block says something beyond what all
+  // together do: the strength of all, drawn to what the block alone would have, with the wander that is
+  // likeliest. NaN: left out.
   std::vector<double> by_block(const HypothesisSet& set, std::size_t member) const;
 
   // Expected log odds of one hypothesis' first coefficient at a strength over another in its place.

@@ -80,8 +80,9 @@ std::vector<Cause> strengths_of(const ColumnSet& columns, const Problem& problem
   return columns.causes_of(chosen);
 }
 
-Named name_causes(const Material& m, const ColumnSet& columns, const Problem& problem, const Explanation& explanation,
-                  std::span<const double> power_w, const std::vector<bool>& left_out) {
+Named name_causes(const Material& m, const ColumnSet& columns, const Problem& problem,
+                  const Explanation& explanation, std::span<const double> power_w,
+                  const std::vector<bool>& left_out) {
   HypothesisSet set = likely_causes(problem, explanation);
   std::vector<double> measured;
   std::vector<Window> windows;

@@ -12,16 +12,16 @@ inline constexpr double least_named = 0.5;     // probability of a name
 inline constexpr double most_wander = 0.8;     // of a strength, over the strength, that still is that cause
 inline constexpr double steady_wander = 0.45;  // up to which it stands still
 
-// Whether a cause has to show in battery power (or in the motors') to be worth a name. The others are seen by other
-// channels however little power they move.
+// Whether a cause has to show in battery power (or in the motors') to be worth a name. The others are seen by
+// other channels however little power they move.
 bool shows_in_power(const Hypothesis& hypothesis);
 
-// Share of the power that a cause has to move to be surely seen: the median over causes that show in power of what is so
-// many standard deviations of each by itself.
+// Share of the power that a cause has to move to be surely seen: the median over causes that show in power of
+// what is so many standard deviations of each by itself.
 double seen_share(const Problem& problem);
 
-// Of an explanation, those that are there, or one of their group, with even odds or better by both judges, and that
-// stand still.
+// Of an explanation, those that are there, or one of their group, with even odds or better by both judges,
+// and that stand still.
 HypothesisSet likely_causes(const Problem& problem, const Explanation& explanation);
 
 // Causes to name, with the strengths that they have by themselves where everything is linear.
@@ -30,9 +30,11 @@ struct Named {
   std::vector<Cause> causes;  // in the order of the set
 };
 
-// The likely causes that the gap needs. All of it without the blocks left out; `power_w`: measured, of the windows.
+// The likely causes that the gap needs. All of it without the blocks left out; `power_w`: measured, of the
+// windows.
 Named name_causes(const Material& material, const ColumnSet& columns, const Problem& problem,
-                  const Explanation& explanation, std::span<const double> power_w, const std::vector<bool>& left_out);
+                  const Explanation& explanation, std::span<const double> power_w,
+                  const std::vector<bool>& left_out);
 
 // The strengths with which these causes alone leave least, of all blocks not left out.
 std::vector<Cause> strengths_of(const ColumnSet& columns, const Problem& problem, const HypothesisSet& named,

@@ -3,14 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "gap/diagnose/ripple.h"
 #include "gap/diagnose/channel_gaps.h"
 #include "gap/diagnose/controls.h"
 #include "gap/diagnose/held_out.h"
 #include "gap/diagnose/naming.h"
 #include "gap/diagnose/referee.h"
 #include "gap/diagnose/refit.h"
+#include "gap/diagnose/ripple.h"
 #include "gap/equations/power.h"
+#include "gap/traits.h"
 #include "gap/verdict/figures.h"
 #include "gap/verdict/judge.h"
 #include "gap/verdict/next_drive.h"
@@ -24,8 +25,10 @@ namespace joulecast::gap {
 namespace {
 
 constexpr std::size_t fewest_windows = 40;
-constexpr double large_gap = 0.15, huge_gap = 0.25;  // of the power: where more may be there, and another start
-constexpr double usual_share = 0.07, large_share = 0.3;  // of the mean power, that an effect which is there may move
+constexpr double large_gap = 0.15,
+                 huge_gap = 0.25;  // of the power: where more may be there, and another start
+constexpr double usual_share = 0.07,
+                 large_share = 0.3;  // of the mean power, that an effect which is there may move
 constexpr std::size_t more_members = 6;
 constexpr double settled_delay_s = 0.006, settled_bias = 0.1;
 constexpr int most_delay_rounds = 3;
@@ -45,26 +48,10 @@ void take_out(std::span<const Cause> causes, windows::WindowSettings& settings) 
   }
 }
 
-// Share of the power that an effect has to move to be surely seen here: the median over effects of what is so many
-// standard deviations of each by itself.
-double detectable_share(const Problem& problem) {
-  constexpr double deviations = 3.5;
-  const Mixture mixture(problem);
-  std::vector<std::string> seen;
-  std::vector<double> shares;
-  for (std::size_t h = 0; h < problem.hypotheses.size(); ++h) {
-    const Hypothesis& hypothesis = problem.hypotheses[h];
-    if (!hypothesis.is_effect() || !shows_in_power(hypothesis)) continue;
-    if (std::ranges::find(seen, hypothesis.id()) != seen.end()) continue;
-    seen.push_back(hypothesis.id());
-    shares.push_back(problem.moved(hypothesis, deviations * mixture.estimate({h}).sd));
-  }
-  return shares.empty() ? missing : statistics::median(shares);
-}
-
 class Diagnoser {
  public:
-  Diagnoser(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot, const DiagnosisSettings& settings)
+  Diagnoser(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
+            const DiagnosisSettings& settings)
       : recordings_(recordings), robot_(robot), settings_(settings) {}
 
   Result<Diagnosis> run();
@@ -78,7 +65,8 @@ class Diagnoser {
 
   bool goes_on(double part) const { return !settings_.progress || settings_.progress(part); }
   Material material() const {
-    return {robot_, adopted_, view_.windows, blocks_, from_motion_, readings_.row_s, covariates_, settings_.prior_factor};
+    return {robot_,       adopted_,        view_.windows, blocks_,
+            from_motion_, readings_.row_s, covariates_,   settings_.prior_factor};
   }
   std::vector<double> modelled(std::span<const Cause> causes) const {
     return modelled_power(robot_, adopted_, causes, view_.windows);
@@ -89,6 +77,7 @@ class Diagnoser {
   void measure();
   bool fit();
   bool judge_all();
+  void name_base(const Problem& problem, Explanation& explanation, Named& named) const;
   std::vector<dynamics::ActiveEffect> instead_of(const Problem& problem, const Member& member) const;
   void add_wander(const Problem& problem, const Explanation& explanation, Findings& findings) const;
   void add_baseline();
@@ -177,8 +166,8 @@ bool Diagnoser::fit() {
   }
   const double settled_bias_a = settled_bias * robot_.motor.friction_torque_nm[0] /
                                 (robot_.motor.torque_constant_nm_a * robot_.motor.gear_ratio);
-  // A delay is linear only while it is short beside the window, a bias only while it turns no current's sign: what is
-  // found is taken out of the windows and fitted again.
+  // A delay is linear only while it is short beside the window, a bias only while it turns no current's sign:
+  // what is found is taken out of the windows and fitted again.
   for (int round = 0;; ++round) {
     const auto still = [&] { return goes_on(after_fit * 0.5); };
     fit_ = fit_windows(material(), {}, fit_settings_, still);
@@ -192,15 +181,61 @@ bool Diagnoser::fit() {
     if (!fit_) return false;
     const windows::WindowSettings before = taken_out_;
     take_out(fit_->causes, taken_out_);
-    const bool settled = std::fabs(taken_out_.electrical_delay_s - before.electrical_delay_s) < settled_delay_s &&
-                         std::fabs(taken_out_.motor_current_bias_a - before.motor_current_bias_a) < settled_bias_a;
+    const bool settled =
+        std::fabs(taken_out_.electrical_delay_s - before.electrical_delay_s) < settled_delay_s &&
+        std::fabs(taken_out_.motor_current_bias_a - before.motor_current_bias_a) < settled_bias_a;
     if (settled || round >= most_delay_rounds) return goes_on(after_fit);
     view_ = view_of(taken_out_);
   }
 }
 
+// Of what every robot has, estimated anew, what no parameter of a robot file says is named as well: beside
+// all that is there already it has its own evidence.
+void Diagnoser::name_base(const Problem& problem, Explanation& explanation, Named& named) const {
+  HypothesisSet whole = named.set;
+  std::vector<std::size_t> more;
+  for (const Cause& cause : fit_->base) {
+    const auto is_it = [&](const Hypothesis& h) { return !h.outside() && h.cause().same_kind(cause); };
+    const auto h = static_cast<std::size_t>(std::ranges::find_if(problem.hypotheses, is_it) -
+                                            problem.hypotheses.begin());
+    if (h == problem.hypotheses.size() || !traits_of(problem.hypotheses[h].id()).calibrates.empty()) continue;
+    const auto clashes = [&](std::size_t o) { return problem.hypotheses[o].excludes(problem.hypotheses[h]); };
+    if (std::ranges::any_of(whole, clashes)) continue;
+    more.push_back(h);
+    whole.insert(std::ranges::lower_bound(whole, h), h);
+  }
+  const Mixture mixture(problem);
+  const std::vector<Cause> causes = strengths_of(*fit_->linear.columns, problem, whole, {});
+  const Mixture::Estimate estimate = mixture.estimate(whole);
+  for (const std::size_t h : more) {
+    const auto place = static_cast<std::size_t>(std::ranges::find(whole, h) - whole.begin());
+    HypothesisSet rest = whole;
+    std::erase(rest, h);
+    Member m;
+    m.hypothesis = h;
+    m.by_evidence = m.group_by_evidence =
+        1 / (1 + std::exp(mixture.log_odds(rest) - mixture.log_odds(whole)));
+    m.by_prediction = m.group_by_prediction = 1;
+    if (m.by_evidence < least_named) continue;
+    Eigen::Index first = 0;
+    for (std::size_t k = 0; k < place; ++k)
+      first += static_cast<Eigen::Index>(problem.hypotheses[whole[k]].candidate.columns.size());
+    m.coefficients = {estimate.mean[first]};
+    m.sd = {estimate.sd[first]};
+    m.share = problem.moved(problem.hypotheses[h], estimate.mean.segment(first, 1));
+    std::erase_if(explanation.members, [&](const Member& other) { return other.hypothesis == h; });
+    explanation.members.push_back(m);
+    if (std::ranges::find(explanation.whole, h) == explanation.whole.end())
+      explanation.whole.insert(std::ranges::lower_bound(explanation.whole, h), h);
+    const auto at = std::ranges::lower_bound(named.set, h);
+    named.causes.insert(named.causes.begin() + (at - named.set.begin()), causes[place]);
+    named.set.insert(at, h);
+  }
+}
+
 // What each alternative of a named member would be in its place.
-std::vector<dynamics::ActiveEffect> Diagnoser::instead_of(const Problem& problem, const Member& member) const {
+std::vector<dynamics::ActiveEffect> Diagnoser::instead_of(const Problem& problem,
+                                                          const Member& member) const {
   std::vector<dynamics::ActiveEffect> effects;
   for (const Alternative& a : member.alternatives) {
     if (!problem.hypotheses[a.hypothesis].is_effect()) continue;
@@ -229,9 +264,11 @@ void Diagnoser::add_wander(const Problem& problem, const Explanation& explanatio
   }
   if (!f.wandering) return;
   const Member& m = explanation.members[*f.wandering];
-  const auto place = static_cast<std::size_t>(std::ranges::find(explanation.whole, m.hypothesis) - explanation.whole.begin());
+  const auto place = static_cast<std::size_t>(std::ranges::find(explanation.whole, m.hypothesis) -
+                                              explanation.whole.begin());
   const std::vector<double> by_block = Mixture(problem).by_block(explanation.whole, place);
-  const double mean_w = m.share * fit_->linear.columns->mean_power_w() / std::max(std::fabs(m.coefficients[0]), 1e-12);
+  const double mean_w =
+      m.share * fit_->linear.columns->mean_power_w() / std::max(std::fabs(m.coefficients[0]), 1e-12);
   const std::size_t third = std::max<std::size_t>(1, by_block.size() / 3);
   for (std::size_t b = 0; b < third; ++b) {
     f.wandering_power_w[0] += by_block[b] * mean_w / static_cast<double>(third);
@@ -253,7 +290,9 @@ void Diagnoser::add_baseline() {
     const double ours = model.fit().coefficients[at];  // what the model itself comes to in the same term
     b.terms.push_back({term.name, term.unit, data, sd, ours});
     constexpr double clear = 3, notable = 0.2;
-    if (!(sd > 0) || std::fabs(data - ours) < clear * sd || std::fabs(data - ours) < notable * std::fabs(data)) continue;
+    if (!(sd > 0) || std::fabs(data - ours) < clear * sd ||
+        std::fabs(data - ours) < notable * std::fabs(data))
+      continue;
     b.says.push_back(referee_words(term, data, ours));
   }
   d_.baseline = std::move(b);
@@ -286,15 +325,13 @@ void Diagnoser::add_shrinkage() {
 }
 
 bool Diagnoser::judge_all() {
-  const Problem problem =
-      make_problem(*fit_->linear.columns, fit_->linear.rows, fit_->linear.noise, blocks_);
+  const Problem problem = make_problem(*fit_->linear.columns, fit_->linear.rows, fit_->linear.noise, blocks_);
   Explanation explanation = explain(problem, {}, fit_settings_.explain);
-  d_.detectable_share = detectable_share(problem);
+  d_.detectable_share = seen_share(problem);
   Named named = name_causes(material(), *fit_->linear.columns, problem, explanation, view_.power_w, {});
   named_ = named.set;
-  held_out_ = hold_out(material(), *fit_, view_.power_w, fit_settings_, [&](double part) {
-    return goes_on(std::lerp(after_fit, after_parts, part));
-  });
+  held_out_ = hold_out(material(), *fit_, view_.power_w, fit_settings_,
+                       [&](double part) { return goes_on(std::lerp(after_fit, after_parts, part)); });
   if (!held_out_) return false;
   if (!fit_->base.empty()) {
     if (held_out_->based() < held_out_->explained()) {
@@ -303,6 +340,8 @@ bool Diagnoser::judge_all() {
       fit_->base.clear();
     }
   }
+  if (!fit_->base.empty()) name_base(problem, explanation, named);
+  named_ = named.set;
   causes_ = refit(material(), joined(fit_->base, named.causes));
   const ControlSettings controls{fit_settings_.explain, settings_.controls, settings_.threads};
   auto made = control(material(), fit_->linear, problem, explanation, controls,
@@ -315,10 +354,14 @@ bool Diagnoser::judge_all() {
   std::optional<Ripple> ripple;
   // Where readings are repeated over rows, what repeats with the wheel is the rows.
   if (!readings_.held())
-    ripple = find_ripple(recordings_, robot_, all, d_.motor_channels, taken_out_.electrical_delay_s, ripple_surrogates);
+    ripple = find_ripple(recordings_, robot_, all, d_.motor_channels, taken_out_.electrical_delay_s,
+                         ripple_surrogates);
 
-  Findings f{problem, explanation, settings_.controls > 0 ? std::move(*made) : std::vector<Controls>{}, named_, {}, {},
-             {}, {}, {}, held_out_, ripple, std::nullopt, {}};
+  Findings f{problem,   explanation, settings_.controls > 0 ? std::move(*made) : std::vector<Controls>{},
+             named_,    {},          {},
+             {},        {},          {},
+             held_out_, ripple,      std::nullopt,
+             {}};
   const std::vector<double> after = modelled(causes_);
   f.shares = held_out_shares(material(), *fit_, problem, named_, view_.power_w);
   f.base = causes_;

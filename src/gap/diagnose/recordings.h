@@ -3,8 +3,8 @@
 #include <functional>
 
 #include "base/error.h"
-#include "telemetry/recording_set.h"
 #include "gap/verdict/diagnosis.h"
+#include "telemetry/recording_set.h"
 
 namespace joulecast::gap {
 
@@ -15,8 +15,8 @@ struct DiagnosisSettings {
   std::function<bool(double)> progress;  // called with 0..1; false cancels
 };
 
-// From recordings of one robot. Fault::invalid for unusable recordings or a robot file whose effects the catalogue
-// rejects, Fault::conflict when cancelled.
+// From recordings of one robot. Fault::invalid for unusable recordings or a robot file whose effects the
+// catalogue rejects, Fault::conflict when cancelled.
 Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
                            const DiagnosisSettings& settings = {});
 

@@ -47,7 +47,8 @@ Referee::Referee(const Material& m, std::span<const double> power_w, const std::
 }
 
 std::string referee_words(const RefereeTerm& term, double data, double model) {
-  return sentence(fmt::format("the data have {} {}; the model has {}", brief(data), term.words, brief(model)));
+  return sentence(
+      fmt::format("the data have {} {}; the model has {}", brief(data), term.words, brief(model)));
 }
 
 }  // namespace joulecast::gap

@@ -15,8 +15,8 @@ struct RefereeTerm {
   std::string words;  // "so many W ..."
 };
 
-// P = c0 + c1 |v| + c2 |v_right - v_left| + c3 v a, with climb c v sin(climb), with covariates c for each, fitted
-// robustly. The referee of a diagnosis: what predicts held-out data worse than this is no explanation.
+// P = c0 + c1 |v| + c2 |v_right - v_left| + c3 v a, with climb c v sin(climb), with covariates c for each,
+// fitted robustly. The referee of a diagnosis: what predicts held-out data worse than this is no explanation.
 class Referee {
  public:
   // On the windows in which `use` holds and power is known.

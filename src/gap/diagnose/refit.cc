@@ -12,8 +12,8 @@ namespace joulecast::gap {
 namespace {
 
 constexpr int most_steps = 12, most_halvings = 4;
-constexpr double better = 0.998;     // misfit, over the one before: a step that gains less is the last
-constexpr double wide_share = 1;     // of the mean power, that a strength is held by
+constexpr double better = 0.998;  // misfit, over the one before: a step that gains less is the last
+constexpr double wide_share = 1;  // of the mean power, that a strength is held by
 constexpr double noticed_share = 0.002;
 
 Shapes shapes_of(std::span<const Cause> causes, const robot::RobotModel& robot) {
@@ -34,7 +34,8 @@ std::vector<Cause> step(const Material& material, const Linear& linear, std::spa
   const ColumnSet& columns = *linear.columns;
   Eigen::VectorXd sd(static_cast<Eigen::Index>(columns.size()));
   for (std::size_t k = 0; k < columns.size(); ++k)
-    sd[static_cast<Eigen::Index>(k)] = std::hypot(columns.columns()[k].tolerance, columns.columns()[k].scatter);
+    sd[static_cast<Eigen::Index>(k)] =
+        std::hypot(columns.columns()[k].tolerance, columns.columns()[k].scatter);
   for (const Hypothesis& h : columns.hypotheses()) {
     for (const std::size_t k : h.candidate.columns) sd[static_cast<Eigen::Index>(k)] = 0;
   }
@@ -47,22 +48,24 @@ std::vector<Cause> step(const Material& material, const Linear& linear, std::spa
     for (const std::size_t k : candidate.columns) sd[static_cast<Eigen::Index>(k)] = candidate.expected;
   }
   statistics::Information total;
-  for (const auto& block : block_information(columns, linear.rows, linear.noise, material.blocks)) total += block;
+  for (const auto& block : block_information(columns, linear.rows, linear.noise, material.blocks))
+    total += block;
   const statistics::Ridge ridge = statistics::ridge(total, sd);
   std::vector<Chosen> chosen;
   for (const std::size_t h : free) {
     const auto& candidate = columns.hypotheses()[h].candidate;
     Chosen c{h, {}};
     for (const std::size_t k : candidate.columns)
-      c.coefficients.push_back(std::clamp(ridge.mean[static_cast<Eigen::Index>(k)], candidate.least, candidate.most));
+      c.coefficients.push_back(
+          std::clamp(ridge.mean[static_cast<Eigen::Index>(k)], candidate.least, candidate.most));
     chosen.push_back(std::move(c));
   }
   return columns.causes_of(chosen);
 }
 
 // The effects that make the robot file's model the plain regression.
-std::vector<Cause> as_regression(const Material& m, std::span<const double> power_w,
-                                                  const ColumnSet& columns, std::span<const std::string_view> ids) {
+std::vector<Cause> as_regression(const Material& m, std::span<const double> power_w, const ColumnSet& columns,
+                                 std::span<const std::string_view> ids) {
   const Referee referee(m, power_w);
   const auto& c = referee.fit().coefficients;
   const auto& k = m.robot.kinematics;
@@ -84,9 +87,9 @@ std::vector<Cause> as_regression(const Material& m, std::span<const double> powe
     const std::string id = hypothesis.id();
     if (std::ranges::find(ids, id) == ids.end()) continue;
     const bool ratio = hypothesis.parameter == 0;
-    const double value = id == "accessory_load"       ? c[0] - m.robot.idle_power_w
-                         : id == "coulomb_friction"   ? (ratio ? torque_nm / file_nm - 1 : torque_nm - file_nm)
-                         : id == "turning_scrub"      ? scrub - file_scrub
+    const double value = id == "accessory_load"     ? c[0] - m.robot.idle_power_w
+                         : id == "coulomb_friction" ? (ratio ? torque_nm / file_nm - 1 : torque_nm - file_nm)
+                         : id == "turning_scrub"    ? scrub - file_scrub
                          : id == "chassis_mass_error" ? chassis_kg / mass.chassis_kg - 1
                          : id == "resistance_error"   ? hypothesis.candidate.least
                                                       : 0.0;
@@ -129,8 +132,8 @@ std::vector<Cause> refit(const Material& material, std::vector<Cause> causes) {
 }
 
 std::vector<Cause> base_fit(const Material& material, std::span<const double> power_w) {
-  constexpr std::array<std::string_view, 7> ids{"accessory_load", "coulomb_friction", "viscous_friction",
-                                                "chassis_mass_error", "turning_scrub", "aerodynamic_drag",
+  constexpr std::array<std::string_view, 7> ids{"accessory_load",     "coulomb_friction", "viscous_friction",
+                                                "chassis_mass_error", "turning_scrub",    "aerodynamic_drag",
                                                 "resistance_error"};
   // Resistance to turning that sets in at once, as of tyres that slide, or with the rate of turning.
   constexpr std::array scrub_rates_rad_s{0.03, 0.1, 0.3};
@@ -142,7 +145,8 @@ std::vector<Cause> base_fit(const Material& material, std::span<const double> po
     const ColumnSet columns(material, shapes, std::array{wide_share});
     std::vector<Cause> causes = rest(material, shapes, as_regression(material, power_w, columns, ids));
     const double gap =
-        gap_size(power_w, modelled_power(material.robot, material.adopted, causes, material.windows)).absolute_relative;
+        gap_size(power_w, modelled_power(material.robot, material.adopted, causes, material.windows))
+            .absolute_relative;
     if (gap >= least) continue;
     least = gap;
     std::erase_if(causes, [&](const Cause& cause) {

@@ -195,9 +195,10 @@ std::vector<Stretch> stretches_of(std::span<const Track> tracks, std::size_t s, 
   return found;
 }
 
-// What the model leaves of the current of a wheel's motor, or of the battery power, in every step of a mission; NaN
-// where something is not measured. Step k ends at sample k.
-std::vector<double> leftover(const Track& track, std::size_t s, const dynamics::DriveModel& model, bool motors) {
+// What the model leaves of the current of a wheel's motor, or of the battery power, in every step of a
+// mission; NaN where something is not measured. Step k ends at sample k.
+std::vector<double> leftover(const Track& track, std::size_t s, const dynamics::DriveModel& model,
+                             bool motors) {
   std::vector<double> values(track.size(), std::numeric_limits<double>::quiet_NaN());
   for (std::size_t k = 1; k + track.late < track.size(); ++k) {
     const Sample &a = track.at(k - 1), &b = track.at(k);
@@ -219,8 +220,8 @@ std::vector<double> leftover(const Track& track, std::size_t s, const dynamics::
 }
 
 // The leftovers of a stretch over the wheel's angle, read `shift` steps later; empty where one is not known.
-std::vector<Step> steps_of(const Track& track, const Stretch& stretch, std::size_t s, std::span<const double> left,
-                           std::size_t shift) {
+std::vector<Step> steps_of(const Track& track, const Stretch& stretch, std::size_t s,
+                           std::span<const double> left, std::size_t shift) {
   std::vector<Step> steps;
   double angle = 0;
   for (std::size_t k = stretch.first; k < stretch.last; ++k) {
@@ -245,7 +246,8 @@ struct Search {
     Spectrum spectrum(band);
     for (const Stretch& stretch : stretches) {
       const std::size_t t = stretch.track;
-      if (const auto steps = steps_of(tracks[t], stretch, side, left[t], shifts[t]); !steps.empty()) spectrum.add(steps);
+      if (const auto steps = steps_of(tracks[t], stretch, side, left[t], shifts[t]); !steps.empty())
+        spectrum.add(steps);
     }
     return spectrum.line(watts_per_value);
   }
@@ -318,7 +320,8 @@ std::optional<Ripple> find_ripple(const telemetry::RecordingSet& set, const robo
     std::vector<std::size_t> shifts;
     for (const Track& track : tracks) {
       const std::size_t part = std::max<std::size_t>(1, track.size() / 10);
-      shifts.push_back(std::uniform_int_distribution<std::size_t>(part, std::max(part, track.size() - part))(random));
+      shifts.push_back(
+          std::uniform_int_distribution<std::size_t>(part, std::max(part, track.size() - part))(random));
     }
     if (std::ranges::any_of(where, [&](const Search& search) {
           const auto line = search.line(shifts);

@@ -29,8 +29,8 @@ struct Modulation {
 // Each covariate that is known in at least half of the windows and differs among them, by its median.
 std::vector<Modulation> modulations_of(std::span<const Window> windows);
 
-// Something found, with its strength: an effect in force, or one whose strength, parameter `parameter`, is so much a
-// unit of a covariate.
+// Something found, with its strength: an effect in force, or one whose strength, parameter `parameter`, is so
+// much a unit of a covariate.
 struct Cause {
   dynamics::ActiveEffect effect;
   std::size_t parameter = 0;

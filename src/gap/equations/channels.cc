@@ -230,7 +230,9 @@ template double metered_power(const dynamics::BasicDriveModel<double>&, const Wi
 template Dual metered_power(const dynamics::BasicDriveModel<Dual>&, const Window&);
 template MeteredPower<double> metered_powers(const dynamics::BasicDriveModel<double>&, const Window&);
 template MeteredPower<Dual> metered_powers(const dynamics::BasicDriveModel<Dual>&, const Window&);
-template ChannelValues<double> residuals(const dynamics::BasicDriveModel<double>&, const Window&, const FromMotion&);
-template ChannelValues<Dual> residuals(const dynamics::BasicDriveModel<Dual>&, const Window&, const FromMotion&);
+template ChannelValues<double> residuals(const dynamics::BasicDriveModel<double>&, const Window&,
+                                         const FromMotion&);
+template ChannelValues<Dual> residuals(const dynamics::BasicDriveModel<Dual>&, const Window&,
+                                       const FromMotion&);
 
 }  // namespace joulecast::gap

@@ -19,7 +19,8 @@ enum class Channel : std::size_t {
   voltage_left,
   torque_right,  // motor current - the torque that the motion asks over K_t n [A]
   torque_left,
-  drive_right,  // V - what the motion asks of motor and winding [V]; judges where no motor current is measured
+  drive_right,  // V - what the motion asks of motor and winding [V]; judges where no motor current is
+                // measured
   drive_left,
   bus,              // battery power - what the measured motor powers ask [W]
   power,            // battery power - what the motion alone asks [W]; judges where bus cannot
@@ -48,7 +49,8 @@ struct FromMotion {
 
 // Residuals of one window. Value NaN: the channel does not speak here.
 template <class S>
-ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w, const FromMotion& from_motion);
+ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w,
+                           const FromMotion& from_motion);
 
 extern template ChannelValues<double> residuals(const dynamics::BasicDriveModel<double>&, const Window&,
                                                 const FromMotion&);

@@ -18,8 +18,8 @@ using dynamics::ActiveEffect;
 using dynamics::Dual;
 using dynamics::Effect;
 
-// Of the mean battery power: what an effect moves in a robot as filed where its traits name no tolerance, and what
-// functions outside the catalogue do.
+// Of the mean battery power: what an effect moves in a robot as filed where its traits name no tolerance, and
+// what functions outside the catalogue do.
 constexpr double unnoticed_share = 0.0025;
 constexpr double unnoticed_outside = 0.0010;
 constexpr double most_tolerance_share = 0.02, least_viscous_share = 0.002;
@@ -45,7 +45,8 @@ enum class Nuisance : std::size_t {
 constexpr auto nuisance_count = static_cast<std::size_t>(Nuisance::count);
 
 constexpr bool paired(Channel channel) {
-  return channel == Channel::torque_right || channel == Channel::voltage_right || channel == Channel::drive_right;
+  return channel == Channel::torque_right || channel == Channel::voltage_right ||
+         channel == Channel::drive_right;
 }
 
 }  // namespace
@@ -53,7 +54,9 @@ constexpr bool paired(Channel channel) {
 bool Hypothesis::excludes(const Hypothesis& other) const {
   if (!is_effect() || !other.is_effect()) return id() == other.id();
   // Slip and a smaller wheel are one thing to every channel but the inertia's.
-  const auto rolls_less = [](const Hypothesis& h) { return h.id() == "wheel_slip" || h.id() == "wheel_radius_error"; };
+  const auto rolls_less = [](const Hypothesis& h) {
+    return h.id() == "wheel_slip" || h.id() == "wheel_radius_error";
+  };
   return effect.effect == other.effect.effect || (rolls_less(*this) && rolls_less(other));
 }
 
@@ -87,7 +90,8 @@ void ColumnSet::add_effects(const Shapes& shapes, std::span<const double> shares
       h.effect = {effect, variant.values};
       h.parameter = variant.parameter;
       h.one_shape = traits.one_shape;
-      h.candidate.log_prior = effect_log_prior - std::log(variant.against * static_cast<double>(shares.size()));
+      h.candidate.log_prior =
+          effect_log_prior - std::log(variant.against * static_cast<double>(shares.size()));
       for (int component = 0; component < (variant.two_components ? 2 : 1); ++component) {
         h.candidate.columns.push_back(columns_.size());
         columns_.emplace_back();
@@ -104,8 +108,10 @@ void ColumnSet::add_effects(const Shapes& shapes, std::span<const double> shares
         }
         h.candidate.least = (traits.nonnegative ? 0 : info.minimum) - in_file;
         h.candidate.most = info.maximum - in_file;
-        // A friction of its own stands in where the robot file's is next to none: less than none it cannot be.
-        if (h.parameter == 1 && (effect->info().id == "viscous_friction" || effect->info().id == "coulomb_friction"))
+        // A friction of its own stands in where the robot file's is next to none: less than none it cannot
+        // be.
+        if (h.parameter == 1 &&
+            (effect->info().id == "viscous_friction" || effect->info().id == "coulomb_friction"))
           h.candidate.least = -in_file;
         if (effect->info().id == "accessory_load")
           h.candidate.least = std::max(h.candidate.least, -robot_.idle_power_w - in_file);
@@ -129,8 +135,10 @@ void ColumnSet::add_covariates(const Material& m, std::span<const double> shares
       h.covariate = m.covariates[by.covariate];
       h.by = by;
       const std::string_view unit = h.effect.effect->info().parameters[h.parameter].unit;
-      h.unit = telemetry::is_label(h.covariate) ? std::string(unit) : fmt::format("{}/unit", unit.empty() ? "1" : unit);
-      h.candidate.log_prior = effect_log_prior - std::log(static_cast<double>(carriers.size() * shares.size()));
+      h.unit = telemetry::is_label(h.covariate) ? std::string(unit)
+                                                : fmt::format("{}/unit", unit.empty() ? "1" : unit);
+      h.candidate.log_prior =
+          effect_log_prior - std::log(static_cast<double>(carriers.size() * shares.size()));
       h.candidate.columns = {columns_.size()};
       followed_.push_back({columns_.size(), carrier->candidate.columns.front(), by});
       columns_.emplace_back();
@@ -142,7 +150,9 @@ void ColumnSet::add_covariates(const Material& m, std::span<const double> shares
 void ColumnSet::add_nuisances() {
   first_nuisance_ = columns_.size();
   columns_.resize(columns_.size() + nuisance_count);
-  const auto nuisance = [&](Nuisance n) -> Column& { return columns_[first_nuisance_ + static_cast<std::size_t>(n)]; };
+  const auto nuisance = [&](Nuisance n) -> Column& {
+    return columns_[first_nuisance_ + static_cast<std::size_t>(n)];
+  };
   nuisance(Nuisance::resistance_difference).tolerance = 0.01;
   nuisance(Nuisance::viscous_difference).tolerance = 0.05;
   for (const Nuisance n : {Nuisance::current_offset_right, Nuisance::current_offset_left})
@@ -187,7 +197,8 @@ std::vector<Cause> ColumnSet::causes_of(std::span<const Chosen> chosen) const {
       const auto& p = cause.effect.effect->info().parameters[k];
       // A strength may be what takes off some of the robot file's.
       const bool bounded = k == h.parameter && h.candidate.columns.size() == 1;
-      values[k] = std::clamp(values[k], bounded ? h.candidate.least : p.minimum, bounded ? h.candidate.most : p.maximum);
+      values[k] = std::clamp(values[k], bounded ? h.candidate.least : p.minimum,
+                             bounded ? h.candidate.most : p.maximum);
     }
     causes.push_back(cause);
   }
@@ -204,7 +215,8 @@ std::optional<Chosen> ColumnSet::coordinates_of(const Cause& cause) const {
     bool same = true;
     for (std::size_t k = 0; k < cause.effect.effect->info().parameters.size(); ++k) {
       const double shape = hypothesis.effect.values[k];
-      if (k != hypothesis.parameter) same = same && std::fabs(shape - values[k]) <= 1e-6 * (1 + std::fabs(shape));
+      if (k != hypothesis.parameter)
+        same = same && std::fabs(shape - values[k]) <= 1e-6 * (1 + std::fabs(shape));
     }
     if (same) return Chosen{h, {values[hypothesis.parameter]}};
   }
@@ -313,7 +325,8 @@ void ColumnSet::measure(std::span<const Window> windows) {
     at.payload_kg = w.payload_kg;
     const auto flow = base_[0].flow(at);
     for (const std::size_t s : {0u, 1u}) {
-      mean_motor_power_w_ += std::fabs(std::isfinite(w.motor_power_w[s]) ? w.motor_power_w[s] : flow.motor_power_w[s]);
+      mean_motor_power_w_ +=
+          std::fabs(std::isfinite(w.motor_power_w[s]) ? w.motor_power_w[s] : flow.motor_power_w[s]);
       if (!w.moving[s]) continue;
       torque_power_w_ +=
           std::fabs(w.speed_rad_s[s]) + 2 * robot_.motor.resistance_ohm * std::fabs(flow.current_a[s]) / kt;
@@ -322,7 +335,8 @@ void ColumnSet::measure(std::span<const Window> windows) {
     for (const Derivative& d : derivatives_) {
       const auto power = metered_powers(d.model, w);
       const auto add = [&](std::size_t column, double times) {
-        if (std::isfinite(power.battery_w.slope)) columns_[column].power_share += times * std::fabs(power.battery_w.slope);
+        if (std::isfinite(power.battery_w.slope))
+          columns_[column].power_share += times * std::fabs(power.battery_w.slope);
         if (std::isfinite(power.motors_w.slope) && !from_motion_.power)
           columns_[column].motor_share += times * std::fabs(power.motors_w.slope);
       };

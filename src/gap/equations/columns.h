@@ -22,7 +22,7 @@ struct Material {
   std::span<const Window> windows;
   std::size_t blocks = 0;
   FromMotion from_motion;
-  double row_s = 0;  // between rows of the recordings
+  double row_s = 0;                           // between rows of the recordings
   std::span<const std::string> covariates{};  // names, in the order of Window::covariates
   double prior_factor = 1;                    // on tolerances and scatter
 };
@@ -56,8 +56,8 @@ class ColumnSet {
   std::optional<Chosen> coordinates_of(const Cause& cause) const;
 
   // Responses of one window: values[channel] = residual at the linearisation point plus what the chosen
-  // coefficients explain, rows(column, channel) the derivatives of the modelled reading. Both NaN / 0 where the
-  // channel does not speak. `rows` has size() * channel_count values, column-major by channel.
+  // coefficients explain, rows(column, channel) the derivatives of the modelled reading. Both NaN / 0 where
+  // the channel does not speak. `rows` has size() * channel_count values, column-major by channel.
   void evaluate(const Window& w, ChannelValues<double>& values, std::span<double> rows) const;
 
  private:
@@ -80,7 +80,8 @@ class ColumnSet {
   FromMotion from_motion_;
   double row_s_;
   double mean_power_w_ = 0, mean_motor_power_w_ = 0;
-  double torque_power_w_ = 0, voltage_power_w_ = 0;  // of the battery for 1 N m at each wheel, for 1 V on each motor
+  double torque_power_w_ = 0,
+         voltage_power_w_ = 0;  // of the battery for 1 N m at each wheel, for 1 V on each motor
   std::vector<Column> columns_;
   std::vector<dynamics::ActiveEffect> column_effect_;  // of effect columns
   std::vector<std::size_t> column_parameter_;

@@ -196,8 +196,10 @@ Ranges ranges_of(std::span<const Window> windows, const robot::RobotModel& robot
   };
   for (const Window& w : windows) {
     raise(most.speed_m_s, 0.5 * r.wheel_radius_m * (w.speed_rad_s[0] + w.speed_rad_s[1]));
-    raise(most.acceleration_m_s2, 0.5 * r.wheel_radius_m * (w.acceleration_rad_s2[0] + w.acceleration_rad_s2[1]));
-    raise(most.yaw_rate_rad_s, r.wheel_radius_m * (w.speed_rad_s[0] - w.speed_rad_s[1]) / (2 * r.half_track_m));
+    raise(most.acceleration_m_s2,
+          0.5 * r.wheel_radius_m * (w.acceleration_rad_s2[0] + w.acceleration_rad_s2[1]));
+    raise(most.yaw_rate_rad_s,
+          r.wheel_radius_m * (w.speed_rad_s[0] - w.speed_rad_s[1]) / (2 * r.half_track_m));
     for (const std::size_t s : {0u, 1u}) {
       raise(most.wheel_speed_rad_s, w.speed_rad_s[s]);
       raise(most.current_a, w.current_a[s]);

@@ -21,9 +21,9 @@ struct Column {
 
 using HypothesisSet = std::vector<std::size_t>;  // ascending indices of hypotheses
 
-// Something that may be there: an effect of the catalogue (one variant of its shapes), a covariate, or a family of
-// functions that stands for what the catalogue does not know. Recordings, tables of runs and comparisons between
-// groups share this vocabulary.
+// Something that may be there: an effect of the catalogue (one variant of its shapes), a covariate, or a
+// family of functions that stands for what the catalogue does not know. Recordings, tables of runs and
+// comparisons between groups share this vocabulary.
 struct Hypothesis {
   statistics::Candidate candidate;
   dynamics::ActiveEffect effect;  // strength as in the robot file's model; null effect: of no effect

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double outlier = 3.5;  // in spreads; beyond it the weight falls
 constexpr std::size_t fewest_rows = 20;
-constexpr std::size_t fewest_blocks = 6;  // to learn from how blocks scatter
+constexpr std::size_t fewest_blocks = 6;   // to learn from how blocks scatter
 constexpr std::size_t most_probed = 1500;  // windows, to learn which columns speak
 
 // Standard deviation that each coefficient may have, there or not.
@@ -31,7 +31,8 @@ struct FlexibleFit {
 };
 
 // Everything that may be there, held by its prior. Rows of weight 0 take no part, and still get a residual.
-FlexibleFit fit_everything(const ChannelRows& rows, const Eigen::VectorXd& weight, const Eigen::VectorXd& sd) {
+FlexibleFit fit_everything(const ChannelRows& rows, const Eigen::VectorXd& weight,
+                           const Eigen::VectorXd& sd) {
   const Eigen::MatrixXd scaled = rows.x * sd.asDiagonal();
   const Eigen::MatrixXd weighted = weight.asDiagonal() * scaled;
   const Eigen::Index p = scaled.cols();
@@ -57,7 +58,8 @@ double spread_of(const Eigen::VectorXd& residual, const Eigen::VectorXd& part) {
   return std::max(statistics::spread_about_zero(values), 1e-9);
 }
 
-// How much more whole blocks' scores scatter than independent rows would let them: 1 where rows are independent.
+// How much more whole blocks' scores scatter than independent rows would let them: 1 where rows are
+// independent.
 double block_inflation(const ChannelRows& rows, const Eigen::MatrixXd& x, const Eigen::VectorXd& residual,
                        const Eigen::VectorXd& part) {
   const Eigen::Index p = x.cols();
@@ -86,16 +88,18 @@ double block_inflation(const ChannelRows& rows, const Eigen::MatrixXd& x, const 
   return count > 0 ? std::max(1.0, sum / count * n / (n - 1)) : 1.0;
 }
 
-// Spread of residuals as it differs between standing and moving, and with the size of what the channel reads: a robot
-// at rest is read more precisely than one on rough ground. One spread a row.
-Eigen::VectorXd spreads(const ChannelRows& rows, const Eigen::VectorXd& residual, const Eigen::VectorXd& part) {
+// Spread of residuals as it differs between standing and moving, and with the size of what the channel reads:
+// a robot at rest is read more precisely than one on rough ground. One spread a row.
+Eigen::VectorXd spreads(const ChannelRows& rows, const Eigen::VectorXd& residual,
+                        const Eigen::VectorXd& part) {
   constexpr std::size_t classes = 4, fewest = 30;
   constexpr double least = 0.05;  // of the spread of all: a reading that does not move is no measure of noise
   const double all = spread_of(residual, part);
   const Eigen::Index n = residual.size();
   Eigen::VectorXd spread = Eigen::VectorXd::Constant(n, all);
   std::vector<Eigen::Index> moving, resting;
-  for (Eigen::Index k = 0; k < n; ++k) (rows.resting[static_cast<std::size_t>(k)] ? resting : moving).push_back(k);
+  for (Eigen::Index k = 0; k < n; ++k)
+    (rows.resting[static_cast<std::size_t>(k)] ? resting : moving).push_back(k);
   std::ranges::stable_sort(moving, {}, [&](Eigen::Index k) { return std::fabs(rows.y[k] - residual[k]); });
   std::vector<std::vector<Eigen::Index>> groups{resting};
   const std::size_t many = std::clamp<std::size_t>(moving.size() / (2 * fewest), 1, classes);
@@ -121,7 +125,8 @@ Eigen::VectorXd spreads(const ChannelRows& rows, const Eigen::VectorXd& residual
   return spread;
 }
 
-ChannelNoise learn_channel(const ChannelRows& rows, const Eigen::VectorXd& sd, const std::vector<bool>& left_out) {
+ChannelNoise learn_channel(const ChannelRows& rows, const Eigen::VectorXd& sd,
+                           const std::vector<bool>& left_out) {
   ChannelNoise noise;
   const Eigen::Index n = rows.y.size();
   if (n == 0) return noise;
@@ -140,7 +145,8 @@ ChannelNoise learn_channel(const ChannelRows& rows, const Eigen::VectorXd& sd, c
     if (spread_of(fit.residual, part) <= std::max(1e-9, 1e-6 * size)) return noise;
     spread = spreads(rows, fit.residual, part);
     for (Eigen::Index k = 0; k < n; ++k)
-      weight[k] = part[k] * statistics::huber_weight(fit.residual[k], spread[k], outlier) / (spread[k] * spread[k]);
+      weight[k] =
+          part[k] * statistics::huber_weight(fit.residual[k], spread[k], outlier) / (spread[k] * spread[k]);
   }
   noise.residual = fit.residual;
   // What the fit has used up it has taken from the residuals.
@@ -153,7 +159,8 @@ ChannelNoise learn_channel(const ChannelRows& rows, const Eigen::VectorXd& sd, c
     noise.weight[k] = part[k] * std::sqrt(statistics::huber_weight(filtered[k], scale, outlier)) / scale;
   noise.spread = spread;
   Eigen::MatrixXd x = spread.cwiseInverse().asDiagonal() * rows.x;
-  noise.inflation = block_inflation(rows, noise.weight.asDiagonal() * x, noise.weight.cwiseProduct(filtered), part);
+  noise.inflation =
+      block_inflation(rows, noise.weight.asDiagonal() * x, noise.weight.cwiseProduct(filtered), part);
   noise.weight /= std::sqrt(noise.inflation);
   return noise;
 }
@@ -222,11 +229,11 @@ Noise learn_noise(const ColumnSet& columns, const Rows& rows, const std::vector<
   return noise;
 }
 
-std::vector<statistics::Information> block_information(const ColumnSet& columns, const Rows& rows, const Noise& noise,
-                                                       std::size_t blocks,
+std::vector<statistics::Information> block_information(const ColumnSet& columns, const Rows& rows,
+                                                       const Noise& noise, std::size_t blocks,
                                                        const Responses* response) {
-  std::vector<statistics::Information> information(blocks,
-                                                   statistics::Information(static_cast<Eigen::Index>(columns.size())));
+  std::vector<statistics::Information> information(
+      blocks, statistics::Information(static_cast<Eigen::Index>(columns.size())));
   for (std::size_t c = 0; c < channel_count; ++c) {
     const ChannelRows& r = rows[c];
     const ChannelNoise& n = noise[c];

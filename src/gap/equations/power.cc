@@ -5,7 +5,8 @@
 
 namespace joulecast::gap {
 
-std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot, bool of_motors) {
+std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot,
+                                   bool of_motors) {
   std::vector<double> power(windows.size());
   std::ranges::transform(windows, power.begin(), [&](const Window& w) {
     return of_motors ? robot.idle_power_w + w.motor_power_w[0] + w.motor_power_w[1] : w.battery_power_w;
@@ -13,7 +14,8 @@ std::vector<double> measured_power(std::span<const Window> windows, const robot:
   return power;
 }
 
-std::vector<double> modelled_power(const robot::RobotModel& robot, std::span<const dynamics::ActiveEffect> adopted,
+std::vector<double> modelled_power(const robot::RobotModel& robot,
+                                   std::span<const dynamics::ActiveEffect> adopted,
                                    std::span<const Cause> causes, std::span<const Window> windows) {
   std::vector<dynamics::ActiveEffect> effects(adopted.begin(), adopted.end());
   for (const Cause& cause : causes) {

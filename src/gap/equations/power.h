@@ -8,13 +8,15 @@
 
 namespace joulecast::gap {
 
-// Battery power of every window [W]; NaN where the battery was not read. `of_motors`: what the motors take and the
-// idle power of the robot file in its place.
-std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot, bool of_motors);
+// Battery power of every window [W]; NaN where the battery was not read. `of_motors`: what the motors take
+// and the idle power of the robot file in its place.
+std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot,
+                                   bool of_motors);
 
-// By the robot file with the effects that it has (`adopted`) and these causes in force, as the robot's meter would
-// read it.
-std::vector<double> modelled_power(const robot::RobotModel& robot, std::span<const dynamics::ActiveEffect> adopted,
+// By the robot file with the effects that it has (`adopted`) and these causes in force, as the robot's meter
+// would read it.
+std::vector<double> modelled_power(const robot::RobotModel& robot,
+                                   std::span<const dynamics::ActiveEffect> adopted,
                                    std::span<const Cause> causes, std::span<const Window> windows);
 
 struct GapSize {

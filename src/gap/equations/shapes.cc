@@ -12,8 +12,9 @@ namespace {
 using dynamics::EffectValues;
 using Variants = std::vector<Variant>;
 
-// Strengths that are ratios to a parameter of the robot file say nothing where that is next to zero: there the
-// effect's own parameter stands in. Next to zero is what could not move this part of the mean power even tenfold.
+// Strengths that are ratios to a parameter of the robot file say nothing where that is next to zero: there
+// the effect's own parameter stands in. Next to zero is what could not move this part of the mean power even
+// tenfold.
 constexpr double least_share = 0.01, tenfold = 10;
 
 EffectValues<double> initial_values(const dynamics::Effect& effect) {
@@ -70,7 +71,10 @@ Variants sensors(EffectValues<double> v, bool is_bias, const ShapeSetting& s) {
     v[1] = of_motors;
     v[2] = of_battery;
     if (s.power_from_motion && of_motors * of_battery == 0) continue;  // only the battery's sensor is seen
-    variants.push_back({v, 0, s.power_from_motion ? (is_bias ? bias : 1) : of_motors > 0 ? motors : battery_alone});
+    variants.push_back({v, 0,
+                        s.power_from_motion ? (is_bias ? bias : 1)
+                        : of_motors > 0     ? motors
+                                            : battery_alone});
   }
   return variants;
 }

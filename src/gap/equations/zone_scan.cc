@@ -22,7 +22,8 @@ class Scanner {
     const auto p = static_cast<Eigen::Index>(columns.size());
     Eigen::VectorXd sd = Eigen::VectorXd::Zero(p);
     for (std::size_t k = 0; k < columns.size(); ++k)
-      sd[static_cast<Eigen::Index>(k)] = std::hypot(columns.columns()[k].tolerance, columns.columns()[k].scatter);
+      sd[static_cast<Eigen::Index>(k)] =
+          std::hypot(columns.columns()[k].tolerance, columns.columns()[k].scatter);
     for (const Hypothesis& h : columns.hypotheses()) {
       if (h.outside()) continue;
       for (const std::size_t k : h.candidate.columns) sd[static_cast<Eigen::Index>(k)] = h.candidate.expected;
@@ -164,8 +165,8 @@ class Scanner {
 
 std::optional<Zone> find_zone(const ColumnSet& columns, const Rows& rows, const Noise& noise,
                               std::span<const Window> windows) {
-  const auto zone = std::ranges::find_if(columns.hypotheses(),
-                                         [](const Hypothesis& h) { return h.id() == "floor_resistance_zone"; });
+  const auto zone = std::ranges::find_if(
+      columns.hypotheses(), [](const Hypothesis& h) { return h.id() == "floor_resistance_zone"; });
   if (zone == columns.hypotheses().end()) return std::nullopt;
   const Scanner scanner(columns, rows, noise, windows, *zone);
   if (scanner.rows() < 50) return std::nullopt;

@@ -11,8 +11,8 @@ namespace joulecast::gap {
 inline constexpr Zone everywhere{0, 0, 90};
 
 // The disc of the floor in which the column of the zone effect, tried everywhere, explains most of what other
-// coefficients cannot, by a grid over the visited floor, then by pattern search. Empty without positions or where no
-// disc explains anything.
+// coefficients cannot, by a grid over the visited floor, then by pattern search. Empty without positions or
+// where no disc explains anything.
 std::optional<Zone> find_zone(const ColumnSet& columns, const Rows& rows, const Noise& noise,
                               std::span<const Window> windows);
 

@@ -68,7 +68,8 @@ void assign_blocks(Grouped& g) {
   }
 }
 
-void make_windows(Grouped& g, const robot::RobotModel& robot, std::span<const dynamics::ActiveEffect> adopted) {
+void make_windows(Grouped& g, const robot::RobotModel& robot,
+                  std::span<const dynamics::ActiveEffect> adopted) {
   g.covariates = windows::covariate_names(g.recordings.missions);
   g.readings = windows::find_readings(g.recordings.missions, robot);
   g.windows = windows::make_windows(g.recordings.missions, robot, g.readings);
@@ -90,7 +91,8 @@ void make_windows(Grouped& g, const robot::RobotModel& robot, std::span<const dy
 }
 
 // The problem with the noise of each group its own: a quiet floor says more than a rough one.
-Problem problem_of(const Linear& linear, const Grouped& g, std::size_t groups, const std::vector<bool>& left_out) {
+Problem problem_of(const Linear& linear, const Grouped& g, std::size_t groups,
+                   const std::vector<bool>& left_out) {
   Problem all;
   for (std::size_t group = 0; group < groups; ++group) {
     std::vector<bool> others(g.group_of_block.size());
@@ -126,9 +128,11 @@ std::vector<Item> measure(const Grouped& g, const robot::RobotModel& robot, std:
   }
   for (std::size_t k = 0; k < g.windows.size(); ++k) {
     const Window& w = g.windows[k];
-    const double way_m = 0.5 * robot.kinematics.wheel_radius_m * std::fabs(w.speed_rad_s[0] + w.speed_rad_s[1]) * length_of(w);
+    const double way_m =
+        0.5 * robot.kinematics.wheel_radius_m * std::fabs(w.speed_rad_s[0] + w.speed_rad_s[1]) * length_of(w);
     const std::size_t group = g.group_of_mission[w.mission];
-    items.push_back({group, w.block, g.power_w[k], common_w[k], length_of(w), length_of(w), way_m, length_of(w)});
+    items.push_back(
+        {group, w.block, g.power_w[k], common_w[k], length_of(w), length_of(w), way_m, length_of(w)});
     if (!std::isfinite(g.power_w[k] + common_w[k])) continue;
     ComparedGroup& own = c.groups[group];
     own.way_m += way_m;
@@ -145,21 +149,24 @@ std::vector<Item> measure(const Grouped& g, const robot::RobotModel& robot, std:
 void add_limits(const Grouped& g, Comparison& c) {
   if (g.power == PowerSource::none) {
     c.limits.emplace_back(
-        "Neither battery power nor the motors' was recorded: what the differences cost in watts, and all that lies "
+        "Neither battery power nor the motors' was recorded: what the differences cost in watts, and all "
+        "that lies "
         "between battery and motors, is not known.");
   }
   if (g.from_motion.power)
     c.limits.emplace_back("Without the motors' currents friction, motors and drivers share one equation.");
   c.limits.emplace_back(
-      "A group is what its name says and whatever else was different that day: payload, tyres, batteries, weather.");
+      "A group is what its name says and whatever else was different that day: payload, tyres, batteries, "
+      "weather.");
 }
 
-std::vector<double> refereed(const Material& m, const Grouped& g, std::size_t groups, const std::vector<double>& missed,
-                             const std::vector<bool>& use) {
+std::vector<double> refereed(const Material& m, const Grouped& g, std::size_t groups,
+                             const std::vector<double>& missed, const std::vector<bool>& use) {
   std::vector<double> answer(missed.size(), 0);
   for (std::size_t group = 0; group < groups; ++group) {
     std::vector<bool> own(use);
-    for (std::size_t k = 0; k < own.size(); ++k) own[k] = own[k] && g.group_of_mission[g.windows[k].mission] == group;
+    for (std::size_t k = 0; k < own.size(); ++k)
+      own[k] = own[k] && g.group_of_mission[g.windows[k].mission] == group;
     const Referee referee(m, missed, own);
     for (std::size_t k = 0; k < own.size(); ++k) {
       if (g.group_of_mission[g.windows[k].mission] == group) answer[k] = referee.predict(g.windows[k]);
@@ -187,7 +194,8 @@ Result<std::vector<std::string>> groups_of(const telemetry::RecordingSet& record
     for (const telemetry::CovariateSeries& series : mission.covariates) {
       if (!series.name.starts_with(by + "=")) continue;
       for (std::size_t k = 0; k < series.value.size(); ++k) {
-        const std::int64_t until = k + 1 < series.utime_us.size() ? series.utime_us[k + 1] : mission.samples.back().utime_us;
+        const std::int64_t until =
+            k + 1 < series.utime_us.size() ? series.utime_us[k + 1] : mission.samples.back().utime_us;
         if (series.value[k] == 1)
           held_s[series.name.substr(by.size() + 1)] += 1e-6 * static_cast<double>(until - series.utime_us[k]);
       }
@@ -199,8 +207,8 @@ Result<std::vector<std::string>> groups_of(const telemetry::RecordingSet& record
 }
 
 Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
-                                      std::span<const std::string> group_of_mission, const robot::RobotModel& robot,
-                                      const CompareSettings& settings) {
+                                      std::span<const std::string> group_of_mission,
+                                      const robot::RobotModel& robot, const CompareSettings& settings) {
   const auto adopted = dynamics::active_effects(robot);
   if (!adopted) return tl::unexpected(adopted.error());
   const std::set<std::string> names(group_of_mission.begin(), group_of_mission.end());
@@ -220,18 +228,22 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   std::vector<std::size_t> count(names.size(), 0);
   for (const Window& w : g.windows) ++count[g.group_of_mission[w.mission]];
   for (std::size_t k = 0; k < count.size(); ++k) {
-    if (count[k] < fewest_windows) return invalid("log", "holds too little motion in group " + c.groups[k].name);
+    if (count[k] < fewest_windows)
+      return invalid("log", "holds too little motion in group " + c.groups[k].name);
   }
   if (g.power == PowerSource::none && g.from_motion.power && !g.from_motion.voltage)
     return invalid("log", "measures neither power nor voltage nor current of the motors");
 
   // What all groups share is found first, and everything linearised around it.
-  const Material material{robot, *adopted, g.windows, g.group_of_block.size(), g.from_motion, g.readings.row_s, g.covariates};
+  const Material material{robot,         *adopted,         g.windows,   g.group_of_block.size(),
+                          g.from_motion, g.readings.row_s, g.covariates};
   FitSettings fit_settings;
   fit_settings.shares = {usual_share};
   const std::vector<double> unchanged = modelled_power(robot, *adopted, {}, g.windows);
-  if (gap_size(g.power_w, unchanged).absolute_relative > large_gap) fit_settings.shares.push_back(large_share);
-  const auto fit = fit_windows(material, {}, fit_settings, [&] { return !settings.progress || settings.progress(0.1); });
+  if (gap_size(g.power_w, unchanged).absolute_relative > large_gap)
+    fit_settings.shares.push_back(large_share);
+  const auto fit =
+      fit_windows(material, {}, fit_settings, [&] { return !settings.progress || settings.progress(0.1); });
   if (!fit || (settings.progress && !settings.progress(after_fit)))
     return fail(Fault::conflict, "", "comparison cancelled");
 
@@ -246,8 +258,8 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   d.energy_relative = size.energy_relative;
   d.power_absolute_relative = size.absolute_relative;
   d.channels = channel_gaps(material);
-  const auto floor = std::ranges::find(d.channels, g.power == PowerSource::battery ? "battery_power" : "motor_power",
-                                       &ChannelGap::channel);
+  const auto floor = std::ranges::find(
+      d.channels, g.power == PowerSource::battery ? "battery_power" : "motor_power", &ChannelGap::channel);
   d.noise_floor = g.power == PowerSource::none || floor == d.channels.end() ? missing : floor->noise_floor;
   if (g.power == PowerSource::none) d.energy_relative = d.power_absolute_relative = missing;
   for (const Cause& cause : fit->causes) {
@@ -256,8 +268,16 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   }
   add_limits(g, c);
 
-  GroupedData data{robot, problem_of(fit->linear, g, names.size(), {}), g.group_of_block, measure(g, robot, common_w, c),
-                   {}, {}, {}, {}, {}, {}};
+  GroupedData data{robot,
+                   problem_of(fit->linear, g, names.size(), {}),
+                   g.group_of_block,
+                   measure(g, robot, common_w, c),
+                   {},
+                   {},
+                   {},
+                   {},
+                   {},
+                   {}};
   data.explain.most_members = 2;
   data.shared = fit->causes;
   data.explain.most_families = 1;
@@ -292,7 +312,8 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
     return refereed(material, g, names.size(), missed, use);
   };
   CompareSettings rest = settings;
-  if (settings.progress) rest.progress = [&](double part) { return settings.progress(std::lerp(after_fit, 1.0, part)); };
+  if (settings.progress)
+    rest.progress = [&](double part) { return settings.progress(std::lerp(after_fit, 1.0, part)); };
   if (!compare_groups(data, rest, c)) return fail(Fault::conflict, "", "comparison cancelled");
   return c;
 }

@@ -37,7 +37,8 @@ Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> 
 
   std::vector<std::size_t> group;
   for (std::size_t k = 0; k < block.size(); ++k) group.push_back(index(k));
-  GroupedData data{robot, {}, std::vector<std::size_t>(1 + *std::ranges::max_element(block)), {}, {}, {}, {}, {}, {}, {}};
+  GroupedData data{
+      robot, {}, std::vector<std::size_t>(1 + *std::ranges::max_element(block)), {}, {}, {}, {}, {}, {}, {}};
   data.without = [&](const std::vector<bool>& out) {
     std::vector<bool> runs_out(out.empty() ? 0 : block.size());
     for (std::size_t k = 0; k < runs_out.size(); ++k) runs_out[k] = out[block[k]];
@@ -53,8 +54,8 @@ Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> 
     data.group_of_block[block[k]] = index(k);
     const auto modelled = columns.modelled(k, shared.causes);
     const double measured = compared.runs[k].measured_j();
-    data.items.push_back({index(k), block[k], measured, modelled.sum_j, 1 / measured, 1, compared.runs[k].at.distance_m,
-                          modelled.duration_s});
+    data.items.push_back({index(k), block[k], measured, modelled.sum_j, 1 / measured, 1,
+                          compared.runs[k].at.distance_m, modelled.duration_s});
     ComparedGroup& g = c.groups[index(k)];
     ++g.missions, ++g.samples;
     g.way_m += compared.runs[k].at.distance_m;
@@ -96,10 +97,12 @@ Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> 
   d.energy_relative = (measured_j - modelled_j) / measured_j;
   d.power_absolute_relative = columns.error(shared.causes);
   d.noise_floor = std::min(std::sqrt(2 / std::numbers::pi) * scatter.run, d.power_absolute_relative);
-  d.channels = {{columns.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
+  d.channels = {
+      {columns.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
   for (const std::size_t h : shared.named) c.common.push_back(columns.hypotheses()[h].id());
   c.limits.emplace_back(
-      "A group is what its name says and whatever else was different: day, payload, tyres, batteries, weather.");
+      "A group is what its name says and whatever else was different: day, payload, tyres, batteries, "
+      "weather.");
   if (!compare_groups(data, settings, c)) return fail(Fault::conflict, "", "comparison cancelled");
   return c;
 }

@@ -34,8 +34,8 @@ class Comparer {
  private:
   bool goes_on(double part) const { return !settings_.progress || settings_.progress(part); }
   bool power_known() const { return c_.diagnosis.power != PowerSource::none; }
-  Eigen::VectorXd coefficients_of(const Problem& problem, const HypothesisSet& set, const std::vector<bool>& out,
-                                  Eigen::VectorXd* sd = nullptr) const;
+  Eigen::VectorXd coefficients_of(const Problem& problem, const HypothesisSet& set,
+                                  const std::vector<bool>& out, Eigen::VectorXd* sd = nullptr) const;
   std::vector<Contrasted> contrasted(const Problem& base, const Problem& problem, const HypothesisSet& set,
                                      const std::vector<bool>& out) const;
   std::vector<double> predict(const std::vector<Contrasted>& causes) const;
@@ -74,11 +74,12 @@ Eigen::VectorXd Comparer::coefficients_of(const Problem& problem, const Hypothes
   return estimate.mean;
 }
 
-std::vector<Contrasted> Comparer::contrasted(const Problem& base, const Problem& problem, const HypothesisSet& set,
-                                             const std::vector<bool>& out) const {
+std::vector<Contrasted> Comparer::contrasted(const Problem& base, const Problem& problem,
+                                             const HypothesisSet& set, const std::vector<bool>& out) const {
   Eigen::VectorXd sd;
   const Eigen::VectorXd mean = coefficients_of(problem, set, out, &sd);
-  const Eigen::VectorXd level = set.empty() ? Eigen::VectorXd() : coefficients_of(alike(base, set, mean), set, out);
+  const Eigen::VectorXd level =
+      set.empty() ? Eigen::VectorXd() : coefficients_of(alike(base, set, mean), set, out);
   Eigen::Index level_at = 0;
   std::vector<Contrasted> result;
   Eigen::Index at = 0;
@@ -118,7 +119,8 @@ std::vector<double> Comparer::predict(const std::vector<Contrasted>& causes) con
   std::vector<std::vector<Cause>> by_group(groups_);
   for (std::size_t g = 0; g < groups_; ++g) {
     for (const Contrasted& c : causes)
-      by_group[g].push_back(data_.cause(c.hypothesis, c.mean + c.strengths.row(static_cast<Eigen::Index>(g)).transpose()));
+      by_group[g].push_back(
+          data_.cause(c.hypothesis, c.mean + c.strengths.row(static_cast<Eigen::Index>(g)).transpose()));
   }
   return data_.predict(by_group);
 }
@@ -134,8 +136,8 @@ double Comparer::error(const std::vector<double>& predicted) const {
   return size > 0 ? sum / size : missing;
 }
 
-// The base problem as it would be if all groups were the mean one: what these hypotheses explain of each block by its
-// group has left its response.
+// The base problem as it would be if all groups were the mean one: what these hypotheses explain of each
+// block by its group has left its response.
 Problem Comparer::alike(Problem base, const HypothesisSet& set, const Eigen::VectorXd& differences) const {
   for (std::size_t g = 0; g < groups_; ++g) {
     Eigen::VectorXd own(0);
@@ -159,7 +161,8 @@ Problem Comparer::alike(Problem base, const HypothesisSet& set, const Eigen::Vec
 std::vector<Controls> Comparer::permuted(const Problem& problem, const Explanation& explanation) const {
   std::vector<Controls> controls(explanation.members.size(), Controls{settings_.controls, 0});
   if (explanation.members.empty()) return controls;
-  const Problem rest = alike(data_.base, explanation.whole, Mixture(problem).estimate(explanation.whole).mean);
+  const Problem rest =
+      alike(data_.base, explanation.whole, Mixture(problem).estimate(explanation.whole).mean);
   for (std::size_t s = 0; s < settings_.controls; ++s) {
     std::mt19937_64 random(s + 1);
     std::vector<std::size_t> order = data_.group_of_block;
@@ -171,11 +174,13 @@ std::vector<Controls> Comparer::permuted(const Problem& problem, const Explanati
       std::set<std::string> group{problem.hypotheses[member.hypothesis].id()};
       for (const Alternative& a : member.alternatives) group.insert(problem.hypotheses[a.hypothesis].id());
       const bool found = std::ranges::any_of(answer.members, [&](const Member& other) {
-        return group.contains(surrogate.hypotheses[other.hypothesis].id()) && other.group_probability() >= least_named;
+        return group.contains(surrogate.hypotheses[other.hypothesis].id()) &&
+               other.group_probability() >= least_named;
       });
       controls[m].named_in += found ? 1 : 0;
     }
-    if (!goes_on(std::lerp(after_parts, 1.0, static_cast<double>(s + 1) / static_cast<double>(settings_.controls))))
+    if (!goes_on(std::lerp(after_parts, 1.0,
+                           static_cast<double>(s + 1) / static_cast<double>(settings_.controls))))
       return {};
   }
   return controls;
@@ -248,12 +253,14 @@ void Comparer::add_differences() {
     std::vector<double> energy(groups_, 0);
     for (std::size_t k = 0; k < with.size(); ++k) {
       const Item& item = data_.items[k];
-      if (std::isfinite(item.measured + item.common)) energy[item.group] += item.energy_per_unit * (with[k] - common[k]);
+      if (std::isfinite(item.measured + item.common))
+        energy[item.group] += item.energy_per_unit * (with[k] - common[k]);
     }
     for (std::size_t g = 0; g < groups_; ++g) {
       const auto at = static_cast<Eigen::Index>(g);
       e.groups.push_back({c.strengths.cols() == 1 ? c.strengths(at, 0) : c.strengths.row(at).norm(),
-                          c.deviations.row(at).norm(), power_known() ? energy[g] / c_.groups[g].way_m : missing});
+                          c.deviations.row(at).norm(),
+                          power_known() ? energy[g] / c_.groups[g].way_m : missing});
     }
     if (d) {
       d->by_effect_j.push_back(e.groups[d->to].energy_per_m_j - e.groups[d->from].energy_per_m_j);
@@ -271,11 +278,12 @@ Explanation Comparer::told(const std::vector<Contrasted>& members) const {
     const auto c = std::ranges::find(members, m.hypothesis, &Contrasted::hypothesis);
     const auto low = static_cast<Eigen::Index>(c->low), high = static_cast<Eigen::Index>(c->high);
     const Eigen::VectorXd apart = (c->strengths.row(high) - c->strengths.row(low)).transpose();
-    const Eigen::VectorXd sd = groups_ == 2 ? Eigen::VectorXd(c->deviations.row(1).transpose())
-                                            : Eigen::VectorXd((c->deviations.row(high).cwiseAbs2() +
-                                                               c->deviations.row(low).cwiseAbs2())
-                                                                  .cwiseSqrt()
-                                                                  .transpose());
+    const Eigen::VectorXd sd =
+        groups_ == 2
+            ? Eigen::VectorXd(c->deviations.row(1).transpose())
+            : Eigen::VectorXd((c->deviations.row(high).cwiseAbs2() + c->deviations.row(low).cwiseAbs2())
+                                  .cwiseSqrt()
+                                  .transpose());
     m.coefficients.assign(apart.begin(), apart.end());
     m.sd.assign(sd.begin(), sd.end());
   }

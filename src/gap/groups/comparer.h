@@ -13,9 +13,10 @@ namespace joulecast::gap {
 // One thing that was measured: a window of a recording, or a run.
 struct Item {
   std::size_t group = 0, block = 0;
-  double measured = 0, common = 0;  // power or energy; by the model with what all groups share. NaN: not known
-  double weight = 1;                // of its error
-  double energy_per_unit = 1;       // J for one of what is measured
+  double measured = 0,
+         common = 0;           // power or energy; by the model with what all groups share. NaN: not known
+  double weight = 1;           // of its error
+  double energy_per_unit = 1;  // J for one of what is measured
   double way_m = 0, time_s = 0;
 };
 

@@ -14,7 +14,8 @@ ordered_json difference_to_json(const Comparison& c) {
   if (!c.difference) return nullptr;
   const GroupDifference& d = *c.difference;
   ordered_json by_effect = ordered_json::object();
-  for (std::size_t k = 0; k < c.effects.size(); ++k) by_effect[c.effects[k].id] = json_number(d.by_effect_j[k]);
+  for (std::size_t k = 0; k < c.effects.size(); ++k)
+    by_effect[c.effects[k].id] = json_number(d.by_effect_j[k]);
   return {{"from", c.groups[d.from].name},
           {"to", c.groups[d.to].name},
           {"energy_per_m_j", json_number(d.energy_per_m_j)},

@@ -24,8 +24,8 @@ void difference_section(Page& page, const Comparison& c) {
   if (!c.difference) return;
   const GroupDifference& d = *c.difference;
   page.section("Where the difference in energy per metre comes from",
-               fmt::format("{} above {}; how they drove and what they carried is by the model.", c.groups[d.to].name,
-                           c.groups[d.from].name));
+               fmt::format("{} above {}; how they drove and what they carried is by the model.",
+                           c.groups[d.to].name, c.groups[d.from].name));
   std::vector<std::vector<std::string>> rows{{"motion and load", quantity(d.by_motion_j, "J/m")}};
   for (std::size_t k = 0; k < c.effects.size(); ++k)
     rows.push_back({xml_escaped(words_of(c.effects[k].id)), quantity(d.by_effect_j[k], "J/m")});
@@ -42,8 +42,11 @@ void strengths_section(Page& page, const Comparison& c) {
     std::vector<BarRow> rows;
     for (std::size_t g = 0; g < e.groups.size(); ++g) {
       const GroupStrength& s = e.groups[g];
-      rows.push_back({c.groups[g].name, with_deviation(s.value, s.deviation, e.unit), s.value,
-                      {s.value - 1.96 * s.deviation, s.value + 1.96 * s.deviation}, "after"});
+      rows.push_back({c.groups[g].name,
+                      with_deviation(s.value, s.deviation, e.unit),
+                      s.value,
+                      {s.value - 1.96 * s.deviation, s.value + 1.96 * s.deviation},
+                      "after"});
     }
     page.chart(bars(rows, e.unit == "1" ? "" : " " + e.unit, e.id + " by group"), words_of(e.id));
   }
@@ -52,8 +55,8 @@ void strengths_section(Page& page, const Comparison& c) {
 }  // namespace
 
 std::string report_html(const Comparison& c, const robot::RobotModel& robot, const ReportOrigin& origin) {
-  Page page("What changes for robot " + c.diagnosis.robot_id + " between groups of missions", "Comparison of groups",
-            sentence_of(c));
+  Page page("What changes for robot " + c.diagnosis.robot_id + " between groups of missions",
+            "Comparison of groups", sentence_of(c));
   page.list(c.diagnosis.reasons);
   effects_section(page, c.diagnosis.effects);
   difference_section(page, c);
@@ -63,10 +66,11 @@ std::string report_html(const Comparison& c, const robot::RobotModel& robot, con
   page.list(c.limits);
   std::vector<std::vector<std::string>> rows;
   for (const ComparedGroup& g : c.groups) {
-    rows.push_back({xml_escaped(g.name), std::to_string(g.missions), std::to_string(g.samples), brief(g.way_m),
-                    brief(g.energy_per_m_j), brief(g.model_per_m_j)});
+    rows.push_back({xml_escaped(g.name), std::to_string(g.missions), std::to_string(g.samples),
+                    brief(g.way_m), brief(g.energy_per_m_j), brief(g.model_per_m_j)});
   }
-  const std::vector<std::string> header{"Group", "missions", "samples", "m driven", "J/m", "J/m by the model"};
+  const std::vector<std::string> header{"Group",    "missions", "samples",
+                                        "m driven", "J/m",      "J/m by the model"};
   page.table(header, rows, 1);
   origin_section(page, origin, robot);
   return page.str();

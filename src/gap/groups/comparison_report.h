@@ -8,6 +8,7 @@
 namespace joulecast::gap {
 
 // A comparison as one HTML page.
-std::string report_html(const Comparison& comparison, const robot::RobotModel& robot, const ReportOrigin& origin);
+std::string report_html(const Comparison& comparison, const robot::RobotModel& robot,
+                        const ReportOrigin& origin);
 
 }  // namespace joulecast::gap

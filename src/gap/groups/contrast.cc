@@ -10,8 +10,9 @@ namespace {
 
 using statistics::Information;
 
-constexpr double shared = 0.3;         // of the mean power, that each thing that groups share may move
-constexpr double ordinary_part = 0.5;  // of what a robot may be off its file: what groups may differ by all the same
+constexpr double shared = 0.3;  // of the mean power, that each thing that groups share may move
+constexpr double ordinary_part =
+    0.5;  // of what a robot may be off its file: what groups may differ by all the same
 
 Eigen::VectorXd share_of(std::span<const std::size_t> group_of_block, std::size_t groups) {
   Eigen::VectorXd share = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(groups));
@@ -20,7 +21,8 @@ Eigen::VectorXd share_of(std::span<const std::size_t> group_of_block, std::size_
   return share;
 }
 
-// The columns of which each group has its own, and how much more of them a block of a group has than the mean.
+// The columns of which each group has its own, and how much more of them a block of a group has than the
+// mean.
 struct Layout {
   std::vector<Eigen::Index> own;
   Eigen::Index base = 0;
@@ -59,7 +61,8 @@ struct Layout {
 Eigen::MatrixXd by_group(const Eigen::VectorXd& differences, const Eigen::VectorXd& share) {
   const Eigen::Index groups = share.size(), own = differences.size() / (groups - 1);
   Eigen::MatrixXd strengths = Eigen::MatrixXd::Zero(groups, own);
-  for (Eigen::Index g = 1; g < groups; ++g) strengths.row(g) = differences.segment((g - 1) * own, own).transpose();
+  for (Eigen::Index g = 1; g < groups; ++g)
+    strengths.row(g) = differences.segment((g - 1) * own, own).transpose();
   return strengths.rowwise() - (share.transpose() * strengths).eval().row(0);
 }
 
@@ -84,8 +87,8 @@ Problem contrast(const Problem& base, std::span<const std::size_t> group_of_bloc
       if (std::ranges::find(layout.own, at) != layout.own.end()) continue;
       place[columns[k]] = layout.own.size();
       layout.own.push_back(at);
-      const double unit =
-          base.moved(h, Eigen::VectorXd::Unit(static_cast<Eigen::Index>(columns.size()), static_cast<Eigen::Index>(k)));
+      const double unit = base.moved(
+          h, Eigen::VectorXd::Unit(static_cast<Eigen::Index>(columns.size()), static_cast<Eigen::Index>(k)));
       // What moves no power at all is not let go further than it is expected to be.
       wide[at] = unit > 0 ? std::min(shared / unit, 10 * h.candidate.expected) : h.candidate.expected;
     }
@@ -95,7 +98,8 @@ Problem contrast(const Problem& base, std::span<const std::size_t> group_of_bloc
     const std::vector<std::size_t> own = h.candidate.columns;
     h.candidate.columns.clear();
     for (std::size_t g = 1; g < groups; ++g) {
-      for (const std::size_t k : own) h.candidate.columns.push_back(static_cast<std::size_t>(layout.place(g, place[k])));
+      for (const std::size_t k : own)
+        h.candidate.columns.push_back(static_cast<std::size_t>(layout.place(g, place[k])));
     }
     h.candidate.least = -std::numeric_limits<double>::infinity();
     h.candidate.most = std::numeric_limits<double>::infinity();
@@ -118,8 +122,8 @@ Problem contrast(const Problem& base, std::span<const std::size_t> group_of_bloc
     for (std::size_t b = 0; b < blocks.size(); ++b)
       problem.blocks.back().push_back(layout.expanded(blocks[b], group_of_block[b]));
   }
-  const auto kept = std::make_shared<const Problem>(
-      Problem{base.hypotheses, {}, {}, {}, base.moved, base.cancelling});
+  const auto kept =
+      std::make_shared<const Problem>(Problem{base.hypotheses, {}, {}, {}, base.moved, base.cancelling});
   problem.moved = [kept, share = layout.share](const Hypothesis& h, const Eigen::VectorXd& c) {
     const Eigen::MatrixXd strengths = by_group(c, share);
     // Any hypothesis of the base that is the same one has its columns.
@@ -155,7 +159,8 @@ void take_out(Problem& problem, const HypothesisSet& set, const Eigen::VectorXd&
   Eigen::VectorXd all = Eigen::VectorXd::Zero(problem.plain.tolerance.size());
   Eigen::Index at = 0;
   for (const std::size_t h : set) {
-    for (const std::size_t k : problem.hypotheses[h].candidate.columns) all[static_cast<Eigen::Index>(k)] = coefficients[at++];
+    for (const std::size_t k : problem.hypotheses[h].candidate.columns)
+      all[static_cast<Eigen::Index>(k)] = coefficients[at++];
   }
   for (auto& blocks : problem.blocks) {
     for (std::size_t b = 0; b < blocks.size(); ++b) {

@@ -105,7 +105,8 @@ void RunDiagnoser::measure() {
   r_.side_scatter = columns_.by_motor() ? finding_.scatter.difference : missing;
   double all_measured = 0, all_modelled = 0;
   for (std::size_t k = 0; k < set_.runs.size(); ++k) {
-    JudgedRun run{set_.runs[k], columns_.modelled(k, {}).sum_j, columns_.modelled(k, finding_.causes).sum_j, missing};
+    JudgedRun run{set_.runs[k], columns_.modelled(k, {}).sum_j, columns_.modelled(k, finding_.causes).sum_j,
+                  missing};
     all_measured += measured(k);
     all_modelled += run.model_j;
     measured_j_.push_back(measured(k));
@@ -114,7 +115,8 @@ void RunDiagnoser::measure() {
   d.energy_relative = (all_measured - all_modelled) / all_measured;
   d.power_absolute_relative = columns_.error({});
   d.noise_floor = std::min(mean_absolute_normal(r_.scatter), d.power_absolute_relative);
-  d.channels = {{columns_.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
+  d.channels = {
+      {columns_.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
   d.detectable_share = seen_share(finding_.problem);
 }
 
@@ -140,7 +142,8 @@ bool RunDiagnoser::hold_out_parts() {
       b.referee += error(k, refereed[k]);
       b.size += 1;
     }
-    if (!goes_on(std::lerp(after_search, after_parts, static_cast<double>(part + 1) / static_cast<double>(held.parts))))
+    if (!goes_on(std::lerp(after_search, after_parts,
+                           static_cast<double>(part + 1) / static_cast<double>(held.parts))))
       return false;
   }
   held_out_ = std::move(held);
@@ -192,8 +195,10 @@ void RunDiagnoser::add_baseline() {
     const double value = data.coefficients[at], sd = data.sd[at], ours = model.coefficients[at];
     b.terms.push_back({term.name, term.unit, value, sd});
     constexpr double clear = 3, notable = 0.2;
-    if (std::fabs(value - ours) < clear * sd || std::fabs(value - ours) < notable * std::fabs(value)) continue;
-    b.says.push_back(sentence(fmt::format("the data have {} {}; the model has {}", brief(value), term.words, brief(ours))));
+    if (std::fabs(value - ours) < clear * sd || std::fabs(value - ours) < notable * std::fabs(value))
+      continue;
+    b.says.push_back(sentence(
+        fmt::format("the data have {} {}; the model has {}", brief(value), term.words, brief(ours))));
   }
   b.held_out = held_out_->referee();
   b.unchanged_model_held_out = held_out_->unchanged();
@@ -270,7 +275,8 @@ bool RunDiagnoser::judge_all() {
 
 void RunDiagnoser::add_limits() {
   std::vector<std::string>& limits = r_.limits;
-  limits.emplace_back("Only energies are known: in which phase of a run, at which time or place the gap arises is not.");
+  limits.emplace_back(
+      "Only energies are known: in which phase of a run, at which time or place the gap arises is not.");
   std::set<double> payloads, speeds;
   std::map<std::string, std::set<double>> by_table;
   for (const MissionRun& run : set_.runs) {
@@ -281,12 +287,14 @@ void RunDiagnoser::add_limits() {
   if (by_table.size() > 1 && payloads.size() > 1 &&
       std::ranges::all_of(by_table, [](const auto& table) { return table.second.size() == 1; })) {
     limits.emplace_back(
-        "The payload changes only from table to table: whatever else differed between them counts as payload, beyond "
+        "The payload changes only from table to table: whatever else differed between them counts as "
+        "payload, beyond "
         "the 2 % by which tables are taken to shift.");
   }
   if (payloads.size() == 2) {
     limits.emplace_back(
-        "Two payloads make a straight line: whether an effect grows in proportion to the payload is not tested. A third "
+        "Two payloads make a straight line: whether an effect grows in proportion to the payload is not "
+        "tested. A third "
         "payload would.");
   } else if (payloads.size() == 1) {
     limits.emplace_back("One payload: nothing that depends on the load can be seen.");
@@ -296,11 +304,13 @@ void RunDiagnoser::add_limits() {
         "Speeds within a factor of {:.1f}: dry and viscous friction and drag are hardly told apart.", range));
   }
   if (r_.model_given && std::fabs(r_.model_ratio - 1) > 0.1) {
-    limits.push_back(fmt::format(
-        "The given model energies are {:.2f} times those of the robot file under the stated conditions: one of the two "
-        "is off (distances, say). Strengths are worked out with the stated conditions; strengths of friction fall in "
-        "proportion to the distance.",
-        r_.model_ratio));
+    limits.push_back(
+        fmt::format("The given model energies are {:.2f} times those of the robot file under the stated "
+                    "conditions: one of the two "
+                    "is off (distances, say). Strengths are worked out with the stated conditions; strengths "
+                    "of friction fall in "
+                    "proportion to the distance.",
+                    r_.model_ratio));
   }
   for (const DiagnosedEffect& e : r_.diagnosis.effects) {
     const auto stands_for = [&](std::string_view id) {
@@ -325,7 +335,8 @@ Result<RunDiagnosis> RunDiagnoser::run() {
 
 }  // namespace
 
-Result<RunDiagnosis> diagnose_runs(const RunSet& set, const robot::RobotModel& robot, const RunSettings& settings) {
+Result<RunDiagnosis> diagnose_runs(const RunSet& set, const robot::RobotModel& robot,
+                                   const RunSettings& settings) {
   if (const auto adopted = dynamics::active_effects(robot); !adopted) return tl::unexpected(adopted.error());
   RunSet judged = set;
   if (settings.robot_file_model) {

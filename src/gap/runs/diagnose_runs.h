@@ -32,13 +32,14 @@ struct JudgedRun {
 
 // The answer where nothing is known but the energies of runs and their conditions.
 struct RunDiagnosis {
-  // As of recordings: power stands for the mean power of runs, so that gap, noise floor and errors are those of the
-  // energies of runs, relative to the measured ones; samples are runs.
+  // As of recordings: power stands for the mean power of runs, so that gap, noise floor and errors are those
+  // of the energies of runs, relative to the measured ones; samples are runs.
   Diagnosis diagnosis;
   bool model_given = false;  // the table gave the model's energies; otherwise the robot file was asked
   double model_ratio = 1;    // of the given energies to those of the robot file under the conditions
-  double scatter = 0, side_scatter = 0;  // from run to run, sd relative to a run's energy; of right minus left
-  std::vector<LeftOut> conditions;       // condition by condition, label by label, and table by table
+  double scatter = 0,
+         side_scatter = 0;          // from run to run, sd relative to a run's energy; of right minus left
+  std::vector<LeftOut> conditions;  // condition by condition, label by label, and table by table
   std::optional<TurningTerm> turning;
   std::vector<std::string> limits;       // what these energies cannot tell, in sentences
   std::vector<std::string> not_visible;  // effects that move none of these energies
@@ -52,6 +53,7 @@ struct RunSettings {
 };
 
 // Fault::invalid for a robot whose adopted effects the catalogue rejects, Fault::conflict when cancelled.
-Result<RunDiagnosis> diagnose_runs(const RunSet& runs, const robot::RobotModel& robot, const RunSettings& settings = {});
+Result<RunDiagnosis> diagnose_runs(const RunSet& runs, const robot::RobotModel& robot,
+                                   const RunSettings& settings = {});
 
 }  // namespace joulecast::gap

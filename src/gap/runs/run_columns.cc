@@ -16,19 +16,20 @@ namespace {
 
 using dynamics::ActiveEffect;
 
-// As in the diagnosis of recordings: a finding moves the energy by this share, and costs this log probability. Tables
-// also hold models that are far off, hence the second scale.
+// As in the diagnosis of recordings: a finding moves the energy by this share, and costs this log
+// probability. Tables also hold models that are far off, hence the second scale.
 constexpr std::array expected_shares{0.07, 0.3};
 constexpr double effect_log_prior = -4.0;
 constexpr double outside_log_prior = -6.0;
 constexpr double unnoticed_share = 0.0025;
 constexpr double most_tolerance_share = 0.02;
-constexpr double too_small_share = 0.002;  // of a run's energy within the bounds: nothing is said of such an effect
-constexpr double common_scale = 0.01;      // of a calibrated model and of the meter that measured the runs
-constexpr std::size_t most_levels = 8;     // of a label
+constexpr double too_small_share =
+    0.002;  // of a run's energy within the bounds: nothing is said of such an effect
+constexpr double common_scale = 0.01;   // of a calibrated model and of the meter that measured the runs
+constexpr std::size_t most_levels = 8;  // of a label
 
-// Which variants of an effect energies of runs can speak of: shapes that they cannot tell apart are left at their
-// initial values.
+// Which variants of an effect energies of runs can speak of: shapes that they cannot tell apart are left at
+// their initial values.
 std::vector<Cause> variants_of(const dynamics::Effect& effect, bool by_motor) {
   const std::string_view id = effect.info().id;
   std::vector<Cause> variants;
@@ -99,7 +100,8 @@ RunColumns::RunColumns(const RunSet& set, const robot::RobotModel& robot)
   linearise_around({});
 }
 
-// Each level of a label as a covariate that is 1 or 0, of two levels one; everything by its median over the runs.
+// Each level of a label as a covariate that is 1 or 0, of two levels one; everything by its median over the
+// runs.
 void RunColumns::add_labels() {
   for (std::size_t l = 0; l < set_.labels.size(); ++l) {
     std::set<std::string> levels;
@@ -111,7 +113,9 @@ void RunColumns::add_labels() {
       covariate_names_.push_back(set_.labels[l] + "=" + level);
       for (std::size_t k = 0; k < runs().size(); ++k) {
         const auto& own = runs()[k].labels;
-        covariates_[k].push_back(l >= own.size() || own[l].empty() ? MissionRun::absent : own[l] == level ? 1 : 0);
+        covariates_[k].push_back(l >= own.size() || own[l].empty() ? MissionRun::absent
+                                 : own[l] == level                 ? 1
+                                                                   : 0);
       }
     }
   }
@@ -200,7 +204,8 @@ void RunColumns::add_effects() {
       Column c;
       c.power_share = mean;
       c.tolerance = unnoticed_share / mean;
-      if (variant.parameter == 0 && traits.usual > 0) c.tolerance = std::min(traits.tolerance, most_tolerance_share / mean);
+      if (variant.parameter == 0 && traits.usual > 0)
+        c.tolerance = std::min(traits.tolerance, most_tolerance_share / mean);
       c.discrepancy = 1 / mean;
       columns_.push_back(c);
       column_cause_.push_back(variant);
@@ -228,8 +233,9 @@ void RunColumns::add_covariates() {
       for (std::size_t k = 0; k < runs().size(); ++k) {
         Cause one = cause;
         one.effect.values[one.parameter] = 1e-3 * carrier->candidate.expected;
-        mean += std::fabs(by_robot(k, in_run(k, {&one, 1})).sum_j - plain_[k].sum_j) / runs()[k].measured_j() /
-                (1e-3 * carrier->candidate.expected) / static_cast<double>(runs().size());
+        mean += std::fabs(by_robot(k, in_run(k, {&one, 1})).sum_j - plain_[k].sum_j) /
+                runs()[k].measured_j() / (1e-3 * carrier->candidate.expected) /
+                static_cast<double>(runs().size());
       }
       if (!(mean > 0)) continue;
       Hypothesis h;
@@ -287,9 +293,11 @@ void RunColumns::linearise_around(std::span<const Cause> causes, const Hypothesi
     const Energy model = modelled(k, causes);
     rows_.push_back({k, false, Eigen::VectorXd::Zero(n), run.measured_j() - model.sum_j});
     rows_.back().x[static_cast<Eigen::Index>(first_shift_ - 1)] = model.sum_j / run.measured_j();
-    if (tables_.size() > 1) rows_.back().x[static_cast<Eigen::Index>(first_shift_ + tables_.at(run.table))] = 1;
+    if (tables_.size() > 1)
+      rows_.back().x[static_cast<Eigen::Index>(first_shift_ + tables_.at(run.table))] = 1;
     if (run.by_motor()) {
-      rows_.push_back({k, true, Eigen::VectorXd::Zero(n), run.motor_j[0] - run.motor_j[1] - model.difference_j});
+      rows_.push_back(
+          {k, true, Eigen::VectorXd::Zero(n), run.motor_j[0] - run.motor_j[1] - model.difference_j});
       rows_.back().x[static_cast<Eigen::Index>(first_shift_ - 1)] = model.difference_j / run.measured_j();
     }
   }
@@ -319,8 +327,8 @@ void RunColumns::linearise_around(std::span<const Cause> causes, const Hypothesi
   }
 }
 
-// A centred difference, or towards the allowed side at a bound. What the strength of the linearisation point explains
-// stays in the response.
+// A centred difference, or towards the allowed side at a bound. What the strength of the linearisation point
+// explains stays in the response.
 void RunColumns::differentiate(std::size_t column, std::span<const Cause> causes) {
   const Cause& own = column_cause_[column];
   std::vector<Cause> base(causes.begin(), causes.end());
@@ -333,9 +341,11 @@ void RunColumns::differentiate(std::size_t column, std::span<const Cause> causes
   });
   if (found == base.end()) found = base.insert(base.end(), own);
   double& value = found->effect.values[own.parameter];
-  const auto h = std::ranges::find_if(hypotheses_, [&](const Hypothesis& o) { return o.candidate.columns.front() == column; });
+  const auto h = std::ranges::find_if(
+      hypotheses_, [&](const Hypothesis& o) { return o.candidate.columns.front() == column; });
   const double centre = value, step = 0.02 * h->candidate.expected;
-  const double high = std::min(centre + step, h->candidate.most), low = std::max(centre - step, h->candidate.least);
+  const double high = std::min(centre + step, h->candidate.most),
+               low = std::max(centre - step, h->candidate.least);
   std::vector<Energy> above, below;
   value = high;
   for (std::size_t k = 0; k < runs().size(); ++k) above.push_back(by_robot(k, in_run(k, base)));
@@ -350,7 +360,8 @@ void RunColumns::differentiate(std::size_t column, std::span<const Cause> causes
   }
 }
 
-std::vector<Cause> RunColumns::causes_of(const HypothesisSet& set, const Eigen::VectorXd& coefficients) const {
+std::vector<Cause> RunColumns::causes_of(const HypothesisSet& set,
+                                         const Eigen::VectorXd& coefficients) const {
   std::vector<Cause> causes;
   Eigen::Index at = 0;
   for (const std::size_t k : set) {

@@ -12,8 +12,8 @@
 
 namespace joulecast::gap {
 
-// One equation: measured - modelled energy [J] = x . coefficients + scatter. Trends and shifts of tables are relative
-// to the run's energy, the other regressors in J.
+// One equation: measured - modelled energy [J] = x . coefficients + scatter. Trends and shifts of tables are
+// relative to the run's energy, the other regressors in J.
 struct RunRow {
   std::size_t run = 0;
   bool difference = false;  // right minus left motor; otherwise their sum, or the battery
@@ -21,16 +21,16 @@ struct RunRow {
   double y = 0;
 };
 
-// What every hypothesis does to the energies of runs: effects of the catalogue, covariates and labels that a load or a
-// friction follows, trends over the conditions for what the catalogue does not know; and what is never a finding, a
-// common scale of model and meter and a shift of each table.
+// What every hypothesis does to the energies of runs: effects of the catalogue, covariates and labels that a
+// load or a friction follows, trends over the conditions for what the catalogue does not know; and what is
+// never a finding, a common scale of model and meter and a shift of each table.
 class RunColumns {
  public:
   RunColumns(const RunSet& set, const robot::RobotModel& robot);
 
-  // Differentiates around these from now on; at first around none. `only`: just the columns of these hypotheses, the
-  // others' become zero; empty: all. Sets are compared around none, since effects that act through others (payload
-  // errors through rolling resistance, say) would otherwise be taken for them.
+  // Differentiates around these from now on; at first around none. `only`: just the columns of these
+  // hypotheses, the others' become zero; empty: all. Sets are compared around none, since effects that act
+  // through others (payload errors through rolling resistance, say) would otherwise be taken for them.
   void linearise_around(std::span<const Cause> causes, const HypothesisSet& only = {});
 
   const std::vector<MissionRun>& runs() const { return set_.runs; }

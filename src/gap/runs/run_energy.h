@@ -10,12 +10,12 @@ namespace joulecast::gap {
 // The conditions of one run, driven from rest to rest: straight, or with an arc in the middle of the way.
 struct RunConditions {
   double distance_m = 0;
-  double speed_m_s = 0;          // reached at the end of the acceleration, if the distance allows it
-  double acceleration_m_s2 = 0;  // of starting and of braking
-  double payload_kg = 0;         // declared
-  double turn_rad = 0;           // change of heading, positive to the left; 0: straight
-  double turn_radius_m = 0;      // mean radius of the arc; of no meaning without a turn
-  double standstill_s = 0;       // with the robot on, before or after
+  double speed_m_s = 0;                // reached at the end of the acceleration, if the distance allows it
+  double acceleration_m_s2 = 0;        // of starting and of braking
+  double payload_kg = 0;               // declared
+  double turn_rad = 0;                 // change of heading, positive to the left; 0: straight
+  double turn_radius_m = 0;            // mean radius of the arc; of no meaning without a turn
+  double standstill_s = 0;             // with the robot on, before or after
   double climb_m = dynamics::unknown;  // by which it ends higher, evenly over the distance
 };
 

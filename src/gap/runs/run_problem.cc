@@ -13,16 +13,17 @@ namespace {
 
 using statistics::Information;
 
-constexpr double anything = 0.3;           // most share of the energy that each cause may move in the fit of everything
-constexpr double least_scatter = 0.002;    // rounding, and conditions that no table lists
+constexpr double anything =
+    0.3;  // most share of the energy that each cause may move in the fit of everything
+constexpr double least_scatter = 0.002;                    // rounding, and conditions that no table lists
 constexpr double most_scatter = 0.5, scatter_step = 1.15;  // of the search
 constexpr std::array widths{0.003, 0.01, 0.03, 0.1, 0.3, 1.0};  // of the prior of the fit of everything
-constexpr double outlier = 2.5;            // spreads from which on a run counts less
+constexpr double outlier = 2.5;                                 // spreads from which on a run counts less
 constexpr std::size_t most_blocks = 24;
-constexpr double usual_shift = 0.02;       // from day to day and floor to floor
+constexpr double usual_shift = 0.02;  // from day to day and floor to floor
 
-// What is averaged over: the scatter over what was learnt, how well the robot keeps to its file, how far formulas are
-// off as a part of the energy, and shifts between tables.
+// What is averaged over: the scatter over what was learnt, how well the robot keeps to its file, how far
+// formulas are off as a part of the energy, and shifts between tables.
 constexpr std::array scatters{0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.2};
 constexpr double scatter_known_to = 0.4;  // sd of its logarithm
 constexpr std::array keeping{0.5, 1.0, 2.0};
@@ -37,8 +38,9 @@ struct Relative {
 
 Relative relative(const RunColumns& columns, const Eigen::VectorXd& size_j) {
   const auto& rows = columns.rows();
-  Relative r{Eigen::MatrixXd(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(columns.size())),
-             Eigen::VectorXd(static_cast<Eigen::Index>(rows.size()))};
+  Relative r{
+      Eigen::MatrixXd(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(columns.size())),
+      Eigen::VectorXd(static_cast<Eigen::Index>(rows.size()))};
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
     const double size = size_j[static_cast<Eigen::Index>(rows[k].run)];
@@ -94,7 +96,8 @@ class Moved {
   Eigen::VectorXd change(const Hypothesis& h, const Eigen::VectorXd& coefficients) const {
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(rows_.y.size());
     for (std::size_t k = 0; k < h.candidate.columns.size(); ++k)
-      sum += coefficients[static_cast<Eigen::Index>(k)] * rows_.x.col(static_cast<Eigen::Index>(h.candidate.columns[k]));
+      sum += coefficients[static_cast<Eigen::Index>(k)] *
+             rows_.x.col(static_cast<Eigen::Index>(h.candidate.columns[k]));
     return sum;
   }
   std::vector<Column> columns_;
@@ -102,7 +105,8 @@ class Moved {
 };
 
 // Adds columns of their own for each group but the first.
-void in_groups(Relative& r, Eigen::VectorXd& sd, const std::vector<RunRow>& rows, std::span<const std::size_t> group) {
+void in_groups(Relative& r, Eigen::VectorXd& sd, const std::vector<RunRow>& rows,
+               std::span<const std::size_t> group) {
   const Eigen::Index p = r.x.cols();
   const auto more = static_cast<Eigen::Index>(*std::ranges::max_element(group));
   r.x.conservativeResize(Eigen::NoChange, p * (more + 1));
@@ -114,18 +118,20 @@ void in_groups(Relative& r, Eigen::VectorXd& sd, const std::vector<RunRow>& rows
   sd = sd.replicate(more + 1, 1).eval();
 }
 
-// A fit of every cause and trend at once, each held by one prior; the scatter and the prior's width are those under which
-// the energies are likeliest.
+// A fit of every cause and trend at once, each held by one prior; the scatter and the prior's width are those
+// under which the energies are likeliest.
 struct FitOfAll {
-  std::array<double, 2> scatter{};     // of the energy, of right minus left
-  Eigen::VectorXd left, residual;      // relative; the same over what it is expected to scatter by
+  std::array<double, 2> scatter{};  // of the energy, of right minus left
+  Eigen::VectorXd left, residual;   // relative; the same over what it is expected to scatter by
 
-  FitOfAll(const Relative& r, const std::vector<RunRow>& rows, const Eigen::VectorXd& freedom, const RunScatter& start)
+  FitOfAll(const Relative& r, const std::vector<RunRow>& rows, const Eigen::VectorXd& freedom,
+           const RunScatter& start)
       : scatter{start.run, start.difference} {
     double width = 1, best = -std::numeric_limits<double>::infinity();
     const bool differences = std::ranges::any_of(rows, &RunRow::difference);
     // One after the other, as each depends little on the other.
-    for (const std::size_t which : differences ? std::vector<std::size_t>{0, 1, 0, 1} : std::vector<std::size_t>{0}) {
+    for (const std::size_t which :
+         differences ? std::vector<std::size_t>{0, 1, 0, 1} : std::vector<std::size_t>{0}) {
       best = -std::numeric_limits<double>::infinity();
       std::array<double, 2> now = scatter;
       for (double sigma = least_scatter; sigma < most_scatter; sigma *= scatter_step) {
@@ -155,11 +161,13 @@ struct FitOfAll {
     const Eigen::MatrixXd x = root.asDiagonal() * r.x * sd.asDiagonal();
     const Eigen::VectorXd y = root.cwiseProduct(r.y);
     // Whichever is smaller: coefficients or runs.
-    Eigen::MatrixXd a = n < x.cols() ? Eigen::MatrixXd(x * x.transpose()) : Eigen::MatrixXd(x.transpose() * x);
+    Eigen::MatrixXd a =
+        n < x.cols() ? Eigen::MatrixXd(x * x.transpose()) : Eigen::MatrixXd(x.transpose() * x);
     a.diagonal().array() += 1.0;
     const Eigen::LLT<Eigen::MatrixXd> factor(a);
     density -= factor.matrixLLT().diagonal().array().log().sum();
-    Eigen::VectorXd whitened, kept;  // what the fit leaves, and the part of each row's variance that it leaves
+    Eigen::VectorXd whitened,
+        kept;  // what the fit leaves, and the part of each row's variance that it leaves
     if (n < x.cols()) {
       whitened = factor.solve(y);
       kept = factor.solve(Eigen::MatrixXd::Identity(n, n)).diagonal();
@@ -239,7 +247,8 @@ Problem make_problem(const RunColumns& columns, const RunScatter& scatter, std::
   Relative r = relative(columns, scatter.size_j);
   if (response != nullptr) {
     for (Eigen::Index k = 0; k < r.y.size(); ++k)
-      r.y[k] = (*response)[k] / scatter.size_j[static_cast<Eigen::Index>(columns.rows()[static_cast<std::size_t>(k)].run)];
+      r.y[k] = (*response)[k] /
+               scatter.size_j[static_cast<Eigen::Index>(columns.rows()[static_cast<std::size_t>(k)].run)];
   }
   Problem problem;
   problem.hypotheses = columns.hypotheses();
@@ -278,8 +287,8 @@ Problem make_problem(const RunColumns& columns, const RunScatter& scatter, std::
         for (const double shift : shifts) {
           if (tables == 0 && shift != usual_shift) continue;
           Circumstances c;
-          c.log_prior = -0.5 * (std::pow(std::log(wider) / scatter_known_to, 2) + std::pow(std::log2(factor), 2) +
-                                std::pow(shift / usual_shift, 2));
+          c.log_prior = -0.5 * (std::pow(std::log(wider) / scatter_known_to, 2) +
+                                std::pow(std::log2(factor), 2) + std::pow(shift / usual_shift, 2));
           c.tolerance = ((factor * tolerance).array().square() + (off * discrepancy).array().square()).sqrt();
           c.tolerance.tail(tables).setConstant(shift);
           c.noise = problem.blocks.size() - 1;
@@ -293,7 +302,8 @@ Problem make_problem(const RunColumns& columns, const RunScatter& scatter, std::
   }
   const auto moved = std::make_shared<const Moved>(columns, std::move(r));
   problem.moved = [moved](const Hypothesis& h, const Eigen::VectorXd& c) { return (*moved)(h, c); };
-  problem.cancelling = [moved, hypotheses = problem.hypotheses](const HypothesisSet& set, const Eigen::VectorXd& c) {
+  problem.cancelling = [moved, hypotheses = problem.hypotheses](const HypothesisSet& set,
+                                                                const Eigen::VectorXd& c) {
     return moved->cancelling(hypotheses, set, c);
   };
   return problem;

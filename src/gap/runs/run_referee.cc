@@ -13,7 +13,8 @@ RunReferee::RunReferee(const RunColumns& columns) {
   const auto take = [&](Term term, auto&& value, bool always) {
     Eigen::VectorXd column(n);
     for (Eigen::Index k = 0; k < n; ++k) column[k] = value(static_cast<std::size_t>(k));
-    // What is the same for each metre, or each second, of every run says nothing beside the distance and the time.
+    // What is the same for each metre, or each second, of every run says nothing beside the distance and the
+    // time.
     if (!always && (terms_.size() >= most_terms || !(column.cwiseAbs().maxCoeff() > 0))) return;
     terms_.push_back(std::move(term));
     x_.conservativeResize(n, x_.cols() + 1);
@@ -22,20 +23,27 @@ RunReferee::RunReferee(const RunColumns& columns) {
   const auto duration_s = [&](std::size_t k) { return columns.modelled(k, {}).duration_s; };
   const auto at = [&](std::size_t k) -> const RunConditions& { return runs[k].at; };
   take({"time", "W", "W whatever the robot does"}, duration_s, true);
-  take({"distance", "J/m", "J per m of way"}, [&](std::size_t k) { return at(k).distance_m; }, true);
+  take(
+      {"distance", "J/m", "J per m of way"}, [&](std::size_t k) { return at(k).distance_m; }, true);
   for (std::size_t c = 0; c < columns.covariates().size(); ++c) {
     const std::string& name = columns.covariates()[c];
-    take({"covariate:" + name, "W/unit", "W per unit of " + name},
-         [&](std::size_t k) { return columns.covariate(k, c) * duration_s(k); }, false);
+    take(
+        {"covariate:" + name, "W/unit", "W per unit of " + name},
+        [&](std::size_t k) { return columns.covariate(k, c) * duration_s(k); }, false);
   }
-  take({"payload", "J/(kg m)", "J per kg carried and m of way"},
-       [&](std::size_t k) { return at(k).payload_kg * at(k).distance_m; }, false);
-  take({"turning", "J/rad", "J per rad turned"}, [&](std::size_t k) { return std::fabs(at(k).turn_rad); }, false);
-  take({"climb", "J/m", "J per m climbed"},
-       [&](std::size_t k) { return std::isfinite(at(k).climb_m) ? at(k).climb_m : 0.0; }, false);
+  take(
+      {"payload", "J/(kg m)", "J per kg carried and m of way"},
+      [&](std::size_t k) { return at(k).payload_kg * at(k).distance_m; }, false);
+  take(
+      {"turning", "J/rad", "J per rad turned"}, [&](std::size_t k) { return std::fabs(at(k).turn_rad); },
+      false);
+  take(
+      {"climb", "J/m", "J per m climbed"},
+      [&](std::size_t k) { return std::isfinite(at(k).climb_m) ? at(k).climb_m : 0.0; }, false);
 }
 
-RunReferee::Fit RunReferee::fit(const std::vector<double>& energy_j, const std::vector<bool>& left_out) const {
+RunReferee::Fit RunReferee::fit(const std::vector<double>& energy_j,
+                                const std::vector<bool>& left_out) const {
   Eigen::MatrixXd x(x_.rows(), x_.cols());
   Eigen::VectorXd y(x_.rows());
   std::vector<std::size_t> block;

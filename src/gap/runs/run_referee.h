@@ -8,8 +8,8 @@
 
 namespace joulecast::gap {
 
-// A plain, robust regression of energy on distance, time, what was carried, turned and climbed, and the covariates over
-// time, as far as they differ: the referee of a diagnosis of runs.
+// A plain, robust regression of energy on distance, time, what was carried, turned and climbed, and the
+// covariates over time, as far as they differ: the referee of a diagnosis of runs.
 class RunReferee {
  public:
   explicit RunReferee(const RunColumns& columns);
@@ -19,7 +19,8 @@ class RunReferee {
   };
   const std::vector<Term>& terms() const { return terms_; }
 
-  // Energies of all runs by the terms, fitted to the runs that are not left out, errors relative to the measured ones.
+  // Energies of all runs by the terms, fitted to the runs that are not left out, errors relative to the
+  // measured ones.
   struct Fit {
     statistics::Regression regression;
     std::vector<double> energy_j;

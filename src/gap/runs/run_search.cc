@@ -30,7 +30,8 @@ std::vector<bool> blocks_left_out(std::span<const std::size_t> block, const std:
   return out;
 }
 
-Eigen::VectorXd strengths_of(const Problem& problem, const HypothesisSet& set, const std::vector<bool>& left_out) {
+Eigen::VectorXd strengths_of(const Problem& problem, const HypothesisSet& set,
+                             const std::vector<bool>& left_out) {
   std::vector<std::size_t> own;
   for (const std::size_t h : set) {
     const auto& more = problem.hypotheses[h].candidate.columns;
@@ -41,8 +42,9 @@ Eigen::VectorXd strengths_of(const Problem& problem, const HypothesisSet& set, c
 }
 
 // The strengths of a set, fitted again around themselves: energies are linear in them only nearby.
-std::vector<Cause> refit(const RunColumns& columns, const RunScatter& scatter, std::span<const std::size_t> block,
-                         const HypothesisSet& set, Eigen::VectorXd strengths, const std::vector<bool>& out) {
+std::vector<Cause> refit(const RunColumns& columns, const RunScatter& scatter,
+                         std::span<const std::size_t> block, const HypothesisSet& set,
+                         Eigen::VectorXd strengths, const std::vector<bool>& out) {
   if (set.empty()) return {};
   RunColumns around = columns;
   for (int round = 0; round < most_refits; ++round) {
@@ -60,7 +62,8 @@ RunFinding search_runs(const RunColumns& columns, std::span<const std::size_t> b
                        const std::vector<bool>& left_out) {
   RunFinding f{learn_scatter(columns, left_out), {}, {}, {}, {}};
   const std::vector<bool> out = blocks_left_out(block, left_out);
-  const auto runs = left_out.empty() ? block.size() : static_cast<std::size_t>(std::ranges::count(left_out, false));
+  const auto runs =
+      left_out.empty() ? block.size() : static_cast<std::size_t>(std::ranges::count(left_out, false));
   f.problem = make_problem(columns, f.scatter, block);
   f.explanation = explain(f.problem, out, settings_for(runs));
   f.named = likely_causes(f.problem, f.explanation);
@@ -84,14 +87,16 @@ RunFinding search_runs(const RunColumns& columns, std::span<const std::size_t> b
   return f;
 }
 
-std::optional<std::vector<Controls>> control_runs(const RunColumns& columns, std::span<const std::size_t> block,
-                                                  const RunFinding& f, std::size_t surrogates,
+std::optional<std::vector<Controls>> control_runs(const RunColumns& columns,
+                                                  std::span<const std::size_t> block, const RunFinding& f,
+                                                  std::size_t surrogates,
                                                   const std::function<bool(double)>& goes_on) {
   const auto& rows = columns.rows();
   const auto members = f.explanation.members.size();
   std::vector<Controls> controls(members, Controls{surrogates, 0});
   if (members == 0) return controls;
-  // In J, as everything is predicted, by hypothesis of the whole set, and what is left, relative to the scatter.
+  // In J, as everything is predicted, by hypothesis of the whole set, and what is left, relative to the
+  // scatter.
   const HypothesisSet& whole = f.explanation.whole;
   const Eigen::VectorXd coefficients = Mixture(f.problem).estimate(whole).mean;
   const auto n = static_cast<Eigen::Index>(rows.size());
@@ -107,7 +112,8 @@ std::optional<std::vector<Controls>> control_runs(const RunColumns& columns, std
     for (std::size_t m = 0; m < whole.size(); ++m) {
       for (const std::size_t c : f.problem.hypotheses[whole[m]].candidate.columns) {
         const double unit = columns.relative(c) ? f.scatter.size_j[static_cast<Eigen::Index>(row.run)] : 1;
-        part(k, static_cast<Eigen::Index>(m)) += coefficients[at++] * unit * row.x[static_cast<Eigen::Index>(c)];
+        part(k, static_cast<Eigen::Index>(m)) +=
+            coefficients[at++] * unit * row.x[static_cast<Eigen::Index>(c)];
       }
     }
     left[k] = (row.y - part.row(k).sum()) / scale_of(row);
@@ -136,7 +142,8 @@ std::optional<std::vector<Controls>> control_runs(const RunColumns& columns, std
       const Problem surrogate = make_problem(columns, f.scatter, block, &response);
       const Explanation answer = explain(surrogate, {}, settings_for(columns.runs().size()));
       const bool found = std::ranges::any_of(answer.members, [&](const Member& other) {
-        return group.contains(surrogate.hypotheses[other.hypothesis].id()) && other.group_probability() >= least_named;
+        return group.contains(surrogate.hypotheses[other.hypothesis].id()) &&
+               other.group_probability() >= least_named;
       });
       controls[m].named_in += found ? 1 : 0;
       if (!goes_on(static_cast<double>(m * surrogates + s + 1) / static_cast<double>(members * surrogates)))

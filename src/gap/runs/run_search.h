@@ -20,15 +20,16 @@ struct RunFinding {
   std::vector<Cause> causes;  // in the order of `named`
 };
 
-// Of the runs that are not left out: scatter, choice and strengths are theirs alone. Blocks hold no two runs of which
-// one is left out and the other is not.
+// Of the runs that are not left out: scatter, choice and strengths are theirs alone. Blocks hold no two runs
+// of which one is left out and the other is not.
 RunFinding search_runs(const RunColumns& columns, std::span<const std::size_t> block,
                        const std::vector<bool>& left_out = {});
 
-// Surrogate tables: the conditions of the runs, energies as the explanation has them without one of its members, and
-// what it leaves over in any order. How often is that member, or one of its group, found there as well? One answer a
-// member; nothing where `goes_on` returns false.
-std::optional<std::vector<Controls>> control_runs(const RunColumns& columns, std::span<const std::size_t> block,
+// Surrogate tables: the conditions of the runs, energies as the explanation has them without one of its
+// members, and what it leaves over in any order. How often is that member, or one of its group, found there
+// as well? One answer a member; nothing where `goes_on` returns false.
+std::optional<std::vector<Controls>> control_runs(const RunColumns& columns,
+                                                  std::span<const std::size_t> block,
                                                   const RunFinding& finding, std::size_t surrogates,
                                                   const std::function<bool(double)>& goes_on);
 

@@ -57,7 +57,8 @@ constexpr std::array<RunColumn, place_count> columns{
 // Columns beside these are named by what they are and how they are called.
 constexpr std::array<RunColumn, 2> own_columns{
     {{"covariate:NAME", "any", "a number that may be a cause: computer load, temperature, ..."},
-     {"label:NAME", "", "a word that may make a difference: surface, driver, ...; --compare-by NAME compares"}}};
+     {"label:NAME", "",
+      "a word that may make a difference: surface, driver, ...; --compare-by NAME compares"}}};
 constexpr std::string_view covariate_prefix = "covariate:", label_prefix = "label:";
 
 // Where a table has what.
@@ -80,7 +81,8 @@ class Row {
   tl::unexpected<Error> wrong(Place place, const std::string& constraint) const {
     return wrong(columns[place].name, text(place), constraint);
   }
-  tl::unexpected<Error> wrong(std::string_view column, std::string_view cell, const std::string& constraint) const {
+  tl::unexpected<Error> wrong(std::string_view column, std::string_view cell,
+                              const std::string& constraint) const {
     return invalid(where_, "column " + std::string(column) + ": '" + std::string(cell) + "' " + constraint);
   }
 
@@ -101,7 +103,8 @@ class Row {
     if (cell.empty()) return MissionRun::absent;
     double value = 0;
     const auto [end, fault] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-    if (fault != std::errc() || end != cell.data() + cell.size() || !std::isfinite(value)) return invalid("", "");
+    if (fault != std::errc() || end != cell.data() + cell.size() || !std::isfinite(value))
+      return invalid("", "");
     return value;
   }
 
@@ -189,7 +192,7 @@ Result<MissionRun> read_run(const Row& row, std::size_t line, const robot::Robot
   for (const Cell& cell : cells) {
     auto value = std::isnan(cell.fallback) && cell.place != climb
                      ? row.required(cell.place, cell.low, cell.high, cell.constraint)
-                                           : row.number(cell.place, cell.low, cell.high, cell.constraint);
+                     : row.number(cell.place, cell.low, cell.high, cell.constraint);
     if (!value) return tl::unexpected(value.error());
     *cell.value = std::isnan(*value) ? cell.fallback : *value;
   }
@@ -226,25 +229,28 @@ Result<Header> read_header(std::span<const std::string> names, const std::string
     const auto own = [&](std::string_view prefix, std::vector<std::string>& list) -> Result<std::size_t> {
       const std::string_view rest = name.substr(prefix.size());
       if (!telemetry::is_valid_covariate_name(rest) || telemetry::is_label(rest))
-        return invalid(where, "column " + names[c] + ": a name is 1 to 47 of letters, digits, '.', '_' and '-'");
+        return invalid(where,
+                       "column " + names[c] + ": a name is 1 to 47 of letters, digits, '.', '_' and '-'");
       return place_in(list, rest);
     };
     const bool covariate = name.starts_with(covariate_prefix);
     if (covariate || name.starts_with(label_prefix)) {
-      const auto index = own(covariate ? covariate_prefix : label_prefix, covariate ? set.covariates : set.labels);
+      const auto index =
+          own(covariate ? covariate_prefix : label_prefix, covariate ? set.covariates : set.labels);
       if (!index) return tl::unexpected(index.error());
       (covariate ? header.covariates : header.labels).emplace_back(c, *index);
       continue;
     }
     const auto found = std::ranges::find(columns, name, &RunColumn::name);
     if (found == columns.end()) {
-      return invalid(where, "column " + names[c] + " is none of a table of runs; covariate:" + names[c] + " or label:" +
-                                names[c] + " would make it a possible cause");
+      return invalid(where, "column " + names[c] + " is none of a table of runs; covariate:" + names[c] +
+                                " or label:" + names[c] + " would make it a possible cause");
     }
     header.at[static_cast<std::size_t>(found - columns.begin())] = c;
   }
   for (const Place needed : {distance, speed}) {
-    if (!header.at[needed]) return invalid(where, "column " + std::string(columns[needed].name) + " is required");
+    if (!header.at[needed])
+      return invalid(where, "column " + std::string(columns[needed].name) + " is required");
   }
   return header;
 }
@@ -259,8 +265,8 @@ Result<void> read_file(const RunFile& file, const robot::RobotModel& robot, bool
     const auto more = table->next(fields);
     if (!more) return invalid(file.name, describe(more.error()));
     if (!*more) return {};
-    auto run = read_run({fields, *header, file.name + ": line " + std::to_string(table->line())}, table->line(), robot,
-                        set);
+    auto run = read_run({fields, *header, file.name + ": line " + std::to_string(table->line())},
+                        table->line(), robot, set);
     if (!run) return tl::unexpected(std::move(run.error()));
     if (several && run->table.empty()) run->table = file.name;
     set.runs.push_back(std::move(*run));
@@ -286,8 +292,10 @@ Result<std::vector<std::string>> RunSet::groups_by(std::string_view label) const
     return invalid("--compare-by", std::string(label) + " is no label of these runs; they have " + known);
   }
   for (const MissionRun& run : runs) {
-    groups.push_back(label == "table" ? run.table : run.labels[static_cast<std::size_t>(found - labels.begin())]);
-    if (groups.back().empty()) return invalid("--compare-by", "run " + run.name + " has no " + std::string(label));
+    groups.push_back(label == "table" ? run.table
+                                      : run.labels[static_cast<std::size_t>(found - labels.begin())]);
+    if (groups.back().empty())
+      return invalid("--compare-by", "run " + run.name + " has no " + std::string(label));
   }
   return groups;
 }

@@ -38,8 +38,8 @@ struct RunSet {
   std::vector<MissionRun> runs;
   std::vector<std::string> covariates, labels;  // names
 
-  // The runs' label of that name; Fault::invalid with the known ones where no table has it, or a run lacks it.
-  // "table" is a label that all runs have.
+  // The runs' label of that name; Fault::invalid with the known ones where no table has it, or a run lacks
+  // it. "table" is a label that all runs have.
   Result<std::vector<std::string>> groups_by(std::string_view label) const;
 };
 
@@ -57,9 +57,9 @@ struct RunFile {
   std::string name, text;
 };
 
-// Reads runs from CSV tables. An error's field is "<name>: line N" and its message names the column. The robot's limit
-// stands in for an acceleration that is not given, and where there are several files a file's name for its table. At
-// least 3 runs, at most 1000.
+// Reads runs from CSV tables. An error's field is "<name>: line N" and its message names the column. The
+// robot's limit stands in for an acceleration that is not given, and where there are several files a file's
+// name for its table. At least 3 runs, at most 1000.
 Result<RunSet> read_runs(std::span<const RunFile> files, const robot::RobotModel& robot);
 
 }  // namespace joulecast::gap

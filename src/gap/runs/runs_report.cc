@@ -15,8 +15,9 @@ std::string sentence_of(const RunDiagnosis& r) {
   const Diagnosis& d = r.diagnosis;
   std::vector<std::string> names;
   for (const DiagnosedEffect& e : d.effects) names.push_back(words_of(e.id));
-  std::string text = fmt::format("Over {} runs the model misses the energy of a run by {} on average; the verdict is {}.",
-                                 d.missions, percent(d.power_absolute_relative), words_of(name_of(d.verdict)));
+  std::string text =
+      fmt::format("Over {} runs the model misses the energy of a run by {} on average; the verdict is {}.",
+                  d.missions, percent(d.power_absolute_relative), words_of(name_of(d.verdict)));
   if (!names.empty()) text += fmt::format(" Found: {}.", enumerate(names));
   return text;
 }
@@ -24,7 +25,8 @@ std::string sentence_of(const RunDiagnosis& r) {
 void runs_section(Page& page, const RunDiagnosis& r) {
   constexpr std::size_t most_runs = 60;
   page.section("Run by run",
-               "How far the model is from the measured energy (measured less modelled, of the measured): as it is, and "
+               "How far the model is from the measured energy (measured less modelled, of the measured): as "
+               "it is, and "
                "with causes named and fitted without that run.");
   std::vector<ChangeRow> rows;
   for (const JudgedRun& run : r.runs) {
@@ -43,16 +45,18 @@ void runs_section(Page& page, const RunDiagnosis& r) {
 void conditions_section(Page& page, const RunDiagnosis& r) {
   if (r.conditions.empty()) return;
   page.section("Conditions left out",
-               "Everything is done again without the runs of one condition, which are then predicted; a plain regression "
+               "Everything is done again without the runs of one condition, which are then predicted; a "
+               "plain regression "
                "of energy on distance, time and what was carried does the same.");
   std::vector<std::vector<std::string>> rows;
   for (const LeftOut& l : r.conditions) {
     std::vector<std::string> names;
     for (const std::string& id : l.effects) names.push_back(words_of(id));
-    rows.push_back({xml_escaped(l.what), std::to_string(l.runs), percent(l.before), percent(l.after), percent(l.referee),
-                    names.empty() ? "nothing" : xml_escaped(enumerate(names))});
+    rows.push_back({xml_escaped(l.what), std::to_string(l.runs), percent(l.before), percent(l.after),
+                    percent(l.referee), names.empty() ? "nothing" : xml_escaped(enumerate(names))});
   }
-  const std::vector<std::string> header{"Left out", "runs", "model as it is", "with causes", "regression", "named"};
+  const std::vector<std::string> header{"Left out",    "runs",       "model as it is",
+                                        "with causes", "regression", "named"};
   page.table(header, rows, 1);
 }
 
@@ -60,8 +64,8 @@ void conditions_section(Page& page, const RunDiagnosis& r) {
 
 std::string report_html(const RunDiagnosis& r, const robot::RobotModel& robot, const ReportOrigin& origin) {
   const Diagnosis& d = r.diagnosis;
-  Page page("Why robot " + d.robot_id + " spends other energies than its model says", "Diagnosis from energies of runs",
-            sentence_of(r));
+  Page page("Why robot " + d.robot_id + " spends other energies than its model says",
+            "Diagnosis from energies of runs", sentence_of(r));
   const std::vector<Page::Figure> figures{
       {percent(d.power_absolute_relative), "mean error of a run, model as it is"},
       {percent(r.scatter), "by which runs scatter beside any cause"},

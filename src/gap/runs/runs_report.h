@@ -8,6 +8,7 @@
 namespace joulecast::gap {
 
 // A diagnosis of runs as one HTML page.
-std::string report_html(const RunDiagnosis& diagnosis, const robot::RobotModel& robot, const ReportOrigin& origin);
+std::string report_html(const RunDiagnosis& diagnosis, const robot::RobotModel& robot,
+                        const ReportOrigin& origin);
 
 }  // namespace joulecast::gap

@@ -7,8 +7,8 @@
 
 namespace joulecast::gap {
 
-// Whether wheel speeds computed as (2v +- l yaw)/(2r) with l half the track, thesis (3-6), are behind the difference
-// between the sides: their turning term is half of the right one.
+// Whether wheel speeds computed as (2v +- l yaw)/(2r) with l half the track, thesis (3-6), are behind the
+// difference between the sides: their turning term is half of the right one.
 struct TurningTerm {
   std::size_t runs = 0;
   double side_difference = 0;      // that the term would make, mean, relative to a run's energy

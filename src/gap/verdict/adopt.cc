@@ -15,7 +15,8 @@ namespace {
 
 using nlohmann::json;
 
-// An effect with its numbers, whatever the catalogue's bounds: what is found may take off some of what the file has.
+// An effect with its numbers, whatever the catalogue's bounds: what is found may take off some of what the
+// file has.
 Result<dynamics::ActiveEffect> as_found(const robot::AdoptedEffect& adopted) {
   const dynamics::Effect* effect = dynamics::find_effect(adopted.id);
   if (effect == nullptr) return invalid("/effects/" + adopted.id, "is not an effect of the catalogue");
@@ -38,7 +39,8 @@ std::optional<Change> change_of(const dynamics::ActiveEffect& effect) {
   const Traits& traits = traits_of(effect.effect->info().id);
   if (traits.calibrates.empty()) return std::nullopt;
   const auto& parameters = effect.effect->info().parameters;
-  Change change{std::string(traits.calibrates), traits.adds ? 0 : effect.values[0], traits.adds ? effect.values[0] : 0};
+  Change change{std::string(traits.calibrates), traits.adds ? 0 : effect.values[0],
+                traits.adds ? effect.values[0] : 0};
   for (std::size_t k = 1; k < parameters.size(); ++k) {
     if (parameters[k].strength) change.plus += effect.values[k];
   }
@@ -77,8 +79,9 @@ Result<robot::RobotModel> with_effects(robot::RobotModel robot, std::span<const 
       const double weight = a + b > 0 ? b / (a + b) : 0;
       const auto& parameters = more->effect->info().parameters;
       for (std::size_t k = 0; k < parameters.size(); ++k) {
-        more->values[k] = k == 0 || parameters[k].strength ? had->values[k] + more->values[k]
-                                                           : std::lerp(had->values[k], more->values[k], weight);
+        more->values[k] = k == 0 || parameters[k].strength
+                              ? had->values[k] + more->values[k]
+                              : std::lerp(had->values[k], more->values[k], weight);
       }
       *present = dynamics::adopt(*more);
     }
@@ -87,7 +90,8 @@ Result<robot::RobotModel> with_effects(robot::RobotModel robot, std::span<const 
   return robot;
 }
 
-Result<robot::RobotModel> with_corrections(robot::RobotModel robot, std::span<const robot::AdoptedEffect> found) {
+Result<robot::RobotModel> with_corrections(robot::RobotModel robot,
+                                           std::span<const robot::AdoptedEffect> found) {
   json file = robot::robot_to_json(robot);
   std::vector<robot::AdoptedEffect> others;
   for (const robot::AdoptedEffect& effect : found) {
@@ -104,7 +108,8 @@ Result<robot::RobotModel> with_corrections(robot::RobotModel robot, std::span<co
   return with_effects(std::move(*corrected), others);
 }
 
-std::vector<FileCorrection> corrections_of(const robot::RobotModel& robot, std::span<const robot::AdoptedEffect> found,
+std::vector<FileCorrection> corrections_of(const robot::RobotModel& robot,
+                                           std::span<const robot::AdoptedEffect> found,
                                            std::span<const double> deviations) {
   const json file = robot::robot_to_json(robot);
   std::vector<FileCorrection> corrections;
@@ -116,8 +121,9 @@ std::vector<FileCorrection> corrections_of(const robot::RobotModel& robot, std::
       const auto had = std::ranges::find(robot.effects, found[k].id, &robot::AdoptedEffect::id);
       const auto in_file = had == robot.effects.end() ? std::nullopt : std::optional(as_found(*had));
       const double before = in_file && *in_file ? (**in_file).values[0] : 0;
-      corrections.push_back({fmt::format("effects.{}.{}", found[k].id, active->effect->info().parameters[0].name), before,
-                             before + active->values[0], deviations[k]});
+      corrections.push_back(
+          {fmt::format("effects.{}.{}", found[k].id, active->effect->info().parameters[0].name), before,
+           before + active->values[0], deviations[k]});
       continue;
     }
     const double value = mean_of(file[json::json_pointer(change->pointer)]);

@@ -10,7 +10,8 @@ std::string_view name_of(PowerSource source) {
 }
 
 std::string_view name_of(Verdict verdict) {
-  constexpr std::array<std::string_view, 5> names{"none", "effects", "outside", "inconclusive", "not_this_robot"};
+  constexpr std::array<std::string_view, 5> names{"none", "effects", "outside", "inconclusive",
+                                                  "not_this_robot"};
   return names[static_cast<std::size_t>(verdict)];
 }
 

@@ -18,8 +18,8 @@ struct WhereRegion {
   std::string variable;  // phase, speed_m_s, ..., floor_m
   std::string label;     // for phases and floor cells; empty for numbers
   double from = 0, to = 0;
-  double share = 0;                  // of the integral of |P_measured - P_model|, signed: positive spends more
-  double time_share = 0;             // of the time: what it would hold if the gap were spread evenly
+  double share = 0;       // of the integral of |P_measured - P_model|, signed: positive spends more
+  double time_share = 0;  // of the time: what it would hold if the gap were spread evenly
   std::array<double, 2> interval{};  // of the share, 95 %, widened for the number of regions looked at
 };
 
@@ -54,7 +54,7 @@ struct DiagnosedEffect {
   double varies = 0;                      // of its strength along the recordings, sd over the strength
   std::vector<std::string> alternatives;  // that these data cannot tell from it
   // Those of them that a robot file can take, each with the strength that it has in this one's place.
-  std::vector<robot::AdoptedEffect> instead;
+  std::vector<robot::AdoptedEffect> instead{};
   std::optional<Controls> controls;
   std::string calibrates;  // parameter of the robot file that it would correct; empty: none
 };
@@ -62,8 +62,8 @@ struct DiagnosedEffect {
 // Something that no effect of the catalogue describes.
 struct Outside {
   double probability = 0;
-  std::string channel, follows;  // empty: none stands out
-  std::string like;              // the effect whose form it has, where its strength does not stand still
+  std::string channel, follows;     // empty: none stands out
+  std::string like;                 // the effect whose form it has, where its strength does not stand still
   std::array<double, 2> power_w{};  // of that form, at the beginning and at the end of a mission
   std::optional<Controls> controls;
 };
@@ -77,11 +77,13 @@ struct ChannelGap {
 struct BaselineTerm {
   std::string name, unit;
   double value = 0, deviation = 0;
-  double model = std::numeric_limits<double>::quiet_NaN();  // what the robot file's model comes to in the same term
+  double model =
+      std::numeric_limits<double>::quiet_NaN();  // what the robot file's model comes to in the same term
 };
 
-// A plain regression of power on motion, the referee: no explanation stands that predicts what it was not fitted to
-// worse than this, or than the unchanged model. Errors are mean |error| over mean |power|, on the same held-out blocks.
+// A plain regression of power on motion, the referee: no explanation stands that predicts what it was not
+// fitted to worse than this, or than the unchanged model. Errors are mean |error| over mean |power|, on the
+// same held-out blocks.
 struct Baseline {
   std::vector<BaselineTerm> terms;
   double held_out = 0;                  // of the regression
@@ -91,8 +93,8 @@ struct Baseline {
   bool wins() const;                    // over the explanation, by more than the gate allows
 };
 
-// What a found explanation does on parts that had no part in finding it: effects, shapes, zone and noise are chosen
-// anew without each part.
+// What a found explanation does on parts that had no part in finding it: effects, shapes, zone and noise are
+// chosen anew without each part.
 struct Shrinkage {
   double before = 0, after = 0;      // integral of |P_measured - P_model| over that of |P_measured|, held out
   double fraction = 0;               // 1 - after/before

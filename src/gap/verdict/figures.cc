@@ -77,7 +77,9 @@ class Collector {
     for (std::size_t k = 0; k < windows_.size(); ++k) {
       const Window& w = windows_[k];
       if (!known(k) || !std::isfinite(w.x_m + w.y_m)) continue;
-      cells[{static_cast<int>((w.x_m - x0) / figures.cell_m), static_cast<int>((w.y_m - y0) / figures.cell_m)}].push_back(k);
+      cells[{static_cast<int>((w.x_m - x0) / figures.cell_m),
+             static_cast<int>((w.y_m - y0) / figures.cell_m)}]
+          .push_back(k);
     }
     for (const auto& [at, members] : cells) {
       if (members.size() < fewest_in_cell) continue;
@@ -134,8 +136,8 @@ class Collector {
       const std::int64_t start = mission.samples.front().utime_us;
       figures.missions.push_back({mission.mission_id, start,
                                   1e-6 * static_cast<double>(mission.samples.back().utime_us - start),
-                                  mission.payload_kg, t.gap / t.measured, t.rest / t.measured, t.absolute / t.size,
-                                  t.absolute_after / t.size});
+                                  mission.payload_kg, t.gap / t.measured, t.rest / t.measured,
+                                  t.absolute / t.size, t.absolute_after / t.size});
     }
   }
 
@@ -176,8 +178,8 @@ class Collector {
 }  // namespace
 
 Figures figures_of(std::span<const Window> windows, std::span<const double> measured_w,
-                   std::span<const double> before_w, std::span<const double> after_w, const telemetry::RecordingSet& recordings,
-                   const robot::RobotModel& robot) {
+                   std::span<const double> before_w, std::span<const double> after_w,
+                   const telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
   const double r = robot.kinematics.wheel_radius_m, l = robot.kinematics.half_track_m;
   const Collector collect(windows, measured_w, before_w, after_w);
   Figures figures;
@@ -198,7 +200,8 @@ Figures figures_of(std::span<const Window> windows, std::span<const double> meas
                      : missing;
         }}}};
   for (const auto& [axis, value] : variables) {
-    if (Figures::Map map = collect.map(axis, value); !map.bins.empty()) figures.maps.push_back(std::move(map));
+    if (Figures::Map map = collect.map(axis, value); !map.bins.empty())
+      figures.maps.push_back(std::move(map));
   }
   collect.floor(figures);
   collect.power(figures, recordings);

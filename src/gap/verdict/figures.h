@@ -3,15 +3,15 @@
 #include <span>
 
 #include "gap/equations/channels.h"
-#include "telemetry/recording_set.h"
 #include "gap/verdict/diagnosis.h"
+#include "telemetry/recording_set.h"
 
 namespace joulecast::gap {
 
-// What a report draws: missed power over what may drive it, over the floor, over time and by mission, by the model as
-// it is and with what was found. Powers are of the windows, in watts, NaN where not known.
+// What a report draws: missed power over what may drive it, over the floor, over time and by mission, by the
+// model as it is and with what was found. Powers are of the windows, in watts, NaN where not known.
 Figures figures_of(std::span<const Window> windows, std::span<const double> measured_w,
-                   std::span<const double> before_w, std::span<const double> after_w, const telemetry::RecordingSet& recordings,
-                   const robot::RobotModel& robot);
+                   std::span<const double> before_w, std::span<const double> after_w,
+                   const telemetry::RecordingSet& recordings, const robot::RobotModel& robot);
 
 }  // namespace joulecast::gap

@@ -12,18 +12,18 @@ namespace joulecast::gap {
 namespace {
 
 // Of the mean power, beyond the noise floor.
-constexpr double largest_unnamed = 0.012;               // what may be left over while nothing is named
-constexpr double largest_left = 0.014, of_gap = 0.1;    // and beside names, with a part of the gap
-constexpr double closes_nothing = 0.95;                 // of the gap on held-out parts, that still is left
-constexpr double mostly_outside = 0.25;                 // of what moves power, outside the catalogue
-constexpr double mostly_closed = 0.5;                   // of what held-out parts can be closed by
-constexpr double beyond_usual = 3;                      // strengths that no robot has, over the usual ones
-constexpr double doubtful = 0.6;                        // factor on names beside which something speaks against all
-constexpr double varying = 0.7;                         // most that a name whose strength varies may have
-constexpr double most_detectable = 0.08;                // share below which effects must be seen for "none"
+constexpr double largest_unnamed = 0.012;             // what may be left over while nothing is named
+constexpr double largest_left = 0.014, of_gap = 0.1;  // and beside names, with a part of the gap
+constexpr double closes_nothing = 0.95;               // of the gap on held-out parts, that still is left
+constexpr double mostly_outside = 0.25;               // of what moves power, outside the catalogue
+constexpr double mostly_closed = 0.5;                 // of what held-out parts can be closed by
+constexpr double beyond_usual = 3;                    // strengths that no robot has, over the usual ones
+constexpr double doubtful = 0.6;          // factor on names beside which something speaks against all
+constexpr double varying = 0.7;           // most that a name whose strength varies may have
+constexpr double most_detectable = 0.08;  // share below which effects must be seen for "none"
 
-// A battery sensor that reads too much while the motors' are right: a load that follows the current would read the
-// same.
+// A battery sensor that reads too much while the motors' are right: a load that follows the current would
+// read the same.
 bool like_a_load(const Cause& cause) {
   const std::string_view id = cause.effect.effect->info().id;
   return (id == "current_sensor_gain" || id == "voltage_sensor_gain") && cause.effect.values[1] == 0;
@@ -64,11 +64,11 @@ std::vector<DiagnosedParameter> parameters_of(const Cause& cause, const Hypothes
 
 // What speaks against the names as a whole.
 struct Doubts {
-  bool far = false;         // the gap is so large that the file is another robot's
-  bool strange = false;     // strengths that no robot has
-  bool idle = false;        // on held-out parts they close nothing
-  bool worse = false;       // than the referee or the unchanged model, on held-out parts
-  bool unexplained = false; // held-out parts keep more of the gap than right names leave
+  bool far = false;          // the gap is so large that the file is another robot's
+  bool strange = false;      // strengths that no robot has
+  bool idle = false;         // on held-out parts they close nothing
+  bool worse = false;        // than the referee or the unchanged model, on held-out parts
+  bool unexplained = false;  // held-out parts keep more of the gap than right names leave
   bool like_load = false;
   bool any_against() const { return idle || worse || unexplained || like_load; }
 };
@@ -99,6 +99,7 @@ class Judge {
   }
 
   void name_effects() {
+    const std::vector<dynamics::ActiveEffect> none;
     for (std::size_t k = 0; k < f_.named.size(); ++k) {
       const Hypothesis& h = hypothesis(f_.named[k]);
       const Member& m = member_of(f_.named[k]);
@@ -117,9 +118,11 @@ class Judge {
       e.power_w = f_.power_w[k];
       e.varies = m.wander;
       for (const Alternative& a : m.alternatives) e.alternatives.push_back(hypothesis(a.hypothesis).id());
-      for (const dynamics::ActiveEffect& effect : f_.instead[k]) e.instead.push_back(dynamics::adopt(effect));
+      for (const dynamics::ActiveEffect& effect : k < f_.instead.size() ? f_.instead[k] : none)
+        e.instead.push_back(dynamics::adopt(effect));
       if (h.is_effect()) e.calibrates = traits_of(e.id).calibrates;
-      weakest_ = std::min(weakest_, e.alternatives.empty() ? e.posterior : std::max(e.posterior, group_of(m, e)));
+      weakest_ =
+          std::min(weakest_, e.alternatives.empty() ? e.posterior : std::max(e.posterior, group_of(m, e)));
       named_share_ += m.share;
       d_.effects.push_back(std::move(e));
     }
@@ -152,9 +155,10 @@ class Judge {
       outside_share_ += m.share;
       if (m.share > largest && passes(controls)) {
         largest = m.share;
-        const std::string channel = d_.motor_channels ? "battery_power_from_motors" : "battery_power_from_motion";
-        d_.outside = {m.group_probability(), channel, "time", hypothesis(m.hypothesis).id(), f_.wandering_power_w,
-                      controls};
+        const std::string channel =
+            d_.motor_channels ? "battery_power_from_motors" : "battery_power_from_motion";
+        d_.outside = {m.group_probability(), channel, "time", hypothesis(m.hypothesis).id(),
+                      f_.wandering_power_w,  controls};
       }
     }
     if (f_.ripple && f_.ripple->power_share > least) {
@@ -163,8 +167,9 @@ class Judge {
       outside_share_ += f_.ripple->power_share;
       rippled_ = true;
       if (f_.ripple->power_share > largest) {
-        d_.outside = {1, d_.motor_channels ? "wheel_torque" : "battery_power_from_motion", "wheel_angle", "", {},
-                      controls};
+        d_.outside = {
+            1,       d_.motor_channels ? "wheel_torque" : "battery_power_from_motion", "wheel_angle", "", {},
+            controls};
       }
     }
     if (d_.outside.channel.empty())
@@ -178,7 +183,8 @@ class Judge {
     if (!f_.held_out || d_.effects.empty() || d_.power == PowerSource::none) return;
     const double after = f_.held_out->explained();
     closed_ = (f_.held_out->unchanged() - after) / (f_.held_out->unchanged() - d_.noise_floor);
-    const bool by_power = std::ranges::all_of(f_.named, [&](std::size_t h) { return shows_in_power(hypothesis(h)); });
+    const bool by_power =
+        std::ranges::all_of(f_.named, [&](std::size_t h) { return shows_in_power(hypothesis(h)); });
     doubts_.idle = by_power && after > closes_nothing * f_.held_out->unchanged();
     doubts_.worse = d_.baseline && d_.baseline->wins();
     doubts_.unexplained = !(closed_ > mostly_closed) &&
@@ -206,7 +212,8 @@ class Judge {
       d_.verdict = Verdict::inconclusive;
       d_.verdict_probability = weakest_;
     }
-    if (d_.verdict != Verdict::none && (doubts_.far || (doubts_.strange && open))) d_.verdict = Verdict::not_this_robot;
+    if (d_.verdict != Verdict::none && (doubts_.far || (doubts_.strange && open)))
+      d_.verdict = Verdict::not_this_robot;
   }
 
   void state_probabilities() {
@@ -222,7 +229,8 @@ class Judge {
       e.probability = stated_probability(e.posterior, standing);
     }
     d_.verdict_probability = std::min(d_.verdict_probability, surest_verdict);
-    // What a file that is not this robot's has wrong is told as its corrections; what no file could say comes first.
+    // What a file that is not this robot's has wrong is told as its corrections; what no file could say comes
+    // first.
     std::ranges::stable_sort(d_.effects, std::greater{}, [&](const DiagnosedEffect& e) {
       return std::pair(d_.verdict == Verdict::not_this_robot && e.calibrates.empty(), e.share);
     });
@@ -236,7 +244,8 @@ class Judge {
       const auto named = std::ranges::find(d_.effects, id, &DiagnosedEffect::id);
       if (named == d_.effects.end()) continue;
       d_.adoptable.push_back(dynamics::adopt(cause.effect));
-      const auto own = std::ranges::find_if(named->parameters, [](const auto& p) { return std::isfinite(p.deviation); });
+      const auto own =
+          std::ranges::find_if(named->parameters, [](const auto& p) { return std::isfinite(p.deviation); });
       deviations.push_back(own == named->parameters.end() ? 0 : own->deviation);
     }
     if (d_.verdict == Verdict::not_this_robot) {
@@ -246,7 +255,8 @@ class Judge {
         deviations.push_back(missing);
       }
     }
-    if (d_.verdict == Verdict::not_this_robot) d_.corrections = corrections_of(robot_, d_.adoptable, deviations);
+    if (d_.verdict == Verdict::not_this_robot)
+      d_.corrections = corrections_of(robot_, d_.adoptable, deviations);
     d_.refusal = refusal_of(d_, doubts_.worse, doubts_.any_against());
   }
 

@@ -161,7 +161,8 @@ statistics::Information expected_information(const Linear& linear, const std::ve
       const ChannelNoise& noise = linear.noise[c];
       if (!std::isfinite(values[c]) || noise.sigma <= 0 || c == index_of(Channel::battery_voltage)) continue;
       const Eigen::Map<const Eigen::VectorXd> x(rows.data() + c * columns.size(), p);
-      info.xx.selfadjointView<Eigen::Lower>().rankUpdate(x, 1 / (noise.sigma * noise.sigma * noise.inflation));
+      info.xx.selfadjointView<Eigen::Lower>().rankUpdate(x,
+                                                         1 / (noise.sigma * noise.sigma * noise.inflation));
     }
   }
   info.xx = info.xx.selfadjointView<Eigen::Lower>();
@@ -203,7 +204,8 @@ std::vector<NextDrive> drives_for(const Outside& outside) {
            missing}};
 }
 
-std::vector<NextDrive> next_drives(const Linear& linear, const Problem& problem, const robot::RobotModel& robot,
+std::vector<NextDrive> next_drives(const Linear& linear, const Problem& problem,
+                                   const robot::RobotModel& robot,
                                    const std::vector<DiagnosedEffect>& effects) {
   std::vector<NextDrive> drives;
   const auto& all = problem.hypotheses;
@@ -228,7 +230,8 @@ std::vector<NextDrive> next_drives(const Linear& linear, const Problem& problem,
     for (const Manoeuvre& m : manoeuvres(robot)) {
       statistics::Information more = total;
       more += expected_information(linear, m.windows);
-      candidates.push_back({m.text, effect.id + " from " + effect.alternatives.front(), separation(more) - known});
+      candidates.push_back(
+          {m.text, effect.id + " from " + effect.alternatives.front(), separation(more) - known});
     }
     std::ranges::stable_sort(candidates, std::greater{}, &NextDrive::expected_log_evidence);
     candidates.resize(std::min(candidates.size(), most_drives));

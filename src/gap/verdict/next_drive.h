@@ -7,9 +7,10 @@
 
 namespace joulecast::gap {
 
-// For each effect that has alternatives: of a list of manoeuvres, the ones that raise the expected log evidence for
-// the named effect over its best alternative most.
-std::vector<NextDrive> next_drives(const Linear& linear, const Problem& problem, const robot::RobotModel& robot,
+// For each effect that has alternatives: of a list of manoeuvres, the ones that raise the expected log
+// evidence for the named effect over its best alternative most.
+std::vector<NextDrive> next_drives(const Linear& linear, const Problem& problem,
+                                   const robot::RobotModel& robot,
                                    const std::vector<DiagnosedEffect>& effects);
 
 // What shows whether something follows a variable, and how.

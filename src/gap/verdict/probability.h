@@ -17,8 +17,8 @@ struct ProbabilityBin {
 // probability_table, and surest_verdict: how often verdicts of the highest probability came true.
 #include "gap/verdict/probabilities.inc"
 
-// The probability to state for an effect so named: how often such names came true in trials, interpolated between the
-// bins of the table.
+// The probability to state for an effect so named: how often such names came true in trials, interpolated
+// between the bins of the table.
 double stated_probability(double posterior, Standing standing);
 
 }  // namespace joulecast::gap

@@ -54,14 +54,14 @@ void say_shrinkage(const Diagnosis& d, bool unexplained, std::vector<std::string
   const Shrinkage& s = *d.shrinkage;
   const bool one = d.effects.size() == 1;
   if (s.interval[1] < 0) {
-    reasons.push_back(sentence(
-        fmt::format("on parts left out {}, {} instead of {}, and is no explanation",
-                    one ? "it makes the gap larger" : "what they do makes the gap larger", percent(s.after),
-                    percent(s.before))));
+    reasons.push_back(
+        sentence(fmt::format("on parts left out {}, {} instead of {}, and is no explanation",
+                             one ? "it makes the gap larger" : "what they do makes the gap larger",
+                             percent(s.after), percent(s.before))));
   } else if (s.interval[0] < 0) {
-    reasons.push_back(sentence(fmt::format("that {} on parts left out is not sure: the gap shrinks by {} to {} there",
-                                           one ? "it helps" : "they help", percent(s.interval[0]),
-                                           percent(s.interval[1]))));
+    reasons.push_back(sentence(
+        fmt::format("that {} on parts left out is not sure: the gap shrinks by {} to {} there",
+                    one ? "it helps" : "they help", percent(s.interval[0]), percent(s.interval[1]))));
   } else if (unexplained || s.after > notable_rest * d.noise_floor) {
     reasons.push_back(sentence(fmt::format(
         "with {} {} of the power is still missed on parts left out, where nothing could remove {}",
@@ -72,12 +72,13 @@ void say_shrinkage(const Diagnosis& d, bool unexplained, std::vector<std::string
 void say_effects(const Diagnosis& d, std::vector<std::string>& reasons) {
   for (const DiagnosedEffect& e : d.effects) {
     if (!e.alternatives.empty()) {
-      reasons.push_back(sentence(
-          fmt::format("these data do not tell {} from {}", words_of(e.id), enumerate(names_of(e.alternatives)))));
+      reasons.push_back(sentence(fmt::format("these data do not tell {} from {}", words_of(e.id),
+                                             enumerate(names_of(e.alternatives)))));
     }
     if (e.controls && e.controls->named_in > 0) {
-      reasons.push_back(sentence(fmt::format("{} is also found in {} of {} surrogates of these recordings without it",
-                                             words_of(e.id), e.controls->named_in, e.controls->surrogates)));
+      reasons.push_back(
+          sentence(fmt::format("{} is also found in {} of {} surrogates of these recordings without it",
+                               words_of(e.id), e.controls->named_in, e.controls->surrogates)));
     }
     constexpr double notable_wander = 0.45;
     if (e.varies > notable_wander) {
@@ -85,7 +86,8 @@ void say_effects(const Diagnosis& d, std::vector<std::string>& reasons) {
                                              words_of(e.id), percent(e.varies))));
     }
     if ((e.id == "current_sensor_gain" || e.id == "voltage_sensor_gain") && d.motor_channels)
-      reasons.push_back(sentence(fmt::format("a load that follows the current would look like {}", words_of(e.id))));
+      reasons.push_back(
+          sentence(fmt::format("a load that follows the current would look like {}", words_of(e.id))));
   }
 }
 
@@ -93,15 +95,15 @@ void say_referee(const Diagnosis& d, std::vector<std::string>& reasons) {
   if (!d.baseline) return;
   const Baseline& b = *d.baseline;
   if (b.unchanged_model_held_out < b.held_out) {
-    reasons.push_back(sentence(fmt::format(
-        "on parts left out the model as it is misses {}, with what is found it misses {}",
-        percent(b.unchanged_model_held_out), percent(b.explanation_held_out))));
+    reasons.push_back(sentence(
+        fmt::format("on parts left out the model as it is misses {}, with what is found it misses {}",
+                    percent(b.unchanged_model_held_out), percent(b.explanation_held_out))));
     return;
   }
-  reasons.push_back(sentence(
-      fmt::format("a plain regression of power on speed, turning and acceleration misses {} on parts left out, this "
-                  "explanation {}",
-                  percent(b.held_out), percent(b.explanation_held_out))));
+  reasons.push_back(sentence(fmt::format(
+      "a plain regression of power on speed, turning and acceleration misses {} on parts left out, this "
+      "explanation {}",
+      percent(b.held_out), percent(b.explanation_held_out))));
   reasons.insert(reasons.end(), b.says.begin(), b.says.end());
 }
 
@@ -109,7 +111,8 @@ void say_referee(const Diagnosis& d, std::vector<std::string>& reasons) {
 
 std::string outside_words(const Outside& o) {
   if (!o.like.empty() && o.power_w[0] != o.power_w[1]) {
-    const std::string what = o.like == "accessory_load" ? "a load independent of motion" : "something like " + words_of(o.like);
+    const std::string what =
+        o.like == "accessory_load" ? "a load independent of motion" : "something like " + words_of(o.like);
     return sentence(fmt::format("{} that follows time or place: from {} W to {} W", what, brief(o.power_w[0]),
                                 brief(o.power_w[1])));
   }
@@ -120,12 +123,14 @@ std::string earlier_words(const Diagnosis& earlier, std::string_view first_missi
   std::vector<std::string> found;
   for (const DiagnosedEffect& e : earlier.effects) {
     const DiagnosedParameter& p = e.parameters.front();
-    found.push_back(fmt::format("{} {} (probability {})", words_of(e.id), with_deviation(p.value, p.deviation, p.unit),
+    found.push_back(fmt::format("{} {} (probability {})", words_of(e.id),
+                                with_deviation(p.value, p.deviation, p.unit),
                                 probability_text(e.probability)));
   }
   return sentence(fmt::format(
-      "judged from mission {} on, after the step; the {} missions before it, judged alone, say {}{}{}", first_mission,
-      earlier.missions, words_of(name_of(earlier.verdict)), found.empty() ? "" : ": ", enumerate(found)));
+      "judged from mission {} on, after the step; the {} missions before it, judged alone, say {}{}{}",
+      first_mission, earlier.missions, words_of(name_of(earlier.verdict)), found.empty() ? "" : ": ",
+      enumerate(found)));
 }
 
 std::vector<std::string> reasons_for(const Diagnosis& d, bool worse, bool unexplained) {
@@ -141,10 +146,10 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse, bool unexpl
   }
   if (d.verdict == Verdict::none) return reasons;
   if (d.verdict == Verdict::not_this_robot) {
-    reasons.push_back(sentence(
-        fmt::format("the robot file misses {} of the power: it is not this robot's, or not as it ran here{}",
-                    percent(d.power_absolute_relative),
-                    d.corrections.empty() ? "" : "; what would fit is said below as a calibration proposal")));
+    reasons.push_back(sentence(fmt::format(
+        "the robot file misses {} of the power: it is not this robot's, or not as it ran here{}",
+        percent(d.power_absolute_relative),
+        d.corrections.empty() ? "" : "; what would fit is said below as a calibration proposal")));
   }
   if (!d.outside.channel.empty()) reasons.push_back(outside_words(d.outside));
   if (worse) say_referee(d, reasons);
@@ -161,15 +166,16 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse, bool unexpl
   }
   if (d.effects.empty() && d.verdict == Verdict::inconclusive) {
     if (d.power_absolute_relative - d.noise_floor > 0.012) {
-      reasons.push_back(sentence(
-          fmt::format("{} of the power is missed where nothing could remove {}, and no effect of the catalogue "
-                      "accounts for it well enough to be named",
-                      percent(d.power_absolute_relative), percent(d.noise_floor))));
-    } else {
       reasons.push_back(sentence(fmt::format(
-          "an effect that moves less than {} of the power could not have been seen in these recordings, so that "
-          "finding nothing says little",
-          percent(d.detectable_share))));
+          "{} of the power is missed where nothing could remove {}, and no effect of the catalogue "
+          "accounts for it well enough to be named",
+          percent(d.power_absolute_relative), percent(d.noise_floor))));
+    } else {
+      reasons.push_back(
+          sentence(fmt::format("an effect that moves less than {} of the power could not have been seen in "
+                               "these recordings, so that "
+                               "finding nothing says little",
+                               percent(d.detectable_share))));
     }
   }
   if (reasons.empty() && !d.effects.empty()) {
@@ -182,12 +188,14 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse, bool unexpl
 
 std::string refusal_of(const Diagnosis& d, bool worse, bool against) {
   if (d.adoptable.empty()) return "nothing was found that a robot file could take";
-  if (d.verdict == Verdict::outside) return "the verdict is outside: something that no effect of the catalogue describes";
+  if (d.verdict == Verdict::outside)
+    return "the verdict is outside: something that no effect of the catalogue describes";
   if (worse) {
-    return fmt::format("on parts left out it misses {} of the power, the better of the model as it is and a plain "
-                       "regression {}",
-                       percent(d.baseline->explanation_held_out, 3),
-                       percent(std::min(d.baseline->held_out, d.baseline->unchanged_model_held_out), 3));
+    return fmt::format(
+        "on parts left out it misses {} of the power, the better of the model as it is and a plain "
+        "regression {}",
+        percent(d.baseline->explanation_held_out, 3),
+        percent(std::min(d.baseline->held_out, d.baseline->unchanged_model_held_out), 3));
   }
   if (d.verdict == Verdict::inconclusive || against) return "the verdict is inconclusive";
   for (const DiagnosedEffect& e : d.effects) {

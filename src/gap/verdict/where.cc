@@ -29,8 +29,8 @@ struct Region {
 };
 
 std::vector<Part> parts_of(std::span<const Window> windows, const robot::RobotModel& robot,
-                           std::span<const dynamics::ActiveEffect> adopted, std::span<const double> measured_w,
-                           std::span<const double> modelled_w) {
+                           std::span<const dynamics::ActiveEffect> adopted,
+                           std::span<const double> measured_w, std::span<const double> modelled_w) {
   const std::size_t n = windows.size();
   std::vector<Part> parts{{"battery_power", std::vector<double>(n)}};
   const dynamics::DriveModel model(robot, adopted);
@@ -185,8 +185,11 @@ std::vector<WhereRegion> localise(std::span<const Window> windows, const robot::
         return w.variable == region.variable && w.label == region.label && w.from == region.from &&
                (w.share > 0) == (share > 0);
       });
-      WhereRegion here{part.channel, region.variable, region.label, region.from, region.to, share, time_share,
-                       {(sum - quantile * deviation) / total, (sum + quantile * deviation) / total}};
+      WhereRegion here{
+          part.channel, region.variable,
+          region.label, region.from,
+          region.to,    share,
+          time_share,   {(sum - quantile * deviation) / total, (sum + quantile * deviation) / total}};
       if (same == found.end()) {
         found.push_back(std::move(here));
       } else if (std::fabs(same->share) < std::fabs(share)) {

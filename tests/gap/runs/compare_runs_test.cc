@@ -11,8 +11,8 @@ namespace {
 using testing::Departure;
 
 // Runs of two groups in turns, each with its own departure from the robot file.
-RunSet two_groups(const Departure& one, const Departure& other, std::size_t runs, double scatter, unsigned seed,
-                  const robot::RobotModel& robot = testing::nomad()) {
+RunSet two_groups(const Departure& one, const Departure& other, std::size_t runs, double scatter,
+                  unsigned seed, const robot::RobotModel& robot = testing::nomad()) {
   std::mt19937_64 random(seed);
   RunSet set;
   set.labels = {"surface"};
@@ -47,8 +47,8 @@ TEST(CompareRuns, FindsTheFrictionOfASurface) {
   ASSERT_TRUE(e.controls);
   EXPECT_LE(e.controls->named_in, 2u);
   EXPECT_LT(c.diagnosis.baseline->explanation_held_out, 0.6 * c.diagnosis.baseline->unchanged_model_held_out);
-  // 0.3 N m at each wheel of 0.1 m is 6 J more mechanical energy for a metre, and that over the motors' efficiency; the
-  // rest of the difference is how the runs were drawn.
+  // 0.3 N m at each wheel of 0.1 m is 6 J more mechanical energy for a metre, and that over the motors'
+  // efficiency; the rest of the difference is how the runs were drawn.
   ASSERT_TRUE(c.difference);
   EXPECT_EQ(c.groups[c.difference->to].name, "carpet");
   EXPECT_GT(c.difference->by_effect_j.front(), 6.0);
@@ -59,8 +59,8 @@ TEST(CompareRuns, FindsTheFrictionOfASurface) {
   }
 }
 
-// Energies of whole runs hardly tell a loss in the drivers from friction or a weaker magnet: it stands in the group that
-// is stated, mostly, and nothing else is stated as sure.
+// Energies of whole runs hardly tell a loss in the drivers from friction or a weaker magnet: it stands in the
+// group that is stated, mostly, and nothing else is stated as sure.
 TEST(CompareRuns, FindsTheDriverLossOfAGroupOrWhatDoesTheSame) {
   robot::RobotModel robot = testing::nomad();
   robot.idle_power_w = 1;

@@ -159,7 +159,8 @@ RunDiagnosis diagnosed(const RunSet& set) {
 
 // The formulas of the tests are those of the robot file: what is planted is the only departure.
 TEST(MadeRuns, FormulasAgreeWithTheModel) {
-  for (const JudgedRun& run : diagnosed(made({}, 8, 0, 3)).runs) EXPECT_NEAR(run.model_j, run.run.energy_j, 0.004 * run.model_j);
+  for (const JudgedRun& run : diagnosed(made({}, 8, 0, 3)).runs)
+    EXPECT_NEAR(run.model_j, run.run.energy_j, 0.004 * run.model_j);
 }
 
 TEST(MadeRuns, NamesRollingResistanceOfTheLoad) {
@@ -230,7 +231,8 @@ TEST(MadeRuns, NameASurfaceThatIsALabel) {
   set.labels = {"surface"};
   for (int k = 0; k < 48; ++k) {
     const bool carpet = k % 2 == 1;
-    set.runs.push_back(testing::made(nomad(), testing::drawn(random), {.friction_nm = carpet ? 0.3 : 0.0}, 0.01, random));
+    set.runs.push_back(
+        testing::made(nomad(), testing::drawn(random), {.friction_nm = carpet ? 0.3 : 0.0}, 0.01, random));
     set.runs.back().labels = {carpet ? "carpet" : "hard"};
   }
   const RunDiagnosis d = diagnosed(set);
@@ -249,7 +251,8 @@ TEST(MadeRuns, NameTheGrade) {
     RunConditions at = testing::drawn(random);
     at.payload_kg = 0;
     at.climb_m = climb(random) * at.distance_m;
-    set.runs.push_back(testing::made(nomad(), at, {.slope_force_n = weight_n * at.climb_m / at.distance_m}, 0.02, random));
+    set.runs.push_back(
+        testing::made(nomad(), at, {.slope_force_n = weight_n * at.climb_m / at.distance_m}, 0.02, random));
   }
   const RunDiagnosis d = diagnosed(set);
   const DiagnosedEffect* e = find(d, "grade");

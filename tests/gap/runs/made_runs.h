@@ -8,8 +8,8 @@
 #include "gap/runs/run_table.h"
 #include "robot/robot_file.h"
 
-// Tables of runs by formulas of their own: the thesis's equations of a straight run, integrated by Simpson's rule, which
-// is exact for a power of second order in time.
+// Tables of runs by formulas of their own: the thesis's equations of a straight run, integrated by Simpson's
+// rule, which is exact for a power of second order in time.
 namespace joulecast::gap::testing {
 
 inline robot::RobotModel nomad() {
@@ -18,11 +18,11 @@ inline robot::RobotModel nomad() {
 
 // What is different from the robot file.
 struct Departure {
-  double friction_nm = 0;     // more at each wheel
-  double rolling = 0;         // coefficient of the payload's weight
-  double load_w = 0;          // at the battery, all the time
-  double driver_loss = 0;     // of the motors' driving power
-  double slope_force_n = 0;   // against the motion
+  double friction_nm = 0;    // more at each wheel
+  double rolling = 0;        // coefficient of the payload's weight
+  double load_w = 0;         // at the battery, all the time
+  double driver_loss = 0;    // of the motors' driving power
+  double slope_force_n = 0;  // against the motion
 };
 
 // Energy at the battery of a run from rest to rest with constant acceleration [J].
@@ -33,9 +33,10 @@ inline double energy_j(const robot::RobotModel& robot, const RunConditions& run,
   const auto power_w = [&](double v, double a) {
     double driving = 0, braking = 0;
     for (const double friction : robot.motor.friction_torque_nm) {
-      const double torque = (0.5 * mass * r * r + robot.mass.wheel_inertia_kg_m2 + robot.motor.rotor_inertia_kg_m2) * a / r +
-                            robot.motor.viscous_friction_nm_s_rad * v / r + friction + d.friction_nm +
-                            0.5 * r * (d.rolling * run.payload_kg * g + d.slope_force_n);
+      const double torque =
+          (0.5 * mass * r * r + robot.mass.wheel_inertia_kg_m2 + robot.motor.rotor_inertia_kg_m2) * a / r +
+          robot.motor.viscous_friction_nm_s_rad * v / r + friction + d.friction_nm +
+          0.5 * r * (d.rolling * run.payload_kg * g + d.slope_force_n);
       const double current = torque / (robot.motor.torque_constant_nm_a * n);
       const double power =
           current * (robot.motor.resistance_ohm * current + robot.motor.voltage_constant_v_s_rad * n * v / r);
@@ -47,14 +48,17 @@ inline double energy_j(const robot::RobotModel& robot, const RunConditions& run,
     const double a = (to - from) / seconds;
     return seconds / 6 * (power_w(from, a) + 4 * power_w(0.5 * (from + to), a) + power_w(to, a));
   };
-  const double rise_s = run.speed_m_s / run.acceleration_m_s2, cruise_s = run.distance_m / run.speed_m_s - rise_s;
+  const double rise_s = run.speed_m_s / run.acceleration_m_s2,
+               cruise_s = run.distance_m / run.speed_m_s - rise_s;
   return phase_j(rise_s, 0, run.speed_m_s) + phase_j(cruise_s, run.speed_m_s, run.speed_m_s) +
          phase_j(rise_s, run.speed_m_s, 0) + (robot.idle_power_w + d.load_w) * run.standstill_s;
 }
 
 // Conditions of one run, drawn.
 inline RunConditions drawn(std::mt19937_64& random) {
-  const auto between = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
+  const auto between = [&](double low, double high) {
+    return std::uniform_real_distribution(low, high)(random);
+  };
   RunConditions at;
   at.distance_m = between(8, 30);
   at.speed_m_s = between(0.2, 0.9);
@@ -64,8 +68,8 @@ inline RunConditions drawn(std::mt19937_64& random) {
   return at;
 }
 
-inline MissionRun made(const robot::RobotModel& robot, const RunConditions& at, const Departure& d, double scatter,
-                       std::mt19937_64& random) {
+inline MissionRun made(const robot::RobotModel& robot, const RunConditions& at, const Departure& d,
+                       double scatter, std::mt19937_64& random) {
   MissionRun run;
   run.name = std::to_string(random() % 100000);
   run.at = at;

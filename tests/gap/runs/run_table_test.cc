@@ -51,7 +51,8 @@ std::string error_of(const std::string& csv) {
 TEST(RunTable, ErrorsNameRowAndColumn) {
   EXPECT_EQ(error_of("distance_m,energy_j\n10,100\n"), "runs.csv: line 1: column speed_m_s is required");
   EXPECT_EQ(error_of("distance_m,speed_m_s,joules\n10,1,100\n"),
-            "runs.csv: line 1: column joules is none of a table of runs; covariate:joules or label:joules would make it a "
+            "runs.csv: line 1: column joules is none of a table of runs; covariate:joules or label:joules "
+            "would make it a "
             "possible cause");
   EXPECT_EQ(error_of("distance_m,speed_m_s,energy_j\n10,1,100\n10,fast,100\n"),
             "runs.csv: line 3: column speed_m_s: 'fast' must be from 0.001 to 100 m/s");
@@ -73,7 +74,8 @@ TEST(RunTable, ErrorsNameRowAndColumn) {
 
 TEST(RunTable, BringsTablesTogether) {
   const std::vector<RunFile> files{
-      {"day1.csv", "distance_m,speed_m_s,energy_j,covariate:cpu,label:surface\n10,1,100,0.5,hard\n10,1,110,,carpet\n"},
+      {"day1.csv",
+       "distance_m,speed_m_s,energy_j,covariate:cpu,label:surface\n10,1,100,0.5,hard\n10,1,110,,carpet\n"},
       {"day2.csv", "distance_m,speed_m_s,energy_j,label:driver,climb_m\n20,0.5,300,ann,1.5\n"}};
   const auto set = read_runs(files, nomad());
   ASSERT_TRUE(set) << describe(set.error());
