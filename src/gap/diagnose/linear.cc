@@ -81,12 +81,11 @@ class Moved {
 
     Eigen::VectorXd moved(const std::vector<std::size_t>& columns,
                           const Eigen::VectorXd& coefficients) const {
-      Eigen::VectorXd sum;
+      const bool speaks = std::ranges::any_of(columns, [&](std::size_t k) { return place[k] >= 0; });
+      Eigen::VectorXd sum = Eigen::VectorXd::Zero(speaks ? x.rows() : 0);
       for (std::size_t k = 0; k < columns.size(); ++k) {
-        const Eigen::Index at = place[columns[k]];
-        if (at < 0) continue;
-        if (sum.size() == 0) sum = Eigen::VectorXd::Zero(x.rows());
-        sum += coefficients[static_cast<Eigen::Index>(k)] * x.col(at);
+        if (const Eigen::Index at = place[columns[k]]; at >= 0)
+          sum += coefficients[static_cast<Eigen::Index>(k)] * x.col(at);
       }
       return sum;
     }

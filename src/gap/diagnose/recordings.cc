@@ -192,19 +192,29 @@ bool Diagnoser::fit() {
 // Of what every robot has, estimated anew, what no parameter of a robot file says is named as well: beside
 // all that is there already it has its own evidence.
 void Diagnoser::name_base(const Problem& problem, Explanation& explanation, Named& named) const {
+  const Mixture mixture(problem);
   HypothesisSet whole = named.set;
   std::vector<std::size_t> more;
+  const auto with = [&](std::size_t h) {
+    HypothesisSet set = whole;
+    set.insert(std::ranges::lower_bound(set, h), h);
+    return set;
+  };
   for (const Cause& cause : fit_->base) {
-    const auto is_it = [&](const Hypothesis& h) { return !h.outside() && h.cause().same_kind(cause); };
-    const auto h = static_cast<std::size_t>(std::ranges::find_if(problem.hypotheses, is_it) -
-                                            problem.hypotheses.begin());
-    if (h == problem.hypotheses.size() || !traits_of(problem.hypotheses[h].id()).calibrates.empty()) continue;
-    const auto clashes = [&](std::size_t o) { return problem.hypotheses[o].excludes(problem.hypotheses[h]); };
-    if (std::ranges::any_of(whole, clashes)) continue;
-    more.push_back(h);
-    whole.insert(std::ranges::lower_bound(whole, h), h);
+    // By the likeliest variant of its shape.
+    std::optional<std::size_t> best;
+    for (std::size_t h = 0; h < problem.hypotheses.size(); ++h) {
+      const Hypothesis& other = problem.hypotheses[h];
+      if (!other.is_effect() || !other.cause().same_kind(cause) || !traits_of(other.id()).calibrates.empty())
+        continue;
+      const auto clashes = [&](std::size_t o) { return problem.hypotheses[o].excludes(other); };
+      if (std::ranges::any_of(whole, clashes)) continue;
+      if (!best || mixture.log_odds(with(h)) > mixture.log_odds(with(*best))) best = h;
+    }
+    if (!best) continue;
+    more.push_back(*best);
+    whole = with(*best);
   }
-  const Mixture mixture(problem);
   const std::vector<Cause> causes = strengths_of(*fit_->linear.columns, problem, whole, {});
   const Mixture::Estimate estimate = mixture.estimate(whole);
   for (const std::size_t h : more) {
@@ -223,7 +233,9 @@ void Diagnoser::name_base(const Problem& problem, Explanation& explanation, Name
     m.coefficients = {estimate.mean[first]};
     m.sd = {estimate.sd[first]};
     m.share = problem.moved(problem.hypotheses[h], estimate.mean.segment(first, 1));
-    std::erase_if(explanation.members, [&](const Member& other) { return other.hypothesis == h; });
+    std::erase_if(explanation.members, [&](const Member& other) {
+      return problem.hypotheses[other.hypothesis].excludes(problem.hypotheses[h]);
+    });
     explanation.members.push_back(m);
     if (std::ranges::find(explanation.whole, h) == explanation.whole.end())
       explanation.whole.insert(std::ranges::lower_bound(explanation.whole, h), h);
