@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "dynamics/catalogue.h"
-#include "gap/adopt.h"
+#include "gap/verdict/adopt.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::gap {

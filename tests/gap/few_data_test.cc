@@ -4,15 +4,22 @@
 #include <nlohmann/json.hpp>
 
 #include "client/virtual_robot/fleet.h"
-#include "gap/diagnosis.h"
-#include "gap/diagnosis_json.h"
+#include "gap/diagnose/recordings.h"
+#include "gap/verdict/diagnosis_json.h"
 #include "robot/robot_file.h"
+#include "telemetry/recording_set.h"
 
 namespace joulecast::gap {
 namespace {
 
 robot::RobotModel shipped() {
   return *robot::parse_robot(virtual_robot::shipped_robots()[0].json_text);
+}
+
+Result<Diagnosis> diagnose_shipped(const telemetry::RecordingSet& set) {
+  DiagnosisSettings settings;
+  settings.controls = 0;
+  return diagnose(set, shipped(), settings);
 }
 
 // A robot that rolls at one speed; `power` whether its battery is metered.
@@ -34,12 +41,12 @@ telemetry::Recording rolling(double duration_s, bool power) {
 TEST(FewData, AreInconclusiveAndAskForADrive) {
   const auto set = telemetry::make_recording_set("r", {rolling(6, true)});
   ASSERT_TRUE(set);
-  const auto d = diagnose(*set, shipped());
+  const auto d = diagnose_shipped(*set);
   ASSERT_TRUE(d);
   EXPECT_EQ(d->verdict, Verdict::inconclusive);
   EXPECT_TRUE(d->effects.empty());
   EXPECT_FALSE(d->next_drive.empty());
-  const auto json = nlohmann::json::parse(to_json_text(*d));
+  const auto json = diagnosis_to_json(*d);
   EXPECT_TRUE(json["gap"]["power_absolute_relative"].is_null());
   EXPECT_EQ(json["verdict"], "inconclusive");
 }
@@ -47,9 +54,10 @@ TEST(FewData, AreInconclusiveAndAskForADrive) {
 TEST(FewData, WithoutElectricalReadingsNothingIsSaid) {
   const auto set = telemetry::make_recording_set("r", {rolling(60, false)});
   ASSERT_TRUE(set);
-  const auto d = diagnose(*set, shipped());
+  const auto d = diagnose_shipped(*set);
   ASSERT_TRUE(d);
   EXPECT_EQ(d->verdict, Verdict::inconclusive);
+  EXPECT_TRUE(d->effects.empty());
   EXPECT_FALSE(d->motor_channels);
 }
 
@@ -63,7 +71,8 @@ TEST(FewData, AnEndlessStandstillNamesNothing) {
   telemetry::Recording r = rolling(60, true);
   for (auto& s : r.samples) s.wheel_velocity_rad_s = {0, 0};
   const auto set = telemetry::make_recording_set("r", {r});
-  const auto d = diagnose(*set, shipped());
+  ASSERT_TRUE(set);
+  const auto d = diagnose_shipped(*set);
   ASSERT_TRUE(d);
   for (const DiagnosedEffect& e : d->effects) {
     // A load that is always on is all that standing can show.

@@ -1,23 +1,31 @@
-#include "gap/next_drive.h"
+#include "gap/verdict/next_drive.h"
 
 #include <gtest/gtest.h>
 
-#include "gap/outside.h"
+#include <string_view>
+
+#include "gap/equations/families.h"
 
 namespace joulecast::gap {
 namespace {
 
+Outside following(std::string_view variable) {
+  Outside outside;
+  outside.probability = 1;
+  outside.follows = variable;
+  return outside;
+}
+
 TEST(NextDrive, HasADriveForWhateverSomethingUnknownMayFollow) {
   Ranges everything;
-  everything.position = everything.heading = everything.payload_varies = true;
+  everything.position = everything.heading = everything.climb = everything.payload_varies = true;
   for (const bool power : {false, true}) {
     for (const OutsideFamily& family : outside_families(everything, power)) {
-      const auto drives =
-          drives_for({.probability = 1, .channel = "", .follows = std::string(family.variable)});
+      const auto drives = drives_for(following(family.variable));
       EXPECT_EQ(drives.size(), 1u) << family.variable;
     }
   }
-  EXPECT_EQ(drives_for({.probability = 1, .channel = "", .follows = "wheel_angle"}).size(), 1u);
+  EXPECT_EQ(drives_for(following("wheel_angle")).size(), 1u);
   EXPECT_TRUE(drives_for({}).empty());
 }
 

@@ -1,18 +1,38 @@
-#include "gap/verdict_text.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
 
-#include "gap/chart.h"
+#include "gap/verdict/text.h"
+#include "gap/verdict/words.h"
 
 namespace joulecast::gap {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+
+Outside outside_of(std::string channel, std::string follows) {
+  Outside outside;
+  outside.probability = 1;
+  outside.channel = std::move(channel);
+  outside.follows = std::move(follows);
+  return outside;
+}
+
+// Of the plain regression, the model as it is and the explanation, on parts left out.
+Baseline baseline(double regression, double model, double explanation) {
+  Baseline b;
+  b.held_out = regression;
+  b.unchanged_model_held_out = model;
+  b.explanation_held_out = explanation;
+  return b;
+}
 
 Diagnosis with_effect(Verdict verdict) {
   Diagnosis d;
@@ -26,61 +46,103 @@ Diagnosis with_effect(Verdict verdict) {
   return d;
 }
 
+std::vector<std::string> said_of(const Diagnosis& d) {
+  return reasons_for(d, false, false);
+}
+
 TEST(VerdictText, SureVerdictsNeedNoReasons) {
-  EXPECT_THAT(verdict_reasons(with_effect(Verdict::effects)), IsEmpty());
-  EXPECT_THAT(verdict_reasons(with_effect(Verdict::none)), IsEmpty());
+  EXPECT_THAT(said_of(with_effect(Verdict::effects)), IsEmpty());
+  EXPECT_THAT(said_of(with_effect(Verdict::none)), IsEmpty());
 }
 
 TEST(VerdictText, TellsWhereSomethingUnknownShowsAndWhatItFollows) {
   Diagnosis d = with_effect(Verdict::outside);
-  d.outside = {.probability = 1, .channel = "wheel_torque", .follows = "wheel_angle"};
-  EXPECT_THAT(verdict_reasons(d),
+  d.outside = outside_of("wheel_torque", "wheel_angle");
+  EXPECT_THAT(said_of(d),
               ElementsAre(HasSubstr("the torque at the wheels and repeats with the turning of a wheel")));
   d.outside.follows = "yaw_rate";
-  EXPECT_THAT(verdict_reasons(d),
-              ElementsAre("It shows in the torque at the wheels and follows the yaw rate."));
+  EXPECT_THAT(said_of(d), ElementsAre("It shows in the torque at the wheels and follows the yaw rate."));
 }
 
 TEST(VerdictText, TellsWhatRemembersTheMotion) {
   Diagnosis d = with_effect(Verdict::outside);
-  d.outside = {.probability = 1, .channel = "battery_power_from_motors", .follows = "recent_motion"};
-  EXPECT_THAT(verdict_reasons(d), ElementsAre(HasSubstr("how much the robot moved of late")));
+  d.outside = outside_of("battery_power_from_motors", "recent_motion");
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("how much the robot moved of late")));
 }
 
 TEST(VerdictText, SaysThatHelpIsNotSure) {
   Diagnosis d = with_effect(Verdict::inconclusive);
   d.shrinkage->interval = {-0.1, 0.22};
-  EXPECT_THAT(verdict_reasons(d), ElementsAre(HasSubstr("is not sure: the gap shrinks by")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("is not sure: the gap shrinks by")));
 }
 
 TEST(VerdictText, NamesWhatSpeaksAgainstTheLikeliest) {
   Diagnosis d = with_effect(Verdict::inconclusive);
-  EXPECT_THAT(verdict_reasons(d), ElementsAre(HasSubstr("Coulomb friction has a probability of 0.40 only")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("Coulomb friction has a probability of 0.40 only")));
   d.effects[0].alternatives = {"viscous_friction", "gear_efficiency"};
   d.outside.probability = 0.35;
   EXPECT_THAT(
-      verdict_reasons(d),
+      said_of(d),
       ElementsAre("These data do not tell coulomb friction from viscous friction and gear efficiency.",
                   HasSubstr("may be at work as well (probability 0.35)")));
   d.effects[0].alternatives.clear();
   d.outside.probability = 0;
   d.shrinkage->after = 0.1;
-  EXPECT_THAT(verdict_reasons(d),
-              ElementsAre(HasSubstr("10 % of the power is still missed on missions left out")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("10 % of the power is still missed on missions left out")));
   d.shrinkage->after = 0.3;
   d.shrinkage->interval = {-0.7, -0.3};
-  EXPECT_THAT(verdict_reasons(d), ElementsAre(HasSubstr("it makes the gap larger, 30 % instead of 20 %")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("it makes the gap larger, 30 % instead of 20 %")));
 }
 
 TEST(VerdictText, SaysWhatStandsOrIsMissingWhereNothingIsNamed) {
   Diagnosis d = with_effect(Verdict::inconclusive);
   d.effects.clear();
-  EXPECT_THAT(verdict_reasons(d),
-              ElementsAre(HasSubstr("20 % of the power is missed where noise makes 1 %")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("20 % of the power is missed where noise makes 1 %")));
+  d.power_absolute_relative = 0.015;
+  d.detectable_share = 0.03;
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("moves less than 3\u00a0% of the power")));
   d.power_absolute_relative = std::nan("");
-  EXPECT_THAT(verdict_reasons(d), ElementsAre(HasSubstr("too little to judge by")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("too little to judge by")));
   d.power = PowerSource::none;
-  EXPECT_THAT(verdict_reasons(d), ElementsAre(HasSubstr("No power was recorded")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("No power was recorded")));
+}
+
+TEST(VerdictText, NamesTheBetterOfTheModelAndThePlainRegression) {
+  Diagnosis d = with_effect(Verdict::inconclusive);
+  d.baseline = baseline(0.1, 0.2, 0.15);
+  d.baseline->says = {"Drag."};
+  EXPECT_THAT(reasons_for(d, true, false),
+              ElementsAre(AllOf(HasSubstr("plain regression"), HasSubstr("misses 10\u00a0%"),
+                                HasSubstr("explanation 15\u00a0%")),
+                          "Drag."));
+  d.baseline->unchanged_model_held_out = 0.05;
+  EXPECT_THAT(reasons_for(d, true, false), ElementsAre(HasSubstr("the model as it is misses 5\u00a0%")));
+}
+
+TEST(VerdictText, SaysWhatTakesOffFromAName) {
+  Diagnosis d = with_effect(Verdict::effects);
+  d.effects[0].controls = Controls{.surrogates = 20, .named_in = 3};
+  d.effects[0].varies = 0.6;
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("3 of 20 surrogates"),
+                                      HasSubstr("varies along the recordings by 60\u00a0%")));
+  d.effects[0].controls->named_in = 0;
+  d.effects[0].varies = 0.1;
+  EXPECT_THAT(said_of(d), IsEmpty());
+}
+
+TEST(VerdictText, SaysWhyNothingIsAdopted) {
+  Diagnosis d = with_effect(Verdict::effects);
+  EXPECT_THAT(refusal_of(d, false, false), HasSubstr("nothing was found"));
+  d.adoptable.push_back({"coulomb_friction", {{"strength", 0.2}}});
+  EXPECT_EQ(refusal_of(d, false, false), "");
+  EXPECT_THAT(refusal_of(d, false, true), HasSubstr("inconclusive"));
+  d.baseline = baseline(0.1, 0.2, 0.15);
+  EXPECT_THAT(refusal_of(d, true, false),
+              AllOf(HasSubstr("misses 15\u00a0%"), HasSubstr("regression 10\u00a0%")));
+  d.effects[0].alternatives = {"viscous_friction"};
+  EXPECT_THAT(refusal_of(d, false, false), HasSubstr("not told from viscous_friction"));
+  d.verdict = Verdict::outside;
+  EXPECT_THAT(refusal_of(d, false, false), HasSubstr("outside"));
 }
 
 TEST(VerdictText, RangesAreAsFineAsTheyAreWide) {

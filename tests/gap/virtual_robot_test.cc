@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "client/virtual_robot/fleet.h"
-#include "client/virtual_robot/simulate.h"
-#include "gap/diagnosis.h"
-#include "robot/robot_file.h"
+#include "gap/diagnose/recordings.h"
+#include "tests/gap/checks/made_recordings.h"
 
 namespace joulecast::gap {
 namespace {
@@ -14,38 +12,27 @@ namespace {
 namespace vr = virtual_robot;
 
 // Missions of the project's own plant, which shares no physics with the model.
-std::vector<telemetry::Recording> virtual_missions(const std::vector<vr::EffectStrength>& effects,
-                                                   std::uint64_t seed, bool motors, int missions) {
-  vr::SimulationSpec spec;
-  spec.robot = *vr::parse_robot(std::string(vr::shipped_robots()[1].json_text));
-  spec.imperfections = *vr::make_imperfections(effects);
-  spec.missions = missions;
-  spec.sensors.motor_channels = motors;
-  const vr::Simulation run = vr::simulate_missions(spec, seed);
-  std::vector<telemetry::Recording> recordings;
-  std::size_t next = 0;
-  for (const telemetry::MissionEvent& event : run.events) {
-    if (event.phase == telemetry::MissionPhase::started) {
-      recordings.emplace_back();
-      recordings.back().mission_id = event.mission_id;
-      recordings.back().payload_kg = event.payload_kg;
-      continue;
-    }
-    while (next < run.samples.size() && run.samples[next].utime_us <= event.utime_us) {
-      recordings.back().samples.push_back(run.samples[next++]);
-    }
-  }
-  return recordings;
+made::Robot virtual_missions(const std::vector<vr::EffectStrength>& effects, std::uint64_t seed, bool motors,
+                             int missions) {
+  return made::virtual_robot(vr::shipped_robots()[1].kind, seed, [&](vr::SimulationSpec& spec) {
+    const vr::SimulationSpec usual;
+    spec.script = usual.script;
+    spec.rate_hz = usual.rate_hz;
+    spec.imperfections = *vr::make_imperfections(effects);
+    spec.missions = missions;
+    spec.sensors.motor_channels = motors;
+  });
 }
 
-Diagnosis diagnose_missions(std::vector<telemetry::Recording> recordings) {
-  const auto robot = *robot::parse_robot(vr::shipped_robots()[1].json_text);
-  return *diagnose(*telemetry::make_recording_set(robot.robot_id, std::move(recordings)), robot);
+Diagnosis diagnose_robot(const made::Robot& robot) {
+  DiagnosisSettings settings;
+  settings.controls = 0;
+  return *diagnose(robot.recordings, robot.model, settings);
 }
 
 Diagnosis diagnose_virtual(const std::vector<vr::EffectStrength>& effects, std::uint64_t seed, bool motors,
                            int missions = 5) {
-  return diagnose_missions(virtual_missions(effects, seed, motors, missions));
+  return diagnose_robot(virtual_missions(effects, seed, motors, missions));
 }
 
 TEST(VirtualRobot, WithoutImperfectionsShowsNoGap) {
@@ -68,7 +55,8 @@ TEST(VirtualRobot, ASingleMissionSufficesForAStrongEffect) {
 
 // Without the loaded mission nothing is known of what load does: its halves are held out in turn.
 TEST(VirtualRobot, OneLoadedMissionSufficesForWhatLoadDoes) {
-  auto recordings = virtual_missions({{"load_rolling_resistance", 0.15}}, 17, true, 12);
+  made::Robot robot = virtual_missions({{"load_rolling_resistance", 0.15}}, 17, true, 12);
+  auto& recordings = robot.recordings.missions;
   bool loaded = false;
   std::erase_if(recordings, [&](const telemetry::Recording& mission) {
     const bool first_load = mission.payload_kg > 0 && !loaded;
@@ -77,7 +65,7 @@ TEST(VirtualRobot, OneLoadedMissionSufficesForWhatLoadDoes) {
   });
   ASSERT_GE(recordings.size(), 2u);
   ASSERT_TRUE(loaded);
-  const Diagnosis d = diagnose_missions(std::move(recordings));
+  const Diagnosis d = diagnose_robot(robot);
   EXPECT_EQ(name_of(d.verdict), "effects");
   ASSERT_EQ(d.effects.size(), 1u);
   EXPECT_EQ(d.effects[0].id, "load_rolling_resistance");
