@@ -21,8 +21,10 @@ std::string answer_of(const Diagnosis& d) {
   std::ostringstream text;
   text << name_of(d.verdict) << ", gap " << d.power_absolute_relative << " over noise " << d.noise_floor;
   for (const DiagnosedEffect& e : d.effects) {
-    text << "; " << e.id << " " << e.parameters.front().value << " +- " << e.parameters.front().deviation
-         << ", probability " << e.probability << " (" << e.posterior << " by the data), " << e.power_w
+    text << "; " << e.id;
+    for (const DiagnosedParameter& p : e.parameters)
+      text << " " << p.name << " " << p.value << " +- " << p.deviation;
+    text << ", probability " << e.probability << " (" << e.posterior << " by the data), " << e.power_w
          << " W";
   }
   return text.str();
