@@ -7,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
 #include <string>
 
 #include "gap/diagnose/recordings.h"
@@ -15,6 +16,19 @@
 
 namespace joulecast::gap {
 namespace {
+
+std::string answer_of(const Diagnosis& d) {
+  std::ostringstream text;
+  text << name_of(d.verdict) << ", gap " << d.power_absolute_relative << " over noise " << d.noise_floor;
+  for (const DiagnosedEffect& e : d.effects) {
+    text << "; " << e.id;
+    for (const DiagnosedParameter& p : e.parameters)
+      text << " " << p.name << " " << p.value << " +- " << p.deviation;
+    text << ", probability " << e.probability << " (" << e.posterior << " by the data), " << e.power_w
+         << " W";
+  }
+  return text.str();
+}
 
 // The practice logs: another plant's recordings with their truths.
 class Practice : public testing::TestWithParam<const char*> {};
@@ -31,6 +45,7 @@ TEST_P(Practice, GetsTheRightVerdict) {
   settings.controls = 0;
   const auto diagnosis = diagnose(*recordings, *robot, settings);
   ASSERT_TRUE(diagnosis);
+  SCOPED_TRACE(answer_of(*diagnosis));
 
   std::ifstream in(folder / "truth.json");
   const auto truth = nlohmann::json::parse(in);

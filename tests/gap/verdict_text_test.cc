@@ -88,16 +88,18 @@ TEST(VerdictText, NamesWhatSpeaksAgainstTheLikeliest) {
   d.effects[0].alternatives.clear();
   d.outside.probability = 0;
   d.shrinkage->after = 0.1;
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("10 % of the power is still missed on missions left out")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("10\u00a0% of the power is still missed on parts left out, "
+                                                "where nothing could remove 1\u00a0%")));
   d.shrinkage->after = 0.3;
   d.shrinkage->interval = {-0.7, -0.3};
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("it makes the gap larger, 30 % instead of 20 %")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("it makes the gap larger, 30\u00a0% instead of 20\u00a0%")));
 }
 
 TEST(VerdictText, SaysWhatStandsOrIsMissingWhereNothingIsNamed) {
   Diagnosis d = with_effect(Verdict::inconclusive);
   d.effects.clear();
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("20 % of the power is missed where noise makes 1 %")));
+  EXPECT_THAT(said_of(d),
+              ElementsAre(HasSubstr("20\u00a0% of the power is missed where nothing could remove 1\u00a0%")));
   d.power_absolute_relative = 0.015;
   d.detectable_share = 0.03;
   EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("moves less than 3\u00a0% of the power")));

@@ -123,7 +123,10 @@ TEST(VirtualRobot, ADelayBetweenChannelsIsNoRipple) {
 
 TEST(VirtualRobot, FrictionThatComesAndGoesIsNoFrictionOfTheCatalogue) {
   const Diagnosis d = diagnose_virtual({{"x_brake_drag", 1}}, 19, true);
-  EXPECT_TRUE(d.verdict == Verdict::outside || d.verdict == Verdict::inconclusive) << name_of(d.verdict);
+  EXPECT_TRUE(d.verdict == Verdict::outside || d.verdict == Verdict::inconclusive)
+      << name_of(d.verdict) << ", gap " << d.power_absolute_relative << " over noise " << d.noise_floor
+      << ", outside " << d.outside.probability << " " << d.outside.follows << ", detectable "
+      << d.detectable_share;
   for (const DiagnosedEffect& effect : d.effects) EXPECT_LT(effect.probability, 0.9) << effect.id;
 }
 
