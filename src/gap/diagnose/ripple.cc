@@ -323,11 +323,12 @@ std::optional<Ripple> find_ripple(const telemetry::RecordingSet& set, const robo
       shifts.push_back(
           std::uniform_int_distribution<std::size_t>(part, std::max(part, track.size() - part))(random));
     }
-    if (std::ranges::any_of(where, [&](const Search& search) {
-          const auto line = search.line(shifts);
-          return line && line->power_share > 0.5 * best->power_share;
-        }))
-      ++best->found_in;
+    double share = 0;
+    for (const Search& search : where) {
+      const auto line = search.line(shifts);
+      if (line) share = motors ? share + line->power_share : std::max(share, line->power_share);
+    }
+    if (share > 0.5 * best->power_share) ++best->found_in;
   }
   return best;
 }

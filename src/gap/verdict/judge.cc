@@ -19,6 +19,7 @@ constexpr double mostly_outside = 0.25;               // of what moves power, ou
 constexpr double mostly_closed = 0.5;                 // of what held-out parts can be closed by
 constexpr double beyond_usual = 3;                    // strengths that no robot has, over the usual ones
 constexpr double doubtful = 0.6;          // factor on names beside which something speaks against all
+constexpr double sure = 0.9;              // probability of such a name
 constexpr double varying = 0.7;           // most that a name whose strength varies may have
 constexpr double most_detectable = 0.08;  // share below which effects must be seen for "none"
 
@@ -44,7 +45,8 @@ std::vector<DiagnosedParameter> parameters_of(const Cause& cause, const Hypothes
   std::vector<DiagnosedParameter> parameters;
   const auto& info = active.effect->info().parameters;
   for (std::size_t k = 0; k < info.size(); ++k) {
-    if (info[k].strength && k != h.parameter) continue;  // a strength of its own that was not asked for
+    if ((k == 0 || info[k].strength) && k != h.parameter)
+      continue;  // a strength of its own that was not asked for
     parameters.push_back({std::string(info[k].name), std::string(info[k].unit), active.values[k], missing});
   }
   const auto own = std::ranges::find(parameters, info[h.parameter].name, &DiagnosedParameter::name);
@@ -197,12 +199,18 @@ class Judge {
                          (rippled_ || (outside_share_ > mostly_outside * (named_share_ + outside_share_) &&
                                        !(closed_ > mostly_closed)));
     const bool open = beyond_noise_ > largest_unnamed;
+    // Where the gap is hardly larger than what nothing could remove, only a sure name says something.
+    const bool all_unsure = std::ranges::all_of(d_.effects, [](const auto& e) { return e.posterior < sure; });
+    const bool seen_elsewhere =
+        std::ranges::any_of(f_.named, [&](std::size_t h) { return !shows_in_power(hypothesis(h)); });
+    const bool nothing = d_.effects.empty() || doubts_.idle || (!open && all_unsure && !seen_elsewhere);
     if (outside) {
       d_.verdict = Verdict::outside;
       d_.verdict_probability = d_.outside.probability;
-    } else if (d_.effects.empty() || doubts_.idle) {
+    } else if (nothing) {
       const bool blind = d_.detectable_share > most_detectable;
-      d_.verdict = !open && !blind ? Verdict::none : Verdict::inconclusive;
+      const bool something = d_.outside.probability >= least_named;
+      d_.verdict = !open && !blind && !something ? Verdict::none : Verdict::inconclusive;
       d_.verdict_probability = open ? 1 : std::max(f_.explanation.none, least_named);
       if (d_.verdict == Verdict::none) d_.effects.clear();
     } else if (!doubts_.any_against() && weakest_ >= least_named) {

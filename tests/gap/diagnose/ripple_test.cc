@@ -85,10 +85,9 @@ TEST(FindRipple, IsFoundAtItsFrequencyAndNotWhenLeftoversAreMoved) {
 
 TEST(FindRipple, WhatRepeatsWithTimeComesBackWhenMoved) {
   // At a constant speed an oscillation in time looks as if it belonged to the wheel.
-  const Drive d = drive([](double) { return 4.0; },
-                        [](std::size_t side, double t, double) {
-                          return side == 0 ? ripple_a * std::sin(4 * cycles_per_turn * t) : 0.0;
-                        });
+  const Drive d =
+      drive([](double) { return 4.0; },
+            [](std::size_t, double t, double) { return ripple_a * std::sin(4 * cycles_per_turn * t); });
   const auto ripple = find_ripple(d.recordings, nomad(), {}, true, 0, 20);
   ASSERT_TRUE(ripple);
   EXPECT_NEAR(ripple->per_turn, cycles_per_turn, 0.13);
