@@ -169,8 +169,11 @@ TEST(Effects, HillsTakeAndGiveBackTheirPotentialEnergyAndShowInPitchAndHeight) {
     EXPECT_NEAR(height(i), 0.06 / k * std::sin(k * s.pose[0]) * std::cos(k * s.pose[1]), 1e-9);
     steepest = std::max(steepest, std::abs(s.pitch_rad));
     if (i == 0) continue;
+    // Forwards or backwards along the heading between the two.
+    const auto& before = run.samples[i - 1];
+    const double heading = before.pose[2] + 0.5 * std::remainder(s.pose[2] - before.pose[2], 2 * pi);
     const double way =
-        std::hypot(s.pose[0] - run.samples[i - 1].pose[0], s.pose[1] - run.samples[i - 1].pose[1]);
+        (s.pose[0] - before.pose[0]) * std::cos(heading) + (s.pose[1] - before.pose[1]) * std::sin(heading);
     climbed_m += 0.5 * (std::sin(s.pitch_rad) + std::sin(run.samples[i - 1].pitch_rad)) * way;
   }
   EXPECT_GT(steepest, 0.03);
