@@ -4,6 +4,9 @@
 #include <cmath>
 #include <map>
 
+#include "statistics/distributions.h"
+#include "statistics/robust.h"
+
 namespace joulecast::gap {
 namespace {
 
@@ -11,23 +14,9 @@ constexpr double gaussian_mad = 1.4826;
 constexpr double least_scatter = 0.002;  // of a mission's ratio: rounding and unlogged conditions
 constexpr double level = 0.01;           // chance of a false mark a stretch
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  if (values.size() % 2 == 1) return *middle;
-  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
-
-// Two-sided quantile of Student's t by Hill's expansion of the Gaussian one; enough for a threshold.
+// What |t| exceeds with `probability`; a stretch too short to judge by counts as one of 2 degrees of freedom.
 double threshold(double probability, double freedom) {
-  // Gaussian upper quantile, Abramowitz and Stegun 26.2.23 (error below 4.5e-4).
-  const double t = std::sqrt(-2 * std::log(probability / 2));
-  const double z =
-      t - (2.515517 + t * (0.802853 + t * 0.010328)) / (1 + t * (1.432788 + t * (0.189269 + t * 0.001308)));
-  const double v = std::max(freedom, 2.0);
-  const double z2 = z * z;
-  return z * (1 + (z2 + 1) / (4 * v) + (5 * z2 * z2 + 16 * z2 + 3) / (96 * v * v) +
-              (3 * z2 * z2 * z2 + 19 * z2 * z2 + 17 * z2 - 15) / (384 * v * v * v));
+  return statistics::student_t_quantile(1 - probability / 2, std::max(freedom, 2.0));
 }
 
 // Scatter of single missions, from differences of neighbours.
@@ -35,7 +24,7 @@ double scatter_of(std::span<const double> ratios) {
   std::vector<double> steps;
   for (std::size_t k = 1; k < ratios.size(); ++k) steps.push_back(std::fabs(ratios[k] - ratios[k - 1]));
   if (steps.empty()) return least_scatter;
-  return std::max(least_scatter, gaussian_mad * median(std::move(steps)) / std::sqrt(2.0));
+  return std::max(least_scatter, gaussian_mad * statistics::median(std::move(steps)) / std::sqrt(2.0));
 }
 
 class Stretch {
@@ -133,13 +122,13 @@ std::vector<SiblingRatio> compare_siblings(std::span<const RobotRatios> robots,
     SiblingRatio s;
     s.robot_id = robot.robot_id;
     s.missions = ratios.size();
-    s.ratio = median(ratios);
+    s.ratio = statistics::median(ratios);
     std::vector<double> off;
     for (const double r : ratios) off.push_back(std::fabs(r - s.ratio));
     const double n = static_cast<double>(ratios.size());
     // The median's error is sqrt(pi/2) times the mean's.
     const double error =
-        1.2533 * std::max(least_scatter, gaussian_mad * median(std::move(off))) / std::sqrt(n);
+        1.2533 * std::max(least_scatter, gaussian_mad * statistics::median(std::move(off))) / std::sqrt(n);
     const double half = threshold(0.05, n - 1) * error;
     s.interval = {s.ratio - half, s.ratio + half};
     errors.push_back(error);
@@ -148,9 +137,9 @@ std::vector<SiblingRatio> compare_siblings(std::span<const RobotRatios> robots,
   if (siblings.size() >= 3) {
     std::vector<double> middle;
     for (const SiblingRatio& s : siblings) middle.push_back(s.ratio);
-    const double centre = median(middle);
+    const double centre = statistics::median(middle);
     for (double& r : middle) r = std::fabs(r - centre);
-    const double spread = gaussian_mad * median(std::move(middle));
+    const double spread = gaussian_mad * statistics::median(std::move(middle));
     const double many = static_cast<double>(siblings.size());
     for (std::size_t k = 0; k < siblings.size(); ++k) {
       SiblingRatio& s = siblings[k];

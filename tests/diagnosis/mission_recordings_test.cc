@@ -36,7 +36,7 @@ TEST(MissionRecordings, HaveTheCovariatesOfTheLogThatTheyCameFrom) {
   const std::string path = folder.file("run.lcmlog");
   auto log = telemetry::EventLogWriter::create(path);
   ASSERT_TRUE(log);
-  for (const auto& one : {recording("m1", start_us), recording("m2", start_us + 100'000'000)})
+  for (const auto& one : {recording("m1", start_us), recording("m2", start_us + 60'000'000)})
     ASSERT_TRUE(telemetry::write_recording(*log, one));
   ASSERT_TRUE(log->close());
   const auto read = telemetry::read_recordings({&path, 1});

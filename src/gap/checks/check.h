@@ -50,7 +50,7 @@ std::vector<Check> check_observations(std::span<const Observation> observations,
 // Missions before a `step_between_missions` and from it on, each side with three at least; empty where no
 // check tells of a step. `checks` are of these recordings. Notes and what could not be read belong to the
 // whole and stay out.
-std::optional<std::array<telemetry::RecordingSet, 2>> split_at_step(telemetry::RecordingSet recordings,
+std::optional<std::array<telemetry::RecordingSet, 2>> split_at_step(const telemetry::RecordingSet& recordings,
                                                                     std::span<const Check> checks);
 
 // NaN for every reading of a contradicted channel. "utime" is left as it is.

@@ -153,7 +153,7 @@ std::vector<Check> check_steps(const CheckContext& c) {
   return {check};
 }
 
-std::optional<std::array<telemetry::RecordingSet, 2>> split_at_step(telemetry::RecordingSet recordings,
+std::optional<std::array<telemetry::RecordingSet, 2>> split_at_step(const telemetry::RecordingSet& recordings,
                                                                     std::span<const Check> checks) {
   const auto step = std::ranges::find_if(checks, [](const Check& c) { return c.first_mission.has_value(); });
   if (step == checks.end()) return std::nullopt;
@@ -161,7 +161,7 @@ std::optional<std::array<telemetry::RecordingSet, 2>> split_at_step(telemetry::R
   for (std::size_t m = 0; m < recordings.missions.size(); ++m) {
     telemetry::RecordingSet& side = sides[m < *step->first_mission ? 0 : 1];
     side.samples += recordings.missions[m].samples.size();
-    side.missions.push_back(std::move(recordings.missions[m]));
+    side.missions.push_back(recordings.missions[m]);
   }
   for (telemetry::RecordingSet& side : sides) side.robot_id = recordings.robot_id;
   return sides;

@@ -324,7 +324,6 @@ class Explainer {
         *std::ranges::max_element(sets_, {}, [](const auto& entry) { return entry.second.probability; });
     // What does not matter by itself still belongs to what the data were fitted with.
     const HypothesisSet& set = best.second.whole;
-    e.log_odds = odds(set);
     e.whole = set;
     const Mixture::Estimate estimate = mixture_.estimate(set);
     for (std::size_t k = 0; k < set.size(); ++k) {
@@ -375,13 +374,6 @@ class Explainer {
 };
 
 }  // namespace
-
-HypothesisSet Explanation::set() const {
-  HypothesisSet set;
-  for (const Member& m : members) set.push_back(m.hypothesis);
-  std::ranges::sort(set);
-  return set;
-}
 
 Explanation explain(const Mixture& mixture, const std::vector<bool>& left_out,
                     const ExplainSettings& settings) {

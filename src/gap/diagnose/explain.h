@@ -51,10 +51,7 @@ struct Explanation {
   double none_by_prediction = 0;
   double outside = 0;  // that something outside the catalogue is, by evidence
   double outside_by_prediction = 0;
-  double log_odds = 0;  // of the set over nothing
   HypothesisSet whole;  // the set with what does not matter by itself
-
-  HypothesisSet set() const;
 };
 
 // Of all blocks that are not left out.

@@ -83,8 +83,7 @@ std::optional<FitResult> fit_windows(const Material& whole, std::span<const Caus
     const Explanation explanation = explain(mixture, {}, quick);
     result.log_joint = mixture.log_joint(explanation.whole);
     next = result.linear.columns->causes_of(chosen_of(*result.linear.columns, explanation));
-    result.rests = same(next, result.causes);
-    if (result.rests) break;
+    if (same(next, result.causes)) break;
     narrow(result.shapes, next, material.robot, factor);
     factor = std::sqrt(factor);
   }

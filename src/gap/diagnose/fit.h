@@ -23,7 +23,6 @@ struct FitResult {
   // not so.
   std::vector<Cause> base;
   double log_joint = 0;  // of the best explanation, to compare starts by
-  bool rests = false;    // false: it would go on to something worse
 };
 
 // Searches from `start`, linearises around what it finds, narrows shapes and searches again until the set and

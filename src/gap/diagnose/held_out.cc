@@ -36,32 +36,48 @@ struct Rest {
   }
 };
 
-// The same point of linearisation with a zone more for each part, where the rest of the floor says that one
-// is. In the order of the parts; a part without its own zone has the first.
-Linear with_zones(const Material& m, const FitResult& fit, const FitSettings& settings, std::size_t parts,
-                  std::vector<std::size_t>& zone_of_part) {
-  Shapes scan, shapes = fit.shapes;
-  scan.zones = {everywhere};
-  const std::vector<Window> some = thinned(m.windows);
-  Material thin = m;
-  thin.windows = some;
-  const Linear linear = linearise(thin, scan, settings.shares, {});
-  for (std::size_t part = 0; part < parts; ++part) {
-    const Noise noise = learn_noise(*linear.columns, linear.rows, blocks_of(part, parts, m.blocks));
-    const auto zone = find_zone(*linear.columns, linear.rows, noise, some);
-    zone_of_part.push_back(zone ? shapes.zones.size() : 0);
-    if (zone) shapes.zones.push_back(*zone);
-  }
-  return linearise(m, shapes, settings.shares, fit.causes);
+bool in_zone(const Cause& cause) {
+  return !cause.by && cause.effect.effect->info().id == "floor_resistance_zone";
 }
 
-// Only one of the zones may be there; the others were found with other parts left out.
-void keep_zone(Problem& problem, std::size_t zone, std::size_t scales) {
-  constexpr double never = -1e6;
-  std::size_t seen = 0;
-  for (Hypothesis& h : problem.hypotheses) {
-    if (h.id() == "floor_resistance_zone" && seen++ / scales != zone) h.candidate.log_prior += never;
+// Finds the zone of a floor anew from the blocks that are not left out.
+class ZoneScan {
+ public:
+  ZoneScan(const Material& m, const FitSettings& settings) : windows_(thinned(m.windows)) {
+    Material thin = m;
+    thin.windows = windows_;
+    Shapes scan;
+    scan.zones = {everywhere};
+    linear_ = linearise(thin, scan, settings.shares, {});
   }
+
+  std::optional<Zone> without(const std::vector<bool>& left_out) const {
+    const Noise noise = learn_noise(*linear_.columns, linear_.rows, left_out);
+    return find_zone(*linear_.columns, linear_.rows, noise, windows_);
+  }
+
+ private:
+  std::vector<Window> windows_;
+  Linear linear_;
+};
+
+// The point of linearisation with another zone in the place of the one that all data show; none: without.
+Linear with_zone(const Material& m, const FitResult& fit, const FitSettings& settings,
+                 const std::optional<Zone>& zone) {
+  Shapes shapes = fit.shapes;
+  std::vector<Cause> around = fit.causes;
+  if (zone) {
+    shapes.zones = {*zone};
+    for (Cause& cause : around) {
+      if (!in_zone(cause)) continue;
+      auto& values = cause.effect.values;
+      values[1] = zone->x_m, values[2] = zone->y_m, values[3] = zone->radius_m;
+    }
+  } else {
+    shapes.zones.clear();
+    std::erase_if(around, in_zone);
+  }
+  return linearise(m, shapes, settings.shares, around);
 }
 
 }  // namespace
@@ -80,16 +96,16 @@ std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::sp
   HeldOut held;
   held.blocks.resize(m.blocks);
   held.parts = std::min(most_parts, m.blocks);
-  std::vector<std::size_t> zone_of_part;
-  std::optional<Linear> zoned;
-  if (!fit.shapes.zones.empty()) zoned = with_zones(m, fit, settings, held.parts, zone_of_part);
-  const Linear& linear = zoned ? *zoned : fit.linear;
+  std::optional<ZoneScan> zones;
+  if (!fit.shapes.zones.empty()) zones.emplace(m, settings);
   const std::vector<double> unchanged = modelled_power(m.robot, m.adopted, {}, m.windows);
   for (std::size_t part = 0; part < held.parts; ++part) {
     const std::vector<bool> out = blocks_of(part, held.parts, m.blocks);
+    std::optional<Linear> zoned;
+    if (zones) zoned = with_zone(m, fit, settings, zones->without(out));
+    const Linear& linear = zoned ? *zoned : fit.linear;
     const Noise noise = learn_noise(*linear.columns, linear.rows, out);
-    Problem problem = make_problem(*linear.columns, linear.rows, noise, m.blocks);
-    if (zoned) keep_zone(problem, zone_of_part[part], settings.shares.size());
+    const Problem problem = make_problem(*linear.columns, linear.rows, noise, m.blocks);
     const Explanation explanation = explain(problem, out, settings.explain);
     const Named named = name_causes(m, *linear.columns, problem, explanation, power_w, out);
     std::vector<std::string> ids;

@@ -177,9 +177,4 @@ std::vector<double> Mixture::by_block(const HypothesisSet& set, std::size_t memb
   return strengths;
 }
 
-double Mixture::separation(std::size_t a, std::size_t b, double strength) const {
-  const Candidate &first = problem_->hypotheses[a].candidate, &second = problem_->hypotheses[b].candidate;
-  return likeliest({a}).evidence.separation(first.columns[0], strength, second.columns[0], second.expected);
-}
-
 }  // namespace joulecast::gap

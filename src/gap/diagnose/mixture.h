@@ -39,9 +39,6 @@ class Mixture {
   // likeliest. NaN: left out.
   std::vector<double> by_block(const HypothesisSet& set, std::size_t member) const;
 
-  // Expected log odds of one hypothesis' first coefficient at a strength over another in its place.
-  double separation(std::size_t a, std::size_t b, double strength) const;
-
  private:
   struct Part {
     const Circumstances* circumstances;

@@ -12,7 +12,9 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr double least_necessary_part = 0.05;  // of the gap, that comes back when a cause is left out
+// What comes back when a cause is left out: of the gap, and of the mean power.
+constexpr double least_necessary_part = 0.05,
+                 least_necessary_share = ExplainSettings{}.least_share_for_certain;
 
 // Causes that only the motors' readings show, not battery power.
 bool moves_motors_alone(const Hypothesis& h) {
@@ -27,9 +29,9 @@ bool shows_in_power(const Hypothesis& hypothesis) {
   return !hypothesis.is_effect() || !traits_of(hypothesis.id()).elsewhere;
 }
 
-double seen_share(const Problem& problem) {
+double seen_share(const Mixture& mixture) {
   constexpr double deviations = 3.5;
-  const Mixture mixture(problem);
+  const Problem& problem = mixture.problem();
   std::map<std::string, double> shares;
   for (std::size_t h = 0; h < problem.hypotheses.size(); ++h) {
     const Hypothesis& hypothesis = problem.hypotheses[h];
@@ -96,7 +98,7 @@ Named name_causes(const Material& m, const ColumnSet& columns, const Problem& pr
     return gap_size(measured, modelled_power(m.robot, m.adopted, causes, windows)).absolute_relative;
   };
   if (!windows.empty() && set.size() > 1) {
-    const double least = least_necessary_part * gap_with({});
+    const double least = std::max(least_necessary_part * gap_with({}), least_necessary_share);
     while (set.size() > 1) {
       const double all = gap_with(set);
       double opened = least;

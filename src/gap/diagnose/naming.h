@@ -18,7 +18,7 @@ bool shows_in_power(const Hypothesis& hypothesis);
 
 // Share of the power that a cause has to move to be surely seen: the median over causes that show in power of
 // what is so many standard deviations of each by itself.
-double seen_share(const Problem& problem);
+double seen_share(const Mixture& mixture);
 
 // Of an explanation, those that are there, or one of their group, with even odds or better by both judges,
 // and that stand still.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gap/diagnose/account.h"
 #include "gap/diagnose/channel_gaps.h"
 #include "gap/diagnose/controls.h"
 #include "gap/diagnose/held_out.h"
@@ -77,11 +78,11 @@ class Diagnoser {
   void measure();
   bool fit();
   bool judge_all();
-  void name_base(const Problem& problem, Explanation& explanation, Named& named) const;
+  void name_base(const Mixture& mixture, Explanation& explanation, Named& named) const;
   std::vector<dynamics::ActiveEffect> instead_of(const Problem& problem, const Member& member) const;
-  void add_wander(const Problem& problem, const Explanation& explanation, Findings& findings) const;
+  void add_wander(const Mixture& mixture, const Explanation& explanation, Findings& findings) const;
   void add_baseline();
-  void add_shrinkage();
+  void lower_noise_floor(double left);
 
   const telemetry::RecordingSet& recordings_;
   const robot::RobotModel& robot_;
@@ -191,8 +192,8 @@ bool Diagnoser::fit() {
 
 // Of what every robot has, estimated anew, what no parameter of a robot file says is named as well: beside
 // all that is there already it has its own evidence.
-void Diagnoser::name_base(const Problem& problem, Explanation& explanation, Named& named) const {
-  const Mixture mixture(problem);
+void Diagnoser::name_base(const Mixture& mixture, Explanation& explanation, Named& named) const {
+  const Problem& problem = mixture.problem();
   HypothesisSet whole = named.set;
   std::vector<std::size_t> more;
   const auto with = [&](std::size_t h) {
@@ -264,7 +265,8 @@ std::vector<dynamics::ActiveEffect> Diagnoser::instead_of(const Problem& problem
   return effects;
 }
 
-void Diagnoser::add_wander(const Problem& problem, const Explanation& explanation, Findings& f) const {
+void Diagnoser::add_wander(const Mixture& mixture, const Explanation& explanation, Findings& f) const {
+  const Problem& problem = mixture.problem();
   double most = 0;
   for (std::size_t k = 0; k < explanation.members.size(); ++k) {
     const Member& m = explanation.members[k];
@@ -278,7 +280,7 @@ void Diagnoser::add_wander(const Problem& problem, const Explanation& explanatio
   const Member& m = explanation.members[*f.wandering];
   const auto place = static_cast<std::size_t>(std::ranges::find(explanation.whole, m.hypothesis) -
                                               explanation.whole.begin());
-  const std::vector<double> by_block = Mixture(problem).by_block(explanation.whole, place);
+  const std::vector<double> by_block = mixture.by_block(explanation.whole, place);
   const double mean_w =
       m.share * fit_->linear.columns->mean_power_w() / std::max(std::fabs(m.coefficients[0]), 1e-12);
   const std::size_t third = std::max<std::size_t>(1, by_block.size() / 3);
@@ -290,61 +292,36 @@ void Diagnoser::add_wander(const Problem& problem, const Explanation& explanatio
 
 void Diagnoser::add_baseline() {
   if (!held_out_ || d_.power == PowerSource::none) return;
-  Baseline b;
+  d_.baseline = baseline_of(*held_out_);
   const Referee referee(material(), view_.power_w), model(material(), modelled({}));
-  b.held_out = held_out_->referee();
-  b.unchanged_model_held_out = held_out_->unchanged();
-  b.explanation_held_out = held_out_->explained();
   for (std::size_t k = 0; k < referee.terms().size(); ++k) {
-    const RefereeTerm& term = referee.terms()[k];
     const auto at = static_cast<Eigen::Index>(k);
-    const double data = referee.fit().coefficients[at], sd = referee.fit().sd[at];
-    const double ours = model.fit().coefficients[at];  // what the model itself comes to in the same term
-    b.terms.push_back({term.name, term.unit, data, sd, ours});
-    constexpr double clear = 3, notable = 0.2;
-    if (!(sd > 0) || std::fabs(data - ours) < clear * sd ||
-        std::fabs(data - ours) < notable * std::fabs(data))
-      continue;
-    b.says.push_back(referee_words(term, data, ours));
+    add_term(*d_.baseline, referee.terms()[k], referee.fit().coefficients[at], referee.fit().sd[at],
+             model.fit().coefficients[at]);
   }
-  d_.baseline = std::move(b);
 }
 
-void Diagnoser::add_shrinkage() {
-  if (!held_out_ || named_.empty() || d_.power == PowerSource::none) return;
-  Shrinkage s;
-  s.before = held_out_->unchanged();
-  s.after = held_out_->explained();
-  s.fraction = 1 - s.after / s.before;
-  s.interval = statistics::bootstrap_interval(held_out_->blocks.size(), [&](std::span<const int> draw) {
-    double before = 0, after = 0;
-    for (std::size_t b = 0; b < draw.size(); ++b) {
-      before += draw[b] * held_out_->blocks[b].unchanged;
-      after += draw[b] * held_out_->blocks[b].explained;
-    }
-    return 1 - after / before;
-  });
-  s.remaining_over_noise_floor = d_.noise_floor > 0 ? s.after / d_.noise_floor : missing;
-  s.parts = held_out_->parts;
-  std::vector<std::string> ids;
-  for (const std::size_t h : named_) ids.push_back(fit_->linear.columns->hypotheses()[h].id());
-  std::ranges::sort(ids);
-  for (std::vector<std::string> part : held_out_->named) {
-    std::ranges::sort(part);
-    s.agreeing += part == ids ? 1 : 0;
+// What predicts parts that had no part in it shows that noise makes no more than it leaves.
+void Diagnoser::lower_noise_floor(double left) {
+  if (!(left < d_.noise_floor)) return;
+  for (ChannelGap& gap : d_.channels) {
+    if (gap.noise_floor == d_.noise_floor) gap.noise_floor = left;
   }
-  d_.shrinkage = s;
+  d_.noise_floor = left;
 }
 
 bool Diagnoser::judge_all() {
   const Problem problem = make_problem(*fit_->linear.columns, fit_->linear.rows, fit_->linear.noise, blocks_);
-  Explanation explanation = explain(problem, {}, fit_settings_.explain);
-  d_.detectable_share = seen_share(problem);
+  const Mixture mixture(problem);
+  const std::vector<bool> all_blocks;
+  Explanation explanation = explain(mixture, all_blocks, fit_settings_.explain);
+  d_.detectable_share = seen_share(mixture);
   Named named = name_causes(material(), *fit_->linear.columns, problem, explanation, view_.power_w, {});
   named_ = named.set;
   held_out_ = hold_out(material(), *fit_, view_.power_w, fit_settings_,
                        [&](double part) { return goes_on(std::lerp(after_fit, after_parts, part)); });
   if (!held_out_) return false;
+  lower_noise_floor(std::min(held_out_->explained(), held_out_->referee()));
   if (!fit_->base.empty()) {
     if (held_out_->based() < held_out_->explained()) {
       for (BlockErrors& b : held_out_->blocks) b.explained = b.based;
@@ -352,7 +329,7 @@ bool Diagnoser::judge_all() {
       fit_->base.clear();
     }
   }
-  if (!fit_->base.empty()) name_base(problem, explanation, named);
+  if (!fit_->base.empty()) name_base(mixture, explanation, named);
   named_ = named.set;
   causes_ = refit(material(), joined(fit_->base, named.causes));
   const ControlSettings controls{fit_settings_.explain, settings_.controls, settings_.threads};
@@ -390,9 +367,10 @@ bool Diagnoser::judge_all() {
   }
   for (const std::size_t h : named_)
     f.instead.push_back(instead_of(problem, *std::ranges::find(explanation.members, h, &Member::hypothesis)));
-  add_wander(problem, explanation, f);
+  add_wander(mixture, explanation, f);
   add_baseline();
-  add_shrinkage();
+  if (!named_.empty() && d_.power != PowerSource::none)
+    d_.shrinkage = shrinkage_of(*held_out_, problem.hypotheses, named_, d_.noise_floor);
   judge(d_, f, robot_);
   if (d_.effects.empty()) d_.shrinkage.reset();
   d_.next_drive = next_drives(fit_->linear, problem, robot_, d_.effects);
@@ -409,7 +387,6 @@ Result<Diagnosis> Diagnoser::run() {
   d_.robot_id = recordings_.robot_id;
   d_.missions = recordings_.missions.size();
   d_.samples = recordings_.samples;
-  d_.notes = recordings_.notes;
   auto adopted = dynamics::active_effects(robot_);
   if (!adopted) return tl::unexpected(adopted.error());
   adopted_ = std::move(*adopted);
@@ -429,24 +406,23 @@ Result<Diagnosis> Diagnoser::run() {
 Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
                            const DiagnosisSettings& settings) {
   std::vector<Check> checks = check_recordings(recordings, robot);
-  telemetry::RecordingSet trusted = recordings;
-  silence_contradicted(trusted, checks);
+  std::optional<telemetry::RecordingSet> cleared;
+  if (std::ranges::any_of(checks, &Check::contradicted))
+    silence_contradicted(cleared.emplace(recordings), checks);
+  const telemetry::RecordingSet& trusted = cleared ? *cleared : recordings;
   // Where a sensor or the robot changed between missions each side is judged alone: the later one is today's.
-  std::string before;
-  if (auto sides = split_at_step(trusted, checks)) {
+  const auto sides = split_at_step(trusted, checks);
+  Result<Diagnosis> d = Diagnoser(sides ? (*sides)[1] : trusted, robot, settings).run();
+  if (!d) return d;
+  d->checks = std::move(checks);
+  d->notes = recordings.notes;
+  if (sides) {
     DiagnosisSettings quick = settings;
     quick.controls = 0;
     const Result<Diagnosis> earlier = Diagnoser((*sides)[0], robot, quick).run();
     if (!earlier) return earlier;
-    before = earlier_words(*earlier, (*sides)[1].missions.front().mission_id);
-    const std::vector<std::string> notes = std::move(trusted.notes);
-    trusted = std::move((*sides)[1]);
-    trusted.notes = notes;
+    d->notes.push_back(earlier_words(*earlier, (*sides)[1].missions.front().mission_id));
   }
-  Result<Diagnosis> d = Diagnoser(trusted, robot, settings).run();
-  if (!d) return d;
-  d->checks = std::move(checks);
-  if (!before.empty()) d->notes.push_back(std::move(before));
   return d;
 }
 

@@ -1,10 +1,6 @@
 #include "gap/diagnose/referee.h"
 
-#include <fmt/format.h>
-
 #include <cmath>
-
-#include "gap/verdict/words.h"
 
 namespace joulecast::gap {
 
@@ -44,11 +40,6 @@ Referee::Referee(const Material& m, std::span<const double> power_w, const std::
     block.push_back(m.windows[k].block);
   }
   fit_ = statistics::robust_regression(x.topRows(rows), y.head(rows), block);
-}
-
-std::string referee_words(const RefereeTerm& term, double data, double model) {
-  return sentence(
-      fmt::format("the data have {} {}; the model has {}", brief(data), term.words, brief(model)));
 }
 
 }  // namespace joulecast::gap

@@ -35,7 +35,4 @@ class Referee {
   statistics::Regression fit_;
 };
 
-// One term as the data have it, beside what the model comes to in the same term.
-std::string referee_words(const RefereeTerm& term, double data, double model);
-
 }  // namespace joulecast::gap

@@ -5,9 +5,9 @@
 #include <random>
 #include <set>
 
+#include "gap/diagnose/account.h"
 #include "gap/diagnose/naming.h"
 #include "gap/verdict/judge.h"
-#include "statistics/bootstrap.h"
 #include "statistics/shapley.h"
 
 namespace joulecast::gap {
@@ -293,33 +293,8 @@ Explanation Comparer::told(const std::vector<Contrasted>& members) const {
 void Comparer::add_baseline() {
   if (!power_known()) return;
   Diagnosis& d = c_.diagnosis;
-  d.baseline.emplace();
-  d.baseline->held_out = held_out_->referee();
-  d.baseline->unchanged_model_held_out = held_out_->unchanged();
-  d.baseline->explanation_held_out = held_out_->explained();
-  if (named_.empty()) return;
-  Shrinkage s;
-  s.before = held_out_->unchanged();
-  s.after = held_out_->explained();
-  s.fraction = 1 - s.after / s.before;
-  s.interval = statistics::bootstrap_interval(held_out_->blocks.size(), [&](std::span<const int> draw) {
-    double before = 0, after = 0;
-    for (std::size_t b = 0; b < draw.size(); ++b) {
-      before += draw[b] * held_out_->blocks[b].unchanged;
-      after += draw[b] * held_out_->blocks[b].explained;
-    }
-    return 1 - after / before;
-  });
-  s.remaining_over_noise_floor = d.noise_floor > 0 ? s.after / d.noise_floor : missing;
-  s.parts = held_out_->parts;
-  std::vector<std::string> ids;
-  for (const std::size_t h : named_) ids.push_back(problem_.hypotheses[h].id());
-  std::ranges::sort(ids);
-  for (std::vector<std::string> part : held_out_->named) {
-    std::ranges::sort(part);
-    s.agreeing += part == ids ? 1 : 0;
-  }
-  d.shrinkage = s;
+  d.baseline = baseline_of(*held_out_);
+  if (!named_.empty()) d.shrinkage = shrinkage_of(*held_out_, problem_.hypotheses, named_, d.noise_floor);
 }
 
 void Comparer::judge_all() {
@@ -371,7 +346,7 @@ void Comparer::judge_all() {
 bool Comparer::run() {
   problem_ = contrast(data_.base, data_.group_of_block, groups_);
   explanation_ = explain(problem_, {}, data_.explain);
-  c_.diagnosis.detectable_share = seen_share(problem_);
+  c_.diagnosis.detectable_share = seen_share(Mixture(problem_));
   named_ = likely_causes(problem_, explanation_);
   causes_ = contrasted(data_.base, problem_, named_, {});
   if (!hold_out()) return false;

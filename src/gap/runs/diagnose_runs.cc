@@ -8,6 +8,7 @@
 #include <numbers>
 #include <set>
 
+#include "gap/diagnose/account.h"
 #include "gap/diagnose/held_out.h"
 #include "gap/diagnose/naming.h"
 #include "gap/runs/run_referee.h"
@@ -76,7 +77,6 @@ class RunDiagnoser {
   bool hold_out_parts();
   bool hold_out_conditions();
   void add_baseline();
-  void add_shrinkage();
   bool judge_all();
   void add_limits();
 
@@ -117,7 +117,7 @@ void RunDiagnoser::measure() {
   d.noise_floor = std::min(mean_absolute_normal(r_.scatter), d.power_absolute_relative);
   d.channels = {
       {columns_.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
-  d.detectable_share = seen_share(finding_.problem);
+  d.detectable_share = seen_share(Mixture(finding_.problem));
 }
 
 bool RunDiagnoser::hold_out_parts() {
@@ -184,52 +184,15 @@ bool RunDiagnoser::hold_out_conditions() {
 }
 
 void RunDiagnoser::add_baseline() {
-  Baseline b;
+  Baseline& baseline = r_.diagnosis.baseline.emplace(baseline_of(*held_out_));
   const auto data = referee_.fit(measured_j_).regression;
   std::vector<double> modelled;
   for (const JudgedRun& run : r_.runs) modelled.push_back(run.model_j);
   const auto model = referee_.fit(modelled).regression;
   for (std::size_t k = 0; k < referee_.terms().size(); ++k) {
-    const RunReferee::Term& term = referee_.terms()[k];
     const auto at = static_cast<Eigen::Index>(k);
-    const double value = data.coefficients[at], sd = data.sd[at], ours = model.coefficients[at];
-    b.terms.push_back({term.name, term.unit, value, sd});
-    constexpr double clear = 3, notable = 0.2;
-    if (std::fabs(value - ours) < clear * sd || std::fabs(value - ours) < notable * std::fabs(value))
-      continue;
-    b.says.push_back(sentence(
-        fmt::format("the data have {} {}; the model has {}", brief(value), term.words, brief(ours))));
+    add_term(baseline, referee_.terms()[k], data.coefficients[at], data.sd[at], model.coefficients[at]);
   }
-  b.held_out = held_out_->referee();
-  b.unchanged_model_held_out = held_out_->unchanged();
-  b.explanation_held_out = held_out_->explained();
-  r_.diagnosis.baseline = std::move(b);
-}
-
-void RunDiagnoser::add_shrinkage() {
-  if (finding_.named.empty()) return;
-  Shrinkage s;
-  s.before = held_out_->unchanged();
-  s.after = held_out_->explained();
-  s.fraction = 1 - s.after / s.before;
-  s.interval = statistics::bootstrap_interval(held_out_->blocks.size(), [&](std::span<const int> draw) {
-    double before = 0, after = 0;
-    for (std::size_t b = 0; b < draw.size(); ++b) {
-      before += draw[b] * held_out_->blocks[b].unchanged;
-      after += draw[b] * held_out_->blocks[b].explained;
-    }
-    return 1 - after / before;
-  });
-  s.remaining_over_noise_floor = s.after / r_.diagnosis.noise_floor;
-  s.parts = held_out_->parts;
-  std::vector<std::string> ids;
-  for (const std::size_t h : finding_.named) ids.push_back(columns_.hypotheses()[h].id());
-  std::ranges::sort(ids);
-  for (std::vector<std::string> part : held_out_->named) {
-    std::ranges::sort(part);
-    s.agreeing += part == ids ? 1 : 0;
-  }
-  r_.diagnosis.shrinkage = s;
 }
 
 bool RunDiagnoser::judge_all() {
@@ -267,7 +230,9 @@ bool RunDiagnoser::judge_all() {
     f.power_w.push_back(change / static_cast<double>(set_.runs.size()));
   }
   add_baseline();
-  add_shrinkage();
+  if (!finding_.named.empty())
+    r_.diagnosis.shrinkage =
+        shrinkage_of(*held_out_, columns_.hypotheses(), finding_.named, r_.diagnosis.noise_floor);
   judge(r_.diagnosis, f, robot_);
   if (r_.diagnosis.effects.empty()) r_.diagnosis.shrinkage.reset();
   return true;

@@ -10,7 +10,7 @@ RunReferee::RunReferee(const RunColumns& columns) {
   const auto n = static_cast<Eigen::Index>(runs.size());
   for (const MissionRun& run : runs) size_.push_back(run.measured_j());
   const std::size_t most_terms = std::max<std::size_t>(2, runs.size() / 4);
-  const auto take = [&](Term term, auto&& value, bool always) {
+  const auto take = [&](RefereeTerm term, auto&& value, bool always) {
     Eigen::VectorXd column(n);
     for (Eigen::Index k = 0; k < n; ++k) column[k] = value(static_cast<std::size_t>(k));
     // What is the same for each metre, or each second, of every run says nothing beside the distance and the

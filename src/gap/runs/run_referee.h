@@ -1,8 +1,8 @@
 #pragma once
 
-#include <string>
 #include <vector>
 
+#include "gap/diagnose/referee.h"
 #include "gap/runs/run_columns.h"
 #include "statistics/regression.h"
 
@@ -14,10 +14,7 @@ class RunReferee {
  public:
   explicit RunReferee(const RunColumns& columns);
 
-  struct Term {
-    std::string name, unit, words;  // "so many <words>"
-  };
-  const std::vector<Term>& terms() const { return terms_; }
+  const std::vector<RefereeTerm>& terms() const { return terms_; }
 
   // Energies of all runs by the terms, fitted to the runs that are not left out, errors relative to the
   // measured ones.
@@ -28,7 +25,7 @@ class RunReferee {
   Fit fit(const std::vector<double>& energy_j, const std::vector<bool>& left_out = {}) const;
 
  private:
-  std::vector<Term> terms_;
+  std::vector<RefereeTerm> terms_;
   Eigen::MatrixXd x_;         // runs by terms
   std::vector<double> size_;  // measured energies
 };

@@ -22,7 +22,8 @@ std::string_view name_of(Standing standing) {
 
 bool Baseline::wins() const {
   constexpr double gate = 1.05;
-  return explanation_held_out > gate * std::min(held_out, unchanged_model_held_out);
+  const double best = std::min(held_out, unchanged_model_held_out);
+  return explanation_held_out > gate * best && explanation_held_out - best > deviation;
 }
 
 }  // namespace joulecast::gap

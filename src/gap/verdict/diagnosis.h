@@ -89,8 +89,10 @@ struct Baseline {
   double held_out = 0;                  // of the regression
   double unchanged_model_held_out = 0;  // of the robot file
   double explanation_held_out = 0;      // of what is found anew without each part
+  double deviation = 0;                 // standard error of how far the last is from the better of the others
   std::vector<std::string> says;        // its terms beside what the model has, in words
-  bool wins() const;                    // over the explanation, by more than the gate allows
+  // Over the explanation: by more than the gate allows and than blocks differ by chance.
+  bool wins() const;
 };
 
 // What a found explanation does on parts that had no part in finding it: effects, shapes, zone and noise are

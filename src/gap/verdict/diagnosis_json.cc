@@ -60,6 +60,7 @@ ordered_json baseline_to_json(const std::optional<Baseline>& baseline) {
           {"held_out", json_number(baseline->held_out)},
           {"unchanged_model_held_out", json_number(baseline->unchanged_model_held_out)},
           {"explanation_held_out", json_number(baseline->explanation_held_out)},
+          {"deviation", json_number(baseline->deviation)},
           {"wins", baseline->wins()},
           {"says", baseline->says}};
 }

@@ -101,11 +101,12 @@ TEST(ThesisTables, ShowLoadDependentRollingResistance) {
     EXPECT_FALSE(d->model_given);
     const DiagnosedEffect* load = find(*d, "load_rolling_resistance");
     ASSERT_NE(load, nullptr);
-    EXPECT_GT(load->posterior, 0.7);
-    // Solid tyres on hard floor roll with 0.01 to 0.03.
+    EXPECT_GT(load->posterior, stretch > 1 ? 0.9 : 0.5);
+    // Solid tyres on hard floor roll with 0.01 to 0.03; what was lost on 14 m is told of 10 m where those are
+    // stated.
     const DiagnosedParameter& strength = load->parameters.front();
     EXPECT_GT(strength.value + 2 * strength.deviation, 0.01);
-    EXPECT_LT(strength.value - 2 * strength.deviation, 0.03);
+    EXPECT_LT(strength.value - 2 * strength.deviation, 0.03 * 1.4 / stretch);
     EXPECT_GT(strength.value, 4 * strength.deviation);
     // Parts left out, everything chosen without them.
     ASSERT_TRUE(d->diagnosis.shrinkage);

@@ -29,6 +29,7 @@ inline Diagnosis made_diagnosis() {
                         0.115,
                         0.205,
                         0.064,
+                        0.004,
                         {"Turning costs 1150 W per m/s; the model has 90."}};
   d.where = {{"battery_power", "phase", "turning", 0, 0, 0.61, 0.17, {0.51, 0.71}},
              {"wheel_torque", "speed_m_s", "", 0.2, 0.4, -0.12, 0.09, {-0.19, -0.05}}};
