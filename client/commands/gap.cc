@@ -119,7 +119,8 @@ Exit gap_of_logs(const Options& options, const robot::RobotModel& robot) {
   if (!recordings) return report(recordings.error());
   const gap::ReportOrigin origin = report_origin(options.logs, options.robot_file);
   if (!options.compare_by.empty())
-    return gap_between_groups(*recordings, robot, options.compare_by, options.json, options.report, origin);
+    return gap_between_groups(*recordings, robot,
+                              {options.compare_by, options.controls, options.json, options.report}, origin);
   const Result<Judged> judged = judge(options, *recordings, robot);
   if (!judged) return report(judged.error());
   nlohmann::ordered_json document = gap::diagnosis_to_json(judged->diagnosis);
@@ -159,6 +160,10 @@ Exit run(const Options& options) {
   missions.json = options.json;
   missions.report = options.report;
   missions.apply = options.apply;
+  missions.compare_by = options.compare_by;
+  missions.controls = options.controls;
+  missions.effect = options.effect;
+  missions.force = options.force;
   return gap_from_missions(missions, *robot);
 }
 
@@ -233,8 +238,6 @@ void add_gap(CLI::App& program, Exit& exit) {
     if (logs->empty() && missions->empty() && server->empty())
       throw CLI::RequiredError("log, --missions or --server");
     if (robot->empty() && server->empty()) throw CLI::RequiredError(robot->get_name());
-    options->missions.compare_by = options->compare_by;
-    options->missions.force = options->force;
     exit = run(*options);
   });
 }

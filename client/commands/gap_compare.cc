@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "client/commands/gap_output.h"
@@ -17,15 +18,21 @@ namespace {
 void print_rest(const gap::Comparison& c) {
   fmt::print("groups:\n");
   for (const gap::ComparedGroup& g : c.groups) {
-    fmt::print("  {:<14} {} missions, {:.4g} m: {:.4g} J/m, by the model with what all share {:.4g} J/m\n",
-               g.name, g.missions, g.way_m, g.energy_per_m_j, g.model_per_m_j);
+    fmt::print("  {:<14} {} missions, {:.4g} m", g.name, g.missions, g.way_m);
+    if (std::isfinite(g.energy_per_m_j)) {
+      fmt::print(": {:.4g} J/m, by the model with what all share {:.4g} J/m", g.energy_per_m_j,
+                 g.model_per_m_j);
+    }
+    fmt::print("\n");
   }
   for (const gap::ComparedEffect& e : c.effects) {
     fmt::print("{} {} beside the mean over all groups:\n", e.id, e.parameter);
     for (std::size_t g = 0; g < e.groups.size(); ++g) {
       const gap::GroupStrength& s = e.groups[g];
-      fmt::print("  {:<14} {:+.4g} +- {:.2g}{} ({:+.3g} J/m)\n", c.groups[g].name, s.value, s.deviation,
-                 e.unit == "1" ? "" : " " + e.unit, s.energy_per_m_j);
+      fmt::print("  {:<14} {:+.4g} +- {:.2g}{}", c.groups[g].name, s.value, s.deviation,
+                 e.unit == "1" ? "" : " " + e.unit);
+      if (std::isfinite(s.energy_per_m_j)) fmt::print(" ({:+.3g} J/m)", s.energy_per_m_j);
+      fmt::print("\n");
     }
   }
   if (c.difference) {
@@ -59,18 +66,18 @@ Exit tell(const gap::Comparison& comparison, const robot::RobotModel& robot, boo
 }
 
 Exit gap_between_groups(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
-                        const std::string& by, bool json, const std::string& report_file,
-                        const gap::ReportOrigin& origin) {
-  const auto groups = gap::groups_of(recordings, by);
+                        const GapCompareOptions& options, const gap::ReportOrigin& origin) {
+  const auto groups = gap::groups_of(recordings, options.by);
   if (!groups) return report(groups.error());
   const auto comparison = [&] {
     Progress progress("comparing", "%", 100);
     gap::CompareSettings settings;
+    settings.controls = options.controls.value_or(settings.controls);
     settings.progress = progress.shares();
     return gap::compare_recordings(recordings, *groups, robot, settings);
   }();
   if (!comparison) return report(comparison.error());
-  return tell(*comparison, robot, json, report_file, origin);
+  return tell(*comparison, robot, options.json, options.report, origin);
 }
 
 }  // namespace joulecast::client

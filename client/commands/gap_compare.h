@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "client/commands/outcome.h"
@@ -9,11 +10,16 @@
 
 namespace joulecast::client {
 
-// What changes between groups of the recordings: by "prefix" or "suffix" of the missions' ids, or a label of
-// theirs. `report_file`: HTML page to write; empty: none.
+struct GapCompareOptions {
+  std::string by;                       // "prefix" or "suffix" of the missions' ids, or a label of theirs
+  std::optional<std::size_t> controls;  // permutations of the groups for each finding
+  bool json = false;
+  std::string report;  // HTML file to write; empty: none
+};
+
+// What changes between groups of the recordings.
 Exit gap_between_groups(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
-                        const std::string& by, bool json, const std::string& report_file,
-                        const gap::ReportOrigin& origin);
+                        const GapCompareOptions& options, const gap::ReportOrigin& origin);
 
 // Prints a comparison and writes its page.
 Exit tell(const gap::Comparison& comparison, const robot::RobotModel& robot, bool json,

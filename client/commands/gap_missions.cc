@@ -62,6 +62,7 @@ Exit compare(const GapMissionsOptions& options, const gap::RunSet& runs, const r
   const auto comparison = [&] {
     Progress progress("comparing", "%", 100);
     gap::CompareSettings settings;
+    settings.controls = options.controls.value_or(settings.controls);
     settings.progress = progress.shares();
     return gap::compare_runs(runs, *groups, robot, settings);
   }();
@@ -92,6 +93,7 @@ Exit gap_from_missions(const GapMissionsOptions& options, const robot::RobotMode
     Progress progress("diagnosing", "%", 100);
     gap::RunSettings settings;
     settings.robot_file_model = options.robot_model;
+    settings.controls = options.controls.value_or(settings.controls);
     settings.progress = progress.shares();
     return gap::diagnose_runs(*runs, robot, settings);
   }();

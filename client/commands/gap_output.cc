@@ -129,9 +129,10 @@ void print_corrections(const json& d) {
   const json corrections = array_of(d, "corrections");
   if (corrections.empty()) return;
   fmt::print("what would fit in the robot file:\n");
-  for (const json& c : corrections)
-    fmt::print("  {} {:.4g} +- {:.2g} instead of {:.4g}\n", text(c["parameter"]), number(c["fits"]),
-               number(c["sd"]), number(c["file"]));
+  for (const json& c : corrections) {
+    fmt::print("  {} {:.4g}{} instead of {:.4g}\n", text(c["parameter"]), number(c["fits"]),
+               c["sd"].is_number() ? fmt::format(" +- {:.2g}", number(c["sd"])) : "", number(c["file"]));
+  }
 }
 
 void print_where(const json& regions) {
@@ -156,8 +157,8 @@ void print_adoption(const json& d) {
 }  // namespace
 
 void print_effect(const json& e) {
-  fmt::print("  {}: probability {:.2f}, closes {:.0f} % of the gap", text(e["id"]), number(e["probability"]),
-             100 * number(e["share"]));
+  fmt::print("  {}: probability {:.2f}", text(e["id"]), number(e["probability"]));
+  if (e["share"].is_number()) fmt::print(", closes {:.0f} % of the gap", 100 * number(e["share"]));
   if (number(e.value("power_w", json())) > 0) fmt::print(", {:.3g} W", number(e["power_w"]));
   fmt::print("\n");
   for (const bool estimated : {true, false}) {
@@ -191,7 +192,7 @@ void print_diagnosis(const json& d) {
                text(d["outside"]["follows"]), number(d["outside"]["probability"]));
     print_controls(d["outside"].value("controls", json()));
   }
-  if (!d["effects"].empty()) print_shrinkage(d["shrinkage"]);
+  if (!d["effects"].empty() && d["shrinkage"]["held_out_before"].is_number()) print_shrinkage(d["shrinkage"]);
   print_baseline(d);
   print_corrections(d);
   print_where(d["where"]);

@@ -34,7 +34,7 @@ struct QuadraticPower {
 };
 
 // One wheel whose motor delivers T = inertia a + damping w + friction [N m] at the wheel:
-// P = rho T^2 + kappa w T with rho = R/(K_t n)^2 and kappa = K_w/K_t (FACTS, straight line).
+// P = rho T^2 + kappa w T with rho = R/(K_t n)^2 and kappa = K_w/K_t (thesis, motion on a straight line).
 QuadraticPower wheel_power(double rho_w_n2_m2, double kappa, double inertia_kg_m2, double damping_nm_s_rad,
                            double friction_nm);
 

@@ -117,7 +117,7 @@ struct RobotModel {
   Limits limits;
   std::vector<AdoptedEffect> effects;
 
-  // m = m_c + 2 m_w + m_p (FACTS, notation) [kg].
+  // m = m_c + 2 m_w + m_p (thesis, notation) [kg].
   double total_mass_kg(double payload_kg) const { return mass.chassis_kg + 2 * mass.wheel_kg + payload_kg; }
 
   friend bool operator==(const RobotModel&, const RobotModel&) = default;

@@ -90,13 +90,17 @@ def count(paths):
             outcome = json.loads(line)
             outcomes[outcome["trial"], outcome["digest"]] = outcome
     cells, cases, sure = {}, {}, {"named": 0, "right": 0}
+    # "inconclusive" claims nothing that could come true. What wrote the outcomes holds its verdicts to its own table's
+    # surest: none is above.
+    claims = [o for o in outcomes.values() if o["verdict"] in ("none", "effects", "outside")]
+    surest = min(SURE_VERDICT, max([o["verdict_probability"] for o in claims], default=SURE_VERDICT))
+    for outcome in claims:
+        if outcome["verdict_probability"] >= surest:
+            sure["named"] += 1
+            sure["right"] += outcome["right"]
     for outcome in outcomes.values():
         trial = outcome["trial"]
         cases[trial] = cases.get(trial, 0) + 1
-        # "inconclusive" claims nothing that could come true.
-        if outcome["verdict"] in ("none", "effects", "outside") and outcome["verdict_probability"] >= SURE_VERDICT:
-            sure["named"] += 1
-            sure["right"] += outcome["right"]
         for name in outcome["effects"]:
             k = bisect.bisect_right(EDGES, name["posterior"])
             lower = EDGES[k - 1] if k else 0.0

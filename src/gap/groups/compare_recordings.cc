@@ -133,15 +133,17 @@ std::vector<Item> measure(const Grouped& g, const robot::RobotModel& robot, std:
     const std::size_t group = g.group_of_mission[w.mission];
     items.push_back(
         {group, w.block, g.power_w[k], common_w[k], length_of(w), length_of(w), way_m, length_of(w)});
-    if (!std::isfinite(g.power_w[k] + common_w[k])) continue;
     ComparedGroup& own = c.groups[group];
-    own.way_m += way_m;
+    const bool known = std::isfinite(g.power_w[k] + common_w[k]);
+    if (known || g.power == PowerSource::none) own.way_m += way_m;
+    if (!known) continue;
     own.energy_per_m_j += g.power_w[k] * length_of(w);
     own.model_per_m_j += common_w[k] * length_of(w);
   }
   for (ComparedGroup& own : c.groups) {
-    own.energy_per_m_j = own.way_m > 0 ? own.energy_per_m_j / own.way_m : missing;
-    own.model_per_m_j = own.way_m > 0 ? own.model_per_m_j / own.way_m : missing;
+    const double way_m = g.power != PowerSource::none && own.way_m > 0 ? own.way_m : missing;
+    own.energy_per_m_j /= way_m;
+    own.model_per_m_j /= way_m;
   }
   return items;
 }
@@ -222,6 +224,8 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   g.recordings = recordings;
   Diagnosis& d = c.diagnosis;
   d.checks = check_recordings(g.recordings, robot);
+  // What steps from one mission to the next is what is compared.
+  std::erase_if(d.checks, [](const Check& check) { return check.id == "step_between_missions"; });
   silence_contradicted(g.recordings, d.checks);
   sort_by_group(g, index, names.size());
   make_windows(g, robot, *adopted);

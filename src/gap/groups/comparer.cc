@@ -336,7 +336,15 @@ void Comparer::judge_all() {
     for (const std::size_t k : some) own.push_back(causes_[k]);
     return power_known() ? error(predict(own)) : 0;
   });
+  // Without power they are ordered by what they move.
+  if (!power_known()) {
+    for (std::size_t k = 0; k < named_.size(); ++k)
+      f.shares[k] = std::ranges::find(explanation.members, named_[k], &Member::hypothesis)->share;
+  }
   judge(c_.diagnosis, f, data_.robot);
+  if (!power_known()) {
+    for (DiagnosedEffect& e : c_.diagnosis.effects) e.share = missing;
+  }
   c_.diagnosis.adoptable.clear();
   c_.diagnosis.corrections.clear();
   c_.diagnosis.refusal = "a robot file has one strength for all groups";

@@ -149,7 +149,7 @@ function Referee({ of }) {
 }
 
 function Corrections({ of }) {
-  return html`<${Panel} title="What would fit in the robot file"><div class="scroll"><table class="grid effects"><thead><tr><th scope="col">Parameter</th><th scope="col" class="figure">In the file</th><th scope="col" class="figure">Would fit</th></tr></thead>
+  return html`<${Panel} title="What would fit in the robot file"><div class="scroll" tabindex="0"><table class="grid effects"><thead><tr><th scope="col">Parameter</th><th scope="col" class="figure">In the file</th><th scope="col" class="figure">Would fit</th></tr></thead>
     <tbody>${of.map((c) => html`<tr key=${c.parameter}><th scope="row">${c.parameter}</th><td class="figure">${format.digits(c.file)}</td><td class="figure">${format.with_deviation(c.fits, c.sd)}</td></tr>`)}</tbody></table></div><//>`;
 }
 
@@ -168,7 +168,7 @@ function BackTest({ test }) {
   const left = [[test.left_out.fitted_on, 'it was found on'], [test.left_out.open, 'still running'], [test.left_out.no_telemetry, 'without telemetry'], [test.left_out.beyond_limits, 'beyond the limits']].filter(([n]) => n > 0).map(([n, why]) => `${n} ${why}`).join(', ');
   return html`<div class=${`verdict-box ${test.improves ? 'makes' : 'fails'}`}><p class="verdict">On ${test.missions.length} missions that it was not found on, the energy error ${test.error_after < test.error_before ? 'falls' : 'goes'} from <b>${share(test.error_before, 2)}</b> to <b>${share(test.error_after, 2)}</b>.</p>
     <p class="note">Improvement ${range_of(test.improvement_ci, 2)} (95 %); power gap ${share(test.power_gap_before, 2)} to ${share(test.power_gap_after, 2)}, falls by ${range_of(test.power_gap_fall_ci, 2)}; against model version ${test.tested_against}.${left && ` Left out: ${left}.`}</p></div>
-    <div class="scroll"><${TestTable} test=${test} /></div>`;
+    <div class="scroll" tabindex="0"><${TestTable} test=${test} /></div>`;
 }
 
 // One of several effects that the data do not tell apart.
@@ -218,7 +218,7 @@ function Result({ job }) {
         <${Readout} large label="Gap shrinks by" of=${format.percent(s.fraction, 0)} note=${range_of(s.ci, 0)} />`}
       <${Readout} large label="Missions" of=${`${r.missions}`} note=${`${format.fixed(r.samples)} samples`} />
     </dl>
-    ${r.effects.length > 0 && html`<${Panel} title="Which effect"><div class="scroll"><${Effects} effects=${r.effects} /></div><//>`}
+    ${r.effects.length > 0 && html`<${Panel} title="Which effect"><div class="scroll" tabindex="0"><${Effects} effects=${r.effects} /></div><//>`}
     ${r.baseline && html`<${Referee} of=${r.baseline} />`}
     ${r.corrections?.length > 0 && html`<${Corrections} of=${r.corrections} />`}
     <div class="columns"><${Panel} title="Where measured power leaves the model"><${Where} regions=${r.where} /><//>
