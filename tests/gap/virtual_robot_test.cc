@@ -99,10 +99,12 @@ TEST(VirtualRobot, ABrushDropIsNotTakenForResistance) {
 
 TEST(VirtualRobot, ALoadThatFollowsTheBatteryCurrentIsNoSureSensorError) {
   const Diagnosis d = diagnose_virtual({{"x_sag_load", 8}}, 16, true);
-  EXPECT_TRUE(d.verdict == Verdict::outside || d.verdict == Verdict::inconclusive)
-      << name_of(d.verdict) << ": " << (d.effects.empty() ? "" : d.effects[0].id) << ", outside "
-      << d.outside.probability;
-  for (const DiagnosedEffect& effect : d.effects) EXPECT_LT(effect.probability, 0.9) << effect.id;
+  // A constant load does most of it; the sensor would have to read too much in just the same measure.
+  EXPECT_FALSE(d.verdict == Verdict::none || d.verdict == Verdict::not_this_robot) << name_of(d.verdict);
+  for (const DiagnosedEffect& effect : d.effects) {
+    if (effect.id == "accessory_load") continue;
+    EXPECT_LT(effect.probability, 0.9) << effect.id;
+  }
 }
 
 TEST(VirtualRobot, ATorqueThatRepeatsWithTheWheelIsNoSureDryFriction) {

@@ -87,7 +87,7 @@ async function with_effect(robot_id, effect) {
   await rm(log);
 }
 await with_effect('worn-01', 'coulomb_friction=0.6');
-await with_effect('oval-01', 'x_oval_wheel=4');
+await with_effect('oval-01', 'x_oval_wheel=3');
 daemon = await start_until(given.daemon, daemon_args, ready);
 
 const browser = await chromium.launch({ executablePath: given.chromium, args: ['--headless', '--no-sandbox', '--disable-gpu', '--disable-quic',

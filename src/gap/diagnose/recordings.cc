@@ -308,6 +308,7 @@ void Diagnoser::lower_noise_floor(double left) {
     if (gap.noise_floor == d_.noise_floor) gap.noise_floor = left;
   }
   d_.noise_floor = left;
+  if (d_.shrinkage) d_.shrinkage->remaining_over_noise_floor = d_.shrinkage->after / left;
 }
 
 bool Diagnoser::judge_all() {
@@ -321,7 +322,6 @@ bool Diagnoser::judge_all() {
   held_out_ = hold_out(material(), *fit_, view_.power_w, fit_settings_,
                        [&](double part) { return goes_on(std::lerp(after_fit, after_parts, part)); });
   if (!held_out_) return false;
-  lower_noise_floor(std::min(held_out_->explained(), held_out_->referee()));
   if (!fit_->base.empty()) {
     if (held_out_->based() < held_out_->explained()) {
       for (BlockErrors& b : held_out_->blocks) b.explained = b.based;
@@ -372,6 +372,7 @@ bool Diagnoser::judge_all() {
   if (!named_.empty() && d_.power != PowerSource::none)
     d_.shrinkage = shrinkage_of(*held_out_, problem.hypotheses, named_, d_.noise_floor);
   judge(d_, f, robot_);
+  lower_noise_floor(std::min(held_out_->explained(), held_out_->referee()));
   if (d_.effects.empty()) d_.shrinkage.reset();
   d_.next_drive = next_drives(fit_->linear, problem, robot_, d_.effects);
   if (!d_.outside.channel.empty()) {

@@ -100,6 +100,7 @@ TEST(DiagnosisJson, TellsEveryField) {
         {"held_out", 0.115},
         {"unchanged_model_held_out", 0.205},
         {"explanation_held_out", 0.064},
+        {"deviation", 0.004},
         {"wins", false},
         {"says", {"Turning costs 1150 W per m/s; the model has 90."}}}},
       {"corrections",
