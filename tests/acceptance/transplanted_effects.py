@@ -211,7 +211,9 @@ def right(effect, answer):
     if effect == "none":
         return answer["verdict"] == "none"
     if effect.startswith("x_"):
-        return answer["verdict"] in ("outside", "inconclusive")
+        # Told to be outside the catalogue, or to be undecided; a name beside it must not be sure.
+        return answer["verdict"] in ("outside", "inconclusive") or (
+            answer["outside"]["channel"] is not None and all(e["probability"] <= 0.9 for e in answer["effects"]))
     if answer["verdict"] != "effects":
         return False
     first = answer["effects"][0]
