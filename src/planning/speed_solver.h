@@ -55,8 +55,8 @@ struct SpeedSolution {
 // Minimises sum of step * [(idle + price)/v + sum over motors of phi(P/v)] by a primal-dual interior point
 // method whose Newton matrix is tridiagonal: time and memory grow linearly with the cells. The kink of phi,
 // where braking begins to regenerate, is smoothed with a width that goes to zero with the barrier, its slope
-// being carried as a dual variable. Convex in z wherever the price of time outweighs viscous friction (thesis,
-// minimum energy).
+// being carried as a dual variable. Convex in z wherever the price of time outweighs viscous friction
+// (thesis, minimum energy).
 class SpeedSolver {
  public:
   SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope);
