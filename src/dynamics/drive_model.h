@@ -38,8 +38,8 @@ struct TorqueBalance {
 };
 
 // The drive of one robot: motion -> torque -> current -> voltage -> power, with the effects in force. Thesis,
-// chapter 2: load torque tau = r F/2 +- c N + I_w alpha, motor K_t n i = I_s alpha + nu w + T_m sgn(w) + tau, V =
-// R i + K_w n w. S is double, or Dual to differentiate with respect to one parameter of one effect.
+// chapter 2: load torque tau = r F/2 +- c N + I_w alpha, motor K_t n i = I_s alpha + nu w + T_m sgn(w) + tau,
+// V = R i + K_w n w. S is double, or Dual to differentiate with respect to one parameter of one effect.
 template <class S>
 class BasicDriveModel {
  public:
