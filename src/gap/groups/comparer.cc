@@ -41,7 +41,7 @@ class Comparer {
   std::vector<double> predict(const std::vector<Contrasted>& causes) const;
   double error(const std::vector<double>& predicted) const;
   Problem alike(Problem base, const HypothesisSet& set, const Eigen::VectorXd& differences) const;
-  std::vector<Controls> permuted(const Problem& problem, const Explanation& explanation) const;
+  std::vector<Controls> permuted(const Mixture& mixture, const Explanation& explanation) const;
   bool hold_out();
   Explanation told(const std::vector<Contrasted>& members) const;
   void add_differences();
@@ -158,11 +158,11 @@ Problem Comparer::alike(Problem base, const HypothesisSet& set, const Eigen::Vec
 }
 
 // Takes all differences out, and shuffles which block is of which group: how often is the same found?
-std::vector<Controls> Comparer::permuted(const Problem& problem, const Explanation& explanation) const {
+std::vector<Controls> Comparer::permuted(const Mixture& mixture, const Explanation& explanation) const {
+  const Problem& problem = mixture.problem();
   std::vector<Controls> controls(explanation.members.size(), Controls{settings_.controls, 0});
   if (explanation.members.empty()) return controls;
-  const Problem rest =
-      alike(data_.base, explanation.whole, Mixture(problem).estimate(explanation.whole).mean);
+  const Problem rest = alike(data_.base, explanation.whole, mixture.estimate(explanation.whole).mean);
   for (std::size_t s = 0; s < settings_.controls; ++s) {
     std::mt19937_64 random(s + 1);
     std::vector<std::size_t> order = data_.group_of_block;
@@ -331,15 +331,15 @@ void Comparer::judge_all() {
     }
     f.power_w.push_back(time_s > 0 ? change / time_s : missing);
   }
-  f.shares = statistics::shapley_shares(causes_.size(), [&](const std::vector<std::size_t>& some) {
-    std::vector<Contrasted> own;
-    for (const std::size_t k : some) own.push_back(causes_[k]);
-    return power_known() ? error(predict(own)) : 0;
-  });
-  // Without power they are ordered by what they move.
-  if (!power_known()) {
-    for (std::size_t k = 0; k < named_.size(); ++k)
-      f.shares[k] = std::ranges::find(explanation.members, named_[k], &Member::hypothesis)->share;
+  if (power_known()) {
+    f.shares = statistics::shapley_shares(causes_.size(), [&](const std::vector<std::size_t>& some) {
+      std::vector<Contrasted> own;
+      for (const std::size_t k : some) own.push_back(causes_[k]);
+      return error(predict(own));
+    });
+  } else {  // ordered by what they move
+    for (const std::size_t h : named_)
+      f.shares.push_back(std::ranges::find(explanation.members, h, &Member::hypothesis)->share);
   }
   judge(c_.diagnosis, f, data_.robot);
   if (!power_known()) {
@@ -353,12 +353,13 @@ void Comparer::judge_all() {
 
 bool Comparer::run() {
   problem_ = contrast(data_.base, data_.group_of_block, groups_);
-  explanation_ = explain(problem_, {}, data_.explain);
-  c_.diagnosis.detectable_share = seen_share(Mixture(problem_));
+  const Mixture mixture(problem_);
+  explanation_ = explain(mixture, {}, data_.explain);
+  c_.diagnosis.detectable_share = seen_share(mixture);
   named_ = likely_causes(problem_, explanation_);
   causes_ = contrasted(data_.base, problem_, named_, {});
   if (!hold_out()) return false;
-  controls_ = permuted(problem_, explanation_);
+  controls_ = permuted(mixture, explanation_);
   if (controls_.size() != explanation_.members.size()) return false;
   if (settings_.controls == 0) controls_.clear();
   add_baseline();
