@@ -139,6 +139,7 @@ TEST(VerdictText, SaysWhyNothingIsAdopted) {
   EXPECT_EQ(refusal_of(d, false, false), "");
   EXPECT_THAT(refusal_of(d, false, true), HasSubstr("inconclusive"));
   d.baseline = baseline(0.1, 0.2, 0.15);
+  d.shrinkage.emplace().after = 0.15;
   EXPECT_THAT(refusal_of(d, true, false),
               AllOf(HasSubstr("misses 15\u00a0%"), HasSubstr("regression 10\u00a0%")));
   d.effects[0].alternatives = {"viscous_friction"};

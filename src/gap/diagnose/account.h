@@ -8,7 +8,7 @@
 namespace joulecast::gap {
 
 // The errors of regression, unchanged model and explanation; its terms are to be added.
-Baseline baseline_of(const HeldOut& held_out);
+Baseline baseline_of(const HeldOut& held_out, double BlockErrors::*explanation = &BlockErrors::explained);
 
 // One term as the regression has it (`data`, with its deviation) beside what the model comes to in the same
 // term; in words too where the two surely and notably differ.

@@ -81,7 +81,7 @@ class Surrogates {
         make_problem(*linear_.columns, linear_.rows, linear_.noise, material_.blocks, &responses);
     const Explanation answer = explain(surrogate, {}, settings);
     std::set<std::string> group{own.id()};
-    for (const Alternative& a : m.alternatives) group.insert(problem_.hypotheses[a.hypothesis].id());
+    for (const Alternative& a : m.stated()) group.insert(problem_.hypotheses[a.hypothesis].id());
     return std::ranges::any_of(answer.members, [&](const Member& other) {
       return group.contains(surrogate.hypotheses[other.hypothesis].id()) &&
              other.group_probability() >= least_named;

@@ -17,7 +17,6 @@ constexpr std::size_t most_predicted = 40;
 constexpr double certain = 50;            // log odds of a member
 constexpr double beyond_tolerance = 2.5;  // of a coefficient, for effects seen in other channels than power
 constexpr double alternative_odds = 0.04;
-constexpr std::size_t most_alternatives = 2;
 constexpr double cancelling = 3;  // from which on members undo each other
 
 HypothesisSet with(HypothesisSet set, std::size_t h) {
@@ -307,7 +306,6 @@ class Explainer {
     std::vector<Alternative> result;
     for (const auto& [id, a] : best) result.push_back(a);
     std::ranges::sort(result, std::greater{}, &Alternative::odds);
-    result.resize(std::min(result.size(), most_alternatives));
     return result;
   }
 
@@ -338,12 +336,15 @@ class Explainer {
       m.by_prediction = predicted(holds);
       if (settings_.predictive && !h.outside()) m.alternatives = alternatives(set, set[k]);
       std::set<std::string> group{h.id()};
-      for (const Alternative& a : m.alternatives) group.insert(hypothesis(a.hypothesis).id());
       const auto holds_any = [&](const HypothesisSet& other) {
         return std::ranges::any_of(other, [&](std::size_t o) { return group.contains(hypothesis(o).id()); });
       };
+      for (const Alternative& a : m.stated()) group.insert(hypothesis(a.hypothesis).id());
       m.group_by_evidence = believed(holds_any);
       m.group_by_prediction = predicted(holds_any);
+      for (const Alternative& a : m.alternatives) group.insert(hypothesis(a.hypothesis).id());
+      m.any_by_evidence = believed(holds_any);
+      m.any_by_prediction = predicted(holds_any);
       m.share = share(set, estimate, set[k]);
       const Eigen::VectorXd mean = own(problem_, set, estimate.mean, set[k]);
       const Eigen::VectorXd sd = own(problem_, set, estimate.sd, set[k]);

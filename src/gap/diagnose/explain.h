@@ -2,6 +2,7 @@
 
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,8 @@ struct ExplainSettings {
   bool predictive = true;  // false: evidence alone, while a linearisation is sought
 };
 
+inline constexpr std::size_t most_stated = 2;  // alternatives that an answer names
+
 // Something else that would explain the data nearly as well in a member's place.
 struct Alternative {
   std::size_t hypothesis = 0;
@@ -30,14 +33,19 @@ struct Alternative {
 struct Member {
   std::size_t hypothesis = 0;
   // Probability that it is there: by the evidence of all data, and by how blocks are predicted that have no
-  // part in the fit. `group`: that it or one of its alternatives is.
+  // part in the fit. `group`: that it or one of the alternatives that are stated is; `any`: or one of all.
   double by_evidence = 0, by_prediction = 0;
   double group_by_evidence = 0, group_by_prediction = 0;
+  double any_by_evidence = 0, any_by_prediction = 0;
   double wander = 0;  // of its strength from block to block: posterior mean of the standard deviation over it
   double share = 0;   // of the mean power that it moves
   std::vector<double> coefficients, sd;
   std::vector<Alternative> alternatives;  // likeliest first
 
+  std::span<const Alternative> stated() const {
+    return std::span(alternatives).first(std::min(alternatives.size(), most_stated));
+  }
+  double there_probability() const { return std::min(any_by_evidence, any_by_prediction); }
   double group_probability() const { return std::min(group_by_evidence, group_by_prediction); }
   // Which of a group it is, only the evidence says.
   double probability() const { return std::min(by_evidence, group_probability()); }

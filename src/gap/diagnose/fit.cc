@@ -37,16 +37,27 @@ void narrow(Shapes& shapes, std::span<const Cause> causes, const robot::RobotMod
   for (const Cause& cause : causes) shapes.narrow(cause.effect, robot.kinematics.wheel_radius_m, factor);
 }
 
-// Where on the floor something brakes, if anything does.
-std::optional<Zone> zone_of(const Material& m, std::span<const double> shares) {
-  if (!ranges_of(m.windows, m.robot).position) return std::nullopt;
+}  // namespace
+
+ZoneScan::ZoneScan(const Material& m, std::span<const double> shares) : windows_(thinned(m.windows)) {
+  Material thin = m;
+  thin.windows = windows_;
   Shapes scan;
   scan.zones = {everywhere};
-  const Linear linear = linearise(m, scan, shares, {});
-  return find_zone(*linear.columns, linear.rows, linear.noise, m.windows);
+  linear_ = linearise(thin, scan, shares, {});
 }
 
-}  // namespace
+std::optional<Zone> ZoneScan::without(const std::vector<bool>& left_out) const {
+  if (left_out.empty()) return find_zone(*linear_.columns, linear_.rows, linear_.noise, windows_);
+  const Noise noise = learn_noise(*linear_.columns, linear_.rows, left_out);
+  return find_zone(*linear_.columns, linear_.rows, noise, windows_);
+}
+
+Material based(const Material& material, const FitResult& fit) {
+  Material m = material;
+  if (!fit.base.empty()) m.adopted = fit.in_force;
+  return m;
+}
 
 std::optional<FitResult> fit_windows(const Material& whole, std::span<const Cause> start,
                                      const FitSettings& settings, const std::function<bool()>& goes_on) {
@@ -54,7 +65,10 @@ std::optional<FitResult> fit_windows(const Material& whole, std::span<const Caus
   Material material = whole;
   material.windows = some;
   FitResult result;
-  if (const auto zone = zone_of(material, settings.shares)) result.shapes.zones = {*zone};
+  if (ranges_of(material.windows, material.robot).position) {
+    result.zones.emplace(material, settings.shares);
+    if (const auto zone = result.zones->without({})) result.shapes.zones = {*zone};
+  }
   narrow(result.shapes, start, material.robot, first_factor);
   if (!goes_on()) return std::nullopt;
   ExplainSettings quick = settings.explain;

@@ -9,6 +9,7 @@
 #include "gap/diagnose/refit.h"
 #include "gap/equations/power.h"
 #include "gap/equations/zone_scan.h"
+#include "statistics/distributions.h"
 #include "statistics/shapley.h"
 
 namespace joulecast::gap {
@@ -36,48 +37,47 @@ struct Rest {
   }
 };
 
-bool in_zone(const Cause& cause) {
-  return !cause.by && cause.effect.effect->info().id == "floor_resistance_zone";
+// Where the blocks show no zone none can be there.
+void forbid_zones(Problem& problem) {
+  for (Hypothesis& h : problem.hypotheses) {
+    if (h.is_effect() && is_zone(h.cause())) h.candidate.log_prior = -std::numeric_limits<double>::infinity();
+  }
 }
 
-// Finds the zone of a floor anew from the blocks that are not left out.
-class ZoneScan {
- public:
-  ZoneScan(const Material& m, const FitSettings& settings) : windows_(thinned(m.windows)) {
-    Material thin = m;
-    thin.windows = windows_;
-    Shapes scan;
-    scan.zones = {everywhere};
-    linear_ = linearise(thin, scan, settings.shares, {});
-  }
-
-  std::optional<Zone> without(const std::vector<bool>& left_out) const {
-    const Noise noise = learn_noise(*linear_.columns, linear_.rows, left_out);
-    return find_zone(*linear_.columns, linear_.rows, noise, windows_);
-  }
-
- private:
-  std::vector<Window> windows_;
-  Linear linear_;
-};
-
-// The point of linearisation with another zone in the place of the one that all data show; none: without.
-Linear with_zone(const Material& m, const FitResult& fit, const FitSettings& settings,
-                 const std::optional<Zone>& zone) {
+// The point of linearisation with another zone in the place of the one that all data show. Where nothing is
+// found in a zone only its columns differ.
+Linear with_zone(const Material& m, const FitResult& fit, const FitSettings& settings, const Zone& zone) {
   Shapes shapes = fit.shapes;
+  shapes.zones = {zone};
   std::vector<Cause> around = fit.causes;
-  if (zone) {
-    shapes.zones = {*zone};
-    for (Cause& cause : around) {
-      if (!in_zone(cause)) continue;
-      auto& values = cause.effect.values;
-      values[1] = zone->x_m, values[2] = zone->y_m, values[3] = zone->radius_m;
-    }
-  } else {
-    shapes.zones.clear();
-    std::erase_if(around, in_zone);
+  for (Cause& cause : around) {
+    if (!is_zone(cause)) continue;
+    auto& values = cause.effect.values;
+    values[1] = zone.x_m, values[2] = zone.y_m, values[3] = zone.radius_m;
   }
-  return linearise(m, shapes, settings.shares, around);
+  if (std::ranges::any_of(around, is_zone)) return linearise(m, shapes, settings.shares, around);
+  Linear linear = linearise(m, shapes, settings.shares, around, std::array{zone_effect}, fit.linear.noise);
+  std::vector<std::size_t> own;
+  for (const Hypothesis& h : linear.columns->hypotheses()) {
+    if (h.is_effect() && is_zone(h.cause()))
+      own.insert(own.end(), h.candidate.columns.begin(), h.candidate.columns.end());
+  }
+  for (std::size_t c = 0; c < channel_count; ++c) {
+    ChannelRows rows = fit.linear.rows[c];
+    for (std::size_t j = rows.columns.size(); j-- > 0;) {
+      if (std::ranges::find(own, rows.columns[j]) == own.end()) continue;
+      const ChannelRows& anew = linear.rows[c];
+      const auto at = std::ranges::find(anew.columns, rows.columns[j]);
+      const auto column = static_cast<Eigen::Index>(j);
+      if (at == anew.columns.end()) {
+        rows.x.col(column).setZero();
+      } else {
+        rows.x.col(column) = anew.x.col(at - anew.columns.begin());
+      }
+    }
+    linear.rows[c] = std::move(rows);
+  }
+  return linear;
 }
 
 }  // namespace
@@ -93,30 +93,33 @@ double HeldOut::relative(double BlockErrors::*error) const {
 
 std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::span<const double> power_w,
                                 const FitSettings& settings, const std::function<bool(double)>& goes_on) {
+  const Material whole = based(m, fit);
   HeldOut held;
   held.blocks.resize(m.blocks);
   held.parts = std::min(most_parts, m.blocks);
-  std::optional<ZoneScan> zones;
-  if (!fit.shapes.zones.empty()) zones.emplace(m, settings);
   const std::vector<double> unchanged = modelled_power(m.robot, m.adopted, {}, m.windows);
   for (std::size_t part = 0; part < held.parts; ++part) {
     const std::vector<bool> out = blocks_of(part, held.parts, m.blocks);
+    std::optional<Zone> zone;
     std::optional<Linear> zoned;
-    if (zones) zoned = with_zone(m, fit, settings, zones->without(out));
+    if (!fit.shapes.zones.empty()) zone = fit.zones->without(out);
+    if (zone) zoned = with_zone(whole, fit, settings, *zone);
     const Linear& linear = zoned ? *zoned : fit.linear;
     const Noise noise = learn_noise(*linear.columns, linear.rows, out);
-    const Problem problem = make_problem(*linear.columns, linear.rows, noise, m.blocks);
+    Problem problem = make_problem(*linear.columns, linear.rows, noise, m.blocks);
+    if (!zone) forbid_zones(problem);
     const Explanation explanation = explain(problem, out, settings.explain);
-    const Named named = name_causes(m, *linear.columns, problem, explanation, power_w, out);
+    const Equations equations{*linear.columns, linear.rows, noise, out};
+    const Named named = name_causes(whole, equations, problem, explanation, power_w);
+    std::vector<double> bent;
+    if (fit.base.empty())
+      bent = left_with_functions(equations, problem, explanation, named.set, m.windows.size());
     std::vector<std::string> ids;
     for (const std::size_t h : named.set) ids.push_back(problem.hypotheses[h].id());
     held.named.push_back(std::move(ids));
-    const std::vector<double> explained = modelled_power(m.robot, m.adopted, named.causes, m.windows);
-    std::vector<double> based;
-    if (!fit.base.empty()) {
-      const std::vector<Cause> all = refit(Rest(m, out).material, joined(fit.base, named.causes));
-      based = modelled_power(m.robot, m.adopted, all, m.windows);
-    }
+    held.causes.push_back(fit.base.empty() ? named.causes
+                                           : refit(Rest(m, out).material, joined(fit.base, named.causes)));
+    const std::vector<double> explained = modelled_power(m.robot, m.adopted, held.causes.back(), m.windows);
     std::vector<bool> others(m.windows.size());
     for (std::size_t k = 0; k < m.windows.size(); ++k) others[k] = !out[m.windows[k].block];
     const Referee referee(m, power_w, others);
@@ -125,13 +128,47 @@ std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::sp
       BlockErrors& b = held.blocks[m.windows[k].block];
       b.unchanged += std::fabs(power_w[k] - unchanged[k]);
       b.explained += std::fabs(power_w[k] - explained[k]);
-      if (!based.empty()) b.based += std::fabs(power_w[k] - based[k]);
+      b.bent +=
+          bent.empty() || !std::isfinite(bent[k]) ? std::fabs(power_w[k] - explained[k]) : std::fabs(bent[k]);
       b.referee += std::fabs(power_w[k] - referee.predict(m.windows[k]));
       b.size += std::fabs(power_w[k]);
     }
     if (!goes_on(static_cast<double>(part + 1) / static_cast<double>(held.parts))) return std::nullopt;
   }
   return held;
+}
+
+std::vector<Need> base_needed(const Material& m, const FitResult& fit, const HeldOut& held,
+                              std::span<const double> power_w) {
+  const auto missed = [&](std::span<const Cause> causes, std::size_t k) {
+    return std::fabs(power_w[k] -
+                     modelled_power(m.robot, m.adopted, causes, m.windows.subspan(k, 1)).front());
+  };
+  std::vector<std::vector<double>> more(fit.base.size(), std::vector<double>(m.blocks));
+  for (std::size_t part = 0; part < held.parts; ++part) {
+    const std::vector<bool> out = blocks_of(part, held.parts, m.blocks);
+    const Rest rest(m, out);
+    const std::vector<Cause>& with = held.causes[part];
+    for (std::size_t b = 0; b < fit.base.size(); ++b) {
+      std::vector<Cause> others = with;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(b));
+      others = refit(rest.material, std::move(others));
+      for (std::size_t k = 0; k < m.windows.size(); ++k) {
+        if (!out[m.windows[k].block] || !std::isfinite(power_w[k])) continue;
+        more[b][m.windows[k].block] += missed(others, k) - missed(with, k);
+      }
+    }
+  }
+  std::vector<Need> needs;
+  double size = 0;
+  for (const BlockErrors& b : held.blocks) size += b.size;
+  for (const std::vector<double>& blocks : more) {
+    double sum = 0, squares = 0;
+    for (const double d : blocks) sum += d, squares += d * d;
+    needs.push_back(
+        {squares > 0 ? std::exp(statistics::log_normal_cdf(sum / std::sqrt(squares))) : 0.5, sum / size});
+  }
+  return needs;
 }
 
 std::vector<double> held_out_shares(const Material& m, const FitResult& fit, const Problem& problem,
@@ -146,7 +183,7 @@ std::vector<double> held_out_shares(const Material& m, const FitResult& fit, con
   for (std::size_t part = 0; part < parts; ++part) {
     const std::vector<bool> out = blocks_of(part, parts, m.blocks);
     Part& p = all[part];
-    p.named = strengths_of(*fit.linear.columns, problem, named, out);
+    p.named = strengths_of({*fit.linear.columns, fit.linear.rows, fit.linear.noise, out}, problem, named);
     if (!fit.base.empty()) {
       for (const Cause& cause : refit(Rest(m, out).material, joined(fit.base, p.named))) {
         const auto own = std::ranges::find_if(p.named, [&](const Cause& n) { return n.same_kind(cause); });
@@ -159,11 +196,14 @@ std::vector<double> held_out_shares(const Material& m, const FitResult& fit, con
       p.measured.push_back(power_w[k]);
     }
   }
-  std::vector<double> shares = statistics::shapley_shares(
-      std::min(named.size(), most_shared), [&](const std::vector<std::size_t>& members) {
+  const std::size_t sharing = std::min(named.size(), most_shared);
+  std::vector<double> shares =
+      statistics::shapley_shares(sharing, [&](const std::vector<std::size_t>& members) {
         double missed = 0;
         for (const Part& part : all) {
           std::vector<Cause> some = part.others;
+          some.insert(some.end(), part.named.begin() + static_cast<std::ptrdiff_t>(sharing),
+                      part.named.end());
           for (const std::size_t k : members) some.push_back(part.named[k]);
           const std::vector<double> modelled = modelled_power(m.robot, m.adopted, some, part.windows);
           for (std::size_t k = 0; k < modelled.size(); ++k)

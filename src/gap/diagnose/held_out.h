@@ -13,7 +13,7 @@ namespace joulecast::gap {
 struct BlockErrors {
   double unchanged = 0;  // of the robot file's model
   double explained = 0;  // of what was found without the part that the block belongs to
-  double based = 0;      // of the same with what every robot has estimated anew (FitResult::base)
+  double bent = 0;       // of the same with functions outside the catalogue that were found as well
   double referee = 0;    // of a plain regression without it
   double size = 0;       // of |power|
 };
@@ -22,13 +22,13 @@ struct HeldOut {
   std::vector<BlockErrors> blocks;
   std::size_t parts = 0;
   std::vector<std::vector<std::string>> named;  // without each part
+  std::vector<std::vector<Cause>> causes;       // and what was in force, the base of the fit first
 
+  // Sum of an error over all blocks, over that of |power|; NaN where no power is known.
   double unchanged() const { return relative(&BlockErrors::unchanged); }
   double explained() const { return relative(&BlockErrors::explained); }
-  double based() const { return relative(&BlockErrors::based); }
+  double bent() const { return relative(&BlockErrors::bent); }
   double referee() const { return relative(&BlockErrors::referee); }
-
- private:
   double relative(double BlockErrors::*error) const;
 };
 
@@ -39,9 +39,19 @@ std::optional<HeldOut> hold_out(const Material& material, const FitResult& fit,
                                 std::span<const double> power_w, const FitSettings& settings,
                                 const std::function<bool(double)>& goes_on);
 
+// How much parts left out need a cause.
+struct Need {
+  double probability = 0;  // that they are predicted better with it than without, by how blocks differ
+  double share = 0;        // of the power, that is missed without it and not with it, the others fitted again
+};
+
+// Of each cause of the base (FitResult::base).
+std::vector<Need> base_needed(const Material& material, const FitResult& fit, const HeldOut& held,
+                              std::span<const double> power_w);
+
 // How much of the gap each named cause closes on held-out parts (Shapley), strengths fitted without each
 // part; what else is estimated (FitResult::base) is there throughout. All are 0 where power was not measured;
-// at most the first six share.
+// the first six share.
 std::vector<double> held_out_shares(const Material& material, const FitResult& fit, const Problem& problem,
                                     const HypothesisSet& named, std::span<const double> power_w);
 

@@ -108,16 +108,35 @@ std::vector<Window> thinned(std::span<const Window> windows) {
   return some;
 }
 
-Linear linearise(const Material& m, const Shapes& shapes, std::span<const double> shares,
-                 std::span<const Cause> around) {
+namespace {
+
+Linear columns_around(const Material& m, const Shapes& shapes, std::span<const double> shares,
+                      std::span<const Cause> around) {
   Linear linear;
   linear.columns = std::make_unique<ColumnSet>(m, shapes, shares);
   for (const Cause& cause : around) {
     if (auto c = linear.columns->coordinates_of(cause)) linear.around.push_back(std::move(*c));
   }
   if (!linear.around.empty()) linear.columns->linearise_around(linear.around);
+  return linear;
+}
+
+}  // namespace
+
+Linear linearise(const Material& m, const Shapes& shapes, std::span<const double> shares,
+                 std::span<const Cause> around) {
+  Linear linear = columns_around(m, shapes, shares, around);
   linear.rows = make_rows(*linear.columns, m.windows);
   linear.noise = learn_noise(*linear.columns, linear.rows);
+  return linear;
+}
+
+Linear linearise(const Material& m, const Shapes& shapes, std::span<const double> shares,
+                 std::span<const Cause> around, std::span<const std::string_view> effects, Noise noise) {
+  Linear linear = columns_around(m, shapes, shares, around);
+  linear.columns->differentiate_only(effects);
+  linear.rows = make_rows(*linear.columns, m.windows);
+  linear.noise = std::move(noise);
   return linear;
 }
 

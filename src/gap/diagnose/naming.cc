@@ -5,6 +5,7 @@
 #include <map>
 #include <string>
 
+#include "gap/diagnose/power_fit.h"
 #include "gap/equations/power.h"
 #include "gap/traits.h"
 #include "statistics/robust.h"
@@ -12,7 +13,7 @@
 namespace joulecast::gap {
 namespace {
 
-// What comes back when a cause is left out: of the gap, and of the mean power.
+// What comes back when a cause is left out that the gap needs: of the gap, and of the mean power.
 constexpr double least_necessary_part = 0.05,
                  least_necessary_share = ExplainSettings{}.least_share_for_certain;
 
@@ -23,7 +24,32 @@ bool moves_motors_alone(const Hypothesis& h) {
          h.effect.values[2] == 0;
 }
 
+// In the order of the set's columns.
+Eigen::VectorXd coefficients_of(const Equations& e, const Problem& problem, const HypothesisSet& set) {
+  std::vector<std::size_t> own = columns_of(problem.hypotheses, set);
+  std::ranges::sort(own);
+  const Eigen::VectorXd mean = Mixture(problem, e.left_out, own).estimate(set).mean;
+  return power_speaks_alone(e) ? fitted_to_power(e, set, mean) : mean;
+}
+
+std::vector<Chosen> chosen_of(const Problem& problem, const HypothesisSet& set,
+                              const Eigen::VectorXd& coefficients) {
+  std::vector<Chosen> chosen;
+  Eigen::Index at = 0;
+  for (const std::size_t h : set) {
+    Chosen c{h, {}};
+    for (std::size_t k = 0; k < problem.hypotheses[h].candidate.columns.size(); ++k)
+      c.coefficients.push_back(coefficients[at++]);
+    chosen.push_back(std::move(c));
+  }
+  return chosen;
+}
+
 }  // namespace
+
+bool told_outside(const Hypothesis& hypothesis, const Member& member) {
+  return hypothesis.outside() && std::min(member.by_evidence, member.by_prediction) >= least_named;
+}
 
 bool shows_in_power(const Hypothesis& hypothesis) {
   return !hypothesis.is_effect() || !traits_of(hypothesis.id()).elsewhere;
@@ -46,7 +72,7 @@ double seen_share(const Mixture& mixture) {
 HypothesisSet likely_causes(const Problem& problem, const Explanation& explanation) {
   HypothesisSet set;
   for (const Member& member : explanation.members) {
-    if (!problem.hypotheses[member.hypothesis].outside() && member.group_probability() >= least_named &&
+    if (!problem.hypotheses[member.hypothesis].outside() && member.there_probability() >= least_named &&
         member.wander < most_wander)
       set.push_back(member.hypothesis);
   }
@@ -61,40 +87,40 @@ std::vector<Cause> joined(std::vector<Cause> base, std::span<const Cause> named)
   return base;
 }
 
-std::vector<Cause> strengths_of(const ColumnSet& columns, const Problem& problem, const HypothesisSet& named,
-                                const std::vector<bool>& left_out) {
+std::vector<Cause> strengths_of(const Equations& e, const Problem& problem, const HypothesisSet& named) {
   if (named.empty()) return {};
-  std::vector<std::size_t> own;
-  for (const std::size_t h : named) {
-    const auto& more = problem.hypotheses[h].candidate.columns;
-    own.insert(own.end(), more.begin(), more.end());
-  }
-  std::ranges::sort(own);
-  const Mixture::Estimate estimate = Mixture(problem, left_out, own).estimate(named);
-  std::vector<Chosen> chosen;
-  Eigen::Index at = 0;
-  for (const std::size_t h : named) {
-    Chosen c{h, {}};
-    for (std::size_t k = 0; k < problem.hypotheses[h].candidate.columns.size(); ++k)
-      c.coefficients.push_back(estimate.mean[at++]);
-    chosen.push_back(std::move(c));
-  }
-  return columns.causes_of(chosen);
+  return e.columns.causes_of(chosen_of(problem, named, coefficients_of(e, problem, named)));
 }
 
-Named name_causes(const Material& m, const ColumnSet& columns, const Problem& problem,
-                  const Explanation& explanation, std::span<const double> power_w,
-                  const std::vector<bool>& left_out) {
+std::vector<double> left_with_functions(const Equations& e, const Problem& problem,
+                                        const Explanation& explanation, const HypothesisSet& named,
+                                        std::size_t windows) {
+  const ChannelRows& r = e.rows[index_of(Channel::power)];
+  if (!power_speaks_alone(e)) return {};
+  HypothesisSet set = named;
+  for (const Member& m : explanation.members) {
+    if (told_outside(problem.hypotheses[m.hypothesis], m)) set.push_back(m.hypothesis);
+  }
+  if (set.size() == named.size()) return {};
+  std::ranges::sort(set);
+  std::vector<double> left(windows, missing);
+  const Eigen::VectorXd rest = r.y - moved_power(e, set, coefficients_of(e, problem, set));
+  for (std::size_t k = 0; k < r.window.size(); ++k) left[r.window[k]] = rest[static_cast<Eigen::Index>(k)];
+  return left;
+}
+
+Named name_causes(const Material& m, const Equations& e, const Problem& problem,
+                  const Explanation& explanation, std::span<const double> power_w) {
   HypothesisSet set = likely_causes(problem, explanation);
   std::vector<double> measured;
   std::vector<Window> windows;
   for (std::size_t k = 0; k < m.windows.size(); ++k) {
-    if (!std::isfinite(power_w[k]) || (!left_out.empty() && left_out[m.windows[k].block])) continue;
+    if (!std::isfinite(power_w[k]) || e.leaves_out(m.windows[k].block)) continue;
     windows.push_back(m.windows[k]);
     measured.push_back(power_w[k]);
   }
   const auto gap_with = [&](const HypothesisSet& some) {
-    const std::vector<Cause> causes = strengths_of(columns, problem, some, left_out);
+    const std::vector<Cause> causes = strengths_of(e, problem, some);
     return gap_size(measured, modelled_power(m.robot, m.adopted, causes, windows)).absolute_relative;
   };
   if (!windows.empty() && set.size() > 1) {
@@ -113,7 +139,7 @@ Named name_causes(const Material& m, const ColumnSet& columns, const Problem& pr
       std::erase(set, *spare);
     }
   }
-  return {set, strengths_of(columns, problem, set, left_out)};
+  return {set, strengths_of(e, problem, set)};
 }
 
 }  // namespace joulecast::gap

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "gap/diagnose/account.h"
 #include "gap/diagnose/channel_gaps.h"
@@ -73,12 +74,21 @@ class Diagnoser {
     return modelled_power(robot_, adopted_, causes, view_.windows);
   }
 
+  Equations equations() const { return {*fit_->linear.columns, fit_->linear.rows, fit_->linear.noise}; }
+
+  // What is said of the channel whose power is judged; the end where it is none.
+  std::vector<ChannelGap>::iterator power_gap() {
+    return std::ranges::find(d_.channels, d_.power == PowerSource::battery ? "battery_power" : "motor_power",
+                             &ChannelGap::channel);
+  }
+
   View view_of(const windows::WindowSettings& settings) const;
   bool prepare();
   void measure();
   bool fit();
+  bool leave_out();
   bool judge_all();
-  void name_base(const Mixture& mixture, Explanation& explanation, Named& named) const;
+  void name_base(const Problem& problem, Explanation& explanation, Named& named);
   std::vector<dynamics::ActiveEffect> instead_of(const Problem& problem, const Member& member) const;
   void add_wander(const Mixture& mixture, const Explanation& explanation, Findings& findings) const;
   void add_baseline();
@@ -97,7 +107,9 @@ class Diagnoser {
   FromMotion from_motion_;
   FitSettings fit_settings_;
   std::optional<FitResult> fit_;
+  std::optional<FitResult> calibrated_;  // beside what every robot has, where the file is far off
   std::optional<HeldOut> held_out_;
+  std::map<std::size_t, double> reopened_;  // of the gap, without a hypothesis that the base has
   HypothesisSet named_;
   std::vector<Cause> causes_;  // with their own strengths; beside the named, FitResult::base
   Diagnosis d_;
@@ -153,8 +165,7 @@ void Diagnoser::measure() {
   const GapSize size = gap_size(plain_.power_w, plain_model_w_);
   d_.energy_relative = size.energy_relative;
   d_.power_absolute_relative = size.absolute_relative;
-  const std::string_view channel = d_.power == PowerSource::battery ? "battery_power" : "motor_power";
-  const auto gap = std::ranges::find(d_.channels, channel, &ChannelGap::channel);
+  const auto gap = power_gap();
   d_.noise_floor = gap == d_.channels.end() ? missing : gap->noise_floor;
   d_.where = localise(plain_.windows, robot_, adopted_, plain_.power_w, plain_model_w_, d_.noise_floor);
 }
@@ -167,17 +178,15 @@ bool Diagnoser::fit() {
   }
   const double settled_bias_a = settled_bias * robot_.motor.friction_torque_nm[0] /
                                 (robot_.motor.torque_constant_nm_a * robot_.motor.gear_ratio);
+  const auto still = [&] { return goes_on(after_fit * 0.5); };
   // A delay is linear only while it is short beside the window, a bias only while it turns no current's sign:
   // what is found is taken out of the windows and fitted again.
   for (int round = 0;; ++round) {
-    const auto still = [&] { return goes_on(after_fit * 0.5); };
     fit_ = fit_windows(material(), {}, fit_settings_, still);
     if (fit_ && d_.power_absolute_relative > huge_gap && round == 0) {
-      const std::vector<Cause> base = base_fit(material(), view_.power_w);
-      auto far = fit_windows(material(), base, fit_settings_, still);
+      auto far = fit_windows(material(), base_fit(material(), view_.power_w), fit_settings_, still);
       if (!far) return false;
       if (far->log_joint > fit_->log_joint) fit_ = std::move(far);
-      if (d_.power_absolute_relative > far_off) fit_->base = base;
     }
     if (!fit_) return false;
     const windows::WindowSettings before = taken_out_;
@@ -185,64 +194,76 @@ bool Diagnoser::fit() {
     const bool settled =
         std::fabs(taken_out_.electrical_delay_s - before.electrical_delay_s) < settled_delay_s &&
         std::fabs(taken_out_.motor_current_bias_a - before.motor_current_bias_a) < settled_bias_a;
-    if (settled || round >= most_delay_rounds) return goes_on(after_fit);
+    if (settled || round >= most_delay_rounds) break;
     view_ = view_of(taken_out_);
   }
+  if (d_.power_absolute_relative - d_.noise_floor > far_off) {
+    FitResult from;
+    from.base = base_fit(material(), view_.power_w);
+    from.in_force = adopted_;
+    for (const Cause& cause : from.base) from.in_force.push_back(cause.effect);
+    calibrated_ = fit_windows(based(material(), from), {}, fit_settings_, still);
+    if (!calibrated_) return false;
+    calibrated_->base = std::move(from.base);
+    calibrated_->in_force = std::move(from.in_force);
+  }
+  return goes_on(after_fit);
 }
 
-// Of what every robot has, estimated anew, what no parameter of a robot file says is named as well: beside
-// all that is there already it has its own evidence.
-void Diagnoser::name_base(const Mixture& mixture, Explanation& explanation, Named& named) const {
-  const Problem& problem = mixture.problem();
-  HypothesisSet whole = named.set;
-  std::vector<std::size_t> more;
-  const auto with = [&](std::size_t h) {
-    HypothesisSet set = whole;
-    set.insert(std::ranges::lower_bound(set, h), h);
-    return set;
+// What predicts parts left out better is judged: effects alone, or beside what every robot has.
+bool Diagnoser::leave_out() {
+  const auto hold = [&](const FitResult& fit) {
+    return hold_out(material(), fit, view_.power_w, fit_settings_,
+                    [&](double part) { return goes_on(std::lerp(after_fit, after_parts, part)); });
   };
-  for (const Cause& cause : fit_->base) {
-    // By the likeliest variant of its shape.
-    std::optional<std::size_t> best;
-    for (std::size_t h = 0; h < problem.hypotheses.size(); ++h) {
-      const Hypothesis& other = problem.hypotheses[h];
-      if (!other.is_effect() || !other.cause().same_kind(cause) || !traits_of(other.id()).calibrates.empty())
-        continue;
-      const auto clashes = [&](std::size_t o) { return problem.hypotheses[o].excludes(other); };
-      if (std::ranges::any_of(whole, clashes)) continue;
-      if (!best || mixture.log_odds(with(h)) > mixture.log_odds(with(*best))) best = h;
-    }
-    if (!best) continue;
-    more.push_back(*best);
-    whole = with(*best);
+  held_out_ = hold(*fit_);
+  if (!held_out_ || !calibrated_) return held_out_.has_value();
+  auto calibrated = hold(*calibrated_);
+  if (!calibrated) return false;
+  if (calibrated->explained() < held_out_->explained()) {
+    held_out_ = std::move(calibrated);
+    fit_ = std::move(calibrated_);
   }
-  const std::vector<Cause> causes = strengths_of(*fit_->linear.columns, problem, whole, {});
-  const Mixture::Estimate estimate = mixture.estimate(whole);
-  for (const std::size_t h : more) {
-    const auto place = static_cast<std::size_t>(std::ranges::find(whole, h) - whole.begin());
-    HypothesisSet rest = whole;
-    std::erase(rest, h);
+  return true;
+}
+
+// Of what every robot has, estimated anew, what parts left out need is named as well; its standard deviation
+// is the jackknife's.
+void Diagnoser::name_base(const Problem& problem, Explanation& explanation, Named& named) {
+  const std::vector<Cause> all = refit(material(), joined(fit_->base, named.causes));
+  const std::vector<Need> needed = base_needed(material(), *fit_, *held_out_, view_.power_w);
+  for (std::size_t b = 0; b < fit_->base.size(); ++b) {
+    const Cause& cause = all[b];
+    const auto same = [&](const Hypothesis& h) { return h.is_effect() && h.cause().same_kind(cause); };
+    const auto at = std::ranges::find_if(problem.hypotheses, same);
+    if (at == problem.hypotheses.end() || needed[b].probability < least_named ||
+        needed[b].share < ExplainSettings{}.least_share_for_certain)
+      continue;
+    const auto h = static_cast<std::size_t>(at - problem.hypotheses.begin());
+    const double value = cause.effect.values[at->parameter];
+    double squares = 0;
+    for (const std::vector<Cause>& part : held_out_->causes)
+      squares += std::pow(part[b].effect.values[at->parameter] - value, 2);
+    const double parts = static_cast<double>(held_out_->causes.size());
     Member m;
     m.hypothesis = h;
-    m.by_evidence = m.group_by_evidence =
-        1 / (1 + std::exp(mixture.log_odds(rest) - mixture.log_odds(whole)));
-    m.by_prediction = m.group_by_prediction = 1;
-    if (m.by_evidence < least_named) continue;
-    Eigen::Index first = 0;
-    for (std::size_t k = 0; k < place; ++k)
-      first += static_cast<Eigen::Index>(problem.hypotheses[whole[k]].candidate.columns.size());
-    m.coefficients = {estimate.mean[first]};
-    m.sd = {estimate.sd[first]};
-    m.share = problem.moved(problem.hypotheses[h], estimate.mean.segment(first, 1));
-    std::erase_if(explanation.members, [&](const Member& other) {
-      return problem.hypotheses[other.hypothesis].excludes(problem.hypotheses[h]);
-    });
+    m.coefficients = {value};
+    m.sd = {std::sqrt((parts - 1) / parts * squares)};
+    m.by_evidence = m.by_prediction = needed[b].probability;
+    m.group_by_evidence = m.group_by_prediction = m.any_by_evidence = m.any_by_prediction = m.by_evidence;
+    m.share = problem.moved(*at, Eigen::VectorXd::Constant(1, value));
+    // What was found beside it of the same kind is part of it.
+    for (std::size_t k = named.set.size(); k-- > 0;) {
+      if (!problem.hypotheses[named.set[k]].excludes(*at) && named.set[k] != h) continue;
+      named.set.erase(named.set.begin() + static_cast<std::ptrdiff_t>(k));
+      named.causes.erase(named.causes.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+    std::erase_if(explanation.members, [&](const Member& other) { return other.hypothesis == h; });
     explanation.members.push_back(m);
-    if (std::ranges::find(explanation.whole, h) == explanation.whole.end())
-      explanation.whole.insert(std::ranges::lower_bound(explanation.whole, h), h);
-    const auto at = std::ranges::lower_bound(named.set, h);
-    named.causes.insert(named.causes.begin() + (at - named.set.begin()), causes[place]);
-    named.set.insert(at, h);
+    const auto place = std::ranges::lower_bound(named.set, h);
+    named.causes.insert(named.causes.begin() + (place - named.set.begin()), cause);
+    named.set.insert(place, h);
+    reopened_[h] = needed[b].share / held_out_->unchanged();
   }
 }
 
@@ -250,13 +271,13 @@ void Diagnoser::name_base(const Mixture& mixture, Explanation& explanation, Name
 std::vector<dynamics::ActiveEffect> Diagnoser::instead_of(const Problem& problem,
                                                           const Member& member) const {
   std::vector<dynamics::ActiveEffect> effects;
-  for (const Alternative& a : member.alternatives) {
+  for (const Alternative& a : member.stated()) {
     if (!problem.hypotheses[a.hypothesis].is_effect()) continue;
     HypothesisSet set = named_;
     std::ranges::replace(set, member.hypothesis, a.hypothesis);
     std::ranges::sort(set);
     const auto place = std::ranges::find(set, a.hypothesis) - set.begin();
-    const std::vector<Cause> causes = strengths_of(*fit_->linear.columns, problem, set, {});
+    const std::vector<Cause> causes = strengths_of(equations(), problem, set);
     const Cause own = causes[static_cast<std::size_t>(place)];
     for (const Cause& cause : refit(material(), joined(fit_->base, causes))) {
       if (cause.same_kind(own)) effects.push_back(cause.effect);
@@ -304,38 +325,25 @@ void Diagnoser::add_baseline() {
 // What predicts parts that had no part in it shows that noise makes no more than it leaves.
 void Diagnoser::lower_noise_floor(double left) {
   if (!(left < d_.noise_floor)) return;
-  for (ChannelGap& gap : d_.channels) {
-    if (gap.noise_floor == d_.noise_floor) gap.noise_floor = left;
-  }
-  d_.noise_floor = left;
+  d_.noise_floor = power_gap()->noise_floor = left;
   if (d_.shrinkage) d_.shrinkage->remaining_over_noise_floor = d_.shrinkage->after / left;
 }
 
 bool Diagnoser::judge_all() {
+  if (!leave_out()) return false;
   const Problem problem = make_problem(*fit_->linear.columns, fit_->linear.rows, fit_->linear.noise, blocks_);
   const Mixture mixture(problem);
   const std::vector<bool> all_blocks;
   Explanation explanation = explain(mixture, all_blocks, fit_settings_.explain);
   d_.detectable_share = seen_share(mixture);
-  Named named = name_causes(material(), *fit_->linear.columns, problem, explanation, view_.power_w, {});
-  named_ = named.set;
-  held_out_ = hold_out(material(), *fit_, view_.power_w, fit_settings_,
-                       [&](double part) { return goes_on(std::lerp(after_fit, after_parts, part)); });
-  if (!held_out_) return false;
-  if (!fit_->base.empty()) {
-    if (held_out_->based() < held_out_->explained()) {
-      for (BlockErrors& b : held_out_->blocks) b.explained = b.based;
-    } else {
-      fit_->base.clear();
-    }
-  }
-  if (!fit_->base.empty()) name_base(mixture, explanation, named);
-  named_ = named.set;
-  causes_ = refit(material(), joined(fit_->base, named.causes));
+  Named named = name_causes(based(material(), *fit_), equations(), problem, explanation, view_.power_w);
   const ControlSettings controls{fit_settings_.explain, settings_.controls, settings_.threads};
   auto made = control(material(), fit_->linear, problem, explanation, controls,
                       [&](double part) { return goes_on(std::lerp(after_parts, 1.0, part)); });
   if (!made) return false;
+  if (!fit_->base.empty()) name_base(problem, explanation, named);
+  named_ = named.set;
+  causes_ = refit(material(), joined(fit_->base, named.causes));
   std::vector<dynamics::ActiveEffect> all = adopted_;
   for (const Cause& cause : causes_) {
     if (!cause.by) all.push_back(cause.effect);
@@ -353,6 +361,10 @@ bool Diagnoser::judge_all() {
              {}};
   const std::vector<double> after = modelled(causes_);
   f.shares = held_out_shares(material(), *fit_, problem, named_, view_.power_w);
+  // Together these move far more than one by one: of each, what comes back without it.
+  for (std::size_t k = 0; k < named_.size(); ++k) {
+    if (const auto own = reopened_.find(named_[k]); own != reopened_.end()) f.shares[k] = own->second;
+  }
   f.base = causes_;
   for (const Cause& name : named.causes) {
     const auto own = std::ranges::find_if(f.base, [&](const Cause& c) { return c.same_kind(name); });
@@ -371,8 +383,8 @@ bool Diagnoser::judge_all() {
   add_baseline();
   if (!named_.empty() && d_.power != PowerSource::none)
     d_.shrinkage = shrinkage_of(*held_out_, problem.hypotheses, named_, d_.noise_floor);
-  judge(d_, f, robot_);
   lower_noise_floor(std::min(held_out_->explained(), held_out_->referee()));
+  judge(d_, f, robot_);
   if (d_.effects.empty()) d_.shrinkage.reset();
   d_.next_drive = next_drives(fit_->linear, problem, robot_, d_.effects);
   if (!d_.outside.channel.empty()) {

@@ -6,7 +6,10 @@
 
 #include "gap/diagnose/referee.h"
 #include "gap/equations/power.h"
+#include "gap/equations/zone_scan.h"
+#include "gap/traits.h"
 #include "statistics/evidence.h"
+#include "statistics/robust.h"
 
 namespace joulecast::gap {
 namespace {
@@ -20,7 +23,7 @@ Shapes shapes_of(std::span<const Cause> causes, const robot::RobotModel& robot) 
   Shapes shapes;
   for (const Cause& cause : causes) {
     const dynamics::ActiveEffect& e = cause.effect;
-    if (e.effect->info().id == "floor_resistance_zone") {
+    if (is_zone(cause)) {
       shapes.zones = {{e.values[1], e.values[2], e.values[3]}};
     } else {
       shapes.only(e, robot.kinematics.wheel_radius_m);
@@ -103,10 +106,13 @@ std::vector<Cause> rest(const Material& whole, const Shapes& shapes, std::vector
   Material material = whole;
   material.windows = some;
   std::vector<Cause> next = causes;
+  std::vector<std::string_view> effects;
+  for (const Cause& cause : causes) effects.push_back(cause.effect.effect->info().id);
   std::optional<Noise> noise;
   double least = std::numeric_limits<double>::infinity();
   for (int k = 0, halved = 0; k < most_steps; ++k) {
-    const Linear linear = linearise(material, shapes, std::array{wide_share}, next);
+    const Linear linear = noise ? linearise(material, shapes, std::array{wide_share}, next, effects, *noise)
+                                : linearise(material, shapes, std::array{wide_share}, next);
     if (!noise) noise = linear.noise;
     const double now = misfit(linear, *noise);
     if (now > better * least) {
@@ -123,12 +129,102 @@ std::vector<Cause> rest(const Material& whole, const Shapes& shapes, std::vector
   return causes;
 }
 
+// Where only battery power speaks, the strengths that leave least of it, by the model itself: Levenberg's
+// steps of Huber's estimator on numerical differences. Each is held by what is expected of it; what other
+// channels show stays.
+std::vector<Cause> rest_of_power(const Material& m, const Shapes& shapes, std::vector<Cause> causes,
+                                 std::span<const double> power_w) {
+  constexpr int most_rounds = 25;
+  constexpr double bound = 1.345;  // as of the regression
+  constexpr double settled = 1e-4, step_share = 1e-3, first_damping = 1e-3, most_damping = 1e6;
+  const ColumnSet columns(m, shapes, std::array{wide_share});
+  struct Free {
+    std::size_t cause, parameter;
+    double unit, least, most;
+  };
+  std::vector<Free> free;
+  for (std::size_t k = 0; k < causes.size(); ++k) {
+    const auto at = columns.coordinates_of(causes[k]);
+    if (!at || causes[k].by || traits_of(causes[k].effect.effect->info().id).elsewhere) continue;
+    const Hypothesis& h = columns.hypotheses()[at->hypothesis];
+    if (h.candidate.columns.size() == 1)
+      free.push_back({k, h.parameter, h.candidate.expected, h.candidate.least, h.candidate.most});
+  }
+  std::vector<std::size_t> rows;
+  for (std::size_t k = 0; k < power_w.size(); ++k) {
+    if (std::isfinite(power_w[k])) rows.push_back(k);
+  }
+  if (free.empty() || rows.empty()) return causes;
+  const auto n = static_cast<Eigen::Index>(rows.size()), p = static_cast<Eigen::Index>(free.size());
+  const auto left_by = [&](const std::vector<Cause>& some) {
+    const std::vector<double> modelled = modelled_power(m.robot, m.adopted, some, m.windows);
+    Eigen::VectorXd left(n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const std::size_t row = rows[static_cast<std::size_t>(k)];
+      left[k] = std::isfinite(modelled[row]) ? power_w[row] - modelled[row] : 0;
+    }
+    return left;
+  };
+  const auto value_of = [&](std::vector<Cause>& some, const Free& f) -> double& {
+    return some[f.cause].effect.values[f.parameter];
+  };
+  Eigen::VectorXd left = left_by(causes);
+  double damping = first_damping;
+  for (int round = 0; round < most_rounds && damping < most_damping; ++round) {
+    const double spread = statistics::spread_about_zero({left.data(), static_cast<std::size_t>(n)});
+    if (!(spread > 0)) break;
+    Eigen::MatrixXd x(n, p);
+    Eigen::VectorXd held(p);
+    for (Eigen::Index k = 0; k < p; ++k) {
+      const Free& f = free[static_cast<std::size_t>(k)];
+      std::vector<Cause> moved = causes;
+      double& value = value_of(moved, f);
+      held[k] = value / f.unit;
+      const double step = value + step_share * f.unit > f.most ? -step_share : step_share;
+      value += step * f.unit;
+      x.col(k) = (left - left_by(moved)) / step;
+    }
+    const Eigen::VectorXd weight = left.unaryExpr([&](double v) {
+      return statistics::huber_weight(v, spread, bound);
+    }) / (spread * spread);
+    const Eigen::MatrixXd weighted = weight.asDiagonal() * x;
+    Eigen::MatrixXd information = weighted.transpose() * x;
+    const Eigen::VectorXd slope = weighted.transpose() * left - held;
+    information.diagonal().array() += 1;
+    bool better_one = false;
+    for (; !better_one && damping < most_damping; damping *= 10) {
+      Eigen::MatrixXd damped = information;
+      damped.diagonal() *= 1 + damping;
+      const Eigen::VectorXd step = damped.ldlt().solve(slope);
+      std::vector<Cause> next = causes;
+      double moved = 0;
+      for (Eigen::Index k = 0; k < p; ++k) {
+        const Free& f = free[static_cast<std::size_t>(k)];
+        double& value = value_of(next, f);
+        const double before = value;
+        value = std::clamp(value + step[k] * f.unit, f.least, f.most);
+        moved = std::max(moved, std::fabs(value - before) / f.unit);
+      }
+      const Eigen::VectorXd now = left_by(next);
+      if (!(now.cwiseAbs().sum() < left.cwiseAbs().sum())) continue;
+      causes = std::move(next);
+      left = now;
+      better_one = true;
+      damping *= 0.01;
+      if (moved < settled) return causes;
+    }
+  }
+  return causes;
+}
+
 }  // namespace
 
 std::vector<Cause> refit(const Material& material, std::vector<Cause> causes) {
   if (causes.empty()) return causes;
   const Shapes shapes = shapes_of(causes, material.robot);
-  return rest(material, shapes, std::move(causes));
+  if (!material.from_motion.alone()) return rest(material, shapes, std::move(causes));
+  return rest_of_power(material, shapes, std::move(causes),
+                       measured_power(material.windows, material.robot, false));
 }
 
 std::vector<Cause> base_fit(const Material& material, std::span<const double> power_w) {
@@ -143,7 +239,9 @@ std::vector<Cause> base_fit(const Material& material, std::span<const double> po
     Shapes shapes;
     shapes.scrub_rates_rad_s = {rate_rad_s};
     const ColumnSet columns(material, shapes, std::array{wide_share});
-    std::vector<Cause> causes = rest(material, shapes, as_regression(material, power_w, columns, ids));
+    std::vector<Cause> causes = as_regression(material, power_w, columns, ids);
+    causes = material.from_motion.alone() ? rest_of_power(material, shapes, std::move(causes), power_w)
+                                          : rest(material, shapes, std::move(causes));
     const double gap =
         gap_size(power_w, modelled_power(material.robot, material.adopted, causes, material.windows))
             .absolute_relative;

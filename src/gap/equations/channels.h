@@ -45,6 +45,7 @@ using ChannelValues = std::array<S, channel_count>;
 struct FromMotion {
   bool power = false;    // Channel::power speaks; it costs as much as the others together
   bool voltage = false;  // Channel::drive_right and drive_left do
+  bool alone() const { return power && !voltage; }
 };
 
 // Residuals of one window. Value NaN: the channel does not speak here.

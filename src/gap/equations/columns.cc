@@ -252,6 +252,12 @@ void ColumnSet::linearise_around(std::span<const Chosen> chosen) {
   }
 }
 
+void ColumnSet::differentiate_only(std::span<const std::string_view> effects) {
+  std::erase_if(derivatives_, [&](const Derivative& d) {
+    return std::ranges::find(effects, column_effect_[d.column].effect->info().id) == effects.end();
+  });
+}
+
 void ColumnSet::evaluate(const Window& w, ChannelValues<double>& values, std::span<double> rows) const {
   const std::size_t n = columns_.size();
   std::ranges::fill(rows, 0.0);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "dynamics/catalogue.h"
@@ -41,6 +42,9 @@ class ColumnSet {
 
   // Differentiates around these from now on, at first around none; in covariates everything is linear anyway.
   void linearise_around(std::span<const Chosen> chosen);
+
+  // The columns of effects other than these stay zero from now on, until it is linearised anew.
+  void differentiate_only(std::span<const std::string_view> effects);
 
   std::size_t size() const { return columns_.size(); }
   const std::vector<Column>& columns() const { return columns_; }

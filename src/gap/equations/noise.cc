@@ -11,8 +11,8 @@ namespace {
 
 constexpr double outlier = 3.5;  // in spreads; beyond it the weight falls
 constexpr std::size_t fewest_rows = 20;
-constexpr std::size_t fewest_blocks = 6;   // to learn from how blocks scatter
-constexpr std::size_t most_probed = 1500;  // windows, to learn which columns speak
+constexpr std::size_t fewest_blocks = 6;  // to learn from how blocks scatter
+constexpr std::size_t at_once = 256;      // windows that are evaluated before their rows are written
 
 // Standard deviation that each coefficient may have, there or not.
 std::vector<double> possible_sd(const ColumnSet& columns) {
@@ -169,40 +169,44 @@ ChannelNoise learn_channel(const ChannelRows& rows, const Eigen::VectorXd& sd,
 
 Rows make_rows(const ColumnSet& columns, std::span<const Window> windows) {
   Rows all;
-  const std::size_t p = columns.size();
-  std::vector<double> cells(p * channel_count);
-  ChannelValues<double> values;
-  // Which columns speak in which channel, from a sample of the windows.
+  const std::size_t p = columns.size(), cell_count = p * channel_count;
+  std::vector<double> cells(at_once * cell_count);
+  std::vector<ChannelValues<double>> values(at_once);
   std::array<std::vector<bool>, channel_count> speaks;
   for (auto& s : speaks) s.assign(p, false);
-  const std::size_t stride = std::max<std::size_t>(1, windows.size() / most_probed);
-  for (std::size_t k = 0; k < windows.size(); k += stride) {
-    columns.evaluate(windows[k], values, cells);
+  for (ChannelRows& rows : all) rows.y.resize(static_cast<Eigen::Index>(windows.size()));
+  for (std::size_t first = 0; first < windows.size(); first += at_once) {
+    const std::size_t count = std::min(at_once, windows.size() - first);
+    for (std::size_t k = 0; k < count; ++k)
+      columns.evaluate(windows[first + k], values[k], std::span(cells).subspan(k * cell_count, cell_count));
     for (std::size_t c = 0; c < channel_count; ++c) {
-      if (!std::isfinite(values[c])) continue;
-      for (std::size_t j = 0; j < p; ++j) speaks[c][j] = speaks[c][j] || cells[c * p + j] != 0;
-    }
-  }
-  for (std::size_t c = 0; c < channel_count; ++c) {
-    ChannelRows& rows = all[c];
-    for (std::size_t j = 0; j < p; ++j) {
-      if (speaks[c][j]) rows.columns.push_back(j);
-    }
-    rows.x.resize(static_cast<Eigen::Index>(windows.size()), static_cast<Eigen::Index>(rows.columns.size()));
-    rows.y.resize(static_cast<Eigen::Index>(windows.size()));
-  }
-  for (std::size_t k = 0; k < windows.size(); ++k) {
-    columns.evaluate(windows[k], values, cells);
-    for (std::size_t c = 0; c < channel_count; ++c) {
-      if (!std::isfinite(values[c])) continue;
       ChannelRows& rows = all[c];
-      const auto row = static_cast<Eigen::Index>(rows.window.size());
-      rows.y[row] = values[c];
-      for (std::size_t j = 0; j < rows.columns.size(); ++j)
-        rows.x(row, static_cast<Eigen::Index>(j)) = cells[c * p + rows.columns[j]];
-      rows.window.push_back(k);
-      rows.block.push_back(windows[k].block);
-      rows.resting.push_back(windows[k].resting[0] && windows[k].resting[1]);
+      const auto cell = [&](std::size_t k, std::size_t j) { return cells[k * cell_count + c * p + j]; };
+      // Columns that speak here for the first time were silent before.
+      const Eigen::Index known = rows.x.cols();
+      for (std::size_t j = 0; j < p; ++j) {
+        for (std::size_t k = 0; k < count && !speaks[c][j]; ++k) {
+          if (!std::isfinite(values[k][c]) || cell(k, j) == 0) continue;
+          speaks[c][j] = true;
+          rows.columns.push_back(j);
+        }
+      }
+      rows.x.conservativeResize(static_cast<Eigen::Index>(windows.size()),
+                                static_cast<Eigen::Index>(rows.columns.size()));
+      rows.x.rightCols(rows.x.cols() - known)
+          .topRows(static_cast<Eigen::Index>(rows.window.size()))
+          .setZero();
+      for (std::size_t k = 0; k < count; ++k) {
+        if (!std::isfinite(values[k][c])) continue;
+        const auto row = static_cast<Eigen::Index>(rows.window.size());
+        const Window& w = windows[first + k];
+        rows.y[row] = values[k][c];
+        for (std::size_t j = 0; j < rows.columns.size(); ++j)
+          rows.x(row, static_cast<Eigen::Index>(j)) = cell(k, rows.columns[j]);
+        rows.window.push_back(first + k);
+        rows.block.push_back(w.block);
+        rows.resting.push_back(w.resting[0] && w.resting[1]);
+      }
     }
   }
   for (ChannelRows& rows : all) {

@@ -165,8 +165,8 @@ class Scanner {
 
 std::optional<Zone> find_zone(const ColumnSet& columns, const Rows& rows, const Noise& noise,
                               std::span<const Window> windows) {
-  const auto zone = std::ranges::find_if(
-      columns.hypotheses(), [](const Hypothesis& h) { return h.id() == "floor_resistance_zone"; });
+  const auto zone =
+      std::ranges::find_if(columns.hypotheses(), [](const Hypothesis& h) { return h.id() == zone_effect; });
   if (zone == columns.hypotheses().end()) return std::nullopt;
   const Scanner scanner(columns, rows, noise, windows, *zone);
   if (scanner.rows() < 50) return std::nullopt;
@@ -193,6 +193,10 @@ std::optional<Zone> find_zone(const ColumnSet& columns, const Rows& rows, const 
     if (!better) step *= 0.5;
   }
   return best;
+}
+
+bool is_zone(const Cause& cause) {
+  return !cause.by && cause.effect.effect->info().id == zone_effect;
 }
 
 }  // namespace joulecast::gap

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <span>
+#include <string_view>
 
 #include "gap/equations/noise.h"
 
@@ -15,5 +16,10 @@ inline constexpr Zone everywhere{0, 0, 90};
 // where no disc explains anything.
 std::optional<Zone> find_zone(const ColumnSet& columns, const Rows& rows, const Noise& noise,
                               std::span<const Window> windows);
+
+inline constexpr std::string_view zone_effect = "floor_resistance_zone";
+
+// Whether a cause is resistance in a zone of the floor.
+bool is_zone(const Cause& cause);
 
 }  // namespace joulecast::gap

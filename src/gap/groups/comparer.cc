@@ -172,7 +172,7 @@ std::vector<Controls> Comparer::permuted(const Mixture& mixture, const Explanati
     for (std::size_t m = 0; m < controls.size(); ++m) {
       const Member& member = explanation.members[m];
       std::set<std::string> group{problem.hypotheses[member.hypothesis].id()};
-      for (const Alternative& a : member.alternatives) group.insert(problem.hypotheses[a.hypothesis].id());
+      for (const Alternative& a : member.stated()) group.insert(problem.hypotheses[a.hypothesis].id());
       const bool found = std::ranges::any_of(answer.members, [&](const Member& other) {
         return group.contains(surrogate.hypotheses[other.hypothesis].id()) &&
                other.group_probability() >= least_named;

@@ -126,7 +126,7 @@ std::optional<std::vector<Controls>> control_runs(const RunColumns& columns,
   for (std::size_t m = 0; m < members; ++m) {
     const Member& member = f.explanation.members[m];
     std::set<std::string> group{f.problem.hypotheses[member.hypothesis].id()};
-    for (const Alternative& a : member.alternatives) group.insert(f.problem.hypotheses[a.hypothesis].id());
+    for (const Alternative& a : member.stated()) group.insert(f.problem.hypotheses[a.hypothesis].id());
     const auto own = std::ranges::find(whole, member.hypothesis) - whole.begin();
     for (std::size_t s = 0; s < surrogates; ++s) {
       std::mt19937_64 random(s + 1);

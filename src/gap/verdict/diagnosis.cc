@@ -21,9 +21,10 @@ std::string_view name_of(Standing standing) {
 }
 
 bool Baseline::wins() const {
-  constexpr double gate = 1.05;
+  constexpr double slight = 1.05, clear = 1.1;
   const double best = std::min(held_out, unchanged_model_held_out);
-  return explanation_held_out > gate * best && explanation_held_out - best > deviation;
+  return explanation_held_out > clear * best ||
+         (explanation_held_out > slight * best && explanation_held_out - best > deviation);
 }
 
 }  // namespace joulecast::gap

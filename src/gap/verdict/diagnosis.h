@@ -88,10 +88,11 @@ struct Baseline {
   std::vector<BaselineTerm> terms;
   double held_out = 0;                  // of the regression
   double unchanged_model_held_out = 0;  // of the robot file
-  double explanation_held_out = 0;      // of what is found anew without each part
-  double deviation = 0;                 // standard error of how far the last is from the better of the others
-  std::vector<std::string> says;        // its terms beside what the model has, in words
-  // Over the explanation: by more than the gate allows and than blocks differ by chance.
+  // Of what is found anew without each part; with the function outside the catalogue where one is told.
+  double explanation_held_out = 0;
+  double deviation = 0;           // standard error of how far the last is from the better of the others
+  std::vector<std::string> says;  // its terms beside what the model has, in words
+  // Over the explanation: by more than a tenth, or by more than a twentieth and than blocks differ by chance.
   bool wins() const;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gap/diagnose/account.h"
 #include "gap/traits.h"
 #include "gap/verdict/adopt.h"
 #include "gap/verdict/probability.h"
@@ -70,6 +71,7 @@ struct Doubts {
   bool strange = false;      // strengths that no robot has
   bool idle = false;         // on held-out parts they close nothing
   bool worse = false;        // than the referee or the unchanged model, on held-out parts
+  bool worse_alone = false;  // the same without a function outside the catalogue that is told beside them
   bool unexplained = false;  // held-out parts keep more of the gap than right names leave
   bool like_load = false;
   bool any_against() const { return idle || worse || unexplained || like_load; }
@@ -83,6 +85,7 @@ class Judge {
   void run() {
     name_effects();
     find_outside();
+    if (d_.baseline && f_.held_out && by_function_) explain_with_functions(*d_.baseline);
     weigh_doubts();
     decide();
     state_probabilities();
@@ -119,7 +122,7 @@ class Judge {
       e.share = f_.shares[k];
       e.power_w = f_.power_w[k];
       e.varies = m.wander;
-      for (const Alternative& a : m.alternatives) e.alternatives.push_back(hypothesis(a.hypothesis).id());
+      for (const Alternative& a : m.stated()) e.alternatives.push_back(hypothesis(a.hypothesis).id());
       for (const dynamics::ActiveEffect& effect : k < f_.instead.size() ? f_.instead[k] : none)
         e.instead.push_back(dynamics::adopt(effect));
       if (h.is_effect()) e.calibrates = traits_of(e.id).calibrates;
@@ -133,6 +136,14 @@ class Judge {
     return m.wander > steady_wander ? e.posterior : m.group_probability();
   }
 
+  // Whether parts left out are predicted better with the functions, where that can be asked, and no worse
+  // than by the regression.
+  bool functions_help() const {
+    if (!f_.held_out || !(std::fabs(f_.held_out->bent() - f_.held_out->explained()) > 0)) return true;
+    return f_.held_out->bent() < f_.held_out->explained() &&
+           !baseline_of(*f_.held_out, &BlockErrors::bent).wins();
+  }
+
   // The largest thing outside the catalogue that both judges see and that surrogates do not show.
   void find_outside() {
     const double least = least_outside_share(std::max(0.0, beyond_noise_));
@@ -142,12 +153,13 @@ class Judge {
     };
     for (const Member& m : f_.explanation.members) {
       const Hypothesis& h = hypothesis(m.hypothesis);
-      if (!h.outside() || std::min(m.by_evidence, m.by_prediction) < least_named || m.share < least) continue;
+      if (!told_outside(h, m) || m.share < least || !functions_help()) continue;
       const auto controls = controls_of(m);
       if (!passes(controls)) continue;
       outside_share_ += m.share;
       if (m.share <= largest) continue;
       largest = m.share;
+      by_function_ = true;
       d_.outside = {std::min(m.by_evidence, m.by_prediction), h.channel, h.variable, "", {}, controls};
       if (h.variable == "time" && h.channel.starts_with("battery_power")) d_.outside.like = "accessory_load";
     }
@@ -178,8 +190,14 @@ class Judge {
       d_.outside.probability = std::min(f_.explanation.outside, f_.explanation.outside_by_prediction);
   }
 
+  void explain_with_functions(Baseline& baseline) const {
+    Baseline with = baseline_of(*f_.held_out, &BlockErrors::bent);
+    baseline.explanation_held_out = with.explanation_held_out;
+    baseline.deviation = with.deviation;
+  }
+
   void weigh_doubts() {
-    doubts_.far = !f_.of_groups && d_.power_absolute_relative > far_off;
+    doubts_.far = !f_.of_groups && beyond_noise_ > far_off;
     doubts_.strange = !f_.of_groups && std::ranges::any_of(f_.causes, implausible);
     doubts_.like_load = d_.motor_channels && std::ranges::any_of(f_.causes, like_a_load);
     if (!f_.held_out || d_.effects.empty() || d_.power == PowerSource::none) return;
@@ -189,6 +207,7 @@ class Judge {
         std::ranges::all_of(f_.named, [&](std::size_t h) { return shows_in_power(hypothesis(h)); });
     doubts_.idle = by_power && after > closes_nothing * f_.held_out->unchanged();
     doubts_.worse = d_.baseline && d_.baseline->wins();
+    doubts_.worse_alone = d_.baseline && baseline_of(*f_.held_out).wins();
     doubts_.unexplained = !(closed_ > mostly_closed) &&
                           after - d_.noise_floor > largest_left + of_gap * d_.power_absolute_relative;
   }
@@ -265,7 +284,7 @@ class Judge {
     }
     if (d_.verdict == Verdict::not_this_robot)
       d_.corrections = corrections_of(robot_, d_.adoptable, deviations);
-    d_.refusal = refusal_of(d_, doubts_.worse, doubts_.any_against());
+    d_.refusal = refusal_of(d_, doubts_.worse_alone, doubts_.any_against());
   }
 
   Diagnosis& d_;
@@ -274,7 +293,7 @@ class Judge {
   double beyond_noise_;
   double weakest_ = 1, named_share_ = 0, outside_share_ = 0;
   double closed_ = missing;  // part of the gap beyond noise that goes away on held-out parts
-  bool rippled_ = false;
+  bool rippled_ = false, by_function_ = false;  // what is outside
   Doubts doubts_;
 };
 

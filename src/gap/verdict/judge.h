@@ -31,7 +31,7 @@ struct Findings {
   bool of_groups = false;  // strengths are differences between groups: large ones make no other robot
 };
 
-// A gap, of the power, from which on the file is another robot's.
+// A gap beyond the noise, of the power, from which on the file is another robot's.
 inline constexpr double far_off = 0.30;
 
 // Share of the mean power that something outside the catalogue has to move to be told, beside a gap that

@@ -194,7 +194,7 @@ std::string refusal_of(const Diagnosis& d, bool worse, bool against) {
     return fmt::format(
         "on parts left out it misses {} of the power, the better of the model as it is and a plain "
         "regression {}",
-        percent(d.baseline->explanation_held_out, 3),
+        percent(d.shrinkage ? d.shrinkage->after : d.baseline->explanation_held_out, 3),
         percent(std::min(d.baseline->held_out, d.baseline->unchanged_model_held_out), 3));
   }
   if (d.verdict == Verdict::inconclusive || against) return "the verdict is inconclusive";
