@@ -79,15 +79,15 @@ await run(given.client, ['simulate', '--robot', hour_robot, '--robots', '1', '--
 await run(given.client, ['replay', hour_log, '--into', store, '--robot', hour_robot]);
 await rm(hour_log);
 // For the diagnosis a robot with more friction than its file says, and one with a wheel out of round.
-async function with_effect(robot_id, effect) {
+async function with_effect(robot_id, effect, more = []) {
   const log = path.join(given.out, `${robot_id}.lcmlog`), file = path.join(given.out, `${robot_id}.json`);
   await writeFile(file, JSON.stringify({ ...JSON.parse(await readFile(hour_robot, 'utf8')), robot_id }));
-  await run(given.client, ['simulate', '--robot', file, '--robots', '1', '--seed', '12', '--effect', effect, '--log', log, '--speed', '0', '--missions', '8', '--quiet']);
+  await run(given.client, ['simulate', '--robot', file, '--robots', '1', '--seed', '12', '--effect', effect, '--log', log, '--speed', '0', '--missions', '8', '--quiet', ...more]);
   await run(given.client, ['replay', log, '--into', store, '--robot', file]);
   await rm(log);
 }
-await with_effect('worn-01', 'coulomb_friction=0.6');
-await with_effect('oval-01', 'x_oval_wheel=2');
+await with_effect('worn-01', 'coulomb_friction=0.6', ['--covariates', '1']);
+await with_effect('oval-01', 'x_oval_wheel=4');
 daemon = await start_until(given.daemon, daemon_args, ready);
 
 const browser = await chromium.launch({ executablePath: given.chromium, args: ['--headless', '--no-sandbox', '--disable-gpu', '--disable-quic',
@@ -509,6 +509,17 @@ await check('a diagnosis shows its checks, what would fit, and effects to choose
   await page.getByRole('button', { name: 'Adopt all the same' }).waitFor();
   await page.unroute(`**/v1/diagnoses/${diagnosis}`);
   await go(page, '#/gap');
+});
+
+await check('a mission tells the conditions of its drive', async () => {
+  const mission = (await get('/v1/missions?robot_id=worn-01')).missions[0];
+  await go(page, `#/missions/${mission.id}`);
+  const conditions = page.locator('.panel', { has: page.getByRole('heading', { name: 'Conditions' }) });
+  await conditions.getByRole('rowheader', { name: 'cpu load' }).waitFor();
+  const { covariates } = await get(`/v1/missions/${mission.id}/covariates`);
+  const loads = covariates.find((c) => c.name === 'cpu_load').value;
+  const told = await conditions.getByRole('row', { name: 'cpu load' }).getByRole('cell').last().textContent();
+  equal(told, `${Number(Math.min(...loads).toPrecision(4))} to ${Number(Math.max(...loads).toPrecision(4))}, ${loads.length} changes`, 'the range of the load');
 });
 
 let outside = 0;

@@ -36,6 +36,7 @@ struct FitResult {
   // everything else is sought beside it. Empty: not so.
   std::vector<Cause> base;
   std::vector<dynamics::ActiveEffect> in_force;  // of the robot file, and the base
+  bool alone = false;                            // nothing is named beside the base
   double log_joint = 0;                          // of the best explanation, to compare starts by
 };
 

@@ -80,6 +80,33 @@ Linear with_zone(const Material& m, const FitResult& fit, const FitSettings& set
   return linear;
 }
 
+// What is found without some blocks.
+struct Found {
+  Named named;
+  std::vector<std::string> ids;
+  std::vector<double> bent;  // left_with_functions()
+};
+
+Found find_without(const std::vector<bool>& out, const Material& m, const FitResult& fit,
+                   std::span<const double> power_w, const FitSettings& settings) {
+  std::optional<Zone> zone;
+  std::optional<Linear> zoned;
+  if (!fit.shapes.zones.empty()) zone = fit.zones->without(out);
+  if (zone) zoned = with_zone(m, fit, settings, *zone);
+  const Linear& linear = zoned ? *zoned : fit.linear;
+  const Noise noise = learn_noise(*linear.columns, linear.rows, out);
+  Problem problem = make_problem(*linear.columns, linear.rows, noise, m.blocks);
+  if (!zone) forbid_zones(problem);
+  const Explanation explanation = explain(problem, out, settings.explain);
+  const Equations equations{*linear.columns, linear.rows, noise, out};
+  Found found;
+  found.named = name_causes(m, equations, problem, explanation, power_w);
+  for (const std::size_t h : found.named.set) found.ids.push_back(problem.hypotheses[h].id());
+  if (fit.base.empty())
+    found.bent = left_with_functions(equations, problem, explanation, found.named.set, m.windows.size());
+  return found;
+}
+
 }  // namespace
 
 double HeldOut::relative(double BlockErrors::*error) const {
@@ -100,25 +127,12 @@ std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::sp
   const std::vector<double> unchanged = modelled_power(m.robot, m.adopted, {}, m.windows);
   for (std::size_t part = 0; part < held.parts; ++part) {
     const std::vector<bool> out = blocks_of(part, held.parts, m.blocks);
-    std::optional<Zone> zone;
-    std::optional<Linear> zoned;
-    if (!fit.shapes.zones.empty()) zone = fit.zones->without(out);
-    if (zone) zoned = with_zone(whole, fit, settings, *zone);
-    const Linear& linear = zoned ? *zoned : fit.linear;
-    const Noise noise = learn_noise(*linear.columns, linear.rows, out);
-    Problem problem = make_problem(*linear.columns, linear.rows, noise, m.blocks);
-    if (!zone) forbid_zones(problem);
-    const Explanation explanation = explain(problem, out, settings.explain);
-    const Equations equations{*linear.columns, linear.rows, noise, out};
-    const Named named = name_causes(whole, equations, problem, explanation, power_w);
-    std::vector<double> bent;
-    if (fit.base.empty())
-      bent = left_with_functions(equations, problem, explanation, named.set, m.windows.size());
-    std::vector<std::string> ids;
-    for (const std::size_t h : named.set) ids.push_back(problem.hypotheses[h].id());
-    held.named.push_back(std::move(ids));
-    held.causes.push_back(fit.base.empty() ? named.causes
-                                           : refit(Rest(m, out).material, joined(fit.base, named.causes)));
+    const Found found = fit.alone ? Found{} : find_without(out, whole, fit, power_w, settings);
+    const std::vector<double>& bent = found.bent;
+    held.named.push_back(found.ids);
+    held.causes.push_back(fit.base.empty()
+                              ? found.named.causes
+                              : refit(Rest(m, out).material, joined(fit.base, found.named.causes)));
     const std::vector<double> explained = modelled_power(m.robot, m.adopted, held.causes.back(), m.windows);
     std::vector<bool> others(m.windows.size());
     for (std::size_t k = 0; k < m.windows.size(); ++k) others[k] = !out[m.windows[k].block];

@@ -171,11 +171,11 @@ void Diagnoser::measure() {
 }
 
 bool Diagnoser::fit() {
+  const bool far = d_.power_absolute_relative - d_.noise_floor > far_off;
   fit_settings_.shares = {usual_share};
-  if (d_.power_absolute_relative > large_gap) {
-    fit_settings_.shares.push_back(large_share);
-    fit_settings_.explain.most_members = more_members;
-  }
+  if (d_.power_absolute_relative > large_gap) fit_settings_.shares.push_back(large_share);
+  // Of a file that is far off what every robot has is calibrated; the search is not for that.
+  if (d_.power_absolute_relative > large_gap && !far) fit_settings_.explain.most_members = more_members;
   const double settled_bias_a = settled_bias * robot_.motor.friction_torque_nm[0] /
                                 (robot_.motor.torque_constant_nm_a * robot_.motor.gear_ratio);
   const auto still = [&] { return goes_on(after_fit * 0.5); };
@@ -184,9 +184,10 @@ bool Diagnoser::fit() {
   for (int round = 0;; ++round) {
     fit_ = fit_windows(material(), {}, fit_settings_, still);
     if (fit_ && d_.power_absolute_relative > huge_gap && round == 0) {
-      auto far = fit_windows(material(), base_fit(material(), view_.power_w), fit_settings_, still);
-      if (!far) return false;
-      if (far->log_joint > fit_->log_joint) fit_ = std::move(far);
+      auto other = fit_windows(material(), base_fit(material(), view_.power_w, Starts::regression),
+                               fit_settings_, still);
+      if (!other) return false;
+      if (other->log_joint > fit_->log_joint) fit_ = std::move(other);
     }
     if (!fit_) return false;
     const windows::WindowSettings before = taken_out_;
@@ -197,9 +198,9 @@ bool Diagnoser::fit() {
     if (settled || round >= most_delay_rounds) break;
     view_ = view_of(taken_out_);
   }
-  if (d_.power_absolute_relative - d_.noise_floor > far_off) {
+  if (far) {
     FitResult from;
-    from.base = base_fit(material(), view_.power_w);
+    from.base = base_fit(material(), view_.power_w, Starts::both);
     from.in_force = adopted_;
     for (const Cause& cause : from.base) from.in_force.push_back(cause.effect);
     calibrated_ = fit_windows(based(material(), from), {}, fit_settings_, still);
@@ -210,7 +211,7 @@ bool Diagnoser::fit() {
   return goes_on(after_fit);
 }
 
-// What predicts parts left out better is judged: effects alone, or beside what every robot has.
+// What predicts parts left out best is judged: effects alone, what every robot has, or both.
 bool Diagnoser::leave_out() {
   const auto hold = [&](const FitResult& fit) {
     return hold_out(material(), fit, view_.power_w, fit_settings_,
@@ -220,8 +221,15 @@ bool Diagnoser::leave_out() {
   if (!held_out_ || !calibrated_) return held_out_.has_value();
   auto calibrated = hold(*calibrated_);
   if (!calibrated) return false;
-  if (calibrated->explained() < held_out_->explained()) {
-    held_out_ = std::move(calibrated);
+  calibrated_->alone = true;
+  auto alone = hold(*calibrated_);
+  if (!alone) return false;
+  if (alone->explained() > calibrated->explained()) {
+    calibrated_->alone = false;
+    alone = std::move(calibrated);
+  }
+  if (alone->explained() < held_out_->explained()) {
+    held_out_ = std::move(alone);
     fit_ = std::move(calibrated_);
   }
   return true;
@@ -336,11 +344,14 @@ bool Diagnoser::judge_all() {
   const std::vector<bool> all_blocks;
   Explanation explanation = explain(mixture, all_blocks, fit_settings_.explain);
   d_.detectable_share = seen_share(mixture);
-  Named named = name_causes(based(material(), *fit_), equations(), problem, explanation, view_.power_w);
+  Named named;
+  if (!fit_->alone)
+    named = name_causes(based(material(), *fit_), equations(), problem, explanation, view_.power_w);
   const ControlSettings controls{fit_settings_.explain, settings_.controls, settings_.threads};
   auto made = control(material(), fit_->linear, problem, explanation, controls,
                       [&](double part) { return goes_on(std::lerp(after_parts, 1.0, part)); });
   if (!made) return false;
+  const HypothesisSet sought = named.set;
   if (!fit_->base.empty()) name_base(problem, explanation, named);
   named_ = named.set;
   causes_ = refit(material(), joined(fit_->base, named.causes));
@@ -382,7 +393,7 @@ bool Diagnoser::judge_all() {
   add_wander(mixture, explanation, f);
   add_baseline();
   if (!named_.empty() && d_.power != PowerSource::none)
-    d_.shrinkage = shrinkage_of(*held_out_, problem.hypotheses, named_, d_.noise_floor);
+    d_.shrinkage = shrinkage_of(*held_out_, problem.hypotheses, sought, d_.noise_floor);
   lower_noise_floor(std::min(held_out_->explained(), held_out_->referee()));
   judge(d_, f, robot_);
   if (d_.effects.empty()) d_.shrinkage.reset();

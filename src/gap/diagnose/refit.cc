@@ -66,6 +66,15 @@ std::vector<Cause> step(const Material& material, const Linear& linear, std::spa
   return columns.causes_of(chosen);
 }
 
+// All of these effects, without strength.
+std::vector<Cause> as_filed(const ColumnSet& columns, std::span<const std::string_view> ids) {
+  std::vector<Chosen> chosen;
+  for (std::size_t h = 0; h < columns.hypotheses().size(); ++h) {
+    if (std::ranges::find(ids, columns.hypotheses()[h].id()) != ids.end()) chosen.push_back({h, {0.0}});
+  }
+  return columns.causes_of(chosen);
+}
+
 // The effects that make the robot file's model the plain regression.
 std::vector<Cause> as_regression(const Material& m, std::span<const double> power_w, const ColumnSet& columns,
                                  std::span<const std::string_view> ids) {
@@ -136,7 +145,9 @@ std::vector<Cause> rest_of_power(const Material& m, const Shapes& shapes, std::v
                                  std::span<const double> power_w) {
   constexpr int most_rounds = 25;
   constexpr double bound = 1.345;  // as of the regression
-  constexpr double settled = 1e-4, step_share = 1e-3, first_damping = 1e-3, most_damping = 1e6;
+  constexpr double settled = 1e-4,
+                   least_gain = 1e-4;  // of a step, in units of what is expected, and of errors
+  constexpr double step_share = 1e-3, first_damping = 1e-3, most_damping = 1e3;
   const ColumnSet columns(m, shapes, std::array{wide_share});
   struct Free {
     std::size_t cause, parameter;
@@ -206,12 +217,13 @@ std::vector<Cause> rest_of_power(const Material& m, const Shapes& shapes, std::v
         moved = std::max(moved, std::fabs(value - before) / f.unit);
       }
       const Eigen::VectorXd now = left_by(next);
-      if (!(now.cwiseAbs().sum() < left.cwiseAbs().sum())) continue;
+      const double before = left.cwiseAbs().sum(), after = now.cwiseAbs().sum();
+      if (!(after < before)) continue;
       causes = std::move(next);
       left = now;
       better_one = true;
       damping *= 0.01;
-      if (moved < settled) return causes;
+      if (moved < settled || after > (1 - least_gain) * before) return causes;
     }
   }
   return causes;
@@ -227,7 +239,7 @@ std::vector<Cause> refit(const Material& material, std::vector<Cause> causes) {
                        measured_power(material.windows, material.robot, false));
 }
 
-std::vector<Cause> base_fit(const Material& material, std::span<const double> power_w) {
+std::vector<Cause> base_fit(const Material& material, std::span<const double> power_w, Starts starts) {
   constexpr std::array<std::string_view, 7> ids{"accessory_load",     "coulomb_friction", "viscous_friction",
                                                 "chassis_mass_error", "turning_scrub",    "aerodynamic_drag",
                                                 "resistance_error"};
@@ -235,17 +247,13 @@ std::vector<Cause> base_fit(const Material& material, std::span<const double> po
   constexpr std::array scrub_rates_rad_s{0.03, 0.1, 0.3};
   std::vector<Cause> best;
   double least = std::numeric_limits<double>::infinity();
-  for (const double rate_rad_s : scrub_rates_rad_s) {
-    Shapes shapes;
-    shapes.scrub_rates_rad_s = {rate_rad_s};
-    const ColumnSet columns(material, shapes, std::array{wide_share});
-    std::vector<Cause> causes = as_regression(material, power_w, columns, ids);
+  const auto try_from = [&](const Shapes& shapes, const ColumnSet& columns, std::vector<Cause> causes) {
     causes = material.from_motion.alone() ? rest_of_power(material, shapes, std::move(causes), power_w)
                                           : rest(material, shapes, std::move(causes));
     const double gap =
         gap_size(power_w, modelled_power(material.robot, material.adopted, causes, material.windows))
             .absolute_relative;
-    if (gap >= least) continue;
+    if (gap >= least) return;
     least = gap;
     std::erase_if(causes, [&](const Cause& cause) {
       const auto at = columns.coordinates_of(cause);
@@ -253,6 +261,13 @@ std::vector<Cause> base_fit(const Material& material, std::span<const double> po
       return std::fabs(at->coefficients[0]) * columns.columns()[k].power_share < noticed_share;
     });
     best = std::move(causes);
+  };
+  for (const double rate_rad_s : scrub_rates_rad_s) {
+    Shapes shapes;
+    shapes.scrub_rates_rad_s = {rate_rad_s};
+    const ColumnSet columns(material, shapes, std::array{wide_share});
+    try_from(shapes, columns, as_regression(material, power_w, columns, ids));
+    if (starts == Starts::both) try_from(shapes, columns, as_filed(columns, ids));
   }
   return best;
 }

@@ -212,10 +212,29 @@ function Facts({ mission }) {
   </tbody></table>`;
 }
 
+// What held of each covariate: of labels the words, of numbers their range.
+function Conditions({ told }) {
+  const labels = new Map(), numbers = [];
+  for (const { name, value } of told.covariates) {
+    const known = value.filter((v) => v !== null), at = name.indexOf('=');
+    if (known.length === 0) continue;
+    if (at > 0) {
+      if (known.some((v) => v !== 0)) labels.set(name.slice(0, at), [...(labels.get(name.slice(0, at)) ?? []), name.slice(at + 1)]);
+    } else {
+      const least = Math.min(...known), most = Math.max(...known), digits = (v) => Number(v.toPrecision(4));
+      numbers.push([name, least === most ? `${digits(least)}` : `${digits(least)} to ${digits(most)}, ${known.length} changes`]);
+    }
+  }
+  return html`<table class="facts"><tbody>${[...[...labels].map(([name, words]) => [name, words.join(', ')]), ...numbers].map(([name, held]) =>
+    html`<tr><th scope="row">${format.words(name)}</th><td>${held}</td></tr>`)}</tbody></table>
+    ${told.next_cursor !== null && html`<p class="note foot">Of the first ${told.covariates.reduce((n, c) => n + c.value.length, 0)} changes.</p>`}`;
+}
+
 export function Mission({ id }) {
   const mission = useGet(`/v1/missions/${id_path(id)}`);
   const there = mission.value !== null;
   const ledger = useGet(there ? `/v1/missions/${id_path(id)}/ledger` : null);
+  const conditions = useGet(there ? `/v1/missions/${id_path(id)}/covariates` : null);
   const trace = useGet(there ? `/v1/missions/${id_path(id)}/trace${query({ points: trace_points })}` : null);
   // A long mission's path and stops need more than a chart does.
   const merged = trace.value !== null && trace.value.start_utime_us.length >= trace_points / 2;
@@ -225,7 +244,7 @@ export function Mission({ id }) {
   const open = mission.value?.state === 'open';
   useEffect(() => {
     if (!open) return undefined;
-    const timer = setInterval(() => [mission, ledger, trace].forEach((told) => told.reload()), 3000);
+    const timer = setInterval(() => [mission, ledger, trace, conditions].forEach((told) => told.reload()), 3000);
     return () => clearInterval(timer);
   }, [open]);
   if (!there && [400, 404].includes(mission.error?.status)) return html`<${Empty} title=${`There is no mission ${id}`}>No mission of this history has that number. See <a href="#/missions">all missions</a>.<//>`;
@@ -253,6 +272,7 @@ export function Mission({ id }) {
         <${Panel} title="Against the minimum-energy drive">${m.model_version === null ? html`<${Empty} title="No model">The robot had no model on this mission.<//>` :
           open ? html`<${Empty} title="Still driving">Compared when the mission ends.<//>` : m.gap_s > 0 ? html`<${Empty} title="Not compared">For ${format.span(m.gap_s)} of the mission nothing is known.<//>` : fine && html`<${LeastDrive} mission=${m} trace=${fine} />`}<//>
         <${Panel} title="Record"><${Facts} mission=${m} /><//>
+        ${conditions.value?.covariates.length > 0 && html`<${Panel} title="Conditions"><${Conditions} told=${conditions.value} /><//>`}
       </div>
     </div>`;
   }}<//>`;
