@@ -53,6 +53,29 @@ TEST(VirtualRobot, ASingleMissionSufficesForAStrongEffect) {
   EXPECT_GT(d.shrinkage->fraction, 0.5);
 }
 
+// Battery power alone, of a robot that has three times the friction of its file and a computer that the file
+// does not know.
+TEST(VirtualRobot, ThatIsFarFromItsFileIsCalibratedAndSaysWhatDiffers) {
+  const made::Robot robot = virtual_missions({{"coulomb_friction", 2}, {"accessory_load", 25}}, 18, false, 5);
+  DiagnosisSettings settings;
+  settings.controls = 3;
+  const Diagnosis d = *diagnose(robot.recordings, robot.model, settings);
+  EXPECT_EQ(name_of(d.verdict), "not_this_robot");
+  ASSERT_GE(d.effects.size(), 2u);
+  double friction = 0, load_w = 0;
+  for (const DiagnosedEffect& e : d.effects) {
+    EXPECT_TRUE(e.probability >= 0 && e.probability <= 1) << e.id;
+    EXPECT_LE(e.controls.value_or(Controls{}).named_in, 3u) << e.id;
+    if (e.id == "coulomb_friction") friction = e.parameters[0].value;
+    if (e.id == "accessory_load") load_w = e.parameters[0].value;
+  }
+  EXPECT_NEAR(friction, 2, 0.3);
+  EXPECT_NEAR(load_w, 25, 4);
+  EXPECT_FALSE(d.corrections.empty());
+  ASSERT_TRUE(d.baseline);
+  EXPECT_LT(d.baseline->explanation_held_out, 0.2 * d.baseline->unchanged_model_held_out);
+}
+
 // Without the loaded mission nothing is known of what load does: its halves are held out in turn.
 TEST(VirtualRobot, OneLoadedMissionSufficesForWhatLoadDoes) {
   made::Robot robot = virtual_missions({{"load_rolling_resistance", 0.15}}, 17, true, 12);

@@ -88,7 +88,8 @@ class Diagnoser {
   bool fit();
   bool leave_out();
   bool judge_all();
-  void name_base(const Problem& problem, Explanation& explanation, Named& named);
+  void name_base(const Problem& problem, Explanation& explanation, std::vector<Controls>& controls,
+                 Named& named);
   std::vector<dynamics::ActiveEffect> instead_of(const Problem& problem, const Member& member) const;
   void add_wander(const Mixture& mixture, const Explanation& explanation, Findings& findings) const;
   void add_baseline();
@@ -237,7 +238,8 @@ bool Diagnoser::leave_out() {
 
 // Of what every robot has, estimated anew, what parts left out need is named as well; its standard deviation
 // is the jackknife's.
-void Diagnoser::name_base(const Problem& problem, Explanation& explanation, Named& named) {
+void Diagnoser::name_base(const Problem& problem, Explanation& explanation, std::vector<Controls>& controls,
+                          Named& named) {
   const std::vector<Cause> all = refit(material(), joined(fit_->base, named.causes));
   const std::vector<Need> needed = base_needed(material(), *fit_, *held_out_, view_.power_w);
   for (std::size_t b = 0; b < fit_->base.size(); ++b) {
@@ -266,8 +268,13 @@ void Diagnoser::name_base(const Problem& problem, Explanation& explanation, Name
       named.set.erase(named.set.begin() + static_cast<std::ptrdiff_t>(k));
       named.causes.erase(named.causes.begin() + static_cast<std::ptrdiff_t>(k));
     }
-    std::erase_if(explanation.members, [&](const Member& other) { return other.hypothesis == h; });
+    const auto own = std::ranges::find(explanation.members, h, &Member::hypothesis);
+    if (own != explanation.members.end()) {
+      controls.erase(controls.begin() + (own - explanation.members.begin()));
+      explanation.members.erase(own);
+    }
     explanation.members.push_back(m);
+    controls.emplace_back();  // no surrogate is without what every robot has
     const auto place = std::ranges::lower_bound(named.set, h);
     named.causes.insert(named.causes.begin() + (place - named.set.begin()), cause);
     named.set.insert(place, h);
@@ -352,7 +359,7 @@ bool Diagnoser::judge_all() {
                       [&](double part) { return goes_on(std::lerp(after_parts, 1.0, part)); });
   if (!made) return false;
   const HypothesisSet sought = named.set;
-  if (!fit_->base.empty()) name_base(problem, explanation, named);
+  if (!fit_->base.empty()) name_base(problem, explanation, *made, named);
   named_ = named.set;
   causes_ = refit(material(), joined(fit_->base, named.causes));
   std::vector<dynamics::ActiveEffect> all = adopted_;

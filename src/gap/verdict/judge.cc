@@ -100,7 +100,8 @@ class Judge {
   }
   std::optional<Controls> controls_of(const Member& m) const {
     if (f_.controls.empty()) return std::nullopt;
-    return f_.controls[static_cast<std::size_t>(&m - f_.explanation.members.data())];
+    const Controls& made = f_.controls[static_cast<std::size_t>(&m - f_.explanation.members.data())];
+    return made.surrogates > 0 ? std::optional(made) : std::nullopt;
   }
 
   void name_effects() {
@@ -114,7 +115,7 @@ class Judge {
       if (m.wander > steady_wander) e.posterior = std::min(e.posterior, varying);
       e.controls = controls_of(m);
       // Found where it is not: no surer than the surrogates allow.
-      if (e.controls && e.controls->surrogates > 0) {
+      if (e.controls) {
         const double n = static_cast<double>(e.controls->surrogates);
         e.posterior = std::min(e.posterior, 1 - static_cast<double>(e.controls->named_in) / n);
       }
@@ -149,7 +150,7 @@ class Judge {
     const double least = least_outside_share(std::max(0.0, beyond_noise_));
     double largest = 0;
     const auto passes = [](const std::optional<Controls>& c) {
-      return !c || c->surrogates == 0 || 10 * c->named_in <= c->surrogates;
+      return !c || 10 * c->named_in <= c->surrogates;
     };
     for (const Member& m : f_.explanation.members) {
       const Hypothesis& h = hypothesis(m.hypothesis);
