@@ -10,7 +10,6 @@
 namespace joulecast::statistics {
 namespace {
 
-constexpr double bound = 1.345;  // 95 % efficient on normal errors, Huber and Ronchetti, section 7.8
 constexpr int most_rounds = 50;
 constexpr double settled = 1e-6;
 constexpr double least_part = 1e-10;  // of the largest eigenvalue: what is below is not in the data
@@ -24,6 +23,11 @@ Eigen::MatrixXd inverse(const Eigen::MatrixXd& a) {
 }
 
 }  // namespace
+
+Eigen::VectorXd huber_weights(const Eigen::VectorXd& residual, double spread) {
+  constexpr double bound = 1.345;
+  return residual.unaryExpr([&](double v) { return huber_weight(v, spread, bound); });
+}
 
 Regression robust_regression(const Eigen::MatrixXd& x, const Eigen::VectorXd& y,
                              const std::vector<std::size_t>& block) {
@@ -44,7 +48,7 @@ Regression robust_regression(const Eigen::MatrixXd& x, const Eigen::VectorXd& y,
     e = y - scaled * b;
     r.spread = spread_about_zero({e.data(), static_cast<std::size_t>(n)});
     if (!(r.spread > 0) || (b - before).norm() <= settled * b.norm()) break;
-    for (Eigen::Index k = 0; k < n; ++k) weight[k] = huber_weight(e[k], r.spread, bound);
+    weight = huber_weights(e, r.spread);
   }
   // Huber's sandwich, section 7.6; scores summed over blocks: Liang and Zeger 1986.
   const bool one_block = std::ranges::adjacent_find(block, std::ranges::not_equal_to()) == block.end();

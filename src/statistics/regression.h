@@ -5,6 +5,10 @@
 
 namespace joulecast::statistics {
 
+// Huber's weights with which normal errors lose 5 % of efficiency (Huber and Ronchetti, Robust Statistics,
+// 2009, section 7.8): 1 within 1.345 spreads, falling beyond.
+Eigen::VectorXd huber_weights(const Eigen::VectorXd& residual, double spread);
+
 // A linear regression that single rows cannot lead astray.
 struct Regression {
   Eigen::VectorXd coefficients;

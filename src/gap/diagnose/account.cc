@@ -10,17 +10,17 @@
 
 namespace joulecast::gap {
 
-Baseline baseline_of(const HeldOut& held_out, double BlockErrors::*explanation) {
+Baseline baseline_of(const HeldOut& held_out, bool with_functions) {
   Baseline baseline;
   baseline.held_out = held_out.referee();
   baseline.unchanged_model_held_out = held_out.unchanged();
-  baseline.explanation_held_out = held_out.relative(explanation);
+  baseline.explanation_held_out = with_functions ? held_out.explained_with_functions() : held_out.explained();
   const auto better =
       baseline.held_out < baseline.unchanged_model_held_out ? &BlockErrors::referee : &BlockErrors::unchanged;
   const double blocks = static_cast<double>(held_out.blocks.size());
   double sum = 0, squares = 0, size = 0;
   for (const BlockErrors& b : held_out.blocks) {
-    const double apart = b.*explanation - b.*better;
+    const double apart = b.explained - (with_functions ? b.spared : 0) - b.*better;
     sum += apart, squares += apart * apart, size += b.size;
   }
   baseline.deviation =

@@ -7,8 +7,9 @@
 // What an answer says of held-out parts, alike for recordings, runs and groups.
 namespace joulecast::gap {
 
-// The errors of regression, unchanged model and explanation; its terms are to be added.
-Baseline baseline_of(const HeldOut& held_out, double BlockErrors::*explanation = &BlockErrors::explained);
+// The errors of regression, unchanged model and explanation, with functions outside the catalogue or without;
+// its terms are to be added.
+Baseline baseline_of(const HeldOut& held_out, bool with_functions = false);
 
 // One term as the regression has it (`data`, with its deviation) beside what the model comes to in the same
 // term; in words too where the two surely and notably differ.

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "gap/diagnose/naming.h"
+#include "gap/diagnose/power_fit.h"
 #include "gap/diagnose/referee.h"
 #include "gap/diagnose/refit.h"
 #include "gap/equations/power.h"
@@ -40,7 +41,7 @@ struct Rest {
 // Where the blocks show no zone none can be there.
 void forbid_zones(Problem& problem) {
   for (Hypothesis& h : problem.hypotheses) {
-    if (h.is_effect() && is_zone(h.cause())) h.candidate.log_prior = -std::numeric_limits<double>::infinity();
+    if (h.id() == zone_effect) h.candidate.log_prior = -std::numeric_limits<double>::infinity();
   }
 }
 
@@ -57,22 +58,20 @@ Linear with_zone(const Material& m, const FitResult& fit, const FitSettings& set
   }
   if (std::ranges::any_of(around, is_zone)) return linearise(m, shapes, settings.shares, around);
   Linear linear = linearise(m, shapes, settings.shares, around, std::array{zone_effect}, fit.linear.noise);
-  std::vector<std::size_t> own;
-  for (const Hypothesis& h : linear.columns->hypotheses()) {
-    if (h.is_effect() && is_zone(h.cause()))
-      own.insert(own.end(), h.candidate.columns.begin(), h.candidate.columns.end());
+  HypothesisSet own;
+  for (std::size_t h = 0; h < linear.columns->hypotheses().size(); ++h) {
+    if (linear.columns->hypotheses()[h].id() == zone_effect) own.push_back(h);
   }
+  const std::vector<std::size_t> columns = columns_of(linear.columns->hypotheses(), own);
   for (std::size_t c = 0; c < channel_count; ++c) {
     ChannelRows rows = fit.linear.rows[c];
-    for (std::size_t j = rows.columns.size(); j-- > 0;) {
-      if (std::ranges::find(own, rows.columns[j]) == own.end()) continue;
-      const ChannelRows& anew = linear.rows[c];
-      const auto at = std::ranges::find(anew.columns, rows.columns[j]);
-      const auto column = static_cast<Eigen::Index>(j);
-      if (at == anew.columns.end()) {
-        rows.x.col(column).setZero();
+    const std::vector<Eigen::Index> to = places_of(rows, columns), from = places_of(linear.rows[c], columns);
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      if (to[k] < 0) continue;
+      if (from[k] < 0) {
+        rows.x.col(to[k]).setZero();
       } else {
-        rows.x.col(column) = anew.x.col(at - anew.columns.begin());
+        rows.x.col(to[k]) = linear.rows[c].x.col(from[k]);
       }
     }
     linear.rows[c] = std::move(rows);
@@ -84,7 +83,7 @@ Linear with_zone(const Material& m, const FitResult& fit, const FitSettings& set
 struct Found {
   Named named;
   std::vector<std::string> ids;
-  std::vector<double> bent;  // left_with_functions()
+  std::vector<double> left_w;  // left_with_functions()
 };
 
 Found find_without(const std::vector<bool>& out, const Material& m, const FitResult& fit,
@@ -103,7 +102,7 @@ Found find_without(const std::vector<bool>& out, const Material& m, const FitRes
   found.named = name_causes(m, equations, problem, explanation, power_w);
   for (const std::size_t h : found.named.set) found.ids.push_back(problem.hypotheses[h].id());
   if (fit.base.empty())
-    found.bent = left_with_functions(equations, problem, explanation, found.named.set, m.windows.size());
+    found.left_w = left_with_functions(equations, problem, explanation, found.named.set, m.windows.size());
   return found;
 }
 
@@ -128,7 +127,7 @@ std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::sp
   for (std::size_t part = 0; part < held.parts; ++part) {
     const std::vector<bool> out = blocks_of(part, held.parts, m.blocks);
     const Found found = fit.alone ? Found{} : find_without(out, whole, fit, power_w, settings);
-    const std::vector<double>& bent = found.bent;
+    const std::vector<double>& left = found.left_w;
     held.named.push_back(found.ids);
     held.causes.push_back(fit.base.empty()
                               ? found.named.causes
@@ -141,9 +140,9 @@ std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::sp
       if (others[k] || !std::isfinite(power_w[k] + unchanged[k])) continue;
       BlockErrors& b = held.blocks[m.windows[k].block];
       b.unchanged += std::fabs(power_w[k] - unchanged[k]);
-      b.explained += std::fabs(power_w[k] - explained[k]);
-      b.bent +=
-          bent.empty() || !std::isfinite(bent[k]) ? std::fabs(power_w[k] - explained[k]) : std::fabs(bent[k]);
+      const double missed = std::fabs(power_w[k] - explained[k]);
+      b.explained += missed;
+      if (!left.empty() && std::isfinite(left[k])) b.spared += missed - std::fabs(left[k]);
       b.referee += std::fabs(power_w[k] - referee.predict(m.windows[k]));
       b.size += std::fabs(power_w[k]);
     }
@@ -154,22 +153,20 @@ std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::sp
 
 std::vector<Need> base_needed(const Material& m, const FitResult& fit, const HeldOut& held,
                               std::span<const double> power_w) {
-  const auto missed = [&](std::span<const Cause> causes, std::size_t k) {
-    return std::fabs(power_w[k] -
-                     modelled_power(m.robot, m.adopted, causes, m.windows.subspan(k, 1)).front());
-  };
   std::vector<std::vector<double>> more(fit.base.size(), std::vector<double>(m.blocks));
   for (std::size_t part = 0; part < held.parts; ++part) {
     const std::vector<bool> out = blocks_of(part, held.parts, m.blocks);
     const Rest rest(m, out);
-    const std::vector<Cause>& with = held.causes[part];
+    const std::vector<Cause>& causes = held.causes[part];
+    const std::vector<double> with = modelled_power(m.robot, m.adopted, causes, m.windows);
     for (std::size_t b = 0; b < fit.base.size(); ++b) {
-      std::vector<Cause> others = with;
+      std::vector<Cause> others = causes;
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(b));
-      others = refit(rest.material, std::move(others));
+      const std::vector<double> without =
+          modelled_power(m.robot, m.adopted, refit(rest.material, std::move(others)), m.windows);
       for (std::size_t k = 0; k < m.windows.size(); ++k) {
         if (!out[m.windows[k].block] || !std::isfinite(power_w[k])) continue;
-        more[b][m.windows[k].block] += missed(others, k) - missed(with, k);
+        more[b][m.windows[k].block] += std::fabs(power_w[k] - without[k]) - std::fabs(power_w[k] - with[k]);
       }
     }
   }

@@ -4,22 +4,10 @@
 #include <cmath>
 
 #include "gap/traits.h"
+#include "statistics/regression.h"
 #include "statistics/robust.h"
 
 namespace joulecast::gap {
-namespace {
-
-// Where each column stands among a channel's; -1: it does not speak there.
-std::vector<Eigen::Index> places_of(const ChannelRows& r, std::span<const std::size_t> columns) {
-  std::vector<Eigen::Index> places;
-  for (const std::size_t k : columns) {
-    const auto at = std::ranges::find(r.columns, k);
-    places.push_back(at == r.columns.end() ? -1 : at - r.columns.begin());
-  }
-  return places;
-}
-
-}  // namespace
 
 bool power_speaks_alone(const Equations& e) {
   return e.columns.from_motion().alone() && e.rows[index_of(Channel::power)].y.size() > 0;
@@ -32,6 +20,15 @@ std::vector<std::size_t> columns_of(std::span<const Hypothesis> hypotheses, cons
     columns.insert(columns.end(), own.begin(), own.end());
   }
   return columns;
+}
+
+std::vector<Eigen::Index> places_of(const ChannelRows& r, std::span<const std::size_t> columns) {
+  std::vector<Eigen::Index> places;
+  for (const std::size_t k : columns) {
+    const auto at = std::ranges::find(r.columns, k);
+    places.push_back(at == r.columns.end() ? -1 : at - r.columns.begin());
+  }
+  return places;
 }
 
 Eigen::VectorXd moved_power(const Equations& e, const HypothesisSet& set,
@@ -47,7 +44,6 @@ Eigen::VectorXd moved_power(const Equations& e, const HypothesisSet& set,
 
 Eigen::VectorXd fitted_to_power(const Equations& e, const HypothesisSet& set, const Eigen::VectorXd& start) {
   constexpr int rounds = 12;
-  constexpr double bound = 1.345;  // as of the regression beside it
   const ChannelRows& r = e.rows[index_of(Channel::power)];
   const std::vector<std::size_t> columns = columns_of(e.columns.hypotheses(), set);
   std::vector<Eigen::Index> free;  // of the set's coefficients
@@ -84,9 +80,7 @@ Eigen::VectorXd fitted_to_power(const Equations& e, const HypothesisSet& set, co
     const Eigen::VectorXd left = y - x * c;
     const double spread = statistics::spread_about_zero({left.data(), static_cast<std::size_t>(left.size())});
     if (!(spread > 0)) break;
-    const Eigen::VectorXd weight = left.unaryExpr([&](double v) {
-      return statistics::huber_weight(v, spread, bound);
-    }) / (spread * spread * inflation);
+    const Eigen::VectorXd weight = statistics::huber_weights(left, spread) / (spread * spread * inflation);
     const Eigen::MatrixXd weighted = weight.asDiagonal() * x;
     const Eigen::MatrixXd information = weighted.transpose() * x + Eigen::MatrixXd(hold.asDiagonal());
     c = information.ldlt().solve(weighted.transpose() * y);

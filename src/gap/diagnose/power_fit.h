@@ -14,6 +14,9 @@ bool power_speaks_alone(const Equations& equations);
 // All columns of a set, in its order.
 std::vector<std::size_t> columns_of(std::span<const Hypothesis> hypotheses, const HypothesisSet& set);
 
+// Where each column stands among a channel's; -1: it does not speak there.
+std::vector<Eigen::Index> places_of(const ChannelRows& rows, std::span<const std::size_t> columns);
+
 // What a set with these coefficients, in the order of its columns, makes of power from motion, row by row
 // [W].
 Eigen::VectorXd moved_power(const Equations& equations, const HypothesisSet& set,

@@ -9,6 +9,7 @@
 #include "gap/equations/zone_scan.h"
 #include "gap/traits.h"
 #include "statistics/evidence.h"
+#include "statistics/regression.h"
 #include "statistics/robust.h"
 
 namespace joulecast::gap {
@@ -144,7 +145,6 @@ std::vector<Cause> rest(const Material& whole, const Shapes& shapes, std::vector
 std::vector<Cause> rest_of_power(const Material& m, const Shapes& shapes, std::vector<Cause> causes,
                                  std::span<const double> power_w) {
   constexpr int most_rounds = 25;
-  constexpr double bound = 1.345;  // as of the regression
   constexpr double settled = 1e-4,
                    least_gain = 1e-4;  // of a step, in units of what is expected, and of errors
   constexpr double step_share = 1e-3, first_damping = 1e-3, most_damping = 1e3;
@@ -195,9 +195,7 @@ std::vector<Cause> rest_of_power(const Material& m, const Shapes& shapes, std::v
       value += step * f.unit;
       x.col(k) = (left - left_by(moved)) / step;
     }
-    const Eigen::VectorXd weight = left.unaryExpr([&](double v) {
-      return statistics::huber_weight(v, spread, bound);
-    }) / (spread * spread);
+    const Eigen::VectorXd weight = statistics::huber_weights(left, spread) / (spread * spread);
     const Eigen::MatrixXd weighted = weight.asDiagonal() * x;
     Eigen::MatrixXd information = weighted.transpose() * x;
     const Eigen::VectorXd slope = weighted.transpose() * left - held;

@@ -140,9 +140,9 @@ class Judge {
   // Whether parts left out are predicted better with the functions, where that can be asked, and no worse
   // than by the regression.
   bool functions_help() const {
-    if (!f_.held_out || !(std::fabs(f_.held_out->bent() - f_.held_out->explained()) > 0)) return true;
-    return f_.held_out->bent() < f_.held_out->explained() &&
-           !baseline_of(*f_.held_out, &BlockErrors::bent).wins();
+    if (!f_.held_out) return true;
+    const double without = f_.held_out->explained(), with = f_.held_out->explained_with_functions();
+    return !(with > without || with < without) || (with < without && !baseline_of(*f_.held_out, true).wins());
   }
 
   // The largest thing outside the catalogue that both judges see and that surrogates do not show.
@@ -192,7 +192,7 @@ class Judge {
   }
 
   void explain_with_functions(Baseline& baseline) const {
-    Baseline with = baseline_of(*f_.held_out, &BlockErrors::bent);
+    const Baseline with = baseline_of(*f_.held_out, true);
     baseline.explanation_held_out = with.explanation_held_out;
     baseline.deviation = with.deviation;
   }
