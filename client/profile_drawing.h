@@ -7,9 +7,8 @@
 
 namespace joulecast::client {
 
-// A picture of a profile or estimate answer: speed, yaw rate where there is any, power and energy over time,
-// the plan against the trapezoid and the triangle as far as the answer has their columns. Fault::corrupt when
-// it has no columns at all.
-[[nodiscard]] Result<std::string> draw_profile(const nlohmann::json& answer);
+// A picture of a profile or estimate answer: the plan against the trapezoid and the triangle as far as the
+// answer has their columns. Fault::corrupt when it has no columns at all.
+[[nodiscard]] Result<std::string> draw_answer(const nlohmann::json& answer);
 
 }  // namespace joulecast::client

@@ -150,7 +150,7 @@ Result<void> plot(const Options& options, const Question& question, json request
   if (!text) return tl::unexpected(text.error());
   const json document = json::parse(*text, nullptr, false);
   if (!document.is_object()) return fail(Fault::corrupt, options.server, "did not answer with a JSON object");
-  const auto drawing = draw_profile(document);
+  const auto drawing = draw_answer(document);
   if (!drawing) return tl::unexpected(drawing.error());
   return write_file(options.plot_file, *drawing);
 }

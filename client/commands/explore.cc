@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "client/commands/table.h"
-#include "client/exploration_drawing.h"
+#include "report/exploration_drawing.h"
 #include "client/files.h"
 #include "client/progress.h"
 #include "client/virtual_robot/fleet.h"
@@ -109,7 +109,7 @@ Exit run(const Options& options) {
       options.map_file.empty() ? "Case " + std::to_string(options.number) : options.map_file;
   if (!options.svg_file.empty()) {
     const std::string drawing =
-        draw_exploration(title + " explored by " + robot->robot_id, *map, *exploration, energy);
+        report::draw_exploration(title + " explored by " + robot->robot_id, *map, *exploration, energy);
     if (auto ok = write_file(options.svg_file, drawing); !ok) return report(ok.error());
   }
   if (options.json)

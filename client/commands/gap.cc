@@ -117,7 +117,7 @@ Exit gap_of_logs(const Options& options, const robot::RobotModel& robot) {
   const auto recordings =
       telemetry::load_recordings(options.logs, options.robot_id.empty() ? robot.robot_id : options.robot_id);
   if (!recordings) return report(recordings.error());
-  const gap::ReportOrigin origin = report_origin(options.logs, options.robot_file);
+  const report::ReportOrigin origin = report_origin(options.logs, options.robot_file);
   if (!options.compare_by.empty())
     return gap_between_groups(*recordings, robot,
                               {options.compare_by, options.controls, options.json, options.report}, origin);
@@ -132,7 +132,7 @@ Exit gap_of_logs(const Options& options, const robot::RobotModel& robot) {
     if (judged->test) print(*judged->test);
   }
   if (!options.report.empty()) {
-    const auto page = gap::report_html(judged->diagnosis, robot, origin);
+    const auto page = report::report_html(judged->diagnosis, robot, origin);
     if (const auto written = write_file(options.report, page); !written) return report(written.error());
   }
   return options.apply.empty() ? Exit::ok : apply(options, *judged);

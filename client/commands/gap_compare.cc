@@ -10,7 +10,6 @@
 #include "client/progress.h"
 #include "client/wrapped.h"
 #include "gap/groups/comparison_json.h"
-#include "gap/groups/comparison_report.h"
 
 namespace joulecast::client {
 namespace {
@@ -52,7 +51,7 @@ void print_rest(const gap::Comparison& c) {
 }  // namespace
 
 Exit tell(const gap::Comparison& comparison, const robot::RobotModel& robot, bool json,
-          const std::string& report_file, const gap::ReportOrigin& origin) {
+          const std::string& report_file, const report::ReportOrigin& origin) {
   const nlohmann::ordered_json document = gap::comparison_to_json(comparison);
   if (json) {
     fmt::print("{}\n", document.dump(2));
@@ -61,12 +60,12 @@ Exit tell(const gap::Comparison& comparison, const robot::RobotModel& robot, boo
     print_rest(comparison);
   }
   if (report_file.empty()) return Exit::ok;
-  const auto written = write_file(report_file, gap::report_html(comparison, robot, origin));
+  const auto written = write_file(report_file, report::report_html(comparison, robot, origin));
   return written ? Exit::ok : report(written.error());
 }
 
 Exit gap_between_groups(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
-                        const GapCompareOptions& options, const gap::ReportOrigin& origin) {
+                        const GapCompareOptions& options, const report::ReportOrigin& origin) {
   const auto groups = gap::groups_of(recordings, options.by);
   if (!groups) return report(groups.error());
   const auto comparison = [&] {

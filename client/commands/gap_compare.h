@@ -5,7 +5,7 @@
 
 #include "client/commands/outcome.h"
 #include "gap/groups/compare.h"
-#include "gap/report/report.h"
+#include "report/report.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::client {
@@ -19,10 +19,10 @@ struct GapCompareOptions {
 
 // What changes between groups of the recordings.
 Exit gap_between_groups(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
-                        const GapCompareOptions& options, const gap::ReportOrigin& origin);
+                        const GapCompareOptions& options, const report::ReportOrigin& origin);
 
 // Prints a comparison and writes its page.
 Exit tell(const gap::Comparison& comparison, const robot::RobotModel& robot, bool json,
-          const std::string& report_file, const gap::ReportOrigin& origin);
+          const std::string& report_file, const report::ReportOrigin& origin);
 
 }  // namespace joulecast::client

@@ -11,7 +11,6 @@
 #include "client/progress.h"
 #include "client/wrapped.h"
 #include "gap/runs/runs_json.h"
-#include "gap/runs/runs_report.h"
 #include "gap/verdict/offer.h"
 
 namespace joulecast::client {
@@ -106,7 +105,7 @@ Exit gap_from_missions(const GapMissionsOptions& options, const robot::RobotMode
     print_rest(*diagnosis);
   }
   if (!options.report.empty()) {
-    const auto page = gap::report_html(*diagnosis, robot, report_origin(options.runs, options.robot_file));
+    const auto page = report::report_html(*diagnosis, robot, report_origin(options.runs, options.robot_file));
     if (const auto written = write_file(options.report, page); !written) return report(written.error());
   }
   if (options.apply.empty()) return Exit::ok;

@@ -224,8 +224,8 @@ Exit write_robot(const robot::RobotModel& robot, const std::string& path) {
   return written ? Exit::ok : report(written.error());
 }
 
-gap::ReportOrigin report_origin(const std::vector<std::string>& sources, const std::string& robot_file) {
-  gap::ReportOrigin origin;
+report::ReportOrigin report_origin(const std::vector<std::string>& sources, const std::string& robot_file) {
+  report::ReportOrigin origin;
   for (const std::string& source : sources)
     origin.sources.push_back(std::filesystem::path(source).filename().string());
   origin.model = std::filesystem::path(robot_file).filename().string();

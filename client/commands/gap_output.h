@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "client/commands/outcome.h"
-#include "gap/report/report.h"
+#include "report/report.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::client {
@@ -27,6 +27,6 @@ Exit write_adopted(std::span<const robot::AdoptedEffect> found, robot::RobotMode
 Exit write_robot(const robot::RobotModel& robot, const std::string& path);
 
 // What a report says of where it comes from: names of files without their folders, and now.
-gap::ReportOrigin report_origin(const std::vector<std::string>& sources, const std::string& robot_file);
+report::ReportOrigin report_origin(const std::vector<std::string>& sources, const std::string& robot_file);
 
 }  // namespace joulecast::client

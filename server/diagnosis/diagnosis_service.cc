@@ -15,9 +15,9 @@
 #include <utility>
 
 #include "gap/diagnose/recordings.h"
-#include "gap/report/report.h"
 #include "gap/verdict/diagnosis_json.h"
 #include "gap/verdict/offer.h"
+#include "report/report.h"
 #include "robot/robot_file.h"
 #include "server/diagnosis/gap_watch.h"
 #include "server/diagnosis/mission_recordings.h"
@@ -320,13 +320,13 @@ class DiagnosisService::Impl {
     result["since_utime_us"] = since_utime_us ? ordered_json(*since_utime_us) : ordered_json(nullptr);
     record.result_json = result.dump();
     record.summary_json = summary_of(result).dump();
-    gap::ReportOrigin origin;
+    report::ReportOrigin origin;
     for (const telemetry::Recording& mission : recordings.missions)
       origin.sources.push_back(mission.mission_id);
     origin.model = "version " + std::to_string(model.version) + " of " + record.robot_id;
     origin.made_at = utc_text(now_utime_us_());
     origin.software = "joulecastd " JOULECAST_VERSION;
-    report_ = gap::report_html(diagnosis, model.robot, origin);
+    report_ = report::report_html(diagnosis, model.robot, origin);
     // What a person who insists would get; of effects that are not told apart nobody has chosen one yet.
     const gap::Offer offer = gap::offer_of(diagnosis);
     if (offer.effects.empty()) return;

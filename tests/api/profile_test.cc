@@ -8,7 +8,6 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "client/profile_drawing.h"
 #include "tests/support/sample_robots.h"
 
 namespace joulecast::api {
@@ -183,29 +182,6 @@ TEST(Profile, TellsTheSpeedThatADeadlineNeeds) {
   EXPECT_GT(needed, 10.0 / 20);
   EXPECT_LE(needed, a["peak_speed_m_s"].get<double>() * (1 + 1e-9));
   EXPECT_GT(a["pareto"][0]["peak_speed_m_s"].get<double>(), needed);
-}
-
-TEST(ProfileDrawing, ShowsPlanAndBaselines) {
-  const json request = {
-      {"path", {{{"kind", "straight"}, {"length_m", 3}}, {{"kind", "turn"}, {"angle_rad", 1}}}},
-      {"baseline_columns", true}};
-  const auto count = [](const std::string& text, const std::string& part) {
-    std::size_t n = 0;
-    for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
-    return n;
-  };
-  const auto drawing = client::draw_profile(answer(profile_answer, request));
-  ASSERT_TRUE(drawing) << describe(drawing.error());
-  EXPECT_EQ(count(*drawing, "<polyline"), 3u * 4u);
-  for (const char* words :
-       {"speed [m/s]", "yaw rate", "power from the battery [W]", "energy from the battery [J]",
-        "least energy", "trapezoid", "triangle", "time [s]"})
-    EXPECT_EQ(count(*drawing, words) > 0, true) << words;
-  EXPECT_EQ(drawing->find("nan"), std::string::npos);
-  const auto bare =
-      client::draw_profile(answer(profile_answer, {{"path", request["path"]}, {"columns", false}}));
-  ASSERT_FALSE(bare);
-  EXPECT_EQ(bare.error().fault, Fault::corrupt);
 }
 
 }  // namespace

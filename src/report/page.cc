@@ -1,10 +1,10 @@
-#include "gap/report/page.h"
+#include "report/page.h"
 
 #include <fmt/format.h>
 
 #include "base/xml_text.h"
 
-namespace joulecast::gap {
+namespace joulecast::report {
 namespace {
 
 constexpr std::string_view style = R"(
@@ -155,4 +155,4 @@ std::string Page::str() const {
       xml_escaped(title_), style, body_, open_ ? "</section>" : "");
 }
 
-}  // namespace joulecast::gap
+}  // namespace joulecast::report

@@ -1,4 +1,4 @@
-#include "gap/report/report.h"
+#include "report/report.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,8 +15,10 @@
 #include "gap/traits.h"
 #include "gap/verdict/text.h"
 
-namespace joulecast::gap {
+namespace joulecast::report {
 namespace {
+
+using namespace gap;
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -477,4 +479,4 @@ TEST(Report, SaysThatAnExplanationDoesNotStand) {
 }
 
 }  // namespace
-}  // namespace joulecast::gap
+}  // namespace joulecast::report

@@ -1,15 +1,17 @@
-#include "gap/report/report.h"
-
 #include <fmt/format.h>
 
 #include <cmath>
 
 #include "base/xml_text.h"
-#include "gap/report/quantity.h"
-#include "gap/report/sections.h"
 #include "gap/verdict/words.h"
+#include "report/quantity.h"
+#include "report/report.h"
+#include "report/sections.h"
 
-namespace joulecast::gap {
+namespace joulecast::report {
+
+using namespace gap;
+
 namespace {
 
 std::string gap_text(const Diagnosis& d) {
@@ -181,4 +183,4 @@ std::string report_html(const Diagnosis& d, const robot::RobotModel& robot, cons
   return page.str();
 }
 
-}  // namespace joulecast::gap
+}  // namespace joulecast::report

@@ -1,14 +1,16 @@
-#include "gap/runs/runs_report.h"
-
 #include <fmt/format.h>
 
 #include "base/xml_text.h"
-#include "gap/report/chart.h"
-#include "gap/report/quantity.h"
-#include "gap/report/sections.h"
 #include "gap/verdict/words.h"
+#include "report/chart.h"
+#include "report/quantity.h"
+#include "report/report.h"
+#include "report/sections.h"
 
-namespace joulecast::gap {
+namespace joulecast::report {
+
+using namespace gap;
+
 namespace {
 
 std::string sentence_of(const RunDiagnosis& r) {
@@ -83,4 +85,4 @@ std::string report_html(const RunDiagnosis& r, const robot::RobotModel& robot, c
   return page.str();
 }
 
-}  // namespace joulecast::gap
+}  // namespace joulecast::report

@@ -4,13 +4,16 @@
 
 #include "base/xml_text.h"
 #include "dynamics/catalogue.h"
-#include "gap/report/quantity.h"
-#include "gap/report/sections.h"
 #include "gap/traits.h"
 #include "gap/verdict/text.h"
 #include "gap/verdict/words.h"
+#include "report/quantity.h"
+#include "report/sections.h"
 
-namespace joulecast::gap {
+namespace joulecast::report {
+
+using namespace gap;
+
 namespace {
 
 constexpr double least_told = 0.01;  // of a strength, that its wander along the recordings is worth a word
@@ -151,4 +154,4 @@ void adoption_section(Page& page, const Diagnosis& d) {
   page.table(header, rows, 2);
 }
 
-}  // namespace joulecast::gap
+}  // namespace joulecast::report

@@ -4,15 +4,17 @@
 #include <string>
 #include <string_view>
 
-namespace joulecast::client {
+namespace joulecast::report {
 
-// How a shape looks; empty colours are not painted.
+// How a shape looks. With `css`, a class of the style sheet around it says so and colours are not written.
 struct SvgStyle {
   std::string_view fill = "none";
   std::string_view stroke = "none";
   double width = 1;
   std::string_view dash = "";
   double opacity = 1;
+  std::string_view css = "";
+  std::string_view hint = "";  // shown when pointed at
 };
 
 struct SvgPoint {
@@ -28,12 +30,17 @@ struct SvgText {
   SvgAnchor anchor = SvgAnchor::start;
   bool bold = false;
   std::string_view halo = "";  // colour painted round the letters
+  std::string_view css = "";   // a class in the place of size, colour and anchor
+  bool upwards = false;        // turned by 90 degrees to the left
 };
 
 // Builds one SVG 1.1 picture; coordinates are pixels, y down. Every text is escaped.
 class Svg {
  public:
-  Svg(double width, double height, std::string_view title);
+  // A document of its own on white, with `style_sheet` for the classes that it uses.
+  static Svg document(double width, double height, std::string_view title, std::string_view style_sheet = "");
+  // A part of a page; `name` is read out by screen readers.
+  static Svg part(double width, double height, std::string_view name, std::string_view css = "");
 
   void rect(double x, double y, double width, double height, const SvgStyle& style, double corner = 0);
   void circle(SvgPoint center, double radius, const SvgStyle& style);
@@ -45,15 +52,16 @@ class Svg {
   void begin_clip(double x, double y, double width, double height);
   void end_clip();
 
-  // The finished document.
   std::string str() const;
 
  private:
-  void points(std::span<const SvgPoint> points);
-  void style(const SvgStyle& style);
+  explicit Svg(std::string head) : body_(std::move(head)) {}
+  void attribute(std::string_view name, double pixels);
+  void points(std::string_view element, std::span<const SvgPoint> points, const SvgStyle& style);
+  void finish(std::string_view element, const SvgStyle& style);
 
   std::string body_;
   int clips_ = 0;
 };
 
-}  // namespace joulecast::client
+}  // namespace joulecast::report

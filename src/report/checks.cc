@@ -4,12 +4,15 @@
 #include <cmath>
 
 #include "base/xml_text.h"
-#include "gap/report/chart.h"
-#include "gap/report/quantity.h"
-#include "gap/report/sections.h"
 #include "gap/verdict/words.h"
+#include "report/chart.h"
+#include "report/quantity.h"
+#include "report/sections.h"
 
-namespace joulecast::gap {
+namespace joulecast::report {
+
+using namespace gap;
+
 namespace {
 
 std::string small_print(const Check& c) {
@@ -140,4 +143,4 @@ void channels_section(Page& page, std::span<const ChannelGap> channels) {
   page.chart(bars(rows, "", "gap of each kind of reading"));
 }
 
-}  // namespace joulecast::gap
+}  // namespace joulecast::report

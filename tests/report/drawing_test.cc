@@ -1,12 +1,15 @@
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <stack>
 #include <string>
+#include <vector>
 
-#include "client/exploration_drawing.h"
-#include "client/svg.h"
+#include "report/exploration_drawing.h"
+#include "report/profile_drawing.h"
+#include "report/svg.h"
 
-namespace joulecast::client {
+namespace joulecast::report {
 namespace {
 
 // Every tag closed in order, attributes quoted: enough of XML for what the writer emits.
@@ -29,7 +32,7 @@ void expect_well_formed(const std::string& text) {
 }
 
 TEST(Svg, EscapesTextAndStaysWellFormed) {
-  Svg svg(100, 50, "a < b & \"c\"");
+  Svg svg = Svg::document(100, 50, "a < b & \"c\"");
   svg.text({1, 2}, "<script>\x01&</script>");
   svg.begin_clip(0, 0, 10, 10);
   svg.line({0, 0}, {-0.001, 1.0 / 3}, {.stroke = "#000"});
@@ -54,5 +57,31 @@ TEST(ExplorationDrawing, NumbersEveryLookAndRepeatsItself) {
   }
 }
 
+TEST(ProfileDrawing, DrawsEveryMotionInEveryPanelThatHasSomething) {
+  const auto count = [](const std::string& text, const std::string& part) {
+    std::size_t n = 0;
+    for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
+    return n;
+  };
+  const double unknown = std::numeric_limits<double>::quiet_NaN();
+  std::vector<DrawnMotion> motions{
+      {"least energy: 10 J", "plan", {0, 1, 2}, {0, 1, 0}, {0, 0, 0}, {5, 9, unknown}, {0, 7, 10}},
+      {"trapezoid: 11 J", "trapezoid", {0, 3}, {0, 0}, {0, 0}, {5, 5}, {0, 11}}};
+  const std::string straight = draw_profile("amr: 1 m", motions);
+  expect_well_formed(straight);
+  EXPECT_EQ(count(straight, "<polyline"), 2u * 3u);
+  EXPECT_EQ(count(straight, "nan"), 0u);
+  for (const char* words : {"amr: 1 m", "least energy: 10 J", "trapezoid: 11 J", "speed, m/s",
+                            "power from the battery, W", "energy from the battery, J", "time, s"})
+    EXPECT_GT(count(straight, words), 0u) << words;
+  EXPECT_EQ(count(straight, "yaw rate"), 0u);
+  motions[0].yaw_rate_rad_s[1] = 0.5;
+  EXPECT_EQ(count(draw_profile("amr", motions), "<polyline"), 2u * 4u);
+  motions[0].speed_m_s[1] = 0;
+  const std::string turn = draw_profile("amr", motions);
+  EXPECT_EQ(count(turn, "<polyline"), 2u * 3u);
+  EXPECT_EQ(count(turn, "speed, m/s"), 0u);
+}
+
 }  // namespace
-}  // namespace joulecast::client
+}  // namespace joulecast::report

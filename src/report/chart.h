@@ -7,14 +7,13 @@
 #include <string_view>
 #include <vector>
 
-namespace joulecast::gap {
+#include "report/svg.h"
 
-struct ChartPoint {
-  double x = 0, y = 0;
-};
+namespace joulecast::report {
 
-// One inline SVG picture with two axes. Colours come from the page's style sheet by class names, so that one
-// picture serves light and dark pages.
+// Two axes and what is drawn between them, within a box of a picture. Colours come from a style sheet by
+// class names, so that one picture serves light and dark pages. Values beyond the axes are drawn at their
+// ends.
 class Chart {
  public:
   struct Axis {
@@ -23,27 +22,26 @@ class Chart {
     bool ticks = true;
     std::string_view degrees = {};  // what degrees beside the axis's radians are called; empty: it has none
   };
-  // `name` is read out by screen readers.
-  Chart(double width, double height, Axis x, Axis y, std::string_view name);
+  struct Box {
+    double left, top, width, height;  // px, with room for the axes
+  };
+  Chart(Svg& svg, Box box, Axis x, Axis y);
 
   void bar(double from, double to, double base, double value, std::string_view style, std::string_view hint);
-  void line(std::span<const ChartPoint> points, std::string_view style);
-  void dot(ChartPoint at, std::string_view style, std::string_view hint, double radius = 3.2);
-  void segment(ChartPoint from, ChartPoint to, std::string_view style);
-  void cell(ChartPoint low, ChartPoint high, std::string_view style, double opacity, std::string_view hint);
+  void line(std::span<const SvgPoint> points, std::string_view style);  // interrupted where a y is not finite
+  void segment(SvgPoint from, SvgPoint to, std::string_view style);
+  void cell(SvgPoint low, SvgPoint high, std::string_view style, double opacity, std::string_view hint);
   void level(double y, std::string_view style);
   // A label under the x axis in the place of numbers.
   void category(double x, std::string_view text);
-
-  std::string str() const;
 
  private:
   double px(double x) const;
   double py(double y) const;
 
-  double width_, height_;
+  Svg& svg_;
+  Box box_;  // between the axes
   Axis x_, y_;
-  std::string body_;
 };
 
 // Round values that span a range.
@@ -70,4 +68,4 @@ struct ChangeRow {
 // One line a row: a value before and after, on a common axis with zero marked.
 std::string changes(std::span<const ChangeRow> rows, std::string_view axis, std::string_view name);
 
-}  // namespace joulecast::gap
+}  // namespace joulecast::report

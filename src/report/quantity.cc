@@ -1,4 +1,4 @@
-#include "gap/report/quantity.h"
+#include "report/quantity.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,10 @@
 
 #include "gap/verdict/words.h"
 
-namespace joulecast::gap {
+namespace joulecast::report {
+
+using namespace gap;
+
 namespace {
 
 constexpr std::string_view unknown = "–";
@@ -98,4 +101,4 @@ std::string capital(std::string text) {
   return text;
 }
 
-}  // namespace joulecast::gap
+}  // namespace joulecast::report

@@ -7,7 +7,7 @@
 #include "exploration/explore.h"
 #include "exploration/mission_energy.h"
 
-namespace joulecast::client {
+namespace joulecast::report {
 
 // An SVG that tells an exploration from start to end: the whole path with its numbered looks on the left, the
 // steps in words, legend and energy on the right, and below one small picture a round with the next best
@@ -16,4 +16,4 @@ std::string draw_exploration(std::string_view title, const exploration::Map& map
                              const exploration::Exploration& exploration,
                              std::span<const exploration::MissionEnergy> energy);
 
-}  // namespace joulecast::client
+}  // namespace joulecast::report

@@ -5,7 +5,7 @@
 #include <string_view>
 
 // How reports put numbers: a dash where a number is not known, degrees beside radians.
-namespace joulecast::gap {
+namespace joulecast::report {
 
 // "0.0182 ± 0.0011 N m", "0.0163 ± 0.0008 rad (0.934 ± 0.046°)".
 std::string quantity(double value, double deviation, std::string_view unit);
@@ -25,4 +25,4 @@ std::string chance_text(double probability);
 std::string count_text(std::size_t count, std::string_view noun);  // "1 mission", "2 missions"
 std::string capital(std::string text);
 
-}  // namespace joulecast::gap
+}  // namespace joulecast::report

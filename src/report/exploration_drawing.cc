@@ -1,4 +1,4 @@
-#include "client/exploration_drawing.h"
+#include "report/exploration_drawing.h"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,10 @@
 #include <numbers>
 #include <vector>
 
-#include "client/svg.h"
+#include "report/chart.h"
+#include "report/svg.h"
 
-namespace joulecast::client {
+namespace joulecast::report {
 namespace {
 
 using namespace exploration;
@@ -86,10 +87,7 @@ void draw_ground(Svg& svg, const Frame& frame, const Exploration& e, std::size_t
 
 void draw_axes(Svg& svg, const Frame& frame) {
   const double longer = std::max(frame.map.width_m, frame.map.height_m);
-  double step = std::pow(10.0, std::floor(std::log10(longer / 2)));
-  while (longer / step < 4) step /= 2;
-  while (longer / step > 8) step *= 2;
-  for (double v = 0; v <= longer * (1 + 1e-9); v += step) {
+  for (const double v : ticks_of(0, longer, 6)) {
     if (v <= frame.map.width_m * (1 + 1e-9)) {
       const SvgPoint p = frame.at({v, 0});
       svg.line(p, {p.x, p.y + 4}, {.stroke = "#333"});
@@ -341,7 +339,7 @@ std::string draw_exploration(std::string_view title, const Map& map, const Explo
       std::max(width, left + static_cast<double>(std::min(panels, panels_a_row)) * (sample.width() + 22));
   const double height = top + upper + 30 + static_cast<double>(panel_rows) * panel_height + margin_px;
 
-  Svg svg(width_needed, height, title);
+  Svg svg = Svg::document(width_needed, height, title);
   svg.text({left, margin_px + 8}, title, {.size = 18, .bold = true});
   draw_whole(svg, whole, e);
 
@@ -365,4 +363,4 @@ std::string draw_exploration(std::string_view title, const Map& map, const Explo
   return svg.str();
 }
 
-}  // namespace joulecast::client
+}  // namespace joulecast::report

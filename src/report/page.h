@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace joulecast::gap {
+namespace joulecast::report {
 
 // Sections of a page with its style sheet around them.
 class Page {
@@ -39,4 +39,4 @@ class Page {
   std::string title_;
 };
 
-}  // namespace joulecast::gap
+}  // namespace joulecast::report

@@ -1,16 +1,19 @@
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 
 #include "base/xml_text.h"
-#include "gap/report/chart.h"
-#include "gap/report/quantity.h"
-#include "gap/report/sections.h"
 #include "gap/verdict/words.h"
+#include "report/chart.h"
+#include "report/quantity.h"
+#include "report/sections.h"
 
-namespace joulecast::gap {
+namespace joulecast::report {
+
+using namespace gap;
+
 namespace {
 
 using Entries = std::vector<std::pair<std::string, std::string>>;
@@ -32,9 +35,9 @@ std::string chart_of(const Figures::Map& map, bool with_effects) {
   const bool named = !map.bins.front().label.empty();
   const std::string_view degrees =
       map.axis.find("rad/s") == std::string::npos ? std::string_view() : degrees_of("rad/s");
-  Chart chart(420, 230, {map.bins.front().from, map.bins.back().to, map.axis, !named, degrees},
-              {low < 0 ? low - margin : low, high + margin, "missed power, W", true},
-              "power that the model misses over " + map.axis);
+  Svg svg = Svg::part(420, 230, "power that the model misses over " + map.axis);
+  Chart chart(svg, {0, 0, 420, 230}, {map.bins.front().from, map.bins.back().to, map.axis, !named, degrees},
+              {low < 0 ? low - margin : low, high + margin, "missed power, W"});
   chart.level(0, "zero");
   for (const Figures::Bin& b : map.bins) {
     const double width = b.to - b.from, middle = b.from + 0.5 * width, edge = 0.08 * width;
@@ -50,7 +53,7 @@ std::string chart_of(const Figures::Map& map, bool with_effects) {
     const double at = 0.5 * (b.from + edge + before_to);
     chart.segment({at, b.before_w - b.half_width_w}, {at, b.before_w + b.half_width_w}, "whisker");
   }
-  return chart.str();
+  return svg.str();
 }
 
 void regions_table(Page& page, std::span<const WhereRegion> where) {
@@ -92,24 +95,20 @@ struct Extent {
 std::string floor_chart(const Figures& f, const Extent& e, bool after) {
   constexpr double plot = 380, beside = 64, below = 50;  // of the picture's longer side, and for its axes
   const double scale = plot / std::max(e.x1 - e.x0, e.y1 - e.y0);
-  Chart chart((e.x1 - e.x0) * scale + beside, (e.y1 - e.y0) * scale + below, {e.x0, e.x1, "x, m", true},
-              {e.y0, e.y1, "y, m", true},
-              after ? "floor map, with the effects" : "floor map, model as it is");
+  const double width = (e.x1 - e.x0) * scale + beside, height = (e.y1 - e.y0) * scale + below;
+  Svg svg = Svg::part(width, height, after ? "floor map, with the effects" : "floor map, model as it is");
+  Chart chart(svg, {0, 0, width, height}, {e.x0, e.x1, "x, m"}, {e.y0, e.y1, "y, m"});
   for (const Figures::Cell& c : f.floor) {
     const double value = after ? c.after_w : c.before_w;
     chart.cell({c.x_m, c.y_m}, {c.x_m + f.cell_m, c.y_m + f.cell_m}, value > 0 ? "more" : "less",
                0.06 + 0.94 * std::min(1.0, std::fabs(value) / std::max(e.strong_w, 1e-9)),
                fmt::format("{} W missed, {}", brief(value), count_text(c.windows, "window")));
   }
-  return chart.str();
+  return svg.str();
 }
 
 std::string utc(std::int64_t utime_us) {
-  const auto seconds = static_cast<std::time_t>(utime_us / 1'000'000);
-  std::tm t{};
-  gmtime_r(&seconds, &t);
-  return fmt::format("{:04}-{:02}-{:02} {:02}:{:02}", t.tm_year + 1900, t.tm_mon + 1, t.tm_mday, t.tm_hour,
-                     t.tm_min);
+  return fmt::format("{:%Y-%m-%d %H:%M}", fmt::gmtime(static_cast<std::time_t>(utime_us / 1'000'000)));
 }
 
 }  // namespace
@@ -150,7 +149,7 @@ void power_section(Page& page, const Diagnosis& d) {
   constexpr std::size_t fewest_points = 5;
   const std::vector<Figures::Point>& points = d.figures.power;
   if (points.size() < fewest_points) return;
-  std::vector<ChartPoint> measured, before, after;
+  std::vector<SvgPoint> measured, before, after;
   double low = 0, high = 0;
   for (const Figures::Point& p : points) {
     measured.push_back({p.t_s, p.measured_w});
@@ -165,15 +164,16 @@ void power_section(Page& page, const Diagnosis& d) {
   Entries legend = legend_of(!d.effects.empty());
   legend.insert(legend.begin(), {"measured", "measured"});
   page.legend(legend);
-  Chart chart(820, 300, {points.front().t_s, points.back().t_s, "time since the mission began, s", true},
+  Svg svg = Svg::part(820, 300, "measured and modelled power");
+  Chart chart(svg, {0, 0, 820, 300},
+              {points.front().t_s, points.back().t_s, "time since the mission began, s"},
               {low, high * 1.05,
-               d.power == PowerSource::battery ? "battery power, W" : "motor power with idle power, W", true},
-              "measured and modelled power");
+               d.power == PowerSource::battery ? "battery power, W" : "motor power with idle power, W"});
   chart.level(0, "zero");
   chart.line(before, "before");
   if (!d.effects.empty()) chart.line(after, "after");
   chart.line(measured, "measured");
-  page.wide_chart(chart.str());
+  page.wide_chart(svg.str());
 }
 
 void missions_section(Page& page, const Diagnosis& d) {
@@ -203,4 +203,4 @@ void missions_section(Page& page, const Diagnosis& d) {
     page.paragraph(fmt::format("The first {} of {} missions.", rows.size(), d.missions));
 }
 
-}  // namespace joulecast::gap
+}  // namespace joulecast::report

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "gap/groups/compare.h"
+#include "gap/runs/diagnose_runs.h"
+#include "gap/verdict/diagnosis.h"
+#include "robot/robot_model.h"
+
+// Diagnoses as HTML pages that need nothing else, for a reader who was not there. A report shows what a
+// diagnosis and its figures hold and computes nothing; `robot` is the model that was judged.
+namespace joulecast::report {
+
+// What a report says of its own origin.
+struct ReportOrigin {
+  std::vector<std::string> sources;  // names of logs or tables, or what else was read; no paths
+  std::string model;                 // name of the robot file, or the version in the daemon
+  std::string made_at;               // UTC, as 2026-01-31 12:00; empty: not said
+  std::string software;              // name and version
+};
+
+// Checks, effects, the plain regression beside them, maps, power over time, limits and origin of the data.
+std::string report_html(const gap::Diagnosis& diagnosis, const robot::RobotModel& robot,
+                        const ReportOrigin& origin);
+// Of a diagnosis from energies of runs.
+std::string report_html(const gap::RunDiagnosis& diagnosis, const robot::RobotModel& robot,
+                        const ReportOrigin& origin);
+// Of a comparison between groups.
+std::string report_html(const gap::Comparison& comparison, const robot::RobotModel& robot,
+                        const ReportOrigin& origin);
+
+}  // namespace joulecast::report
