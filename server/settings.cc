@@ -247,73 +247,79 @@ std::string Settings::print() const {
   return text;
 }
 
-Result<Invocation> read_settings(const std::vector<std::string>& arguments,
-                                 const std::vector<std::string>& environment) {
-  using Action = Invocation::Action;
-  static const std::vector<std::pair<std::string, Action>> actions{
-      {"--help", Action::help},
-      {"--version", Action::version},
-      {"--check-config", Action::check_config},
-      {"--print-config", Action::print_config},
-      {"--print-openapi", Action::print_openapi},
-      {"--print-config-schema", Action::print_config_schema},
-  };
-  Invocation invocation;
+namespace {
+
+using Action = Invocation::Action;
+
+constexpr std::array<std::pair<std::string_view, Action>, 6> actions{{
+    {"--help", Action::help},
+    {"--version", Action::version},
+    {"--check-config", Action::check_config},
+    {"--print-config", Action::print_config},
+    {"--print-openapi", Action::print_openapi},
+    {"--print-config-schema", Action::print_config_schema},
+}};
+
+// What flags and environment say before any of it is in force.
+struct Given {
+  std::optional<Action> action;
   std::optional<std::string> config;
-  std::vector<Pending> flags;
-  bool acting = false;
+  std::vector<Pending> flags, variables;
+};
+
+Result<const Setting*> setting_of_flag(const std::string& name) {
+  const auto table = settings_table();
+  const auto setting =
+      std::find_if(table.begin(), table.end(), [&](const Setting& each) { return each.flag() == name; });
+  if (setting != table.end()) return &*setting;
+  if (name == "--config") return nullptr;
+  auto known = all_names([](const Setting& each) { return each.flag(); });
+  for (const auto& each : actions) known.emplace_back(each.first);
+  known.emplace_back("--config");
+  return invalid(name, "unknown flag" + did_you_mean(name, known));
+}
+
+Result<void> read_flags(const std::vector<std::string>& arguments, Given& given) {
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const std::string& argument = arguments[i];
-    const auto equals = argument.find('=');
-    const std::string name = argument.substr(0, equals);
     const auto action = std::find_if(actions.begin(), actions.end(),
                                      [&](const auto& each) { return each.first == argument; });
     if (action != actions.end()) {
-      if (acting && invocation.action != action->second)
+      if (given.action.value_or(action->second) != action->second)
         return invalid(argument, "only one such command can be given");
-      invocation.action = action->second;
-      acting = true;
+      given.action = action->second;
       continue;
     }
-    const auto table = settings_table();
-    const auto setting =
-        std::find_if(table.begin(), table.end(), [&](const Setting& each) { return each.flag() == name; });
-    if (setting == table.end() && name != "--config") {
-      auto known = all_names([](const Setting& each) { return each.flag(); });
-      for (const auto& each : actions) known.push_back(each.first);
-      known.emplace_back("--config");
-      return invalid(name, "unknown flag" + did_you_mean(name, known));
-    }
-    std::string value;
-    if (equals != std::string::npos) {
-      value = argument.substr(equals + 1);
-    } else if (i + 1 < arguments.size()) {
-      value = arguments[++i];
-    } else {
-      return invalid(name, "needs a value");
-    }
-    if (setting == table.end()) {
-      if (config) return invalid(name, "is given more than once");
-      config = std::move(value);
-      continue;
-    }
-    if (std::any_of(flags.begin(), flags.end(), [&](const Pending& each) { return each.where == name; })) {
-      return invalid(name, "is given more than once");
-    }
-    flags.push_back({std::string(setting->key), std::move(value), name});
+    const auto equals = argument.find('=');
+    const std::string name = argument.substr(0, equals);
+    const auto setting = setting_of_flag(name);
+    if (!setting) return tl::unexpected(setting.error());
+    if (equals == std::string::npos && i + 1 == arguments.size()) return invalid(name, "needs a value");
+    std::string value = equals == std::string::npos ? arguments[++i] : argument.substr(equals + 1);
+    const bool repeated =
+        *setting == nullptr
+            ? given.config.has_value()
+            : std::ranges::any_of(given.flags, [&](const Pending& each) { return each.where == name; });
+    if (repeated) return invalid(name, "is given more than once");
+    if (*setting == nullptr)
+      given.config = std::move(value);
+    else
+      given.flags.push_back({std::string((*setting)->key), std::move(value), name});
   }
+  return {};
+}
 
-  std::vector<Pending> variables;
+Result<void> read_environment(const std::vector<std::string>& environment, Given& given) {
+  const auto table = settings_table();
   for (const std::string& entry : environment) {
     if (!entry.starts_with("JOULECAST_")) continue;
     const auto equals = entry.find('=');
     const std::string name = entry.substr(0, equals);
     std::string value = equals == std::string::npos ? "" : entry.substr(equals + 1);
     if (name == "JOULECAST_CONFIG") {
-      if (!config) config = std::move(value);
+      if (!given.config) given.config = std::move(value);
       continue;
     }
-    const auto table = settings_table();
     const auto setting = std::find_if(table.begin(), table.end(),
                                       [&](const Setting& each) { return each.environment() == name; });
     if (setting == table.end()) {
@@ -321,24 +327,32 @@ Result<Invocation> read_settings(const std::vector<std::string>& arguments,
       known.emplace_back("JOULECAST_CONFIG");
       return invalid(name, "unknown environment variable" + did_you_mean(name, known));
     }
-    variables.push_back({std::string(setting->key), std::move(value), name});
+    given.variables.push_back({std::string(setting->key), std::move(value), name});
   }
+  return {};
+}
 
+}  // namespace
+
+Result<Invocation> read_settings(const std::vector<std::string>& arguments,
+                                 const std::vector<std::string>& environment) {
+  Given given;
+  if (auto done = read_flags(arguments, given); !done) return tl::unexpected(done.error());
+  if (auto done = read_environment(environment, given); !done) return tl::unexpected(done.error());
+  Invocation invocation;
+  if (given.action) invocation.action = *given.action;
   if (invocation.action == Action::help || invocation.action == Action::version) return invocation;
-  if (config) {
-    auto text = read_whole(*config);
-    if (!text) return tl::unexpected<Error>(text.error());
-    if (auto done = invocation.settings.read_file_text(*text, *config); !done)
-      return tl::unexpected<Error>(done.error());
+  if (given.config) {
+    auto text = read_whole(*given.config);
+    if (!text) return tl::unexpected(text.error());
+    if (auto done = invocation.settings.read_file_text(*text, *given.config); !done)
+      return tl::unexpected(done.error());
   }
-  for (const auto& [key, value, where] : variables) {
-    if (auto done = invocation.settings.set(key, value, Origin::environment, where); !done) {
-      return tl::unexpected<Error>(done.error());
-    }
-  }
-  for (const auto& [key, value, where] : flags) {
-    if (auto done = invocation.settings.set(key, value, Origin::flag, where); !done) {
-      return tl::unexpected<Error>(done.error());
+  for (const auto& [pending, origin] :
+       {std::pair{&given.variables, Origin::environment}, {&given.flags, Origin::flag}}) {
+    for (const auto& [key, value, where] : *pending) {
+      if (auto done = invocation.settings.set(key, value, origin, where); !done)
+        return tl::unexpected(done.error());
     }
   }
   return invocation;

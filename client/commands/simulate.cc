@@ -255,48 +255,39 @@ double length_s(const std::vector<vr::SimulationSpec>& specs, const Options& opt
   return 1e-6 * static_cast<double>(last_us - specs.front().start_utime_us);
 }
 
-Exit run(const Options& options, bool lcm_asked) {
-  if (options.list_effects) {
-    print_effects();
-    return Exit::ok;
-  }
-  const bool over_lcm = options.log.empty() || lcm_asked;
-  if (!over_lcm && options.duration_s == 0 && options.missions == 0) {
-    return report({Fault::invalid, "--log", "a log needs an end: give --duration or --missions"});
-  }
-  if (over_lcm && options.speed == 0) {
-    return report(
-        {Fault::invalid, "--speed", "0 (unpaced) goes with --log alone; LCM receivers would lose messages"});
-  }
+Result<void> check_options(const Options& options, bool over_lcm) {
   const bool endless = options.duration_s == 0 && options.missions == 0;
-  if (over_lcm && options.speed > 1 && endless) {
-    return report(
-        {Fault::invalid, "--speed",
-         "above 1 needs an end, so that no stamp lies in the future: give --duration or --missions"});
-  }
+  if (!over_lcm && endless) return invalid("--log", "a log needs an end: give --duration or --missions");
+  if (over_lcm && options.speed == 0)
+    return invalid("--speed", "0 (unpaced) goes with --log alone; LCM receivers would lose messages");
+  if (over_lcm && options.speed > 1 && endless)
+    return invalid(
+        "--speed",
+        "above 1 needs an end, so that no stamp lies in the future: give --duration or --missions");
   for (const auto& [flag, file] : {std::pair{"--log", &options.log}, {"--truth", &options.truth}})
-    if (const auto may = may_write(flag, *file, options.force); !may) return report(may.error());
-  auto members = assemble(options);
-  if (!members) return report(members.error());
+    if (const auto may = may_write(flag, *file, options.force); !may) return may;
+  return {};
+}
 
-  InterruptGuard interrupt;
+Result<Outlets> open_outlets(const Options& options, bool over_lcm) {
   Outlets outlets;
   if (!options.log.empty()) {
     auto log = telemetry::EventLogWriter::create(options.log);
-    if (!log) return report(log.error());
+    if (!log) return tl::unexpected(log.error());
     outlets.log = std::move(*log);
   }
   if (over_lcm) {
     auto link = telemetry::LcmLink::open(options.lcm_url);
-    if (!link) return report(link.error());
+    if (!link) return tl::unexpected(link.error());
     outlets.link = std::move(*link);
   }
-  if (!options.server.empty()) {
-    if (auto known = introduce(*members, options.server); !known) return report(known.error());
-  }
+  return outlets;
+}
 
+std::vector<vr::SimulationSpec> timed_specs(const std::vector<Member>& members, const Options& options,
+                                            bool over_lcm) {
   std::vector<vr::SimulationSpec> specs;
-  for (const Member& member : *members) specs.push_back(member.spec);
+  for (const Member& member : members) specs.push_back(member.spec);
   std::int64_t start_us = batch_start_us;
   if (over_lcm) {
     // Robots whose time runs faster begin as far in the past as brings their last stamp to the time it is
@@ -308,53 +299,136 @@ Exit run(const Options& options, bool lcm_asked) {
     spec.start_utime_us = start_us;
     spec.run = name_of_run(options, over_lcm, start_us);
   }
-  vr::Fleet fleet(specs, options.seed);
-  if (!options.quiet && over_lcm) {
-    for (const auto& spec : specs) {
-      std::printf("%s: %g kg, up to %g m/s, %g V\n", spec.robot.robot_id.c_str(),
-                  spec.robot.chassis_kg + 2 * spec.robot.wheel_kg, spec.robot.speed_limit_m_s,
-                  spec.robot.nominal_voltage_v);
-    }
-    std::printf("publishing on %s; ctrl-C stops\n", options.lcm_url.c_str());
-    std::fflush(stdout);
-  }
+  return specs;
+}
 
+void announce(const std::vector<vr::SimulationSpec>& specs, const std::string& lcm_url) {
+  for (const auto& spec : specs) {
+    std::printf("%s: %g kg, up to %g m/s, %g V\n", spec.robot.robot_id.c_str(),
+                spec.robot.chassis_kg + 2 * spec.robot.wheel_kg, spec.robot.speed_limit_m_s,
+                spec.robot.nominal_voltage_v);
+  }
+  std::printf("publishing on %s; ctrl-C stops\n", lcm_url.c_str());
+  std::fflush(stdout);
+}
+
+struct Sent {
+  std::uint64_t messages = 0;
+  double robot_time_s = 0;
+};
+
+// Messages in the order of their time, over LCM at the speed asked for, until the end, the duration or
+// ctrl-C.
+Result<Sent> publish(vr::Fleet& fleet, std::int64_t start_us, const Options& options, Outlets& outlets) {
+  InterruptGuard interrupt;
+  Sent sent;
   const auto began = Clock::now();
-  std::uint64_t sent = 0;
-  double simulated_s = 0;
   while (auto message = fleet.next()) {
     const double at_s = 1e-6 * static_cast<double>(message->emission.utime_us - start_us);
     if (options.duration_s > 0 && at_s >= options.duration_s) break;
-    if (over_lcm) {
+    if (outlets.link) {
       const auto due = began + std::chrono::duration_cast<Clock::duration>(
                                    std::chrono::duration<double>(at_s / options.speed));
       if (interrupt.wait_until(due)) break;
-    } else if (sent % 1024 == 0 && interrupt.interrupted()) {
+    } else if (sent.messages % 1024 == 0 && interrupt.interrupted()) {
       break;
     }
-    if (auto done = outlets.send(fleet.robot(message->robot).robot_id(), message->emission); !done) {
-      return report(done.error());
-    }
-    simulated_s = at_s;
-    ++sent;
+    if (auto done = outlets.send(fleet.robot(message->robot).robot_id(), message->emission); !done)
+      return tl::unexpected(done.error());
+    sent.robot_time_s = at_s;
+    ++sent.messages;
   }
   for (const auto& message : fleet.abort()) {
-    if (auto done = outlets.send(fleet.robot(message.robot).robot_id(), message.emission); !done) {
-      return report(done.error());
-    }
+    if (auto done = outlets.send(fleet.robot(message.robot).robot_id(), message.emission); !done)
+      return tl::unexpected(done.error());
   }
   if (outlets.log) {
-    if (auto closed = outlets.log->close(); !closed) return report(closed.error());
+    if (auto closed = outlets.log->close(); !closed) return tl::unexpected(closed.error());
   }
-  if (auto written = write_truth(options, *members, fleet); !written) return report(written.error());
+  return sent;
+}
+
+Result<void> run(const Options& options, bool over_lcm) {
+  if (auto checked = check_options(options, over_lcm); !checked) return checked;
+  auto members = assemble(options);
+  if (!members) return tl::unexpected(members.error());
+  auto outlets = open_outlets(options, over_lcm);
+  if (!outlets) return tl::unexpected(outlets.error());
+  if (!options.server.empty()) {
+    if (auto known = introduce(*members, options.server); !known) return known;
+  }
+  const std::vector<vr::SimulationSpec> specs = timed_specs(*members, options, over_lcm);
+  vr::Fleet fleet(specs, options.seed);
+  if (!options.quiet && over_lcm) announce(specs, options.lcm_url);
+  const auto began = Clock::now();
+  const auto sent = publish(fleet, specs.front().start_utime_us, options, *outlets);
+  if (!sent) return tl::unexpected(sent.error());
+  if (auto written = write_truth(options, *members, fleet); !written) return written;
   if (!options.quiet) {
     std::size_t missions = 0;
     for (std::size_t k = 0; k < fleet.size(); ++k) missions += fleet.robot(k).finished().size();
     const double wall_s = std::chrono::duration<double>(Clock::now() - began).count();
     std::printf("%llu messages of %zu robots, %zu missions finished, %.1f s of robot time in %.1f s\n",
-                static_cast<unsigned long long>(sent), fleet.size(), missions, simulated_s, wall_s);
+                static_cast<unsigned long long>(sent->messages), fleet.size(), missions, sent->robot_time_s,
+                wall_s);
   }
-  return Exit::ok;
+  return {};
+}
+
+// What the robots are like and how they work.
+void add_habits(CLI::App* command, const std::shared_ptr<Options>& options) {
+  command->add_option("--effect", options->effects,
+                      "id=strength, an imperfection of the robots; may be repeated");
+  command->add_flag("--list-effects", options->list_effects, "print the effects with their units and exit");
+  command->add_option("--scatter", options->scatter, "size of the differences between missions, 0 = none")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command
+      ->add_option("--jitter", options->jitter,
+                   "how far sampling strays from its instant, part of the period")
+      ->check(CLI::Range(0.0, 0.45))
+      ->capture_default_str();
+  command->add_option("--loss", options->loss, "probability that a sample is lost")
+      ->check(CLI::Range(0.0, 0.99))
+      ->capture_default_str();
+  command->add_option("--pickups", options->pickups, "part of the halts at which the payload changes")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command
+      ->add_option("--undeclared", options->undeclared,
+                   "part of the missions that carry more than they declare")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command
+      ->add_option("--charge-below", options->charge_below,
+                   "charge under which a robot charges between missions; 0 = packs are exchanged")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command
+      ->add_option("--charge-rate", options->charge_rate_per_h,
+                   "how fast chargers are, part of the capacity an hour")
+      ->check(CLI::Range(0.05, 10.0))
+      ->capture_default_str();
+  command->add_option("--initial-charge", options->initial_charge, "charge at the beginning")
+      ->check(CLI::Range(0.05, 1.0))
+      ->capture_default_str();
+}
+
+// What the robots drive and which sensors they have.
+void add_sensors(CLI::App* command, const std::shared_ptr<Options>& options) {
+  command->add_flag("--manoeuvre", options->manoeuvre,
+                    "every mission is the calibration drive: straight, at nine constant speeds");
+  command->add_flag("--no-motor-channels", options->no_motor_channels,
+                    "robots without motor voltage and current");
+  command->add_flag("--no-gyro", options->no_gyro, "robots without gyro");
+  command->add_flag("--no-pose", options->no_pose, "robots without localisation");
+  command->add_flag("--temperature", options->temperature, "robots with winding temperature sensors");
+  command->add_flag("--pitch", options->pitch, "robots with an inclinometer");
+  command
+      ->add_option("--covariates", options->covariates_hz,
+                   "robots that publish the covariates cpu_load and height_m so often, Hz; 0 = not")
+      ->check(CLI::Range(0.0, 200.0))
+      ->capture_default_str();
 }
 
 }  // namespace
@@ -399,58 +473,14 @@ void add_simulate(CLI::App& program, Exit& exit) {
   command->add_option("--mission-duration", options->mission_duration_s, "about how long a mission takes, s")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command->add_option("--effect", options->effects,
-                      "id=strength, an imperfection of the robots; may be repeated");
-  command->add_flag("--list-effects", options->list_effects, "print the effects with their units and leave");
-  command->add_option("--scatter", options->scatter, "size of the differences between missions, 0 = none")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  command
-      ->add_option("--jitter", options->jitter,
-                   "how far sampling strays from its instant, part of the period")
-      ->check(CLI::Range(0.0, 0.45))
-      ->capture_default_str();
-  command->add_option("--loss", options->loss, "probability that a sample is lost")
-      ->check(CLI::Range(0.0, 0.99))
-      ->capture_default_str();
-  command->add_option("--pickups", options->pickups, "part of the halts at which the payload changes")
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
-  command
-      ->add_option("--undeclared", options->undeclared,
-                   "part of the missions that carry more than they declare")
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
-  command
-      ->add_option("--charge-below", options->charge_below,
-                   "charge under which a robot charges between missions; 0 = packs are exchanged")
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
-  command
-      ->add_option("--charge-rate", options->charge_rate_per_h,
-                   "how fast chargers are, part of the capacity an hour")
-      ->check(CLI::Range(0.05, 10.0))
-      ->capture_default_str();
-  command->add_option("--initial-charge", options->initial_charge, "charge at the beginning")
-      ->check(CLI::Range(0.05, 1.0))
-      ->capture_default_str();
-  command->add_flag("--manoeuvre", options->manoeuvre,
-                    "every mission is the calibration drive: straight, at nine constant speeds");
-  command->add_flag("--no-motor-channels", options->no_motor_channels,
-                    "robots without motor voltage and current");
-  command->add_flag("--no-gyro", options->no_gyro, "robots without gyro");
-  command->add_flag("--no-pose", options->no_pose, "robots without localisation");
-  command->add_flag("--temperature", options->temperature, "robots with winding temperature sensors");
-  command->add_flag("--pitch", options->pitch, "robots with an inclinometer");
-  command
-      ->add_option("--covariates", options->covariates_hz,
-                   "robots that publish the covariates cpu_load and height_m so often, Hz; 0 = not")
-      ->check(CLI::Range(0.0, 200.0))
-      ->capture_default_str();
+  add_habits(command, options);
+  add_sensors(command, options);
   command->add_flag("--quiet", options->quiet, "no summary");
   command->callback([options, robots, files, url, &exit] {
     if (files->count() > 0 && robots->count() == 0) options->robots = options->robot_files.size();
-    exit = run(*options, url->count() > 0);
+    if (options->list_effects) return print_effects();
+    const auto ran = run(*options, options->log.empty() || url->count() > 0);
+    exit = ran ? Exit::ok : report(ran.error());
   });
 }
 

@@ -144,19 +144,9 @@ double Plant::driver_power_w(double motor_power_w) const {
   return drawn + effect_.driver_loss * std::abs(motor_power_w);
 }
 
-Plant::Rates Plant::rates(const PlantState& s, const std::array<double, 2>& voltage_v) const {
-  Rates out;
-  PlantAccounts& power = out.power;
-  const double rim0 = arm_m_[0] * s.wheel_speed_rad_s[0];
-  const double rim1 = arm_m_[1] * s.wheel_speed_rad_s[1];
-  const double v = 0.5 * (rim0 + rim1);
-  const double yaw = (rim0 - rim1) / (2 * half_track_m_);
-  out.state.x_m = v * std::cos(s.heading_rad);
-  out.state.y_m = v * std::sin(s.heading_rad);
-  out.state.heading_rad = yaw;
-  out.state.wheel_angle_rad = s.wheel_speed_rad_s;
-
-  // Forces on the body, positive against forward motion and against a turn to the left.
+// Forces on the body, positive against forward motion and against a turn to the left, with the power they
+// take.
+Plant::Body Plant::body(const PlantState& s, double v, double yaw, PlantAccounts& power) const {
   const double drag_n = effect_.aerodynamic_drag * v * std::abs(v);
   double slope_n = effect_.slope == 0 ? 0
                                       : weight_n_ * std::sin(effect_.slope) *
@@ -184,17 +174,32 @@ Plant::Rates Plant::rates(const PlantState& s, const std::array<double, 2>& volt
     dry_factor += effect_.x_cold_bearing * std::exp(-time_since_start_s_ / world_.burst_time_s);
   }
   if (effect_.x_brake_drag != 0 && brake_holds()) dry_factor += effect_.x_brake_drag;
+  return {force_n, moment_nm, floor_n, dry_factor};
+}
+
+Plant::Rates Plant::rates(const PlantState& s, const std::array<double, 2>& voltage_v) const {
+  Rates out;
+  PlantAccounts& power = out.power;
+  const double rim0 = arm_m_[0] * s.wheel_speed_rad_s[0];
+  const double rim1 = arm_m_[1] * s.wheel_speed_rad_s[1];
+  const double v = 0.5 * (rim0 + rim1);
+  const double yaw = (rim0 - rim1) / (2 * half_track_m_);
+  out.state.x_m = v * std::cos(s.heading_rad);
+  out.state.y_m = v * std::sin(s.heading_rad);
+  out.state.heading_rad = yaw;
+  out.state.wheel_angle_rad = s.wheel_speed_rad_s;
+  const Body on = body(s, v, yaw, power);
 
   std::array<double, 2> net_nm{};
   for (std::size_t side : {0u, 1u}) {
     const double w = s.wheel_speed_rad_s[side];
     const double i = s.current_a[side];
-    double dry_nm = dry_nm_[side] * dry_factor;
+    double dry_nm = dry_nm_[side] * on.dry_factor;
     if (effect_.x_cogging != 0) {
       const double angle = std::sin(1.5 * s.wheel_angle_rad[side]);
       dry_nm += dry_nm_[side] * effect_.x_cogging * angle * angle;
     }
-    const double floor_nm = 0.5 * floor_n * arm_m_[side];
+    const double floor_nm = 0.5 * on.floor_n * arm_m_[side];
     const double bend_rate = bristle_.bend_rate(s.bend[side], w);
     const double ratio = Bristle::torque_ratio(s.bend[side], bend_rate, w);
     double internal_nm = dry_nm * ratio + viscous_nm_s_rad_ * w + cubic_nm_s3_rad3_ * w * w * w;
@@ -218,7 +223,7 @@ Plant::Rates Plant::rates(const PlantState& s, const std::array<double, 2>& volt
       if (passed_nm * w > 0) slip_nm = std::abs(effect_.wheel_slip * passed_nm) * direction;
     }
     net_nm[side] = motor_nm - internal_nm - floor_nm * ratio - mesh_nm - slip_nm -
-                   0.5 * arm_m_[side] * (force_n + sides[side] * moment_nm / half_track_m_);
+                   0.5 * arm_m_[side] * (on.force_n + sides[side] * on.moment_nm / half_track_m_);
 
     const double emf_v = emf_per_rad_s_ * w;
     const double brush_v = effect_.brush_drop == 0 ? 0 : effect_.brush_drop * std::tanh(i / brush_scale_a_);

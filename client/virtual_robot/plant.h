@@ -81,6 +81,12 @@ class Plant {
 
  private:
   struct Rates;
+  struct Body {
+    double force_n, moment_nm;
+    double floor_n;     // resistance of the floor to rolling
+    double dry_factor;  // of dry friction in the drives
+  };
+  Body body(const PlantState& s, double speed_m_s, double yaw_rate_rad_s, PlantAccounts& power) const;
   Rates rates(const PlantState& s, const std::array<double, 2>& voltage_v) const;
   double driver_power_w(double motor_power_w) const;
   double zone_share(double x_m, double y_m) const;

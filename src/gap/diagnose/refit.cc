@@ -139,87 +139,115 @@ std::vector<Cause> rest(const Material& whole, const Shapes& shapes, std::vector
   return causes;
 }
 
-// Where only battery power speaks, the strengths that leave least of it, by the model itself: Levenberg's
-// steps of Huber's estimator on numerical differences. Each is held by what is expected of it; what other
-// channels show stays.
-std::vector<Cause> rest_of_power(const Material& m, const Shapes& shapes, std::vector<Cause> causes,
-                                 std::span<const double> power_w) {
-  constexpr int most_rounds = 25;
-  constexpr double settled = 1e-4,
-                   least_gain = 1e-4;  // of a step, in units of what is expected, and of errors
-  constexpr double step_share = 1e-3, first_damping = 1e-3, most_damping = 1e3;
-  const ColumnSet columns(m, shapes, std::array{wide_share});
+// Measured less modelled power as a function of the strengths that may move. Each is held by what is expected
+// of it; what other channels show stays.
+class PowerMisfit {
+ public:
+  PowerMisfit(const Material& material, const Shapes& shapes, std::span<const Cause> causes,
+              std::span<const double> power_w)
+      : m_(material), power_w_(power_w) {
+    const ColumnSet columns(m_, shapes, std::array{wide_share});
+    for (std::size_t k = 0; k < causes.size(); ++k) {
+      const auto at = columns.coordinates_of(causes[k]);
+      if (!at || causes[k].by || traits_of(causes[k].effect.effect->info().id).elsewhere) continue;
+      const Hypothesis& h = columns.hypotheses()[at->hypothesis];
+      if (h.candidate.columns.size() == 1)
+        free_.push_back({k, h.parameter, h.candidate.expected, h.candidate.least, h.candidate.most});
+    }
+    for (std::size_t k = 0; k < power_w.size(); ++k) {
+      if (std::isfinite(power_w[k])) rows_.push_back(k);
+    }
+  }
+
+  bool empty() const { return free_.empty() || rows_.empty(); }
+
+  Eigen::VectorXd left_by(std::span<const Cause> causes) const {
+    const std::vector<double> modelled = modelled_power(m_.robot, m_.adopted, causes, m_.windows);
+    Eigen::VectorXd left(static_cast<Eigen::Index>(rows_.size()));
+    for (std::size_t k = 0; k < rows_.size(); ++k) {
+      const double model = modelled[rows_[k]];
+      left[static_cast<Eigen::Index>(k)] = std::isfinite(model) ? power_w_[rows_[k]] - model : 0;
+    }
+    return left;
+  }
+
+  // Strengths in units of what is expected of them, and what a unit more of each takes from what is left, by
+  // differences.
+  struct Slopes {
+    Eigen::VectorXd strengths;
+    Eigen::MatrixXd takes;
+  };
+  Slopes slopes(const std::vector<Cause>& causes, const Eigen::VectorXd& left) const {
+    constexpr double step_share = 1e-3;
+    Slopes s{Eigen::VectorXd(size()), Eigen::MatrixXd(left.size(), size())};
+    for (Eigen::Index k = 0; k < size(); ++k) {
+      const Free& f = free_[static_cast<std::size_t>(k)];
+      std::vector<Cause> moved = causes;
+      double& value = moved[f.cause].effect.values[f.parameter];
+      s.strengths[k] = value / f.unit;
+      const double step = value + step_share * f.unit > f.most ? -step_share : step_share;
+      value += step * f.unit;
+      s.takes.col(k) = (left - left_by(moved)) / step;
+    }
+    return s;
+  }
+
+  // `causes` moved by a step within their bounds; the largest part of it that was possible.
+  double move(std::vector<Cause>& causes, const Eigen::VectorXd& step) const {
+    double moved = 0;
+    for (Eigen::Index k = 0; k < size(); ++k) {
+      const Free& f = free_[static_cast<std::size_t>(k)];
+      double& value = causes[f.cause].effect.values[f.parameter];
+      const double before = value;
+      value = std::clamp(value + step[k] * f.unit, f.least, f.most);
+      moved = std::max(moved, std::fabs(value - before) / f.unit);
+    }
+    return moved;
+  }
+
+ private:
   struct Free {
     std::size_t cause, parameter;
     double unit, least, most;
   };
-  std::vector<Free> free;
-  for (std::size_t k = 0; k < causes.size(); ++k) {
-    const auto at = columns.coordinates_of(causes[k]);
-    if (!at || causes[k].by || traits_of(causes[k].effect.effect->info().id).elsewhere) continue;
-    const Hypothesis& h = columns.hypotheses()[at->hypothesis];
-    if (h.candidate.columns.size() == 1)
-      free.push_back({k, h.parameter, h.candidate.expected, h.candidate.least, h.candidate.most});
-  }
-  std::vector<std::size_t> rows;
-  for (std::size_t k = 0; k < power_w.size(); ++k) {
-    if (std::isfinite(power_w[k])) rows.push_back(k);
-  }
-  if (free.empty() || rows.empty()) return causes;
-  const auto n = static_cast<Eigen::Index>(rows.size()), p = static_cast<Eigen::Index>(free.size());
-  const auto left_by = [&](const std::vector<Cause>& some) {
-    const std::vector<double> modelled = modelled_power(m.robot, m.adopted, some, m.windows);
-    Eigen::VectorXd left(n);
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const std::size_t row = rows[static_cast<std::size_t>(k)];
-      left[k] = std::isfinite(modelled[row]) ? power_w[row] - modelled[row] : 0;
-    }
-    return left;
-  };
-  const auto value_of = [&](std::vector<Cause>& some, const Free& f) -> double& {
-    return some[f.cause].effect.values[f.parameter];
-  };
-  Eigen::VectorXd left = left_by(causes);
+  Eigen::Index size() const { return static_cast<Eigen::Index>(free_.size()); }
+
+  const Material& m_;
+  std::span<const double> power_w_;
+  std::vector<Free> free_;
+  std::vector<std::size_t> rows_;
+};
+
+// Where only battery power was measured, the strengths that leave least of it, by the model itself:
+// Levenberg's steps of Huber's estimator on numerical differences.
+std::vector<Cause> rest_of_power(const PowerMisfit& misfit, std::vector<Cause> causes) {
+  constexpr int most_rounds = 25;
+  // Of a step, in units of what is expected, and of errors.
+  constexpr double settled = 1e-4, least_gain = 1e-4;
+  constexpr double first_damping = 1e-3, most_damping = 1e3;
+  if (misfit.empty()) return causes;
+  Eigen::VectorXd left = misfit.left_by(causes);
   double damping = first_damping;
   for (int round = 0; round < most_rounds && damping < most_damping; ++round) {
-    const double spread = statistics::spread_about_zero({left.data(), static_cast<std::size_t>(n)});
+    const double spread = statistics::spread_about_zero({left.data(), static_cast<std::size_t>(left.size())});
     if (!(spread > 0)) break;
-    Eigen::MatrixXd x(n, p);
-    Eigen::VectorXd held(p);
-    for (Eigen::Index k = 0; k < p; ++k) {
-      const Free& f = free[static_cast<std::size_t>(k)];
-      std::vector<Cause> moved = causes;
-      double& value = value_of(moved, f);
-      held[k] = value / f.unit;
-      const double step = value + step_share * f.unit > f.most ? -step_share : step_share;
-      value += step * f.unit;
-      x.col(k) = (left - left_by(moved)) / step;
-    }
+    const PowerMisfit::Slopes s = misfit.slopes(causes, left);
     const Eigen::VectorXd weight = statistics::huber_weights(left, spread) / (spread * spread);
-    const Eigen::MatrixXd weighted = weight.asDiagonal() * x;
-    Eigen::MatrixXd information = weighted.transpose() * x;
-    const Eigen::VectorXd slope = weighted.transpose() * left - held;
+    const Eigen::MatrixXd weighted = weight.asDiagonal() * s.takes;
+    Eigen::MatrixXd information = weighted.transpose() * s.takes;
+    const Eigen::VectorXd slope = weighted.transpose() * left - s.strengths;
     information.diagonal().array() += 1;
-    bool better_one = false;
-    for (; !better_one && damping < most_damping; damping *= 10) {
+    for (bool improved = false; !improved && damping < most_damping; damping *= 10) {
       Eigen::MatrixXd damped = information;
       damped.diagonal() *= 1 + damping;
-      const Eigen::VectorXd step = damped.ldlt().solve(slope);
       std::vector<Cause> next = causes;
-      double moved = 0;
-      for (Eigen::Index k = 0; k < p; ++k) {
-        const Free& f = free[static_cast<std::size_t>(k)];
-        double& value = value_of(next, f);
-        const double before = value;
-        value = std::clamp(value + step[k] * f.unit, f.least, f.most);
-        moved = std::max(moved, std::fabs(value - before) / f.unit);
-      }
-      const Eigen::VectorXd now = left_by(next);
+      const double moved = misfit.move(next, damped.ldlt().solve(slope));
+      const Eigen::VectorXd now = misfit.left_by(next);
       const double before = left.cwiseAbs().sum(), after = now.cwiseAbs().sum();
       if (!(after < before)) continue;
       causes = std::move(next);
       left = now;
-      better_one = true;
+      improved = true;
       damping *= 0.01;
       if (moved < settled || after > (1 - least_gain) * before) return causes;
     }
@@ -233,8 +261,9 @@ std::vector<Cause> refit(const Material& material, std::vector<Cause> causes) {
   if (causes.empty()) return causes;
   const Shapes shapes = shapes_of(causes, material.robot);
   if (!material.from_motion.alone()) return rest(material, shapes, std::move(causes));
-  return rest_of_power(material, shapes, std::move(causes),
-                       measured_power(material.windows, material.robot, false));
+  const std::vector<double> power_w = measured_power(material.windows, material.robot, false);
+  const PowerMisfit power(material, shapes, causes, power_w);
+  return rest_of_power(power, std::move(causes));
 }
 
 std::vector<Cause> base_fit(const Material& material, std::span<const double> power_w, Starts starts) {
@@ -246,7 +275,8 @@ std::vector<Cause> base_fit(const Material& material, std::span<const double> po
   std::vector<Cause> best;
   double least = std::numeric_limits<double>::infinity();
   const auto try_from = [&](const Shapes& shapes, const ColumnSet& columns, std::vector<Cause> causes) {
-    causes = material.from_motion.alone() ? rest_of_power(material, shapes, std::move(causes), power_w)
+    const PowerMisfit power(material, shapes, causes, power_w);
+    causes = material.from_motion.alone() ? rest_of_power(power, std::move(causes))
                                           : rest(material, shapes, std::move(causes));
     const double gap =
         gap_size(power_w, modelled_power(material.robot, material.adopted, causes, material.windows))

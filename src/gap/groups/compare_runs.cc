@@ -9,6 +9,81 @@
 
 namespace joulecast::gap {
 
+namespace {
+
+// The label that makes the groups is no cause beside them.
+RunSet without_own_label(RunSet set, std::span<const std::string> group_of_run) {
+  for (std::size_t l = 0; l < set.labels.size(); ++l) {
+    bool same = true;
+    for (std::size_t k = 0; k < set.runs.size(); ++k) same = same && set.runs[k].labels[l] == group_of_run[k];
+    if (!same) continue;
+    for (MissionRun& run : set.runs) run.labels[l].clear();
+  }
+  return set;
+}
+
+// Runs with the group of each, around what all of them share.
+struct GroupedRuns {
+  const RunSet& set;
+  const RunColumns& columns;
+  const std::vector<std::size_t>& block;
+  const std::vector<std::size_t>& group;
+  const std::vector<Cause>& shared;
+
+  double modelled_j(std::size_t run, const std::vector<std::vector<Cause>>& by_group) const {
+    std::vector<Cause> causes = shared;
+    causes.insert(causes.end(), by_group[group[run]].begin(), by_group[group[run]].end());
+    return columns.modelled(run, causes).sum_j;
+  }
+
+  // The plain regression of each group alone, on what the model misses of each run in use.
+  std::vector<double> regression(const RunReferee& referee, const std::vector<double>& missed,
+                                 const std::vector<bool>& use) const {
+    std::vector<double> answer(missed.size(), 0);
+    for (std::size_t g = 0; g <= *std::ranges::max_element(group); ++g) {
+      std::vector<bool> out(missed.size());
+      for (std::size_t k = 0; k < out.size(); ++k) out[k] = !use[k] || group[k] != g;
+      const std::vector<double> own = referee.fit(missed, out).energy_j;
+      for (std::size_t k = 0; k < out.size(); ++k) {
+        if (group[k] == g) answer[k] = own[k];
+      }
+    }
+    return answer;
+  }
+
+  std::vector<Item> items(std::vector<ComparedGroup>& groups) const {
+    std::vector<Item> items;
+    for (std::size_t k = 0; k < block.size(); ++k) {
+      const auto modelled = columns.modelled(k, shared);
+      const double measured = set.runs[k].measured_j(), way_m = set.runs[k].at.distance_m;
+      items.push_back(
+          {group[k], block[k], measured, modelled.sum_j, 1 / measured, 1, way_m, modelled.duration_s});
+      ComparedGroup& g = groups[group[k]];
+      ++g.missions, ++g.samples;
+      g.way_m += way_m;
+      g.energy_per_m_j += measured;
+      g.model_per_m_j += modelled.sum_j;
+    }
+    for (ComparedGroup& g : groups) g.energy_per_m_j /= g.way_m, g.model_per_m_j /= g.way_m;
+    return items;
+  }
+};
+
+void fill_gap(Diagnosis& d, const GroupedRuns& runs, std::span<const Item> items, double scatter) {
+  double measured_j = 0, modelled_j = 0;
+  for (const Item& item : items) measured_j += item.measured, modelled_j += item.common;
+  d.missions = d.samples = items.size();
+  d.motor_channels = runs.columns.by_motor();
+  d.power = d.motor_channels ? PowerSource::motors : PowerSource::battery;
+  d.energy_relative = (measured_j - modelled_j) / measured_j;
+  d.power_absolute_relative = runs.columns.error(runs.shared);
+  d.noise_floor = std::min(std::sqrt(2 / std::numbers::pi) * scatter, d.power_absolute_relative);
+  d.channels = {
+      {d.motor_channels ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
+}
+
+}  // namespace
+
 Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> group_of_run,
                                 const robot::RobotModel& robot, const CompareSettings& settings) {
   if (const auto adopted = dynamics::active_effects(robot); !adopted) return tl::unexpected(adopted.error());
@@ -16,27 +91,19 @@ Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> 
   if (names.size() < 2) return invalid("--compare-by", "gives one group only; two are needed to compare");
   Comparison c;
   for (const std::string& name : names) c.groups.push_back({name, 0, 0, 0, 0, 0});
-  const auto index = [&](std::size_t run) {
-    return static_cast<std::size_t>(std::distance(names.begin(), names.find(group_of_run[run])));
-  };
-  // The label that makes the groups is no cause beside them.
-  RunSet compared = set;
-  for (std::size_t l = compared.labels.size(); l-- > 0;) {
-    for (std::size_t k = 0; k < compared.runs.size(); ++k) {
-      if (compared.runs[k].labels[l] != group_of_run[k]) break;
-      if (k + 1 < compared.runs.size()) continue;
-      for (MissionRun& run : compared.runs) run.labels[l].clear();
-    }
-  }
+  std::vector<std::size_t> group;
+  for (const std::string& name : group_of_run)
+    group.push_back(static_cast<std::size_t>(std::distance(names.begin(), names.find(name))));
+
+  const RunSet compared = without_own_label(set, group_of_run);
   RunColumns columns(compared, robot);
   const std::vector<std::size_t> block = blocks_of(compared.runs, group_of_run);
   // What all runs share is found first; differences are judged around it.
   const RunFinding shared = search_runs(columns, block);
   columns.linearise_around(shared.causes);
   const RunReferee referee(columns);
+  const GroupedRuns runs{compared, columns, block, group, shared.causes};
 
-  std::vector<std::size_t> group;
-  for (std::size_t k = 0; k < block.size(); ++k) group.push_back(index(k));
   GroupedData data{
       robot, {}, std::vector<std::size_t>(1 + *std::ranges::max_element(block)), {}, {}, {}, {}, {}, {}, {}};
   data.without = [&](const std::vector<bool>& out) {
@@ -49,56 +116,21 @@ Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> 
   data.explain.most_families = 1;
   data.explain.most_members = 2;
   data.shared = shared.causes;
-  double measured_j = 0, modelled_j = 0;
-  for (std::size_t k = 0; k < block.size(); ++k) {
-    data.group_of_block[block[k]] = index(k);
-    const auto modelled = columns.modelled(k, shared.causes);
-    const double measured = compared.runs[k].measured_j();
-    data.items.push_back({index(k), block[k], measured, modelled.sum_j, 1 / measured, 1,
-                          compared.runs[k].at.distance_m, modelled.duration_s});
-    ComparedGroup& g = c.groups[index(k)];
-    ++g.missions, ++g.samples;
-    g.way_m += compared.runs[k].at.distance_m;
-    g.energy_per_m_j += measured;
-    g.model_per_m_j += modelled.sum_j;
-    measured_j += measured;
-    modelled_j += modelled.sum_j;
-  }
-  for (ComparedGroup& g : c.groups) g.energy_per_m_j /= g.way_m, g.model_per_m_j /= g.way_m;
+  for (std::size_t k = 0; k < block.size(); ++k) data.group_of_block[block[k]] = group[k];
+  data.items = runs.items(c.groups);
   data.cause = [&](std::size_t h, const Eigen::VectorXd& coefficients) {
     return columns.causes_of({h}, coefficients).front();
   };
   data.predict = [&](const std::vector<std::vector<Cause>>& by_group) {
     std::vector<double> energies;
-    for (std::size_t k = 0; k < block.size(); ++k) {
-      std::vector<Cause> causes = shared.causes;
-      causes.insert(causes.end(), by_group[index(k)].begin(), by_group[index(k)].end());
-      energies.push_back(columns.modelled(k, causes).sum_j);
-    }
+    for (std::size_t k = 0; k < block.size(); ++k) energies.push_back(runs.modelled_j(k, by_group));
     return energies;
   };
   data.referee = [&](const std::vector<double>& missed, const std::vector<bool>& use) {
-    std::vector<double> answer(missed.size(), 0);
-    for (std::size_t g = 0; g < c.groups.size(); ++g) {
-      std::vector<bool> out(missed.size());
-      for (std::size_t k = 0; k < out.size(); ++k) out[k] = !use[k] || index(k) != g;
-      const std::vector<double> own = referee.fit(missed, out).energy_j;
-      for (std::size_t k = 0; k < out.size(); ++k) {
-        if (index(k) == g) answer[k] = own[k];
-      }
-    }
-    return answer;
+    return runs.regression(referee, missed, use);
   };
-  Diagnosis& d = c.diagnosis;
-  d.robot_id = robot.robot_id;
-  d.missions = d.samples = block.size();
-  d.motor_channels = columns.by_motor();
-  d.power = columns.by_motor() ? PowerSource::motors : PowerSource::battery;
-  d.energy_relative = (measured_j - modelled_j) / measured_j;
-  d.power_absolute_relative = columns.error(shared.causes);
-  d.noise_floor = std::min(std::sqrt(2 / std::numbers::pi) * scatter.run, d.power_absolute_relative);
-  d.channels = {
-      {columns.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
+  c.diagnosis.robot_id = robot.robot_id;
+  fill_gap(c.diagnosis, runs, data.items, scatter.run);
   for (const std::size_t h : shared.named) c.common.push_back(columns.hypotheses()[h].id());
   c.limits.emplace_back(
       "A group is what its name says and whatever else was different: day, payload, tyres, batteries, "
