@@ -90,7 +90,7 @@ nlohmann::json to_json(const Imported& one) {
   for (const telemetry::Glitch& g : report.glitches)
     glitches.push_back({{"line", g.line}, {"column", g.column}, {"value", g.value}, {"action", g.action}});
   nlohmann::json covariates = nlohmann::json::array();
-  for (const telemetry::CovariateSeries& series : recording.covariates)
+  for (const signals::CovariateSeries& series : recording.covariates)
     covariates.push_back({{"name", series.name}, {"changes", series.value.size()}});
   return {{"table", one.table},
           {"robot_id", recording.robot_id},

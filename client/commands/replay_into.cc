@@ -43,13 +43,13 @@ void print_table(const std::vector<history::Mission>& missions) {
   std::printf("%-16s %-20s %-12s %9s %9s %12s %12s %12s\n", "robot", "mission", "state", "time s", "way m",
               "measured J", "modelled J", "unexplained");
   for (const history::Mission& m : missions) {
-    const energy::Accounts& a = m.accounts;
+    const signals::Accounts& a = m.accounts;
     std::printf("%-16s %-20s %-12s %9.1f %9.1f ", m.robot_id.c_str(), m.mission_id.c_str(),
                 (std::string(history::name(m.state)) + (m.incomplete ? "*" : "")).c_str(), a.duration_s,
                 a.distance_m);
     print_number(a.measured_s > 0 ? a.measured_j : NAN, "%12.2f");
     print_number(a.modelled_j, " %12.2f");
-    print_number(a.measured_s > 0 ? a.ledger[energy::Term::unexplained] : NAN, " %12.2f");
+    print_number(a.measured_s > 0 ? a.ledger[signals::Term::unexplained] : NAN, " %12.2f");
     std::printf("\n");
   }
 }

@@ -25,6 +25,8 @@
 #include "client/lcm_url.h"
 #include "client/virtual_robot/fleet.h"
 #include "client/virtual_robot/truth_json.h"
+#include "signals/ids.h"
+#include "signals/mission_event.h"
 #include "telemetry/codec.h"
 #include "telemetry/event_log.h"
 #include "telemetry/lcm_link.h"
@@ -140,7 +142,7 @@ Result<std::vector<Member>> assemble(const Options& options) {
       if (!member) return tl::unexpected<Error>(member.error());
     }
     const std::string& id = member->spec.robot.robot_id;
-    if (!telemetry::is_valid_robot_id(id))
+    if (!signals::is_valid_robot_id(id))
       return invalid(source + "#/robot_id", "\"" + id + "\" is no robot id");
     if (std::any_of(members.begin(), members.end(),
                     [&](const Member& m) { return m.spec.robot.robot_id == id; })) {
@@ -185,13 +187,13 @@ Result<void> introduce(const std::vector<Member>& members, const std::string& ur
 }
 
 using Encoded = Result<std::vector<std::uint8_t>>;
-Encoded encoded(const std::string& robot_id, const telemetry::MissionEvent& event) {
+Encoded encoded(const std::string& robot_id, const signals::MissionEvent& event) {
   return telemetry::encode_mission_event(robot_id, event);
 }
-Encoded encoded(const std::string& robot_id, const telemetry::Sample& sample) {
+Encoded encoded(const std::string& robot_id, const signals::Sample& sample) {
   return telemetry::encode_telemetry(robot_id, sample);
 }
-Encoded encoded(const std::string& robot_id, const telemetry::CovariateMessage& covariates) {
+Encoded encoded(const std::string& robot_id, const signals::CovariateMessage& covariates) {
   return telemetry::encode_covariates(robot_id, covariates);
 }
 

@@ -20,10 +20,10 @@ Result<gap::Diagnosis> diagnose_without(Ablation ablation, const telemetry::Reco
   }
   telemetry::RecordingSet poorer = recordings;
   for (auto& mission : poorer.missions) {
-    for (telemetry::Sample& sample : mission.samples) {
-      sample.motor_voltage_v.fill(telemetry::unmeasured);
-      sample.motor_current_a.fill(telemetry::unmeasured);
-      sample.yaw_rate_rad_s = telemetry::unmeasured;
+    for (signals::Sample& sample : mission.samples) {
+      sample.motor_voltage_v.fill(signals::unmeasured);
+      sample.motor_current_a.fill(signals::unmeasured);
+      sample.yaw_rate_rad_s = signals::unmeasured;
     }
   }
   return gap::diagnose(poorer, robot, settings);

@@ -10,6 +10,7 @@
 #include "base/text_file.h"
 #include "client/files.h"
 #include "client/virtual_robot/simulate.h"
+#include "signals/mission_event.h"
 #include "telemetry/codec.h"
 #include "telemetry/event_log.h"
 
@@ -97,11 +98,11 @@ Result<void> write_log(const TrialCase& c, const std::filesystem::path& path) {
   vr::VirtualRobot robot(c.spec, c.seed);
   vr::Emission emission;
   while (robot.next(emission)) {
-    const auto* sample = std::get_if<telemetry::Sample>(&emission.message);
+    const auto* sample = std::get_if<signals::Sample>(&emission.message);
     const std::string& id = robot.robot_id();
     const auto bytes = sample != nullptr ? telemetry::encode_telemetry(id, *sample)
                                          : telemetry::encode_mission_event(
-                                               id, std::get<telemetry::MissionEvent>(emission.message));
+                                               id, std::get<signals::MissionEvent>(emission.message));
     if (!bytes) return tl::unexpected<Error>(bytes.error());
     const auto subject =
         sample != nullptr ? telemetry::Subject::telemetry : telemetry::Subject::mission_event;

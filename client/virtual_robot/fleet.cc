@@ -40,8 +40,8 @@ std::optional<Fleet::Message> Fleet::next() {
   if (!earliest) return std::nullopt;
   Message message{*earliest, std::move(*waiting_[*earliest])};
   auto& open = open_[*earliest];
-  if (const auto* event = std::get_if<telemetry::MissionEvent>(&message.emission.message)) {
-    open = event->phase == telemetry::MissionPhase::started ? std::optional(*event) : std::nullopt;
+  if (const auto* event = std::get_if<signals::MissionEvent>(&message.emission.message)) {
+    open = event->phase == signals::MissionPhase::started ? std::optional(*event) : std::nullopt;
   } else if (open) {
     open->utime_us = message.emission.utime_us;
   }
@@ -56,7 +56,7 @@ std::vector<Fleet::Message> Fleet::abort() {
   for (std::size_t k = 0; k < robots_.size(); ++k) {
     waiting_[k].reset();
     if (!open_[k]) continue;
-    open_[k]->phase = telemetry::MissionPhase::aborted;
+    open_[k]->phase = signals::MissionPhase::aborted;
     events.push_back({k, {open_[k]->utime_us, std::move(*open_[k])}});
     open_[k].reset();
   }

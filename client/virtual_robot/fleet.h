@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "client/virtual_robot/virtual_robot.h"
+#include "signals/mission_event.h"
 
 namespace joulecast::virtual_robot {
 
@@ -45,7 +46,7 @@ class Fleet {
  private:
   std::vector<VirtualRobot> robots_;
   std::vector<std::optional<Emission>> waiting_;
-  std::vector<std::optional<telemetry::MissionEvent>> open_;  // the start given out last, until its end is
+  std::vector<std::optional<signals::MissionEvent>> open_;  // the start given out last, until its end is
 };
 
 }  // namespace joulecast::virtual_robot

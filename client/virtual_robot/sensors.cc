@@ -51,9 +51,9 @@ Reading Sensors::systematic(Reading r) const {
   return r;
 }
 
-telemetry::Sample Sensors::sample(const Reading& truth) {
+signals::Sample Sensors::sample(const Reading& truth) {
   const Reading r = systematic(truth);
-  telemetry::Sample out;
+  signals::Sample out;
   for (std::size_t s : {0u, 1u}) {
     out.wheel_velocity_rad_s[s] =
         read(r.wheel_speed_rad_s[s], suite_.encoder_noise_rad_s, suite_.encoder_step_rad_s);

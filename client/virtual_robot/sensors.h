@@ -6,7 +6,7 @@
 #include "client/virtual_robot/imperfections.h"
 #include "client/virtual_robot/rng.h"
 #include "client/virtual_robot/robot_parameters.h"
-#include "telemetry/sample.h"
+#include "signals/sample.h"
 
 namespace joulecast::virtual_robot {
 
@@ -71,7 +71,7 @@ class Sensors {
   // Gains and biases of the electrical sensors applied; what a noiseless logger would write.
   Reading systematic(Reading truth) const;
   // A sample without its clock: systematic errors, noise, quantisation, missing channels as NaN.
-  telemetry::Sample sample(const Reading& truth);
+  signals::Sample sample(const Reading& truth);
 
   const SensorSuite& suite() const { return suite_; }
   Rng& rng() { return rng_; }

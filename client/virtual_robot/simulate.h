@@ -7,7 +7,8 @@
 
 #include "base/error.h"
 #include "client/virtual_robot/virtual_robot.h"
-#include "telemetry/sample.h"
+#include "signals/mission_event.h"
+#include "signals/sample.h"
 
 namespace joulecast::virtual_robot {
 
@@ -29,9 +30,9 @@ struct Truth {
 };
 
 struct Simulation {
-  std::vector<telemetry::MissionEvent> events;
-  std::vector<telemetry::Sample> samples;  // in order of time
-  std::vector<telemetry::CovariateMessage> covariates;
+  std::vector<signals::MissionEvent> events;
+  std::vector<signals::Sample> samples;  // in order of time
+  std::vector<signals::CovariateMessage> covariates;
   Truth truth;
 };
 

@@ -104,8 +104,8 @@ void VirtualRobot::start_mission() {
   controller_.set_payload(script.payload_kg);
   pilot_.begin(std::move(script));
   outbox_.push_back(
-      {now_us(), telemetry::MissionEvent{now_us(), mission_.mission_id, telemetry::MissionPhase::started,
-                                         mission_.payload_kg, "virtual robot"}});
+      {now_us(), signals::MissionEvent{now_us(), mission_.mission_id, signals::MissionPhase::started,
+                                       mission_.payload_kg, "virtual robot"}});
 }
 
 void VirtualRobot::finish_mission() {
@@ -113,8 +113,8 @@ void VirtualRobot::finish_mission() {
   mission_.accounts = difference(plant_.accounts(), accounts_at_start_);
   mission_.charge_at_end = pack_.state_of_charge();
   outbox_.push_back(
-      {now_us(), telemetry::MissionEvent{now_us(), mission_.mission_id, telemetry::MissionPhase::finished,
-                                         mission_.payload_kg, "virtual robot"}});
+      {now_us(), signals::MissionEvent{now_us(), mission_.mission_id, signals::MissionPhase::finished,
+                                       mission_.payload_kg, "virtual robot"}});
   finished_.push_back(mission_);
 }
 
@@ -214,10 +214,10 @@ void VirtualRobot::publish_covariates() {
   double height_m = plant_.height_m();
   if (noise) height_m += spec_.sensors.height_noise_m * computer_rng_.normal();
   outbox_.push_back(
-      {now_us(), telemetry::CovariateMessage{now_us(),
-                                             {{"cpu_load", cpu_load_},
-                                              {std::string(telemetry::height_covariate),
-                                               quantised(height_m, spec_.sensors.height_step_m)}}}});
+      {now_us(), signals::CovariateMessage{now_us(),
+                                           {{"cpu_load", cpu_load_},
+                                            {std::string(signals::height_covariate),
+                                             quantised(height_m, spec_.sensors.height_step_m)}}}});
   ++covariate_index_;
 }
 
@@ -232,7 +232,7 @@ void VirtualRobot::take_sample() {
   const Reading truth = reading();
   witness_ = {sensors_.systematic(truth), plant_.wheel_acceleration_rad_s2(voltage_v_),
               truth.declared_payload_kg};
-  telemetry::Sample sample = sensors_.sample(truth);
+  signals::Sample sample = sensors_.sample(truth);
   sample.utime_us = now_us();
   sample.sequence = sample_index_;
   const bool lost =

@@ -15,8 +15,9 @@
 #include "client/virtual_robot/plant.h"
 #include "client/virtual_robot/robot_parameters.h"
 #include "client/virtual_robot/sensors.h"
-#include "telemetry/covariates.h"
-#include "telemetry/sample.h"
+#include "signals/covariates.h"
+#include "signals/mission_event.h"
+#include "signals/sample.h"
 
 namespace joulecast::virtual_robot {
 
@@ -64,7 +65,7 @@ struct MissionTruth {
 
 struct Emission {
   std::int64_t utime_us = 0;
-  std::variant<telemetry::MissionEvent, telemetry::Sample, telemetry::CovariateMessage> message;
+  std::variant<signals::MissionEvent, signals::Sample, signals::CovariateMessage> message;
 };
 
 // What a perfect logger would have seen at the instant of the last sample, systematic sensor errors included.

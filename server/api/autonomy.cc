@@ -84,8 +84,8 @@ void write_charging(JsonWriter& json, const Autonomy& a, const server::RobotSnap
   json.key("charging");
   phase == ChargingPhase::none || phase == ChargingPhase::suspected ? json.null()
                                                                     : json.value(battery::name(phase));
-  json.field("time_to_charged_s", known ? live->charge.to_full.duration_s : telemetry::unmeasured);
-  json.field("time_to_charged_sd_s", known ? live->charge.to_full.sd_s : telemetry::unmeasured);
+  json.field("time_to_charged_s", known ? live->charge.to_full.duration_s : signals::unmeasured);
+  json.field("time_to_charged_sd_s", known ? live->charge.to_full.sd_s : signals::unmeasured);
 }
 
 void write_minimum_energy(JsonWriter& json, const Autonomy& a) {
@@ -162,7 +162,7 @@ Whereabouts whereabouts(const server::RobotSnapshot* live) {
 Result<forecast::Charge> charge_of(const std::optional<double>& given, const std::optional<double>& given_sd,
                                    const std::optional<double>& reserve, const robot::Battery& battery,
                                    const server::RobotSnapshot* live) {
-  const double charge = given.value_or(live != nullptr ? live->state_of_charge : telemetry::unmeasured);
+  const double charge = given.value_or(live != nullptr ? live->state_of_charge : signals::unmeasured);
   if (!std::isfinite(charge)) {
     return fail(Fault::infeasible, "/state_of_charge",
                 "is not known: the robot has reported no battery voltage and current since it was first "

@@ -46,9 +46,9 @@ BatteryStatus battery_status(const robot::Battery& battery, const forecast::Char
                              const server::RobotSnapshot* live) {
   BatteryStatus s;
   s.charge = charge.fraction;
-  s.health = battery.ageing_factor.value_or(telemetry::unmeasured);
+  s.health = battery.ageing_factor.value_or(signals::unmeasured);
   s.rated_capacity_ah = battery.capacity_ah;
-  s.voltage_v = s.current_a = telemetry::unmeasured;
+  s.voltage_v = s.current_a = signals::unmeasured;
   if (live != nullptr && live->sample.utime_us != 0) {
     s.voltage_v = live->sample.battery_voltage_v;
     s.current_a = live->sample.battery_current_a;
@@ -110,7 +110,7 @@ std::string battery_dialect(Dialect dialect, const BatteryStatus& s) {
                          : !std::isfinite(s.current_a) ? ros_unknown
                          : s.current_a > 0             ? ros_discharging
                                                        : ros_not_charging;
-      json.field("voltage", rounded(s.voltage_v, milli)).field("temperature", telemetry::unmeasured);
+      json.field("voltage", rounded(s.voltage_v, milli)).field("temperature", signals::unmeasured);
       json.field("current", rounded(-s.current_a, milli))
           .field("charge", rounded(s.charge * capacity_ah, milli));
       json.field("capacity", rounded(capacity_ah, milli)).field("design_capacity", s.rated_capacity_ah);

@@ -403,7 +403,7 @@ std::vector<TableRow> matrix_rows() {
                                     const std::optional<double>& reserve) {
            const auto live = services.fleet.find(model.robot.robot_id);
            return charge_of(given, {}, reserve, model.robot.battery, live.get())
-               .value_or(forecast::Charge{telemetry::unmeasured, 0, 0});
+               .value_or(forecast::Charge{signals::unmeasured, 0, 0});
          };
          auto answer = MatrixAnswer::make(*r.json, fleet, services.cost_tables);
          if (!answer) return tl::unexpected(std::move(answer.error()));

@@ -4,9 +4,9 @@
 
 namespace joulecast::api {
 
-void write_accounts(JsonWriter& json, const energy::Accounts& a) {
+void write_accounts(JsonWriter& json, const signals::Accounts& a) {
   const bool battery = a.measured_s > 0, motors = a.motor_measured_s > 0;
-  const double unmeasured = telemetry::unmeasured;
+  const double unmeasured = signals::unmeasured;
   json.begin_object();
   json.field("battery_j", a.battery_j);
   json.field("measured_j", battery ? a.measured_j : unmeasured);
@@ -21,7 +21,7 @@ void write_accounts(JsonWriter& json, const energy::Accounts& a) {
       .value(a.modelled_motor_j[0])
       .value(a.modelled_motor_j[1])
       .end_array();
-  json.field("unexplained_j", battery ? a.ledger[energy::Term::unexplained] : unmeasured);
+  json.field("unexplained_j", battery ? a.ledger[signals::Term::unexplained] : unmeasured);
   json.field("drawn_j", a.drawn_j);
   json.field("returned_j", a.returned_j);
   json.field("charge_ah", a.charge_ah);
@@ -31,12 +31,12 @@ void write_accounts(JsonWriter& json, const energy::Accounts& a) {
   json.end_object();
 }
 
-void write_ledger(JsonWriter& json, const energy::Accounts& a) {
+void write_ledger(JsonWriter& json, const signals::Accounts& a) {
   const double sum = a.ledger.total();
   json.begin_object();
   json.field("battery_j", a.battery_j);
   json.key("terms_j").begin_object();
-  for (std::size_t k = 0; k < energy::term_count; ++k) json.field(energy::term_names[k], a.ledger.value[k]);
+  for (std::size_t k = 0; k < signals::term_count; ++k) json.field(signals::term_names[k], a.ledger.value[k]);
   json.end_object();
   json.field("sum_j", sum);
   json.field("closure_relative",

@@ -240,7 +240,7 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
   JsonWriter json;
   json.begin_object();
   json.field("id", *key);
-  using telemetry::Sample;
+  using signals::Sample;
   json.key("utime_us").begin_array();
   for (const Sample& s : samples) json.value(s.utime_us);
   json.end_array();
@@ -248,31 +248,15 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
   for (const Sample& s : samples) json.value(s.sequence);
   json.end_array();
   // Raw samples are evidence: every digit is kept.
-  const auto write = [&](std::string_view name, auto&& value) {
-    json.key(name).begin_array();
-    for (const Sample& s : samples) json.exact(value(s));
+  for (std::size_t k = 0; k < signals::sample_numbers; ++k) {
+    const signals::SampleField& field = signals::sample_fields[k];
+    if (field.part == "right") json.key(field.key).begin_object();
+    const bool side = field.part == "right" || field.part == "left";
+    json.key(side ? field.part : field.key).begin_array();
+    for (const Sample& s : samples) json.exact(*signals::numbers_of(s)[k]);
     json.end_array();
-  };
-  const auto pair = [&](std::string_view name, std::array<double, 2> Sample::*member) {
-    json.key(name).begin_object();
-    write("right", [&](const Sample& s) { return (s.*member)[0]; });
-    write("left", [&](const Sample& s) { return (s.*member)[1]; });
-    json.end_object();
-  };
-  pair("wheel_velocity_rad_s", &Sample::wheel_velocity_rad_s);
-  pair("motor_voltage_v", &Sample::motor_voltage_v);
-  pair("motor_current_a", &Sample::motor_current_a);
-  write("battery_voltage_v", [](const Sample& s) { return s.battery_voltage_v; });
-  write("battery_current_a", [](const Sample& s) { return s.battery_current_a; });
-  write("command_speed_m_s", [](const Sample& s) { return s.velocity_command[0]; });
-  write("command_yaw_rate_rad_s", [](const Sample& s) { return s.velocity_command[1]; });
-  write("yaw_rate_rad_s", [](const Sample& s) { return s.yaw_rate_rad_s; });
-  write("pitch_rad", [](const Sample& s) { return s.pitch_rad; });
-  write("x_m", [](const Sample& s) { return s.pose[0]; });
-  write("y_m", [](const Sample& s) { return s.pose[1]; });
-  write("heading_rad", [](const Sample& s) { return s.pose[2]; });
-  pair("motor_temperature_c", &Sample::motor_temperature_c);
-  write("payload_kg", [](const Sample& s) { return s.payload_kg; });
+    if (field.part == "left") json.end_object();
+  }
   write_cursor(json, found->next_cursor);
   json.end_object();
   return http::json_response(json.take());
@@ -290,7 +274,7 @@ Result<Response> covariates(const Services& services, const Request& request) {
   json.begin_object();
   json.field("id", *key);
   json.key("covariates").begin_array();
-  for (const telemetry::CovariateSeries& series : telemetry::series_of(found->changes)) {
+  for (const signals::CovariateSeries& series : signals::series_of(found->changes)) {
     json.begin_object().field("name", series.name).array("utime_us", series.utime_us);
     json.key("value").begin_array();
     for (const double value : series.value) json.exact(value);

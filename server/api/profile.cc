@@ -178,8 +178,8 @@ Result<std::string> write_answer(const server::ModelInForce& model, const planni
   write_summary(json, plan.summary);
   write_certificate(json, plan.certificate);
   json.key("ledger_j").begin_object();
-  for (std::size_t k = 0; k < energy::term_count; ++k)
-    json.field(energy::term_names[k], plan.ledger.value[k]);
+  for (std::size_t k = 0; k < signals::term_count; ++k)
+    json.field(signals::term_names[k], plan.ledger.value[k]);
   json.end_object();
   if (Result<void> done = write_baselines(json, planner, request, plan, question.baseline_columns); !done)
     return tl::unexpected(std::move(done.error()));
@@ -242,7 +242,7 @@ std::optional<std::string> brief_profile_answer(const nlohmann::json& body,
 
 Result<std::string> estimate_answer(const nlohmann::json& body, const server::ModelInForce& model) {
   Fields fields(body);
-  energy::Accounts accounts;
+  signals::Accounts accounts;
   const bool columns = fields.boolean("columns", false);
   planning::Profile series;
   planning::Peaks peaks;  // stays at nothing for a plan, which keeps its limits
@@ -274,7 +274,7 @@ Result<std::string> estimate_answer(const nlohmann::json& body, const server::Mo
     if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
     std::vector<energy::MotionPoint> points(t.size());
     for (std::size_t k = 0; k < t.size(); ++k) points[k] = {t[k], v[k], yaw[k], climb[k], height[k]};
-    Result<energy::Accounts> priced = energy::estimate_motion(model.drive, points, payload, start);
+    Result<signals::Accounts> priced = energy::estimate_motion(model.drive, points, payload, start);
     if (!priced) return tl::unexpected(std::move(priced.error()));
     accounts = *priced;
     series = series_of(model.drive, points, payload, start, peaks);

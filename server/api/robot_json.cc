@@ -9,7 +9,7 @@ constexpr double live_s = 5;
 
 double silence_s(const server::RobotSnapshot& s, std::int64_t now_utime_us) {
   return s.received_utime_us > 0 ? static_cast<double>(now_utime_us - s.received_utime_us) * 1e-6
-                                 : telemetry::unmeasured;
+                                 : signals::unmeasured;
 }
 
 void write_sides(JsonWriter& json, std::string_view name, const std::array<double, 2>& sides) {
@@ -25,7 +25,7 @@ void write_charge(JsonWriter& json, const server::ChargeView& charge) {
   json.field("default_curve", estimate.default_curve);
   json.field("flat_curve", estimate.flat_curve);
   const bool heard = estimate.source != battery::ChargeSource::unknown;
-  json.field("current_bias_a", heard ? estimate.current_bias_a : telemetry::unmeasured);
+  json.field("current_bias_a", heard ? estimate.current_bias_a : signals::unmeasured);
   json.field("current_bias_sd_a", estimate.current_bias_sd_a);
   json.field("time_to_charged_s", charge.to_full.duration_s);
   json.field("time_to_charged_sd_s", charge.to_full.sd_s);
@@ -77,8 +77,7 @@ void write_state(JsonWriter& json, const server::RobotSnapshot& s,
   json.field("state_of_charge", s.state_of_charge);
   json.field("state_of_charge_sd", s.charge.estimate.sd);
   write_charge(json, s.charge);
-  constexpr std::array<double, 3> unknown{telemetry::unmeasured, telemetry::unmeasured,
-                                          telemetry::unmeasured};
+  constexpr std::array<double, 3> unknown{signals::unmeasured, signals::unmeasured, signals::unmeasured};
   const std::array<double, 3>& range = reach ? reach->range_m : unknown;
   const std::array<double, 3>& run_time = reach ? reach->run_time_s : unknown;
   json.field("range_m", range[1]).field("run_time_s", run_time[1]);

@@ -64,12 +64,12 @@ Result<std::vector<gap::MissionRatio>> mission_ratios(const history::Store& stor
     Result<history::MissionPage> found = store.missions(filter, page);
     if (!found) return tl::unexpected(std::move(found.error()));
     for (const history::Mission& m : found->missions) {
-      const energy::Accounts& a = m.accounts;
+      const signals::Accounts& a = m.accounts;
       // Only whole missions compare: what was not measured is in neither energy.
       if (m.state == history::MissionState::open || !(a.measured_s > 0.9 * a.duration_s) ||
           !(a.measured_j > 0))
         continue;
-      const double modelled_j = a.measured_j - a.ledger[energy::Term::unexplained];
+      const double modelled_j = a.measured_j - a.ledger[signals::Term::unexplained];
       if (!(modelled_j > 0)) continue;
       ratios.push_back({m.key, m.start_utime_us, m.model_version.value_or(0), a.measured_j, modelled_j});
       if (ratios.size() == limit) break;

@@ -8,8 +8,8 @@
 namespace joulecast::server {
 namespace {
 
-Result<std::vector<telemetry::Sample>> samples_of(const history::Store& store, history::MissionKey key) {
-  std::vector<telemetry::Sample> samples;
+Result<std::vector<signals::Sample>> samples_of(const history::Store& store, history::MissionKey key) {
+  std::vector<signals::Sample> samples;
   history::PageRequest page;
   page.limit = history::max_telemetry_samples;
   do {
@@ -22,15 +22,15 @@ Result<std::vector<telemetry::Sample>> samples_of(const history::Store& store, h
     }
     page.cursor = std::move(got->next_cursor);
   } while (!page.cursor.empty());
-  std::ranges::stable_sort(samples, {}, &telemetry::Sample::utime_us);
-  const auto same = std::ranges::unique(samples, {}, &telemetry::Sample::utime_us);
+  std::ranges::stable_sort(samples, {}, &signals::Sample::utime_us);
+  const auto same = std::ranges::unique(samples, {}, &signals::Sample::utime_us);
   samples.erase(same.begin(), same.end());
   return samples;
 }
 
-Result<std::vector<telemetry::CovariateSeries>> covariates_of(const history::Store& store,
-                                                              history::MissionKey key) {
-  std::vector<telemetry::CovariateChange> changes;
+Result<std::vector<signals::CovariateSeries>> covariates_of(const history::Store& store,
+                                                            history::MissionKey key) {
+  std::vector<signals::CovariateChange> changes;
   history::PageRequest page;
   page.limit = history::max_telemetry_samples;
   do {
@@ -40,7 +40,7 @@ Result<std::vector<telemetry::CovariateSeries>> covariates_of(const history::Sto
                    std::make_move_iterator(got->changes.end()));
     page.cursor = std::move(got->next_cursor);
   } while (!page.cursor.empty());
-  return telemetry::series_of(changes);
+  return signals::series_of(changes);
 }
 
 class Reader {
@@ -56,7 +56,7 @@ class Reader {
     if (full() || result_.samples + static_cast<std::size_t>(std::max<std::int64_t>(mission.samples, 0)) >
                       wanted_.max_samples)
       return ++out.too_many, Result<void>{};
-    Result<std::vector<telemetry::Sample>> samples = samples_of(store_, mission.key);
+    Result<std::vector<signals::Sample>> samples = samples_of(store_, mission.key);
     if (!samples) return tl::unexpected(std::move(samples.error()));
     // A mission of which the retention has dropped a part is not what its accounts say.
     if (static_cast<std::int64_t>(samples->size()) * 10 < mission.samples * 9 || samples->size() < 2)
@@ -65,7 +65,7 @@ class Reader {
         charging != mission.sample_faults.end() && charging->second > 0)
       out.charging_samples += drop_charging(wanted_.battery_capacity_ah, *samples);
     if (samples->size() < 2) return ++out.no_telemetry, Result<void>{};
-    Result<std::vector<telemetry::CovariateSeries>> covariates = covariates_of(store_, mission.key);
+    Result<std::vector<signals::CovariateSeries>> covariates = covariates_of(store_, mission.key);
     if (!covariates) return tl::unexpected(std::move(covariates.error()));
     result_.samples += samples->size();
     result_.missions.push_back({mission.key,

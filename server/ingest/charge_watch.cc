@@ -11,7 +11,7 @@ using nlohmann::json;
 
 constexpr double standing_rad_s = 0.05;  // encoders of a standing robot show less
 
-bool moves(const telemetry::Sample& sample) {
+bool moves(const signals::Sample& sample) {
   return std::fabs(sample.wheel_velocity_rad_s[0]) > standing_rad_s ||
          std::fabs(sample.wheel_velocity_rad_s[1]) > standing_rad_s;
 }
@@ -26,18 +26,18 @@ battery::Seen seen_from(const json& document) {
 
 }  // namespace
 
-std::size_t drop_charging(double capacity_ah, std::vector<telemetry::Sample>& samples) {
+std::size_t drop_charging(double capacity_ah, std::vector<signals::Sample>& samples) {
   using battery::ChargingPhase;
   battery::ChargingObserver charging(capacity_ah);
-  std::vector<telemetry::Sample> kept, undecided;
+  std::vector<signals::Sample> kept, undecided;
   kept.reserve(samples.size());
   const auto keep_undecided = [&] {
     kept.insert(kept.end(), undecided.begin(), undecided.end());
     undecided.clear();
   };
-  for (const telemetry::Sample& s : samples) {
+  for (const signals::Sample& s : samples) {
     const ChargingPhase phase =
-        charging.add({s.utime_us, s.battery_voltage_v, s.battery_current_a, moves(s), telemetry::unmeasured});
+        charging.add({s.utime_us, s.battery_voltage_v, s.battery_current_a, moves(s), signals::unmeasured});
     if (phase == ChargingPhase::suspected) {
       undecided.push_back(s);
     } else if (charging.charging()) {
@@ -57,7 +57,7 @@ ChargeWatch::ChargeWatch(const robot::RobotModel& robot)
     : tracker_(robot.battery, robot.idle_power_w),
       charging_(robot.battery.capacity_ah * robot.battery.ageing_factor.value_or(1)) {}
 
-ChargeWatch::Share ChargeWatch::add(const telemetry::Sample& sample, double modelled_power_w) {
+ChargeWatch::Share ChargeWatch::add(const signals::Sample& sample, double modelled_power_w) {
   utime_us_ = sample.utime_us;
   tracker_.add({sample.utime_us, sample.battery_voltage_v, sample.battery_current_a, modelled_power_w});
   const bool was_full = charging_.phase() == battery::ChargingPhase::full;

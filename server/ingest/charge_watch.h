@@ -9,7 +9,7 @@
 #include "battery/charge_tracker.h"
 #include "battery/charging.h"
 #include "robot/robot_model.h"
-#include "telemetry/sample.h"
+#include "signals/sample.h"
 
 namespace joulecast::server {
 
@@ -24,7 +24,7 @@ struct ChargeView {
 
 // Takes out what came while a charger fed the robot, as a ChargeWatch would share it out; how many samples.
 // `capacity_ah` of its battery.
-std::size_t drop_charging(double capacity_ah, std::vector<telemetry::Sample>& samples);
+std::size_t drop_charging(double capacity_ah, std::vector<signals::Sample>& samples);
 
 // Follows one robot's state of charge and its stays at chargers, in missions and outside, and keeps what it
 // has learned over restarts.
@@ -37,7 +37,7 @@ class ChargeWatch {
   enum class Share { robot, undecided, charger };
 
   // Samples in order of time; `modelled_power_w` stands in for an unmeasured current (NaN: unknown).
-  Share add(const telemetry::Sample& sample, double modelled_power_w);
+  Share add(const signals::Sample& sample, double modelled_power_w);
   void interrupt();
 
   ChargeView view() const;

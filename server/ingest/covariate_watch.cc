@@ -9,7 +9,7 @@
 namespace joulecast::server {
 namespace {
 
-using telemetry::CovariateChange;
+using signals::CovariateChange;
 using Verdict = telemetry::CovariateTracker::Verdict;
 
 constexpr std::size_t most_heights = 1000;  // ahead of the samples: a second of them, and more
@@ -27,9 +27,9 @@ void count(history::CovariateSummary& summary, std::int64_t until_utime_us) {
 
 }  // namespace
 
-void CovariateWatch::take(const telemetry::CovariateMessage& message,
+void CovariateWatch::take(const signals::CovariateMessage& message,
                           const std::function<void(IngestFault)>& fault) {
-  for (const telemetry::Covariate& covariate : message.covariates) {
+  for (const signals::Covariate& covariate : message.covariates) {
     if (telemetry::check_plausible(covariate)) {
       fault(IngestFault::implausible);
       continue;
@@ -39,7 +39,7 @@ void CovariateWatch::take(const telemetry::CovariateMessage& message,
     if (verdict == Verdict::late) fault(IngestFault::late);
     if (verdict == Verdict::no_room) fault(IngestFault::too_many_covariates);
     if (verdict != Verdict::news) continue;
-    if (covariate.name == telemetry::height_covariate) hear_height(message.utime_us, covariate.value);
+    if (covariate.name == signals::height_covariate) hear_height(message.utime_us, covariate.value);
     if (in_mission_) note(std::move(change));
   }
 }
@@ -74,7 +74,7 @@ void CovariateWatch::resume(const history::Mission& mission) {
   std::vector<CovariateChange> held;
   for (const history::CovariateSummary& summary : summaries_) {
     held.push_back({summary.value_utime_us, summary.name, summary.value});
-    if (summary.name == telemetry::height_covariate) height_m_ = summary.value;
+    if (summary.name == signals::height_covariate) height_m_ = summary.value;
   }
   tracker_.resume(mission.start_utime_us, held);
 }
@@ -96,7 +96,7 @@ void CovariateWatch::hear_height(std::int64_t utime_us, double height_m) {
 }
 
 double CovariateWatch::climb_at(const dynamics::Parameters<double>& parameters,
-                                const telemetry::Sample& sample) {
+                                const signals::Sample& sample) {
   for (; !heights_.empty() && heights_.front().first <= sample.utime_us; heights_.pop_front())
     height_m_ = heights_.front().second;
   return climb_.add(telemetry::climb_reading(parameters, sample, height_m_));

@@ -10,8 +10,9 @@
 #include "dynamics/parameters.h"
 #include "history/records.h"
 #include "server/ingest/counters.h"
-#include "telemetry/covariates.h"
-#include "telemetry/sample.h"
+#include "signals/covariates.h"
+#include "signals/sample.h"
+#include "telemetry/covariate_tracker.h"
 
 namespace joulecast::server {
 
@@ -23,7 +24,7 @@ class CovariateWatch {
   explicit CovariateWatch(std::int64_t reorder_us) : tracker_(reorder_us) {}
 
   // Takes a message with a plausible clock; `fault` is told of every value turned away.
-  void take(const telemetry::CovariateMessage& message, const std::function<void(IngestFault)>& fault);
+  void take(const signals::CovariateMessage& message, const std::function<void(IngestFault)>& fault);
 
   // What holds goes on into the mission.
   void begin_mission(std::int64_t start_utime_us);
@@ -34,24 +35,24 @@ class CovariateWatch {
   // Changes of the open mission that settle() has not handed over.
   std::size_t pending() const { return pending_.size(); }
   // Brings the record's summaries up to its end and hands over what changed since the last call.
-  std::vector<telemetry::CovariateChange> settle(history::Mission& record);
+  std::vector<signals::CovariateChange> settle(history::Mission& record);
 
   // The climb at the next sample in order of time.
-  double climb_at(const dynamics::Parameters<double>& parameters, const telemetry::Sample& sample);
+  double climb_at(const dynamics::Parameters<double>& parameters, const signals::Sample& sample);
   // The robot's clock was set: what holds goes on in the new time.
   void on_clock_step(std::int64_t utime_us);
 
  private:
-  void note(telemetry::CovariateChange change);
+  void note(signals::CovariateChange change);
   void hear_height(std::int64_t utime_us, double height_m);
 
   telemetry::CovariateTracker tracker_;
   bool in_mission_ = false;
   std::vector<history::CovariateSummary> summaries_;  // of the open mission
-  std::vector<telemetry::CovariateChange> pending_;
+  std::vector<signals::CovariateChange> pending_;
   dynamics::ClimbTracker climb_;
   std::deque<std::pair<std::int64_t, double>> heights_;  // of times that no sample has reached
-  double height_m_ = telemetry::unmeasured;
+  double height_m_ = signals::unmeasured;
 };
 
 }  // namespace joulecast::server

@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "energy/ledger.h"
 #include "server/ingest/charge_watch.h"
-#include "telemetry/sample.h"
+#include "signals/ledger.h"
+#include "signals/sample.h"
 
 namespace joulecast::server {
 
@@ -21,18 +21,18 @@ struct RobotSnapshot {
   bool has_model = false;
   std::int64_t model_version = 0;
   std::int64_t received_utime_us = 0;  // host clock at the last message; 0 = never heard
-  telemetry::Sample sample;            // the last one accounted for
-  double measured_power_w = telemetry::unmeasured;
-  double modelled_power_w = telemetry::unmeasured;
-  double speed_m_s = telemetry::unmeasured;
-  double yaw_rate_rad_s = telemetry::unmeasured;
-  double state_of_charge = telemetry::unmeasured;  // of charge.estimate
+  signals::Sample sample;              // the last one accounted for
+  double measured_power_w = signals::unmeasured;
+  double modelled_power_w = signals::unmeasured;
+  double speed_m_s = signals::unmeasured;
+  double yaw_rate_rad_s = signals::unmeasured;
+  double state_of_charge = signals::unmeasured;  // of charge.estimate
   ChargeView charge;
-  std::array<double, 2> winding_temperature_c{telemetry::unmeasured, telemetry::unmeasured};
+  std::array<double, 2> winding_temperature_c{signals::unmeasured, signals::unmeasured};
   std::string mission_id;  // empty: no mission open
   std::int64_t mission_key = 0;
   std::int64_t mission_start_utime_us = 0;
-  energy::Accounts accounts;  // of the open mission
+  signals::Accounts accounts;  // of the open mission
   std::uint64_t samples = 0;
   std::map<std::string, std::uint64_t>
       faults;  // reason -> messages rejected or repaired, since the daemon started

@@ -172,7 +172,7 @@ forecast::Charge live_charge(const RobotSnapshot& live, const robot::Battery& ba
 
 forecast::Reach Forecasts::reach(const std::shared_ptr<const ModelInForce>& model,
                                  const RobotSnapshot& live) {
-  constexpr double nan = telemetry::unmeasured;
+  constexpr double nan = signals::unmeasured;
   const forecast::Charge charge = live_charge(live, model->robot.battery);
   if (!std::isfinite(charge.fraction)) return {nan, nan, nan, nan, {nan, nan, nan}, {nan, nan, nan}};
   const bool heard = live.sample.utime_us != 0 && std::isfinite(live.sample.payload_kg);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/host_clock.h"
+#include "signals/energy_state.h"
 #include "telemetry/lcm_link.h"
 
 namespace joulecast::server {
@@ -151,7 +152,7 @@ class IngestService::Impl {
       const std::shared_ptr<const ModelInForce> model = models_.find(snapshot->robot_id);
       if (model == nullptr) continue;
       const forecast::Reach reach = forecasts_.reach(model, *snapshot);
-      telemetry::EnergyState state;
+      signals::EnergyState state;
       state.utime_us = snapshot->sample.utime_us;
       state.robot_id = snapshot->robot_id;
       state.mission_id = snapshot->mission_id;
@@ -160,10 +161,10 @@ class IngestService::Impl {
       state.modelled_power_w = snapshot->modelled_power_w;
       if (snapshot->accounts.measured_s > 0) {
         state.measured_energy_j = snapshot->accounts.measured_j;
-        state.unexplained_energy_j = snapshot->accounts.ledger[energy::Term::unexplained];
+        state.unexplained_energy_j = snapshot->accounts.ledger[signals::Term::unexplained];
       }
       state.modelled_energy_j = snapshot->accounts.modelled_j;
-      state.recovered_energy_j = snapshot->accounts.ledger[energy::Term::recovered];
+      state.recovered_energy_j = snapshot->accounts.ledger[signals::Term::recovered];
       state.state_of_charge = snapshot->state_of_charge;
       state.state_of_charge_sd = snapshot->charge.estimate.sd;
       state.range_m = reach.range_m[1];

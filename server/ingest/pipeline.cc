@@ -70,12 +70,12 @@ void Pipeline::handle(const InboundMessage& message) {
   refresh_models();
   RobotSession* robot = session(message.robot_id);
   if (robot == nullptr) return;
-  if (const auto* sample = std::get_if<telemetry::Sample>(&message.content)) {
+  if (const auto* sample = std::get_if<signals::Sample>(&message.content)) {
     robot->on_sample(*sample, message.host_utime_us);
-  } else if (const auto* covariates = std::get_if<telemetry::CovariateMessage>(&message.content)) {
+  } else if (const auto* covariates = std::get_if<signals::CovariateMessage>(&message.content)) {
     robot->on_covariates(*covariates);
   } else {
-    robot->on_event(std::get<telemetry::MissionEvent>(message.content), message.host_utime_us);
+    robot->on_event(std::get<signals::MissionEvent>(message.content), message.host_utime_us);
   }
 }
 

@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "server/ingest/robot_session.h"
+#include "signals/mission_event.h"
 #include "telemetry/codec.h"
 
 namespace joulecast::server {
@@ -18,7 +19,7 @@ namespace joulecast::server {
 // A message off the wire that passed the guard.
 struct InboundMessage {
   std::string robot_id;
-  std::variant<telemetry::Sample, telemetry::MissionEvent, telemetry::CovariateMessage> content;
+  std::variant<signals::Sample, signals::MissionEvent, signals::CovariateMessage> content;
   std::int64_t host_utime_us = 0;
 };
 

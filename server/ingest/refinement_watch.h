@@ -8,7 +8,7 @@
 #include "energy/refinement.h"
 #include "history/records.h"
 #include "robot/robot_model.h"
-#include "telemetry/sample.h"
+#include "signals/sample.h"
 
 namespace joulecast::server {
 
@@ -24,7 +24,7 @@ class RefinementWatch {
 
   void begin_mission();
   // Samples of the mission in order of time, without those at a charger, and the climb there.
-  void add(const telemetry::Sample& sample, double climb_rad) { equations_.add(sample, climb_rad); }
+  void add(const signals::Sample& sample, double climb_rad) { equations_.add(sample, climb_rad); }
   void interrupt() { equations_.interrupt(); }
 
   struct Judgement {

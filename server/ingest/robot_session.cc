@@ -51,7 +51,7 @@ Result<std::shared_ptr<const ModelInForce>> stored_model(const history::Store& s
 // The mission that is open, as stored, with what came since its last checkpoint.
 struct RobotSession::OpenMission {
   history::Mission record;
-  std::vector<telemetry::Sample> samples;
+  std::vector<signals::Sample> samples;
   std::uint64_t unsaved = 0;
   telemetry::MissionPayload payload;
   // Gaps that an earlier run of the daemon counted; the meter counts those of this run.
@@ -68,7 +68,7 @@ RobotSession::RobotSession(std::string robot_id, const SessionSettings& settings
       missions_(settings.mission),
       covariates_(settings.mission.reorder_us) {
   snapshot_.robot_id = robot_id_;
-  if (const auto stored = outputs_.store.energy_state(robot_id_); stored && stored->has_value()) {
+  if (const auto stored = outputs_.store.resume_state(robot_id_); stored && stored->has_value()) {
     snapshot_.state_of_charge = (*stored)->state_of_charge;
     stored_charge_utime_us_ = (*stored)->utime_us;
   }
@@ -94,7 +94,7 @@ void RobotSession::set_model(std::shared_ptr<const ModelInForce> model) {
 
 void RobotSession::meter_with(std::shared_ptr<const ModelInForce> model) {
   flush_meter();
-  const energy::Accounts accounts = meter_ != nullptr ? meter_->accounts() : energy::Accounts{};
+  const signals::Accounts accounts = meter_ != nullptr ? meter_->accounts() : signals::Accounts{};
   model_ = std::move(model);
   meter_.reset();
   snapshot_.has_model = model_ != nullptr;
@@ -166,7 +166,7 @@ void RobotSession::on_fault(IngestFault fault, std::uint64_t count) {
   changed_ = true;
 }
 
-void RobotSession::on_sample(const telemetry::Sample& sample, std::int64_t host_utime_us) {
+void RobotSession::on_sample(const signals::Sample& sample, std::int64_t host_utime_us) {
   snapshot_.received_utime_us = host_utime_us;
   if (model_ == nullptr) return on_fault(IngestFault::unknown_robot);
   if (telemetry::check_plausible(sample)) return on_fault(IngestFault::implausible);
@@ -195,7 +195,7 @@ void RobotSession::on_sample(const telemetry::Sample& sample, std::int64_t host_
   }
   last_sequence_ = sample.sequence;
 
-  const double modelled_power_w = open_ != nullptr ? snapshot_.modelled_power_w : telemetry::unmeasured;
+  const double modelled_power_w = open_ != nullptr ? snapshot_.modelled_power_w : signals::unmeasured;
   const ChargeWatch::Share share = charge_->add(sample, modelled_power_w);
   snapshot_.state_of_charge = charge_->estimate().charge;
   changed_ = true;
@@ -224,7 +224,7 @@ void RobotSession::on_sample(const telemetry::Sample& sample, std::int64_t host_
 
 void RobotSession::release_held() {
   while (!held_.empty()) {
-    const telemetry::Sample sample = held_.front();
+    const signals::Sample sample = held_.front();
     held_.pop_front();
     on_own_sample(sample);
   }
@@ -232,10 +232,10 @@ void RobotSession::release_held() {
 
 // What flows while a charger feeds the robot is no cost of its motion: it stays out of the mission's
 // accounts, and does not open a mission.
-void RobotSession::on_charger_sample(const telemetry::Sample& sample) {
+void RobotSession::on_charger_sample(const signals::Sample& sample) {
   snapshot_.sample = sample;
   snapshot_.measured_power_w = sample.battery_voltage_v * sample.battery_current_a;
-  snapshot_.modelled_power_w = telemetry::unmeasured;
+  snapshot_.modelled_power_w = signals::unmeasured;
   snapshot_.speed_m_s = snapshot_.yaw_rate_rad_s = 0;
   ++snapshot_.samples;
   outputs_.counters.samples.fetch_add(1, std::memory_order_relaxed);
@@ -250,10 +250,10 @@ void RobotSession::on_charger_sample(const telemetry::Sample& sample) {
 }
 
 // A sample that no mission accounts for still tells what the robot does now.
-void RobotSession::show(const telemetry::Sample& sample) {
+void RobotSession::show(const signals::Sample& sample) {
   snapshot_.sample = sample;
   snapshot_.measured_power_w = sample.battery_voltage_v * sample.battery_current_a;
-  snapshot_.modelled_power_w = telemetry::unmeasured;
+  snapshot_.modelled_power_w = signals::unmeasured;
   const dynamics::Body<double> body =
       dynamics::body_of_wheels(model_->drive.parameters(), sample.wheel_velocity_rad_s, {});
   snapshot_.speed_m_s = body.speed_m_s;
@@ -300,14 +300,14 @@ void RobotSession::remember_charge() {
       {robot_id_, std::string(charge_topic), remembered_utime_us_, charge_->memory_json()}});
 }
 
-void RobotSession::keep(const telemetry::Sample& sample) {
+void RobotSession::keep(const signals::Sample& sample) {
   ++open_->record.samples;
   ++open_->unsaved;
   open_->samples.push_back(sample);
   if (open_->samples.size() >= settings_.checkpoint_samples) checkpoint();
 }
 
-void RobotSession::on_own_sample(const telemetry::Sample& sample) {
+void RobotSession::on_own_sample(const signals::Sample& sample) {
   const telemetry::SampleStep step = missions_.on_sample(sample.utime_us, sample.payload_kg);
   carry_out(step.actions);
   if (!step.belongs || open_ == nullptr) {
@@ -328,7 +328,7 @@ void RobotSession::on_own_sample(const telemetry::Sample& sample) {
   ++snapshot_.samples;
   outputs_.counters.samples.fetch_add(1, std::memory_order_relaxed);
   if (open_->payload.contradicts(sample.payload_kg)) on_fault(IngestFault::zero_payload);
-  telemetry::Sample counted = sample;
+  signals::Sample counted = sample;
   counted.payload_kg = open_->payload.take(sample.payload_kg);
   const double climb_rad = covariates_.climb_at(model_->drive.parameters(), counted);
   if (const Result<void> metered = meter_->add(counted, climb_rad); !metered) {
@@ -340,14 +340,14 @@ void RobotSession::on_own_sample(const telemetry::Sample& sample) {
   changed_ = true;
 }
 
-void RobotSession::on_event(const telemetry::MissionEvent& event, std::int64_t host_utime_us) {
+void RobotSession::on_event(const signals::MissionEvent& event, std::int64_t host_utime_us) {
   snapshot_.received_utime_us = host_utime_us;
   if (model_ == nullptr) return on_fault(IngestFault::unknown_robot);
   if (const auto fault = telemetry::check_plausible(event)) {
     on_fault(IngestFault::implausible);
     if (fault->why == telemetry::Implausibility::bad_clock) return;
-    telemetry::MissionEvent without_payload = event;
-    without_payload.payload_kg = telemetry::unmeasured;
+    signals::MissionEvent without_payload = event;
+    without_payload.payload_kg = signals::unmeasured;
     return on_event(without_payload, host_utime_us);
   }
   release_held();
@@ -361,7 +361,7 @@ void RobotSession::on_event(const telemetry::MissionEvent& event, std::int64_t h
   changed_ = true;
 }
 
-void RobotSession::on_covariates(const telemetry::CovariateMessage& message) {
+void RobotSession::on_covariates(const signals::CovariateMessage& message) {
   if (telemetry::check_plausible(message)) return on_fault(IngestFault::implausible);
   const std::size_t before = covariates_.pending();
   covariates_.take(message, [this](IngestFault fault) { on_fault(fault); });
@@ -487,14 +487,14 @@ void RobotSession::checkpoint() {
   open_->samples.reserve(settings_.checkpoint_samples);
   open_->unsaved = 0;
   if (std::isfinite(snapshot_.state_of_charge)) {
-    command.energy_state = history::EnergyState{robot_id_, snapshot_.sample.utime_us, last_sequence_,
+    command.resume_state = history::ResumeState{robot_id_, snapshot_.sample.utime_us, last_sequence_,
                                                 snapshot_.state_of_charge, snapshot_.winding_temperature_c};
   }
   if (open_->record.key > 0) outputs_.post(std::move(command));
 }
 
 void RobotSession::on_point(const energy::MeterPoint& point) {
-  const energy::Accounts& accounts = meter_->accounts();
+  const signals::Accounts& accounts = meter_->accounts();
   trace_.add(point, accounts, snapshot_.state_of_charge);
   legs_->add({point.bridged ? point.interval_s : 0, point.speed_m_s, point.yaw_rate_rad_s,
               point.measured_power_w, point.sample.payload_kg});

@@ -19,9 +19,10 @@
 #include "server/ingest/model_registry.h"
 #include "server/ingest/refinement_watch.h"
 #include "server/ingest/trace_builder.h"
+#include "signals/mission_event.h"
+#include "signals/sample.h"
 #include "telemetry/mission_tracker.h"
 #include "telemetry/payload.h"
-#include "telemetry/sample.h"
 #include "telemetry/sequence_tracker.h"
 
 namespace joulecast::server {
@@ -63,10 +64,10 @@ class RobotSession {
   // Goes on with a mission that was open when the last daemon stopped.
   void resume(const history::Mission& mission);
 
-  void on_sample(const telemetry::Sample& sample, std::int64_t host_utime_us);
-  void on_event(const telemetry::MissionEvent& event, std::int64_t host_utime_us);
+  void on_sample(const signals::Sample& sample, std::int64_t host_utime_us);
+  void on_event(const signals::MissionEvent& event, std::int64_t host_utime_us);
   // Opens no mission and is no sign that the robot's telemetry lives.
-  void on_covariates(const telemetry::CovariateMessage& message);
+  void on_covariates(const signals::CovariateMessage& message);
   void on_fault(IngestFault fault, std::uint64_t count = 1);
 
   // Call about once a second: ends missions that fell silent, checkpoints the open one, publishes what
@@ -84,14 +85,14 @@ class RobotSession {
   struct OpenMission;
 
   // A sample in its place that is the robot's own, or that came while a charger fed it.
-  void on_own_sample(const telemetry::Sample& sample);
-  void on_charger_sample(const telemetry::Sample& sample);
-  void show(const telemetry::Sample& sample);
+  void on_own_sample(const signals::Sample& sample);
+  void on_charger_sample(const signals::Sample& sample);
+  void show(const signals::Sample& sample);
   void release_held();
   void leave_charger();
   void remember_charge();
   void judge_mission();
-  void keep(const telemetry::Sample& sample);
+  void keep(const signals::Sample& sample);
   void carry_out(const telemetry::MissionActions& actions);
   void open(const telemetry::MissionAction& action);
   void tell_of_namesake();
@@ -117,7 +118,7 @@ class RobotSession {
   std::string charge_memory_;                // as stored by the last daemon
   std::int64_t stored_charge_utime_us_ = 0;  // of the charge that the last daemon stored
   std::int64_t remembered_utime_us_ = 0;
-  std::deque<telemetry::Sample> held_;  // until it is clear whether a charger feeds the robot
+  std::deque<signals::Sample> held_;  // until it is clear whether a charger feeds the robot
   bool at_charger_ = false;
   CovariateWatch covariates_;
   TraceBuilder trace_;

@@ -38,7 +38,7 @@ void TraceBuilder::begin() {
   any_ = touched_ = false;
 }
 
-void TraceBuilder::add(const energy::MeterPoint& point, const energy::Accounts& accounts,
+void TraceBuilder::add(const energy::MeterPoint& point, const signals::Accounts& accounts,
                        double state_of_charge) {
   std::int64_t start = point.sample.utime_us - point.sample.utime_us % history::trace_bucket_us;
   if (any_ && start != open_.start_utime_us) {
@@ -58,7 +58,7 @@ void TraceBuilder::add(const energy::MeterPoint& point, const energy::Accounts& 
   open_.x.add(point.sample.pose[0], weight);
   open_.y.add(point.sample.pose[1], weight);
   open_.state_of_charge = state_of_charge;
-  open_.measured_j = accounts.measured_s > 0 ? accounts.measured_j : telemetry::unmeasured;
+  open_.measured_j = accounts.measured_s > 0 ? accounts.measured_j : signals::unmeasured;
   open_.modelled_j = accounts.modelled_j;
   touched_ = true;
 }

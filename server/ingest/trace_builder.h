@@ -13,7 +13,7 @@ class TraceBuilder {
  public:
   void begin();
   // `accounts` and `state_of_charge` (0 to 1; NaN: unknown) as of the point.
-  void add(const energy::MeterPoint& point, const energy::Accounts& accounts, double state_of_charge);
+  void add(const energy::MeterPoint& point, const signals::Accounts& accounts, double state_of_charge);
   // The buckets that changed since the last call; the newest one may come again, fuller.
   std::vector<history::TraceBucket> take();
 
@@ -21,7 +21,7 @@ class TraceBuilder {
   // A running band: sums become the mean when the bucket is handed out.
   struct Sum {
     double weighted = 0, weight = 0;
-    double min = telemetry::unmeasured, max = telemetry::unmeasured;
+    double min = signals::unmeasured, max = signals::unmeasured;
     void add(double value, double weight_s);
     history::Band band() const;
   };
@@ -30,8 +30,8 @@ class TraceBuilder {
     double covered_s = 0;
     Sum measured, modelled, speed, x, y;
     history::TraceBucket bucket() const;
-    double state_of_charge = telemetry::unmeasured, measured_j = telemetry::unmeasured,
-           modelled_j = telemetry::unmeasured;
+    double state_of_charge = signals::unmeasured, measured_j = signals::unmeasured,
+           modelled_j = signals::unmeasured;
   };
 
   std::vector<history::TraceBucket> finished_;

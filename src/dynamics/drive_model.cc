@@ -122,7 +122,9 @@ PowerFlow<S> BasicDriveModel<S>::flow(const Instant& at) const {
   const TorqueBalance<S> b = balance(at);
   const S grip = S(1) - p.slip;
   PowerFlow<S> f;
-  f.accessories_w = p.idle_power_w + p.accessory_power_w;
+  using signals::Term;
+  auto& ledger = f.ledger;
+  ledger[Term::accessories] = p.idle_power_w + p.accessory_power_w;
   for (std::size_t s : {0u, 1u}) {
     const double speed = at.wheel_speed_rad_s[s];
     f.torque_nm[s] = b.total_nm[s];
@@ -130,30 +132,31 @@ PowerFlow<S> BasicDriveModel<S>::flow(const Instant& at) const {
     f.voltage_v[s] = voltage_for(s, f.current_a[s], at);
     f.motor_power_w[s] = f.voltage_v[s] * f.current_a[s];
 
-    f.copper_w += resistance(s, at) * f.current_a[s] * f.current_a[s];
-    f.brush_w += brush_voltage(p, f.current_a[s]) * f.current_a[s];
+    ledger[Term::copper] += resistance(s, at) * f.current_a[s] * f.current_a[s];
+    ledger[Term::brush] += brush_voltage(p, f.current_a[s]) * f.current_a[s];
     // Field energy of the winding, and what unequal SI values of K_t and K_w leave over, are stored or lost
     // in the motor.
-    f.kinetic_w += p.inductance_h * at.current_slope_a_s[s] * f.current_a[s];
-    f.friction_internal_w += (p.voltage_constant_v_s_rad - p.torque_constant_nm_a) * speed * f.current_a[s];
+    ledger[Term::kinetic] += p.inductance_h * at.current_slope_a_s[s] * f.current_a[s];
+    ledger[Term::friction_internal] +=
+        (p.voltage_constant_v_s_rad - p.torque_constant_nm_a) * speed * f.current_a[s];
     const auto power = [&](Load load) { return b.loads.torque[static_cast<std::size_t>(load)][s] * speed; };
-    f.friction_internal_w += (b.friction_nm[s] + b.gear_nm[s]) * speed + power(Load::internal);
-    f.friction_rolling_w += power(Load::rolling);
-    f.friction_zone_w += power(Load::zone);
+    ledger[Term::friction_internal] += (b.friction_nm[s] + b.gear_nm[s]) * speed + power(Load::internal);
+    ledger[Term::friction_rolling] += power(Load::rolling);
+    ledger[Term::friction_zone] += power(Load::zone);
     // Slip: of what reaches the ground through the wheel, the body gets (1 - slip).
     const S wheel_inertia = p.wheel_inertia_kg_m2 * at.wheel_acceleration_rad_s2[s];
     const S body_inertia = (b.inertial_nm[s] - wheel_inertia) * speed;
-    f.kinetic_w += wheel_inertia * speed + body_inertia * grip;
-    f.friction_scrub_w += power(Load::scrub) * grip;
-    f.drag_w += power(Load::drag) * grip;
-    f.potential_w += power(Load::potential) * grip;
-    f.friction_slip_w +=
+    ledger[Term::kinetic] += wheel_inertia * speed + body_inertia * grip;
+    ledger[Term::friction_scrub] += power(Load::scrub) * grip;
+    ledger[Term::drag] += power(Load::drag) * grip;
+    ledger[Term::potential] += power(Load::potential) * grip;
+    ledger[Term::friction_slip] +=
         (body_inertia + power(Load::scrub) + power(Load::drag) + power(Load::potential)) * p.slip;
 
-    f.driver_w += p.driver_loss * abs(f.motor_power_w[s]);
+    ledger[Term::driver] += p.driver_loss * abs(f.motor_power_w[s]);
     if (f.motor_power_w[s] < S(0)) {
-      f.braking_w -= f.motor_power_w[s];
-      f.recovered_w -= f.motor_power_w[s] * (S(1) - p.unreturned);
+      ledger[Term::braking] -= f.motor_power_w[s];
+      ledger[Term::recovered] -= f.motor_power_w[s] * (S(1) - p.unreturned);
     }
   }
   f.battery_power_w = battery_power_for(f.motor_power_w);

@@ -7,6 +7,7 @@
 #include "dynamics/catalogue.h"
 #include "dynamics/motion.h"
 #include "robot/robot_model.h"
+#include "signals/ledger.h"
 
 namespace joulecast::dynamics {
 
@@ -19,11 +20,9 @@ struct PowerFlow {
   std::array<S, 2> voltage_v{};
   std::array<S, 2> motor_power_w{};  // V i, negative while braking regenerates
   S battery_power_w = 0;             // at the battery terminals
-  // Where it goes; the fields add up to battery_power_w with `recovered_w` counted negative.
-  S accessories_w = 0, driver_w = 0, copper_w = 0, brush_w = 0;
-  S friction_internal_w = 0, friction_rolling_w = 0, friction_scrub_w = 0, friction_zone_w = 0,
-    friction_slip_w = 0;
-  S drag_w = 0, kinetic_w = 0, potential_w = 0, braking_w = 0, recovered_w = 0;
+  // Where it goes; adds up to battery_power_w. Without `sensor` and `unexplained`, which physics does not
+  // know.
+  signals::BasicLedger<S> ledger;
 };
 
 // The torque balance of both wheels at one instant.

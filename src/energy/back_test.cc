@@ -38,10 +38,10 @@ struct Replay {
 Result<Replay> replay(const dynamics::DriveModel& model, const DriveRun& run, bool at_battery,
                       const BackTestSettings& settings) {
   Replay result;
-  Accounts last;
+  signals::Accounts last;
   const Meter* source = nullptr;
   const auto take = [&](const MeterPoint& point) {
-    const Accounts& now = source->accounts();
+    const signals::Accounts& now = source->accounts();
     const bool counts =
         at_battery ? now.measured_s > last.measured_s : now.motor_measured_s > last.motor_measured_s;
     if (counts) {
@@ -50,7 +50,7 @@ Result<Replay> replay(const dynamics::DriveModel& model, const DriveRun& run, bo
       Span part;
       if (at_battery) {
         part.measured_j = now.measured_j - last.measured_j;
-        part.missed_j = -(now.ledger[Term::unexplained] - last.ledger[Term::unexplained]);
+        part.missed_j = -(now.ledger[signals::Term::unexplained] - last.ledger[signals::Term::unexplained]);
       } else {
         for (std::size_t s : {0u, 1u}) {
           const double measured = now.measured_motor_j[s] - last.measured_motor_j[s];
@@ -68,7 +68,7 @@ Result<Replay> replay(const dynamics::DriveModel& model, const DriveRun& run, bo
   source = &meter;
   telemetry::MissionPayload payload(run.payload_kg);
   for (std::size_t k = 0; k < run.samples.size(); ++k) {
-    telemetry::Sample sample = run.samples[k];
+    signals::Sample sample = run.samples[k];
     sample.payload_kg = payload.take(sample.payload_kg);
     if (Result<void> added = meter.add(sample, run.climb_at(k)); !added)
       return tl::unexpected(std::move(added.error()));

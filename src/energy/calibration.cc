@@ -138,7 +138,7 @@ class Calibrator {
     double top = 0;
     bool any_current = false;
     for (const DriveRun& run : runs) {
-      for (const telemetry::Sample& s : run.samples) {
+      for (const signals::Sample& s : run.samples) {
         for (std::size_t side : {0u, 1u}) {
           top = std::max(top, std::fabs(s.wheel_velocity_rad_s[side]));
           any_current |= std::isfinite(s.motor_current_a[side]);
@@ -187,7 +187,7 @@ class Calibrator {
     if (!stretch.empty()) close(stretch, stretch.back().t_s - stretch.front().t_s);
   }
 
-  bool usable(const telemetry::Sample& s, const std::array<double, 2>& acceleration) const {
+  bool usable(const signals::Sample& s, const std::array<double, 2>& acceleration) const {
     for (std::size_t side : {0u, 1u}) {
       if (!std::isfinite(s.motor_current_a[side])) return false;
       if (!(std::fabs(s.wheel_velocity_rad_s[side]) > moving_rad_s_)) return false;
@@ -198,7 +198,7 @@ class Calibrator {
            std::fabs(right - left) < options_.straight_fraction * std::fabs(right + left) / 2;
   }
 
-  Moment observe(const telemetry::Sample& s, double climb_rad, const std::array<double, 2>& acceleration,
+  Moment observe(const signals::Sample& s, double climb_rad, const std::array<double, 2>& acceleration,
                  double t_s, double payload_kg) {
     dynamics::Instant at;
     at.wheel_speed_rad_s = s.wheel_velocity_rad_s;
@@ -492,13 +492,14 @@ Result<DriveCalibration> calibrate_drive(const robot::RobotModel& robot, std::sp
   return Calibrator(robot, options, std::move(*known)).run(runs);
 }
 
-Result<Accounts> metered(const robot::RobotModel& robot, const DriveRun& run, const MeterSettings& settings) {
+Result<signals::Accounts> metered(const robot::RobotModel& robot, const DriveRun& run,
+                                  const MeterSettings& settings) {
   Result<dynamics::DriveModel> drive = dynamics::drive_model(robot);
   if (!drive) return tl::unexpected(std::move(drive.error()));
   Meter meter(std::move(*drive), settings, [](const MeterPoint&) {});
   telemetry::MissionPayload payload(run.payload_kg);
   for (std::size_t k = 0; k < run.samples.size(); ++k) {
-    telemetry::Sample sample = run.samples[k];
+    signals::Sample sample = run.samples[k];
     sample.payload_kg = payload.take(sample.payload_kg);
     if (Result<void> added = meter.add(sample, run.climb_at(k)); !added) return tl::unexpected(added.error());
   }

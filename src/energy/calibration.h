@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "base/error.h"
-#include "energy/ledger.h"
 #include "energy/meter.h"
 #include "robot/robot_model.h"
-#include "telemetry/sample.h"
+#include "signals/ledger.h"
+#include "signals/sample.h"
 
 namespace joulecast::energy {
 
@@ -48,7 +48,7 @@ struct CalibrationOptions {
 
 struct DriveRun {
   std::string name;
-  std::span<const telemetry::Sample> samples;  // in order of time
+  std::span<const signals::Sample> samples;  // in order of time
   double payload_kg = 0;
   std::span<const double> climb_rad = {};  // at each sample (dynamics/climb.h); empty: their pitch
 
@@ -83,6 +83,7 @@ Result<DriveCalibration> calibrate_drive(const robot::RobotModel& robot, std::sp
 double half_window_for(std::span<const DriveRun> runs);
 
 // The accounts of a run by the online meter with a robot's model.
-Result<Accounts> metered(const robot::RobotModel& robot, const DriveRun& run, const MeterSettings& settings);
+Result<signals::Accounts> metered(const robot::RobotModel& robot, const DriveRun& run,
+                                  const MeterSettings& settings);
 
 }  // namespace joulecast::energy

@@ -13,7 +13,7 @@ constexpr double longest_gap_s = 2.0;         // between samples of one stretch
 constexpr double moving_share = 0.03;         // of the fastest wheel speed: slower wheels may stick
 constexpr std::size_t most_equations = 6000;  // half an hour of driving
 
-double seconds_between(const telemetry::Sample& from, const telemetry::Sample& to) {
+double seconds_between(const signals::Sample& from, const signals::Sample& to) {
   return 1e-6 * static_cast<double>(to.utime_us - from.utime_us);
 }
 
@@ -99,8 +99,8 @@ std::vector<DriveEquation> DriveEquations::take() {
   return std::exchange(equations_, {});
 }
 
-void DriveEquations::add(const telemetry::Sample& sample, double climb_rad) {
-  std::vector<telemetry::Sample>& samples = recording_.samples;
+void DriveEquations::add(const signals::Sample& sample, double climb_rad) {
+  std::vector<signals::Sample>& samples = recording_.samples;
   const bool another_payload = std::isfinite(sample.payload_kg) && sample.payload_kg != recording_.payload_kg;
   if (!samples.empty()) {
     const double interval_s = seconds_between(samples.back(), sample);
@@ -120,7 +120,7 @@ void DriveEquations::interrupt() {
 
 // The next stretch begins where the windows of this one would have gone on. One without any is of no use.
 void DriveEquations::close_windows() {
-  std::vector<telemetry::Sample>& samples = recording_.samples;
+  std::vector<signals::Sample>& samples = recording_.samples;
   if (samples.size() < 2) return;
   const std::vector<windows::Window> made = windows::make_windows({&recording_, 1}, robot_, {});
   if (made.empty()) return samples.clear();
@@ -131,7 +131,7 @@ void DriveEquations::close_windows() {
     }
     add(window);
   }
-  std::erase_if(samples, [&, begin = samples.front()](const telemetry::Sample& s) {
+  std::erase_if(samples, [&, begin = samples.front()](const signals::Sample& s) {
     return seconds_between(begin, s) < made.back().t_s;
   });
 }

@@ -65,8 +65,8 @@ class DriveEquations {
   static Result<DriveEquations> make(const robot::RobotModel& robot);
 
   // In order of time, with the climb there (dynamics/climb.h).
-  void add(const telemetry::Sample& sample, double climb_rad);
-  void add(const telemetry::Sample& sample) { add(sample, sample.pitch_rad); }
+  void add(const signals::Sample& sample, double climb_rad);
+  void add(const signals::Sample& sample) { add(sample, sample.pitch_rad); }
   // The robot's time or what it did is interrupted: no window holds samples of both sides.
   void interrupt();
 

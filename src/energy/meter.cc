@@ -127,7 +127,7 @@ bool Meter::window_complete(std::size_t index) const {
              reach_s();
 }
 
-Result<void> Meter::add(const telemetry::Sample& sample, double climb_rad) {
+Result<void> Meter::add(const signals::Sample& sample, double climb_rad) {
   if (!waiting_.empty()) {
     const double interval_s =
         static_cast<double>(sample.utime_us - waiting_.back().sample.utime_us) * microseconds;
@@ -162,7 +162,7 @@ Result<void> Meter::flush() {
 }
 
 Result<void> Meter::settle(std::size_t index) {
-  const telemetry::Sample& sample = waiting_[index].sample;
+  const signals::Sample& sample = waiting_[index].sample;
   const double reach_us = reach_s() / microseconds, bridge_us = settings_.gap_bridge_s / microseconds;
   const auto span_us = [&](std::size_t from, std::size_t to) {
     return static_cast<double>(waiting_[to].sample.utime_us - waiting_[from].sample.utime_us);
@@ -227,7 +227,7 @@ Result<void> Meter::settle(std::size_t index) {
       accounts_.distance_m += increment[account::distance];
       accounts_.turned_rad += increment[account::turned];
       accounts_.duration_s += point.interval_s;
-      for (std::size_t k = 0; k < term_count; ++k)
+      for (std::size_t k = 0; k < signals::term_count; ++k)
         accounts_.ledger.value[k] += increment[account::ledger + k];
     } else {
       ++gaps_;
@@ -247,7 +247,7 @@ Result<void> Meter::settle(std::size_t index) {
   point.t_s = static_cast<double>(sample.utime_us - origin_utime_us_) * microseconds;
   point.speed_m_s = body.speed_m_s;
   point.yaw_rate_rad_s = body.yaw_rate_rad_s;
-  point.measured_power_w = node.coverage.battery ? now[account::measured] : telemetry::unmeasured;
+  point.measured_power_w = node.coverage.battery ? now[account::measured] : signals::unmeasured;
   point.modelled_power_w = now[account::modelled];
   for (std::size_t s : {0u, 1u}) {
     point.winding_temperature_c[s] =

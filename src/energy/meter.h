@@ -10,8 +10,8 @@
 #include "dynamics/drive_model.h"
 #include "energy/acceleration_filter.h"
 #include "energy/cvode.h"
-#include "energy/ledger.h"
-#include "telemetry/sample.h"
+#include "signals/ledger.h"
+#include "signals/sample.h"
 
 namespace joulecast::energy {
 
@@ -26,7 +26,7 @@ struct MeterSettings {
 
 // What the meter knows at one sample, once the acceleration filter has seen enough of what follows it.
 struct MeterPoint {
-  telemetry::Sample sample;
+  signals::Sample sample;
   double t_s = 0;         // since the first sample of the mission
   double interval_s = 0;  // since the previous point; 0 for the first
   bool bridged = true;    // false: the interval was longer than gap_bridge_s and was not integrated
@@ -34,7 +34,7 @@ struct MeterPoint {
   double climb_rad = dynamics::unknown;
   double speed_m_s = 0;
   double yaw_rate_rad_s = 0;
-  double measured_power_w = telemetry::unmeasured;
+  double measured_power_w = signals::unmeasured;
   double modelled_power_w = 0;
   std::array<double, 2> winding_temperature_c{};
 };
@@ -59,9 +59,9 @@ class Meter {
   // Takes the next sample: later than the previous one, finite where measured (src/telemetry/validation
   // refuses others), and the climb there (dynamics/climb.h; NaN: unknown). A payload of NaN counts as the
   // last one since begin(), at first 0. An error is CVODE's; the interval's chord then stands for it.
-  Result<void> add(const telemetry::Sample& sample, double climb_rad);
+  Result<void> add(const signals::Sample& sample, double climb_rad);
   // The climb is the pitch, where that is measured.
-  Result<void> add(const telemetry::Sample& sample) { return add(sample, sample.pitch_rad); }
+  Result<void> add(const signals::Sample& sample) { return add(sample, sample.pitch_rad); }
 
   // Processes the samples that still wait for the filter, with one-sided windows.
   Result<void> flush();
@@ -70,13 +70,13 @@ class Meter {
   void begin();
 
   // Goes on with accounts from before a restart of the service; call before the first sample.
-  void resume(const Accounts& accounts) { accounts_ = accounts; }
+  void resume(const signals::Accounts& accounts) { accounts_ = accounts; }
 
   // Forgets the previous sample without ending the accounts: what lies between is not integrated. For a
   // robot's clock that was set. flush() first.
   void interrupt();
 
-  const Accounts& accounts() const { return accounts_; }
+  const signals::Accounts& accounts() const { return accounts_; }
   std::size_t gaps() const { return gaps_; }  // intervals not integrated
   double gap_seconds() const { return gap_seconds_; }
   const dynamics::DriveModel& model() const { return model_; }
@@ -85,7 +85,7 @@ class Meter {
   class Segment;
   struct Node;
   struct Waiting {
-    telemetry::Sample sample;
+    signals::Sample sample;
     double climb_rad = dynamics::unknown;
   };
 
@@ -105,7 +105,7 @@ class Meter {
   std::unique_ptr<Segment> segment_;
   std::vector<SpeedSample> window_;
   double usual_interval_s_ = 0;  // running mean of the sample intervals
-  Accounts accounts_;
+  signals::Accounts accounts_;
   std::array<double, 2> copper_heat_w_{};
   double payload_kg_ = 0;
   std::int64_t origin_utime_us_ = 0;

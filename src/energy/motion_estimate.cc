@@ -98,8 +98,9 @@ Result<std::array<double, 2>> climb_of_span(const MotionPoint& a, const MotionPo
   return std::array{climb, climb};
 }
 
-Result<Accounts> estimate_motion(const dynamics::DriveModel& model, std::span<const MotionPoint> points,
-                                 double payload_kg, const std::optional<StartPose>& start) {
+Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
+                                          std::span<const MotionPoint> points, double payload_kg,
+                                          const std::optional<StartPose>& start) {
   if (points.size() < 2) return invalid("/profile/time_s", "must have at least 2 points");
   Span span(model, payload_kg, start.has_value());
   Cvode cvode(state_size, Method::adams, span);
@@ -121,7 +122,7 @@ Result<Accounts> estimate_motion(const dynamics::DriveModel& model, std::span<co
     if (Result<void> done = cvode.advance(0, duration, 0); !done) return tl::unexpected(done.error());
   }
 
-  Accounts a;
+  signals::Accounts a;
   a.battery_j = y[account::battery];
   a.modelled_j = y[account::modelled];
   a.modelled_motor_j = {y[account::modelled_motor], y[account::modelled_motor + 1]};
@@ -131,7 +132,7 @@ Result<Accounts> estimate_motion(const dynamics::DriveModel& model, std::span<co
   a.distance_m = y[account::distance];
   a.turned_rad = y[account::turned];
   a.duration_s = points.back().time_s - points.front().time_s;
-  for (std::size_t k = 0; k < term_count; ++k) a.ledger.value[k] = y[account::ledger + k];
+  for (std::size_t k = 0; k < signals::term_count; ++k) a.ledger.value[k] = y[account::ledger + k];
   return a;
 }
 

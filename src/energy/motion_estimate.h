@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "dynamics/drive_model.h"
-#include "energy/ledger.h"
+#include "signals/ledger.h"
 
 namespace joulecast::energy {
 
@@ -36,7 +36,8 @@ struct StartPose {
 // what a robot that drove it would be metered to spend. Nothing is measured: battery_j equals modelled_j and
 // nothing is unexplained. Times must increase and there must be at least two points; a jump in speed is
 // refused, since it costs infinite power.
-Result<Accounts> estimate_motion(const dynamics::DriveModel& model, std::span<const MotionPoint> points,
-                                 double payload_kg, const std::optional<StartPose>& start = std::nullopt);
+Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
+                                          std::span<const MotionPoint> points, double payload_kg,
+                                          const std::optional<StartPose>& start = std::nullopt);
 
 }  // namespace joulecast::energy

@@ -22,7 +22,7 @@ double lerp_angle(double a, double b, double s) {
 
 }  // namespace
 
-Reading reading_of(const telemetry::Sample& sample, const std::array<double, 2>& wheel_acceleration_rad_s2,
+Reading reading_of(const signals::Sample& sample, const std::array<double, 2>& wheel_acceleration_rad_s2,
                    double payload_kg, double climb_rad, const std::array<double, 2>& copper_heat_w) {
   Reading r;
   r.motion.wheel_speed_rad_s = sample.wheel_velocity_rad_s;
@@ -89,23 +89,10 @@ Rates rates_at(const dynamics::DriveModel& model, const Reading& reading, Covera
   r[account::distance] = std::fabs(body.speed_m_s);
   r[account::turned] = std::fabs(body.yaw_rate_rad_s);
 
-  const auto term = [&](Term t) -> double& { return r[account::ledger + static_cast<std::size_t>(t)]; };
-  term(Term::accessories) = flow.accessories_w;
-  term(Term::driver) = flow.driver_w;
-  term(Term::copper) = flow.copper_w;
-  term(Term::brush) = flow.brush_w;
-  term(Term::friction_internal) = flow.friction_internal_w;
-  term(Term::friction_rolling) = flow.friction_rolling_w;
-  term(Term::friction_scrub) = flow.friction_scrub_w;
-  term(Term::friction_zone) = flow.friction_zone_w;
-  term(Term::friction_slip) = flow.friction_slip_w;
-  term(Term::drag) = flow.drag_w;
-  term(Term::kinetic) = flow.kinetic_w;
-  term(Term::potential) = flow.potential_w;
-  term(Term::braking) = flow.braking_w;
-  term(Term::recovered) = flow.recovered_w;
-  term(Term::sensor) = modelled - flow.battery_power_w;
-  term(Term::unexplained) = coverage.battery ? measured - modelled : 0;
+  signals::Ledger ledger = flow.ledger;
+  ledger[signals::Term::sensor] = modelled - flow.battery_power_w;
+  ledger[signals::Term::unexplained] = coverage.battery ? measured - modelled : 0;
+  std::ranges::copy(ledger.value, r.begin() + account::ledger);
   for (std::size_t s : {0u, 1u})
     copper_w[s] = model.resistance(s, reading.motion) * flow.current_a[s] * flow.current_a[s];
   return r;

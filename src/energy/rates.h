@@ -4,8 +4,8 @@
 #include <cstddef>
 
 #include "dynamics/drive_model.h"
-#include "energy/ledger.h"
-#include "telemetry/sample.h"
+#include "signals/ledger.h"
+#include "signals/sample.h"
 
 namespace joulecast::energy {
 
@@ -22,7 +22,7 @@ inline constexpr std::size_t charge_a = 9;
 inline constexpr std::size_t distance = 10;
 inline constexpr std::size_t turned = 11;
 inline constexpr std::size_t ledger = 12;  // term_count
-inline constexpr std::size_t count = ledger + term_count;
+inline constexpr std::size_t count = ledger + signals::term_count;
 }  // namespace account
 
 using Rates = std::array<double, account::count>;
@@ -43,7 +43,7 @@ struct Coverage {
 };
 
 // The reading of a sample; unmeasured electrical channels are zero (the coverage says so).
-Reading reading_of(const telemetry::Sample& sample, const std::array<double, 2>& wheel_acceleration_rad_s2,
+Reading reading_of(const signals::Sample& sample, const std::array<double, 2>& wheel_acceleration_rad_s2,
                    double payload_kg, double climb_rad, const std::array<double, 2>& copper_heat_w);
 
 // The reading at fraction s in [0, 1] between two. What is unknown at either end is unknown in between.

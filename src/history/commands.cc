@@ -26,12 +26,11 @@ std::size_t content_bytes(const StartMission& c) {
 
 std::size_t content_bytes(const CheckpointMission& c) {
   return content_bytes(c.mission) + c.trace.capacity() * sizeof(TraceBucket) +
-         c.samples.capacity() * sizeof(telemetry::Sample) +
-         c.covariates.capacity() *
-             (sizeof(telemetry::CovariateChange) + telemetry::max_covariate_name_length) +
-         (c.energy_state ? c.energy_state->robot_id.size() : 0);
+         c.samples.capacity() * sizeof(signals::Sample) +
+         c.covariates.capacity() * (sizeof(signals::CovariateChange) + signals::max_covariate_name_length) +
+         (c.resume_state ? c.resume_state->robot_id.size() : 0);
 }
-std::size_t content_bytes(const PutEnergyState& c) {
+std::size_t content_bytes(const PutResumeState& c) {
   return c.state.robot_id.size();
 }
 std::size_t content_bytes(const PutLearned& c) {

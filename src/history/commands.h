@@ -44,14 +44,14 @@ struct StartMission {
 struct CheckpointMission {
   Mission mission;
   std::vector<TraceBucket> trace;
-  std::vector<telemetry::Sample> samples;
-  std::optional<EnergyState> energy_state;
-  std::vector<telemetry::CovariateChange> covariates = {};
+  std::vector<signals::Sample> samples;
+  std::optional<ResumeState> resume_state;
+  std::vector<signals::CovariateChange> covariates = {};
 };
 
 // Replaces a robot's energy state, for robots outside missions. The robot is created when new. Outcome: 0.
-struct PutEnergyState {
-  EnergyState state;
+struct PutResumeState {
+  ResumeState state;
 };
 
 // Replaces what was learned of the robot under the topic. The robot is created when new. Outcome: 0.
@@ -111,7 +111,7 @@ struct CloseProposal {
   std::optional<std::int64_t> adopted_version;
 };
 
-using Command = std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutEnergyState,
+using Command = std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutResumeState,
                              PutLearned, AppendEvent, Prune, AddDiagnosis, UpdateDiagnosis,
                              InterruptDiagnoses, AddProposal, CloseProposal>;
 

@@ -12,10 +12,10 @@
 namespace joulecast::history {
 namespace {
 
-using telemetry::CovariateChange;
+using signals::CovariateChange;
 
 constexpr std::byte format{1};
-constexpr std::size_t max_name_bytes = 2 * telemetry::max_covariate_name_length + 1;
+constexpr std::size_t max_name_bytes = 2 * signals::max_covariate_name_length + 1;
 // Every change may have a name of its own.
 constexpr std::size_t max_plain_bytes =
     max_chunk_changes * (3 * max_varint_bytes + max_name_bytes + 8) + 2 * max_varint_bytes + 9;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "telemetry/covariates.h"
+#include "signals/covariates.h"
 
 // Changes of covariates as a compressed block, bit-exact.
 //
@@ -19,9 +19,9 @@ namespace joulecast::history {
 inline constexpr std::size_t max_chunk_changes = 65'536;
 
 // 1 to max_chunk_changes changes of names no longer than covariates may have. `level`: zstd's, 1 is fast.
-std::vector<std::byte> encode_covariates(std::span<const telemetry::CovariateChange> changes, int level);
+std::vector<std::byte> encode_covariates(std::span<const signals::CovariateChange> changes, int level);
 
 // Fault::corrupt for bytes that are no whole chunk; safe on any bytes.
-Result<std::vector<telemetry::CovariateChange>> decode_covariates(std::span<const std::byte> bytes);
+Result<std::vector<signals::CovariateChange>> decode_covariates(std::span<const std::byte> bytes);
 
 }  // namespace joulecast::history

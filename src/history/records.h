@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "energy/ledger.h"
-#include "telemetry/covariates.h"
-#include "telemetry/sample.h"
+#include "signals/covariates.h"
+#include "signals/ledger.h"
+#include "signals/sample.h"
 
 // What the store keeps. Times are microseconds since the Unix epoch (the robot's clock for missions, traces
 // and samples; the daemon's for versions and events). NaN = not measured or not declared; stored as NULL.
@@ -59,13 +59,13 @@ std::optional<MissionState> mission_state_from(std::string_view text);
 struct CovariateSummary {
   std::string name;
   double mean =
-      telemetry::unmeasured;  // over the time in which it was known; of a label the share in which it held
-  double min = telemetry::unmeasured;
-  double max = telemetry::unmeasured;
-  double known_s = 0;                    // the mean counts over so long, up to counted_utime_us
-  std::int64_t counted_utime_us = 0;     // robot's clock
-  double value = telemetry::unmeasured;  // the last one
-  std::int64_t value_utime_us = 0;       // from which on it holds
+      signals::unmeasured;  // over the time in which it was known; of a label the share in which it held
+  double min = signals::unmeasured;
+  double max = signals::unmeasured;
+  double known_s = 0;                  // the mean counts over so long, up to counted_utime_us
+  std::int64_t counted_utime_us = 0;   // robot's clock
+  double value = signals::unmeasured;  // the last one
+  std::int64_t value_utime_us = 0;     // from which on it holds
 };
 
 struct Mission {
@@ -78,10 +78,10 @@ struct Mission {
   bool implicit = false;          // began with a sample, not with a mission event
   bool incomplete = false;        // a part of it was not measured: its energy is a lower bound
   std::string incomplete_reason;  // empty when complete
-  double payload_kg = telemetry::unmeasured;
+  double payload_kg = signals::unmeasured;
   std::string note;
   std::optional<std::int64_t> model_version;  // of robot_id; absent when the robot's model was unknown
-  energy::Accounts accounts;
+  signals::Accounts accounts;
   std::int64_t samples = 0;                           // accepted and accounted for
   std::map<std::string, std::int64_t> sample_faults;  // reason -> samples counted out or repaired
   std::int64_t gap_count = 0;
@@ -92,9 +92,9 @@ struct Mission {
 
 // Least, mean and greatest of a quantity; all NaN when it was not measured.
 struct Band {
-  double min = telemetry::unmeasured;
-  double mean = telemetry::unmeasured;  // over time
-  double max = telemetry::unmeasured;
+  double min = signals::unmeasured;
+  double mean = signals::unmeasured;  // over time
+  double max = signals::unmeasured;
 };
 
 inline constexpr std::int64_t trace_bucket_us = 1'000'000;
@@ -107,11 +107,11 @@ struct TraceBucket {
   Band measured_power_w;            // out of the battery positive
   Band modelled_power_w;
   Band speed_m_s;
-  double state_of_charge = telemetry::unmeasured;  // at the bucket's end, 0 to 1
-  double measured_j = telemetry::unmeasured;       // since the mission's start, at the bucket's end
-  double modelled_j = telemetry::unmeasured;       // since the mission's start, at the bucket's end
-  double x_m = telemetry::unmeasured;              // mean position
-  double y_m = telemetry::unmeasured;
+  double state_of_charge = signals::unmeasured;  // at the bucket's end, 0 to 1
+  double measured_j = signals::unmeasured;       // since the mission's start, at the bucket's end
+  double modelled_j = signals::unmeasured;       // since the mission's start, at the bucket's end
+  double x_m = signals::unmeasured;              // mean position
+  double y_m = signals::unmeasured;
 };
 
 struct Trace {
@@ -120,12 +120,12 @@ struct Trace {
 };
 
 // What a restarted daemon must know of a robot to carry on.
-struct EnergyState {
+struct ResumeState {
   std::string robot_id;
   std::int64_t utime_us = 0;  // of the last sample accounted for
   std::int64_t sequence = 0;  // of the last sample accounted for
-  double state_of_charge = telemetry::unmeasured;
-  std::array<double, 2> winding_temperature_c{telemetry::unmeasured, telemetry::unmeasured};
+  double state_of_charge = signals::unmeasured;
+  std::array<double, 2> winding_temperature_c{signals::unmeasured, signals::unmeasured};
 };
 
 // What the service has learned of a robot under one topic.

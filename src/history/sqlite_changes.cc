@@ -27,9 +27,9 @@ Result<void> check_trace(const std::vector<TraceBucket>& trace) {
   return {};
 }
 
-Result<void> check_covariates(const std::vector<telemetry::CovariateChange>& changes) {
+Result<void> check_covariates(const std::vector<signals::CovariateChange>& changes) {
   for (std::size_t i = 0; i < changes.size(); ++i)
-    if (!telemetry::is_valid_covariate_name(changes[i].name))
+    if (!signals::is_valid_covariate_name(changes[i].name))
       return invalid("/covariates/" + std::to_string(i) + "/name", "is no name of a covariate");
   return {};
 }
@@ -177,21 +177,21 @@ Outcome SqliteChanges::run(const CheckpointMission& c) {
   const bool ended = m.state != MissionState::open;
   chunks::append(database_, m.key, c.samples, ended, now_utime_us_());
   chunks::append(database_, m.key, c.covariates, ended, now_utime_us_());
-  if (c.energy_state) put(*c.energy_state);
+  if (c.resume_state) put(*c.resume_state);
   return m.key;
 }
 
-void SqliteChanges::put(const EnergyState& state) {
+void SqliteChanges::put(const ResumeState& state) {
   make_robot(state.robot_id);
   static const std::string replace = "INSERT OR REPLACE INTO energy_state (" +
-                                     std::string(energy_state_columns) + ") VALUES (" +
-                                     placeholders(energy_state_columns) + ")";
+                                     std::string(resume_state_columns) + ") VALUES (" +
+                                     placeholders(resume_state_columns) + ")";
   Rows rows(database_.statement(replace));
-  bind_energy_state(rows, state);
+  bind_resume_state(rows, state);
   rows.run();
 }
 
-Outcome SqliteChanges::run(const PutEnergyState& c) {
+Outcome SqliteChanges::run(const PutResumeState& c) {
   if (auto ok = check_robot_id(c.state.robot_id); !ok) return tl::unexpected(ok.error());
   put(c.state);
   return 0;

@@ -27,7 +27,7 @@ class SqliteChanges {
   Outcome run(const ActivateModel& command);
   Outcome run(const StartMission& command);
   Outcome run(const CheckpointMission& command);
-  Outcome run(const PutEnergyState& command);
+  Outcome run(const PutResumeState& command);
   Outcome run(const PutLearned& command);
   Outcome run(const AppendEvent& command);
   Outcome run(const Prune& command);
@@ -38,7 +38,7 @@ class SqliteChanges {
   Outcome run(const CloseProposal& command);
 
   void make_robot(const std::string& robot_id);
-  void put(const EnergyState& state);
+  void put(const ResumeState& state);
 
   Database& database_;
   std::function<std::int64_t()> now_utime_us_;

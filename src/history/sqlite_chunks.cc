@@ -12,8 +12,8 @@
 namespace joulecast::history::chunks {
 namespace {
 
-using telemetry::CovariateChange;
-using telemetry::Sample;
+using signals::CovariateChange;
+using signals::Sample;
 
 // zstd levels: a tail chunk is soon written again, a sealed one is kept.
 constexpr int tail_level = 1;

@@ -17,10 +17,10 @@ inline constexpr std::size_t sealed_items = 1024;
 
 // Appends to the mission's unsealed tail and seals it in full chunks, or all of it when the mission has
 // ended.
-void append(Database& database, MissionKey key, std::span<const telemetry::Sample> samples, bool ended,
+void append(Database& database, MissionKey key, std::span<const signals::Sample> samples, bool ended,
             std::int64_t now_utime_us);
-void append(Database& database, MissionKey key, std::span<const telemetry::CovariateChange> changes,
-            bool ended, std::int64_t now_utime_us);
+void append(Database& database, MissionKey key, std::span<const signals::CovariateChange> changes, bool ended,
+            std::int64_t now_utime_us);
 
 // As Store's; the mission is known to be there.
 Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range, const PageRequest& page);

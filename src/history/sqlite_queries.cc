@@ -320,13 +320,13 @@ Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std
   });
 }
 
-Result<std::optional<EnergyState>> energy_state(Database& database, std::string_view robot_id) {
+Result<std::optional<ResumeState>> resume_state(Database& database, std::string_view robot_id) {
   static const std::string sql =
-      "SELECT " + std::string(energy_state_columns) + " FROM energy_state WHERE robot_id = ?";
+      "SELECT " + std::string(resume_state_columns) + " FROM energy_state WHERE robot_id = ?";
   Rows rows(database.statement(sql));
   rows.bind(robot_id);
   if (!rows.next()) return std::nullopt;
-  return read_energy_state(rows);
+  return read_resume_state(rows);
 }
 
 Result<std::optional<Learned>> learned(Database& database, std::string_view robot_id,

@@ -58,7 +58,7 @@ bool parse_covariates(const std::string& text, std::vector<CovariateSummary>& co
   const auto json = nlohmann::json::parse(text, nullptr, false);
   if (!json.is_array()) return false;
   const auto real = [](const nlohmann::json& value) {
-    return value.is_number() ? value.get<double>() : telemetry::unmeasured;
+    return value.is_number() ? value.get<double>() : signals::unmeasured;
   };
   for (const auto& row : json) {
     if (!row.is_array() || row.size() != 8 || !row[0].is_string() || !row[5].is_number_integer() ||
@@ -78,7 +78,7 @@ const std::string& accounts_columns() {
         "battery_j, measured_j, measured_s, measured_motor_right_j, measured_motor_left_j, motor_measured_s, "
         "modelled_j, modelled_motor_right_j, "
         "modelled_motor_left_j, drawn_j, returned_j, charge_ah, distance_m, turned_rad, duration_s";
-    for (const std::string_view term : energy::term_names) text += ", ledger_" + std::string(term) + "_j";
+    for (const std::string_view term : signals::term_names) text += ", ledger_" + std::string(term) + "_j";
     return text;
   }();
   return columns;
@@ -145,8 +145,8 @@ Result<Mission> read_mission(Rows& rows) {
   return m;
 }
 
-energy::Accounts read_accounts(Rows& rows) {
-  energy::Accounts accounts;
+signals::Accounts read_accounts(Rows& rows) {
+  signals::Accounts accounts;
   visit_accounts(accounts, [&](double& value) { value = rows.real(); });
   return accounts;
 }
@@ -174,13 +174,13 @@ TraceBucket read_bucket(Rows& rows) {
   return b;
 }
 
-void bind_energy_state(Rows& rows, const EnergyState& s) {
+void bind_resume_state(Rows& rows, const ResumeState& s) {
   rows.bind(s.robot_id).bind(s.utime_us).bind(s.sequence).bind(s.state_of_charge);
   for (const double celsius : s.winding_temperature_c) rows.bind(celsius);
 }
 
-EnergyState read_energy_state(Rows& rows) {
-  EnergyState s;
+ResumeState read_resume_state(Rows& rows) {
+  ResumeState s;
   s.robot_id = rows.text();
   s.utime_us = rows.integer();
   s.sequence = rows.integer();

@@ -23,9 +23,9 @@ std::string covariates_json(const Mission& mission);  // empty: none
 // Reads identity and content columns. Fault::corrupt when a column's text has no meaning.
 Result<Mission> read_mission(Rows& rows);
 
-// The columns of energy::Accounts, a part of the mission's content.
+// The columns of signals::Accounts, a part of the mission's content.
 const std::string& accounts_columns();
-energy::Accounts read_accounts(Rows& rows);
+signals::Accounts read_accounts(Rows& rows);
 
 inline constexpr std::string_view trace_columns =
     "start_utime_us, covered_s, measured_power_min_w, measured_power_mean_w, measured_power_max_w, "
@@ -34,10 +34,10 @@ inline constexpr std::string_view trace_columns =
 void bind_bucket(Rows& rows, const TraceBucket& bucket);
 TraceBucket read_bucket(Rows& rows);
 
-inline constexpr std::string_view energy_state_columns =
+inline constexpr std::string_view resume_state_columns =
     "robot_id, utime_us, sequence, state_of_charge, winding_temperature_right_c, winding_temperature_left_c";
-void bind_energy_state(Rows& rows, const EnergyState& state);
-EnergyState read_energy_state(Rows& rows);
+void bind_resume_state(Rows& rows, const ResumeState& state);
+ResumeState read_resume_state(Rows& rows);
 
 // "?, ?, ?" for as many as the comma-separated columns.
 std::string placeholders(std::string_view columns);

@@ -206,8 +206,8 @@ class SqliteStore final : public Store {
   Result<std::optional<Learned>> learned(std::string_view robot_id, std::string_view topic) const override {
     return read([&](Database& database) { return queries::learned(database, robot_id, topic); });
   }
-  Result<std::optional<EnergyState>> energy_state(std::string_view robot_id) const override {
-    return read([&](Database& database) { return queries::energy_state(database, robot_id); });
+  Result<std::optional<ResumeState>> resume_state(std::string_view robot_id) const override {
+    return read([&](Database& database) { return queries::resume_state(database, robot_id); });
   }
 
   Result<DiagnosisRecord> diagnosis(std::int64_t id) const override {

@@ -51,7 +51,7 @@ struct Totals {
   std::int64_t samples = 0;
   std::int64_t gap_count = 0;
   double gap_s = 0;
-  energy::Accounts accounts;
+  signals::Accounts accounts;
 };
 
 inline constexpr std::int64_t whole_past = std::numeric_limits<std::int64_t>::min();
@@ -68,13 +68,13 @@ inline constexpr std::int64_t max_telemetry_samples = 100'000;
 
 // In the order of arrival, which is not always that of utime.
 struct TelemetryPage {
-  std::vector<telemetry::Sample> samples;
+  std::vector<signals::Sample> samples;
   std::string next_cursor;  // empty: nothing follows
 };
 
 // In the order of arrival, which is not always that of utime.
 struct CovariatePage {
-  std::vector<telemetry::CovariateChange> changes;
+  std::vector<signals::CovariateChange> changes;
   std::string next_cursor;  // empty: nothing follows
 };
 
@@ -143,7 +143,7 @@ class Store {
                                             std::optional<std::string> robot_id = std::nullopt) const = 0;
 
   // Absent when none was ever put.
-  virtual Result<std::optional<EnergyState>> energy_state(std::string_view robot_id) const = 0;
+  virtual Result<std::optional<ResumeState>> resume_state(std::string_view robot_id) const = 0;
 
   // What was learned of the robot under the topic; absent when nothing was.
   virtual Result<std::optional<Learned>> learned(std::string_view robot_id, std::string_view topic) const = 0;

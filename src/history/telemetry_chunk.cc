@@ -10,30 +10,13 @@
 namespace joulecast::history {
 namespace {
 
-using telemetry::Sample;
+using signals::Sample;
 
 constexpr std::byte format{1};
-constexpr std::size_t double_columns = 18;
+constexpr std::size_t double_columns = signals::sample_numbers;
 // No sample takes more than two varints and its doubles; the columns' first bytes and the count come on top.
 constexpr std::size_t max_plain_bytes =
     max_chunk_samples * (2 * max_varint_bytes + 8 * double_columns) + double_columns * 9 + max_varint_bytes;
-
-// Visits the doubles of a sample, const or not, in the order of the layout.
-template <class S, class Visit>
-void visit_doubles(S& s, Visit visit) {
-  std::size_t column = 0;
-  for (auto* pair : {&s.wheel_velocity_rad_s, &s.motor_voltage_v, &s.motor_current_a})
-    for (auto& value : *pair) visit(column++, value);
-  visit(column++, s.battery_voltage_v);
-  visit(column++, s.battery_current_a);
-  for (auto& value : s.velocity_command) visit(column++, value);
-  visit(column++, s.yaw_rate_rad_s);
-  visit(column++, s.pitch_rad);
-  for (auto& value : s.pose) visit(column++, value);
-  for (auto& value : s.motor_temperature_c) visit(column++, value);
-  visit(column++, s.payload_kg);
-  assert(column == double_columns);
-}
 
 constexpr std::array integer_columns{&Sample::utime_us, &Sample::sequence};
 
@@ -55,10 +38,12 @@ std::vector<std::byte> encode_chunk(std::span<const Sample> samples, int level) 
   }
   std::array<std::vector<std::uint64_t>, double_columns> columns;
   for (auto& column : columns) column.reserve(samples.size());
-  for (const Sample& sample : samples)
-    visit_doubles(sample, [&](std::size_t column, const double& value) {
-      columns[column].push_back(std::bit_cast<std::uint64_t>(value));
+  for (const Sample& sample : samples) {
+    auto* column = columns.data();
+    signals::visit_fields(sample, [&](const signals::SampleField&, double value) {
+      column++->push_back(std::bit_cast<std::uint64_t>(value));
     });
+  }
   for (const auto& column : columns) put_doubles(plain, column);
   Bytes out{format};
   append_compressed(out, plain, level);
@@ -84,10 +69,12 @@ Result<std::vector<Sample>> decode_chunk(std::span<const std::byte> bytes) {
     if (!reader.doubles(column)) return corrupt("ends within its doubles");
   }
   if (!reader.at_end()) return corrupt("has bytes after its end");
-  for (std::size_t i = 0; i < samples.size(); ++i)
-    visit_doubles(samples[i], [&](std::size_t column, double& value) {
-      value = std::bit_cast<double>(columns[column][i]);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const auto* column = columns.data();
+    signals::visit_fields(samples[i], [&](const signals::SampleField&, double& value) {
+      value = std::bit_cast<double>((*column++)[i]);
     });
+  }
   return samples;
 }
 

@@ -28,7 +28,7 @@ void TraceMerger::Mean::add(double value, double with_weight) {
 }
 
 double TraceMerger::Mean::value() const {
-  return weight > 0 ? sum / weight : telemetry::unmeasured;
+  return weight > 0 ? sum / weight : signals::unmeasured;
 }
 
 TraceMerger::TraceMerger(std::int64_t origin_utime_us, std::int64_t width_us)

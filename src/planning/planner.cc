@@ -249,7 +249,7 @@ class Writer {
     for (bool end : {false, true}) {
       push(start_s_ + (end ? duration_s : 0), driven_m_, pose, 0, 0, 0, 0, payload_kg, idle);
       if (!end) {
-        plan_.ledger[energy::Term::accessories] += idle * duration_s;
+        plan_.ledger[signals::Term::accessories] += idle * duration_s;
         plan_.summary.energy_j += idle * duration_s;
       }
     }
@@ -277,25 +277,12 @@ class Writer {
   }
 
   void add(const dynamics::PowerFlow<double>& f, double seconds) {
-    using energy::Term;
-    const auto put = [&](Term term, double watts) { plan_.ledger[term] += watts * seconds; };
-    put(Term::accessories, f.accessories_w);
-    put(Term::driver, f.driver_w);
-    put(Term::copper, f.copper_w);
-    put(Term::brush, f.brush_w);
-    put(Term::friction_internal, f.friction_internal_w);
-    put(Term::friction_rolling, f.friction_rolling_w);
-    put(Term::friction_scrub, f.friction_scrub_w);
-    put(Term::friction_zone, f.friction_zone_w);
-    put(Term::friction_slip, f.friction_slip_w);
-    put(Term::drag, f.drag_w);
-    put(Term::kinetic, f.kinetic_w);
-    put(Term::potential, f.potential_w);
-    put(Term::braking, f.braking_w);
-    put(Term::recovered, f.recovered_w);
+    using signals::Term;
+    for (std::size_t k = 0; k < signals::term_count; ++k)
+      plan_.ledger.value[k] += f.ledger.value[k] * seconds;
     plan_.summary.energy_j += f.battery_power_w * seconds;
-    plan_.summary.braking_j += f.braking_w * seconds;
-    plan_.summary.recovered_j += f.recovered_w * seconds;
+    plan_.summary.braking_j += f.ledger[Term::braking] * seconds;
+    plan_.summary.recovered_j += f.ledger[Term::recovered] * seconds;
   }
 
   void reserve(std::size_t rows) {

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "energy/ledger.h"
+#include "signals/ledger.h"
 
 namespace joulecast::planning {
 
@@ -67,7 +67,7 @@ struct Plan {
   Profile profile;
   std::vector<double> run_duration_s;  // of each run between stops, dwells left out
   Summary summary;
-  energy::Ledger ledger;  // joules
+  signals::Ledger ledger;  // joules
   Certificate certificate;
 };
 

@@ -1,5 +1,6 @@
 #include <utility>
 
+#include "signals/ids.h"
 #include "telemetry/codec.h"
 #include "telemetry/lcm_link.h"
 
@@ -29,7 +30,7 @@ std::optional<ChannelName> parse_channel(std::string_view channel) noexcept {
   for (const auto& [subject, prefix] : prefixes) {
     if (!channel.starts_with(prefix)) continue;
     const std::string_view robot_id = channel.substr(prefix.size());
-    if (!is_valid_robot_id(robot_id)) return std::nullopt;
+    if (!signals::is_valid_robot_id(robot_id)) return std::nullopt;
     return ChannelName{subject, robot_id};
   }
   return std::nullopt;

@@ -1,6 +1,7 @@
 #include "telemetry/codec.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <joulecast/energy_state_t.hpp>
 #include <joulecast/mission_event_t.hpp>
@@ -9,6 +10,7 @@
 #include <limits>
 #include <utility>
 
+#include "signals/ids.h"
 #include "telemetry/utf8.h"
 
 namespace joulecast::telemetry {
@@ -16,15 +18,6 @@ namespace {
 
 // LCM counts in int; no message of the contract comes near this.
 constexpr std::size_t max_message_size = 64 * 1024;
-
-bool is_id_character(char c) noexcept {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
-         c == '-';
-}
-
-bool is_id(std::string_view id, std::size_t max_length) noexcept {
-  return !id.empty() && id.size() <= max_length && std::all_of(id.begin(), id.end(), is_id_character);
-}
 
 enum class Text { id, optional_id, note, covariate_name };
 
@@ -40,12 +33,13 @@ std::string fault_of(std::string_view text, Text kind, std::size_t max_length) {
   }
   if (text.empty()) return kind == Text::optional_id ? "" : "is empty";
   if (kind == Text::covariate_name) {
-    return is_valid_covariate_name(text)
+    return signals::is_valid_covariate_name(text)
                ? ""
-               : "must be 1 to " + std::to_string(max_covariate_name_length) +
+               : "must be 1 to " + std::to_string(signals::max_covariate_name_length) +
                      " of letters, digits, '.', '_' and '-', which '=' and as many more may follow";
   }
-  return is_id(text, max_length) ? "" : "may contain only letters, digits, '.', '_' and '-'";
+  // Robot ids are such ids, too, but shorter.
+  return signals::is_valid_mission_id(text) ? "" : "may contain only letters, digits, '.', '_' and '-'";
 }
 
 std::uint64_t read_big_endian(const std::uint8_t* bytes, std::size_t size) noexcept {
@@ -186,43 +180,34 @@ void copy(const std::array<double, N>& from, double (&to)[N]) {
 }
 
 constexpr std::size_t real = sizeof(double);
-constexpr std::size_t max_covariate_text = 2 * max_covariate_name_length + 1;  // name, '=', label
+constexpr std::size_t max_covariate_text = 2 * signals::max_covariate_name_length + 1;  // name, '=', label
 
 }  // namespace
-
-bool is_valid_robot_id(std::string_view id) noexcept {
-  return is_id(id, max_robot_id_length);
-}
-bool is_valid_mission_id(std::string_view id) noexcept {
-  return is_id(id, max_mission_id_length);
-}
 
 Result<DecodedTelemetry> decode_telemetry(std::span<const std::uint8_t> bytes) {
   static const std::int64_t fingerprint = robot_telemetry_t::getHash();
   Guard guard(bytes, fingerprint);
   guard.fixed(8, "utime");
   guard.fixed(8, "sequence");
-  guard.text("robot_id", Text::id, max_robot_id_length);
-  guard.fixed(18 * real, "wheel_velocity to payload_mass");
-  auto decoded = decode_guarded<robot_telemetry_t>(bytes, guard);
-  if (!decoded) return tl::unexpected<Error>(std::move(decoded.error()));
+  guard.text("robot_id", Text::id, signals::max_robot_id_length);
+  guard.fixed(signals::sample_numbers * real, "wheel_velocity to payload_mass");
+  if (auto sound = guard.finish(); !sound) return tl::unexpected<Error>(std::move(sound.error()));
 
+  const std::uint8_t* at = bytes.data() + 8;  // past the fingerprint
+  const auto next = [&at](std::size_t size) {
+    const std::uint64_t value = read_big_endian(at, size);
+    at += size;
+    return value;
+  };
   DecodedTelemetry result;
-  result.robot_id = std::move(decoded->robot_id);
-  Sample& sample = result.sample;
-  sample.utime_us = decoded->utime;
-  sample.sequence = decoded->sequence;
-  copy(decoded->wheel_velocity, sample.wheel_velocity_rad_s);
-  copy(decoded->motor_voltage, sample.motor_voltage_v);
-  copy(decoded->motor_current, sample.motor_current_a);
-  sample.battery_voltage_v = decoded->battery_voltage;
-  sample.battery_current_a = decoded->battery_current;
-  copy(decoded->velocity_command, sample.velocity_command);
-  sample.yaw_rate_rad_s = decoded->yaw_rate;
-  sample.pitch_rad = decoded->pitch;
-  copy(decoded->pose, sample.pose);
-  copy(decoded->motor_temperature, sample.motor_temperature_c);
-  sample.payload_kg = decoded->payload_mass;
+  result.sample.utime_us = static_cast<std::int64_t>(next(8));
+  result.sample.sequence = static_cast<std::int64_t>(next(8));
+  const auto length = static_cast<std::size_t>(next(4));  // with its NUL
+  result.robot_id.assign(reinterpret_cast<const char*>(at), length - 1);
+  at += length;
+  signals::visit_fields(result.sample, [&](const signals::SampleField&, double& number) {
+    number = std::bit_cast<double>(next(real));
+  });
   return result;
 }
 
@@ -230,11 +215,11 @@ Result<DecodedMissionEvent> decode_mission_event(std::span<const std::uint8_t> b
   static const std::int64_t fingerprint = mission_event_t::getHash();
   Guard guard(bytes, fingerprint);
   guard.fixed(8, "utime");
-  guard.text("robot_id", Text::id, max_robot_id_length);
-  guard.text("mission_id", Text::id, max_mission_id_length);
+  guard.text("robot_id", Text::id, signals::max_robot_id_length);
+  guard.text("mission_id", Text::id, signals::max_mission_id_length);
   guard.one_of("event", mission_event_t::STARTED, mission_event_t::ABORTED);
   guard.fixed(real, "payload_mass");
-  guard.text("note", Text::note, max_note_length);
+  guard.text("note", Text::note, signals::max_note_length);
   auto decoded = decode_guarded<mission_event_t>(bytes, guard);
   if (!decoded) return tl::unexpected<Error>(std::move(decoded.error()));
 
@@ -242,7 +227,7 @@ Result<DecodedMissionEvent> decode_mission_event(std::span<const std::uint8_t> b
   result.robot_id = std::move(decoded->robot_id);
   result.event.utime_us = decoded->utime;
   result.event.mission_id = std::move(decoded->mission_id);
-  result.event.phase = static_cast<MissionPhase>(decoded->event);
+  result.event.phase = static_cast<signals::MissionPhase>(decoded->event);
   result.event.payload_kg = decoded->payload_mass;
   result.event.note = std::move(decoded->note);
   return result;
@@ -253,7 +238,7 @@ Result<DecodedCovariates> decode_covariates(std::span<const std::uint8_t> bytes)
   Guard guard(bytes, fingerprint);
   guard.fixed(8, "utime");
   guard.text("robot_id", Text::id, max_covariates_robot_id_length);
-  const std::size_t count = guard.count("n", max_covariates);
+  const std::size_t count = guard.count("n", signals::max_covariates);
   guard.texts("name", count, Text::covariate_name, max_covariate_text);
   guard.fixed(count * real, "value");
   auto decoded = decode_guarded<robot_covariates_t>(bytes, guard);
@@ -268,18 +253,18 @@ Result<DecodedCovariates> decode_covariates(std::span<const std::uint8_t> bytes)
   return result;
 }
 
-Result<EnergyState> decode_energy_state(std::span<const std::uint8_t> bytes) {
+Result<signals::EnergyState> decode_energy_state(std::span<const std::uint8_t> bytes) {
   static const std::int64_t fingerprint = energy_state_t::getHash();
   Guard guard(bytes, fingerprint);
   guard.fixed(8, "utime");
-  guard.text("robot_id", Text::id, max_robot_id_length);
-  guard.text("mission_id", Text::optional_id, max_mission_id_length);
+  guard.text("robot_id", Text::id, signals::max_robot_id_length);
+  guard.text("mission_id", Text::optional_id, signals::max_mission_id_length);
   guard.fixed(8, "model_version");
   guard.fixed(16 * real, "measured_power to winding_temperature");
   auto decoded = decode_guarded<energy_state_t>(bytes, guard);
   if (!decoded) return tl::unexpected<Error>(std::move(decoded.error()));
 
-  EnergyState state;
+  signals::EnergyState state;
   state.utime_us = decoded->utime;
   state.robot_id = std::move(decoded->robot_id);
   state.mission_id = std::move(decoded->mission_id);
@@ -300,32 +285,32 @@ Result<EnergyState> decode_energy_state(std::span<const std::uint8_t> bytes) {
   return state;
 }
 
-Result<std::vector<std::uint8_t>> encode_telemetry(std::string_view robot_id, const Sample& sample) {
-  if (auto fault = check_text("robot_id", robot_id, Text::id, max_robot_id_length)) {
+Result<std::vector<std::uint8_t>> encode_telemetry(std::string_view robot_id, const signals::Sample& sample) {
+  if (auto fault = check_text("robot_id", robot_id, Text::id, signals::max_robot_id_length)) {
     return tl::unexpected<Error>(std::move(*fault));
   }
-  robot_telemetry_t message;
-  message.utime = sample.utime_us;
-  message.sequence = sample.sequence;
-  message.robot_id = robot_id;
-  copy(sample.wheel_velocity_rad_s, message.wheel_velocity);
-  copy(sample.motor_voltage_v, message.motor_voltage);
-  copy(sample.motor_current_a, message.motor_current);
-  message.battery_voltage = sample.battery_voltage_v;
-  message.battery_current = sample.battery_current_a;
-  copy(sample.velocity_command, message.velocity_command);
-  message.yaw_rate = sample.yaw_rate_rad_s;
-  message.pitch = sample.pitch_rad;
-  copy(sample.pose, message.pose);
-  copy(sample.motor_temperature_c, message.motor_temperature);
-  message.payload_mass = sample.payload_kg;
-  return encode(message);
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(28 + robot_id.size() + 1 + signals::sample_numbers * real);
+  const auto put = [&bytes](std::uint64_t value, std::size_t size) {
+    while (size-- > 0) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * size)));
+  };
+  put(static_cast<std::uint64_t>(robot_telemetry_t::getHash()), 8);
+  put(static_cast<std::uint64_t>(sample.utime_us), 8);
+  put(static_cast<std::uint64_t>(sample.sequence), 8);
+  put(robot_id.size() + 1, 4);
+  bytes.insert(bytes.end(), robot_id.begin(), robot_id.end());
+  bytes.push_back(0);
+  signals::visit_fields(sample, [&](const signals::SampleField&, double number) {
+    put(std::bit_cast<std::uint64_t>(number), real);
+  });
+  return bytes;
 }
 
-Result<std::vector<std::uint8_t>> encode_mission_event(std::string_view robot_id, const MissionEvent& event) {
-  for (auto& fault : {check_text("robot_id", robot_id, Text::id, max_robot_id_length),
-                      check_text("mission_id", event.mission_id, Text::id, max_mission_id_length),
-                      check_text("note", event.note, Text::note, max_note_length)}) {
+Result<std::vector<std::uint8_t>> encode_mission_event(std::string_view robot_id,
+                                                       const signals::MissionEvent& event) {
+  for (auto& fault : {check_text("robot_id", robot_id, Text::id, signals::max_robot_id_length),
+                      check_text("mission_id", event.mission_id, Text::id, signals::max_mission_id_length),
+                      check_text("note", event.note, Text::note, signals::max_note_length)}) {
     if (fault) return tl::unexpected<Error>(*fault);
   }
   mission_event_t message;
@@ -339,13 +324,13 @@ Result<std::vector<std::uint8_t>> encode_mission_event(std::string_view robot_id
 }
 
 Result<std::vector<std::uint8_t>> encode_covariates(std::string_view robot_id,
-                                                    const CovariateMessage& message) {
+                                                    const signals::CovariateMessage& message) {
   if (auto fault = check_text("robot_id", robot_id, Text::id, max_covariates_robot_id_length))
     return tl::unexpected<Error>(std::move(*fault));
   const std::size_t count = message.covariates.size();
-  if (count > max_covariates) {
-    return invalid(
-        "n", "is " + std::to_string(count) + "; 0 to " + std::to_string(max_covariates) + " are allowed");
+  if (count > signals::max_covariates) {
+    return invalid("n", "is " + std::to_string(count) + "; 0 to " + std::to_string(signals::max_covariates) +
+                            " are allowed");
   }
   robot_covariates_t out;
   out.utime = message.utime_us;
@@ -362,9 +347,10 @@ Result<std::vector<std::uint8_t>> encode_covariates(std::string_view robot_id,
   return encode(out);
 }
 
-Result<std::vector<std::uint8_t>> encode_energy_state(const EnergyState& state) {
-  for (auto& fault : {check_text("robot_id", state.robot_id, Text::id, max_robot_id_length),
-                      check_text("mission_id", state.mission_id, Text::optional_id, max_mission_id_length)}) {
+Result<std::vector<std::uint8_t>> encode_energy_state(const signals::EnergyState& state) {
+  for (auto& fault :
+       {check_text("robot_id", state.robot_id, Text::id, signals::max_robot_id_length),
+        check_text("mission_id", state.mission_id, Text::optional_id, signals::max_mission_id_length)}) {
     if (fault) return tl::unexpected<Error>(*fault);
   }
   energy_state_t message;

@@ -7,6 +7,7 @@
 #include <string>
 #include <unordered_map>
 
+#include "signals/ids.h"
 #include "telemetry/codec.h"
 #include "telemetry/csv_table.h"
 #include "telemetry/import_covariates.h"
@@ -67,7 +68,7 @@ struct Column {
   std::string name;
   std::size_t place = 0;
   const ValueLimits* limits = nullptr;
-  double value = unmeasured;
+  double value = signals::unmeasured;
 };
 
 struct Reference {
@@ -153,7 +154,7 @@ Result<Reference> Importer::bind_term(const ColumnTerm& term) {
   }
   auto place = place_of(term.column);
   if (!place) return tl::unexpected<Error>(std::move(place.error()));
-  Column column{term.column, *place, nullptr, unmeasured};
+  Column column{term.column, *place, nullptr, signals::unmeasured};
   if (const auto limits = mapping_.column_limits.find(term.column); limits != mapping_.column_limits.end()) {
     column.limits = &limits->second;
   }
@@ -190,9 +191,7 @@ Result<void> Importer::bind() {
     required_.emplace_back(*place, &wanted);
   }
   for (const FieldTarget& target : mapping_.targets) {
-    std::string name(target.slot->field);
-    if (target.slot->size > 1) name.append("[").append(std::to_string(target.element)).append("]");
-    auto bound = bind_expression(target.expression, std::move(name));
+    auto bound = bind_expression(target.expression, target.name);
     if (!bound) return tl::unexpected<Error>(std::move(bound.error()));
     targets_.push_back({&target, std::move(*bound)});
   }
@@ -252,12 +251,12 @@ double Importer::limited(double value, const ValueLimits& limits, double held, c
     case OutsidePolicy::clamp:
       return value < limits.low ? limits.low : limits.high;
     case OutsidePolicy::blank:
-      return unmeasured;
+      return signals::unmeasured;
     case OutsidePolicy::drop_row:
       drop_row_ = true;
       return held;
   }
-  return unmeasured;
+  return signals::unmeasured;
 }
 
 Result<void> Importer::take_cells(const std::vector<std::string_view>& row) {
@@ -268,7 +267,7 @@ Result<void> Importer::take_cells(const std::vector<std::string_view>& row) {
     const std::string_view text = trimmed(row[column.place]);
     if (text.empty()) {
       if (!mapping_.hold_empty_cells) {
-        column.value = unmeasured;
+        column.value = signals::unmeasured;
       } else if (!std::isnan(column.value)) {
         ++result_.report.cells_filled;
       }
@@ -325,13 +324,13 @@ double Importer::evaluate(const BoundExpression& bound) {
   if (expression.negate) value = -value;
   value = value * expression.scale / expression.divide_by + expression.offset;
   if (!expression.limits) return value;
-  return limited(value, *expression.limits, unmeasured, bound.name);
+  return limited(value, *expression.limits, signals::unmeasured, bound.name);
 }
 
 Result<Recording> Importer::name_recording() const {
   Recording recording;
   recording.robot_id = options_.robot_id.value_or(mapping_.robot_id);
-  if (!is_valid_robot_id(recording.robot_id))
+  if (!signals::is_valid_robot_id(recording.robot_id))
     return invalid("robot_id", "'" + recording.robot_id + "' is no robot id");
   recording.mission_id = options_.mission_id.value_or(mapping_.mission_id);
   const std::filesystem::path path(options_.source_name);
@@ -342,9 +341,9 @@ Result<Recording> Importer::name_recording() const {
       recording.mission_id.replace(at, name.size(), text);
     }
   }
-  if (!is_valid_mission_id(recording.mission_id)) {
+  if (!signals::is_valid_mission_id(recording.mission_id)) {
     return invalid("mission_id", "'" + recording.mission_id + "' must be 1 to " +
-                                     std::to_string(max_mission_id_length) +
+                                     std::to_string(signals::max_mission_id_length) +
                                      " of letters, digits, '.', '_', '-'");
   }
   recording.payload_kg = mapping_.payload_kg;
@@ -358,7 +357,7 @@ Result<Import> Importer::run() {
   if (auto bound = bind(); !bound) return tl::unexpected<Error>(std::move(bound.error()));
 
   std::vector<std::string_view> row;
-  std::vector<Sample>& samples = result_.recording.samples;
+  std::vector<signals::Sample>& samples = result_.recording.samples;
   ImportReport& report = result_.report;
   while (true) {
     auto read = table_.next(row);
@@ -371,13 +370,12 @@ Result<Import> Importer::run() {
     if (!utime_us) return tl::unexpected<Error>(std::move(utime_us.error()));
     if (auto taken = take_cells(row); !taken) return tl::unexpected<Error>(std::move(taken.error()));
 
-    Sample sample;
+    signals::Sample sample;
     sample.utime_us = *utime_us;
     sample.sequence = static_cast<std::int64_t>(samples.size());
     sample.payload_kg = mapping_.payload_kg;
-    for (const BoundTarget& bound : targets_) {
-      bound.target->slot->place(sample)[bound.target->element] = evaluate(bound.value);
-    }
+    const auto numbers = signals::numbers_of(sample);
+    for (const BoundTarget& bound : targets_) *numbers[bound.target->number] = evaluate(bound.value);
     if (auto taken = take_covariates(row); !taken) return tl::unexpected<Error>(std::move(taken.error()));
     if (drop_row_) {
       ++report.rows_glitched;

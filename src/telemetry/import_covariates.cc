@@ -13,7 +13,7 @@ std::string label_of(std::string_view text) {
   std::string label;
   for (const char c : text) {
     const bool continues = (static_cast<unsigned char>(c) & 0xC0) == 0x80;
-    if (!continues) label += is_valid_covariate_name(std::string_view(&c, 1)) ? c : '_';
+    if (!continues) label += signals::is_valid_covariate_name(std::string_view(&c, 1)) ? c : '_';
   }
   return label.empty() ? "_" : label;
 }
@@ -27,9 +27,9 @@ void ImportedCovariates::set(const std::string& name, double value) {
 
 Result<void> ImportedCovariates::set_label(const std::string& quantity, std::string_view text) {
   const std::string label = label_of(text);
-  if (label.size() > max_covariate_name_length)
+  if (label.size() > signals::max_covariate_name_length)
     return fail(Fault::corrupt, "",
-                "is longer than the " + std::to_string(max_covariate_name_length) +
+                "is longer than the " + std::to_string(signals::max_covariate_name_length) +
                     " characters that a label may have");
   const std::string name = quantity + "=" + label;
   Labels& labels = labels_[quantity];
@@ -48,14 +48,14 @@ Result<void> ImportedCovariates::set_label(const std::string& quantity, std::str
 void ImportedCovariates::forget_labels(const std::string& quantity) {
   Labels& labels = labels_[quantity];
   labels.known = false;
-  for (const std::string& name : labels.names) set(name, unmeasured);
+  for (const std::string& name : labels.names) set(name, signals::unmeasured);
 }
 
 void ImportedCovariates::commit(std::int64_t utime_us) {
   for (const std::string& name : names_) {
     const double value = now_.at(name);
     const auto before = committed_.find(name);
-    const double last = before == committed_.end() ? unmeasured : before->second;
+    const double last = before == committed_.end() ? signals::unmeasured : before->second;
     if (value == last || (std::isnan(value) && std::isnan(last))) continue;
     changes_.push_back({utime_us, name, value});
     committed_[name] = value;
@@ -64,22 +64,22 @@ void ImportedCovariates::commit(std::int64_t utime_us) {
     if (labels.known && labels.first_utime_us < 0) labels.first_utime_us = utime_us;
 }
 
-Result<std::vector<CovariateSeries>> ImportedCovariates::finish() {
-  std::vector<CovariateChange> before;
+Result<std::vector<signals::CovariateSeries>> ImportedCovariates::finish() {
+  std::vector<signals::CovariateChange> before;
   for (const auto& [quantity, labels] : labels_) {
     for (const std::string& name : labels.names) {
-      const auto first = std::ranges::find(changes_, name, &CovariateChange::name);
+      const auto first = std::ranges::find(changes_, name, &signals::CovariateChange::name);
       if (first != changes_.end() && first->utime_us > labels.first_utime_us)
         before.push_back({labels.first_utime_us, name, 0});
     }
   }
   changes_.insert(changes_.end(), before.begin(), before.end());
-  std::ranges::stable_sort(changes_, {}, &CovariateChange::utime_us);
-  std::vector<CovariateSeries> series = series_of(changes_);
-  if (series.size() > max_covariates)
+  std::ranges::stable_sort(changes_, {}, &signals::CovariateChange::utime_us);
+  std::vector<signals::CovariateSeries> series = signals::series_of(changes_);
+  if (series.size() > signals::max_covariates)
     return invalid("covariates", "are " + std::to_string(series.size()) +
                                      " with every label; a recording has at most " +
-                                     std::to_string(max_covariates));
+                                     std::to_string(signals::max_covariates));
   return series;
 }
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "telemetry/covariates.h"
+#include "signals/covariates.h"
 
 namespace joulecast::telemetry {
 
@@ -30,7 +30,7 @@ class ImportedCovariates {
 
   // A label that comes later in the table did not hold before. Fault::invalid for more names than a mission
   // may have.
-  Result<std::vector<CovariateSeries>> finish();
+  Result<std::vector<signals::CovariateSeries>> finish();
 
  private:
   struct Labels {
@@ -42,7 +42,7 @@ class ImportedCovariates {
   std::vector<std::string> names_;  // in order of appearance
   std::map<std::string, double, std::less<>> now_, committed_;
   std::map<std::string, Labels, std::less<>> labels_;
-  std::vector<CovariateChange> changes_;
+  std::vector<signals::CovariateChange> changes_;
 };
 
 }  // namespace joulecast::telemetry

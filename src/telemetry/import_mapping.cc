@@ -7,8 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "signals/covariates.h"
+#include "signals/ids.h"
 #include "telemetry/codec.h"
-#include "telemetry/covariates.h"
 
 namespace joulecast::telemetry {
 namespace {
@@ -151,30 +152,30 @@ class Reader {
     }
     for (const auto& [name, member] : value.items()) {
       const std::string here = pointer + "/" + name;
-      const auto* slot =
-          std::find_if(sample_slots.begin(), sample_slots.end(),
-                       [&, &field = name](const SampleSlot& known) { return known.field == field; });
-      if (slot == sample_slots.end()) {
+      std::vector<std::size_t> numbers;
+      for (std::size_t k = 0; k < signals::sample_numbers; ++k)
+        if (signals::sample_fields[k].name == name) numbers.push_back(k);
+      if (numbers.empty() || name == "payload_mass") {  // the payload is the mission's
         refuse(here, "is no field of a sample that a table can fill");
         break;
       }
-      if (slot->size == 1) {
-        targets.push_back({slot, 0, expression(member, here)});
+      if (numbers.size() == 1) {
+        targets.push_back({name, numbers[0], expression(member, here)});
         continue;
       }
-      if (!member.is_array() || member.size() != slot->size) {
+      if (!member.is_array() || member.size() != numbers.size()) {
         refuse(here,
-               "must be an array of " + std::to_string(slot->size) + " expressions (null: not measured)");
+               "must be an array of " + std::to_string(numbers.size()) + " expressions (null: not measured)");
         break;
       }
-      for (std::size_t i = 0; i < slot->size; ++i) {
-        if (!member[i].is_null()) {
-          targets.push_back({slot, i, expression(member[i], here + "/" + std::to_string(i))});
-        }
+      for (std::size_t i = 0; i < numbers.size(); ++i) {
+        if (member[i].is_null()) continue;
+        const std::string index = std::to_string(i);
+        targets.push_back({name + "[" + index + "]", numbers[i], expression(member[i], here + "/" + index)});
       }
     }
-    const auto wheels = std::count_if(targets.begin(), targets.end(), [](const FieldTarget& target) {
-      return target.slot == sample_slots.data();
+    const auto wheels = std::ranges::count_if(targets, [](const FieldTarget& target) {
+      return signals::sample_fields[target.number].name == "wheel_velocity";
     });
     if (wheels != 2) refuse(pointer + "/wheel_velocity", "must give both wheels: no sample is without them");
     return targets;
@@ -187,8 +188,8 @@ class Reader {
     if (!value.is_object()) return refuse(pointer, "must be an object");
     for (const auto& [name, member] : value.items()) {
       const std::string here = pointer + "/" + name;
-      if (!is_valid_covariate_name(name) || is_label(name))
-        refuse(here, "must be called by 1 to " + std::to_string(max_covariate_name_length) +
+      if (!signals::is_valid_covariate_name(name) || signals::is_label(name))
+        refuse(here, "must be called by 1 to " + std::to_string(signals::max_covariate_name_length) +
                          " of letters, digits, '.', '_', '-'");
       take(name, member, here);
     }
@@ -209,8 +210,9 @@ class Reader {
             content.labels.push_back({name, text(member.value("column", json()), here + "/column")});
           });
     }
-    if (content.covariates.size() + content.labels.size() > max_covariates)
-      refuse("/covariates", "must be at most " + std::to_string(max_covariates) + ", labels among them");
+    if (content.covariates.size() + content.labels.size() > signals::max_covariates)
+      refuse("/covariates",
+             "must be at most " + std::to_string(signals::max_covariates) + ", labels among them");
   }
 
   void time(const json& value, ImportMapping::Content& content) {
@@ -237,9 +239,9 @@ class Reader {
       return content;
     }
     content.robot_id = text(value.value("robot_id", json()), "/robot_id");
-    if (!is_valid_robot_id(content.robot_id)) {
-      refuse("/robot_id",
-             "must be 1 to " + std::to_string(max_robot_id_length) + " of letters, digits, '.', '_', '-'");
+    if (!signals::is_valid_robot_id(content.robot_id)) {
+      refuse("/robot_id", "must be 1 to " + std::to_string(signals::max_robot_id_length) +
+                              " of letters, digits, '.', '_', '-'");
     }
     if (value.contains("mission_id")) content.mission_id = text(value["mission_id"], "/mission_id");
     if (value.contains("payload_kg")) {

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "signals/sample.h"
 #include "telemetry/csv_import.h"
-#include "telemetry/sample.h"
 
 // What a mapping file says, as data. Only the import's own sources use this.
 namespace joulecast::telemetry {
@@ -39,7 +39,7 @@ struct ColumnTerm {
 struct FieldExpression {
   enum class Source { constant, columns, quaternion_yaw };
   Source source = Source::constant;
-  double constant = unmeasured;
+  double constant = signals::unmeasured;
   std::vector<ColumnTerm> terms;  // of a quaternion: x, y, z, w
   bool mean = false;              // else the sum
   bool absolute = false;
@@ -51,29 +51,9 @@ struct FieldExpression {
   std::optional<ValueLimits> limits;
 };
 
-// The doubles of a sample that a table can fill, in the order of robot_telemetry_t, and where they go.
-struct SampleSlot {
-  std::string_view field;  // name in robot_telemetry_t
-  std::size_t size = 1;    // elements; 1 is a scalar
-  double* (*place)(Sample&) = nullptr;
-};
-
-inline constexpr std::array<SampleSlot, 10> sample_slots{{
-    {"wheel_velocity", 2, [](Sample& s) { return s.wheel_velocity_rad_s.data(); }},
-    {"motor_voltage", 2, [](Sample& s) { return s.motor_voltage_v.data(); }},
-    {"motor_current", 2, [](Sample& s) { return s.motor_current_a.data(); }},
-    {"battery_voltage", 1, [](Sample& s) { return &s.battery_voltage_v; }},
-    {"battery_current", 1, [](Sample& s) { return &s.battery_current_a; }},
-    {"velocity_command", 2, [](Sample& s) { return s.velocity_command.data(); }},
-    {"yaw_rate", 1, [](Sample& s) { return &s.yaw_rate_rad_s; }},
-    {"pitch", 1, [](Sample& s) { return &s.pitch_rad; }},
-    {"pose", 3, [](Sample& s) { return s.pose.data(); }},
-    {"motor_temperature", 2, [](Sample& s) { return s.motor_temperature_c.data(); }},
-}};
-
 struct FieldTarget {
-  const SampleSlot* slot = nullptr;
-  std::size_t element = 0;
+  std::string name;        // of the field, e.g. "wheel_velocity[0]"
+  std::size_t number = 0;  // of signals::sample_fields
   FieldExpression expression;
 };
 
@@ -91,7 +71,7 @@ struct LabelTarget {
 struct ImportMapping::Content {
   std::string robot_id;
   std::string mission_id = "{stem}";
-  double payload_kg = unmeasured;
+  double payload_kg = signals::unmeasured;
   char separator = ',';
   std::string column_prefix;
   std::string time_column;

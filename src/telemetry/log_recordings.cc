@@ -4,7 +4,9 @@
 #include <optional>
 #include <utility>
 
+#include "signals/mission_event.h"
 #include "telemetry/codec.h"
+#include "telemetry/covariate_tracker.h"
 #include "telemetry/event_log.h"
 #include "telemetry/mission_tracker.h"
 #include "telemetry/validation.h"
@@ -39,7 +41,7 @@ class Collector {
     for (const auto& [id, robot] : robots_)
       result_.samples_outside += robot.missions.counters().samples_outside;
     for (std::size_t k = 0; k < changes_.size(); ++k) {
-      result_.recordings[k].covariates = series_of(changes_[k]);
+      result_.recordings[k].covariates = signals::series_of(changes_[k]);
       result_.unreadable += put_in_order(result_.recordings[k].samples);
     }
     return std::move(result_);
@@ -54,7 +56,7 @@ class Collector {
 
   void refuse() { ++result_.unreadable; }
 
-  void add(const std::string& id, const Sample& sample) {
+  void add(const std::string& id, const signals::Sample& sample) {
     if (check_plausible(sample)) return refuse();
     Robot& robot = robots_[id];
     const SampleStep step = robot.missions.on_sample(sample.utime_us, sample.payload_kg);
@@ -62,18 +64,18 @@ class Collector {
     if (step.belongs) result_.recordings[*robot.open].samples.push_back(sample);
   }
 
-  void add(const std::string& id, const MissionEvent& event) {
+  void add(const std::string& id, const signals::MissionEvent& event) {
     if (check_plausible(event)) return refuse();
     Robot& robot = robots_[id];
     carry_out(id, robot, robot.missions.on_event(event));
   }
 
-  void add(const std::string& id, const CovariateMessage& message) {
+  void add(const std::string& id, const signals::CovariateMessage& message) {
     using Verdict = CovariateTracker::Verdict;
     if (check_plausible(message)) return refuse();
     Robot& robot = robots_[id];
-    for (const Covariate& covariate : message.covariates) {
-      CovariateChange change;
+    for (const signals::Covariate& covariate : message.covariates) {
+      signals::CovariateChange change;
       const Verdict verdict = check_plausible(covariate)
                                   ? Verdict::late
                                   : robot.covariates.take(message.utime_us, covariate, change);
@@ -95,7 +97,7 @@ class Collector {
   const std::string& wanted_;
   LogRecordings result_;
   std::map<std::string, Robot> robots_;
-  std::vector<std::vector<CovariateChange>> changes_;  // of each recording
+  std::vector<std::vector<signals::CovariateChange>> changes_;  // of each recording
 };
 
 }  // namespace

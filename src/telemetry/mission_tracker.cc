@@ -45,9 +45,9 @@ SampleStep MissionTracker::on_sample(std::int64_t utime_us, double payload_kg) {
   return step;
 }
 
-MissionActions MissionTracker::on_event(const MissionEvent& event) {
+MissionActions MissionTracker::on_event(const signals::MissionEvent& event) {
   MissionActions actions;
-  if (event.phase == MissionPhase::started) {
+  if (event.phase == signals::MissionPhase::started) {
     on_start(actions, event);
   } else {
     on_end(actions, event);
@@ -97,7 +97,7 @@ bool MissionTracker::any_past(std::string_view mission_id, auto is_it) const {
                              [&](const Past& past) { return past.mission_id == mission_id && is_it(past); });
 }
 
-void MissionTracker::on_start(MissionActions& actions, const MissionEvent& event) {
+void MissionTracker::on_start(MissionActions& actions, const signals::MissionEvent& event) {
   const auto repeats = [&](const Past& past) {
     return past.start_us && is_same_instant(*past.start_us, event.utime_us);
   };
@@ -127,8 +127,9 @@ void MissionTracker::on_start(MissionActions& actions, const MissionEvent& event
   open(actions, event.mission_id, event.utime_us, event.payload_kg, event.note);
 }
 
-void MissionTracker::on_end(MissionActions& actions, const MissionEvent& event) {
-  const MissionEnd end = event.phase == MissionPhase::aborted ? MissionEnd::aborted : MissionEnd::finished;
+void MissionTracker::on_end(MissionActions& actions, const signals::MissionEvent& event) {
+  const MissionEnd end =
+      event.phase == signals::MissionPhase::aborted ? MissionEnd::aborted : MissionEnd::finished;
   const bool of_current = current_ && current_->mission_id == event.mission_id;
   const bool before_current = of_current && event.utime_us < begin_us_;
   // Said already, or late: of a mission that ended otherwise, or of an earlier one of the open one's name.

@@ -8,7 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "telemetry/sample.h"
+#include "signals/mission_event.h"
+#include "signals/sample.h"
 
 namespace joulecast::telemetry {
 
@@ -38,7 +39,7 @@ struct OpenMission {
   std::string mission_id;
   std::int64_t start_utime_us = 0;
   std::int64_t last_utime_us = 0;  // of the newest sample or event that belongs to it
-  double payload_kg = unmeasured;
+  double payload_kg = signals::unmeasured;
   bool implicit = false;
 
   friend bool operator==(const OpenMission&, const OpenMission&) = default;
@@ -50,9 +51,9 @@ struct MissionAction {
   std::string mission_id;
   std::int64_t utime_us = 0;  // robot's clock: where the mission begins or ends
   bool implicit = false;
-  double payload_kg = unmeasured;         // open: as declared
-  MissionEnd end = MissionEnd::finished;  // close only
-  std::string note;                       // the event's note, if an event caused this
+  double payload_kg = signals::unmeasured;  // open: as declared
+  MissionEnd end = MissionEnd::finished;    // close only
+  std::string note;                         // the event's note, if an event caused this
 };
 
 using MissionActions = std::vector<MissionAction>;
@@ -92,7 +93,7 @@ class MissionTracker {
   // Call before integrating a sample that advances the stream: carry the actions out, then count the sample
   // to current() if it belongs.
   SampleStep on_sample(std::int64_t utime_us, double payload_kg);
-  MissionActions on_event(const MissionEvent& event);
+  MissionActions on_event(const signals::MissionEvent& event);
   // Nothing was heard of the robot for so long by the HOST's clock.
   MissionActions on_silence(std::int64_t silent_us);
   // The robot's clock was set (ClockStep of the sequence tracker): the open mission goes on in the new time.
@@ -121,8 +122,8 @@ class MissionTracker {
   void close(MissionActions& actions, std::int64_t utime_us, MissionEnd end, std::string note = {},
              std::optional<std::int64_t> said_us = {});
   void close_if_over(MissionActions& actions, std::int64_t utime_us);
-  void on_start(MissionActions& actions, const MissionEvent& event);
-  void on_end(MissionActions& actions, const MissionEvent& event);
+  void on_start(MissionActions& actions, const signals::MissionEvent& event);
+  void on_end(MissionActions& actions, const signals::MissionEvent& event);
   void remember(Past past);
   [[nodiscard]] bool is_same_instant(std::int64_t said_us, std::int64_t other_us) const noexcept;
   // A mission of the past that satisfies `is_it` and is called so.

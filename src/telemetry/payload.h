@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "telemetry/sample.h"
+#include "signals/sample.h"
 
 namespace joulecast::telemetry {
 
@@ -30,7 +30,7 @@ class MissionPayload {
   }
 
  private:
-  double kg_ = unmeasured;
+  double kg_ = signals::unmeasured;
   bool told_ = false;
 };
 

@@ -4,14 +4,15 @@
 #include <cmath>
 #include <span>
 
+#include "signals/mission_event.h"
 #include "telemetry/codec.h"
 
 namespace joulecast::telemetry {
 namespace {
 
-Result<void> write_event(EventLogWriter& log, const Recording& recording, MissionPhase phase,
+Result<void> write_event(EventLogWriter& log, const Recording& recording, signals::MissionPhase phase,
                          std::int64_t utime_us) {
-  const MissionEvent event{utime_us, recording.mission_id, phase, recording.payload_kg, {}};
+  const signals::MissionEvent event{utime_us, recording.mission_id, phase, recording.payload_kg, {}};
   return encode_mission_event(recording.robot_id, event)
       .and_then([&](const std::vector<std::uint8_t>& bytes) {
         return log.write(utime_us, channel_of(Subject::mission_event, recording.robot_id), bytes);
@@ -20,12 +21,12 @@ Result<void> write_event(EventLogWriter& log, const Recording& recording, Missio
 
 // Changes in order of time: one message an instant, or several where it changes more than one holds.
 Result<void> write_changes(EventLogWriter& log, const std::string& robot_id,
-                           std::span<const CovariateChange> changes) {
+                           std::span<const signals::CovariateChange> changes) {
   const std::string channel = channel_of(Subject::covariates, robot_id);
   for (std::size_t k = 0; k < changes.size();) {
-    CovariateMessage message{changes[k].utime_us, {}};
+    signals::CovariateMessage message{changes[k].utime_us, {}};
     for (; k < changes.size() && changes[k].utime_us == message.utime_us &&
-           message.covariates.size() < max_covariates;
+           message.covariates.size() < signals::max_covariates;
          ++k)
       message.covariates.push_back({changes[k].name, changes[k].value});
     auto written = encode_covariates(robot_id, message).and_then([&](const std::vector<std::uint8_t>& bytes) {
@@ -38,9 +39,9 @@ Result<void> write_changes(EventLogWriter& log, const std::string& robot_id,
 
 }  // namespace
 
-std::size_t put_in_order(std::vector<Sample>& samples) {
-  std::ranges::stable_sort(samples, {}, &Sample::utime_us);
-  const auto same = std::ranges::unique(samples, {}, &Sample::utime_us);
+std::size_t put_in_order(std::vector<signals::Sample>& samples) {
+  std::ranges::stable_sort(samples, {}, &signals::Sample::utime_us);
+  const auto same = std::ranges::unique(samples, {}, &signals::Sample::utime_us);
   const std::size_t dropped = same.size();
   samples.erase(same.begin(), same.end());
   return dropped;
@@ -49,16 +50,17 @@ std::size_t put_in_order(std::vector<Sample>& samples) {
 Result<void> write_recording(EventLogWriter& log, const Recording& recording) {
   if (recording.samples.empty()) return invalid("samples", "a recording needs one sample at least");
   const std::string channel = channel_of(Subject::telemetry, recording.robot_id);
-  const std::vector<CovariateChange> changes = changes_of(recording.covariates);
-  std::span<const CovariateChange> left = changes;
-  auto written = write_event(log, recording, MissionPhase::started, recording.samples.front().utime_us);
+  const std::vector<signals::CovariateChange> changes = signals::changes_of(recording.covariates);
+  std::span<const signals::CovariateChange> left = changes;
+  auto written =
+      write_event(log, recording, signals::MissionPhase::started, recording.samples.front().utime_us);
   const auto write_up_to = [&](std::int64_t utime_us) {
     std::size_t count = 0;
     while (count < left.size() && left[count].utime_us <= utime_us) ++count;
     if (written) written = write_changes(log, recording.robot_id, left.first(count));
     left = left.subspan(count);
   };
-  for (const Sample& sample : recording.samples) {
+  for (const signals::Sample& sample : recording.samples) {
     write_up_to(sample.utime_us);
     if (!written) return written;
     written =
@@ -68,12 +70,12 @@ Result<void> write_recording(EventLogWriter& log, const Recording& recording) {
     if (!written) return written;
   }
   const std::int64_t end_us = recording.samples.back().utime_us;
-  written = write_event(log, recording, MissionPhase::finished, end_us);
+  written = write_event(log, recording, signals::MissionPhase::finished, end_us);
   if (!written) return written;
-  std::vector<CovariateChange> unknown;
-  for (const CovariateSeries& series : recording.covariates) {
+  std::vector<signals::CovariateChange> unknown;
+  for (const signals::CovariateSeries& series : recording.covariates) {
     if (!series.value.empty() && !std::isnan(series.value.back()))
-      unknown.push_back({std::max(end_us, series.utime_us.back()) + 1, series.name, unmeasured});
+      unknown.push_back({std::max(end_us, series.utime_us.back()) + 1, series.name, signals::unmeasured});
   }
   return write_changes(log, recording.robot_id, unknown);
 }

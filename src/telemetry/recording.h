@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "base/error.h"
-#include "telemetry/covariates.h"
+#include "signals/covariates.h"
+#include "signals/sample.h"
 #include "telemetry/event_log.h"
-#include "telemetry/sample.h"
 
 namespace joulecast::telemetry {
 
@@ -15,14 +15,14 @@ namespace joulecast::telemetry {
 struct Recording {
   std::string robot_id;
   std::string mission_id;
-  double payload_kg = unmeasured;
-  std::vector<Sample> samples;
-  std::vector<CovariateSeries> covariates = {};
+  double payload_kg = signals::unmeasured;
+  std::vector<signals::Sample> samples;
+  std::vector<signals::CovariateSeries> covariates = {};
   bool implicit = false;  // no STARTED declared it
 };
 
 // Sorts samples by time and drops those whose time is that of another; returns how many.
-std::size_t put_in_order(std::vector<Sample>& samples);
+std::size_t put_in_order(std::vector<signals::Sample>& samples);
 
 // Append to the log as the robot would have published it: STARTED at the first sample, every sample with the
 // covariates that change by then before it, FINISHED at the last, and that the covariates are unknown from

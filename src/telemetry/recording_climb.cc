@@ -2,17 +2,17 @@
 
 namespace joulecast::telemetry {
 
-dynamics::ClimbReading climb_reading(const dynamics::Parameters<double>& parameters, const Sample& sample,
-                                     double height_m) {
+dynamics::ClimbReading climb_reading(const dynamics::Parameters<double>& parameters,
+                                     const signals::Sample& sample, double height_m) {
   const auto body = dynamics::body_of_wheels(parameters, sample.wheel_velocity_rad_s, {});
   return {sample.utime_us, body.speed_m_s, sample.pitch_rad, height_m};
 }
 
 std::vector<double> climb_of(const Recording& recording, const dynamics::Parameters<double>& parameters) {
-  CovariateReader height(find_series(recording.covariates, height_covariate));
+  signals::CovariateReader height(signals::find_series(recording.covariates, signals::height_covariate));
   std::vector<dynamics::ClimbReading> readings;
   readings.reserve(recording.samples.size());
-  for (const Sample& sample : recording.samples)
+  for (const signals::Sample& sample : recording.samples)
     readings.push_back(climb_reading(parameters, sample, height.at(sample.utime_us)));
   return dynamics::climb_along(readings);
 }

@@ -10,7 +10,7 @@ namespace joulecast::telemetry {
 
 // A sample as dynamics/climb.h reads it, on a robot of these parameters.
 [[nodiscard]] dynamics::ClimbReading climb_reading(const dynamics::Parameters<double>& parameters,
-                                                   const Sample& sample, double height_m);
+                                                   const signals::Sample& sample, double height_m);
 
 // The climb at each sample of a recording (dynamics::climb_along): from its pitch, else from its covariate
 // height_m.

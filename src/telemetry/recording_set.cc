@@ -48,10 +48,10 @@ std::vector<Recording> joined(std::vector<Recording> missions, std::vector<std::
     if (is_short && !names.empty() && same(result.back().payload_kg, mission.payload_kg)) {
       Recording& whole = result.back();
       whole.samples.insert(whole.samples.end(), mission.samples.begin(), mission.samples.end());
-      std::vector<CovariateChange> changes = changes_of(whole.covariates);
-      const std::vector<CovariateChange> more = changes_of(mission.covariates);
+      std::vector<signals::CovariateChange> changes = signals::changes_of(whole.covariates);
+      const std::vector<signals::CovariateChange> more = signals::changes_of(mission.covariates);
       changes.insert(changes.end(), more.begin(), more.end());
-      whole.covariates = series_of(changes);
+      whole.covariates = signals::series_of(changes);
     } else {
       told();
       result.push_back(std::move(mission));
@@ -72,8 +72,8 @@ Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<Record
   set.robot_id = std::move(robot_id);
   std::size_t without_speed = 0, twice = 0;
   std::erase_if(missions, [&](Recording& mission) {
-    std::vector<Sample>& samples = mission.samples;
-    without_speed += std::erase_if(samples, [](const Sample& s) {
+    std::vector<signals::Sample>& samples = mission.samples;
+    without_speed += std::erase_if(samples, [](const signals::Sample& s) {
       return !std::isfinite(s.wheel_velocity_rad_s[0]) || !std::isfinite(s.wheel_velocity_rad_s[1]);
     });
     twice += put_in_order(samples);

@@ -33,7 +33,7 @@ constexpr std::array<PlausibleRange, 18> ranges{{
 constexpr std::size_t wheel_channels = 2;
 constexpr std::int64_t year_2200_us = 7'258'118'400'000'000;
 
-std::array<double, ranges.size()> channels(const Sample& s) noexcept {
+std::array<double, ranges.size()> channels(const signals::Sample& s) noexcept {
   return {s.wheel_velocity_rad_s[0],
           s.wheel_velocity_rad_s[1],
           s.motor_voltage_v[0],
@@ -75,7 +75,7 @@ std::span<const PlausibleRange> plausible_ranges() noexcept {
   return ranges;
 }
 
-std::optional<Implausible> check_plausible(const Sample& sample) noexcept {
+std::optional<Implausible> check_plausible(const signals::Sample& sample) noexcept {
   if (auto fault = check_clock(sample.utime_us)) return fault;
   if (sample.sequence < 0) {
     return Implausible{Implausibility::bad_sequence, "sequence", static_cast<double>(sample.sequence)};
@@ -87,19 +87,19 @@ std::optional<Implausible> check_plausible(const Sample& sample) noexcept {
   return std::nullopt;
 }
 
-std::optional<Implausible> check_plausible(const MissionEvent& event) noexcept {
+std::optional<Implausible> check_plausible(const signals::MissionEvent& event) noexcept {
   if (auto fault = check_clock(event.utime_us)) return fault;
   return check_value(event.payload_kg, ranges.back(), false);
 }
 
-std::optional<Implausible> check_plausible(const CovariateMessage& message) noexcept {
+std::optional<Implausible> check_plausible(const signals::CovariateMessage& message) noexcept {
   return check_clock(message.utime_us);
 }
 
-std::optional<Implausible> check_plausible(const Covariate& covariate) noexcept {
+std::optional<Implausible> check_plausible(const signals::Covariate& covariate) noexcept {
   const double value = covariate.value;
   if (std::isinf(value)) return Implausible{Implausibility::infinite, "value", value};
-  if (is_label(covariate.name) && !std::isnan(value) && value != 0 && value != 1)
+  if (signals::is_label(covariate.name) && !std::isnan(value) && value != 0 && value != 1)
     return Implausible{Implausibility::out_of_range, "value", value};
   return std::nullopt;
 }

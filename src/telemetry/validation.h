@@ -6,8 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include "telemetry/covariates.h"
-#include "telemetry/sample.h"
+#include "signals/covariates.h"
+#include "signals/mission_event.h"
+#include "signals/sample.h"
 
 namespace joulecast::telemetry {
 
@@ -36,11 +37,11 @@ struct Implausible {
 };
 
 // What is wrong with the sample taken alone; empty when nothing is.
-[[nodiscard]] std::optional<Implausible> check_plausible(const Sample& sample) noexcept;
-[[nodiscard]] std::optional<Implausible> check_plausible(const MissionEvent& event) noexcept;
+[[nodiscard]] std::optional<Implausible> check_plausible(const signals::Sample& sample) noexcept;
+[[nodiscard]] std::optional<Implausible> check_plausible(const signals::MissionEvent& event) noexcept;
 // Of the message its clock; of each value that it is finite or NaN, of a label's 0, 1 or NaN.
-[[nodiscard]] std::optional<Implausible> check_plausible(const CovariateMessage& message) noexcept;
-[[nodiscard]] std::optional<Implausible> check_plausible(const Covariate& covariate) noexcept;
+[[nodiscard]] std::optional<Implausible> check_plausible(const signals::CovariateMessage& message) noexcept;
+[[nodiscard]] std::optional<Implausible> check_plausible(const signals::Covariate& covariate) noexcept;
 [[nodiscard]] std::string describe(const Implausible& fault);
 [[nodiscard]] std::string_view name_of(Implausibility why) noexcept;
 

@@ -12,7 +12,7 @@
 namespace joulecast::windows {
 namespace {
 
-using telemetry::Sample;
+using signals::Sample;
 
 // Median distance between neighbouring values among readings that differ: the step of a coarse converter,
 // next to nothing for a fine one.
@@ -183,7 +183,7 @@ class Builder {
 
   void add_covariates() {
     for (const std::string& name : covariates_) {
-      telemetry::CovariateReader reader(telemetry::find_series(mission_.covariates, name));
+      signals::CovariateReader reader(signals::find_series(mission_.covariates, name));
       track_.covariates.push_back(column([&](const Sample& s) { return reader.at(s.utime_us); }));
     }
   }

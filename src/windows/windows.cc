@@ -250,8 +250,8 @@ std::vector<std::string> covariate_names(std::span<const telemetry::Recording> m
   };
   std::map<std::string, Values> names;
   for (const telemetry::Recording& mission : missions) {
-    for (const telemetry::CovariateSeries& series : mission.covariates) {
-      if (series.name == telemetry::height_covariate) continue;
+    for (const signals::CovariateSeries& series : mission.covariates) {
+      if (series.name == signals::height_covariate) continue;
       Values& values = names[series.name];
       for (const double v : series.value) {
         if (!std::isfinite(v)) continue;

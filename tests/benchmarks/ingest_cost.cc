@@ -38,7 +38,7 @@ std::vector<Message> messages() {
   for (std::int64_t k = 0; k < samples_a_robot; ++k) {
     for (int r = 0; r < robots; ++r) {
       const std::string id = "bench-" + std::to_string(r);
-      telemetry::Sample s = drive.at(static_cast<double>(k) * 0.02);
+      signals::Sample s = drive.at(static_cast<double>(k) * 0.02);
       s.utime_us = 1'750'000'000'000'000 + k * 20'000;
       s.sequence = k;
       all.push_back(
@@ -74,15 +74,15 @@ double decode_only(const std::vector<Message>& all) {
 
 double meter_only(const std::vector<Message>& all) {
   server::IngestCounters counters;
-  std::vector<telemetry::Sample> samples;
+  std::vector<signals::Sample> samples;
   for (std::size_t k = 0; k < all.size(); k += robots) {
-    samples.push_back(std::get<telemetry::Sample>(
+    samples.push_back(std::get<signals::Sample>(
         server::decode_message(all[k].channel, all[k].bytes, 0, counters)->content));
   }
   energy::Meter meter(*dynamics::drive_model(benchmarks::robot_named("bench-0")), {},
                       [](const energy::MeterPoint&) {});
   const Timer timer("metering (CVODE, all accounts)", samples.size());
-  for (const telemetry::Sample& s : samples) {
+  for (const signals::Sample& s : samples) {
     if (!meter.add(s)) std::abort();
   }
   return timer.stop();

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "robot/robot_model.h"
-#include "telemetry/sample.h"
+#include "signals/sample.h"
 #include "tests/support/sample_robots.h"
 
 namespace joulecast::benchmarks {
@@ -13,8 +13,8 @@ namespace joulecast::benchmarks {
 class NoisyDrive {
  public:
   // `t` robot seconds since its start; utime and sequence are left to the caller.
-  telemetry::Sample at(double t) {
-    telemetry::Sample s;
+  signals::Sample at(double t) {
+    signals::Sample s;
     s.wheel_velocity_rad_s = {4 + 3 * std::sin(0.5 * t) + 0.02 * noise(),
                               4 + 3 * std::sin(0.55 * t) + 0.02 * noise()};
     s.motor_voltage_v = {8 + 5 * std::sin(0.5 * t) + 0.1 * noise(),

@@ -107,7 +107,7 @@ class Fleet {
   }
   void publish(Publisher& robot, Clock::time_point now) {
     for (; robot.due <= now; robot.due += period(robot)) {
-      telemetry::Sample s = robot.drive.at(static_cast<double>(robot.sequence) / robot.rate_hz);
+      signals::Sample s = robot.drive.at(static_cast<double>(robot.sequence) / robot.rate_hz);
       s.sequence = robot.sequence++;
       s.utime_us = host_utime_us();
       if (!robot.sent_utime_us.empty()) s.utime_us = std::max(s.utime_us, robot.sent_utime_us.back() + 1);

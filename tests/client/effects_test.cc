@@ -199,7 +199,7 @@ TEST(Effects, TheComputerDrawsByItsLoadWhichTheRobotMayPublish) {
     least = std::min(least, load);
     most = std::max(most, load);
     if (busy.covariates[next - 1].utime_us != busy.samples[k].utime_us) continue;
-    const auto power = [](const telemetry::Sample& s) { return s.battery_voltage_v * s.battery_current_a; };
+    const auto power = [](const signals::Sample& s) { return s.battery_voltage_v * s.battery_current_a; };
     // The sag of the bus under the load changes what the drives make of it a little.
     EXPECT_NEAR(power(busy.samples[k]) - power(idle.samples[k]), 40 * load, 0.5);
   }

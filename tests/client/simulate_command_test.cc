@@ -17,6 +17,7 @@
 
 #include "base/host_clock.h"
 #include "client/commands/table.h"
+#include "signals/mission_event.h"
 #include "telemetry/codec.h"
 #include "telemetry/event_log.h"
 
@@ -102,7 +103,7 @@ TEST_F(SimulateCommand, RepeatsBitForBit) {
 }
 
 struct Told {
-  std::vector<telemetry::MissionEvent> missions;
+  std::vector<signals::MissionEvent> missions;
   std::int64_t first_utime_us = 0, last_utime_us = 0;
 };
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "client/virtual_robot/simulate.h"
+#include "signals/mission_event.h"
 #include "telemetry/codec.h"
 #include "tests/client/robots.h"
 
@@ -47,7 +48,7 @@ TEST(VirtualRobot, MissionsFollowOneAnotherInsideTheWalls) {
     ASSERT_EQ(run.events.size(), 6u);
     for (std::size_t k = 0; k < 6; ++k) {
       EXPECT_EQ(run.events[k].phase,
-                k % 2 == 0 ? telemetry::MissionPhase::started : telemetry::MissionPhase::finished);
+                k % 2 == 0 ? signals::MissionPhase::started : signals::MissionPhase::finished);
       EXPECT_EQ(run.events[k].mission_id, run.truth.missions[k / 2].mission_id);
     }
     for (const auto& sample : run.samples) {
@@ -166,8 +167,8 @@ TEST(Fleet, MessagesComeInOrderOfTimeAndOpenMissionsAreBrokenOff) {
   const auto ends = fleet.abort();
   ASSERT_EQ(ends.size(), 3u);
   for (const auto& end : ends) {
-    const auto& event = std::get<telemetry::MissionEvent>(end.emission.message);
-    EXPECT_EQ(event.phase, telemetry::MissionPhase::aborted);
+    const auto& event = std::get<signals::MissionEvent>(end.emission.message);
+    EXPECT_EQ(event.phase, signals::MissionPhase::aborted);
     EXPECT_EQ(event.utime_us, last_of[end.robot]);
   }
   EXPECT_FALSE(fleet.next());

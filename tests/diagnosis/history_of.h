@@ -8,6 +8,7 @@
 #include "client/virtual_robot/simulate.h"
 #include "dynamics/drive_model.h"
 #include "history/writer.h"
+#include "signals/mission_event.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
 
@@ -29,10 +30,10 @@ inline history::MissionKey drive(PipelineHarness& harness, const robot::RobotMod
   std::normal_distribution<double> noise(0, 0.05);
   const std::int64_t start_us = 1'750'000'000'000'000 + number * 3'600'000'000LL;
   const std::string id = "m" + std::to_string(number);
-  const auto event = [&](telemetry::MissionPhase phase, std::int64_t utime_us) {
-    harness.pipeline->handle({truth.robot_id, telemetry::MissionEvent{utime_us, id, phase, 0, ""}, utime_us});
+  const auto event = [&](signals::MissionPhase phase, std::int64_t utime_us) {
+    harness.pipeline->handle({truth.robot_id, signals::MissionEvent{utime_us, id, phase, 0, ""}, utime_us});
   };
-  event(telemetry::MissionPhase::started, start_us - 1000);
+  event(signals::MissionPhase::started, start_us - 1000);
   const double swing = 0.3 + 0.05 * (number % 5);
   for (int k = 0; k < samples; ++k) {
     const bool charges = k < charging_samples;
@@ -43,7 +44,7 @@ inline history::MissionKey drive(PipelineHarness& harness, const robot::RobotMod
     const double slope = 3 * swing * std::cos(swing * t), bend = 0.7 * swing * std::cos(0.7 * swing * t);
     at.wheel_acceleration_rad_s2 = {slope + bend, slope - bend};
     const auto flow = model.flow(at);
-    telemetry::Sample s;
+    signals::Sample s;
     s.utime_us = start_us + 20'000LL * k;
     s.sequence = number * 1'000'000LL + k;
     s.wheel_velocity_rad_s = at.wheel_speed_rad_s;
@@ -61,7 +62,7 @@ inline history::MissionKey drive(PipelineHarness& harness, const robot::RobotMod
     }
     harness.pipeline->handle({truth.robot_id, s, s.utime_us});
   }
-  event(telemetry::MissionPhase::finished, start_us + 20'000LL * samples);
+  event(signals::MissionPhase::finished, start_us + 20'000LL * samples);
   return harness.missions().back().key;
 }
 
@@ -77,10 +78,10 @@ inline void play(PipelineHarness& harness, std::string_view robot_json,
   const virtual_robot::Simulation run = virtual_robot::simulate_missions(spec, seed);
   const std::int64_t shift = start_us - run.events.front().utime_us;
   std::size_t next = 0;
-  for (telemetry::MissionEvent event : run.events) {
-    if (event.phase != telemetry::MissionPhase::started) {
+  for (signals::MissionEvent event : run.events) {
+    if (event.phase != signals::MissionPhase::started) {
       for (; next < run.samples.size() && run.samples[next].utime_us <= event.utime_us; ++next) {
-        telemetry::Sample sample = run.samples[next];
+        signals::Sample sample = run.samples[next];
         sample.utime_us += shift;
         harness.pipeline->handle({spec.robot.robot_id, sample, sample.utime_us});
       }

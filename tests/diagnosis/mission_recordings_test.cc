@@ -15,7 +15,7 @@ constexpr std::int64_t start_us = 1'750'000'000'000'000;
 telemetry::Recording recording(const std::string& mission, std::int64_t begin_us) {
   telemetry::Recording made{"nomad", mission, 2.5, {}};
   for (int k = 0; k < 3000; ++k) {
-    telemetry::Sample sample;
+    signals::Sample sample;
     sample.utime_us = begin_us + 20'000 * k;
     sample.sequence = begin_us / 20'000 + k;
     sample.wheel_velocity_rad_s = {3, 3};

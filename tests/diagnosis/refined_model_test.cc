@@ -7,6 +7,7 @@
 #include "client/virtual_robot/fleet.h"
 #include "robot/robot_file.h"
 #include "server/diagnosis/proposal_acceptor.h"
+#include "signals/mission_event.h"
 #include "tests/ingest/harness.h"
 
 namespace joulecast::server {
@@ -35,8 +36,8 @@ TEST(RefinedModel, IsProposedFromMissionsAndAdoptedAfterItsBackTest) {
           harness.pipeline->handle({robot.robot_id, message, emission.utime_us});
         },
         emission.message);
-    if (const auto* event = std::get_if<telemetry::MissionEvent>(&emission.message))
-      if (event->phase != telemetry::MissionPhase::started && ++ended == 5) {
+    if (const auto* event = std::get_if<signals::MissionEvent>(&emission.message))
+      if (event->phase != signals::MissionPhase::started && ++ended == 5) {
         // What was learned outlives the daemon.
         harness.restart();
       }

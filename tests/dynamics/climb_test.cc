@@ -209,7 +209,7 @@ TEST(Grade, IsTheWeightAlongTheFloorAndFeedsThePotentialTerm) {
   EXPECT_EQ(with.flow(at).battery_power_w, without.flow(at).battery_power_w);  // the climb is unknown
   at.climb_rad = 0.04;
   const double speed = 5 * robot.kinematics.wheel_radius_m;
-  EXPECT_NEAR(with.flow(at).potential_w,
+  EXPECT_NEAR(with.flow(at).ledger[signals::Term::potential],
               robot.total_mass_kg(4) * robot::standard_gravity_m_s2 * std::sin(0.05) * speed, 1e-9);
 }
 

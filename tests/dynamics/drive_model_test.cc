@@ -57,7 +57,7 @@ TEST(DriveModel, KineticTermIsTheRateOfKineticEnergy) {
                         (2 * h);
     Instant still = at;
     still.current_slope_a_s = {};
-    EXPECT_NEAR(model.flow(still).kinetic_w, rate, 1e-7 * (1 + std::fabs(rate)));
+    EXPECT_NEAR(model.flow(still).ledger[signals::Term::kinetic], rate, 1e-7 * (1 + std::fabs(rate)));
   }
 }
 
@@ -82,8 +82,8 @@ TEST(DriveModel, UnreturnedBrakingPowerStaysOutOfTheBattery) {
   const auto flow = model.flow(at);
   ASSERT_LT(flow.motor_power_w[0], 0);
   EXPECT_DOUBLE_EQ(flow.battery_power_w, 14);
-  EXPECT_EQ(flow.recovered_w, 0);
-  EXPECT_GT(flow.braking_w, 0);
+  EXPECT_EQ(flow.ledger[signals::Term::recovered], 0);
+  EXPECT_GT(flow.ledger[signals::Term::braking], 0);
 }
 
 TEST(DriveModel, RefusesARobotWithABadEffect) {

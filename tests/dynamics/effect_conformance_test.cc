@@ -24,12 +24,6 @@ robot::RobotModel offset_robot() {
   return robot;
 }
 
-double sum_of_flows(const PowerFlow<double>& f) {
-  return f.accessories_w + f.driver_w + f.copper_w + f.brush_w + f.friction_internal_w +
-         f.friction_rolling_w + f.friction_scrub_w + f.friction_zone_w + f.friction_slip_w + f.drag_w +
-         f.kinetic_w + f.potential_w + f.braking_w - f.recovered_w;
-}
-
 // A strength that matters but stays inside the bounds.
 ActiveEffect moderate(const Effect& effect) {
   ActiveEffect active = initial(effect);
@@ -77,9 +71,10 @@ TEST_P(EveryEffect, KeepsTheLedgerClosed) {
   std::mt19937 random(2);
   for (int k = 0; k < 500; ++k) {
     const auto flow = model.flow(random_motion(random));
-    const double scale = std::fabs(flow.copper_w) + std::fabs(flow.kinetic_w) + std::fabs(flow.braking_w) +
-                         std::fabs(flow.battery_power_w);
-    EXPECT_NEAR(sum_of_flows(flow), flow.battery_power_w, 1e-12 * scale);
+    const double scale = std::fabs(flow.ledger[signals::Term::copper]) +
+                         std::fabs(flow.ledger[signals::Term::kinetic]) +
+                         std::fabs(flow.ledger[signals::Term::braking]) + std::fabs(flow.battery_power_w);
+    EXPECT_NEAR(flow.ledger.total(), flow.battery_power_w, 1e-12 * scale);
   }
 }
 

@@ -25,7 +25,7 @@ using dynamics::ActiveEffect;
 using dynamics::DriveModel;
 using dynamics::Effect;
 using dynamics::Instant;
-using energy::Term;
+using signals::Term;
 
 robot::RobotModel robot_with(const Effect* effect) {
   robot::RobotModel robot = testing::nomad();
@@ -109,11 +109,11 @@ TEST_P(EffectEverywhere, FeedsItsOwnTermsOfTheLedger) {
   const Answers& own = answers().at(id());
   const DriveModel nominal = model_with(nullptr), with = model_with(GetParam());
   std::mt19937 random(11);
-  std::array<double, energy::term_count> most{}, least{};
+  std::array<double, signals::term_count> most{}, least{};
   for (int k = 0; k < 400; ++k) {
     const Instant at = testing::random_motion(random);
     const auto a = rates_of(nominal, at), b = rates_of(with, at);
-    for (std::size_t t = 0; t < energy::term_count; ++t) {
+    for (std::size_t t = 0; t < signals::term_count; ++t) {
       const double change = b[energy::account::ledger + t] - a[energy::account::ledger + t];
       most[t] = std::max(most[t], change);
       least[t] = std::min(least[t], change);
@@ -122,10 +122,10 @@ TEST_P(EffectEverywhere, FeedsItsOwnTermsOfTheLedger) {
   constexpr double rounding_w = 1e-9;
   // Copper losses follow any torque, and what braking gives follows both.
   const auto follows = [](Term t) { return t == Term::copper || t == Term::braking || t == Term::recovered; };
-  for (std::size_t t = 0; t < energy::term_count; ++t) {
+  for (std::size_t t = 0; t < signals::term_count; ++t) {
     const auto term = static_cast<Term>(t);
     const auto answer = std::ranges::find(own, term, &std::pair<Term, Answer>::first);
-    SCOPED_TRACE(energy::term_names[t]);
+    SCOPED_TRACE(signals::term_names[t]);
     if (answer == own.end()) {
       if (follows(term)) continue;
       EXPECT_LE(most[t], rounding_w);
@@ -172,13 +172,13 @@ TEST_P(EffectEverywhere, DrivesForwardByTheVoltagesThatItAsksFor) {
 }
 
 // Turns, braking, standstill, a payload and a way over the floor.
-std::vector<telemetry::Sample> a_drive() {
-  std::vector<telemetry::Sample> samples;
+std::vector<signals::Sample> a_drive() {
+  std::vector<signals::Sample> samples;
   double x = -2, y = -1, heading = 0.3;
   constexpr double rate_hz = 50;
   for (int k = 0; k < 1500; ++k) {
     const double t = k / rate_hz;
-    telemetry::Sample s;
+    signals::Sample s;
     s.utime_us = 1'700'000'000'000'000 + static_cast<std::int64_t>(std::llround(t * 1e6));
     s.sequence = k;
     const double w = 3 * (1 - std::cos(0.5 * t)), turn = 0.8 * std::sin(1.1 * t);

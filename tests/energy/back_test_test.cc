@@ -11,7 +11,7 @@
 namespace joulecast::energy {
 namespace {
 
-using telemetry::Sample;
+using signals::Sample;
 
 robot::RobotModel nomad() {
   auto robot = robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/nomad.json");
@@ -134,7 +134,7 @@ TEST_F(BackTestTest, RunsOnWhichTheModelsAgreeDoNotDiluteTheOthers) {
 
 TEST_F(BackTestTest, JudgesByTheMotorsWhereTheBatteryIsNotMeasured) {
   for (auto* run : {&first_, &second_})
-    for (Sample& s : *run) s.battery_current_a = telemetry::unmeasured;
+    for (Sample& s : *run) s.battery_current_a = signals::unmeasured;
   const auto test = back_test(runs(), nomad(), truth_);
   ASSERT_TRUE(test) << describe(test.error());
   ASSERT_EQ(test->runs.size(), 2U);
@@ -146,8 +146,8 @@ TEST_F(BackTestTest, JudgesByTheMotorsWhereTheBatteryIsNotMeasured) {
 TEST_F(BackTestTest, LeavesOutRunsThatMeasureTooLittle) {
   first_.resize(200);
   for (Sample& s : second_) {
-    s.battery_voltage_v = telemetry::unmeasured;
-    s.motor_voltage_v[0] = telemetry::unmeasured;
+    s.battery_voltage_v = signals::unmeasured;
+    s.motor_voltage_v[0] = signals::unmeasured;
   }
   const auto test = back_test(runs(), nomad(), truth_);
   ASSERT_TRUE(test) << describe(test.error());

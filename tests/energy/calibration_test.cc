@@ -14,7 +14,7 @@
 namespace joulecast::energy {
 namespace {
 
-using telemetry::Sample;
+using signals::Sample;
 
 robot::RobotModel nomad() {
   auto robot = robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/nomad.json");
@@ -176,7 +176,7 @@ TEST(CalibrateDrive, NoisySimulatedRunsGiveTheNomadsFrictionWithinItsStatedError
 TEST(CalibrateDrive, SaysWhatIsMissing) {
   const robot::RobotModel robot = nomad();
   std::vector<Sample> samples = prescribed(robot, {5, 0, 0}, {5, 0, 0}, 0);
-  for (Sample& s : samples) s.motor_current_a = {telemetry::unmeasured, telemetry::unmeasured};
+  for (Sample& s : samples) s.motor_current_a = {signals::unmeasured, signals::unmeasured};
   const std::vector<DriveRun> runs{{"", samples, 0}};
   const auto fit = calibrate_drive(robot, runs, {});
   ASSERT_FALSE(fit);

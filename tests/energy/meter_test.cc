@@ -14,7 +14,7 @@
 namespace joulecast::energy {
 namespace {
 
-using telemetry::Sample;
+using signals::Sample;
 
 // A drive with turns, braking and standstill; electrical channels from the model itself plus a known extra
 // load.
@@ -46,8 +46,8 @@ std::vector<Sample> drive(const dynamics::DriveModel& model, double rate_hz, dou
   return samples;
 }
 
-Accounts metered(const std::vector<Sample>& samples, MeterSettings settings = {},
-                 std::size_t* points = nullptr) {
+signals::Accounts metered(const std::vector<Sample>& samples, MeterSettings settings = {},
+                          std::size_t* points = nullptr) {
   const robot::RobotModel robot = testing::nomad();
   std::size_t seen = 0;
   Meter meter(*dynamics::drive_model(robot), settings, [&](const MeterPoint&) { ++seen; });
@@ -72,7 +72,7 @@ TEST(Meter, AgreesWithAnIndependentQuadrature) {
   const auto model = *dynamics::drive_model(testing::nomad());
   for (double rate : {10.0, 50.0, 200.0}) {
     const auto samples = drive(model, rate, 60, 3, 0.3);
-    const Accounts a = metered(samples);
+    const signals::Accounts a = metered(samples);
     const double battery = quadrature(
         samples, [](const Sample& s) { return s.battery_voltage_v; },
         [](const Sample& s) { return s.battery_current_a; });
@@ -91,15 +91,16 @@ TEST(Meter, AgreesWithAnIndependentQuadrature) {
 TEST(Meter, LedgerClosesAndExplainsWhatTheModelKnows) {
   const auto model = *dynamics::drive_model(testing::nomad());
   const auto samples = drive(model, 50, 120, 3);
-  const Accounts a = metered(samples);
+  const signals::Accounts a = metered(samples);
   EXPECT_NEAR(a.ledger.total(), a.battery_j, 1e-9 * a.battery_j);
   EXPECT_NEAR(a.battery_j, a.measured_j, 1e-12 * a.battery_j);
   // The extra 3 W is what the model cannot explain; the filter's attenuation at these slow motions stays
   // below 1 %.
-  EXPECT_NEAR(a.ledger[Term::unexplained], 3 * a.duration_s, 0.01 * a.battery_j);
-  EXPECT_NEAR(a.ledger[Term::accessories], 14 * a.duration_s, 1e-9 * a.battery_j);
-  EXPECT_GT(a.ledger[Term::braking], 0);
-  EXPECT_EQ(a.ledger[Term::braking], a.ledger[Term::recovered]);  // the nominal model returns all of it
+  EXPECT_NEAR(a.ledger[signals::Term::unexplained], 3 * a.duration_s, 0.01 * a.battery_j);
+  EXPECT_NEAR(a.ledger[signals::Term::accessories], 14 * a.duration_s, 1e-9 * a.battery_j);
+  EXPECT_GT(a.ledger[signals::Term::braking], 0);
+  EXPECT_EQ(a.ledger[signals::Term::braking],
+            a.ledger[signals::Term::recovered]);  // the nominal model returns all of it
 }
 
 // The bias and the latency that acceleration_filter.h states, of a robot whose clock shakes by a tenth of its
@@ -160,9 +161,9 @@ TEST(Meter, SeesAccelerationRoundMissingSamples) {
 
 TEST(Meter, IsDeterministicToTheBit) {
   const auto samples = drive(*dynamics::drive_model(testing::nomad()), 50, 30, 1, 0.2);
-  const Accounts a = metered(samples), b = metered(samples);
+  const signals::Accounts a = metered(samples), b = metered(samples);
   EXPECT_EQ(std::bit_cast<std::uint64_t>(a.measured_j), std::bit_cast<std::uint64_t>(b.measured_j));
-  for (std::size_t k = 0; k < term_count; ++k) {
+  for (std::size_t k = 0; k < signals::term_count; ++k) {
     EXPECT_EQ(std::bit_cast<std::uint64_t>(a.ledger.value[k]),
               std::bit_cast<std::uint64_t>(b.ledger.value[k]));
   }
@@ -190,17 +191,17 @@ TEST(Meter, BridgesShortSilencesAndCountsLongOnes) {
 
 TEST(Meter, WithoutBatteryChannelsTheModelStandsInAndNothingIsUnexplained) {
   auto samples = drive(*dynamics::drive_model(testing::nomad()), 50, 20, 3);
-  for (Sample& s : samples) s.battery_current_a = telemetry::unmeasured;
-  const Accounts a = metered(samples);
+  for (Sample& s : samples) s.battery_current_a = signals::unmeasured;
+  const signals::Accounts a = metered(samples);
   EXPECT_EQ(a.measured_s, 0);
   EXPECT_EQ(a.measured_j, 0);
   EXPECT_EQ(a.battery_j, a.modelled_j);
-  EXPECT_EQ(a.ledger[Term::unexplained], 0);
+  EXPECT_EQ(a.ledger[signals::Term::unexplained], 0);
   EXPECT_GT(a.motor_measured_s, 19);
 }
 
 TEST(Meter, ChargeFollowsTheEnergyAtASteadyVoltage) {
-  const Accounts a = metered(drive(*dynamics::drive_model(testing::nomad()), 50, 60, 0));
+  const signals::Accounts a = metered(drive(*dynamics::drive_model(testing::nomad()), 50, 60, 0));
   EXPECT_NEAR(a.charge_ah * 3600 * 24, a.measured_j, 1e-6 * a.measured_j);
 }
 

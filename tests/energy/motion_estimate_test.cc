@@ -39,7 +39,7 @@ TEST(MotionEstimate, AgreesWithTheClosedFormOnATrapezoid) {
   EXPECT_NEAR(accounts->battery_j, expected, 1e-3 * expected);
   EXPECT_NEAR(accounts->ledger.total(), accounts->battery_j, 1e-9 * expected);
   EXPECT_NEAR(accounts->distance_m, 0.8 * 9, 1e-6);
-  EXPECT_NEAR(accounts->ledger[Term::kinetic], 0, 1e-4);
+  EXPECT_NEAR(accounts->ledger[signals::Term::kinetic], 0, 1e-4);
 }
 
 TEST(MotionEstimate, KnowsTheFloorOnlyFromAStartPose) {
@@ -50,10 +50,10 @@ TEST(MotionEstimate, KnowsTheFloorOnlyFromAStartPose) {
   const auto blind = estimate_motion(model, points, 0);
   const auto placed = estimate_motion(model, points, 0, StartPose{});
   ASSERT_TRUE(blind && placed);
-  EXPECT_EQ(blind->ledger[Term::friction_zone], 0);
+  EXPECT_EQ(blind->ledger[signals::Term::friction_zone], 0);
   // Coefficient times weight times the two metres of the zone's diameter.
   const double weight = robot.total_mass_kg(0) * robot::standard_gravity_m_s2;
-  EXPECT_NEAR(placed->ledger[Term::friction_zone], 0.05 * weight * 2, 1e-3 * weight);
+  EXPECT_NEAR(placed->ledger[signals::Term::friction_zone], 0.05 * weight * 2, 1e-3 * weight);
 }
 
 // There and back over a hill, forward and in reverse: the weight's energy is that of the height, to rounding.
@@ -70,7 +70,7 @@ TEST(MotionEstimate, PaysForEveryMetreOfHeightOnce) {
                                              {12, 0, 0, none, 7.4}};
     const auto accounts = estimate_motion(model, points, 3);
     ASSERT_TRUE(accounts) << describe(accounts.error());
-    EXPECT_NEAR(accounts->ledger[Term::potential], weight * 0.4, 1e-5 * weight);
+    EXPECT_NEAR(accounts->ledger[signals::Term::potential], weight * 0.4, 1e-5 * weight);
     EXPECT_NEAR(accounts->ledger.total(), accounts->battery_j, 1e-9 * accounts->battery_j);
   }
   // Without the effect the height says nothing, without a height the effect.
@@ -78,7 +78,7 @@ TEST(MotionEstimate, PaysForEveryMetreOfHeightOnce) {
   const std::vector<MotionPoint> blind = {{0, 0.5, 0}, {10, 0.5, 0}};
   const dynamics::DriveModel nominal(testing::nomad(), {});
   EXPECT_EQ(estimate_motion(nominal, up, 3)->battery_j, estimate_motion(nominal, blind, 3)->battery_j);
-  EXPECT_EQ(estimate_motion(model, blind, 3)->ledger[Term::potential], 0);
+  EXPECT_EQ(estimate_motion(model, blind, 3)->ledger[signals::Term::potential], 0);
 }
 
 TEST(MotionEstimate, TakesTheClimbLinearInBetween) {
@@ -91,7 +91,7 @@ TEST(MotionEstimate, TakesTheClimbLinearInBetween) {
   const auto accounts = estimate_motion(model, points, 0);
   ASSERT_TRUE(accounts);
   // Half the weight over 5 m at 0.02 on the average; the last span's climb is unknown.
-  EXPECT_NEAR(accounts->ledger[Term::potential], 0.5 * weight * 5 * 0.02, 1e-3 * weight * 0.05);
+  EXPECT_NEAR(accounts->ledger[signals::Term::potential], 0.5 * weight * 5 * 0.02, 1e-3 * weight * 0.05);
 }
 
 TEST(MotionEstimate, RefusesHeightsThatNoRobotDrives) {

@@ -9,6 +9,7 @@
 #include "client/virtual_robot/fleet.h"
 #include "energy/drive_equations.h"
 #include "robot/robot_file.h"
+#include "signals/mission_event.h"
 
 namespace joulecast::energy {
 namespace {
@@ -59,10 +60,9 @@ History work(const virtual_robot::ShippedRobot& shipped, std::uint64_t seed, con
   virtual_robot::VirtualRobot machine(spec, seed);
   virtual_robot::Emission emission;
   while (machine.next(emission)) {
-    if (const auto* sample = std::get_if<telemetry::Sample>(&emission.message)) {
+    if (const auto* sample = std::get_if<signals::Sample>(&emission.message)) {
       equations.add(*sample);
-    } else if (std::get<telemetry::MissionEvent>(emission.message).phase !=
-               telemetry::MissionPhase::started) {
+    } else if (std::get<signals::MissionEvent>(emission.message).phase != signals::MissionPhase::started) {
       const auto of_mission = equations.take();
       out.findings.push_back(refinement.judge(of_mission, equations.mean_payload_kg(), true));
       out.undeclared_kg.push_back(machine.finished().back().undeclared_kg);
@@ -197,7 +197,7 @@ TEST(Refinement, SaysWhenPayloadIsNotToldFromFriction) {
   at.wheel_speed_rad_s = {8, 8};
   const auto flow = truth.flow(at);
   for (int k = 0; k < 5000; ++k) {
-    telemetry::Sample s;
+    signals::Sample s;
     s.utime_us = 1'000'000 + 20'000LL * k;
     s.wheel_velocity_rad_s = at.wheel_speed_rad_s;
     s.motor_current_a = {flow.current_a[0] + 0.05 * std::sin(k),

@@ -8,6 +8,7 @@
 #include "client/virtual_robot/fleet.h"
 #include "energy/meter.h"
 #include "robot/robot_file.h"
+#include "signals/mission_event.h"
 
 namespace joulecast::forecast {
 namespace {
@@ -114,8 +115,8 @@ VirtualRobotRun run(std::string_view kind, int missions, std::uint64_t seed,
                  p.sample.payload_kg});
   });
   std::size_t next = 0, index = 0;
-  for (const telemetry::MissionEvent& event : done.events) {
-    if (event.phase == telemetry::MissionPhase::started) {
+  for (const signals::MissionEvent& event : done.events) {
+    if (event.phase == signals::MissionPhase::started) {
       meter.begin();
       tracker.begin();
       continue;

@@ -4,7 +4,10 @@
 #include <span>
 #include <vector>
 
+#include "signals/energy_state.h"
+#include "signals/mission_event.h"
 #include "telemetry/codec.h"
+#include "telemetry/covariate_tracker.h"
 #include "telemetry/validation.h"
 
 namespace t = joulecast::telemetry;
@@ -31,10 +34,11 @@ void try_type(const std::vector<std::uint8_t>& example, std::span<const std::uin
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* raw, std::size_t size) {
   static const auto telemetry = t::encode_telemetry("r", {}).value();
-  static const auto mission = t::encode_mission_event("r", {0, "m", t::MissionPhase::started, 0, ""}).value();
+  static const auto mission =
+      t::encode_mission_event("r", {0, "m", joulecast::signals::MissionPhase::started, 0, ""}).value();
   static const auto covariates = t::encode_covariates("r", {0, {{"a", 0}}}).value();
   static const auto state = [] {
-    t::EnergyState s;
+    joulecast::signals::EnergyState s;
     s.robot_id = "r";
     return t::encode_energy_state(s).value();
   }();
@@ -52,18 +56,19 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* raw, std::size_t size)
       covariates, data, [](auto bytes) { return t::decode_covariates(bytes); },
       [](const t::DecodedCovariates& d) {
         t::CovariateTracker tracker;
-        std::vector<t::CovariateChange> changes(1);
-        for (const t::Covariate& one : d.message.covariates) {
+        std::vector<joulecast::signals::CovariateChange> changes(1);
+        for (const joulecast::signals::Covariate& one : d.message.covariates) {
           if (t::check_plausible(one)) continue;
           if (tracker.take(d.message.utime_us, one, changes.back()) == t::CovariateTracker::Verdict::news)
             changes.emplace_back();
         }
         changes.pop_back();
-        if (t::changes_of(t::series_of(changes)).size() != changes.size()) std::abort();
+        if (joulecast::signals::changes_of(joulecast::signals::series_of(changes)).size() != changes.size())
+          std::abort();
         return t::encode_covariates(d.robot_id, d.message);
       });
   try_type(
       state, data, [](auto bytes) { return t::decode_energy_state(bytes); },
-      [](const t::EnergyState& d) { return t::encode_energy_state(d); });
+      [](const joulecast::signals::EnergyState& d) { return t::encode_energy_state(d); });
   return 0;
 }

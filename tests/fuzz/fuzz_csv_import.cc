@@ -32,12 +32,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       std::abort();
     }
     std::int64_t before = -1;
-    for (const t::Sample& sample : import->recording.samples) {
+    for (const joulecast::signals::Sample& sample : import->recording.samples) {
       if (sample.utime_us <= before || std::isnan(sample.wheel_velocity_rad_s[0])) std::abort();
       before = sample.utime_us;
     }
-    for (const t::CovariateSeries& series : import->recording.covariates) {
-      if (!t::is_valid_covariate_name(series.name) || series.value.size() != series.utime_us.size())
+    for (const joulecast::signals::CovariateSeries& series : import->recording.covariates) {
+      if (!joulecast::signals::is_valid_covariate_name(series.name) ||
+          series.value.size() != series.utime_us.size())
         std::abort();
       if (!std::is_sorted(series.utime_us.begin(), series.utime_us.end())) std::abort();
     }

@@ -26,7 +26,7 @@ Result<Diagnosis> diagnose_shipped(const telemetry::RecordingSet& set) {
 telemetry::Recording rolling(double duration_s, bool power) {
   telemetry::Recording r;
   for (int k = 0; 0.02 * k < duration_s; ++k) {
-    telemetry::Sample s;
+    signals::Sample s;
     s.utime_us = 20'000 * k;
     s.wheel_velocity_rad_s = {3, 3};
     if (power) {

@@ -9,7 +9,7 @@
 namespace joulecast::history {
 namespace {
 
-using telemetry::CovariateChange;
+using signals::CovariateChange;
 
 void expect_round_trip(const std::vector<CovariateChange>& changes) {
   const auto decoded = decode_covariates(encode_covariates(changes, 1));
@@ -36,7 +36,7 @@ TEST(CovariateChunk, HoldsNamesOfTheirGreatestLengthAndAsManyChangesAsAChunkMay)
   std::vector<CovariateChange> changes;
   for (std::size_t k = 0; k < max_chunk_changes; ++k) {
     std::string name = std::to_string(k);
-    name.resize(telemetry::max_covariate_name_length, 'a');
+    name.resize(signals::max_covariate_name_length, 'a');
     changes.push_back({static_cast<std::int64_t>(k), name + "=" + name, NAN});
   }
   expect_round_trip(changes);

@@ -48,7 +48,7 @@ constexpr std::int64_t samples_a_checkpoint = 10;
     bucket.start_utime_us = m.samples / samples_a_checkpoint * trace_bucket_us;
     checkpoint.trace = {bucket};
     checkpoint.covariates = {{m.samples, "load", m.accounts.distance_m}};
-    checkpoint.energy_state = EnergyState{"amr-1", m.samples, m.samples, 0.5, {}};
+    checkpoint.resume_state = ResumeState{"amr-1", m.samples, m.samples, 0.5, {}};
     if (tells == Tells::committed) {
       need(writer.execute(std::move(checkpoint)));
     } else {
@@ -106,7 +106,7 @@ std::int64_t stored_samples(const std::string& path) {
   EXPECT_EQ(missions.size(), 1U);
   const Mission& m = missions.at(0);
   EXPECT_EQ(m.accounts.distance_m, static_cast<double>(m.samples));
-  EXPECT_EQ(need(store->energy_state("amr-1"))->sequence, m.samples);
+  EXPECT_EQ(need(store->resume_state("amr-1"))->sequence, m.samples);
   EXPECT_EQ(static_cast<std::int64_t>(need(store->trace(m.key, {}, max_trace_points)).buckets.size()),
             m.samples / samples_a_checkpoint);
   std::int64_t next = 0;

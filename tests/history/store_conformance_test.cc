@@ -17,8 +17,8 @@
 namespace joulecast::history {
 namespace {
 
-using telemetry::CovariateChange;
-using telemetry::Sample;
+using signals::CovariateChange;
+using signals::Sample;
 
 struct StoreKind {
   std::string name;
@@ -115,9 +115,9 @@ bool same_bits(double a, double b) {
 }
 
 // Accounts are nothing but doubles: as an array of them, none is forgotten when one is added.
-using AccountNumbers = std::array<double, sizeof(energy::Accounts) / sizeof(double)>;
+using AccountNumbers = std::array<double, sizeof(signals::Accounts) / sizeof(double)>;
 
-void expect_same_accounts(const energy::Accounts& a, const energy::Accounts& b) {
+void expect_same_accounts(const signals::Accounts& a, const signals::Accounts& b) {
   const auto left = std::bit_cast<AccountNumbers>(a);
   const auto right = std::bit_cast<AccountNumbers>(b);
   for (std::size_t k = 0; k < left.size(); ++k) EXPECT_PRED2(same_bits, left[k], right[k]) << k;
@@ -162,7 +162,7 @@ std::vector<CovariateChange> some_changes(std::int64_t first, std::size_t count)
   std::vector<CovariateChange> changes;
   for (std::int64_t k = first; k < first + static_cast<std::int64_t>(count); ++k) {
     changes.push_back({10'000 * k, names[static_cast<std::size_t>(k) % 3],
-                       k % 9 == 8 ? telemetry::unmeasured : 0.1 * static_cast<double>(k)});
+                       k % 9 == 8 ? signals::unmeasured : 0.1 * static_cast<double>(k)});
   }
   return changes;
 }
@@ -177,10 +177,10 @@ void expect_same_changes(const std::vector<CovariateChange>& a, const std::vecto
 }
 
 // Every number differs from every other.
-energy::Accounts distinct_accounts() {
+signals::Accounts distinct_accounts() {
   AccountNumbers numbers{};
   for (std::size_t k = 0; k < numbers.size(); ++k) numbers[k] = 0.1 + static_cast<double>(k);
-  return std::bit_cast<energy::Accounts>(numbers);
+  return std::bit_cast<signals::Accounts>(numbers);
 }
 
 // ---- models
@@ -400,7 +400,7 @@ TEST_P(StoreConformance, KeepsEveryNumberOfAMission) {
   m.findings_json = R"({"payload":{"verdict":"as_declared"}})";
   m.accounts = distinct_accounts();
   m.covariates = {{"cpu_load", 0.1, 1e-300, 3.5, 12.25, 223'456'789, 0.3, 200'000'000},
-                  {"surface=ice", telemetry::unmeasured, 0, 1, 0, 5, telemetry::unmeasured, 6}};
+                  {"surface=ice", signals::unmeasured, 0, 1, 0, 5, signals::unmeasured, 6}};
   need(apply(CheckpointMission{m, {}, {}, {}}));
   expect_same_mission(need(store_->mission(m.key)), m);
   reopen();
@@ -410,10 +410,10 @@ TEST_P(StoreConformance, KeepsEveryNumberOfAMission) {
 TEST_P(StoreConformance, KeepsNotMeasuredApartFromZero) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   m.accounts = distinct_accounts();
-  m.accounts.measured_j = telemetry::unmeasured;
-  m.accounts.measured_motor_j = {telemetry::unmeasured, 0.0};
-  m.accounts.ledger[energy::Term::unexplained] = telemetry::unmeasured;
-  m.payload_kg = telemetry::unmeasured;
+  m.accounts.measured_j = signals::unmeasured;
+  m.accounts.measured_motor_j = {signals::unmeasured, 0.0};
+  m.accounts.ledger[signals::Term::unexplained] = signals::unmeasured;
+  m.payload_kg = signals::unmeasured;
   need(apply(CheckpointMission{m, {}, {}, {}}));
   const Mission stored = need(store_->mission(m.key));
   expect_same_mission(stored, m);
@@ -575,7 +575,7 @@ TEST_P(StoreConformance, RefusesBadQueries) {
   f.start_to_utime_us = 1;
   refuses(f, {1, {}}, "from_utime_us");
   f = {};
-  f.payload_min_kg = telemetry::unmeasured;
+  f.payload_min_kg = signals::unmeasured;
   refuses(f, {1, {}}, "payload_min_kg");
   EXPECT_EQ(store_->trace(1, {}, 0).error().field, "points");
   EXPECT_EQ(store_->telemetry(1, {5, 4}, {}).error().field, "from_utime_us");
@@ -586,13 +586,13 @@ TEST_P(StoreConformance, RefusesBadQueries) {
 
 TEST_P(StoreConformance, SumsOverMissions) {
   auto missions = add_missions("amr-1", 4);  // measured 0, 10, 20, 30 J
-  missions[3].accounts.measured_j = telemetry::unmeasured;
+  missions[3].accounts.measured_j = signals::unmeasured;
   missions[3].accounts.measured_s = 0;
   missions[3].incomplete = true;
   missions[3].gap_count = 2;
   missions[3].gap_s = 1.5;
   missions[3].samples = 9;
-  missions[3].accounts.ledger[energy::Term::drag] = 5;
+  missions[3].accounts.ledger[signals::Term::drag] = 5;
   need(apply(CheckpointMission{missions[3], {}, {}, {}}));
   const Totals all = need(store_->totals({}));
   EXPECT_EQ(all.missions, 4);
@@ -602,7 +602,7 @@ TEST_P(StoreConformance, SumsOverMissions) {
   EXPECT_EQ(all.gap_count, 2);
   EXPECT_EQ(all.gap_s, 1.5);
   EXPECT_EQ(all.accounts.measured_j, 30);
-  EXPECT_EQ(all.accounts.ledger[energy::Term::drag], 5);
+  EXPECT_EQ(all.accounts.ledger[signals::Term::drag], 5);
   MissionFilter nobody;
   nobody.robot_id = "nobody";
   EXPECT_EQ(need(store_->totals(nobody)).missions, 0);
@@ -614,7 +614,7 @@ TEST_P(StoreConformance, RecoversOpenMissionsWithTheirState) {
   Mission open = start_mission(*store_, "amr-2", "left open", 900);
   open.accounts = distinct_accounts();
   open.samples = 3;
-  EnergyState state{"amr-2", 930, 17, 0.75, {41.5, telemetry::unmeasured}};
+  ResumeState state{"amr-2", 930, 17, 0.75, {41.5, signals::unmeasured}};
   open.covariates = {{"cpu_load", 0.5, 0.25, 0.75, 2, 930, 0.75, 920}};
   need(apply(CheckpointMission{open, {}, some_samples(900, 15, 3), state, some_changes(0, 5)}));
   reopen();
@@ -622,14 +622,14 @@ TEST_P(StoreConformance, RecoversOpenMissionsWithTheirState) {
   const auto left = need(store_->recover());
   ASSERT_EQ(left.size(), 1U);
   expect_same_mission(left[0], open);
-  const auto restored = need(store_->energy_state("amr-2"));
+  const auto restored = need(store_->resume_state("amr-2"));
   ASSERT_TRUE(restored);
   EXPECT_EQ(restored->utime_us, 930);
   EXPECT_EQ(restored->sequence, 17);
   EXPECT_EQ(restored->state_of_charge, 0.75);
   EXPECT_EQ(restored->winding_temperature_c[0], 41.5);
   EXPECT_TRUE(std::isnan(restored->winding_temperature_c[1]));
-  EXPECT_FALSE(need(store_->energy_state("amr-1")));
+  EXPECT_FALSE(need(store_->resume_state("amr-1")));
 
   // Resumed: it goes on where it was.
   need(apply(CheckpointMission{left[0], {}, some_samples(1000, 18, 2), {}, some_changes(5, 4)}));
@@ -653,9 +653,9 @@ TEST_P(StoreConformance, KeepsTheLatestOfWhatWasLearnedUnderEachTopic) {
 }
 
 TEST_P(StoreConformance, KeepsEnergyStateOutsideMissions) {
-  need(apply(PutEnergyState{{"amr-1", 5, 1, 0.9, {20, 21}}}));
-  need(apply(PutEnergyState{{"amr-1", 6, 2, telemetry::unmeasured, {20, 21}}}));
-  const auto state = need(store_->energy_state("amr-1"));
+  need(apply(PutResumeState{{"amr-1", 5, 1, 0.9, {20, 21}}}));
+  need(apply(PutResumeState{{"amr-1", 6, 2, signals::unmeasured, {20, 21}}}));
+  const auto state = need(store_->resume_state("amr-1"));
   ASSERT_TRUE(state);
   EXPECT_EQ(state->utime_us, 6);
   EXPECT_TRUE(std::isnan(state->state_of_charge));

@@ -11,7 +11,7 @@
 namespace joulecast::history {
 namespace {
 
-using telemetry::Sample;
+using signals::Sample;
 
 // All bits of a sample, member by member.
 std::array<std::uint64_t, 20> bits(const Sample& s) {

@@ -66,9 +66,9 @@ inline Mission start_mission(Store& store, const std::string& robot_id, const st
 }
 
 // Samples that differ in every number, 10 ms apart.
-inline std::vector<telemetry::Sample> some_samples(std::int64_t first_utime_us, std::int64_t first_sequence,
-                                                   std::size_t count) {
-  std::vector<telemetry::Sample> samples(count);
+inline std::vector<signals::Sample> some_samples(std::int64_t first_utime_us, std::int64_t first_sequence,
+                                                 std::size_t count) {
+  std::vector<signals::Sample> samples(count);
   for (std::size_t i = 0; i < count; ++i) {
     const auto n = static_cast<std::int64_t>(i);
     samples[i].utime_us = first_utime_us + 10'000 * n;

@@ -70,8 +70,8 @@ class FailingStore final : public Store {
   Result<std::optional<Learned>> learned(std::string_view r, std::string_view topic) const override {
     return store_->learned(r, topic);
   }
-  Result<std::optional<EnergyState>> energy_state(std::string_view r) const override {
-    return store_->energy_state(r);
+  Result<std::optional<ResumeState>> resume_state(std::string_view r) const override {
+    return store_->resume_state(r);
   }
   Result<DiagnosisRecord> diagnosis(std::int64_t id) const override { return store_->diagnosis(id); }
   Result<std::vector<DiagnosisRecord>> diagnoses(std::optional<std::string> r, std::int64_t b,

@@ -56,7 +56,7 @@ Followed follow(const std::string& kind, bool calibrated, double charge, double 
   harness.add_robot(model);
   if (std::isfinite(told)) {
     history::Command stored =
-        history::PutEnergyState{{model.robot_id, spec.start_utime_us - 1'000'000, 0, told, {}}};
+        history::PutResumeState{{model.robot_id, spec.start_utime_us - 1'000'000, 0, told, {}}};
     EXPECT_TRUE(harness.store->apply({&stored, 1}));
   }
   virtual_robot::VirtualRobot robot(spec, seed);
@@ -69,7 +69,7 @@ Followed follow(const std::string& kind, bool calibrated, double charge, double 
           harness.pipeline->handle({model.robot_id, message, emission.utime_us});
         },
         emission.message);
-    if (!std::holds_alternative<telemetry::Sample>(emission.message)) continue;
+    if (!std::holds_alternative<signals::Sample>(emission.message)) continue;
     harness.pipeline->publish();
     const auto snapshot = harness.fleet.find(model.robot_id);
     const double error = snapshot->state_of_charge - robot.state_of_charge();

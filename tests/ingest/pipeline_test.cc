@@ -7,15 +7,16 @@
 #include <functional>
 #include <limits>
 
+#include "signals/mission_event.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
 
 namespace joulecast::server {
 namespace {
 
-using telemetry::MissionEvent;
-using telemetry::MissionPhase;
-using telemetry::Sample;
+using signals::MissionEvent;
+using signals::MissionPhase;
+using signals::Sample;
 using testing::PipelineHarness;
 
 constexpr std::int64_t start_us = 1'750'000'000'000'000;
@@ -41,14 +42,14 @@ class PipelineTest : public ::testing::Test {
 
   void send(const Sample& s) { harness.pipeline->handle({"nomad", s, s.utime_us}); }
   void send(const MissionEvent& e) { harness.pipeline->handle({"nomad", e, e.utime_us}); }
-  void send(std::int64_t sequence, std::vector<telemetry::Covariate> covariates) {
+  void send(std::int64_t sequence, std::vector<signals::Covariate> covariates) {
     const std::int64_t at_us = start_us + sequence * 20'000;
-    harness.pipeline->handle({"nomad", telemetry::CovariateMessage{at_us, std::move(covariates)}, at_us});
+    harness.pipeline->handle({"nomad", signals::CovariateMessage{at_us, std::move(covariates)}, at_us});
   }
-  std::vector<telemetry::CovariateChange> changes(history::MissionKey key) {
+  std::vector<signals::CovariateChange> changes(history::MissionKey key) {
     const auto page = harness.store->covariates(key, {}, {.limit = 10'000, .cursor = {}});
     EXPECT_TRUE(page);
-    return page ? page->changes : std::vector<telemetry::CovariateChange>{};
+    return page ? page->changes : std::vector<signals::CovariateChange>{};
   }
   void send_range(std::int64_t from, std::int64_t to) {
     for (std::int64_t k = from; k < to; ++k) send(sample(k));
@@ -87,7 +88,7 @@ TEST_F(PipelineTest, KeepsTheCovariatesOfAMissionWithTheirMeanAndRange) {
   send_range(0, 100);
   send(100, {{"cpu_load", 0.25}, {"ambient_c", 21}, {"surface=ice", 1}});
   send_range(100, 400);
-  send(400, {{"cpu_load", 1}, {"surface=ice", 0}, {"ambient_c", telemetry::unmeasured}});
+  send(400, {{"cpu_load", 1}, {"surface=ice", 0}, {"ambient_c", signals::unmeasured}});
   send_range(400, 501);
   send(event(MissionPhase::finished, 501));
   const auto missions = harness.missions();
@@ -104,7 +105,7 @@ TEST_F(PipelineTest, KeepsTheCovariatesOfAMissionWithTheirMeanAndRange) {
   EXPECT_NEAR(covariates[1].mean, (6 * 0.25 + 2.015 * 1) / 8.015, 1e-9);
   EXPECT_EQ(covariates[2].name, "surface=ice");
   EXPECT_NEAR(covariates[2].mean, 6 / 8.015, 1e-9);
-  const auto series = telemetry::series_of(changes(missions[0].key));
+  const auto series = signals::series_of(changes(missions[0].key));
   ASSERT_EQ(series.size(), 3u);
   EXPECT_EQ(series[0].utime_us, (std::vector<std::int64_t>{start_us - 5'000, start_us + 8'000'000}));
   EXPECT_EQ(series[1].value, (std::vector<double>{0.25, 1}));
@@ -126,13 +127,13 @@ TEST_F(PipelineTest, CountsCovariatesThatItTurnsAway) {
   send(10, {{"load", INFINITY}, {"floor=ice", 0.5}, {"load", 1}});
   send(9, {{"load", 2}});
   for (int k = 0; k < 70; ++k) send(11, {{"c" + std::to_string(k), 1}});
-  harness.pipeline->handle({"nomad", telemetry::CovariateMessage{-1, {{"load", 1}}}, start_us});
+  harness.pipeline->handle({"nomad", signals::CovariateMessage{-1, {{"load", 1}}}, start_us});
   send(event(MissionPhase::finished, 12));
   EXPECT_EQ(harness.faults(IngestFault::implausible), 3u);
   EXPECT_EQ(harness.faults(IngestFault::late), 1u);
   EXPECT_EQ(harness.faults(IngestFault::too_many_covariates), 7u);
   const auto missions = harness.missions();
-  EXPECT_EQ(missions[0].covariates.size(), telemetry::max_covariates);
+  EXPECT_EQ(missions[0].covariates.size(), signals::max_covariates);
   EXPECT_EQ(missions[0].sample_faults.at("too_many_covariates"), 7);
   harness.pipeline->publish();
   EXPECT_EQ(harness.fleet.find("nomad")->faults.at("too_many_covariates"), 7u);
@@ -183,7 +184,7 @@ TEST_F(PipelineTest, TheClimbOfAHeightFeedsTheGradeOfTheModel) {
   for (std::int64_t k = 0; k <= 1000; ++k) {  // 20 s up an even ramp, height ten times a second
     const double way = speed * 0.02 * static_cast<double>(k);
     const std::int64_t at_us = start_us + 20'000 * k;
-    if (k % 5 == 0) handle(telemetry::CovariateMessage{at_us, {{"height_m", 100 + slope * way}}}, at_us);
+    if (k % 5 == 0) handle(signals::CovariateMessage{at_us, {{"height_m", 100 + slope * way}}}, at_us);
     handle(sample(k), at_us);
   }
   handle(event(MissionPhase::finished, 1001), start_us + 20'020'000);
@@ -191,7 +192,7 @@ TEST_F(PipelineTest, TheClimbOfAHeightFeedsTheGradeOfTheModel) {
   const double raised_j =
       robot.total_mass_kg(2) * robot::standard_gravity_m_s2 * slope * mission.accounts.distance_m;
   // But for the stretch until the climb is known.
-  EXPECT_NEAR(mission.accounts.ledger[energy::Term::potential], raised_j, 0.08 * raised_j);
+  EXPECT_NEAR(mission.accounts.ledger[signals::Term::potential], raised_j, 0.08 * raised_j);
   EXPECT_NEAR(mission.accounts.ledger.total(), mission.accounts.battery_j, 1e-9 * 1000);
 }
 
@@ -333,7 +334,7 @@ TEST_F(PipelineTest, UnmeasuredChannelsAreNotZero) {
   send(event(MissionPhase::started, 0));
   for (std::int64_t k = 0; k < 100; ++k) {
     Sample s = sample(k);
-    s.battery_current_a = telemetry::unmeasured;
+    s.battery_current_a = signals::unmeasured;
     send(s);
   }
   send(event(MissionPhase::finished, 101));
@@ -387,15 +388,15 @@ Carried carried(double declared_kg, const std::function<double(std::int64_t)>& s
 TEST(PipelinePayload, IsTheMissionsWhereTheSamplesSayNothing) {
   const auto always = [](double kg) { return [kg](std::int64_t) { return kg; }; };
   const Carried said = carried(20, always(20));
-  const Carried silent = carried(20, always(telemetry::unmeasured));
+  const Carried silent = carried(20, always(signals::unmeasured));
   EXPECT_EQ(silent.modelled_j, said.modelled_j);
   EXPECT_EQ(silent.shown_kg, 20);
   EXPECT_TRUE(std::isnan(silent.stored_kg));  // evidence stays as it came
   EXPECT_EQ(silent.contradicted, 0u);
 
-  const Carried empty = carried(telemetry::unmeasured, always(0));
+  const Carried empty = carried(signals::unmeasured, always(0));
   EXPECT_GT(said.modelled_j, empty.modelled_j + 1);
-  EXPECT_EQ(carried(telemetry::unmeasured, always(telemetry::unmeasured)).modelled_j, empty.modelled_j);
+  EXPECT_EQ(carried(signals::unmeasured, always(signals::unmeasured)).modelled_j, empty.modelled_j);
   EXPECT_EQ(carried(0, always(0)).contradicted, 0u);
   EXPECT_EQ(carried(20, always(20), 100).contradicted, 0u);
 }
@@ -563,7 +564,7 @@ TEST_F(PipelineTest, ADeclaredMissionKeepsItsModelOverARestart) {
   send(event(MissionPhase::finished, 102));
   const auto mission = harness.missions().at(0);
   EXPECT_EQ(mission.model_version, 1);
-  const double per_s = mission.accounts.ledger[energy::Term::accessories] / mission.accounts.duration_s;
+  const double per_s = mission.accounts.ledger[signals::Term::accessories] / mission.accounts.duration_s;
   EXPECT_NEAR(per_s, testing::nomad().idle_power_w, 1e-9);
   EXPECT_TRUE(harness.warnings.empty());
 }
@@ -576,7 +577,7 @@ TEST_F(PipelineTest, AMissionThatNobodyDeclaredChangesOverAtOnce) {
   const auto mission = harness.missions().at(0);
   EXPECT_TRUE(mission.implicit);
   EXPECT_EQ(mission.model_version, 2);
-  EXPECT_GT(mission.accounts.ledger[energy::Term::accessories] / mission.accounts.duration_s,
+  EXPECT_GT(mission.accounts.ledger[signals::Term::accessories] / mission.accounts.duration_s,
             testing::nomad().idle_power_w + 4);
 }
 
@@ -593,7 +594,7 @@ TEST_F(PipelineTest, TheSameMessagesGiveTheSameBits) {
     h.pipeline->handle({"nomad", event(MissionPhase::finished, 3001), 0});
     return h.missions().at(0).accounts;
   };
-  const energy::Accounts a = run(), b = run();
+  const signals::Accounts a = run(), b = run();
   EXPECT_EQ(std::bit_cast<std::uint64_t>(a.measured_j), std::bit_cast<std::uint64_t>(b.measured_j));
   EXPECT_EQ(std::bit_cast<std::uint64_t>(a.modelled_j), std::bit_cast<std::uint64_t>(b.modelled_j));
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "robot/robot_file.h"
+#include "signals/mission_event.h"
 #include "telemetry/event_log.h"
 #include "tests/ingest/harness.h"
 
@@ -26,7 +27,7 @@ std::map<std::string, double> independent_energies(const std::string& log) {
        read = reader->next()) {
     if (read.event.channel.starts_with("MISSION_EVENT")) {
       const auto decoded = telemetry::decode_mission_event(read.event.data);
-      mission = decoded->event.phase == telemetry::MissionPhase::started ? decoded->event.mission_id : "";
+      mission = decoded->event.phase == signals::MissionPhase::started ? decoded->event.mission_id : "";
       any = false;
     } else if (!mission.empty()) {
       const auto decoded = telemetry::decode_telemetry(read.event.data);

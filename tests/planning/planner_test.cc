@@ -281,7 +281,7 @@ TEST(Planner, AdoptedEffectsChangeTheAnswer) {
   robot.effects = {{"turning_scrub", {{"coefficient", 0.1}}}};
   const auto scrubbing = plan(robot, path, limited(robot));
   ASSERT_TRUE(scrubbing) << describe(scrubbing.error());
-  EXPECT_GT(scrubbing->ledger[energy::Term::friction_scrub], 0);
+  EXPECT_GT(scrubbing->ledger[signals::Term::friction_scrub], 0);
   EXPECT_GT(scrubbing->summary.energy_j, plain->summary.energy_j);
   robot.effects = {{"no_regeneration", {{"fraction", 0.6}}}};
   Problem problem = limited(robot);
@@ -300,7 +300,7 @@ TEST(Planner, LoadsThatAreLinearInTheSpeedKeepTheClosedForm) {
   const auto closed = plan(robot, made({Straight{10}}, 40), problem);
   ASSERT_TRUE(closed) << describe(closed.error());
   EXPECT_EQ(closed->certificate.method, Method::closed_form);
-  EXPECT_GT(closed->ledger[energy::Term::friction_rolling], 0);
+  EXPECT_GT(closed->ledger[signals::Term::friction_rolling], 0);
   problem.regeneration = 1 - 1e-9;
   const auto numeric = plan(robot, made({Straight{10}}, 40), problem);
   ASSERT_TRUE(numeric);

@@ -11,6 +11,9 @@
 #include <limits>
 
 #include "samples.h"
+#include "signals/energy_state.h"
+#include "signals/ids.h"
+#include "signals/mission_event.h"
 
 namespace joulecast::telemetry {
 namespace {
@@ -27,16 +30,18 @@ Bytes telemetry_bytes() {
 }
 
 Bytes mission_bytes() {
-  return encode_mission_event("amr-07", {5, "m-1", MissionPhase::finished, 3.5, "über die Rampe"}).value();
+  return encode_mission_event("amr-07", {5, "m-1", signals::MissionPhase::finished, 3.5, "über die Rampe"})
+      .value();
 }
 
 Bytes covariate_bytes() {
-  return encode_covariates("amr-07", {5, {{"cpu_load", 0.25}, {"surface=ice", 1}, {"height_m", unmeasured}}})
+  return encode_covariates("amr-07",
+                           {5, {{"cpu_load", 0.25}, {"surface=ice", 1}, {"height_m", signals::unmeasured}}})
       .value();
 }
 
 Bytes state_bytes() {
-  EnergyState state;
+  signals::EnergyState state;
   state.robot_id = "amr-07";
   state.mission_id = "m-1";
   state.range_m = 1200;
@@ -55,7 +60,7 @@ Message generated_decode(const Bytes& bytes) {
 }
 
 TEST(Codec, TelemetryReachesTheGeneratedClassFieldByField) {
-  const Sample s = distinct_sample();
+  const signals::Sample s = distinct_sample();
   const auto m = generated_decode<robot_telemetry_t>(telemetry_bytes());
   EXPECT_EQ(m.utime, s.utime_us);
   EXPECT_EQ(m.sequence, s.sequence);
@@ -88,7 +93,7 @@ TEST(Codec, MissionEventRoundTrip) {
   EXPECT_EQ(decoded->robot_id, "amr-07");
   EXPECT_EQ(decoded->event.utime_us, 5);
   EXPECT_EQ(decoded->event.mission_id, "m-1");
-  EXPECT_EQ(decoded->event.phase, MissionPhase::finished);
+  EXPECT_EQ(decoded->event.phase, signals::MissionPhase::finished);
   EXPECT_EQ(decoded->event.payload_kg, 3.5);
   EXPECT_EQ(decoded->event.note, "über die Rampe");
 }
@@ -104,22 +109,23 @@ TEST(Codec, CovariatesRoundTrip) {
   EXPECT_EQ(decoded->robot_id, "amr-07");
   EXPECT_EQ(decoded->message.utime_us, 5);
   ASSERT_EQ(decoded->message.covariates.size(), 3u);
-  EXPECT_EQ(decoded->message.covariates[0], (Covariate{"cpu_load", 0.25}));
-  EXPECT_EQ(decoded->message.covariates[1], (Covariate{"surface=ice", 1}));
+  EXPECT_EQ(decoded->message.covariates[0], (signals::Covariate{"cpu_load", 0.25}));
+  EXPECT_EQ(decoded->message.covariates[1], (signals::Covariate{"surface=ice", 1}));
   EXPECT_TRUE(std::isnan(decoded->message.covariates[2].value));
   EXPECT_TRUE(decode_covariates(encode_covariates("a", {}).value()));  // none is a message too
 }
 
 TEST(Codec, RefusesCovariatesBeyondTheirLimits) {
-  CovariateMessage message;
-  for (std::size_t k = 0; k < max_covariates; ++k) message.covariates.push_back({"c" + std::to_string(k), 1});
+  signals::CovariateMessage message;
+  for (std::size_t k = 0; k < signals::max_covariates; ++k)
+    message.covariates.push_back({"c" + std::to_string(k), 1});
   ASSERT_TRUE(decode_covariates(encode_covariates("a", message).value()));
   message.covariates.push_back({"one_more", 1});
   EXPECT_EQ(encode_covariates("a", message).error().field, "n");
   EXPECT_TRUE(encode_covariates(std::string(max_covariates_robot_id_length, 'a'), {}));
   EXPECT_EQ(encode_covariates(std::string(max_covariates_robot_id_length + 1, 'a'), {}).error().field,
             "robot_id");
-  const std::string part(max_covariate_name_length, 'a');
+  const std::string part(signals::max_covariate_name_length, 'a');
   for (const std::string& name : {part, part + "=" + part, std::string("a.b_c-9=Z")})
     EXPECT_TRUE(encode_covariates("a", {0, {{name, 1}}})) << name;
   for (const std::string& name :
@@ -154,7 +160,8 @@ TEST(Codec, RefusesHostileCounts) {
 }
 
 TEST(Codec, EnergyStateRoundTrip) {
-  EnergyState state{7, "amr-07", "", 3, 1, 2, 3, 4, 5, 6, 0.5, 0.01, 8, {6, 10}, 9, {7, 11}, {10, 11}};
+  signals::EnergyState state{7, "amr-07", "",   3, 1,       2, 3,       4,       5,
+                             6, 0.5,      0.01, 8, {6, 10}, 9, {7, 11}, {10, 11}};
   const auto bytes = encode_energy_state(state);
   ASSERT_TRUE(bytes);
   const auto m = generated_decode<energy_state_t>(*bytes);
@@ -234,12 +241,14 @@ TEST(Codec, RefusesIdsThatCannotTravel) {
     bytes[telemetry_text + 4 + 2] = static_cast<std::uint8_t>(bad);
     EXPECT_FALSE(decode_telemetry(bytes)) << static_cast<int>(bad);
   }
-  EXPECT_TRUE(is_valid_robot_id(std::string(max_robot_id_length, 'a')));
-  EXPECT_FALSE(is_valid_robot_id(std::string(max_robot_id_length + 1, 'a')));
-  EXPECT_FALSE(is_valid_robot_id(""));
+  EXPECT_TRUE(signals::is_valid_robot_id(std::string(signals::max_robot_id_length, 'a')));
+  EXPECT_FALSE(signals::is_valid_robot_id(std::string(signals::max_robot_id_length + 1, 'a')));
+  EXPECT_FALSE(signals::is_valid_robot_id(""));
   EXPECT_EQ(encode_telemetry("a b", {}).error().field, "robot_id");
-  EXPECT_EQ(encode_mission_event("a", {0, "", MissionPhase::started, 0, ""}).error().field, "mission_id");
-  EXPECT_EQ(encode_mission_event("a", {0, "m", MissionPhase::started, 0, "\xC0\xAF"}).error().field, "note");
+  EXPECT_EQ(encode_mission_event("a", {0, "", signals::MissionPhase::started, 0, ""}).error().field,
+            "mission_id");
+  EXPECT_EQ(encode_mission_event("a", {0, "m", signals::MissionPhase::started, 0, "\xC0\xAF"}).error().field,
+            "note");
 }
 
 TEST(Codec, RefusesUnknownPhasesAndBadNotes) {
@@ -281,7 +290,7 @@ TEST(Codec, SurvivesAnyByteChange) {
 
 TEST(Codec, AnySampleSurvives) {
   EXPECT_TRUE(rc::check([] {
-    Sample s;
+    signals::Sample s;
     s.utime_us = *rc::gen::arbitrary<std::int64_t>();
     s.sequence = *rc::gen::arbitrary<std::int64_t>();
     const auto real = [] { return std::bit_cast<double>(*rc::gen::arbitrary<std::uint64_t>()); };

@@ -1,11 +1,9 @@
-#include "telemetry/covariates.h"
-
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "telemetry/codec.h"
+#include "telemetry/covariate_tracker.h"
 #include "telemetry/log_recordings.h"
 #include "telemetry/validation.h"
 #include "temporary_file.h"
@@ -13,18 +11,16 @@
 namespace joulecast::telemetry {
 namespace {
 
-using testing::ElementsAre;
-using testing::IsNan;
 using Verdict = CovariateTracker::Verdict;
 
 Verdict take(CovariateTracker& tracker, std::int64_t utime_us, const std::string& name, double value) {
-  CovariateChange change;
+  signals::CovariateChange change;
   return tracker.take(utime_us, {name, value}, change);
 }
 
 TEST(Covariates, OnlyChangesAreNews) {
   CovariateTracker tracker;
-  CovariateChange change;
+  signals::CovariateChange change;
   EXPECT_EQ(tracker.take(10, {"load", 0.5}, change), Verdict::news);
   EXPECT_EQ(change.utime_us, 10);
   EXPECT_EQ(change.name, "load");
@@ -32,9 +28,9 @@ TEST(Covariates, OnlyChangesAreNews) {
   EXPECT_EQ(take(tracker, 20, "load", 0.5), Verdict::repeat);
   EXPECT_EQ(take(tracker, 15, "load", 0.7), Verdict::late);  // 0.5 was said at 20 again
   EXPECT_EQ(take(tracker, 20, "load", 0.7), Verdict::late);
-  EXPECT_EQ(take(tracker, 30, "load", unmeasured), Verdict::news);
-  EXPECT_EQ(take(tracker, 40, "load", unmeasured), Verdict::repeat);
-  EXPECT_EQ(take(tracker, 40, "heater", unmeasured), Verdict::repeat);  // nothing was known of it
+  EXPECT_EQ(take(tracker, 30, "load", signals::unmeasured), Verdict::news);
+  EXPECT_EQ(take(tracker, 40, "load", signals::unmeasured), Verdict::repeat);
+  EXPECT_EQ(take(tracker, 40, "heater", signals::unmeasured), Verdict::repeat);  // nothing was known of it
   EXPECT_EQ(take(tracker, 50, "load", 0.7), Verdict::news);
 }
 
@@ -52,7 +48,7 @@ TEST(Covariates, HoldFromOneMissionToTheNext) {
   take(tracker, 10, "floor=ice", 1);
   take(tracker, 10, "floor=grip", 0);
   take(tracker, 10, "heater", 3);
-  take(tracker, 20, "heater", unmeasured);
+  take(tracker, 20, "heater", signals::unmeasured);
   const auto held = tracker.begin_mission(100);
   ASSERT_EQ(held.size(), 2u);  // what is unknown or a label that does not hold is forgotten
   EXPECT_EQ(held[0].name, "floor=ice");
@@ -60,18 +56,18 @@ TEST(Covariates, HoldFromOneMissionToTheNext) {
   EXPECT_EQ(held[1].value, 0.5);
   EXPECT_EQ(held[1].utime_us, 100);
   // What comes late of the time before the start counts from the start on.
-  CovariateChange change;
+  signals::CovariateChange change;
   EXPECT_EQ(tracker.take(50, {"load", 0.6}, change), Verdict::news);
   EXPECT_EQ(change.utime_us, 100);
 }
 
 TEST(Covariates, AreBounded) {
   CovariateTracker tracker;
-  for (std::size_t k = 0; k < max_covariates; ++k)
+  for (std::size_t k = 0; k < signals::max_covariates; ++k)
     EXPECT_EQ(take(tracker, 1, "c" + std::to_string(k), 1), Verdict::news);
   EXPECT_EQ(take(tracker, 1, "more", 1), Verdict::no_room);
   EXPECT_EQ(take(tracker, 2, "c0", 2), Verdict::news);
-  EXPECT_EQ(take(tracker, 3, "c0", unmeasured), Verdict::news);
+  EXPECT_EQ(take(tracker, 3, "c0", signals::unmeasured), Verdict::news);
   EXPECT_EQ(take(tracker, 4, "more", 1), Verdict::no_room);  // c0 is a name of this mission
   tracker.begin_mission(5);
   EXPECT_EQ(take(tracker, 6, "more", 1), Verdict::news);
@@ -79,53 +75,31 @@ TEST(Covariates, AreBounded) {
 
 TEST(Covariates, GoOnAfterARestart) {
   CovariateTracker tracker;
-  tracker.resume(100, std::vector<CovariateChange>{{150, "load", 0.5}});
+  tracker.resume(100, std::vector<signals::CovariateChange>{{150, "load", 0.5}});
   EXPECT_EQ(take(tracker, 160, "load", 0.5), Verdict::repeat);
   EXPECT_EQ(take(tracker, 170, "load", 0.6), Verdict::news);
-  CovariateChange change;
+  signals::CovariateChange change;
   EXPECT_EQ(tracker.take(90, {"heater", 1}, change), Verdict::news);
   EXPECT_EQ(change.utime_us, 100);
 }
 
-TEST(Covariates, SeriesAreSortedByTimeAndReadBack) {
-  const std::vector<CovariateChange> changes{
-      {10, "b", 1}, {30, "a", 3}, {20, "a", 2}, {20, "a", 4}, {40, "b", unmeasured}};
-  const auto series = series_of(changes);
-  ASSERT_EQ(series.size(), 2u);
-  EXPECT_EQ(series[0].name, "b");
-  EXPECT_THAT(series[0].value, ElementsAre(1, IsNan()));
-  EXPECT_THAT(series[1].utime_us, ElementsAre(20, 30));
-  EXPECT_THAT(series[1].value, ElementsAre(4, 3));  // of two at one time the later in the list
-  const auto again = changes_of(series);
-  ASSERT_EQ(again.size(), 4u);
-  EXPECT_EQ(again[1].name, "a");
-  EXPECT_EQ(again[1].utime_us, 20);
-
-  CovariateReader reader(find_series(series, "a"));
-  EXPECT_THAT(reader.at(19), IsNan());
-  EXPECT_EQ(reader.at(20), 4);
-  EXPECT_EQ(reader.at(29), 4);
-  EXPECT_EQ(reader.at(1000), 3);
-  EXPECT_THAT(CovariateReader(find_series(series, "c")).at(5), IsNan());
-}
-
 TEST(Covariates, PlausibleAreFiniteNumbersAndLabelsOfTwoValues) {
-  EXPECT_FALSE(check_plausible(Covariate{"load", -1e300}));
-  EXPECT_FALSE(check_plausible(Covariate{"load", unmeasured}));
-  EXPECT_EQ(check_plausible(Covariate{"load", INFINITY})->why, Implausibility::infinite);
-  EXPECT_FALSE(check_plausible(Covariate{"floor=ice", 0}));
-  EXPECT_FALSE(check_plausible(Covariate{"floor=ice", 1}));
-  EXPECT_FALSE(check_plausible(Covariate{"floor=ice", unmeasured}));
-  const auto half = check_plausible(Covariate{"floor=ice", 0.5});
+  EXPECT_FALSE(check_plausible(signals::Covariate{"load", -1e300}));
+  EXPECT_FALSE(check_plausible(signals::Covariate{"load", signals::unmeasured}));
+  EXPECT_EQ(check_plausible(signals::Covariate{"load", INFINITY})->why, Implausibility::infinite);
+  EXPECT_FALSE(check_plausible(signals::Covariate{"floor=ice", 0}));
+  EXPECT_FALSE(check_plausible(signals::Covariate{"floor=ice", 1}));
+  EXPECT_FALSE(check_plausible(signals::Covariate{"floor=ice", signals::unmeasured}));
+  const auto half = check_plausible(signals::Covariate{"floor=ice", 0.5});
   ASSERT_TRUE(half);
   EXPECT_EQ(half->why, Implausibility::out_of_range);
   EXPECT_EQ(describe(*half), "value of a label is neither 0 nor 1");
-  EXPECT_EQ(check_plausible(CovariateMessage{-1, {}})->why, Implausibility::bad_clock);
+  EXPECT_EQ(check_plausible(signals::CovariateMessage{-1, {}})->why, Implausibility::bad_clock);
 }
 
 Recording with_covariates(const std::string& mission, std::int64_t start_utime_us,
-                          std::vector<CovariateSeries> covariates) {
-  Recording made{"a", mission, unmeasured, {}};
+                          std::vector<signals::CovariateSeries> covariates) {
+  Recording made{"a", mission, signals::unmeasured, {}};
   for (int k = 0; k < 5; ++k) {
     made.samples.emplace_back();
     made.samples.back().utime_us = start_utime_us + 100'000 * k;
@@ -168,7 +142,7 @@ TEST(Covariates, OfALogThatBreakTheRulesAreCounted) {
   auto log = EventLogWriter::create(file.path());
   ASSERT_TRUE(log);
   const Recording recording = with_covariates("m-1", 1'000'000, {});
-  const auto put = [&](std::int64_t utime_us, std::vector<Covariate> covariates) {
+  const auto put = [&](std::int64_t utime_us, std::vector<signals::Covariate> covariates) {
     const auto bytes = encode_covariates("a", {utime_us, std::move(covariates)});
     ASSERT_TRUE(bytes);
     ASSERT_TRUE(log->write(utime_us, channel_of(Subject::covariates, "a"), *bytes));

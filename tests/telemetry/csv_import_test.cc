@@ -29,7 +29,8 @@ std::vector<double> battery_voltages(const std::string& csv, const std::string& 
   EXPECT_TRUE(import) << describe(import.error());
   std::vector<double> values;
   if (import) {
-    for (const Sample& sample : import->recording.samples) values.push_back(sample.battery_voltage_v);
+    for (const signals::Sample& sample : import->recording.samples)
+      values.push_back(sample.battery_voltage_v);
   }
   return values;
 }
@@ -206,9 +207,9 @@ TEST(CsvImport, BadCellsNameLineColumnAndText) {
   EXPECT_THAT(import_csv("t,r,l\n0,,\n", mapping_of("")).error().message, HasSubstr("none of 1 rows"));
 }
 
-const CovariateSeries& series_called(const Recording& recording, const std::string& name) {
-  static const CovariateSeries none;
-  const CovariateSeries* found = find_series(recording.covariates, name);
+const signals::CovariateSeries& series_called(const Recording& recording, const std::string& name) {
+  static const signals::CovariateSeries none;
+  const signals::CovariateSeries* found = signals::find_series(recording.covariates, name);
   EXPECT_NE(found, nullptr) << name;
   return found == nullptr ? none : *found;
 }
@@ -222,7 +223,7 @@ TEST(CsvImport, CovariatesAreWrittenWhereTheyChange) {
   ASSERT_TRUE(import) << describe(import.error());
   const Recording& recording = import->recording;
   EXPECT_EQ(recording.covariates.size(), 3u);
-  const CovariateSeries& load = series_called(recording, "cpu_load");
+  const signals::CovariateSeries& load = series_called(recording, "cpu_load");
   EXPECT_THAT(load.utime_us, testing::ElementsAre(1'000'000, 3'000'000, 4'000'000));
   EXPECT_THAT(load.value, testing::ElementsAre(0.5, testing::IsNan(), 0.75));
   EXPECT_THAT(series_called(recording, "height_m").utime_us, testing::ElementsAre(0, 2'000'000, 5'000'000));
@@ -238,10 +239,10 @@ TEST(CsvImport, EveryTextOfAColumnBecomesALabel) {
   ASSERT_TRUE(import) << describe(import.error());
   const Recording& recording = import->recording;
   EXPECT_EQ(recording.covariates.size(), 2u);  // the row of the mud gave no sample
-  const CovariateSeries& ice = series_called(recording, "surface=ice");
+  const signals::CovariateSeries& ice = series_called(recording, "surface=ice");
   EXPECT_THAT(ice.utime_us, testing::ElementsAre(1'000'000, 2'000'000, 4'000'000));
   EXPECT_THAT(ice.value, testing::ElementsAre(1, 0, 1));
-  const CovariateSeries& grass = series_called(recording, "surface=wet_gr_ss_");
+  const signals::CovariateSeries& grass = series_called(recording, "surface=wet_gr_ss_");
   EXPECT_THAT(grass.utime_us, testing::ElementsAre(1'000'000, 2'000'000, 4'000'000));
   EXPECT_THAT(grass.value, testing::ElementsAre(0, 1, 0));  // it did not hold before it was read
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <numbers>
 
+#include "signals/ids.h"
 #include "telemetry/codec.h"
 #include "telemetry/csv_import.h"
 #include "telemetry/csv_table.h"
@@ -50,7 +51,7 @@ std::vector<double> column(const std::string& csv, const std::string& name) {
   const std::size_t place = table.find(name).value();
   std::vector<double> values;
   std::vector<std::string_view> row;
-  double held = unmeasured;
+  double held = signals::unmeasured;
   while (table.next(row).value()) {
     if (!row[place].empty()) held = std::stod(std::string(row[place]));
     values.push_back(held);
@@ -75,7 +76,7 @@ TEST(ImportFrc3314, EveryRecordingGivesOneMissionWithPlausibleSamples) {
     EXPECT_EQ(import->recording.robot_id, high ? "frc3314-high" : "frc3314-low");
     EXPECT_EQ(import->recording.mission_id, path.stem().string());
     EXPECT_EQ(import->report.samples, import->report.rows);
-    for (const Sample& sample : import->recording.samples) {
+    for (const signals::Sample& sample : import->recording.samples) {
       const auto fault = check_plausible(sample);
       ASSERT_FALSE(fault) << describe(*fault);
       EXPECT_TRUE(std::isnan(sample.battery_voltage_v));
@@ -140,7 +141,7 @@ TEST(ImportFrc3314, DrivenSidesPushTheWayTheyRoll) {
     const auto import = import_file(path, high ? "frc3314_high.json" : "frc3314_low.json");
     ASSERT_TRUE(import);
     std::size_t driven = 0;
-    for (const Sample& s : import->recording.samples) {
+    for (const signals::Sample& s : import->recording.samples) {
       for (const std::size_t side : {0u, 1u}) {
         EXPECT_GE(s.motor_voltage_v[side] * s.motor_current_a[side], 0);
         if (std::abs(s.motor_voltage_v[side]) < 1 || std::abs(s.wheel_velocity_rad_s[side]) < 1) continue;
@@ -187,10 +188,10 @@ TEST(ImportHusky, EveryTableGivesPlausibleSamples) {
     SCOPED_TRACE(path.string());
     const auto import = import_file(path, "borealtc_husky.json");
     ASSERT_TRUE(import) << describe(import.error());
-    EXPECT_TRUE(is_valid_mission_id(import->recording.mission_id));
+    EXPECT_TRUE(signals::is_valid_mission_id(import->recording.mission_id));
     EXPECT_EQ(import->report.samples, import->report.rows);
     EXPECT_TRUE(import->report.glitches.empty());
-    for (const Sample& sample : import->recording.samples) {
+    for (const signals::Sample& sample : import->recording.samples) {
       ASSERT_FALSE(check_plausible(sample));
       ASSERT_TRUE(std::isnan(sample.battery_voltage_v));
       for (std::size_t side : {0u, 1u})
@@ -209,7 +210,7 @@ TEST(ImportWarthog, TheTableGivesPlausibleSamplesAtItsOwnTimes) {
   EXPECT_EQ(import->report.samples, import->report.rows);
   EXPECT_EQ(import->recording.samples[0].utime_us, 1'721'335'045'320'405);
   std::size_t without_voltage = 0;
-  for (const Sample& sample : import->recording.samples) {
+  for (const signals::Sample& sample : import->recording.samples) {
     ASSERT_FALSE(check_plausible(sample));
     if (std::isnan(sample.battery_voltage_v)) {
       ++without_voltage;
@@ -242,7 +243,7 @@ TEST(ImportMotives, TheClimbOfATripFollowsItsElevationWithoutSpikes) {
     const Recording& recording = import->recording;
     EXPECT_EQ(recording.samples.size(), import->report.rows);
     ASSERT_EQ(recording.covariates.size(), 2u);
-    CovariateReader elevation(find_series(recording.covariates, height_covariate));
+    signals::CovariateReader elevation(signals::find_series(recording.covariates, signals::height_covariate));
     const auto climb = climb_of(recording, wheels_of(0.33));
     const auto speed = column(csv, "v_mps");
     double height_m = elevation.at(recording.samples[0].utime_us), steepest = 0, furthest_m = 0, moved_s = 0;
@@ -272,7 +273,7 @@ TEST(ImportMotives, TheDynamometerIsFlat) {
   const auto import = import_csv(test::read_packed_text(path), shipped("motives_lab.json"), options);
   ASSERT_TRUE(import) << describe(import.error());
   for (const double climb : climb_of(import->recording, wheels_of(0.33))) ASSERT_EQ(climb, 0);
-  EXPECT_NE(find_series(import->recording.covariates, "auxiliary_a"), nullptr);
+  EXPECT_NE(signals::find_series(import->recording.covariates, "auxiliary_a"), nullptr);
 }
 
 TEST(ImportEvPino, PowerIsWhatWasRecorded) {
@@ -285,7 +286,7 @@ TEST(ImportEvPino, PowerIsWhatWasRecorded) {
   const auto power = column(csv, "BatteryPower");
   ASSERT_EQ(import->recording.samples.size(), power.size());
   for (std::size_t k = 0; k < power.size(); ++k) {
-    const Sample& s = import->recording.samples[k];
+    const signals::Sample& s = import->recording.samples[k];
     ASSERT_NEAR(s.battery_voltage_v * s.battery_current_a, power[k], 1e-6);
     ASSERT_EQ(s.wheel_velocity_rad_s[0], s.wheel_velocity_rad_s[1]);
   }

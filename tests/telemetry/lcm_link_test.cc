@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "samples.h"
+#include "signals/ids.h"
 #include "telemetry/codec.h"
 #include "telemetry/recording.h"
 #include "temporary_file.h"
@@ -99,7 +100,7 @@ TEST(LcmLink, RefusesBadProvidersPatternsAndChannels) {
 
 // The longest robot id still fits LCM's channel names, over the provider that is strictest about them.
 TEST(LcmLink, LongestRobotIdMakesAValidChannel) {
-  EXPECT_EQ(channel_of(Subject::telemetry, std::string(max_robot_id_length, 'r')).size(), 63u);
+  EXPECT_EQ(channel_of(Subject::telemetry, std::string(signals::max_robot_id_length, 'r')).size(), 63u);
 }
 
 TEST(LcmLink, ReplaysALogAndTellsItsEnd) {
@@ -134,8 +135,8 @@ TEST(Recording, RefusesWhatNoRobotCouldPublish) {
   const test::TemporaryFile file;
   auto log = EventLogWriter::create(file.path()).value();
   EXPECT_FALSE(write_recording(log, {"amr-07", "m-1", 0, {}}));
-  EXPECT_FALSE(write_recording(log, {"amr 07", "m-1", 0, {Sample{}}}));
-  EXPECT_FALSE(write_recording(log, {"amr-07", "m/1", 0, {Sample{}}}));
+  EXPECT_FALSE(write_recording(log, {"amr 07", "m-1", 0, {signals::Sample{}}}));
+  EXPECT_FALSE(write_recording(log, {"amr-07", "m/1", 0, {signals::Sample{}}}));
   EXPECT_EQ(log.count(), 0);
 }
 

@@ -11,7 +11,7 @@ namespace {
 Recording recording(const std::string& robot, const std::string& mission, std::int64_t start_utime_us) {
   Recording made{robot, mission, 2.5, {}};
   for (int k = 0; k < 5; ++k) {
-    Sample sample;
+    signals::Sample sample;
     sample.utime_us = start_utime_us + 100'000 * k;
     sample.sequence = k;
     sample.wheel_velocity_rad_s = {1.0 * k, -1.0 * k};
@@ -28,7 +28,7 @@ TEST(LogRecordings, AreThoseThatWereWritten) {
                                        recording("a", "m-2", 3'000'000)};
   for (const Recording& r : written) ASSERT_TRUE(write_recording(*log, r));
   // After the end of its mission a sample belongs to none.
-  Sample late = written[2].samples.back();
+  signals::Sample late = written[2].samples.back();
   const auto bytes = encode_telemetry("a", late);
   ASSERT_TRUE(bytes);
   ASSERT_TRUE(log->write(4'000'000, channel_of(Subject::telemetry, "a"), *bytes));

@@ -6,6 +6,8 @@
 
 #include <set>
 
+#include "signals/mission_event.h"
+
 namespace joulecast::telemetry {
 namespace {
 
@@ -33,17 +35,17 @@ class MissionTrackerTest : public testing::Test {
     belongs = step.belongs;
     return told(step.actions);
   }
-  std::vector<std::string> event(MissionPhase phase, const std::string& id, std::int64_t second) {
+  std::vector<std::string> event(signals::MissionPhase phase, const std::string& id, std::int64_t second) {
     return told(tracker.on_event({second * second_us, id, phase, 7.0, "note"}));
   }
   std::vector<std::string> started(const std::string& id, std::int64_t second) {
-    return event(MissionPhase::started, id, second);
+    return event(signals::MissionPhase::started, id, second);
   }
   std::vector<std::string> finished(const std::string& id, std::int64_t second) {
-    return event(MissionPhase::finished, id, second);
+    return event(signals::MissionPhase::finished, id, second);
   }
   std::vector<std::string> aborted(const std::string& id, std::int64_t second) {
-    return event(MissionPhase::aborted, id, second);
+    return event(signals::MissionPhase::aborted, id, second);
   }
 
   MissionTracker tracker;
@@ -52,7 +54,7 @@ class MissionTrackerTest : public testing::Test {
 
 TEST_F(MissionTrackerTest, ExplicitMission) {
   const MissionActions opened =
-      tracker.on_event({5 * second_us, "m-1", MissionPhase::started, 7.0, "to dock"});
+      tracker.on_event({5 * second_us, "m-1", signals::MissionPhase::started, 7.0, "to dock"});
   ASSERT_EQ(opened.size(), 1u);
   EXPECT_EQ(opened[0].payload_kg, 7.0);
   EXPECT_EQ(opened[0].note, "to dock");
@@ -158,7 +160,8 @@ TEST_F(MissionTrackerTest, UnknownEndLeavesAnExplicitMissionButEndsAnImplicitOne
   EXPECT_EQ(tracker.current()->mission_id, "m-2");
   finished("m-2", 2);
   sample(10);
-  const MissionActions actions = tracker.on_event({12 * second_us, "m-9", MissionPhase::aborted, 0, ""});
+  const MissionActions actions =
+      tracker.on_event({12 * second_us, "m-9", signals::MissionPhase::aborted, 0, ""});
   EXPECT_THAT(told(actions), ElementsAre("close implicit-10000000 @12 aborted"));
   EXPECT_NE(actions[0].note.find("m-9"), std::string::npos);
 }
@@ -167,7 +170,8 @@ TEST_F(MissionTrackerTest, UnknownEndLeavesAnExplicitMissionButEndsAnImplicitOne
 TEST_F(MissionTrackerTest, TheEndOfALaterMissionWhoseStartWasLostEndsTheOpenOne) {
   tracker.resume({"m-2", 0, 12 * second_us, 2.0, false});
   sample(20);
-  const MissionActions actions = tracker.on_event({30 * second_us, "m-3", MissionPhase::finished, 0, ""});
+  const MissionActions actions =
+      tracker.on_event({30 * second_us, "m-3", signals::MissionPhase::finished, 0, ""});
   EXPECT_THAT(told(actions), ElementsAre("close m-2 @30 superseded"));
   EXPECT_NE(actions[0].note.find("m-3"), std::string::npos);
   EXPECT_EQ(tracker.counters().unknown_missions, 1u);
@@ -194,7 +198,8 @@ TEST_F(MissionTrackerTest, SampleOlderThanTheOpenMissionDoesNotBelong) {
 TEST_F(MissionTrackerTest, MissionEndsNoEarlierThanItsNewestSample) {
   started("m-1", 0);
   tracker.on_sample(9 * second_us + 20, 0);
-  const MissionActions actions = tracker.on_event({9 * second_us, "m-1", MissionPhase::finished, 0, ""});
+  const MissionActions actions =
+      tracker.on_event({9 * second_us, "m-1", signals::MissionPhase::finished, 0, ""});
   EXPECT_EQ(actions.at(0).utime_us, 9 * second_us + 20);
 }
 
@@ -315,7 +320,7 @@ TEST(MissionTrackerProperty, ActionsAlwaysPair) {
       switch (*rc::gen::inRange(0, 4)) {
         case 0:
           follow(tracker.on_event({utime, "m-" + std::to_string(*rc::gen::inRange(0, 30)),
-                                   static_cast<MissionPhase>(*rc::gen::inRange(1, 4)), 0, ""}));
+                                   static_cast<signals::MissionPhase>(*rc::gen::inRange(1, 4)), 0, ""}));
           break;
         case 1:
           follow(tracker.on_silence(*rc::gen::inRange<std::int64_t>(0, 1000 * second_us)));

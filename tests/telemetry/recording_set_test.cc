@@ -23,7 +23,7 @@ Recording mission(const std::string& id, double start_s, double length_s, double
                   const std::string& robot = "a") {
   Recording made{robot, id, payload_kg, {}};
   for (double t = 0; t <= length_s + 1e-9; t += 0.1) {
-    Sample sample;
+    signals::Sample sample;
     sample.utime_us = std::llround((start_s + t) * 1e6);
     sample.sequence = static_cast<std::int64_t>(made.samples.size());
     sample.wheel_velocity_rad_s = {3, 3};
@@ -43,7 +43,7 @@ class Log {
  public:
   Log() : writer_(EventLogWriter::create(file_.path()).value()) {}
   void add(const Recording& recording) { ASSERT_TRUE(write_recording(writer_, recording)); }
-  void add(const std::string& robot, const Sample& sample) {
+  void add(const std::string& robot, const signals::Sample& sample) {
     const auto bytes = encode_telemetry(robot, sample);
     ASSERT_TRUE(bytes);
     put(channel_of(Subject::telemetry, robot), *bytes);
@@ -83,8 +83,8 @@ TEST(RecordingSet, IsOfOneRobot) {
 
 TEST(RecordingSet, FollowsTelemetryThatDeclaresNoMission) {
   Log log;
-  for (const Sample& s : mission("", 10, 20).samples) log.add("a", s);
-  for (const Sample& s : mission("", 200, 8).samples) log.add("a", s);
+  for (const signals::Sample& s : mission("", 10, 20).samples) log.add("a", s);
+  for (const signals::Sample& s : mission("", 200, 8).samples) log.add("a", s);
   const auto set = log.load();
   ASSERT_TRUE(set) << describe(set.error());
   EXPECT_THAT(names_of(*set), ElementsAre("implicit-10000000", "implicit-200000000"));
@@ -95,7 +95,7 @@ TEST(RecordingSet, CountsWhatCannotBeRead) {
   Log log;
   log.put("ROBOT_TELEMETRY.a", {1, 2, 3});
   const Recording good = mission("m1", 10, 20);
-  Sample odd = good.samples[50];
+  signals::Sample odd = good.samples[50];
   odd.utime_us = -1;
   log.add("a", odd);
   odd.utime_us = std::int64_t{1} << 62;  // 146 millennia: it would end every mission and begin one
@@ -125,7 +125,8 @@ TEST(RecordingSet, PutsSamplesInOrder) {
   ASSERT_TRUE(set) << describe(set.error());
   EXPECT_EQ(set->unreadable, 1u);
   ASSERT_EQ(set->missions[0].samples.size(), made.samples.size() - 1);
-  EXPECT_TRUE(std::ranges::is_sorted(set->missions[0].samples, std::ranges::less_equal{}, &Sample::utime_us));
+  EXPECT_TRUE(std::ranges::is_sorted(set->missions[0].samples, std::ranges::less_equal{},
+                                     &signals::Sample::utime_us));
 
   const auto in_memory = make_recording_set("a", {made});
   ASSERT_TRUE(in_memory);
@@ -154,8 +155,8 @@ TEST(RecordingSet, JoinsShortMissionsInARowAndNamesThem) {
 
 // A payload that nobody declared is the same in each mission.
 TEST(RecordingSet, JoinsShortMissionsOfUnknownPayload) {
-  const auto set =
-      make_recording_set("a", {mission("s1", 0, 3, unmeasured), mission("s2", 10, 3, unmeasured)});
+  const auto set = make_recording_set(
+      "a", {mission("s1", 0, 3, signals::unmeasured), mission("s2", 10, 3, signals::unmeasured)});
   ASSERT_TRUE(set) << describe(set.error());
   EXPECT_THAT(names_of(*set), ElementsAre("s1"));
 }
@@ -166,7 +167,7 @@ TEST(RecordingSet, NamesAFewOfManyAndWhatHoldsNothing) {
   missions.push_back(mission("empty", 100, 2));
   missions.back().samples.clear();
   missions.push_back(mission("long", 110, 20));
-  missions.back().samples[5].wheel_velocity_rad_s[1] = unmeasured;
+  missions.back().samples[5].wheel_velocity_rad_s[1] = signals::unmeasured;
   const auto set = make_recording_set("a", missions);
   ASSERT_TRUE(set) << describe(set.error());
   EXPECT_THAT(set->notes, ElementsAre(HasSubstr("mission empty holds no motion"),

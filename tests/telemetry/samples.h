@@ -3,13 +3,13 @@
 #include <bit>
 #include <cstdint>
 
-#include "telemetry/sample.h"
+#include "signals/sample.h"
 
 namespace joulecast::telemetry::test {
 
 // Every field different, two of them unmeasured.
-inline Sample distinct_sample() {
-  Sample s;
+inline signals::Sample distinct_sample() {
+  signals::Sample s;
   s.utime_us = 1'700'000'000'123'456;
   s.sequence = 42;
   s.wheel_velocity_rad_s = {1.25, -2.5};
@@ -19,9 +19,9 @@ inline Sample distinct_sample() {
   s.battery_current_a = -7;
   s.velocity_command = {0.75, -0.125};
   s.yaw_rate_rad_s = 0.375;
-  s.pitch_rad = unmeasured;
+  s.pitch_rad = signals::unmeasured;
   s.pose = {10, -11, 2};
-  s.motor_temperature_c = {55, unmeasured};
+  s.motor_temperature_c = {55, signals::unmeasured};
   s.payload_kg = 12.5;
   return s;
 }
@@ -39,7 +39,7 @@ bool same_bits(const std::array<double, N>& a, const std::array<double, N>& b) {
   return true;
 }
 
-inline bool same_bits(const Sample& a, const Sample& b) {
+inline bool same_bits(const signals::Sample& a, const signals::Sample& b) {
   return a.utime_us == b.utime_us && a.sequence == b.sequence &&
          same_bits(a.wheel_velocity_rad_s, b.wheel_velocity_rad_s) &&
          same_bits(a.motor_voltage_v, b.motor_voltage_v) && same_bits(a.motor_current_a, b.motor_current_a) &&

@@ -12,8 +12,8 @@
 namespace joulecast::windows {
 namespace {
 
+using signals::Sample;
 using telemetry::Recording;
-using telemetry::Sample;
 
 double speed(double t) {
   return 5 + 3 * std::sin(0.7 * t) + std::sin(1.9 * t);
@@ -167,7 +167,7 @@ TEST(HeldWindows, ReadingsBetweenRowsWithoutOneAreUsed) {
   auto mission = held(120, 20, 1);
   for (std::size_t k = 0; k < mission.samples.size(); ++k) {
     if (k % 20 != 0)
-      mission.samples[k].battery_voltage_v = mission.samples[k].battery_current_a = telemetry::unmeasured;
+      mission.samples[k].battery_voltage_v = mission.samples[k].battery_current_a = signals::unmeasured;
   }
   const auto robot = testing::nomad();
   const std::vector missions{mission};

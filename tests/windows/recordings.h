@@ -17,13 +17,13 @@ constexpr std::int64_t start_us = 1'700'000'000'000'000;
 // A mission of so many samples at a rate; `fill` gets the time since it began [s] and a sample with that
 // time.
 inline telemetry::Recording recorded(std::size_t samples, double rate_hz,
-                                     const std::function<void(double, telemetry::Sample&)>& fill) {
+                                     const std::function<void(double, signals::Sample&)>& fill) {
   telemetry::Recording mission;
   mission.robot_id = "nomad";
   mission.mission_id = "made";
   for (std::size_t k = 0; k < samples; ++k) {
     const std::int64_t us = std::llround(1e6 * static_cast<double>(k) / rate_hz);
-    telemetry::Sample s;
+    signals::Sample s;
     s.utime_us = start_us + us;
     s.sequence = static_cast<std::int64_t>(k);
     fill(1e-6 * static_cast<double>(us), s);
@@ -34,7 +34,7 @@ inline telemetry::Recording recorded(std::size_t samples, double rate_hz,
 
 // Takes out the samples in [from, to) seconds.
 inline telemetry::Recording without(telemetry::Recording mission, double from, double to) {
-  std::erase_if(mission.samples, [&](const telemetry::Sample& s) {
+  std::erase_if(mission.samples, [&](const signals::Sample& s) {
     const double t = 1e-6 * static_cast<double>(s.utime_us - start_us);
     return t >= from && t < to;
   });

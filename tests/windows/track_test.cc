@@ -12,7 +12,7 @@
 namespace joulecast::windows {
 namespace {
 
-using telemetry::Sample;
+using signals::Sample;
 
 Track track_of(const telemetry::Recording& mission, const WindowSettings& settings = {}) {
   return make_track(mission, testing::nomad(), {}, median_period_s(mission), settings);
@@ -42,7 +42,7 @@ TEST(Track, PowerBrakingAndSign) {
   const auto mission = testing::recorded(500, 50, [](double t, Sample& s) {
     s.wheel_velocity_rad_s = {3, 3};
     s.motor_voltage_v = {12, 12};
-    s.motor_current_a = {t < 5 ? 1.5 : -0.5, telemetry::unmeasured};
+    s.motor_current_a = {t < 5 ? 1.5 : -0.5, signals::unmeasured};
   });
   const Track c = track_of(mission);
   EXPECT_NEAR(c.power[0][100], 18, 1e-9);
@@ -62,7 +62,7 @@ TEST(Track, HeatAndMotionAreLowPassed) {
   const robot::RobotModel robot = testing::nomad();
   const auto mission = testing::recorded(5000, 50, [](double, Sample& s) {
     s.wheel_velocity_rad_s = {4, -2};
-    s.motor_current_a = {2, telemetry::unmeasured};
+    s.motor_current_a = {2, signals::unmeasured};
   });
   const Track c = track_of(mission);
   const double friction_a =
@@ -97,7 +97,7 @@ TEST(Track, AWheelSlidesByTheAngleSinceItStood) {
 TEST(Track, BatteryChargePowerAndStep) {
   const auto mission = testing::recorded(1000, 50, [](double t, Sample& s) {
     s.battery_voltage_v = 24 - 0.5 * std::floor(t / 5);
-    s.battery_current_a = t < 10 ? 3 : telemetry::unmeasured;
+    s.battery_current_a = t < 10 ? 3 : signals::unmeasured;
   });
   const Track c = track_of(mission);
   EXPECT_NEAR(c.battery_voltage_step_v, 0.5, 1e-12);
@@ -139,8 +139,8 @@ TEST(Track, TakesTheElectricalDelayOut) {
 }
 
 TEST(Track, PayloadIsWhatWasSaidLast) {
-  auto mission = testing::recorded(
-      500, 50, [](double t, Sample& s) { s.payload_kg = t > 5 ? 4 : telemetry::unmeasured; });
+  auto mission =
+      testing::recorded(500, 50, [](double t, Sample& s) { s.payload_kg = t > 5 ? 4 : signals::unmeasured; });
   EXPECT_EQ(track_of(mission).payload[100], 0);
   mission.payload_kg = 2;
   const Track c = track_of(mission);
@@ -152,7 +152,7 @@ TEST(Track, ClimbIsThePitchOrTheSlopeOfTheHeight) {
   // 0.4 m/s up a slope of 5 %.
   auto mission = testing::recorded(1000, 50, [](double, Sample& s) { s.wheel_velocity_rad_s = {4, 4}; });
   EXPECT_TRUE(std::isnan(track_of(mission).climb[500]));
-  telemetry::CovariateSeries height{.name = "height_m", .utime_us = {}, .value = {}};
+  signals::CovariateSeries height{.name = "height_m", .utime_us = {}, .value = {}};
   for (const Sample& s : mission.samples) {
     height.utime_us.push_back(s.utime_us);
     height.value.push_back(0.05 * 0.4 * 1e-6 * static_cast<double>(s.utime_us - testing::start_us));

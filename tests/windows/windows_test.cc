@@ -13,8 +13,8 @@
 namespace joulecast::windows {
 namespace {
 
+using signals::Sample;
 using telemetry::Recording;
-using telemetry::Sample;
 
 std::vector<Window> windows_of(const std::vector<Recording>& missions, const WindowSettings& settings = {}) {
   const robot::RobotModel robot = testing::nomad();
@@ -259,7 +259,7 @@ TEST(Windows, ClimbFromPitchAndFromHeight) {
     s.pitch_rad = 0.01 * t;
   });
   Recording high = testing::recorded(500, 50, [](double, Sample& s) { s.wheel_velocity_rad_s = {4, 4}; });
-  telemetry::CovariateSeries height{.name = "height_m", .utime_us = {}, .value = {}};
+  signals::CovariateSeries height{.name = "height_m", .utime_us = {}, .value = {}};
   for (const Sample& s : high.samples) {
     height.utime_us.push_back(s.utime_us);
     height.value.push_back(-0.03 * 0.4 * 1e-6 * static_cast<double>(s.utime_us - testing::start_us));

@@ -54,9 +54,9 @@ std::vector<telemetry::Recording> made_recording(const MotionLog& log,
   for (std::size_t m = 0; m < made.size(); ++m) {
     const std::vector<Instant>& instants = log.instants[m];
     std::size_t next = 0;
-    double held_a = telemetry::unmeasured, sag_v = 0;
+    double held_a = signals::unmeasured, sag_v = 0;
     for (std::size_t k = 0; k < made[m].samples.size(); ++k) {
-      telemetry::Sample& sample = made[m].samples[k];
+      signals::Sample& sample = made[m].samples[k];
       if (next < instants.size() && instants[next].sample == k) {
         const Instant& at = instants[next];
         const double drawn_a = current_of(power[m][next].drawn_w, at, log.battery.resistance_ohm);
@@ -67,8 +67,8 @@ std::vector<telemetry::Recording> made_recording(const MotionLog& log,
       }
       if (std::isfinite(sample.battery_current_a)) sample.battery_current_a = held_a;
       sample.battery_voltage_v = rounded(sample.battery_voltage_v - sag_v, log.battery.voltage_step_v);
-      sample.motor_voltage_v.fill(telemetry::unmeasured);
-      sample.motor_current_a.fill(telemetry::unmeasured);
+      sample.motor_voltage_v.fill(signals::unmeasured);
+      sample.motor_current_a.fill(signals::unmeasured);
     }
   }
   return made;

@@ -13,8 +13,8 @@
 namespace joulecast::trial::motion {
 namespace {
 
+using signals::Sample;
 using telemetry::Recording;
-using telemetry::Sample;
 
 constexpr double half_window_s = 0.4;
 constexpr std::size_t fewest_neighbours = 2;  // on each side

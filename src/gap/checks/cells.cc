@@ -30,7 +30,7 @@ double CellCutter::Mean::get() const {
   return count > 0 ? sum / static_cast<double>(count) : std::numeric_limits<double>::quiet_NaN();
 }
 
-void CellCutter::take(const telemetry::Sample& s) {
+void CellCutter::take(const signals::Sample& s) {
   const double t = seconds(begin_us_, s.utime_us);
   ++sums_.rows;
   sums_.t += t;
@@ -86,7 +86,7 @@ Cell CellCutter::cell() const {
   return c;
 }
 
-std::optional<Cell> CellCutter::add(const telemetry::Sample& sample) {
+std::optional<Cell> CellCutter::add(const signals::Sample& sample) {
   std::optional<Cell> done;
   if (sums_.rows > 0) {
     const double since = seconds(begin_us_, sample.utime_us), step = seconds(last_us_, sample.utime_us);
@@ -102,15 +102,15 @@ std::optional<Cell> CellCutter::add(const telemetry::Sample& sample) {
   return done;
 }
 
-void SpanCutter::begin(const telemetry::Sample& sample) {
+void SpanCutter::begin(const signals::Sample& sample) {
   first_ = last_ = sample;
   span_ = {};
   heading_sum_ = 0;
   rows_ = 1;
 }
 
-std::optional<Span> SpanCutter::add(const telemetry::Sample& sample) {
-  const auto placed = [](const telemetry::Sample& s) { return std::isfinite(s.pose[0] + s.pose[1]); };
+std::optional<Span> SpanCutter::add(const signals::Sample& sample) {
+  const auto placed = [](const signals::Sample& s) { return std::isfinite(s.pose[0] + s.pose[1]); };
   if (!first_) return begin(sample), std::nullopt;
   const double step = seconds(last_->utime_us, sample.utime_us);
   if (!(step > 0) || step > longest_gap_s * 5) return begin(sample), std::nullopt;
@@ -134,7 +134,7 @@ std::optional<Span> SpanCutter::add(const telemetry::Sample& sample) {
   span_.forward = dx * std::cos(heading) + dy * std::sin(heading);
   span_.sideways = dy * std::cos(heading) - dx * std::sin(heading);
   span_.distance = std::hypot(dx, dy);
-  const auto mean = [](const telemetry::Sample& s) {
+  const auto mean = [](const signals::Sample& s) {
     return 0.5 * (s.wheel_velocity_rad_s[0] + s.wheel_velocity_rad_s[1]);
   };
   span_.begin_rad_s = mean(*first_);

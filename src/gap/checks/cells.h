@@ -5,8 +5,8 @@
 #include <limits>
 #include <optional>
 
+#include "signals/sample.h"
 #include "telemetry/payload.h"
-#include "telemetry/sample.h"
 
 namespace joulecast::gap {
 
@@ -31,7 +31,7 @@ class CellCutter {
   CellCutter(double limit_rad_s, double declared_kg) : limit_rad_s_(limit_rad_s), payload_(declared_kg) {}
 
   // A cell that ended with this sample.
-  std::optional<Cell> add(const telemetry::Sample& sample);
+  std::optional<Cell> add(const signals::Sample& sample);
 
  private:
   struct Mean {
@@ -47,7 +47,7 @@ class CellCutter {
     std::array<Mean, 2> voltage, current, command;
     Mean battery_voltage, battery_current, battery_power, motor_power, yaw_rate, pitch, payload;
   };
-  void take(const telemetry::Sample& sample);
+  void take(const signals::Sample& sample);
   Cell cell() const;
 
   double limit_rad_s_;
@@ -69,12 +69,12 @@ struct Span {
 
 class SpanCutter {
  public:
-  std::optional<Span> add(const telemetry::Sample& sample);
+  std::optional<Span> add(const signals::Sample& sample);
 
  private:
-  void begin(const telemetry::Sample& sample);
+  void begin(const signals::Sample& sample);
 
-  std::optional<telemetry::Sample> first_, last_;
+  std::optional<signals::Sample> first_, last_;
   Span span_;
   double heading_sum_ = 0;  // of the turn since the begin, for the mean heading
   std::size_t rows_ = 0;

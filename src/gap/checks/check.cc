@@ -122,10 +122,10 @@ void silence_contradicted(telemetry::RecordingSet& recordings, std::span<const C
   }
   if (std::ranges::none_of(silent, [](bool s) { return s; })) return;
   for (telemetry::Recording& mission : recordings.missions) {
-    for (telemetry::Sample& sample : mission.samples) {
-      const auto readings = readings_of(sample);
+    for (signals::Sample& sample : mission.samples) {
+      const auto readings = signals::numbers_of(sample);
       for (std::size_t k = 0; k < reading_count; ++k) {
-        if (silent[k]) *readings[k] = telemetry::unmeasured;
+        if (silent[k]) *readings[k] = signals::unmeasured;
       }
     }
   }

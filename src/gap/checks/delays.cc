@@ -66,13 +66,13 @@ double best_lag(const Eigen::VectorXd& part) {
 
 }  // namespace
 
-LagSums::Row LagSums::row_of(const telemetry::Sample& s) {
+LagSums::Row LagSums::row_of(const signals::Sample& s) {
   return {s.wheel_velocity_rad_s,
           {s.motor_current_a[0], s.motor_current_a[1], s.battery_voltage_v * s.battery_current_a,
            s.yaw_rate_rad_s}};
 }
 
-void LagSums::add(const telemetry::Sample& sample) {
+void LagSums::add(const signals::Sample& sample) {
   if (step_s_ > 0) return take(sample);
   first_.push_back(sample);
   if (first_.size() < rows_for_step) return;
@@ -83,13 +83,13 @@ void LagSums::add(const telemetry::Sample& sample) {
   step_s_ = std::max(finest_s, statistics::median(std::move(steps)));
   begin_us_ = first_.front().utime_us;
   for (std::size_t k = 0; k < late_count; ++k) open_[k] = empty(k);
-  const std::vector<telemetry::Sample> first = std::move(first_);
+  const std::vector<signals::Sample> first = std::move(first_);
   first_.clear();
-  for (const telemetry::Sample& s : first) take(s);
+  for (const signals::Sample& s : first) take(s);
 }
 
-void LagSums::take(const telemetry::Sample& sample) {
-  const auto place = [&](const telemetry::Sample& s) {
+void LagSums::take(const signals::Sample& sample) {
+  const auto place = [&](const signals::Sample& s) {
     return 1e-6 * static_cast<double>(s.utime_us - begin_us_) / step_s_;
   };
   const double to = place(sample), from = last_ ? place(*last_) : to;

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "gap/checks/products.h"
-#include "telemetry/sample.h"
+#include "signals/sample.h"
 
 namespace joulecast::gap {
 
@@ -30,7 +30,7 @@ struct LagBlock {
 // Rows are put on an even grid first; its step comes from the first rows.
 class LagSums {
  public:
-  void add(const telemetry::Sample& sample);
+  void add(const signals::Sample& sample);
   void finish();
 
   double step_s() const { return step_s_; }
@@ -43,16 +43,16 @@ class LagSums {
     std::array<double, 2> speed{};
     std::array<double, late_count> late{};
   };
-  static Row row_of(const telemetry::Sample& sample);
-  void take(const telemetry::Sample& sample);
+  static Row row_of(const signals::Sample& sample);
+  void take(const signals::Sample& sample);
   void take(const Row& row);
   bool moving() const;
   void correlate();
   void next_block();
 
   double step_s_ = 0;
-  std::vector<telemetry::Sample> first_;  // until the step is known
-  std::optional<telemetry::Sample> last_;
+  std::vector<signals::Sample> first_;  // until the step is known
+  std::optional<signals::Sample> last_;
   std::int64_t begin_us_ = 0;
   std::int64_t next_ = 0;  // place on the grid
   std::deque<Row> rows_;   // unbroken, of the grid

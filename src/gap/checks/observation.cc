@@ -7,7 +7,7 @@
 namespace joulecast::gap {
 namespace {
 
-using telemetry::Sample;
+using signals::Sample;
 
 constexpr std::size_t block_cells = 3;
 constexpr std::size_t most_fitted = 512;  // blocks; more tell no more of how they scatter
@@ -65,7 +65,7 @@ void Observer::begin(std::string mission_id, double declared_payload_kg) {
 
 void Observer::add(const Sample& sample) {
   seen_.clock.add(sample.utime_us, sample.sequence);
-  const auto readings = readings_of(sample);
+  const auto readings = signals::numbers_of(sample);
   for (std::size_t k = 0; k < reading_count; ++k) seen_.values[k].add(*readings[k]);
   if (!std::isfinite(sample.wheel_velocity_rad_s[0] + sample.wheel_velocity_rad_s[1])) return;
   seen_.lags.add(sample);
@@ -147,12 +147,12 @@ void Observer::take_power(const Cell& c) {
   at.wheel_acceleration_rad_s2 = c.acceleration_rad_s2;
   at.payload_kg = c.payload_kg;
   const auto flow = model_.flow(at);
-  const double modelled = flow.battery_power_w, moving = modelled - flow.accessories_w;
+  const double modelled = flow.battery_power_w, moving = modelled - flow.ledger[signals::Term::accessories];
   of(Relation::motors).add({c.battery_power_w, c.motor_power_w, 1.0});
   of(Relation::motion).add({c.battery_power_w, moving, 1.0});
   if (c.resting) of(Relation::idle).add({c.battery_power_w, 1.0});
   if (c.way[0] == 0 && c.way[1] == 0) return;
-  if (flow.kinetic_w >= 0) of(Relation::driving).add({c.battery_power_w, modelled, 1.0});
+  if (flow.ledger[signals::Term::kinetic] >= 0) of(Relation::driving).add({c.battery_power_w, modelled, 1.0});
   const double speed = 0.5 * robot_.kinematics.wheel_radius_m * (c.speed_rad_s[0] + c.speed_rad_s[1]);
   const double weight = robot_.total_mass_kg(c.payload_kg) * robot::standard_gravity_m_s2;
   of(Relation::climb).add({c.battery_power_w - modelled, weight * speed * std::sin(c.pitch_rad), 1.0});

@@ -69,11 +69,11 @@ class Observer {
   explicit Observer(const robot::RobotModel& robot);
 
   void begin(std::string mission_id, double declared_payload_kg);
-  void add(const telemetry::Sample& sample);
+  void add(const signals::Sample& sample);
   Observation finish();
 
  private:
-  void take(telemetry::Sample sample);
+  void take(signals::Sample sample);
   void take(const Cell& cell);
   void take_power(const Cell& cell);
   void take(const Span& span);
@@ -86,9 +86,9 @@ class Observer {
   std::optional<CellCutter> cells_;
   SpanCutter spans_;
   std::size_t cells_in_block_ = 0;
-  std::optional<telemetry::Sample> before_, waiting_;  // a spike is known by what follows
-  telemetry::Sample known_;                            // last known position and yaw rate ...
-  std::int64_t known_us_ = 0;                          // ... of then
+  std::optional<signals::Sample> before_, waiting_;  // a spike is known by what follows
+  signals::Sample known_;                            // last known position and yaw rate ...
+  std::int64_t known_us_ = 0;                        // ... of then
 };
 
 // Blocks of one relation of all missions, neighbours together where they are many.

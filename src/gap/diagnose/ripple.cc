@@ -15,7 +15,7 @@
 namespace joulecast::gap {
 namespace {
 
-using telemetry::Sample;
+using signals::Sample;
 
 // What repeats within a turn of the wheel is looked for in long stretches, what repeats with the motor behind
 // its gear in short ones of slow motion.

@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "gap/traits.h"
-#include "telemetry/covariates.h"
+#include "signals/covariates.h"
 
 namespace joulecast::gap {
 namespace {
@@ -135,8 +135,8 @@ void ColumnSet::add_covariates(const Material& m, std::span<const double> shares
       h.covariate = m.covariates[by.covariate];
       h.by = by;
       const std::string_view unit = h.effect.effect->info().parameters[h.parameter].unit;
-      h.unit = telemetry::is_label(h.covariate) ? std::string(unit)
-                                                : fmt::format("{}/unit", unit.empty() ? "1" : unit);
+      h.unit = signals::is_label(h.covariate) ? std::string(unit)
+                                              : fmt::format("{}/unit", unit.empty() ? "1" : unit);
       h.candidate.log_prior =
           effect_log_prior - std::log(static_cast<double>(carriers.size() * shares.size()));
       h.candidate.columns = {columns_.size()};

@@ -193,7 +193,7 @@ Result<std::vector<std::string>> groups_of(const telemetry::RecordingSet& record
       continue;
     }
     std::map<std::string, double> held_s;
-    for (const telemetry::CovariateSeries& series : mission.covariates) {
+    for (const signals::CovariateSeries& series : mission.covariates) {
       if (!series.name.starts_with(by + "=")) continue;
       for (std::size_t k = 0; k < series.value.size(); ++k) {
         const std::int64_t until =

@@ -8,8 +8,8 @@
 #include <set>
 
 #include "gap/traits.h"
+#include "signals/covariates.h"
 #include "statistics/robust.h"
-#include "telemetry/covariates.h"
 
 namespace joulecast::gap {
 namespace {
@@ -244,7 +244,7 @@ void RunColumns::add_covariates() {
       h.covariate = covariate_names_[c];
       h.by = cause.by;
       const std::string_view unit = h.effect.effect->info().parameters[h.parameter].unit;
-      h.unit = telemetry::is_label(h.covariate) ? std::string(unit) : fmt::format("{}/unit", unit);
+      h.unit = signals::is_label(h.covariate) ? std::string(unit) : fmt::format("{}/unit", unit);
       h.candidate.log_prior =
           effect_log_prior - std::log(static_cast<double>(carriers.size() * expected_shares.size()));
       h.candidate.columns = {columns_.size()};

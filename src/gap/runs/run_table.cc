@@ -7,7 +7,7 @@
 #include <optional>
 #include <set>
 
-#include "telemetry/covariates.h"
+#include "signals/covariates.h"
 #include "telemetry/csv_table.h"
 
 namespace joulecast::gap {
@@ -228,7 +228,7 @@ Result<Header> read_header(std::span<const std::string> names, const std::string
     if (!seen.insert(names[c]).second) return invalid(where, "column " + names[c] + " appears twice");
     const auto own = [&](std::string_view prefix, std::vector<std::string>& list) -> Result<std::size_t> {
       const std::string_view rest = name.substr(prefix.size());
-      if (!telemetry::is_valid_covariate_name(rest) || telemetry::is_label(rest))
+      if (!signals::is_valid_covariate_name(rest) || signals::is_label(rest))
         return invalid(where,
                        "column " + names[c] + ": a name is 1 to 47 of letters, digits, '.', '_' and '-'");
       return place_in(list, rest);

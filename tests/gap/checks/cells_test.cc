@@ -11,7 +11,7 @@ namespace joulecast::gap {
 namespace {
 
 TEST(Cells, AverageChannelsAndTakeSlopes) {
-  const auto recording = made::mission(10, 50, [](double t, telemetry::Sample& s) {
+  const auto recording = made::mission(10, 50, [](double t, signals::Sample& s) {
     s.wheel_velocity_rad_s = {2 + 0.5 * t, -3.0};
     s.battery_voltage_v = 24;
     s.battery_current_a = 2 + t;
@@ -40,7 +40,7 @@ TEST(Cells, DoNotReachAcrossGaps) {
   CellCutter cutter(10, 0);
   std::size_t count = 0;
   for (int k = 0; k < 100; ++k) {
-    telemetry::Sample s;
+    signals::Sample s;
     s.utime_us = 20'000 * k + 5'000'000 * (k / 10);  // ten rows at a time
     s.wheel_velocity_rad_s = {k < 50 ? 1.0 : -1.0, 1.0};
     count += cutter.add(s).has_value();
@@ -52,7 +52,7 @@ TEST(Cells, DoNotReachAcrossGaps) {
 TEST(Spans, FollowAnArc) {
   const double radius = 4, speed = 0.8, rate = speed / radius;
   for (const bool degrees : {false, true}) {
-    const auto recording = made::mission(60, 20, [&](double t, telemetry::Sample& s) {
+    const auto recording = made::mission(60, 20, [&](double t, signals::Sample& s) {
       const double heading = rate * t;
       s.wheel_velocity_rad_s = {10, 8};
       s.yaw_rate_rad_s = rate;

@@ -32,7 +32,7 @@ TEST(SilenceContradicted, TakesAwayTheReadingsOfTheChannelAndNoOther) {
   const std::vector<Check> checks{{"dead_channel", "motor_current.left, pose", 0, {}, "", true, {}},
                                   {"held_samples", "yaw_rate", 0, {}, "", false, {}}};
   silence_contradicted(set, checks);
-  const telemetry::Sample& s = set.missions[1].samples[7];
+  const signals::Sample& s = set.missions[1].samples[7];
   EXPECT_TRUE(std::isnan(s.motor_current_a[1]));
   EXPECT_TRUE(std::isnan(s.pose[0]) && std::isnan(s.pose[1]) && std::isnan(s.pose[2]));
   EXPECT_TRUE(std::isfinite(s.motor_current_a[0]));
@@ -77,7 +77,7 @@ TEST(CheckRecordings, DisorderAndGapsOfTheClockAreTold) {
 
 TEST(CheckRecordings, AYearThatNobodyLivesInIsTold) {
   telemetry::RecordingSet set = scout().recordings;
-  mistakes::each_sample(set, [](telemetry::Sample& s) { s.utime_us += 10'000'000'000'000'000; });
+  mistakes::each_sample(set, [](signals::Sample& s) { s.utime_us += 10'000'000'000'000'000; });
   const auto checks = check_recordings(set, scout().model);
   ASSERT_TRUE(find(checks, "utime_year"));
   EXPECT_GT(find(checks, "utime_year")->value, 2300);
@@ -85,7 +85,7 @@ TEST(CheckRecordings, AYearThatNobodyLivesInIsTold) {
 
 TEST(CheckRecordings, PitchAndPayloadHaveTheirUnits) {
   telemetry::RecordingSet degrees = scout().recordings;
-  mistakes::each_sample(degrees, [](telemetry::Sample& s) { s.pitch_rad = 12 + 57.3 * s.pitch_rad; });
+  mistakes::each_sample(degrees, [](signals::Sample& s) { s.pitch_rad = 12 + 57.3 * s.pitch_rad; });
   ASSERT_TRUE(find(check_recordings(degrees, scout().model), "pitch_scale"));
   telemetry::RecordingSet grams = scout().recordings;
   mistakes::multiply(grams, {reading::payload}, 1000);

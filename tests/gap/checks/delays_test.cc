@@ -16,7 +16,7 @@ namespace {
 LagSums drive(double delay_s, double rate_hz, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
-  const auto recording = made::mission(120, rate_hz, [&](double t, telemetry::Sample& s) {
+  const auto recording = made::mission(120, rate_hz, [&](double t, signals::Sample& s) {
     const made::Motion now = made::motion(t), then = made::motion(t - delay_s);
     s.wheel_velocity_rad_s = {now.speed[0] + 0.01 * normal(random), now.speed[1] + 0.01 * normal(random)};
     for (std::size_t k : {0u, 1u}) {
@@ -55,7 +55,7 @@ INSTANTIATE_TEST_SUITE_P(Rates, AtRate, testing::Values(10.0, 50.0, 200.0));
 TEST(Delays, AreUnknownWhereMotionExplainsNothing) {
   std::mt19937_64 random(12);
   std::normal_distribution<double> normal;
-  const auto recording = made::mission(120, 25, [&](double t, telemetry::Sample& s) {
+  const auto recording = made::mission(120, 25, [&](double t, signals::Sample& s) {
     s.wheel_velocity_rad_s = made::motion(t).speed;
     s.motor_current_a = {normal(random), normal(random)};
   });

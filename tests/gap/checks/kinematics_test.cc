@@ -25,7 +25,7 @@ telemetry::RecordingSet drive(const robot::RobotModel& robot, const World& world
   const double right = robot.kinematics.wheel_radius_m * world.radius * world.right_radius;
   const double left = robot.kinematics.wheel_radius_m * world.radius;
   return *telemetry::make_recording_set(
-      "made", {made::mission(200, 20, [&](double t, telemetry::Sample& s) {
+      "made", {made::mission(200, 20, [&](double t, signals::Sample& s) {
         const made::Motion m = made::motion(t);
         const double yaw =
             (right * m.speed[0] - left * m.speed[1]) / (2 * robot.kinematics.half_track_m * world.track);

@@ -10,6 +10,7 @@
 #include "client/virtual_robot/fleet.h"
 #include "client/virtual_robot/simulate.h"
 #include "robot/robot_file.h"
+#include "signals/mission_event.h"
 #include "telemetry/recording_set.h"
 
 namespace joulecast::gap::made {
@@ -38,8 +39,8 @@ inline Robot virtual_robot(std::string_view kind, std::uint64_t seed,
   const vr::Simulation run = vr::simulate_missions(spec, seed);
   std::vector<telemetry::Recording> missions;
   std::size_t next = 0;
-  for (const telemetry::MissionEvent& event : run.events) {
-    if (event.phase == telemetry::MissionPhase::started) {
+  for (const signals::MissionEvent& event : run.events) {
+    if (event.phase == signals::MissionPhase::started) {
       missions.push_back({robot.model.robot_id, event.mission_id, event.payload_kg, {}});
       continue;
     }
@@ -53,11 +54,11 @@ inline Robot virtual_robot(std::string_view kind, std::uint64_t seed,
 
 // A mission whose samples are given as a function of the time [s].
 inline telemetry::Recording mission(double length_s, double rate_hz,
-                                    const std::function<void(double, telemetry::Sample&)>& fill) {
+                                    const std::function<void(double, signals::Sample&)>& fill) {
   telemetry::Recording recording;
   recording.mission_id = "made";
   for (std::int64_t k = 0; k < static_cast<std::int64_t>(length_s * rate_hz); ++k) {
-    telemetry::Sample s;
+    signals::Sample s;
     const double t = static_cast<double>(k) / rate_hz;
     s.utime_us = 1'700'000'000'000'000 + static_cast<std::int64_t>(std::llround(1e6 * t));
     s.sequence = k;

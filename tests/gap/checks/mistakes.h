@@ -17,8 +17,8 @@
 // What integrators get wrong, done to sound recordings in memory.
 namespace joulecast::gap::mistakes {
 
+using signals::Sample;
 using telemetry::Recording;
-using telemetry::Sample;
 
 inline void each_sample(telemetry::RecordingSet& set, const std::function<void(Sample&)>& change) {
   for (Recording& mission : set.missions) {
@@ -29,20 +29,20 @@ inline void each_sample(telemetry::RecordingSet& set, const std::function<void(S
 inline void multiply(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings,
                      double factor) {
   each_sample(set, [&](Sample& s) {
-    for (const std::size_t k : readings) *readings_of(s)[k] *= factor;
+    for (const std::size_t k : readings) *signals::numbers_of(s)[k] *= factor;
   });
 }
 
 inline void fill(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double value) {
   each_sample(set, [&](Sample& s) {
-    for (const std::size_t k : readings) *readings_of(s)[k] = value;
+    for (const std::size_t k : readings) *signals::numbers_of(s)[k] = value;
   });
 }
 
 // Unmeasured readings too.
 inline void zero_unmeasured(telemetry::RecordingSet& set) {
   each_sample(set, [](Sample& s) {
-    for (double* reading : readings_of(s)) {
+    for (double* reading : signals::numbers_of(s)) {
       if (std::isnan(*reading)) *reading = 0;
     }
   });
@@ -50,7 +50,7 @@ inline void zero_unmeasured(telemetry::RecordingSet& set) {
 
 inline void swap_sides(telemetry::RecordingSet& set, std::initializer_list<std::size_t> pairs) {
   each_sample(set, [&](Sample& s) {
-    for (const std::size_t k : pairs) std::swap(*readings_of(s)[k], *readings_of(s)[k + 1]);
+    for (const std::size_t k : pairs) std::swap(*signals::numbers_of(s)[k], *signals::numbers_of(s)[k + 1]);
   });
 }
 
@@ -61,7 +61,7 @@ inline void hold(telemetry::RecordingSet& set, std::initializer_list<std::size_t
       std::int64_t next_us = mission.samples.front().utime_us;
       double value = 0;
       for (Sample& s : mission.samples) {
-        double& reading = *readings_of(s)[k];
+        double& reading = *signals::numbers_of(s)[k];
         if (s.utime_us >= next_us) {
           value = reading;
           next_us += static_cast<std::int64_t>(1e6 * period_s);
@@ -74,13 +74,15 @@ inline void hold(telemetry::RecordingSet& set, std::initializer_list<std::size_t
 
 inline void round_to(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double step) {
   each_sample(set, [&](Sample& s) {
-    for (const std::size_t k : readings) *readings_of(s)[k] = step * std::round(*readings_of(s)[k] / step);
+    for (const std::size_t k : readings)
+      *signals::numbers_of(s)[k] = step * std::round(*signals::numbers_of(s)[k] / step);
   });
 }
 
 inline void clip(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double most) {
   each_sample(set, [&](Sample& s) {
-    for (const std::size_t k : readings) *readings_of(s)[k] = std::clamp(*readings_of(s)[k], -most, most);
+    for (const std::size_t k : readings)
+      *signals::numbers_of(s)[k] = std::clamp(*signals::numbers_of(s)[k], -most, most);
   });
 }
 
@@ -92,7 +94,7 @@ inline void delay(telemetry::RecordingSet& set, std::initializer_list<std::size_
     for (Sample& s : mission.samples) {
       const std::int64_t then = s.utime_us - static_cast<std::int64_t>(1e6 * delay_s);
       while (from + 1 < before.size() && before[from + 1].utime_us <= then) ++from;
-      for (const std::size_t k : readings) *readings_of(s)[k] = *readings_of(before[from])[k];
+      for (const std::size_t k : readings) *signals::numbers_of(s)[k] = *signals::numbers_of(before[from])[k];
     }
   }
 }
@@ -102,7 +104,7 @@ inline void drop_out(telemetry::RecordingSet& set, std::initializer_list<std::si
                      std::size_t n) {
   for (Recording& mission : set.missions) {
     for (std::size_t row = n / 2; row < mission.samples.size(); row += n) {
-      for (const std::size_t k : readings) *readings_of(mission.samples[row])[k] = 0;
+      for (const std::size_t k : readings) *signals::numbers_of(mission.samples[row])[k] = 0;
     }
   }
 }
@@ -134,7 +136,7 @@ inline void add_second_sender(telemetry::RecordingSet& set) {
 inline void step(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double factor) {
   for (std::size_t m = set.missions.size() / 2; m < set.missions.size(); ++m) {
     for (Sample& s : set.missions[m].samples) {
-      for (const std::size_t k : readings) *readings_of(s)[k] *= factor;
+      for (const std::size_t k : readings) *signals::numbers_of(s)[k] *= factor;
     }
   }
 }

@@ -22,7 +22,7 @@ telemetry::RecordingSet drive(const Truth& right, const Truth& left, double dela
   std::normal_distribution<double> normal;
   std::vector<telemetry::Recording> missions;
   for (int m = 0; m < 3; ++m) {
-    missions.push_back(made::mission(60, 25, [&](double t, telemetry::Sample& s) {
+    missions.push_back(made::mission(60, 25, [&](double t, signals::Sample& s) {
       const double at = t + 31 * m;
       const made::Motion now = made::motion(at), then = made::motion(at - delay_s);
       s.utime_us += 1'000'000'000LL * m;

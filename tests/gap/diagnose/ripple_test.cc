@@ -38,7 +38,7 @@ Drive drive(const std::function<double(double)>& speed,
   Drive made;
   std::vector<telemetry::Recording> missions;
   for (int m = 0; m < 2; ++m) {
-    missions.push_back(made::mission(150, 1 / step_s, [&](double t, telemetry::Sample& s) {
+    missions.push_back(made::mission(150, 1 / step_s, [&](double t, signals::Sample& s) {
       dynamics::Instant at;
       at.wheel_speed_rad_s = {speed(t), speed(t)};
       at.wheel_acceleration_rad_s2.fill((speed(t + step_s) - speed(t - step_s)) / (2 * step_s));

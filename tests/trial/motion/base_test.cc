@@ -18,7 +18,7 @@ telemetry::Recording sampled(double rate_hz, double duration_s,
                              const std::function<double(std::size_t)>& current_a) {
   telemetry::Recording mission;
   for (std::size_t n = 0; n < static_cast<std::size_t>(rate_hz * duration_s); ++n) {
-    telemetry::Sample s;
+    signals::Sample s;
     s.utime_us = static_cast<std::int64_t>(1e6 * static_cast<double>(n) / rate_hz);
     s.wheel_velocity_rad_s = {1, 1};
     s.battery_voltage_v = 24;
@@ -63,7 +63,7 @@ TEST(BatteryChannels, FindsTheResistanceBesideTheFallWithCharge) {
   virtual_robot::Rng rng(3);
   telemetry::Recording mission = sampled(10, 200, [&](std::size_t) { return rng.uniform(0, 20); });
   double charge_as = 0;
-  for (telemetry::Sample& s : mission.samples) {
+  for (signals::Sample& s : mission.samples) {
     charge_as += 0.1 * s.battery_current_a;
     s.battery_voltage_v = 48 - 0.05 * s.battery_current_a - 0.001 * charge_as;
   }
@@ -141,9 +141,9 @@ TEST(ReadMotionLog, SaysWhyALogCannotServe) {
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   auto missions = driven_missions(1, 60, 1, plain_power);
-  for (telemetry::Sample& s : missions[0].samples) {
+  for (signals::Sample& s : missions[0].samples) {
     s.motor_current_a = {s.battery_current_a, s.battery_current_a};
-    s.battery_voltage_v = s.battery_current_a = telemetry::unmeasured;
+    s.battery_voltage_v = s.battery_current_a = signals::unmeasured;
   }
   auto log = telemetry::EventLogWriter::create((folder / "poor.lcmlog").string());
   ASSERT_TRUE(log && telemetry::write_recording(*log, missions[0]) && log->close());

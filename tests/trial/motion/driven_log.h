@@ -47,7 +47,7 @@ inline std::vector<telemetry::Recording> driven_missions(
       const double a = std::clamp(goal - v, -1.0, 1.0);
       v += 0.1 * a;
       yaw += 0.1 * std::clamp(turn - yaw, -0.5, 0.5);
-      telemetry::Sample s;
+      signals::Sample s;
       s.utime_us = 1'700'000'000'000'000 + static_cast<std::int64_t>(m) * 3'600'000'000 +
                    static_cast<std::int64_t>(n) * 100'000;
       s.sequence = static_cast<std::int64_t>(n);

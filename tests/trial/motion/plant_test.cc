@@ -176,9 +176,9 @@ TEST_F(Plant, MadeRecordingHoldsAndRoundsAsItWasRecorded) {
   for (auto& mission : log.missions) {
     double held_a = 0;
     for (std::size_t k = 0; k < mission.samples.size(); ++k) {
-      telemetry::Sample& s = mission.samples[k];
+      signals::Sample& s = mission.samples[k];
       if (k % 10 == 0) held_a = 0.25 * std::round(s.battery_current_a / 0.25) + (k % 20 == 0 ? 0.25 : 0);
-      s.battery_current_a = k < 20 ? telemetry::unmeasured : held_a;
+      s.battery_current_a = k < 20 ? signals::unmeasured : held_a;
       s.battery_voltage_v = 48 - 0.1 * held_a;
       s.motor_current_a = {1, 1};
     }
@@ -197,7 +197,7 @@ TEST_F(Plant, MadeRecordingHoldsAndRoundsAsItWasRecorded) {
     EXPECT_TRUE(std::isnan(made[m].samples[50].motor_current_a[0]));
     for (std::size_t n = 0; n < log.instants[m].size(); ++n) {
       const Instant& at = log.instants[m][n];
-      const telemetry::Sample& s = made[m].samples[at.sample];
+      const signals::Sample& s = made[m].samples[at.sample];
       EXPECT_NEAR(s.battery_voltage_v * s.battery_current_a, power[m][n].read_w, 48 * 0.125 + 1);
       EXPECT_NEAR(std::remainder(s.battery_current_a, 0.25), 0, 1e-6);
       // About 50 W more drawn at 48 V, and what is only read does not sag.

@@ -2,20 +2,20 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "telemetry/sample.h"
+#include "signals/ids.h"
+#include "signals/sample.h"
 
 // robot_covariates_t, free of LCM: named quantities beside a robot's telemetry that may explain its power.
-namespace joulecast::telemetry {
+namespace joulecast::signals {
 
-inline constexpr std::size_t max_covariates = 64;             // names in a message, and in a mission
-inline constexpr std::size_t max_covariate_name_length = 47;  // of a name, and of the label after its '='
+inline constexpr std::size_t max_covariates = 64;  // names in a message, and in a mission
+inline constexpr std::size_t max_covariate_name_length =
+    max_robot_id_length;  // of a name, and of the label after its '='
 
 // The covariate from which the climb follows: height above any fixed datum, m.
 inline constexpr std::string_view height_covariate = "height_m";
@@ -74,39 +74,4 @@ class CovariateReader {
   std::size_t next_ = 0;
 };
 
-// One robot's covariates as its messages arrive: which of their values are news, and what holds when a
-// mission begins. Holds max_covariates names at most.
-class CovariateTracker {
- public:
-  enum class Verdict {
-    news,     // the value changed
-    repeat,   // it is the one that holds
-    late,     // older than the one that holds
-    no_room,  // a name beyond max_covariates
-  };
-
-  // A value older by more than `reorder_us` than the one that holds tells of a clock set back, and is news.
-  explicit CovariateTracker(std::int64_t reorder_us = 5'000'000) : reorder_us_(reorder_us) {}
-
-  // Takes one value of a message; `change` is set where it is news. Within a mission no change is earlier
-  // than the mission's start.
-  Verdict take(std::int64_t utime_us, const Covariate& covariate, CovariateChange& change);
-
-  // A mission begins: what holds, as changes at its start. Forgets the names that hold nothing.
-  std::vector<CovariateChange> begin_mission(std::int64_t start_utime_us);
-
-  // Goes on with what held when an earlier run of the program stopped within a mission.
-  void resume(std::int64_t mission_start_utime_us, std::span<const CovariateChange> held);
-
- private:
-  struct Held {
-    std::int64_t utime_us = 0;
-    double value = unmeasured;
-  };
-
-  std::int64_t reorder_us_;
-  std::int64_t mission_start_us_ = INT64_MIN;
-  std::map<std::string, Held, std::less<>> held_;
-};
-
-}  // namespace joulecast::telemetry
+}  // namespace joulecast::signals

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <string_view>
 
-namespace joulecast::energy {
+namespace joulecast::signals {
 
 // Where battery energy goes. Energy leaving the battery is positive, and over any span
 //   battery = sum over terms of sign(term) * energy[term],
@@ -39,20 +39,23 @@ constexpr double sign(Term term) {
   return term == Term::recovered ? -1.0 : 1.0;
 }
 
-// One value a term: watts where it holds rates, joules where it holds energies.
-struct Ledger {
-  std::array<double, term_count> value{};
+// One value a term: watts where it holds rates, joules where it holds energies. S: double, or a dual number.
+template <class S>
+struct BasicLedger {
+  std::array<S, term_count> value{};
 
-  double& operator[](Term term) { return value[static_cast<std::size_t>(term)]; }
-  double operator[](Term term) const { return value[static_cast<std::size_t>(term)]; }
+  S& operator[](Term term) { return value[static_cast<std::size_t>(term)]; }
+  const S& operator[](Term term) const { return value[static_cast<std::size_t>(term)]; }
 
   // The signed sum, equal to what leaves the battery.
-  double total() const {
-    double sum = 0;
+  S total() const {
+    S sum = 0;
     for (std::size_t k = 0; k < term_count; ++k) sum += sign(static_cast<Term>(k)) * value[k];
     return sum;
   }
 };
+
+using Ledger = BasicLedger<double>;
 
 // The accounts of one mission or one span of it, in joules unless the name says otherwise.
 struct Accounts {
@@ -73,4 +76,4 @@ struct Accounts {
   Ledger ledger;
 };
 
-}  // namespace joulecast::energy
+}  // namespace joulecast::signals

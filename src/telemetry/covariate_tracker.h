@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "signals/covariates.h"
+
+namespace joulecast::telemetry {
+
+// One robot's covariates as its messages arrive: which of their values are news, and what holds when a
+// mission begins. Holds max_covariates names at most.
+class CovariateTracker {
+ public:
+  enum class Verdict {
+    news,     // the value changed
+    repeat,   // it is the one that holds
+    late,     // older than the one that holds
+    no_room,  // a name beyond max_covariates
+  };
+
+  // A value older by more than `reorder_us` than the one that holds tells of a clock set back, and is news.
+  explicit CovariateTracker(std::int64_t reorder_us = 5'000'000) : reorder_us_(reorder_us) {}
+
+  // Takes one value of a message; `change` is set where it is news. Within a mission no change is earlier
+  // than the mission's start.
+  Verdict take(std::int64_t utime_us, const signals::Covariate& covariate, signals::CovariateChange& change);
+
+  // A mission begins: what holds, as changes at its start. Forgets the names that hold nothing.
+  std::vector<signals::CovariateChange> begin_mission(std::int64_t start_utime_us);
+
+  // Goes on with what held when an earlier run of the program stopped within a mission.
+  void resume(std::int64_t mission_start_utime_us, std::span<const signals::CovariateChange> held);
+
+ private:
+  struct Held {
+    std::int64_t utime_us = 0;
+    double value = signals::unmeasured;
+  };
+
+  std::int64_t reorder_us_;
+  std::int64_t mission_start_us_ = INT64_MIN;
+  std::map<std::string, Held, std::less<>> held_;
+};
+
+}  // namespace joulecast::telemetry

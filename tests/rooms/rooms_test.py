@@ -1,0 +1,125 @@
+#!/usr/bin/env python3
+"""Holds that rooms (folders with a library of their own) use one another as they say, by include and by link.
+
+rooms_test.py SOURCE
+
+- A room links exactly the rooms whose headers its files include; PUBLIC those that its own headers include.
+- A room of src/ uses only rooms that deploy/documents/architecture.md lists above it, and the build lists them in
+  that order.
+"""
+import re
+import sys
+from pathlib import Path
+
+
+def calls(text, function):
+    """The arguments of every call of a CMake function."""
+    text = re.sub(r"#.*", "", text)
+    return [m.split() for m in re.findall(rf"\b{function}\(([^()]*)\)", text)]
+
+
+class Library:
+    def __init__(self, name, folder):
+        self.name, self.folder = name, folder
+        self.sources, self.links = set(), {"PUBLIC": set(), "PRIVATE": set()}
+
+    def __repr__(self):
+        return f"{self.folder} ({self.name})"
+
+
+def libraries_of(source):
+    """The libraries by name and, of each source file or header, its library."""
+    libraries, owner = {}, {}
+    lists = [f for top in ("src", "server", "client") for f in sorted((source / top).rglob("CMakeLists.txt"))]
+    for file in lists:
+        folder, text = file.parent, file.read_text()
+        made = [("joulecast_" + a[0], a[1:]) for a in calls(text, "joulecast_room") if a[0] != "name"]
+        made += [(a[0], a[2:]) for a in calls(text, "add_library") if a[0].startswith("joulecast_") and "$" not in a[0]]
+        for name, sources in made:
+            library = libraries[name] = Library(name, folder.relative_to(source))
+            library.sources = {folder / s for s in sources if s.endswith(".cc") and "$" not in s}
+            for s in library.sources:
+                owner[s] = owner[s.with_suffix(".h")] = library
+        for name, *words in calls(text, "target_link_libraries"):
+            scope = None
+            for word in words:
+                if word in ("PUBLIC", "PRIVATE", "INTERFACE"):
+                    scope = word
+                elif name in libraries and word.startswith("joulecast_") and word != "joulecast_options":
+                    libraries[name].links[scope].add(word)
+    # A header without a source belongs to the library of its name, or else of its folder's.
+    for header in [h for top in ("src", "server", "client") for h in (source / top).rglob("*.h") if h not in owner]:
+        folder = next(f for f in header.parents if f == source or (f / "CMakeLists.txt").exists())
+        near = [l for l in libraries.values() if source / l.folder == folder]
+        named = [l for n in (header.stem, folder.name) for l in near + list(libraries.values()) if l.name == f"joulecast_{n}"]
+        if named or near:
+            owner[header] = (named or near)[0]
+    return libraries, owner
+
+
+def included(source, file):
+    for name in re.findall(r'^#include "([^"]+)"', file.read_text(), re.M):
+        for root in (source / "src", source, file.parent):
+            if (root / name).exists():
+                yield (root / name).resolve()
+                break
+
+
+def wanted_links(source, libraries, owner, library):
+    """The libraries that it must link, PUBLIC and PRIVATE, and of each a file that includes it."""
+    headers, sources = {}, {}
+    for file in sorted(f for f, l in owner.items() if l is library and f.exists()):
+        for header in included(source, file):
+            to = owner.get(header, library)
+            if to is not library:
+                (headers if file.suffix == ".h" else sources).setdefault(to.name, file)
+    return {"PUBLIC": headers, "PRIVATE": {n: f for n, f in sources.items() if n not in headers}}
+
+
+def faults_of_links(source, libraries, owner):
+    faults = []
+    for library in libraries.values():
+        wanted = wanted_links(source, libraries, owner, library)
+        for scope, other in (("PUBLIC", "PRIVATE"), ("PRIVATE", "PUBLIC")):
+            for name, file in wanted[scope].items():
+                if name not in library.links[scope]:
+                    faults.append(f"{library}: {file.relative_to(source)} includes {name}, which is not linked {scope}")
+            for name in library.links[scope]:
+                if name in libraries and name not in wanted[scope]:
+                    faults.append(f"{library}: links {name} {scope}, which its "
+                                  + ("files do not include" if name not in wanted[other] else "sources alone include"
+                                     if scope == "PUBLIC" else "headers include"))
+    return faults
+
+
+def faults_of_order(source, libraries):
+    architecture = (source / "deploy/documents/architecture.md").read_text()
+    order = re.findall(r"^src/([a-z_]+) ", architecture, re.M)
+    built = re.search(r"foreach\(room ([^)]*)\)", (source / "src/CMakeLists.txt").read_text()).group(1).split()
+    faults = [] if order == built else [f"architecture.md lists {order}, src/CMakeLists.txt builds {built}"]
+    folders = sorted(p.name for p in (source / "src").iterdir() if p.is_dir())
+    if folders != sorted(order):
+        faults.append(f"architecture.md lists {sorted(order)}, src/ has {folders}")
+    place = {name: k for k, name in enumerate(order)}
+    for library in libraries.values():
+        if library.folder.parts[0] != "src":
+            continue
+        own = library.folder.parts[1]
+        for name in library.links["PUBLIC"] | library.links["PRIVATE"]:
+            to = libraries[name].folder if name in libraries else None
+            if to is None or to.parts[0] == "src" and place.get(to.parts[1], -1) <= place.get(own, -1):
+                continue
+            faults.append(f"{library} uses {name}, which is not above it")
+    return faults
+
+
+def main():
+    source = Path(sys.argv[1]).resolve()
+    libraries, owner = libraries_of(source)
+    assert len(libraries) > 20, "the build's lists are not read as they are written"
+    faults = faults_of_links(source, libraries, owner) + faults_of_order(source, libraries)
+    print("\n".join(sorted(faults)))
+    sys.exit(1 if faults else 0)
+
+
+main()
