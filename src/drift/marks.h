@@ -1,15 +1,16 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
 
-// How a robot's gap moves over its missions, and against robots of its kind: from each mission's measured and
-// modelled energy alone, so that the whole history can be looked at often.
-namespace joulecast::gap {
+// How a robot's gap moves over its missions: from each mission's measured and modelled energy alone, so that
+// the whole history can be looked at often.
+namespace joulecast::drift {
 
 // One mission as the meter accounted it.
 struct MissionRatio {
@@ -20,10 +21,11 @@ struct MissionRatio {
   double modelled_j = 0;
 
   double ratio() const { return measured_j / modelled_j; }
+  bool usable() const { return measured_j > 0 && modelled_j > 0 && std::isfinite(ratio()); }
 };
 
 // From this mission on, the ratio is another one than before, under the same model.
-struct DriftMark {
+struct Mark {
   std::int64_t mission_key = 0;  // the first mission after the change
   std::int64_t utime_us = 0;
   std::int64_t model_version = 0;
@@ -32,7 +34,8 @@ struct DriftMark {
   std::size_t missions = 0;          // after it, until the next mark or the end
 };
 
-struct DriftSettings {
+// What watch, page and adoption all go by.
+struct Settings {
   double least_change = 0.01;      // of the ratio: what is smaller is no drift
   std::size_t least_missions = 3;  // on each side of a mark
 };
@@ -41,30 +44,6 @@ struct DriftSettings {
 // time; their scatter comes from differences of neighbours, so that a drift does not hide itself. A mark is
 // set where the two sides differ by more than chance over all places looked at allows (Bonferroni, 1 % a
 // stretch).
-std::vector<DriftMark> drift_marks(std::span<const MissionRatio> missions,
-                                   const DriftSettings& settings = {});
+std::vector<Mark> find_marks(std::span<const MissionRatio> missions, const Settings& settings);
 
-// One robot among others of its kind.
-struct SiblingRatio {
-  std::string robot_id;
-  std::size_t missions = 0;
-  double ratio = 1;                  // median over its missions
-  std::array<double, 2> interval{};  // of the median, 95 %
-  double deviation = 0;              // robust standard deviations from the kind's median
-  bool stands_out = false;           // more than chance allows, and by more than least_change
-};
-
-struct RobotRatios {
-  std::string robot_id;
-  std::vector<MissionRatio> missions;
-};
-
-// Compares the median ratios of robots of one kind; robots with fewer than least_missions missions are left
-// out, and none stands out among fewer than three. By robot id.
-std::vector<SiblingRatio> compare_siblings(std::span<const RobotRatios> robots,
-                                           const DriftSettings& settings = {});
-
-// What the parameters of an effect wear out with: "wear", "floor", "battery", "load", "sensors", "model".
-std::string_view cause_of(std::string_view effect_id);
-
-}  // namespace joulecast::gap
+}  // namespace joulecast::drift
