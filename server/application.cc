@@ -88,10 +88,15 @@ server::DiagnosisOptions diagnosis_options(const Settings& settings) {
   return options;
 }
 
+server::DriftOptions drift_options(const Settings& settings) {
+  server::DriftOptions options;
+  options.settings.least_change = settings.number("watch.least_change");
+  return options;
+}
+
 server::WatchOptions watch_options(const Settings& settings) {
   server::WatchOptions options;
   options.period_s = settings.number("watch.period_s");
-  options.drift.least_change = settings.number("watch.least_change");
   options.diagnose = settings.boolean("watch.diagnose");
   std::istringstream robots(settings.text("watch.robots"));
   for (std::string id; std::getline(robots, id, ',');)
@@ -211,6 +216,7 @@ struct Application::Parts {
   std::unique_ptr<history::Store> store;
   std::unique_ptr<history::Writer> writer;
   std::unique_ptr<server::IngestService> ingest;
+  std::unique_ptr<server::DriftView> drift;
   std::unique_ptr<server::ModelAdoption> adoption;
   std::unique_ptr<server::ProposalAcceptor> acceptor;  // null: a person adopts
   std::unique_ptr<server::DiagnosisService> diagnoses;
@@ -270,7 +276,8 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   if (Result<void> started = p.ingest->start(); !started)
     return fail(started.error().fault, "lcm.url", std::move(started.error().message));
 
-  p.adoption = std::make_unique<server::ModelAdoption>(*p.store, *p.writer, p.models, host_utime_us,
+  p.drift = std::make_unique<server::DriftView>(*p.store, p.models, drift_options(settings));
+  p.adoption = std::make_unique<server::ModelAdoption>(*p.store, *p.writer, p.models, *p.drift, host_utime_us,
                                                        adoption_options(settings));
   if (settings.boolean("adoption.automatic")) {
     p.acceptor = std::make_unique<server::ProposalAcceptor>(*p.store, *p.adoption, p.warn);
@@ -278,16 +285,16 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   }
   const auto warn_of = [](const Error& error) { log_error("diagnosis", error); };
   p.diagnoses = std::make_unique<server::DiagnosisService>(
-      *p.store, *p.writer, p.models, host_utime_us, diagnosis_options(settings), warn_of,
+      *p.store, *p.writer, p.models, *p.drift, host_utime_us, diagnosis_options(settings), warn_of,
       [&p](const history::DiagnosisRecord& diagnosis) { p.watch->on_diagnosis(diagnosis); });
-  p.watch = std::make_unique<server::GapWatch>(*p.store, *p.writer, p.models, *p.diagnoses, host_utime_us,
-                                               watch_options(settings), warn_of);
+  p.watch = std::make_unique<server::GapWatch>(*p.store, *p.writer, p.models, *p.drift, *p.diagnoses,
+                                               host_utime_us, watch_options(settings), warn_of);
   if (Result<void> started = p.diagnoses->start(); !started)
     return tl::unexpected(std::move(started.error()));
   p.watch->start();
-  p.services =
-      std::make_unique<api::Services>(api::Services{*p.store, *p.writer, p.models, p.fleet, *p.forecasts,
-                                                    p.cost_tables, *p.adoption, *p.diagnoses, host_utime_us});
+  p.services = std::make_unique<api::Services>(api::Services{*p.store, *p.writer, p.models, p.fleet,
+                                                             *p.forecasts, p.cost_tables, *p.drift,
+                                                             *p.adoption, *p.diagnoses, host_utime_us});
   std::vector<http::ReadinessCheck> checks;
   checks.push_back({"ingest", [&p]() -> Result<void> {
                       const server::IngestStatus status = p.ingest->status();

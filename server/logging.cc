@@ -4,9 +4,9 @@
 #include <spdlog/spdlog.h>
 
 #include <atomic>
-#include <ctime>
 #include <memory>
 
+#include "base/format_utc.h"
 #include "base/host_clock.h"
 
 namespace joulecast {
@@ -55,16 +55,8 @@ spdlog::logger& logger() {
 }
 
 std::string time_text(std::int64_t utime_us) {
-  std::time_t seconds = static_cast<std::time_t>(utime_us / 1'000'000);
-  std::int64_t rest = utime_us % 1'000'000;
-  if (rest < 0) {
-    rest += 1'000'000;
-    --seconds;
-  }
-  std::tm parts{};
-  gmtime_r(&seconds, &parts);
-  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:06}Z", parts.tm_year + 1900, parts.tm_mon + 1,
-                     parts.tm_mday, parts.tm_hour, parts.tm_min, parts.tm_sec, rest);
+  const std::int64_t rest = (utime_us % 1'000'000 + 1'000'000) % 1'000'000;
+  return fmt::format("{}.{:06}Z", format_utc(utime_us, "%Y-%m-%dT%H:%M:%S"), rest);
 }
 
 // Control characters are escaped in both formats: no value can forge a line.

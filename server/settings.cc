@@ -5,13 +5,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <utility>
 
+#include "base/json_text.h"
 #include "base/nearest_word.h"
-#include "server/http/json_text.h"
+#include "base/text_file.h"
 #include "server/http/text.h"
 
 namespace joulecast {
@@ -108,13 +107,6 @@ std::optional<std::string> text_of(const Setting& setting, const nlohmann::json&
   return std::nullopt;
 }
 
-Result<std::string> read_whole(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  if (!file || !(text << file.rdbuf())) return fail(Fault::not_found, "--config", "cannot read " + path);
-  return std::move(text).str();
-}
-
 struct Pending {
   std::string key;
   std::string value;
@@ -207,7 +199,7 @@ Result<void> Settings::set(std::string_view key, std::string_view value, Origin 
 }
 
 Result<void> Settings::read_file_text(std::string_view json_text, std::string_view file) {
-  auto document = http::parse_json(json_text);
+  auto document = parse_json(json_text);
   const std::string prefix = std::string(file) + ": ";
   if (!document) {
     return invalid(prefix + document.error().field, document.error().message);
@@ -343,7 +335,7 @@ Result<Invocation> read_settings(const std::vector<std::string>& arguments,
   if (given.action) invocation.action = *given.action;
   if (invocation.action == Action::help || invocation.action == Action::version) return invocation;
   if (given.config) {
-    auto text = read_whole(*given.config);
+    auto text = read_text_file(*given.config);
     if (!text) return tl::unexpected(text.error());
     if (auto done = invocation.settings.read_file_text(*text, *given.config); !done)
       return tl::unexpected(done.error());

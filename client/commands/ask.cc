@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/json_text.h"
 #include "client/commands/print_autonomy.h"
 #include "client/commands/table.h"
 #include "client/files.h"
@@ -21,7 +22,6 @@
 #include "robot/robot_file.h"
 #include "server/api/autonomy.h"
 #include "server/api/profile.h"
-#include "server/http/json_text.h"
 
 // What a scheduler asks of one robot: profile, estimate, autonomy. Answered here from a robot file, or by a
 // daemon; both answers come from the same functions.
@@ -74,7 +74,7 @@ Result<json> request_of(const Options& options) {
   if (!options.request_file.empty()) {
     const auto text = read_file(options.request_file);
     if (!text) return tl::unexpected(text.error());
-    auto parsed = http::parse_json(*text);
+    auto parsed = parse_json(*text);
     if (!parsed) return invalid(options.request_file, describe(parsed.error()));
     request = std::move(*parsed);
     if (!request.is_object()) return invalid(options.request_file, "is not a JSON object");

@@ -4,11 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "base/format_utc.h"
+#include "base/host_clock.h"
 #include "client/files.h"
 #include "client/wrapped.h"
 #include "gap/verdict/adopt.h"
@@ -229,11 +230,7 @@ report::ReportOrigin report_origin(const std::vector<std::string>& sources, cons
   for (const std::string& source : sources)
     origin.sources.push_back(std::filesystem::path(source).filename().string());
   origin.model = std::filesystem::path(robot_file).filename().string();
-  const std::time_t now = std::time(nullptr);
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  origin.made_at = fmt::format("{:04}-{:02}-{:02} {:02}:{:02}", utc.tm_year + 1900, utc.tm_mon + 1,
-                               utc.tm_mday, utc.tm_hour, utc.tm_min);
+  origin.made_at = format_utc(host_utime_us());
   origin.software = "joulecast " JOULECAST_VERSION;
   return origin;
 }

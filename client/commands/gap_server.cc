@@ -59,7 +59,9 @@ Result<json> follow(const Daemon& daemon, json job) {
   while (job["state"] == "queued" || job["state"] == "running") {
     progress.reach(static_cast<std::uint64_t>(100 * number(job["progress"])));
     if (interrupt.wait_until(std::chrono::steady_clock::now() + between_looks)) {
-      (void)daemon.ask(HttpMethod::del, target);
+      if (const auto cancelled = daemon.ask(HttpMethod::del, target); !cancelled)
+        return fail(Fault::conflict, "",
+                    "interrupted; the diagnosis goes on: " + describe(cancelled.error()));
       return fail(Fault::conflict, "", "interrupted; the diagnosis is cancelled");
     }
     auto now = daemon.json_of(HttpMethod::get, target);

@@ -13,13 +13,13 @@
 #include <utility>
 #include <vector>
 
+#include "base/json_text.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/http_client.h"
 #include "client/progress.h"
 #include "robot/robot_file.h"
 #include "server/api/autonomy.h"
-#include "server/http/json_text.h"
 
 namespace joulecast::client {
 namespace {
@@ -48,7 +48,7 @@ Result<std::string> ask_server(const Options& options, std::string request) {
 }
 
 Result<std::string> answer_here(const Options& options, const std::string& text) {
-  const auto parsed = http::parse_json(text);
+  const auto parsed = parse_json(text);
   if (!parsed) return invalid(options.request_file, describe(parsed.error()));
   const json& request = *parsed;
   if (!request.is_object()) return invalid(options.request_file, "is not a JSON object");

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <ctime>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -12,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/format_utc.h"
 #include "client/commands/parse_time.h"
 #include "client/commands/table.h"
 #include "client/http_client.h"
@@ -49,12 +49,7 @@ std::string text_of(const json& value) {
 
 std::string utc(const json& utime_us) {
   if (!utime_us.is_number_integer()) return "-";
-  const std::time_t seconds = utime_us.get<std::int64_t>() / 1'000'000;
-  std::tm parts{};
-  gmtime_r(&seconds, &parts);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S", &parts);
-  return text;
+  return format_utc(utime_us.get<std::int64_t>(), "%Y-%m-%d %H:%M:%S");
 }
 
 std::string joules(const json& energy, const char* name) {

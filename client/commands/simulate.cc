@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -16,6 +15,7 @@
 #include <variant>
 #include <vector>
 
+#include "base/format_utc.h"
 #include "base/host_clock.h"
 #include "base/text_file.h"
 #include "client/commands/table.h"
@@ -115,9 +115,9 @@ std::string numbered(const std::string& kind, std::size_t index) {
 // kinds in turn.
 Result<std::vector<Member>> assemble(const Options& options) {
   auto effects = parse_effects(options.effects);
-  if (!effects) return tl::unexpected<Error>(effects.error());
+  if (!effects) return tl::unexpected(effects.error());
   const auto imperfections = vr::make_imperfections(*effects);
-  if (!imperfections) return tl::unexpected<Error>(imperfections.error());
+  if (!imperfections) return tl::unexpected(imperfections.error());
 
   std::vector<Member> members;
   vr::Rng world_rng = vr::Rng::stream(options.seed, 1);
@@ -132,14 +132,14 @@ Result<std::vector<Member>> assemble(const Options& options) {
     } else {
       source = options.robot_files[k % options.robot_files.size()];
       auto read = read_text_file(source);
-      if (!read) return tl::unexpected<Error>(read.error());
+      if (!read) return tl::unexpected(read.error());
       text = std::move(*read);
     }
     auto member = make_member(source, text, std::nullopt);
-    if (!member) return tl::unexpected<Error>(member.error());
+    if (!member) return tl::unexpected(member.error());
     if (options.robot_files.empty() || options.robots != options.robot_files.size()) {
       member = make_member(source, text, numbered(member->spec.robot.robot_id, k));
-      if (!member) return tl::unexpected<Error>(member.error());
+      if (!member) return tl::unexpected(member.error());
     }
     const std::string& id = member->spec.robot.robot_id;
     if (!signals::is_valid_robot_id(id))
@@ -176,12 +176,12 @@ Result<std::vector<Member>> assemble(const Options& options) {
 
 Result<void> introduce(const std::vector<Member>& members, const std::string& url) {
   auto server = parse_server_url(url);
-  if (!server) return tl::unexpected<Error>(server.error());
+  if (!server) return tl::unexpected(server.error());
   for (const auto& member : members) {
     auto reply = http_request(*server, HttpMethod::put, "/v1/robots/" + member.spec.robot.robot_id,
                               member.json_text, std::chrono::seconds(5));
-    if (!reply) return tl::unexpected<Error>(reply.error());
-    if (!reply->ok()) return tl::unexpected<Error>(error_of(*reply));
+    if (!reply) return tl::unexpected(reply.error());
+    if (!reply->ok()) return tl::unexpected(error_of(*reply));
   }
   return {};
 }
@@ -204,7 +204,7 @@ struct Outlets {
   Result<void> send(const std::string& robot_id, const vr::Emission& emission) {
     const auto bytes =
         std::visit([&](const auto& message) { return encoded(robot_id, message); }, emission.message);
-    if (!bytes) return tl::unexpected<Error>(bytes.error());
+    if (!bytes) return tl::unexpected(bytes.error());
     constexpr telemetry::Subject subjects[] = {telemetry::Subject::mission_event,
                                                telemetry::Subject::telemetry, telemetry::Subject::covariates};
     const std::string channel = telemetry::channel_of(subjects[emission.message.index()], robot_id);
@@ -240,12 +240,7 @@ Result<void> write_truth(const Options& options, const std::vector<Member>& memb
 // which comes out the same again, the seed.
 std::string name_of_run(const Options& options, bool over_lcm, std::int64_t start_us) {
   if (!over_lcm) return "s" + std::to_string(options.seed);
-  const std::time_t seconds = start_us / 1'000'000;
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  std::array<char, 32> text{};
-  std::strftime(text.data(), text.size(), "%y%m%d-%H%M%S", &utc);
-  return text.data();
+  return format_utc(start_us, "%y%m%d-%H%M%S");
 }
 
 // Robot time from the first message to the last.

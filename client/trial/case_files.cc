@@ -94,7 +94,7 @@ std::string truth_text(const TrialCase& c) {
 
 Result<void> write_log(const TrialCase& c, const std::filesystem::path& path) {
   auto log = telemetry::EventLogWriter::create(path.string());
-  if (!log) return tl::unexpected<Error>(log.error());
+  if (!log) return tl::unexpected(log.error());
   vr::VirtualRobot robot(c.spec, c.seed);
   vr::Emission emission;
   while (robot.next(emission)) {
@@ -103,7 +103,7 @@ Result<void> write_log(const TrialCase& c, const std::filesystem::path& path) {
     const auto bytes = sample != nullptr ? telemetry::encode_telemetry(id, *sample)
                                          : telemetry::encode_mission_event(
                                                id, std::get<signals::MissionEvent>(emission.message));
-    if (!bytes) return tl::unexpected<Error>(bytes.error());
+    if (!bytes) return tl::unexpected(bytes.error());
     const auto subject =
         sample != nullptr ? telemetry::Subject::telemetry : telemetry::Subject::mission_event;
     if (auto done = log->write(emission.utime_us, telemetry::channel_of(subject, id), *bytes); !done) {
@@ -120,17 +120,17 @@ Result<std::uint64_t> drive_case(const TrialCase& c, const CaseFiles& files) {
   std::filesystem::create_directories(files.folder, failed);
   if (failed) return fail(Fault::unavailable, files.folder.string(), "cannot be made: " + failed.message());
   if (auto done = client::write_file(files.robot().string(), c.robot_json); !done)
-    return tl::unexpected<Error>(done.error());
-  if (auto done = write_log(c, files.log()); !done) return tl::unexpected<Error>(done.error());
+    return tl::unexpected(done.error());
+  if (auto done = write_log(c, files.log()); !done) return tl::unexpected(done.error());
   if (auto done = client::write_file(files.truth().string(), truth_text(c)); !done)
-    return tl::unexpected<Error>(done.error());
+    return tl::unexpected(done.error());
   return digest_of(files);
 }
 
 Result<std::uint64_t> digest_of(const CaseFiles& files) {
   Digest digest;
   for (const auto& path : {files.robot(), files.log(), files.truth()}) {
-    if (auto done = digest_file(digest, path); !done) return tl::unexpected<Error>(done.error());
+    if (auto done = digest_file(digest, path); !done) return tl::unexpected(done.error());
   }
   return digest.value();
 }

@@ -47,7 +47,7 @@ Result<std::vector<Outcome>> run_cases(
     const std::function<Result<Outcome>(std::size_t index, const CaseFiles& files)>& run_case,
     const std::function<void(const Outcome&)>& done) {
   const auto folder = CaseFolder::open(keep);
-  if (!folder) return tl::unexpected<Error>(folder.error());
+  if (!folder) return tl::unexpected(folder.error());
   std::vector<Outcome> outcomes(count);
   std::atomic<std::size_t> next{0};
   std::mutex mutex;
@@ -72,7 +72,7 @@ Result<std::vector<Outcome>> run_cases(
     for (std::size_t k = 1; k < jobs; ++k) others.emplace_back(work);
     work();
   }
-  if (error) return tl::unexpected<Error>(*error);
+  if (error) return tl::unexpected(*error);
   return outcomes;
 }
 

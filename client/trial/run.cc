@@ -16,18 +16,18 @@ Result<CaseOutcome> run_case(const RunSettings& settings, std::size_t index, con
   CaseOutcome outcome;
   outcome.index = index;
   const auto digest = settings.again ? digest_of(files) : drive_case(draw_case(settings.trial, index), files);
-  if (!digest) return tl::unexpected<Error>(digest.error());
+  if (!digest) return tl::unexpected(digest.error());
   outcome.digest = *digest;
 
   // As `joulecast gap LOG --robot FILE` does: nothing else is read.
   const double began_s = thread_cpu_s();
   const auto robot = robot::load_robot(files.robot());
-  if (!robot) return tl::unexpected<Error>(robot.error());
+  if (!robot) return tl::unexpected(robot.error());
   const std::string log = files.log().string();
   const auto recordings = telemetry::load_recordings({&log, 1});
-  if (!recordings) return tl::unexpected<Error>(recordings.error());
+  if (!recordings) return tl::unexpected(recordings.error());
   auto diagnosis = gap::diagnose(*recordings, *robot, settings.diagnosis);
-  if (!diagnosis) return tl::unexpected<Error>(diagnosis.error());
+  if (!diagnosis) return tl::unexpected(diagnosis.error());
   outcome.diagnosis = std::move(*diagnosis);
   outcome.diagnosis_s = thread_cpu_s() - began_s;
 
@@ -37,13 +37,13 @@ Result<CaseOutcome> run_case(const RunSettings& settings, std::size_t index, con
     }
     for (const Ablation ablation : ablations) {
       auto without = diagnose_without(ablation, *recordings, *robot, settings.diagnosis);
-      if (!without) return tl::unexpected<Error>(without.error());
+      if (!without) return tl::unexpected(without.error());
       outcome.others.emplace_back(name_of(ablation), std::move(*without));
     }
   }
 
   auto truth = open_truth(files.truth());
-  if (!truth) return tl::unexpected<Error>(truth.error());
+  if (!truth) return tl::unexpected(truth.error());
   outcome.truth = std::move(*truth);
   outcome.oracle = oracle_shrinkage(*recordings, *robot, outcome.truth);
   return outcome;

@@ -127,7 +127,7 @@ Result<RobotParameters> parse_robot(const std::string& json_text) {
   if (const json* effects = in.find("/effects"); effects != nullptr && !effects->empty()) {
     in.report("/effects", "must be empty: a virtual robot's imperfections are given with --effect");
   }
-  if (!in.fault().message.empty()) return tl::unexpected<Error>(in.fault());
+  if (!in.fault().message.empty()) return tl::unexpected(in.fault());
   return p;
 }
 

@@ -5,7 +5,6 @@
 #include "server/api/common_parameters.h"
 #include "server/api/json_writer.h"
 #include "server/api/services.h"
-#include "server/diagnosis/gap_watch.h"
 
 // How a robot's gap moved over its missions, what was adopted meanwhile, and how robots of its kind do.
 namespace joulecast::api {
@@ -18,11 +17,10 @@ using http::Response;
 using nlohmann::json;
 
 constexpr std::int64_t most_missions = 5000;
-constexpr std::size_t sibling_missions = 10;  // newest ones, that tell how a robot does now
 
-void write_ratios(JsonWriter& out, const std::vector<gap::MissionRatio>& missions) {
+void write_ratios(JsonWriter& out, const std::vector<drift::MissionRatio>& missions) {
   out.key("missions").begin_array();
-  for (const gap::MissionRatio& m : missions) {
+  for (const drift::MissionRatio& m : missions) {
     out.begin_object().field("id", m.mission_key).field("start_utime_us", m.utime_us);
     out.field("model_version", m.model_version).field("measured_j", m.measured_j);
     out.field("modelled_j", m.modelled_j).field("ratio", m.ratio()).end_object();
@@ -30,9 +28,9 @@ void write_ratios(JsonWriter& out, const std::vector<gap::MissionRatio>& mission
   out.end_array();
 }
 
-void write_marks(JsonWriter& out, const std::vector<gap::DriftMark>& marks) {
+void write_marks(JsonWriter& out, const std::vector<drift::Mark>& marks) {
   out.key("drift").begin_array();
-  for (const gap::DriftMark& m : marks) {
+  for (const drift::Mark& m : marks) {
     out.begin_object().field("id", m.mission_key).field("start_utime_us", m.utime_us);
     out.field("model_version", m.model_version).field("ratio_before", m.before).field("ratio_after", m.after);
     out.array("change_ci", m.interval);
@@ -64,29 +62,23 @@ Result<Response> gap_history(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
   const auto model = model_of(services, id);
   if (!model) return tl::unexpected(model.error());
-  const auto missions = server::mission_ratios(
-      services.store, id, static_cast<std::size_t>(request.query_integer("limit").value_or(500)));
+  const auto missions =
+      services.drift.missions(id, static_cast<std::size_t>(request.query_integer("limit").value_or(500)));
   if (!missions) return tl::unexpected(missions.error());
+  const auto marks = services.drift.marks(id);
+  if (!marks) return tl::unexpected(marks.error());
+  const auto siblings = services.drift.siblings(id);
+  if (!siblings) return tl::unexpected(siblings.error());
   const auto versions = services.store.model_versions(id);
   if (!versions) return tl::unexpected(versions.error());
-
-  std::vector<gap::RobotRatios> kind;
-  for (const std::string& sibling : server::robots_of_kind(services.models, id)) {
-    const auto in_force = services.models.find(sibling);
-    auto ratios = server::mission_ratios(services.store, sibling, 4 * sibling_missions);
-    if (!ratios) return tl::unexpected(std::move(ratios.error()));
-    std::erase_if(*ratios, [&](const auto& m) { return m.model_version != in_force->version; });
-    if (ratios->size() > sibling_missions) ratios->erase(ratios->begin(), ratios->end() - sibling_missions);
-    kind.push_back({sibling, std::move(*ratios)});
-  }
 
   JsonWriter out;
   out.begin_object().field("robot_id", id).field("model_version", (*model)->version);
   write_ratios(out, *missions);
-  write_marks(out, gap::drift_marks(*missions));
+  write_marks(out, *marks);
   write_versions(out, *versions);
   out.key("siblings").begin_array();
-  for (const gap::SiblingRatio& s : gap::compare_siblings(kind)) {
+  for (const drift::SiblingRatio& s : *siblings) {
     out.begin_object().field("robot_id", s.robot_id).field("missions", static_cast<std::int64_t>(s.missions));
     out.field("ratio", s.ratio);
     out.array("ci", s.interval);

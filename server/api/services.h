@@ -8,6 +8,7 @@
 #include "history/writer.h"
 #include "planning/cost_table_cache.h"
 #include "server/diagnosis/diagnosis_service.h"
+#include "server/diagnosis/drift_view.h"
 #include "server/diagnosis/model_adoption.h"
 #include "server/http/router.h"
 #include "server/ingest/fleet_view.h"
@@ -24,6 +25,7 @@ struct Services {
   const server::FleetView& fleet;
   server::Forecasts& forecasts;
   planning::CostTableCache& cost_tables;
+  const server::DriftView& drift;
   server::ModelAdoption& adoption;
   server::DiagnosisService& diagnoses;
   std::function<std::int64_t()> now_utime_us;  // host clock

@@ -7,19 +7,18 @@
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
-#include <ctime>
 #include <deque>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <thread>
 #include <utility>
 
+#include "base/format_utc.h"
 #include "gap/diagnose/recordings.h"
 #include "gap/verdict/diagnosis_json.h"
 #include "gap/verdict/offer.h"
 #include "report/report.h"
 #include "robot/robot_file.h"
-#include "server/diagnosis/gap_watch.h"
 #include "server/diagnosis/mission_recordings.h"
 
 namespace joulecast::server {
@@ -61,15 +60,6 @@ json summary_of(const ordered_json& result) {
           {"shrinkage", result["shrinkage"]}};
 }
 
-// As "2026-01-31 12:00".
-std::string utc_text(std::int64_t utime_us) {
-  const std::time_t seconds = utime_us / 1'000'000;
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  char text[32];
-  return {text, std::strftime(text, sizeof text, "%Y-%m-%d %H:%M", &utc)};
-}
-
 // Spread evenly over the missions: every 1/share-th, one at least of three or more.
 bool is_held_back(std::size_t index, std::size_t count, double share) {
   if (!(share > 0) || count < 2) return false;
@@ -84,11 +74,12 @@ bool is_held_back(std::size_t index, std::size_t count, double share) {
 class DiagnosisService::Impl {
  public:
   Impl(const history::Store& store, history::Writer& writer, const ModelRegistry& models,
-       std::function<std::int64_t()> now_utime_us, const DiagnosisOptions& options,
+       const DriftView& drift, std::function<std::int64_t()> now_utime_us, const DiagnosisOptions& options,
        std::function<void(const Error&)> on_error, Ended on_ended)
       : store_(store),
         writer_(writer),
         models_(models),
+        drift_(drift),
         now_utime_us_(std::move(now_utime_us)),
         options_(options),
         on_error_(std::move(on_error)),
@@ -273,8 +264,11 @@ class DiagnosisService::Impl {
     wanted.only = request.missions;
     wanted.since_utime_us = request.since_utime_us;
     // A robot that changed is two robots to the diagnosis: it is asked for the one that it is now.
-    if (request.missions.empty() && !request.since_utime_us)
-      wanted.since_utime_us = last_drift(store_, record.robot_id, model->version, options_.max_missions);
+    if (request.missions.empty() && !request.since_utime_us) {
+      const auto change = drift_.last_change(record.robot_id, model->version);
+      if (!change) return tl::unexpected(change.error());
+      wanted.since_utime_us = *change;
+    }
     wanted.max_missions = std::min(request.max_missions, options_.max_missions);
     wanted.max_samples = options_.max_samples;
     wanted.battery_capacity_ah = model->robot.battery.capacity_ah;
@@ -324,7 +318,7 @@ class DiagnosisService::Impl {
     for (const telemetry::Recording& mission : recordings.missions)
       origin.sources.push_back(mission.mission_id);
     origin.model = "version " + std::to_string(model.version) + " of " + record.robot_id;
-    origin.made_at = utc_text(now_utime_us_());
+    origin.made_at = format_utc(now_utime_us_());
     origin.software = "joulecastd " JOULECAST_VERSION;
     report_ = report::report_html(diagnosis, model.robot, origin);
     // What a person who insists would get; of effects that are not told apart nobody has chosen one yet.
@@ -360,6 +354,7 @@ class DiagnosisService::Impl {
   const history::Store& store_;
   history::Writer& writer_;
   const ModelRegistry& models_;
+  const DriftView& drift_;
   std::function<std::int64_t()> now_utime_us_;
   DiagnosisOptions options_;
   std::function<void(const Error&)> on_error_;
@@ -376,10 +371,11 @@ class DiagnosisService::Impl {
 };
 
 DiagnosisService::DiagnosisService(const history::Store& store, history::Writer& writer,
-                                   const ModelRegistry& models, std::function<std::int64_t()> now_utime_us,
+                                   const ModelRegistry& models, const DriftView& drift,
+                                   std::function<std::int64_t()> now_utime_us,
                                    const DiagnosisOptions& options,
                                    std::function<void(const Error&)> on_error, Ended on_ended)
-    : impl_(std::make_unique<Impl>(store, writer, models, std::move(now_utime_us), options,
+    : impl_(std::make_unique<Impl>(store, writer, models, drift, std::move(now_utime_us), options,
                                    std::move(on_error), std::move(on_ended))) {}
 DiagnosisService::~DiagnosisService() = default;
 Result<void> DiagnosisService::start() {

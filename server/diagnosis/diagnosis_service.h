@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "history/store.h"
 #include "history/writer.h"
+#include "server/diagnosis/drift_view.h"
 #include "server/ingest/model_registry.h"
 
 namespace joulecast::server {
@@ -58,8 +59,9 @@ class DiagnosisService {
 
   // `on_ended` is told of every job that has ended and is stored; called on the service's thread.
   DiagnosisService(const history::Store& store, history::Writer& writer, const ModelRegistry& models,
-                   std::function<std::int64_t()> now_utime_us, const DiagnosisOptions& options,
-                   std::function<void(const Error&)> on_error, Ended on_ended = {});
+                   const DriftView& drift, std::function<std::int64_t()> now_utime_us,
+                   const DiagnosisOptions& options, std::function<void(const Error&)> on_error,
+                   Ended on_ended = {});
   ~DiagnosisService();  // cancels what runs
   DiagnosisService(const DiagnosisService&) = delete;
   DiagnosisService& operator=(const DiagnosisService&) = delete;

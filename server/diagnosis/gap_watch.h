@@ -4,26 +4,22 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
-#include <optional>
 #include <set>
 #include <string>
 #include <thread>
-#include <vector>
 
-#include "gap/drift.h"
 #include "history/store.h"
 #include "history/writer.h"
 #include "server/diagnosis/diagnosis_service.h"
+#include "server/diagnosis/drift_view.h"
 #include "server/ingest/model_registry.h"
 
 namespace joulecast::server {
 
 struct WatchOptions {
-  double period_s = 3600;          // 0: no watch
-  std::set<std::string> robots;    // empty: all
-  std::size_t max_missions = 500;  // of each robot, newest first
-  bool diagnose = true;            // a drift starts a diagnosis of the missions since
-  gap::DriftSettings drift;
+  double period_s = 3600;        // 0: no watch
+  std::set<std::string> robots;  // empty: all
+  bool diagnose = true;          // a drift starts a diagnosis of the missions since
 };
 
 struct WatchCounts {
@@ -34,19 +30,6 @@ struct WatchCounts {
   double ratio_min = 1, ratio_median = 1, ratio_max = 1;  // of the robots' newest missions; NaN: none
 };
 
-// The finished missions of a robot that measured energy, as the meter accounted them, newest `limit`, oldest
-// first.
-Result<std::vector<gap::MissionRatio>> mission_ratios(const history::Store& store,
-                                                      const std::string& robot_id, std::size_t limit);
-
-// Start of the first mission after the robot's last change of consumption under this version of its model, as
-// far as its newest `limit` missions show one.
-std::optional<std::int64_t> last_drift(const history::Store& store, const std::string& robot_id,
-                                       std::int64_t version, std::size_t limit);
-
-// Robots whose files agree in all but their id, idle power and effects: one kind.
-std::vector<std::string> robots_of_kind(const ModelRegistry& models, const std::string& robot_id);
-
 // Looks at every robot's missions from time to time: a change of measured over modelled energy is an event
 // "gap_drift" and, when asked for, starts a diagnosis of the missions since, whose end is an event
 // "gap_diagnosed" that says what it blames: wear, floor, battery, load or sensors. A robot that comes to
@@ -54,7 +37,7 @@ std::vector<std::string> robots_of_kind(const ModelRegistry& models, const std::
 class GapWatch {
  public:
   GapWatch(const history::Store& store, history::Writer& writer, const ModelRegistry& models,
-           DiagnosisService& diagnoses, std::function<std::int64_t()> now_utime_us,
+           const DriftView& drift, DiagnosisService& diagnoses, std::function<std::int64_t()> now_utime_us,
            const WatchOptions& options, std::function<void(const Error&)> on_error);
   ~GapWatch();
   GapWatch(const GapWatch&) = delete;
@@ -71,13 +54,16 @@ class GapWatch {
   WatchCounts counts() const;
 
  private:
-  void look_at(const std::string& robot_id, const std::vector<gap::MissionRatio>& missions,
-               WatchCounts& counts);
+  Result<void> look_at(const ModelInForce& model, WatchCounts& counts);
+  Result<void> compare_kinds(WatchCounts& counts);
+  Result<void> remember(const std::string& robot_id, std::int64_t announced_utime_us, bool stood_out);
+  bool watches(const std::string& robot_id) const;
   void record(const std::string& robot_id, const std::string& kind, std::string detail_json);
 
   const history::Store& store_;
   history::Writer& writer_;
   const ModelRegistry& models_;
+  const DriftView& drift_;
   DiagnosisService& diagnoses_;
   std::function<std::int64_t()> now_utime_us_;
   WatchOptions options_;

@@ -8,7 +8,6 @@
 
 #include "energy/back_test_json.h"
 #include "robot/robot_file.h"
-#include "server/diagnosis/gap_watch.h"
 
 namespace joulecast::server {
 namespace {
@@ -62,10 +61,12 @@ std::string refusal_of(const energy::BackTest& test) {
 }  // namespace
 
 ModelAdoption::ModelAdoption(const history::Store& store, history::Writer& writer, ModelRegistry& models,
-                             std::function<std::int64_t()> now_utime_us, const AdoptionOptions& options)
+                             const DriftView& drift, std::function<std::int64_t()> now_utime_us,
+                             const AdoptionOptions& options)
     : store_(store),
       writer_(writer),
       models_(models),
+      drift_(drift),
       now_utime_us_(std::move(now_utime_us)),
       options_(options) {}
 
@@ -88,12 +89,13 @@ Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request, 
     for (const history::MissionKey key : request.fitted_on)
       if (const auto mission = store_.mission(key))
         since_utime_us = std::min(since_utime_us.value_or(mission->start_utime_us), mission->start_utime_us);
-    const auto drift = last_drift(store_, wanted.robot_id, before.version, 2 * options_.max_missions);
-    if (drift && drift > since_utime_us) {
-      wanted.since_utime_us = drift;
+    const auto change = drift_.last_change(wanted.robot_id, before.version);
+    if (!change) return tl::unexpected(change.error());
+    if (*change && *change > since_utime_us) {
+      wanted.since_utime_us = *change;
       Result<StoredRecordings> recent = read_recordings(store_, wanted);
       if (!recent || recent->missions.size() >= enough_missions) {
-        since_utime_us = drift;
+        since_utime_us = *change;
         return recent;
       }
     }

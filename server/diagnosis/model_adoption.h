@@ -13,6 +13,7 @@
 #include "history/store.h"
 #include "history/writer.h"
 #include "robot/robot_model.h"
+#include "server/diagnosis/drift_view.h"
 #include "server/diagnosis/mission_recordings.h"
 #include "server/ingest/model_registry.h"
 
@@ -70,7 +71,8 @@ struct AdoptionOptions {
 class ModelAdoption {
  public:
   ModelAdoption(const history::Store& store, history::Writer& writer, ModelRegistry& models,
-                std::function<std::int64_t()> now_utime_us, const AdoptionOptions& options);
+                const DriftView& drift, std::function<std::int64_t()> now_utime_us,
+                const AdoptionOptions& options);
 
   // Fault::not_found: the robot has no model to test against; ::invalid: the candidate is no valid model;
   // ::conflict: another model came in force meanwhile; ::unavailable: another back-test is running, or the
@@ -90,6 +92,7 @@ class ModelAdoption {
   const history::Store& store_;
   history::Writer& writer_;
   ModelRegistry& models_;
+  const DriftView& drift_;
   std::function<std::int64_t()> now_utime_us_;
   AdoptionOptions options_;
   std::atomic<std::uint64_t> adopted_ = 0, forced_ = 0, refused_ = 0;

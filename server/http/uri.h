@@ -14,9 +14,6 @@ namespace joulecast::http {
 // control characters and on text that is not UTF-8.
 std::optional<std::string> percent_decode(std::string_view text, bool plus_is_space);
 
-// True for well-formed UTF-8 without overlong forms, surrogates or values above U+10FFFF.
-bool is_utf8(std::string_view text);
-
 struct Target {
   std::vector<std::string> segments;  // of the path, decoded one by one: "%2F" stays inside its segment
   std::vector<std::pair<std::string, std::string>> query;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "forecast/siblings.h"
+#include "robot/kind.h"
 
 namespace joulecast::server {
 namespace {
@@ -111,7 +112,7 @@ void Forecasts::bring_up(Entry& entry, const std::shared_ptr<const ModelInForce>
   if (entry.model == model) return;
   const bool first = entry.forecast == nullptr;
   entry.model = model;
-  entry.kind = forecast::kind_of(model->robot);
+  entry.kind = robot::kind_of(model->robot);
   entry.outlook.model = model;
   entry.outlook.battery = charge_map(model->robot.battery);
   if (first) {

@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <initializer_list>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
+
+#include "base/json_text.h"
+#include "base/text_file.h"
 
 namespace joulecast::exploration {
 namespace {
@@ -149,19 +151,13 @@ Result<Map> parse_map(std::string_view text) {
     return fail(Fault::too_large, "",
                 fmt::format("has {} bytes, must have at most {}", text.size(), max_file_bytes));
   }
-  const json document = json::parse(text, nullptr, false);
-  if (document.is_discarded()) return invalid("", "is not JSON");
-  return read_map(document);
+  return parse_json(text).and_then(read_map);
 }
 
 Result<Map> load_map(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return fail(Fault::not_found, "", path.string() + ": cannot be read");
-  std::string text(max_file_bytes + 1, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (file.bad()) return fail(Fault::not_found, "", path.string() + ": cannot be read");
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  auto map = parse_map(text);
+  const auto text = read_text_file(path);
+  if (!text) return tl::unexpected(text.error());
+  auto map = parse_map(*text);
   if (!map) map.error().message = path.string() + ": " + map.error().message;
   return map;
 }

@@ -1,7 +1,6 @@
 #include "forecast/siblings.h"
 
 #include <algorithm>
-#include <cstdio>
 
 namespace joulecast::forecast {
 namespace {
@@ -49,15 +48,6 @@ Siblings pool(std::span<const OwnFinding* const> others) {
                            finding->scores.end());
   }
   return siblings;
-}
-
-std::string kind_of(const robot::RobotModel& r) {
-  std::array<char, 200> text{};
-  const int length = std::snprintf(text.data(), text.size(), "%.6g %.6g %.6g %.6g %.6g %.6g %.6g %.6g",
-                                   r.kinematics.wheel_radius_m, r.kinematics.half_track_m, r.mass.chassis_kg,
-                                   r.mass.wheel_kg, r.motor.resistance_ohm, r.motor.torque_constant_nm_a,
-                                   r.motor.gear_ratio, r.battery.nominal_voltage_v);
-  return {text.data(), static_cast<std::size_t>(length)};
 }
 
 }  // namespace joulecast::forecast

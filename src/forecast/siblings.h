@@ -3,12 +3,10 @@
 #include <array>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "forecast/correction.h"
 #include "forecast/scores.h"
-#include "robot/robot_model.h"
 
 namespace joulecast::forecast {
 
@@ -34,8 +32,5 @@ struct Siblings {
 // between robots) and drawn to the untried prior; the variance between robots is that of the findings beyond
 // what their own variances explain, never less than what 5 % with the weight of three robots would give.
 Siblings pool(std::span<const OwnFinding* const> others);
-
-// Robots that share this text are siblings: same body and motors, whatever was calibrated since.
-std::string kind_of(const robot::RobotModel& robot);
 
 }  // namespace joulecast::forecast

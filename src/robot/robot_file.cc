@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "base/json_hint.h"
+#include "base/json_text.h"
 #include "base/text_file.h"
 #include "robot/robot_fields.h"
 
@@ -64,18 +64,9 @@ struct Overloaded : Cases... {
 template <class... Cases>
 Overloaded(Cases...) -> Overloaded<Cases...>;
 
-// The pointer of a member, escaped after RFC 6901.
-std::string child(std::string pointer, std::string_view key) {
-  pointer += '/';
-  for (const char c : key) {
-    if (c == '~')
-      pointer += "~0";
-    else if (c == '/')
-      pointer += "~1";
-    else
-      pointer += c;
-  }
-  return pointer;
+// The pointer of a member.
+std::string child(const std::string& pointer, std::string_view key) {
+  return pointer + (json::json_pointer() / std::string(key)).to_string();
 }
 
 std::string with_unit(double value, std::string_view unit) {
@@ -451,31 +442,11 @@ void read_document(const json& document, std::string_view root, Wanted wanted, R
   }
 }
 
-// nlohmann keeps the last of two equal keys; a file that says two things is refused instead.
 Result<json> parse_text(std::string_view text) {
   if (text.size() > max_file_bytes)
     return fail(Fault::too_large, "",
                 fmt::format("is {} bytes, must be at most {}", text.size(), max_file_bytes));
-  std::vector<std::set<std::string>> open_objects;
-  std::string repeated;
-  const auto watch = [&](int, json::parse_event_t event, json& parsed) {
-    if (event == json::parse_event_t::object_start) open_objects.emplace_back();
-    if (event == json::parse_event_t::object_end) open_objects.pop_back();
-    if (event == json::parse_event_t::key && !open_objects.back().insert(parsed.get<std::string>()).second)
-      repeated = parsed.get<std::string>();
-    return true;
-  };
-  try {
-    json document = json::parse(text.begin(), text.end(), watch);
-    if (!repeated.empty()) return invalid(child("", repeated), "is given twice in one object");
-    return document;
-  } catch (const json::exception& error) {
-    const std::string_view what = error.what();  // begins with the library's name for it, in brackets
-    const std::size_t bracket = what.find("] ");
-    const auto* fault = dynamic_cast<const json::parse_error*>(&error);
-    return invalid("", fmt::format("is not JSON: {}{}", what.substr(bracket == what.npos ? 0 : bracket + 2),
-                                   fault == nullptr ? "" : not_finite_hint(text, fault->byte)));
-  }
+  return parse_json(text);
 }
 
 Result<Battery> parse_battery_document(const json& document) {

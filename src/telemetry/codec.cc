@@ -10,8 +10,8 @@
 #include <limits>
 #include <utility>
 
+#include "base/utf8.h"
 #include "signals/ids.h"
-#include "telemetry/utf8.h"
 
 namespace joulecast::telemetry {
 namespace {
@@ -116,7 +116,7 @@ class Guard {
     if (!error_ && position_ != bytes_.size()) {
       refuse("", std::to_string(bytes_.size() - position_) + " bytes follow the message");
     }
-    if (error_) return tl::unexpected<Error>(std::move(*error_));
+    if (error_) return tl::unexpected(std::move(*error_));
     return {};
   }
 
@@ -144,7 +144,7 @@ class Guard {
 
 template <class Message>
 Result<Message> decode_guarded(std::span<const std::uint8_t> bytes, Guard& guard) {
-  if (auto sound = guard.finish(); !sound) return tl::unexpected<Error>(std::move(sound.error()));
+  if (auto sound = guard.finish(); !sound) return tl::unexpected(std::move(sound.error()));
   Message message;
   const int size = static_cast<int>(bytes.size());
   if (message.decode(bytes.data(), 0, size) != size) {
@@ -191,7 +191,7 @@ Result<DecodedTelemetry> decode_telemetry(std::span<const std::uint8_t> bytes) {
   guard.fixed(8, "sequence");
   guard.text("robot_id", Text::id, signals::max_robot_id_length);
   guard.fixed(signals::sample_numbers * real, "wheel_velocity to payload_mass");
-  if (auto sound = guard.finish(); !sound) return tl::unexpected<Error>(std::move(sound.error()));
+  if (auto sound = guard.finish(); !sound) return tl::unexpected(std::move(sound.error()));
 
   const std::uint8_t* at = bytes.data() + 8;  // past the fingerprint
   const auto next = [&at](std::size_t size) {
@@ -221,7 +221,7 @@ Result<DecodedMissionEvent> decode_mission_event(std::span<const std::uint8_t> b
   guard.fixed(real, "payload_mass");
   guard.text("note", Text::note, signals::max_note_length);
   auto decoded = decode_guarded<mission_event_t>(bytes, guard);
-  if (!decoded) return tl::unexpected<Error>(std::move(decoded.error()));
+  if (!decoded) return tl::unexpected(std::move(decoded.error()));
 
   DecodedMissionEvent result;
   result.robot_id = std::move(decoded->robot_id);
@@ -242,7 +242,7 @@ Result<DecodedCovariates> decode_covariates(std::span<const std::uint8_t> bytes)
   guard.texts("name", count, Text::covariate_name, max_covariate_text);
   guard.fixed(count * real, "value");
   auto decoded = decode_guarded<robot_covariates_t>(bytes, guard);
-  if (!decoded) return tl::unexpected<Error>(std::move(decoded.error()));
+  if (!decoded) return tl::unexpected(std::move(decoded.error()));
 
   DecodedCovariates result;
   result.robot_id = std::move(decoded->robot_id);
@@ -262,7 +262,7 @@ Result<signals::EnergyState> decode_energy_state(std::span<const std::uint8_t> b
   guard.fixed(8, "model_version");
   guard.fixed(16 * real, "measured_power to winding_temperature");
   auto decoded = decode_guarded<energy_state_t>(bytes, guard);
-  if (!decoded) return tl::unexpected<Error>(std::move(decoded.error()));
+  if (!decoded) return tl::unexpected(std::move(decoded.error()));
 
   signals::EnergyState state;
   state.utime_us = decoded->utime;
@@ -287,7 +287,7 @@ Result<signals::EnergyState> decode_energy_state(std::span<const std::uint8_t> b
 
 Result<std::vector<std::uint8_t>> encode_telemetry(std::string_view robot_id, const signals::Sample& sample) {
   if (auto fault = check_text("robot_id", robot_id, Text::id, signals::max_robot_id_length)) {
-    return tl::unexpected<Error>(std::move(*fault));
+    return tl::unexpected(std::move(*fault));
   }
   std::vector<std::uint8_t> bytes;
   bytes.reserve(28 + robot_id.size() + 1 + signals::sample_numbers * real);
@@ -311,7 +311,7 @@ Result<std::vector<std::uint8_t>> encode_mission_event(std::string_view robot_id
   for (auto& fault : {check_text("robot_id", robot_id, Text::id, signals::max_robot_id_length),
                       check_text("mission_id", event.mission_id, Text::id, signals::max_mission_id_length),
                       check_text("note", event.note, Text::note, signals::max_note_length)}) {
-    if (fault) return tl::unexpected<Error>(*fault);
+    if (fault) return tl::unexpected(*fault);
   }
   mission_event_t message;
   message.utime = event.utime_us;
@@ -326,7 +326,7 @@ Result<std::vector<std::uint8_t>> encode_mission_event(std::string_view robot_id
 Result<std::vector<std::uint8_t>> encode_covariates(std::string_view robot_id,
                                                     const signals::CovariateMessage& message) {
   if (auto fault = check_text("robot_id", robot_id, Text::id, max_covariates_robot_id_length))
-    return tl::unexpected<Error>(std::move(*fault));
+    return tl::unexpected(std::move(*fault));
   const std::size_t count = message.covariates.size();
   if (count > signals::max_covariates) {
     return invalid("n", "is " + std::to_string(count) + "; 0 to " + std::to_string(signals::max_covariates) +
@@ -340,7 +340,7 @@ Result<std::vector<std::uint8_t>> encode_covariates(std::string_view robot_id,
     const auto& [name, value] = message.covariates[k];
     const std::string field = "name[" + std::to_string(k) + "]";
     if (auto fault = check_text(field.c_str(), name, Text::covariate_name, max_covariate_text))
-      return tl::unexpected<Error>(std::move(*fault));
+      return tl::unexpected(std::move(*fault));
     out.name.push_back(name);
     out.value.push_back(value);
   }
@@ -351,7 +351,7 @@ Result<std::vector<std::uint8_t>> encode_energy_state(const signals::EnergyState
   for (auto& fault :
        {check_text("robot_id", state.robot_id, Text::id, signals::max_robot_id_length),
         check_text("mission_id", state.mission_id, Text::optional_id, signals::max_mission_id_length)}) {
-    if (fault) return tl::unexpected<Error>(*fault);
+    if (fault) return tl::unexpected(*fault);
   }
   energy_state_t message;
   message.utime = state.utime_us;

@@ -121,7 +121,7 @@ class Importer {
   }
   [[nodiscard]] tl::unexpected<Error> located(Error error) const {
     error.field = options_.source_name + ": " + error.field;
-    return tl::unexpected<Error>(std::move(error));
+    return tl::unexpected(std::move(error));
   }
 
   CsvTable table_;
@@ -153,7 +153,7 @@ Result<Reference> Importer::bind_term(const ColumnTerm& term) {
     return Reference{known->second, term.negate};
   }
   auto place = place_of(term.column);
-  if (!place) return tl::unexpected<Error>(std::move(place.error()));
+  if (!place) return tl::unexpected(std::move(place.error()));
   Column column{term.column, *place, nullptr, signals::unmeasured};
   if (const auto limits = mapping_.column_limits.find(term.column); limits != mapping_.column_limits.end()) {
     column.limits = &limits->second;
@@ -167,7 +167,7 @@ Result<std::vector<Reference>> Importer::bind_terms(const std::vector<ColumnTerm
   std::vector<Reference> references;
   for (const ColumnTerm& term : terms) {
     auto reference = bind_term(term);
-    if (!reference) return tl::unexpected<Error>(std::move(reference.error()));
+    if (!reference) return tl::unexpected(std::move(reference.error()));
     references.push_back(*reference);
   }
   return references;
@@ -175,34 +175,34 @@ Result<std::vector<Reference>> Importer::bind_terms(const std::vector<ColumnTerm
 
 Result<BoundExpression> Importer::bind_expression(const FieldExpression& expression, std::string name) {
   auto terms = bind_terms(expression.terms);
-  if (!terms) return tl::unexpected<Error>(std::move(terms.error()));
+  if (!terms) return tl::unexpected(std::move(terms.error()));
   auto signs = bind_terms(expression.sign_from);
-  if (!signs) return tl::unexpected<Error>(std::move(signs.error()));
+  if (!signs) return tl::unexpected(std::move(signs.error()));
   return BoundExpression{&expression, std::move(name), std::move(*terms), std::move(*signs)};
 }
 
 Result<void> Importer::bind() {
   auto time_place = place_of(mapping_.time_column);
-  if (!time_place) return tl::unexpected<Error>(std::move(time_place.error()));
+  if (!time_place) return tl::unexpected(std::move(time_place.error()));
   time_place_ = *time_place;
   for (const auto& [column, wanted] : mapping_.require) {
     auto place = place_of(column);
-    if (!place) return tl::unexpected<Error>(std::move(place.error()));
+    if (!place) return tl::unexpected(std::move(place.error()));
     required_.emplace_back(*place, &wanted);
   }
   for (const FieldTarget& target : mapping_.targets) {
     auto bound = bind_expression(target.expression, target.name);
-    if (!bound) return tl::unexpected<Error>(std::move(bound.error()));
+    if (!bound) return tl::unexpected(std::move(bound.error()));
     targets_.push_back({&target, std::move(*bound)});
   }
   for (const CovariateTarget& target : mapping_.covariates) {
     auto bound = bind_expression(target.expression, target.name);
-    if (!bound) return tl::unexpected<Error>(std::move(bound.error()));
+    if (!bound) return tl::unexpected(std::move(bound.error()));
     covariate_targets_.push_back(std::move(*bound));
   }
   for (const LabelTarget& target : mapping_.labels) {
     auto place = place_of(target.column);
-    if (!place) return tl::unexpected<Error>(std::move(place.error()));
+    if (!place) return tl::unexpected(std::move(place.error()));
     label_targets_.push_back({&target, *place});
   }
   for (const auto& [column, limits] : mapping_.column_limits) {
@@ -352,9 +352,9 @@ Result<Recording> Importer::name_recording() const {
 
 Result<Import> Importer::run() {
   auto named = name_recording();
-  if (!named) return tl::unexpected<Error>(std::move(named.error()));
+  if (!named) return tl::unexpected(std::move(named.error()));
   result_.recording = std::move(*named);
-  if (auto bound = bind(); !bound) return tl::unexpected<Error>(std::move(bound.error()));
+  if (auto bound = bind(); !bound) return tl::unexpected(std::move(bound.error()));
 
   std::vector<std::string_view> row;
   std::vector<signals::Sample>& samples = result_.recording.samples;
@@ -365,10 +365,10 @@ Result<Import> Importer::run() {
     if (!*read) break;
     ++report.rows;
     drop_row_ = false;
-    if (auto met = check_required(row); !met) return tl::unexpected<Error>(std::move(met.error()));
+    if (auto met = check_required(row); !met) return tl::unexpected(std::move(met.error()));
     auto utime_us = time_of(row);
-    if (!utime_us) return tl::unexpected<Error>(std::move(utime_us.error()));
-    if (auto taken = take_cells(row); !taken) return tl::unexpected<Error>(std::move(taken.error()));
+    if (!utime_us) return tl::unexpected(std::move(utime_us.error()));
+    if (auto taken = take_cells(row); !taken) return tl::unexpected(std::move(taken.error()));
 
     signals::Sample sample;
     sample.utime_us = *utime_us;
@@ -376,7 +376,7 @@ Result<Import> Importer::run() {
     sample.payload_kg = mapping_.payload_kg;
     const auto numbers = signals::numbers_of(sample);
     for (const BoundTarget& bound : targets_) *numbers[bound.target->number] = evaluate(bound.value);
-    if (auto taken = take_covariates(row); !taken) return tl::unexpected<Error>(std::move(taken.error()));
+    if (auto taken = take_covariates(row); !taken) return tl::unexpected(std::move(taken.error()));
     if (drop_row_) {
       ++report.rows_glitched;
     } else if (std::isnan(sample.wheel_velocity_rad_s[0]) || std::isnan(sample.wheel_velocity_rad_s[1])) {
@@ -406,7 +406,7 @@ Result<Import> import_csv(std::string_view csv, const ImportMapping& mapping, co
   if (!table) {
     Error error = std::move(table.error());
     error.field = options.source_name + ": " + error.field;
-    return tl::unexpected<Error>(std::move(error));
+    return tl::unexpected(std::move(error));
   }
   return Importer(std::move(*table), mapping.content(), options).run();
 }

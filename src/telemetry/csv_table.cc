@@ -16,7 +16,7 @@ Result<CsvTable> CsvTable::open(std::string_view text, char separator) {
   CsvTable table(text, separator);
   std::vector<std::string_view> names;
   auto read = table.read_row(names);
-  if (!read) return tl::unexpected<Error>(std::move(read.error()));
+  if (!read) return tl::unexpected(std::move(read.error()));
   if (!*read) return fail(Fault::corrupt, "line 1", "the table is empty; a header is needed");
   table.header_.assign(names.begin(), names.end());
   return table;

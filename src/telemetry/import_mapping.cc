@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/json_text.h"
 #include "signals/covariates.h"
 #include "signals/ids.h"
 #include "telemetry/codec.h"
@@ -285,11 +286,11 @@ class Reader {
 }  // namespace
 
 Result<ImportMapping> ImportMapping::parse(std::string_view text) {
-  const json document = json::parse(text, nullptr, false);
-  if (document.is_discarded()) return fail(Fault::invalid, "", "is not JSON");
+  const auto document = parse_json(text);
+  if (!document) return tl::unexpected(document.error());
   Reader reader;
-  auto content = std::make_shared<const Content>(reader.mapping(document));
-  if (reader.error) return tl::unexpected<Error>(std::move(*reader.error));
+  auto content = std::make_shared<const Content>(reader.mapping(*document));
+  if (reader.error) return tl::unexpected(std::move(*reader.error));
   return ImportMapping(std::move(content));
 }
 

@@ -9,6 +9,7 @@
 #include "battery/prediction.h"
 #include "robot/robot_file.h"
 #include "support.h"
+#include "tests/support/shared_folder.h"
 
 namespace joulecast::battery {
 namespace {
@@ -171,7 +172,7 @@ class RealCell : public testing::TestWithParam<const char*> {};
 TEST_P(RealCell, RandomDischargesArePredicted) {
   const std::filesystem::path folder =
       std::filesystem::path(JOULECAST_SHARED) / "data/real/battery_dmegc18650";
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "the battery recordings are not beside the project";
+  JOULECAST_NEED_SHARED(std::filesystem::exists(folder), "battery recordings");
   const std::string prefix = (folder / GetParam()).string();
   std::vector<Recording> recordings;
   const auto files = identification_files(prefix);

@@ -11,6 +11,7 @@
 #include "battery/calibrate.h"
 #include "battery/charge_tracker.h"
 #include "support.h"
+#include "tests/support/shared_folder.h"
 
 namespace joulecast::battery {
 namespace {
@@ -193,7 +194,7 @@ Statistics follow(const robot::Battery& battery, const std::vector<Recording>& d
 
 TEST(ChargeFilterOnRealCells, FollowsTheCountedChargeFromAnyStart) {
   const std::string folder = std::string(JOULECAST_SHARED) + "/data/real/battery_dmegc18650/";
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no recordings beside the project";
+  JOULECAST_NEED_SHARED(std::filesystem::exists(folder), "recordings");
   for (const std::string cell : {"R1", "R2", "R3"}) {
     std::vector<Recording> tests;
     const auto files = identification_files(folder + cell).value();

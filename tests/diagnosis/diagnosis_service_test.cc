@@ -28,7 +28,7 @@ class DiagnosisServiceTest : public ::testing::Test {
   void serve(DiagnosisOptions options = {}) {
     writer_ = std::make_unique<history::Writer>(*harness_.store, history::WriterOptions{});
     service_ = std::make_unique<DiagnosisService>(
-        *harness_.store, *writer_, harness_.models, [] { return 42; }, options,
+        *harness_.store, *writer_, harness_.models, drift_, [] { return 42; }, options,
         [this](const Error& error) { errors_.push_back(describe(error)); },
         [this](const history::DiagnosisRecord& d) {
           if (watch_) watch_->on_diagnosis(d);
@@ -53,6 +53,7 @@ class DiagnosisServiceTest : public ::testing::Test {
   }
 
   testing::PipelineHarness harness_;
+  DriftView drift_{*harness_.store, harness_.models, {}};
   std::vector<std::string> errors_;
   std::unique_ptr<history::Writer> writer_;
   std::unique_ptr<GapWatch> watch_;
@@ -89,7 +90,7 @@ TEST_F(DiagnosisServiceTest, FindsTheEffectAndWhatItFoundCanBeAdopted) {
   EXPECT_EQ(summary["effects"][0]["probability"], result["effects"][0]["probability"]);
   EXPECT_EQ(summary["effects"].size(), result["effects"].size());
 
-  ModelAdoption adoption(*harness_.store, *writer_, harness_.models, [] { return 43; }, {});
+  ModelAdoption adoption(*harness_.store, *writer_, harness_.models, drift_, [] { return 43; }, {});
   AdoptionRequest adopt;
   adopt.model = *robot::parse_robot(d.model_json);
   adopt.fitted_on = d.fitted_on;
@@ -194,7 +195,7 @@ class GapWatchTest : public DiagnosisServiceTest {
     WatchOptions options;
     options.diagnose = diagnose;
     watch_ = std::make_unique<GapWatch>(
-        *harness_.store, *writer_, harness_.models, *service_, [] { return 44; }, options,
+        *harness_.store, *writer_, harness_.models, drift_, *service_, [] { return 44; }, options,
         [this](const Error& error) { errors_.push_back(describe(error)); });
   }
 
@@ -246,10 +247,43 @@ TEST_F(GapWatchTest, TellsOfASiblingThatStandsOut) {
   const auto told = events("gap_sibling");
   ASSERT_EQ(told.size(), 1U);
   EXPECT_EQ(told[0].robot_id, "c");
-  EXPECT_EQ(robots_of_kind(harness_.models, "a").size(), 5U);  // and the nomad itself
+  EXPECT_EQ(drift_.robots_of_kind("a").size(), 5U);  // and the nomad itself
   watch_->look();
   EXPECT_EQ(events("gap_sibling").size(), 1U);
   EXPECT_EQ(watch_->counts().standing_out, 1U);
+
+  const auto siblings = drift_.siblings("a");
+  ASSERT_TRUE(siblings);
+  for (const drift::SiblingRatio& s : *siblings) EXPECT_EQ(s.stands_out, s.robot_id == "c") << s.robot_id;
+  // What is asked for holds for all who ask.
+  DriftOptions loose;
+  loose.settings.least_change = 1;
+  const DriftView patient(*harness_.store, harness_.models, loose);
+  EXPECT_TRUE(std::ranges::none_of(*patient.siblings("a"), &drift::SiblingRatio::stands_out));
+}
+
+TEST_F(GapWatchTest, LeastChangeHoldsForWatchDiagnosisAndAdoptionAlike) {
+  for (int number = 0; number < 16; ++number)
+    drive(harness_, nomad_with_friction(number < 8 ? 1.0 : 1.6), number);
+  const auto change = drift_.last_change("nomad", 1);
+  ASSERT_TRUE(change) << describe(change.error());
+  ASSERT_TRUE(*change);
+  EXPECT_EQ(**change, drift_.marks("nomad")->back().utime_us);
+  EXPECT_FALSE(*drift_.last_change("nomad", 2));  // another model answers it
+
+  DriftOptions loose;
+  loose.settings.least_change = 1;
+  const DriftView patient(*harness_.store, harness_.models, loose);
+  EXPECT_TRUE(patient.marks("nomad")->empty());
+  EXPECT_FALSE(*patient.last_change("nomad", 1));
+  serve();
+  GapWatch watch(
+      *harness_.store, *writer_, harness_.models, patient, *service_, [] { return 44; }, {},
+      [this](const Error& error) { errors_.push_back(describe(error)); });
+  watch.look();
+  EXPECT_EQ(watch.counts().drifting, 0U);
+  EXPECT_TRUE(events("gap_drift").empty());
+  EXPECT_TRUE(errors_.empty());
 }
 
 }  // namespace

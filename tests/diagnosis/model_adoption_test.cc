@@ -22,7 +22,7 @@ class ModelAdoptionTest : public ::testing::Test {
     for (int number = 0; number < 4; ++number) keys_.push_back(drive(harness_, truth_, number));
     writer_ = std::make_unique<history::Writer>(*harness_.store, history::WriterOptions{});
     adoption_ = std::make_unique<ModelAdoption>(
-        *harness_.store, *writer_, harness_.models, [] { return 42; }, AdoptionOptions{});
+        *harness_.store, *writer_, harness_.models, drift_, [] { return 42; }, AdoptionOptions{});
   }
 
   AdoptionRequest candidate(double friction) const {
@@ -37,6 +37,7 @@ class ModelAdoptionTest : public ::testing::Test {
   }
 
   testing::PipelineHarness harness_;
+  DriftView drift_{*harness_.store, harness_.models, {}};
   robot::RobotModel truth_ = nomad_with_friction(1.4);
   std::vector<history::MissionKey> keys_;
   std::unique_ptr<history::Writer> writer_;

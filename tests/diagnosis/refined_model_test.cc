@@ -77,8 +77,9 @@ TEST(RefinedModel, IsProposedFromMissionsAndAdoptedAfterItsBackTest) {
   EXPECT_EQ(json::parse(newest.detail_json)["parameters"].size(), 4u);
 
   history::Writer writer(*harness.store, history::WriterOptions{});
+  const DriftView drift(*harness.store, harness.models, {});
   ModelAdoption adoption(
-      *harness.store, writer, harness.models, [] { return 42; }, AdoptionOptions{});
+      *harness.store, writer, harness.models, drift, [] { return 42; }, AdoptionOptions{});
   std::vector<std::string> told_of;
   ProposalAcceptor acceptor(*harness.store, adoption,
                             [&](const std::string&, const std::string& text) { told_of.push_back(text); });
@@ -93,6 +94,11 @@ TEST(RefinedModel, IsProposedFromMissionsAndAdoptedAfterItsBackTest) {
               evidence["missions"].size(), 1e2 * before, 1e2 * after);
   EXPECT_LT(after, 0.5 * before);
   EXPECT_EQ(harness.models.find(robot.robot_id)->version, 2);
+  // A robot whose refined model was adopted keeps its siblings.
+  robot::RobotModel sibling = robot;
+  sibling.robot_id = "sibling";
+  harness.add_version(sibling, 1);
+  EXPECT_EQ(drift.robots_of_kind("sibling").size(), 2u);
 }
 
 }  // namespace

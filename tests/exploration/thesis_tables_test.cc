@@ -9,6 +9,7 @@
 
 #include "client/thesis/gaussian_detour.h"
 #include "client/thesis/tables.h"
+#include "tests/support/shared_folder.h"
 
 namespace joulecast::client::thesis {
 namespace {
@@ -94,7 +95,7 @@ TEST_F(ThesisTables, EveryRowSaysSomethingOfItsDifference) {
 // Every number of the last columns of the thesis's tables stands among the printed values.
 TEST_F(ThesisTables, PrintedValuesAreTheThesiss) {
   const std::filesystem::path folder = std::filesystem::path(JOULECAST_SHARED) / "seed/tables";
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "the thesis's tables are not beside the project";
+  JOULECAST_NEED_SHARED(std::filesystem::exists(folder), "thesis's tables");
   struct Source {
     const char* file;
     const char* table;

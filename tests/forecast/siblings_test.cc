@@ -49,14 +49,5 @@ TEST(Siblings, UnlikeOnesLendLess) {
   EXPECT_GT(spread(unlike), 2 * spread(like));
 }
 
-TEST(Siblings, AreRobotsOfOneBodyWhateverWasCalibrated) {
-  robot::RobotModel a = shipped("amr"), b = a;
-  b.robot_id = "other";
-  b.motor.friction_torque_nm = {1.1, 1.2};
-  b.idle_power_w = 30;
-  EXPECT_EQ(kind_of(a), kind_of(b));
-  EXPECT_NE(kind_of(a), kind_of(shipped("tug")));
-}
-
 }  // namespace
 }  // namespace joulecast::forecast

@@ -13,6 +13,7 @@
 #include "gap/diagnose/recordings.h"
 #include "robot/robot_file.h"
 #include "telemetry/recording_set.h"
+#include "tests/support/shared_folder.h"
 
 namespace joulecast::gap {
 namespace {
@@ -35,7 +36,7 @@ class Practice : public testing::TestWithParam<const char*> {};
 
 TEST_P(Practice, GetsTheRightVerdict) {
   const std::filesystem::path folder = std::filesystem::path(JOULECAST_SHARED) / "data/practice" / GetParam();
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no practice log " << folder;
+  JOULECAST_NEED_SHARED(std::filesystem::exists(folder), "practice log " << folder);
   const auto robot = robot::load_robot(folder / "robot.json");
   ASSERT_TRUE(robot);
   const std::string log = folder / "telemetry.lcmlog";

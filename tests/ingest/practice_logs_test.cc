@@ -10,6 +10,7 @@
 #include "signals/mission_event.h"
 #include "telemetry/event_log.h"
 #include "tests/ingest/harness.h"
+#include "tests/support/shared_folder.h"
 
 namespace joulecast::server {
 namespace {
@@ -44,7 +45,7 @@ std::map<std::string, double> independent_energies(const std::string& log) {
 
 TEST(PracticeLogs, MeasuredEnergyAgreesWithAnIndependentQuadrature) {
   const fs::path folder = fs::path(JOULECAST_SHARED) / "data" / "practice";
-  if (!fs::exists(folder)) GTEST_SKIP() << "practice logs are not beside the project";
+  JOULECAST_NEED_SHARED(fs::exists(folder), "practice logs");
   std::size_t logs = 0;
   for (const auto& entry : fs::directory_iterator(folder)) {
     if (!entry.is_directory()) continue;

@@ -1,64 +1,9 @@
 #pragma once
 
-#include <array>
-#include <string>
-
-#include "robot/robot_model.h"
+#include "tests/support/robots.h"
 
 namespace joulecast::planning::test {
 
-// The thesis's Nomad Super Scout and P3-DX (FACTS, parameters), and two robots of a warehouse: a tug that
-// carries 250 kg and a mid-size AMR.
-inline robot::RobotModel nomad() {
-  robot::RobotModel r;
-  r.robot_id = "nomad";
-  r.kinematics = {0.1, 0.165, 0};
-  r.mass = {21.2, 1.39, 0.75, 0.028};
-  r.motor = {2.74, 0.0026, 0.069, 0.069, 24.9, 0, 0.0017, {0.3728, 0.346}};
-  r.battery.nominal_voltage_v = 24;
-  r.idle_power_w = 14;
-  r.limits = {1.0, 0.35, 1.5, 8, 10.5};
-  return r;
-}
-
-inline robot::RobotModel p3dx() {
-  robot::RobotModel r;
-  r.robot_id = "p3dx";
-  r.kinematics = {0.095, 0.165, 0};
-  r.mass = {6.04, 1.48, 0.25, 0};
-  r.motor = {0.7, 0, 0.88, 0.88, 1, 0.0713, 0.039, {0, 0}};
-  r.battery.nominal_voltage_v = 12.6;
-  r.idle_power_w = 6;
-  r.limits = {1.2, 0.5, 2.0, 12, 7.6};
-  return r;
-}
-
-inline robot::RobotModel amr() {
-  robot::RobotModel r;
-  r.robot_id = "amr";
-  r.kinematics = {0.0825, 0.21, 0};
-  r.mass = {62, 3.1, 4.2, 0.052};
-  r.motor = {0.36, 0.0004, 0.056, 0.056, 21, 0, 0.021, {0.85, 0.92}};
-  r.battery.nominal_voltage_v = 25.6;
-  r.idle_power_w = 24;
-  r.limits = {1.5, 0.6, 1.8, 30, 60};
-  return r;
-}
-
-inline robot::RobotModel tug() {
-  robot::RobotModel r;
-  r.robot_id = "tug";
-  r.kinematics = {0.125, 0.29, 0};
-  r.mass = {135, 5.5, 14, 0.11};
-  r.motor = {0.21, 0.00025, 0.071, 0.071, 28, 0, 0.034, {1.9, 1.75}};
-  r.battery.nominal_voltage_v = 51.2;
-  r.idle_power_w = 45;
-  r.limits = {1.4, 0.5, 1.2, 40, 250};
-  return r;
-}
-
-inline std::array<robot::RobotModel, 4> all_robots() {
-  return {nomad(), p3dx(), amr(), tug()};
-}
+using namespace joulecast::samples;
 
 }  // namespace joulecast::planning::test

@@ -12,6 +12,7 @@
 #include <random>
 
 #include "robot/robot_fields.h"
+#include "tests/support/shared_folder.h"
 
 namespace joulecast::robot {
 namespace {
@@ -64,7 +65,7 @@ TEST(RobotFile, ShippedRobotsAreValid) {
 
 TEST(RobotFile, ReadsEveryPracticeRobotUnchanged) {
   const std::filesystem::path practice = std::filesystem::path(JOULECAST_SHARED) / "data/practice";
-  if (!std::filesystem::exists(practice)) GTEST_SKIP() << "practice recordings are not beside the project";
+  JOULECAST_NEED_SHARED(std::filesystem::exists(practice), "practice recordings");
   int count = 0;
   for (const auto& folder : std::filesystem::directory_iterator(practice)) {
     const auto path = folder.path() / "robot.json";
@@ -244,25 +245,25 @@ TEST(RobotFile, TextThatIsNoSingleJsonDocumentIsRefused) {
   for (const char* text : {"", "{", "{} {}", "[1e999]", "\xff", "{\"a\":1,}"}) {
     const auto model = parse_robot(std::string_view(text));
     ASSERT_FALSE(model) << text;
-    EXPECT_THAT(model.error().message, HasSubstr("is not JSON"));
+    EXPECT_THAT(model.error().message, HasSubstr("malformed JSON"));
   }
   const auto twice = parse_robot(std::string_view(R"({"robot_id": "a", "robot_id": "b"})"));
   ASSERT_FALSE(twice);
-  EXPECT_EQ(twice.error(), (Error{Fault::invalid, "/robot_id", "is given twice in one object"}));
+  EXPECT_EQ(twice.error(), (Error{Fault::invalid, "/robot_id", "the key is given more than once"}));
   const auto huge = parse_robot(std::string_view(std::string((1 << 20) + 1, ' ')));
   ASSERT_FALSE(huge);
   EXPECT_EQ(huge.error().fault, Fault::too_large);
   EXPECT_FALSE(parse_robot(std::string_view(std::string(500000, '['))));
 }
 
-TEST(RobotFile, UnreadableFileIsNotFound) {
+TEST(RobotFile, AnAbsentFileIsNotFoundAndAFolderIsNone) {
   const auto model = load_robot(shipped / "absent.json");
   ASSERT_FALSE(model);
   EXPECT_EQ(model.error().fault, Fault::not_found);
   EXPECT_THAT(model.error().field, HasSubstr("absent.json"));
   const auto folder = load_robot(shipped);
   ASSERT_FALSE(folder);
-  EXPECT_EQ(folder.error().fault, Fault::not_found);
+  EXPECT_EQ(folder.error().fault, Fault::invalid);
 }
 
 TEST(RobotFile, ModelsBuiltInCodeAreHeldToTheSameConstraints) {

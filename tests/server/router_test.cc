@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "server/http/json_text.h"
+#include "base/json_text.h"
 #include "server/http/problem.h"
 #include "server/http/uri.h"
 
@@ -263,17 +263,6 @@ TEST(Problem, NamesFieldConstraintAndRequest) {
 TEST(Problem, SurvivesTextThatIsNotUtf8) {
   const Response response = problem(Error{Fault::invalid, "\xff", "is \xfe"}, "r");
   EXPECT_TRUE(json::accept(response.body));
-}
-
-TEST(Uri, KnowsUtf8) {
-  for (const char* good :
-       {"", "a", "\xC2\x80", "\xE0\xA0\x80", "\xED\x9F\xBF", "\xF0\x90\x80\x80", "\xF4\x8F\xBF\xBF"}) {
-    EXPECT_TRUE(is_utf8(good));
-  }
-  for (const char* bad : {"\x80", "\xC1\x81", "\xC2", "\xE0\x9F\xBF", "\xED\xA0\x80", "\xF0\x8F\xBF\xBF",
-                          "\xF4\x90\x80\x80", "\xF5\x80\x80\x80", "\xE2\x82"}) {
-    EXPECT_FALSE(is_utf8(bad));
-  }
 }
 
 TEST(RouterDeathTest, RefusesAmbiguousTables) {

@@ -12,6 +12,7 @@
 #include "telemetry/recording_climb.h"
 #include "telemetry/validation.h"
 #include "temporary_file.h"
+#include "tests/support/shared_folder.h"
 
 // The shipped mapping files on the recordings they were written for.
 namespace joulecast::telemetry {
@@ -67,7 +68,7 @@ TEST(ShippedMappings, EveryOneParses) {
 
 TEST(ImportFrc3314, EveryRecordingGivesOneMissionWithPlausibleSamples) {
   const auto tables = tables_in(real_data / "frc3314_drivetrain");
-  if (tables.empty()) GTEST_SKIP() << "the frc3314_drivetrain recordings are not beside the project";
+  JOULECAST_NEED_SHARED(!tables.empty(), "frc3314_drivetrain recordings");
   for (const fs::path& path : tables) {
     SCOPED_TRACE(path.filename().string());
     const bool high = path.stem().string().ends_with("high");
@@ -92,7 +93,7 @@ TEST(ImportFrc3314, EveryRecordingGivesOneMissionWithPlausibleSamples) {
 // the same way.
 TEST(ImportFrc3314, IntegratedWheelSpeedMeetsTheEncoderTicks) {
   const auto tables = tables_in(real_data / "frc3314_drivetrain");
-  if (tables.empty()) GTEST_SKIP() << "the frc3314_drivetrain recordings are not beside the project";
+  JOULECAST_NEED_SHARED(!tables.empty(), "frc3314_drivetrain recordings");
   constexpr double wheel_radius_in = 6.125 / 2;
   for (const fs::path& path : tables) {
     SCOPED_TRACE(path.filename().string());
@@ -134,7 +135,7 @@ TEST(ImportFrc3314, IntegratedWheelSpeedMeetsTheEncoderTicks) {
 // While the motors are driven, current has the voltage's sign on both sides and both sides push the same way.
 TEST(ImportFrc3314, DrivenSidesPushTheWayTheyRoll) {
   const auto tables = tables_in(real_data / "frc3314_drivetrain");
-  if (tables.empty()) GTEST_SKIP() << "the frc3314_drivetrain recordings are not beside the project";
+  JOULECAST_NEED_SHARED(!tables.empty(), "frc3314_drivetrain recordings");
   for (const fs::path& path : tables) {
     SCOPED_TRACE(path.filename().string());
     const bool high = path.stem().string().ends_with("high");
@@ -155,7 +156,7 @@ TEST(ImportFrc3314, DrivenSidesPushTheWayTheyRoll) {
 
 TEST(ImportFrc3314, TheOneGlitchIsReported) {
   const fs::path path = real_data / "frc3314_drivetrain/step_voltage_forward_high.csv";
-  if (!fs::exists(path)) GTEST_SKIP() << "the frc3314_drivetrain recordings are not beside the project";
+  JOULECAST_NEED_SHARED(fs::exists(path), "frc3314_drivetrain recordings");
   const auto import = import_file(path, "frc3314_high.json");
   ASSERT_TRUE(import) << describe(import.error());
   ASSERT_EQ(import->report.glitches.size(), 1u);
@@ -166,7 +167,7 @@ TEST(ImportFrc3314, TheOneGlitchIsReported) {
 
 TEST(ImportFrc3314, MotorCurrentIsTheSumOfThreeMotors) {
   const fs::path path = real_data / "frc3314_drivetrain/step_voltage_backward_low.csv";
-  if (!fs::exists(path)) GTEST_SKIP() << "the frc3314_drivetrain recordings are not beside the project";
+  JOULECAST_NEED_SHARED(fs::exists(path), "frc3314_drivetrain recordings");
   const auto import = import_file(path, "frc3314_low.json");
   ASSERT_TRUE(import);
   const std::string csv = test::read_text(path);
@@ -183,7 +184,7 @@ TEST(ImportFrc3314, MotorCurrentIsTheSumOfThreeMotors) {
 
 TEST(ImportHusky, EveryTableGivesPlausibleSamples) {
   const auto tables = tables_in(real_data / "borealtc_husky");
-  if (tables.empty()) GTEST_SKIP() << "the borealtc_husky recordings are not beside the project";
+  JOULECAST_NEED_SHARED(!tables.empty(), "borealtc_husky recordings");
   for (const fs::path& path : tables) {
     SCOPED_TRACE(path.string());
     const auto import = import_file(path, "borealtc_husky.json");
@@ -202,7 +203,7 @@ TEST(ImportHusky, EveryTableGivesPlausibleSamples) {
 
 TEST(ImportWarthog, TheTableGivesPlausibleSamplesAtItsOwnTimes) {
   const fs::path path = real_data / "warthog_grass/warthog_wheels_grass_2024-07-18_a.csv";
-  if (!fs::exists(path)) GTEST_SKIP() << "the warthog_grass recording is not beside the project";
+  JOULECAST_NEED_SHARED(fs::exists(path), "warthog_grass recording");
   ImportOptions options;
   options.source_name = path.string();
   const auto import = import_csv(test::read_text(path), shipped("warthog_grass.json"), options);
@@ -233,7 +234,7 @@ dynamics::Parameters<double> wheels_of(double radius_m) {
 // Elevation in steps of a metre at 5 Hz.
 TEST(ImportMotives, TheClimbOfATripFollowsItsElevationWithoutSpikes) {
   const fs::path folder = real_data / "motives_bev/road";
-  if (!fs::exists(folder)) GTEST_SKIP() << "the motives_bev recordings are not beside the project";
+  JOULECAST_NEED_SHARED(fs::exists(folder), "motives_bev recordings");
   for (const char* trip : {"trip075", "trip085", "trip095"}) {
     SCOPED_TRACE(trip);
     ImportOptions options{trip, {}, {}, 1'700'000'000'000'000};
@@ -268,7 +269,7 @@ TEST(ImportMotives, TheClimbOfATripFollowsItsElevationWithoutSpikes) {
 
 TEST(ImportMotives, TheDynamometerIsFlat) {
   const fs::path path = real_data / "motives_bev/lab/CLTC_CSS__06_CS_20_1.csv.gz";
-  if (!fs::exists(path)) GTEST_SKIP() << "the motives_bev recordings are not beside the project";
+  JOULECAST_NEED_SHARED(fs::exists(path), "motives_bev recordings");
   ImportOptions options{path.string(), {}, "m", 1'700'000'000'000'000};
   const auto import = import_csv(test::read_packed_text(path), shipped("motives_lab.json"), options);
   ASSERT_TRUE(import) << describe(import.error());
@@ -278,7 +279,7 @@ TEST(ImportMotives, TheDynamometerIsFlat) {
 
 TEST(ImportEvPino, PowerIsWhatWasRecorded) {
   const fs::path path = real_data / "evpino_tesla3/Tesla3_full.csv.gz";
-  if (!fs::exists(path)) GTEST_SKIP() << "the evpino_tesla3 recording is not beside the project";
+  JOULECAST_NEED_SHARED(fs::exists(path), "evpino_tesla3 recording");
   ImportOptions options{path.string(), {}, "m", 1'700'000'000'000'000};
   const std::string csv = test::read_packed_text(path);
   const auto import = import_csv(csv, shipped("evpino_tesla3.json"), options);
@@ -294,7 +295,7 @@ TEST(ImportEvPino, PowerIsWhatWasRecorded) {
 
 TEST(ImportWarthog, TheScanMatchersHeightGivesAClimb) {
   const fs::path path = real_data / "warthog_grass/warthog_wheels_grass_2024-07-18_a.csv";
-  if (!fs::exists(path)) GTEST_SKIP() << "the warthog_grass recording is not beside the project";
+  JOULECAST_NEED_SHARED(fs::exists(path), "warthog_grass recording");
   ImportOptions options;
   options.source_name = path.string();
   const auto import = import_csv(test::read_text(path), shipped("warthog_grass.json"), options);

@@ -9,6 +9,7 @@
 #include "telemetry/mission_tracker.h"
 #include "telemetry/sequence_tracker.h"
 #include "telemetry/validation.h"
+#include "tests/support/shared_folder.h"
 
 namespace joulecast::telemetry {
 namespace {
@@ -35,7 +36,7 @@ std::size_t true_missions(const fs::path& log) {
 // and split into the missions that were driven. Equal bytes mean equal fingerprints.
 TEST(PracticeLogs, DecodeExactlyAndSplitIntoTheirMissions) {
   const auto logs = practice_logs();
-  if (logs.empty()) GTEST_SKIP() << "the practice recordings are not beside the project";
+  JOULECAST_NEED_SHARED(!logs.empty(), "practice recordings");
   for (const fs::path& path : logs) {
     SCOPED_TRACE(path.parent_path().filename().string());
     EventLogReader reader = EventLogReader::open(path.string()).value();

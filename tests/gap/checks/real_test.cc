@@ -8,6 +8,7 @@
 #include "gap/checks/check.h"
 #include "robot/robot_file.h"
 #include "telemetry/csv_import.h"
+#include "tests/support/shared_folder.h"
 
 // Recordings that nobody made for these checks.
 namespace joulecast::gap {
@@ -55,7 +56,7 @@ class PracticeLogs : public testing::TestWithParam<const char*> {};
 
 TEST_P(PracticeLogs, AreNotContradicted) {
   const fs::path folder = data / "practice" / GetParam();
-  if (!fs::exists(folder)) GTEST_SKIP() << "no practice log " << folder;
+  JOULECAST_NEED_SHARED(fs::exists(folder), "practice log " << folder);
   const std::string log = folder / "telemetry.lcmlog";
   const auto checks =
       check_recordings(*telemetry::load_recordings({&log, 1}), *robot::load_robot(folder / "robot.json"));
@@ -71,7 +72,7 @@ INSTANTIATE_TEST_SUITE_P(Logs, PracticeLogs,
 // The left current is negative where the left wheel is the inner one and is driven back through the ground.
 TEST(Warthog, NoCurrentIsCalledReversed) {
   const fs::path folder = data / "real/warthog_grass";
-  if (!fs::exists(folder)) GTEST_SKIP() << "no recordings " << folder;
+  JOULECAST_NEED_SHARED(fs::exists(folder), "recordings " << folder);
   const auto robot = robot::load_robot(robots / "warthog-grass.json");
   ASSERT_TRUE(robot);
   std::string mapping = text_of(JOULECAST_SOURCE_DIR "/deploy/import/warthog_grass.json");
@@ -89,7 +90,7 @@ TEST(Warthog, NoCurrentIsCalledReversed) {
 
 TEST(Frc, TheFileOfTheOtherGearIsFarFromTheRobot) {
   const fs::path folder = data / "real/frc3314_drivetrain";
-  if (!fs::exists(folder)) GTEST_SKIP() << "no recordings " << folder;
+  JOULECAST_NEED_SHARED(fs::exists(folder), "recordings " << folder);
   const auto set = imported(tables_in(folder, "_low.csv"),
                             text_of(JOULECAST_SOURCE_DIR "/deploy/import/frc3314_low.json"));
   const auto checks = check_recordings(set, *robot::load_robot(robots / "frc3314-high.json"));

@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "made_runs.h"
+#include "tests/support/shared_folder.h"
 
 namespace joulecast::gap {
 namespace {
@@ -88,7 +89,7 @@ const DiagnosedEffect* find(const RunDiagnosis& d, const std::string& id) {
 // alone.
 TEST(ThesisTables, ShowLoadDependentRollingResistance) {
   const std::string rows = straight_runs() + curve_runs();
-  if (rows.empty()) GTEST_SKIP() << "no shared tables beside the project";
+  JOULECAST_NEED_SHARED(!rows.empty(), "shared tables");
   RunSet runs = runs_of(rows);
   for (const double stretch : {1.0, 1.4}) {
     SCOPED_TRACE(stretch);
@@ -118,7 +119,7 @@ TEST(ThesisTables, ShowLoadDependentRollingResistance) {
 // diagnosis must say rather than name an effect.
 TEST(ThesisTables, PrintedModelEnergiesDecideNothing) {
   const std::string rows = straight_runs() + curve_runs();
-  if (rows.empty()) GTEST_SKIP() << "no shared tables beside the project";
+  JOULECAST_NEED_SHARED(!rows.empty(), "shared tables");
   const auto d = diagnose_runs(runs_of(rows), nomad());
   ASSERT_TRUE(d);
   EXPECT_TRUE(d->model_given);
@@ -134,7 +135,7 @@ TEST(ThesisTables, PrintedModelEnergiesDecideNothing) {
 // sum, so that it cannot be what the payload adds; nor do the sides differ as it says.
 TEST(ThesisTables, HalvedTurningTermExplainsLittle) {
   const std::string rows = curve_runs();
-  if (rows.empty()) GTEST_SKIP() << "no shared tables beside the project";
+  JOULECAST_NEED_SHARED(!rows.empty(), "shared tables");
   const auto d = diagnose_runs(runs_of(rows), nomad());
   ASSERT_TRUE(d && d->turning);
   EXPECT_EQ(d->turning->runs, 8u);

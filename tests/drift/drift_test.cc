@@ -1,16 +1,13 @@
-#include "gap/drift.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
 #include <vector>
 
-#include "dynamics/catalogue.h"
-#include "gap/verdict/adopt.h"
-#include "robot/robot_file.h"
+#include "drift/marks.h"
+#include "drift/siblings.h"
 
-namespace joulecast::gap {
+namespace joulecast::drift {
 namespace {
 
 std::vector<MissionRatio> series(std::uint64_t seed, const std::vector<double>& levels, std::size_t each,
@@ -27,7 +24,7 @@ std::vector<MissionRatio> series(std::uint64_t seed, const std::vector<double>& 
 }
 
 TEST(Drift, MarksWhereTheRatioChanges) {
-  const auto marks = drift_marks(series(1, {1.0, 1.05, 1.02}, 20));
+  const auto marks = find_marks(series(1, {1.0, 1.05, 1.02}, 20), {});
   ASSERT_EQ(marks.size(), 2U);
   EXPECT_NEAR(static_cast<double>(marks[0].mission_key), 21, 1);
   EXPECT_NEAR(marks[0].before, 1.0, 0.01);
@@ -41,7 +38,7 @@ TEST(Drift, MarksWhereTheRatioChanges) {
 TEST(Drift, SteadyMissionsRaiseNoAlarm) {
   int alarms = 0;
   for (std::uint64_t seed = 0; seed < 400; ++seed)
-    alarms += !drift_marks(series(seed, {1.03}, 60, 0.02)).empty();
+    alarms += !find_marks(series(seed, {1.03}, 60, 0.02), {}).empty();
   // 1 % is asked for; 400 trials of a binomial with twice that have a 99.9 % upper limit of 18.
   EXPECT_LE(alarms, 18);
 }
@@ -51,7 +48,7 @@ TEST(Drift, SeesAWearThatGrowsMissionByMission) {
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     auto missions = series(seed, {1.0}, 60, 0.01);
     for (std::size_t k = 0; k < missions.size(); ++k) missions[k].measured_j += 1.0 * static_cast<double>(k);
-    seen += !drift_marks(missions).empty();
+    seen += !find_marks(missions, {}).empty();
   }
   EXPECT_EQ(seen, 50);
 }
@@ -59,14 +56,14 @@ TEST(Drift, SeesAWearThatGrowsMissionByMission) {
 TEST(Drift, AnAdoptedModelIsNoDrift) {
   auto missions = series(3, {1.1, 1.0}, 20);
   for (std::size_t k = 20; k < missions.size(); ++k) missions[k].model_version = 2;
-  EXPECT_TRUE(drift_marks(missions).empty());
+  EXPECT_TRUE(find_marks(missions, {}).empty());
 }
 
 TEST(Drift, LeavesOutMissionsThatMeasuredNothing) {
   auto missions = series(4, {1.0}, 20);
   for (std::size_t k = 10; k < 15; ++k) missions[k].measured_j = 0;
-  EXPECT_TRUE(drift_marks(missions).empty());
-  EXPECT_TRUE(drift_marks({}).empty());
+  EXPECT_TRUE(find_marks(missions, {}).empty());
+  EXPECT_TRUE(find_marks({}, {}).empty());
 }
 
 TEST(Drift, ASiblingThatSpendsMoreStandsOut) {
@@ -75,7 +72,7 @@ TEST(Drift, ASiblingThatSpendsMoreStandsOut) {
     robots.push_back({"r" + std::to_string(k),
                       series(static_cast<std::uint64_t>(10 + k), {k == 4 ? 1.12 : 1.0 + 0.003 * k}, 20)});
   robots.push_back({"young", series(5, {1.3}, 2)});
-  const auto siblings = compare_siblings(robots);
+  const auto siblings = compare_siblings(robots, {});
   ASSERT_EQ(siblings.size(), 6U);
   for (const auto& s : siblings) {
     EXPECT_EQ(s.stands_out, s.robot_id == "r4") << s.robot_id << " " << s.deviation;
@@ -84,25 +81,8 @@ TEST(Drift, ASiblingThatSpendsMoreStandsOut) {
   }
   robots.resize(2);
   robots[0].missions = series(9, {1.5}, 20);
-  EXPECT_TRUE(std::ranges::none_of(compare_siblings(robots), &SiblingRatio::stands_out));
-}
-
-TEST(Adopt, AddsEffectsAndSumsThoseThatAreThere) {
-  const auto robot = robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/nomad.json");
-  ASSERT_TRUE(robot);
-  const robot::AdoptedEffect friction{"coulomb_friction", {{"strength", 0.2}}};
-  const std::string name(dynamics::find_effect("coulomb_friction")->info().parameters[0].name);
-  robot::AdoptedEffect first = friction;
-  first.parameters[0].first = name;
-  const auto once = with_effects(*robot, {&first, 1});
-  ASSERT_TRUE(once) << describe(once.error());
-  const auto twice = with_effects(*once, {&first, 1});
-  ASSERT_TRUE(twice) << describe(twice.error());
-  ASSERT_EQ(twice->effects.size(), 1U);
-  EXPECT_DOUBLE_EQ(twice->effects[0].parameters[0].second, 0.4);
-  first.parameters[0].second = dynamics::find_effect("coulomb_friction")->info().parameters[0].maximum;
-  EXPECT_EQ(with_effects(*once, {&first, 1}).error().fault, Fault::invalid);
+  EXPECT_TRUE(std::ranges::none_of(compare_siblings(robots, {}), &SiblingRatio::stands_out));
 }
 
 }  // namespace
-}  // namespace joulecast::gap
+}  // namespace joulecast::drift

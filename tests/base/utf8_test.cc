@@ -1,11 +1,11 @@
-#include "telemetry/utf8.h"
+#include "base/utf8.h"
 
 #include <gtest/gtest.h>
 
 #include <cstdint>
 #include <string>
 
-namespace joulecast::telemetry {
+namespace joulecast {
 namespace {
 
 // Encodes by the bit pattern of the given length, whether or not that is the shortest.
@@ -46,4 +46,4 @@ TEST(Utf8, BrokenSequences) {
 }
 
 }  // namespace
-}  // namespace joulecast::telemetry
+}  // namespace joulecast

@@ -1,9 +1,9 @@
-#include "telemetry/utf8.h"
+#include "base/utf8.h"
 
 #include <cstddef>
 #include <cstdint>
 
-namespace joulecast::telemetry {
+namespace joulecast {
 
 bool is_utf8(std::string_view text) noexcept {
   std::size_t at = 0;
@@ -38,4 +38,4 @@ bool is_utf8(std::string_view text) noexcept {
   return true;
 }
 
-}  // namespace joulecast::telemetry
+}  // namespace joulecast

@@ -1,4 +1,4 @@
-#include "server/http/json_text.h"
+#include "base/json_text.h"
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -8,7 +8,7 @@
 
 #include "base/json_hint.h"
 
-namespace joulecast::http {
+namespace joulecast {
 namespace {
 
 using nlohmann::json;
@@ -33,7 +33,7 @@ class StrictBuilder : public nlohmann::json_sax<json> {
   bool key(string_t& name) override {
     auto [place, inserted] = open_.back()->get_ref<json::object_t&>().emplace(name, nullptr);
     if (!inserted) {
-      error_ = Error{Fault::invalid, pointer(open_.size() - 1) + "/" + escaped(name),
+      error_ = Error{Fault::invalid, (pointer(open_.size() - 1) / name).to_string(),
                      "the key is given more than once"};
       return false;
     }
@@ -48,7 +48,7 @@ class StrictBuilder : public nlohmann::json_sax<json> {
     const auto start = text.find("] ");
     if (start != std::string::npos) text.erase(0, start + 2);
     const std::string hint = not_finite_hint(text_, position);
-    error_ = Error{Fault::invalid, hint.empty() ? "" : pointer(open_.size()),
+    error_ = Error{Fault::invalid, hint.empty() ? "" : pointer(open_.size()).to_string(),
                    "malformed JSON at byte " + std::to_string(position) + ": " + text + hint};
     return false;
   }
@@ -71,7 +71,7 @@ class StrictBuilder : public nlohmann::json_sax<json> {
   }
   bool open(json&& container) {
     if (open_.size() >= max_depth_) {
-      error_ = Error{Fault::invalid, pointer(open_.size()),
+      error_ = Error{Fault::invalid, pointer(open_.size()).to_string(),
                      "nested deeper than " + std::to_string(max_depth_) + " levels"};
       return false;
     }
@@ -84,29 +84,19 @@ class StrictBuilder : public nlohmann::json_sax<json> {
     names_.pop_back();
     return true;
   }
-  // RFC 6901, to what stands or is about to stand in the given number of open containers, outermost first.
-  std::string pointer(std::size_t levels) const {
-    std::string path;
+  // To what stands or is about to stand in the given number of open containers, outermost first.
+  json::json_pointer pointer(std::size_t levels) const {
+    json::json_pointer path;
     for (std::size_t k = 0; k < levels; ++k) {
       // A container that is open counts already among its array's elements.
       const bool holds_next = k + 1 < open_.size();
-      path += "/" + (open_[k]->is_array() ? std::to_string(open_[k]->size() - (holds_next ? 1 : 0))
-                                          : escaped(names_[k]));
-    }
-    return path;
-  }
-  static std::string escaped(std::string_view name) {
-    std::string text;
-    for (const char c : name) {
-      if (c == '~') {
-        text += "~0";
-      } else if (c == '/') {
-        text += "~1";
+      if (open_[k]->is_array()) {
+        path /= open_[k]->size() - (holds_next ? 1 : 0);
       } else {
-        text += c;
+        path /= names_[k];
       }
     }
-    return text;
+    return path;
   }
 
   json& root_;
@@ -128,4 +118,4 @@ Result<json> parse_json(std::string_view text, std::size_t max_depth) {
   return tl::unexpected<Error>(error ? *error : Error{Fault::invalid, "", "malformed JSON"});
 }
 
-}  // namespace joulecast::http
+}  // namespace joulecast

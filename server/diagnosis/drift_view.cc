@@ -1,0 +1,104 @@
+#include "server/diagnosis/drift_view.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "robot/kind.h"
+
+namespace joulecast::server {
+namespace {
+
+constexpr std::size_t newest = 10;  // missions that tell how a robot does now
+
+}  // namespace
+
+Result<std::vector<drift::MissionRatio>> DriftView::missions(const std::string& robot_id,
+                                                             std::size_t limit) const {
+  history::MissionFilter filter;
+  filter.robot_id = robot_id;
+  history::PageRequest page;
+  page.limit = history::max_page_size;
+  std::vector<drift::MissionRatio> ratios;
+  do {
+    Result<history::MissionPage> found = store_.missions(filter, page);
+    if (!found) return tl::unexpected(std::move(found.error()));
+    for (const history::Mission& m : found->missions) {
+      const signals::Accounts& a = m.accounts;
+      // Only whole missions compare: what was not measured is in neither energy.
+      if (m.state == history::MissionState::open || !(a.measured_s > 0.9 * a.duration_s) ||
+          !(a.measured_j > 0))
+        continue;
+      const double modelled_j = a.measured_j - a.ledger[signals::Term::unexplained];
+      if (!(modelled_j > 0)) continue;
+      ratios.push_back({m.key, m.start_utime_us, m.model_version.value_or(0), a.measured_j, modelled_j});
+      if (ratios.size() == limit) break;
+    }
+    page.cursor = std::move(found->next_cursor);
+  } while (!page.cursor.empty() && ratios.size() < limit);
+  std::ranges::reverse(ratios);
+  return ratios;
+}
+
+Result<std::vector<drift::Mark>> DriftView::marks(const std::string& robot_id) const {
+  return missions(robot_id, options_.max_missions).map([&](const auto& found) {
+    return drift::find_marks(found, options_.settings);
+  });
+}
+
+Result<std::optional<std::int64_t>> DriftView::last_change(const std::string& robot_id,
+                                                           std::int64_t version) const {
+  return marks(robot_id).map([&](const auto& found) -> std::optional<std::int64_t> {
+    if (found.empty() || found.back().model_version != version) return std::nullopt;
+    return found.back().utime_us;
+  });
+}
+
+Result<std::vector<drift::MissionRatio>> DriftView::recent(const ModelInForce& model) const {
+  // Some of the newest may be of a version before.
+  return missions(model.robot.robot_id, 4 * newest).map([&](auto found) {
+    std::erase_if(found, [&](const auto& m) { return m.model_version != model.version; });
+    if (found.size() > newest) found.erase(found.begin(), found.end() - newest);
+    return found;
+  });
+}
+
+std::vector<std::string> DriftView::robots_of_kind(const std::string& robot_id) const {
+  std::vector<std::string> ids;
+  const auto model = models_.find(robot_id);
+  if (model == nullptr) return ids;
+  for (const auto& other : models_.all())
+    if (robot::kind_of(other->robot) == robot::kind_of(model->robot)) ids.push_back(other->robot.robot_id);
+  return ids;
+}
+
+Result<std::vector<drift::SiblingRatio>> DriftView::compare(const Models& kind) const {
+  std::vector<drift::RobotRatios> robots;
+  for (const auto& model : kind) {
+    auto now = recent(*model);
+    if (!now) return tl::unexpected(std::move(now.error()));
+    robots.push_back({model->robot.robot_id, std::move(*now)});
+  }
+  return drift::compare_siblings(robots, options_.settings);
+}
+
+Result<std::vector<drift::SiblingRatio>> DriftView::siblings(const std::string& robot_id) const {
+  Models kind;
+  for (const std::string& id : robots_of_kind(robot_id))
+    if (auto model = models_.find(id)) kind.push_back(std::move(model));
+  return compare(kind);
+}
+
+Result<std::vector<std::vector<drift::SiblingRatio>>> DriftView::kinds() const {
+  std::map<std::string, Models> kinds;
+  for (const auto& model : models_.all()) kinds[robot::kind_of(model->robot)].push_back(model);
+  std::vector<std::vector<drift::SiblingRatio>> all;
+  for (const auto& [kind, models] : kinds) {
+    auto compared = compare(models);
+    if (!compared) return tl::unexpected(std::move(compared.error()));
+    all.push_back(std::move(*compared));
+  }
+  return all;
+}
+
+}  // namespace joulecast::server

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "drift/marks.h"
+#include "drift/siblings.h"
+#include "history/store.h"
+#include "server/ingest/model_registry.h"
+
+namespace joulecast::server {
+
+struct DriftOptions {
+  drift::Settings settings;
+  std::size_t max_missions = 500;  // of each robot, newest first
+};
+
+// What the store's missions say of robots whose consumption changed: one answer for the watch, the page,
+// diagnoses and adoption. Safe to use from any thread.
+class DriftView {
+ public:
+  DriftView(const history::Store& store, const ModelRegistry& models, const DriftOptions& options)
+      : store_(store), models_(models), options_(options) {}
+
+  // The finished missions of a robot that measured energy, as the meter accounted them, newest `limit`,
+  // oldest first.
+  Result<std::vector<drift::MissionRatio>> missions(const std::string& robot_id, std::size_t limit) const;
+
+  // Where its ratio changed, oldest first.
+  Result<std::vector<drift::Mark>> marks(const std::string& robot_id) const;
+
+  // Start of the first mission after its last change, when that came under this version of its model.
+  Result<std::optional<std::int64_t>> last_change(const std::string& robot_id, std::int64_t version) const;
+
+  // Its newest missions under the model in force: how it does now.
+  Result<std::vector<drift::MissionRatio>> recent(const ModelInForce& model) const;
+
+  // Robots of its kind (robot/kind.h), itself among them.
+  std::vector<std::string> robots_of_kind(const std::string& robot_id) const;
+
+  // Those of them with missions enough, compared as they do now; none where it has no model.
+  Result<std::vector<drift::SiblingRatio>> siblings(const std::string& robot_id) const;
+  // The same of every kind.
+  Result<std::vector<std::vector<drift::SiblingRatio>>> kinds() const;
+
+ private:
+  using Models = std::vector<std::shared_ptr<const ModelInForce>>;
+  Result<std::vector<drift::SiblingRatio>> compare(const Models& kind) const;
+
+  const history::Store& store_;
+  const ModelRegistry& models_;
+  DriftOptions options_;
+};
+
+}  // namespace joulecast::server
