@@ -180,6 +180,23 @@ struct Application::Parts {
     post(history::AppendEvent{{0, host_utime_us(), robot_id, "consumption_drift", std::move(detail)}});
   }
 
+  // A faulty file costs its robot, not the fleet.
+  Result<void> load_robot_files(const std::string& directory) {
+    const Result<server::RobotFiles> files = server::read_robot_files(directory);
+    if (!files) return tl::unexpected(files.error());
+    for (const Error& faulty : files->faulty) log_error("robot file left out", faulty);
+    for (const auto& [path, robot] : files->robots) {
+      if (Result<void> loaded = server::load_robot(robot, path, *store, *writer, host_utime_us()); !loaded)
+        return loaded;
+    }
+    metrics.gauge("joulecast_robot_files_faulty", "Robot files left out at the start for being faulty")
+        .set(static_cast<double>(files->faulty.size()));
+    log_info("robot files read", {{"directory", directory},
+                                  {"files", std::to_string(files->robots.size())},
+                                  {"faulty", std::to_string(files->faulty.size())}});
+    return {};
+  }
+
   // Learns from what the store kept, so that the first answers need not wait for it.
   void warm_forecasts() {
     for (const auto& model : models.all()) {
@@ -242,9 +259,7 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   p.writer = std::make_unique<history::Writer>(*p.store, writer_options(settings));
 
   if (const std::string& directory = settings.text("robots.directory"); !directory.empty()) {
-    const Result<int> loaded = server::load_robot_files(directory, *p.store, *p.writer, host_utime_us());
-    if (!loaded) return tl::unexpected(loaded.error());
-    log_info("robot files read", {{"directory", directory}, {"files", std::to_string(*loaded)}});
+    if (Result<void> loaded = p.load_robot_files(directory); !loaded) return tl::unexpected(loaded.error());
   }
   if (Result<void> models = server::load_stored_models(*p.store, p.models); !models)
     return tl::unexpected(std::move(models.error()));
@@ -338,6 +353,13 @@ bool Application::alive() {
   parts_->last_account = ingest.account_ticks;
   parts_->last_write = written;
   return turning;
+}
+
+std::vector<Error> faulty_robot_files(const Settings& settings) {
+  const std::string& directory = settings.text("robots.directory");
+  if (directory.empty()) return {};
+  const Result<server::RobotFiles> files = server::read_robot_files(directory);
+  return files ? files->faulty : std::vector<Error>{files.error()};
 }
 
 void Application::stop() {

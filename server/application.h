@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "base/error.h"
 #include "server/settings.h"
@@ -31,6 +32,9 @@ class Application {
   explicit Application(std::unique_ptr<Parts> parts);
   std::unique_ptr<Parts> parts_;
 };
+
+// What is wrong with the robot files that the settings name, one a file; or with their directory.
+std::vector<Error> faulty_robot_files(const Settings& settings);
 
 // The OpenAPI document of the table that start() would serve.
 Result<std::string> openapi_document();
