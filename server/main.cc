@@ -1,4 +1,5 @@
 #include <systemd/sd-daemon.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <csignal>
@@ -62,9 +63,10 @@ int serve(const joulecast::Settings& settings) {
   run(**application);
   sd_notify(0, "STOPPING=1");
   joulecast::log_info("stopping");
-  (*application)->stop();
-  joulecast::log_info("stopped");
+  const bool ended = (*application)->stop();
+  joulecast::log_info(ended ? "stopped" : "stopped; work that did not end was left");
   joulecast::flush_log();
+  if (!ended) _exit(0);
   return 0;
 }
 

@@ -126,12 +126,25 @@ def check_programs(root):
     check(json.loads(answer)["robot_id"] == "amr", answer)
 
 
+def check_library(root):
+    """The example that comes with the library is built against what is installed, and prices as the command line does."""
+    if subprocess.run(["chroot", str(root), "which", "cmake", "c++"], capture_output=True).returncode != 0:
+        return print("no compiler in the root: example not built")
+    source = "/usr/share/doc/libjoulecast-dev/examples"
+    run("chroot", root, "cmake", "-S", source, "-B", "/run/example", "-DCMAKE_BUILD_TYPE=Release")
+    run("chroot", root, "cmake", "--build", "/run/example")
+    answer = run("chroot", root, "/run/example/price_a_path", "/usr/share/joulecast/robots/amr.json")
+    print("the example of libjoulecast-dev says", answer.strip())
+    check(re.fullmatch(r"[1-9]\d+ J in \d+\.\d s\n", answer), answer)
+
+
 def install_and_use(root, packages):
     for package in packages:
         shutil.copy(package, root / "run")
     run("chroot", root, "dpkg", "--install", *[f"/run/{p.name}" for p in packages])
     check_programs(root)
 
+    check_library(root)
     path, unit = unit_of(root)
     check_with_systemd(root, path)
     program, flag, settings = shlex.split(unit["ExecStart"])
@@ -158,9 +171,9 @@ def install_and_use(root, packages):
     check((state / "history.db").stat().st_mode & 0o777 == 0o600, "the history can be read by others")
     check(service.stop(15) == 0, "the service did not stop in order")
 
-    run("chroot", root, "dpkg", "--remove", "joulecast", "joulecastd")
+    run("chroot", root, "dpkg", "--remove", "joulecast", "joulecastd", "libjoulecast-dev")
     check((state / "history.db").exists() and (root / "etc/joulecast/joulecastd.json").exists(), "remove took data")
-    run("chroot", root, "dpkg", "--purge", "joulecast", "joulecastd")
+    run("chroot", root, "dpkg", "--purge", "joulecast", "joulecastd", "libjoulecast-dev")
     left = [p for p in (state, root / "etc/joulecast", root / "usr/bin/joulecastd", root / "usr/share/joulecast",
                         root / "usr/bin/joulecast") if p.exists()]
     check(not left, f"left after the purge: {left}")
@@ -179,7 +192,7 @@ def main():
         # Made outside the overlay: cpack writes the build's install records.
         run("cpack", "--config", os.path.join(options.build, "CPackConfig.cmake"), "-B", packages_folder, cwd=options.build)
         packages = sorted(pathlib.Path(packages_folder).glob("*.deb"))
-        check(len(packages) == 2, f"packages: {packages}")
+        check(len(packages) == 3, f"packages: {packages}")
         check_with_lintian(packages)
         # Not within a folder that is removed with all that is in it: what is mounted there is not the test's.
         mounted = pathlib.Path(tempfile.mkdtemp())
