@@ -3,6 +3,9 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstdio>
+#include <functional>
+#include <future>
 #include <mutex>
 #include <sstream>
 #include <thread>
@@ -10,6 +13,7 @@
 #include <vector>
 
 #include "base/host_clock.h"
+#include "history/spool.h"
 #include "history/sqlite_store.h"
 #include "history/writer.h"
 #include "server/api/services.h"
@@ -43,6 +47,34 @@ std::int64_t microseconds(double s) {
   return static_cast<std::int64_t>(s * 1e6);
 }
 
+std::string spool_path(const Settings& settings) {
+  return settings.text("store.path") + ".spool";
+}
+
+// What the last daemon could not store. A spool that cannot be read is put aside: it must not stand in the
+// way.
+void take_in_spool(const Settings& settings, history::Store& store) {
+  const std::string path = spool_path(settings);
+  const Result<std::size_t> taken = history::take_in_spool(
+      path, store, [](const Error& refused) { log_error("a command of the spool was refused", refused); });
+  if (taken && *taken > 0) log_info("spool taken in", {{"path", path}, {"commands", std::to_string(*taken)}});
+  if (taken) return;
+  log_error("the spool is not taken in", taken.error());
+  if (taken.error().fault == Fault::corrupt) std::rename(path.c_str(), (path + ".refused").c_str());
+}
+
+// Runs work on a thread of its own. False when it has not ended in time; then it goes on, and the process can
+// only end by _exit().
+bool within(milliseconds limit, std::function<void()> work) {
+  auto done = std::make_shared<std::promise<void>>();
+  std::future<void> ended = done->get_future();
+  std::thread([done, work = std::move(work)] {
+    work();
+    done->set_value();
+  }).detach();
+  return ended.wait_for(limit) == std::future_status::ready;
+}
+
 history::WriterOptions writer_options(const Settings& settings) {
   history::WriterOptions options;
   if (const double days = settings.number("store.retention_days"); days > 0) {
@@ -50,6 +82,8 @@ history::WriterOptions writer_options(const Settings& settings) {
   }
   if (const auto bytes = settings.integer("store.retention_bytes"); bytes > 0)
     options.retention.telemetry_max_bytes = bytes;
+  options.queue_bytes = static_cast<std::size_t>(settings.integer("store.queue_bytes"));
+  options.spool_path = spool_path(settings);
   options.on_error = [](const Error& error) { log_error("store", error); };
   return options;
 }
@@ -154,27 +188,40 @@ struct Application::Parts {
           log_warning(text, {{"robot_id", robot}});
         }) {}
 
-  ~Parts() { stop(); }
+  ~Parts() { (void)stop(); }
 
-  void stop() {
-    if (stopped.exchange(true)) return;
-    if (acceptor) acceptor->stop();
-    if (watch) watch->stop();
-    if (diagnoses) diagnoses->stop();
-    if (ingest) ingest->stop();
-    {
-      const std::lock_guard lock(beat_mutex);
-      beating = false;
-    }
-    beat_wake.notify_all();
-    if (beat.joinable()) beat.join();
-    if (warming.joinable()) warming.join();
-    if (http && !http->stop(seconds(settings.number("http.stop_deadline_s"))))
-      log_warning("requests were cut off at the stop deadline");
+  // Whatever does not end is left behind, so that the store is always brought to its end.
+  bool stop() {
+    if (stopped.exchange(true)) return true;
+    const milliseconds patience = seconds(settings.number("http.stop_deadline_s"));
+    std::future<bool> http_ended = std::async(std::launch::async, [this, patience] {
+      return within(patience + milliseconds(500), [this, patience] {
+        if (http && !http->stop(patience)) log_warning("requests were cut off at the stop deadline");
+      });
+    });
+    bool ended = within(milliseconds(3000), [this] {
+      if (acceptor) acceptor->stop();
+      if (watch) watch->stop();
+      if (diagnoses) diagnoses->stop();
+    });
+    ended &= within(milliseconds(2000), [this] {
+      if (ingest) ingest->stop();
+      {
+        const std::lock_guard lock(beat_mutex);
+        beating = false;
+      }
+      beat_wake.notify_all();
+      if (beat.joinable()) beat.join();
+      if (warming.joinable()) warming.join();
+    });
+    ended &= http_ended.get();
     if (writer) {
-      if (const Result<void> written = writer->stop(milliseconds(10'000)); !written)
+      if (const Result<void> written = writer->stop(milliseconds(3000)); !written) {
         log_error("stopping the writer", written.error());
+        ended &= writer->status().attempt_s == 0;
+      }
     }
+    return ended;
   }
 
   void report_drift(const std::string& robot_id, const forecast::Drift& drift,
@@ -183,6 +230,23 @@ struct Application::Parts {
     log_warning("consumption has changed", {{"robot_id", robot_id}, {"drift", detail}});
     events.publish("drift", detail, robot_id);
     post(history::AppendEvent{{0, host_utime_us(), robot_id, "consumption_drift", std::move(detail)}});
+  }
+
+  // A faulty file costs its robot, not the fleet.
+  Result<void> load_robot_files(const std::string& directory) {
+    const Result<server::RobotFiles> files = server::read_robot_files(directory);
+    if (!files) return tl::unexpected(files.error());
+    for (const Error& faulty : files->faulty) log_error("robot file left out", faulty);
+    for (const auto& [path, robot] : files->robots) {
+      if (Result<void> loaded = server::load_robot(robot, path, *store, *writer, host_utime_us()); !loaded)
+        return loaded;
+    }
+    metrics.gauge("joulecast_robot_files_faulty", "Robot files left out at the start for being faulty")
+        .set(static_cast<double>(files->faulty.size()));
+    log_info("robot files read", {{"directory", directory},
+                                  {"files", std::to_string(files->robots.size())},
+                                  {"faulty", std::to_string(files->faulty.size())}});
+    return {};
   }
 
   // Learns from what the store kept, so that the first answers need not wait for it.
@@ -245,12 +309,11 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   Result<std::unique_ptr<history::Store>> store = history::open_sqlite_store(sqlite);
   if (!store) return fail(store.error().fault, "store.path", std::move(store.error().message));
   p.store = std::move(*store);
+  take_in_spool(settings, *p.store);
   p.writer = std::make_unique<history::Writer>(*p.store, writer_options(settings));
 
   if (const std::string& directory = settings.text("robots.directory"); !directory.empty()) {
-    const Result<int> loaded = server::load_robot_files(directory, *p.store, *p.writer, host_utime_us());
-    if (!loaded) return tl::unexpected(loaded.error());
-    log_info("robot files read", {{"directory", directory}, {"files", std::to_string(*loaded)}});
+    if (Result<void> loaded = p.load_robot_files(directory); !loaded) return tl::unexpected(loaded.error());
   }
   if (Result<void> models = server::load_stored_models(*p.store, p.models); !models)
     return tl::unexpected(std::move(models.error()));
@@ -258,7 +321,7 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   p.forecasts = std::make_unique<server::Forecasts>(*p.store);
   history::Writer& writer = *p.writer;
   const auto post = [&writer, warn = p.warn](history::Command command) {
-    if (const Result<void> posted = writer.post(std::move(command)); !posted)
+    if (const Result<void> posted = writer.offer(std::move(command)); !posted)
       warn("", describe(posted.error()));
   };
   server::SessionOutputs outputs{*p.store, post, p.fleet, p.counters, p.warn};
@@ -336,19 +399,28 @@ std::uint16_t Application::http_port() const {
 
 bool Application::alive() {
   const server::IngestStatus ingest = parts_->ingest->status();
-  const std::uint64_t written = parts_->writer->status().ticks;
+  const history::WriterStatus writing = parts_->writer->status();
   constexpr milliseconds longest_silence{5000};
-  const bool turning = ingest.receive_ticks != parts_->last_receive &&
-                       ingest.account_ticks != parts_->last_account && written != parts_->last_write &&
-                       parts_->http->silence() < longest_silence;
+  const bool turning =
+      ingest.receive_ticks != parts_->last_receive && ingest.account_ticks != parts_->last_account &&
+      // A commit that waits for the disk is not a loop that hangs: a restart would not mend it.
+      (writing.ticks != parts_->last_write || writing.attempt_s > 0) &&
+      parts_->http->silence() < longest_silence;
   parts_->last_receive = ingest.receive_ticks;
   parts_->last_account = ingest.account_ticks;
-  parts_->last_write = written;
+  parts_->last_write = writing.ticks;
   return turning;
 }
 
-void Application::stop() {
-  parts_->stop();
+std::vector<Error> faulty_robot_files(const Settings& settings) {
+  const std::string& directory = settings.text("robots.directory");
+  if (directory.empty()) return {};
+  const Result<server::RobotFiles> files = server::read_robot_files(directory);
+  return files ? files->faulty : std::vector<Error>{files.error()};
+}
+
+bool Application::stop() {
+  return parts_->stop();
 }
 
 Result<std::string> openapi_document() {

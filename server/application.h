@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "base/error.h"
 #include "server/settings.h"
@@ -23,14 +24,19 @@ class Application {
   // True while every loop turns: receiving, accounting, writing, HTTP. What the watchdog asks.
   bool alive();
 
-  // Stops in order: receiving, accounting (open missions are checkpointed), HTTP, writing.
-  void stop();
+  // Stops in order: receiving, accounting (open missions are checkpointed), HTTP, writing. What the store
+  // does not take goes to the spool beside it. False when a part did not end in time: the process is to end
+  // by _exit().
+  bool stop();
 
  private:
   struct Parts;
   explicit Application(std::unique_ptr<Parts> parts);
   std::unique_ptr<Parts> parts_;
 };
+
+// What is wrong with the robot files that the settings name, one a file; or with their directory.
+std::vector<Error> faulty_robot_files(const Settings& settings);
 
 // The OpenAPI document of the table that start() would serve.
 Result<std::string> openapi_document();

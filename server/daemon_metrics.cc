@@ -37,6 +37,11 @@ void export_metrics(Metrics& metrics, const IngestCounters& counters, const Inge
       metrics.gauge("joulecast_fleet_power_watts", "Measured battery power of all live robots");
   const Gauge write_queue =
       metrics.gauge("joulecast_store_queue_commands", "Commands waiting to be committed");
+  const Gauge write_bytes = metrics.gauge("joulecast_store_queue_bytes", "Memory that these commands hold");
+  const Gauge write_limit =
+      metrics.gauge("joulecast_store_queue_limit_bytes", "Memory that they may hold, store.queue_bytes");
+  const Counter shed = metrics.counter("joulecast_store_shed_samples_total",
+                                       "Raw samples left out of the store because its queue was full");
   const Gauge write_wait =
       metrics.gauge("joulecast_store_oldest_wait_seconds", "Age of the oldest command not yet committed");
   const Gauge healthy = metrics.gauge("joulecast_store_healthy", "1 while commits succeed");
@@ -84,6 +89,9 @@ void export_metrics(Metrics& metrics, const IngestCounters& counters, const Inge
 
         const history::WriterStatus writing = writer.status();
         write_queue.set(static_cast<double>(writing.queue_commands));
+        write_bytes.set(static_cast<double>(writing.queue_bytes));
+        write_limit.set(static_cast<double>(writing.queue_limit_bytes));
+        shed.raise_to(static_cast<double>(writing.shed_samples));
         write_wait.set(writing.oldest_wait_s);
         healthy.set(writing.healthy ? 1 : 0);
         commits.raise_to(static_cast<double>(writing.commits));

@@ -1,4 +1,5 @@
 #include <systemd/sd-daemon.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <csignal>
@@ -62,19 +63,30 @@ int serve(const joulecast::Settings& settings) {
   run(**application);
   sd_notify(0, "STOPPING=1");
   joulecast::log_info("stopping");
-  (*application)->stop();
-  joulecast::log_info("stopped");
+  const bool ended = (*application)->stop();
+  joulecast::log_info(ended ? "stopped" : "stopped; work that did not end was left");
   joulecast::flush_log();
+  if (!ended) _exit(0);
   return 0;
+}
+
+void complain(const joulecast::Error& error) {
+  std::fprintf(stderr, "joulecastd: %s\n", joulecast::describe(error).c_str());
 }
 
 int print(const joulecast::Result<std::string>& text) {
   if (!text) {
-    std::fprintf(stderr, "joulecastd: %s\n", joulecast::describe(text.error()).c_str());
+    complain(text.error());
     return 1;
   }
   std::fputs(text->c_str(), stdout);
   return 0;
+}
+
+int check(const joulecast::Settings& settings) {
+  const auto faulty = joulecast::faulty_robot_files(settings);
+  for (const joulecast::Error& error : faulty) complain(error);
+  return faulty.empty() ? print(std::string("the settings are valid\n")) : 2;
 }
 
 }  // namespace
@@ -82,7 +94,7 @@ int print(const joulecast::Result<std::string>& text) {
 int main(int argc, char** argv) {
   const auto invocation = joulecast::read_settings({argv + 1, argv + argc}, joulecast::process_environment());
   if (!invocation) {
-    std::fprintf(stderr, "joulecastd: %s\n", joulecast::describe(invocation.error()).c_str());
+    complain(invocation.error());
     return 2;
   }
   switch (invocation->action) {
@@ -91,7 +103,7 @@ int main(int argc, char** argv) {
     case Invocation::Action::version:
       return print(std::string("joulecastd " JOULECAST_VERSION "\n"));
     case Invocation::Action::check_config:
-      return print(std::string("the settings are valid\n"));
+      return check(invocation->settings);
     case Invocation::Action::print_config:
       return print(invocation->settings.print());
     case Invocation::Action::print_openapi:

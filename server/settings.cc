@@ -107,6 +107,22 @@ std::optional<std::string> text_of(const Setting& setting, const nlohmann::json&
   return std::nullopt;
 }
 
+// Everything that is wrong as one error, each on a line of its own.
+class Problems {
+ public:
+  void add(const Result<void>& done) {
+    if (done) return;
+    if (!error_)
+      error_ = done.error();
+    else
+      error_->message += '\n' + describe(done.error());
+  }
+  Result<void> all() const { return error_ ? Result<void>(tl::unexpected(*error_)) : Result<void>(); }
+
+ private:
+  std::optional<Error> error_;
+};
+
 struct Pending {
   std::string key;
   std::string value;
@@ -205,23 +221,28 @@ Result<void> Settings::read_file_text(std::string_view json_text, std::string_vi
     return invalid(prefix + document.error().field, document.error().message);
   }
   if (!document->is_object()) return invalid(std::string(file), "must be a JSON object of sections");
-  std::vector<std::string> keys = all_names([](const Setting& each) { return std::string(each.key); });
+  const std::vector<std::string> keys = all_names([](const Setting& each) { return std::string(each.key); });
+  Problems problems;
   for (const auto& [section, content] : document->items()) {
     if (section == "$schema" && content.is_string()) continue;
     if (!content.is_object()) {
-      return invalid(prefix + section,
-                     "must be an object such as {\"http\": {\"port\": 8080}}" + did_you_mean(section, keys));
+      problems.add(invalid(prefix + section, "must be an object such as {\"http\": {\"port\": 8080}}" +
+                                                 did_you_mean(section, keys)));
+      continue;
     }
     for (const auto& [name, value] : content.items()) {
       const std::string key = section + "." + name;
       const Setting* setting = find_setting(key);
-      if (setting == nullptr) return invalid(prefix + key, "unknown setting" + did_you_mean(key, keys));
-      const auto text = text_of(*setting, value);
-      if (!text) return invalid(prefix + key, "must be of type " + kind(*setting));
-      if (auto done = set(key, *text, Origin::file, prefix + key); !done) return done;
+      const auto text = setting == nullptr ? std::nullopt : text_of(*setting, value);
+      if (setting == nullptr)
+        problems.add(invalid(prefix + key, "unknown setting" + did_you_mean(key, keys)));
+      else if (!text)
+        problems.add(invalid(prefix + key, "must be of type " + kind(*setting)));
+      else
+        problems.add(set(key, *text, Origin::file, prefix + key));
     }
   }
-  return {};
+  return problems.all();
 }
 
 std::string Settings::print() const {
@@ -301,7 +322,7 @@ Result<void> read_flags(const std::vector<std::string>& arguments, Given& given)
   return {};
 }
 
-Result<void> read_environment(const std::vector<std::string>& environment, Given& given) {
+void read_environment(const std::vector<std::string>& environment, Given& given, Problems& problems) {
   const auto table = settings_table();
   for (const std::string& entry : environment) {
     if (!entry.starts_with("JOULECAST_")) continue;
@@ -317,11 +338,11 @@ Result<void> read_environment(const std::vector<std::string>& environment, Given
     if (setting == table.end()) {
       auto known = all_names([](const Setting& each) { return each.environment(); });
       known.emplace_back("JOULECAST_CONFIG");
-      return invalid(name, "unknown environment variable" + did_you_mean(name, known));
+      problems.add(invalid(name, "unknown environment variable" + did_you_mean(name, known)));
+      continue;
     }
     given.variables.push_back({std::string(setting->key), std::move(value), name});
   }
-  return {};
 }
 
 }  // namespace
@@ -330,23 +351,21 @@ Result<Invocation> read_settings(const std::vector<std::string>& arguments,
                                  const std::vector<std::string>& environment) {
   Given given;
   if (auto done = read_flags(arguments, given); !done) return tl::unexpected(done.error());
-  if (auto done = read_environment(environment, given); !done) return tl::unexpected(done.error());
+  Problems problems;
+  read_environment(environment, given, problems);
   Invocation invocation;
   if (given.action) invocation.action = *given.action;
   if (invocation.action == Action::help || invocation.action == Action::version) return invocation;
   if (given.config) {
-    auto text = read_text_file(*given.config);
-    if (!text) return tl::unexpected(text.error());
-    if (auto done = invocation.settings.read_file_text(*text, *given.config); !done)
-      return tl::unexpected(done.error());
+    const auto text = read_text_file(*given.config);
+    problems.add(text ? invocation.settings.read_file_text(*text, *given.config)
+                      : tl::unexpected(text.error()));
   }
-  for (const auto& [pending, origin] :
-       {std::pair{&given.variables, Origin::environment}, {&given.flags, Origin::flag}}) {
-    for (const auto& [key, value, where] : *pending) {
-      if (auto done = invocation.settings.set(key, value, origin, where); !done)
-        return tl::unexpected(done.error());
-    }
-  }
+  for (const auto& [key, value, where] : given.variables)
+    problems.add(invocation.settings.set(key, value, Origin::environment, where));
+  for (const auto& [key, value, where] : given.flags)
+    problems.add(invocation.settings.set(key, value, Origin::flag, where));
+  if (const Result<void> sound = problems.all(); !sound) return tl::unexpected(sound.error());
   return invocation;
 }
 
@@ -361,13 +380,14 @@ std::string settings_help() {
       "joulecastd: counts and forecasts the energy of a fleet of differential-drive robots\n\n"
       "usage: joulecastd [--config FILE] [--SETTING VALUE ...] [COMMAND]\n\n"
       "commands\n"
-      "  --check-config         check the settings and exit\n"
+      "  --check-config         check the settings and the robot files, and exit\n"
       "  --print-config         print the effective settings with their origin and exit\n"
       "  --print-config-schema  print the JSON Schema of the settings file and exit\n"
       "  --print-openapi        print the OpenAPI document and exit\n"
       "  --help, --version\n\n"
-      "settings (flag > environment > file > default; --http-port is JOULECAST_HTTP_PORT in the\n"
-      "environment and {\"http\": {\"port\": ...}} in the file)\n";
+      "A setting comes from flag > environment > file > default; --http-port is JOULECAST_HTTP_PORT in the\n"
+      "environment and {\"http\": {\"port\": ...}} in the file.\n\n"
+      "settings\n";
   for (const Setting& setting : settings_table()) {
     std::string line = "  " + setting.flag() + " <" + kind(setting) + ">";
     line.resize(std::max<std::size_t>(line.size() + 2, 44), ' ');

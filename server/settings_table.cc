@@ -40,9 +40,11 @@ constexpr Setting table[] = {
 
     {"store.path", Type::text, "joulecast.db", 0, 0, "", "SQLite file of the history"},
     {"store.retention_days", Type::number, "30", 0, 36500, "d",
-     "age at which raw telemetry is deleted; 0: never"},
+     "age at which raw telemetry is deleted, at most 5 % of it an hour; 0: never"},
     {"store.retention_bytes", Type::integer, "10737418240", 0, 1e15, "B",
      "size of raw telemetry beyond which the oldest is deleted; 0: no limit"},
+    {"store.queue_bytes", Type::integer, "67108864", 1048576, 1e12, "B",
+     "memory for what waits while the store takes no data; beyond: raw samples are left out and counted"},
 
     {"ingest.queue_messages", Type::integer, "200000", 1000, 1e8, "",
      "received messages that may wait to be accounted; beyond: dropped and counted"},

@@ -81,7 +81,9 @@ Exit replay_into(const ReplayInto& options) {
   history::Writer writer(**store, {});
   server::ModelRegistry models;
   for (const std::string& file : options.robot_files) {
-    if (Result<void> loaded = server::load_robot_file(file, **store, writer, host_utime_us()); !loaded)
+    const auto robot = server::read_robot_file(file);
+    if (!robot) return report(robot.error());
+    if (Result<void> loaded = server::load_robot(*robot, file, **store, writer, host_utime_us()); !loaded)
       return report(loaded.error());
   }
   if (Result<void> loaded = server::load_stored_models(**store, models); !loaded)

@@ -339,8 +339,12 @@ class DiagnosisService::Impl {
     record.finished_utime_us = now_utime_us_();
     // The result is in the store before the job leaves the queue, so that whoever looks finds it in one of
     // them.
-    if (const auto stored = writer_.execute(history::UpdateDiagnosis{record, std::move(report)}); !stored)
+    history::UpdateDiagnosis update{record, std::move(report)};
+    if (const auto stored = writer_.execute(update); !stored) {
       on_error_(stored.error());
+      // Minutes of work wait until the store takes data again.
+      if (stored.error().fault == Fault::unavailable) (void)writer_.offer(std::move(update));
+    }
     if (on_ended_) on_ended_(record);
     {
       const std::lock_guard lock(mutex_);

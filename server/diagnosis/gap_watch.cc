@@ -97,7 +97,7 @@ void GapWatch::stop() {
 
 void GapWatch::record(const std::string& robot_id, const std::string& kind, std::string detail_json) {
   const auto posted =
-      writer_.post(history::AppendEvent{{0, now_utime_us_(), robot_id, kind, std::move(detail_json)}});
+      writer_.offer(history::AppendEvent{{0, now_utime_us_(), robot_id, kind, std::move(detail_json)}});
   if (!posted) on_error_(posted.error());
 }
 

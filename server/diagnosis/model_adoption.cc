@@ -72,7 +72,7 @@ ModelAdoption::ModelAdoption(const history::Store& store, history::Writer& write
 
 Result<void> ModelAdoption::record(const std::string& robot_id, const std::string& kind,
                                    std::string detail_json) {
-  return writer_.post(history::AppendEvent{{0, now_utime_us_(), robot_id, kind, std::move(detail_json)}});
+  return writer_.offer(history::AppendEvent{{0, now_utime_us_(), robot_id, kind, std::move(detail_json)}});
 }
 
 Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request, const ModelInForce& before,

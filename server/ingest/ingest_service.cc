@@ -126,6 +126,7 @@ class IngestService::Impl {
       }
       for (const InboundMessage& message : work) pipeline_.handle(message);
       work.clear();
+      if (const std::int64_t step_us = clock_steps_.take_step_us(); step_us != 0) on_clock_step(step_us);
       const auto now = Clock::now();
       if (now >= next_tick) {
         pipeline_.tick(host_utime_us());
@@ -141,6 +142,14 @@ class IngestService::Impl {
       }
     }
     pipeline_.suspend();
+  }
+
+  void on_clock_step(std::int64_t step_us) {
+    const std::int64_t now_us = host_utime_us();
+    const std::string step_s = std::to_string(static_cast<double>(step_us) * 1e-6);
+    outputs_.warn("", "the host's clock was set by " + step_s + " s");
+    outputs_.post(history::AppendEvent{{0, now_us, "", "host_clock_step", "{\"step_s\":" + step_s + "}"}});
+    pipeline_.on_host_clock_step(now_us, step_us);
   }
 
   void publish_energy_states() {
@@ -185,6 +194,7 @@ class IngestService::Impl {
   Forecasts& forecasts_;
   SessionOutputs outputs_;
   Pipeline pipeline_;
+  ClockSteps clock_steps_;  // the accountant's
   std::unique_ptr<telemetry::LcmLink> link_;
   std::vector<InboundMessage> batch_;  // the receiver's
   mutable std::mutex mutex_;

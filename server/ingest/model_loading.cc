@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -29,21 +30,24 @@ Result<void> load_stored_models(const history::Store& store, ModelRegistry& mode
   return {};
 }
 
-Result<void> load_robot_file(const std::string& path, history::Store& store, history::Writer& writer,
-                             std::int64_t now_utime_us) {
+Result<robot::RobotModel> read_robot_file(const std::string& path) {
   Result<robot::RobotModel> robot = robot::load_robot(path);
-  if (!robot) return tl::unexpected(std::move(robot.error()));
-  if (auto effects = dynamics::active_effects(*robot); !effects) {
-    effects.error().message = path + ": " + effects.error().message;
-    return tl::unexpected(std::move(effects.error()));
-  }
+  if (!robot) return robot;
+  if (auto effects = dynamics::active_effects(*robot); !effects)
+    return fail(effects.error().fault, std::move(effects.error().field),
+                path + ": " + effects.error().message);
+  return robot;
+}
+
+Result<void> load_robot(const robot::RobotModel& robot, const std::string& path, history::Store& store,
+                        history::Writer& writer, std::int64_t now_utime_us) {
   history::AddModel command;
-  command.robot_id = robot->robot_id;
+  command.robot_id = robot.robot_id;
   command.utime_us = now_utime_us;
   command.origin = history::ModelOrigin::file;
   command.note = std::filesystem::path(path).filename().string();
-  command.model_json = robot::to_json_text(*robot);
-  if (const auto versions = store.model_versions(robot->robot_id)) {
+  command.model_json = robot::to_json_text(robot);
+  if (const auto versions = store.model_versions(robot.robot_id)) {
     const auto last = std::ranges::find(*versions, history::ModelOrigin::file,
                                         &history::ModelVersion::origin);  // newest first
     if (last != versions->end() && last->model_json == command.model_json) return {};
@@ -53,20 +57,28 @@ Result<void> load_robot_file(const std::string& path, history::Store& store, his
   return {};
 }
 
-Result<int> load_robot_files(const std::string& directory, history::Store& store, history::Writer& writer,
-                             std::int64_t now_utime_us) {
+Result<RobotFiles> read_robot_files(const std::string& directory) {
   std::error_code fault;
-  std::vector<std::filesystem::path> files;
+  std::vector<std::filesystem::path> paths;
   for (const auto& entry : std::filesystem::directory_iterator(directory, fault)) {
-    if (entry.path().extension() == ".json") files.push_back(entry.path());
+    if (entry.path().extension() == ".json") paths.push_back(entry.path());
   }
   if (fault) return fail(Fault::not_found, "robots.directory", directory + ": " + fault.message());
-  std::ranges::sort(files);
-  for (const auto& file : files) {
-    if (Result<void> loaded = load_robot_file(file.string(), store, writer, now_utime_us); !loaded)
-      return tl::unexpected(std::move(loaded.error()));
+  std::ranges::sort(paths);
+  RobotFiles files;
+  std::map<std::string, std::string> file_of;  // by robot
+  for (const auto& path : paths) {
+    Result<robot::RobotModel> robot = read_robot_file(path.string());
+    if (robot) {
+      if (const auto [first, is_new] = file_of.emplace(robot->robot_id, path.filename().string()); !is_new)
+        robot = invalid("/robot_id", path.string() + ": " + first->second + " has the same robot already");
+    }
+    if (robot)
+      files.robots.emplace_back(path.string(), std::move(*robot));
+    else
+      files.faulty.push_back(std::move(robot.error()));
   }
-  return static_cast<int>(files.size());
+  return files;
 }
 
 }  // namespace joulecast::server

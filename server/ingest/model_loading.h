@@ -1,6 +1,8 @@
 #pragma once
 
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "base/error.h"
 #include "history/store.h"
@@ -13,13 +15,21 @@ namespace joulecast::server {
 // version.
 Result<void> load_stored_models(const history::Store& store, ModelRegistry& models);
 
-// Adds a robot file as a new version where it says something else than the last version that came from a
-// file; so a model adopted since stays in force. An effect that the catalogue rejects is an error.
-Result<void> load_robot_file(const std::string& path, history::Store& store, history::Writer& writer,
-                             std::int64_t now_utime_us);
+// A robot file whose effects the catalogue knows; errors name the file.
+Result<robot::RobotModel> read_robot_file(const std::string& path);
 
-// The same for all robot files (*.json) of a directory. Returns their number. Any bad file is an error.
-Result<int> load_robot_files(const std::string& directory, history::Store& store, history::Writer& writer,
-                             std::int64_t now_utime_us);
+// Adds what a robot file says as a new version where it differs from the last version that came from a file;
+// so a model adopted since stays in force.
+Result<void> load_robot(const robot::RobotModel& robot, const std::string& path, history::Store& store,
+                        history::Writer& writer, std::int64_t now_utime_us);
+
+// The robot files (*.json) of a directory.
+struct RobotFiles {
+  std::vector<std::pair<std::string, robot::RobotModel>> robots;  // with their paths
+  std::vector<Error> faulty;                                      // one a file that cannot be used
+};
+
+// Fault::not_found when the directory cannot be read.
+Result<RobotFiles> read_robot_files(const std::string& directory);
 
 }  // namespace joulecast::server

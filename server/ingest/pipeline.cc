@@ -84,6 +84,10 @@ void Pipeline::tick(std::int64_t host_utime_us) {
   for (auto& [id, robot] : sessions_) robot->on_tick(host_utime_us);
 }
 
+void Pipeline::on_host_clock_step(std::int64_t host_utime_us, std::int64_t step_us) {
+  for (auto& [id, robot] : sessions_) robot->on_host_clock_step(host_utime_us, step_us);
+}
+
 void Pipeline::publish() {
   for (auto& [id, robot] : sessions_) robot->publish();
 }

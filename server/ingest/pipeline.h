@@ -42,6 +42,8 @@ class Pipeline {
   // Call about once a second.
   void tick(std::int64_t host_utime_us);
   // Publishes the snapshots that changed.
+  // The host's clock was set: silence is counted on as if it had not been.
+  void on_host_clock_step(std::int64_t host_utime_us, std::int64_t step_us);
   void publish();
   // Ends missions as if the robots had fallen silent for good; for offline replay.
   void finish();

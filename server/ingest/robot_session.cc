@@ -484,7 +484,6 @@ void RobotSession::checkpoint() {
   command.mission = open_->record;
   command.trace = trace_.take();
   command.samples = std::exchange(open_->samples, {});
-  open_->samples.reserve(settings_.checkpoint_samples);
   open_->unsaved = 0;
   if (std::isfinite(snapshot_.state_of_charge)) {
     command.resume_state = history::ResumeState{robot_id_, snapshot_.sample.utime_us, last_sequence_,
@@ -516,6 +515,15 @@ void RobotSession::on_tick(std::int64_t host_utime_us) {
   }
   if (open_ != nullptr && (open_->unsaved > 0 || covariates_.pending() > 0)) checkpoint();
   publish();
+}
+
+void RobotSession::on_host_clock_step(std::int64_t host_utime_us, std::int64_t step_us) {
+  std::int64_t& received = snapshot_.received_utime_us;
+  const auto distance = [host_utime_us](std::int64_t utime_us) { return std::abs(host_utime_us - utime_us); };
+  // What was received after the step has the new time already.
+  if (received == 0 || distance(received + step_us) >= distance(received)) return;
+  received += step_us;
+  changed_ = true;
 }
 
 void RobotSession::suspend() {

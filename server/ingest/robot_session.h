@@ -72,6 +72,8 @@ class RobotSession {
 
   // Call about once a second: ends missions that fell silent, checkpoints the open one, publishes what
   // changed.
+  // The host's clock was set by so much: what it stamped before is told by its new time.
+  void on_host_clock_step(std::int64_t host_utime_us, std::int64_t step_us);
   void on_tick(std::int64_t host_utime_us);
   // Checkpoints and publishes at once; for an orderly stop, which leaves an open mission to be resumed.
   void suspend();

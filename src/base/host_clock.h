@@ -2,6 +2,10 @@
 
 #include <chrono>
 #include <cstdint>
+#include <cstdlib>
+#include <ctime>
+#include <functional>
+#include <utility>
 
 namespace joulecast {
 
@@ -11,5 +15,43 @@ inline std::int64_t host_utime_us() {
              std::chrono::system_clock::now().time_since_epoch())
       .count();
 }
+
+// Microseconds since the host was booted, its sleep included. Nobody sets this clock.
+inline std::int64_t host_boot_us() {
+  timespec now{};
+  clock_gettime(CLOCK_BOOTTIME, &now);
+  return std::int64_t{1'000'000} * now.tv_sec + now.tv_nsec / 1000;
+}
+
+// Finds the steps of the host's clock: where it went on by something else than the time that passed.
+class ClockSteps {
+ public:
+  using Clock = std::function<std::int64_t()>;
+
+  explicit ClockSteps(Clock wall_us = host_utime_us, Clock steady_us = host_boot_us)
+      : wall_us_(std::move(wall_us)), steady_us_(std::move(steady_us)), offset_us_(offset_us()) {}
+
+  // How far the clock was set forward since the last call, negative when back; 0 for what slewing explains
+  // within a call's distance.
+  std::int64_t take_step_us() {
+    const std::int64_t before_us = std::exchange(offset_us_, offset_us());
+    const std::int64_t step_us = offset_us_ - before_us;
+    return std::abs(step_us) < least_step_us ? 0 : step_us;
+  }
+
+ private:
+  static constexpr std::int64_t least_step_us = 500'000;
+
+  // Both clocks read at one moment: again if the thread was kept waiting in between.
+  std::int64_t offset_us() const {
+    for (;;) {
+      const std::int64_t before_us = steady_us_(), wall_us = wall_us_();
+      if (steady_us_() - before_us < least_step_us / 10) return wall_us - before_us;
+    }
+  }
+
+  Clock wall_us_, steady_us_;
+  std::int64_t offset_us_;
+};
 
 }  // namespace joulecast

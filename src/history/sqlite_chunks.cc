@@ -207,6 +207,11 @@ std::int64_t encoded_bytes(Database& database) {
       "(SELECT coalesce(sum(bytes), 0) FROM covariate_chunk)");
 }
 
+std::int64_t count(Database& database) {
+  return database.integer(
+      "SELECT (SELECT count(*) FROM telemetry_chunk) + (SELECT count(*) FROM covariate_chunk)");
+}
+
 std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_chunks,
                    std::int64_t now_utime_us) {
   std::int64_t total_bytes = encoded_bytes(database);

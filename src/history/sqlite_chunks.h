@@ -28,6 +28,7 @@ Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange r
                                  const PageRequest& page);
 
 std::int64_t encoded_bytes(Database& database);
+std::int64_t count(Database& database);
 
 // Drops chunks beyond the retention, oldest first, at most `max_chunks`; answers how many.
 std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_chunks,

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,8 +11,10 @@
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 #include "base/host_clock.h"
 #include "history/schema.h"
@@ -60,6 +63,42 @@ class FileLock {
 
  private:
   int descriptor_;
+};
+
+// The files that were opened, known again by device and inode.
+class OpenedFiles {
+ public:
+  explicit OpenedFiles(std::vector<std::string> paths) : paths_(std::move(paths)) {
+    for (const std::string& path : paths_) opened_.push_back(identity_of(path));
+  }
+
+  // A lost file stays lost: what was written to it since is in no file that anybody finds.
+  Result<void> check() {
+    for (std::size_t k = 0; k < paths_.size() && lost_.empty(); ++k) {
+      const Identity now = identity_of(paths_[k]);
+      if (now != opened_[k])
+        lost_ = paths_[k] + (now ? " was replaced" : " was deleted") +
+                " under the running program; nothing is stored until it is started again";
+    }
+    if (!lost_.empty()) return fail(Fault::unavailable, "database", lost_);
+    for (const std::string& path : paths_) {
+      if (access(path.c_str(), W_OK) != 0)
+        return fail(Fault::unavailable, "database", path + " cannot be written: " + std::strerror(errno));
+    }
+    return {};
+  }
+
+ private:
+  using Identity = std::optional<std::pair<dev_t, ino_t>>;
+  static Identity identity_of(const std::string& path) {
+    struct stat now {};
+    if (stat(path.c_str(), &now) != 0) return std::nullopt;
+    return std::pair(now.st_dev, now.st_ino);
+  }
+
+  std::vector<std::string> paths_;
+  std::vector<Identity> opened_;
+  std::string lost_;
 };
 
 // Reading connections, lent one at a time.
@@ -118,19 +157,27 @@ void configure_writer(Database& database) {
 
 class SqliteStore final : public Store {
  public:
-  SqliteStore(const SqliteOptions& options, std::unique_ptr<FileLock> lock, std::unique_ptr<Database> writer)
+  SqliteStore(const SqliteOptions& options, std::vector<std::unique_ptr<FileLock>> locks,
+              std::unique_ptr<Database> writer)
       : path_(options.path),
-        lock_(std::move(lock)),
+        locks_(std::move(locks)),
         writer_(std::move(writer)),
         changes_(*writer_, options.now_utime_us ? options.now_utime_us : host_utime_us),
         readers_(options.path, options.readers, options.busy_timeout_ms),
-        last_key_(queries::greatest_key(*writer_)) {}
+        // The first query has opened the journal.
+        last_key_(queries::greatest_key(*writer_)),
+        files_({path_, path_ + "-wal"}) {}
 
   Result<std::vector<Outcome>> apply(std::span<const Command> commands) override {
+    if (const Result<void> sound = files_.check(); !sound) return tl::unexpected(sound.error());
     auto outcomes = guarded([&]() -> Result<std::vector<Outcome>> { return changes_.apply(commands); });
+    // Nothing is acknowledged that went into a file which was deleted meanwhile.
+    if (const Result<void> sound = files_.check(); !sound) return tl::unexpected(sound.error());
     if (outcomes) forget_reservations(commands, *outcomes);
     return outcomes;
   }
+
+  Result<void> check() override { return files_.check(); }
 
   Result<MissionKey> mission_key(std::string_view robot_id, std::string_view mission_id,
                                  std::int64_t start_utime_us) override {
@@ -242,6 +289,7 @@ class SqliteStore final : public Store {
       const auto journal = std::filesystem::file_size(path_ + "-wal", absent);
       size.journal_bytes = absent ? 0 : static_cast<std::int64_t>(journal);
       size.telemetry_bytes = chunks::encoded_bytes(database);
+      size.telemetry_chunks = chunks::count(database);
       return size;
     });
   }
@@ -271,7 +319,7 @@ class SqliteStore final : public Store {
   }
 
   std::string path_;
-  std::unique_ptr<FileLock> lock_;
+  std::vector<std::unique_ptr<FileLock>> locks_;  // of the lock file and of the database itself
   std::unique_ptr<Database> writer_;
   SqliteChanges changes_;
   mutable ReaderPool readers_;
@@ -279,20 +327,27 @@ class SqliteStore final : public Store {
   std::mutex keys_mutex_;
   MissionKey last_key_;
   std::map<MissionName, MissionKey> reserved_;
+  OpenedFiles files_;
 };
 
 }  // namespace
 
 Result<std::unique_ptr<Store>> open_sqlite_store(const SqliteOptions& options) {
-  auto lock = FileLock::acquire(options.path + ".lock");
-  if (!lock) return tl::unexpected(lock.error());
+  // The lock file keeps others off before anything is read; the database's own lock holds where the lock file
+  // is deleted. Its descriptor is closed after SQLite's, whose locks would go with it.
+  std::vector<std::unique_ptr<FileLock>> locks;
+  for (const char* suffix : {".lock", ""}) {
+    auto lock = FileLock::acquire(options.path + suffix);
+    if (!lock) return tl::unexpected(lock.error());
+    locks.push_back(std::move(*lock));
+  }
   return guarded([&]() -> Result<std::unique_ptr<Store>> {
     auto writer =
         std::make_unique<Database>(options.path, OpenMode::read_write_create, options.busy_timeout_ms);
     // The schema first, so that a file which is refused is left exactly as it was.
     if (auto ready = bring_to_schema(*writer, store_schema()); !ready) return tl::unexpected(ready.error());
     configure_writer(*writer);
-    return std::make_unique<SqliteStore>(options, std::move(*lock), std::move(writer));
+    return std::make_unique<SqliteStore>(options, std::move(locks), std::move(writer));
   });
 }
 

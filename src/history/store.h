@@ -82,6 +82,7 @@ struct StoreSize {
   std::int64_t database_bytes = 0;   // pages in use and free
   std::int64_t journal_bytes = 0;    // committed, not yet in the database's pages
   std::int64_t telemetry_bytes = 0;  // encoded raw telemetry and covariates
+  std::int64_t telemetry_chunks = 0;
 };
 
 // What came of one command: a number that its description names, or why it was refused.
@@ -101,6 +102,11 @@ class Store {
   // (not_found, conflict, invalid) leaves no trace and the others stand. An error means that nothing was
   // applied.
   virtual Result<std::vector<Outcome>> apply(std::span<const Command> commands) = 0;
+
+  // Whether the store still is what was opened; apply() asks it too. Fault::unavailable when its files were
+  // deleted or replaced, which lasts until the program is started again, or when they cannot be written for
+  // now. To be called from apply()'s thread.
+  virtual Result<void> check() { return {}; }
 
   // The key of the mission of that robot, name and start: the stored one's, or else a new one which
   // StartMission then uses. Asked again before that, it answers the same.

@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <condition_variable>
-#include <deque>
-#include <future>
+#include <iterator>
+#include <list>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <thread>
 #include <utility>
 #include <vector>
+
+#include "history/spool.h"
 
 namespace joulecast::history {
 namespace {
@@ -17,22 +20,43 @@ using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
 constexpr std::chrono::milliseconds longest_sleep{1000};
+constexpr std::chrono::seconds slow_commit{5};  // longer, and the store counts as stalled
+constexpr std::chrono::seconds patience{4};     // with a commit that runs when its waiter's time is up
+constexpr std::chrono::seconds tell_again{60};  // of a store that still takes no data
+constexpr double seconds_per_hour = 3600;
 
+Error unavailable(std::string message) {
+  return Error{Fault::unavailable, "store", std::move(message)};
+}
 Error stopping() {
-  return Error{Fault::unavailable, "store", "the writer is stopping"};
+  return unavailable("the writer is stopping; not done");
+}
+
+// `later` follows `earlier` and concerns the same mission: one checkpoint that does what both would.
+void take_up(CheckpointMission& earlier, CheckpointMission later) {
+  const auto append = [](auto& to, auto& from) {
+    to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+  };
+  earlier.mission = std::move(later.mission);
+  append(earlier.trace, later.trace);
+  append(earlier.samples, later.samples);
+  append(earlier.covariates, later.covariates);
+  if (later.energy_state) earlier.energy_state = std::move(later.energy_state);
 }
 
 }  // namespace
 
 class Writer::Impl {
  public:
-  Impl(Store& store, WriterOptions options) : store_(store), options_(std::move(options)) {
+  Impl(Store& store, WriterOptions options)
+      : store_(store), options_(std::move(options)), steps_(options_.wall_clock, options_.steady_clock) {
     last_prune_ = Clock::now();
     thread_ = std::thread([this] { loop(); });
   }
 
   ~Impl() {
-    if (thread_.joinable()) (void)stop(options_.retry_last);
+    if (!stopping_) (void)stop(options_.retry_last);
+    if (thread_.joinable()) thread_.join();
   }
 
   Result<void> post(Command command) {
@@ -40,89 +64,106 @@ class Writer::Impl {
     std::unique_lock lock(mutex_);
     room_.wait(lock, [&] { return stopping_ || has_room(bytes); });
     if (stopping_) return tl::unexpected(stopping());
-    push({std::move(command), bytes, Clock::now(), nullptr});
+    push(std::move(command), nullptr);
     return {};
   }
 
-  Result<void> try_post(Command& command) {
-    const std::size_t bytes = weight_bytes(command);
-    std::lock_guard lock(mutex_);
+  Result<void> offer(Command command) {
+    const std::lock_guard lock(mutex_);
     if (stopping_) return tl::unexpected(stopping());
-    if (!has_room(bytes)) {
-      ++status_.overflowed;
-      return fail(Fault::unavailable, "store", "the writer's queue is full");
-    }
-    push({std::move(command), bytes, Clock::now(), nullptr});
+    if (!has_room(weight_bytes(command))) shed(command);
+    if (merged(command)) return {};
+    push(std::move(command), nullptr);
     return {};
   }
 
   Outcome execute(Command command, std::chrono::milliseconds timeout) {
     const auto deadline = Clock::now() + timeout;
     const std::size_t bytes = weight_bytes(command);
-    auto promise = std::make_shared<std::promise<Outcome>>();
-    std::future<Outcome> outcome = promise->get_future();
-    {
-      std::unique_lock lock(mutex_);
-      if (!room_.wait_until(lock, deadline, [&] { return stopping_ || has_room(bytes); }))
-        return fail(Fault::unavailable, "store", "the writer's queue is full");
-      if (stopping_) return tl::unexpected(stopping());
-      push({std::move(command), bytes, Clock::now(), std::move(promise)});
-      hurry_ = true;
-    }
+    std::unique_lock lock(mutex_);
+    room_.wait_until(lock, deadline, [&] { return stopping_ || trouble() || has_room(bytes); });
+    if (stopping_) return tl::unexpected(stopping());
+    if (const auto why = trouble())
+      return tl::unexpected(unavailable("takes no data for now, so this was not done: " + *why));
+    if (!has_room(bytes)) return tl::unexpected(unavailable("the writer's queue is full; not done"));
+    const auto waiter = std::make_shared<Waiter>();
+    const auto item = push(std::move(command), waiter);
+    hurry_ = true;
     work_.notify_one();
-    if (outcome.wait_until(deadline) == std::future_status::ready) return outcome.get();
-    return fail(Fault::unavailable, "store", "not committed yet; the command stands in the queue");
+    const auto answered = [&] { return waiter->outcome.has_value(); };
+    if (!waiter->done.wait_until(lock, deadline, answered) && waiter->queued) {
+      queued_bytes_ -= item->bytes;
+      queue_.erase(item);
+      return tl::unexpected(unavailable("not committed in time and withdrawn; not done"));
+    }
+    if (!waiter->done.wait_for(lock, patience, answered))
+      return tl::unexpected(unavailable("the commit does not return; whether it was done will be seen"));
+    return std::move(*waiter->outcome);
   }
 
   Result<void> flush(std::chrono::milliseconds timeout) {
     std::unique_lock lock(mutex_);
-    const std::uint64_t target = status_.posted;
+    const std::uint64_t target = last_id_;
+    const auto committed = [&] { return oldest_id() > target; };
     hurry_ = true;
     work_.notify_one();
-    if (committed_.wait_for(lock, timeout, [&] { return done_ >= target || ended_; }) && done_ >= target)
-      return {};
-    return fail(Fault::unavailable, "store",
-                std::to_string(target - done_) + " commands are not committed yet" +
-                    (status_.healthy ? "" : ": " + status_.error));
+    committed_.wait_for(lock, timeout, [&] { return committed() || ended_; });
+    if (committed() && left_ == 0) return {};
+    return tl::unexpected(
+        unavailable("what was posted is not committed yet" + (why_.empty() ? std::string() : ": " + why_)));
   }
 
   Result<void> stop(std::chrono::milliseconds grace) {
-    {
-      std::lock_guard lock(mutex_);
-      if (!stopping_) stop_deadline_ = Clock::now() + grace;
-      stopping_ = true;
-    }
-    work_.notify_one();
+    std::unique_lock lock(mutex_);
+    if (!stopping_) stop_deadline_ = Clock::now() + grace;
+    stopping_ = true;
+    work_.notify_all();
     room_.notify_all();
-    if (thread_.joinable()) thread_.join();
-    std::lock_guard lock(mutex_);
-    const std::uint64_t left = status_.posted - done_;
-    if (left == 0) return {};
-    return fail(Fault::unavailable, "store",
-                std::to_string(left) + " commands were not committed: " + status_.error);
+    // An attempt that runs when the grace is over may still succeed: it is waited for, but not for ever.
+    committed_.wait_until(lock, stop_deadline_ + patience, [&] { return ended_; });
+    if (!ended_) end();
+    if (left_ == 0) return {};
+    return tl::unexpected(unavailable(std::to_string(left_) + " commands were not committed: " + why_));
   }
 
   WriterStatus status() const {
-    std::lock_guard lock(mutex_);
+    const std::lock_guard lock(mutex_);
     WriterStatus now = status_;
-    now.queue_commands = queue_.size() + in_flight_;
+    const auto why = trouble();
+    now.healthy = !why;
+    now.error = why.value_or("");
+    now.queue_commands = queue_.size() + batch_.items.size();
     now.queue_bytes = queued_bytes_;
-    if (oldest_) now.oldest_wait_s = Seconds(Clock::now() - *oldest_).count();
+    now.queue_limit_bytes = options_.queue_bytes;
+    if (!batch_.items.empty() || !queue_.empty()) {
+      const Item& oldest = batch_.items.empty() ? queue_.front() : batch_.items.front();
+      now.oldest_wait_s = Seconds(Clock::now() - oldest.since).count();
+    }
+    if (attempt_since_) now.attempt_s = Seconds(Clock::now() - *attempt_since_).count();
     return now;
   }
 
  private:
+  // Somebody who waits for a command's outcome.
+  struct Waiter {
+    bool queued = true;  // the command may still be withdrawn
+    std::optional<Outcome> outcome;
+    std::condition_variable done;
+  };
+
   struct Item {
+    std::uint64_t id = 0;  // increasing in the queue's order
     Command command;
     std::size_t bytes = 0;
     Clock::time_point since;
-    std::shared_ptr<std::promise<Outcome>> answer;  // null when nobody waits
+    std::shared_ptr<Waiter> waiter;  // null when nobody waits
   };
+  using Place = std::list<Item>::iterator;
 
+  // What is being committed: the commands of the items, side by side as apply() wants them.
   struct Batch {
+    std::list<Item> items;
     std::vector<Command> commands;
-    std::vector<std::shared_ptr<std::promise<Outcome>>> answers;
-    std::size_t bytes = 0;
   };
 
   // A command heavier than the whole bound passes when it is alone.
@@ -130,157 +171,291 @@ class Writer::Impl {
     return queued_bytes_ == 0 || queued_bytes_ + bytes <= options_.queue_bytes;
   }
 
-  void push(Item item) {
-    queued_bytes_ += item.bytes;
-    if (!oldest_) oldest_ = item.since;
-    queue_.push_back(std::move(item));
+  // Why the store takes no data.
+  std::optional<std::string> trouble() const {
+    if (!why_.empty()) return why_;
+    if (attempt_since_ && Clock::now() - *attempt_since_ > slow_commit)
+      return "a commit has been running for " +
+             std::to_string(static_cast<int>(Seconds(Clock::now() - *attempt_since_).count())) + " s";
+    return std::nullopt;
+  }
+
+  std::uint64_t oldest_id() const {
+    if (!batch_.items.empty()) return batch_.items.front().id;
+    return queue_.empty() ? last_id_ + 1 : queue_.front().id;
+  }
+
+  Place push(Command command, std::shared_ptr<Waiter> waiter) {
+    const std::size_t bytes = weight_bytes(command);
+    queued_bytes_ += bytes;
+    queue_.push_back({++last_id_, std::move(command), bytes, Clock::now(), std::move(waiter)});
     ++status_.posted;
     if (queue_.size() == 1 || queue_.size() >= options_.batch_commands) work_.notify_one();
+    const Place item = std::prev(queue_.end());
+    forget(*item);  // an earlier one must not overtake this one
+    if (item->waiter) return item;
+    if (const auto* checkpoint = std::get_if<CheckpointMission>(&item->command))
+      checkpoints_[checkpoint->mission.key] = item;
+    else if (const auto* put = std::get_if<PutLearned>(&item->command))
+      learned_[{put->learned.robot_id, put->learned.topic}] = item;
+    return item;
+  }
+
+  void shed(Command& command) {
+    auto* checkpoint = std::get_if<CheckpointMission>(&command);
+    if (checkpoint == nullptr) return;
+    status_.shed_samples += checkpoint->samples.size();
+    checkpoint->samples = {};
+    checkpoint->covariates = {};
+    checkpoint->trace = {};
+  }
+
+  // Whether a waiting command has taken up this one.
+  bool merged(Command& command) {
+    Place waiting;
+    if (auto* checkpoint = std::get_if<CheckpointMission>(&command)) {
+      const auto found = checkpoints_.find(checkpoint->mission.key);
+      if (found == checkpoints_.end()) return false;
+      waiting = found->second;
+      take_up(std::get<CheckpointMission>(waiting->command), std::move(*checkpoint));
+    } else if (auto* put = std::get_if<PutLearned>(&command)) {
+      const auto found = learned_.find({put->learned.robot_id, put->learned.topic});
+      if (found == learned_.end()) return false;
+      waiting = found->second;
+      std::get<PutLearned>(waiting->command) = std::move(*put);
+    } else {
+      return false;
+    }
+    queued_bytes_ -= waiting->bytes;
+    waiting->bytes = weight_bytes(waiting->command);
+    queued_bytes_ += waiting->bytes;
+    ++status_.posted;
+    ++status_.merged;
+    return true;
+  }
+
+  // Nothing is merged any more into what waits of the same mission or topic.
+  void forget(const Item& item) {
+    if (const auto* checkpoint = std::get_if<CheckpointMission>(&item.command))
+      checkpoints_.erase(checkpoint->mission.key);
+    else if (const auto* start = std::get_if<StartMission>(&item.command))
+      checkpoints_.erase(start->mission.key);
+    else if (const auto* put = std::get_if<PutLearned>(&item.command))
+      learned_.erase({put->learned.robot_id, put->learned.topic});
   }
 
   void loop() {
-    for (;;) {
-      std::optional<Batch> batch = next_batch();
-      if (!batch) break;
-      if (!batch->commands.empty() && !commit(*batch)) break;
-      prune_when_due();
-    }
-    end();
+    while (take_batch() && commit()) prune_when_due();
+    const std::lock_guard lock(mutex_);
+    if (!ended_) end();
   }
 
-  // The next commands to commit; an empty batch as a sign of life; nothing when stopping and all is done or
-  // time is up.
-  std::optional<Batch> next_batch() {
+  // Fills the batch with the next commands, or leaves it empty as a sign of life. False when stopping and all
+  // is done or time is up.
+  bool take_batch() {
     std::unique_lock lock(mutex_);
     ++status_.ticks;
-    if (queue_.empty()) {
-      work_.wait_for(lock, longest_sleep, [this] { return stopping_ || !queue_.empty(); });
-    }
-    if (queue_.empty()) return stopping_ ? std::nullopt : std::optional<Batch>(Batch{});
-    if (stopping_ && Clock::now() >= stop_deadline_) return std::nullopt;
+    if (queue_.empty()) work_.wait_for(lock, longest_sleep, [this] { return stopping_ || !queue_.empty(); });
+    if (ended_) return false;
+    if (queue_.empty()) return !stopping_;
+    if (stopping_ && Clock::now() >= stop_deadline_) return false;
     work_.wait_until(lock, queue_.front().since + options_.batch_delay, [this] {
       return stopping_ || hurry_ || queue_.size() >= options_.batch_commands ||
              2 * queued_bytes_ >= options_.queue_bytes;
     });
-    Batch batch;
     const std::size_t count = std::min(queue_.size(), std::max<std::size_t>(options_.batch_commands, 1));
-    batch.commands.reserve(count);
-    batch.answers.reserve(count);
-    oldest_ = queue_.front().since;
-    for (std::size_t k = 0; k < count; ++k) {
-      Item& item = queue_.front();
-      batch.commands.push_back(std::move(item.command));
-      batch.answers.push_back(std::move(item.answer));
-      batch.bytes += item.bytes;
-      queue_.pop_front();
+    const auto end = std::next(queue_.begin(), static_cast<std::ptrdiff_t>(count));
+    batch_.items.splice(batch_.items.end(), queue_, queue_.begin(), end);
+    for (Item& item : batch_.items) {
+      forget(item);
+      if (item.waiter) item.waiter->queued = false;
+      batch_.commands.push_back(std::move(item.command));
     }
-    in_flight_ = count;
     if (queue_.empty()) hurry_ = false;
-    return batch;
+    return true;
   }
 
   // False when stopping left no time to succeed.
-  bool commit(Batch& batch) {
+  bool commit() {
     std::chrono::milliseconds pause = options_.retry_first;
     for (;;) {
       const auto begin = Clock::now();
-      auto outcomes = store_.apply(batch.commands);
-      if (outcomes) {
-        settle(batch, *outcomes, Seconds(Clock::now() - begin).count());
-        return true;
+      bool idle = false;
+      {
+        const std::lock_guard lock(mutex_);
+        attempt_since_ = begin;
+        idle = batch_.commands.empty() && why_.empty();
       }
-      tell(outcomes.error());
-      if (!wait_before_retry(outcomes.error(), pause)) {
-        refuse(batch.answers);
-        return false;
-      }
+      // After a failure an empty transaction tries the store where nothing waits to be committed.
+      Result<std::vector<Outcome>> outcomes = std::vector<Outcome>();
+      if (!idle) outcomes = store_.apply(batch_.commands);
+      if (const Result<void> sound = idle ? store_.check() : Result<void>(); !sound)
+        outcomes = tl::unexpected(sound.error());
+      if (outcomes) return settle(*outcomes, idle, Seconds(Clock::now() - begin).count());
+      if (!wait_before_retry(outcomes.error(), pause)) return false;
       pause = std::min(2 * pause, options_.retry_last);
     }
   }
 
-  static void refuse(const std::vector<std::shared_ptr<std::promise<Outcome>>>& answers) {
-    for (const auto& answer : answers)
-      if (answer) answer->set_value(tl::unexpected(stopping()));
+  // Whoever waits for a command is told that it was not done, and it is not tried again.
+  void withdraw_awaited(const Error& why) {
+    const auto answer = [&](const Item& item) {
+      item.waiter->outcome = tl::unexpected(unavailable(why.message + "; not done"));
+      item.waiter->queued = false;
+      item.waiter->done.notify_all();
+      queued_bytes_ -= item.bytes;
+    };
+    std::size_t k = 0;
+    for (auto item = batch_.items.begin(); item != batch_.items.end();) {
+      if (!item->waiter) {
+        ++item, ++k;
+        continue;
+      }
+      answer(*item);
+      item = batch_.items.erase(item);
+      batch_.commands.erase(batch_.commands.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+    std::erase_if(queue_, [&](const Item& item) {
+      if (item.waiter) answer(item);
+      return item.waiter != nullptr;
+    });
   }
 
   bool wait_before_retry(const Error& error, std::chrono::milliseconds pause) {
-    const auto until = Clock::now() + pause;
+    const auto now = Clock::now();
+    const auto until = now + pause;
     std::unique_lock lock(mutex_);
-    status_.healthy = false;
-    status_.error = describe(error);
+    attempt_since_.reset();
+    if (why_.empty()) failing_since_ = now;
+    const bool news = why_.empty() || now - told_ >= tell_again;
+    why_ = describe(error);
     ++status_.failed_commits;
+    withdraw_awaited(error);
+    if (news) {
+      told_ = now;
+      const auto age_s = static_cast<int>(Seconds(now - failing_since_).count());
+      lock.unlock();
+      tell(age_s == 0 ? error
+                      : Error{error.fault, error.field,
+                              "has taken no data for " + std::to_string(age_s) + " s: " + error.message});
+      lock.lock();
+    }
+    room_.notify_all();  // execute() refuses now
     for (;;) {
       ++status_.ticks;
-      const auto now = Clock::now();
-      if (stopping_ && now >= stop_deadline_) return false;
-      if (now >= until) return true;
+      const auto at = Clock::now();
+      if (ended_ || (stopping_ && at >= stop_deadline_)) return false;
+      if (at >= until) return true;
       // Stopping cuts the pause short to the deadline, not to nothing: a sick disk is not hammered.
-      const auto wake = std::min(until, now + Clock::duration(longest_sleep));
+      const auto wake = std::min(until, at + Clock::duration(longest_sleep));
       work_.wait_until(lock, stopping_ ? std::min(wake, stop_deadline_) : wake);
     }
   }
 
-  void settle(Batch& batch, std::vector<Outcome>& outcomes, double duration_s) {
+  // False when stop() did not wait for this any longer.
+  bool settle(std::vector<Outcome>& outcomes, bool idle, double duration_s) {
     // Before flush() can return: who waits for it may look for what was refused.
-    for (std::size_t k = 0; k < outcomes.size(); ++k)
-      if (!outcomes[k] && !batch.answers[k]) tell(outcomes[k].error());
+    auto item = batch_.items.begin();
+    for (const Outcome& outcome : outcomes)
+      if (const Item& settled = *item++; !outcome && !settled.waiter) tell(outcome.error());
     bool recovered = false;
     {
-      std::lock_guard lock(mutex_);
-      recovered = !status_.healthy;
-      status_.healthy = true;
-      status_.error.clear();
-      ++status_.commits;
-      status_.last_commit_s = duration_s;
-      status_.max_commit_s = std::max(status_.max_commit_s, duration_s);
-      status_.total_commit_s += duration_s;
-      done_ += batch.commands.size();
-      queued_bytes_ -= batch.bytes;
-      in_flight_ = 0;
-      oldest_ = queue_.empty() ? std::nullopt : std::optional(queue_.front().since);
-      for (const Outcome& outcome : outcomes) ++(outcome ? status_.applied : status_.refused);
+      const std::lock_guard lock(mutex_);
+      attempt_since_.reset();
+      if (ended_) return false;
+      recovered = !why_.empty();
+      why_.clear();
+      if (!idle && !outcomes.empty()) {
+        ++status_.commits;
+        status_.last_commit_s = duration_s;
+        status_.max_commit_s = std::max(status_.max_commit_s, duration_s);
+        status_.total_commit_s += duration_s;
+      }
+      item = batch_.items.begin();
+      for (Outcome& outcome : outcomes) {
+        ++(outcome ? status_.applied : status_.refused);
+        queued_bytes_ -= item->bytes;
+        if (item->waiter) {
+          item->waiter->outcome = std::move(outcome);
+          item->waiter->done.notify_all();
+        }
+        ++item;
+      }
+      batch_ = {};
     }
     room_.notify_all();
     committed_.notify_all();
-    for (std::size_t k = 0; k < outcomes.size(); ++k)
-      if (batch.answers[k]) batch.answers[k]->set_value(std::move(outcomes[k]));
-    if (recovered) tell({Fault::unavailable, "store", "commits succeed again"});
+    if (recovered) tell(unavailable("commits succeed again"));
+    return true;
   }
 
   void prune_when_due() {
+    const auto now = Clock::now();
+    if (steps_.take_step_us() != 0) distrust_until_ = now + options_.clock_distrust;
     const Retention& keep = options_.retention;
     if (!keep.telemetry_max_age_us && !keep.telemetry_max_bytes) return;
-    if (Clock::now() - last_prune_ < options_.prune_interval) return;
-    const Command prune = Prune{keep};
-    const auto outcomes = store_.apply({&prune, 1});
-    const Outcome outcome = outcomes ? outcomes->front() : Outcome(tl::unexpected(outcomes.error()));
-    if (!outcome) {
-      last_prune_ = Clock::now();
-      tell(outcome.error());
-      return;
+    if (now - last_prune_ < options_.prune_interval) return;
+    bool more_is_due = false;
+    if (keep.telemetry_max_age_us && now >= distrust_until_) {
+      const auto size = store_.size();
+      const double share =
+          size ? options_.age_share_per_hour * static_cast<double>(size->telemetry_chunks) : 0;
+      const double hours = Seconds(now - last_prune_).count() / seconds_per_hour;
+      // What an hour allows, saved up; of a small store one chunk at least.
+      age_allowance_ = std::min(age_allowance_ + share * hours, std::max(share, 1.0));
+      if (age_allowance_ >= 1) {
+        const auto most = static_cast<std::int64_t>(age_allowance_);
+        age_allowance_ -= static_cast<double>(prune({{keep.telemetry_max_age_us, {}}, most}));
+      }
     }
-    // A full measure means that more is due: after the commands that came meanwhile.
-    if (*outcome < std::get<Prune>(prune).max_chunks) last_prune_ = Clock::now();
-    std::lock_guard lock(mutex_);
-    status_.pruned_chunks += static_cast<std::uint64_t>(*outcome);
+    if (keep.telemetry_max_bytes) {
+      const Prune by_size{{{}, keep.telemetry_max_bytes}};
+      // A full measure means that more is due: after the commands that came meanwhile.
+      more_is_due = prune(by_size) == by_size.max_chunks;
+    }
+    if (!more_is_due) last_prune_ = now;
   }
 
-  void end() {
-    std::uint64_t left = 0;
-    std::string why;
-    std::vector<std::shared_ptr<std::promise<Outcome>>> unanswered;
-    {
-      std::lock_guard lock(mutex_);
-      ended_ = true;
-      left = status_.posted - done_;
-      why = status_.error;
-      for (Item& item : queue_) unanswered.push_back(std::move(item.answer));
-      queue_.clear();
+  // The number of chunks dropped.
+  std::int64_t prune(const Prune& measure) {
+    const Command command = measure;
+    const auto outcomes = store_.apply({&command, 1});
+    const Outcome outcome = outcomes ? outcomes->front() : Outcome(tl::unexpected(outcomes.error()));
+    if (!outcome) {
+      tell(outcome.error());
+      return 0;
     }
-    refuse(unanswered);
+    const std::lock_guard lock(mutex_);
+    status_.pruned_chunks += static_cast<std::uint64_t>(*outcome);
+    return *outcome;
+  }
+
+  // Answers who waits, and spools what nobody waits for: with the mutex held, once.
+  void end() {
+    ended_ = true;
+    if (why_.empty() && attempt_since_) why_ = trouble().value_or("a commit did not return");
+    std::vector<const Command*> spooled;
+    std::size_t k = 0;
+    for (const Item& item : batch_.items) {
+      const Command& command = batch_.commands[k++];
+      item.waiter ? refuse(*item.waiter) : spooled.push_back(&command);
+    }
+    for (const Item& item : queue_) item.waiter ? refuse(*item.waiter) : spooled.push_back(&item.command);
+    left_ = batch_.items.size() + queue_.size();
     committed_.notify_all();
-    if (left > 0)
-      tell({Fault::unavailable, "store", std::to_string(left) + " commands were lost at the stop: " + why});
+    if (spooled.empty()) return;
+    const std::string number = std::to_string(spooled.size()) + " commands were ";
+    Result<void> kept = options_.spool_path.empty() ? Result<void>(tl::unexpected(unavailable(why_)))
+                                                    : write_spool(options_.spool_path, spooled);
+    tell(unavailable(kept ? number + "written to " + options_.spool_path +
+                                ", which the next start takes in: " + why_
+                          : number + "lost at the stop: " + describe(kept.error())));
+  }
+
+  static void refuse(Waiter& waiter) {
+    waiter.outcome = tl::unexpected(stopping());
+    waiter.queued = false;
+    waiter.done.notify_all();
   }
 
   void tell(const Error& error) const {
@@ -293,18 +468,26 @@ class Writer::Impl {
   mutable std::mutex mutex_;
   std::condition_variable work_;       // for the writing thread
   std::condition_variable room_;       // for those who wait to post
-  std::condition_variable committed_;  // for those who flush
-  std::deque<Item> queue_;
-  std::size_t queued_bytes_ = 0;  // waiting and in flight
-  std::size_t in_flight_ = 0;
-  std::uint64_t done_ = 0;  // commands committed or refused
-  std::optional<Clock::time_point> oldest_;
+  std::condition_variable committed_;  // for those who flush or stop
+  std::list<Item> queue_;
+  Batch batch_;                              // changed by the writing thread alone, with the mutex held
+  std::map<MissionKey, Place> checkpoints_;  // the last one that waits, of a mission
+  std::map<std::pair<std::string, std::string>, Place> learned_;  // the one that waits, of a robot and topic
+  std::size_t queued_bytes_ = 0;                                  // waiting and in the batch
+  std::uint64_t last_id_ = 0;
+  std::size_t left_ = 0;                            // commands that the end left uncommitted
+  std::optional<Clock::time_point> attempt_since_;  // a commit runs
+  std::string why_;                                 // the last commit failed; empty: it did not
+  Clock::time_point failing_since_, told_;
   bool hurry_ = false;  // somebody waits: commit what there is
   bool stopping_ = false;
   bool ended_ = false;
   Clock::time_point stop_deadline_;
   WriterStatus status_;
-  Clock::time_point last_prune_;  // the writing thread's own
+  // The writing thread's own.
+  Clock::time_point last_prune_, distrust_until_;
+  double age_allowance_ = 0;  // chunks that may be dropped by age
+  ClockSteps steps_;
 
   std::thread thread_;
 };
@@ -318,8 +501,8 @@ Result<void> Writer::post(Command command) {
   return impl_->post(std::move(command));
 }
 
-Result<void> Writer::try_post(Command& command) {
-  return impl_->try_post(command);
+Result<void> Writer::offer(Command command) {
+  return impl_->offer(std::move(command));
 }
 
 Outcome Writer::execute(Command command, std::chrono::milliseconds timeout) {

@@ -23,13 +23,17 @@ def free_port(kind):
 
 
 class Sandbox:
-    """Commands say 8080 and 7667, as their readers would; what runs uses ports that were free."""
+    """Commands say the ports that their readers would use; what runs uses ports that were free."""
+
+    USUAL_HTTP = ["8080", "8081", "8082", "8083", "8084"]
+    USUAL_LCM = ["7667", "7671", "7672", "7673", "7674"]
 
     def __init__(self, daemon, client, source):
         self.home = Path(tempfile.mkdtemp(prefix="joulecast-document-"))
         for name in ("deploy", "schemas", "lcmtypes", "client", "src"):
             (self.home / name).symlink_to(source.resolve() / name)
-        self.ports = {"8080": free_port(socket.SOCK_STREAM), "7667": free_port(socket.SOCK_DGRAM)}
+        self.ports = {usual: free_port(socket.SOCK_STREAM) for usual in self.USUAL_HTTP}
+        self.ports |= {usual: free_port(socket.SOCK_DGRAM) for usual in self.USUAL_LCM}
         lcm_url = f"udpm://239.255.76.67:{self.ports['7667']}?ttl=0"
         environment = {"PATH": f"{daemon.resolve().parent}:{client.resolve().parent}:{os.environ['PATH']}",
                        "HOME": str(self.home), "LANG": "C.UTF-8", "TERM": "dumb", "PYTHONDONTWRITEBYTECODE": "1",

@@ -81,6 +81,37 @@ TEST_F(SqliteStoreTest, IsHeldOpenByOneOnly) {
   EXPECT_TRUE(open());
 }
 
+TEST_F(SqliteStoreTest, IsHeldOpenByOneOnlyThoughTheLockFileWasDeleted) {
+  const auto store = need(open());
+  std::filesystem::remove(path_ + ".lock");
+  const auto second = open();
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().fault, Fault::conflict);
+}
+
+TEST_F(SqliteStoreTest, AcknowledgesNothingOnceItsFileWasDeletedOrReplaced) {
+  for (const bool replaced : {false, true}) {
+    for (const char* suffix : {"", "-wal"}) {
+      auto store = need(open());
+      EXPECT_TRUE(store->check());
+      EXPECT_TRUE(apply_one(*store, AppendEvent{{0, 1, "", "test", "{}"}}));
+      std::filesystem::rename(path_ + suffix, path_ + ".moved");
+      if (replaced) std::filesystem::copy_file(path_ + ".moved", path_ + suffix);
+      const std::string what = path_ + suffix + (replaced ? " was replaced" : " was deleted");
+      const auto found = store->check();
+      ASSERT_FALSE(found) << what;
+      EXPECT_EQ(found.error().fault, Fault::unavailable);
+      EXPECT_NE(found.error().message.find(what), std::string::npos) << found.error().message;
+      EXPECT_FALSE(apply_one(*store, AppendEvent{{0, 2, "", "test", "{}"}}));
+      // Put back it may be, but what was written meanwhile, and by whom, nobody knows.
+      std::filesystem::rename(path_ + ".moved", path_ + suffix);
+      EXPECT_FALSE(store->check());
+      store.reset();
+      EXPECT_TRUE(need(open())->check());
+    }
+  }
+}
+
 TEST_F(SqliteStoreTest, ReportsPagesOverwrittenByOthers) {
   MissionKey key = 0;
   {

@@ -5,9 +5,11 @@
 
 #include <atomic>
 #include <chrono>
+#include <filesystem>
 #include <mutex>
 #include <thread>
 
+#include "history/spool.h"
 #include "history/sqlite.h"
 #include "temporary_store.h"
 
@@ -26,14 +28,21 @@ class FailingStore final : public Store {
   }
 
   std::atomic<bool> fails{false};
+  std::atomic<bool> hangs{false};
+  std::atomic<bool> lost{false};
   std::atomic<int> attempts{0};
   std::atomic<std::size_t> largest_batch{0};
 
   Result<std::vector<Outcome>> apply(std::span<const Command> commands) override {
     ++attempts;
+    while (hangs) std::this_thread::sleep_for(milliseconds(1));
     if (fails) return fail(Fault::unavailable, "database", "database or disk is full");
     largest_batch = std::max(largest_batch.load(), commands.size());
     return store_->apply(commands);
+  }
+  Result<void> check() override {
+    if (lost) return fail(Fault::unavailable, "database", "was deleted");
+    return {};
   }
   Result<MissionKey> mission_key(std::string_view r, std::string_view m, std::int64_t s) override {
     return store_->mission_key(r, m, s);
@@ -215,14 +224,14 @@ TEST_F(WriterTest, TriesAgainUntilTheDiskIsWellAndLosesNothing) {
   EXPECT_EQ(status.queue_commands, 100U);
   EXPECT_GT(status.oldest_wait_s, 0.0);
   EXPECT_FALSE(writer.flush(milliseconds(20)));
-  const Outcome late = writer.execute(event(100), milliseconds(20));
-  ASSERT_FALSE(late);
-  EXPECT_EQ(late.error().fault, Fault::unavailable);
+  const Outcome refused = writer.execute(event(100));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().fault, Fault::unavailable);
 
   store_.fails = false;
   ASSERT_TRUE(writer.flush());
   EXPECT_TRUE(writer.status().healthy);
-  EXPECT_EQ(stored(), numbers_to(101));
+  EXPECT_EQ(stored(), numbers_to(100)) << "what execute() called unavailable is not done later";
   EXPECT_THAT(told(), testing::Contains(testing::HasSubstr("succeed again")));
 }
 
@@ -243,27 +252,128 @@ TEST_F(WriterTest, WaitsOutALockOfAnotherProcess) {
   EXPECT_EQ(stored(), numbers_to(1));
 }
 
-TEST_F(WriterTest, BoundsItsQueueAndCountsWhatItTurnsAway) {
+TEST_F(WriterTest, PostWaitsForRoom) {
   WriterOptions o = options();
   o.queue_bytes = 20 * weight_bytes(event(0));
   Writer writer(store_, o);
   store_.fails = true;
-  int taken = 0;
-  Command command = event(taken);
-  while (writer.try_post(command)) command = event(++taken);
   // Small texts live inside their strings: all commands weigh the same.
-  EXPECT_EQ(taken, 20);
-  EXPECT_EQ(std::get<AppendEvent>(command).event.utime_us, 20)
-      << "a command turned away stays with its owner";
-  EXPECT_EQ(writer.status().overflowed, 1U);
-  EXPECT_LE(writer.status().queue_bytes, o.queue_bytes);
-
-  // One that waits for room gets it once the disk is well.
-  std::thread poster([&] { EXPECT_TRUE(writer.post(event(20))); });
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(writer.post(event(i)));
+  EXPECT_LE(writer.status().queue_bytes, writer.status().queue_limit_bytes);
+  std::atomic<bool> posted = false;
+  std::thread poster([&] {
+    EXPECT_TRUE(writer.post(event(20)));
+    posted = true;
+  });
+  std::this_thread::sleep_for(milliseconds(50));
+  EXPECT_FALSE(posted);
   store_.fails = false;
   poster.join();
   ASSERT_TRUE(writer.flush());
   EXPECT_EQ(stored(), numbers_to(21));
+}
+
+TEST_F(WriterTest, OffersMergeWhileTheStoreStallsAndNothingIsLost) {
+  Mission m = start_mission(store_, "amr-1", "m", 0);
+  Writer writer(store_, options());
+  store_.fails = true;
+  ASSERT_TRUE(writer.offer(event(0)));
+  ASSERT_TRUE(eventually([&] { return writer.status().failed_commits > 0; }));
+  for (int k = 0; k < 400; ++k) {
+    m.samples += 25;
+    ASSERT_TRUE(writer.offer(CheckpointMission{m, {}, some_samples(1'000'000 * k, 25 * k, 25), {}}));
+    ASSERT_TRUE(writer.offer(PutLearned{{"amr-1", "charge", k, "{}"}}));
+  }
+  EXPECT_LE(writer.status().queue_commands, 3U);
+  EXPECT_EQ(writer.status().merged, 798U);
+  store_.fails = false;
+  ASSERT_TRUE(writer.flush());
+  EXPECT_EQ(writer.status().queue_bytes, 0U);
+  EXPECT_EQ(need(store_.mission(m.key)).samples, 10'000);
+  EXPECT_EQ(need(store_.learned("amr-1", "charge"))->utime_us, 399);
+  const auto page = need(store_.telemetry(m.key, {}, {.limit = 20'000, .cursor = {}}));
+  ASSERT_EQ(page.samples.size(), 10'000U);
+  for (std::size_t k = 0; k < page.samples.size(); ++k)
+    ASSERT_EQ(page.samples[k].sequence, static_cast<std::int64_t>(k));
+}
+
+TEST_F(WriterTest, ACheckpointIsNotMergedAcrossANewStartOfItsMission) {
+  Mission m = start_mission(store_, "amr-1", "m", 0);
+  Writer writer(store_, options());
+  store_.fails = true;
+  ASSERT_TRUE(writer.offer(event(0)));
+  ASSERT_TRUE(eventually([&] { return writer.status().failed_commits > 0; }));
+  ASSERT_TRUE(writer.offer(CheckpointMission{m, {}, some_samples(0, 0, 25), {}}));
+  ASSERT_TRUE(writer.offer(StartMission{m}));
+  m.samples = 10;
+  ASSERT_TRUE(writer.offer(CheckpointMission{m, {}, some_samples(0, 0, 10), {}}));
+  store_.fails = false;
+  ASSERT_TRUE(writer.flush());
+  EXPECT_EQ(need(store_.telemetry(m.key, {}, {.limit = 100, .cursor = {}})).samples.size(), 10U);
+}
+
+TEST_F(WriterTest, AFullQueueKeepsAccountsAndCountsTheSamplesLeftOut) {
+  WriterOptions o = options();
+  o.queue_bytes = 100'000;
+  Mission m = start_mission(store_, "amr-1", "m", 0);
+  Writer writer(store_, o);
+  store_.fails = true;
+  for (int k = 0; k < 400; ++k) {
+    m.samples += 25;
+    ASSERT_TRUE(writer.offer(CheckpointMission{m, {}, some_samples(1'000'000 * k, 25 * k, 25), {}}));
+    ASSERT_LE(writer.status().queue_bytes, o.queue_bytes + 50'000);
+  }
+  store_.fails = false;
+  ASSERT_TRUE(writer.flush());
+  EXPECT_EQ(need(store_.mission(m.key)).samples, 10'000);
+  const auto page = need(store_.telemetry(m.key, {}, {.limit = 20'000, .cursor = {}}));
+  EXPECT_GT(page.samples.size(), 100U);
+  EXPECT_EQ(page.samples.size() + writer.status().shed_samples, 10'000U);
+}
+
+TEST_F(WriterTest, ExecuteWithdrawsWhatHasNotBegunInTime) {
+  Writer writer(store_, options());
+  store_.hangs = true;
+  ASSERT_TRUE(writer.offer(event(0)));
+  ASSERT_TRUE(eventually([&] { return writer.status().attempt_s > 0; }));
+  const Outcome late = writer.execute(event(1), milliseconds(20));
+  ASSERT_FALSE(late);
+  EXPECT_THAT(late.error().message, testing::HasSubstr("not done"));
+  store_.hangs = false;
+  ASSERT_TRUE(writer.flush());
+  EXPECT_EQ(stored(), numbers_to(1));
+}
+
+TEST_F(WriterTest, ExecuteIsAnsweredByTheAttemptThatRunsWhenItsTimeIsUp) {
+  Writer writer(store_, options());
+  store_.hangs = true;
+  std::thread disk([&] {
+    std::this_thread::sleep_for(milliseconds(200));
+    store_.hangs = false;
+  });
+  EXPECT_TRUE(writer.execute(event(0), milliseconds(50)));
+  disk.join();
+  EXPECT_EQ(stored(), numbers_to(1));
+}
+
+TEST_F(WriterTest, AFailedAttemptAnswersAtOnceAndIsNotRepeated) {
+  Writer writer(store_, options());
+  store_.fails = true;
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_FALSE(writer.execute(event(0)));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
+  store_.fails = false;
+  // Nothing waits, and the writer finds out by itself that the store is well again.
+  EXPECT_TRUE(eventually([&] { return writer.status().healthy; }));
+  EXPECT_EQ(writer.execute(event(0)), 1);
+  EXPECT_EQ(stored(), numbers_to(1));
+}
+
+TEST_F(WriterTest, ALostStoreIsNoticedWhileNothingIsWritten) {
+  Writer writer(store_, options());
+  store_.lost = true;
+  EXPECT_TRUE(eventually([&] { return !writer.status().healthy; }));
+  EXPECT_THAT(writer.status().error, testing::HasSubstr("was deleted"));
 }
 
 TEST_F(WriterTest, TakesACommandHeavierThanTheWholeBound) {
@@ -286,19 +396,78 @@ TEST_F(WriterTest, StopCommitsWhatWaitsAndTakesNoMore) {
   EXPECT_FALSE(writer.execute(event(10)));
 }
 
-TEST_F(WriterTest, StopSaysWhatItCouldNotCommit) {
-  Writer writer(store_, options());
-  store_.fails = true;
-  for (int i = 0; i < 10; ++i) ASSERT_TRUE(writer.post(event(i)));
-  Outcome waiting = 0;
-  std::thread waiter([&] { waiting = writer.execute(event(10)); });
-  ASSERT_TRUE(eventually([&] { return writer.status().posted == 11; }));
-  const auto stopped = writer.stop(milliseconds(30));
-  waiter.join();
-  ASSERT_FALSE(stopped);
-  EXPECT_THAT(stopped.error().message, testing::HasSubstr("11 commands"));
-  EXPECT_FALSE(waiting);
-  EXPECT_THAT(told(), testing::Contains(testing::HasSubstr("11 commands were lost")));
+TEST_F(WriterTest, StopSpoolsWhatItCouldNotCommitAndTheNextStartTakesItIn) {
+  const std::string spool = folder_.file("store.db.spool");
+  Mission m = start_mission(store_, "amr-1", "m", 0);
+  {
+    WriterOptions o = options();
+    o.spool_path = spool;
+    Writer writer(store_, o);
+    store_.fails = true;
+    for (int i = 0; i < 10; ++i) ASSERT_TRUE(writer.post(event(i)));
+    m.note = "spooled";
+    m.samples = 30;
+    m.sample_faults["late"] = 2;
+    m.accounts.ledger[energy::Term::copper] = 3.5;
+    CovariateSummary load;
+    load.name = "cpu_load";
+    load.mean = 0.25;
+    m.covariates.push_back(load);
+    TraceBucket bucket;
+    bucket.start_utime_us = trace_bucket_us;
+    bucket.speed_m_s.max = 1.5;
+    EnergyState charge;
+    charge.robot_id = "amr-1";
+    charge.state_of_charge = 0.5;
+    ASSERT_TRUE(writer.offer(
+        CheckpointMission{m, {bucket}, some_samples(0, 0, 30), charge, {{7, "cpu_load", 0.25}}}));
+    const auto stopped = writer.stop(milliseconds(30));
+    ASSERT_FALSE(stopped);
+    EXPECT_THAT(stopped.error().message, testing::HasSubstr("11 commands"));
+    EXPECT_THAT(told(), testing::Contains(testing::HasSubstr("11 commands were written to")));
+  }
+  store_.fails = false;
+  const auto refused = [](const Error& error) { ADD_FAILURE() << describe(error); };
+  EXPECT_EQ(need(take_in_spool(spool, store_, refused)), 11U);
+  EXPECT_EQ(stored(), numbers_to(10));
+  const Mission stored_mission = need(store_.mission(m.key));
+  EXPECT_EQ(stored_mission.note, "spooled");
+  EXPECT_EQ(stored_mission.sample_faults, m.sample_faults);
+  EXPECT_EQ(stored_mission.accounts.ledger[energy::Term::copper], 3.5);
+  ASSERT_EQ(stored_mission.covariates.size(), 1U);
+  EXPECT_EQ(stored_mission.covariates[0].mean, 0.25);
+  EXPECT_EQ(need(store_.telemetry(m.key, {}, {.limit = 100, .cursor = {}})).samples.size(), 30U);
+  EXPECT_EQ(need(store_.trace(m.key, {}, 10)).buckets.at(0).speed_m_s.max, 1.5);
+  EXPECT_EQ(need(store_.covariates(m.key, {}, {.limit = 10, .cursor = {}})).changes.at(0).name, "cpu_load");
+  EXPECT_EQ(need(store_.energy_state("amr-1"))->state_of_charge, 0.5);
+  EXPECT_EQ(need(take_in_spool(spool, store_, refused)), 0U) << "taken in once";
+}
+
+TEST_F(WriterTest, ADamagedSpoolIsRefusedAndStays) {
+  const std::string spool = folder_.file("store.db.spool");
+  const Command command = event(0);
+  const Command* const commands[] = {&command};
+  ASSERT_TRUE(write_spool(spool, commands));
+  std::filesystem::resize_file(spool, std::filesystem::file_size(spool) - 1);
+  const auto taken = take_in_spool(spool, store_, [](const Error&) {});
+  ASSERT_FALSE(taken);
+  EXPECT_EQ(taken.error().fault, Fault::corrupt);
+  EXPECT_TRUE(std::filesystem::exists(spool));
+}
+
+TEST_F(WriterTest, StopReturnsThoughACommitHangs) {
+  const std::string spool = folder_.file("store.db.spool");
+  WriterOptions o = options();
+  o.spool_path = spool;
+  Writer writer(store_, o);
+  store_.hangs = true;
+  ASSERT_TRUE(writer.post(event(0)));
+  ASSERT_TRUE(eventually([&] { return writer.status().attempt_s > 0; }));
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_FALSE(writer.stop(milliseconds(30)));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(8));
+  EXPECT_EQ(need(read_spool(spool)).size(), 1U);
+  store_.hangs = false;
 }
 
 TEST_F(WriterTest, TakesCommandsOfManyThreads) {
@@ -333,6 +502,69 @@ TEST_F(WriterTest, EnforcesTheRetention) {
   ASSERT_TRUE(writer.flush());
   EXPECT_TRUE(eventually([&] { return writer.status().pruned_chunks == 5; }));
   EXPECT_EQ(need(store_.size()).telemetry_bytes, 0);
+}
+
+class AgeTest : public WriterTest {
+ protected:
+  // Twenty sealed chunks, stored long ago by the host's clock, and the writer that prunes them by age.
+  WriterOptions aged() {
+    Mission m = start_mission(store_, "amr-1", "m", 0);
+    m.state = MissionState::finished;
+    const Command checkpoint = CheckpointMission{m, {}, some_samples(0, 0, 20 * 1024), {}};
+    EXPECT_TRUE(store_.apply({&checkpoint, 1}));
+    chunks_ = need(store_.size()).telemetry_chunks;
+    WriterOptions o = options();
+    o.retention.telemetry_max_age_us = -1;  // everything is too old
+    o.prune_interval = milliseconds(1);
+    o.wall_clock = [this] { return wall_us_.load(); };
+    o.steady_clock = [this] { return steady_us_.load(); };
+    return o;
+  }
+  std::int64_t left() { return need(store_.size()).telemetry_chunks; }
+
+  std::int64_t chunks_ = 0;
+  std::atomic<std::int64_t> wall_us_{1'700'000'000'000'000}, steady_us_{5'000'000};
+};
+
+TEST_F(AgeTest, AWrongClockCostsAFewPercentAnHourAtMost) {
+  WriterOptions o = aged();
+  ASSERT_EQ(chunks_, 20);
+  Writer writer(store_, o);  // 5 % of 20 chunks in an hour are one, and not before it has passed
+  std::this_thread::sleep_for(std::chrono::seconds(3));
+  EXPECT_EQ(left(), chunks_);
+}
+
+TEST_F(AgeTest, WhatIsTooOldGoesAtThePaceThatIsAllowed) {
+  WriterOptions o = aged();
+  o.age_share_per_hour = 3600;  // all of it in a second
+  Writer writer(store_, o);
+  EXPECT_TRUE(eventually([&] { return left() == 0; }));
+}
+
+TEST_F(AgeTest, AStepOfTheClockEndsThePruningByAge) {
+  WriterOptions o = aged();
+  o.age_share_per_hour = 360;
+  Writer writer(store_, o);
+  wall_us_ += std::int64_t{60} * 86'400 * 1'000'000;
+  std::this_thread::sleep_for(std::chrono::seconds(4));
+  const std::int64_t after_step = left();
+  EXPECT_GE(after_step, chunks_ - 3) << "at most what went before the step was seen";
+  std::this_thread::sleep_for(std::chrono::seconds(3));
+  EXPECT_EQ(left(), after_step);
+}
+
+TEST(ClockStepsTest, TellsAStepFromThePassingOfTime) {
+  std::int64_t wall_us = 1'700'000'000'000'000, steady_us = 7;
+  ClockSteps steps([&] { return wall_us; }, [&] { return steady_us; });
+  const auto pass = [&](std::int64_t us) { wall_us += us, steady_us += us; };
+  pass(3'600'000'000);
+  EXPECT_EQ(steps.take_step_us(), 0);
+  wall_us -= 3'600'000'000;
+  EXPECT_EQ(steps.take_step_us(), -3'600'000'000);
+  pass(1'000'000);
+  EXPECT_EQ(steps.take_step_us(), 0) << "told once";
+  wall_us += 400;  // slewing
+  EXPECT_EQ(steps.take_step_us(), 0);
 }
 
 TEST_F(WriterTest, GivesSignsOfLifeWhenIdle) {

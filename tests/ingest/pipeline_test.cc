@@ -519,6 +519,23 @@ TEST_F(PipelineTest, AMissionGoesOnAfterAKill) {
   EXPECT_NEAR(missions[0].accounts.measured_j, 48 * (200 - 22) * 0.02, 48 * 0.2);
 }
 
+TEST_F(PipelineTest, AStepOfTheHostsClockIsNoSilence) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 100);
+  const std::int64_t hour_us = 3'600'000'000, now_us = start_us + 2'000'000;
+  harness.pipeline->tick(now_us);
+  const auto received = [&] { return harness.fleet.all().at(0)->received_utime_us; };
+  const std::int64_t before_us = received();
+  harness.pipeline->on_host_clock_step(now_us + hour_us, hour_us);
+  harness.pipeline->tick(now_us + hour_us);
+  EXPECT_EQ(received(), before_us + hour_us);
+  EXPECT_EQ(harness.missions().at(0).state, history::MissionState::open);
+  // What came after the step has the new time already.
+  harness.pipeline->on_host_clock_step(now_us + hour_us, hour_us);
+  harness.pipeline->publish();
+  EXPECT_EQ(received(), before_us + hour_us);
+}
+
 TEST_F(PipelineTest, AMissionWhoseRobotDoesNotComeBackIsInterrupted) {
   send(event(MissionPhase::started, 0));
   send_range(0, 100);

@@ -99,6 +99,16 @@ TEST_F(SettingsTest, ValuesAreCheckedAgainstTypeAndBounds) {
   }
 }
 
+TEST_F(SettingsTest, EveryFaultyValueIsToldAtOnce) {
+  const std::string file = write(R"({"http": {"port": -1, "prot": 1}, "log": {"level": "loud"}})");
+  const std::string all =
+      describe(fault({"--config", file, "--http-worker-threads", "0"}, {"JOULECAST_LCM_ULR=x"}));
+  for (const char* name :
+       {"http.port", "http.prot", "log.level", "--http-worker-threads", "JOULECAST_LCM_ULR"})
+    EXPECT_NE(all.find(name), std::string::npos) << name << " is not in:\n" << all;
+  EXPECT_EQ(std::count(all.begin(), all.end(), '\n'), 4) << all;
+}
+
 TEST_F(SettingsTest, CommandsAreKnown) {
   using Action = Invocation::Action;
   EXPECT_EQ(read_settings({"--help"}, {}).value().action, Action::help);

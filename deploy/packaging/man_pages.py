@@ -1,0 +1,91 @@
+"""Writes the manual pages from what the programs' --help says: joulecastd.8, joulecast.1 and one for each command.
+
+man_pages.py DAEMON CLIENT FOLDER
+"""
+
+import gzip
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+
+def help_of(program, *command):
+    return subprocess.run([program, *command, "--help"], check=True, capture_output=True, text=True).stdout
+
+
+def roff(text):
+    escaped = text.replace("\\", "\\e").replace("-", "\\-")
+    return "\\&" + escaped if escaped[:1] in (".", "'") else escaped
+
+
+def sections(text):
+    """(heading, lines) pairs; what comes before the first heading has none. A heading stands over indented lines."""
+    lines = text.splitlines()
+    found = [("", [])]
+    for line, following in zip(lines, lines[1:] + [""]):
+        usage = re.fullmatch(r"[Uu]sage: (.*)", line)
+        if usage:
+            found.append(("synopsis", ["  " + usage[1]]))
+        elif line[:1].strip() and following.startswith("  "):
+            found.append((line.rstrip(":"), []))
+        else:
+            found[-1][1].append(line)
+    return found
+
+
+def rows(lines):
+    """[left, text] of the rows of a section; a row without a left side is plain text."""
+    table = []
+    for line in filter(str.strip, lines):
+        row = re.fullmatch(r"  (\S.*?)(?:\s{2,}(\S.*))?", line)
+        if row:
+            table.append([row[1], row[2] or ""])
+        elif table and line.startswith("   "):
+            table[-1][1] = f"{table[-1][1]} {line.strip()}".strip()
+        else:
+            table.append(["", line.strip()])
+    return table
+
+
+def page(name, section, text, related):
+    parts = sections(text)
+    summary = " ".join(line for line in parts[0][1] if line).removeprefix("joulecast: ").removeprefix("joulecastd: ")
+    out = [f'.TH {name.upper()} {section} "" joulecast', ".SH NAME", f"{name} \\- {roff(summary)}"]
+    for heading, lines in parts[1:]:
+        out.append(f".SH {heading.upper()}")
+        for left, meaning in rows(lines):
+            if left and meaning:
+                out += [".TP", ".B " + roff(left), roff(meaning)]
+            else:
+                out += [".PP", roff(left or meaning)]
+    out += [".SH SEE ALSO", ", ".join(map(roff, related))]
+    return "\n".join(out) + "\n"
+
+
+def commands_of(text):
+    return [left for heading, lines in sections(text) if heading == "Subcommands" for left, _ in rows(lines)]
+
+
+def main():
+    daemon, client, folder = sys.argv[1], sys.argv[2], Path(sys.argv[3])
+    folder.mkdir(parents=True, exist_ok=True)
+
+    def write(name, section, text, related):
+        content = page(name, section, text, related).encode()
+        (folder / f"{name}.{section}.gz").write_bytes(gzip.compress(content, 9, mtime=0))
+
+    def write_client(command):
+        text = help_of(client, *command)
+        name = "-".join(["joulecast", *command])
+        below = commands_of(text)
+        write(name, 1, text, [f"{name}-{each}(1)" for each in below] + (["joulecast(1)"] if command else []) +
+              ["joulecastd(8)"])
+        for each in below:
+            write_client([*command, each])
+
+    write("joulecastd", 8, help_of(daemon), ["joulecast(1)"])
+    write_client([])
+
+
+main()

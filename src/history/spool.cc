@@ -1,0 +1,336 @@
+#include "history/spool.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <concepts>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <optional>
+#include <type_traits>
+#include <utility>
+
+#include "history/chunk_bytes.h"
+
+namespace joulecast::history {
+namespace {
+
+// The members of everything that a command holds, once for both directions.
+template <class Archive>
+void members(Archive& a, AddModel& c) {
+  a(c.robot_id, c.utime_us, c.origin, c.note, c.model_json, c.expected_active, c.evidence_json);
+}
+template <class Archive>
+void members(Archive& a, ActivateModel& c) {
+  a(c.robot_id, c.version);
+}
+template <class Archive>
+void members(Archive& a, energy::Accounts& c) {
+  a(c.battery_j, c.measured_j, c.measured_s, c.measured_motor_j, c.motor_measured_s, c.modelled_j,
+    c.modelled_motor_j, c.drawn_j, c.returned_j, c.charge_ah, c.distance_m, c.turned_rad, c.duration_s,
+    c.ledger.value);
+}
+template <class Archive>
+void members(Archive& a, CovariateSummary& c) {
+  a(c.name, c.mean, c.min, c.max, c.known_s, c.counted_utime_us, c.value, c.value_utime_us);
+}
+template <class Archive>
+void members(Archive& a, Mission& c) {
+  a(c.key, c.robot_id, c.mission_id, c.start_utime_us, c.end_utime_us, c.state, c.implicit, c.incomplete,
+    c.incomplete_reason, c.payload_kg, c.note, c.model_version, c.accounts, c.samples, c.sample_faults,
+    c.gap_count, c.gap_s, c.findings_json, c.covariates);
+}
+template <class Archive>
+void members(Archive& a, StartMission& c) {
+  a(c.mission);
+}
+template <class Archive>
+void members(Archive& a, Band& c) {
+  a(c.min, c.mean, c.max);
+}
+template <class Archive>
+void members(Archive& a, TraceBucket& c) {
+  a(c.start_utime_us, c.covered_s, c.measured_power_w, c.modelled_power_w, c.speed_m_s, c.state_of_charge,
+    c.measured_j, c.modelled_j, c.x_m, c.y_m);
+}
+template <class Archive>
+void members(Archive& a, telemetry::Sample& c) {
+  a(c.utime_us, c.sequence, c.wheel_velocity_rad_s, c.motor_voltage_v, c.motor_current_a, c.battery_voltage_v,
+    c.battery_current_a, c.velocity_command, c.yaw_rate_rad_s, c.pitch_rad, c.pose, c.motor_temperature_c,
+    c.payload_kg);
+}
+template <class Archive>
+void members(Archive& a, telemetry::CovariateChange& c) {
+  a(c.utime_us, c.name, c.value);
+}
+template <class Archive>
+void members(Archive& a, EnergyState& c) {
+  a(c.robot_id, c.utime_us, c.sequence, c.state_of_charge, c.winding_temperature_c);
+}
+template <class Archive>
+void members(Archive& a, CheckpointMission& c) {
+  a(c.mission, c.trace, c.samples, c.energy_state, c.covariates);
+}
+template <class Archive>
+void members(Archive& a, PutEnergyState& c) {
+  a(c.state);
+}
+template <class Archive>
+void members(Archive& a, PutLearned& c) {
+  a(c.learned.robot_id, c.learned.topic, c.learned.utime_us, c.learned.body_json);
+}
+template <class Archive>
+void members(Archive& a, AppendEvent& c) {
+  a(c.event.id, c.event.utime_us, c.event.robot_id, c.event.kind, c.event.detail_json);
+}
+template <class Archive>
+void members(Archive& a, Prune& c) {
+  a(c.retention.telemetry_max_age_us, c.retention.telemetry_max_bytes, c.max_chunks);
+}
+template <class Archive>
+void members(Archive& a, DiagnosisRecord& c) {
+  a(c.id, c.robot_id, c.created_utime_us, c.started_utime_us, c.finished_utime_us, c.state, c.cause,
+    c.request_json, c.model_version, c.fitted_on, c.held_back, c.result_json, c.summary_json, c.model_json,
+    c.error);
+}
+template <class Archive>
+void members(Archive& a, AddDiagnosis& c) {
+  a(c.diagnosis);
+}
+template <class Archive>
+void members(Archive& a, UpdateDiagnosis& c) {
+  a(c.diagnosis, c.report_html);
+}
+template <class Archive>
+void members(Archive& a, InterruptDiagnoses& c) {
+  a(c.utime_us);
+}
+template <class Archive>
+void members(Archive& a, AddProposal& c) {
+  Proposal& p = c.proposal;
+  a(p.id, p.robot_id, p.created_utime_us, p.kind, p.state, p.note, p.base_version, p.adopted_version,
+    p.fitted_on, p.model_json, p.detail_json);
+}
+template <class Archive>
+void members(Archive& a, CloseProposal& c) {
+  a(c.id, c.state, c.adopted_version);
+}
+
+template <class T>
+concept Plain = std::is_arithmetic_v<T> || std::is_enum_v<T>;
+
+class Saver {
+ public:
+  explicit Saver(Bytes& out) : out_(out) {}
+  template <class... T>
+  void operator()(T&... values) {
+    (put(values), ...);
+  }
+
+ private:
+  template <Plain T>
+  void put(T value) {
+    const auto* bytes = reinterpret_cast<const std::byte*>(&value);
+    out_.insert(out_.end(), bytes, bytes + sizeof(T));
+  }
+  void put(const std::string& text) {
+    put(text.size());
+    const auto* bytes = reinterpret_cast<const std::byte*>(text.data());
+    out_.insert(out_.end(), bytes, bytes + text.size());
+  }
+  template <class T>
+  void put(std::optional<T>& value) {
+    put(value.has_value());
+    if (value) put(*value);
+  }
+  template <class T>
+  void put(std::vector<T>& values) {
+    put(values.size());
+    for (T& value : values) put(value);
+  }
+  template <class T, std::size_t n>
+  void put(std::array<T, n>& values) {
+    for (T& value : values) put(value);
+  }
+  void put(std::map<std::string, std::int64_t>& counts) {
+    put(counts.size());
+    for (auto& [name, count] : counts) {
+      put(name);
+      put(count);
+    }
+  }
+  template <class T>
+  requires(std::is_class_v<T> && !std::same_as<std::remove_const_t<T>, std::string>) void put(T& value) {
+    members(*this, value);
+  }
+
+  Bytes& out_;
+};
+
+// After the bytes have run out everything reads as empty, and sound() is false.
+class Loader {
+ public:
+  explicit Loader(std::span<const std::byte> bytes) : reader_(bytes) {}
+  template <class... T>
+  void operator()(T&... values) {
+    (get(values), ...);
+  }
+  bool sound() const { return sound_; }
+  bool at_end() const { return reader_.at_end(); }
+
+ private:
+  template <Plain T>
+  void get(T& value) {
+    const auto bytes = reader_.take(sizeof(T));
+    if (!bytes) {
+      sound_ = false;
+      return;
+    }
+    std::memcpy(&value, bytes->data(), sizeof(T));
+  }
+  void get(std::string& text) {
+    std::size_t size = 0;
+    get(size);
+    const auto bytes = sound_ ? reader_.take(size) : std::nullopt;
+    if (!bytes) {
+      sound_ = false;
+      return;
+    }
+    text.assign(reinterpret_cast<const char*>(bytes->data()), size);
+  }
+  template <class T>
+  void get(std::optional<T>& value) {
+    bool there = false;
+    get(there);
+    if (there && sound_) get(value.emplace());
+  }
+  template <class T>
+  void get(std::vector<T>& values) {
+    std::size_t size = 0;
+    get(size);
+    for (std::size_t k = 0; k < size && sound_; ++k) get(values.emplace_back());
+  }
+  template <class T, std::size_t n>
+  void get(std::array<T, n>& values) {
+    for (T& value : values) get(value);
+  }
+  void get(std::map<std::string, std::int64_t>& counts) {
+    std::size_t size = 0;
+    get(size);
+    for (std::size_t k = 0; k < size && sound_; ++k) {
+      std::string name;
+      get(name);
+      get(counts[name]);
+    }
+  }
+  template <class T>
+  requires std::is_class_v<T>
+  void get(T& value) { members(*this, value); }
+
+  ByteReader reader_;
+  bool sound_ = true;
+};
+
+// What a file begins with: another layout has another size of something.
+std::string layout() {
+  std::string text = "joulecast spool 1";
+  for (const std::size_t size :
+       {sizeof(Mission), sizeof(energy::Accounts), sizeof(CovariateSummary), sizeof(TraceBucket),
+        sizeof(telemetry::Sample), sizeof(EnergyState), sizeof(DiagnosisRecord), sizeof(Proposal),
+        sizeof(AddModel), std::variant_size_v<Command>})
+    text += ' ' + std::to_string(size);
+  return text + '\n';
+}
+
+template <std::size_t... index>
+void get_command(Loader& load, std::size_t kind, Command& command, std::index_sequence<index...>) {
+  ((kind == index ? load(command.emplace<index>()) : void()), ...);
+}
+
+tl::unexpected<Error> trouble(const std::string& path, const char* what) {
+  return fail(Fault::unavailable, path, std::string(what) + ": " + std::strerror(errno));
+}
+
+Result<void> write_whole(const std::string& path, const Bytes& bytes) {
+  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  if (file < 0) return trouble(path, "cannot be written");
+  bool written = true;
+  for (std::size_t at = 0; written && at < bytes.size();) {
+    const ssize_t n = write(file, bytes.data() + at, bytes.size() - at);
+    written = n > 0;
+    if (written) at += static_cast<std::size_t>(n);
+  }
+  written = written && fsync(file) == 0;
+  const Result<void> done = written ? Result<void>() : trouble(path, "cannot be written");
+  close(file);
+  if (!written) unlink(path.c_str());
+  return done;
+}
+
+}  // namespace
+
+Result<void> write_spool(const std::string& path, std::span<const Command* const> commands) {
+  Bytes plain;
+  Saver save(plain);
+  std::size_t count = commands.size();
+  save(count);
+  for (const Command* command : commands) {
+    std::size_t kind = command->index();
+    save(kind);
+    Command copy = *command;
+    std::visit([&](auto& c) { save(c); }, copy);
+  }
+  Bytes file;
+  for (const char c : layout()) file.push_back(static_cast<std::byte>(c));
+  append_compressed(file, plain, 1);
+  const std::string unfinished = path + ".unfinished";
+  if (Result<void> written = write_whole(unfinished, file); !written) return written;
+  if (std::rename(unfinished.c_str(), path.c_str()) != 0) return trouble(path, "cannot be written");
+  return {};
+}
+
+Result<std::vector<Command>> read_spool(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return fail(Fault::not_found, path, "cannot be read");
+  const std::string text((std::istreambuf_iterator<char>(file)), {});
+  const std::string begin = layout();
+  if (!text.starts_with(begin))
+    return fail(Fault::corrupt, path, "is not a spool that this version of the program wrote");
+  const auto frame = std::as_bytes(std::span(text)).subspan(begin.size());
+  const Result<Bytes> plain =
+      decompressed(frame, std::numeric_limits<std::int32_t>::max(), "the spool's content");
+  if (!plain) return fail(Fault::corrupt, path, describe(plain.error()));
+  Loader load(*plain);
+  std::size_t count = 0;
+  load(count);
+  std::vector<Command> commands;
+  for (std::size_t k = 0; k < count && load.sound(); ++k) {
+    std::size_t kind = 0;
+    load(kind);
+    get_command(load, kind, commands.emplace_back(),
+                std::make_index_sequence<std::variant_size_v<Command>>());
+  }
+  if (!load.sound() || !load.at_end()) return fail(Fault::corrupt, path, "is cut off");
+  return commands;
+}
+
+Result<std::size_t> take_in_spool(const std::string& path, Store& store,
+                                  const std::function<void(const Error&)>& refused) {
+  if (!std::filesystem::exists(path)) return std::size_t{0};
+  const Result<std::vector<Command>> commands = read_spool(path);
+  if (!commands) return tl::unexpected(commands.error());
+  const auto outcomes = store.apply(*commands);
+  if (!outcomes) return tl::unexpected(outcomes.error());
+  for (const Outcome& outcome : *outcomes)
+    if (!outcome) refused(outcome.error());
+  if (unlink(path.c_str()) != 0) return trouble(path, "is taken in and cannot be removed");
+  return commands->size();
+}
+
+}  // namespace joulecast::history

@@ -1,0 +1,206 @@
+#!/usr/bin/env python3
+"""The Debian packages as an administrator meets them: installed with dpkg into a root of their own, the service started as
+its unit says, asked, given a faulty robot file, removed and purged. The root is an overlay over this machine's, so that
+nothing of the machine changes and no network is needed; --fresh ROOT takes a Debian root instead (mmdebstrap makes one)."""
+import argparse
+import json
+import os
+import pathlib
+import re
+import shlex
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+
+from harness import check, skip
+
+
+def run(*command, **options):
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, **options)
+    check(done.returncode == 0, f"{' '.join(map(str, command))}: {done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def isolate():
+    """Runs this script again in name spaces of its own: mounts and network are the test's."""
+    if os.environ.pop("JOULECAST_ISOLATED", None):
+        for command in ("ip link set lo up", "ip link set lo multicast on", "ip route add 224.0.0.0/4 dev lo"):
+            run(*command.split())
+        return
+    if os.geteuid() != 0 or subprocess.run(["unshare", "--mount", "--net", "true"], capture_output=True).returncode != 0:
+        skip("needs root and name spaces")
+    os.environ["JOULECAST_ISOLATED"] = "1"
+    os.execvp("unshare", ["unshare", "--mount", "--net", sys.executable, "-B", *sys.argv])
+
+
+def make_root(folder, fresh):
+    """A root into which packages can be installed: the given one, or this machine's under an overlay."""
+    run("mount", "-t", "tmpfs", "tmpfs", folder)
+    for name in ("upper", "work", "root"):
+        (folder / name).mkdir()
+    root = folder / "root"
+    layers = f"lowerdir={fresh or '/'},upperdir={folder}/upper,workdir={folder}/work"
+    if subprocess.run(["mount", "-t", "overlay", "overlay", "-o", layers, root], capture_output=True).returncode != 0:
+        skip("no overlay over the root")
+    run("mount", "-t", "proc", "proc", root / "proc")
+    run("mount", "-t", "tmpfs", "tmpfs", root / "dev")
+    for name, minor in (("null", 3), ("zero", 5), ("random", 8), ("urandom", 9)):
+        run("mknod", "-m", "666", root / "dev" / name, "c", 1, minor)
+    run("mount", "-t", "tmpfs", "tmpfs", root / "run")
+    (root / "usr/sbin/policy-rc.d").write_text("#!/bin/sh\nexit 101\n")
+    (root / "usr/sbin/policy-rc.d").chmod(0o755)
+    return root
+
+
+def unit_of(root):
+    """The unit's settings; of those given more than once the last."""
+    path, = [p for p in (root / "usr/lib/systemd/system/joulecastd.service", root / "lib/systemd/system/joulecastd.service")
+             if p.exists()][:1]
+    return path, dict(line.split("=", 1) for line in path.read_text().splitlines() if re.match(r"\w+=", line))
+
+
+class Service:
+    """The daemon as systemd would start it: program, user, folder and readiness of the unit."""
+
+    def __init__(self, root, unit):
+        notify = root / "run/notify"
+        notify.unlink(missing_ok=True)
+        ready = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        ready.bind(str(notify))
+        notify.chmod(0o777)
+        ready.settimeout(20)
+        self.log = open(root / "run/log", "w+")
+        command = (f"umask {unit['UMask']}; cd {unit['WorkingDirectory']} && NOTIFY_SOCKET=/run/notify exec setpriv "
+                   f"--reuid {unit['User']} --regid {unit['Group']} --clear-groups --inh-caps=-all --no-new-privs "
+                   + unit["ExecStart"])
+        self.process = subprocess.Popen(["chroot", str(root), "sh", "-c", command], stderr=self.log)
+        try:
+            check(b"READY=1" in ready.recv(4096), "the service said something else than READY=1")
+        except socket.timeout:
+            check(False, "the service did not become ready:\n" + self.lines())
+
+    def lines(self):
+        self.log.seek(0)
+        return self.log.read()
+
+    def stop(self, limit_s):
+        self.process.send_signal(signal.SIGTERM)
+        return self.process.wait(timeout=limit_s)
+
+
+def get(path):
+    with urllib.request.urlopen("http://127.0.0.1:8080" + path, timeout=10) as reply:
+        return reply.read().decode()
+
+
+def check_with_lintian(packages):
+    if shutil.which("lintian") is None:
+        return print("lintian is not here: packages not linted")
+    done = subprocess.run(["lintian", "--fail-on", "error", "--allow-root", *map(str, packages)], capture_output=True, text=True)
+    check(done.returncode == 0, done.stdout + done.stderr)
+
+
+def check_with_systemd(root, path):
+    if shutil.which("systemd-analyze") is None:
+        return print("systemd-analyze is not here: unit not verified")
+    inside = "/" + str(path.relative_to(root))
+    told = subprocess.run(["chroot", str(root), "systemd-analyze", "verify", inside], capture_output=True, text=True)
+    check(told.returncode == 0 and not told.stdout + told.stderr, "systemd-analyze verify: " + told.stdout + told.stderr)
+    exposure = run("systemd-analyze", "security", "--offline=true", "--threshold=20", path)
+    print(exposure.strip().splitlines()[-1])
+
+
+def check_programs(root):
+    """Manual pages and completions of what is installed."""
+    for page in ("man8/joulecastd.8.gz", "man1/joulecast.1.gz", "man1/joulecast-calibrate-drive.1.gz"):
+        check((root / "usr/share/man" / page).exists(), f"no {page}")
+    for script in ("bash-completion/completions/joulecast", "zsh/vendor-completions/_joulecast",
+                   "fish/vendor_completions.d/joulecast.fish"):
+        check("joulecast" in (root / "usr/share" / script).read_text(), f"no {script}")
+    answer = run("chroot", root, "joulecast", "profile", "--robot", "/usr/share/joulecast/robots/amr.json", "--length", "10", "--json")
+    check(json.loads(answer)["robot_id"] == "amr", answer)
+
+
+def check_library(root):
+    """The example that comes with the library is built against what is installed, and prices as the command line does."""
+    if subprocess.run(["chroot", str(root), "which", "cmake", "c++"], capture_output=True).returncode != 0:
+        return print("no compiler in the root: example not built")
+    source = "/usr/share/doc/libjoulecast-dev/examples"
+    run("chroot", root, "cmake", "-S", source, "-B", "/run/example", "-DCMAKE_BUILD_TYPE=Release")
+    run("chroot", root, "cmake", "--build", "/run/example")
+    answer = run("chroot", root, "/run/example/price_a_path", "/usr/share/joulecast/robots/amr.json")
+    print("the example of libjoulecast-dev says", answer.strip())
+    check(re.fullmatch(r"[1-9]\d+ J in \d+\.\d s\n", answer), answer)
+
+
+def install_and_use(root, packages):
+    for package in packages:
+        shutil.copy(package, root / "run")
+    run("chroot", root, "dpkg", "--install", *[f"/run/{p.name}" for p in packages])
+    check_programs(root)
+
+    check_library(root)
+    path, unit = unit_of(root)
+    check_with_systemd(root, path)
+    program, flag, settings = shlex.split(unit["ExecStart"])
+    check(flag == "--config" and settings == "/etc/joulecast/joulecastd.json", unit["ExecStart"])
+    check(run("chroot", root, program, flag, settings, "--check-config") == "the settings are valid\n", "--check-config")
+
+    robots = root / "etc/joulecast/robots"
+    shutil.copy(root / "usr/share/joulecast/robots/amr.json", robots)
+    (robots / "broken.json").write_text("{")
+    (robots / "negative.json").write_text((robots / "amr.json").read_text().replace('"amr"', '"other"')
+                                          .replace('"wheel_radius_m": 0', '"wheel_radius_m": -1'))
+    (robots / "twin.json").write_text((robots / "amr.json").read_text())
+    told = subprocess.run(["chroot", str(root), program, flag, settings, "--check-config"], capture_output=True, text=True)
+    check(told.returncode == 2 and len(told.stderr.splitlines()) == 3, f"{told.returncode}: {told.stderr}")
+    for fault in ("broken.json", "negative.json", "twin.json"):
+        check(fault in told.stderr, f"{fault}: {told.stderr}")
+
+    service = Service(root, unit)
+    check(json.loads(get("/readyz"))["status"] == "ready", get("/readyz"))
+    check([r["robot_id"] for r in json.loads(get("/v1/robots"))["robots"]] == ["amr"], get("/v1/robots"))
+    check("joulecast_robot_files_faulty 3" in get("/metrics"), get("/metrics"))
+    check(service.lines().count("robot file left out") == 3, service.lines())
+    state = root / "var/lib/joulecast"
+    check((state / "history.db").stat().st_mode & 0o777 == 0o600, "the history can be read by others")
+    check(service.stop(15) == 0, "the service did not stop in order")
+
+    run("chroot", root, "dpkg", "--remove", "joulecast", "joulecastd", "libjoulecast-dev")
+    check((state / "history.db").exists() and (root / "etc/joulecast/joulecastd.json").exists(), "remove took data")
+    run("chroot", root, "dpkg", "--purge", "joulecast", "joulecastd", "libjoulecast-dev")
+    left = [p for p in (state, root / "etc/joulecast", root / "usr/bin/joulecastd", root / "usr/share/joulecast",
+                        root / "usr/bin/joulecast") if p.exists()]
+    check(not left, f"left after the purge: {left}")
+    print("installed, started, asked, stopped, removed and purged")
+
+
+def main():
+    isolate()
+    parser = argparse.ArgumentParser()
+    for name in ("daemon", "client", "source", "shared", "build"):
+        parser.add_argument("--" + name, required=True)
+    parser.add_argument("--fresh", default="")
+    options = parser.parse_args()
+
+    with tempfile.TemporaryDirectory() as packages_folder:
+        # Made outside the overlay: cpack writes the build's install records.
+        run("cpack", "--config", os.path.join(options.build, "CPackConfig.cmake"), "-B", packages_folder, cwd=options.build)
+        packages = sorted(pathlib.Path(packages_folder).glob("*.deb"))
+        check(len(packages) == 3, f"packages: {packages}")
+        check_with_lintian(packages)
+        # Not within a folder that is removed with all that is in it: what is mounted there is not the test's.
+        mounted = pathlib.Path(tempfile.mkdtemp())
+        try:
+            install_and_use(make_root(mounted, options.fresh), packages)
+        finally:
+            subprocess.run(["umount", "--recursive", "--lazy", str(mounted)])
+            mounted.rmdir()
+
+
+main()
