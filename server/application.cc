@@ -75,6 +75,15 @@ bool within(milliseconds limit, std::function<void()> work) {
   return ended.wait_for(limit) == std::future_status::ready;
 }
 
+// The entries of a list separated by commas.
+std::vector<std::string> listed(const std::string& text) {
+  std::vector<std::string> entries;
+  std::istringstream rest(text);
+  for (std::string entry; std::getline(rest, entry, ',');)
+    if (!entry.empty()) entries.push_back(entry);
+  return entries;
+}
+
 history::WriterOptions writer_options(const Settings& settings) {
   history::WriterOptions options;
   if (const double days = settings.number("store.retention_days"); days > 0) {
@@ -132,9 +141,7 @@ server::WatchOptions watch_options(const Settings& settings) {
   server::WatchOptions options;
   options.period_s = settings.number("watch.period_s");
   options.diagnose = settings.boolean("watch.diagnose");
-  std::istringstream robots(settings.text("watch.robots"));
-  for (std::string id; std::getline(robots, id, ',');)
-    if (!id.empty()) options.robots.insert(id);
+  for (std::string& id : listed(settings.text("watch.robots"))) options.robots.insert(std::move(id));
   return options;
 }
 
@@ -142,14 +149,20 @@ http::ServerOptions http_options(const Settings& settings) {
   http::ServerOptions options;
   options.address = settings.text("http.address");
   options.port = static_cast<std::uint16_t>(settings.integer("http.port"));
+  options.allowed_hosts = listed(settings.text("http.allowed_hosts"));
   options.worker_threads = static_cast<unsigned>(settings.integer("http.worker_threads"));
+  options.compute_threads = static_cast<unsigned>(settings.integer("http.compute_threads"));
   options.worker_queue = static_cast<std::size_t>(settings.integer("http.worker_queue"));
+  options.client_requests = static_cast<std::size_t>(settings.integer("http.client_requests"));
   options.max_connections = static_cast<std::size_t>(settings.integer("http.max_connections"));
+  options.client_connections = static_cast<std::size_t>(settings.integer("http.client_connections"));
   options.max_header_bytes = static_cast<std::uint32_t>(settings.integer("http.max_header_bytes"));
   options.max_body_bytes = static_cast<std::uint64_t>(settings.integer("http.max_body_bytes"));
+  options.max_bodies_bytes = static_cast<std::uint64_t>(settings.integer("http.max_bodies_bytes"));
   options.read_timeout = seconds(settings.number("http.read_timeout_s"));
   options.write_timeout = seconds(settings.number("http.write_timeout_s"));
   options.idle_timeout = seconds(settings.number("http.idle_timeout_s"));
+  options.request_deadline = seconds(settings.number("http.request_deadline_s"));
   return options;
 }
 

@@ -311,7 +311,8 @@ std::vector<TableRow> autonomy_rows() {
         .summary = "How far and how long a robot still goes, and whether it can do a list of tasks",
         .request_schema = "autonomy-request",
         .response_schema = "autonomy",
-        .error_statuses = {404, 422}},
+        .error_statuses = {404, 422},
+        .run = http::Run::compute},
        answered_by([](Services& services, const http::Request& r) -> Result<http::Response> {
          const std::string& id = r.param("id");
          const auto model = model_of(services, id);
@@ -328,7 +329,8 @@ std::vector<TableRow> autonomy_rows() {
                    .summary = "The autonomy of many robots in one call",
                    .request_schema = "fleet-autonomy-request",
                    .response_schema = "fleet-autonomy",
-                   .error_statuses = {422}},
+                   .error_statuses = {422},
+                   .run = http::Run::compute},
                   answered_by([](Services& services, const http::Request& r) -> Result<http::Response> {
                     Result<std::string> answer = fleet_autonomy_answer(*r.json, services);
                     if (!answer) return tl::unexpected(std::move(answer.error()));

@@ -202,7 +202,8 @@ std::vector<TableRow> diagnosis_rows() {
         .request_schema = "diagnosis-request",
         .response_schema = "diagnosis",
         .success_status = 202,
-        .error_statuses = {404, 409, 422}},
+        .error_statuses = {404, 409, 422},
+        .run = http::Run::write},
        answered_by(start)});
   rows.push_back(
       {{.method = Method::get,
@@ -226,7 +227,8 @@ std::vector<TableRow> diagnosis_rows() {
                    .operation_id = "cancelDiagnosis",
                    .summary = "Cancels a diagnosis that waits or runs",
                    .response_schema = "diagnosis",
-                   .error_statuses = {404, 409}},
+                   .error_statuses = {404, 409},
+                   .run = http::Run::write},
                   answered_by(cancel)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/diagnoses/{id}/events",
@@ -240,7 +242,8 @@ std::vector<TableRow> diagnosis_rows() {
                    .operation_id = "getDiagnosisReport",
                    .summary = "The report of a diagnosis as one self-contained page",
                    .response_type = "text/html",
-                   .error_statuses = {404}},
+                   .error_statuses = {404},
+                   .run = http::Run::compute},
                   answered_by(report)});
   return rows;
 }

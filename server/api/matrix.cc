@@ -386,7 +386,8 @@ std::vector<TableRow> matrix_rows() {
         .summary = "Energy and duration of every robot doing every task, row by row",
         .request_schema = "energy-matrix-request",
         .response_schema = "energy-matrix",
-        .error_statuses = {413, 422}},
+        .error_statuses = {413, 422},
+        .run = http::Run::compute},
        answered_by([](Services& services, const http::Request& r) -> Result<http::Response> {
          MatrixFleet fleet;
          fleet.model = [&services](const std::string& id) { return model_of(services, id); };

@@ -257,7 +257,8 @@ std::vector<TableRow> model_rows() {
                    "back-test on missions that it was not fitted on; or puts an earlier version in force",
         .request_schema = "model-request",
         .response_schema = "model-adoption",
-        .error_statuses = {404, 409, 422}},
+        .error_statuses = {404, 409, 422},
+        .run = http::Run::write},
        answered_by(post_model)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/robots/{id}/versions/diff",

@@ -328,7 +328,8 @@ std::vector<TableRow> planning_rows() {
             "The minimum-energy motion along a path, with its certificate, against trapezoid and triangle",
         .request_schema = "profile-request",
         .response_schema = "profile",
-        .error_statuses = {404, 422}},
+        .error_statuses = {404, 422},
+        .run = http::Run::compute},
        [with_model](Services& services, http::Endpoint& endpoint) {
          with_model(profile_answer)(services, endpoint);
          endpoint.brief = [&services](const http::Request& r) -> std::optional<http::Response> {
@@ -345,7 +346,8 @@ std::vector<TableRow> planning_rows() {
                    .summary = "Energy and ledger of a given motion, or of the best one along a path",
                    .request_schema = "estimate-request",
                    .response_schema = "estimate",
-                   .error_statuses = {404, 422}},
+                   .error_statuses = {404, 422},
+                   .run = http::Run::compute},
                   with_model(estimate_answer)});
   return rows;
 }

@@ -133,7 +133,8 @@ std::vector<TableRow> robot_rows() {
                    .summary = "Gives a robot a model; a changed one is a new version, used at once",
                    .request_schema = "robot",
                    .response_schema = "robot-version",
-                   .error_statuses = {422}},
+                   .error_statuses = {422},
+                   .run = http::Run::write},
                   answered_by(put)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/robots/{id}/state",

@@ -4,21 +4,22 @@
 #include <atomic>
 #include <cstdio>
 #include <ctime>
+#include <exception>
 #include <mutex>
 #include <random>
 #include <thread>
+#include <tuple>
 #include <vector>
 
-#include "server/http/connection.h"
+#include "server/http/session.h"
 
 namespace joulecast::http {
 namespace {
 
-using Tcp = net::ip::tcp;
 constexpr std::chrono::milliseconds tick_period{100};
 constexpr std::chrono::milliseconds stop_poll_period{10};
-constexpr std::size_t turned_away_at_once =
-    64;  // connections told 503 politely beyond the limit; others are cut
+constexpr std::size_t guest_places = 64;
+constexpr std::size_t operations_queue = 64;
 
 std::string http_date() {
   const std::time_t now = std::time(nullptr);
@@ -44,6 +45,17 @@ std::int64_t milliseconds_now() {
   return std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now().time_since_epoch()).count();
 }
 
+// Whom the limits for one client are for: who has one IPv6 address commonly has its whole /64.
+net::ip::address peer_of(const Socket& socket) {
+  boost::system::error_code error;
+  const net::ip::address address = socket.remote_endpoint(error).address();
+  if (!address.is_v6()) return address;
+  if (address.to_v6().is_v4_mapped()) return net::ip::make_address_v4(net::ip::v4_mapped, address.to_v6());
+  auto bytes = address.to_v6().to_bytes();
+  std::fill(bytes.begin() + 8, bytes.end(), static_cast<unsigned char>(0));
+  return net::ip::address_v6(bytes);
+}
+
 ServerObserver& nobody() {
   static ServerObserver observer;
   return observer;
@@ -55,18 +67,32 @@ std::string_view to_string(Refusal refusal) {
   switch (refusal) {
     case Refusal::connections:
       return "connections";
+    case Refusal::evicted:
+      return "evicted";
     case Refusal::header_size:
       return "header_size";
     case Refusal::body_size:
       return "body_size";
+    case Refusal::bodies:
+      return "bodies";
     case Refusal::malformed:
       return "malformed";
+    case Refusal::host:
+      return "host";
+    case Refusal::origin:
+      return "origin";
     case Refusal::read_timeout:
       return "read_timeout";
     case Refusal::write_timeout:
       return "write_timeout";
     case Refusal::worker_queue:
       return "worker_queue";
+    case Refusal::client_requests:
+      return "client_requests";
+    case Refusal::deadline:
+      return "deadline";
+    case Refusal::departed:
+      return "departed";
     case Refusal::slow_stream:
       return "slow_stream";
     case Refusal::count_:
@@ -77,24 +103,27 @@ std::string_view to_string(Refusal refusal) {
 
 struct HttpServer::Impl {
   Impl(const ServerOptions& options, const Router& router, ServerObserver& observer)
-      : core(std::make_shared<Core>(options, router, observer)), acceptor(core->io), timer(core->io) {}
+      : core(std::make_shared<Core>(options, router, observer)),
+        acceptor(core->io),
+        ticking(core->io),
+        retry(core->io) {}
 
   Result<void> open();
   void run();
-  void accept();
-  void schedule_tick();
-  void tick();
+  Task<void> accept();
+  void admit(Socket socket);
+  bool make_room(const Peer* of, bool guests);
+  Task<void> tick();
   void begin_stop(std::chrono::milliseconds patience);
-  bool settle();
+  bool settled();
 
   std::shared_ptr<Core> core;
-  Tcp::acceptor acceptor;
-  net::steady_timer timer;
+  net::basic_socket_acceptor<Tcp, Executor> acceptor;
+  Timer ticking, retry;
   std::uint16_t port = 0;
   std::thread thread;
   std::atomic<std::int64_t> ticked_ms{0};
   Clock::time_point stop_deadline{};
-  bool accept_at_tick = false;
   bool cut_off = false;
   std::mutex stop_mutex;
   bool stopped = false;
@@ -122,68 +151,75 @@ Result<void> HttpServer::Impl::open() {
 }
 
 void HttpServer::Impl::run() {
-  core->workers = std::make_unique<WorkerPool>(core->options.worker_threads, core->options.worker_queue);
-  net::post(core->io, [this] {
-    accept();
-    schedule_tick();
-  });
+  const ServerOptions& options = core->options;
+  for (const auto& [run, threads, queue] : {std::tuple{Run::operations, 1U, operations_queue},
+                                            {Run::worker, options.worker_threads, options.worker_queue},
+                                            {Run::compute, options.compute_threads, options.worker_queue},
+                                            {Run::write, 1U, options.worker_queue}})
+    core->pools[run] = std::make_unique<WorkerPool>(threads, queue);
+  const auto ended = [](const std::exception_ptr& fault) {
+    if (fault) std::rethrow_exception(fault);
+  };
+  net::co_spawn(
+      core->io, [this] { return accept(); }, ended);
+  net::co_spawn(
+      core->io, [this] { return tick(); }, ended);
   thread = std::thread([this] { core->io.run(); });
 }
 
-void HttpServer::Impl::accept() {
-  acceptor.async_accept([this](const boost::system::error_code& error, Tcp::socket socket) {
-    if (!acceptor.is_open()) return;
-    if (error) {
-      // Out of descriptors or memory: retrying at once would spin; the next tick accepts again.
-      if (error == boost::system::errc::too_many_files_open ||
-          error == boost::system::errc::too_many_files_open_in_system ||
-          error == net::error::no_buffer_space || error == net::error::no_memory) {
-        accept_at_tick = true;
-        return;
-      }
-      return accept();
+Task<void> HttpServer::Impl::accept() {
+  while (acceptor.is_open()) {
+    boost::system::error_code error;
+    Socket socket = co_await acceptor.async_accept(net::redirect_error(use_task, error));
+    if (!error) {
+      admit(std::move(socket));
+    } else if (acceptor.is_open()) {
+      // Out of descriptors or memory: trying again at once would spin.
+      retry.expires_after(tick_period);
+      co_await retry.async_wait(net::redirect_error(use_task, error));
     }
-    boost::system::error_code ignored;
-    socket.set_option(Tcp::no_delay(true), ignored);
-    const std::size_t open = core->connections.size();
-    if (open < core->options.max_connections + turned_away_at_once) {
-      auto connection = std::make_shared<Connection>(core, std::move(socket));
-      core->connections.emplace(connection.get(), connection);
-      core->observer.connections(core->connections.size());
-      if (open < core->options.max_connections) {
-        connection->start();
-      } else {
-        connection->turn_away();
-      }
-    } else {
-      core->observer.refused(Refusal::connections);
-    }
-    accept();
-  });
-}
-
-void HttpServer::Impl::schedule_tick() {
-  timer.expires_after(core->stopping ? stop_poll_period : tick_period);
-  timer.async_wait([this](const boost::system::error_code& error) {
-    if (!error) tick();
-  });
-}
-
-void HttpServer::Impl::tick() {
-  ticked_ms = milliseconds_now();
-  core->date = http_date();
-  const auto now = Clock::now();
-  // A connection that closes leaves the map: walk over a copy.
-  std::vector<std::shared_ptr<Connection>> all;
-  all.reserve(core->connections.size());
-  for (const auto& [key, connection] : core->connections) all.push_back(connection);
-  for (const auto& connection : all) connection->tick(now);
-  if (core->stopping && settle()) return;
-  if (accept_at_tick && !core->stopping) {
-    accept_at_tick = false;
-    accept();
   }
-  schedule_tick();
+}
+
+// Where the server is full, or the peer holds all that one may, its longest idle connection makes room; where
+// none is idle the connection becomes a guest.
+void HttpServer::Impl::admit(Socket socket) {
+  boost::system::error_code ignored;
+  socket.set_option(Tcp::no_delay(true), ignored);
+  const net::ip::address address = peer_of(socket);
+  const auto known = core->peers.find(address);
+  const Peer* peer = known != core->peers.end() ? known->second.get() : nullptr;
+  const bool crowded = peer != nullptr && peer->connections >= core->options.client_connections;
+  const bool full = core->connections >= core->options.max_connections;
+  const bool guest = (crowded || full) && !make_room(crowded ? peer : nullptr, false);
+  if (guest && core->guests >= guest_places) make_room(nullptr, true);
+  make_session(core, std::move(socket), address, guest)->start();
+}
+
+// Closes the longest idle connection, of one peer if given; of guests the oldest, idle or not.
+bool HttpServer::Impl::make_room(const Peer* of, bool guests) {
+  Session* oldest = nullptr;
+  for (Session* each : core->sessions) {
+    const bool possible = each->guest() == guests && (each->idle() || (guests && each->busy())) &&
+                          (of == nullptr || each->peer() == of);
+    if (possible && (oldest == nullptr || each->since() < oldest->since())) oldest = each;
+  }
+  if (oldest == nullptr) return false;
+  core->observer.refused(Refusal::evicted);
+  oldest->cut();
+  return true;
+}
+
+Task<void> HttpServer::Impl::tick() {
+  for (;;) {
+    ticked_ms = milliseconds_now();
+    core->date = http_date();
+    for (Session* session : core->sessions) session->tick(Clock::now());
+    if (core->stopping && settled()) co_return;
+    ticking.expires_after(core->stopping ? stop_poll_period : tick_period);
+    boost::system::error_code ignored;
+    co_await ticking.async_wait(net::redirect_error(use_task, ignored));
+  }
 }
 
 void HttpServer::Impl::begin_stop(std::chrono::milliseconds patience) {
@@ -191,27 +227,18 @@ void HttpServer::Impl::begin_stop(std::chrono::milliseconds patience) {
   stop_deadline = Clock::now() + patience;
   boost::system::error_code ignored;
   acceptor.close(ignored);
-  std::vector<std::shared_ptr<Connection>> all;
-  for (const auto& [key, connection] : core->connections) all.push_back(connection);
-  for (const auto& connection : all) connection->begin_stop();
-  timer.cancel();
-  net::post(core->io, [this] { tick(); });
+  for (Session* session : core->sessions) session->begin_stop();
+  ticking.cancel();
 }
 
 // True when nothing is left; beyond the deadline cuts off what is.
-bool HttpServer::Impl::settle() {
-  const bool busy = std::any_of(core->connections.begin(), core->connections.end(),
-                                [](const auto& entry) { return entry.second->busy(); });
-  const bool late = Clock::now() >= stop_deadline;
-  if (busy && !late) return false;
-  // What is left when nothing is busy has been answered and only lingers for the client's end of the
-  // connection.
-  if (!core->connections.empty() && !late && !busy) return false;
-  cut_off = busy;
-  if (late) core->patience.request_stop();
-  std::vector<std::shared_ptr<Connection>> all;
-  for (const auto& [key, connection] : core->connections) all.push_back(connection);
-  for (const auto& connection : all) connection->close();
+bool HttpServer::Impl::settled() {
+  if (core->sessions.empty()) return true;
+  if (Clock::now() < stop_deadline) return false;
+  for (Session* session : core->sessions) {
+    cut_off = cut_off || session->busy();
+    session->cut();
+  }
   return true;
 }
 
@@ -242,8 +269,8 @@ bool HttpServer::stop(std::chrono::milliseconds deadline) {
   if (impl_->stopped) return !impl_->cut_off;
   impl_->stopped = true;
   net::post(impl_->core->io, [this, deadline] { impl_->begin_stop(deadline); });
-  impl_->thread.join();          // returns when the last connection is closed and no handler is left
-  impl_->core->workers.reset();  // workers may still finish requests that were cut off
+  impl_->thread.join();  // returns when the last session has ended, and with it its work
+  impl_->core->pools.clear();
   impl_->core->io.restart();
   impl_->core->io.run();  // lets what they posted go
   return !impl_->cut_off;

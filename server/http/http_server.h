@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/error.h"
 #include "server/http/router.h"
@@ -16,26 +17,41 @@ namespace joulecast::http {
 struct ServerOptions {
   std::string address = "127.0.0.1";
   std::uint16_t port = 0;  // 0: the system chooses, see HttpServer::port()
-  unsigned worker_threads = 2;
-  std::size_t worker_queue = 256;  // requests waiting for a worker; beyond: 503
-  std::size_t max_connections = 1024;
+  // Names of this service for its clients besides IP addresses, localhost and the host's name; "*": any.
+  std::vector<std::string> allowed_hosts = {};
+  unsigned worker_threads = 2;         // of Run::worker endpoints
+  unsigned compute_threads = 2;        // of Run::compute endpoints
+  std::size_t worker_queue = 256;      // requests waiting for one kind of threads; beyond: 503
+  std::size_t client_requests = 64;    // waiting or computing for one client address; beyond: 429
+  std::size_t max_connections = 1024;  // beyond: the longest idle one is closed, or else 503
+  std::size_t client_connections = 512;
   std::uint32_t max_header_bytes = 16 * 1024;
   std::uint64_t max_body_bytes = 4 * 1024 * 1024;
-  std::chrono::milliseconds read_timeout{10'000};   // from a request's first byte to its last
-  std::chrono::milliseconds write_timeout{30'000};  // without progress of the answer
-  std::chrono::milliseconds idle_timeout{60'000};   // between requests of one connection
+  std::uint64_t max_bodies_bytes = 64 * 1024 * 1024;  // of all bodies being received; beyond: 503
+  std::chrono::milliseconds read_timeout{10'000};     // from a request's first byte to its last
+  std::chrono::milliseconds write_timeout{30'000};    // without progress of the answer
+  std::chrono::milliseconds idle_timeout{60'000};     // between requests of one connection
+  // Waiting and computing of one request, all pieces of a streamed answer together; beyond: 503.
+  std::chrono::milliseconds request_deadline{30'000};
 };
 
 // Why the server closed a connection or refused a request by itself.
 enum class Refusal : std::uint8_t {
-  connections,  // more than max_connections
+  connections,  // more than max_connections or client_connections, none of them idle
+  evicted,      // an idle connection closed to make room for another
   header_size,
   body_size,
+  bodies,  // more than max_bodies_bytes
   malformed,
+  host,    // addressed under a name that is not allowed
+  origin,  // a change asked for by a foreign page
   read_timeout,
   write_timeout,
   worker_queue,
-  slow_stream,  // a client too slow for its event stream
+  client_requests,  // more than client_requests
+  deadline,         // more than request_deadline
+  departed,         // cancelled because the client left
+  slow_stream,      // a client too slow for its event stream
   count_
 };
 
@@ -63,7 +79,8 @@ class ServerObserver {
   virtual void connections(std::size_t open) { (void)open; }
 };
 
-// HTTP/1.1 server: one I/O thread, a small worker pool, keep-alive, pipelining answered in order.
+// HTTP/1.1 server: one I/O thread, small worker pools, keep-alive, pipelining answered in order. A client, or
+// peer, is an IPv4 address or the /64 network of an IPv6 address.
 // Thread-safe where stated; router and observer must outlive it.
 class HttpServer {
  public:

@@ -33,7 +33,9 @@ struct Request {
   std::string body;
   std::shared_ptr<const nlohmann::json> json;  // the parsed body where the endpoint declares a request schema
   std::string id;                              // request id: the client's X-Request-Id when sane, else ours
-  std::stop_token stop;  // set when the server's patience with running requests has ended
+  // Set when the answer is no longer wanted: past http.request_deadline_s or when the client has gone (see
+  // Run), and when the server's patience at a stop has ended. What the handler then returns is not sent.
+  std::stop_token stop;
 
   // Value of a path parameter of the endpoint's template. Asking for one that is not in the template is our
   // bug.

@@ -129,10 +129,11 @@ ordered_json parameter_of(const Parameter& parameter) {
 // What the frame itself can answer for an endpoint, and what the endpoint declares.
 std::set<unsigned> errors_of(const Endpoint& endpoint) {
   std::set<unsigned> statuses(endpoint.error_statuses.begin(), endpoint.error_statuses.end());
-  statuses.insert({400, 406, 500});
+  statuses.insert({400, 406, 421, 500});
+  if (endpoint.method != Method::get) statuses.insert(403);
   if (!endpoint.parameters.empty()) statuses.insert(422);
   if (!endpoint.request_schema.empty()) statuses.insert({413, 415, 422});
-  if (endpoint.run == Run::worker) statuses.insert(503);
+  if (endpoint.run != Run::io) statuses.insert({429, 503});
   return statuses;
 }
 

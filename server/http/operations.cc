@@ -18,6 +18,7 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
   health.summary = "The process answers";
   health.response_schema = "health";
   health.run = Run::io;
+  health.reserved = true;
   health.handler = [](const Request&) -> Result<Response> { return json_response(R"({"status":"live"})"); };
   endpoints.push_back(std::move(health));
 
@@ -26,6 +27,8 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
   ready.operation_id = "getReadiness";
   ready.summary = "All parts of the service can do their work";
   ready.response_schema = "readiness";
+  ready.run = Run::operations;
+  ready.reserved = true;
   ready.handler = [shared = std::make_shared<const std::vector<ReadinessCheck>>(std::move(checks))](
                       const Request&) -> Result<Response> {
     nlohmann::ordered_json names = nlohmann::ordered_json::array();
@@ -46,6 +49,8 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
   scrape.operation_id = "getMetrics";
   scrape.summary = "Prometheus metrics";
   scrape.response_type = Metrics::content_type();
+  scrape.run = Run::operations;
+  scrape.reserved = true;
   scrape.handler = [&metrics](const Request&) -> Result<Response> {
     Response response;
     response.content_type = Metrics::content_type();

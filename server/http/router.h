@@ -12,9 +12,14 @@
 
 namespace joulecast::http {
 
-// Where an endpoint runs. `io` handlers run on the I/O thread: they neither block nor compute for more than
-// some tens of microseconds, and save two thread changes. All others run on the worker pool.
-enum class Run : std::uint8_t { worker, io };
+// Where an endpoint runs; each but `io` has threads and a queue of its own, so that none waits for another.
+enum class Run : std::uint8_t {
+  worker,      // reads the store or answers within some milliseconds
+  io,          // on the I/O thread: neither blocks nor computes for more than some tens of microseconds
+  operations,  // tells how the service is
+  compute,     // plans or forecasts; cancelled past the deadline and when its client leaves
+  write        // changes the store; cancelled past the deadline only where it has not begun
+};
 
 // One query parameter. Values are checked before the handler runs; keys that are not declared are errors.
 struct Parameter {
@@ -42,6 +47,8 @@ struct Endpoint {
   unsigned success_status = 200;
   std::vector<unsigned> error_statuses = {};  // beyond those the frame itself can answer
   Run run = Run::worker;
+  // Answered even when all connections are taken, at a place kept for such requests.
+  bool reserved = false;
   // Of a worker's endpoint, when set: tried first, on the I/O thread and under its rules. It answers the
   // requests that are quickly answered and declines the others, which then go to `handler`.
   std::function<std::optional<Response>(const Request&)> brief = {};

@@ -19,22 +19,14 @@ WorkerPool::~WorkerPool() {
   for (auto& thread : threads_) thread.join();
 }
 
-bool WorkerPool::submit(std::function<void()> task) {
+bool WorkerPool::submit(std::function<void()> task, bool admitted) {
   {
     const std::lock_guard lock(mutex_);
-    if (queue_.size() >= capacity_) return false;
+    if (!admitted && queue_.size() >= capacity_) return false;
     queue_.push_back(std::move(task));
   }
   filled_.notify_one();
   return true;
-}
-
-void WorkerPool::submit_admitted(std::function<void()> task) {
-  {
-    const std::lock_guard lock(mutex_);
-    queue_.push_back(std::move(task));
-  }
-  filled_.notify_one();
 }
 
 void WorkerPool::work() {

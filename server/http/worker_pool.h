@@ -18,10 +18,9 @@ class WorkerPool {
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 
-  // False when the queue is full. Any thread.
-  bool submit(std::function<void()> task);
-  // Next piece of work already admitted: never refused.
-  void submit_admitted(std::function<void()> task);
+  // False when the queue is full; `admitted`, for the next piece of work that has begun, is never refused.
+  // Any thread.
+  bool submit(std::function<void()> task, bool admitted = false);
 
  private:
   void work();

@@ -129,6 +129,7 @@ class HttpServerTest : public ::testing::Test {
   }
 
   void start(ServerOptions options = {}) {
+    if (options.allowed_hosts.empty()) options.allowed_hosts = {"test", "t", "a"};
     auto server = HttpServer::start(options, router_, &recorder_);
     ASSERT_TRUE(server.has_value()) << describe(server.error());
     server_ = std::move(*server);
@@ -316,16 +317,19 @@ TEST_F(HttpServerTest, TurnsAwayConnectionsBeyondTheLimit) {
   start({.max_connections = 2});
   RawClient first(port());
   RawClient second(port());
-  first.send(get_text("/echo/a"));
-  second.send(get_text("/echo/a"));
-  ASSERT_EQ(first.reply().status, 200U);
-  ASSERT_EQ(second.reply().status, 200U);
+  first.send(get_text("/blocked"));
+  second.send(get_text("/blocked"));
+  ASSERT_TRUE(soon([&] { return blocked_ == 2; }));
   RawClient third(port());
   third.send(get_text("/echo/a"));
   const RawReply reply = third.reply();
   EXPECT_EQ(reply.status, 503U);
   EXPECT_EQ(reply.headers.at("retry-after"), "1");
   EXPECT_EQ(recorder_.count(Refusal::connections), 1);
+  release_.set_value();
+  EXPECT_EQ(first.reply().status, 200U);
+  EXPECT_EQ(second.reply().status, 200U);
+  release_ = {};
   first.close();
   third.close();
   ASSERT_TRUE(soon([&] { return recorder_.open == 1; }));

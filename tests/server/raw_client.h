@@ -19,8 +19,9 @@ struct RawReply {
 // A blocking TCP client that sends exactly the bytes it is told. Reads give up after two seconds unless told.
 class RawClient {
  public:
-  // A small receive buffer lets a test play the slow reader; 0 leaves the system's.
-  explicit RawClient(std::uint16_t port, int receive_buffer = 0);
+  // A small receive buffer lets a test play the slow reader; 0 leaves the system's. `source` is the address
+  // to come from: one of 127.0.0.0/8 makes a peer of its own.
+  explicit RawClient(std::uint16_t port, int receive_buffer = 0, const char* source = nullptr);
   ~RawClient();
   RawClient(const RawClient&) = delete;
   RawClient& operator=(const RawClient&) = delete;
@@ -28,8 +29,11 @@ class RawClient {
   void send(
       std::string_view bytes);  // errors are ignored: the server may have hung up, which reads will show
   RawReply reply(bool to_head = false);
+  void end_sending();  // the client's half of the connection only
   // Bytes until `marker` has arrived (inclusive); what there is when the time is over or the server closes.
   std::string read_until(std::string_view marker);
+  // All bytes until the server closes or patience ends.
+  std::string read_to_end();
   // True when the server has closed (end of file or reset) within the time.
   bool closed_within(std::chrono::milliseconds time);
   void close();

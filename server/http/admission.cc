@@ -1,0 +1,77 @@
+#include "server/http/admission.h"
+
+#include <algorithm>
+
+#include "server/http/text.h"
+
+namespace joulecast::http {
+namespace {
+
+namespace net = boost::asio;
+namespace bhttp = boost::beast::http;
+
+std::string_view view(boost::string_view text) {
+  return {text.data(), text.size()};
+}
+
+// "name:80" -> "name", "[::1]:80" -> "::1"; a root dot at the end is no part of the name.
+std::string_view name_of(std::string_view authority) {
+  if (authority.starts_with('[')) return authority.substr(1, authority.find(']') - 1);
+  authority = authority.substr(0, authority.find(':'));
+  if (authority.ends_with('.')) authority.remove_suffix(1);
+  return authority;
+}
+
+bool changes_something(bhttp::verb method) {
+  return method != bhttp::verb::get && method != bhttp::verb::head && method != bhttp::verb::options;
+}
+
+}  // namespace
+
+Admission::Admission(const std::vector<std::string>& allowed_hosts) : names_(allowed_hosts) {
+  any_ = std::ranges::find(names_, "*") != names_.end();
+  names_.emplace_back("localhost");
+  boost::system::error_code error;
+  if (std::string own = net::ip::host_name(error); !error) names_.push_back(std::move(own));
+}
+
+// An address cannot be made to lead elsewhere, so every one is let in.
+bool Admission::is_own(std::string_view host) const {
+  if (any_ || std::ranges::any_of(names_, [&](const auto& n) { return equals_ignoring_case(n, host); }))
+    return true;
+  boost::system::error_code error;
+  net::ip::make_address(std::string(host), error);
+  return !error;
+}
+
+std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>& head) const {
+  const auto malformed = [](std::string detail) {
+    return Denial{Refusal::malformed, 400, "malformed-request", std::move(detail)};
+  };
+  const auto codings = head.count(bhttp::field::transfer_encoding);
+  if (codings > 0 && (codings > 1 || head.version() < 11 ||
+                      !equals_ignoring_case(trim(view(head[bhttp::field::transfer_encoding])), "chunked")))
+    return malformed("Transfer-Encoding must be exactly chunked, once, in HTTP/1.1");
+  const auto hosts = head.count(bhttp::field::host);
+  if (hosts > 1 || (hosts == 0 && head.version() >= 11))
+    return malformed("HTTP/1.1 needs exactly one Host header");
+  const auto expect = head.find(bhttp::field::expect);
+  if (expect != head.end() && head.version() >= 11 &&
+      !equals_ignoring_case(trim(view(expect->value())), "100-continue"))
+    return Denial{Refusal::malformed, 417, "expectation-failed",
+                  "Only the expectation 100-continue is known here"};
+  const auto host = view(head[bhttp::field::host]);
+  if (hosts > 0 && !is_own(name_of(host)))
+    return Denial{Refusal::host, 421, "misdirected",
+                  "Host names no address or name of this service; http.allowed_hosts adds names"};
+  const auto origin = view(head[bhttp::field::origin]);
+  if (!origin.empty() && changes_something(head.method())) {
+    const auto scheme = origin.find("://");
+    if (scheme == std::string_view::npos || !equals_ignoring_case(origin.substr(scheme + 3), host))
+      return Denial{Refusal::origin, 403, "foreign-origin",
+                    "A page may change something only under the host it came from; Origin differs from Host"};
+  }
+  return std::nullopt;
+}
+
+}  // namespace joulecast::http

@@ -1,0 +1,41 @@
+#pragma once
+
+// Private to server/http: which heads of requests are let in.
+#include "server/http/asio.h"
+// asio.h stays first.
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/http/http_server.h"
+
+namespace joulecast::http {
+
+struct Denial {
+  Refusal refusal = Refusal::malformed;
+  unsigned status = 400;
+  std::string_view slug;
+  std::string detail;
+};
+
+// Looks at a head before its body is read. A denied request's connection closes, since where its body ends
+// may be unknown.
+class Admission {
+ public:
+  // The names besides IP addresses, localhost and this host's name; "*" lets any name in.
+  explicit Admission(const std::vector<std::string>& allowed_hosts);
+
+  // Framing (RFC 9112 section 6.3: one Host; no Transfer-Encoding but exactly "chunked", in HTTP/1.1 only),
+  // Expect, the Host that the client believes to talk to (a foreign name that resolves to this machine is how
+  // a web page reaches it under its own origin) and the Origin of requests that change something.
+  std::optional<Denial> deny(
+      const boost::beast::http::request_header<boost::beast::http::fields>& head) const;
+
+ private:
+  bool is_own(std::string_view host) const;
+  std::vector<std::string> names_;
+  bool any_ = false;
+};
+
+}  // namespace joulecast::http

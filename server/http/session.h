@@ -1,0 +1,158 @@
+#pragma once
+
+// Private to server/http: what sessions and the server share. Everything runs on the I/O thread unless
+// stated.
+#include "server/http/asio.h"
+// asio.h stays first.
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <unordered_set>
+
+#include "server/http/admission.h"
+#include "server/http/http_server.h"
+#include "server/http/worker_pool.h"
+
+namespace joulecast::http {
+
+namespace net = boost::asio;
+namespace beast = boost::beast;
+using Clock = std::chrono::steady_clock;
+using Tcp = net::ip::tcp;
+using Executor = net::io_context::executor_type;
+using Socket = net::basic_stream_socket<Tcp, Executor>;
+using Timer = net::basic_waitable_timer<Clock, net::wait_traits<Clock>, Executor>;
+template <class T>
+using Task = net::awaitable<T, Executor>;
+inline constexpr net::use_awaitable_t<Executor> use_task;
+inline constexpr Clock::time_point never = Clock::time_point::max();
+
+class Session;
+
+// A client address, with what it holds of the server.
+struct Peer {
+  std::size_t connections = 0;
+  std::size_t requests = 0;  // waiting or computing
+};
+
+struct Core {
+  Core(const ServerOptions& options_in, const Router& router_in, ServerObserver& observer_in)
+      : options(options_in), router(router_in), observer(observer_in), admission(options.allowed_hosts) {}
+
+  // An `io` endpoint's stream that pulls on a worker does so on those of the store.
+  WorkerPool& pool_of(Run run) { return *pools.at(run == Run::io ? Run::worker : run); }
+
+  const ServerOptions options;
+  const Router& router;
+  ServerObserver& observer;
+  const Admission admission;
+  net::io_context io{1};
+  std::map<Run, std::unique_ptr<WorkerPool>> pools;
+  std::map<net::ip::address, std::shared_ptr<Peer>> peers;
+  std::unordered_set<Session*> sessions;  // each kept alive by its coroutine
+  std::size_t connections = 0;            // that are served
+  std::size_t guests = 0;                 // see Session
+  std::uint64_t bodies_bytes = 0;         // of requests not yet answered
+  std::string date;                       // value of the Date header, refreshed by the tick
+  std::string id_prefix;                  // of the request ids of this run
+  std::uint64_t next_id = 0;
+  bool stopping = false;
+};
+
+// One connection: a coroutine that reads a request, answers it, and begins again. A guest came when all
+// places were taken: it is answered one request, and only of a `reserved` endpoint.
+class Session : public std::enable_shared_from_this<Session> {
+ public:
+  Session(std::shared_ptr<Core> core, const net::ip::address& peer, bool guest);
+  virtual ~Session() = default;
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  void start();
+  // Enforces the deadline of whatever the session waits for.
+  void tick(Clock::time_point now);
+  // The server stops: ends what is idle or endless, lets the rest finish.
+  void begin_stop();
+  // Closes the connection at once. The session ends when no worker has its request any more.
+  void cut();
+
+  bool idle() const { return state_ == State::idle; }
+  bool busy() const { return state_ == State::busy; }
+  bool guest() const { return guest_; }
+  Clock::time_point since() const { return since_; }  // when it was opened or became idle
+  const Peer* peer() const { return peer_.get(); }
+
+ protected:
+  enum class State : std::uint8_t { idle, busy, ending };
+  enum class Outcome : std::uint8_t { done, full, late, departed, cut };
+  using Waiter = net::async_result<net::use_awaitable_t<Executor>, void()>::handler_type;
+  using Parser = beast::http::request_parser<beast::http::string_body>;
+
+  virtual Socket& socket() = 0;  // below the stream
+  virtual Task<void> run() = 0;
+
+  void begin_request();
+  bool parse();
+  void fill_request();
+  bool refuse(Refusal refusal, unsigned status, std::string_view slug, std::string_view detail);
+  void write_head(bool chunked);
+  void observe(bool streamed);
+  void watch_source();
+  Task<void> event();
+  void wake();
+  Task<Outcome> work();
+  void do_work();
+  void arm(Clock::duration time);
+  void release_place();
+
+  const std::shared_ptr<Core> core_;  // first: everything else needs the io_context in it
+  std::shared_ptr<Peer> peer_;
+  const net::ip::address address_;
+  const bool guest_;
+  bool placed_ = true;
+  State state_ = State::idle;
+  Clock::time_point since_ = Clock::now();
+  Clock::time_point deadline_ = never;
+  bool expired_ = false;  // the deadline has passed: what was under way is cancelled
+  bool cut_ = false;
+  std::optional<Waiter> waiter_;  // of event()
+
+  beast::flat_buffer buffer_;
+  std::optional<Parser> parser_;
+  bool reading_ahead_ = false;  // see StreamSession::watch
+  bool departed_ = false;       // the client has sent its end
+  std::uint64_t body_bytes_ = 0;
+
+  Request request_;
+  const Endpoint* endpoint_ = nullptr;
+  Response response_;
+  std::string head_;
+  bool refused_ = false;
+  bool keep_alive_ = true;
+  Clock::time_point received_{};
+  std::size_t request_bytes_ = 0;
+  std::size_t response_bytes_ = 0;
+
+  std::stop_source stop_;
+  Clock::duration patience_{};  // left for waiting and computing
+  bool working_ = false;        // a worker reads request_ and writes made_, or piece_ and pulled_
+  std::atomic<bool> claimed_{
+      false};  // by the worker that begins the work, or by the session that gives it up
+  Response made_;
+  std::string piece_;
+  StreamSource::Next pulled_ = StreamSource::Next::more;
+  bool streaming_ = false;
+  bool pull_again_ = false;
+  std::atomic<bool> wake_posted_{false};
+};
+
+// A session on an accepted connection.
+std::shared_ptr<Session> make_session(std::shared_ptr<Core> core, Socket socket, const net::ip::address& peer,
+                                      bool guest);
+
+}  // namespace joulecast::http
