@@ -9,13 +9,11 @@
 #include <limits>
 #include <utility>
 
+#include "telemetry/datagram.h"
 #include "telemetry/utf8.h"
 
 namespace joulecast::telemetry {
 namespace {
-
-// LCM counts in int; no message of the contract comes near this.
-constexpr std::size_t max_message_size = 64 * 1024;
 
 bool is_id_character(char c) noexcept {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
@@ -59,9 +57,9 @@ std::uint64_t read_big_endian(const std::uint8_t* bytes, std::size_t size) noexc
 class Guard {
  public:
   Guard(std::span<const std::uint8_t> bytes, std::int64_t fingerprint) : bytes_(bytes) {
-    if (bytes.size() > max_message_size) {
+    if (bytes.size() > max_message_bytes) {
       refuse("", "message of " + std::to_string(bytes.size()) + " bytes; at most " +
-                     std::to_string(max_message_size) + " are accepted");
+                     std::to_string(max_message_bytes) + " are accepted");
       return;
     }
     const std::uint8_t* at = take(8, "fingerprint");
