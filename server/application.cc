@@ -100,15 +100,21 @@ history::WriterOptions writer_options(const Settings& settings) {
 server::IngestOptions ingest_options(const Settings& settings) {
   server::IngestOptions options;
   options.lcm_url = settings.text("lcm.url");
+  options.listen = {settings.text("lcm.bind_address"), settings.text("lcm.accept_from")};
   options.queue_messages = static_cast<std::size_t>(settings.integer("ingest.queue_messages"));
   options.energy_state_period = seconds(settings.number("energy_state.period_s"));
-  options.max_robots = static_cast<std::size_t>(settings.integer("ingest.max_robots"));
+  options.max_unknown_robots = static_cast<std::size_t>(settings.integer("ingest.max_unknown_robots"));
   options.session.meter.tolerance = settings.number("meter.tolerance");
   options.session.meter.gap_bridge_s = settings.number("ingest.gap_bridge_s");
   options.session.sequence.gap_us = microseconds(settings.number("ingest.gap_bridge_s"));
   options.session.mission.explicit_silence_us =
       microseconds(settings.number("ingest.mission_idle_timeout_s"));
   options.session.implicit_missions = settings.boolean("ingest.implicit_missions");
+  options.session.reorder_us = microseconds(settings.number("ingest.reorder_s"));
+  options.session.sender_takeover_us = microseconds(settings.number("ingest.sender_takeover_s"));
+  options.session.max_ahead_us = microseconds(settings.number("ingest.max_clock_ahead_s"));
+  options.session.booked_margin_us = microseconds(settings.number("ingest.booked_time_margin_s"));
+  options.session.event_rate_hz = settings.number("ingest.event_rate_hz");
   return options;
 }
 
@@ -349,8 +355,7 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   };
   p.ingest =
       std::make_unique<server::IngestService>(ingest_options(settings), p.models, *p.forecasts, outputs);
-  if (Result<void> started = p.ingest->start(); !started)
-    return fail(started.error().fault, "lcm.url", std::move(started.error().message));
+  if (Result<void> started = p.ingest->start(); !started) return tl::unexpected(std::move(started.error()));
 
   p.drift = std::make_unique<server::DriftView>(*p.store, p.models, drift_options(settings));
   p.adoption = std::make_unique<server::ModelAdoption>(*p.store, *p.writer, p.models, *p.drift, host_utime_us,

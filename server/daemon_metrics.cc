@@ -29,6 +29,13 @@ void export_metrics(Metrics& metrics, const IngestCounters& counters, const Inge
   const std::vector<Counter> faults = metrics.counters(
       "joulecast_ingest_faults_total", "Messages, samples and events turned away or repaired", "reason",
       std::vector<std::string>(ingest_fault_names.begin(), ingest_fault_names.end()));
+  const Counter datagrams =
+      metrics.counter("joulecast_lcm_datagrams_total", "Datagrams received on the LCM group");
+  const std::vector<Counter> lost = metrics.counters(
+      "joulecast_lcm_datagrams_dropped_total",
+      "Datagrams that gave no message; kernel: lost for want of receive buffer, other_channel: LCM traffic of others",
+      "reason",
+      std::vector<std::string>(telemetry::datagram_fault_names.begin(), telemetry::datagram_fault_names.end()));
   const Gauge queue = metrics.gauge("joulecast_ingest_queue_messages", "Messages waiting to be accounted");
   const Gauge receiving = metrics.gauge("joulecast_ingest_receiving", "1 while LCM is being received");
   const Gauge known = metrics.gauge("joulecast_robots_known", "Robots heard of since the daemon started");
@@ -71,6 +78,9 @@ void export_metrics(Metrics& metrics, const IngestCounters& counters, const Inge
           ended[k].raise_to(static_cast<double>(counters.missions_ended[k + 1]));
         for (std::size_t k = 0; k < faults.size(); ++k)
           faults[k].raise_to(static_cast<double>(counters.faults[k]));
+        datagrams.raise_to(static_cast<double>(counters.datagrams.received));
+        for (std::size_t k = 0; k < lost.size(); ++k)
+          lost[k].raise_to(static_cast<double>(counters.datagrams.faults[k]));
         const IngestStatus ingesting = ingest.status();
         queue.set(static_cast<double>(ingesting.queue_messages));
         receiving.set(ingesting.receiving ? 1 : 0);

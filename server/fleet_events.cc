@@ -6,6 +6,7 @@
 namespace joulecast::server {
 
 void FleetEvents::publish(std::int64_t now_utime_us) {
+  std::erase_if(told_, [&](const auto& each) { return fleet_.find(each.first) == nullptr; });
   for (const auto& snapshot : fleet_.all()) {
     Told& told = told_[snapshot->robot_id];
     const bool live = api::is_live(*snapshot, now_utime_us);

@@ -100,6 +100,9 @@ void write_state(JsonWriter& json, const server::RobotSnapshot& s,
   json.key("faults").begin_object();
   for (const auto& [reason, count] : s.faults) json.field(reason, count);
   json.end_object();
+  json.key("fault_notes").begin_object();
+  for (const auto& [reason, note] : s.fault_notes) json.field(reason, note);
+  json.end_object();
   json.end_object();
 }
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "history/records.h"
+#include "telemetry/datagram.h"
 
 namespace joulecast::server {
 
@@ -15,7 +16,7 @@ enum class IngestFault : std::size_t {
   undecodable,      // the guard or the decoder refused the bytes
   wrong_channel,    // the message's robot_id is not its channel's
   queue_full,       // the bounded queue between receiving and accounting was full
-  too_many_robots,  // more robots than the setting allows
+  too_many_robots,  // of unknown robots beyond those that are remembered
   unknown_robot,    // no model: its samples are not accounted
   implausible,      // a value is missing, infinite or absurd
   duplicate,
@@ -25,36 +26,26 @@ enum class IngestFault : std::size_t {
   clock_backward,
   clock_forward,
   clock_ahead,          // stamped well after the daemon's time; accounted for all the same
+  too_far_ahead,        // stamped further after the daemon's time than the setting allows; not accounted for
+  too_fast,             // after its clock was set, more time than has passed by the daemon's; not accounted for
+  second_sender,        // another sender under the robot's id; not accounted for
   gap,                  // a silence too long to be bridged
   zero_payload,         // said 0 where the mission's start declared a load: accounted with that
   outside_mission,      // belongs to no mission: just after an end, or before a start
   bad_event,            // duplicate, out-of-order or unknown mission event
+  event_flood,          // more mission events than the setting allows
+  empty_mission,        // ended before its first sample; not stored
   reused_mission_id,    // a mission began under an id that an earlier one had
   too_many_covariates,  // a value of a name beyond those that a mission may have
   solver                // CVODE failed on an interval; its chord stood in
 };
-inline constexpr std::size_t ingest_fault_count = 20;
+inline constexpr std::size_t ingest_fault_count = 25;
 
-inline constexpr std::array<std::string_view, ingest_fault_count> ingest_fault_names = {"undecodable",
-                                                                                        "wrong_channel",
-                                                                                        "queue_full",
-                                                                                        "too_many_robots",
-                                                                                        "unknown_robot",
-                                                                                        "implausible",
-                                                                                        "duplicate",
-                                                                                        "late",
-                                                                                        "missing",
-                                                                                        "restart",
-                                                                                        "clock_backward",
-                                                                                        "clock_forward",
-                                                                                        "clock_ahead",
-                                                                                        "gap",
-                                                                                        "zero_payload",
-                                                                                        "outside_mission",
-                                                                                        "bad_event",
-                                                                                        "reused_mission_id",
-                                                                                        "too_many_covariates",
-                                                                                        "solver"};
+inline constexpr std::array<std::string_view, ingest_fault_count> ingest_fault_names = {
+    "undecodable", "wrong_channel", "queue_full", "too_many_robots", "unknown_robot", "implausible", "duplicate",
+    "late", "missing", "restart", "clock_backward", "clock_forward", "clock_ahead", "too_far_ahead", "too_fast",
+    "second_sender", "gap", "zero_payload", "outside_mission", "bad_event", "event_flood", "empty_mission",
+    "reused_mission_id", "too_many_covariates", "solver"};
 
 // Written by the ingest threads, read by the metrics.
 struct IngestCounters {
@@ -64,6 +55,7 @@ struct IngestCounters {
   std::array<std::atomic<std::uint64_t>, 2> missions_started{};  // announced, implicit
   std::array<std::atomic<std::uint64_t>, history::mission_state_count> missions_ended{};  // by state
   std::array<std::atomic<std::uint64_t>, ingest_fault_count> faults{};
+  telemetry::DatagramCounters datagrams;
 
   void add(IngestFault fault, std::uint64_t count = 1) {
     faults[static_cast<std::size_t>(fault)].fetch_add(count, std::memory_order_relaxed);

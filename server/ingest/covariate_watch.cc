@@ -27,17 +27,16 @@ void count(history::CovariateSummary& summary, std::int64_t until_utime_us) {
 
 }  // namespace
 
-void CovariateWatch::take(const signals::CovariateMessage& message,
-                          const std::function<void(IngestFault)>& fault) {
+void CovariateWatch::take(const signals::CovariateMessage& message, const Fault& fault) {
   for (const signals::Covariate& covariate : message.covariates) {
-    if (telemetry::check_plausible(covariate)) {
-      fault(IngestFault::implausible);
+    if (const auto implausible = telemetry::check_plausible(covariate)) {
+      fault(IngestFault::implausible, "covariate " + covariate.name + ": " + telemetry::describe(*implausible));
       continue;
     }
     CovariateChange change;
     const Verdict verdict = tracker_.take(message.utime_us, covariate, change);
-    if (verdict == Verdict::late) fault(IngestFault::late);
-    if (verdict == Verdict::no_room) fault(IngestFault::too_many_covariates);
+    if (verdict == Verdict::late) fault(IngestFault::late, {});
+    if (verdict == Verdict::no_room) fault(IngestFault::too_many_covariates, {});
     if (verdict != Verdict::news) continue;
     if (covariate.name == signals::height_covariate) hear_height(message.utime_us, covariate.value);
     if (in_mission_) note(std::move(change));

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -23,8 +24,9 @@ class CovariateWatch {
   // Values behind the last one of their name by more than `reorder_us` tell of a clock set back.
   explicit CovariateWatch(std::int64_t reorder_us) : tracker_(reorder_us) {}
 
-  // Takes a message with a plausible clock; `fault` is told of every value turned away.
-  void take(const signals::CovariateMessage& message, const std::function<void(IngestFault)>& fault);
+  // Takes a message with a plausible clock; `fault` is told of every value turned away, and why.
+  using Fault = std::function<void(IngestFault, std::string why)>;
+  void take(const signals::CovariateMessage& message, const Fault& fault);
 
   // What holds goes on into the mission.
   void begin_mission(std::int64_t start_utime_us);

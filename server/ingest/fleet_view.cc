@@ -19,6 +19,11 @@ void FleetView::publish(std::shared_ptr<const RobotSnapshot> snapshot) {
   slot->latest.store(std::move(snapshot), std::memory_order_release);
 }
 
+void FleetView::remove(std::string_view robot_id) {
+  const std::unique_lock lock(mutex_);
+  if (const auto found = slots_.find(robot_id); found != slots_.end()) slots_.erase(found);
+}
+
 std::shared_ptr<const RobotSnapshot> FleetView::find(std::string_view robot_id) const {
   const std::shared_lock lock(mutex_);
   const auto found = slots_.find(robot_id);

@@ -36,12 +36,14 @@ struct RobotSnapshot {
   std::uint64_t samples = 0;
   std::map<std::string, std::uint64_t>
       faults;  // reason -> messages rejected or repaired, since the daemon started
+  std::map<std::string, std::string> fault_notes;  // reason -> what was wrong with the last one
 };
 
 // The latest snapshot of every robot. One thread publishes, any thread reads without waiting for it.
 class FleetView {
  public:
   void publish(std::shared_ptr<const RobotSnapshot> snapshot);
+  void remove(std::string_view robot_id);
   std::shared_ptr<const RobotSnapshot> find(std::string_view robot_id) const;
   std::vector<std::shared_ptr<const RobotSnapshot>> all() const;
 
@@ -49,7 +51,7 @@ class FleetView {
   struct Slot {
     std::atomic<std::shared_ptr<const RobotSnapshot>> latest;
   };
-  mutable std::shared_mutex mutex_;  // of the map; slots are never removed
+  mutable std::shared_mutex mutex_;  // of the map
   std::map<std::string, std::unique_ptr<Slot>, std::less<>> slots_;
 };
 

@@ -10,7 +10,6 @@
 
 #include "base/host_clock.h"
 #include "signals/energy_state.h"
-#include "telemetry/lcm_link.h"
 
 namespace joulecast::server {
 namespace {
@@ -28,7 +27,7 @@ class IngestService::Impl {
         models_(models),
         forecasts_(forecasts),
         outputs_(outputs),
-        pipeline_(options_.session, options_.max_robots, models, std::move(outputs)) {}
+        pipeline_(options_.session, options_.max_unknown_robots, models, std::move(outputs)) {}
 
   ~Impl() { stop(); }
 
@@ -38,15 +37,11 @@ class IngestService::Impl {
     if (!link) return tl::unexpected(std::move(link.error()));
     link_ = std::make_unique<telemetry::LcmLink>(std::move(*link));
     const auto handler = [this](const telemetry::Received& received) {
-      std::optional<InboundMessage> message =
-          decode_message(received.channel, received.data, received.recv_utime_us, outputs_.counters);
+      std::optional<InboundMessage> message = decode_message(received.channel, received.data, received.recv_utime_us,
+                                                             outputs_.counters, received.sender);
       if (message) batch_.push_back(std::move(*message));
     };
-    for (telemetry::Subject subject :
-         {telemetry::Subject::telemetry, telemetry::Subject::mission_event, telemetry::Subject::covariates}) {
-      if (Result<void> done = link_->subscribe(telemetry::channel_pattern(subject), handler, 100'000); !done)
-        return done;
-    }
+    if (Result<void> done = link_->listen(handler, outputs_.counters.datagrams, options_.listen); !done) return done;
     running_ = true;
     receiving_ = true;
     receiver_ = std::thread([this] { receive(); });

@@ -8,16 +8,18 @@
 #include "base/error.h"
 #include "server/ingest/forecasts.h"
 #include "server/ingest/pipeline.h"
+#include "telemetry/lcm_link.h"
 
 namespace joulecast::server {
 
 struct IngestOptions {
   std::string lcm_url;
+  telemetry::ListenOptions listen;
   std::size_t queue_messages = 200'000;          // bound between receiving and accounting
   std::chrono::milliseconds publish_period{50};  // snapshots are no older than this
   std::chrono::milliseconds energy_state_period{1000};
   SessionSettings session;
-  std::size_t max_robots = 1000;
+  std::size_t max_unknown_robots = 100;
 };
 
 struct IngestStatus {

@@ -1,95 +1,138 @@
 #include "server/ingest/pipeline.h"
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
 namespace joulecast::server {
+namespace {
 
-std::optional<InboundMessage> decode_message(std::string_view channel, std::span<const std::uint8_t> data,
-                                             std::int64_t host_utime_us, IngestCounters& counters) {
-  const std::optional<telemetry::ChannelName> name = telemetry::parse_channel(channel);
-  if (!name || name->subject == telemetry::Subject::energy_state) return std::nullopt;
-  counters.messages.fetch_add(1, std::memory_order_relaxed);
-  const auto refuse = [&](IngestFault fault) {
-    counters.add(fault);
-    return std::nullopt;
-  };
-  if (name->subject == telemetry::Subject::telemetry) {
-    Result<telemetry::DecodedTelemetry> decoded = telemetry::decode_telemetry(data);
-    if (!decoded) return refuse(IngestFault::undecodable);
-    if (decoded->robot_id != name->robot_id) return refuse(IngestFault::wrong_channel);
-    return InboundMessage{std::move(decoded->robot_id), decoded->sample, host_utime_us};
-  }
-  if (name->subject == telemetry::Subject::covariates) {
-    Result<telemetry::DecodedCovariates> decoded = telemetry::decode_covariates(data);
-    if (!decoded) return refuse(IngestFault::undecodable);
-    if (decoded->robot_id != name->robot_id) return refuse(IngestFault::wrong_channel);
-    return InboundMessage{std::move(decoded->robot_id), std::move(decoded->message), host_utime_us};
-  }
-  Result<telemetry::DecodedMissionEvent> decoded = telemetry::decode_mission_event(data);
-  if (!decoded) return refuse(IngestFault::undecodable);
-  if (decoded->robot_id != name->robot_id) return refuse(IngestFault::wrong_channel);
-  return InboundMessage{std::move(decoded->robot_id), std::move(decoded->event), host_utime_us};
+constexpr std::size_t waiting_units = 131'072;  // some 30 MB of messages
+constexpr std::int64_t stranger_silence_us = 60'000'000, forget_period_us = 1'000'000, tell_period_us = 600'000'000;
+
+}  // namespace
+
+Pipeline::Pipeline(const SessionSettings& settings, std::size_t max_unknown_robots, const ModelRegistry& models,
+                   SessionOutputs outputs)
+    : settings_(settings),
+      max_unknown_robots_(max_unknown_robots),
+      models_(models),
+      outputs_(std::move(outputs)),
+      waiting_room_(waiting_units) {}
+
+Pipeline::Robot& Pipeline::add(const std::string& robot_id) {
+  strangers_.erase(robot_id);
+  auto made = std::unique_ptr<Robot>(
+      new Robot{{robot_id, settings_, outputs_}, {settings_.sender_takeover_us, waiting_room_}});
+  made->session.set_model(models_.find(robot_id));
+  return *robots_.emplace(robot_id, std::move(made)).first->second;
 }
 
-Pipeline::Pipeline(const SessionSettings& settings, std::size_t max_robots, const ModelRegistry& models,
-                   SessionOutputs outputs)
-    : settings_(settings), max_robots_(max_robots), models_(models), outputs_(std::move(outputs)) {}
-
-RobotSession* Pipeline::session(const std::string& robot_id) {
-  if (const auto found = sessions_.find(robot_id); found != sessions_.end()) return found->second.get();
-  if (sessions_.size() >= max_robots_) {
-    outputs_.counters.add(IngestFault::too_many_robots);
-    return nullptr;
-  }
-  auto made = std::make_unique<RobotSession>(robot_id, settings_, outputs_);
-  made->set_model(models_.find(robot_id));
-  return sessions_.emplace(robot_id, std::move(made)).first->second.get();
+Pipeline::Robot* Pipeline::find(const std::string& robot_id) {
+  if (const auto found = robots_.find(robot_id); found != robots_.end()) return found->second.get();
+  return models_.find(robot_id) != nullptr ? &add(robot_id) : nullptr;
 }
 
 Result<void> Pipeline::recover() {
   Result<std::vector<history::Mission>> open = outputs_.store.recover();
   if (!open) return tl::unexpected(std::move(open.error()));
   for (const history::Mission& mission : *open) {
-    RobotSession* robot = session(mission.robot_id);
-    if (robot == nullptr) continue;
-    robot->resume(mission);
-    robot->publish();
+    const auto found = robots_.find(mission.robot_id);
+    RobotSession& session = found != robots_.end() ? found->second->session : add(mission.robot_id).session;
+    session.resume(mission);
+    session.publish();
   }
   return {};
 }
 
 void Pipeline::refresh_models() {
-  if (const std::uint64_t now = models_.epoch(); now != epoch_) {
-    epoch_ = now;
-    for (auto& [id, robot] : sessions_) robot->set_model(models_.find(id));
+  const std::uint64_t now = models_.epoch();
+  if (now == epoch_) return;
+  epoch_ = now;
+  for (auto& [id, robot] : robots_) robot->session.set_model(models_.find(id));
+  for (auto stranger = strangers_.begin(); stranger != strangers_.end();) {
+    const std::string id = (stranger++)->first;
+    if (models_.find(id) != nullptr) add(id);
+  }
+}
+
+bool Pipeline::forget_a_stranger(std::int64_t host_utime_us) {
+  if (host_utime_us - forgot_utime_us_ < forget_period_us && host_utime_us >= forgot_utime_us_) return false;
+  forgot_utime_us_ = host_utime_us;
+  const auto silent = std::ranges::min_element(
+      strangers_, {}, [](const auto& each) { return each.second.snapshot.received_utime_us; });
+  if (silent == strangers_.end() || host_utime_us - silent->second.snapshot.received_utime_us < stranger_silence_us)
+    return false;
+  outputs_.fleet.remove(silent->first);
+  strangers_.erase(silent);
+  return true;
+}
+
+void Pipeline::count_stranger(const InboundMessage& message) {
+  IngestFault fault = IngestFault::unknown_robot;
+  if (const auto* refused = std::get_if<RefusedMessage>(&message.content)) {
+    fault = refused->fault;  // counted already
+  } else {
+    outputs_.counters.add(fault);
+  }
+  auto found = strangers_.find(message.robot_id);
+  if (found == strangers_.end()) {
+    if (strangers_.size() >= max_unknown_robots_ && !forget_a_stranger(message.host_utime_us))
+      return outputs_.counters.add(IngestFault::too_many_robots);
+    found = strangers_.try_emplace(message.robot_id).first;
+    found->second.snapshot.robot_id = message.robot_id;
+    if (told_utime_us_ == 0 || message.host_utime_us - told_utime_us_ >= tell_period_us) {
+      told_utime_us_ = message.host_utime_us;
+      outputs_.warn(message.robot_id, "has no model: its messages are counted and not accounted for");
+    }
+  }
+  RobotSnapshot& snapshot = found->second.snapshot;
+  snapshot.received_utime_us = message.host_utime_us;
+  ++snapshot.faults[std::string(ingest_fault_names[static_cast<std::size_t>(fault)])];
+  found->second.changed = true;
+}
+
+void Pipeline::deliver(RobotSession& session, const InboundMessage& message) {
+  if (const auto* sample = std::get_if<signals::Sample>(&message.content)) {
+    session.on_sample(*sample, message.host_utime_us);
+  } else if (const auto* covariates = std::get_if<signals::CovariateMessage>(&message.content)) {
+    session.on_covariates(*covariates, message.host_utime_us);
+  } else {
+    session.on_event(std::get<signals::MissionEvent>(message.content), message.host_utime_us);
   }
 }
 
 void Pipeline::handle(const InboundMessage& message) {
   refresh_models();
-  RobotSession* robot = session(message.robot_id);
-  if (robot == nullptr) return;
-  if (const auto* sample = std::get_if<signals::Sample>(&message.content)) {
-    robot->on_sample(*sample, message.host_utime_us);
-  } else if (const auto* covariates = std::get_if<signals::CovariateMessage>(&message.content)) {
-    robot->on_covariates(*covariates);
-  } else {
-    robot->on_event(std::get<signals::MissionEvent>(message.content), message.host_utime_us);
-  }
+  Robot* robot = find(message.robot_id);
+  if (robot == nullptr) return count_stranger(message);
+  if (const auto* refused = std::get_if<RefusedMessage>(&message.content))
+    return robot->session.note_fault(refused->fault, 1, refused->why, message.host_utime_us);
+  const SenderGate::Verdict verdict = robot->gate.take(message);
+  for (const InboundMessage& each : verdict.released) deliver(robot->session, each);
+  if (verdict.refused > 0)
+    robot->session.on_fault(IngestFault::second_sender, verdict.refused, robot->gate.describe());
+  if (verdict.pass) deliver(robot->session, message);
 }
 
 void Pipeline::tick(std::int64_t host_utime_us) {
   refresh_models();
-  for (auto& [id, robot] : sessions_) robot->on_tick(host_utime_us);
+  for (auto& [id, robot] : robots_) {
+    for (const InboundMessage& each : robot->gate.release(host_utime_us)) deliver(robot->session, each);
+    robot->session.on_tick(host_utime_us);
+  }
 }
 
 void Pipeline::on_host_clock_step(std::int64_t host_utime_us, std::int64_t step_us) {
-  for (auto& [id, robot] : sessions_) robot->on_host_clock_step(host_utime_us, step_us);
+  for (auto& [id, robot] : robots_) robot->session.on_host_clock_step(host_utime_us, step_us);
 }
 
 void Pipeline::publish() {
-  for (auto& [id, robot] : sessions_) robot->publish();
+  for (auto& [id, robot] : robots_) robot->session.publish();
+  for (auto& [id, stranger] : strangers_) {
+    if (std::exchange(stranger.changed, false))
+      outputs_.fleet.publish(std::make_shared<const RobotSnapshot>(stranger.snapshot));
+  }
 }
 
 void Pipeline::finish() {
@@ -97,7 +140,11 @@ void Pipeline::finish() {
 }
 
 void Pipeline::suspend() {
-  for (auto& [id, robot] : sessions_) robot->suspend();
+  for (auto& [id, robot] : robots_) {
+    for (const InboundMessage& each : robot->gate.release(std::numeric_limits<std::int64_t>::max()))
+      deliver(robot->session, each);
+    robot->session.suspend();
+  }
 }
 
 }  // namespace joulecast::server

@@ -3,35 +3,20 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <optional>
-#include <span>
 #include <string>
-#include <string_view>
-#include <variant>
 
 #include "base/error.h"
+#include "server/ingest/inbound_message.h"
 #include "server/ingest/robot_session.h"
-#include "signals/mission_event.h"
-#include "telemetry/codec.h"
+#include "server/ingest/sender_gate.h"
 
 namespace joulecast::server {
 
-// A message off the wire that passed the guard.
-struct InboundMessage {
-  std::string robot_id;
-  std::variant<signals::Sample, signals::MissionEvent, signals::CovariateMessage> content;
-  std::int64_t host_utime_us = 0;
-};
-
-// Guards and decodes one message. Empty when it is not ours or is refused, which is counted.
-std::optional<InboundMessage> decode_message(std::string_view channel, std::span<const std::uint8_t> data,
-                                             std::int64_t host_utime_us, IngestCounters& counters);
-
-// Decoded messages in, history out: one session a robot, in one thread. The daemon and the offline replay run
-// this same code.
+// Decoded messages in, history out: one session a robot that has a model, in one thread. Of other ids only messages are
+// counted, of a bounded number of ids. The daemon and the offline replay run this same code.
 class Pipeline {
  public:
-  Pipeline(const SessionSettings& settings, std::size_t max_robots, const ModelRegistry& models,
+  Pipeline(const SessionSettings& settings, std::size_t max_unknown_robots, const ModelRegistry& models,
            SessionOutputs outputs);
 
   // Opens sessions for the missions that were open when the last daemon stopped.
@@ -51,15 +36,32 @@ class Pipeline {
   void suspend();
 
  private:
-  RobotSession* session(const std::string& robot_id);
+  struct Robot {
+    RobotSession session;
+    SenderGate gate;
+  };
+  struct Stranger {
+    RobotSnapshot snapshot;
+    bool changed = true;
+  };
+
+  Robot* find(const std::string& robot_id);
+  Robot& add(const std::string& robot_id);
+  static void deliver(RobotSession& session, const InboundMessage& message);
+  void count_stranger(const InboundMessage& message);
+  // Makes room for another stranger by forgetting one that has long been silent.
+  bool forget_a_stranger(std::int64_t host_utime_us);
   void refresh_models();
 
   SessionSettings settings_;
-  std::size_t max_robots_;
+  std::size_t max_unknown_robots_;
   const ModelRegistry& models_;
   SessionOutputs outputs_;
   std::uint64_t epoch_ = 0;
-  std::map<std::string, std::unique_ptr<RobotSession>, std::less<>> sessions_;
+  std::size_t waiting_room_;  // of all gates
+  std::map<std::string, std::unique_ptr<Robot>, std::less<>> robots_;
+  std::map<std::string, Stranger, std::less<>> strangers_;
+  std::int64_t forgot_utime_us_ = 0, told_utime_us_ = 0;
 };
 
 }  // namespace joulecast::server

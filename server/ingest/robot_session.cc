@@ -1,5 +1,8 @@
 #include "server/ingest/robot_session.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -16,6 +19,9 @@ constexpr std::string_view refinement_topic = "refinement";  // of what is learn
 constexpr std::int64_t clock_ahead_us = 10'000'000;          // beyond what transport and drift explain
 constexpr auto json_replace = nlohmann::json::error_handler_t::replace;
 constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
+constexpr std::int64_t tell_period_us = 600'000'000;
+// Events that a robot may send at once, and how many each sample earns it: recordings are replayed faster than they were.
+constexpr double event_burst = 100, events_a_sample = 0.2;
 
 history::MissionState state_of(telemetry::MissionEnd end) {
   switch (end) {
@@ -50,7 +56,12 @@ Result<std::shared_ptr<const ModelInForce>> stored_model(const history::Store& s
 
 // The mission that is open, as stored, with what came since its last checkpoint.
 struct RobotSession::OpenMission {
+  void end_at(std::int64_t utime_us) {  // a clock that is set back would end it before its start
+    record.end_utime_us = std::max(record.start_utime_us, utime_us);
+  }
+
   history::Mission record;
+  bool stored = false;
   std::vector<signals::Sample> samples;
   std::uint64_t unsaved = 0;
   telemetry::MissionPayload payload;
@@ -58,15 +69,20 @@ struct RobotSession::OpenMission {
   std::int64_t earlier_gaps = 0;
   double earlier_gap_s = 0;
   bool resumed_silent = false;  // resumed after a restart, and nothing came since
+  std::optional<std::int64_t> stepped_utime_us;  // host's, when the robot's clock was first set
+  std::int64_t booked_us = 0;                    // since then
 };
 
 RobotSession::RobotSession(std::string robot_id, const SessionSettings& settings, SessionOutputs outputs)
     : robot_id_(std::move(robot_id)),
       settings_(settings),
       outputs_(std::move(outputs)),
+      order_(settings.reorder_us, settings.sequence.backward_jump_us,
+             [this](const signals::Sample& sample) { place(sample); }),
       sequence_(settings.sequence),
       missions_(settings.mission),
-      covariates_(settings.mission.reorder_us) {
+      covariates_(settings.mission.reorder_us),
+      event_allowance_(event_burst) {
   snapshot_.robot_id = robot_id_;
   if (const auto stored = outputs_.store.resume_state(robot_id_); stored && stored->has_value()) {
     snapshot_.state_of_charge = (*stored)->state_of_charge;
@@ -141,6 +157,7 @@ void RobotSession::resume(const history::Mission& mission) {
   }
   open_ = std::make_unique<OpenMission>();
   open_->record = mission;
+  open_->stored = true;
   open_->earlier_gaps = mission.gap_count;
   open_->earlier_gap_s = mission.gap_s;
   open_->resumed_silent = true;
@@ -158,20 +175,81 @@ void RobotSession::resume(const history::Mission& mission) {
   changed_ = true;
 }
 
-void RobotSession::on_fault(IngestFault fault, std::uint64_t count) {
-  const std::string name = name_of(fault);
+void RobotSession::on_fault(IngestFault fault, std::uint64_t count, std::string why) {
   outputs_.counters.add(fault, count);
+  note_fault(fault, count, std::move(why), snapshot_.received_utime_us);
+}
+
+void RobotSession::note_fault(IngestFault fault, std::uint64_t count, std::string why, std::int64_t host_utime_us) {
+  const std::string name = name_of(fault);
   snapshot_.faults[name] += count;
   if (open_ != nullptr) open_->record.sample_faults[name] += static_cast<std::int64_t>(count);
   changed_ = true;
+  if (why.empty()) return;
+  const auto [told, first] = told_.try_emplace(fault);
+  told->second.since += count;
+  if (first || host_utime_us - told->second.utime_us >= tell_period_us) {
+    outputs_.warn(robot_id_, name + ": " + why + " (" + std::to_string(told->second.since) +
+                                 (first ? " so far)" : " since this was last logged)"));
+    told->second = {host_utime_us, 0};
+  }
+  snapshot_.fault_notes[name] = std::move(why);
+}
+
+bool RobotSession::is_too_far_ahead(std::int64_t utime_us, std::int64_t host_utime_us) {
+  const std::int64_t ahead_us = utime_us - host_utime_us;  // of plausible clocks: no overflow
+  if (ahead_us <= settings_.max_ahead_us) return false;
+  on_fault(IngestFault::too_far_ahead, 1,
+           fmt::format("utime is {:.0f} s ahead of the service's clock; at most {:.0f} s are accepted",
+                       static_cast<double>(ahead_us) * 1e-6, static_cast<double>(settings_.max_ahead_us) * 1e-6));
+  return true;
 }
 
 void RobotSession::on_sample(const signals::Sample& sample, std::int64_t host_utime_us) {
   snapshot_.received_utime_us = host_utime_us;
   if (model_ == nullptr) return on_fault(IngestFault::unknown_robot);
-  if (telemetry::check_plausible(sample)) return on_fault(IngestFault::implausible);
+  if (const auto fault = telemetry::check_plausible(sample))
+    return on_fault(IngestFault::implausible, 1, telemetry::describe(*fault));
+  if (is_too_far_ahead(sample.utime_us, host_utime_us)) return;
   if (sample.utime_us - host_utime_us > clock_ahead_us) on_fault(IngestFault::clock_ahead);
+  if (!order_.take(sample, host_utime_us)) on_fault(IngestFault::duplicate);
+}
 
+void RobotSession::interrupt() {
+  release_held();
+  charge_->interrupt();
+  refinement_->interrupt();
+  flush_meter();
+  meter_->interrupt();
+}
+
+void RobotSession::on_clock_step(const signals::Sample& sample) {
+  interrupt();
+  missions_.on_clock_step(sample.utime_us);
+  covariates_.on_clock_step(sample.utime_us);
+  if (open_ == nullptr || open_->record.samples == 0) return;
+  open_->record.incomplete = true;
+  open_->record.incomplete_reason = "the robot's clock was set during the mission";
+  if (!open_->stepped_utime_us) open_->stepped_utime_us = snapshot_.received_utime_us;
+}
+
+bool RobotSession::is_too_fast(std::int64_t elapsed_us) {
+  if (open_ == nullptr || !open_->stepped_utime_us) return false;
+  const std::int64_t passed_us = snapshot_.received_utime_us - *open_->stepped_utime_us;
+  if (open_->booked_us + elapsed_us <= passed_us + settings_.booked_margin_us) {
+    open_->booked_us += elapsed_us;
+    return false;
+  }
+  interrupt();
+  on_fault(IngestFault::too_fast, 1,
+           fmt::format("since the robot's clock was set, samples of {:.1f} s came in {:.1f} s; at most {:.0f} s more than "
+                       "passed are accounted for",
+                       static_cast<double>(open_->booked_us + elapsed_us) * 1e-6, static_cast<double>(passed_us) * 1e-6,
+                       static_cast<double>(settings_.booked_margin_us) * 1e-6));
+  return true;
+}
+
+void RobotSession::place(const signals::Sample& sample) {
   const telemetry::Placement place = sequence_.place(sample.sequence, sample.utime_us);
   if (place.missing > 0) on_fault(IngestFault::missing, static_cast<std::uint64_t>(place.missing));
   if (place.arrival == telemetry::Arrival::duplicate) return on_fault(IngestFault::duplicate);
@@ -181,17 +259,9 @@ void RobotSession::on_sample(const signals::Sample& sample, std::int64_t host_ut
   if (place.clock != telemetry::ClockStep::none) {
     on_fault(place.clock == telemetry::ClockStep::backward ? IngestFault::clock_backward
                                                            : IngestFault::clock_forward);
-    release_held();
-    charge_->interrupt();
-    refinement_->interrupt();
-    flush_meter();
-    meter_->interrupt();
-    missions_.on_clock_step(sample.utime_us);
-    covariates_.on_clock_step(sample.utime_us);
-    if (open_ != nullptr && open_->record.samples > 0) {
-      open_->record.incomplete = true;
-      open_->record.incomplete_reason = "the robot's clock was set during the mission";
-    }
+    on_clock_step(sample);
+  } else if (place.continues() && !place.gap && is_too_fast(place.elapsed_us)) {
+    return;
   }
   last_sequence_ = sample.sequence;
 
@@ -244,7 +314,7 @@ void RobotSession::on_charger_sample(const signals::Sample& sample) {
   carry_out(step.actions);
   if (!step.belongs || open_ == nullptr || open_->record.implicit) return;
   open_->resumed_silent = false;
-  open_->record.end_utime_us = sample.utime_us;
+  open_->end_at(sample.utime_us);
   ++open_->record.sample_faults["charging"];
   keep(sample);
 }
@@ -301,6 +371,8 @@ void RobotSession::remember_charge() {
 }
 
 void RobotSession::keep(const signals::Sample& sample) {
+  if (!open_->stored) begin_record();
+  event_allowance_ = std::min(event_burst, event_allowance_ + events_a_sample);
   ++open_->record.samples;
   ++open_->unsaved;
   open_->samples.push_back(sample);
@@ -340,33 +412,54 @@ void RobotSession::on_own_sample(const signals::Sample& sample) {
   changed_ = true;
 }
 
+bool RobotSession::may_send_event(std::int64_t host_utime_us) {
+  const double passed_s = 1e-6 * static_cast<double>(std::max<std::int64_t>(0, host_utime_us - event_utime_us_));
+  event_utime_us_ = host_utime_us;
+  event_allowance_ = std::min(event_burst, event_allowance_ + passed_s * settings_.event_rate_hz);
+  if (event_allowance_ < 1) {
+    on_fault(IngestFault::event_flood, 1,
+             fmt::format("more than {:g} mission events a second are not looked at", settings_.event_rate_hz));
+    return false;
+  }
+  --event_allowance_;
+  return true;
+}
+
 void RobotSession::on_event(const signals::MissionEvent& event, std::int64_t host_utime_us) {
   snapshot_.received_utime_us = host_utime_us;
   if (model_ == nullptr) return on_fault(IngestFault::unknown_robot);
   if (const auto fault = telemetry::check_plausible(event)) {
-    on_fault(IngestFault::implausible);
+    on_fault(IngestFault::implausible, 1, "mission event: " + telemetry::describe(*fault));
     if (fault->why == telemetry::Implausibility::bad_clock) return;
     signals::MissionEvent without_payload = event;
     without_payload.payload_kg = signals::unmeasured;
     return on_event(without_payload, host_utime_us);
   }
+  if (is_too_far_ahead(event.utime_us, host_utime_us) || !may_send_event(host_utime_us)) return;
+  order_.flush();
   release_held();
   const auto refused = [&] {
     const telemetry::MissionCounters& c = missions_.counters();
     return c.duplicate_events + c.out_of_order_events + c.unknown_missions;
   };
   const std::uint64_t before = refused();
-  carry_out(missions_.on_event(event));
+  telemetry::MissionActions actions = missions_.on_event(event);
+  if (actions.empty()) ++event_allowance_;  // robots may repeat themselves
+  carry_out(actions);
   if (refused() != before) on_fault(IngestFault::bad_event);
   changed_ = true;
 }
 
-void RobotSession::on_covariates(const signals::CovariateMessage& message) {
-  if (telemetry::check_plausible(message)) return on_fault(IngestFault::implausible);
+void RobotSession::on_covariates(const signals::CovariateMessage& message, std::int64_t host_utime_us) {
+  if (const auto fault = telemetry::check_plausible(message))
+    return on_fault(IngestFault::implausible, 1, "covariates: " + telemetry::describe(*fault));
+  if (is_too_far_ahead(message.utime_us, host_utime_us)) return;
   const std::size_t before = covariates_.pending();
-  covariates_.take(message, [this](IngestFault fault) { on_fault(fault); });
+  covariates_.take(message, [this](IngestFault fault, std::string why) { on_fault(fault, 1, std::move(why)); });
   outputs_.counters.covariate_changes.fetch_add(covariates_.pending() - before, std::memory_order_relaxed);
-  if (open_ != nullptr && covariates_.pending() >= settings_.checkpoint_samples) checkpoint();
+  if (open_ == nullptr || covariates_.pending() < settings_.checkpoint_samples) return;
+  if (!open_->stored) begin_record();
+  checkpoint();
 }
 
 void RobotSession::carry_out(const telemetry::MissionActions& actions) {
@@ -393,17 +486,23 @@ void RobotSession::open(const telemetry::MissionAction& action) {
   open_->payload = telemetry::MissionPayload(action.payload_kg);
   record.note = action.note;
   record.model_version = model_->version;
+  snapshot_.mission_id = record.mission_id;
+  snapshot_.mission_key = 0;
+  snapshot_.mission_start_utime_us = record.start_utime_us;
+  snapshot_.accounts = {};
+}
+
+void RobotSession::begin_record() {
+  history::Mission& record = open_->record;
+  open_->stored = true;
   const Result<history::MissionKey> key =
       outputs_.store.mission_key(robot_id_, record.mission_id, record.start_utime_us);
   if (!key) outputs_.warn(robot_id_, describe(key.error()));
   record.key = key.value_or(0);
   if (record.key > 0) outputs_.post(history::StartMission{record});
   if (!record.implicit) tell_of_namesake();
-  snapshot_.mission_id = record.mission_id;
   snapshot_.mission_key = record.key;
-  snapshot_.mission_start_utime_us = record.start_utime_us;
-  snapshot_.accounts = {};
-  outputs_.counters.missions_started[action.implicit ? 1 : 0].fetch_add(1, std::memory_order_relaxed);
+  outputs_.counters.missions_started[record.implicit ? 1 : 0].fetch_add(1, std::memory_order_relaxed);
 }
 
 // People look missions up by the robot's name for them: they should know when it is no longer unique.
@@ -442,13 +541,18 @@ void RobotSession::close(const telemetry::MissionAction& action) {
   if (!action.note.empty() && action.note != record.note)
     record.note += (record.note.empty() ? "" : "; ") + action.note;
   record.end_utime_us = std::max(record.end_utime_us, action.utime_us);
-  outputs_.counters.missions_ended[static_cast<std::size_t>(record.state)].fetch_add(
-      1, std::memory_order_relaxed);
-  judge_mission();
-  checkpoint();
-  remember_charge();
-  if (outputs_.mission_ended && model_ != nullptr)
-    outputs_.mission_ended(model_, {record.start_utime_us, legs_->take()});
+  if (open_->stored) {
+    outputs_.counters.missions_ended[static_cast<std::size_t>(record.state)].fetch_add(
+        1, std::memory_order_relaxed);
+    judge_mission();
+    checkpoint();
+    remember_charge();
+    if (outputs_.mission_ended && model_ != nullptr)
+      outputs_.mission_ended(model_, {record.start_utime_us, legs_->take()});
+  } else {
+    on_fault(IngestFault::empty_mission);
+    (void)covariates_.settle(record);
+  }
   open_.reset();
   covariates_.end_mission();
   snapshot_.mission_id.clear();
@@ -478,6 +582,7 @@ void RobotSession::refresh_record() {
 }
 
 void RobotSession::checkpoint() {
+  if (!open_->stored) return;
   refresh_record();
   history::CheckpointMission command;
   command.covariates = covariates_.settle(open_->record);
@@ -497,7 +602,7 @@ void RobotSession::on_point(const energy::MeterPoint& point) {
   trace_.add(point, accounts, snapshot_.state_of_charge);
   legs_->add({point.bridged ? point.interval_s : 0, point.speed_m_s, point.yaw_rate_rad_s,
               point.measured_power_w, point.sample.payload_kg});
-  if (open_ != nullptr) open_->record.end_utime_us = point.sample.utime_us;
+  if (open_ != nullptr) open_->end_at(point.sample.utime_us);
   snapshot_.sample = point.sample;
   snapshot_.measured_power_w = point.measured_power_w;
   snapshot_.modelled_power_w = point.modelled_power_w;
@@ -508,6 +613,7 @@ void RobotSession::on_point(const energy::MeterPoint& point) {
 }
 
 void RobotSession::on_tick(std::int64_t host_utime_us) {
+  order_.release(host_utime_us);
   if (snapshot_.received_utime_us > 0) {
     carry_out(missions_.on_silence(host_utime_us - snapshot_.received_utime_us));
   } else if (open_ != nullptr) {
@@ -527,6 +633,7 @@ void RobotSession::on_host_clock_step(std::int64_t host_utime_us, std::int64_t s
 }
 
 void RobotSession::suspend() {
+  order_.flush();
   release_held();
   flush_meter();
   remember_charge();

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -18,6 +19,7 @@
 #include "server/ingest/fleet_view.h"
 #include "server/ingest/model_registry.h"
 #include "server/ingest/refinement_watch.h"
+#include "server/ingest/sample_order.h"
 #include "server/ingest/trace_builder.h"
 #include "signals/mission_event.h"
 #include "signals/sample.h"
@@ -32,6 +34,11 @@ struct SessionSettings {
   telemetry::SequenceLimits sequence;
   telemetry::MissionLimits mission;
   bool implicit_missions = true;
+  std::int64_t reorder_us = 500'000;              // how long samples wait for one that is missing before them
+  std::int64_t sender_takeover_us = 2'000'000;    // silence of a robot's sender after which another one may speak
+  std::int64_t max_ahead_us = INT64_MAX;          // of robots' clocks ahead of the host's; a log has none
+  std::int64_t booked_margin_us = 60'000'000;     // see RobotSession::is_too_fast
+  double event_rate_hz = 5;                       // of mission events, in the long run
   std::size_t checkpoint_samples = 1024;  // a mission is checkpointed at this many samples at the latest
 };
 
@@ -67,8 +74,11 @@ class RobotSession {
   void on_sample(const signals::Sample& sample, std::int64_t host_utime_us);
   void on_event(const signals::MissionEvent& event, std::int64_t host_utime_us);
   // Opens no mission and is no sign that the robot's telemetry lives.
-  void on_covariates(const signals::CovariateMessage& message);
-  void on_fault(IngestFault fault, std::uint64_t count = 1);
+  void on_covariates(const signals::CovariateMessage& message, std::int64_t host_utime_us);
+  // `why` is a sentence on the last one, which is logged at most every ten minutes.
+  void on_fault(IngestFault fault, std::uint64_t count = 1, std::string why = {});
+  // The same of what the daemon's counters have already.
+  void note_fault(IngestFault fault, std::uint64_t count, std::string why, std::int64_t host_utime_us);
 
   // Call about once a second: ends missions that fell silent, checkpoints the open one, publishes what
   // changed.
@@ -86,6 +96,16 @@ class RobotSession {
  private:
   struct OpenMission;
 
+  // A sample in the order of its sequence number, or that no order helps.
+  void place(const signals::Sample& sample);
+  void on_clock_step(const signals::Sample& sample);
+  // What is integrated next does not continue what was.
+  void interrupt();
+  // Once a robot's clock was set within a mission, its time may pass no faster than the host's, but for a margin:
+  // else a clock that is set again and again would book more energy than there was time for.
+  bool is_too_fast(std::int64_t elapsed_us);
+  bool is_too_far_ahead(std::int64_t utime_us, std::int64_t host_utime_us);
+  bool may_send_event(std::int64_t host_utime_us);
   // A sample in its place that is the robot's own, or that came while a charger fed it.
   void on_own_sample(const signals::Sample& sample);
   void on_charger_sample(const signals::Sample& sample);
@@ -97,6 +117,8 @@ class RobotSession {
   void keep(const signals::Sample& sample);
   void carry_out(const telemetry::MissionActions& actions);
   void open(const telemetry::MissionAction& action);
+  // Stores the open mission, which its first sample makes worth it.
+  void begin_record();
   void tell_of_namesake();
   void close(const telemetry::MissionAction& action);
   void checkpoint();
@@ -111,6 +133,7 @@ class RobotSession {
   std::shared_ptr<const ModelInForce> model_;  // the meter's
   std::shared_ptr<const ModelInForce>
       next_;  // in force, and the meter's when the open mission has ended; else null
+  SampleOrder order_;
   telemetry::SequenceTracker sequence_;
   telemetry::MissionTracker missions_;
   std::unique_ptr<energy::Meter> meter_;
@@ -128,6 +151,13 @@ class RobotSession {
   std::unique_ptr<OpenMission> open_;
   RobotSnapshot snapshot_;
   std::int64_t last_sequence_ = 0;
+  double event_allowance_;
+  std::int64_t event_utime_us_ = 0;  // host's, when it was last counted up
+  struct Told {
+    std::int64_t utime_us = 0;  // host's, when it was last logged
+    std::uint64_t since = 0;    // further ones
+  };
+  std::map<IngestFault, Told> told_;
   bool changed_ = false;
 };
 

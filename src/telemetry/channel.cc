@@ -2,7 +2,6 @@
 
 #include "signals/ids.h"
 #include "telemetry/codec.h"
-#include "telemetry/lcm_link.h"
 
 namespace joulecast::telemetry {
 namespace {
@@ -37,7 +36,8 @@ std::optional<ChannelName> parse_channel(std::string_view channel) noexcept {
 }
 
 std::string channel_pattern(Subject subject) {
-  return escape_regex(prefix_of(subject)) + ".+";
+  std::string pattern(prefix_of(subject));
+  return pattern.insert(pattern.size() - 1, "\\") + ".+";  // of the prefix only the last character, a '.', is special
 }
 
 }  // namespace joulecast::telemetry

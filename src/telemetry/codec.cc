@@ -12,12 +12,11 @@
 
 #include "base/utf8.h"
 #include "signals/ids.h"
+#include "telemetry/datagram.h"
 
 namespace joulecast::telemetry {
 namespace {
 
-// LCM counts in int; no message of the contract comes near this.
-constexpr std::size_t max_message_size = 64 * 1024;
 
 enum class Text { id, optional_id, note, covariate_name };
 
@@ -53,9 +52,9 @@ std::uint64_t read_big_endian(const std::uint8_t* bytes, std::size_t size) noexc
 class Guard {
  public:
   Guard(std::span<const std::uint8_t> bytes, std::int64_t fingerprint) : bytes_(bytes) {
-    if (bytes.size() > max_message_size) {
+    if (bytes.size() > max_message_bytes) {
       refuse("", "message of " + std::to_string(bytes.size()) + " bytes; at most " +
-                     std::to_string(max_message_size) + " are accepted");
+                     std::to_string(max_message_bytes) + " are accepted");
       return;
     }
     const std::uint8_t* at = take(8, "fingerprint");

@@ -11,11 +11,16 @@
 #include <cstring>
 #include <exception>
 #include <limits>
+#include <optional>
 #include <utility>
-#include <vector>
+
+#include "telemetry/codec.h"
+#include "telemetry/datagram_socket.h"
 
 namespace joulecast::telemetry {
 namespace {
+
+constexpr int queue_capacity = 100'000;  // messages that liblcm holds unhandled before it drops new ones silently
 
 struct LcmDestroyer {
   void operator()(lcm_t* lcm) const noexcept { lcm_destroy(lcm); }
@@ -24,35 +29,39 @@ struct LcmDestroyer {
 }  // namespace
 
 struct LcmLink::State {
-  struct Subscription {
-    State* owner;
-    Handler handler;
-  };
-
   State() = default;
   State(const State&) = delete;
   State& operator=(const State&) = delete;
   ~State() {
-    lcm.reset();  // before the handlers that it may still call
+    lcm.reset();  // before the handler that it may still call
     if (wake_fd >= 0) ::close(wake_fd);
   }
 
   // Called from LCM's C frames: nothing may be thrown through them.
   static void receive(const lcm_recv_buf_t* buffer, const char* channel, void* user) noexcept {
-    auto& subscription = *static_cast<Subscription*>(user);
-    std::exception_ptr& thrown = subscription.owner->thrown;
-    if (thrown) return;
+    State& state = *static_cast<State*>(user);
+    if (state.thrown) return;
     try {
-      subscription.handler(
-          {channel, {static_cast<const std::uint8_t*>(buffer->data), buffer->data_size}, buffer->recv_utime});
+      state.handler({channel, {static_cast<const std::uint8_t*>(buffer->data), buffer->data_size}, buffer->recv_utime});
     } catch (...) {
-      thrown = std::current_exception();
+      state.thrown = std::current_exception();
     }
   }
 
+  // Handles a message of liblcm's, and says whether another one waits.
+  Result<bool> handle_one(pollfd waiting) {
+    if (lcm_handle(lcm.get()) != 0) return fail(Fault::unavailable, "lcm", "the provider ended: " + url);
+    if (thrown) std::rethrow_exception(std::exchange(thrown, nullptr));
+    waiting.revents = 0;
+    if (::poll(&waiting, 1, 0) < 0 && errno != EINTR) return fail(Fault::unavailable, "lcm", std::strerror(errno));
+    return (waiting.revents & POLLIN) != 0;
+  }
+
   std::string url;
+  std::optional<UdpmUrl> udpm;
   std::unique_ptr<lcm_t, LcmDestroyer> lcm;
-  std::vector<std::unique_ptr<Subscription>> subscriptions;
+  std::optional<DatagramSocket> socket;  // of udpm, once listening
+  Handler handler;
   std::exception_ptr thrown;
   int wake_fd = -1;
 };
@@ -65,22 +74,39 @@ LcmLink::~LcmLink() = default;
 Result<LcmLink> LcmLink::open(const std::string& provider_url) {
   auto state = std::make_unique<State>();
   state->url = provider_url;
+  const std::string scheme = provider_url.substr(0, provider_url.find("://"));
+  if (scheme == "udpm") {
+    Result<UdpmUrl> udpm = parse_udpm_url(provider_url);
+    if (!udpm) return tl::unexpected(std::move(udpm.error()));
+    state->udpm = *udpm;
+  } else if (scheme != "memq" && scheme != "file" && scheme != "tcpq") {
+    return invalid("lcm.url", "'" + provider_url + "' must begin with udpm://, tcpq://, file:// or memq://");
+  }
   state->wake_fd = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
   if (state->wake_fd < 0) return fail(Fault::unavailable, "lcm", std::strerror(errno));
   state->lcm.reset(lcm_create(provider_url.c_str()));
-  if (!state->lcm) return fail(Fault::unavailable, "lcm", "cannot open the provider " + provider_url);
+  if (!state->lcm) return fail(Fault::unavailable, "lcm.url", "cannot open the provider " + provider_url);
   return LcmLink(std::move(state));
 }
 
-Result<void> LcmLink::subscribe(const std::string& pattern, Handler handler, int queue_capacity) {
-  if (queue_capacity < 1) return invalid("queue_capacity", "must be at least 1");
-  auto subscription =
-      std::make_unique<State::Subscription>(State::Subscription{state_.get(), std::move(handler)});
-  lcm_subscription_t* made =
-      lcm_subscribe(state_->lcm.get(), pattern.c_str(), &State::receive, subscription.get());
-  if (made == nullptr) return invalid("pattern", "LCM refuses the channel pattern " + pattern);
-  state_->subscriptions.push_back(std::move(subscription));
-  lcm_subscription_set_queue_capacity(made, queue_capacity);
+Result<void> LcmLink::listen(Handler handler, DatagramCounters& counters, const ListenOptions& options) {
+  if (state_->handler) return fail(Fault::conflict, "lcm", "the link listens already");
+  if (state_->udpm) {
+    Result<AcceptedSenders> accepted = AcceptedSenders::parse(options.accept_from);
+    if (!accepted) return tl::unexpected(std::move(accepted.error()));
+    Result<DatagramSocket> socket =
+        DatagramSocket::open(*state_->udpm, options.interface_address, std::move(*accepted), counters);
+    if (!socket) return tl::unexpected(std::move(socket.error()));
+    state_->socket.emplace(std::move(*socket));
+  } else {
+    for (const Subject subject : {Subject::telemetry, Subject::mission_event, Subject::covariates}) {
+      lcm_subscription_t* made =
+          lcm_subscribe(state_->lcm.get(), channel_pattern(subject).c_str(), &State::receive, state_.get());
+      if (made == nullptr) return fail(Fault::internal, "lcm", "LCM refuses a channel pattern");
+      lcm_subscription_set_queue_capacity(made, queue_capacity);
+    }
+  }
+  state_->handler = std::move(handler);
   return {};
 }
 
@@ -93,8 +119,10 @@ Result<void> LcmLink::publish(const std::string& channel, std::span<const std::u
 }
 
 Result<int> LcmLink::poll(std::chrono::milliseconds timeout, int max_messages) {
-  std::array<pollfd, 2> waiting{pollfd{lcm_get_fileno(state_->lcm.get()), POLLIN, 0},
-                                pollfd{state_->wake_fd, POLLIN, 0}};
+  State& state = *state_;
+  // liblcm would open its own receiver to give a descriptor of UDP; poll() passes over negative ones.
+  const int source = state.socket ? state.socket->descriptor() : state.udpm ? -1 : lcm_get_fileno(state.lcm.get());
+  std::array<pollfd, 2> waiting{pollfd{source, POLLIN, 0}, pollfd{state.wake_fd, POLLIN, 0}};
   const auto wait_ms = std::clamp<std::chrono::milliseconds::rep>(timeout.count(), 0, 1'000'000'000);
   if (::poll(waiting.data(), waiting.size(), static_cast<int>(wait_ms)) < 0) {
     if (errno == EINTR) return 0;
@@ -102,19 +130,18 @@ Result<int> LcmLink::poll(std::chrono::milliseconds timeout, int max_messages) {
   }
   if ((waiting[1].revents & POLLIN) != 0) {
     std::uint64_t count = 0;
-    [[maybe_unused]] const ssize_t got = ::read(state_->wake_fd, &count, sizeof count);
+    [[maybe_unused]] const ssize_t got = ::read(state.wake_fd, &count, sizeof count);
+  }
+  if (state.socket) {
+    return state.socket->receive(max_messages, [&](const Sender& sender, const ChannelMessage& message, std::int64_t utime_us) {
+      state.handler({message.channel, message.data, utime_us, sender});
+    });
   }
   int handled = 0;
-  while ((waiting[0].revents & POLLIN) != 0 && handled < max_messages) {
-    if (lcm_handle(state_->lcm.get()) != 0) {
-      return fail(Fault::unavailable, "lcm", "the provider ended: " + state_->url);
-    }
-    if (state_->thrown) std::rethrow_exception(std::exchange(state_->thrown, nullptr));
-    ++handled;
-    waiting[0].revents = 0;
-    if (::poll(waiting.data(), 1, 0) < 0 && errno != EINTR) {
-      return fail(Fault::unavailable, "lcm", std::strerror(errno));
-    }
+  for (bool more = (waiting[0].revents & POLLIN) != 0; more && handled < max_messages; ++handled) {
+    const Result<bool> next = state.handle_one(waiting[0]);
+    if (!next) return tl::unexpected(next.error());
+    more = *next;
   }
   return handled;
 }
@@ -123,16 +150,6 @@ void LcmLink::wake() noexcept {
   const std::uint64_t one = 1;
   // Only a full counter can refuse, and then a wake-up is pending already.
   [[maybe_unused]] const ssize_t put = ::write(state_->wake_fd, &one, sizeof one);
-}
-
-std::string escape_regex(std::string_view text) {
-  std::string escaped;
-  for (const char c : text) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
-    if (!plain) escaped += '\\';
-    escaped += c;
-  }
-  return escaped;
 }
 
 }  // namespace joulecast::telemetry

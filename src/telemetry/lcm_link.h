@@ -9,10 +9,11 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "telemetry/datagram.h"
 
 namespace joulecast::telemetry {
 
-// The group and port that LCM programs share unless told; ttl=0 keeps messages on this machine. The kernel's
+// The group and port that LCM programs share unless told; ttl=0 keeps what is sent on this machine. The kernel's
 // usual receive buffer holds some 30 ms of 6,000 messages a second, less than a busy machine may keep the
 // receiver waiting, and drops the rest unseen; 4 MiB hold more than a second of them, where net.core.rmem_max
 // allows so much.
@@ -21,16 +22,25 @@ inline constexpr std::string_view default_lcm_url = "udpm://239.255.76.67:7667?t
 struct Received {
   std::string_view channel;
   std::span<const std::uint8_t> data;
-  std::int64_t recv_utime_us =
-      0;  // host clock when LCM took it off the wire, or when a file's event fell due
+  // Host clock when it was taken off the wire, or when a file's event fell due.
+  std::int64_t recv_utime_us = 0;
+  Sender sender = {};
+};
+
+// Whose messages to listen to, of UDP: see datagram_socket.h.
+struct ListenOptions {
+  std::string interface_address;
+  std::string accept_from = "local";
 };
 
 // One LCM instance: raw bytes in and out. The views handed to a handler are valid during the call only.
 // Not thread-safe but for wake() and publish(), which any thread may call.
 //
 // Providers: "udpm://239.255.76.67:7667?ttl=0" (network), "memq://" (this instance alone, for tests),
-// "file:///path/to.log?speed=0" (a log's events as if received; 0 = as fast as they are read).
-// LCM has no authentication: whoever reaches the segment may publish, so the default is ttl=0.
+// "file:///path/to.log?speed=0" (a log's events as if received; 0 = as fast as they are read), "tcpq://host:port".
+// UDP is received by DatagramSocket, which checks what it is sent; liblcm 1.3.1 writes beyond its buffer when a
+// fragment says so. All else is liblcm's. LCM has no authentication: whoever reaches the segment and is accepted by
+// ListenOptions may publish.
 class LcmLink {
  public:
   using Handler = std::function<void(const Received&)>;
@@ -40,15 +50,14 @@ class LcmLink {
   LcmLink& operator=(LcmLink&&) noexcept;
   ~LcmLink();
 
-  // `pattern` is a regular expression that must match the whole channel; escape_regex() makes one of a plain
-  // name. `queue_capacity` is how many messages of this subscription LCM holds unhandled before it drops new
-  // ones silently.
-  Result<void> subscribe(const std::string& pattern, Handler handler, int queue_capacity = 10'000);
+  // Receives the messages of the channels that robots publish on, until the link goes; once a link. `counters` of the
+  // datagrams that came by UDP, and must outlive the link. Errors name the setting that is at fault.
+  Result<void> listen(Handler handler, DatagramCounters& counters, const ListenOptions& options = {});
 
   Result<void> publish(const std::string& channel, std::span<const std::uint8_t> data);
 
   // Wait at most `timeout` for messages, then handle all that are waiting, `max_messages` at most. Returns
-  // the number handled; 0 after a timeout or wake(). An exception of a handler leaves through here, after LCM
+  // the number handled (of UDP that of datagrams); 0 after a timeout or wake(). An exception of a handler leaves through here, after LCM
   // has returned. Fault::unavailable when the provider ended: the end of a file, or a broken socket.
   Result<int> poll(std::chrono::milliseconds timeout, int max_messages = 1'000);
 
@@ -60,7 +69,5 @@ class LcmLink {
   explicit LcmLink(std::unique_ptr<State> state) noexcept;
   std::unique_ptr<State> state_;
 };
-
-[[nodiscard]] std::string escape_regex(std::string_view text);
 
 }  // namespace joulecast::telemetry

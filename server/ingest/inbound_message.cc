@@ -1,0 +1,42 @@
+#include "server/ingest/inbound_message.h"
+
+#include <utility>
+
+namespace joulecast::server {
+
+std::optional<InboundMessage> decode_message(std::string_view channel, std::span<const std::uint8_t> data,
+                                             std::int64_t host_utime_us, IngestCounters& counters,
+                                             const telemetry::Sender& sender) {
+  const std::optional<telemetry::ChannelName> name = telemetry::parse_channel(channel);
+  if (!name || name->subject == telemetry::Subject::energy_state) return std::nullopt;
+  counters.messages.fetch_add(1, std::memory_order_relaxed);
+  InboundMessage message{std::string(name->robot_id), {}, host_utime_us, sender};
+  const auto refuse = [&](IngestFault fault, std::string why) {
+    counters.add(fault);
+    message.content = RefusedMessage{fault, std::string(channel) + ": " + std::move(why)};
+  };
+  const auto take = [&](auto decoded, auto part) {
+    if (!decoded) {
+      refuse(IngestFault::undecodable, describe(decoded.error()));
+    } else if (decoded->robot_id != name->robot_id) {
+      refuse(IngestFault::wrong_channel, "carries messages of robot_id " + decoded->robot_id);
+    } else {
+      message.content = std::move((*decoded).*part);
+    }
+  };
+  switch (name->subject) {
+    case telemetry::Subject::telemetry:
+      take(telemetry::decode_telemetry(data), &telemetry::DecodedTelemetry::sample);
+      break;
+    case telemetry::Subject::covariates:
+      take(telemetry::decode_covariates(data), &telemetry::DecodedCovariates::message);
+      break;
+    case telemetry::Subject::mission_event:
+    case telemetry::Subject::energy_state:
+      take(telemetry::decode_mission_event(data), &telemetry::DecodedMissionEvent::event);
+      break;
+  }
+  return message;
+}
+
+}  // namespace joulecast::server

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "server/ingest/counters.h"
+#include "telemetry/codec.h"
+#include "telemetry/datagram.h"
+
+namespace joulecast::server {
+
+// A message on a robot's channel that was turned away before it was read; counted already.
+struct RefusedMessage {
+  IngestFault fault = IngestFault::undecodable;
+  std::string why;
+};
+
+// A message off the wire that passed the guard, or of which the robot whose channel it came on is told.
+struct InboundMessage {
+  std::string robot_id;
+  std::variant<signals::Sample, signals::MissionEvent, signals::CovariateMessage, RefusedMessage> content;
+  std::int64_t host_utime_us = 0;
+  telemetry::Sender sender = {};
+};
+
+// Guards and decodes one message. Empty when its channel is none that robots publish on.
+std::optional<InboundMessage> decode_message(std::string_view channel, std::span<const std::uint8_t> data,
+                                             std::int64_t host_utime_us, IngestCounters& counters,
+                                             const telemetry::Sender& sender = {});
+
+}  // namespace joulecast::server

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <vector>
+
+#include "server/ingest/inbound_message.h"
+
+namespace joulecast::server {
+
+// Lets one sender speak for a robot. Where a second one sends under the robot's id, told apart by its address or, behind
+// one address, by its own stream of sequence numbers, its messages wait: when the first one speaks again they are
+// refused, so that no energy is booked twice; when it has fallen silent they pass, so that a robot whose publisher was
+// started anew or whose address changed loses nothing. Messages of unknown senders (logs) have the streams only.
+class SenderGate {
+ public:
+  // `takeover_us`: silence after which another sender takes over at the latest. `room`: units (about one sample) that
+  // all gates together may let wait.
+  SenderGate(std::int64_t takeover_us, std::size_t& room) : takeover_us_(takeover_us), room_(room) {}
+  ~SenderGate() { drop_waiting(); }
+  SenderGate(const SenderGate&) = delete;
+  SenderGate& operator=(const SenderGate&) = delete;
+
+  struct Verdict {
+    std::vector<InboundMessage> released;  // pass first
+    bool pass = false;                     // the message itself; else it waits or is refused
+    std::size_t refused = 0;               // it and such that waited
+  };
+  Verdict take(const InboundMessage& message);
+  // What waited long enough; all of it when `now` is the end of time.
+  std::vector<InboundMessage> release(std::int64_t host_utime_us);
+
+  // Who is refused beside whom.
+  std::string describe() const;
+
+ private:
+  struct Stream {
+    std::int64_t sequence = -1, utime_us = 0;
+    // Sequence numbers count up and clocks agree.
+    bool continued_by(const signals::Sample& sample) const;
+  };
+
+  Verdict take_first(const InboundMessage& message, const signals::Sample* sample);
+  Verdict take_other(const InboundMessage& message);
+  bool is_of_first(const InboundMessage& message, const signals::Sample* sample) const;
+  bool is_second_stream(const signals::Sample& sample, std::int64_t host_utime_us);
+  std::int64_t patience_us(std::int64_t host_utime_us) const;
+  std::vector<InboundMessage> hand_over();
+  std::size_t drop_waiting();
+
+  std::int64_t takeover_us_;
+  std::size_t& room_;
+  telemetry::Sender first_, other_;
+  bool any_ = false;                 // first_ is known
+  bool first_sends_events_ = false;  // so nobody else is expected to
+  std::int64_t heard_us_ = 0;        // of first_
+  double interval_us_ = 0;           // between its messages
+  std::int64_t contested_us_ = 0;    // when both were last heard; 0: never
+  std::deque<InboundMessage> waiting_;  // of other_, since first_ spoke last
+  std::size_t waiting_units_ = 0;
+  Stream main_, side_;
+  int returns_ = 0;  // to a stream that was left, lately
+  std::int64_t returned_us_ = 0;
+};
+
+}  // namespace joulecast::server

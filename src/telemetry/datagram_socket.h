@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "telemetry/datagram.h"
+
+namespace joulecast::telemetry {
+
+struct UdpmUrl {
+  std::uint32_t group = 0;  // host byte order
+  std::uint16_t port = 0;
+  int receive_buffer_bytes = 0;  // 0: the system's usual
+};
+
+// "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"; group and port may be left out. ttl is the sender's and only
+// checked here.
+[[nodiscard]] Result<UdpmUrl> parse_udpm_url(std::string_view url);
+
+// Which addresses may send to us.
+class AcceptedSenders {
+ public:
+  // Networks separated by commas: "10.1.0.0/16", "192.168.1.7", "any", "local" for loopback and the networks of this
+  // host's interfaces, which are looked at again when a sender is not known.
+  static Result<AcceptedSenders> parse(std::string_view list);
+
+  // `now_us` of any clock that does not go back.
+  bool accepts(std::uint32_t address, std::int64_t now_us);
+
+ private:
+  struct Network {
+    std::uint32_t address = 0, mask = 0;
+  };
+  bool contains(std::uint32_t address) const;
+  void read_interfaces();
+
+  std::vector<Network> networks_, interfaces_;
+  bool local_ = false;
+  std::int64_t read_us_ = 0;
+};
+
+// Receives the robots' messages of one multicast group. Bound to the group's address, so that unicast and other groups
+// of the port do not come in.
+class DatagramSocket {
+ public:
+  // The views end with the call.
+  using Handler = std::function<void(const Sender&, const ChannelMessage&, std::int64_t recv_utime_us)>;
+
+  // `interface_address`: IPv4 of the interface to listen on; empty: the one that the system routes the group to.
+  // Errors name the setting that is at fault.
+  static Result<DatagramSocket> open(const UdpmUrl& url, const std::string& interface_address,
+                                     AcceptedSenders accepted, DatagramCounters& counters);
+  DatagramSocket(DatagramSocket&&) noexcept;
+  DatagramSocket& operator=(DatagramSocket&&) noexcept;
+  ~DatagramSocket();
+
+  int descriptor() const noexcept;
+
+  // Handles the datagrams that wait, `max_datagrams` at most, and returns their number. Does not wait.
+  Result<int> receive(int max_datagrams, const Handler& handler);
+
+ private:
+  struct State;
+  explicit DatagramSocket(std::unique_ptr<State> state) noexcept;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace joulecast::telemetry
