@@ -20,10 +20,17 @@ function leastFactor({ time_s: t, speed_m_s: v, yaw_rate_rad_s: w }, limits) {
 // The same way in `factor` times the time; stops last as long as before.
 function slowed({ time_s: t, speed_m_s: v, yaw_rate_rad_s: w }, factor) {
   const stands = (k) => Math.abs(v[k]) < standing && Math.abs(w[k]) < standing;
-  const time = [t[0]];
-  for (let k = 1; k < t.length; ++k)
-    time.push(time[k - 1] + (t[k] - t[k - 1]) * (stands(k) && stands(k - 1) ? 1 : factor));
-  return { time_s: time, speed_m_s: v.map((x) => x / factor), yaw_rate_rad_s: w.map((x) => x / factor) };
+  const rows = [[t[0], v[0], w[0]]];
+  for (let k = 1; k < t.length; ++k) {
+    if (t[k] <= t[k - 1]) continue; // both sides of a corner
+    const pace = stands(k) && stands(k - 1) ? 1 : factor;
+    rows.push([rows[rows.length - 1][0] + (t[k] - t[k - 1]) * pace, v[k], w[k]]);
+  }
+  return {
+    time_s: rows.map(([at]) => at),
+    speed_m_s: rows.map(([, speed]) => speed / factor),
+    yaw_rate_rad_s: rows.map(([, , rate]) => rate / factor),
+  };
 }
 
 // {energyJ, durationS, slowed} of a baseline within the limits; null where there is none.

@@ -20,13 +20,18 @@ export const energyUnit = choice.get;
 export const useEnergyUnit = choice.use;
 export const toggleEnergyUnit = () => choice.set(choice.get() === 'Wh' ? 'J' : 'Wh');
 
-// {u, joule, places}: one unit and number of decimals for all of `values`, by the greatest of them.
-export function energyScale(values, significant = 4) {
-  const largest = values.reduce((most, v) => (known(v) ? Math.max(most, Math.abs(v)) : most), 0);
-  const sizes = units[choice.get()];
-  const [u, joule] = sizes.findLast(([, size]) => largest >= 0.9995 * size) ?? sizes[0];
-  const magnitude = largest > 0 ? Math.floor(Math.log10(largest / joule)) : 0;
-  return { u, joule, places: Math.max(0, Math.min(4, significant - 1 - magnitude)) };
+const decimals = (value, significant) =>
+  Math.max(0, Math.min(4, significant - 1 - (value > 0 ? Math.floor(Math.log10(value)) : 0)));
+
+// {u, joule, places}: one unit and number of decimals for all of `values`: the unit by the greatest, the decimals
+// so that the middle one has `significant` digits.
+export function energyScale(values, significant = 3) {
+  const sizes = values.filter((v) => known(v) && v !== 0).map(Math.abs);
+  sizes.sort((a, b) => a - b);
+  const [middle = 0, largest = 0] = [sizes[sizes.length >> 1], sizes[sizes.length - 1]];
+  const all = units[choice.get()];
+  const [u, joule] = all.findLast(([, size]) => largest >= 0.9995 * size) ?? all[0];
+  return { u, joule, places: decimals(middle / joule, significant) };
 }
 
 export function energyIn(scale, value) {
@@ -38,7 +43,10 @@ export function energy(value, significant = 3) {
   if (!known(value)) return none;
   const { u, joule } = energyScale([value]);
   const size = Math.abs(value / joule);
-  return { n: size === 0 || size >= 1e-3 ? digits(value / joule, significant) : fixed(value / joule, 4), u };
+  return {
+    n: size < 5e-5 ? '0' : size < 1e-3 ? fixed(value / joule, 4) : digits(value / joule, significant),
+    u,
+  };
 }
 
 // Consumption from joules a metre.

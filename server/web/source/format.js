@@ -49,11 +49,17 @@ export function length(metre) {
   return { n: size < 1 ? fixed(metre, 2) : digits(metre), u: 'm' }; // no robot knows its way to the millimetre
 }
 
+// For columns of ranges, which are all of the size of kilometres.
+export function kilometres(metre) {
+  return known(metre) ? { n: fixed(metre / 1000, metre < 99_500 ? 1 : 0), u: 'km' } : { n: dash, u: '' };
+}
+
 // A band of lengths in the unit of its far end: 2.4–35 km, 0–920 m.
 export function lengthBand(low, high) {
   if (!known(low) || !known(high)) return '';
   const [per, u] = high >= 9995 ? [1000, 'km'] : [1, 'm'];
-  return `${digits(low / per, 2)}–${digits(high / per, 2)}\u00a0${u}`;
+  const end = high >= 999_500 ? 'over 1000' : digits(high / per, 2);
+  return `${digits(low / per, 2)}–${end}\u00a0${u}`;
 }
 
 // Both ends of a range, as finely as its width asks for.

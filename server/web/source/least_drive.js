@@ -13,8 +13,8 @@ const mostRuns = 400;
 const mostAsked = 64;
 const idleMargin = 1.05; // a standing robot that draws more than this over its idle power turns in place
 
-// {lengthM, stoodS, first, last, utimeUs}: each run between stops, how long the robot stood still before
-// it, the directions in which it begins and ends (rad, NaN where the robot did not report its position), and a
+// {lengthM, stoodS, first, last, utimeUs}: each run between stops, how long the robot stood still before it,
+// the directions in which it begins and ends (rad, NaN where the robot did not report its position), and a
 // time within.
 function runsOf(trace, idlePowerW) {
   const runs = [];

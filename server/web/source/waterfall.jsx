@@ -116,7 +116,7 @@ export function Waterfall({ terms, total, closure, measured = true }) {
   const low = Math.min(...ends);
   const span = Math.max(Math.max(...ends) - low, 1e-9);
   const x = (joule) => ((joule - low) / span) * 100;
-  const scale = energyScale(ends);
+  const scale = energyScale([total], 4);
   const last = {
     key: 'battery',
     name: measured ? 'Battery energy' : 'Total',

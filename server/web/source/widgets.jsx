@@ -160,7 +160,7 @@ export function useTitleOf(text) {
   document.title = text ? `${text} · joulecast` : 'joulecast';
 }
 
-const narrowScreen = matchMedia('(max-width: 760px)');
+const narrowScreen = matchMedia('(max-width: 900px)');
 
 // Whether rows are drawn as cards; the style sheet has the same width.
 export function useNarrow() {

@@ -159,7 +159,7 @@ const correctionColumns = [
 
 function Checks({ checks }) {
   return (
-    <Panel title="Problems of the recordings">
+    <Panel title="Checks of the recordings">
       <ul class="reasons">
         {checks.map((c, k) => (
           <li key={k}>
@@ -272,7 +272,7 @@ function Figures({ result: r }) {
 function NextDrives({ result: r }) {
   const decided = r.verdict === 'effects' || r.verdict === 'none';
   if (r.next_drive.length === 0)
-    return <Empty title={decided ? 'No further drive is needed' : 'No drive would decide it'} />;
+    return <p class="note">{decided ? 'No further drive is needed.' : 'No drive would decide it.'}</p>;
   return (
     <ol class="next">
       {r.next_drive.map((n, k) => (

@@ -109,7 +109,7 @@ class Row extends Component {
           <Charge state={s} />
         </td>
         <td class="figure range">
-          <Quantity of={format.length(s.range_m)} />
+          <Quantity of={format.kilometres(s.range_m)} />
           <span class="below">{between(s.range_quantiles_m, format.lengthBand)}</span>
         </td>
         <td class="figure wide time">{format.about(s.run_time_s)}</td>

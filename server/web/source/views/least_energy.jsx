@@ -78,7 +78,7 @@ export function LeastEnergy({ mission, trace }) {
   if (answer.value === null) return <Loading what="the minimum-energy drive" />;
   const e = mission.energy;
   const least = answer.value;
-  const scale = energyScale([e.measured_j, e.modelled_j, least.energy_j]);
+  const scale = energyScale([e.measured_j, e.modelled_j, least.energy_j], 4);
   const row = (name, value, channel, durationS) => ({
     name,
     value,

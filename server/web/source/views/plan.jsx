@@ -131,13 +131,13 @@ function Figures({ answer }) {
   );
 }
 
-function FrontPanel({ answer, baselines, take }) {
+function FrontPanel({ answer, take }) {
   return (
     <Panel class="screen" title="Energy against time">
       {answer.pareto.length < 2 ? (
         <Empty title="Nothing to trade">Time and energy do not compete on this path.</Empty>
       ) : (
-        <Front answer={answer} baselines={baselines} take={take} />
+        <Front answer={answer} take={take} />
       )}
     </Panel>
   );
@@ -175,7 +175,7 @@ function Result({ plan, path, take }) {
               label="The planned path, coloured by power; circle: start, square: end"
             />
           </Panel>
-          <FrontPanel answer={answer} baselines={baselines} take={take} />
+          <FrontPanel answer={answer} take={take} />
           <Panel title="How exact the plan is">
             <Certificate answer={answer} />
           </Panel>

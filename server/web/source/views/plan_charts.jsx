@@ -118,40 +118,32 @@ export function priceOfHaste({ duration_s: durationS, time_multiplier_w: priceW 
 
 function frontOptions(unit) {
   const c = palette();
-  const dot = (size, colour, fill) => ({
-    stroke: 'transparent',
-    paths: () => null,
-    points: { show: true, size, width: 2, stroke: colour, fill },
-  });
-  const line = { show: true, size: 5, fill: c.modelled };
+  const points = { show: true, size: 12, width: 2, stroke: c.accent, fill: c.accent };
   return {
     scales: { x: { time: false } },
     cursor: { y: false, drag: { x: false, y: false }, points: { show: false } },
     axes: [axis('duration, s', { size: 28, space: 70 }), axis(`energy, ${unit}`, { size: 64 })],
     series: [
       {},
-      { stroke: c.modelled, width: 1.5, spanGaps: true, points: line },
-      dot(12, c.accent, c.accent),
-      dot(9, c.muted, c.screen),
-      dot(9, c.muted, c.muted),
+      { stroke: c.modelled, width: 1.5, spanGaps: true, points: { show: true, size: 5, fill: c.modelled } },
+      { stroke: 'transparent', paths: () => null, points },
     ],
   };
 }
 
-// One row a duration, in order; a column of energies for each kind of point.
-function frontData(answer, { trapezoid, triangle }, joule) {
-  const point = (b) => b && { duration_s: b.durationS, energy_j: b.energyJ };
-  const kinds = [answer.pareto, [answer], [point(trapezoid)], [point(triangle)]].map(
-    (points) => new Map(points.filter(Boolean).map((p) => [p.duration_s, p.energy_j / joule])),
+// One row for each duration, in order; a column of energies for the front and one for the plan.
+function frontData(answer, joule) {
+  const kinds = [answer.pareto, [answer]].map(
+    (points) => new Map(points.map((p) => [p.duration_s, p.energy_j / joule])),
   );
   const times = [...new Set(kinds.flatMap((kind) => [...kind.keys()]))].sort((a, b) => a - b);
   return [times, ...kinds.map((kind) => times.map((t) => kind.get(t) ?? null))];
 }
 
-export function Front({ answer, baselines, take }) {
+export function Front({ answer, take }) {
   const front = answer.pareto;
   const scale = energyScale(front.map((p) => p.energy_j));
-  const data = useMemo(() => frontData(answer, baselines, scale.joule), [answer, baselines, scale.joule]);
+  const data = useMemo(() => frontData(answer, scale.joule), [answer, scale.joule]);
   const [at, setAt] = useState(0);
   const point = front[Math.min(at, front.length - 1)];
   const [first, last] = [front[0], front[front.length - 1]];
@@ -166,9 +158,7 @@ export function Front({ answer, baselines, take }) {
       />
       <p class="note foot">
         <span class="swatch accent dot" />
-        this plan <span class="swatch hollow dot grey" />
-        trapezoid <span class="swatch grey dot" />
-        triangle <span class="swatch modelled" />
+        this plan <span class="swatch modelled" />
         cheapest for each duration
       </p>
       <div class="front-pick">

@@ -14,8 +14,9 @@ const methods = {
   mixed: 'closed formulas and an interior-point method',
 };
 
-// Energies near zero: their size is what matters.
-const little = (joule) => (Math.abs(joule) < 1e-3 ? 'less than 0.001\u00a0J' : format.text(energy(joule)));
+// Numerical errors, in joules in either unit: their size is what matters.
+const little = (joule) =>
+  Math.abs(joule) < 1e-3 ? 'less than 0.001\u00a0J' : `${format.digits(joule)}\u00a0J`;
 
 const Row = ({ name, children }) => (
   <tr>
@@ -99,7 +100,7 @@ export function Baselines({ answer, found }) {
     ['Trapezoid', found.trapezoid],
     ['Triangle', found.triangle],
   ];
-  const scale = energyScale([answer.energy_j, ...kinds.map(([, b]) => b?.energyJ)]);
+  const scale = energyScale([answer.energy_j, ...kinds.map(([, b]) => b?.energyJ)], 4);
   const rows = kinds.map(([name, b]) => ({
     name,
     value: b?.energyJ ?? null,

@@ -262,11 +262,15 @@ export function Robot({ id }) {
       {(s || detail.value) && <WithModel id={id} detail={detail} />}
       <RecentMissions id={id} running={s?.mission?.id} />
       <div class="columns">
-        <Panel class="screen" title={s?.live === false ? 'Last known position' : 'Position'}>
-          {entry ? <LiveMap entry={entry} /> : <Empty title="No telemetry yet" />}
-        </Panel>
-        <div>
+        {entry && !unheard(s) ? (
+          <Panel class="screen" title={s.live ? 'Position' : 'Last known position'}>
+            <LiveMap entry={entry} />
+          </Panel>
+        ) : (
           <RecentEvents id={id} />
+        )}
+        <div>
+          {entry && !unheard(s) && <RecentEvents id={id} />}
           <Panel title="Model">
             {detail.value ? <Model model={detail.value.model} /> : <p class="note">none</p>}
           </Panel>

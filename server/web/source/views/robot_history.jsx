@@ -60,8 +60,15 @@ function RatioChart({ history }) {
       const first = missions.find((m) => m.model_version === v.model_version);
       if (first !== undefined) line(first.start_utime_us, p.muted, `v${v.model_version}`, -0.3, []);
     }
-    for (const d of drift)
-      line(d.start_utime_us, p.gap, `${format.signed(share(d.ratio_after - d.ratio_before))}`, 1, [4, 3]);
+    drift.forEach((d, k) =>
+      line(
+        d.start_utime_us,
+        p.gap,
+        `${format.signed(share(d.ratio_after - d.ratio_before))}`,
+        1 + (k % 3),
+        [4, 3],
+      ),
+    );
     c.restore();
   };
   const spread = Math.max(0.05, ...data[1].map((v) => Math.min(0.6, Math.abs(v - 1)))) * 1.15;
