@@ -11,7 +11,10 @@ class Problem extends Error {
 async function answer(response) {
   if (response.ok) return response.json();
   const told = await response.json().catch(() => ({}));
-  throw Object.assign(new Problem(response.status, told.title ?? response.statusText, told.detail ?? '', told.field), { told });
+  throw Object.assign(
+    new Problem(response.status, told.title ?? response.statusText, told.detail ?? '', told.field),
+    { told },
+  );
 }
 
 async function call(path, options) {
@@ -30,7 +33,12 @@ export function get(path, signal) {
 }
 
 export function post(path, body, signal) {
-  return call(path, { method: 'POST', body: JSON.stringify(body), headers: { 'content-type': 'application/json' }, signal });
+  return call(path, {
+    method: 'POST',
+    body: JSON.stringify(body),
+    headers: { 'content-type': 'application/json' },
+    signal,
+  });
 }
 
 export function del(path) {
@@ -43,23 +51,25 @@ export function query(values) {
   return kept.length === 0 ? '' : `?${new URLSearchParams(kept)}`;
 }
 
-export const id_path = (id) => encodeURIComponent(id);
+export const idPath = (id) => encodeURIComponent(id);
 
 // {value, error, loading, reload}; asks again when `path` changes, keeps the last value while it does.
 // An empty or null path asks nothing.
 export function useGet(path) {
-  const [told, set_told] = useState({ value: null, error: null, loading: Boolean(path), path });
-  const [turn, set_turn] = useState(0);
+  const [told, setTold] = useState({ value: null, error: null, loading: Boolean(path), path });
+  const [turn, setTurn] = useState(0);
   const shown = useRef(path);
   useEffect(() => {
     if (!path) return undefined;
     const abort = new AbortController();
     shown.current = path;
-    set_told((before) => ({ ...before, loading: true }));
+    setTold((before) => ({ ...before, loading: true }));
     get(path, abort.signal).then(
-      (value) => set_told({ value, error: null, loading: false, path }),
-      (error) => error.name === 'AbortError' || set_told((before) => ({ ...before, error, loading: false, path })));
+      (value) => setTold({ value, error: null, loading: false, path }),
+      (error) =>
+        error.name === 'AbortError' || setTold((before) => ({ ...before, error, loading: false, path })),
+    );
     return () => abort.abort();
   }, [path, turn]);
-  return { ...told, reload: () => set_turn((n) => n + 1) };
+  return { ...told, reload: () => setTurn((n) => n + 1) };
 }

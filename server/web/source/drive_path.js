@@ -1,37 +1,54 @@
 // Legs as the form keeps them, to the path that the service takes and to points for a first look.
 const degree = Math.PI / 180;
 
-export const leg_kinds = {
+export const legKinds = {
   straight: { name: 'Straight', fields: { length: { label: 'length', unit: 'm', min: 0.01, start: 5 } } },
   turn: { name: 'Turn in place', fields: { angle: { label: 'angle, left positive', unit: '°', start: 90 } } },
-  arc: { name: 'Arc', fields: { radius: { label: 'radius', unit: 'm', min: 0.01, start: 2 }, angle: { label: 'angle, left positive', unit: '°', start: 90 } } },
+  arc: {
+    name: 'Arc',
+    fields: {
+      radius: { label: 'radius', unit: 'm', min: 0.01, start: 2 },
+      angle: { label: 'angle, left positive', unit: '°', start: 90 },
+    },
+  },
   dwell: { name: 'Dwell', fields: { duration: { label: 'time', unit: 's', min: 0, start: 10 } } },
-  payload: { name: 'Payload from here', fields: { mass: { label: 'payload', unit: 'kg', min: 0, start: 10 } } },
+  payload: {
+    name: 'Payload from here',
+    fields: { mass: { label: 'payload', unit: 'kg', min: 0, start: 10 } },
+  },
 };
 
-export function new_leg(kind) {
-  return { kind, ...Object.fromEntries(Object.entries(leg_kinds[kind].fields).map(([key, field]) => [key, field.start])) };
-}
-
-export function segment_of(leg) {
-  switch (leg.kind) {
-    case 'turn': return { kind: 'turn', angle_rad: leg.angle * degree };
-    case 'arc': return { kind: 'arc', radius_m: leg.radius, angle_rad: leg.angle * degree };
-    case 'dwell': return { kind: 'dwell', duration_s: leg.duration };
-    case 'payload': return { kind: 'payload', payload_kg: leg.mass };
-    default: return { kind: 'straight', length_m: leg.length };
-  }
-}
-
-export function path_of_points(points) {
-  const [[x_m, y_m], second] = points;
+export function newLeg(kind) {
   return {
-    start_pose: { x_m, y_m, heading_rad: Math.atan2(second[1] - y_m, second[0] - x_m) },
-    path: [{ kind: 'polyline', points: points.slice(1).map(([x, y]) => ({ x_m: x, y_m: y })) }],
+    kind,
+    ...Object.fromEntries(Object.entries(legKinds[kind].fields).map(([key, field]) => [key, field.start])),
   };
 }
 
-export function points_of_legs(legs) {
+export function segmentOf(leg) {
+  switch (leg.kind) {
+    case 'turn':
+      return { kind: 'turn', angle_rad: leg.angle * degree };
+    case 'arc':
+      return { kind: 'arc', radius_m: leg.radius, angle_rad: leg.angle * degree };
+    case 'dwell':
+      return { kind: 'dwell', duration_s: leg.duration };
+    case 'payload':
+      return { kind: 'payload', payload_kg: leg.mass };
+    default:
+      return { kind: 'straight', length_m: leg.length };
+  }
+}
+
+export function pathOfPoints(points) {
+  const [[x, y], second] = points;
+  return {
+    start_pose: { x_m: x, y_m: y, heading_rad: Math.atan2(second[1] - y, second[0] - x) },
+    path: [{ kind: 'polyline', points: points.slice(1).map(([px, py]) => ({ x_m: px, y_m: py })) }],
+  };
+}
+
+export function pointsOfLegs(legs) {
   let [x, y, heading] = [0, 0, 0];
   const points = [[x, y]];
   for (const leg of legs) {
@@ -42,8 +59,10 @@ export function points_of_legs(legs) {
     } else if (leg.kind === 'turn') {
       heading += leg.angle * degree;
     } else if (leg.kind === 'arc') {
-      const side = leg.angle < 0 ? -1 : 1, steps = Math.max(2, Math.ceil(Math.abs(leg.angle) / 5));
-      const cx = x - side * leg.radius * Math.sin(heading), cy = y + side * leg.radius * Math.cos(heading);
+      const side = leg.angle < 0 ? -1 : 1;
+      const steps = Math.max(2, Math.ceil(Math.abs(leg.angle) / 5));
+      const cx = x - side * leg.radius * Math.sin(heading);
+      const cy = y + side * leg.radius * Math.cos(heading);
       for (let k = 1; k <= steps; ++k) {
         const h = heading + (leg.angle * degree * k) / steps;
         points.push([cx + side * leg.radius * Math.sin(h), cy - side * leg.radius * Math.cos(h)]);
@@ -53,4 +72,28 @@ export function points_of_legs(legs) {
     }
   }
   return points;
+}
+
+// Legs and points as the address keeps them: "straight:6,turn:90,arc:2:90" and "-5:-2,2:2.5".
+export const legsText = (legs) =>
+  legs
+    .map((leg) => [leg.kind, ...Object.keys(legKinds[leg.kind].fields).map((key) => leg[key])].join(':'))
+    .join(',');
+
+export function legsFrom(text) {
+  const legs = (text ?? '').split(',').map((part) => {
+    const [kind, ...values] = part.split(':');
+    const fields = Object.keys(legKinds[kind]?.fields ?? {});
+    return { kind, ...Object.fromEntries(fields.map((key, k) => [key, Number(values[k])])) };
+  });
+  return legs.every((leg) => leg.kind in legKinds && Object.values(leg).every((v) => !Number.isNaN(v)))
+    ? legs
+    : null;
+}
+
+export const pointsText = (points) => points.map((point) => point.join(':')).join(',');
+
+export function pointsFrom(text) {
+  const points = (text ?? '').split(',').map((part) => part.split(':').map(Number));
+  return points.every((point) => point.length === 2 && point.every(Number.isFinite)) ? points : null;
 }

@@ -33,15 +33,7 @@ export function signed(text) {
   return text === dash || text.startsWith(minus) || text === '0' ? text : `+${text}`;
 }
 
-// {n, u}: the number and the unit, prefixed so that the number stays short.
-export function energy(joule, count = 3) {
-  if (!known(joule)) return { n: dash, u: '' };
-  const size = Math.abs(joule);
-  if (size >= 9.995e8) return { n: digits(joule / 1e9, count), u: 'GJ' };
-  if (size >= 999_500) return { n: digits(joule / 1e6, count), u: 'MJ' };
-  if (size >= 999.5) return { n: digits(joule / 1e3, count), u: 'kJ' };
-  return { n: size >= 0.05 || size === 0 ? digits(joule, count) : fixed(joule, 2), u: 'J' };
-}
+// Quantities are {n, u}: the number and the unit, prefixed so that the number stays short.
 
 export function power(watt) {
   if (!known(watt)) return { n: dash, u: '' };
@@ -54,14 +46,20 @@ export function length(metre) {
   if (!known(metre)) return { n: dash, u: '' };
   const size = Math.abs(metre);
   if (size >= 9995) return { n: digits(metre / 1e3), u: 'km' };
-  return { n: size < 1 ? fixed(metre, 2) : digits(metre), u: 'm' };  // no robot knows its way to the millimetre
+  return { n: size < 1 ? fixed(metre, 2) : digits(metre), u: 'm' }; // no robot knows its way to the millimetre
+}
+
+// For columns of ranges, which are all of the size of kilometres.
+export function kilometres(metre) {
+  return known(metre) ? { n: fixed(metre / 1000, metre < 99_500 ? 1 : 0), u: 'km' } : { n: dash, u: '' };
 }
 
 // A band of lengths in the unit of its far end: 2.4–35 km, 0–920 m.
-export function length_band(low, high) {
+export function lengthBand(low, high) {
   if (!known(low) || !known(high)) return '';
   const [per, u] = high >= 9995 ? [1000, 'km'] : [1, 'm'];
-  return `${digits(low / per, 2)}–${digits(high / per, 2)}\u00a0${u}`;
+  const end = high >= 999_500 ? 'over 1000' : digits(high / per, 2);
+  return `${digits(low / per, 2)}–${end}\u00a0${u}`;
 }
 
 // Both ends of a range, as finely as its width asks for.
@@ -72,7 +70,7 @@ export function range(low, high) {
 }
 
 // "0.54 ± 0.04": as many digits as the deviation has to say.
-export function with_deviation(value, deviation) {
+export function withDeviation(value, deviation) {
   if (!known(deviation) || deviation <= 0) return digits(value);
   const places = Math.max(0, Math.min(6, 1 - Math.floor(Math.log10(deviation))));
   return `${fixed(value, places)} ± ${fixed(deviation, places)}`;
@@ -83,17 +81,20 @@ export function percent(share, places = 0) {
 }
 
 export function unit(value, u, places) {
-  return known(value) ? { n: places === undefined ? digits(value) : fixed(value, places), u } : { n: dash, u: '' };
+  return known(value)
+    ? { n: places === undefined ? digits(value) : fixed(value, places), u }
+    : { n: dash, u: '' };
 }
 
 export function text(quantity) {
   return quantity.u === '' ? quantity.n : `${quantity.n}\u00a0${quantity.u}`;
 }
 
-// A span as an operator says it: 8.4 s, 3 min 20 s, 5 h 07 min, 12 d.
+// A duration: 8.4 s, 3 min 20 s, 5 h 07 min, 12 d.
 export function span(second) {
   if (!known(second)) return dash;
-  const s = Math.abs(second), sign = second < 0 ? minus : '';
+  const s = Math.abs(second);
+  const sign = second < 0 ? minus : '';
   const two = (v) => String(Math.floor(v)).padStart(2, '0');
   if (s < 60) return `${sign}${s < 9.95 ? s.toFixed(1) : s.toFixed(0)}\u00a0s`;
   if (s < 3600) return `${sign}${Math.floor(s / 60)}\u00a0min ${two(s % 60)}\u00a0s`;
@@ -101,16 +102,18 @@ export function span(second) {
   return `${sign}${Math.round(s / 86_400)}\u00a0d`;
 }
 
-// A span that is foreseen: to the minute, from a minute on.
+// A forecast duration: to the minute, from a minute on.
 export function about(second) {
   if (known(second) && second < 60) return `${fixed(second)}\u00a0s`;
   if (!known(second) || second >= 172_800) return span(second);
   const minutes = Math.round(second / 60);
-  return minutes < 60 ? `${minutes}\u00a0min` : `${Math.floor(minutes / 60)}\u00a0h ${String(minutes % 60).padStart(2, '0')}\u00a0min`;
+  return minutes < 60
+    ? `${minutes}\u00a0min`
+    : `${Math.floor(minutes / 60)}\u00a0h ${String(minutes % 60).padStart(2, '0')}\u00a0min`;
 }
 
-function parts(utime_us) {
-  const d = new Date(utime_us / 1000);
+function parts(utimeUs) {
+  const d = new Date(utimeUs / 1000);
   const two = (v) => String(v).padStart(2, '0');
   return {
     day: `${d.getFullYear()}-${two(d.getMonth() + 1)}-${two(d.getDate())}`,
@@ -118,14 +121,19 @@ function parts(utime_us) {
   };
 }
 
-export function time(utime_us) {
-  if (!known(utime_us)) return dash;
-  const { day, clock } = parts(utime_us);
+export function time(utimeUs) {
+  if (!known(utimeUs)) return dash;
+  const { day, clock } = parts(utimeUs);
   return `${day} ${clock}`;
 }
 
-export function clock(utime_us) {
-  return known(utime_us) ? parts(utime_us).clock : dash;
+export function clock(utimeUs) {
+  return known(utimeUs) ? parts(utimeUs).clock : dash;
 }
 
 export const words = (name) => name.replaceAll('_', ' ');
+
+export const degrees = (rad) => (rad * 180) / Math.PI;
+
+// The slope that an angle is, in percent.
+export const slopePercent = (rad) => 100 * Math.tan(rad);

@@ -1,62 +1,93 @@
-// What a minimum-energy drive would have spent on a mission's legs: the same distance in the same runs between
-// stops, turned at each stop from the old direction into the new one, standing as long as it stood, carrying
-// what it carried, arriving no later. The mission as driven is one of the drives that this minimum ranges over.
+// What a minimum-energy drive would have used on a mission's legs: the same distance in the same runs
+// between stops, turned at each stop from the old direction into the new one, standing as long as it stood,
+// carrying what it carried, arriving no later. The mission as driven is one of the drives that this minimum
+// ranges over.
 import { get, query } from './api.js';
 
-const standing_m_s = 0.02, least_run_m = 0.05, chord_m = 0.05, least_turn_rad = 0.02, least_dwell_s = 0.2, most_runs = 400, most_asked = 64;
-const idle_margin = 1.05;  // a standing robot that draws more than this over its idle power turns in place
+const standing = 0.02; // m/s
+const shortest = 0.05; // m, of a run
+const chord = 0.05; // m, between positions that give a direction
+const straight = 0.02; // rad, below which a turn is none
+const leastDwell = 0.2; // s
+const mostRuns = 400;
+const mostAsked = 64;
+const idleMargin = 1.05; // a standing robot that draws more than this over its idle power turns in place
 
-// {length_m, stood_s, first, last, utime_us}: each run between stops, how long the robot stood still before it,
-// the directions in which it begins and ends (rad, NaN where the robot did not tell its place), and a time within.
-function runs_of(trace, idle_power_w) {
+// {lengthM, stoodS, first, last, utimeUs}: each run between stops, how long the robot stood still before it,
+// the directions in which it begins and ends (rad, NaN where the robot did not report its position), and a
+// time within.
+function runsOf(trace, idlePowerW) {
   const runs = [];
-  let run = null, place = null, stood_s = 0;
+  let run = null;
+  let place = null;
+  let stoodS = 0;
   trace.speed_m_s.mean.forEach((speed, k) => {
-    const size = Math.abs(speed ?? 0), [x, y] = [trace.x_m[k], trace.y_m[k]], covered_s = trace.covered_s[k] ?? 0;
-    if (size <= standing_m_s) {
+    const size = Math.abs(speed ?? 0);
+    const [x, y] = [trace.x_m[k], trace.y_m[k]];
+    const coveredS = trace.covered_s[k] ?? 0;
+    if (size <= standing) {
       run = null;
-      if (trace.modelled_power_w.mean[k] <= idle_margin * idle_power_w) stood_s += covered_s;
+      if (trace.modelled_power_w.mean[k] <= idleMargin * idlePowerW) stoodS += coveredS;
     } else {
       if (run === null) {
-        runs.push((run = { length_m: 0, stood_s, first: NaN, last: NaN, utime_us: trace.start_utime_us[k] + trace.width_us / 2 }));
-        stood_s = 0;
+        runs.push(
+          (run = {
+            lengthM: 0,
+            stoodS,
+            first: NaN,
+            last: NaN,
+            utimeUs: trace.start_utime_us[k] + trace.width_us / 2,
+          }),
+        );
+        stoodS = 0;
       }
-      run.length_m += size * covered_s;
+      run.lengthM += size * coveredS;
     }
     if (x === null || y === null) return;
     if (place === null) place = [x, y];
     const step = Math.hypot(x - place[0], y - place[1]);
-    if (step < chord_m) return;
-    const direction = Math.atan2(y - place[1], x - place[0]), of = run ?? runs[runs.length - 1];
+    if (step < chord) return;
+    const direction = Math.atan2(y - place[1], x - place[0]);
+    const of = run ?? runs[runs.length - 1];
     if (of !== undefined) {
       if (Number.isNaN(of.first)) of.first = direction;
       of.last = direction;
     }
     place = [x, y];
   });
-  return { runs: runs.filter(({ length_m }) => length_m >= least_run_m), stood_at_end_s: stood_s };
+  return { runs: runs.filter(({ lengthM }) => lengthM >= shortest), stoodAtEndS: stoodS };
 }
 
-function turn_between(before, after) {
+function turnBetween(before, after) {
   const turn = after - before;
   return Math.atan2(Math.sin(turn), Math.cos(turn));
 }
 
 // What the mission is made of, or null where it went nowhere.
-export function driven_runs(mission, trace, idle_power_w) {
-  const found = runs_of(trace, idle_power_w);
-  return found.runs.length === 0 || found.runs.length > most_runs || mission.energy.distance_m < least_run_m ? null : found;
+export function drivenRuns(mission, trace, idlePowerW) {
+  const found = runsOf(trace, idlePowerW);
+  return found.runs.length === 0 || found.runs.length > mostRuns || mission.energy.distance_m < shortest
+    ? null
+    : found;
 }
 
-// The payload of each run as the robot told it and the service accounted for it; null where that is not kept.
-export async function payloads_of(mission, runs, signal) {
-  if (runs.length > most_asked) return null;
-  const told = await Promise.all(runs.map(({ utime_us }) =>
-    get(`/v1/missions/${mission.id}/telemetry${query({ from_utime_us: Math.round(utime_us), limit: 1 })}`, signal)));
-  if (told.some(({ payload_kg }) => payload_kg.length === 0)) return null;
-  let now = mission.payload_kg ?? 0, named = false;
-  return told.map(({ payload_kg: [said] }) => {
-    // A 0 against the load declared at the start says nothing until a load was named.
+// The payload of each run as the robot reported it and the service accounted for it; null where that is not
+// stored.
+export async function payloadsOf(mission, runs, signal) {
+  if (runs.length > mostAsked) return null;
+  const samples = await Promise.all(
+    runs.map(({ utimeUs }) =>
+      get(
+        `/v1/missions/${mission.id}/telemetry${query({ from_utime_us: Math.round(utimeUs), limit: 1 })}`,
+        signal,
+      ),
+    ),
+  );
+  if (samples.some((sample) => sample.payload_kg.length === 0)) return null;
+  let now = mission.payload_kg ?? 0;
+  let named = false;
+  return samples.map(({ payload_kg: [said] }) => {
+    // A 0 against the load declared at the start means nothing until a load was reported.
     if (said === null || (said === 0 && !named && now > 0)) return now;
     named = true;
     return (now = said);
@@ -64,16 +95,25 @@ export async function payloads_of(mission, runs, signal) {
 }
 
 // The request for /profile; `payloads`: of each run, or null for the declared one all the way.
-export function least_drive_request(mission, { runs, stood_at_end_s }, payloads) {
-  const { distance_m, duration_s } = mission.energy;
+export function leastDriveRequest(mission, { runs, stoodAtEndS }, payloads) {
+  const { distance_m: distance, duration_s: duration } = mission.energy;
   const carried = payloads ?? runs.map(() => mission.payload_kg ?? 0);
-  const total = runs.reduce((sum, run) => sum + run.length_m, 0);
-  const dwell = (stood_s) => (stood_s > least_dwell_s ? [{ kind: 'dwell', duration_s: stood_s }] : []);
+  const total = runs.reduce((sum, run) => sum + run.lengthM, 0);
+  const dwell = (stoodS) => (stoodS > leastDwell ? [{ kind: 'dwell', duration_s: stoodS }] : []);
   const path = runs.flatMap((run, k) => {
-    const turn = k === 0 ? NaN : turn_between(runs[k - 1].last, run.first);
+    const turn = k === 0 ? NaN : turnBetween(runs[k - 1].last, run.first);
     const load = k > 0 && carried[k] !== carried[k - 1] ? [{ kind: 'payload', payload_kg: carried[k] }] : [];
-    return [...dwell(run.stood_s), ...load, ...(Math.abs(turn) > least_turn_rad ? [{ kind: 'turn', angle_rad: turn }] : []),
-      { kind: 'straight', length_m: (run.length_m / total) * distance_m }];
+    return [
+      ...dwell(run.stoodS),
+      ...load,
+      ...(Math.abs(turn) > straight ? [{ kind: 'turn', angle_rad: turn }] : []),
+      { kind: 'straight', length_m: (run.lengthM / total) * distance },
+    ];
   });
-  return { path: [...path, ...dwell(stood_at_end_s)], payload_kg: carried[0], deadline_s: duration_s, columns: false };
+  return {
+    path: [...path, ...dwell(stoodAtEndS)],
+    payload_kg: carried[0],
+    deadline_s: duration,
+    columns: false,
+  };
 }

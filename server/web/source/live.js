@@ -3,10 +3,10 @@
 import { useEffect, useState } from 'preact/hooks';
 import { get } from './api.js';
 
-const power_samples = 90;
-const path_samples = 600;
-const least_ms_between_draws = 200;
-const silence_before_check_ms = 20_000;
+const powerSamples = 90;
+const pathSamples = 600;
+const leastMsBetweenDraws = 200;
+const silenceBeforeCheckMs = 20_000;
 
 class Track {
   constructor(length) {
@@ -23,13 +23,27 @@ class Track {
 }
 
 const robots = new Map();
-const state = { link: 'connecting', since_ms: Date.now(), loaded: false, loads: 0, error: null, robots, revision: 0, events: 0 };
+const state = {
+  link: 'connecting',
+  sinceMs: Date.now(),
+  loaded: false,
+  loads: 0,
+  error: null,
+  robots,
+  revision: 0,
+  events: 0,
+};
 const listeners = new Set();
-let source = null, drawn_ms = 0, scheduled = false, loading = false, heard_ms = 0, retry_ms = 1000;
+let source = null;
+let drawnMs = 0;
+let scheduled = false;
+let loading = false;
+let heardMs = 0;
+let retryMs = 1000;
 
 function tell() {
   scheduled = false;
-  drawn_ms = performance.now();
+  drawnMs = performance.now();
   state.revision += 1;
   for (const listener of listeners) listener(state.revision);
 }
@@ -37,7 +51,7 @@ function tell() {
 function changed() {
   if (scheduled) return;
   scheduled = true;
-  const wait = least_ms_between_draws - (performance.now() - drawn_ms);
+  const wait = leastMsBetweenDraws - (performance.now() - drawnMs);
   if (wait > 0) setTimeout(() => requestAnimationFrame(tell), wait);
   else requestAnimationFrame(tell);
 }
@@ -45,24 +59,25 @@ function changed() {
 function take(told) {
   let entry = robots.get(told.robot_id);
   if (entry === undefined) {
-    entry = { id: told.robot_id, revision: 0, power: new Track(power_samples), path: new Track(path_samples) };
+    entry = { id: told.robot_id, revision: 0, power: new Track(powerSamples), path: new Track(pathSamples) };
     robots.set(told.robot_id, entry);
   }
-  told.heard_us = told.silent_s === null ? null : (Date.now() - 1000 * told.silent_s) * 1000;
+  told.heardUs = told.silent_s === null ? null : (Date.now() - 1000 * told.silent_s) * 1000;
   const fresh = entry.state === undefined || entry.state.utime_us !== told.utime_us;
   entry.state = told;
   entry.revision += 1;
   if (fresh && told.utime_us !== null) {
     entry.power.push([told.utime_us, told.measured_power_w ?? NaN, told.modelled_power_w ?? NaN]);
     const [x, y, heading] = told.pose;
-    if (x !== null && y !== null) entry.path.push([x, y, heading ?? 0, told.measured_power_w ?? told.modelled_power_w ?? NaN]);
+    if (x !== null && y !== null)
+      entry.path.push([x, y, heading ?? 0, told.measured_power_w ?? told.modelled_power_w ?? NaN]);
   }
 }
 
 function link(name) {
   if (state.link === name) return;
   state.link = name;
-  state.since_ms = Date.now();
+  state.sinceMs = Date.now();
   changed();
 }
 
@@ -86,37 +101,37 @@ async function load() {
 function connect() {
   source = new EventSource('/v1/events');
   source.addEventListener('open', () => {
-    heard_ms = performance.now();
+    heardMs = performance.now();
     if (state.link === 'offline' || (!state.loaded && !loading)) load();
-    retry_ms = 1000;
+    retryMs = 1000;
     link('live');
   });
   source.addEventListener('state', (event) => {
-    heard_ms = performance.now();
+    heardMs = performance.now();
     state.events += 1;
     take(JSON.parse(event.data));
     changed();
   });
   source.addEventListener('mission', () => {
-    heard_ms = performance.now();
+    heardMs = performance.now();
   });
   source.addEventListener('reset', load);
   source.addEventListener('error', () => {
     link('offline');
-    if (source.readyState === EventSource.CLOSED) again();  // the browser retries by itself otherwise
+    if (source.readyState === EventSource.CLOSED) again(); // the browser retries by itself otherwise
   });
 }
 
 function again() {
   source.close();
-  setTimeout(connect, retry_ms);
-  retry_ms = Math.min(2 * retry_ms, 15_000);
+  setTimeout(connect, retryMs);
+  retryMs = Math.min(2 * retryMs, 15_000);
 }
 
 // A stream that died without a word looks like a quiet fleet: ask.
 async function check() {
-  if (state.link !== 'live' || performance.now() - heard_ms < silence_before_check_ms) return;
-  heard_ms = performance.now();
+  if (state.link !== 'live' || performance.now() - heardMs < silenceBeforeCheckMs) return;
+  heardMs = performance.now();
   try {
     await get('/healthz');
   } catch {
@@ -125,18 +140,18 @@ async function check() {
   }
 }
 
-export function start_live() {
+export function startLive() {
   load();
   connect();
   setInterval(check, 5000);
 }
 
 export function useLive() {
-  const [, set_revision] = useState(0);
+  const [, setRevision] = useState(0);
   useEffect(() => {
-    listeners.add(set_revision);
-    set_revision(state.revision);
-    return () => listeners.delete(set_revision);
+    listeners.add(setRevision);
+    setRevision(state.revision);
+    return () => listeners.delete(setRevision);
   }, []);
   return state;
 }

@@ -1,7 +1,7 @@
 import { query } from './api.js';
 
 // "#/missions/12" -> view mission, id 12; "#/missions?state=open" -> view missions, given {state: 'open'}.
-export function route_of(hash) {
+export function routeOf(hash) {
   const [path, values] = hash.replace(/^#\/?/, '').split('?');
   const [view = '', id] = path.split('/');
   const given = Object.fromEntries(new URLSearchParams(values ?? ''));
@@ -11,15 +11,16 @@ export function route_of(hash) {
   try {
     name = decodeURIComponent(id);
   } catch {
-    // not ours; shown as it stands
+    // not one of the page's own addresses; shown as it stands
   }
   return { view: view === 'missions' ? 'mission' : view, id: name, given };
 }
 
-export const robot_link = (id) => `#/robots/${encodeURIComponent(id)}`;
-export const mission_link = (id) => `#/missions/${id}`;
+export const robotLink = (id) => `#/robots/${encodeURIComponent(id)}`;
+export const missionLink = (id) => `#/missions/${id}`;
 
 // Changes what the address says after "?", without a new step in the history.
-export function keep_in_address(view, values) {
-  history.replaceState(null, '', `#/${view}${query(values)}`);
+export function keepInAddress(values) {
+  const [path] = location.hash.split('?');
+  history.replaceState(null, '', `${path || '#/fleet'}${query(values)}`);
 }

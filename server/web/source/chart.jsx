@@ -1,0 +1,145 @@
+// uPlot in a component: loaded when first drawn, follows its container's width and the theme.
+import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
+import { energyUnit } from './energy.js';
+import { palette, useTheme } from './theme.js';
+import { clock, fixed } from './format.js';
+
+const narrow = '"Liberation Sans Narrow", "Arial Narrow", "Helvetica Neue", Arial, sans-serif';
+
+// Decimals that a step between ticks needs.
+function decimals(step) {
+  const figures = String(step).match(/[1-9]/g)?.length ?? 1;
+  return Math.max(0, Math.ceil(-Math.log10(step) - 1e-9 + figures - 1));
+}
+
+export function axis(label, more = {}) {
+  const p = palette();
+  const line = { stroke: p.graticule, width: 1 };
+  return {
+    label: label || undefined,
+    labelFont: `13px ${narrow}`,
+    font: `13px ${narrow}`,
+    stroke: p.muted,
+    labelSize: label === '' ? 0 : 20,
+    labelGap: 2,
+    size: 50,
+    gap: 4,
+    grid: line,
+    ticks: { ...line, size: 4 },
+    border: { show: true, stroke: p.line, width: 1 },
+    values: (_, splits, index, space, step) =>
+      splits.map((v) => (v === null ? '' : fixed(v, decimals(step)))),
+    ...more,
+  };
+}
+
+const minute = 60;
+const hours = 3600;
+const day = 86_400;
+export const clockSteps = [
+  1,
+  2,
+  5,
+  10,
+  15,
+  30,
+  ...[1, 2, 5, 10, 15, 30].map((m) => m * minute),
+  ...[1, 2, 3, 6, 12].map((h) => h * hours),
+  ...[1, 2, 7, 14, 28, 91, 182, 364, 728, 1820].map((d) => d * day),
+];
+
+// Local times, with the day where it changes.
+export const clockAxis = { incrs: clockSteps, splits: clockSplits, values: clockValues };
+
+function clockSplits(_, index, low, high, step) {
+  const offset = new Date(low * 1000).getTimezoneOffset() * minute;
+  const splits = [];
+  for (let at = Math.ceil((low - offset) / step) * step + offset; at <= high; at += step) splits.push(at);
+  return splits;
+}
+
+function clockValues(_, splits, index, space, step) {
+  let day = '';
+  return splits.map((second) => {
+    const d = new Date(second * 1000);
+    const today = `${d.getMonth() + 1}-${String(d.getDate()).padStart(2, '0')}`;
+    const hour = clock(second * 1e6).slice(0, step < 60 ? 8 : 5);
+    const text = today === day ? hour : `${hour}\n${d.getFullYear()}-${today.padStart(5, '0')}`;
+    day = today;
+    return text;
+  });
+}
+
+let uPlot = null;
+let loading = null;
+
+export function loadCharts() {
+  loading ??= import('./uplot.js').then(
+    (module) => (uPlot = module.default),
+    (error) => {
+      loading = null;
+      throw error;
+    },
+  );
+  return loading;
+}
+
+function useCharts() {
+  const [state, setState] = useState(uPlot === null ? 'loading' : 'ready');
+  useEffect(() => {
+    if (uPlot === null)
+      loadCharts().then(
+        () => setState('ready'),
+        () => setState('failed'),
+      );
+  }, []);
+  return state;
+}
+
+// `make()` gives uPlot's options without width and height; called again when `changes`, the theme or the unit
+// of energy do.
+export function Chart({ make, data, height = 220, label, changes = [], onReady }) {
+  const place = useRef(null);
+  const plot = useRef(null);
+  const latest = useRef(data);
+  const dark = useTheme();
+  const state = useCharts();
+  latest.current = data;
+  useLayoutEffect(() => {
+    if (state !== 'ready') return undefined;
+    const width = () => Math.max(200, Math.floor(place.current.clientWidth));
+    const options = { legend: { show: false }, ...make(), width: width(), height };
+    const u = new uPlot(options, latest.current, place.current);
+    plot.current = u;
+    onReady?.(u);
+    const observer = new ResizeObserver(() => {
+      if (width() !== u.width) u.setSize({ width: width(), height });
+    });
+    observer.observe(place.current);
+    return () => {
+      observer.disconnect();
+      plot.current = null;
+      u.destroy();
+    };
+  }, [state, dark, height, energyUnit(), ...changes]);
+  useEffect(() => {
+    if (plot.current !== null && plot.current.data !== data) plot.current.setData(data);
+  }, [data]);
+  const text = state === 'failed' ? 'The chart could not be loaded.' : '';
+  return (
+    <div class="chart" role="img" aria-label={label} ref={place} style={{ minHeight: `${height}px` }}>
+      {text}
+    </div>
+  );
+}
+
+export function withAlpha(colour, share) {
+  return `color-mix(in srgb, ${colour} ${share * 100}%, transparent)`;
+}
+
+export const cursorOf = (group) => ({
+  sync: { key: group },
+  points: { size: 7, width: 1.5 },
+  drag: { x: true, y: false, dist: 6 },
+  focus: { prox: -1 },
+});

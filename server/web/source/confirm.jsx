@@ -1,0 +1,39 @@
+// A button that asks once before it does what it says; its children tell what will change.
+import { useRef, useState } from 'preact/hooks';
+
+export function ConfirmButton({ label, title, action, onConfirm, disabled, class: name, children }) {
+  const dialog = useRef(null);
+  const [open, setOpen] = useState(false);
+  const ask = () => {
+    setOpen(true);
+    dialog.current.showModal();
+  };
+  const answer = (event) => {
+    event.preventDefault();
+    dialog.current.close();
+    onConfirm();
+  };
+  return (
+    <>
+      <button type="button" class={name} disabled={disabled} onClick={ask}>
+        {label}
+      </button>
+      <dialog ref={dialog} aria-label={title} onClose={() => setOpen(false)}>
+        {open && (
+          <form onSubmit={answer}>
+            <h2>{title}</h2>
+            {children}
+            <p class="tools">
+              <button type="submit" class="primary">
+                {action ?? label}
+              </button>
+              <button type="button" onClick={() => dialog.current.close()}>
+                Cancel
+              </button>
+            </p>
+          </form>
+        )}
+      </dialog>
+    </>
+  );
+}

@@ -1,0 +1,64 @@
+// Energies as people read them: watt hours, or joules where the reader chose so. Values come in joules.
+import { keptChoice } from './choice.js';
+import { digits, fixed, known } from './format.js';
+
+const units = {
+  Wh: [
+    ['Wh', 3600],
+    ['kWh', 3.6e6],
+  ],
+  J: [
+    ['J', 1],
+    ['kJ', 1e3],
+    ['MJ', 1e6],
+  ],
+};
+const choice = keptChoice('energy_unit', ['Wh', 'J'], () => 'Wh');
+const none = { n: '–', u: '' };
+
+export const energyUnit = choice.get;
+export const useEnergyUnit = choice.use;
+export const toggleEnergyUnit = () => choice.set(choice.get() === 'Wh' ? 'J' : 'Wh');
+
+const decimals = (value, significant) =>
+  Math.max(0, Math.min(4, significant - 1 - (value > 0 ? Math.floor(Math.log10(value)) : 0)));
+
+// {u, joule, places}: one unit and number of decimals for all of `values`: the unit by the greatest, the decimals
+// so that the middle one has `significant` digits.
+export function energyScale(values, significant = 3) {
+  const sizes = values.filter((v) => known(v) && v !== 0).map(Math.abs);
+  sizes.sort((a, b) => a - b);
+  const [middle = 0, largest = 0] = [sizes[sizes.length >> 1], sizes[sizes.length - 1]];
+  const all = units[choice.get()];
+  const [u, joule] = all.findLast(([, size]) => largest >= 0.9995 * size) ?? all[0];
+  return { u, joule, places: decimals(middle / joule, significant) };
+}
+
+export function energyIn(scale, value) {
+  return known(value) ? { n: fixed(value / scale.joule, scale.places), u: scale.u } : none;
+}
+
+// One energy by itself.
+export function energy(value, significant = 3) {
+  if (!known(value)) return none;
+  const { u, joule } = energyScale([value]);
+  const size = Math.abs(value / joule);
+  return {
+    n: size < 5e-5 ? '0' : size < 1e-3 ? fixed(value / joule, 4) : digits(value / joule, significant),
+    u,
+  };
+}
+
+// Consumption from joules a metre.
+export function consumption(joulePerMetre) {
+  if (!known(joulePerMetre)) return none;
+  return choice.get() === 'Wh'
+    ? { n: fixed(joulePerMetre / 3.6, 1), u: 'Wh/km' }
+    : { n: fixed(joulePerMetre, 1), u: 'J/m' };
+}
+
+// The part of a full battery that a charge is, where the capacity is known.
+export function chargeShare(chargeAh, model) {
+  const capacityAh = model?.battery?.capacity_ah;
+  return known(chargeAh) && known(capacityAh) && capacityAh > 0 ? chargeAh / capacityAh : null;
+}

@@ -1,0 +1,65 @@
+// How far measured energy of each robot departs from its model, and whether that has changed: what the
+// history says, beside the live state.
+import { useEffect, useState } from 'preact/hooks';
+import { get, idPath } from './api.js';
+import { newestEvents } from './audit_log.js';
+
+const renewMs = 120_000;
+const mostRobots = 100; // one question for each kind of robot; larger fleets would keep the service busy
+const driftKinds = ['gap_drift', 'consumption_drift'];
+const changeOf = { gap_drift: (d) => d.ratio_after - d.ratio_before, consumption_drift: (d) => d.ratio - 1 };
+
+// Robots of one kind are told in one answer.
+async function readRatios(ids, told, signal) {
+  const asked = new Set();
+  for (const id of ids) {
+    if (asked.has(id)) continue;
+    const { siblings } = await get(`/v1/robots/${idPath(id)}/gap-history?limit=1`, signal);
+    for (const s of siblings) {
+      asked.add(s.robot_id);
+      told.set(s.robot_id, { ratio: s.ratio, standsOut: s.stands_out });
+    }
+  }
+}
+
+// A drift counts until another model is in force.
+async function readDrifts(told, signal) {
+  const events = await newestEvents({ count: 1000, signal });
+  const settled = new Set();
+  for (const { robot_id: id, kind, detail } of events) {
+    if (settled.has(id)) continue;
+    if (kind === 'model_adopted' || kind === 'model_activated') settled.add(id);
+    if (!driftKinds.includes(kind)) continue;
+    settled.add(id);
+    told.set(id, {
+      ...told.get(id),
+      drift: changeOf[kind](detail),
+      driftUs: detail.since_utime_us ?? detail.utime_us,
+    });
+  }
+}
+
+// Map from robot to {ratio, standsOut, drift, driftUs}; empty until it is read.
+export function useFleetGap(ids) {
+  const [told, setTold] = useState(new Map());
+  const key = ids.length > mostRobots ? '' : ids.join('\n');
+  useEffect(() => {
+    if (key === '') return undefined;
+    const abort = new AbortController();
+    const read = async () => {
+      const next = new Map();
+      await readRatios(key.split('\n'), next, abort.signal);
+      await readDrifts(next, abort.signal);
+      setTold(next);
+    };
+    const quietly = () => read().catch(() => {}); // the live view says when the service is gone
+    const first = setTimeout(quietly, 300); // after the first view is drawn
+    const timer = setInterval(quietly, renewMs);
+    return () => {
+      abort.abort();
+      clearTimeout(first);
+      clearInterval(timer);
+    };
+  }, [key]);
+  return told;
+}

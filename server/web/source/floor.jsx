@@ -1,0 +1,265 @@
+// Paths on the floor, to scale, on a canvas.
+import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
+import { palette, useTheme } from './theme.js';
+import { scaleFor } from './colour.js';
+import { digits } from './format.js';
+
+// Where the floor lies on the canvas.
+function fit(points, width, height, margin = 28, leastM = 2) {
+  let [x0, x1, y0, y1] = [Infinity, -Infinity, Infinity, -Infinity];
+  for (const [x, y] of points) {
+    if (!Number.isFinite(x) || !Number.isFinite(y)) continue;
+    x0 = Math.min(x0, x);
+    x1 = Math.max(x1, x);
+    y0 = Math.min(y0, y);
+    y1 = Math.max(y1, y);
+  }
+  if (x0 > x1) [x0, x1, y0, y1] = [-leastM, leastM, -leastM, leastM];
+  const scale = Math.min(
+    (width - 2 * margin) / Math.max(x1 - x0, leastM),
+    (height - 2 * margin) / Math.max(y1 - y0, leastM),
+  );
+  const cx = (x0 + x1) / 2;
+  const cy = (y0 + y1) / 2;
+  return viewOf(scale, cx, cy, width, height);
+}
+
+export function viewOf(scale, cx, cy, width, height) {
+  return {
+    scale,
+    width,
+    height,
+    to: (x, y) => [width / 2 + (x - cx) * scale, height / 2 - (y - cy) * scale],
+    from: (px, py) => [cx + (px - width / 2) / scale, cy - (py - height / 2) / scale],
+  };
+}
+
+function niceLength(metre) {
+  const power = 10 ** Math.floor(Math.log10(metre));
+  return [5, 2, 1].map((k) => k * power).find((k) => k <= metre) ?? power;
+}
+
+export function drawGrid(c, view) {
+  const p = palette();
+  const step = niceLength(90 / view.scale);
+  const [left, top] = view.from(0, 0);
+  const [right, bottom] = view.from(view.width, view.height);
+  c.strokeStyle = p.graticule;
+  c.lineWidth = 1;
+  c.beginPath();
+  for (let x = Math.ceil(left / step) * step; x <= right; x += step) {
+    const px = Math.round(view.to(x, 0)[0]) + 0.5;
+    c.moveTo(px, 0);
+    c.lineTo(px, view.height);
+  }
+  for (let y = Math.ceil(bottom / step) * step; y <= top; y += step) {
+    const py = Math.round(view.to(0, y)[1]) + 0.5;
+    c.moveTo(0, py);
+    c.lineTo(view.width, py);
+  }
+  c.stroke();
+}
+
+export function drawScaleBar(c, view) {
+  const p = palette();
+  const metre = niceLength(120 / view.scale);
+  const long = metre * view.scale;
+  const x = 14.5;
+  const y = view.height - 14.5;
+  c.strokeStyle = c.fillStyle = p.ink;
+  c.lineWidth = 1.5;
+  c.beginPath();
+  c.moveTo(x, y - 5);
+  c.lineTo(x, y);
+  c.lineTo(x + long, y);
+  c.lineTo(x + long, y - 5);
+  c.stroke();
+  c.font = '12px "Liberation Sans", "Helvetica Neue", Arial, sans-serif';
+  c.textAlign = 'left';
+  c.textBaseline = 'alphabetic';
+  c.fillText(`${digits(metre, 1)} m`, x + long + 6, y);
+}
+
+export function drawRobot(c, view, x, y, heading, colour) {
+  const [px, py] = view.to(x, y);
+  c.save();
+  c.translate(px, py);
+  c.rotate(-heading);
+  c.fillStyle = colour;
+  c.strokeStyle = palette().screen;
+  c.lineWidth = 2;
+  c.beginPath();
+  c.moveTo(11, 0);
+  c.lineTo(-7, 7);
+  c.lineTo(-3.5, 0);
+  c.lineTo(-7, -7);
+  c.closePath();
+  c.stroke();
+  c.fill();
+  c.restore();
+}
+
+// Gives `draw(context, width, height)` a canvas that fills its box at the screen's density.
+export function Canvas({ draw, height, label, changes, ...more }) {
+  const canvas = useRef(null);
+  const latest = useRef(draw);
+  const dark = useTheme();
+  latest.current = draw;
+  const paint = () => {
+    const at = canvas.current;
+    const density = devicePixelRatio || 1;
+    const width = at?.clientWidth ?? 0;
+    if (width === 0) return;
+    if (at.width !== Math.round(width * density) || at.height !== Math.round(height * density)) {
+      at.width = Math.round(width * density);
+      at.height = Math.round(height * density);
+    }
+    const c = at.getContext('2d');
+    c.setTransform(density, 0, 0, density, 0, 0);
+    c.clearRect(0, 0, width, height);
+    latest.current(c, width, height);
+  };
+  useLayoutEffect(() => {
+    const observer = new ResizeObserver(paint);
+    observer.observe(canvas.current);
+    return () => observer.disconnect();
+  }, [height]);
+  useEffect(paint, [dark, ...changes]);
+  return (
+    <canvas
+      class="floor"
+      role="img"
+      aria-label={label}
+      ref={canvas}
+      style={{ height: `${height}px` }}
+      {...more}
+    />
+  );
+}
+
+function drawEnds(c, view, points) {
+  const p = palette();
+  const first = points[0];
+  const last = points[points.length - 1];
+  c.lineWidth = 2;
+  c.strokeStyle = p.ink;
+  c.fillStyle = p.screen;
+  const [sx, sy] = view.to(first[0], first[1]);
+  c.beginPath();
+  c.arc(sx, sy, 5, 0, 7);
+  c.fill();
+  c.stroke();
+  const [ex, ey] = view.to(last[0], last[1]);
+  c.fillStyle = p.ink;
+  c.fillRect(ex - 4.5, ey - 4.5, 9, 9);
+}
+
+function drawUnder(c, view, points) {
+  c.strokeStyle = palette().muted;
+  c.lineWidth = 1.25;
+  c.setLineDash([5, 4]);
+  c.beginPath();
+  points.forEach(([x, y], k) => c[k === 0 ? 'moveTo' : 'lineTo'](...view.to(x, y)));
+  c.stroke();
+  c.setLineDash([]);
+}
+
+// `points`: rows [x m, y m, value]. `cursor`: index of the row to mark, or null. `under`: a path drawn dashed
+// below it.
+export function FloorPath({
+  points,
+  kind = 'power',
+  height = 380,
+  label,
+  cursor = null,
+  robot = null,
+  legend = true,
+  ends = true,
+  under = null,
+}) {
+  const shown = points.filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y));
+  const dark = useTheme();
+  const scale = scaleFor(
+    kind,
+    shown.map((row) => row[2]),
+  );
+  const draw = (c, width, tall) => {
+    const view = fit([...shown, ...(robot ? [robot] : []), ...(under ?? [])], width, tall, 34);
+    drawGrid(c, view);
+    if (under !== null) drawUnder(c, view, under);
+    c.lineWidth = 3.2;
+    c.lineCap = 'round';
+    c.lineJoin = 'round';
+    let colour = null;
+    for (let k = 1; k < shown.length; ++k) {
+      // stretches of one colour are one stroke
+      const value = shown[k][2];
+      const own = Number.isFinite(value) ? scale.colourOf(value) : palette().line;
+      if (own !== colour) {
+        if (colour !== null) c.stroke();
+        c.strokeStyle = colour = own;
+        c.beginPath();
+        c.moveTo(...view.to(shown[k - 1][0], shown[k - 1][1]));
+      }
+      c.lineTo(...view.to(shown[k][0], shown[k][1]));
+    }
+    if (colour !== null) c.stroke();
+    if (shown.length > 1 && ends) drawEnds(c, view, shown);
+    if (robot) drawRobot(c, view, robot[0], robot[1], robot[2] ?? 0, palette().ink);
+    const at = cursor === null ? null : points[cursor];
+    if (at && Number.isFinite(at[0])) {
+      const [px, py] = view.to(at[0], at[1]);
+      c.strokeStyle = palette().ink;
+      c.lineWidth = 1;
+      c.beginPath();
+      c.moveTo(px, 0);
+      c.lineTo(px, tall);
+      c.moveTo(0, py);
+      c.lineTo(width, py);
+      c.stroke();
+      c.fillStyle = palette().accent;
+      c.beginPath();
+      c.arc(px, py, 6, 0, 7);
+      c.fill();
+      c.stroke();
+    }
+    drawScaleBar(c, view);
+  };
+  return (
+    <div class="floor-box">
+      <Canvas draw={draw} height={height} label={label} changes={[points, kind, cursor, robot, under]} />
+      {legend && shown.some((row) => row[2] > 0 || kind === 'gap') && (
+        <Legend scale={scale} dark={dark} title={kind === 'gap' ? 'measured − modelled' : 'power'} />
+      )}
+    </div>
+  );
+}
+
+function Legend({ scale, title, unit = 'W' }) {
+  const middle = (scale.low + scale.high) / 2;
+  const draw = (c, width, height) => {
+    const step = width / scale.colours.length;
+    scale.colours.forEach((colour, k) => {
+      c.fillStyle = colour;
+      c.fillRect(k * step, 0, step + 1, height);
+    });
+  };
+  return (
+    <div class="legend">
+      <span class="legend-title">{title}</span>
+      <span class="number">{digits(scale.low, 2)}</span>
+      <Canvas
+        draw={draw}
+        height={10}
+        label={`Colours from ${scale.low} to ${scale.high} ${unit}`}
+        changes={[scale.low, scale.high, title]}
+      />
+      <span class="number">
+        {digits(scale.high, 2)}
+        {'\u00a0'}
+        {unit}
+      </span>
+      {title !== 'power' && <span class="note">neutral at {digits(middle, 1)}</span>}
+    </div>
+  );
+}

@@ -1,0 +1,89 @@
+// How a robot's telemetry and charge are said, in the fleet and on its own page.
+import * as format from './format.js';
+import { Quantity } from './widgets.jsx';
+
+export const lowCharge = 0.25;
+
+// Normal operation, not faults: robots and the service are restarted, and stand between missions.
+const ordinary = ['restart', 'gap', 'outside_mission', 'reused_mission_id'];
+
+// No telemetry came from it since the service started.
+export const unheard = (state) => state.silent_s === null;
+
+// The value while the robot is live: what it last sent says nothing about a robot that is silent now.
+export const now = (state, value) => (state.live ? value : null);
+
+// A time, as short as today allows.
+export function since(utimeUs) {
+  const at = new Date(utimeUs / 1000);
+  return Date.now() - at < 86_400e3
+    ? format.clock(utimeUs).slice(0, 5)
+    : at.toLocaleDateString('en', { day: 'numeric', month: 'short' });
+}
+
+function telemetryOf(state) {
+  if (!state.has_model) return { level: 'bad', text: 'no model' };
+  if (state.live) return { level: 'good', text: 'live' };
+  if (unheard(state)) return { level: 'none', text: 'no telemetry yet' };
+  return { level: 'bad', text: `silent since ${since(state.heardUs)}` };
+}
+
+export function Health({ state }) {
+  const { level, text } = telemetryOf(state);
+  const faults = Object.entries(state.faults).filter(([reason]) => !ordinary.includes(reason));
+  const count = faults.reduce((sum, [, n]) => sum + n, 0);
+  const listed = faults.map(([reason, n]) => `${format.fixed(n)} ${format.words(reason)}`).join(', ');
+  return (
+    <>
+      <span class="telemetry">
+        <span class={`lamp ${level}`} aria-hidden="true" />
+        {text}
+      </span>
+      {count > 0 && (
+        <span class="below fault" title={`Rejected or repaired samples: ${listed}`}>
+          {listed}
+        </span>
+      )}
+    </>
+  );
+}
+
+// A charger's effect, or how sure the charge is: {text, what}.
+export function chargeNote({ charging, charge, state_of_charge_sd: sd }) {
+  const leftS = charge?.time_to_charged_s;
+  const left = format.known(leftS) ? `, ${format.about(leftS)}` : '';
+  if (charging?.phase === 'full') return { text: 'charged', what: 'At its charger, which has ended' };
+  if (charging) return { text: `charging${left}`, what: `At its charger${left}` };
+  return { text: format.known(sd) ? `± ${format.text(format.percent(sd))}` : '', what: 'standard deviation' };
+}
+
+export function Charge({ state }) {
+  const share = state.state_of_charge;
+  if (share === null) return <span class="note">unknown</span>;
+  const { text, what } = chargeNote(state);
+  return (
+    <>
+      <span
+        class={`charge-bar ${state.charging ? 'charging' : share < lowCharge ? 'low' : ''}`}
+        aria-hidden="true"
+      >
+        <span style={{ width: `${Math.max(2, share * 100)}%` }} />
+      </span>
+      <Quantity of={format.percent(share)} />
+      <span class="below" title={what}>
+        {text}
+      </span>
+    </>
+  );
+}
+
+// The central 90 % of a forecast, written by `as(low, high)`; nothing where there is no forecast.
+export function between(band, as) {
+  if (!format.known(band?.p05) || !format.known(band.p95)) return '';
+  return (
+    <span title="90 % of the forecast lies between">
+      <span class="hidden">90 % between </span>
+      {as(band.p05, band.p95)}
+    </span>
+  );
+}

@@ -1,0 +1,142 @@
+import { render } from 'preact';
+import { useEffect, useRef, useState } from 'preact/hooks';
+import './style.css';
+import { clock } from './format.js';
+import { toggleEnergyUnit, useEnergyUnit } from './energy.js';
+import { startLive, useLive } from './live.js';
+import { toggleTheme, useTheme } from './theme.js';
+import { routeOf } from './route.js';
+import { Empty, Guard } from './widgets.jsx';
+import { Fleet } from './views/fleet.jsx';
+import { later } from './views/later.jsx';
+
+const views = {
+  fleet: Fleet,
+  robots: later('Robot'),
+  missions: later('Missions'),
+  mission: later('Mission'),
+  plan: later('Plan'),
+  gap: later('Gap'),
+  audit: later('Audit'),
+  help: later('Help'),
+};
+
+function Link() {
+  const live = useLive();
+  const name = { live: 'Live', connecting: 'Connecting', offline: 'Offline' }[live.link];
+  return (
+    <span class={`link ${live.link}`} role="status">
+      <span class="lamp" aria-hidden="true" />
+      {name}
+    </span>
+  );
+}
+
+function OfflineBanner() {
+  const live = useLive();
+  const [late, setLate] = useState(false);
+  useEffect(() => {
+    setLate(false);
+    if (live.link !== 'offline') return undefined;
+    const timer = setTimeout(() => setLate(true), 1500); // the stream reconnects by itself
+    return () => clearTimeout(timer);
+  }, [live.link]);
+  if (!late) return null;
+  const since = clock(live.sinceMs * 1000);
+  return (
+    <div class="banner" role="alert">
+      No connection to the service since {since}. What is shown is as of then; trying again.
+    </div>
+  );
+}
+
+function App() {
+  const [route, setRoute] = useState(routeOf(location.hash));
+  const main = useRef(null);
+  const first = useRef(true);
+  const dark = useTheme();
+  const unit = useEnergyUnit();
+  useEffect(() => {
+    const change = () => setRoute(routeOf(location.hash));
+    addEventListener('hashchange', change);
+    return () => removeEventListener('hashchange', change);
+  }, []);
+  useEffect(() => {
+    if (first.current) first.current = false;
+    else {
+      scrollTo(0, 0);
+      main.current.focus({ preventScroll: true });
+    }
+  }, [route.view, route.id]);
+  const View = views[route.view];
+  const here = { robots: 'fleet', mission: 'missions' }[route.view] ?? route.view;
+  const tab = (view, name) => (
+    <a href={`#/${view}`} aria-current={here === view ? 'page' : undefined}>
+      {name}
+    </a>
+  );
+  const skip = (event) => {
+    event.preventDefault();
+    main.current.focus();
+  };
+  return (
+    <>
+      <a class="skip" href="#main" onClick={skip}>
+        Skip to content
+      </a>
+      <header class="top">
+        <a class="mark" href="#/fleet" aria-label="joulecast, fleet">
+          <svg viewBox="0 0 32 20" width="38" height="24" aria-hidden="true">
+            <path d="M1 14h6l4-12 6 17 4-10 2 5h8" />
+          </svg>
+          joulecast
+        </a>
+        <nav aria-label="Views">
+          {tab('fleet', 'Fleet')}
+          {tab('missions', 'Missions')}
+          {tab('plan', 'Plan')}
+          {tab('gap', 'Gap')}
+          {tab('audit', 'Log')}
+          {tab('help', 'Help')}
+        </nav>
+        <Link />
+        <button
+          type="button"
+          class="unit-choice"
+          onClick={toggleEnergyUnit}
+          aria-label={`Energy in ${unit === 'Wh' ? 'watt hours; show joules' : 'joules; show watt hours'}`}
+          title={unit === 'Wh' ? 'Show energy in joules' : 'Show energy in watt hours'}
+        >
+          {unit}
+        </button>
+        <button
+          type="button"
+          class="theme"
+          onClick={toggleTheme}
+          aria-label={dark ? 'Light theme' : 'Dark theme'}
+          title={dark ? 'Light theme' : 'Dark theme'}
+        >
+          <svg viewBox="0 0 20 20" width="18" height="18" aria-hidden="true">
+            <circle cx="10" cy="10" r="7.5" class="ring" />
+            <path d="M10 2.5a7.5 7.5 0 0 1 0 15z" />
+          </svg>
+        </button>
+      </header>
+      <OfflineBanner />
+      <main id="main" tabindex="-1" ref={main}>
+        <Guard view={location.hash}>
+          {View ? (
+            <View key={`${route.view}/${route.id ?? ''}`} id={route.id} given={route.given} />
+          ) : (
+            <Empty title="There is no such page">
+              Go to the <a href="#/fleet">fleet</a>.
+            </Empty>
+          )}
+        </Guard>
+      </main>
+    </>
+  );
+}
+
+startLive();
+render(<App />, document.getElementById('app'));

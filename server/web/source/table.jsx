@@ -1,0 +1,104 @@
+// Tables of records. On a narrow screen each row becomes a card, with the column's title beside each value.
+
+export const names = new Intl.Collator('en', { numeric: true });
+
+function compare(a, b) {
+  const missing = (a === null || a === undefined) - (b === null || b === undefined);
+  if (missing !== 0 || a === null || a === undefined) return missing;
+  return typeof a === 'string' ? names.compare(a, b) : a - b;
+}
+
+// A copy of `rows` in the order of the column `sort.key`; what has no value comes last in both directions.
+export function sorted(rows, columns, sort) {
+  const value = columns.find((c) => c.key === sort?.key)?.sort;
+  if (value === undefined) return rows;
+  const direction = sort.down ? -1 : 1;
+  const absent = (v) => v === null || v === undefined;
+  return [...rows].sort((one, other) => {
+    const [a, b] = [value(one), value(other)];
+    return absent(a) || absent(b) ? compare(a, b) : direction * compare(a, b);
+  });
+}
+
+export const turned = (sort, key, downFirst = false) => ({
+  key,
+  down: sort?.key === key ? !sort.down : downFirst,
+});
+
+function Title({ column, sort, onSort }) {
+  if (!onSort || !column.sort) return column.title;
+  return (
+    <button type="button" onClick={() => onSort(column.key)}>
+      {column.title}
+      <span class="arrow" aria-hidden="true">
+        {column.key === sort?.key ? (sort.down ? '▾' : '▴') : ''}
+      </span>
+    </button>
+  );
+}
+
+export function Head({ columns, sort, onSort }) {
+  const direction = (c) => (c.key !== sort?.key ? undefined : sort.down ? 'descending' : 'ascending');
+  return (
+    <thead>
+      <tr>
+        {columns.map((c) => (
+          <th key={c.key} scope="col" class={c.class} title={c.hint} aria-sort={direction(c)}>
+            <Title column={c} sort={sort} onSort={onSort} />
+          </th>
+        ))}
+      </tr>
+    </thead>
+  );
+}
+
+// The order of a table whose titles a narrow screen does not show.
+export function SortChoice({ columns, sort, onSort }) {
+  const sortable = columns.filter((c) => c.sort);
+  return (
+    <span class="sort-choice">
+      <label>
+        <span>Sort by</span>
+        <select value={sort?.key ?? ''} onChange={(event) => onSort(event.currentTarget.value)}>
+          {sort ? null : <option value="">as listed</option>}
+          {sortable.map((c) => (
+            <option key={c.key} value={c.key}>
+              {c.title}
+            </option>
+          ))}
+        </select>
+      </label>
+      {sort && (
+        <button type="button" onClick={() => onSort(sort.key)}>
+          {sort.down ? 'Descending' : 'Ascending'}
+        </button>
+      )}
+    </span>
+  );
+}
+
+// columns: {key, title, cell(row), class, head: the row's name, hint, sort(row) where it can be sorted by}
+export function Table({ columns, rows, keyOf, sort, onSort, class: name = '', rowClass }) {
+  return (
+    <table class={`grid cards ${name}`}>
+      <Head columns={columns} sort={sort} onSort={onSort} />
+      <tbody>
+        {rows.map((row, k) => (
+          <tr key={keyOf ? keyOf(row) : k} class={rowClass?.(row)}>
+            {columns.map((c) =>
+              c.head ? (
+                <th key={c.key} scope="row" class={c.class}>
+                  {c.cell(row)}
+                </th>
+              ) : (
+                <td key={c.key} class={c.class} data-title={c.title}>
+                  {c.cell(row)}
+                </td>
+              ),
+            )}
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}

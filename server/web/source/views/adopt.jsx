@@ -1,0 +1,141 @@
+// Adopting what a diagnosis found: a choice among confounded effects, a back-test, and one question before it
+// is done.
+import { useState } from 'preact/hooks';
+import { idPath, post, useGet } from '../api.js';
+import { ConfirmButton } from '../confirm.jsx';
+import * as format from '../format.js';
+import { robotLink } from '../route.js';
+import { Failure } from '../widgets.jsx';
+import { BackTest } from './back_test.jsx';
+import { Changes, changesOf } from './changes.jsx';
+import { effectName } from './jobs.jsx';
+
+// One of several effects that the data do not distinguish.
+function ChooseEffect({ of, value, onChange }) {
+  const ids = [of.id, ...of.instead.filter((e) => Object.keys(e.parameters).length > 0).map((e) => e.id)];
+  return (
+    <label class="field">
+      <span>Adopt which of these</span>
+      <select value={value} onChange={(e) => onChange(e.currentTarget.value)}>
+        <option value="">choose one</option>
+        {ids.map((id) => (
+          <option key={id} value={id}>
+            {effectName(id)}
+          </option>
+        ))}
+      </select>
+    </label>
+  );
+}
+
+// What is adopted: the diagnosed model, or with a choice among effects the parameters of those chosen.
+function changesFor(job, robot, chosen) {
+  if (chosen.length === 0) return changesOf(job.model, robot?.model);
+  const all = job.result.adoption.effects.flatMap((e) => [e, ...e.instead]);
+  return chosen
+    .map((id) => all.find((e) => e.id === id))
+    .flatMap((e) =>
+      Object.entries(e?.parameters ?? {}).map(([name, value]) => [`effects.${e.id}.${name}`, value]),
+    )
+    .map(([key, value]) => ({ key, from: null, to: format.digits(value, 4) }));
+}
+
+function useAdoption(job, effect) {
+  const [state, setState] = useState({ test: null, error: null, busy: '', adopted: null });
+  const ask = async (busy, more) => {
+    setState((before) => ({ ...before, busy, error: null }));
+    const body = { diagnosis_id: job.id, ...(effect.length > 0 && { effect }), ...more };
+    try {
+      const answer = await post(`/v1/robots/${idPath(job.robot_id)}/model`, body);
+      const version = answer.adopted ? answer.model_version : null;
+      setState((before) => ({
+        test: answer.back_test,
+        error: null,
+        busy: '',
+        adopted: version ?? before.adopted,
+      }));
+    } catch (error) {
+      setState((before) => ({ ...before, test: error.told?.back_test ?? before.test, error, busy: '' }));
+    }
+  };
+  return [state, ask];
+}
+
+function Messages({ job, state, refusal, refused }) {
+  const { adopted, test, error } = state;
+  return (
+    <>
+      {adopted !== null && (
+        <p class="adopted" role="status">
+          Version {adopted} is in force for <a href={robotLink(job.robot_id)}>{job.robot_id}</a>: planning and
+          autonomy use it now, the meter from the next mission on.
+        </p>
+      )}
+      {refusal && (
+        <p class="failure">
+          <b>Not recommended:</b> {refusal}.
+        </p>
+      )}
+      {test && <BackTest test={test} />}
+      {refused && (
+        <p class="failure" role="alert">
+          <b>Not adopted:</b> it does not improve the model on these missions.
+        </p>
+      )}
+      {error && !refused && <Failure error={error} />}
+    </>
+  );
+}
+
+export function Adopt({ job }) {
+  const offer = job.result.adoption;
+  const groups = offer?.effects.filter((e) => e.instead.length > 0) ?? [];
+  const refusal = offer && !offer.choice_settles ? offer.refusal : null;
+  const [chosen, setChosen] = useState({});
+  const effect = groups.map((g) => chosen[g.id] ?? '');
+  const robot = useGet(`/v1/robots/${idPath(job.robot_id)}`);
+  const [state, ask] = useAdoption(job, effect);
+  const refused = state.error?.status === 409 && state.error.told?.back_test !== undefined;
+  const hold = state.busy !== '' || effect.includes('');
+  const confirm = (label, name, more) => (
+    <ConfirmButton
+      label={state.busy === 'adopt' ? 'Testing and adopting …' : label}
+      action={label}
+      class={name}
+      title={`Change the model of ${job.robot_id}?`}
+      disabled={hold}
+      onConfirm={() => ask('adopt', more)}
+    >
+      <p>
+        A new version replaces version {robot.value?.model_version},{' '}
+        {more.force
+          ? 'whatever the back-test says'
+          : 'if the back-test on other missions shows an improvement'}
+        . Every earlier version can be put in force again.
+      </p>
+      <Changes of={changesFor(job, robot.value, effect)} />
+    </ConfirmButton>
+  );
+  return (
+    <>
+      <Messages job={job} state={state} refusal={refusal} refused={refused} />
+      {state.adopted === null && (
+        <div class="tools adopt">
+          {groups.map((g) => (
+            <ChooseEffect
+              key={g.id}
+              of={g}
+              value={chosen[g.id] ?? ''}
+              onChange={(id) => setChosen({ ...chosen, [g.id]: id })}
+            />
+          ))}
+          <button type="button" disabled={hold} onClick={() => ask('test', { dry_run: true })}>
+            {state.busy === 'test' ? 'Testing …' : 'Test on other missions'}
+          </button>
+          {!refusal && confirm('Adopt', 'primary', {})}
+          {(refused || refusal) && confirm('Adopt anyway', '', { force: true })}
+        </div>
+      )}
+    </>
+  );
+}

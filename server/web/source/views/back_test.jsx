@@ -1,0 +1,100 @@
+// A model compared with measured energy of missions that it was not fitted on.
+import { energyIn, energyScale } from '../energy.js';
+import * as format from '../format.js';
+import { missionLink } from '../route.js';
+import { Table } from '../table.jsx';
+import { Quantity } from '../widgets.jsx';
+import { rangeOf, share } from './jobs.jsx';
+
+function ErrorBar({ error, most, kind }) {
+  const width = `${Math.max(0.5, (100 * Math.abs(error.relative)) / most)}%`;
+  return (
+    <svg width="100%" height="12" aria-hidden="true">
+      <rect height="8" y="2" width={width} class={`account ${kind}`} />
+    </svg>
+  );
+}
+
+function TestTable({ missions }) {
+  const errors = missions.flatMap((m) => [Math.abs(m.before.relative), Math.abs(m.after.relative)]);
+  const most = Math.max(0.01, ...errors);
+  const scale = energyScale(missions.map((m) => m.measured_j));
+  const error = (key, title) => ({
+    key,
+    title,
+    class: 'figure',
+    cell: (m) => (
+      <span title={`95 % interval ${rangeOf(m[key].ci)}`}>{format.signed(share(m[key].relative))}</span>
+    ),
+  });
+  const bar = (key, kind) => ({
+    key: `${key}-bar`,
+    title: '',
+    class: 'wide bar-cell',
+    cell: (m) => <ErrorBar error={m[key]} most={most} kind={kind} />,
+  });
+  const columns = [
+    {
+      key: 'mission',
+      title: 'Mission',
+      head: true,
+      cell: (m) => (
+        <>
+          <a href={missionLink(m.id)}>{m.mission_id}</a>
+          {m.basis === 'motors' && <span class="note"> at the motors</span>}
+        </>
+      ),
+    },
+    {
+      key: 'measured',
+      title: 'Measured',
+      class: 'figure',
+      cell: (m) => <Quantity of={energyIn(scale, m.measured_j)} />,
+    },
+    error('before', 'Error before'),
+    bar('before', 'plain'),
+    error('after', 'Error after'),
+    bar('after', 'modelled'),
+  ];
+  return <Table class="test" columns={columns} rows={missions} keyOf={(m) => m.id} />;
+}
+
+const reasons = {
+  fitted_on: 'used for the fit',
+  open: 'still running',
+  no_telemetry: 'without telemetry',
+  beyond_limits: 'beyond the limits',
+};
+
+export function BackTest({ test }) {
+  if (test.missions.length === 0)
+    return (
+      <p>
+        There is no mission to test it on: none with stored telemetry and measured energy that was not used
+        for the fit.
+      </p>
+    );
+  const left = Object.entries(reasons)
+    .filter(([key]) => test.left_out[key] > 0)
+    .map(([key, why]) => `${test.left_out[key]} ${why}`)
+    .join(', ');
+  const falls = test.error_after < test.error_before;
+  return (
+    <>
+      <div class={`verdict-box ${test.improves ? 'makes' : 'fails'}`}>
+        <p class="verdict">
+          On {test.missions.length} missions that were not used for the fit, the energy error{' '}
+          {falls ? 'falls' : 'goes'} from <b>{share(test.error_before, 2)}</b> to{' '}
+          <b>{share(test.error_after, 2)}</b>.
+        </p>
+        <p class="note">
+          Improvement {rangeOf(test.improvement_ci, 2)} (95 % interval); power gap{' '}
+          {share(test.power_gap_before, 2)} to {share(test.power_gap_after, 2)}, falls by{' '}
+          {rangeOf(test.power_gap_fall_ci, 2)}; compared with model version {test.tested_against}.
+          {left && ` Left out: ${left}.`}
+        </p>
+      </div>
+      <TestTable missions={test.missions} />
+    </>
+  );
+}

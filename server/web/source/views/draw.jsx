@@ -1,0 +1,144 @@
+import { useRef, useState } from 'preact/hooks';
+import { Canvas, drawGrid, drawRobot, drawScaleBar, viewOf } from '../floor.jsx';
+import { palette } from '../theme.js';
+import { digits } from '../format.js';
+
+const snapM = 0.25;
+const reachPx = 12;
+const snapped = (v) => Math.round(v / snapM) * snapM;
+
+// A path drawn point by point. Pointer: press adds, drag moves. Keys: arrows move the cross, Enter adds
+// there, Backspace takes the last away.
+export function DrawPath({ points, change, height = 400 }) {
+  const [acrossM, setAcross] = useState(16);
+  const [cross, setCross] = useState(null);
+  const held = useRef(null);
+  const view = useRef(null);
+  const at = (event) => {
+    const box = event.currentTarget.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  };
+  const near = ([px, py]) =>
+    points.findIndex(([x, y]) => {
+      const [qx, qy] = view.current.to(x, y);
+      return Math.hypot(px - qx, py - qy) < reachPx;
+    });
+  const floorAt = (p) => view.current.from(...p).map(snapped);
+  const add = (point) => {
+    const last = points[points.length - 1];
+    if (!last || last[0] !== point[0] || last[1] !== point[1]) change([...points, point]);
+  };
+  const down = (event) => {
+    const p = at(event);
+    const hit = near(p);
+    event.currentTarget.setPointerCapture(event.pointerId);
+    if (hit >= 0) held.current = hit;
+    else {
+      add(floorAt(p));
+      held.current = points.length;
+    }
+  };
+  const move = (event) => {
+    if (held.current === null) return;
+    const point = floorAt(at(event));
+    const here = points[held.current];
+    if (here && (here[0] !== point[0] || here[1] !== point[1]))
+      change(points.map((old, k) => (k === held.current ? point : old)));
+  };
+  const up = () => {
+    held.current = null;
+  };
+  const key = (event) => {
+    const step = event.shiftKey ? 4 * snapM : snapM;
+    const way = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, step], ArrowDown: [0, -step] }[
+      event.key
+    ];
+    const from = cross ?? points[points.length - 1] ?? [0, 0];
+    if (way) setCross([from[0] + way[0], from[1] + way[1]]);
+    else if (event.key === 'Enter') add(from);
+    else if (event.key === 'Backspace' || event.key === 'Delete') change(points.slice(0, -1));
+    else return;
+    event.preventDefault();
+  };
+  const draw = (c, width, tall) => {
+    const v = (view.current = viewOf(width / acrossM, 0, 0, width, tall));
+    const p = palette();
+    drawGrid(c, v);
+    c.strokeStyle = c.fillStyle = p.accent;
+    c.lineWidth = 3;
+    c.lineJoin = 'round';
+    c.beginPath();
+    points.forEach(([x, y], k) => c[k === 0 ? 'moveTo' : 'lineTo'](...v.to(x, y)));
+    c.stroke();
+    points.forEach(([x, y], k) => {
+      c.beginPath();
+      c.arc(...v.to(x, y), 5, 0, 7);
+      c.fillStyle = k === points.length - 1 ? p.accent : p.screen;
+      c.fill();
+      c.stroke();
+    });
+    if (points.length > 0)
+      drawRobot(
+        c,
+        v,
+        points[0][0],
+        points[0][1],
+        points.length > 1 ? Math.atan2(points[1][1] - points[0][1], points[1][0] - points[0][0]) : 0,
+        p.ink,
+      );
+    if (cross) {
+      const [x, y] = v.to(...cross);
+      c.strokeStyle = p.ink;
+      c.lineWidth = 1;
+      c.beginPath();
+      c.moveTo(x - 12, y);
+      c.lineTo(x + 12, y);
+      c.moveTo(x, y - 12);
+      c.lineTo(x, y + 12);
+      c.stroke();
+    }
+    drawScaleBar(c, v);
+  };
+  return (
+    <div class="draw">
+      <Canvas
+        draw={draw}
+        height={height}
+        changes={[points, acrossM, cross]}
+        role="application"
+        tabindex="0"
+        label={`Drawing of the path, ${points.length} points. Arrow keys move the cross, Enter adds a point, Backspace removes the last.${cross ? ` Cross at ${digits(cross[0], 3)}, ${digits(cross[1], 3)} metres.` : ''}`}
+        onPointerDown={down}
+        onPointerMove={move}
+        onPointerUp={up}
+        onPointerCancel={up}
+        onKeyDown={key}
+      />
+      <div class="tools">
+        <button type="button" onClick={() => change(points.slice(0, -1))} disabled={points.length === 0}>
+          Undo point
+        </button>
+        <button type="button" onClick={() => change([])} disabled={points.length === 0}>
+          Clear
+        </button>
+        <button
+          type="button"
+          onClick={() => setAcross(acrossM / 2)}
+          disabled={acrossM <= 4}
+          aria-label="Closer"
+        >
+          +
+        </button>
+        <button
+          type="button"
+          onClick={() => setAcross(acrossM * 2)}
+          disabled={acrossM >= 256}
+          aria-label="Wider"
+        >
+          −
+        </button>
+        <span class="note">Press to add, drag to move; snaps to {snapM} m. Corners are turned in place.</span>
+      </div>
+    </div>
+  );
+}

@@ -1,0 +1,355 @@
+import { Component } from 'preact';
+import { useEffect, useRef, useState } from 'preact/hooks';
+import { energy, energyIn, energyScale } from '../energy.js';
+import { useFleetGap } from '../fleet_gap.js';
+import * as format from '../format.js';
+import { Charge, Health, between, lowCharge, now, unheard } from '../health.jsx';
+import { useLive } from '../live.js';
+import { keepInAddress, missionLink, robotLink } from '../route.js';
+import { Sparkline } from '../sparkline.jsx';
+import { Head, SortChoice, names, sorted, turned } from '../table.jsx';
+import { useTheme } from '../theme.js';
+import {
+  Choice,
+  Empty,
+  Failure,
+  Loading,
+  Quantity,
+  Ratio,
+  Readout,
+  useNarrow,
+  useTitleOf,
+} from '../widgets.jsx';
+
+const rowPx = 50;
+const cardPx = 152; // with the space below it, as in the style sheet
+const spareRows = 8;
+const reorderMs = 3000;
+
+const powerNow = (state) => now(state, state.measured_power_w ?? state.modelled_power_w);
+const telemetryOrder = (s) => (s.live ? 0 : unheard(s) ? Infinity : 1 + s.silent_s);
+
+const columns = [
+  { key: 'robot', title: 'Robot', sort: (r) => r.id, class: 'robot' },
+  { key: 'health', title: 'Telemetry', sort: (r) => telemetryOrder(r.state), class: 'health' },
+  { key: 'power', title: 'Power', sort: (r) => powerNow(r.state), class: 'figure power' },
+  { key: 'trace', title: 'Last 90 s', class: 'spark' },
+  { key: 'charge', title: 'Charge', sort: (r) => r.state.state_of_charge, class: 'charge' },
+  { key: 'range', title: 'Range', sort: (r) => r.state.range_m, class: 'figure range' },
+  { key: 'time', title: 'Run time', sort: (r) => r.state.run_time_s, class: 'figure wide time' },
+  { key: 'speed', title: 'Speed', sort: (r) => now(r.state, r.state.speed_m_s), class: 'figure wide speed' },
+  {
+    key: 'ratio',
+    title: 'Ratio',
+    sort: (r) => r.gap?.ratio,
+    class: 'figure ratio-cell',
+    hint: 'measured energy over modelled energy, median of the newest missions',
+  },
+  { key: 'mission', title: 'Mission', sort: (r) => r.state.mission?.start_utime_us, class: 'mission' },
+  { key: 'spent', title: 'Energy', sort: (r) => r.state.mission?.energy.battery_j, class: 'figure spent' },
+];
+
+const filters = {
+  all: ['All', () => true],
+  live: ['Live', (s) => s.live],
+  silent: ['Silent', (s) => !s.live],
+  mission: ['On a mission', (s) => s.mission !== null],
+  charging: ['Charging', (s) => s.charging !== null],
+  low: ['Low charge', (s) => s.state_of_charge !== null && s.state_of_charge < lowCharge],
+};
+
+// Missions that are named after their robot need not repeat it in its row.
+const ownPart = (missionId, robotId) =>
+  missionId.startsWith(`${robotId}-`) ? missionId.slice(robotId.length + 1) : missionId;
+
+function GapBadges({ gap }) {
+  if (gap === undefined) return <span class="note">–</span>;
+  return (
+    <>
+      <Ratio value={gap.ratio ?? null} />
+      <span class="below">
+        {format.known(gap.drift) && (
+          <span class="flag" title={`Consumption changed on ${format.time(gap.driftUs)}`}>
+            drift {format.signed(format.text(format.percent(gap.drift, 1)))}
+          </span>
+        )}
+        {gap.standsOut && (
+          <span class="flag" title="Differs from the other robots of its kind">
+            stands out
+          </span>
+        )}
+      </span>
+    </>
+  );
+}
+
+class Row extends Component {
+  shouldComponentUpdate(next) {
+    return ['revision', 'entry', 'index', 'dark', 'gap', 'unit'].some((key) => next[key] !== this.props[key]);
+  }
+  render({ entry, index, revision, dark, gap, scale }) {
+    const s = entry.state;
+    const modelledOnly = s.live && s.measured_power_w === null && s.modelled_power_w !== null;
+    return (
+      <tr aria-rowindex={index + 2} class={s.live ? '' : 'quiet'}>
+        <th scope="row" class="robot">
+          <a href={robotLink(entry.id)}>{entry.id}</a>
+        </th>
+        <td class="health">
+          <Health state={s} />
+        </td>
+        <td class="figure power">
+          <Quantity of={format.power(powerNow(s))} />
+          {modelledOnly && <span class="below">modelled</span>}
+        </td>
+        <td class="spark">
+          <Sparkline track={entry.power} revision={revision} dark={dark} />
+        </td>
+        <td class="charge">
+          <Charge state={s} />
+        </td>
+        <td class="figure range">
+          <Quantity of={format.kilometres(s.range_m)} />
+          <span class="below">{between(s.range_quantiles_m, format.lengthBand)}</span>
+        </td>
+        <td class="figure wide time">{format.about(s.run_time_s)}</td>
+        <td class="figure wide speed">
+          <Quantity of={format.unit(now(s, s.speed_m_s), 'm/s', 2)} />
+        </td>
+        <td class="figure ratio-cell">
+          <GapBadges gap={gap} />
+        </td>
+        <td class="mission">
+          {s.mission ? (
+            <a href={missionLink(s.mission.id)} title={s.mission.mission_id}>
+              {ownPart(s.mission.mission_id, entry.id)}
+            </a>
+          ) : (
+            <span class="note">{s.live ? 'idle' : '–'}</span>
+          )}
+        </td>
+        <td class="figure spent">
+          <Quantity of={energyIn(scale, s.mission?.energy.battery_j)} />
+        </td>
+      </tr>
+    );
+  }
+}
+
+function chosen(robots, text, keep) {
+  const wanted = text.trim().toLowerCase();
+  const named = ({ id, state }) =>
+    wanted === '' ||
+    id.toLowerCase().includes(wanted) ||
+    (state.mission?.mission_id ?? '').toLowerCase().includes(wanted);
+  return [...robots.values()].filter((entry) => keep(entry.state) && named(entry));
+}
+
+// The rows in their order. Live values change all the time; their order is renewed only every few seconds, so
+// that rows can be read.
+function useOrder(live, text, only, sort, gaps) {
+  const kept = useRef({ key: '', at: -Infinity, rows: [] });
+  const key = [text, only, sort.key, sort.down, live.robots.size, live.loads, gaps.size].join('|');
+  const at = performance.now();
+  if (kept.current.key !== key || at - kept.current.at > reorderMs) {
+    const keep = only === 'heard' ? (s) => !unheard(s) : filters[only][1];
+    const rows = chosen(live.robots, text, keep)
+      .sort((a, b) => names.compare(a.id, b.id))
+      .map((entry) => ({ id: entry.id, state: entry.state, gap: gaps.get(entry.id), entry }));
+    const ordered = sorted(rows, columns, sort);
+    // Robots without telemetry come last in every order.
+    const heard = (wanted) => ordered.filter((r) => unheard(r.state) !== wanted);
+    kept.current = { key, at, rows: [...heard(true), ...heard(false)].map((r) => r.entry) };
+  }
+  return kept.current.rows;
+}
+
+// The rows that the window shows, of a table that scrolls with the page.
+function useWindow(count, heightPx) {
+  const body = useRef(null);
+  const [range, setRange] = useState([0, 40]);
+  useEffect(() => {
+    const look = () => {
+      if (body.current === null) return;
+      const top = body.current.getBoundingClientRect().top;
+      const first = Math.max(0, Math.floor(-top / heightPx) - spareRows);
+      const last = Math.min(count, Math.ceil((innerHeight - top) / heightPx) + spareRows);
+      setRange((before) => (before[0] === first && before[1] === last ? before : [first, last]));
+    };
+    look();
+    addEventListener('scroll', look, { passive: true });
+    addEventListener('resize', look);
+    return () => {
+      removeEventListener('scroll', look);
+      removeEventListener('resize', look);
+    };
+  }, [count, heightPx]);
+  return [body, Math.min(range[0], count), Math.min(Math.max(range[1], 0), count)];
+}
+
+function totalsOf(robots) {
+  const t = { power: null, live: 0, running: 0, spent: null, lowest: null, charging: 0, charged: 0 };
+  for (const { state: s } of robots.values()) {
+    const drawn = s.measured_power_w ?? s.modelled_power_w;
+    if (s.live) {
+      t.live += 1;
+      if (s.charging !== null) {
+        t.charging += 1;
+        t.charged -= Math.min(0, s.measured_power_w ?? 0);
+      } else if (drawn !== null) t.power = (t.power ?? 0) + drawn;
+    }
+    if (s.mission !== null) {
+      t.running += 1;
+      t.spent = (t.spent ?? 0) + s.mission.energy.battery_j;
+    }
+    if (s.state_of_charge !== null && !(t.lowest?.state_of_charge <= s.state_of_charge)) t.lowest = s;
+  }
+  return t;
+}
+
+function Summary({ robots }) {
+  const t = totalsOf(robots);
+  const lowest = t.lowest && <a href={robotLink(t.lowest.robot_id)}>{t.lowest.robot_id}</a>;
+  return (
+    <dl class="readouts">
+      <Readout large label="Fleet power" of={format.power(t.power)} channel="measured" />
+      <Readout large label="Live" of={`${t.live}`} note={`of ${robots.size}`} />
+      <Readout large label="On a mission" of={`${t.running}`} />
+      <Readout large label="Energy of running missions" of={energy(t.spent)} />
+      {t.charging > 0 && (
+        <Readout
+          large
+          label="Charging"
+          of={`${t.charging}`}
+          note={`at ${format.text(format.power(t.charged))}`}
+        />
+      )}
+      <Readout large label="Lowest charge" of={format.percent(t.lowest?.state_of_charge)} note={lowest} />
+    </dl>
+  );
+}
+
+function Spacer({ rows, heightPx }) {
+  if (rows <= 0) return null;
+  return (
+    <tr aria-hidden="true" class="spacer">
+      <td colspan={columns.length} style={{ height: `${rows * heightPx}px` }} />
+    </tr>
+  );
+}
+
+function RobotTable({ live, shown, sort, onSort, gaps }) {
+  const dark = useTheme();
+  const heightPx = useNarrow() ? cardPx : rowPx;
+  const [body, first, last] = useWindow(shown.length, heightPx);
+  const scale = energyScale([...live.robots.values()].map(({ state }) => state.mission?.energy.battery_j));
+  return (
+    <table class="grid fleet" aria-rowcount={shown.length + 1}>
+      <Head columns={columns} sort={sort} onSort={onSort} />
+      <tbody ref={body}>
+        <Spacer key="above" rows={first} heightPx={heightPx} />
+        {shown.slice(first, last).map((entry, k) => (
+          <Row
+            key={entry.id}
+            entry={entry}
+            revision={entry.revision}
+            index={first + k}
+            dark={dark}
+            gap={gaps.get(entry.id)}
+            scale={scale}
+            unit={`${scale.u}${scale.places}`}
+          />
+        ))}
+        <Spacer key="below" rows={shown.length - last} heightPx={heightPx} />
+      </tbody>
+    </table>
+  );
+}
+
+// What the address says of the view, as it is kept there.
+function useChoices(given) {
+  const [choices, setChoices] = useState({
+    text: given.find ?? '',
+    only: given.show in filters ? given.show : 'all',
+    sort: { key: columns.some((c) => c.key === given.sort) ? given.sort : 'robot', down: given.down === '1' },
+  });
+  const choose = (part) => {
+    const next = { ...choices, ...part };
+    setChoices(next);
+    keepInAddress({
+      find: next.text,
+      show: next.only === 'all' ? '' : next.only,
+      sort: next.sort.key === 'robot' ? '' : next.sort.key,
+      down: next.sort.down ? 1 : '',
+    });
+  };
+  return [choices, choose];
+}
+
+function QuietFold({ count, whole, onToggle }) {
+  return (
+    <p class="fold">
+      <button type="button" class="plain" aria-expanded={String(whole)} onClick={onToggle}>
+        {whole ? 'Hide' : 'Show'} {count} {count === 1 ? 'robot' : 'robots'} without telemetry since the
+        service started
+      </button>
+    </p>
+  );
+}
+
+export function Fleet({ given }) {
+  useTitleOf('Fleet');
+  const live = useLive();
+  const [{ text, only, sort }, choose] = useChoices(given);
+  const [whole, setWhole] = useState(false);
+  const modelled = [...live.robots.values()].filter((entry) => entry.state.has_model);
+  const gaps = useFleetGap(modelled.map((entry) => entry.id).sort());
+  const quiet = [...live.robots.values()].filter((entry) => unheard(entry.state)).length;
+  const foldable = only === 'all' && text === '' && quiet > 0 && quiet < live.robots.size;
+  const rows = useOrder(live, text, foldable && !whole ? 'heard' : only, sort, gaps);
+  if (!live.loaded && live.robots.size === 0)
+    return live.error !== null ? <Failure error={live.error} /> : <Loading what="the fleet" />;
+  if (live.robots.size === 0)
+    return (
+      <>
+        <h1>Fleet</h1>
+        <Empty title="No robot yet">
+          A robot appears here when its telemetry arrives over LCM or its robot file is sent to{' '}
+          <code>PUT /v1/robots/…</code>.
+        </Empty>
+      </>
+    );
+  const onSort = (key) => choose({ sort: turned(sort, key) });
+  return (
+    <>
+      <h1 class="hidden">Fleet</h1>
+      <Summary robots={live.robots} />
+      <div class="tools">
+        <label class="find">
+          <span class="hidden">Find a robot or mission</span>
+          <input
+            type="search"
+            placeholder="Find a robot or mission"
+            value={text}
+            onInput={(e) => choose({ text: e.currentTarget.value })}
+          />
+        </label>
+        <Choice
+          label="Show"
+          value={only}
+          onChange={(value) => choose({ only: value })}
+          options={Object.entries(filters).map(([key, [name]]) => [key, name])}
+        />
+        <SortChoice columns={columns} sort={sort} onSort={onSort} />
+        <span class="key">
+          <span class="swatch measured" />
+          measured <span class="swatch modelled" />
+          modelled
+        </span>
+      </div>
+      <RobotTable live={live} shown={rows} sort={sort} onSort={onSort} gaps={gaps} />
+      {rows.length === 0 && <Empty title="No robot matches" />}
+      {foldable && <QuietFold count={quiet} whole={whole} onToggle={() => setWhole(!whole)} />}
+    </>
+  );
+}

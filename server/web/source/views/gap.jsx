@@ -1,0 +1,223 @@
+// Diagnoses of the gap: start one, follow it, list them.
+import { useEffect, useState } from 'preact/hooks';
+import { del, post, query, useGet } from '../api.js';
+import * as format from '../format.js';
+import { useLive } from '../live.js';
+import { robotLink } from '../route.js';
+import { Answer, Empty, Failure, Panel, useOptions, useTitleOf } from '../widgets.jsx';
+import { Result } from './diagnosis.jsx';
+import { JobRows, State, stateNotes } from './jobs.jsx';
+
+const ended = (d) => d.state !== 'queued' && d.state !== 'running';
+
+// Follows a job that waits or runs; `onEnd` when it has ended.
+function useProgress(job, onEnd) {
+  const [progress, setProgress] = useState(null);
+  const id = job && !ended(job) ? job.id : null;
+  useEffect(() => {
+    if (id === null) return undefined;
+    const source = new EventSource(`/v1/diagnoses/${id}/events`);
+    source.addEventListener('progress', (event) => setProgress(JSON.parse(event.data)));
+    source.addEventListener('ended', () => {
+      source.close();
+      onEnd();
+    });
+    return () => source.close();
+  }, [id]);
+  return progress !== null && progress.id === id ? progress : job;
+}
+
+function Progress({ job, onEnd }) {
+  const now = useProgress(job, onEnd);
+  const [error, setError] = useState(null);
+  const part = Math.round(100 * now.progress);
+  const words =
+    now.state === 'queued' ? (now.ahead > 0 ? `${now.ahead} before it` : 'about to start') : `${part} %`;
+  return (
+    <div class="progress">
+      <label for="progress">
+        Diagnosis {job.id} of {job.robot_id}: {stateNotes[now.state]}, {words}
+      </label>
+      <progress id="progress" max="100" value={now.state === 'queued' ? undefined : part} />
+      <button type="button" onClick={() => del(`/v1/diagnoses/${job.id}`).catch(setError)}>
+        Cancel
+      </button>
+      {error && <Failure error={error} />}
+    </div>
+  );
+}
+
+function Start({ given, onStart }) {
+  const live = useLive();
+  const robots = [...live.robots.values()]
+    .filter((r) => r.state.has_model)
+    .map((r) => r.id)
+    .sort();
+  const [robot, setRobot] = useState(given.robot ?? '');
+  const [missions, setMissions] = useState('50');
+  const [busy, setBusy] = useState(false);
+  const [error, setError] = useState(null);
+  const newest = useGet('/v1/missions?state=finished&limit=200');
+  const lately = new Set(newest.value?.missions.map((m) => m.robot_id));
+  const driven = robots.filter((id) => lately.has(id));
+  const others = robots.filter((id) => !lately.has(id));
+  const ofDriven = useOptions(driven);
+  const ofOthers = useOptions(others);
+  const chosen = robot || (newest.loading ? '' : (driven[0] ?? robots[0] ?? ''));
+  const past = useGet(chosen && `/v1/mission-totals${query({ robot_id: chosen, state: 'finished' })}`);
+  const count = chosen && past.value !== null && !past.loading ? past.value.missions : null;
+  const start = async (event) => {
+    event.preventDefault();
+    setBusy(true);
+    setError(null);
+    try {
+      const job = await post('/v1/diagnoses', { robot_id: chosen, max_missions: Number(missions) });
+      onStart(job);
+    } catch (problem) {
+      setError(problem);
+    }
+    setBusy(false);
+  };
+  if (live.loaded && robots.length === 0)
+    return (
+      <Empty title="No robot has a model yet">
+        The gap is measured minus modelled energy: send a robot file to <code>PUT /v1/robots/…</code>.
+      </Empty>
+    );
+  return (
+    <form class="filters" onSubmit={start}>
+      <label class="field">
+        <span>Robot</span>
+        <select value={chosen} onChange={(e) => setRobot(e.currentTarget.value)}>
+          {[
+            [driven, ofDriven, 'Recent missions'],
+            [others, ofOthers, 'Others'],
+          ].map(
+            ([ids, options, name]) =>
+              ids.length > 0 && (
+                <optgroup key={name} label={name}>
+                  {options}
+                </optgroup>
+              ),
+          )}
+        </select>
+      </label>
+      <label class="field">
+        <span>Missions, newest</span>
+        <input
+          class="short"
+          type="number"
+          min="1"
+          max="1000"
+          required
+          value={missions}
+          onInput={(e) => setMissions(e.currentTarget.value)}
+        />
+      </label>
+      <button type="submit" class="primary" disabled={busy || !count}>
+        Diagnose
+      </button>
+      <p class="note" role="status">
+        {count === 0 ? (
+          <>{chosen} has no finished mission yet: there is nothing to diagnose.</>
+        ) : (
+          <>
+            {count !== null && `${format.fixed(count)} finished ${count === 1 ? 'mission' : 'missions'}. `}
+            Every fourth is held back to test the result.
+          </>
+        )}
+      </p>
+      {error && <Failure error={error} />}
+    </form>
+  );
+}
+
+function All({ given }) {
+  useTitleOf('Gap');
+  const jobs = useGet(`/v1/diagnoses${query({ robot_id: given.robot, limit: 50 })}`);
+  const running =
+    jobs.value?.diagnoses.find((d) => d.state === 'running') ??
+    jobs.value?.diagnoses.findLast?.((d) => d.state === 'queued');
+  return (
+    <>
+      <div class="heading">
+        <h1>Gap between robot and model</h1>
+      </div>
+      <Start
+        given={given}
+        onStart={(job) => {
+          location.hash = `#/gap/${job.id}`;
+        }}
+      />
+      {running && <Progress key={running.id} job={running} onEnd={jobs.reload} />}
+      <Panel
+        title={given.robot ? `Diagnoses of ${given.robot}` : 'Diagnoses'}
+        aside={given.robot && <a href="#/gap">All robots</a>}
+      >
+        <Answer of={jobs} what="diagnoses">
+          {(list) =>
+            list.diagnoses.length === 0 ? (
+              <Empty title="No diagnosis yet">
+                A diagnosis says where measured power departs from the model, and which effect the model
+                leaves out.
+              </Empty>
+            ) : (
+              <JobRows jobs={list.diagnoses} />
+            )
+          }
+        </Answer>
+      </Panel>
+    </>
+  );
+}
+
+function One({ id }) {
+  useTitleOf(`Diagnosis ${id}`);
+  const job = useGet(`/v1/diagnoses/${encodeURIComponent(id)}`);
+  if (job.value === null && [400, 404].includes(job.error?.status))
+    return (
+      <Empty title={`There is no diagnosis ${id}`}>
+        See <a href="#/gap">all diagnoses</a>.
+      </Empty>
+    );
+  return (
+    <Answer of={job} what="the diagnosis">
+      {(d) => (
+        <>
+          <div class="heading">
+            <p class="crumbs">
+              <a href="#/gap">Gap</a>
+            </p>
+            <h1>Diagnosis {d.id}</h1>
+            <span>
+              <a href={robotLink(d.robot_id)}>{d.robot_id}</a>
+            </span>{' '}
+            <State of={d} />
+            <span class="note">
+              {format.time(d.created_utime_us)}
+              {d.model_version !== null && ` · model version ${d.model_version}`}
+            </span>
+            <span class="spring" />
+            {d.state === 'done' && (
+              <a class="button" href={`/v1/diagnoses/${d.id}/report`} target="_blank" rel="noopener">
+                Whole report
+              </a>
+            )}
+          </div>
+          {!ended(d) && <Progress key={d.id} job={d} onEnd={job.reload} />}
+          {d.error && (
+            <div class="failure" role="alert">
+              <p class="empty-title">{stateNotes[d.state]}</p>
+              <p>{d.error}</p>
+            </div>
+          )}
+          {d.result && <Result job={d} />}
+        </>
+      )}
+    </Answer>
+  );
+}
+
+export function Gap({ id, given }) {
+  return id ? <One id={id} /> : <All given={given} />;
+}

@@ -1,0 +1,52 @@
+// What the page's words mean: the text of deploy/documents/glossary.md.
+import glossary from '../../../../deploy/documents/glossary.md';
+import { useTitleOf } from '../widgets.jsx';
+
+const entries = [...glossary.matchAll(/^- \*\*(.+?)\*\*: (.+(?:\n {2}.+)*)$/gm)].map(([, term, text]) => ({
+  term,
+  text: text.replaceAll(/\s+/g, ' ').replaceAll('`', ''),
+}));
+
+const views = [
+  ['#/fleet', 'Fleet', 'every robot now: power, charge, range, and how well its model fits'],
+  ['#/missions', 'Missions', 'what each mission cost, where its energy went, and a cheaper way to drive it'],
+  ['#/plan', 'Plan', 'energy and time of a drive before it is driven, and whether the charge suffices'],
+  ['#/gap', 'Gap', 'diagnoses: why measured energy departs from the model, and what to change'],
+  ['#/audit', 'Log', 'what happened to robots and their models'],
+];
+
+export function Help() {
+  useTitleOf('Help');
+  return (
+    <>
+      <div class="heading">
+        <h1>Help</h1>
+      </div>
+      <dl class="glossary short">
+        {views.map(([to, name, text]) => (
+          <div key={to}>
+            <dt>
+              <a href={to}>{name}</a>
+            </dt>
+            <dd>{text}</dd>
+          </div>
+        ))}
+      </dl>
+      <h2>Keys</h2>
+      <p>
+        Every control is reached with Tab. In the charts of a mission the arrow keys move the cursor (with
+        Shift in larger steps), + zooms in and − zooms out. In the drawing of a path the arrow keys move the
+        cross, Enter adds a point and Backspace removes the last.
+      </p>
+      <h2 id="glossary">Glossary</h2>
+      <dl class="glossary">
+        {entries.map(({ term, text }) => (
+          <div key={term}>
+            <dt>{term}</dt>
+            <dd>{text}</dd>
+          </div>
+        ))}
+      </dl>
+    </>
+  );
+}

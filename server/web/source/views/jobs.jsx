@@ -1,0 +1,79 @@
+// Lists of diagnoses, and how their states, verdicts and effects are said.
+import * as format from '../format.js';
+import { robotLink } from '../route.js';
+import { Table } from '../table.jsx';
+
+export const stateNotes = {
+  queued: 'waiting',
+  running: 'running',
+  done: 'done',
+  failed: 'failed',
+  cancelled: 'cancelled',
+  interrupted: 'interrupted by a restart',
+};
+export const share = (value, places = 1) => format.text(format.percent(value, places));
+export const rangeOf = (ci, places = 1) =>
+  ci && format.known(ci[0]) ? `${share(ci[0], places)} to ${share(ci[1], places)}` : '–';
+export const effectName = (id) =>
+  id.startsWith('covariate:') ? `covariate ${format.words(id.slice(10))}` : format.words(id);
+
+export const verdicts = {
+  none: ['No gap', 'Measured and modelled energy agree, as far as these missions can show.'],
+  effects: ['Effects found', 'The model leaves out the effects that are listed here.'],
+  outside: ['Outside the catalogue', 'There is a cause that no known effect describes.'],
+  not_this_robot: ['Not this robot', 'The robot file does not describe this robot as it ran here.'],
+  inconclusive: ['Inconclusive', 'These missions do not decide what causes the gap.'],
+};
+
+export function State({ of }) {
+  return <span class={`job job-${of.state}`}>{stateNotes[of.state]}</span>;
+}
+
+function foundWords(summary) {
+  if (!summary) return '–';
+  const verdict = (verdicts[summary.verdict]?.[0] ?? summary.verdict).toLowerCase();
+  const effects = summary.effects.map((e) => effectName(e.id)).join(', ');
+  if (effects === '') return verdict;
+  return summary.verdict === 'effects' ? effects : `${verdict}; most likely ${effects}`;
+}
+
+const columns = [
+  {
+    key: 'id',
+    title: 'Diagnosis',
+    head: true,
+    cell: (d) => (
+      <>
+        <a href={`#/gap/${d.id}`}>{d.id}</a>
+        {d.cause === 'watch' && <span class="note"> after a drift</span>}
+      </>
+    ),
+  },
+  { key: 'robot', title: 'Robot', cell: (d) => <a href={robotLink(d.robot_id)}>{d.robot_id}</a> },
+  { key: 'started', title: 'Started', class: 'when', cell: (d) => format.time(d.created_utime_us) },
+  { key: 'state', title: 'State', cell: (d) => <State of={d} /> },
+  {
+    key: 'found',
+    title: 'Result',
+    class: 'words',
+    cell: (d) => (d.error ? <span class="note">{d.error}</span> : foundWords(d.summary)),
+  },
+  {
+    key: 'gap',
+    title: 'Gap in power',
+    class: 'figure',
+    cell: (d) => share(d.summary?.gap.power_absolute_relative),
+  },
+  {
+    key: 'held-out',
+    title: 'Held-out error',
+    class: 'figure',
+    cell: (d) => share(d.summary?.effects.length > 0 ? d.summary.shrinkage.held_out_after : null),
+  },
+  { key: 'missions', title: 'Missions', class: 'figure', cell: (d) => d.fitted_on.length || '–' },
+];
+const ownColumns = columns.filter((c) => !['robot', 'held-out', 'missions'].includes(c.key));
+
+export function JobRows({ jobs, withRobot = true }) {
+  return <Table class="jobs" columns={withRobot ? columns : ownColumns} rows={jobs} keyOf={(d) => d.id} />;
+}

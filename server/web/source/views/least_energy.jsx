@@ -1,0 +1,110 @@
+// A mission beside the drive of the same legs with the least energy.
+import { useEffect, useMemo, useState } from 'preact/hooks';
+import { idPath, post, useGet } from '../api.js';
+import { Bars } from '../bars.jsx';
+import { energyIn, energyScale } from '../energy.js';
+import * as format from '../format.js';
+import { drivenRuns, leastDriveRequest, payloadsOf } from '../least_drive.js';
+import { Empty, Failure, Loading } from '../widgets.jsx';
+
+function carriedNote(mission, payloads) {
+  const kg = (value) => format.text(format.unit(value, 'kg'));
+  if (payloads === null)
+    return `with the declared payload of ${kg(mission.payload_kg ?? 0)} all the way, whatever was loaded on the way`;
+  const [low, high] = [Math.min(...payloads), Math.max(...payloads)];
+  return low === high
+    ? `payload ${kg(low)}`
+    : `payload as the robot reported it on the way, ${kg(low)} to ${kg(high)}`;
+}
+
+// What the service computes for the mission's legs: {value, error, request, payloads}.
+function useLeastDrive(mission, driven) {
+  const [answer, setAnswer] = useState({ value: null, error: null });
+  useEffect(() => {
+    if (driven === null) return undefined;
+    const abort = new AbortController();
+    payloadsOf(mission, driven.runs, abort.signal)
+      .then(async (payloads) => {
+        const request = leastDriveRequest(mission, driven, payloads);
+        const value = await post(`/v1/robots/${idPath(mission.robot_id)}/profile`, request, abort.signal);
+        setAnswer({ value, error: null, request, payloads });
+      })
+      .catch((error) => error.name === 'AbortError' || setAnswer({ value: null, error }));
+    return () => abort.abort();
+  }, [driven]);
+  return answer;
+}
+
+function Saving({ share }) {
+  if (share > 0.005)
+    return (
+      <>
+        The same legs could have been driven for <b>{format.text(format.percent(share, 1))}</b> less.
+      </>
+    );
+  return share > -0.005
+    ? 'Driven about as cheaply as the model allows.'
+    : 'Driven for less than these legs cost from stop to stop: the robot turned while it drove.';
+}
+
+function Footnote({ mission, request, payloads, version }) {
+  const sum = (key) => request.path.reduce((total, leg) => total + Math.abs(leg[key] ?? 0), 0);
+  const legs = request.path.filter((leg) => leg.kind === 'straight').length;
+  const stoodS = sum('duration_s');
+  return (
+    <p class="note foot">
+      {legs} {legs === 1 ? 'leg' : 'legs'} between stops,{' '}
+      {format.text(format.length(mission.energy.distance_m))} in all,{' '}
+      {format.fixed(format.degrees(sum('angle_rad')))}° turned at the stops,
+      {stoodS > 0 ? ` ${format.span(stoodS)} at rest as in the mission,` : ''}{' '}
+      {carriedNote(mission, payloads)}, arriving no later. Model version {version}; the saving is against the
+      modelled energy, so that a gap of the model does not count as one.
+    </p>
+  );
+}
+
+export function LeastEnergy({ mission, trace }) {
+  const robot = useGet(`/v1/robots/${idPath(mission.robot_id)}`);
+  const idlePowerW = robot.value?.model.idle_power_w;
+  const driven = useMemo(
+    () => (idlePowerW === undefined ? null : drivenRuns(mission, trace, idlePowerW)),
+    [mission.id, mission.state, idlePowerW],
+  );
+  const answer = useLeastDrive(mission, driven);
+  const error = robot.value === null ? robot.error : answer.error;
+  if (error !== null) return <Failure error={error} />;
+  if (robot.value !== null && driven === null)
+    return <Empty title="Nothing to compare">The robot did not drive, or in too many short runs.</Empty>;
+  if (answer.value === null) return <Loading what="the minimum-energy drive" />;
+  const e = mission.energy;
+  const least = answer.value;
+  const scale = energyScale([e.measured_j, e.modelled_j, least.energy_j], 4);
+  const row = (name, value, channel, durationS) => ({
+    name,
+    value,
+    of: energyIn(scale, value),
+    channel,
+    note: format.span(durationS),
+  });
+  return (
+    <>
+      <p class="verdict">
+        <Saving share={1 - least.energy_j / e.modelled_j} />
+      </p>
+      <Bars
+        label="Energy of the mission and of the minimum-energy drive"
+        rows={[
+          row('Measured', e.measured_j, 'measured', e.duration_s),
+          row('Modelled', e.modelled_j, 'modelled', e.duration_s),
+          row('Least energy', least.energy_j, 'least', least.duration_s),
+        ]}
+      />
+      <Footnote
+        mission={mission}
+        request={answer.request}
+        payloads={answer.payloads}
+        version={least.model_version}
+      />
+    </>
+  );
+}

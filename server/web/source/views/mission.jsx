@@ -1,0 +1,155 @@
+import { useEffect } from 'preact/hooks';
+import { idPath, query, useGet } from '../api.js';
+import { loadCharts } from '../chart.jsx';
+import { chargeShare, consumption, energy } from '../energy.js';
+import * as format from '../format.js';
+import { useModels } from '../models.js';
+import { robotLink } from '../route.js';
+import { Waterfall } from '../waterfall.jsx';
+import { Answer, Empty, MissionState, Panel, Readout, useTitleOf } from '../widgets.jsx';
+import { LeastEnergy } from './least_energy.jsx';
+import { ratioOf } from './mission_rows.jsx';
+import { Conditions, Facts, Findings } from './record.jsx';
+import { TracePanels } from './trace.jsx';
+
+const tracePoints = 700;
+const finePoints = 6000;
+const renewMs = 3000; // while the mission runs
+
+function Heading({ mission: m }) {
+  const reason = m.incomplete_reason ? `: ${format.words(m.incomplete_reason)}` : '';
+  return (
+    <div class="heading">
+      <p class="crumbs">
+        <a href="#/missions">Missions</a> / <a href={robotLink(m.robot_id)}>{m.robot_id}</a>
+      </p>
+      <h1>{m.mission_id}</h1>
+      <MissionState mission={m} />
+      {m.incomplete && <span class="flag">incomplete{reason}</span>}
+      {m.findings?.payload.verdict === 'undeclared' && <span class="flag">undeclared payload</span>}
+      <span class="note">{format.time(m.start_utime_us)}</span>
+    </div>
+  );
+}
+
+function Figures({ mission: m, model }) {
+  const e = m.energy;
+  const ratio = ratioOf(e);
+  const share = chargeShare(e.charge_ah, model);
+  const unexplained = energy(e.unexplained_j);
+  return (
+    <dl class="readouts">
+      <Readout
+        large
+        label={e.measured_j === null ? 'Battery energy (modelled)' : 'Battery energy'}
+        of={energy(e.battery_j)}
+        channel={e.measured_j === null ? 'modelled' : 'measured'}
+        note={share === null ? '' : `${format.text(format.percent(share, 2))} of charge`}
+      />
+      <Readout large label="Modelled" of={energy(e.modelled_j)} channel="modelled" />
+      <Readout
+        large
+        label="Unexplained"
+        of={{ n: format.signed(unexplained.n), u: unexplained.u }}
+        channel="gap"
+        note={ratio === null ? '' : `ratio ${format.fixed(ratio, 3)}`}
+      />
+      <Readout large label="Distance" of={format.length(e.distance_m)} />
+      <Readout large label="Duration" of={format.span(e.duration_s)} />
+      <Readout
+        large
+        label="Consumption"
+        of={consumption(e.distance_m > 0.1 ? e.battery_j / e.distance_m : null)}
+      />
+      <Readout large label="Declared payload" of={format.unit(m.payload_kg, 'kg')} />
+    </dl>
+  );
+}
+
+function Comparison({ mission: m, trace }) {
+  if (m.model_version === null)
+    return <Empty title="No model">The robot had no model on this mission.</Empty>;
+  if (m.state === 'open') return <Empty title="Still driving">Compared when the mission ends.</Empty>;
+  if (m.gap_s > 0)
+    return (
+      <Empty title="Not compared">For {format.span(m.gap_s)} of the mission there is no telemetry.</Empty>
+    );
+  return trace && <LeastEnergy mission={m} trace={trace} />;
+}
+
+// What the service has of a mission, read again while it runs.
+function useMission(id) {
+  const mission = useGet(`/v1/missions/${idPath(id)}`);
+  const there = mission.value !== null;
+  const part = (name) => (there ? `/v1/missions/${idPath(id)}/${name}` : null);
+  const ledger = useGet(part('ledger'));
+  const conditions = useGet(part('covariates'));
+  const trace = useGet(part(`trace${query({ points: tracePoints })}`));
+  // A long mission's path and stops need more points than a chart does.
+  const merged = trace.value !== null && trace.value.start_utime_us.length >= tracePoints / 2;
+  const finer = useGet(merged ? part(`trace${query({ points: finePoints })}`) : null);
+  const open = mission.value?.state === 'open';
+  useEffect(() => {
+    if (!open) return undefined;
+    const reload = () => [mission, ledger, trace, conditions].forEach((answer) => answer.reload());
+    const timer = setInterval(reload, renewMs);
+    return () => clearInterval(timer);
+  }, [open]);
+  return { mission, ledger, conditions, trace, fine: merged ? finer.value : trace.value };
+}
+
+export function Mission({ id, given }) {
+  useEffect(() => void loadCharts().catch(() => {}), []); // while the mission is read
+  const { mission, ledger, conditions, trace, fine } = useMission(id);
+  const robotId = mission.value?.robot_id;
+  const model = useModels(robotId ? [robotId] : []).get(robotId);
+  useTitleOf(mission.value?.mission_id ?? 'Mission');
+  if (mission.value === null && [400, 404].includes(mission.error?.status))
+    return (
+      <Empty title={`There is no mission ${id}`}>
+        No mission of this history has that number. See <a href="#/missions">all missions</a>.
+      </Empty>
+    );
+  return (
+    <Answer of={mission} what="the mission">
+      {(m) => (
+        <>
+          <Heading mission={m} />
+          <Figures mission={m} model={model} />
+          <Answer of={trace} what="the trace">
+            {(value) => <TracePanels mission={m} whole={value} fine={fine ?? value} given={given} />}
+          </Answer>
+          <div class="columns">
+            <div>
+              <Panel title="Where the energy went">
+                <Answer of={ledger} what="the ledger">
+                  {({ ledger: l }) => (
+                    <Waterfall terms={l.terms_j} total={l.battery_j} closure={l.closure_relative} />
+                  )}
+                </Answer>
+              </Panel>
+              <Panel title="Compared with the minimum-energy drive">
+                <Comparison mission={m} trace={fine} />
+              </Panel>
+            </div>
+            <div>
+              <Panel title="Record">
+                <Facts mission={m} model={model} />
+              </Panel>
+              {m.findings && (
+                <Panel title="Payload by the motion">
+                  <Findings of={m.findings} />
+                </Panel>
+              )}
+              {conditions.value?.covariates.length > 0 && (
+                <Panel title="Conditions">
+                  <Conditions answer={conditions.value} />
+                </Panel>
+              )}
+            </div>
+          </div>
+        </>
+      )}
+    </Answer>
+  );
+}

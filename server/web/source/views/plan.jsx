@@ -1,0 +1,277 @@
+import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
+import { idPath, post } from '../api.js';
+import { consumption, energy } from '../energy.js';
+import {
+  legsFrom,
+  legsText,
+  pathOfPoints,
+  pointsFrom,
+  pointsOfLegs,
+  pointsText,
+  segmentOf,
+} from '../drive_path.js';
+import { FloorPath } from '../floor.jsx';
+import * as format from '../format.js';
+import { useLive } from '../live.js';
+import { keepInAddress } from '../route.js';
+import { Waterfall } from '../waterfall.jsx';
+import { Empty, Failure, Loading, Panel, Readout, useTitleOf } from '../widgets.jsx';
+import { DrawPath } from './draw.jsx';
+import { Front, SpeedChart } from './plan_charts.jsx';
+import { PlanForm } from './plan_form.jsx';
+import { Baselines, Certificate, useBaselines } from './plan_panels.jsx';
+import { PlanVerdict } from './plan_verdict.jsx';
+
+const frontPoints = 24;
+const firstLegs = 'straight:6,turn:90,straight:4';
+const firstPoints = '-5:-2,2:-2,2:2.5,5:2.5';
+
+const number = (text) => (text === '' ? undefined : Number(text));
+
+// What is asked, from the address and back to it.
+function useQuestion(address, robots) {
+  const [given, setGiven] = useState({
+    robot: address.robot ?? '',
+    way: address.points ? 'draw' : 'legs',
+    legs: legsFrom(address.path) ?? legsFrom(firstLegs),
+    points: pointsFrom(address.points) ?? pointsFrom(firstPoints),
+    payload: address.payload ?? '',
+    deadline: address.deadline ?? '',
+    value: address.value ?? '',
+    charge: address.charge ?? '',
+  });
+  const change = (part) => {
+    const next = { ...given, ...part };
+    setGiven(next);
+    const { way, legs, points, ...terms } = next;
+    const path = legsText(legs);
+    keepInAddress({
+      ...terms,
+      path: way === 'legs' && path !== firstLegs ? path : '',
+      points: way === 'draw' ? pointsText(points) : '',
+    });
+  };
+  return [{ ...given, robot: robots.includes(given.robot) ? given.robot : (robots[0] ?? '') }, change];
+}
+
+function requestOf(given) {
+  return {
+    ...(given.way === 'draw' ? pathOfPoints(given.points) : { path: given.legs.map(segmentOf) }),
+    payload_kg: number(given.payload),
+    deadline_s: number(given.deadline),
+    value_of_time_w: number(given.value),
+    pareto_points: frontPoints,
+    baseline_columns: true,
+  };
+}
+
+// The forecast for this very plan: a plan with a deadline is the one that values a second as its certificate
+// says.
+function autonomyRequest(request, answer, charge) {
+  return {
+    state_of_charge: charge === undefined ? undefined : charge / 100,
+    payload_kg: request.payload_kg ?? 0,
+    start_pose: request.start_pose ?? { x_m: 0, y_m: 0, heading_rad: 0 },
+    value_of_time_w: Math.min(1e6, answer.certificate.time_multiplier_w),
+    tasks: [{ name: 'this drive', path: request.path }],
+  };
+}
+
+const noAutonomy = { value: null, error: null, busy: false };
+const noPath = Object.assign(new Error('Draw at least two points.'), { title: 'No path yet' });
+
+// {answer, request, asked, error, busy, autonomy, compute}; `asked` is what the answer is to.
+function usePlan() {
+  const live = useLive();
+  const [plan, setPlan] = useState({ answer: null, error: null, busy: false, autonomy: noAutonomy });
+  const running = useRef(null);
+  useEffect(() => () => running.current?.abort(), []);
+  const compute = async (given) => {
+    if (given.way === 'draw' && given.points.length < 2) {
+      setPlan((before) => ({ ...before, error: noPath }));
+      return;
+    }
+    running.current?.abort();
+    const { signal } = (running.current = new AbortController());
+    const request = requestOf(given);
+    const charge = number(given.charge);
+    const known = charge !== undefined || live.robots.get(given.robot)?.state.state_of_charge !== null;
+    const url = `/v1/robots/${idPath(given.robot)}`;
+    setPlan((before) => ({ ...before, busy: true, error: null }));
+    try {
+      const answer = await post(`${url}/profile`, request, signal);
+      const fresh = { answer, request, asked: given, error: null, busy: false };
+      setPlan({ ...fresh, autonomy: { ...noAutonomy, busy: known } });
+      if (!known) return;
+      const autonomy = await post(`${url}/autonomy`, autonomyRequest(request, answer, charge), signal).then(
+        (value) => ({ ...noAutonomy, value }),
+        (error) => ({ ...noAutonomy, error }),
+      );
+      if (!signal.aborted) setPlan((before) => ({ ...before, autonomy }));
+    } catch (error) {
+      if (error.name !== 'AbortError') setPlan((before) => ({ ...before, error, busy: false }));
+    }
+  };
+  return { ...plan, compute };
+}
+
+function Figures({ answer }) {
+  return (
+    <dl class="readouts">
+      <Readout large label="Least energy" of={energy(answer.energy_j)} channel="accent" />
+      <Readout large label="Duration" of={format.span(answer.duration_s)} />
+      <Readout large label="Distance" of={format.length(answer.distance_m)} />
+      <Readout large label="Top speed" of={format.unit(answer.peak_speed_m_s, 'm/s', 2)} />
+      <Readout
+        large
+        label="Consumption"
+        of={consumption(answer.distance_m > 0 ? answer.energy_j / answer.distance_m : null)}
+      />
+    </dl>
+  );
+}
+
+function FrontPanel({ answer, take }) {
+  return (
+    <Panel class="screen" title="Energy against time">
+      {answer.pareto.length < 2 ? (
+        <Empty title="Nothing to trade">Time and energy do not compete on this path.</Empty>
+      ) : (
+        <Front answer={answer} take={take} />
+      )}
+    </Panel>
+  );
+}
+
+function Result({ plan, path, take }) {
+  const { answer, request } = plan;
+  const baselines = useBaselines(answer, request);
+  const driven = useMemo(
+    () => answer.profile.x_m.map((x, k) => [x, answer.profile.y_m[k], answer.profile.power_w[k]]),
+    [answer],
+  );
+  return (
+    <>
+      <PlanVerdict answer={answer} autonomy={plan.autonomy} />
+      <Figures answer={answer} />
+      <div class="columns">
+        <div>
+          <Panel class="screen" title="Speed and power">
+            <SpeedChart answer={answer} />
+          </Panel>
+          <Panel title="Compared with usual profiles">
+            <Baselines answer={answer} found={baselines} />
+          </Panel>
+          <Panel title="Where the energy goes">
+            <Waterfall terms={answer.ledger_j} total={answer.energy_j} measured={false} />
+          </Panel>
+        </div>
+        <div>
+          <Panel class="screen" title="Path">
+            <FloorPath
+              points={driven}
+              under={path}
+              height={340}
+              label="The planned path, coloured by power; circle: start, square: end"
+            />
+          </Panel>
+          <FrontPanel answer={answer} take={take} />
+          <Panel title="How exact the plan is">
+            <Certificate answer={answer} />
+          </Panel>
+        </div>
+      </div>
+    </>
+  );
+}
+
+function Outdated({ onCompute }) {
+  return (
+    <div class="outdated" role="status">
+      <b>Out of date.</b> The path or the terms have changed since this was computed.{' '}
+      <button type="button" onClick={onCompute}>
+        Compute again
+      </button>
+    </div>
+  );
+}
+
+const floorPath = (given) =>
+  given.way === 'legs' ? pointsOfLegs(given.legs).filter(([x, y]) => Number.isFinite(x + y)) : given.points;
+
+function ResultArea({ plan, given, change }) {
+  const path = useMemo(() => floorPath(given), [given.way, given.legs, given.points]);
+  const outdated = plan.answer !== null && JSON.stringify(plan.asked) !== JSON.stringify(given);
+  const take = ({ duration_s: durationS }) => {
+    const next = { ...given, deadline: String(Math.ceil(durationS * 100) / 100) };
+    change({ deadline: next.deadline });
+    plan.compute(next);
+  };
+  return (
+    <div class="plan-result" aria-live="polite" aria-busy={String(plan.busy)}>
+      {plan.error && <Failure error={plan.error} />}
+      {given.way === 'draw' && (
+        <Panel class="screen" title="Draw the path">
+          <DrawPath points={given.points} change={(points) => change({ points })} />
+        </Panel>
+      )}
+      {plan.answer === null && plan.error === null && <Loading what="the plan" />}
+      {plan.answer !== null && outdated && !plan.busy && <Outdated onCompute={() => plan.compute(given)} />}
+      {plan.answer !== null && (
+        <div class={plan.busy || outdated ? 'stale' : ''}>
+          <Result plan={plan} path={outdated ? path : null} take={take} />
+        </div>
+      )}
+      {given.way === 'legs' && plan.answer === null && path.length > 1 && (
+        <Panel class="screen" title="Path">
+          <FloorPath
+            points={path.map(([x, y]) => [x, y, NaN])}
+            legend={false}
+            label="The path that was entered"
+          />
+        </Panel>
+      )}
+    </div>
+  );
+}
+
+export function Plan({ given: address }) {
+  useTitleOf('Plan');
+  const live = useLive();
+  const robots = [...live.robots.values()]
+    .filter((entry) => entry.state.has_model)
+    .map((entry) => entry.id)
+    .sort();
+  const [given, change] = useQuestion(address, robots);
+  const plan = usePlan();
+  useEffect(() => {
+    if (given.robot !== '') plan.compute(given);
+  }, [given.robot]);
+  if (!live.loaded) return <Loading what="the fleet" />;
+  if (robots.length === 0)
+    return (
+      <>
+        <h1>Plan</h1>
+        <Empty title="No robot has a model">
+          Send a robot file to <code>PUT /v1/robots/…</code> to plan with it.
+        </Empty>
+      </>
+    );
+  const fault = /^\/path\/(\d+)/.exec(plan.error?.field ?? '');
+  return (
+    <>
+      <h1 class="hidden">Plan</h1>
+      <div class="plan">
+        <PlanForm
+          given={given}
+          robots={robots}
+          change={change}
+          busy={plan.busy}
+          fault={fault ? Number(fault[1]) : null}
+          onCompute={() => plan.compute(given)}
+        />
+        <ResultArea plan={plan} given={given} change={change} />
+      </div>
+    </>
+  );
+}

@@ -1,0 +1,126 @@
+// What is said of a plan beside its charts: how exact it is, and what usual profiles cost.
+import { useEffect, useState } from 'preact/hooks';
+import { idPath, useGet } from '../api.js';
+import { Bars } from '../bars.jsx';
+import { withinLimits } from '../baselines.js';
+import { energy, energyIn, energyScale } from '../energy.js';
+import * as format from '../format.js';
+import { Failure } from '../widgets.jsx';
+import { priceOfHaste } from './plan_charts.jsx';
+
+const methods = {
+  closed_form: 'closed formulas',
+  interior_point: 'an interior-point method',
+  mixed: 'closed formulas and an interior-point method',
+};
+
+// Numerical errors, in joules in either unit: their size is what matters.
+const little = (joule) =>
+  Math.abs(joule) < 1e-3 ? 'less than 0.001\u00a0J' : `${format.digits(joule)}\u00a0J`;
+
+const Row = ({ name, children }) => (
+  <tr>
+    <th scope="row">{name}</th>
+    <td>{children}</td>
+  </tr>
+);
+
+export function Certificate({ answer }) {
+  const c = answer.certificate;
+  return (
+    <table class="facts">
+      <tbody>
+        <Row name="Computed by">{methods[c.method] ?? format.words(c.method)}</Row>
+        <Row name="Above the optimum by at most">{little(c.gap_j)}</Row>
+        <Row name="Error of the time steps">{little(c.discretisation_j)}</Row>
+        <Row name="Global optimum">
+          {c.convex ? 'yes: the problem is convex' : 'not proven: the problem is not convex'}
+        </Row>
+        <Row name="In less time">{priceOfHaste({ ...answer, ...c }, c.shortest_time_s)}</Row>
+        <Row name="Shortest time">
+          {format.known(c.shortest_time_s)
+            ? `${format.fixed(c.shortest_time_s, 2)} s, by the robot’s limits`
+            : 'not bounded'}
+        </Row>
+        <Row name="Limits reached">
+          {c.binding.length === 0 ? 'none' : c.binding.map(format.words).join(', ')}
+        </Row>
+        <Row name="Braking">
+          {format.text(energy(answer.braking_j))}, of which {format.text(energy(answer.recovered_j))} is
+          recovered
+        </Row>
+        <Row name="Peak power">{format.text(format.power(answer.peak_power_w))}</Row>
+        <Row name="Model">version {answer.model_version}</Row>
+      </tbody>
+    </table>
+  );
+}
+
+const none = { trapezoid: undefined, triangle: undefined, error: null };
+
+// The usual profiles within the robot's limits; undefined while they are computed, null where there is none.
+export function useBaselines(answer, request) {
+  const [found, setFound] = useState(none);
+  const robotId = answer?.robot_id;
+  const robot = useGet(robotId && `/v1/robots/${idPath(robotId)}`);
+  const limits = robot.value?.robot_id === robotId ? robot.value?.model.limits : undefined;
+  useEffect(() => {
+    setFound(none);
+    if (!answer || !limits) return undefined;
+    const abort = new AbortController();
+    const question = {
+      robotId,
+      limits,
+      payloadKg: request.payload_kg,
+      mayScale: !request.path.some((leg) => leg.kind === 'payload'),
+      signal: abort.signal,
+    };
+    const { trapezoid, triangle } = answer.baselines;
+    Promise.all([withinLimits(trapezoid, question), withinLimits(triangle, question)]).then(
+      ([a, b]) => setFound({ trapezoid: a, triangle: b, error: null }),
+      (error) => error.name !== 'AbortError' && setFound({ ...none, error }),
+    );
+    return () => abort.abort();
+  }, [answer, limits]);
+  return found;
+}
+
+function noteOf(found, plan) {
+  if (found === undefined) return 'computing …';
+  if (found === null) return 'not possible within the limits here';
+  const saved = 1 - plan.energy_j / found.energyJ;
+  const by = format.text(format.percent(Math.abs(saved), 1));
+  const time = `${format.span(found.durationS)}${found.slowed ? ', slowed to keep the limits' : ''}`;
+  return `${time}; ${saved >= 0 ? `the plan saves ${by}` : `costs ${by} less`}`;
+}
+
+export function Baselines({ answer, found }) {
+  if (found.error) return <Failure error={found.error} />;
+  const kinds = [
+    ['Trapezoid', found.trapezoid],
+    ['Triangle', found.triangle],
+  ];
+  const scale = energyScale([answer.energy_j, ...kinds.map(([, b]) => b?.energyJ)], 4);
+  const rows = kinds.map(([name, b]) => ({
+    name,
+    value: b?.energyJ ?? null,
+    of: energyIn(scale, b?.energyJ),
+    channel: 'plain',
+    note: noteOf(b, answer),
+  }));
+  const plan = {
+    name: 'Least energy',
+    value: answer.energy_j,
+    of: energyIn(scale, answer.energy_j),
+    channel: 'least',
+    note: format.span(answer.duration_s),
+  };
+  return (
+    <>
+      <Bars label="Energy of the plan, a trapezoid and a triangle within the limits" rows={[plan, ...rows]} />
+      <p class="note foot">
+        Usual profiles on every run between stops, in the plan’s time where the robot’s limits allow it.
+      </p>
+    </>
+  );
+}

@@ -1,0 +1,116 @@
+// Whether the charge suffices for the plan, and what it then costs.
+import { energy, energyIn, energyScale } from '../energy.js';
+import * as format from '../format.js';
+import { Table } from '../table.jsx';
+import { Failure, Quantity } from '../widgets.jsx';
+
+// A probability, as precisely as it means something.
+function chance(p) {
+  if (p > 0.999) return 'more than 99.9\u00a0%';
+  if (p < 0.001) return 'less than 0.1\u00a0%';
+  return format.text(format.percent(p, p > 0.99 || p < 0.01 ? 1 : 0));
+}
+
+const verdicts = [
+  [0.95, 'The charge suffices', 'makes'],
+  [0.5, 'The charge probably suffices', 'maybe'],
+  [0.05, 'The charge probably does not suffice', 'fails'],
+  [-1, 'The charge does not suffice', 'fails'],
+];
+
+const bases = {
+  recent_missions: ({ missions }) => `its ${missions === 1 ? 'last mission' : `last ${missions} missions`}`,
+  siblings: ({ siblings }) => `missions of ${siblings} ${siblings === 1 ? 'robot' : 'robots'} of its kind`,
+  model: () => 'its model alone: no mission has shown yet how far the model is off',
+};
+
+const percent = (share) => format.text(format.percent(share, 1));
+
+function Arrival({ of: arrival }) {
+  const certain = percent(arrival.p05) === percent(arrival.p95);
+  return (
+    <>
+      {percent(arrival.p50)}
+      {!certain && (
+        <span class="note">
+          {' '}
+          90 %: {percent(arrival.p05)} to {percent(arrival.p95)}
+        </span>
+      )}
+    </>
+  );
+}
+
+function Drives({ drives }) {
+  const scale = energyScale(drives.map((d) => d.expected_energy_j));
+  const columns = [
+    { key: 'name', title: 'Drive', head: true, cell: (d) => d.name },
+    { key: 'chance', title: 'Chance', class: 'figure', cell: (d) => chance(d.success_probability) },
+    {
+      key: 'energy',
+      title: 'Expected energy',
+      class: 'figure',
+      cell: (d) => <Quantity of={energyIn(scale, d.expected_energy_j)} />,
+    },
+    { key: 'time', title: 'Time', class: 'figure', cell: (d) => format.about(d.duration_s) },
+    { key: 'arrival', title: 'Charge on arrival', class: 'figure', cell: (d) => <Arrival of={d.arrival} /> },
+  ];
+  return <Table class="chances" columns={columns} rows={drives} keyOf={(d) => d.name} />;
+}
+
+function Explanation({ answer, autonomy: a, planned }) {
+  const reasons = [
+    `it is a forecast from ${bases[a.consumption.basis](a.consumption)}`,
+    a.driving.pause_s > 0.05 &&
+      `it includes the usual pause of ${format.fixed(a.driving.pause_s, 1)} s at each stop`,
+  ].filter(Boolean);
+  return (
+    <p class="note">
+      Least energy ({format.text(energy(answer.energy_j))}) is the model’s optimum for this path. The expected
+      energy
+      {planned && ` (${format.text(energy(planned.expected_energy_j))})`} is what the robot will probably use:{' '}
+      {reasons.join(', and ')}.
+    </p>
+  );
+}
+
+function drivesOf({ plan: usual, minimum_energy: planned, consumption }) {
+  const who = consumption.missions > 0 ? 'it usually drives' : 'robots usually drive';
+  return [
+    planned && { ...planned, name: 'As planned here', arrival: planned.arrival_charge },
+    { ...usual, name: `As ${who}`, arrival: usual.legs[0].arrival_charge },
+  ].filter(Boolean);
+}
+
+export function PlanVerdict({ answer, autonomy }) {
+  if (autonomy.error !== null) return <Failure error={autonomy.error} />;
+  if (autonomy.value === null)
+    return (
+      <p class="verdict open">
+        {autonomy.busy
+          ? 'Computing whether the charge suffices …'
+          : 'The robot has not reported its charge: enter it to see whether it suffices.'}
+      </p>
+    );
+  const a = autonomy.value;
+  const drives = drivesOf(a);
+  const [first] = drives;
+  const [, words, name] = verdicts.find(([least]) => first.success_probability >= least);
+  const times = first.expected_energy_j > 0 ? Math.floor(a.usable_energy_j / first.expected_energy_j) : 0;
+  const sd = a.state_of_charge_sd > 0.0005 ? ` ± ${percent(a.state_of_charge_sd)}` : '';
+  return (
+    <div class={`verdict-box ${name}`}>
+      <p class="verdict">
+        <b>{words}</b>: {chance(first.success_probability)} chance to finish with its reserve of{' '}
+        {format.text(format.percent(a.reserve_fraction))} left.
+      </p>
+      <Drives drives={drives} />
+      <p class="note">
+        Starts with {percent(a.state_of_charge)}
+        {sd} charge, {format.text(energy(a.usable_energy_j))} usable
+        {times >= 2 ? `: about ${format.fixed(Number(times.toPrecision(2)))} such drives` : ''}.
+      </p>
+      <Explanation answer={answer} autonomy={a} planned={a.minimum_energy} />
+    </div>
+  );
+}

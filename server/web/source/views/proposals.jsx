@@ -1,0 +1,117 @@
+// Models that the service suggests for a robot: what they would change, adoption, and what became of them.
+import { useEffect, useState } from 'preact/hooks';
+import { idPath, post, useGet } from '../api.js';
+import { ConfirmButton } from '../confirm.jsx';
+import * as format from '../format.js';
+import { Failure, Panel } from '../widgets.jsx';
+import { BackTest } from './back_test.jsx';
+import { Changes, changesOf } from './changes.jsx';
+
+const kinds = { calibration: 'Calibration from recent missions', diagnosis: 'From a diagnosis' };
+
+// Why a proposal is no longer one to adopt, or null.
+function closedReason(p, versionInForce) {
+  if (p.state === 'adopted')
+    return p.adopted_version === null ? 'adopted' : `adopted as version ${p.adopted_version}`;
+  if (p.state === 'superseded') return 'replaced by a later proposal';
+  if (p.state === 'dismissed') return 'dismissed';
+  if (p.base_version !== null && p.base_version !== versionInForce)
+    return `out of date: it was made for version ${p.base_version}, and version ${versionInForce} is in force`;
+  return null;
+}
+
+function parameterChanges(p, inForce) {
+  const parameters = p.detail?.parameters;
+  if (!Array.isArray(parameters)) return changesOf(p.model, inForce.model);
+  return parameters.map(({ name, in_force: from, value, sd, unit }) => ({
+    key: name,
+    from: `${format.digits(from)} ${unit}`,
+    to: `${format.withDeviation(value, sd)} ${unit}`,
+  }));
+}
+
+function Proposal({ of: p, robot, inForce, onChange }) {
+  const [result, setResult] = useState({ busy: '', test: null, error: null });
+  const ask = async (busy, body) => {
+    setResult({ ...result, busy, error: null });
+    try {
+      const answer = await post(`/v1/robots/${idPath(robot)}/model`, { proposal_id: p.id, ...body });
+      setResult({ busy: '', test: answer.back_test, error: null });
+      if (answer.adopted) onChange();
+    } catch (error) {
+      setResult({ busy: '', test: error.told?.back_test ?? result.test, error });
+    }
+  };
+  const changes = parameterChanges(p, inForce);
+  const next = `Adopt proposal ${p.id}?`;
+  const busy = result.busy !== '';
+  return (
+    <li class="active">
+      <p>
+        <b>{kinds[p.kind] ?? format.words(p.kind)}</b>{' '}
+        <span class="note">
+          {format.time(p.created_utime_us)} · {p.note}
+        </span>
+      </p>
+      <Changes of={changes} />
+      {result.test && <BackTest test={result.test} />}
+      {result.error && <Failure error={result.error} />}
+      <p class="tools">
+        <button type="button" disabled={busy} onClick={() => ask('test', { dry_run: true })}>
+          {result.busy === 'test' ? 'Testing …' : 'Test on other missions'}
+        </button>
+        <ConfirmButton
+          label={result.busy === 'adopt' ? 'Testing and adopting …' : 'Adopt'}
+          action="Adopt"
+          class="primary"
+          title={next}
+          disabled={busy}
+          onConfirm={() => ask('adopt', { expected_version: inForce.model_version })}
+        >
+          <p>
+            {robot} gets a new model version in place of version {inForce.model_version}, if the back-test on
+            other missions shows an improvement:
+          </p>
+          <Changes of={changes} />
+        </ConfirmButton>
+      </p>
+    </li>
+  );
+}
+
+// `turn` changes when the model in force may have changed.
+export function Proposals({ id, inForce, turn, onChange }) {
+  const list = useGet(`/v1/robots/${idPath(id)}/proposals?limit=20`);
+  useEffect(() => {
+    if (turn > 0) list.reload();
+  }, [turn]);
+  if (inForce === null || !list.value?.proposals.length) return null;
+  const sorted = list.value.proposals.map((p) => [p, closedReason(p, inForce.model_version)]);
+  const open = sorted.filter(([, reason]) => reason === null);
+  const closed = sorted.filter(([, reason]) => reason !== null);
+  return (
+    <Panel title={open.length === 1 ? 'A better model is proposed' : 'Proposed models'}>
+      {open.length === 0 && <p class="note">No proposal is open.</p>}
+      <ol class="versions">
+        {open.map(([p]) => (
+          <Proposal key={p.id} of={p} robot={id} inForce={inForce} onChange={onChange} />
+        ))}
+      </ol>
+      {closed.length > 0 && (
+        <details>
+          <summary>
+            {closed.length} closed {closed.length === 1 ? 'proposal' : 'proposals'}
+          </summary>
+          <ol class="versions">
+            {closed.map(([p, reason]) => (
+              <li key={p.id}>
+                <b>{kinds[p.kind] ?? format.words(p.kind)}</b>{' '}
+                <span class="note">{format.time(p.created_utime_us)}</span> – {reason}
+              </li>
+            ))}
+          </ol>
+        </details>
+      )}
+    </Panel>
+  );
+}

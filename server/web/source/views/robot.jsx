@@ -1,0 +1,281 @@
+import { useEffect, useState } from 'preact/hooks';
+import { idPath, query, useGet } from '../api.js';
+import { energy } from '../energy.js';
+import { FloorPath } from '../floor.jsx';
+import * as format from '../format.js';
+import { Health, between, chargeNote, now, since, unheard } from '../health.jsx';
+import { useLive } from '../live.js';
+import { missionLink } from '../route.js';
+import { Sparkline } from '../sparkline.jsx';
+import { useTheme } from '../theme.js';
+import { Answer, Empty, Panel, Readout, useTitleOf } from '../widgets.jsx';
+import { flat } from './changes.jsx';
+import { Events, useEvents } from './events.jsx';
+import { MissionTable } from './mission_rows.jsx';
+import { Proposals } from './proposals.jsx';
+import { RobotHistory } from './robot_history.jsx';
+
+const recentRows = 12;
+const recentEvents = 12;
+
+function Model({ model }) {
+  return (
+    <details class="model">
+      <summary>Parameters in force</summary>
+      <table class="facts">
+        <tbody>
+          {Object.entries(flat(model))
+            .filter(([key]) => key !== 'robot_id')
+            .map(([key, value]) => (
+              <tr key={key}>
+                <th scope="row">
+                  <code>{key}</code>
+                </th>
+                <td>{value}</td>
+              </tr>
+            ))}
+        </tbody>
+      </table>
+    </details>
+  );
+}
+
+// Where the robot is and was: the running mission's trace so far, then the live positions.
+function LiveMap({ entry }) {
+  const mission = entry.state.mission?.id;
+  const begun = useGet(mission ? `/v1/missions/${mission}/trace?points=600` : null);
+  const [joined] = useState({ mission: null, rows: [] });
+  if (joined.mission !== mission) Object.assign(joined, { mission, rows: [] });
+  const live = entry.path.last();
+  const before =
+    mission && begun.value && begun.value.id === mission
+      ? begun.value.x_m.map((x, k) => [
+          x ?? NaN,
+          begun.value.y_m[k] ?? NaN,
+          begun.value.measured_power_w.mean[k] ?? begun.value.modelled_power_w.mean[k] ?? NaN,
+        ])
+      : [];
+  const rows = [...before, ...live.map(([x, y, , w]) => [x, y, w])];
+  const [x, y, heading] = entry.state.pose;
+  if (rows.length === 0 || x === null)
+    return (
+      <Empty title="No position">
+        {entry.state.silent_s === null ? 'No telemetry yet.' : 'This robot does not report its position.'}
+      </Empty>
+    );
+  return (
+    <FloorPath
+      points={rows}
+      height={340}
+      ends={false}
+      robot={[x, y, heading ?? 0]}
+      label={`Path of ${entry.id} so far, coloured by power, and where it is now`}
+    />
+  );
+}
+
+function PowerReadout({ entry }) {
+  const dark = useTheme();
+  const s = entry.state;
+  const measured = s.measured_power_w !== null;
+  const trace = (
+    <Sparkline track={entry.power} revision={entry.revision} dark={dark} width={120} height={26} />
+  );
+  return (
+    <Readout
+      large
+      label={measured ? 'Power' : 'Power (modelled)'}
+      of={format.power(now(s, s.measured_power_w ?? s.modelled_power_w))}
+      channel={measured ? 'measured' : 'modelled'}
+      note={trace}
+    />
+  );
+}
+
+function ChargeReadouts({ state: s }) {
+  const voltage = s.battery_voltage_v === null ? '' : format.text(format.unit(s.battery_voltage_v, 'V', 2));
+  const note = [s.state_of_charge === null ? '' : chargeNote(s).text, voltage].filter(Boolean).join(' · ');
+  const hours = (low, high) => `${format.about(low)} – ${format.about(high)}`;
+  return (
+    <>
+      <Readout large label="Charge" of={format.percent(s.state_of_charge)} note={note} />
+      <Readout
+        large
+        label="Range"
+        of={format.length(s.range_m)}
+        note={between(s.range_quantiles_m, format.lengthBand)}
+      />
+      <Readout
+        large
+        label="Run time"
+        of={format.about(s.run_time_s)}
+        note={between(s.run_time_quantiles_s, hours)}
+      />
+      {s.charging === null && format.known(s.charge.time_to_charged_s) && (
+        <Readout
+          large
+          label="Time to charge"
+          of={format.about(s.charge.time_to_charged_s)}
+          note="if it started now"
+        />
+      )}
+    </>
+  );
+}
+
+function Now({ entry }) {
+  const s = entry.state;
+  const [right, left] = s.winding_temperature_c;
+  return (
+    <dl class="readouts">
+      <PowerReadout entry={entry} />
+      <ChargeReadouts state={s} />
+      <Readout large label="Speed" of={format.unit(now(s, s.speed_m_s), 'm/s', 2)} />
+      <Readout large label="Payload" of={format.unit(s.payload_kg, 'kg')} />
+      <Readout
+        large
+        label="Windings, right · left"
+        of={right === null ? '–' : `${format.fixed(right)} · ${format.fixed(left)} °C`}
+      />
+      <Readout
+        large
+        label="Mission"
+        of={energy(s.mission?.energy.battery_j)}
+        note={s.mission ? <a href={missionLink(s.mission.id)}>{s.mission.mission_id}</a> : 'none running'}
+      />
+    </dl>
+  );
+}
+
+function SilenceNote({ state }) {
+  if (unheard(state))
+    return <p class="note">No telemetry since the service started. Its history is below.</p>;
+  if (state.live) return null;
+  return (
+    <p class="note">
+      Silent since {since(state.heardUs)}: its power and speed are unknown. The other values are the last that
+      it sent.
+    </p>
+  );
+}
+
+function Heading({ id, state }) {
+  return (
+    <div class="heading">
+      <p class="crumbs">
+        <a href="#/fleet">Fleet</a>
+      </p>
+      <h1>{id}</h1>
+      {state && (
+        <span class="health">
+          <Health state={state} />
+        </span>
+      )}
+      <span class="spring" />
+      <a class="button" href={`#/plan${query({ robot: id })}`}>
+        Plan a drive
+      </a>
+    </div>
+  );
+}
+
+function RecentMissions({ id, running }) {
+  const missions = useGet(`/v1/missions${query({ robot_id: id, limit: recentRows })}`);
+  useEffect(() => {
+    if (missions.value !== null) missions.reload();
+  }, [running]);
+  return (
+    <Panel
+      title="Recent missions"
+      aside={<a href={`#/missions${query({ robot: id })}`}>All missions of {id}</a>}
+    >
+      <Answer of={missions} what="missions">
+        {(page) =>
+          page.missions.length === 0 ? (
+            <Empty title="No mission yet" />
+          ) : (
+            <MissionTable missions={page.missions} withRobot={false} />
+          )
+        }
+      </Answer>
+    </Panel>
+  );
+}
+
+function RecentEvents({ id }) {
+  const events = useEvents({ robotId: id });
+  return (
+    <Panel title="Log" aside={<a href={`#/audit${query({ robot: id })}`}>All of {id}</a>}>
+      <Answer of={events} what="the log">
+        {(list) =>
+          list.length === 0 ? (
+            <Empty title="Nothing has happened yet" />
+          ) : (
+            <Events events={list.slice(0, recentEvents)} withRobot={false} />
+          )
+        }
+      </Answer>
+    </Panel>
+  );
+}
+
+// What needs the robot's model: its gap, versions and proposals.
+function WithModel({ id, detail }) {
+  const [turn, setTurn] = useState(0);
+  if (detail.error?.status === 404)
+    return (
+      <Panel title="Model">
+        <Empty title="No model">
+          Send a robot file to <code>PUT /v1/robots/{id}</code> to have its energy modelled.
+        </Empty>
+      </Panel>
+    );
+  const changed = () => {
+    detail.reload();
+    setTurn(turn + 1);
+  };
+  return (
+    <>
+      <Proposals id={id} inForce={detail.value} turn={turn} onChange={changed} />
+      <RobotHistory id={id} turn={turn} onChange={changed} />
+    </>
+  );
+}
+
+export function Robot({ id }) {
+  useTitleOf(id);
+  const live = useLive();
+  const detail = useGet(`/v1/robots/${idPath(id)}`);
+  const entry = live.robots.get(id);
+  const s = entry?.state;
+  if (!s && live.loaded && detail.error?.status === 404)
+    return (
+      <Empty title={`There is no robot ${id}`}>
+        See the <a href="#/fleet">fleet</a>.
+      </Empty>
+    );
+  return (
+    <>
+      <Heading id={id} state={s} />
+      {s && <SilenceNote state={s} />}
+      {s && !unheard(s) && <Now entry={entry} />}
+      {(s || detail.value) && <WithModel id={id} detail={detail} />}
+      <RecentMissions id={id} running={s?.mission?.id} />
+      <div class="columns">
+        {entry && !unheard(s) ? (
+          <Panel class="screen" title={s.live ? 'Position' : 'Last known position'}>
+            <LiveMap entry={entry} />
+          </Panel>
+        ) : (
+          <RecentEvents id={id} />
+        )}
+        <div>
+          {entry && !unheard(s) && <RecentEvents id={id} />}
+          <Panel title="Model">
+            {detail.value ? <Model model={detail.value.model} /> : <p class="note">none</p>}
+          </Panel>
+        </div>
+      </div>
+    </>
+  );
+}

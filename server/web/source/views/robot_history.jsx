@@ -1,0 +1,173 @@
+// A robot's gap over its missions, its model versions, and robots of its kind.
+import { useEffect, useMemo } from 'preact/hooks';
+import { idPath, query, useGet } from '../api.js';
+import { Chart, axis, clockAxis } from '../chart.jsx';
+import * as format from '../format.js';
+import { palette } from '../theme.js';
+import { Answer, Empty, Panel } from '../widgets.jsx';
+import { JobRows, share } from './jobs.jsx';
+import { Siblings } from './siblings.jsx';
+import { Versions } from './versions.jsx';
+
+const medianMissions = 9;
+
+function median(values) {
+  const sorted = [...values].sort((a, b) => a - b);
+  const half = sorted.length >> 1;
+  return sorted.length % 2 === 1 ? sorted[half] : (sorted[half - 1] + sorted[half]) / 2;
+}
+
+// Measured over modelled energy of each mission with a running median, drifts and new model versions.
+function RatioChart({ history }) {
+  const { missions, drift, versions } = history;
+  const data = useMemo(() => {
+    const ratio = missions.map((m) => m.ratio);
+    return [
+      missions.map((m) => m.start_utime_us / 1e6),
+      ratio,
+      ratio.map((_, k) => (k < 2 ? null : median(ratio.slice(Math.max(0, k + 1 - medianMissions), k + 1)))),
+    ];
+  }, [missions]);
+  if (missions.length === 0) return <Empty title="No finished mission with a measured battery yet" />;
+  const drawMarks = (u) => {
+    const c = u.ctx;
+    const p = palette();
+    const y1 = u.valToPos(1, 'y', true);
+    const px = devicePixelRatio;
+    const { left, top, width, height } = u.bbox;
+    const line = (at, colour, text, row, dash) => {
+      const x = u.valToPos(at / 1e6, 'x', true);
+      if (x < left || x > left + width) return;
+      c.strokeStyle = c.fillStyle = colour;
+      c.setLineDash(dash.map((d) => d * px));
+      c.beginPath();
+      c.moveTo(x, top);
+      c.lineTo(x, top + height);
+      c.stroke();
+      const room = c.measureText(text).width + 8 * px;
+      c.fillText(text, x + room > left + width ? x - room : x + 4 * px, top + row * 14 * px);
+    };
+    c.save();
+    c.lineWidth = px;
+    c.font = `${11 * px}px "Liberation Sans", Arial, sans-serif`;
+    c.strokeStyle = p.muted;
+    c.beginPath();
+    c.moveTo(left, y1);
+    c.lineTo(left + width, y1);
+    c.stroke();
+    // A version counts from the first mission that it metered: replayed missions are older than the version.
+    for (const v of versions) {
+      const first = missions.find((m) => m.model_version === v.model_version);
+      if (first !== undefined) line(first.start_utime_us, p.muted, `v${v.model_version}`, -0.3, []);
+    }
+    drift.forEach((d, k) =>
+      line(
+        d.start_utime_us,
+        p.gap,
+        `${format.signed(share(d.ratio_after - d.ratio_before))}`,
+        1 + (k % 3),
+        [4, 3],
+      ),
+    );
+    c.restore();
+  };
+  const spread = Math.max(0.05, ...data[1].map((v) => Math.min(0.6, Math.abs(v - 1)))) * 1.15;
+  const make = () => {
+    const p = palette();
+    return {
+      scales: {
+        x: {
+          time: false,
+          range: (_, low, high) => {
+            const pad = Math.max(60, 0.02 * (high - low));
+            return [low - pad, high + pad];
+          },
+        },
+        y: { range: () => [1 - spread, 1 + spread] },
+      },
+      axes: [axis('', { size: 42, space: 90, ...clockAxis }), axis('measured / modelled', { size: 56 })],
+      series: [
+        {},
+        {
+          stroke: 'transparent',
+          width: 0,
+          points: { show: true, size: 7, width: 1.5, stroke: p.measured, fill: p.measured },
+          paths: () => null,
+        },
+        { stroke: p.gap, width: 2, points: { show: false }, spanGaps: true },
+      ],
+      cursor: { show: false },
+      hooks: { drawAxes: [drawMarks] },
+    };
+  };
+  const last = data[2][data[2].length - 1] ?? median(data[1]);
+  const drifts = drift
+    .map((d) => `${format.time(d.start_utime_us)}: ${format.signed(share(d.ratio_after - d.ratio_before))}`)
+    .join('; ');
+  return (
+    <>
+      <Chart
+        make={make}
+        data={data}
+        height={240}
+        changes={[history]}
+        label={`Measured over modelled energy of ${missions.length} missions; running median now ${format.fixed(last, 3)}; ${drift.length} drifts${drifts && `: ${drifts}`}`}
+      />
+      <p class="note foot">
+        <span class="swatch measured dot" />
+        mission <span class="swatch gap" />
+        median of the last {medianMissions}, now <b>{format.fixed(last, 3)}</b>; full vertical lines: new
+        model versions; dashed:{' '}
+        {drift.length === 0 ? 'drifts (none)' : `${drift.length} ${drift.length === 1 ? 'drift' : 'drifts'}`}.
+      </p>
+    </>
+  );
+}
+
+// `turn` changes when the model in force may have changed.
+export function RobotHistory({ id, turn, onChange }) {
+  const history = useGet(`/v1/robots/${idPath(id)}/gap-history?limit=500`);
+  const versions = useGet(`/v1/robots/${idPath(id)}/versions`);
+  const jobs = useGet(`/v1/diagnoses${query({ robot_id: id, limit: 5 })}`);
+  useEffect(() => {
+    if (turn > 0) [history, versions].forEach((answer) => answer.reload());
+  }, [turn]);
+  return (
+    <>
+      <div class="columns">
+        <Panel
+          class="screen"
+          title="Measured over modelled energy"
+          aside={<a href={`#/gap${query({ robot: id })}`}>Diagnose the gap</a>}
+        >
+          <Answer of={history} what="the history">
+            {(h) => <RatioChart history={h} />}
+          </Answer>
+        </Panel>
+        <Panel title="Robots of this kind">
+          <Answer of={history} what="robots of this kind">
+            {(h) => <Siblings siblings={h.siblings} id={id} />}
+          </Answer>
+        </Panel>
+      </div>
+      <div class="columns">
+        <Panel title="Diagnoses" aside={<a href={`#/gap${query({ robot: id })}`}>All of {id}</a>}>
+          <Answer of={jobs} what="diagnoses">
+            {(j) =>
+              j.diagnoses.length === 0 ? (
+                <Empty title="No diagnosis yet" />
+              ) : (
+                <JobRows jobs={j.diagnoses} withRobot={false} />
+              )
+            }
+          </Answer>
+        </Panel>
+        <Panel title="Model versions">
+          <Answer of={versions} what="versions">
+            {(v) => <Versions versions={v.versions} robot={id} onChange={onChange} />}
+          </Answer>
+        </Panel>
+      </div>
+    </>
+  );
+}

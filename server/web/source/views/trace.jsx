@@ -1,0 +1,329 @@
+// A mission over time and on the floor: power, speed, path, and every sample of the motors when zoomed.
+import { useMemo, useRef, useState } from 'preact/hooks';
+import { query, useGet } from '../api.js';
+import { Chart, axis, clockSteps, cursorOf, withAlpha } from '../chart.jsx';
+import { FloorPath } from '../floor.jsx';
+import * as format from '../format.js';
+import { keepInAddress } from '../route.js';
+import { palette } from '../theme.js';
+import { Choice, Empty, Panel, Readout } from '../widgets.jsx';
+import { runClock } from './clock.js';
+import { Motors } from './motors.jsx';
+
+const tracePoints = 700;
+const group = 'mission';
+function seconds(trace, startUs) {
+  return trace.start_utime_us.map((t) => (t - startUs + trace.width_us / 2) / 1e6);
+}
+
+// Columns for the chart, with an empty row where the trace pauses, so that no line bridges it.
+function withPauses(trace, startUs, columns) {
+  const t = seconds(trace, startUs);
+  const pauses = [];
+  for (let k = 1; k < t.length; ++k)
+    if (trace.start_utime_us[k] - trace.start_utime_us[k - 1] > 1.9 * trace.width_us) pauses.push(k);
+  if (pauses.length === 0) return [t, ...columns];
+  const open = (column, at) => {
+    const rows = [];
+    column.forEach((v, k) => {
+      if (pauses.includes(k)) rows.push(at === undefined ? (column[k - 1] + v) / 2 : at);
+      rows.push(v);
+    });
+    return rows;
+  };
+  return [open(t), ...columns.map((column) => open(column, null))];
+}
+
+function Charts({ trace, mission, setZoom, setCursor }) {
+  const [power, speed] = useMemo(() => {
+    const bands = (...of) =>
+      withPauses(
+        trace,
+        mission.start_utime_us,
+        of.flatMap((band) => [band.max, band.min, band.mean]),
+      );
+    return [bands(trace.measured_power_w, trace.modelled_power_w), bands(trace.speed_m_s)];
+  }, [trace]);
+  const traceNow = useRef(trace);
+  traceNow.current = trace;
+  const hooks = {
+    setCursor: [
+      (u) =>
+        setCursor(
+          u.cursor.idx === null || u.cursor.idx === undefined
+            ? null
+            : indexAt(traceNow.current, mission.start_utime_us + u.data[0][u.cursor.idx] * 1e6),
+        ),
+    ],
+    setSelect: [
+      (u) => {
+        if (u.select.width < 6) return;
+        setZoom([u.posToVal(u.select.left, 'x'), u.posToVal(u.select.left + u.select.width, 'x')]);
+        u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+      },
+    ],
+  };
+  const cursor = {
+    ...cursorOf(group),
+    drag: { x: true, y: false, setScale: false, dist: 6 },
+    bind: { dblclick: () => () => setZoom(null) },
+  };
+  const timeAxis = (label) => axis(label, { size: 28, incrs: clockSteps, values: runClock });
+  const makePower = () => {
+    const p = palette();
+    const none = { show: true, stroke: 'transparent', points: { show: false } };
+    return {
+      cursor,
+      hooks,
+      scales: { x: { time: false } },
+      axes: [timeAxis(''), axis('power, W')],
+      bands: [
+        { series: [1, 2], fill: withAlpha(p.measured, 0.2) },
+        { series: [4, 5], fill: withAlpha(p.modelled, 0.16) },
+      ],
+      series: [
+        {},
+        none,
+        none,
+        { stroke: p.measured, width: 2.75, points: { show: false } },
+        none,
+        none,
+        { stroke: p.modelled, width: 1, points: { show: false } },
+      ],
+    };
+  };
+  const makeSpeed = () => {
+    const p = palette();
+    const none = { stroke: 'transparent', points: { show: false } };
+    return {
+      cursor,
+      hooks,
+      scales: { x: { time: false } },
+      axes: [timeAxis('time since the start'), axis('speed, m/s')],
+      bands: [{ series: [1, 2], fill: withAlpha(p.ink, 0.12) }],
+      series: [{}, none, none, { stroke: p.ink, width: 1.5, points: { show: false } }],
+    };
+  };
+  // Keys move the cursor over both charts and zoom around it.
+  const plots = useRef([]);
+  const at = useRef(0);
+  const key = (event) => {
+    const t = plots.current[0].data[0];
+    const far = Math.max(1, Math.round(t.length / 20));
+    const step = event.shiftKey ? far : 1;
+    const to = { ArrowLeft: at.current - step, ArrowRight: at.current + step, Home: 0, End: t.length - 1 }[
+      event.key
+    ];
+    const span = t[t.length - 1] - t[0];
+    const here = t[Math.min(at.current, t.length - 1)];
+    if (to !== undefined) {
+      at.current = Math.max(0, Math.min(t.length - 1, to));
+      for (const u of plots.current) u.setCursor({ left: u.valToPos(t[at.current], 'x'), top: 8 });
+    } else if (event.key === '+' && span > 4)
+      setZoom([Math.max(t[0], here - span / 4), Math.min(t[t.length - 1], here + span / 4)]);
+    else if (event.key === '-' || event.key === 'Escape') setZoom(null);
+    else return;
+    event.preventDefault();
+  };
+  return (
+    <div
+      class="charts"
+      tabindex="0"
+      role="group"
+      aria-label="Power and speed over time. Left and right move the cursor, plus zooms in, minus shows the whole mission."
+      onKeyDown={key}
+    >
+      <Chart
+        make={makePower}
+        data={power}
+        height={270}
+        changes={[mission.id]}
+        onReady={(u) => {
+          plots.current[0] = u;
+        }}
+        label="Battery power over the mission, measured and modelled, with the least and greatest of each span"
+      />
+      <Chart
+        make={makeSpeed}
+        data={speed}
+        height={150}
+        changes={[mission.id]}
+        onReady={(u) => {
+          plots.current[1] = u;
+        }}
+        label="Speed over the mission"
+      />
+    </div>
+  );
+}
+
+function AtCursor({ trace, mission, index }) {
+  const at = index !== null && index < trace.start_utime_us.length ? index : null;
+  const of = (column, f) => (at === null ? { n: '–', u: '' } : f(column[at]));
+  const measured = trace.measured_power_w;
+  const modelled = trace.modelled_power_w;
+  const gap = at === null || measured.mean[at] === null ? null : measured.mean[at] - modelled.mean[at];
+  return (
+    <dl class="readouts strip" aria-live="off">
+      <Readout
+        label="Time"
+        of={at === null ? '–' : format.span((trace.start_utime_us[at] - mission.start_utime_us) / 1e6)}
+      />
+      <Readout
+        label="Measured"
+        channel="measured"
+        of={of(measured.mean, format.power)}
+        note={
+          at !== null && measured.mean[at] !== null
+            ? `${format.fixed(measured.min[at], 0)} to ${format.fixed(measured.max[at], 0)}`
+            : ''
+        }
+      />
+      <Readout label="Modelled" channel="modelled" of={of(modelled.mean, format.power)} />
+      <Readout
+        label="Gap"
+        channel="gap"
+        of={(() => {
+          const q = format.power(gap);
+          return { n: format.signed(q.n), u: q.u };
+        })()}
+      />
+      <Readout label="Speed" of={of(trace.speed_m_s.mean, (v) => format.unit(v, 'm/s', 2))} />
+      <Readout label="Charge" of={of(trace.state_of_charge, (v) => format.percent(v, 2))} />
+    </dl>
+  );
+}
+
+function indexAt(trace, utimeUs) {
+  const k = Math.floor((utimeUs - trace.start_utime_us[0]) / trace.width_us);
+  let at = Math.max(0, Math.min(k, trace.start_utime_us.length - 1));
+  while (at > 0 && trace.start_utime_us[at] > utimeUs) at -= 1;
+  return at;
+}
+
+// The path on the floor, coloured by power or by the gap, with the place of the charts' cursor.
+function PathPanel({ way, trace, cursor, measured, colouring, setColouring }) {
+  const path = useMemo(
+    () =>
+      way.x_m.map((x, k) => {
+        const m = way.measured_power_w.mean[k];
+        const f = way.modelled_power_w.mean[k];
+        const gap = m === null ? NaN : m - f;
+        return [x ?? NaN, way.y_m[k] ?? NaN, colouring === 'gap' ? gap : (m ?? f ?? NaN)];
+      }),
+    [way, colouring],
+  );
+  const known = cursor !== null && cursor < trace.start_utime_us.length;
+  const here = known ? indexAt(way, trace.start_utime_us[cursor] + trace.width_us / 2) : null;
+  const options = [['power', 'Power'], ...(measured ? [['gap', 'Gap']] : [])];
+  const what = colouring === 'gap' ? 'measured minus modelled power' : 'power';
+  return (
+    <Panel
+      class="screen"
+      title="Path"
+      aside={<Choice label="Colour by" value={colouring} onChange={setColouring} options={options} />}
+    >
+      {path.some(([x]) => Number.isFinite(x)) ? (
+        <>
+          <FloorPath
+            points={path}
+            kind={colouring}
+            cursor={here}
+            height={440}
+            label={`Path of the mission, coloured by ${what}; circle: start, square: end`}
+          />
+          <p class="note foot">○ start ■ end. Positions as the robot reported them.</p>
+        </>
+      ) : (
+        <Empty title="No positions">This robot did not report where it was.</Empty>
+      )}
+    </Panel>
+  );
+}
+
+function ChartsAside({ zoomed, onWhole }) {
+  return (
+    <>
+      <span class="key">
+        <span class="swatch measured" />
+        measured <span class="swatch modelled" />
+        modelled <span class="swatch band" />
+        minimum to maximum
+      </span>
+      {zoomed ? (
+        <button type="button" onClick={onWhole}>
+          Whole mission
+        </button>
+      ) : (
+        <span class="note">drag or press + to zoom</span>
+      )}
+    </>
+  );
+}
+
+// The zoom and the colouring, as the address keeps them.
+function useView(given) {
+  const zoomed = [given.from, given.to].map(Number);
+  const [view, setView] = useState({
+    zoom: given.to && zoomed.every(Number.isFinite) ? zoomed : null,
+    colouring: given.colour === 'gap' ? 'gap' : 'power',
+  });
+  const latest = useRef(view); // charts keep the functions that they were made with
+  const change = (part) => {
+    const next = (latest.current = { ...latest.current, ...part });
+    setView(next);
+    const [from, to] = next.zoom ?? [];
+    keepInAddress({
+      from: from?.toFixed(2),
+      to: to?.toFixed(2),
+      colour: next.colouring === 'gap' ? 'gap' : '',
+    });
+  };
+  return [view, change];
+}
+
+export function TracePanels({ mission, whole, fine, given }) {
+  const [{ zoom, colouring }, change] = useView(given);
+  const [cursor, setCursor] = useState(null);
+  const setZoom = (next) => change({ zoom: next });
+  const utime = (second) => Math.round(mission.start_utime_us + second * 1e6);
+  const window = zoom && { from_utime_us: utime(zoom[0]), to_utime_us: utime(zoom[1]) };
+  const closer = useGet(
+    window && `/v1/missions/${mission.id}/trace${query({ points: tracePoints, ...window })}`,
+  );
+  const trace = zoom !== null && closer.value?.start_utime_us.length > 1 ? closer.value : whole;
+  const measured = whole.measured_power_w.mean.some((v) => v !== null);
+  if (whole.start_utime_us.length === 0)
+    return (
+      <Panel title="Power">
+        <Empty title="No trace stored">The mission ended before its first sample was stored.</Empty>
+      </Panel>
+    );
+  return (
+    <>
+      <div class="columns trace-columns">
+        <Panel
+          class="screen"
+          title="Power and speed"
+          aside={<ChartsAside zoomed={zoom !== null} onWhole={() => setZoom(null)} />}
+        >
+          <Charts trace={trace} mission={mission} setZoom={setZoom} setCursor={setCursor} />
+          <AtCursor trace={trace} mission={mission} index={cursor} />
+          <p class="note foot">
+            Each point is {format.span(trace.width_us / 1e6)}
+            {zoom !== null ? ', zoomed' : ''}.
+          </p>
+        </Panel>
+        <PathPanel
+          way={trace === whole ? fine : trace}
+          trace={trace}
+          cursor={cursor}
+          measured={measured}
+          colouring={colouring}
+          setColouring={(next) => change({ colouring: next })}
+        />
+      </div>
+      <Motors mission={mission} zoom={zoom} />
+    </>
+  );
+}

@@ -1,0 +1,148 @@
+// The ledger as a waterfall: each account starts where the one above ended, and the last ends at the
+// battery's energy. Unexplained is hatched: it is integrated from the measured gap, not computed as the rest.
+import { energyIn, energyScale } from './energy.js';
+import * as format from './format.js';
+import { Quantity } from './widgets.jsx';
+
+const names = {
+  accessories: 'Idle and accessories',
+  driver: 'Motor drivers',
+  copper: 'Copper',
+  brush: 'Brushes',
+  friction_internal: 'Friction in motors and gears',
+  friction_rolling: 'Rolling',
+  friction_scrub: 'Scrub in turns',
+  friction_zone: 'Floor zones',
+  friction_slip: 'Wheel slip',
+  drag: 'Air',
+  kinetic: 'Change of motion',
+  potential: 'Change of height',
+  braking: 'Generated in braking',
+  recovered: 'Recovered',
+  sensor: 'Sensor error',
+  unexplained: 'Unexplained',
+};
+const rowPx = 30;
+const negligible = 1e-5; // of the whole
+
+function rowsOf(terms, total) {
+  const empty = ([term, value]) => Math.abs(value) <= negligible * Math.abs(total) && term !== 'unexplained';
+  const rows = [];
+  let at = 0;
+  for (const [term, value] of Object.entries(terms)) {
+    const change = term === 'recovered' ? -value : value;
+    if (term === 'unexplained')
+      rows.push({ key: 'modelled', name: 'Modelled', from: 0, to: at, total: true });
+    if (!empty([term, value]))
+      rows.push({ key: term, name: names[term] ?? format.words(term), from: at, to: at + change, change });
+    at += change;
+  }
+  const absent = Object.entries(terms).filter(empty);
+  return { rows, sum: at, absent: absent.map(([term]) => (names[term] ?? term).toLowerCase()) };
+}
+
+function colourOf(row) {
+  if (row.total) return row.key;
+  if (row.key === 'unexplained') return 'unexplained';
+  return row.change < 0 ? 'back' : 'out';
+}
+
+function Bar({ row, x, end }) {
+  const vertical = (value) => ({ x1: `${x(value)}%`, x2: `${x(value)}%` });
+  return (
+    <svg class="bar" width="100%" height={rowPx} aria-hidden="true" focusable="false">
+      <line class="zero" {...vertical(0)} y1="0" y2={rowPx} />
+      <line class="goal" {...vertical(end)} y1="0" y2={rowPx} />
+      {row.key !== 'battery' && <line class="step" {...vertical(row.to)} y1={rowPx - 7} y2={rowPx} />}
+      <rect
+        class={`account ${colourOf(row)}`}
+        x={`${Math.min(x(row.from), x(row.to))}%`}
+        y="7"
+        width={`${Math.max(Math.abs(x(row.to) - x(row.from)), 0.15)}%`}
+        height={rowPx - 14}
+      />
+    </svg>
+  );
+}
+
+const hatch = (
+  <svg class="patterns" width="0" height="0" aria-hidden="true" focusable="false">
+    <defs>
+      <pattern id="hatch" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)">
+        <rect class="hatch-back" width="6" height="6" />
+        <line class="hatch-line" x1="0" x2="0" y1="0" y2="6" />
+      </pattern>
+    </defs>
+  </svg>
+);
+
+function Row({ row, x, end, scale }) {
+  const value = row.total ? row.to : row.change;
+  const q = energyIn(scale, value);
+  const kind = row.total ? `total ${row.key}` : row.key === 'unexplained' ? 'odd' : '';
+  return (
+    <tr class={kind}>
+      <th scope="row">{row.name}</th>
+      <td class="bar-cell">
+        <Bar row={row} x={x} end={end} />
+      </td>
+      <td class="figure">
+        <Quantity of={q} sign={!row.total} />
+      </td>
+      <td class="figure share">
+        <Quantity of={format.percent(end !== 0 ? value / end : null, 1)} />
+      </td>
+    </tr>
+  );
+}
+
+function Closing({ sum, end, scale, closure, absent }) {
+  const text = (value) => format.text(energyIn({ ...scale, places: scale.places + 1 }, value));
+  return (
+    <p class="closing">
+      Sum of the accounts <b>{text(sum)}</b>, battery energy <b>{text(end)}</b>.
+      {closure !== undefined &&
+        ` ${closure < 1e-9 ? 'They agree' : 'They do not agree'}: difference ${closure === 0 ? 'none' : closure.toExponential(1)} of the whole.`}
+      {absent.length > 0 && <span class="note"> Negligible: {absent.join(', ')}.</span>}
+    </p>
+  );
+}
+
+// `terms`: energy of each account in joules; `total`: the battery's.
+export function Waterfall({ terms, total, closure, measured = true }) {
+  const { rows, sum, absent } = rowsOf(terms, total);
+  const shown = measured ? rows : rows.filter((row) => row.key !== 'unexplained' && row.key !== 'modelled');
+  const ends = shown.flatMap((row) => [row.from, row.to]).concat(total, 0);
+  const low = Math.min(...ends);
+  const span = Math.max(Math.max(...ends) - low, 1e-9);
+  const x = (joule) => ((joule - low) / span) * 100;
+  const scale = energyScale([total], 4);
+  const last = {
+    key: 'battery',
+    name: measured ? 'Battery energy' : 'Total',
+    from: 0,
+    to: total,
+    total: true,
+  };
+  return (
+    <div class="waterfall">
+      {hatch}
+      <table>
+        <thead class="hidden">
+          <tr>
+            <th scope="col">Account</th>
+            <th scope="col">Bar</th>
+            <th scope="col">Energy</th>
+            <th scope="col">Share</th>
+          </tr>
+        </thead>
+        <tbody>
+          {[...shown, last].map((row) => (
+            <Row key={row.key} row={row} x={x} end={total} scale={scale} />
+          ))}
+        </tbody>
+      </table>
+      <Closing sum={sum} end={total} scale={scale} closure={closure} absent={absent} />
+    </div>
+  );
+}

@@ -1,0 +1,174 @@
+import { Component } from 'preact';
+import { useEffect, useMemo, useState } from 'preact/hooks';
+import * as format from './format.js';
+
+// A number with its unit; `of` is what a function of format.js gave.
+export function Quantity({ of, sign }) {
+  const n = sign ? format.signed(of.n) : of.n;
+  return (
+    <span class="quantity">
+      <span class="number">{n}</span>
+      {of.u && (
+        <span class="unit">
+          {'\u00a0'}
+          {of.u}
+        </span>
+      )}
+    </span>
+  );
+}
+
+export function Readout({ label, of, note, channel, large }) {
+  return (
+    <div class={`readout ${large ? 'large' : ''} ${channel ?? ''}`}>
+      <dt>{label}</dt>
+      <dd>
+        {typeof of === 'string' ? <span class="number">{of}</span> : <Quantity of={of} />}
+        {note && <span class="note">{note}</span>}
+      </dd>
+    </div>
+  );
+}
+
+// Measured over modelled energy; marked where the model is off by more than a tenth, more than missions
+// usually scatter.
+export function Ratio({ value }) {
+  const off = format.known(value) && Math.abs(value - 1) > 0.1;
+  return <span class={off ? 'ratio off' : 'ratio'}>{format.fixed(value, 3)}</span>;
+}
+
+export function Empty({ title, children }) {
+  return (
+    <div class="empty">
+      <p class="empty-title">{title}</p>
+      {children && <p>{children}</p>}
+    </div>
+  );
+}
+
+export function Loading({ what }) {
+  return (
+    <div class="loading" role="status">
+      <span class="sweep" aria-hidden="true" />
+      Loading {what} …
+    </div>
+  );
+}
+
+export function Failure({ error, retry }) {
+  const where = error.field && !error.message.includes(error.field) ? ` (${error.field})` : '';
+  return (
+    <div class="failure" role="alert">
+      <p class="empty-title">
+        {error.status === 0
+          ? error.title
+          : `${error.title ?? 'Error'}${error.status ? ` · ${error.status}` : ''}`}
+      </p>
+      <p>
+        {error.message}
+        {where}
+      </p>
+      {retry && (
+        <button type="button" onClick={retry}>
+          Try again
+        </button>
+      )}
+    </div>
+  );
+}
+
+// The answer of useGet: its value through `children`, or why there is none.
+export function Answer({ of, what, children }) {
+  if (of.value !== null) return children(of.value);
+  if (of.error !== null) return <Failure error={of.error} retry={of.reload} />;
+  return <Loading what={what} />;
+}
+
+export function Panel({ title, aside, children, class: name }) {
+  return (
+    <section class={`panel ${name ?? ''}`}>
+      <header>
+        <h2>{title}</h2>
+        {aside && <div class="aside">{aside}</div>}
+      </header>
+      {children}
+    </section>
+  );
+}
+
+export function Choice({ label, options, value, onChange }) {
+  return (
+    <div class="choice" role="group" aria-label={label}>
+      {options.map(([key, name]) => (
+        <button key={key} type="button" aria-pressed={String(key === value)} onClick={() => onChange(key)}>
+          {name}
+        </button>
+      ))}
+    </div>
+  );
+}
+
+export const stateNotes = {
+  open: 'running',
+  finished: 'finished',
+  aborted: 'aborted',
+  unfinished: 'telemetry ended',
+  superseded: 'superseded',
+  interrupted: 'interrupted',
+};
+
+export function MissionState({ mission }) {
+  return <span class={`state state-${mission.state}`}>{stateNotes[mission.state] ?? mission.state}</span>;
+}
+
+// Keeps an error in one view from taking down the whole page.
+export class Guard extends Component {
+  constructor() {
+    super();
+    this.state = { error: null };
+  }
+  static getDerivedStateFromError(error) {
+    return { error };
+  }
+  componentDidCatch(error) {
+    console.error(error);
+  }
+  componentDidUpdate(before) {
+    if (before.view !== this.props.view && this.state.error !== null) this.setState({ error: null });
+  }
+  render() {
+    if (this.state.error === null) return this.props.children;
+    return <Failure error={this.state.error} retry={() => this.setState({ error: null })} />;
+  }
+}
+
+// Robots as options of a choice; drawn again only when they change, since live values come many times a
+// second.
+export function useOptions(ids) {
+  return useMemo(
+    () =>
+      ids.map((id) => (
+        <option key={id} value={id}>
+          {id}
+        </option>
+      )),
+    [ids.join('\n')],
+  );
+}
+
+export function useTitleOf(text) {
+  document.title = text ? `${text} · joulecast` : 'joulecast';
+}
+
+const narrowScreen = matchMedia('(max-width: 900px)');
+
+// Whether rows are drawn as cards; the style sheet has the same width.
+export function useNarrow() {
+  const [narrow, setNarrow] = useState(narrowScreen.matches);
+  useEffect(() => {
+    const change = () => setNarrow(narrowScreen.matches);
+    narrowScreen.addEventListener('change', change);
+    return () => narrowScreen.removeEventListener('change', change);
+  }, []);
+  return narrow;
+}
