@@ -10,8 +10,8 @@
 #include <sstream>
 #include <utility>
 
+#include "base/json_text.h"
 #include "base/nearest_word.h"
-#include "server/http/json_text.h"
 #include "server/http/text.h"
 
 namespace joulecast {
@@ -207,7 +207,7 @@ Result<void> Settings::set(std::string_view key, std::string_view value, Origin 
 }
 
 Result<void> Settings::read_file_text(std::string_view json_text, std::string_view file) {
-  auto document = http::parse_json(json_text);
+  auto document = parse_json(json_text);
   const std::string prefix = std::string(file) + ": ";
   if (!document) {
     return invalid(prefix + document.error().field, document.error().message);

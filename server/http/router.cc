@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "server/http/json_text.h"
+#include "base/json_text.h"
 #include "server/http/problem.h"
 #include "server/http/text.h"
 #include "server/http/uri.h"

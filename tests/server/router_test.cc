@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "server/http/json_text.h"
+#include "base/json_text.h"
 #include "server/http/problem.h"
 #include "server/http/uri.h"
 

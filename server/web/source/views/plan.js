@@ -167,7 +167,7 @@ function Verdict({ answer, autonomy }) {
     <div class="scroll"><table class="chances"><thead><tr><th scope="col"><span class="hidden">How it is driven</span></th><th scope="col">Chance</th><th scope="col" title="mean of the forecast">Energy</th><th scope="col">Takes</th><th scope="col" title="nine times of ten within the span">Charge on arrival</th></tr></thead>
       <tbody>${drives.map((drive) => html`<tr key=${drive.name}><th scope="row">${drive.name}</th><td class="number">${chance(drive.success_probability)}</td><td class="number">${format.text(format.energy(drive.expected_energy_j))}</td><td class="number">${format.about(drive.duration_s)}</td>
         <td class="number">${percent(drive.arrival.p50)}${percent(drive.arrival.p05) !== percent(drive.arrival.p95) && html` <span class="note">nine times of ten ${percent(drive.arrival.p05)} to ${percent(drive.arrival.p95)}</span>`}</td></tr>`)}</tbody></table></div>
-    <p class="note">Starts with ${percent(a.state_of_charge)}${a.state_of_charge_sd > 0.0005 ? ` ± ${percent(a.state_of_charge_sd)}` : ''} charge, ${format.text(format.energy(a.usable_energy_j))} usable${times >= 2 ? `: about ${format.fixed(Number(times.toPrecision(2)))} such drives` : ''}. Foreseen by ${bases[a.consumption.basis](a.consumption)}${a.driving.pause_s > 0.05 ? `, with its usual pause of ${format.fixed(a.driving.pause_s, 1)} s at each stop` : ''}.</p></div>`;
+    <p class="note">Starts with ${percent(a.state_of_charge)}${a.state_of_charge_sd > 0.0005 ? ` ± ${percent(a.state_of_charge_sd)}` : ''} charge, ${format.text(format.energy(a.usable_energy_j))} usable${times >= 2 ? `: about ${format.fixed(Number(times.toPrecision(2)))} such drives` : ''}. Foreseen by ${bases[a.consumption.basis](a.consumption)}${a.pace.pause_s > 0.05 ? `, with its usual pause of ${format.fixed(a.pace.pause_s, 1)} s at each stop` : ''}.</p></div>`;
 }
 
 export function Plan({ given }) {
@@ -209,7 +209,7 @@ export function Plan({ given }) {
       if (!known) return;
       // The chance of this very plan: a deadline's plan is the one that values a second as its certificate says.
       const asked_for = { state_of_charge: charge === undefined ? undefined : charge / 100, payload_kg: body.payload_kg ?? 0, start_pose: body.start_pose ?? { x_m: 0, y_m: 0, heading_rad: 0 },
-        value_of_time_w: Math.min(1e6, answer.certificate.time_multiplier_w), tasks: [{ name: 'this drive', path: body.path }] };
+        value_of_time_w: Math.min(1e6, answer.certificate.time_multiplier_w), tasks: [{ task_id: 'this drive', path: body.path }] };
       const autonomy = await post(`${url}/autonomy`, asked_for, abort.signal).then((value) => ({ value, error: null }), (error) => ({ value: null, error }));
       if (!abort.signal.aborted) set_told((before) => ({ ...before, autonomy }));
     } catch (error) {

@@ -1,0 +1,131 @@
+#include "base/json_text.h"
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/json_hint.h"
+
+namespace joulecast {
+namespace {
+
+using nlohmann::json;
+
+// Builds the value from parser events, which is where repeated keys can still be seen.
+class StrictBuilder : public nlohmann::json_sax<json> {
+ public:
+  StrictBuilder(json& root, std::string_view text, std::size_t max_depth)
+      : root_(root), text_(text), max_depth_(max_depth) {}
+
+  bool null() override { return add(json(nullptr)) != nullptr; }
+  bool boolean(bool value) override { return add(json(value)) != nullptr; }
+  bool number_integer(number_integer_t value) override { return add(json(value)) != nullptr; }
+  bool number_unsigned(number_unsigned_t value) override { return add(json(value)) != nullptr; }
+  bool number_float(number_float_t value, const string_t&) override { return add(json(value)) != nullptr; }
+  bool string(string_t& value) override { return add(json(std::move(value))) != nullptr; }
+  bool binary(binary_t&) override { return false; }
+  bool start_object(std::size_t) override { return open(json::object()); }
+  bool start_array(std::size_t) override { return open(json::array()); }
+  bool end_object() override { return close(); }
+  bool end_array() override { return close(); }
+  bool key(string_t& name) override {
+    auto [place, inserted] = open_.back()->get_ref<json::object_t&>().emplace(name, nullptr);
+    if (!inserted) {
+      error_ = Error{Fault::invalid, pointer(open_.size() - 1) + "/" + escaped(name),
+                     "the key is given more than once"};
+      return false;
+    }
+    slot_ = &place->second;
+    names_.back() = name;
+    return true;
+  }
+  bool parse_error(std::size_t position, const std::string&,
+                   const nlohmann::detail::exception& cause) override {
+    // nlohmann's text is "[json.exception...] parse error at line 1, column 5: syntax error ..."
+    std::string text = cause.what();
+    const auto start = text.find("] ");
+    if (start != std::string::npos) text.erase(0, start + 2);
+    const std::string hint = not_finite_hint(text_, position);
+    error_ = Error{Fault::invalid, hint.empty() ? "" : pointer(open_.size()),
+                   "malformed JSON at byte " + std::to_string(position) + ": " + text + hint};
+    return false;
+  }
+
+  std::optional<Error> take_error() { return std::exchange(error_, std::nullopt); }
+
+ private:
+  json* add(json&& value) {
+    if (open_.empty()) {
+      root_ = std::move(value);
+      return &root_;
+    }
+    if (open_.back()->is_array()) {
+      auto& array = open_.back()->get_ref<json::array_t&>();
+      array.push_back(std::move(value));
+      return &array.back();
+    }
+    *slot_ = std::move(value);
+    return slot_;
+  }
+  bool open(json&& container) {
+    if (open_.size() >= max_depth_) {
+      error_ = Error{Fault::invalid, pointer(open_.size()),
+                     "nested deeper than " + std::to_string(max_depth_) + " levels"};
+      return false;
+    }
+    open_.push_back(add(std::move(container)));
+    names_.emplace_back();
+    return true;
+  }
+  bool close() {
+    open_.pop_back();
+    names_.pop_back();
+    return true;
+  }
+  // RFC 6901, to what stands or is about to stand in the given number of open containers, outermost first.
+  std::string pointer(std::size_t levels) const {
+    std::string path;
+    for (std::size_t k = 0; k < levels; ++k) {
+      // A container that is open counts already among its array's elements.
+      const bool holds_next = k + 1 < open_.size();
+      path += "/" + (open_[k]->is_array() ? std::to_string(open_[k]->size() - (holds_next ? 1 : 0))
+                                          : escaped(names_[k]));
+    }
+    return path;
+  }
+  static std::string escaped(std::string_view name) {
+    std::string text;
+    for (const char c : name) {
+      if (c == '~') {
+        text += "~0";
+      } else if (c == '/') {
+        text += "~1";
+      } else {
+        text += c;
+      }
+    }
+    return text;
+  }
+
+  json& root_;
+  std::string_view text_;
+  std::size_t max_depth_;
+  std::vector<json*> open_;  // containers being filled, outermost first; stable: only the last one grows
+  std::vector<std::string> names_;  // the key being filled in each, empty for arrays
+  json* slot_ = nullptr;
+  std::optional<Error> error_;
+};
+
+}  // namespace
+
+Result<json> parse_json(std::string_view text, std::size_t max_depth) {
+  json value;
+  StrictBuilder builder(value, text, max_depth);
+  if (json::sax_parse(text.begin(), text.end(), &builder)) return value;
+  auto error = builder.take_error();
+  return tl::unexpected<Error>(error ? *error : Error{Fault::invalid, "", "malformed JSON"});
+}
+
+}  // namespace joulecast
