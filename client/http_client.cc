@@ -10,8 +10,11 @@ namespace joulecast::client {
 Result<ServerAddress> parse_server_url(std::string_view url) {
   constexpr std::string_view scheme = "http://";
   const std::string given(url);
-  if (!url.starts_with(scheme)) return invalid("--server", given + " must begin with http://");
-  url.remove_prefix(scheme.size());
+  if (url.starts_with(scheme)) {
+    url.remove_prefix(scheme.size());
+  } else if (url.find("://") != std::string_view::npos) {
+    return invalid("--server", given + " must begin with http://");
+  }
   const std::size_t slash = std::min(url.find('/'), url.size());
   std::string_view authority = url.substr(0, slash);
   std::string_view path = url.substr(slash);

@@ -14,7 +14,7 @@ struct ServerAddress {
   std::string base_path;  // without a slash at the end; empty for the root
 };
 
-// "http://host[:port][/path]"; the port defaults to 80. Fault::invalid for anything else.
+// "[http://]host[:port][/path]"; the port defaults to 80. Fault::invalid for anything else.
 [[nodiscard]] Result<ServerAddress> parse_server_url(std::string_view url);
 
 struct HttpReply {

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "answers/json/autonomy_json.h"
 #include "base/host_clock.h"
 #include "history/spool.h"
 #include "history/sqlite_store.h"
@@ -245,7 +246,9 @@ struct Application::Parts {
 
   void report_drift(const std::string& robot_id, const forecast::Drift& drift,
                     const std::function<void(history::Command)>& post) {
-    std::string detail = server::drift_json(drift);
+    JsonWriter json;
+    answers::write_drift(json, drift);
+    std::string detail = json.take();
     log_warning("consumption has changed", {{"robot_id", robot_id}, {"drift", detail}});
     events.publish("drift", detail, robot_id);
     post(history::AppendEvent{{0, host_utime_us(), robot_id, "consumption_drift", std::move(detail)}});

@@ -1,6 +1,6 @@
 #include "server/fleet_events.h"
 
-#include "server/api/mission_json.h"
+#include "answers/json/mission_json.h"
 #include "server/api/robot_json.h"
 
 namespace joulecast::server {
@@ -13,14 +13,14 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
     if (told.snapshot != nullptr && told.snapshot->mission_key > 0 &&
         told.snapshot->mission_key != snapshot->mission_key) {
       if (const auto mission = store_.mission(told.snapshot->mission_key)) {
-        api::JsonWriter json;
-        api::write_mission(json, *mission);
+        JsonWriter json;
+        answers::write_mission(json, *mission);
         hub_.publish("mission", json.text(), snapshot->robot_id);
       }
     }
     if (told.snapshot == snapshot && told.live == live) continue;
     const auto model = models_.find(snapshot->robot_id);
-    api::JsonWriter json;
+    JsonWriter json;
     std::optional<forecast::Reach> reach;
     if (model != nullptr) reach = forecasts_.reach(model, *snapshot);
     api::write_state(json, *snapshot, reach, now_utime_us);

@@ -6,7 +6,7 @@
 #include <atomic>
 #include <memory>
 
-#include "base/format_utc.h"
+#include "base/utc_time.h"
 #include "base/host_clock.h"
 
 namespace joulecast {

@@ -1,27 +1,31 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <deque>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "answers/json/autonomy_json.h"
+#include "answers/json/estimate_json.h"
+#include "answers/json/profile_json.h"
 #include "base/json_text.h"
+#include "client/commands/examples.h"
 #include "client/commands/print_autonomy.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/http_client.h"
 #include "client/profile_drawing.h"
 #include "robot/robot_file.h"
-#include "server/api/autonomy.h"
-#include "server/api/profile.h"
 
 // What a scheduler asks of one robot: profile, estimate, autonomy. Answered here from a robot file, or by a
 // daemon; both answers come from the same functions.
@@ -49,23 +53,28 @@ struct Options {
   bool json = false;
   std::string plot_file;
   std::deque<Member<double>> numbers;  // whose places CLI11 keeps
-  std::vector<Member<std::string>> texts;
+  std::deque<Member<std::string>> texts;
   std::optional<double> length_m;
-  std::optional<double> turn_rad;
+  std::optional<std::string> turn;
+  std::optional<double> turn_rad;  // what it says
 };
 
 struct Question {
   const char* name;
   const char* what;
-  Result<std::string> (*offline)(const json& request, const server::ModelInForce& model);
+  Result<std::string> (*offline)(const json& request, const answers::RobotOutlook& robot);
   void (*print)(json answer);
-  bool fleet = false;  // may be asked for all robots of a server at once
+  const char* example;  // request
+  bool fleet = false;   // may be asked for all robots of a server at once
 };
 
-Result<std::string> autonomy_offline(const json& body, const server::ModelInForce& model) {
-  const auto shared = std::make_shared<const server::ModelInForce>(model);
+Result<std::string> profile_offline(const json& request, const answers::RobotOutlook& robot) {
+  return answers::profile_answer(request, *robot.model);
+}
+
+Result<std::string> autonomy_offline(const json& request, const answers::RobotOutlook& robot) {
   planning::CostTableCache tables;
-  return api::autonomy_answer(body, server::Forecasts::untried(shared), nullptr, tables);
+  return answers::autonomy_answer(request, robot, {}, tables);
 }
 
 // The request file with the flags' members put over it.
@@ -134,9 +143,9 @@ Result<std::string> answer(const Options& options, const Question& question, con
   if (!options.server.empty()) return ask_server(options, question, request);
   auto robot = robot::load_robot(options.robot_file);
   if (!robot) return tl::unexpected(robot.error());
-  const auto model = server::model_in_force(std::move(*robot), file_version);
+  const auto model = answers::model_in_force(std::move(*robot), file_version);
   if (!model) return tl::unexpected(model.error());
-  return question.offline(request, **model);
+  return question.offline(request, answers::untried(*model));
 }
 
 extern const Question profile;
@@ -158,6 +167,16 @@ Result<void> plot(const Options& options, const Question& question, json request
 double number(const json& object, const char* name) {
   const auto found = object.find(name);
   return found != object.end() && found->is_number() ? found->get<double>() : std::nan("");
+}
+
+// "1.57", "1.57rad" or "90deg".
+std::optional<double> radians(std::string_view text) {
+  double angle = 0;
+  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), angle);
+  if (fault != std::errc()) return std::nullopt;
+  const std::string_view unit = text.substr(static_cast<std::size_t>(end - text.data()));
+  if (unit == "deg") return angle * std::numbers::pi / 180;
+  return unit.empty() || unit == "rad" ? std::optional(angle) : std::nullopt;
 }
 
 // A motion that the robot cannot drive has a price all the same: said aloud, whatever else is printed.
@@ -204,8 +223,9 @@ void print_head(const json& a) {
 }
 
 void print_ledger(const json& ledger) {
+  constexpr double shown_j = 0.0005;
   for (const auto& [term, joules] : ledger.items())
-    if (joules.is_number() && joules.get<double>() != 0)
+    if (joules.is_number() && std::fabs(joules.get<double>()) >= shown_j)
       fmt::print("  {:<20} {:>12.3f} J\n", term, joules.get<double>());
 }
 
@@ -213,7 +233,7 @@ void print_ledger(const json& ledger) {
 void print_haste(double duration_s, const json& certificate) {
   const double shortest_s = number(certificate, "shortest_time_s"),
                price_w = number(certificate, "time_multiplier_w");
-  if (duration_s <= shortest_s * (1 + api::at_the_limit)) {
+  if (duration_s <= shortest_s * (1 + answers::at_the_limit)) {
     fmt::print("no faster time is possible: the robot is at its limits\n");
     return;
   }
@@ -266,23 +286,45 @@ void print_profile(json a) {
 
 void print_estimate(json a) {
   print_head(a);
-  print_ledger(a["ledger"]["terms_j"]);
+  if (const json& q = a["energy_quantiles_j"]; q.is_object())
+    fmt::print("as it usually drives; {:.2f} to {:.2f} J at 5 and 95 %\n", number(q, "p05"),
+               number(q, "p95"));
+  if (a["ledger"].is_object()) print_ledger(a["ledger"]["terms_j"]);
 }
 
-const Question profile{"profile", "Plan the minimum-energy motion along a path", api::profile_answer,
-                       print_profile};
-constexpr Question estimate{"estimate", "Price a motion, or the best one along a path", api::estimate_answer,
-                            print_estimate};
+const Question profile{"profile", "Plan the minimum-energy motion along a path", profile_offline,
+                       print_profile, R"({
+  "path": [{"kind": "straight", "length_m": 6},
+           {"kind": "turn", "angle_rad": 1.5708},
+           {"kind": "arc", "radius_m": 1.5, "angle_rad": -0.8}],
+  "payload_kg": 5,
+  "deadline_s": 40
+})"};
+constexpr Question estimate{"estimate", "Price a motion: a given one, or a path at least energy or as usual",
+                            answers::estimate_answer, print_estimate, R"({
+  "path": [{"kind": "straight", "length_m": 6}, {"kind": "dwell", "duration_s": 10}, {"kind": "straight", "length_m": 4}],
+  "payload_kg": 5,
+  "driving": "usual"
+})"};
 constexpr Question autonomy{
-    "autonomy", "Ask how far and how long a robot still goes, and whether it can do a list of tasks",
-    autonomy_offline, [](json answer) { print_autonomy(answer); }, true};
+    "autonomy",
+    "Ask how far and how long a robot still goes, and whether it can do a list of tasks",
+    autonomy_offline,
+    [](json answer) { print_autonomy(answer); },
+    R"({
+  "state_of_charge": 0.6,
+  "tasks": [{"task_id": "fetch", "distance_m": 40, "payload_kg": 2, "dwell_s": 30},
+            {"task_id": "bring", "turn_rad": 1.5708, "distance_m": 60}],
+  "charger": {"x_m": 0, "y_m": 0}
+})",
+    true};
 
 std::pair<CLI::App*, std::shared_ptr<Options>> add(CLI::App& program, Exit& exit, const Question& question) {
   auto options = std::make_shared<Options>();
   auto* command = program.add_subcommand(question.name, question.what);
   auto* file =
       command->add_option("--robot", options->robot_file, "robot file: answer here, without a server");
-  auto* server = command->add_option("--server", options->server, "joulecastd to ask, http://host:port");
+  auto* server = command->add_option("--server", options->server, "joulecastd to ask, host:port");
   auto* id = command->add_option(
       "--robot-id", options->robot_id,
       question.fleet ? "which robot of the server; without it, all of them" : "which robot of the server");
@@ -296,7 +338,9 @@ std::pair<CLI::App*, std::shared_ptr<Options>> add(CLI::App& program, Exit& exit
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->add_flag("--json", options->json, "print the answer as the server sends it");
+  add_example(*command, question.example);
   command->callback([options, &question, &exit] {
+    if (options->turn) options->turn_rad = radians(*options->turn);
     if (options->robot_file.empty() && options->server.empty())
       throw CLI::RequiredError("--robot (a file) or --server (a daemon's address)");
     const bool drive = !question.fleet, asked = !options->request_file.empty();
@@ -315,11 +359,22 @@ void add_numbers(CLI::App& command, Options& options,
     command.add_option(flag, options.numbers.emplace_back(Member<double>{flag, member}).value, help);
 }
 
+void add_driving(CLI::App& command, Options& options, const char* help) {
+  command
+      .add_option("--driving", options.texts.emplace_back(Member<std::string>{"--driving", "driving"}).value,
+                  help)
+      ->check(CLI::IsMember({"usual", "minimum_energy"}));
+}
+
 void add_drive_flags(CLI::App& command, Options& options) {
   command.add_option("--plot", options.plot_file,
                      "draw speed, power and energy over time into this SVG, against the baselines");
-  command.add_option("--turn", options.turn_rad,
-                     "turn in place by so many rad (to the left), before --length");
+  command
+      .add_option("--turn", options.turn,
+                  "turn in place by that angle (to the left), before --length: 1.57 (rad) or 90deg")
+      ->check([](const std::string& text) {
+        return radians(text) ? std::string() : "must be an angle such as 1.57 (rad) or 90deg, is " + text;
+      });
   command.add_option("--length", options.length_m, "drive straight for so many m");
   add_numbers(command, options,
               {{"--payload", "payload_kg", "what the robot carries, kg"},
@@ -342,6 +397,7 @@ void add_profile(CLI::App& program, Exit& exit) {
 void add_estimate(CLI::App& program, Exit& exit) {
   auto [command, options] = add(program, exit, estimate);
   add_drive_flags(*command, *options);
+  add_driving(*command, *options, "by minimum-energy profiles (the default), or as the robot usually drives");
 }
 
 void add_autonomy(CLI::App& program, Exit& exit) {
@@ -354,12 +410,13 @@ void add_autonomy(CLI::App& program, Exit& exit) {
                {"--speed", "speed_m_s", "m/s that the plan states, instead of the robot's habit"},
                {"--confidence", "confidence",
                 "how sure the latest departure to the charger shall be, 0.01 to 0.999"}});
-  options->texts = {{"--driving", "driving"}, {"--dialect", "dialect"}};
-  command->add_option("--driving", options->texts[0].value, "usual, or by minimum-energy profiles")
-      ->check(CLI::IsMember({"usual", "minimum_energy"}));
-  command->add_option("--dialect", options->texts[1].value, "answer as another standard's battery message")
+  add_driving(*command, *options, "as the robot usually drives (the default), or by minimum-energy profiles");
+  command
+      ->add_option("--dialect",
+                   options->texts.emplace_back(Member<std::string>{"--dialect", "dialect"}).value,
+                   "answer as another standard's battery message")
       ->check(CLI::IsMember(
-          std::vector<std::string>(std::begin(api::dialect_names), std::end(api::dialect_names))));
+          std::vector<std::string>(std::begin(answers::dialect_names), std::end(answers::dialect_names))));
 }
 
 }  // namespace joulecast::client

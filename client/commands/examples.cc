@@ -1,6 +1,7 @@
 #include "client/commands/examples.h"
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <sstream>
 #include <string>
 
@@ -18,16 +19,20 @@ constexpr Examples table[] = {
     {"profile",
      "joulecast profile --robot amr.json --length 10 --payload 20\n"
      "joulecast profile --robot amr.json --length 10 --deadline 14 --json\n"
-     "joulecast profile --server http://127.0.0.1:8080 --robot-id amr --turn 1.57 --length 10 --pareto 5"},
-    {"estimate", "joulecast estimate --robot amr.json --length 10 --payload 20"},
+     "joulecast profile --server http://127.0.0.1:8080 --robot-id amr --turn 90deg --length 10 --pareto 5"},
+    {"estimate",
+     "joulecast estimate --robot amr.json --length 10 --payload 20\n"
+     "joulecast estimate --example | joulecast estimate --robot amr.json --request -"},
     {"autonomy",
      "joulecast autonomy --robot amr.json --charge 0.6 --payload 20\n"
      "joulecast autonomy --robot amr.json --charge 0.6 --dialect vda5050-3.0\n"
      "joulecast autonomy --server http://127.0.0.1:8080 --robot-id amr"},
-    {"matrix", "joulecast matrix tasks.json --robot amr.json"},
+    {"matrix",
+     "joulecast matrix tasks.json --robot amr.json\n"
+     "joulecast matrix --example | joulecast matrix - --robot amr.json"},
     {"missions",
      "joulecast missions --server http://127.0.0.1:8080 --robot-id amr --limit 20\n"
-     "joulecast missions --server http://127.0.0.1:8080 --from 2026-11-21T06:00:00Z --state finished"},
+     "joulecast missions --server http://127.0.0.1:8080 --from 2026-11-21 --state finished"},
     {"import",
      "joulecast import runs.csv --mapping mapping.json --start 2026-03-01T08:00:00Z --out imported.lcmlog"},
     {"replay",
@@ -72,6 +77,16 @@ CLI::App* find(CLI::App& program, const std::string& path) {
 }
 
 }  // namespace
+
+void add_example(CLI::App& command, const char* request) {
+  command.add_flag_callback(
+      "--example",
+      [request] {
+        std::puts(request);
+        throw CLI::Success();
+      },
+      "print a request as JSON to begin with, and leave");
+}
 
 void add_examples(CLI::App& program) {
   for (const auto& [command, text] : table) {

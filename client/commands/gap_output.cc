@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "base/format_utc.h"
+#include "base/utc_time.h"
 #include "base/host_clock.h"
 #include "client/files.h"
 #include "client/wrapped.h"

@@ -1,5 +1,3 @@
-#include "server/api/matrix.h"
-
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -13,13 +11,14 @@
 #include <utility>
 #include <vector>
 
+#include "answers/json/matrix_json.h"
 #include "base/json_text.h"
+#include "client/commands/examples.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/http_client.h"
 #include "client/progress.h"
 #include "robot/robot_file.h"
-#include "server/api/autonomy.h"
 
 namespace joulecast::client {
 namespace {
@@ -29,57 +28,59 @@ using nlohmann::json;
 constexpr std::int64_t file_version = 1;
 constexpr std::size_t most_columns = 8;  // of the printed table
 
+// Two tasks that any robot can price: their ways are given, so that nobody need know where it stands.
+constexpr const char* example = R"({
+  "driving": "minimum_energy",
+  "tasks": [{"task_id": "fetch", "payload_kg": 2, "empty": {"distance_m": 12},
+             "loaded": {"distances_m": [8, 5], "turns_rad": [1.5708]}, "pickup_dwell_s": 20},
+            {"task_id": "patrol", "empty": {"distance_m": 0}, "loaded": {"distances_m": [30, 30], "turns_rad": [3.1416]}}]
+})";
+
 struct Options {
   std::string request_file;
   std::vector<std::string> robot_files;
   std::string server;
+  std::string driving;
   double timeout_s = 60;
   bool json = false;
 };
 
-Result<std::string> ask_server(const Options& options, std::string request) {
+Result<std::string> ask_server(const Options& options, const json& request) {
   const auto server = parse_server_url(options.server);
   if (!server) return tl::unexpected(server.error());
   const auto timeout = std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * options.timeout_s));
-  auto reply = http_request(*server, HttpMethod::post, "/v1/energy-matrix", std::move(request), timeout);
+  auto reply = http_request(*server, HttpMethod::post, "/v1/energy-matrix", request.dump(), timeout);
   if (!reply) return tl::unexpected(reply.error());
   if (!reply->ok()) return tl::unexpected(error_of(*reply));
   return std::move(reply->body);
 }
 
-Result<std::string> answer_here(const Options& options, const std::string& text) {
-  const auto parsed = parse_json(text);
-  if (!parsed) return invalid(options.request_file, describe(parsed.error()));
-  const json& request = *parsed;
-  if (!request.is_object()) return invalid(options.request_file, "is not a JSON object");
-  std::map<std::string, std::shared_ptr<const server::ModelInForce>> models;
+Result<std::string> answer_here(const Options& options, json request) {
+  json ids = json::array();
+  std::map<std::string, std::shared_ptr<const answers::ModelInForce>> models;
   for (const std::string& file : options.robot_files) {
     auto robot = robot::load_robot(file);
     if (!robot) return tl::unexpected(robot.error());
-    auto model = server::model_in_force(std::move(*robot), file_version);
+    auto model = answers::model_in_force(std::move(*robot), file_version);
     if (!model) return tl::unexpected(std::move(model.error()));
+    ids.push_back((*model)->robot.robot_id);
     models[(*model)->robot.robot_id] = *model;
   }
-  api::MatrixFleet fleet;
-  fleet.model = [&](const std::string& id) -> Result<std::shared_ptr<const server::ModelInForce>> {
+  if (!request.contains("robots")) request["robots"] = std::move(ids);
+  auto input = answers::read_matrix(request);
+  if (!input) return tl::unexpected(std::move(input.error()));
+  answers::MatrixFleet fleet;
+  fleet.model = [&](const std::string& id) -> Result<std::shared_ptr<const answers::ModelInForce>> {
     if (const auto found = models.find(id); found != models.end()) return found->second;
     return fail(Fault::not_found, "robot_id", "no --robot file describes " + id);
   };
-  fleet.pose = [](const std::string&) { return std::nullopt; };
-  fleet.outlook = [](const std::shared_ptr<const server::ModelInForce>& model) {
-    return server::Forecasts::untried(model);
-  };
-  fleet.charge = [](const server::ModelInForce& model, const std::optional<double>& given,
-                    const std::optional<double>& reserve) {
-    return api::charge_of(given, {}, reserve, model.robot.battery, nullptr)
-        .value_or(forecast::Charge{std::nan(""), 0, 0});
-  };
+  fleet.live = [](const std::string&) { return answers::LiveRobot{}; };
+  fleet.outlook = answers::untried;
   planning::CostTableCache tables;
-  auto answer = api::MatrixAnswer::make(request, fleet, tables);
-  if (!answer) return tl::unexpected(std::move(answer.error()));
+  answers::MatrixText answer(answers::Matrix(std::move(*input), fleet, tables));
   std::string out;
   Progress progress("pricing", "robots", options.robot_files.size());
-  for (std::uint64_t rows = 0; (*answer)->next(out, {}); ++rows) progress.reach(rows);
+  for (std::uint64_t rows = 0; answer.next(out, {}); ++rows) progress.reach(rows);
   return out;
 }
 
@@ -124,8 +125,18 @@ void print(const json& answer) {
   }
 }
 
+Result<json> request_of(const Options& options) {
+  const auto text = read_file(options.request_file);
+  if (!text) return tl::unexpected(text.error());
+  auto request = parse_json(*text);
+  if (!request) return invalid(options.request_file, describe(request.error()));
+  if (!request->is_object()) return invalid(options.request_file, "is not a JSON object");
+  if (!options.driving.empty()) (*request)["driving"] = options.driving;
+  return request;
+}
+
 Exit run(const Options& options) {
-  const auto request = read_file(options.request_file);
+  const auto request = request_of(options);
   if (!request) return report(request.error());
   const auto text = options.server.empty() ? answer_here(options, *request) : ask_server(options, *request);
   if (!text) return report(text.error());
@@ -150,13 +161,19 @@ void add_matrix(CLI::App& program, Exit& exit) {
                    "request as JSON (schemas/energy-matrix-request.schema.json), - for standard input")
       ->required();
   auto* files = command->add_option("--robot", options->robot_files,
-                                    "robot file, once a robot: answer here, without a server");
-  auto* server = command->add_option("--server", options->server, "joulecastd to ask, http://host:port");
+                                    "robot file, once a robot: answer here, without a server, for all of "
+                                    "them where the request names no robots");
+  command
+      ->add_option("--driving", options->driving,
+                   "by minimum-energy profiles (the default), or as each robot usually drives")
+      ->check(CLI::IsMember({"usual", "minimum_energy"}));
+  auto* server = command->add_option("--server", options->server, "joulecastd to ask, host:port");
   server->excludes(files);
   command->add_option("--timeout", options->timeout_s, "seconds to wait for the server")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->add_flag("--json", options->json, "print the answer as the server sends it");
+  add_example(*command, example);
   command->callback([options, &exit] {
     if (options->robot_files.empty() && options->server.empty())
       throw CLI::RequiredError("--robot or --server");

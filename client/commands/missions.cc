@@ -11,7 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "base/format_utc.h"
 #include "client/commands/parse_time.h"
 #include "client/commands/table.h"
 #include "client/http_client.h"
@@ -47,9 +46,12 @@ std::string text_of(const json& value) {
   return value.is_string() ? value.get<std::string>() : value.is_null() ? "-" : value.dump();
 }
 
-std::string utc(const json& utime_us) {
-  if (!utime_us.is_number_integer()) return "-";
-  return format_utc(utime_us.get<std::int64_t>(), "%Y-%m-%d %H:%M:%S");
+// "2026-11-22T16:45:00.25Z" -> "2026-11-22 16:45:00"
+std::string to_second(const json& time) {
+  if (!time.is_string()) return "-";
+  std::string text = time.get<std::string>().substr(0, std::string_view("2026-11-22T16:45:00").size());
+  std::ranges::replace(text, 'T', ' ');
+  return text;
 }
 
 std::string joules(const json& energy, const char* name) {
@@ -64,7 +66,7 @@ void print_table(const json& page) {
     const json& energy = m["energy"];
     fmt::print("{:>6} {:<20} {:<28} {:<12} {:<19} {:>9} {:>9} {:>12} {:>12}\n", text_of(m["id"]),
                text_of(m["robot_id"]), text_of(m["mission_id"]),
-               text_of(m["state"]) + (m.value("incomplete", false) ? "*" : ""), utc(m["start_utime_us"]),
+               text_of(m["state"]) + (m.value("incomplete", false) ? "*" : ""), to_second(m["start"]),
                joules(energy, "duration_s"), joules(energy, "distance_m"), joules(energy, "battery_j"),
                joules(energy, "modelled_j"));
   }
@@ -111,14 +113,14 @@ Exit run(const Options& options) {
 void add_missions(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
   auto* command = program.add_subcommand("missions", "List what robots did and what it cost, newest first");
-  command->add_option("--server", options->server, "joulecastd to ask, http://host:port")->required();
+  command->add_option("--server", options->server, "joulecastd to ask, host:port")->required();
   constexpr std::array<std::array<const char*, 3>, 10> filters{{
       {"--robot-id", "robot_id", "only this robot's"},
       {"--mission-id", "mission_id", "only those that the robot called so"},
       {"--state", "state", "only those in this state"},
       {"--incomplete", "incomplete", "true: only those with unmeasured parts; false: only those without"},
       {"--from", "from_utime_us",
-       "started at or after, UTC (2024-07-18T09:10:45Z) or microseconds since 1970"},
+       "started at or after: 2024-07-18, 2024-07-18T09:10:45Z or microseconds since 1970"},
       {"--to", "to_utime_us", "started before, the same"},
       {"--payload-min", "payload_min_kg", "kg"},
       {"--payload-max", "payload_max_kg", "kg"},

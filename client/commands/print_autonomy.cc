@@ -44,8 +44,8 @@ std::string probability(double p) {
 std::string where(const json& place) {
   if (!place.is_object()) return "";
   if (!place["task"].is_number()) return "on the way to the charger";
-  const std::string name = place.value("name", "");
-  return fmt::format("in leg {}{}", place["task"].get<int>() + 1, name.empty() ? "" : " (" + name + ")");
+  const std::string id = place.value("task_id", "");
+  return fmt::format("in leg {}{}", place["task"].get<int>() + 1, id.empty() ? "" : " (" + id + ")");
 }
 
 void print_stage(const std::string& title, const json& stage) {
@@ -65,8 +65,7 @@ void print_plan(const json& plan) {
              "95 %", "reserve");
   int index = 0;
   for (const json& leg : plan["legs"]) {
-    const std::string name = leg.value("name", "");
-    print_stage(fmt::format("{:>3} {}", ++index, name), leg);
+    print_stage(fmt::format("{:>3} {}", ++index, leg.value("task_id", "")), leg);
   }
   if (plan["charger"].is_object()) print_stage("    to the charger", plan["charger"]);
   if (plan["fails_at"].is_object()) fmt::print("Fails {} more often than not.\n", where(plan["fails_at"]));
@@ -85,7 +84,6 @@ void print_plan(const json& plan) {
 }
 
 void print_one(const json& a) {
-  const json& driving = a["driving"];
   fmt::print("{} (model version {}): charge {}", a.value("robot_id", ""), a.value("model_version", 0),
              percent(number(a, "state_of_charge")));
   if (const double sd = number(a, "state_of_charge_sd"); sd > 0) fmt::print(" +- {}", percent(sd));
@@ -102,8 +100,8 @@ void print_one(const json& a) {
   }
   const json& c = a["consumption"];
   const std::string basis = c.value("basis", "");
-  fmt::print("Driving {} at {} m/s with {} kg: {} J/m, {} W; ", driving.value("kind", ""),
-             figure(number(driving, "speed_m_s"), 2), figure(number(a, "payload_kg"), 1),
+  fmt::print("Driving {} at {} m/s with {} kg: {} J/m, {} W; ", a.value("driving", ""),
+             figure(number(a["pace"], "speed_m_s"), 2), figure(number(a, "payload_kg"), 1),
              figure(number(c, "energy_per_m_j"), 1), figure(number(c, "mean_power_w"), 1));
   if (basis == "recent_missions")
     fmt::print("by {} missions of its own", c.value("missions", 0));

@@ -8,11 +8,11 @@
 #include <set>
 #include <utility>
 
+#include "answers/json/mission_json.h"
 #include "base/host_clock.h"
 #include "client/log_progress.h"
 #include "history/sqlite_store.h"
 #include "history/writer.h"
-#include "server/api/mission_json.h"
 #include "server/ingest/forecasts.h"
 #include "server/ingest/model_loading.h"
 #include "server/ingest/pipeline.h"
@@ -130,13 +130,13 @@ Exit replay_into(const ReplayInto& options) {
     missions.push_back(std::move(*mission));
   }
   if (options.json) {
-    api::JsonWriter json;
+    JsonWriter json;
     json.begin_object().field("messages", tally.events).field("damaged_places", tally.damaged_places);
     json.field("skipped_bytes", tally.skipped_bytes).key("faults").begin_object();
     for (std::size_t k = 0; k < server::ingest_fault_count; ++k)
       json.field(server::ingest_fault_names[k], counters.faults[k].load());
     json.end_object().key("missions").begin_array();
-    for (const history::Mission& mission : missions) api::write_mission(json, mission);
+    for (const history::Mission& mission : missions) answers::write_mission(json, mission);
     json.end_array().end_object();
     std::printf("%s\n", json.text().c_str());
   } else {

@@ -15,7 +15,7 @@
 #include <variant>
 #include <vector>
 
-#include "base/format_utc.h"
+#include "base/utc_time.h"
 #include "base/host_clock.h"
 #include "base/text_file.h"
 #include "client/commands/table.h"

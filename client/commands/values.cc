@@ -25,6 +25,7 @@ constexpr auto table = std::to_array<Named>({
     {"", "--robot-id", "ID", ""},
     {"", "--mission-id", "ID", ""},
     {"", "--request", "FILE", "*.json"},
+    {"", "--turn", "ANGLE", ""},
     {"matrix", "request", "FILE", "*.json"},
     {"", "log", "FILE", "*.lcmlog"},
     {"import", "table", "FILE", "*.csv"},

@@ -36,14 +36,16 @@ bool takes_words(const CLI::App& app) {
 
 // What nobody took explains more than what is missing for want of it.
 std::string about_rest(const CLI::App& app, const std::vector<std::string>& rest) {
+  const auto commands = names_of_commands(app);
+  const bool takes_command = !commands.empty() && !takes_words(app);
+  // A command that is not there explains its options too.
+  if (takes_command && !rest.front().starts_with("-"))
+    return "has no command " + rest.front() + did_you_mean(rest.front(), commands);
   const auto option = std::ranges::find_if(rest, [](const std::string& w) { return w.starts_with("-"); });
   if (option != rest.end()) {
     const std::string name = option->substr(0, option->find('='));
     return "has no option " + name + did_you_mean(name, names_of_options(app));
   }
-  const auto commands = names_of_commands(app);
-  if (!commands.empty() && !takes_words(app))
-    return "has no command " + rest.front() + did_you_mean(rest.front(), commands);
   return "has no use for " + rest.front();
 }
 

@@ -3,6 +3,8 @@
 #include <charconv>
 #include <utility>
 
+#include "base/utc_time.h"
+
 namespace joulecast::api {
 
 using http::Parameter;
@@ -25,11 +27,41 @@ Parameter limit_parameter(std::string things, std::int64_t maximum) {
           .maximum = static_cast<double>(maximum)};
 }
 
-Parameter before_parameter() {
-  return {.name = "before",
-          .type = Parameter::Type::integer,
-          .description = "only those with a smaller id",
-          .minimum = 1};
+Parameter cursor_parameter() {
+  return {
+      .name = "cursor", .type = Parameter::Type::text, .description = "the next_cursor of the page before"};
+}
+
+Result<std::optional<std::int64_t>> id_cursor(const http::Request& request) {
+  const auto text = request.query_value("cursor");
+  if (!text) return std::nullopt;
+  std::int64_t id = 0;
+  const auto [end, fault] = std::from_chars(text->data(), text->data() + text->size(), id);
+  if (fault != std::errc() || end != text->data() + text->size() || id < 0)
+    return invalid("cursor", "must be the next_cursor of a page of this list");
+  return id;
+}
+
+void write_cursor(JsonWriter& json, std::string_view cursor) {
+  json.key("next_cursor");
+  cursor.empty() ? json.null() : json.value(cursor);
+}
+
+std::vector<Parameter> time_parameters(const std::string& name, const std::string& what) {
+  return {{.name = name, .type = Parameter::Type::text, .description = what + ", " + std::string(utc_forms)},
+          {.name = name + "_utime_us",
+           .type = Parameter::Type::integer,
+           .description = "the same in microseconds since 1970"}};
+}
+
+Result<std::optional<std::int64_t>> time_of(const http::Request& request, const std::string& name) {
+  const auto text = request.query_value(name);
+  const auto utime_us = request.query_integer(name + "_utime_us");
+  if (!text) return utime_us;
+  if (utime_us) return invalid(name, "must not be given beside " + name + "_utime_us");
+  const auto parsed = parse_utc(*text);
+  if (!parsed) return invalid(name, "is \"" + std::string(*text) + "\", must be " + std::string(utc_forms));
+  return parsed;
 }
 
 }  // namespace joulecast::api

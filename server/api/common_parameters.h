@@ -1,10 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "base/error.h"
+#include "base/json_writer.h"
 #include "server/http/router.h"
 
 // Parameters that several endpoints share.
@@ -16,7 +20,22 @@ Result<std::int64_t> path_id(const http::Request& request, std::string_view thin
 // ?limit=: how many `things`, e.g. "missions a page", are answered at most.
 http::Parameter limit_parameter(std::string things, std::int64_t maximum);
 
-// ?before=: where a list that runs from the newest backwards begins.
-http::Parameter before_parameter();
+// ?cursor=: the next_cursor of the page before.
+http::Parameter cursor_parameter();
+// Of a list whose cursors are ids: the id after which the page begins, in the list's order. Fault::invalid
+// for any other text.
+Result<std::optional<std::int64_t>> id_cursor(const http::Request& request);
+// "next_cursor": null where `cursor` is empty.
+void write_cursor(JsonWriter& json, std::string_view cursor);
+// The same for ids: null where the page is not full.
+template <class Items, class Id>
+void write_id_cursor(JsonWriter& json, const Items& items, std::int64_t limit, Id id_of) {
+  write_cursor(json, std::cmp_less(items.size(), limit) ? "" : std::to_string(id_of(items.back())));
+}
+
+// ?<name>= in ISO 8601 and ?<name>_utime_us=: one time in either form. `what` begins the description.
+std::vector<http::Parameter> time_parameters(const std::string& name, const std::string& what);
+// What they say; nothing where both are absent. Fault::invalid for text of no such form and for both at once.
+Result<std::optional<std::int64_t>> time_of(const http::Request& request, const std::string& name);
 
 }  // namespace joulecast::api

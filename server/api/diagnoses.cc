@@ -2,9 +2,9 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/json_fields.h"
+#include "base/json_writer.h"
 #include "server/api/common_parameters.h"
-#include "server/api/fields.h"
-#include "server/api/json_writer.h"
 #include "server/api/services.h"
 #include "server/diagnosis/diagnosis_service.h"
 
@@ -32,9 +32,9 @@ void write_diagnosis(JsonWriter& out, const Services& services, const history::D
       .field("cause", history::name(d.cause));
   out.field("progress", progress ? progress->fraction : d.state == history::DiagnosisState::done ? 1.0 : 0.0);
   out.field("ahead", static_cast<std::int64_t>(progress ? progress->ahead : 0));
-  out.field("created_utime_us", d.created_utime_us);
-  out.field("started_utime_us", progress ? progress->started_utime_us : d.started_utime_us);
-  out.field("finished_utime_us", d.finished_utime_us);
+  out.time("created", d.created_utime_us);
+  out.time("started", progress ? progress->started_utime_us : d.started_utime_us);
+  out.time("finished", d.finished_utime_us);
   out.field("model_version", d.model_version);
   out.array("fitted_on", d.fitted_on);
   out.array("held_back", d.held_back);
@@ -79,7 +79,7 @@ Result<Response> start(Services& services, const Request& request) {
       }
     }
   }
-  wanted.since_utime_us = fields.optional_integer("since_utime_us", 0, std::int64_t{1} << 53);
+  wanted.since_utime_us = fields.time("since");
   wanted.max_missions = static_cast<std::size_t>(
       fields.integer("max_missions", 1, static_cast<std::int64_t>(most_missions), 200));
   if (const auto controls = fields.optional_integer("controls", 0, static_cast<std::int64_t>(most_controls)))
@@ -111,14 +111,15 @@ Result<Response> list(const Services& services, const Request& request) {
   std::optional<std::string> robot;
   if (const auto id = request.query_value("robot_id")) robot = std::string(*id);
   const std::int64_t limit = request.query_integer("limit").value_or(50);
-  const auto found =
-      services.store.diagnoses(robot, request.query_integer("before").value_or(history::whole_future), limit);
+  const auto cursor = id_cursor(request);
+  if (!cursor) return tl::unexpected(cursor.error());
+  const auto found = services.store.diagnoses(robot, cursor->value_or(history::whole_future), limit);
   if (!found) return tl::unexpected(found.error());
   JsonWriter out;
   out.begin_object().key("diagnoses").begin_array();
   for (const history::DiagnosisRecord& d : *found) write_diagnosis(out, services, d, Detail::list);
-  out.end_array().key("next_before");
-  static_cast<std::int64_t>(found->size()) < limit ? out.null() : out.value(found->back().id);
+  out.end_array();
+  write_id_cursor(out, *found, limit, [](const history::DiagnosisRecord& d) { return d.id; });
   out.end_object();
   return http::json_response(out.take());
 }
@@ -212,7 +213,7 @@ std::vector<TableRow> diagnosis_rows() {
         .summary = "Diagnoses, newest first, without their whole results",
         .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},
                        limit_parameter("diagnoses a page", history::max_page_size),
-                       before_parameter()},
+                       cursor_parameter()},
         .response_schema = "diagnosis-list"},
        answered_by(list)});
   rows.push_back({{.method = Method::get,

@@ -1,14 +1,13 @@
-#include <algorithm>
-#include <array>
+#include "server/api/fleet_autonomy.h"
+
 #include <nlohmann/json.hpp>
-#include <set>
-#include <thread>
+#include <optional>
 #include <utility>
 #include <vector>
 
-#include "server/api/autonomy.h"
-#include "server/api/json_writer.h"
-#include "server/api/services.h"
+#include "answers/json/autonomy_json.h"
+#include "base/parallel.h"
+#include "server/api/live_robot.h"
 
 namespace joulecast::api {
 namespace {
@@ -32,60 +31,75 @@ std::string_view name_of(Fault fault) {
 
 struct Row {
   std::string robot_id;
-  const json* own = nullptr;  // this robot's request, instead of the common one
-  std::size_t own_index = 0;
-  std::string text;
+  std::string at = "/request";  // where its request stands
+  // This robot's request instead of the common one, or what is wrong with it.
+  std::optional<Result<answers::AutonomyRequest>> own = {};
 };
 
-void write_problem(Row& row, const Error& error) {
+std::string problem_row(const std::string& robot_id, const Error& error) {
   JsonWriter out;
-  out.begin_object().field("robot_id", row.robot_id);
+  out.begin_object().field("robot_id", robot_id);
   out.key("problem").begin_object();
   out.field("fault", name_of(error.fault)).field("field", error.field).field("message", error.message);
   out.end_object().end_object();
-  row.text = out.take();
+  return out.take();
 }
 
-// Answers rows first, first + 2, first + 4 ...; a request that is the same for all robots is read once.
-void answer_rows(std::vector<Row>& rows, std::size_t first, const json& common, Services& services) {
-  const bool same = !depends_on_whereabouts(common);
-  std::optional<AutonomyRequest> read;
-  for (std::size_t k = first; k < rows.size(); k += 2) {
-    Row& row = rows[k];
-    const auto model = model_of(services, row.robot_id);
-    if (!model) {
-      write_problem(row, model.error());
-      continue;
-    }
-    const auto live = services.fleet.find(row.robot_id);
-    const Whereabouts now = whereabouts(live.get());
-    const bool shared = row.own == nullptr && (same || (!now.pose && !now.payload_kg));
-    std::optional<AutonomyRequest> mine;
-    if (!shared || !read) {
-      Fields fields(
-          row.own != nullptr ? *row.own : common,
-          row.own != nullptr ? "/robots/" + std::to_string(row.own_index) + "/request" : "/request");
-      mine = read_autonomy(fields, now, false);
-      if (Result<void> done = fields.finish(); !done) {
-        write_problem(row, done.error());
-        continue;
-      }
-      if (shared) read = std::exchange(mine, std::nullopt);
-    }
-    const AutonomyRequest& request = shared ? *read : *mine;
-    const server::RobotOutlook robot = services.forecasts.of(*model);
-    const Result<Autonomy> autonomy = autonomy_of(request, robot, live.get(), services.cost_tables);
-    if (!autonomy) {
-      write_problem(row, autonomy.error());
-      continue;
-    }
-    row.text = autonomy_json(*autonomy, request, robot, live.get());
-    if (request.dialect != Dialect::joulecast) {
-      JsonWriter named;
-      named.begin_object().field("robot_id", row.robot_id).key("battery").raw(row.text).end_object();
-      row.text = named.take();
-    }
+// What all robots are asked.
+struct Common {
+  answers::AutonomyRequest request;
+  answers::TaskPlan plan;  // of a robot that tells neither its place nor its payload
+};
+
+bool depends_on_whereabouts(const answers::AutonomyInput& input) {
+  return !input.start_pose || !input.payload_kg;
+}
+
+Result<std::string> answer(const Row& row, const Common& common, const Services& services) {
+  const auto model = model_of(services, row.robot_id);
+  if (!model) return tl::unexpected(model.error());
+  if (row.own && !*row.own) return tl::unexpected(row.own->error());
+  const auto in_request = [&row](Error error) {
+    error.field.insert(0, row.at);
+    return tl::unexpected(std::move(error));
+  };
+  const answers::LiveRobot now = live_robot(services.fleet.find(row.robot_id).get());
+  const answers::AutonomyRequest& request = row.own ? **row.own : common.request;
+  std::optional<answers::TaskPlan> mine;
+  if (row.own || (depends_on_whereabouts(request.input) && (now.pose || now.payload_kg))) {
+    auto plan = answers::task_plan(request.input, now);
+    if (!plan) return in_request(std::move(plan.error()));
+    mine = std::move(*plan);
   }
+  const answers::RobotOutlook robot = services.forecasts.of(*model);
+  const auto autonomy =
+      answers::autonomy(request.input, mine ? *mine : common.plan, robot, now, services.cost_tables);
+  if (!autonomy) return in_request(autonomy.error());
+  std::string text = answers::autonomy_json(request, *autonomy, robot, now);
+  if (request.dialect == answers::Dialect::joulecast) return text;
+  JsonWriter named;
+  named.begin_object().field("robot_id", row.robot_id).key("battery").raw(text).end_object();
+  return named.take();
+}
+
+Result<answers::AutonomyRequest> read_request(const json& request, const std::string& at) {
+  Fields fields(request, at);
+  auto read = answers::read_autonomy(fields, false);
+  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  return read;
+}
+
+Row read_row(const json& given, const std::string& at, Fields& outer) {
+  if (given.is_string()) return {given.get<std::string>()};
+  Fields own(given, at);
+  Row row{own.text("robot_id", 256)};
+  if (const json* request = own.member("request")) {
+    if (!request->is_object()) own.fault("request", "must be an object");
+    row.at = own.pointer("request");
+    row.own = read_request(*request, row.at);
+  }
+  if (Result<void> done = own.finish(); !done) outer.fault(std::move(done.error()));
+  return row;
 }
 
 }  // namespace
@@ -93,50 +107,45 @@ void answer_rows(std::vector<Row>& rows, std::size_t first, const json& common, 
 Result<std::string> fleet_autonomy_answer(const json& body, Services& services) {
   Fields fields(body);
   const json nothing = json::object();
-  const json* common = fields.member("request");
-  if (common != nullptr && !common->is_object()) fields.fault("request", "must be an object");
+  const json* shared = fields.member("request");
+  if (shared != nullptr && !shared->is_object()) fields.fault("request", "must be an object");
   const json* robots = fields.member("robots");
   std::vector<Row> rows;
   if (robots == nullptr) {
-    for (const auto& model : services.models.all()) rows.push_back({model->robot.robot_id, nullptr, 0, {}});
+    for (const auto& model : services.models.all()) rows.push_back({model->robot.robot_id});
   } else if (!robots->is_array() || robots->size() > max_robots) {
     fields.fault("robots", "must be an array of at most " + std::to_string(max_robots) + " robots");
   } else {
-    for (std::size_t k = 0; k < robots->size() && fields.ok(); ++k) {
-      const json& given = (*robots)[k];
-      if (given.is_string()) {
-        rows.push_back({given.get<std::string>(), nullptr, k, {}});
-        continue;
-      }
-      Fields own(given, fields.pointer("robots") + "/" + std::to_string(k));
-      Row row{own.text("robot_id", 256), own.member("request"), k, {}};
-      if (row.own != nullptr && !row.own->is_object()) own.fault("request", "must be an object");
-      if (Result<void> done = own.finish(); !done) fields.fault(std::move(done.error()));
-      rows.push_back(std::move(row));
-    }
+    for (std::size_t k = 0; k < robots->size() && fields.ok(); ++k)
+      rows.push_back(read_row((*robots)[k], fields.pointer("robots") + "/" + std::to_string(k), fields));
   }
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
   // A fault of the common request is the caller's, whatever the robots.
-  const json& shared = common != nullptr ? *common : nothing;
-  Fields check(shared, "/request");
-  read_autonomy(check, {}, false);
-  if (Result<void> done = check.finish(); !done) return tl::unexpected(std::move(done.error()));
+  auto request = read_request(shared != nullptr ? *shared : nothing, "/request");
+  if (!request) return tl::unexpected(std::move(request.error()));
+  auto plan = answers::task_plan(request->input, {});
+  if (!plan) {
+    plan.error().field.insert(0, "/request");
+    return tl::unexpected(std::move(plan.error()));
+  }
+  const Common common{std::move(*request), std::move(*plan)};
 
-  {
-    std::jthread other([&] { answer_rows(rows, 1, shared, services); });
-    answer_rows(rows, 0, shared, services);
-  }
+  std::vector<std::string> texts(rows.size());
+  parallel_for(rows.size(), 2, [&](std::size_t k) {
+    auto text = answer(rows[k], common, services);
+    texts[k] = text ? std::move(*text) : problem_row(rows[k].robot_id, text.error());
+  });
   std::size_t length = 16;
-  for (const Row& row : rows) length += row.text.size() + 1;
-  std::string text;
-  text.reserve(length);
-  text = "{\"robots\":[";
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    if (k > 0) text += ',';
-    text += rows[k].text;
+  for (const std::string& text : texts) length += text.size() + 1;
+  std::string out;
+  out.reserve(length);
+  out = "{\"robots\":[";
+  for (std::size_t k = 0; k < texts.size(); ++k) {
+    if (k > 0) out += ',';
+    out += texts[k];
   }
-  text += "]}";
-  return text;
+  out += "]}";
+  return out;
 }
 
 }  // namespace joulecast::api

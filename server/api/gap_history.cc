@@ -2,8 +2,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/json_writer.h"
 #include "server/api/common_parameters.h"
-#include "server/api/json_writer.h"
 #include "server/api/services.h"
 
 // How a robot's gap moved over its missions, what was adopted meanwhile, and how robots of its kind do.
@@ -21,7 +21,7 @@ constexpr std::int64_t most_missions = 5000;
 void write_ratios(JsonWriter& out, const std::vector<drift::MissionRatio>& missions) {
   out.key("missions").begin_array();
   for (const drift::MissionRatio& m : missions) {
-    out.begin_object().field("id", m.mission_key).field("start_utime_us", m.utime_us);
+    out.begin_object().field("id", m.mission_key).time("start", m.utime_us);
     out.field("model_version", m.model_version).field("measured_j", m.measured_j);
     out.field("modelled_j", m.modelled_j).field("ratio", m.ratio()).end_object();
   }
@@ -31,7 +31,7 @@ void write_ratios(JsonWriter& out, const std::vector<drift::MissionRatio>& missi
 void write_marks(JsonWriter& out, const std::vector<drift::Mark>& marks) {
   out.key("drift").begin_array();
   for (const drift::Mark& m : marks) {
-    out.begin_object().field("id", m.mission_key).field("start_utime_us", m.utime_us);
+    out.begin_object().field("id", m.mission_key).time("start", m.utime_us);
     out.field("model_version", m.model_version).field("ratio_before", m.before).field("ratio_after", m.after);
     out.array("change_ci", m.interval);
     out.field("missions", static_cast<std::int64_t>(m.missions)).end_object();
@@ -42,7 +42,7 @@ void write_marks(JsonWriter& out, const std::vector<drift::Mark>& marks) {
 void write_versions(JsonWriter& out, const std::vector<history::ModelVersion>& versions) {
   out.key("versions").begin_array();
   for (const history::ModelVersion& v : versions) {
-    out.begin_object().field("model_version", v.version).field("created_utime_us", v.created_utime_us);
+    out.begin_object().field("model_version", v.version).time("created", v.created_utime_us);
     out.field("origin", history::name(v.origin)).field("note", v.note).field("active", v.active);
     const json evidence = json::parse(v.evidence_json, nullptr, false);
     const json test = evidence.is_object() ? evidence.value("back_test", json::object()) : json::object();
@@ -92,17 +92,21 @@ Result<Response> gap_history(const Services& services, const Request& request) {
 Result<Response> audit(const Services& services, const Request& request) {
   std::optional<std::string> robot;
   if (const auto id = request.query_value("robot_id")) robot = std::string(*id);
-  const auto found = services.store.events(request.query_integer("after").value_or(0),
-                                           request.query_integer("limit").value_or(100), robot);
+  const auto cursor = id_cursor(request);
+  if (!cursor) return tl::unexpected(cursor.error());
+  const std::int64_t limit = request.query_integer("limit").value_or(100);
+  const auto found = services.store.events(cursor->value_or(0), limit, robot);
   if (!found) return tl::unexpected(found.error());
   JsonWriter out;
   out.begin_object().key("events").begin_array();
   for (const history::Event& e : *found) {
-    out.begin_object().field("id", e.id).field("utime_us", e.utime_us).key("robot_id");
+    out.begin_object().field("id", e.id).time("", e.utime_us).key("robot_id");
     e.robot_id.empty() ? out.null() : out.value(e.robot_id);
     out.field("kind", e.kind).key("detail").raw(e.detail_json).end_object();
   }
-  out.end_array().end_object();
+  out.end_array();
+  write_id_cursor(out, *found, limit, [](const history::Event& e) { return e.id; });
+  out.end_object();
   return http::json_response(out.take());
 }
 
@@ -128,11 +132,8 @@ std::vector<TableRow> gap_history_rows() {
         .summary = "What happened to robots and their models: adoptions, drifts, diagnoses, reused mission "
                    "ids, in order",
         .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},
-                       {.name = "after",
-                        .type = Type::integer,
-                        .description = "only entries with a greater id",
-                        .minimum = 0},
-                       limit_parameter("entries a page", history::max_page_size)},
+                       limit_parameter("entries a page", history::max_page_size),
+                       cursor_parameter()},
         .response_schema = "audit-log"},
        answered_by(audit)});
   return rows;

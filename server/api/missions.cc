@@ -5,8 +5,9 @@
 #include <unordered_map>
 #include <utility>
 
+#include "answers/json/ledger_json.h"
+#include "answers/json/mission_json.h"
 #include "server/api/common_parameters.h"
-#include "server/api/mission_json.h"
 #include "server/api/services.h"
 
 namespace joulecast::api {
@@ -21,8 +22,11 @@ Result<history::MissionFilter> filter_of(const Request& request) {
   history::MissionFilter filter;
   if (const auto robot = request.query_value("robot_id")) filter.robot_id = std::string(*robot);
   if (const auto mission = request.query_value("mission_id")) filter.mission_id = std::string(*mission);
-  filter.start_from_utime_us = request.query_integer("from_utime_us");
-  filter.start_to_utime_us = request.query_integer("to_utime_us");
+  const auto from = time_of(request, "from"), to = time_of(request, "to");
+  if (!from) return tl::unexpected(from.error());
+  if (!to) return tl::unexpected(to.error());
+  filter.start_from_utime_us = *from;
+  filter.start_to_utime_us = *to;
   filter.incomplete = request.query_boolean("incomplete");
   filter.payload_min_kg = request.query_number("payload_min_kg");
   filter.payload_max_kg = request.query_number("payload_max_kg");
@@ -31,57 +35,62 @@ Result<history::MissionFilter> filter_of(const Request& request) {
   return filter;
 }
 
-std::vector<Parameter> filter_parameters() {
-  using Type = Parameter::Type;
-  return {
-      {.name = "robot_id", .type = Type::text, .description = "only missions of this robot"},
-      {.name = "mission_id", .type = Type::text, .description = "only missions that the robot called so"},
-      {.name = "from_utime_us",
-       .type = Type::integer,
-       .description = "only missions that started at or after this time"},
-      {.name = "to_utime_us",
-       .type = Type::integer,
-       .description = "only missions that started before this time"},
-      {.name = "state",
-       .type = Type::text,
-       .description = "only missions in this state",
-       .choices = {"open", "finished", "aborted", "unfinished", "superseded", "interrupted"}},
-      {.name = "incomplete",
-       .type = Type::boolean,
-       .description = "only missions with (true) or without (false) unmeasured parts"},
-      {.name = "payload_min_kg",
-       .type = Type::number,
-       .description = "only missions with at least this payload",
-       .minimum = 0},
-      {.name = "payload_max_kg",
-       .type = Type::number,
-       .description = "only missions with at most this payload",
-       .minimum = 0},
-  };
-}
-
 std::vector<Parameter> with(std::vector<Parameter> parameters, std::vector<Parameter> more) {
   parameters.insert(parameters.end(), std::make_move_iterator(more.begin()),
                     std::make_move_iterator(more.end()));
   return parameters;
 }
 
-void write_cursor(JsonWriter& json, const std::string& cursor) {
-  json.key("next_cursor");
-  cursor.empty() ? json.null() : json.value(cursor);
+std::vector<Parameter> filter_parameters() {
+  using Type = Parameter::Type;
+  const std::vector<Parameter> times =
+      with(time_parameters("from", "only missions that started at or after this time"),
+           time_parameters("to", "only missions that started before this time"));
+  return with(
+      times,
+      {
+          {.name = "robot_id", .type = Type::text, .description = "only missions of this robot"},
+          {.name = "mission_id", .type = Type::text, .description = "only missions that the robot called so"},
+          {.name = "state",
+           .type = Type::text,
+           .description = "only missions in this state",
+           .choices = {"open", "finished", "aborted", "unfinished", "superseded", "interrupted"}},
+          {.name = "incomplete",
+           .type = Type::boolean,
+           .description = "only missions with (true) or without (false) unmeasured parts"},
+          {.name = "payload_min_kg",
+           .type = Type::number,
+           .description = "only missions with at least this payload",
+           .minimum = 0},
+          {.name = "payload_max_kg",
+           .type = Type::number,
+           .description = "only missions with at most this payload",
+           .minimum = 0},
+      });
+}
+
+Result<history::TimeRange> range_of(const Request& request) {
+  const auto from = time_of(request, "from"), to = time_of(request, "to");
+  if (!from) return tl::unexpected(from.error());
+  if (!to) return tl::unexpected(to.error());
+  return history::TimeRange{from->value_or(history::whole_past), to->value_or(history::whole_future)};
+}
+
+history::PageRequest page_of(const Request& request, std::int64_t limit) {
+  history::PageRequest page;
+  page.limit = request.query_integer("limit").value_or(limit);
+  page.cursor = std::string(request.query_value("cursor").value_or(""));
+  return page;
 }
 
 Result<Response> list(const Services& services, const Request& request) {
   const Result<history::MissionFilter> filter = filter_of(request);
   if (!filter) return tl::unexpected(filter.error());
-  history::PageRequest page;
-  page.limit = request.query_integer("limit").value_or(50);
-  page.cursor = std::string(request.query_value("cursor").value_or(""));
-  Result<history::MissionPage> found = services.store.missions(*filter, page);
+  Result<history::MissionPage> found = services.store.missions(*filter, page_of(request, 50));
   if (!found) return tl::unexpected(std::move(found.error()));
   JsonWriter json;
   json.begin_object().key("missions").begin_array();
-  for (const history::Mission& mission : found->missions) write_mission(json, mission);
+  for (const history::Mission& mission : found->missions) answers::write_mission(json, mission);
   json.end_array();
   write_cursor(json, found->next_cursor);
   json.end_object();
@@ -102,9 +111,9 @@ Result<Response> totals(const Services& services, const Request& request) {
   json.field("gap_count", found->gap_count);
   json.field("gap_s", found->gap_s);
   json.key("energy");
-  write_accounts(json, found->accounts);
+  answers::write_accounts(json, found->accounts);
   json.key("ledger");
-  write_ledger(json, found->accounts);
+  answers::write_ledger(json, found->accounts);
   json.end_object();
   return http::json_response(json.take());
 }
@@ -140,7 +149,7 @@ class MissionSummaries {
     const Result<history::Mission> mission = mission_of(services_, request);
     if (!mission) return tl::unexpected(mission.error());
     JsonWriter json;
-    write_mission(json, *mission);
+    answers::write_mission(json, *mission);
     Response response;
     response.shared_body = std::make_shared<const std::string>(json.take());
     const std::lock_guard lock(mutex_);
@@ -170,21 +179,18 @@ Result<Response> ledger(const Services& services, const Request& request) {
   json.field("mission_id", mission->mission_id);
   json.field("model_version", mission->model_version);
   json.key("ledger");
-  write_ledger(json, mission->accounts);
+  answers::write_ledger(json, mission->accounts);
   json.end_object();
   return http::json_response(json.take());
-}
-
-history::TimeRange range_of(const Request& request) {
-  return {request.query_integer("from_utime_us").value_or(history::whole_past),
-          request.query_integer("to_utime_us").value_or(history::whole_future)};
 }
 
 Result<Response> trace(const Services& services, const Request& request) {
   const Result<history::MissionKey> key = path_id(request, "mission");
   if (!key) return tl::unexpected(key.error());
+  const auto range = range_of(request);
+  if (!range) return tl::unexpected(range.error());
   const Result<history::Trace> found =
-      services.store.trace(*key, range_of(request), request.query_integer("points").value_or(1000));
+      services.store.trace(*key, *range, request.query_integer("points").value_or(1000));
   if (!found) return tl::unexpected(found.error());
   JsonWriter json;
   json.begin_object();
@@ -231,10 +237,9 @@ Result<Response> trace(const Services& services, const Request& request) {
 Result<Response> raw_telemetry(const Services& services, const Request& request) {
   const Result<history::MissionKey> key = path_id(request, "mission");
   if (!key) return tl::unexpected(key.error());
-  history::PageRequest page;
-  page.limit = request.query_integer("limit").value_or(1000);
-  page.cursor = std::string(request.query_value("cursor").value_or(""));
-  const Result<history::TelemetryPage> found = services.store.telemetry(*key, range_of(request), page);
+  const auto range = range_of(request);
+  if (!range) return tl::unexpected(range.error());
+  const Result<history::TelemetryPage> found = services.store.telemetry(*key, *range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
   const auto& samples = found->samples;
   JsonWriter json;
@@ -250,12 +255,13 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
   // Raw samples are evidence: every digit is kept.
   for (std::size_t k = 0; k < signals::sample_numbers; ++k) {
     const signals::SampleField& field = signals::sample_fields[k];
-    if (field.part == "right") json.key(field.key).begin_object();
-    const bool side = field.part == "right" || field.part == "left";
-    json.key(side ? field.part : field.key).begin_array();
+    const bool right = field.part == "right", left = field.part == "left";
+    if (right) json.key(field.key).begin_array();
+    if (!right && !left) json.key(field.key);
+    json.begin_array();
     for (const Sample& s : samples) json.exact(*signals::numbers_of(s)[k]);
     json.end_array();
-    if (field.part == "left") json.end_object();
+    if (left) json.end_array();
   }
   write_cursor(json, found->next_cursor);
   json.end_object();
@@ -265,10 +271,10 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
 Result<Response> covariates(const Services& services, const Request& request) {
   const Result<history::MissionKey> key = path_id(request, "mission");
   if (!key) return tl::unexpected(key.error());
-  history::PageRequest page;
-  page.limit = request.query_integer("limit").value_or(1000);
-  page.cursor = std::string(request.query_value("cursor").value_or(""));
-  const Result<history::CovariatePage> found = services.store.covariates(*key, range_of(request), page);
+  const auto range = range_of(request);
+  if (!range) return tl::unexpected(range.error());
+  const Result<history::CovariatePage> found =
+      services.store.covariates(*key, *range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
   JsonWriter json;
   json.begin_object();
@@ -290,21 +296,18 @@ Result<Response> covariates(const Services& services, const Request& request) {
 
 std::vector<TableRow> mission_rows() {
   using Type = Parameter::Type;
-  const Parameter cursor{
-      .name = "cursor", .type = Type::text, .description = "the next_cursor of the page before"};
-  const std::vector<Parameter> span = {
-      {.name = "from_utime_us", .type = Type::integer, .description = "from this time on"},
-      {.name = "to_utime_us", .type = Type::integer, .description = "before this time"},
-  };
+  const std::vector<Parameter> span =
+      with(time_parameters("from", "from this time on"), time_parameters("to", "before this time"));
   std::vector<TableRow> rows;
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/missions",
-                   .operation_id = "listMissions",
-                   .summary = "Missions, newest first, in pages that stay stable while missions come",
-                   .parameters = with(filter_parameters(),
-                                      {limit_parameter("missions a page", history::max_page_size), cursor}),
-                   .response_schema = "mission-page"},
-                  answered_by(list)});
+  rows.push_back(
+      {{.method = Method::get,
+        .path = "/v1/missions",
+        .operation_id = "listMissions",
+        .summary = "Missions, newest first, in pages that stay stable while missions come",
+        .parameters = with(filter_parameters(),
+                           {limit_parameter("missions a page", history::max_page_size), cursor_parameter()}),
+        .response_schema = "mission-page"},
+       answered_by(list)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/mission-totals",
                    .operation_id = "totalMissions",
@@ -351,7 +354,8 @@ std::vector<TableRow> mission_rows() {
         .path = "/v1/missions/{id}/telemetry",
         .operation_id = "getMissionTelemetry",
         .summary = "The samples of a mission as received, as far as the retention keeps them",
-        .parameters = with(span, {limit_parameter("samples a page", history::max_telemetry_samples), cursor}),
+        .parameters = with(
+            span, {limit_parameter("samples a page", history::max_telemetry_samples), cursor_parameter()}),
         .response_schema = "mission-telemetry",
         .error_statuses = {404}},
        answered_by(raw_telemetry)});
@@ -360,7 +364,8 @@ std::vector<TableRow> mission_rows() {
         .path = "/v1/missions/{id}/covariates",
         .operation_id = "getMissionCovariates",
         .summary = "What changed of a mission's covariates, as far as the retention keeps them",
-        .parameters = with(span, {limit_parameter("changes a page", history::max_telemetry_samples), cursor}),
+        .parameters = with(
+            span, {limit_parameter("changes a page", history::max_telemetry_samples), cursor_parameter()}),
         .response_schema = "mission-covariates",
         .error_statuses = {404}},
        answered_by(covariates)});

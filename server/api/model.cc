@@ -2,10 +2,10 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/json_fields.h"
+#include "base/json_writer.h"
 #include "robot/robot_file.h"
 #include "server/api/common_parameters.h"
-#include "server/api/fields.h"
-#include "server/api/json_writer.h"
 #include "server/api/services.h"
 #include "server/diagnosis/diagnosed_model.h"
 #include "server/diagnosis/model_adoption.h"
@@ -56,7 +56,7 @@ Result<ModelRequest> read_request(const json& body) {
   r.effects = read_effects(fields);
   r.proposal_id = fields.optional_integer("proposal_id", 1, greatest_id);
   r.version = fields.optional_integer("version", 1, greatest_id);
-  r.since_utime_us = fields.optional_integer("since_utime_us", 0, greatest_id);
+  r.since_utime_us = fields.time("since");
   r.expected_version = fields.optional_integer("expected_version", 1, greatest_id);
   if (fields.has("note")) r.note = fields.text("note", longest_note);
   r.force = fields.boolean("force", false);
@@ -69,8 +69,7 @@ Result<ModelRequest> read_request(const json& body) {
   if (fields.ok() && !r.effects.empty() && !r.diagnosis_id)
     fields.fault("effect", "goes with diagnosis_id alone");
   if (fields.ok() && r.version && (r.force || r.dry_run || r.since_utime_us))
-    fields.fault("version",
-                 "is put in force without a back-test: leave out force, dry_run and since_utime_us");
+    fields.fault("version", "is put in force without a back-test: leave out force, dry_run and since");
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
   return r;
 }
@@ -220,10 +219,7 @@ Result<Response> diff(const Services& services, const Request& request) {
 }
 
 void write_proposal(JsonWriter& out, const history::Proposal& p) {
-  out.begin_object()
-      .field("id", p.id)
-      .field("robot_id", p.robot_id)
-      .field("created_utime_us", p.created_utime_us);
+  out.begin_object().field("id", p.id).field("robot_id", p.robot_id).time("created", p.created_utime_us);
   out.field("kind", p.kind).field("state", history::name(p.state)).field("note", p.note);
   out.field("base_version", p.base_version).field("adopted_version", p.adopted_version);
   out.array("fitted_on", p.fitted_on);
@@ -233,14 +229,17 @@ void write_proposal(JsonWriter& out, const history::Proposal& p) {
 Result<Response> proposals(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
   if (auto known = model_of(services, id); !known) return tl::unexpected(std::move(known.error()));
-  const auto found =
-      services.store.proposals(id, request.query_integer("before").value_or(history::whole_future),
-                               request.query_integer("limit").value_or(50));
+  const auto cursor = id_cursor(request);
+  if (!cursor) return tl::unexpected(cursor.error());
+  const std::int64_t limit = request.query_integer("limit").value_or(50);
+  const auto found = services.store.proposals(id, cursor->value_or(history::whole_future), limit);
   if (!found) return tl::unexpected(found.error());
   JsonWriter out;
   out.begin_object().field("robot_id", id).key("proposals").begin_array();
   for (const history::Proposal& proposal : *found) write_proposal(out, proposal);
-  out.end_array().end_object();
+  out.end_array();
+  write_id_cursor(out, *found, limit, [](const history::Proposal& p) { return p.id; });
+  out.end_object();
   return http::json_response(out.take());
 }
 
@@ -280,7 +279,7 @@ std::vector<TableRow> model_rows() {
         .path = "/v1/robots/{id}/proposals",
         .operation_id = "listProposals",
         .summary = "Models that were suggested for a robot, newest first",
-        .parameters = {limit_parameter("proposals a page", history::max_page_size), before_parameter()},
+        .parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
         .response_schema = "proposal-list",
         .error_statuses = {404}},
        answered_by(proposals)});

@@ -1,6 +1,7 @@
 #include "server/api/robot_json.h"
 
-#include "server/api/mission_json.h"
+#include "answers/json/drive_json.h"
+#include "answers/json/ledger_json.h"
 
 namespace joulecast::api {
 namespace {
@@ -38,7 +39,7 @@ void write_charge(JsonWriter& json, const server::ChargeView& charge) {
   }
   json.begin_object();
   json.field("phase", battery::name(charge.phase));
-  json.field("since_utime_us", charge.stay.start_utime_us);
+  json.time("since", charge.stay.start_utime_us);
   json.field("charged_ah", charge.stay.charged_ah);
   json.field("charged_j", charge.stay.charged_j);
   json.end_object();
@@ -46,11 +47,6 @@ void write_charge(JsonWriter& json, const server::ChargeView& charge) {
 
 bool is_live(const server::RobotSnapshot& snapshot, std::int64_t now_utime_us) {
   return silence_s(snapshot, now_utime_us) <= live_s;  // false for NaN
-}
-
-void write_quantiles(JsonWriter& json, std::string_view name, const std::array<double, 3>& values) {
-  json.key(name).begin_object();
-  json.field("p05", values[0]).field("p50", values[1]).field("p95", values[2]).end_object();
 }
 
 void write_state(JsonWriter& json, const server::RobotSnapshot& s,
@@ -62,8 +58,7 @@ void write_state(JsonWriter& json, const server::RobotSnapshot& s,
   s.has_model ? json.value(s.model_version) : json.null();
   json.field("live", is_live(s, now_utime_us));
   json.field("silent_s", silence_s(s, now_utime_us));
-  json.key("utime_us");
-  s.sample.utime_us != 0 ? json.value(s.sample.utime_us) : json.null();
+  json.time("", s.sample.utime_us != 0 ? std::optional(s.sample.utime_us) : std::nullopt);
   json.field("measured_power_w", s.measured_power_w);
   json.field("modelled_power_w", s.modelled_power_w);
   json.field("speed_m_s", s.speed_m_s);
@@ -81,8 +76,8 @@ void write_state(JsonWriter& json, const server::RobotSnapshot& s,
   const std::array<double, 3>& range = reach ? reach->range_m : unknown;
   const std::array<double, 3>& run_time = reach ? reach->run_time_s : unknown;
   json.field("range_m", range[1]).field("run_time_s", run_time[1]);
-  write_quantiles(json, "range_quantiles_m", range);
-  write_quantiles(json, "run_time_quantiles_s", run_time);
+  answers::write_quantiles(json, "range_quantiles_m", range);
+  answers::write_quantiles(json, "run_time_quantiles_s", run_time);
   write_sides(json, "winding_temperature_c", s.winding_temperature_c);
   json.key("mission");
   if (s.mission_id.empty()) {
@@ -91,9 +86,9 @@ void write_state(JsonWriter& json, const server::RobotSnapshot& s,
     json.begin_object();
     json.field("id", s.mission_key);
     json.field("mission_id", s.mission_id);
-    json.field("start_utime_us", s.mission_start_utime_us);
+    json.time("start", s.mission_start_utime_us);
     json.key("energy");
-    write_accounts(json, s.accounts);
+    answers::write_accounts(json, s.accounts);
     json.end_object();
   }
   json.field("samples", s.samples);

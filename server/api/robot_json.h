@@ -1,11 +1,9 @@
 #pragma once
 
-#include <array>
 #include <optional>
-#include <string_view>
 
+#include "base/json_writer.h"
 #include "forecast/outlook.h"
-#include "server/api/json_writer.h"
 #include "server/ingest/fleet_view.h"
 
 namespace joulecast::api {
@@ -20,8 +18,5 @@ void write_charge(JsonWriter& json, const server::ChargeView& charge);
 // `reach` is by the robot's forecast; empty when it has no model.
 void write_state(JsonWriter& json, const server::RobotSnapshot& snapshot,
                  const std::optional<forecast::Reach>& reach, std::int64_t now_utime_us);
-
-// Values at the quantiles 5, 50 and 95 %.
-void write_quantiles(JsonWriter& json, std::string_view name, const std::array<double, 3>& values);
 
 }  // namespace joulecast::api

@@ -1,8 +1,10 @@
+#include <algorithm>
 #include <optional>
 #include <set>
 #include <utility>
 
 #include "robot/robot_file.h"
+#include "server/api/common_parameters.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
 
@@ -12,6 +14,8 @@ namespace {
 using http::Method;
 using http::Request;
 using http::Response;
+
+constexpr std::int64_t most_robots = 10'000;  // a page
 
 void write_robot_state(JsonWriter& json, const Services& services, const std::string& robot_id) {
   const auto model = services.models.find(robot_id);
@@ -28,14 +32,20 @@ void write_robot_state(JsonWriter& json, const Services& services, const std::st
   write_state(json, now, reach, services.now_utime_us());
 }
 
-Result<Response> list(const Services& services, const Request&) {
+Result<Response> list(const Services& services, const Request& request) {
   std::set<std::string> ids;
   for (const auto& model : services.models.all()) ids.insert(model->robot.robot_id);
   for (const auto& snapshot : services.fleet.all()) ids.insert(snapshot->robot_id);
+  const std::int64_t limit = request.query_integer("limit").value_or(most_robots);
+  auto next = ids.upper_bound(std::string(request.query_value("cursor").value_or("")));
+  std::string last;
   JsonWriter json;
   json.begin_object().key("robots").begin_array();
-  for (const std::string& id : ids) write_robot_state(json, services, id);
-  json.end_array().end_object();
+  for (std::int64_t k = 0; k < limit && next != ids.end(); ++k, ++next)
+    write_robot_state(json, services, last = *next);
+  json.end_array();
+  write_cursor(json, next == ids.end() ? "" : last);
+  json.end_object();
   return http::json_response(json.take());
 }
 
@@ -49,7 +59,7 @@ Result<Response> get(const Services& services, const Request& request) {
   json.field("robot_id", id);
   json.field("model_version", model->version);
   json.field("origin", history::name(model->origin));
-  json.field("created_utime_us", model->created_utime_us);
+  json.time("created", model->created_utime_us);
   json.key("model").compact(model->model_json);
   json.end_object();
   return http::json_response(json.take());
@@ -94,11 +104,20 @@ Result<Response> versions(const Services& services, const Request& request) {
     return tl::unexpected(known.error());
   const Result<std::vector<history::ModelVersion>> found = services.store.model_versions(request.param("id"));
   if (!found) return tl::unexpected(found.error());
+  const auto cursor = id_cursor(request);
+  if (!cursor) return tl::unexpected(cursor.error());
+  const auto limit =
+      static_cast<std::size_t>(request.query_integer("limit").value_or(history::max_page_size));
+  const auto is_next = [&](const history::ModelVersion& v) { return !*cursor || v.version < **cursor; };
+  auto next = std::ranges::find_if(*found, is_next);
+  const auto end =
+      next + static_cast<std::ptrdiff_t>(std::min(limit, static_cast<std::size_t>(found->end() - next)));
   JsonWriter json;
   json.begin_object().field("robot_id", request.param("id")).key("versions").begin_array();
-  for (const history::ModelVersion& v : *found) {
+  for (; next != end; ++next) {
+    const history::ModelVersion& v = *next;
     json.begin_object();
-    json.field("model_version", v.version).field("created_utime_us", v.created_utime_us);
+    json.field("model_version", v.version).time("created", v.created_utime_us);
     json.field("origin", history::name(v.origin)).field("note", v.note).field("active", v.active);
     json.field("parent_version", v.parent_version);
     json.key("model").compact(v.model_json);
@@ -106,7 +125,9 @@ Result<Response> versions(const Services& services, const Request& request) {
     v.evidence_json.empty() ? json.null() : json.raw(v.evidence_json);
     json.end_object();
   }
-  json.end_array().end_object();
+  json.end_array();
+  write_cursor(json, end == found->end() ? "" : std::to_string((end - 1)->version));
+  json.end_object();
   return http::json_response(json.take());
 }
 
@@ -117,7 +138,9 @@ std::vector<TableRow> robot_rows() {
   rows.push_back({{.method = Method::get,
                    .path = "/v1/robots",
                    .operation_id = "listRobots",
-                   .summary = "The fleet: every robot that has a model or was heard of, with its live state",
+                   .summary = "The fleet: every robot that has a model or was heard of, by id, with its live "
+                              "state",
+                   .parameters = {limit_parameter("robots a page", most_robots), cursor_parameter()},
                    .response_schema = "robot-list"},
                   answered_by(list)});
   rows.push_back({{.method = Method::get,
@@ -144,13 +167,15 @@ std::vector<TableRow> robot_rows() {
                    .error_statuses = {404},
                    .run = http::Run::io},
                   answered_by(state)});
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/robots/{id}/versions",
-                   .operation_id = "listRobotVersions",
-                   .summary = "Every version of a robot's model, newest first",
-                   .response_schema = "robot-version-list",
-                   .error_statuses = {404}},
-                  answered_by(versions)});
+  rows.push_back(
+      {{.method = Method::get,
+        .path = "/v1/robots/{id}/versions",
+        .operation_id = "listRobotVersions",
+        .summary = "Every version of a robot's model, newest first",
+        .parameters = {limit_parameter("versions a page", history::max_page_size), cursor_parameter()},
+        .response_schema = "robot-version-list",
+        .error_statuses = {404}},
+       answered_by(versions)});
   return rows;
 }
 

@@ -60,8 +60,6 @@ std::vector<TableRow> diagnosis_rows();
 std::vector<TableRow> gap_history_rows();
 std::vector<TableRow> mission_rows();
 std::vector<TableRow> planning_rows();
-std::vector<TableRow> matrix_rows();
-std::vector<TableRow> autonomy_rows();
 
 // The model of a robot that `field` of the request names, or the error that says why there is none.
 Result<std::shared_ptr<const server::ModelInForce>> model_of(const Services& services,

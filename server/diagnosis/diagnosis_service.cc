@@ -13,7 +13,7 @@
 #include <thread>
 #include <utility>
 
-#include "base/format_utc.h"
+#include "base/utc_time.h"
 #include "gap/diagnose/recordings.h"
 #include "gap/verdict/diagnosis_json.h"
 #include "gap/verdict/offer.h"

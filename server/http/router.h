@@ -51,7 +51,7 @@ struct Endpoint {
   bool reserved = false;
   // Of a worker's endpoint, when set: tried first, on the I/O thread and under its rules. It answers the
   // requests that are quickly answered and declines the others, which then go to `handler`.
-  std::function<std::optional<Response>(const Request&)> brief = {};
+  std::function<std::optional<Response>(Request&)> brief = {};
   bool documented = true;  // false: left out of the OpenAPI document (assets)
   Handler handler = {};
 };

@@ -25,10 +25,6 @@ double shortened(double value) {
   return std::round(value * scale) / scale;
 }
 
-std::shared_ptr<const forecast::ChargeMap> charge_map(const robot::Battery& battery) {
-  return std::make_shared<const forecast::ChargeMap>(battery::Circuit(battery));
-}
-
 }  // namespace
 
 struct Forecasts::Entry {
@@ -89,14 +85,6 @@ std::optional<std::deque<forecast::PastMission>> legs_from_json(const std::strin
   return missions;
 }
 
-std::string drift_json(const forecast::Drift& drift) {
-  return json{{"since_utime_us", drift.since_utime_us},
-              {"detected_utime_us", drift.detected_utime_us},
-              {"ratio", drift.ratio},
-              {"missions", drift.missions}}
-      .dump();
-}
-
 Forecasts::Entry& Forecasts::entry(const ModelInForce& model) {
   const std::lock_guard lock(mutex_);
   auto& slot = entries_[model.robot.robot_id];
@@ -114,7 +102,7 @@ void Forecasts::bring_up(Entry& entry, const std::shared_ptr<const ModelInForce>
   entry.model = model;
   entry.kind = robot::kind_of(model->robot);
   entry.outlook.model = model;
-  entry.outlook.battery = charge_map(model->robot.battery);
+  entry.outlook.battery = answers::charge_map(model->robot.battery);
   if (first) {
     entry.forecast = std::make_unique<forecast::RobotForecast>(model->robot, model->drive);
     borrow(entry);
@@ -218,12 +206,6 @@ Forecasts::Learnt Forecasts::learn(const std::shared_ptr<const ModelInForce>& mo
   learnt.document = {slot.robot_id, std::string(topic),
                      slot.kept.empty() ? 0 : slot.kept.back().start_utime_us, legs_json(slot.kept)};
   return learnt;
-}
-
-RobotOutlook Forecasts::untried(std::shared_ptr<const ModelInForce> model) {
-  const forecast::RobotForecast forecast(model->robot, model->drive);
-  auto battery = charge_map(model->robot.battery);
-  return {std::move(model), forecast.forecaster(), std::move(battery)};
 }
 
 }  // namespace joulecast::server

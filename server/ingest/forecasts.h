@@ -8,7 +8,6 @@
 #include <string>
 #include <string_view>
 
-#include "forecast/charge_map.h"
 #include "forecast/outlook.h"
 #include "forecast/robot_forecast.h"
 #include "history/store.h"
@@ -17,12 +16,7 @@
 
 namespace joulecast::server {
 
-// What answers about a robot's future need, at one moment.
-struct RobotOutlook {
-  std::shared_ptr<const ModelInForce> model;
-  std::shared_ptr<const forecast::Forecaster> forecaster;
-  std::shared_ptr<const forecast::ChargeMap> battery;
-};
+using answers::RobotOutlook;
 
 // The forecasts of all robots: each learns from its missions as they end, lends to its siblings (robots of
 // equal body and motors) and borrows from them. The legs of the latest missions are kept in the store under
@@ -46,9 +40,6 @@ class Forecasts {
     std::optional<forecast::Drift> drift;
   };
   Learnt learn(const std::shared_ptr<const ModelInForce>& model, forecast::PastMission mission);
-
-  // The outlook of a robot without any past: for answers from a robot file alone.
-  static RobotOutlook untried(std::shared_ptr<const ModelInForce> model);
 
  private:
   struct Entry;
@@ -75,8 +66,5 @@ forecast::Charge live_charge(const RobotSnapshot& live, const robot::Battery& ba
 // Stored form of past missions, and back; nothing when the text is not of that form.
 std::string legs_json(const std::deque<forecast::PastMission>& missions);
 std::optional<std::deque<forecast::PastMission>> legs_from_json(const std::string& text);
-
-// The audit log's entry of a drift.
-std::string drift_json(const forecast::Drift& drift);
 
 }  // namespace joulecast::server

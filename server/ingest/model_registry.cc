@@ -5,15 +5,6 @@
 
 namespace joulecast::server {
 
-Result<std::shared_ptr<const ModelInForce>> model_in_force(robot::RobotModel robot, std::int64_t version) {
-  Result<dynamics::DriveModel> drive = dynamics::drive_model(robot);
-  if (!drive) return tl::unexpected(std::move(drive.error()));
-  Result<planning::Planner> planner = planning::Planner::make(robot);
-  if (!planner) return tl::unexpected(std::move(planner.error()));
-  return std::make_shared<const ModelInForce>(
-      ModelInForce{std::move(robot), std::move(*drive), version, std::move(*planner)});
-}
-
 Error unknown_robot(std::string field, std::string_view robot_id) {
   return {Fault::not_found, std::move(field),
           "no robot is called '" + std::string(robot_id) + "'; GET /v1/robots lists those that there are"};

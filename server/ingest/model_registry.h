@@ -9,23 +9,12 @@
 #include <string_view>
 #include <vector>
 
-#include "base/error.h"
-#include "dynamics/drive_model.h"
-#include "planning/planner.h"
-#include "robot/robot_model.h"
+#include "answers/model.h"
 
 namespace joulecast::server {
 
-// A robot's model as everything uses it: immutable, shared by reference.
-struct ModelInForce {
-  robot::RobotModel robot;
-  dynamics::DriveModel drive;
-  std::int64_t version = 0;
-  planning::Planner planner;
-};
-
-// An effect that the catalogue rejects is an error.
-Result<std::shared_ptr<const ModelInForce>> model_in_force(robot::RobotModel robot, std::int64_t version);
+using answers::model_in_force;
+using answers::ModelInForce;
 
 // What every answer says of a robot id that nobody has.
 Error unknown_robot(std::string field, std::string_view robot_id);

@@ -15,8 +15,8 @@ constexpr std::int64_t contest_memory_us = 60 * second_us;
 constexpr std::size_t waiting_units_a_robot = 16'384;
 // What may be lost between two samples of one stream.
 constexpr std::int64_t stream_step = 1000, stream_span_us = 60 * second_us;
-// Going back to a stream that was left happens to a robot that boots while its last datagrams are late; going back and
-// forth does not.
+// Going back to a stream that was left happens to a robot that boots while its last datagrams are late; going
+// back and forth does not.
 constexpr int most_returns = 3;
 constexpr std::int64_t returns_memory_us = 10 * second_us;
 // Publishers that open a socket for each message go on with their numbers.
@@ -114,8 +114,9 @@ bool SenderGate::is_second_stream(const signals::Sample& sample, std::int64_t ho
     side_ = std::exchange(main_, now);
     return false;
   }
-  const bool repeated = sample.sequence <= main_.sequence && main_.sequence - sample.sequence <= stream_step &&
-                        std::abs(sample.utime_us - main_.utime_us) <= stream_span_us && sample.utime_us <= main_.utime_us;
+  const bool repeated =
+      sample.sequence <= main_.sequence && main_.sequence - sample.sequence <= stream_step &&
+      std::abs(sample.utime_us - main_.utime_us) <= stream_span_us && sample.utime_us <= main_.utime_us;
   if (!repeated) side_ = std::exchange(main_, now);
   return false;
 }
@@ -123,7 +124,8 @@ bool SenderGate::is_second_stream(const signals::Sample& sample, std::int64_t ho
 std::int64_t SenderGate::patience_us(std::int64_t host_utime_us) const {
   if (contested_us_ > 0 && host_utime_us - contested_us_ < contest_memory_us) return takeover_us_;
   const double usual = missed_intervals * interval_us_;
-  return std::min(takeover_us_, std::max(least_patience_us, static_cast<std::int64_t>(std::min(usual, 1e12))));
+  return std::min(takeover_us_,
+                  std::max(least_patience_us, static_cast<std::int64_t>(std::min(usual, 1e12))));
 }
 
 std::vector<InboundMessage> SenderGate::release(std::int64_t host_utime_us) {
@@ -137,13 +139,15 @@ std::vector<InboundMessage> SenderGate::release(std::int64_t host_utime_us) {
 }
 
 std::vector<InboundMessage> SenderGate::hand_over() {
-  std::vector<InboundMessage> released(std::make_move_iterator(waiting_.begin()), std::make_move_iterator(waiting_.end()));
+  std::vector<InboundMessage> released(std::make_move_iterator(waiting_.begin()),
+                                       std::make_move_iterator(waiting_.end()));
   heard_us_ = released.back().host_utime_us;
   first_ = other_;
   first_sends_events_ = false;
   main_ = side_ = {};
   for (const InboundMessage& message : released) {
-    if (const auto* sample = std::get_if<signals::Sample>(&message.content)) main_ = {sample->sequence, sample->utime_us};
+    if (const auto* sample = std::get_if<signals::Sample>(&message.content))
+      main_ = {sample->sequence, sample->utime_us};
     first_sends_events_ |= std::holds_alternative<signals::MissionEvent>(message.content);
   }
   drop_waiting();
@@ -163,8 +167,8 @@ std::string SenderGate::describe() const {
            " sends two streams of sequence numbers under this robot's id; the one at sequence " +
            std::to_string(side_.sequence) + " is not accounted for";
   }
-  return telemetry::to_string(other_) + " publishes under this robot's id beside " + telemetry::to_string(first_) +
-         ", which alone is accounted for";
+  return telemetry::to_string(other_) + " publishes under this robot's id beside " +
+         telemetry::to_string(first_) + ", which alone is accounted for";
 }
 
 }  // namespace joulecast::server

@@ -101,7 +101,7 @@ Result<std::array<double, 2>> climb_of_span(const MotionPoint& a, const MotionPo
 Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
                                           std::span<const MotionPoint> points, double payload_kg,
                                           const std::optional<StartPose>& start) {
-  if (points.size() < 2) return invalid("/profile/time_s", "must have at least 2 points");
+  if (points.size() < 2) return invalid("time_s", "must have at least 2 points");
   Span span(model, payload_kg, start.has_value());
   Cvode cvode(state_size, Method::adams, span);
   const std::span<double> y = cvode.state();
@@ -112,9 +112,9 @@ Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
   }
   for (std::size_t k = 1; k < points.size(); ++k) {
     if (!(points[k].time_s > points[k - 1].time_s))
-      return invalid("/profile/time_s/" + std::to_string(k), "must be later than the one before");
+      return invalid("time_s/" + std::to_string(k), "must be later than the one before");
     const auto climb = climb_of_span(points[k - 1], points[k]);
-    if (!climb) return invalid("/profile/height_m/" + std::to_string(k), climb.error().message);
+    if (!climb) return invalid("height_m/" + std::to_string(k), climb.error().message);
     span.begin(points[k - 1], points[k], *climb);
     const double duration = points[k].time_s - points[k - 1].time_s;
     const double fastest = std::max(std::fabs(points[k].speed_m_s), std::fabs(points[k - 1].speed_m_s));

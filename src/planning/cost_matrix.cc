@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <span>
 #include <unordered_map>
 #include <utility>
 
@@ -13,32 +12,73 @@ namespace {
 // Stations closer than this are one place, towards which nobody turns.
 constexpr double same_place_m = 1e-6;
 
-LegCost cost_of(const CostTable& table, std::span<const double> distances_m,
-                std::span<const double> turns_rad, double payload_kg) {
-  LegCost sum;
-  for (const double d : distances_m) sum += table.straight(d, payload_kg);
-  for (const double a : turns_rad) sum += table.turn(a, payload_kg);
-  return sum;
-}
-
 double angle_between(double from, double to) {
   return std::remainder(to - from, 2 * std::numbers::pi);
 }
 
+// The stretches of a way go to `driver`, which has straight(m) and turn(rad).
+
+template <class Driver>
+void drive(const Leg& leg, Driver& driver) {
+  for (const double d : leg.distances_m) driver.straight(d);
+  for (const double a : leg.turns_rad) driver.turn(a);
+}
+
 // Turn towards the place, drive there, turn to its heading.
-LegCost between(const CostTable& table, const Pose& from, const Station& to, double payload_kg) {
+template <class Driver>
+void drive_between(const Pose& from, const Station& to, Driver& driver) {
   const double dx = to.x_m - from.x_m, dy = to.y_m - from.y_m, distance = std::hypot(dx, dy);
   double heading = from.heading_rad;
-  LegCost sum;
   if (distance > same_place_m) {
     const double way = std::atan2(dy, dx);
-    sum += table.turn(angle_between(heading, way), payload_kg);
-    sum += table.straight(distance, payload_kg);
+    driver.turn(angle_between(heading, way));
+    driver.straight(distance);
     heading = way;
   }
-  if (to.heading_rad) sum += table.turn(angle_between(heading, *to.heading_rad), payload_kg);
-  return sum;
+  if (to.heading_rad) driver.turn(angle_between(heading, *to.heading_rad));
 }
+
+template <class Driver>
+void drive_loaded(const MatrixTask& task, Driver& driver) {
+  if (task.loaded) return drive(*task.loaded, driver);
+  // With no heading at the pick-up the robot stands as it came; see turn_at_pickup().
+  const Station& from = *task.pickup;
+  const double way = std::atan2(task.dropoff->y_m - from.y_m, task.dropoff->x_m - from.x_m);
+  drive_between({from.x_m, from.y_m, from.heading_rad.value_or(way)}, *task.dropoff, driver);
+}
+
+template <class Driver>
+void drive_empty(const MatrixTask& task, std::size_t robot, const std::optional<Pose>& pose, Driver& driver) {
+  if (task.empty.empty()) return drive_between(*pose, *task.pickup, driver);
+  drive(task.empty.size() == 1 ? task.empty[0] : task.empty[robot], driver);
+}
+
+// From the heading in which the robot came to a pick-up that has none, towards the drop-off.
+template <class Driver>
+void turn_at_pickup(const MatrixTask& task, const std::optional<Pose>& pose, Driver& driver) {
+  if (!task.empty.empty() || task.loaded || task.pickup->heading_rad) return;
+  const Station &from = *task.pickup, &to = *task.dropoff;
+  if (!(std::hypot(to.x_m - from.x_m, to.y_m - from.y_m) > same_place_m)) return;
+  const double dx = from.x_m - pose->x_m, dy = from.y_m - pose->y_m;
+  const double arrived = std::hypot(dx, dy) > same_place_m ? std::atan2(dy, dx) : pose->heading_rad;
+  driver.turn(angle_between(arrived, std::atan2(to.y_m - from.y_m, to.x_m - from.x_m)));
+}
+
+// Sums up what a table says.
+struct Pricer {
+  const CostTable& table;
+  double payload_kg = 0;
+  LegCost sum = {};
+  void straight(double distance_m) { sum += table.straight(distance_m, payload_kg); }
+  void turn(double angle_rad) { sum += table.turn(angle_rad, payload_kg); }
+};
+
+struct Recorder {
+  std::vector<Stretch>& into;
+  bool loaded = false;
+  void straight(double distance_m) { into.push_back({false, distance_m, loaded}); }
+  void turn(double angle_rad) { into.push_back({true, std::fabs(angle_rad), loaded}); }
+};
 
 }  // namespace
 
@@ -56,6 +96,15 @@ std::string_view name_of(Obstacle obstacle) {
       return "model";
   }
   return "";
+}
+
+void stretches_of(const MatrixTask& task, std::size_t robot, const std::optional<Pose>& pose,
+                  std::vector<Stretch>& stretches) {
+  stretches.clear();
+  Recorder empty{stretches, false}, loaded{stretches, true};
+  drive_empty(task, robot, pose, empty);
+  turn_at_pickup(task, pose, loaded);
+  drive_loaded(task, loaded);
 }
 
 CostMatrix::CostMatrix(std::vector<MatrixRobot> robots, std::vector<MatrixTask> tasks)
@@ -77,16 +126,9 @@ const std::vector<LegCost>& CostMatrix::loaded_legs(std::size_t table, const Cos
   std::call_once(loaded.once, [&] {
     loaded.legs.reserve(tasks_.size());
     for (const MatrixTask& task : tasks_) {
-      if (task.loaded) {
-        loaded.legs.push_back(
-            cost_of(costs, task.loaded->distances_m, task.loaded->turns_rad, task.payload_kg));
-        continue;
-      }
-      // With no heading at the pick-up the robot stands as it came; its turn is then part of the cell.
-      const Station& from = *task.pickup;
-      const double way = std::atan2(task.dropoff->y_m - from.y_m, task.dropoff->x_m - from.x_m);
-      loaded.legs.push_back(between(costs, {from.x_m, from.y_m, from.heading_rad.value_or(way)},
-                                    *task.dropoff, task.payload_kg));
+      Pricer pricer{costs, task.payload_kg};
+      drive_loaded(task, pricer);
+      loaded.legs.push_back(pricer.sum);
     }
   });
   return loaded.legs;
@@ -112,23 +154,13 @@ void CostMatrix::row(std::size_t r, std::vector<Cell>& cells) const {
       cell.obstacle = Obstacle::pose;
       continue;
     }
+    // In this order: sums of equal cells are equal to the last bit.
+    Pricer empty{costs, 0, {}}, at_pickup{costs, task.payload_kg, {}};
+    drive_empty(task, r, robot.pose, empty);
+    turn_at_pickup(task, robot.pose, at_pickup);
     LegCost sum = loaded[t];
-    if (!task.empty.empty()) {
-      const Leg& leg = task.empty.size() == 1 ? task.empty[0] : task.empty[r];
-      sum += cost_of(costs, leg.distances_m, leg.turns_rad, 0);
-    } else {
-      sum += between(costs, *robot.pose, *task.pickup, 0);
-      if (!task.loaded && !task.pickup->heading_rad) {
-        const Station &from = *task.pickup, &to = *task.dropoff;
-        const double dx = from.x_m - robot.pose->x_m, dy = from.y_m - robot.pose->y_m;
-        const double arrived =
-            std::hypot(dx, dy) > same_place_m ? std::atan2(dy, dx) : robot.pose->heading_rad;
-        if (std::hypot(to.x_m - from.x_m, to.y_m - from.y_m) > same_place_m) {
-          const double way = std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
-          sum += costs.turn(angle_between(arrived, way), task.payload_kg);
-        }
-      }
-    }
+    sum += empty.sum;
+    sum += at_pickup.sum;
     const double dwell = task.pickup_dwell_s + task.dropoff_dwell_s;
     sum += {costs.idle_power_w() * dwell, dwell};
     if (std::isfinite(sum.energy_j)) {

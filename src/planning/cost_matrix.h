@@ -41,6 +41,17 @@ struct MatrixTask {
   double pickup_dwell_s = 0, dropoff_dwell_s = 0;
 };
 
+// A part of a task's way, from rest to rest.
+struct Stretch {
+  bool turn = false;  // in place
+  double way = 0;     // m, rad; at least 0
+  bool loaded = false;
+};
+
+// What the robot of that row drives for a task, in order. `pose` is needed where the empty leg is not given.
+void stretches_of(const MatrixTask& task, std::size_t robot, const std::optional<Pose>& pose,
+                  std::vector<Stretch>& stretches);
+
 enum class Obstacle : unsigned char {
   none,
   payload,  // heavier than the robot may carry

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "answers/json/profile_json.h"
 #include "planning/planner.h"
-#include "server/api/profile.h"
 #include "tests/benchmarks/noisy_drive.h"
 
 namespace joulecast::benchmarks {
@@ -30,9 +30,7 @@ void time_of(const char* what, F&& once) {
 
 void run(const char* title, const robot::RobotModel& robot) {
   std::printf("%s\n", title);
-  server::ModelRegistry models;
-  if (!models.put(robot, 1)) std::abort();
-  const auto model = models.find(robot.robot_id);
+  const auto model = *answers::model_in_force(robot, 1);
   const std::string text = R"({"path":[{"kind":"straight","length_m":10}],"payload_kg":5})";
   const nlohmann::json body = nlohmann::json::parse(text);
   nlohmann::json lean = body;
@@ -53,10 +51,10 @@ void run(const char* title, const robot::RobotModel& robot) {
     if (!planner->plan(*path, problem)) std::abort();
   });
   time_of("  the answer without columns", [&] {
-    if (!api::profile_answer(lean, *model)) std::abort();
+    if (!answers::profile_answer(lean, *model)) std::abort();
   });
   time_of("  the whole answer", [&] {
-    if (!api::profile_answer(body, *model)) std::abort();
+    if (!answers::profile_answer(body, *model)) std::abort();
   });
 }
 

@@ -168,6 +168,8 @@ TEST_F(WrongUse, NamesTheNearestOptionAndCommand) {
   EXPECT_EQ(told({"profile", "--robot", "a.json", "--lenght", "3"}),
             "joulecast profile: has no option --lenght; did you mean --length?\njoulecast profile --help "
             "says what it takes\n");
+  EXPECT_THAT(told({"profil", "--robot", "a.json"}),
+              HasSubstr("joulecast: has no command profil; did you mean profile?"));
   EXPECT_THAT(told({"calibrate", "drvie"}),
               HasSubstr("joulecast calibrate: has no command drvie; did you mean drive?"));
   EXPECT_THAT(told({"effects", "all"}), HasSubstr("joulecast effects: has no use for all"));

@@ -86,12 +86,15 @@ TEST(ServerUrl, TakesHostPortAndPathApart) {
   ASSERT_TRUE(bare);
   EXPECT_EQ(bare->port, "80");
   EXPECT_EQ(bare->base_path, "");
+  const auto plain = parse_server_url("localhost:8080");
+  ASSERT_TRUE(plain);
+  EXPECT_EQ(plain->host + '|' + plain->port, "localhost|8080");
   const auto six = parse_server_url("http://[::1]:99");
   ASSERT_TRUE(six);
   EXPECT_EQ(six->host, "::1");
   EXPECT_EQ(six->port, "99");
   for (const char* wrong :
-       {"localhost:80", "ftp://x", "http://", "http://:80", "http://h:", "http://h:99999", "http://h:8o"}) {
+       {"https://x", "ftp://x", "http://", "http://:80", "http://h:", "http://h:99999", "http://h:8o"}) {
     EXPECT_FALSE(parse_server_url(wrong)) << wrong;
   }
 }

@@ -111,11 +111,20 @@ class Checker:
         return value
 
 
+def resolved(document, schema):
+    """What a schema refers to."""
+    while "$ref" in schema:
+        node = document
+        for part in schema["$ref"].lstrip("#/").split("/"):
+            node = node[part]
+        schema = node
+    return schema
+
+
 def numbers_of(document, schema, value, at=""):
     """Every number of a request with its pointer and its schema."""
-    while "$ref" in schema:
-        schema = document["components"]["schemas"][schema["$ref"].rsplit("/", 1)[1]]
-    for option in schema.get("oneOf", schema.get("anyOf", ())):
+    schema = resolved(document, schema)
+    for option in (resolved(document, option) for option in schema.get("oneOf", schema.get("anyOf", ()))):
         constants = {k: v["const"] for k, v in option.get("properties", {}).items() if "const" in v}
         if "properties" in option and isinstance(value, dict) and all(value.get(k) == v for k, v in constants.items()):
             schema = option
@@ -153,7 +162,7 @@ DRIVE = {"path": SEGMENTS, "start_pose": POSE, "payload_kg": 0, "deadline_s": 1e
          "start_speed_m_s": 0, "end_speed_m_s": 0, "limits": LIMITS}
 AUTONOMY = {"state_of_charge": 0.5, "state_of_charge_sd": 0.1, "reserve_fraction": 0.1, "payload_kg": 0, "value_of_time_w": 0,
             "confidence": 0.9, "start_pose": POSE, "charger": {**POINT, "detour_factor": 1}, "to_charger_m": 1, **PACE,
-            "tasks": [{"path": SEGMENTS, "dwell_s": 1, "payload_kg": 0, **PACE},
+            "tasks": [{"task_id": "t", "path": SEGMENTS, "dwell_s": 1, "payload_kg": 0, **PACE},
                       {"turn_rad": 1, "distance_m": 1, "to_charger_m": 1}]}
 # What no number bounds: the robot's own limits do, or nothing does.
 UNBOUNDED = {"payload_kg", "start_speed_m_s", "end_speed_m_s", "deadline_s", "way_m", *PACE, *LIMITS}
@@ -195,6 +204,61 @@ def hold_bounds(checker, name):
     print(f"{held} bounds of requests hold")
     if held < 200:
         checker.fault("hardly any bound was looked at")
+
+
+def hold_driving(checker, name, matrix):
+    """Estimate, matrix and autonomy tell the same of the same way, driven alike."""
+    path = [{"kind": "straight", "length_m": 40}, {"kind": "turn", "angle_rad": 1.5}, {"kind": "straight", "length_m": 20}]
+    estimate = ("POST", "/v1/robots/{id}/estimate", f"/v1/robots/{name}/estimate")
+    autonomy = ("POST", "/v1/robots/{id}/autonomy", f"/v1/robots/{name}/autonomy")
+    usual = checker.check(*estimate, {"path": path, "driving": "usual"}, expect=200)
+    least = checker.check(*estimate, {"path": path}, expect=200)
+    plan = checker.check(*autonomy, {"state_of_charge": 0.9, "payload_kg": 0, "tasks": [{"task_id": "t", "path": path}]}, expect=200)["plan"]
+    if least["driving"] != "minimum_energy" or not least["energy_j"] < usual["energy_j"]:
+        checker.fault(f"an optimum that is not below the usual: {least['energy_j']}, {usual['energy_j']}")
+    if abs(usual["energy_j"] - plan["expected_energy_j"]) > 1e-9 * usual["energy_j"] or usual["energy_quantiles_j"] != plan["energy_j"]:
+        checker.fault(f"usual driving: estimate {usual}, autonomy {plan}")
+    way = {"task_id": "t", "empty": {}, "loaded": {"distances_m": [40, 20], "turns_rad": [1.5]}}
+    rows = checker.check("POST", "/v1/energy-matrix", body={"robots": [{"robot_id": name, "state_of_charge": 0.9}], "tasks": [way], "driving": "usual"}, expect=200)["rows"]
+    if abs(rows[0]["energy_j"][0] - usual["energy_j"]) > 1e-3 or not rows[0]["success_probability"][0] > 0.9:
+        checker.fault(f"usual driving: estimate {usual['energy_j']}, matrix {rows[0]}")
+    checker.check("POST", "/v1/energy-matrix", body={**matrix, "driving": "usual"}, expect=200)
+    for field, value in (("deadline_s", 90), ("columns", True), ("limits", {"speed_m_s": 1}), ("driving", "fast")):
+        told = checker.check(*estimate, {"path": path, "driving": "usual", field: value}, expect=422) or {}
+        if told.get("field") != "/" + field:
+            checker.fault(f"estimate of usual driving with {field}: {told}")
+    told = checker.check("POST", "/v1/energy-matrix", body={**matrix, "driving": "usual", "value_of_time_w": 1}, expect=422) or {}
+    if told.get("field") != "/value_of_time_w":
+        checker.fault(f"matrix of usual driving with a value of time: {told}")
+
+
+def hold_pages(checker, name):
+    """Lists page with limit and cursor, times are ISO 8601 or microseconds."""
+    robot = checker.check("GET", "/v1/robots/{id}", f"/v1/robots/{name}", expect=200)["model"]
+    for k in range(3):
+        checker.check("PUT", "/v1/robots/{id}", f"/v1/robots/page-{k}", {**robot, "robot_id": f"page-{k}"}, expect=200)
+        checker.check("PUT", "/v1/robots/{id}", f"/v1/robots/page-0", {**robot, "robot_id": "page-0", "idle_power_w": 10 + k}, expect=200)
+    for template, member, key in (("/v1/robots", "robots", "robot_id"), ("/v1/robots/{id}/versions", "versions", "model_version")):
+        path = template.replace("{id}", "page-0")
+        whole = [row[key] for row in checker.check("GET", template, path, expect=200)[member]]
+        seen, cursor = [], ""
+        while len(seen) <= len(whole):
+            page = checker.check("GET", template, f"{path}?limit=2{cursor}", expect=200)
+            seen += [row[key] for row in page[member]]
+            if page["next_cursor"] is None:
+                break
+            cursor = "&cursor=" + page["next_cursor"]
+        if len(whole) < 4 or seen != whole:
+            checker.fault(f"{template} by pages: {seen}, whole: {whole}")
+    for template in ("/v1/diagnoses", "/v1/audit-log", "/v1/robots/{id}/proposals"):
+        told = checker.check("GET", template, template.replace("{id}", name) + "?cursor=x", expect=422) or {}
+        if told.get("field") != "cursor":
+            checker.fault(f"{template}: {told}")
+    for times, status in (("from=2026-11-22&to=2026-11-22T16:45:00Z", 200), ("from_utime_us=0&to=2026-11-22T17:45:00%2B01:00", 200),
+                          ("from=yesterday", 422), ("from=2026-11-22&from_utime_us=0", 422), ("to=2026-02-30", 422)):
+        told = checker.check("GET", "/v1/missions", f"/v1/missions?{times}", expect=status)
+        if status == 422 and (told or {}).get("field") != times.split("=")[0]:
+            checker.fault(f"{times}: {told}")
 
 
 def main():
@@ -317,6 +381,8 @@ def exercise(checker, source):
     checker.check("POST", "/v1/energy-matrix", body={**matrix, "robots": [*matrix["robots"], "no-such-robot"]}, expect=200)
     checker.check("POST", "/v1/energy-matrix", body={**matrix, "tasks": [{"task_id": "t"}]}, expect=422)
     checker.check("POST", "/v1/energy-matrix", body={"robots": [matrix["robots"][0]] * 2001, "tasks": [errand] * 2000}, expect=413)
+    hold_driving(checker, name, matrix)
+    hold_pages(checker, name)
     status, kind, _ = ask(checker.url, "DELETE", "/v1/robots")
     if (status, kind) != (405, "application/problem+json"):
         checker.fault(f"DELETE /v1/robots: {status} {kind}")

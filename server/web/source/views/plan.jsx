@@ -73,7 +73,7 @@ function autonomyRequest(request, answer, charge) {
     payload_kg: request.payload_kg ?? 0,
     start_pose: request.start_pose ?? { x_m: 0, y_m: 0, heading_rad: 0 },
     value_of_time_w: Math.min(1e6, answer.certificate.time_multiplier_w),
-    tasks: [{ name: 'this drive', path: request.path }],
+    tasks: [{ task_id: 'this drive', path: request.path }],
   };
 }
 

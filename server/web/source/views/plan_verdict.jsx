@@ -61,8 +61,8 @@ function Drives({ drives }) {
 function Explanation({ answer, autonomy: a, planned }) {
   const reasons = [
     `it is a forecast from ${bases[a.consumption.basis](a.consumption)}`,
-    a.driving.pause_s > 0.05 &&
-      `it includes the usual pause of ${format.fixed(a.driving.pause_s, 1)} s at each stop`,
+    a.pace.pause_s > 0.05 &&
+      `it includes the usual pause of ${format.fixed(a.pace.pause_s, 1)} s at each stop`,
   ].filter(Boolean);
   return (
     <p class="note">

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "base/error.h"
+#include "server/api/services.h"
+
+namespace joulecast::api {
+
+// {"robots": [...], "request": {...}}; a row a robot, in the order asked for or by id.
+Result<std::string> fleet_autonomy_answer(const nlohmann::json& body, Services& services);
+
+}  // namespace joulecast::api

@@ -1,0 +1,168 @@
+#include <any>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "answers/json/autonomy_json.h"
+#include "answers/json/estimate_json.h"
+#include "answers/json/matrix_json.h"
+#include "answers/json/profile_json.h"
+#include "server/api/fleet_autonomy.h"
+#include "server/api/live_robot.h"
+#include "server/api/services.h"
+
+// What schedulers ask: each request becomes an input of src/answers, each output JSON.
+namespace joulecast::api {
+namespace {
+
+using http::Request;
+using http::Response;
+using Model = std::shared_ptr<const answers::ModelInForce>;
+
+Result<Response> json_or_error(Result<std::string> text) {
+  if (!text) return tl::unexpected(std::move(text.error()));
+  return http::json_response(std::move(*text));
+}
+
+// A profile request, read once: by whoever comes first of `brief` and `handler`.
+struct ProfileRequest {
+  Model model;
+  answers::ProfileInput input;
+};
+using ReadProfile = Result<std::shared_ptr<const ProfileRequest>>;
+
+ReadProfile read_profile(const Services& services, const Request& r) {
+  if (const auto* read = std::any_cast<ReadProfile>(&r.input)) return *read;
+  auto model = model_of(services, r.param("id"));
+  if (!model) return tl::unexpected(std::move(model.error()));
+  auto input = answers::read_profile(*r.json, (*model)->robot);
+  if (!input) return tl::unexpected(std::move(input.error()));
+  return std::make_shared<const ProfileRequest>(ProfileRequest{std::move(*model), std::move(*input)});
+}
+
+std::optional<Response> brief_profile(const Services& services, Request& r) {
+  ReadProfile read = read_profile(services, r);
+  if (read) {
+    const auto& [model, input] = **read;
+    if (const auto output = answers::profile_at_once(input, *model))
+      return http::json_response(answers::profile_json(input, *output, *model));
+  }
+  r.input = std::move(read);
+  return std::nullopt;
+}
+
+Result<Response> profile(const Services& services, const Request& r) {
+  const ReadProfile read = read_profile(services, r);
+  if (!read) return tl::unexpected(read.error());
+  const auto& [model, input] = **read;
+  const auto output = answers::profile(input, *model);
+  if (!output) return tl::unexpected(output.error());
+  return http::json_response(answers::profile_json(input, *output, *model));
+}
+
+Result<Response> estimate(const Services& services, const Request& r) {
+  const auto model = model_of(services, r.param("id"));
+  if (!model) return tl::unexpected(model.error());
+  const auto input = answers::read_estimate(*r.json, (*model)->robot);
+  if (!input) return tl::unexpected(input.error());
+  const bool usual = input->driving == answers::Driving::usual;
+  const auto output = answers::estimate(
+      *input, usual ? services.forecasts.of(*model) : answers::RobotOutlook{*model, nullptr, nullptr});
+  if (!output) return tl::unexpected(output.error());
+  return http::json_response(answers::estimate_json(*input, *output, **model));
+}
+
+Result<Response> autonomy(const Services& services, const Request& r) {
+  const std::string& id = r.param("id");
+  const auto model = model_of(services, id);
+  if (!model) return tl::unexpected(model.error());
+  return json_or_error(answers::autonomy_answer(*r.json, services.forecasts.of(*model),
+                                                live_robot(services.fleet.find(id).get()),
+                                                services.cost_tables));
+}
+
+Result<Response> matrix(const Services& services, const Request& r) {
+  auto input = answers::read_matrix(*r.json);
+  if (!input) return tl::unexpected(std::move(input.error()));
+  answers::MatrixFleet fleet;
+  fleet.model = [&services](const std::string& id) { return model_of(services, id); };
+  fleet.live = [&services](const std::string& id) { return live_robot(services.fleet.find(id).get()); };
+  fleet.outlook = [&services](const Model& model) { return services.forecasts.of(model); };
+  const auto text =
+      std::make_shared<answers::MatrixText>(answers::Matrix(std::move(*input), fleet, services.cost_tables));
+  Response response;
+  response.stream =
+      http::generate([text](std::string& out, const std::stop_token& left) { return text->next(out, left); });
+  return response;
+}
+
+}  // namespace
+
+std::vector<TableRow> planning_rows() {
+  using http::Method;
+  std::vector<TableRow> rows;
+  rows.push_back(
+      {{.method = Method::post,
+        .path = "/v1/robots/{id}/profile",
+        .operation_id = "computeProfile",
+        .summary =
+            "The minimum-energy motion along a path, with its certificate, against trapezoid and triangle",
+        .request_schema = "profile-request",
+        .response_schema = "profile",
+        .error_statuses = {404, 422},
+        .run = http::Run::compute},
+       [](Services& services, http::Endpoint& endpoint) {
+         answered_by(profile)(services, endpoint);
+         endpoint.brief = [&services](Request& r) { return brief_profile(services, r); };
+       }});
+  rows.push_back(
+      {{.method = Method::post,
+        .path = "/v1/robots/{id}/estimate",
+        .operation_id = "estimateEnergy",
+        .summary = "Energy of a path driven by its minimum-energy motion (the default: it needs no past of "
+                   "the robot) or as the robot usually drives, or of a given motion",
+        .request_schema = "estimate-request",
+        .response_schema = "estimate",
+        .error_statuses = {404, 422},
+        .run = http::Run::compute},
+       answered_by(estimate)});
+  rows.push_back(
+      {{.method = Method::post,
+        .path = "/v1/energy-matrix",
+        .operation_id = "computeEnergyMatrix",
+        .summary =
+            "Energy and duration of every robot doing every task, row by row, driven by minimum-energy "
+            "motions (the default: the same for equal robots, whatever their past) or as each robot "
+            "usually drives",
+        .request_schema = "energy-matrix-request",
+        .response_schema = "energy-matrix",
+        .error_statuses = {413, 422},
+        .run = http::Run::compute},
+       answered_by(matrix)});
+  rows.push_back(
+      {{.method = Method::post,
+        .path = "/v1/robots/{id}/autonomy",
+        .operation_id = "computeAutonomy",
+        .summary =
+            "How far and how long a robot still goes, and whether it can do a list of tasks, driven as "
+            "it usually drives (the default: the charge must last for that) or by minimum-energy motions",
+        .request_schema = "autonomy-request",
+        .response_schema = "autonomy",
+        .error_statuses = {404, 422},
+        .run = http::Run::compute},
+       answered_by(autonomy)});
+  rows.push_back({{.method = Method::post,
+                   .path = "/v1/autonomy",
+                   .operation_id = "computeFleetAutonomy",
+                   .summary = "The autonomy of many robots in one call",
+                   .request_schema = "fleet-autonomy-request",
+                   .response_schema = "fleet-autonomy",
+                   .error_statuses = {422},
+                   .run = http::Run::compute},
+                  answered_by([](Services& services, const Request& r) {
+                    return json_or_error(fleet_autonomy_answer(*r.json, services));
+                  })});
+  return rows;
+}
+
+}  // namespace joulecast::api

@@ -1,0 +1,217 @@
+#include "answers/autonomy.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "answers/least_energy.h"
+
+namespace joulecast::answers {
+namespace {
+
+using forecast::Motion;
+using forecast::PlannedLeg;
+using forecast::PricedLeg;
+using forecast::PricedTask;
+using Track = forecast::Driving;
+
+std::vector<PlannedLeg> to_charger(const std::optional<Charger>& charger, const planning::Pose& from,
+                                   const std::optional<double>& distance_m, double payload_kg) {
+  std::vector<PlannedLeg> legs;
+  if (distance_m) {
+    if (*distance_m > 0) legs.push_back({Motion::drive, *distance_m, 0, payload_kg, 0});
+  } else if (charger) {
+    const double dx = charger->at.x_m - from.x_m, dy = charger->at.y_m - from.y_m;
+    const double turn =
+        std::fabs(std::remainder(std::atan2(dy, dx) - from.heading_rad, 2 * std::numbers::pi));
+    const double distance = std::hypot(dx, dy);
+    if (distance > 0 && turn > 0) legs.push_back({Motion::turn, turn, 0, payload_kg, 0});
+    if (distance > 0) legs.push_back({Motion::drive, distance * charger->detour_factor, 0, payload_kg, 0});
+  } else {
+    return legs;
+  }
+  // At the charger already: a charger is given, and the way there costs nothing.
+  if (legs.empty()) legs.push_back({Motion::stand, 0, 0, payload_kg, 0});
+  return legs;
+}
+
+// The task's stretches; `pose` and `payload_kg` go on to where it ends.
+Result<std::vector<PlannedLeg>> legs_of(const AutonomyTask& task, planning::Pose& pose, double& payload_kg) {
+  std::vector<PlannedLeg> legs;
+  if (!task.path.empty()) {
+    planning::PathOptions options;
+    options.start = pose;
+    options.payload_kg = payload_kg;
+    const Result<planning::Path> path = path_of(task.path, options);
+    if (!path) return tl::unexpected(path.error());
+    legs = forecast::planned_legs(*path);
+    payload_kg = path->final_payload_kg;
+    if (!path->runs.empty()) pose = path->runs.back().knots.back().pose;
+  } else {
+    const double turn = task.turn_rad, distance = task.distance_m;
+    if (turn != 0) legs.push_back({Motion::turn, std::fabs(turn), 0, payload_kg, 0});
+    if (distance > 0) legs.push_back({Motion::drive, distance, 0, payload_kg, 0});
+    pose.heading_rad += turn;
+    pose.x_m += distance * std::cos(pose.heading_rad);
+    pose.y_m += distance * std::sin(pose.heading_rad);
+  }
+  if (task.dwell_s > 0) legs.push_back({Motion::stand, 0, 0, payload_kg, task.dwell_s});
+  return legs;
+}
+
+struct Pricing {
+  std::vector<PricedTask> tasks;
+  std::vector<PricedLeg> from_here;
+};
+
+Pricing at_pace(const AutonomyInput& input, const TaskPlan& plan, const forecast::LegPricer& pricer,
+                const forecast::Pace& habit) {
+  Pricing priced;
+  priced.tasks.reserve(plan.tasks.size());
+  const forecast::Pace common = input.pace.over(habit);
+  for (std::size_t k = 0; k < plan.tasks.size(); ++k)
+    priced.tasks.push_back({forecast::price(pricer, plan.tasks[k].legs, input.tasks[k].pace.over(habit)),
+                            forecast::price(pricer, plan.tasks[k].to_charger, common)});
+  priced.from_here = forecast::price(pricer, plan.from_here, common);
+  return priced;
+}
+
+Result<Pricing> at_least_energy(const TaskPlan& plan, LeastEnergy& least, double pause_s) {
+  Pricing priced;
+  const auto add = [&](const std::vector<forecast::PlannedLeg>& legs,
+                       std::vector<PricedLeg>& into) -> Result<void> {
+    auto one = least.price(legs, pause_s);
+    if (!one) return tl::unexpected(one.error());
+    into = std::move(*one);
+    return {};
+  };
+  for (const TaskPlan::Task& task : plan.tasks) {
+    PricedTask& into = priced.tasks.emplace_back();
+    if (auto done = add(task.legs, into.legs); !done) return tl::unexpected(done.error());
+    if (auto done = add(task.to_charger, into.to_charger); !done) return tl::unexpected(done.error());
+  }
+  if (auto done = add(plan.from_here, priced.from_here); !done) return tl::unexpected(done.error());
+  return priced;
+}
+
+}  // namespace
+
+forecast::Pace StatedPace::over(forecast::Pace habit) const {
+  habit.speed_m_s = speed_m_s.value_or(habit.speed_m_s);
+  habit.acceleration_m_s2 = acceleration_m_s2.value_or(habit.acceleration_m_s2);
+  habit.yaw_rate_rad_s = yaw_rate_rad_s.value_or(habit.yaw_rate_rad_s);
+  habit.yaw_acceleration_rad_s2 = yaw_acceleration_rad_s2.value_or(habit.yaw_acceleration_rad_s2);
+  return habit;
+}
+
+Result<TaskPlan> task_plan(const AutonomyInput& input, const LiveRobot& now) {
+  planning::Pose pose = input.start_pose.value_or(now.pose.value_or(planning::Pose{}));
+  double payload_kg = input.payload_kg.value_or(now.payload_kg.value_or(0));
+  TaskPlan plan;
+  plan.from_here = to_charger(input.charger, pose, input.to_charger_m, payload_kg);
+  plan.tasks.reserve(input.tasks.size());
+  for (std::size_t k = 0; k < input.tasks.size(); ++k) {
+    const AutonomyTask& task = input.tasks[k];
+    if (task.payload_kg) payload_kg = *task.payload_kg;
+    auto legs = legs_of(task, pose, payload_kg);
+    if (!legs) {
+      legs.error().field.insert(0, fmt::format("/tasks/{}", k));
+      return tl::unexpected(std::move(legs.error()));
+    }
+    TaskPlan::Task& into = plan.tasks.emplace_back();
+    into.legs = std::move(*legs);
+    for (const PlannedLeg& leg : into.legs)
+      into.greatest_payload_kg = std::max(into.greatest_payload_kg, leg.payload_kg);
+    into.to_charger = to_charger(input.charger, pose, task.to_charger_m, payload_kg);
+  }
+  return plan;
+}
+
+Result<forecast::Charge> charge_of(const std::optional<double>& given, const std::optional<double>& given_sd,
+                                   const std::optional<double>& reserve, const robot::Battery& battery,
+                                   const LiveRobot& now) {
+  const double charge = given.value_or(now.state_of_charge);
+  if (!std::isfinite(charge)) {
+    return fail(Fault::infeasible, "/state_of_charge",
+                "is not known: the robot has reported no battery voltage and current since it was first "
+                "seen; give it in the request");
+  }
+  const double live_sd = std::isfinite(now.state_of_charge_sd) ? now.state_of_charge_sd : 0;
+  return forecast::Charge{charge, given_sd.value_or(given ? 0 : live_sd),
+                          reserve.value_or(battery.reserve_fraction)};
+}
+
+Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan, const RobotOutlook& robot,
+                                const LiveRobot& now, planning::CostTableCache& tables) {
+  const ModelInForce& model = *robot.model;
+  const forecast::Forecaster& forecaster = *robot.forecaster;
+  AutonomyOutput out;
+  const auto charge = charge_of(input.state_of_charge, input.state_of_charge_sd, input.reserve_fraction,
+                                model.robot.battery, now);
+  if (!charge) return tl::unexpected(charge.error());
+  out.charge = *charge;
+  out.charge_is_live = !input.state_of_charge;
+  out.payload_kg = input.payload_kg.value_or(now.payload_kg.value_or(0));
+  const double limit = model.robot.limits.payload_kg;
+  const auto too_heavy = [&](const std::string& field, double payload_kg) {
+    return invalid(field, fmt::format("is {}, must be at most the robot's limit of {}", payload_kg, limit));
+  };
+  if (input.payload_kg && *input.payload_kg > limit) return too_heavy("/payload_kg", *input.payload_kg);
+  for (std::size_t k = 0; k < input.tasks.size(); ++k)
+    if (plan.tasks[k].greatest_payload_kg > limit)
+      return too_heavy(fmt::format("/tasks/{}/payload_kg", k), plan.tasks[k].greatest_payload_kg);
+
+  const bool minimum_energy = input.driving == Driving::minimum_energy;
+  const bool all_stated =
+      input.pace.whole() ||
+      (!input.tasks.empty() && plan.from_here.empty() &&
+       std::ranges::all_of(input.tasks, [](const AutonomyTask& task) { return task.pace.whole(); }));
+  out.track = minimum_energy || all_stated ? Track::stated : Track::usual;
+  out.pace = input.pace.over(forecaster.usual);
+
+  const forecast::LegPricer pricer(model.robot, model.drive);
+  std::optional<LeastEnergy> least;
+  const bool with_plan = !input.tasks.empty() || !plan.from_here.empty();
+  if (minimum_energy || (input.compare_minimum_energy && with_plan)) {
+    auto made = LeastEnergy::make(model, tables, input.value_of_time_w);
+    if (!made) return tl::unexpected(made.error());
+    least.emplace(std::move(*made));
+  }
+
+  if (minimum_energy) {
+    const auto priced = least->price(forecast::typical_legs(forecaster, out.payload_kg), out.pace.pause_s);
+    if (!priced) return tl::unexpected(priced.error());
+    out.reach = forecast::reach(forecaster, Track::stated, *robot.battery, out.charge,
+                                forecast::sum_of(forecaster, Track::stated, *priced));
+  } else {
+    const auto priced = forecast::price_typical(forecaster, pricer, out.pace, out.payload_kg);
+    out.reach = forecast::reach(forecaster, out.track, *robot.battery, out.charge,
+                                forecast::sum_of(forecaster, out.track, priced));
+  }
+  if (!with_plan) return out;
+
+  std::optional<Pricing> best;
+  if (least) {
+    auto priced = at_least_energy(plan, *least, out.pace.pause_s);
+    if (priced)
+      best = std::move(*priced);
+    else if (minimum_energy)
+      return tl::unexpected(priced.error());
+  }
+  const auto look = [&](const Pricing& priced, Track driving) {
+    return forecast::look_ahead(forecaster, driving, *robot.battery, out.charge, priced.tasks,
+                                priced.from_here, pricer.standing_w(), input.confidence);
+  };
+  if (minimum_energy) {
+    out.outlook = look(*best, Track::stated);
+    return out;
+  }
+  out.outlook = look(at_pace(input, plan, pricer, forecaster.usual), out.track);
+  if (best) out.minimum_energy_outlook = look(*best, Track::stated);
+  return out;
+}
+
+}  // namespace joulecast::answers

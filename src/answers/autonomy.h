@@ -1,0 +1,89 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "answers/drive.h"
+#include "answers/live.h"
+#include "answers/model.h"
+#include "forecast/outlook.h"
+#include "planning/cost_table_cache.h"
+
+namespace joulecast::answers {
+
+// Part of a pace; what is absent is the robot's habit.
+struct StatedPace {
+  std::optional<double> speed_m_s, acceleration_m_s2, yaw_rate_rad_s, yaw_acceleration_rad_s2;
+
+  forecast::Pace over(forecast::Pace habit) const;
+  bool whole() const { return speed_m_s.has_value(); }
+};
+
+// Drives the path, or where there is none turns and drives straight; then stands.
+struct AutonomyTask {
+  std::string task_id;
+  std::optional<double> payload_kg;  // absent: as before
+  StatedPace pace;
+  std::vector<planning::Segment> path;
+  double turn_rad = 0, distance_m = 0, dwell_s = 0;
+  std::optional<double> to_charger_m;  // from where the task ends
+};
+
+struct Charger {
+  planning::Point at;
+  double detour_factor = 1;  // of the way to it over the straight line
+};
+
+struct AutonomyInput {
+  std::optional<double> state_of_charge;     // instead of the live one
+  std::optional<double> state_of_charge_sd;  // of state_of_charge
+  std::optional<double> reserve_fraction;    // instead of the robot file's
+  std::optional<double> payload_kg;          // instead of the live one
+  Driving driving = Driving::usual;
+  bool compare_minimum_energy = false;
+  double value_of_time_w = 0;  // of the planner's profiles
+  StatedPace pace;
+  double confidence = 0.95;
+  std::optional<planning::Pose> start_pose;  // instead of the live one, else the origin
+  std::optional<Charger> charger;
+  std::optional<double> to_charger_m;  // from where the robot is, instead of the charger's place
+  std::vector<AutonomyTask> tasks;     // each begins where the one before ends
+};
+
+// What the robot is to drive, from stop to stop.
+struct TaskPlan {
+  struct Task {
+    std::vector<forecast::PlannedLeg> legs;
+    std::vector<forecast::PlannedLeg> to_charger;  // empty: no charger given
+    double greatest_payload_kg = 0;
+  };
+  std::vector<Task> tasks;
+  std::vector<forecast::PlannedLeg> from_here;  // to the charger
+};
+
+// Builds each task's path once. Errors name "/tasks/<index>/path/...".
+Result<TaskPlan> task_plan(const AutonomyInput& input, const LiveRobot& now);
+
+struct AutonomyOutput {
+  forecast::Charge charge;
+  bool charge_is_live = false;
+  double payload_kg = 0;
+  forecast::Driving track = forecast::Driving::usual;  // of the forecast
+  forecast::Pace pace;
+  forecast::Reach reach;
+  std::optional<forecast::Outlook> outlook;                 // with a task list or a charger
+  std::optional<forecast::Outlook> minimum_energy_outlook;  // the same, driven as the planner would
+};
+
+// How far and how long a robot still goes, and what becomes of the plan. infeasible when the charge is known
+// from nowhere; invalid for a payload beyond the robot's limit.
+Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan, const RobotOutlook& robot,
+                                const LiveRobot& now, planning::CostTableCache& tables);
+
+// What is known of the charge: what is given, else what is live. infeasible where neither is.
+Result<forecast::Charge> charge_of(const std::optional<double>& given, const std::optional<double>& given_sd,
+                                   const std::optional<double>& reserve, const robot::Battery& battery,
+                                   const LiveRobot& now);
+
+}  // namespace joulecast::answers

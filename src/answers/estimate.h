@@ -1,0 +1,41 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <variant>
+#include <vector>
+
+#include "answers/drive.h"
+#include "answers/model.h"
+#include "energy/motion_estimate.h"
+#include "planning/peaks.h"
+
+namespace joulecast::answers {
+
+// A motion as it is to be driven.
+struct GivenMotion {
+  std::vector<energy::MotionPoint> points;
+  double payload_kg = 0;
+  std::optional<energy::StartPose> start;
+};
+
+struct EstimateInput {
+  std::variant<DriveInput, GivenMotion> motion;
+  Driving driving = Driving::minimum_energy;  // of a path
+  bool columns = false;                       // not of usual driving, whose motion nobody plans
+};
+
+struct EstimateOutput {
+  double energy_j = 0;  // from the battery; of usual driving its expectation
+  double duration_s = 0, distance_m = 0, turned_rad = 0;
+  std::optional<signals::Accounts> accounts;                 // not of usual driving
+  std::optional<std::array<double, 3>> energy_quantiles_j;  // of usual driving, at forecast::told_quantiles
+  std::vector<planning::BrokenLimit> beyond_limits;         // by a given motion
+  std::optional<planning::Profile> columns;                 // where they are asked for
+};
+
+// Energy of a motion: of a given one by CVODE, of a path's minimum-energy motion by the planner, of usual
+// driving by the robot's forecast. Errors name "/path/...", "/profile/..." or the field of the problem.
+Result<EstimateOutput> estimate(const EstimateInput& input, const RobotOutlook& robot);
+
+}  // namespace joulecast::answers

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "answers/autonomy.h"
+#include "answers/json/battery_dialects.h"
+#include "base/json_fields.h"
+#include "base/json_writer.h"
+
+namespace joulecast::answers {
+
+struct AutonomyRequest {
+  AutonomyInput input;
+  Dialect dialect = Dialect::joulecast;
+};
+
+// schemas/autonomy-request.schema.json, from fields that the caller finishes. `single`: one robot is asked
+// for, so that the comparison with minimum-energy profiles is made unless it is declined.
+AutonomyRequest read_autonomy(Fields& fields, bool single);
+
+// schemas/autonomy.schema.json, or the dialect's
+std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& output,
+                          const RobotOutlook& robot, const LiveRobot& now);
+
+// From request to answer, of one robot.
+Result<std::string> autonomy_answer(const nlohmann::json& request, const RobotOutlook& robot,
+                                    const LiveRobot& now, planning::CostTableCache& tables);
+
+// {"since_utime_us", "detected_utime_us", "ratio", "missions"}
+void write_drift(JsonWriter& json, const forecast::Drift& drift);
+
+}  // namespace joulecast::answers

@@ -1,0 +1,41 @@
+#include "answers/json/mission_json.h"
+
+#include "answers/json/ledger_json.h"
+
+namespace joulecast::answers {
+
+void write_mission(JsonWriter& json, const history::Mission& m) {
+  json.begin_object();
+  json.field("id", m.key);
+  json.field("robot_id", m.robot_id);
+  json.field("mission_id", m.mission_id);
+  json.field("state", history::name(m.state));
+  json.field("implicit", m.implicit);
+  json.field("incomplete", m.incomplete);
+  json.key("incomplete_reason");
+  m.incomplete_reason.empty() ? json.null() : json.value(m.incomplete_reason);
+  json.time("start", m.start_utime_us);
+  json.time("end", m.end_utime_us);
+  json.field("payload_kg", m.payload_kg);
+  json.field("note", m.note);
+  json.field("model_version", m.model_version);
+  json.key("energy");
+  write_accounts(json, m.accounts);
+  json.field("samples", m.samples);
+  json.key("sample_faults").begin_object();
+  for (const auto& [reason, count] : m.sample_faults) json.field(reason, count);
+  json.end_object();
+  json.field("gap_count", m.gap_count);
+  json.field("gap_s", m.gap_s);
+  json.key("findings");
+  m.findings_json.empty() ? json.null() : json.raw(m.findings_json);
+  json.key("covariates").begin_array();
+  for (const history::CovariateSummary& c : m.covariates) {
+    json.begin_object().field("name", c.name).field("mean", c.mean).field("min", c.min).field("max", c.max);
+    json.field("known_s", c.known_s).end_object();
+  }
+  json.end_array();
+  json.end_object();
+}
+
+}  // namespace joulecast::answers

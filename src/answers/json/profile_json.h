@@ -1,0 +1,18 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "answers/profile.h"
+
+namespace joulecast::answers {
+
+// schemas/profile-request.schema.json. Errors name the field.
+Result<ProfileInput> read_profile(const nlohmann::json& request, const robot::RobotModel& robot);
+// schemas/profile.schema.json
+std::string profile_json(const ProfileInput& input, const ProfileOutput& output, const ModelInForce& model);
+
+// From request to answer.
+Result<std::string> profile_answer(const nlohmann::json& request, const ModelInForce& model);
+
+}  // namespace joulecast::answers

@@ -1,0 +1,90 @@
+#include "answers/least_energy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace joulecast::answers {
+
+using forecast::LegCost;
+using forecast::Motion;
+using forecast::PlannedLeg;
+using forecast::PricedLeg;
+
+LeastEnergy::LeastEnergy(std::shared_ptr<const planning::CostTable> table, const ModelInForce& model,
+                         double value_of_time_w)
+    : table_(std::move(table)),
+      model_(&model),
+      standing_w_(model.drive.battery_power_for({0, 0})),
+      value_of_time_w_(value_of_time_w) {}
+
+Result<LeastEnergy> LeastEnergy::make(const ModelInForce& model, planning::CostTableCache& tables,
+                                      double value_of_time_w) {
+  if (value_of_time_w > 0) return LeastEnergy(nullptr, model, value_of_time_w);
+  auto table = tables.get(model.robot, {});
+  if (!table) return tl::unexpected(std::move(table.error()));
+  return LeastEnergy(std::move(*table), model, 0);
+}
+
+Result<planning::LegCost> LeastEnergy::curve(const PlannedLeg& leg) {
+  const auto same = [&](const Curve& known) {
+    return known.leg.motion == leg.motion && known.leg.way == leg.way &&
+           known.leg.payload_kg == leg.payload_kg && known.leg.curvature_1_m == leg.curvature_1_m;
+  };
+  if (const auto found = std::ranges::find_if(curves_, same); found != curves_.end()) return found->cost;
+  planning::Path path;
+  planning::Run run;
+  run.payload_kg = path.final_payload_kg = leg.payload_kg;
+  if (leg.motion == Motion::turn) run.turn = 1;
+  run.knots = {{0, leg.curvature_1_m, {}}, {leg.way, leg.curvature_1_m, {}}};
+  path.runs.push_back(std::move(run));
+  planning::Problem problem;
+  problem.limits = planning::limits_of(model_->robot);
+  problem.value_of_time_w = value_of_time_w_;
+  const Result<planning::PlanCost> best = model_->planner.cost(path, problem);
+  if (!best) return tl::unexpected(best.error());
+  curves_.push_back({leg, {best->energy_j, best->duration_s}});
+  return curves_.back().cost;
+}
+
+Result<LegCost> LeastEnergy::cost(const PlannedLeg& leg) {
+  if (leg.motion == Motion::stand || !(leg.way > 0))
+    return LegCost{leg.duration_s, standing_w_ * leg.duration_s, 0, 0};
+  planning::LegCost best;
+  if (table_ != nullptr && leg.motion == Motion::turn && leg.way <= planning::widest_turn_rad) {
+    best = table_->turn(leg.way, leg.payload_kg);
+  } else if (table_ != nullptr && leg.motion == Motion::drive && leg.curvature_1_m == 0 &&
+             leg.way <= planning::longest_leg_m) {
+    best = table_->straight(leg.way, leg.payload_kg);
+  } else {
+    const auto solved = curve(leg);
+    if (!solved) return tl::unexpected(solved.error());
+    best = *solved;
+  }
+  if (!std::isfinite(best.energy_j))
+    return fail(Fault::infeasible, "/tasks", "no motion of one of the legs keeps within the robot's limits");
+  LegCost cost;
+  cost.duration_s = best.duration_s;
+  cost.standing_j = standing_w_ * best.duration_s;
+  cost.motor_j = best.energy_j - cost.standing_j;
+  const robot::Limits& limits = model_->robot.limits;
+  const double limit = leg.motion == Motion::turn ? limits.yaw_rate_rad_s : limits.speed_m_s;
+  constexpr double peak_over_mean = 1.25;  // between a parabola's 1.5 and a plateau's 1
+  cost.speed_fraction = std::min(1.0, peak_over_mean * leg.way / best.duration_s / limit);
+  return cost;
+}
+
+Result<std::vector<PricedLeg>> LeastEnergy::price(const std::vector<PlannedLeg>& legs, double pause_s) {
+  std::vector<PricedLeg> priced;
+  priced.reserve(2 * legs.size());
+  for (const PlannedLeg& leg : legs) {
+    const Result<LegCost> best = cost(leg);
+    if (!best) return tl::unexpected(best.error());
+    priced.push_back({leg.motion, leg.payload_kg, leg.motion == Motion::drive ? leg.way : 0, *best});
+    if (leg.motion != Motion::stand && pause_s > 0)
+      priced.push_back({Motion::stand, leg.payload_kg, 0, {pause_s, standing_w_ * pause_s, 0, 0}});
+  }
+  return priced;
+}
+
+}  // namespace joulecast::answers

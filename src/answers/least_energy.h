@@ -1,0 +1,41 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "answers/model.h"
+#include "forecast/outlook.h"
+#include "planning/cost_table_cache.h"
+
+namespace joulecast::answers {
+
+// Prices legs driven as the planner would: minimum energy from stop to stop, within the robot's limits. In
+// free time straight legs and turns come from the robot's cost table, which is made once for its model (some
+// tenths of a second) and kept; curves, and all legs where a second has its price, are solved one by one,
+// equal ones once. Not thread-safe.
+class LeastEnergy {
+ public:
+  static Result<LeastEnergy> make(const ModelInForce& model, planning::CostTableCache& tables,
+                                  double value_of_time_w = 0);
+
+  // Each stop is followed by the pause. Error: a leg that cannot be driven within the limits.
+  Result<std::vector<forecast::PricedLeg>> price(const std::vector<forecast::PlannedLeg>& legs,
+                                                 double pause_s);
+
+ private:
+  struct Curve {
+    forecast::PlannedLeg leg;
+    planning::LegCost cost;
+  };
+  LeastEnergy(std::shared_ptr<const planning::CostTable> table, const ModelInForce& model,
+              double value_of_time_w);
+  Result<forecast::LegCost> cost(const forecast::PlannedLeg& leg);
+  Result<planning::LegCost> curve(const forecast::PlannedLeg& leg);
+
+  std::shared_ptr<const planning::CostTable> table_;  // null where a second has its price
+  const ModelInForce* model_;
+  double standing_w_, value_of_time_w_;
+  std::vector<Curve> curves_;
+};
+
+}  // namespace joulecast::answers

@@ -1,0 +1,244 @@
+#include "answers/matrix.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <stdexcept>
+#include <unordered_map>
+#include <utility>
+
+#include "answers/autonomy.h"
+#include "base/parallel.h"
+#include "forecast/outlook.h"
+
+namespace joulecast::answers {
+namespace {
+
+using forecast::Motion;
+using planning::Cell;
+using planning::CostTable;
+using planning::Obstacle;
+
+constexpr std::size_t threads = 2;
+constexpr auto habit = forecast::Driving::usual;
+
+struct Robot {
+  std::shared_ptr<const ModelInForce> model;  // null: see `problem`
+  std::string problem;
+  std::optional<planning::Pose> pose;
+  std::optional<forecast::Charge> charge;
+  RobotOutlook outlook;  // where the charge is known or habits are asked for
+};
+
+}  // namespace
+
+struct Matrix::State {
+  MatrixInput input;
+  std::vector<Robot> robots;
+  planning::CostTableCache& cache;
+
+  // Of minimum-energy driving: tables, one for each different model, then the matrix.
+  std::vector<const ModelInForce*> models = {};
+  std::vector<Result<std::shared_ptr<const CostTable>>> tables = {};
+  std::size_t tables_done = 0;
+  std::unique_ptr<planning::CostMatrix> matrix = {};
+
+  Robot robot_of(const MatrixInput::Robot& given, const MatrixFleet& fleet) const;
+  void assemble();
+  std::vector<Cell> usual_cells(std::size_t r, std::vector<double>& probability) const;
+  std::optional<std::vector<double>> success(const Robot& robot, const std::vector<Cell>& cells) const;
+  std::string detail_of(Obstacle obstacle, std::size_t r) const;
+};
+
+Robot Matrix::State::robot_of(const MatrixInput::Robot& given, const MatrixFleet& fleet) const {
+  Robot robot;
+  auto model = fleet.model(given.robot_id);
+  if (!model) {
+    robot.problem = model.error().message;
+    return robot;
+  }
+  robot.model = std::move(*model);
+  const LiveRobot now = fleet.live(given.robot_id);
+  robot.pose = given.pose ? given.pose : now.pose;
+  if (const auto charge =
+          charge_of(given.state_of_charge, {}, input.reserve_fraction, robot.model->robot.battery, now))
+    robot.charge = *charge;
+  if (robot.charge || input.driving == Driving::usual) robot.outlook = fleet.outlook(robot.model);
+  return robot;
+}
+
+void Matrix::State::assemble() {
+  std::unordered_map<const ModelInForce*, std::size_t> table_of;
+  for (std::size_t k = 0; k < models.size(); ++k) {
+    // Every model in force and every option has been checked, so that a table not to be had is our bug.
+    if (!tables[k]) throw std::logic_error(describe(tables[k].error()));
+    table_of.emplace(models[k], k);
+  }
+  std::vector<planning::MatrixRobot> rows;
+  rows.reserve(robots.size());
+  for (const Robot& robot : robots) {
+    if (robot.model == nullptr) {
+      rows.emplace_back();
+      continue;
+    }
+    rows.push_back(
+        {*tables[table_of.at(robot.model.get())], robot.model->robot.limits.payload_kg, robot.pose});
+  }
+  matrix = std::make_unique<planning::CostMatrix>(std::move(rows), input.tasks);
+}
+
+// Priced at the robot's usual pace and corrected by its forecast; chances of the same forecasts.
+std::vector<Cell> Matrix::State::usual_cells(std::size_t r, std::vector<double>& probability) const {
+  const Robot& robot = robots[r];
+  std::vector<Cell> cells(input.tasks.size());
+  if (robot.model == nullptr) {
+    for (Cell& cell : cells) cell.obstacle = Obstacle::model;
+    return cells;
+  }
+  const forecast::Forecaster& forecaster = *robot.outlook.forecaster;
+  const forecast::LegPricer pricer(robot.model->robot, robot.model->drive);
+  std::vector<planning::Stretch> stretches;
+  std::vector<forecast::PlannedLeg> legs;
+  for (std::size_t t = 0; t < cells.size(); ++t) {
+    const planning::MatrixTask& task = input.tasks[t];
+    Cell& cell = cells[t];
+    if (task.payload_kg > robot.model->robot.limits.payload_kg) {
+      cell.obstacle = Obstacle::payload;
+      continue;
+    }
+    if (task.empty.empty() && !robot.pose) {
+      cell.obstacle = Obstacle::pose;
+      continue;
+    }
+    planning::stretches_of(task, r, robot.pose, stretches);
+    legs.clear();
+    for (const planning::Stretch& s : stretches)
+      if (s.way > 0)
+        legs.push_back({s.turn ? Motion::turn : Motion::drive, s.way, 0, s.loaded ? task.payload_kg : 0, 0});
+    if (const double dwell_s = task.pickup_dwell_s + task.dropoff_dwell_s; dwell_s > 0)
+      legs.push_back({Motion::stand, 0, 0, 0, dwell_s});
+    const forecast::PlanSum sum =
+        forecast::sum_of(forecaster, habit, forecast::price(pricer, legs, forecaster.usual));
+    cell.energy_j = forecaster.predict(sum, habit).mean_j();
+    cell.duration_s = sum.duration_s;
+    if (robot.charge)
+      probability[t] =
+          forecast::probability_of_reserve(forecaster, habit, *robot.outlook.battery, *robot.charge, sum);
+  }
+  return cells;
+}
+
+// That a robot driving by minimum-energy profiles ends each task with its reserve.
+std::optional<std::vector<double>> Matrix::State::success(const Robot& robot,
+                                                          const std::vector<Cell>& cells) const {
+  if (!robot.charge) return std::nullopt;
+  const auto possible = std::ranges::find_if(cells, [](const Cell& c) { return c.duration_s > 0; });
+  const double standing_w = robot.model->drive.battery_power_for({0, 0});
+  const double power_w = possible != cells.end() ? possible->energy_j / possible->duration_s : standing_w;
+  const forecast::QuickSuccess quick(*robot.outlook.forecaster, *robot.outlook.battery, *robot.charge,
+                                     standing_w, power_w);
+  std::vector<double> probability(cells.size());
+  for (std::size_t t = 0; t < cells.size(); ++t) {
+    const Cell& cell = cells[t];
+    probability[t] = std::isfinite(cell.energy_j)
+                         ? quick.probability(cell.energy_j, cell.duration_s, cell.loaded.energy_j,
+                                             cell.loaded.duration_s, input.tasks[t].payload_kg)
+                         : cell.energy_j;
+  }
+  return probability;
+}
+
+std::string Matrix::State::detail_of(Obstacle obstacle, std::size_t r) const {
+  switch (obstacle) {
+    case Obstacle::none:
+      break;
+    case Obstacle::payload:
+      return fmt::format("this robot carries at most {} kg", robots[r].model->robot.limits.payload_kg);
+    case Obstacle::limits:
+      return matrix->robot(r).table->obstacle() ? describe(*matrix->robot(r).table->obstacle())
+                                                : std::string("no motion within the limits");
+    case Obstacle::pose:
+      return "the robot reports no pose; give it in the request, or the way to the pick-up";
+    case Obstacle::model:
+      return robots[r].problem;
+  }
+  return {};
+}
+
+Matrix::Matrix(MatrixInput input, const MatrixFleet& fleet, planning::CostTableCache& tables)
+    : state_(new State{.input = std::move(input), .robots = {}, .cache = tables}) {
+  State& s = *state_;
+  s.robots.reserve(s.input.robots.size());
+  for (const MatrixInput::Robot& given : s.input.robots) s.robots.push_back(s.robot_of(given, fleet));
+  if (s.input.driving == Driving::usual) return;
+  std::unordered_map<const ModelInForce*, bool> seen;
+  for (const Robot& robot : s.robots)
+    if (robot.model != nullptr && seen.emplace(robot.model.get(), true).second)
+      s.models.push_back(robot.model.get());
+  s.tables.assign(s.models.size(), std::shared_ptr<const CostTable>());
+}
+
+Matrix::~Matrix() = default;
+Matrix::Matrix(Matrix&&) noexcept = default;
+
+const MatrixInput& Matrix::input() const {
+  return state_->input;
+}
+
+bool Matrix::prepare(std::chrono::milliseconds time) {
+  State& s = *state_;
+  if (s.tables_done == s.models.size()) {
+    if (s.matrix == nullptr && s.input.driving == Driving::minimum_energy) s.assemble();
+    return false;
+  }
+  const auto until = std::chrono::steady_clock::now() + time;
+  std::atomic<std::size_t> next = s.tables_done;
+  parallel_for(threads, threads, [&](std::size_t) {
+    do {
+      const std::size_t k = next++;
+      if (k >= s.models.size()) return;
+      s.tables[k] = s.cache.get(s.models[k]->robot, s.input.options);
+    } while (std::chrono::steady_clock::now() < until);
+  });
+  s.tables_done = std::min(next.load(), s.models.size());
+  return true;
+}
+
+MatrixRow Matrix::row(std::size_t r) const {
+  const State& s = *state_;
+  const Robot& robot = s.robots[r];
+  MatrixRow out;
+  out.robot_id = s.input.robots[r].robot_id;
+  std::vector<Cell> cells;
+  if (s.input.driving == Driving::usual) {
+    std::vector<double> probability(s.input.tasks.size(), std::nan(""));
+    cells = s.usual_cells(r, probability);
+    if (robot.charge) out.success_probability = std::move(probability);
+  } else {
+    s.matrix->row(r, cells);
+    out.success_probability = s.success(robot, cells);
+  }
+  if (robot.model != nullptr) {
+    out.model_version = robot.model->version;
+    const auto effects = *dynamics::active_effects(robot.model->robot);
+    for (const dynamics::ActiveEffect& active : effects)
+      if (active.effect->info().needs_position || active.effect->info().needs_heading)
+        out.neglected_effects.emplace_back(active.effect->info().id);
+    if (s.matrix != nullptr) out.interpolation_error = s.matrix->robot(r).table->interpolation_error();
+  }
+  for (const Cell& cell : cells) {
+    out.energy_j.push_back(cell.energy_j);
+    out.duration_s.push_back(cell.duration_s);
+  }
+  for (const Obstacle obstacle : {Obstacle::model, Obstacle::pose, Obstacle::payload, Obstacle::limits}) {
+    std::vector<std::size_t> tasks;
+    for (std::size_t t = 0; t < cells.size(); ++t)
+      if (cells[t].obstacle == obstacle) tasks.push_back(t);
+    if (!tasks.empty()) out.infeasible.push_back({obstacle, s.detail_of(obstacle, r), std::move(tasks)});
+  }
+  return out;
+}
+
+}  // namespace joulecast::answers

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "answers/drive.h"
+#include "answers/live.h"
+#include "answers/model.h"
+#include "planning/cost_matrix.h"
+#include "planning/cost_table_cache.h"
+
+namespace joulecast::answers {
+
+struct MatrixInput {
+  struct Robot {
+    std::string robot_id;
+    std::optional<planning::Pose> pose;     // instead of the live one
+    std::optional<double> state_of_charge;  // likewise
+  };
+  Driving driving = Driving::minimum_energy;
+  planning::CostOptions options;           // of minimum-energy driving
+  std::optional<double> reserve_fraction;  // instead of the robot files'
+  std::vector<Robot> robots;
+  std::vector<std::string> task_ids;
+  std::vector<planning::MatrixTask> tasks;  // as many
+};
+
+// What the matrix needs to know of the fleet.
+struct MatrixFleet {
+  std::function<Result<std::shared_ptr<const ModelInForce>>(const std::string& robot_id)> model;
+  std::function<LiveRobot(const std::string& robot_id)> live;
+  std::function<RobotOutlook(const std::shared_ptr<const ModelInForce>& model)> outlook;
+};
+
+// One robot on every task, a value a task; NaN where it cannot do it.
+struct MatrixRow {
+  struct Infeasible {
+    planning::Obstacle reason = planning::Obstacle::none;
+    std::string detail;
+    std::vector<std::size_t> tasks;
+  };
+  std::string robot_id;
+  std::optional<std::int64_t> model_version;
+  std::optional<double> interpolation_error;  // of minimum-energy driving
+  std::vector<std::string> neglected_effects;
+  std::vector<double> energy_j, duration_s;
+  std::optional<std::vector<double>> success_probability;  // absent: the charge is not known
+  std::vector<Infeasible> infeasible;
+};
+
+// Every robot on every task. What is amiss with one robot, that it is not known or nobody knows where it
+// stands, is told in its row.
+class Matrix {
+ public:
+  Matrix(MatrixInput input, const MatrixFleet& fleet, planning::CostTableCache& tables);
+  ~Matrix();
+  Matrix(Matrix&&) noexcept;
+
+  const MatrixInput& input() const;
+
+  // Builds cost tables, on two threads, for so long; false when there is none left to build.
+  bool prepare(std::chrono::milliseconds time);
+  // From any thread; after the last prepare().
+  MatrixRow row(std::size_t robot) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace joulecast::answers

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "base/error.h"
+#include "dynamics/drive_model.h"
+#include "forecast/charge_map.h"
+#include "forecast/robot_forecast.h"
+#include "planning/planner.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::answers {
+
+// A robot's model as everything uses it: immutable, shared by reference.
+struct ModelInForce {
+  robot::RobotModel robot;
+  dynamics::DriveModel drive;
+  std::int64_t version = 0;
+  planning::Planner planner;
+};
+
+// An effect that the catalogue rejects is an error.
+Result<std::shared_ptr<const ModelInForce>> model_in_force(robot::RobotModel robot, std::int64_t version);
+
+// What answers about a robot's future need, at one moment.
+struct RobotOutlook {
+  std::shared_ptr<const ModelInForce> model;
+  std::shared_ptr<const forecast::Forecaster> forecaster;
+  std::shared_ptr<const forecast::ChargeMap> battery;
+};
+
+std::shared_ptr<const forecast::ChargeMap> charge_map(const robot::Battery& battery);
+
+// Of a robot without any past: for answers from a robot file alone.
+RobotOutlook untried(std::shared_ptr<const ModelInForce> model);
+
+}  // namespace joulecast::answers

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "answers/drive.h"
+#include "answers/model.h"
+#include "planning/baseline.h"
+
+namespace joulecast::answers {
+
+// A plan this little above the shortest time, relatively, is as fast as the robot can: ten times what the
+// planner meets deadlines to.
+inline constexpr double at_the_limit = 1e-3;
+
+struct ProfileInput {
+  DriveInput drive;
+  bool columns = true;            // the answer tells the profile
+  bool baseline_columns = false;  // and those of the baselines
+  std::size_t pareto_points = 0;  // of the front of energy against time; fewer than 2: none
+};
+
+struct ProfileOutput {
+  struct Baseline {
+    planning::Baseline motion;
+    bool within_limits = true;
+    double saving_fraction = 0;  // of its energy, by the plan
+  };
+  planning::Plan plan;
+  std::optional<Baseline> trapezoid, triangle;  // as long on every run; absent where a run is too short
+  std::optional<double> needed_speed_m_s;       // with a deadline
+  std::vector<planning::PlanCost> pareto;
+};
+
+// The minimum-energy motion along the path within the limits, against a trapezoid and a triangle.
+Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& model);
+
+// The same where it takes no more than some tens of microseconds; nothing for longer ones and for errors.
+std::optional<ProfileOutput> profile_at_once(const ProfileInput& input, const ModelInForce& model);
+
+// The same without what it is compared with. With another regeneration than the model's a planner is made.
+Result<planning::Plan> plan(const DriveInput& input, const ModelInForce& model);
+
+}  // namespace joulecast::answers

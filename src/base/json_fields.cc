@@ -1,0 +1,187 @@
+#include "base/json_fields.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "base/utc_time.h"
+
+namespace joulecast {
+
+using nlohmann::json;
+
+Fields::Fields(const json& object, std::string at) : object_(object), at_(std::move(at)) {
+  if (!object_.is_object()) error_ = Error{Fault::invalid, at_, "must be an object"};
+}
+
+bool Fields::has(std::string_view name) const {
+  if (!object_.is_object()) return false;
+  const auto found = object_.find(name);
+  return found != object_.end() && !found->is_null();
+}
+
+std::string Fields::pointer(std::string_view name) const {
+  return at_ + "/" + std::string(name);
+}
+
+void Fields::fault(std::string_view name, std::string message) {
+  fault(Error{Fault::invalid, pointer(name), std::move(message)});
+}
+
+void Fields::fault(Error error) {
+  if (!error_) error_ = std::move(error);
+}
+
+const json* Fields::member(std::string_view name) {
+  read_.emplace(name);
+  return has(name) ? &*object_.find(name) : nullptr;
+}
+
+const json* Fields::required(std::string_view name, bool has_fallback) {
+  const json* found = member(name);
+  if (found == nullptr && !has_fallback) {
+    misses_ = misses_ || ok();
+    fault(name, "is required");
+  }
+  return found;
+}
+
+double Fields::number(std::string_view name, const Bounds& bounds, std::optional<double> fallback) {
+  const json* found = required(name, fallback.has_value());
+  if (found == nullptr) return fallback.value_or(0);
+  if (!found->is_number()) {
+    fault(name, "must be a number");
+    return 0;
+  }
+  const double value = found->get<double>();
+  if (!std::isfinite(value)) fault(name, "must be finite");
+  if (bounds.exclusive_minimum ? !(value > bounds.minimum) : !(value >= bounds.minimum)) {
+    fault(name, fmt::format("is {}, must be {} {}", value,
+                            bounds.exclusive_minimum ? "greater than" : "at least", bounds.minimum));
+  }
+  if (!(value <= bounds.maximum))
+    fault(name, fmt::format("is {}, must be at most {}", value, bounds.maximum));
+  return value;
+}
+
+std::optional<double> Fields::optional_number(std::string_view name, const Bounds& bounds) {
+  read_.emplace(name);
+  if (!has(name)) return std::nullopt;
+  return number(name, bounds);
+}
+
+std::optional<std::int64_t> Fields::optional_integer(std::string_view name, std::int64_t minimum,
+                                                     std::int64_t maximum) {
+  read_.emplace(name);
+  if (!has(name)) return std::nullopt;
+  return integer(name, minimum, maximum);
+}
+
+std::int64_t Fields::integer(std::string_view name, std::int64_t minimum, std::int64_t maximum,
+                             std::optional<std::int64_t> fallback) {
+  const json* found = required(name, fallback.has_value());
+  if (found == nullptr) return fallback.value_or(0);
+  if (!found->is_number_integer()) {
+    fault(name, "must be an integer");
+    return 0;
+  }
+  const auto value = found->get<std::int64_t>();
+  if (value < minimum || value > maximum)
+    fault(name, fmt::format("is {}, must be from {} to {}", value, minimum, maximum));
+  return value;
+}
+
+std::optional<std::int64_t> Fields::time(std::string_view name) {
+  const std::string in_us = std::string(name) + "_utime_us";
+  const auto utime_us = optional_integer(in_us, 0, std::int64_t{1} << 53);
+  if (member(name) == nullptr) return utime_us;
+  if (utime_us) fault(name, fmt::format("must not be given beside {}", in_us));
+  const auto parsed = parse_utc(text(name, 64));
+  if (!parsed) fault(name, fmt::format("must be {}", utc_forms));
+  return parsed;
+}
+
+bool Fields::boolean(std::string_view name, std::optional<bool> fallback) {
+  const json* found = required(name, fallback.has_value());
+  if (found == nullptr) return fallback.value_or(false);
+  if (!found->is_boolean()) {
+    fault(name, "must be true or false");
+    return false;
+  }
+  return found->get<bool>();
+}
+
+std::string Fields::text(std::string_view name, std::size_t max_length, std::optional<std::string> fallback) {
+  const json* found = required(name, fallback.has_value());
+  if (found == nullptr) return fallback.value_or("");
+  if (!found->is_string()) {
+    fault(name, "must be a text");
+    return "";
+  }
+  std::string value = found->get<std::string>();
+  if (value.size() > max_length)
+    fault(name, fmt::format("has {} bytes, must have at most {}", value.size(), max_length));
+  return value;
+}
+
+std::string Fields::choice(std::string_view name, const std::vector<std::string_view>& words,
+                           std::optional<std::string> fallback) {
+  std::string value = text(name, 256, std::move(fallback));
+  if (ok() && std::ranges::find(words, value) == words.end()) {
+    fault(name, fmt::format("is \"{}\", must be one of {}", value, fmt::join(words, ", ")));
+  }
+  return value;
+}
+
+std::vector<double> Fields::numbers(std::string_view name, std::size_t minimum, std::size_t maximum,
+                                    const Bounds& bounds) {
+  const json* found = required(name, false);
+  std::vector<double> values;
+  if (found == nullptr) return values;
+  if (!found->is_array() || found->size() < minimum || found->size() > maximum) {
+    fault(name, fmt::format("must be an array of {} to {} numbers", minimum, maximum));
+    return values;
+  }
+  values.reserve(found->size());
+  for (std::size_t k = 0; k < found->size(); ++k) {
+    const json& item = (*found)[k];
+    const double value = item.is_number() ? item.get<double>() : std::nan("");
+    const bool low = bounds.exclusive_minimum ? !(value > bounds.minimum) : !(value >= bounds.minimum);
+    if (!std::isfinite(value) || low || !(value <= bounds.maximum)) {
+      fault(fmt::format("{}/{}", name, k),
+            fmt::format("must be a number from {} to {}", bounds.minimum, bounds.maximum));
+      return values;
+    }
+    values.push_back(value);
+  }
+  return values;
+}
+
+std::vector<std::string> Fields::unknown() const {
+  std::vector<std::string> names;
+  if (!object_.is_object()) return names;
+  for (const auto& [name, content] : object_.items())
+    if (!read_.contains(name)) names.push_back(name);
+  return names;
+}
+
+Result<void> Fields::finish() {
+  if (!error_) {
+    if (const auto names = unknown(); !names.empty()) {
+      // RFC 6901
+      std::string escaped;
+      for (const char c : names.front()) escaped += c == '~' ? "~0" : c == '/' ? "~1" : std::string(1, c);
+      fault(escaped, "is not a known field");
+    }
+  } else if (misses_) {
+    if (const auto names = unknown(); !names.empty())
+      error_->message += fmt::format("; not known here: {}", fmt::join(names, ", "));
+  }
+  if (error_) return tl::unexpected(*error_);
+  return {};
+}
+
+}  // namespace joulecast

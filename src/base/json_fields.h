@@ -1,0 +1,74 @@
+#pragma once
+
+#include <limits>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+
+namespace joulecast {
+
+// Bounds of a number in a request; inclusive unless said otherwise.
+struct Bounds {
+  double minimum = -std::numeric_limits<double>::infinity();
+  double maximum = std::numeric_limits<double>::infinity();
+  bool exclusive_minimum = false;
+};
+inline constexpr Bounds positive{0, std::numeric_limits<double>::infinity(), true};
+inline constexpr Bounds not_negative{0, std::numeric_limits<double>::infinity(), false};
+inline constexpr Bounds fraction{0, 1, false};
+
+// Reads one JSON object of a request, field by field, and remembers the first fault: the JSON pointer of the
+// field and the constraint that it broke. A null counts as absent. finish() also refuses keys that nobody
+// read, and names them beside a required one that misses: often the one is the other, misspelt.
+class Fields {
+ public:
+  // `at` is the pointer of the object itself, "" for the whole body.
+  explicit Fields(const nlohmann::json& object, std::string at = "");
+
+  double number(std::string_view name, const Bounds& bounds, std::optional<double> fallback = std::nullopt);
+  std::optional<double> optional_number(std::string_view name, const Bounds& bounds);
+  std::int64_t integer(std::string_view name, std::int64_t minimum, std::int64_t maximum,
+                       std::optional<std::int64_t> fallback = std::nullopt);
+  std::optional<std::int64_t> optional_integer(std::string_view name, std::int64_t minimum,
+                                               std::int64_t maximum);
+  // "<name>" in ISO 8601 (base/utc_time.h), or "<name>_utime_us", microseconds since 1970; not both.
+  std::optional<std::int64_t> time(std::string_view name);
+  bool boolean(std::string_view name, std::optional<bool> fallback = std::nullopt);
+  std::string text(std::string_view name, std::size_t max_length,
+                   std::optional<std::string> fallback = std::nullopt);
+  // One of the words; the fault lists them.
+  std::string choice(std::string_view name, const std::vector<std::string_view>& words,
+                     std::optional<std::string> fallback = std::nullopt);
+  // Numbers of an array, each within the bounds, `minimum` to `maximum` of them.
+  std::vector<double> numbers(std::string_view name, std::size_t minimum, std::size_t maximum,
+                              const Bounds& bounds);
+  // A member that the caller reads by itself; null when absent.
+  const nlohmann::json* member(std::string_view name);
+  // One that must be there; null, and a fault, when absent.
+  const nlohmann::json* required(std::string_view name, bool has_fallback = false);
+
+  bool has(std::string_view name) const;
+  std::string pointer(std::string_view name) const;
+  void fault(std::string_view name, std::string message);
+  // For constraints between fields, or found by a nested reader.
+  void fault(Error error);
+  bool ok() const { return !error_.has_value(); }
+
+  Result<void> finish();
+
+ private:
+  std::vector<std::string> unknown() const;
+
+  const nlohmann::json& object_;
+  std::string at_;
+  std::set<std::string, std::less<>> read_;
+  std::optional<Error> error_;
+  bool misses_ = false;  // error_ is a required member of this object
+};
+
+}  // namespace joulecast

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace joulecast {
+
+// Writes JSON text front to back. Doubles that are not finite become null, so that "not measured" is never a
+// number. Several times faster than building a document first, which long series need.
+class JsonWriter {
+ public:
+  JsonWriter& begin_object();
+  JsonWriter& end_object();
+  JsonWriter& begin_array();
+  JsonWriter& end_array();
+  JsonWriter& key(std::string_view name);
+
+  JsonWriter& value(double number);  // resolved() (base/resolution.h), in the shortest text that reads back
+  JsonWriter& exact(double number);  // as it is, for evidence: the text reads back as the same double
+  JsonWriter& value(std::int64_t number);
+  JsonWriter& value(std::uint64_t number);
+  JsonWriter& value(int number) { return value(static_cast<std::int64_t>(number)); }
+  JsonWriter& value(bool truth);
+  JsonWriter& value(std::string_view text);
+  JsonWriter& value(const char* text) { return value(std::string_view(text)); }
+  JsonWriter& value(const std::string& text) { return value(std::string_view(text)); }
+  JsonWriter& null();
+  // JSON text made elsewhere.
+  JsonWriter& raw(std::string_view json);
+  // JSON text written for people: without the space between its parts.
+  JsonWriter& compact(std::string_view json);
+
+  template <class T>
+  JsonWriter& field(std::string_view name, const T& content) {
+    key(name);
+    return value(content);
+  }
+  template <class T>
+  JsonWriter& field(std::string_view name, const std::optional<T>& content) {
+    key(name);
+    return content ? value(*content) : null();
+  }
+  // A time as people and as programs read it: "<name>" in ISO 8601 and "<name>_utime_us", or "time" and
+  // "utime_us" for a name that is empty; both null where there is none.
+  JsonWriter& time(std::string_view name, std::optional<std::int64_t> utime_us);
+  // An array of what value() takes.
+  template <class Range>
+  JsonWriter& array(std::string_view name, const Range& items) {
+    key(name).begin_array();
+    for (const auto& item : items) value(item);
+    return end_array();
+  }
+
+  // An array of numbers rounded to `places` decimals: series for people and planners, where the digits behind
+  // are noise.
+  JsonWriter& column(std::string_view name, std::span<const double> numbers, int places = 6);
+
+  std::string take() { return std::move(text_); }
+  const std::string& text() const { return text_; }
+
+ private:
+  void separate();
+
+  std::string text_;
+  bool comma_ = false;
+};
+
+}  // namespace joulecast

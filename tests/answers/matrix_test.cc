@@ -1,0 +1,244 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "answers/json/autonomy_json.h"
+#include "answers/json/matrix_json.h"
+#include "planning/cost_matrix.h"
+#include "tests/support/sample_robots.h"
+
+namespace joulecast::answers {
+namespace {
+
+using nlohmann::json;
+
+class MatrixAnswer : public ::testing::Test {
+ protected:
+  MatrixAnswer() {
+    add("a", 10.5);
+    add("b", 4);
+    fleet_.model = [this](const std::string& id) -> Result<std::shared_ptr<const ModelInForce>> {
+      if (const auto found = models_.find(id); found != models_.end()) return found->second;
+      return fail(Fault::not_found, "id", "no robot " + id);
+    };
+    fleet_.live = [](const std::string& id) {
+      LiveRobot now;
+      if (id == "a") now.pose = planning::Pose{0, 0, 0};
+      return now;
+    };
+    fleet_.outlook = untried;
+  }
+
+  void add(const std::string& id, double payload_limit_kg) {
+    robot::RobotModel robot = testing::nomad();
+    robot.robot_id = id;
+    robot.limits.payload_kg = payload_limit_kg;
+    models_[id] = *model_in_force(robot, static_cast<std::int64_t>(models_.size() + 1));
+  }
+
+  static json with_payload(json task, double payload_kg) {
+    task["payload_kg"] = payload_kg;
+    return task;
+  }
+
+  Error error_of(const json& request) {
+    const auto input = read_matrix(request);
+    EXPECT_FALSE(input) << request;
+    return input ? Error{} : input.error();
+  }
+
+  MatrixText text_of(const json& request) {
+    auto input = read_matrix(request);
+    EXPECT_TRUE(input) << describe(input.error());
+    return MatrixText(::joulecast::answers::Matrix(std::move(*input), fleet_, tables_));
+  }
+
+  json answer_to(const json& request, int* pieces = nullptr) {
+    MatrixText answer = text_of(request);
+    std::string text;
+    int count = 1;
+    while (answer.next(text, {})) ++count;
+    if (pieces != nullptr) *pieces = count;
+    return json::parse(text);
+  }
+
+  std::map<std::string, std::shared_ptr<const ModelInForce>> models_;
+  MatrixFleet fleet_;
+  planning::CostTableCache tables_;
+  const json stations_ = {{"task_id", "t1"},
+                          {"payload_kg", 5},
+                          {"pickup", {{"x_m", 3}, {"y_m", 0}}},
+                          {"dropoff", {{"x_m", 3}, {"y_m", 4}, {"heading_rad", 0}}}};
+  const json legs_ = {{"task_id", "t2"},
+                      {"empty", {{"distance_m", 4}}},
+                      {"loaded", {{"distances_m", {1, 2}}, {"turns_rad", {1.5}}}},
+                      {"pickup_dwell_s", 10}};
+};
+
+TEST_F(MatrixAnswer, TellsTheChanceOfEachTaskWhereTheChargeIsKnown) {
+  json far = stations_;
+  far["task_id"] = "far";
+  far["dropoff"] = {{"x_m", 3}, {"y_m", 9000}};
+  const json request = {{"robots",
+                         {{{"robot_id", "a"}, {"state_of_charge", 0.8}},
+                          {{"robot_id", "a"}, {"state_of_charge", 0.16}},
+                          {{"robot_id", "b"}, {"state_of_charge", 0.8}, {"pose", {{"x_m", 0}, {"y_m", 0}}}},
+                          "a"}},
+                        {"tasks", {stations_, far}}};
+  const json rows = answer_to(request)["rows"];
+  EXPECT_GT(rows[0]["success_probability"][0], 0.99);
+  EXPECT_LT(rows[1]["success_probability"][1], 0.01);
+  EXPECT_GT(rows[1]["success_probability"][0], rows[1]["success_probability"][1]);
+  EXPECT_TRUE(rows[2]["success_probability"][0].is_null());  // too heavy for it
+  EXPECT_TRUE(rows[3]["success_probability"].is_null());     // charge not known
+}
+
+TEST_F(MatrixAnswer, AnswersARowForEachRobot) {
+  json request = {{"robots", json::array({"a"})}, {"tasks", {stations_, legs_}}};
+  for (int k = 0; k < 40; ++k)
+    request["robots"].push_back({{"robot_id", k % 2 ? "a" : "b"}, {"pose", {{"x_m", k}, {"y_m", 0}}}});
+  int pieces = 0;
+  const json all = answer_to(request, &pieces);
+  EXPECT_GT(pieces, 3);
+  EXPECT_EQ(all["tasks"], json({"t1", "t2"}));
+  ASSERT_EQ(all["rows"].size(), 41u);
+  EXPECT_EQ(tables_.size(), 2u);
+  for (std::size_t r = 0; r < 41; ++r) {
+    const json& row = all["rows"][r];
+    const bool strong = row["robot_id"] == "a";
+    EXPECT_EQ(row["robot_id"], r == 0 || r % 2 == 0 ? "a" : "b");
+    EXPECT_EQ(row["model_version"], strong ? 1 : 2);
+    EXPECT_LT(row["interpolation_error"].get<double>(), 2e-3);
+    EXPECT_EQ(row["energy_j"][0].is_null(), !strong);
+    EXPECT_EQ(row["duration_s"][0].is_null(), !strong);
+    EXPECT_TRUE(row["energy_j"][1].is_number());
+    if (strong) {
+      EXPECT_TRUE(row["infeasible"].empty());
+    } else {
+      EXPECT_EQ(row["infeasible"][0]["reason"], "payload");
+      EXPECT_EQ(row["infeasible"][0]["tasks"], json({0}));
+      EXPECT_NE(row["infeasible"][0]["detail"].get<std::string>().find("4 kg"), std::string::npos);
+    }
+    // Legs that are given do not depend on where the robot stands.
+    EXPECT_EQ(row["energy_j"][1], all["rows"][strong ? 0 : 1]["energy_j"][1]);
+  }
+  // Farther away costs more.
+  EXPECT_GT(all["rows"][40]["energy_j"][0].get<double>(), all["rows"][0]["energy_j"][0].get<double>());
+}
+
+// The same legs as a task list of the same robot, driven as it usually drives.
+TEST_F(MatrixAnswer, UsualDrivingIsWhatAutonomyForesees) {
+  json far = stations_;
+  far["payload_kg"] = 50;
+  json request = {{"robots", {{{"robot_id", "a"}, {"state_of_charge", 0.8}}, "b"}},
+                  {"tasks", {stations_, legs_, far}},
+                  {"driving", "usual"}};
+  const json all = answer_to(request);
+  EXPECT_EQ(all["driving"], "usual");
+  EXPECT_EQ(tables_.size(), 0u);  // none is built for it
+  const json& row = all["rows"][0];
+  EXPECT_TRUE(row["interpolation_error"].is_null());
+  EXPECT_TRUE(row["energy_j"][2].is_null());
+  EXPECT_EQ(row["infeasible"][0]["reason"], "payload");
+  EXPECT_GT(row["success_probability"][0], 0.99);
+  EXPECT_TRUE(all["rows"][1]["energy_j"][0].is_null());
+  EXPECT_EQ(all["rows"][1]["infeasible"][0]["reason"], "payload");
+  // To the pick-up empty, a turn there, four metres loaded, a turn at the drop-off.
+  const double quarter = std::acos(0.0);
+  const json tasks = {{{"task_id", "go"}, {"distance_m", 3}, {"payload_kg", 0}},
+                      {{"task_id", "bring"}, {"turn_rad", quarter}, {"distance_m", 4}, {"payload_kg", 5}},
+                      {{"task_id", "set"}, {"turn_rad", -quarter}}};
+  const auto text = autonomy_answer({{"state_of_charge", 0.8}, {"payload_kg", 0}, {"tasks", tasks}},
+                                    untried(models_.at("a")), {}, tables_);
+  ASSERT_TRUE(text) << describe(text.error());
+  const json plan = json::parse(*text)["plan"];
+  EXPECT_NEAR(row["energy_j"][0].get<double>(), plan["expected_energy_j"].get<double>(), 1e-3);
+  EXPECT_NEAR(row["duration_s"][0].get<double>(), plan["duration_s"].get<double>(), 1e-3);
+  EXPECT_NEAR(row["success_probability"][0].get<double>(), plan["success_probability"].get<double>(), 1e-4);
+  request["driving"] = "minimum_energy";
+  EXPECT_LT(answer_to(request)["rows"][0]["energy_j"][0], row["energy_j"][0]);
+  request["driving"] = "usual";
+  request["value_of_time_w"] = 3;
+  EXPECT_EQ(error_of(request).field, "/value_of_time_w");
+}
+
+TEST_F(MatrixAnswer, StopsWhenTheClientHasLeft) {
+  json request = {{"robots", json::array()}, {"tasks", {stations_}}};
+  for (int k = 0; k < 100; ++k) request["robots"].push_back("a");
+  MatrixText answer = text_of(request);
+  std::stop_source client;
+  std::string text;
+  ASSERT_TRUE(answer.next(text, client.get_token()));
+  ASSERT_TRUE(answer.next(text, client.get_token()));
+  const std::string so_far = text;
+  client.request_stop();
+  EXPECT_FALSE(answer.next(text, client.get_token()));
+  EXPECT_EQ(text, so_far);
+}
+
+TEST_F(MatrixAnswer, OneRobotsTroubleIsItsOwn) {
+  // b reports no pose: what gives the way to its pick-up is answered all the same.
+  const json request = {{"robots", {"nobody", "b", "a"}}, {"tasks", {with_payload(stations_, 1), legs_}}};
+  const json rows = answer_to(request)["rows"];
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_TRUE(rows[0]["model_version"].is_null());
+  EXPECT_EQ(rows[0]["energy_j"], json({nullptr, nullptr}));
+  EXPECT_EQ(rows[0]["infeasible"],
+            json::array({{{"reason", "model"}, {"detail", "no robot nobody"}, {"tasks", {0, 1}}}}));
+  EXPECT_TRUE(rows[1]["energy_j"][0].is_null());
+  EXPECT_GT(rows[1]["energy_j"][1], 0);
+  ASSERT_EQ(rows[1]["infeasible"].size(), 1u);
+  EXPECT_EQ(rows[1]["infeasible"][0]["reason"], "pose");
+  EXPECT_EQ(rows[1]["infeasible"][0]["tasks"], json({0}));
+  EXPECT_GT(rows[2]["energy_j"][0], 0);
+  EXPECT_EQ(rows[2]["energy_j"][1], rows[1]["energy_j"][1]);
+  EXPECT_TRUE(rows[2]["infeasible"].empty());
+}
+
+TEST_F(MatrixAnswer, NamesTheFieldAtFault) {
+  const json a = {"a"};
+  const auto with = [](json object, const char* name, json value) {
+    object[name] = std::move(value);
+    return object;
+  };
+  struct Case {
+    json request;
+    const char* field;
+    Fault fault = Fault::invalid;
+  };
+  json far = stations_;
+  far["dropoff"]["x_m"] = 50'000;
+  json leg = legs_;
+  leg["loaded"]["turns_rad"] = {1, "left"};
+  json rows = json::array();
+  for (int k = 0; k < 2000; ++k) rows.push_back("a");
+  json columns = json::array();
+  for (int k = 0; k < 2001; ++k) columns.push_back(legs_);
+  for (const Case& c : std::vector<Case>{
+           {json::array(), ""},
+           {{{"tasks", {legs_}}}, "/robots"},
+           {{{"robots", a}}, "/tasks"},
+           {{{"robots", json::array()}, {"tasks", {legs_}}}, "/robots"},
+           {{{"robots", {"a", {{"robot_id", "b"}, {"pose", {{"x_m", 0}}}}}}, {"tasks", {legs_}}},
+            "/robots/1/pose/y_m"},
+           {{{"robots", a}, {"tasks", {legs_, with(legs_, "payload_kg", -1)}}}, "/tasks/1/payload_kg"},
+           {{{"robots", a}, {"tasks", {with(legs_, "colour", 1)}}}, "/tasks/0/colour"},
+           {{{"robots", a},
+             {"tasks", {with(legs_, "empty", json::array({{{"distance_m", 1}}, {{"distance_m", 2}}}))}}},
+            "/tasks/0/empty"},
+           {{{"robots", a}, {"tasks", {with(stations_, "pickup", nullptr)}}}, "/tasks/0/pickup"},
+           {{{"robots", a}, {"tasks", {with(stations_, "dropoff", nullptr)}}}, "/tasks/0/dropoff"},
+           {{{"robots", a}, {"tasks", {far}}}, "/tasks/0/dropoff"},
+           {{{"robots", a}, {"tasks", {leg}}}, "/tasks/0/loaded/turns_rad/1"},
+           {{{"robots", a}, {"tasks", {legs_}}, {"regeneration", 1.5}}, "/regeneration"},
+           {{{"robots", rows}, {"tasks", columns}}, "/tasks", Fault::too_large}}) {
+    const Error error = error_of(c.request);
+    EXPECT_EQ(error.field, c.field) << describe(error);
+    EXPECT_EQ(error.fault, c.fault) << describe(error);
+  }
+}
+
+}  // namespace
+}  // namespace joulecast::answers

@@ -1,0 +1,249 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "answers/json/estimate_json.h"
+#include "answers/json/profile_json.h"
+#include "tests/support/sample_robots.h"
+
+namespace joulecast::answers {
+namespace {
+
+using nlohmann::json;
+
+Result<std::string> estimated(const json& request, const ModelInForce& model) {
+  return estimate_answer(request, untried(std::make_shared<const ModelInForce>(model)));
+}
+
+ModelInForce model() {
+  return **model_in_force(testing::nomad(), 3);
+}
+
+json answer(Result<std::string> (*question)(const json&, const ModelInForce&), const json& request) {
+  const auto text = question(request, model());
+  EXPECT_TRUE(text) << describe(text.error());
+  return text ? json::parse(*text) : json();
+}
+
+Error fault(Result<std::string> (*question)(const json&, const ModelInForce&), const json& request) {
+  const auto text = question(request, model());
+  EXPECT_FALSE(text) << *text;
+  return text ? Error{} : text.error();
+}
+
+// Out empty, loaded after a stop, back: payload and dwell are segments like any other, and profile and
+// estimate price them alike.
+TEST(Profile, PayloadChangesAndDwellsBetweenLegs) {
+  const auto straight = [](double m) { return json{{"kind", "straight"}, {"length_m", m}}; };
+  const json errand = {
+      straight(3), {{"kind", "dwell"}, {"duration_s", 12}},  {{"kind", "payload"}, {"payload_kg", 8}},
+      straight(4), {{"kind", "payload"}, {"payload_kg", 0}}, {{"kind", "dwell"}, {"duration_s", 5}}};
+  const json whole = answer(profile_answer, {{"path", errand}});
+  const json out = answer(profile_answer, {{"path", {straight(3)}}});
+  const json back = answer(profile_answer, {{"path", {straight(4)}}, {"payload_kg", 8}});
+  const double idle_j = 17 * testing::nomad().idle_power_w;
+  const double sum = out["energy_j"].get<double>() + back["energy_j"].get<double>() + idle_j;
+  EXPECT_NEAR(whole["energy_j"].get<double>(), sum, 1e-9 * sum);
+  EXPECT_NEAR(whole["duration_s"].get<double>(),
+              out["duration_s"].get<double>() + back["duration_s"].get<double>() + 17, 1e-9);
+  const auto payloads = whole["profile"]["payload_kg"].get<std::vector<double>>();
+  EXPECT_EQ(payloads.front(), 0);
+  EXPECT_EQ(*std::max_element(payloads.begin(), payloads.end()), 8);
+  EXPECT_EQ(payloads.back(), 0);
+  const json estimate = answer(estimated, {{"path", errand}});
+  EXPECT_EQ(estimate["energy_j"], whole["energy_j"]);
+  EXPECT_FALSE(estimate.contains("profile"));
+}
+
+TEST(Profile, ColumnsEndAtTheirTotals) {
+  const json request = {{"path",
+                         {{{"kind", "straight"}, {"length_m", 3}},
+                          {{"kind", "turn"}, {"angle_rad", 1}},
+                          {{"kind", "dwell"}, {"duration_s", 2}},
+                          {{"kind", "arc"}, {"radius_m", 1}, {"angle_rad", -1}}}},
+                        {"regeneration", 0.4},
+                        {"baseline_columns", true}};
+  const json a = answer(profile_answer, request);
+  for (const json& motion : {a, a["baselines"]["trapezoid"], a["baselines"]["triangle"]}) {
+    const json& columns = motion["profile"];
+    EXPECT_NEAR(columns["energy_j"].back().get<double>(), motion["energy_j"].get<double>(), 1e-3);
+    EXPECT_NEAR(columns["time_s"].back().get<double>(), motion["duration_s"].get<double>(), 1e-5);
+    const auto times = columns["time_s"].get<std::vector<double>>();
+    EXPECT_TRUE(std::is_sorted(times.begin(), times.end()));
+    for (const char* name : {"speed_m_s", "yaw_rate_rad_s", "power_w", "energy_j"})
+      EXPECT_EQ(columns[name].size(), times.size()) << name;
+  }
+  // A baseline is as long on every run, so as long in all.
+  EXPECT_NEAR(a["baselines"]["triangle"]["duration_s"].get<double>(), a["duration_s"].get<double>(), 1e-9);
+  const json plain = answer(profile_answer, {{"path", request["path"]}});
+  EXPECT_FALSE(plain["baselines"]["triangle"].contains("profile"));
+
+  // A given motion: its columns are integrated by another rule than its energy.
+  const json motion = {
+      {"time_s", {0, 2, 6, 8}}, {"speed_m_s", {0, 0.6, 0.6, 0}}, {"yaw_rate_rad_s", {0, 0, 0.4, 0}}};
+  const json e = answer(estimated, {{"profile", motion}, {"columns", true}, {"payload_kg", 4}});
+  const double energy = e["energy_j"].get<double>();
+  EXPECT_NEAR(e["profile"]["energy_j"].back().get<double>(), energy, 1e-4 * energy);
+  EXPECT_NEAR(e["profile"]["distance_m"].back().get<double>(), e["distance_m"].get<double>(), 1e-6);
+  EXPECT_TRUE(e["profile"]["x_m"][0].is_null());
+  const json placed = answer(
+      estimated,
+      {{"profile", motion}, {"columns", true}, {"start_pose", {{"x_m", 1}, {"y_m", 2}, {"heading_rad", 0}}}});
+  EXPECT_EQ(placed["profile"]["x_m"][0], 1);
+}
+
+TEST(Estimate, TellsTheLimitsThatAMotionBreaks) {
+  const robot::RobotModel nomad = testing::nomad();
+  const auto broken = [](const json& motion) {
+    std::map<std::string, std::array<double, 2>> by_name;
+    const json told = answer(estimated, {{"profile", motion}});
+    for (const json& limit : told["beyond_limits"])
+      by_name[limit["limit"]] = {limit["reached"], limit["allowed"]};
+    return by_name;
+  };
+  const double v = nomad.limits.speed_m_s, a = nomad.limits.acceleration_m_s2,
+               yaw = nomad.limits.yaw_rate_rad_s;
+  // A ramp of half the acceleration to half the speed keeps them all.
+  EXPECT_TRUE(broken({{"time_s", {0, v / a, 2 * v / a}}, {"speed_m_s", {0, v / 2, 0}}}).empty());
+  const auto fast = broken({{"time_s", {0, 2 * v / a, 4 * v / a}}, {"speed_m_s", {0, 1.5 * v, 0}}});
+  ASSERT_TRUE(fast.contains("speed"));
+  EXPECT_DOUBLE_EQ(fast.at("speed")[0], 1.5 * v);
+  EXPECT_EQ(fast.at("speed")[1], v);
+  EXPECT_FALSE(fast.contains("acceleration"));
+  EXPECT_FALSE(fast.contains("yaw_rate"));
+  // Turning in place the wheels' rims accelerate.
+  const double rise_s = 2;
+  const auto turn = broken(
+      {{"time_s", {0, rise_s, 2 * rise_s}}, {"speed_m_s", {0, 0, 0}}, {"yaw_rate_rad_s", {0, -2 * yaw, 0}}});
+  ASSERT_TRUE(turn.contains("yaw_rate"));
+  EXPECT_DOUBLE_EQ(turn.at("yaw_rate")[0], 2 * yaw);
+  const double rim = nomad.kinematics.half_track_m * 2 * yaw / rise_s;
+  EXPECT_EQ(turn.contains("acceleration"), rim > a);
+  const json path = {{{"kind", "straight"}, {"length_m", 3}}};
+  EXPECT_TRUE(answer(estimated, {{"path", path}})["beyond_limits"].empty());
+}
+
+TEST(Estimate, PricesTheFloorOfAGivenProfile) {
+  robot::RobotModel climber = testing::nomad();
+  climber.effects = {{"grade", {{"share", 1}}}};
+  const ModelInForce with = **model_in_force(climber, 1);
+  json motion = {{"time_s", {0, 2, 12, 14}}, {"speed_m_s", {0, 0.5, 0.5, 0}}};
+  const auto priced = [&](const json& profile) {
+    const auto text = estimated({{"profile", profile}, {"columns", true}}, with);
+    EXPECT_TRUE(text) << describe(text.error());
+    return text ? json::parse(*text) : json();
+  };
+  const double level = priced(motion)["energy_j"].get<double>();
+  json uphill = motion, tilted = motion;
+  uphill["height_m"] = {0, 0.02, 0.22, 0.24};
+  tilted["climb_rad"] = {0.04, 0.04, 0.04, 0.04};
+  const json a = priced(uphill), b = priced(tilted);
+  const double weight = climber.total_mass_kg(0) * robot::standard_gravity_m_s2;
+  EXPECT_NEAR(a["ledger"]["terms_j"]["potential"].get<double>(), weight * 0.24, 1e-4 * weight);
+  EXPECT_NEAR(b["ledger"]["terms_j"]["potential"].get<double>(), weight * 6 * std::sin(0.04), 1e-4 * weight);
+  for (const json& e : {a, b}) {
+    const double energy = e["energy_j"].get<double>();
+    EXPECT_GT(energy, level + weight * 0.23);
+    EXPECT_NEAR(e["profile"]["energy_j"].back().get<double>(), energy, 1e-4 * energy);
+  }
+  uphill["climb_rad"] = tilted["climb_rad"];
+  EXPECT_EQ(fault(estimated, {{"profile", uphill}}).field, "/profile/climb_rad");
+  tilted["climb_rad"] = {0, 0};
+  EXPECT_EQ(fault(estimated, {{"profile", tilted}}).field, "/profile/climb_rad");
+}
+
+TEST(Estimate, UsualDrivingIsWhatTheForecastSays) {
+  const json path = {{{"kind", "straight"}, {"length_m", 40}},
+                     {{"kind", "turn"}, {"angle_rad", 1.5}},
+                     {{"kind", "dwell"}, {"duration_s", 20}},
+                     {{"kind", "straight"}, {"length_m", 20}}};
+  const json usual = answer(estimated, {{"path", path}, {"payload_kg", 3}, {"driving", "usual"}});
+  const json best = answer(estimated, {{"path", path}, {"payload_kg", 3}});
+  EXPECT_EQ(best["driving"], "minimum_energy");
+  EXPECT_TRUE(best["energy_quantiles_j"].is_null());
+  EXPECT_EQ(usual["driving"], "usual");
+  EXPECT_TRUE(usual["ledger"].is_null());
+  EXPECT_GT(usual["energy_j"], best["energy_j"]);
+  EXPECT_EQ(usual["distance_m"], best["distance_m"]);
+  EXPECT_LT(usual["energy_quantiles_j"]["p05"], usual["energy_quantiles_j"]["p50"]);
+  // By hand, of a robot without a past: 0.7 of its limits, trapezoids, its model; the mean lies above it.
+  const robot::RobotModel nomad = testing::nomad();
+  const double v = 0.7 * nomad.limits.speed_m_s, a = 0.7 * nomad.limits.acceleration_m_s2;
+  const double w = 0.7 * nomad.limits.yaw_rate_rad_s, b = a / nomad.kinematics.half_track_m;
+  EXPECT_NEAR(usual["duration_s"].get<double>(), 60 / v + 2 * v / a + 1.5 / w + w / b + 20, 0.5);
+  EXPECT_EQ(fault(estimated, {{"path", path}, {"driving", "usual"}, {"deadline_s", 90}}).field,
+            "/deadline_s");
+  EXPECT_EQ(fault(estimated, {{"path", path}, {"driving", "usual"}, {"columns", true}}).field, "/columns");
+}
+
+// What the I/O thread may answer is decided before any path is made: a way of many knots is declined at once.
+TEST(Profile, OnlyShortStretchesAreBrief) {
+  const auto brief = [](const json& path) {
+    const auto input = read_profile({{"path", path}}, model().robot);
+    EXPECT_TRUE(input) << describe(input.error());
+    return is_brief(input->drive.path);
+  };
+  const json straight = {{"kind", "straight"}, {"length_m", 5000}};
+  EXPECT_TRUE(brief({straight}));
+  EXPECT_TRUE(brief({{{"kind", "dwell"}, {"duration_s", 3}}, {{"kind", "turn"}, {"angle_rad", 3}}}));
+  EXPECT_TRUE(brief({{{"kind", "arc"}, {"radius_m", 2}, {"angle_rad", -3}}}));
+  EXPECT_FALSE(brief({straight, straight}));
+  EXPECT_FALSE(brief({{{"kind", "dwell"}, {"duration_s", 3}}}));
+  EXPECT_FALSE(brief({{{"kind", "arc"}, {"radius_m", 1e5}, {"angle_rad", 1}}}));
+  EXPECT_FALSE(
+      brief({{{"kind", "clothoid"}, {"length_m", 1}, {"start_curvature_1_m", 0}, {"end_curvature_1_m", 1}}}));
+}
+
+// Brief or not, the answer is the same.
+TEST(Profile, AnswersAtOnceWhatItWouldAnswer) {
+  const ModelInForce with = model();
+  int answered = 0;
+  for (const double length_m : {0.5, 3.0, 40.0}) {
+    const json request = {{"path", {{{"kind", "straight"}, {"length_m", length_m}}}}, {"deadline_s", 200}};
+    const auto input = read_profile(request, with.robot);
+    const auto at_once = profile_at_once(*input, with);
+    if (!at_once) continue;
+    ++answered;
+    EXPECT_EQ(profile_json(*input, *at_once, with), *profile_answer(request, with));
+  }
+  EXPECT_GT(answered, 0);
+}
+
+TEST(Profile, StartPosesAreReadAlikeEverywhere) {
+  const json path = {{{"kind", "straight"}, {"length_m", 3}}};
+  const json motion = {{"time_s", {0, 2, 4}}, {"speed_m_s", {0, 1, 0}}};
+  for (const json& pose : {json{{"x_m", 1}, {"y_m", 2}}, json{{"x_m", 1}, {"y_m", 2}, {"heading_rad", 1e5}},
+                           json{{"x_m", 1}, {"y_m", "left"}, {"heading_rad", 0}}}) {
+    const Error planned = fault(profile_answer, {{"path", path}, {"start_pose", pose}});
+    EXPECT_EQ(planned, fault(estimated, {{"path", path}, {"start_pose", pose}}));
+    EXPECT_EQ(planned, fault(estimated, {{"profile", motion}, {"start_pose", pose}}));
+    EXPECT_TRUE(planned.field.starts_with("/start_pose/")) << planned.field;
+  }
+}
+
+TEST(Profile, TellsTheSpeedThatADeadlineNeeds) {
+  const json path = {{{"kind", "straight"}, {"length_m", 10}}};
+  EXPECT_TRUE(answer(profile_answer, {{"path", path}})["needed_speed_m_s"].is_null());
+  // In free time the Nomad drives 10 m nearly as fast as it can: little to trade, but a front.
+  const json front = answer(profile_answer, {{"path", path}, {"pareto_points", 4}})["pareto"];
+  ASSERT_EQ(front.size(), 4u);
+  EXPECT_LT(front[3]["duration_s"], front[0]["duration_s"]);
+  // With a price on top there is none.
+  EXPECT_EQ(answer(profile_answer, {{"path", path}, {"pareto_points", 4}, {"value_of_time_w", 1e6}})["pareto"]
+                .size(),
+            1u);
+  const json a = answer(
+      profile_answer,
+      {{"path", path}, {"deadline_s", 20}, {"pareto_points", 4}, {"limits", {{"acceleration_m_s2", 0.3}}}});
+  const double needed = a["needed_speed_m_s"].get<double>();
+  EXPECT_GT(needed, 10.0 / 20);
+  EXPECT_LE(needed, a["peak_speed_m_s"].get<double>() * (1 + 1e-9));
+  EXPECT_GT(a["pareto"][0]["peak_speed_m_s"].get<double>(), needed);
+}
+
+}  // namespace
+}  // namespace joulecast::answers
