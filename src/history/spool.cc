@@ -31,7 +31,7 @@ void members(Archive& a, ActivateModel& c) {
   a(c.robot_id, c.version);
 }
 template <class Archive>
-void members(Archive& a, energy::Accounts& c) {
+void members(Archive& a, signals::Accounts& c) {
   a(c.battery_j, c.measured_j, c.measured_s, c.measured_motor_j, c.motor_measured_s, c.modelled_j,
     c.modelled_motor_j, c.drawn_j, c.returned_j, c.charge_ah, c.distance_m, c.turned_rad, c.duration_s,
     c.ledger.value);
@@ -60,25 +60,24 @@ void members(Archive& a, TraceBucket& c) {
     c.measured_j, c.modelled_j, c.x_m, c.y_m);
 }
 template <class Archive>
-void members(Archive& a, telemetry::Sample& c) {
-  a(c.utime_us, c.sequence, c.wheel_velocity_rad_s, c.motor_voltage_v, c.motor_current_a, c.battery_voltage_v,
-    c.battery_current_a, c.velocity_command, c.yaw_rate_rad_s, c.pitch_rad, c.pose, c.motor_temperature_c,
-    c.payload_kg);
+void members(Archive& a, signals::Sample& c) {
+  a(c.utime_us, c.sequence);
+  signals::visit_fields(c, [&a](const signals::SampleField&, double& number) { a(number); });
 }
 template <class Archive>
-void members(Archive& a, telemetry::CovariateChange& c) {
+void members(Archive& a, signals::CovariateChange& c) {
   a(c.utime_us, c.name, c.value);
 }
 template <class Archive>
-void members(Archive& a, EnergyState& c) {
+void members(Archive& a, ResumeState& c) {
   a(c.robot_id, c.utime_us, c.sequence, c.state_of_charge, c.winding_temperature_c);
 }
 template <class Archive>
 void members(Archive& a, CheckpointMission& c) {
-  a(c.mission, c.trace, c.samples, c.energy_state, c.covariates);
+  a(c.mission, c.trace, c.samples, c.resume_state, c.covariates);
 }
 template <class Archive>
-void members(Archive& a, PutEnergyState& c) {
+void members(Archive& a, PutResumeState& c) {
   a(c.state);
 }
 template <class Archive>
@@ -241,8 +240,8 @@ class Loader {
 std::string layout() {
   std::string text = "joulecast spool 1";
   for (const std::size_t size :
-       {sizeof(Mission), sizeof(energy::Accounts), sizeof(CovariateSummary), sizeof(TraceBucket),
-        sizeof(telemetry::Sample), sizeof(EnergyState), sizeof(DiagnosisRecord), sizeof(Proposal),
+       {sizeof(Mission), sizeof(signals::Accounts), sizeof(CovariateSummary), sizeof(TraceBucket),
+        sizeof(signals::Sample), sizeof(ResumeState), sizeof(DiagnosisRecord), sizeof(Proposal),
         sizeof(AddModel), std::variant_size_v<Command>})
     text += ' ' + std::to_string(size);
   return text + '\n';

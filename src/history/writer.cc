@@ -41,7 +41,7 @@ void take_up(CheckpointMission& earlier, CheckpointMission later) {
   append(earlier.trace, later.trace);
   append(earlier.samples, later.samples);
   append(earlier.covariates, later.covariates);
-  if (later.energy_state) earlier.energy_state = std::move(later.energy_state);
+  if (later.resume_state) earlier.resume_state = std::move(later.resume_state);
 }
 
 }  // namespace

@@ -439,7 +439,7 @@ TEST_F(WriterTest, StopSpoolsWhatItCouldNotCommitAndTheNextStartTakesItIn) {
   EXPECT_EQ(need(store_.telemetry(m.key, {}, {.limit = 100, .cursor = {}})).samples.size(), 30U);
   EXPECT_EQ(need(store_.trace(m.key, {}, 10)).buckets.at(0).speed_m_s.max, 1.5);
   EXPECT_EQ(need(store_.covariates(m.key, {}, {.limit = 10, .cursor = {}})).changes.at(0).name, "cpu_load");
-  EXPECT_EQ(need(store_.energy_state("amr-1"))->state_of_charge, 0.5);
+  EXPECT_EQ(need(store_.resume_state("amr-1"))->state_of_charge, 0.5);
   EXPECT_EQ(need(take_in_spool(spool, store_, refused)), 0U) << "taken in once";
 }
 
