@@ -416,7 +416,7 @@ TEST_F(WriterTest, StopSpoolsWhatItCouldNotCommitAndTheNextStartTakesItIn) {
     TraceBucket bucket;
     bucket.start_utime_us = trace_bucket_us;
     bucket.speed_m_s.max = 1.5;
-    EnergyState charge;
+    ResumeState charge;
     charge.robot_id = "amr-1";
     charge.state_of_charge = 0.5;
     ASSERT_TRUE(writer.offer(

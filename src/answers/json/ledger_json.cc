@@ -1,7 +1,8 @@
 #include "answers/json/ledger_json.h"
 
 #include <cmath>
-#include <limits>
+
+#include "signals/sample.h"
 
 namespace joulecast::answers {
 
