@@ -302,7 +302,7 @@ struct Application::Parts {
   std::unique_ptr<history::Store> store;
   std::unique_ptr<history::Writer> writer;
   std::unique_ptr<server::IngestService> ingest;
-  std::unique_ptr<server::DriftView> drift;
+  std::unique_ptr<server::DriftView> drift_view;
   std::unique_ptr<server::ModelAdoption> adoption;
   std::unique_ptr<server::ProposalAcceptor> acceptor;  // null: a person adopts
   std::unique_ptr<server::DiagnosisService> diagnoses;
@@ -360,24 +360,24 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
       std::make_unique<server::IngestService>(ingest_options(settings), p.models, *p.forecasts, outputs);
   if (Result<void> started = p.ingest->start(); !started) return tl::unexpected(std::move(started.error()));
 
-  p.drift = std::make_unique<server::DriftView>(*p.store, p.models, drift_options(settings));
-  p.adoption = std::make_unique<server::ModelAdoption>(*p.store, *p.writer, p.models, *p.drift, host_utime_us,
-                                                       adoption_options(settings));
+  p.drift_view = std::make_unique<server::DriftView>(*p.store, p.models, drift_options(settings));
+  p.adoption = std::make_unique<server::ModelAdoption>(*p.store, *p.writer, p.models, *p.drift_view,
+                                                       host_utime_us, adoption_options(settings));
   if (settings.boolean("adoption.automatic")) {
     p.acceptor = std::make_unique<server::ProposalAcceptor>(*p.store, *p.adoption, p.warn);
     p.acceptor->start(milliseconds(10'000));
   }
   const auto warn_of = [](const Error& error) { log_error("diagnosis", error); };
   p.diagnoses = std::make_unique<server::DiagnosisService>(
-      *p.store, *p.writer, p.models, *p.drift, host_utime_us, diagnosis_options(settings), warn_of,
+      *p.store, *p.writer, p.models, *p.drift_view, host_utime_us, diagnosis_options(settings), warn_of,
       [&p](const history::DiagnosisRecord& diagnosis) { p.watch->on_diagnosis(diagnosis); });
-  p.watch = std::make_unique<server::GapWatch>(*p.store, *p.writer, p.models, *p.drift, *p.diagnoses,
+  p.watch = std::make_unique<server::GapWatch>(*p.store, *p.writer, p.models, *p.drift_view, *p.diagnoses,
                                                host_utime_us, watch_options(settings), warn_of);
   if (Result<void> started = p.diagnoses->start(); !started)
     return tl::unexpected(std::move(started.error()));
   p.watch->start();
   p.services = std::make_unique<api::Services>(api::Services{*p.store, *p.writer, p.models, p.fleet,
-                                                             *p.forecasts, p.cost_tables, *p.drift,
+                                                             *p.forecasts, p.cost_tables, *p.drift_view,
                                                              *p.adoption, *p.diagnoses, host_utime_us});
   std::vector<http::ReadinessCheck> checks;
   checks.push_back({"ingest", [&p]() -> Result<void> {

@@ -214,12 +214,6 @@ Error of_option(Error error, const std::string& option) {
   return error;
 }
 
-Exit write_adopted(std::span<const robot::AdoptedEffect> found, robot::RobotModel robot,
-                   const std::string& path) {
-  const auto extended = gap::with_effects(std::move(robot), found);
-  return extended ? write_robot(*extended, path) : report(extended.error());
-}
-
 Exit write_robot(const robot::RobotModel& robot, const std::string& path) {
   const auto written = write_file(path, robot::to_json_text(robot) + '\n');
   return written ? Exit::ok : report(written.error());

@@ -20,10 +20,6 @@ void print_diagnosis(const nlohmann::json& diagnosis);
 // What is wrong with adopting, as of the option that asked for it; a choice among effects is --effect's.
 Error of_option(Error error, const std::string& option);
 
-// Writes the robot file with the effects found next to those it has.
-Exit write_adopted(std::span<const robot::AdoptedEffect> found, robot::RobotModel robot,
-                   const std::string& path);
-
 Exit write_robot(const robot::RobotModel& robot, const std::string& path);
 
 // What a report says of where it comes from: names of files without their folders, and now.

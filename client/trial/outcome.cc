@@ -15,15 +15,6 @@ bool stands_for(const gap::DiagnosedEffect& reported, std::string_view id) {
 
 }  // namespace
 
-const gap::DiagnosedEffect* reported_as(const gap::Diagnosis& diagnosis, std::string_view id) {
-  const gap::DiagnosedEffect* in_group = nullptr;
-  for (const gap::DiagnosedEffect& effect : diagnosis.effects) {
-    if (effect.id == id) return &effect;
-    if (in_group == nullptr && stands_for(effect, id)) in_group = &effect;
-  }
-  return in_group;
-}
-
 bool holds(const SealedTruth& truth, std::string_view id) {
   return std::ranges::any_of(truth.effects, [&](const auto& effect) { return effect.id == id; });
 }

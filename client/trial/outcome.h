@@ -23,9 +23,6 @@ struct CaseOutcome {
   std::vector<std::pair<std::string, gap::Diagnosis>> others;
 };
 
-// The reported effect whose id, or whose inseparable group of at most three, holds this id; null: none does.
-[[nodiscard]] const gap::DiagnosedEffect* reported_as(const gap::Diagnosis& diagnosis, std::string_view id);
-
 [[nodiscard]] bool holds(const SealedTruth& truth, std::string_view id);
 
 // The verdict that the truth asks for, with every effect named (or in the named group) and none more.

@@ -78,12 +78,6 @@ bool excluded(std::string_view name, const std::vector<std::string>& names) {
 
 }  // namespace
 
-std::vector<std::string> variant_names() {
-  std::vector<std::string> names;
-  for (const Variant& v : variants) names.emplace_back(v.name);
-  return names;
-}
-
 std::vector<std::string> vary_plant(Rng& rng, SimulationSpec& spec) {
   std::vector<std::string> names;
   while (names.empty()) {

@@ -348,10 +348,6 @@ double ChargeFilter::current_bias_sd_a() const {
   return std::sqrt(map(covariance_)(at_bias, at_bias));
 }
 
-double ChargeFilter::resistance_factor() const {
-  return std::exp(map(mean_)[at_factor]);
-}
-
 double ChargeFilter::voltage_only_sd() const {
   Matrix wide = covariance_;
   // Over a tenth of the capacity: single points of a measured curve are noisy.

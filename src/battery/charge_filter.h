@@ -68,7 +68,6 @@ class ChargeFilter {
   double charge_sd() const;
   double current_bias_a() const;
   double current_bias_sd_a() const;
-  double resistance_factor() const;
   // The standard deviation of the charge that one voltage would give here by itself; large on a flat curve.
   double voltage_only_sd() const;
   std::size_t restarts() const { return restarts_; }  // times that the voltage contradicted the charge

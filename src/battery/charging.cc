@@ -88,28 +88,6 @@ ChargingTime time_to_full(const ChargingHabit& habit, double capacity_ah, double
   return sum(constant_s, constant_sd, c.taper_s.value * left, taper_sd);
 }
 
-ChargingTime time_to_charge(const ChargingHabit& habit, double capacity_ah, double charge, double charge_sd,
-                            double target) {
-  if (habit.current_a.count == 0 || !std::isfinite(charge)) return {};
-  if (target <= charge) return {0, 0};
-  const Course c = course_of(habit, capacity_ah);
-  const double capacity_as = capacity_ah * seconds_per_hour;
-  const double constant_to = std::clamp(target, charge, std::max(charge, c.taper_charge.value));
-  const double constant_s = (constant_to - charge) * capacity_as / c.current_a.value;
-  const double constant_sd = std::hypot(charge_sd * capacity_as / c.current_a.value,
-                                        constant_s * c.current_a.sd / c.current_a.value);
-  if (target <= constant_to) return {constant_s, constant_sd};
-  // In the taper s = s_t + A (1 - exp(-t / tau)), A what a taper without end would put in.
-  const double whole = c.taper_s.value * c.current_a.value / capacity_as;
-  const auto at = [&](double s) {
-    return -c.taper_s.value * std::log(1 - std::max(0.0, s - c.taper_charge.value) / whole);
-  };
-  const double taper_s = at(target) - at(constant_to);
-  if (!std::isfinite(taper_s)) return {};
-  return sum(constant_s, std::hypot(constant_sd, c.taper_charge.sd * capacity_as / c.current_a.value),
-             taper_s, taper_s * c.taper_s.sd / c.taper_s.value);
-}
-
 std::string_view name(ChargingPhase phase) {
   switch (phase) {
     case ChargingPhase::none:

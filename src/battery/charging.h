@@ -34,9 +34,6 @@ struct ChargingTime {
 // the charge at the beginning of the taper, an end at a twentieth of the current) with a matching doubt. NaN
 // while no current was ever seen.
 ChargingTime time_to_full(const ChargingHabit& habit, double capacity_ah, double charge, double charge_sd);
-// To `target` below full: NaN where the taper never gets there.
-ChargingTime time_to_charge(const ChargingHabit& habit, double capacity_ah, double charge, double charge_sd,
-                            double target);
 
 enum class ChargingPhase { none, suspected, constant_current, taper, full };
 std::string_view name(ChargingPhase phase);

@@ -44,10 +44,8 @@ class Circuit {
   bool typical_curve() const { return typical_curve_; }  // the battery's own open-circuit curve is not known
 
   double open_circuit_voltage_v(double charge) const { return open_circuit_voltage_.extended(charge); }
-  double open_circuit_slope_v(double charge) const { return open_circuit_voltage_.slope(charge); }
   double ohmic_resistance_ohm(const State& state) const;
   double branch_resistance_ohm(std::size_t branch, const State& state) const;
-  double branch_time_constant_s(std::size_t branch) const { return branches_[branch].time_constant_s; }
 
   // Voltage behind the ohmic resistance: that of the terminals at no current.
   double inner_voltage_v(const State& state) const;

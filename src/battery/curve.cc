@@ -28,12 +28,6 @@ double Curve::extended(double x) const {
   return y0 + (y1 - y0) * ((x - x0) / (x1 - x0));
 }
 
-double Curve::slope(double x) const {
-  if (points_.size() == 1) return 0;
-  const std::size_t i = piece(x);
-  return (points_[i + 1].second - points_[i].second) / (points_[i + 1].first - points_[i].first);
-}
-
 double Curve::mean() const {
   if (points_.size() == 1) return points_.front().second;
   double area = 0;

@@ -13,7 +13,6 @@ class Curve {
 
   double held(double x) const;      // constant beyond the ends
   double extended(double x) const;  // beyond the ends, along the first and the last piece
-  double slope(double x) const;     // of extended(); at a point, that of the piece above it
   double mean() const;              // over [first x, last x]
 
   const std::vector<std::pair<double, double>>& points() const { return points_; }

@@ -74,7 +74,6 @@ class DriveEquations {
   std::vector<DriveEquation> take();
   // Declared, over the windows of what the last take() gave.
   double mean_payload_kg() const { return mean_payload_kg_; }
-  double torque_per_a() const { return torque_per_a_; }
 
  private:
   struct Varied {

@@ -168,14 +168,29 @@ std::optional<Error> check_text(const char* field, std::string_view text, Text k
   return Error{Fault::invalid, field, std::move(fault)};
 }
 
-template <std::size_t N>
-void copy(const double (&from)[N], std::array<double, N>& to) {
-  std::copy(std::begin(from), std::end(from), to.begin());
-}
-
-template <std::size_t N>
-void copy(const std::array<double, N>& from, double (&to)[N]) {
-  std::copy(from.begin(), from.end(), std::begin(to));
+// Visits what energy_state_t and EnergyState have in common, field by field: visit(of the message, of the
+// state).
+template <class Message, class State, class Visit>
+void visit_energy_state(Message& m, State& s, Visit visit) {
+  visit(m.utime, s.utime_us);
+  visit(m.robot_id, s.robot_id);
+  visit(m.mission_id, s.mission_id);
+  visit(m.model_version, s.model_version);
+  visit(m.measured_power, s.measured_power_w);
+  visit(m.modelled_power, s.modelled_power_w);
+  visit(m.measured_energy, s.measured_energy_j);
+  visit(m.modelled_energy, s.modelled_energy_j);
+  visit(m.unexplained_energy, s.unexplained_energy_j);
+  visit(m.recovered_energy, s.recovered_energy_j);
+  visit(m.state_of_charge, s.state_of_charge);
+  visit(m.state_of_charge_sd, s.state_of_charge_sd);
+  visit(m.range, s.range_m);
+  visit(m.run_time, s.run_time_s);
+  for (std::size_t k : {0u, 1u}) {
+    visit(m.range_band[k], s.range_band_m[k]);
+    visit(m.run_time_band[k], s.run_time_band_s[k]);
+    visit(m.winding_temperature[k], s.winding_temperature_c[k]);
+  }
 }
 
 constexpr std::size_t real = sizeof(double);
@@ -264,23 +279,7 @@ Result<signals::EnergyState> decode_energy_state(std::span<const std::uint8_t> b
   if (!decoded) return tl::unexpected(std::move(decoded.error()));
 
   signals::EnergyState state;
-  state.utime_us = decoded->utime;
-  state.robot_id = std::move(decoded->robot_id);
-  state.mission_id = std::move(decoded->mission_id);
-  state.model_version = decoded->model_version;
-  state.measured_power_w = decoded->measured_power;
-  state.modelled_power_w = decoded->modelled_power;
-  state.measured_energy_j = decoded->measured_energy;
-  state.modelled_energy_j = decoded->modelled_energy;
-  state.unexplained_energy_j = decoded->unexplained_energy;
-  state.recovered_energy_j = decoded->recovered_energy;
-  state.state_of_charge = decoded->state_of_charge;
-  state.state_of_charge_sd = decoded->state_of_charge_sd;
-  state.range_m = decoded->range;
-  copy(decoded->range_band, state.range_band_m);
-  state.run_time_s = decoded->run_time;
-  copy(decoded->run_time_band, state.run_time_band_s);
-  copy(decoded->winding_temperature, state.winding_temperature_c);
+  visit_energy_state(*decoded, state, [](auto& from, auto& to) { to = std::move(from); });
   return state;
 }
 
@@ -353,23 +352,7 @@ Result<std::vector<std::uint8_t>> encode_energy_state(const signals::EnergyState
     if (fault) return tl::unexpected(*fault);
   }
   energy_state_t message;
-  message.utime = state.utime_us;
-  message.robot_id = state.robot_id;
-  message.mission_id = state.mission_id;
-  message.model_version = state.model_version;
-  message.measured_power = state.measured_power_w;
-  message.modelled_power = state.modelled_power_w;
-  message.measured_energy = state.measured_energy_j;
-  message.modelled_energy = state.modelled_energy_j;
-  message.unexplained_energy = state.unexplained_energy_j;
-  message.recovered_energy = state.recovered_energy_j;
-  message.state_of_charge = state.state_of_charge;
-  message.state_of_charge_sd = state.state_of_charge_sd;
-  message.range = state.range_m;
-  copy(state.range_band_m, message.range_band);
-  message.run_time = state.run_time_s;
-  copy(state.run_time_band_s, message.run_time_band);
-  copy(state.winding_temperature_c, message.winding_temperature);
+  visit_energy_state(message, state, [](auto& to, const auto& from) { to = from; });
   return encode(message);
 }
 
