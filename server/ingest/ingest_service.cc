@@ -38,7 +38,7 @@ class IngestService::Impl {
     link_ = std::make_unique<telemetry::LcmLink>(std::move(*link));
     const auto handler = [this](const telemetry::Received& received) {
       std::optional<InboundMessage> message =
-          decode_message(received.channel, received.data, received.recv_utime_us, outputs_.counters);
+          decode_message(received.channel, received.data, host_utime_us(), outputs_.counters);
       if (message) batch_.push_back(std::move(*message));
     };
     for (telemetry::Subject subject :
