@@ -36,7 +36,7 @@ for _ in $(seq 50); do
   sleep 0.1
 done
 if curl -s -o /dev/null "$url"; then
-  echo "Something else answers at $url: stop it, or say DEMO_PORT=8081 deploy/demo.sh" >&2
+  echo "Something else answers at $url: stop it, or say DEMO_PORT=8090 deploy/demo.sh" >&2
   exit 1
 fi
 

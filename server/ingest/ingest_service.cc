@@ -38,7 +38,7 @@ class IngestService::Impl {
     link_ = std::make_unique<telemetry::LcmLink>(std::move(*link));
     const auto handler = [this](const telemetry::Received& received) {
       std::optional<InboundMessage> message = decode_message(
-          received.channel, received.data, received.recv_utime_us, outputs_.counters, received.sender);
+          received.channel, received.data, host_utime_us(), outputs_.counters, received.sender);
       if (message) batch_.push_back(std::move(*message));
     };
     if (Result<void> done = link_->listen(handler, outputs_.counters.datagrams, options_.listen); !done)

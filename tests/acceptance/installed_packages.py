@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The Debian packages as an administrator meets them: installed with dpkg into a root of their own, the service started as
 its unit says, asked, given a faulty robot file, removed and purged. The root is an overlay over this machine's, so that
-nothing of the machine changes and no network is needed; --fresh ROOT takes a Debian root instead (mmdebstrap makes one)."""
+nothing of the machine changes and no network is needed."""
 import argparse
 import json
 import os
@@ -38,13 +38,13 @@ def isolate():
     os.execvp("unshare", ["unshare", "--mount", "--net", sys.executable, "-B", *sys.argv])
 
 
-def make_root(folder, fresh):
-    """A root into which packages can be installed: the given one, or this machine's under an overlay."""
+def make_root(folder):
+    """A root into which packages can be installed: this machine's under an overlay."""
     run("mount", "-t", "tmpfs", "tmpfs", folder)
     for name in ("upper", "work", "root"):
         (folder / name).mkdir()
     root = folder / "root"
-    layers = f"lowerdir={fresh or '/'},upperdir={folder}/upper,workdir={folder}/work"
+    layers = f"lowerdir=/,upperdir={folder}/upper,workdir={folder}/work"
     if subprocess.run(["mount", "-t", "overlay", "overlay", "-o", layers, root], capture_output=True).returncode != 0:
         skip("no overlay over the root")
     run("mount", "-t", "proc", "proc", root / "proc")
@@ -185,7 +185,6 @@ def main():
     parser = argparse.ArgumentParser()
     for name in ("daemon", "client", "source", "shared", "build"):
         parser.add_argument("--" + name, required=True)
-    parser.add_argument("--fresh", default="")
     options = parser.parse_args()
 
     with tempfile.TemporaryDirectory() as packages_folder:
@@ -197,7 +196,7 @@ def main():
         # Not within a folder that is removed with all that is in it: what is mounted there is not the test's.
         mounted = pathlib.Path(tempfile.mkdtemp())
         try:
-            install_and_use(make_root(mounted, options.fresh), packages)
+            install_and_use(make_root(mounted), packages)
         finally:
             subprocess.run(["umount", "--recursive", "--lazy", str(mounted)])
             mounted.rmdir()
