@@ -353,6 +353,10 @@ bool Application::alive() {
   return turning;
 }
 
+bool Application::ended() const {
+  return parts_->http->ended();
+}
+
 void Application::stop() {
   parts_->stop();
 }

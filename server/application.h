@@ -25,6 +25,8 @@ class Application {
 
   // Stops in order: receiving, accounting (open missions are checkpointed), HTTP, writing.
   void stop();
+  // False after a stop while a request still computes that could not be cancelled: destruction waits for it.
+  bool ended() const;
 
  private:
   struct Parts;

@@ -469,5 +469,19 @@ TEST_F(HttpAttackTest, StopWaitsForNoClientAndCancelsWhatComputes) {
   EXPECT_EQ(begun_, 1);
 }
 
+TEST_F(HttpAttackTest, StopIsBoundedEvenByADeafHandler) {
+  start();
+  RawClient client(port());
+  client.send(get_text("/deaf"));
+  ASSERT_TRUE(soon([&] { return begun_ == 1; }));
+  const auto begun = Steady::now();
+  EXPECT_FALSE(server_->stop(200ms));
+  EXPECT_LT(Steady::now() - begun, 2500ms);
+  EXPECT_TRUE(client.closed_within(100ms));
+  EXPECT_FALSE(server_->ended());
+  release();
+  EXPECT_TRUE(soon([&] { return server_->ended(); }));
+}
+
 }  // namespace
 }  // namespace joulecast::http
