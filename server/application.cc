@@ -441,7 +441,7 @@ std::vector<Error> faulty_robot_files(const Settings& settings) {
 }
 
 bool Application::stop() {
-  return parts_->stop();
+  return parts_->stop() && parts_->http->ended();
 }
 
 Result<std::string> openapi_document() {

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -66,7 +67,8 @@ int serve(const joulecast::Settings& settings) {
   const bool ended = (*application)->stop();
   joulecast::log_info(ended ? "stopped" : "stopped; work that did not end was left");
   joulecast::flush_log();
-  if (!ended) _exit(0);
+  // What must be kept is written; a computation that heeds nothing does not hold up the end.
+  if (!ended) std::_Exit(EXIT_SUCCESS);
   return 0;
 }
 

@@ -52,6 +52,10 @@ std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>
   if (codings > 0 && (codings > 1 || head.version() < 11 ||
                       !equals_ignoring_case(trim(view(head[bhttp::field::transfer_encoding])), "chunked")))
     return malformed("Transfer-Encoding must be exactly chunked, once, in HTTP/1.1");
+  // A repeated or listed length is allowed by the RFC where all agree; others may read it otherwise.
+  if (head.count(bhttp::field::content_length) > 1 ||
+      view(head[bhttp::field::content_length]).find_first_not_of("0123456789") != std::string_view::npos)
+    return malformed("Content-Length must be one number");
   const auto hosts = head.count(bhttp::field::host);
   if (hosts > 1 || (hosts == 0 && head.version() >= 11))
     return malformed("HTTP/1.1 needs exactly one Host header");

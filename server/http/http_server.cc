@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <ctime>
 #include <exception>
+#include <future>
 #include <mutex>
 #include <random>
 #include <thread>
@@ -18,6 +19,7 @@ namespace {
 
 constexpr std::chrono::milliseconds tick_period{100};
 constexpr std::chrono::milliseconds stop_poll_period{10};
+constexpr std::chrono::milliseconds notice_time{1000};  // for what is cancelled to notice it
 constexpr std::size_t guest_places = 64;
 constexpr std::size_t operations_queue = 64;
 
@@ -122,6 +124,7 @@ struct HttpServer::Impl {
   Timer ticking, retry;
   std::uint16_t port = 0;
   std::thread thread;
+  std::shared_future<void> ended;
   std::atomic<std::int64_t> ticked_ms{0};
   Clock::time_point stop_deadline{};
   bool cut_off = false;
@@ -157,14 +160,19 @@ void HttpServer::Impl::run() {
                                             {Run::compute, options.compute_threads, options.worker_queue},
                                             {Run::write, 1U, options.worker_queue}})
     core->pools[run] = std::make_unique<WorkerPool>(threads, queue);
-  const auto ended = [](const std::exception_ptr& fault) {
+  const auto rethrow = [](const std::exception_ptr& fault) {
     if (fault) std::rethrow_exception(fault);
   };
   net::co_spawn(
-      core->io, [this] { return accept(); }, ended);
+      core->io, [this] { return accept(); }, rethrow);
   net::co_spawn(
-      core->io, [this] { return tick(); }, ended);
-  thread = std::thread([this] { core->io.run(); });
+      core->io, [this] { return tick(); }, rethrow);
+  std::promise<void> end;
+  ended = end.get_future().share();
+  thread = std::thread([this, end = std::move(end)]() mutable {
+    core->io.run();  // returns when the last session has ended, and with it its work
+    end.set_value();
+  });
 }
 
 Task<void> HttpServer::Impl::accept() {
@@ -254,6 +262,10 @@ HttpServer::HttpServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 HttpServer::~HttpServer() {
   stop(std::chrono::milliseconds(0));
+  impl_->thread.join();
+  impl_->core->pools.clear();
+  impl_->core->io.restart();
+  impl_->core->io.run();  // lets what workers posted go
 }
 
 std::uint16_t HttpServer::port() const {
@@ -266,14 +278,13 @@ std::chrono::milliseconds HttpServer::silence() const {
 
 bool HttpServer::stop(std::chrono::milliseconds deadline) {
   const std::lock_guard lock(impl_->stop_mutex);
-  if (impl_->stopped) return !impl_->cut_off;
-  impl_->stopped = true;
-  net::post(impl_->core->io, [this, deadline] { impl_->begin_stop(deadline); });
-  impl_->thread.join();  // returns when the last session has ended, and with it its work
-  impl_->core->pools.clear();
-  impl_->core->io.restart();
-  impl_->core->io.run();  // lets what they posted go
-  return !impl_->cut_off;
+  if (!std::exchange(impl_->stopped, true))
+    net::post(impl_->core->io, [this, deadline] { impl_->begin_stop(deadline); });
+  return impl_->ended.wait_for(deadline + notice_time) == std::future_status::ready && !impl_->cut_off;
+}
+
+bool HttpServer::ended() const {
+  return impl_->ended.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
 
 }  // namespace joulecast::http

@@ -99,9 +99,13 @@ class HttpServer {
   std::chrono::milliseconds silence() const;
 
   // Stops accepting, closes idle connections and endless streams, lets running requests finish until the
-  // deadline, closes what is left, joins the threads. Any thread but the server's own; a second call returns
-  // at once when the first has finished. Returns false when requests had to be cut off.
+  // deadline, then cancels and closes what is left. Any thread but the server's own. Returns, within a second
+  // of the deadline, false when requests had to be cut off.
   bool stop(std::chrono::milliseconds deadline);
+
+  // Nothing runs any more. After a stop only a handler that does not heed its token delays it; the destructor
+  // waits for it.
+  bool ended() const;
 
  private:
   struct Impl;

@@ -1,11 +1,8 @@
-#include "server/http/session.h"
-
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <utility>
 
 #include "server/http/problem.h"
+#include "server/http/stream_session.h"
 #include "server/http/text.h"
 
 namespace joulecast::http {
@@ -13,12 +10,7 @@ namespace {
 
 namespace bhttp = beast::http;
 using boost::system::error_code;
-constexpr std::size_t read_size = 8 * 1024;
-constexpr std::size_t body_read_size = 64 * 1024;
 constexpr std::size_t kept_buffer_bytes = 64 * 1024;
-constexpr std::chrono::milliseconds linger_time{2000};
-constexpr std::chrono::milliseconds linger_time_at_stop{250};
-constexpr std::chrono::milliseconds poll_stream_every{1000};
 
 std::string_view view(boost::string_view text) {
   return {text.data(), text.size()};
@@ -41,266 +33,6 @@ bool is_sane_id(std::string_view id) {
            c == '_' || c == '.';
   });
 }
-
-// Control characters would let a value forge further headers.
-void append_header(std::string& head, std::string_view name, std::string_view value) {
-  head.append(name).append(": ");
-  for (const char c : value) head.push_back(static_cast<unsigned char>(c) < 0x20 || c == 0x7F ? ' ' : c);
-  head.append("\r\n");
-}
-
-std::string_view body_of(const Response& response) {
-  return response.shared_body ? std::string_view(*response.shared_body) : std::string_view(response.body);
-}
-
-// What differs between byte streams. A TLS stream overloads both, with its handshake and its own end.
-Task<bool> open_stream(Socket&) {
-  co_return true;
-}
-Task<void> end_stream(Socket& socket) {
-  error_code ignored;
-  socket.shutdown(Tcp::socket::shutdown_send, ignored);
-  co_return;
-}
-
-// The coroutines, over any stream with async_read_some and async_write_some above a TCP socket.
-template <class Stream>
-class StreamSession final : public Session {
- public:
-  StreamSession(std::shared_ptr<Core> core, Stream stream, const net::ip::address& peer, bool guest)
-      : Session(std::move(core), peer, guest), stream_(std::move(stream)) {}
-
- private:
-  Socket& socket() override { return beast::get_lowest_layer(stream_); }
-
-  Task<void> run() override {
-    arm(core_->options.read_timeout);
-    bool open = co_await open_stream(stream_);
-    while (open) {
-      open = co_await receive();
-      if (!open && (cut_ || !core_->stopping)) break;
-      if (open && !refused_) co_await answer();
-      if (open) open = co_await send();
-      if (open && keep_alive_ && !core_->stopping) continue;
-      if (!cut_) co_await linger();
-      break;
-    }
-    cut();
-    while (working_) co_await event();
-  }
-
-  // Reads one request, or refuses it. False when the connection ends before it.
-  Task<bool> receive() {
-    begin_request();
-    if (core_->stopping && buffer_.size() == 0) co_return false;
-    bool continued = false;
-    for (;;) {
-      if (buffer_.size() > 0) {
-        if (state_ == State::idle) {
-          state_ = State::busy;
-          arm(core_->options.read_timeout);
-        }
-        if (!parse() || parser_->is_done()) co_return !cut_;
-      }
-      if (parser_->is_header_done() && !std::exchange(continued, true) && parser_->get().version() >= 11 &&
-          parser_->get().count(bhttp::field::expect) > 0) {
-        const Clock::time_point until = deadline_;
-        const net::const_buffer go_on = net::buffer("HTTP/1.1 100 Continue\r\n\r\n", 25);
-        const bool told = co_await write(go_on);
-        if (!told) co_return false;
-        deadline_ = until;
-      }
-      const bool more = co_await read_some();
-      if (!more && expired_ && state_ == State::busy) {
-        refuse(Refusal::read_timeout, 408, "timeout", "The request did not arrive in time");
-        co_return true;
-      }
-      if (!more) co_return false;
-    }
-  }
-
-  // False at the end of the connection, when the deadline has passed or there is no room.
-  Task<bool> read_some() {
-    if (reading_ahead_) {
-      while (reading_ahead_) co_await event();
-      co_return !departed_ && !expired_ && !cut_;
-    }
-    const std::size_t wanted =
-        std::min(parser_->is_header_done() ? body_read_size : read_size, buffer_.max_size() - buffer_.size());
-    if (departed_ || cut_ || wanted == 0) co_return false;
-    error_code error;
-    const auto room = buffer_.prepare(wanted);
-    const std::size_t bytes = co_await stream_.async_read_some(room, net::redirect_error(use_task, error));
-    buffer_.commit(bytes);
-    co_return !error && !cut_;
-  }
-
-  // Notices when the client leaves while its answer is made. One read: what it brings is the next request,
-  // which waits in the buffer for its turn.
-  void watch() {
-    if (reading_ahead_ || departed_ || buffer_.size() > 0) return;
-    reading_ahead_ = true;
-    stream_.async_read_some(buffer_.prepare(read_size),
-                            [self = shared_from_this(), this](const error_code& error, std::size_t bytes) {
-                              reading_ahead_ = false;
-                              buffer_.commit(bytes);
-                              departed_ = error && error != net::error::operation_aborted;
-                              if (departed_ && streaming_) cut();
-                              wake();
-                            });
-  }
-
-  Task<void> answer() {
-    received_ = Clock::now();
-    patience_ = core_->options.request_deadline;
-    fill_request();
-    auto match = core_->router.match(request_);
-    endpoint_ = match.endpoint;
-    if (guest_ && (endpoint_ == nullptr || !endpoint_->reserved)) {
-      refuse(Refusal::connections, 503, "unavailable", "Too many connections are open");
-      co_return;
-    }
-    if (match.answer) {
-      response_ = std::move(*match.answer);
-      co_return;
-    }
-    if (endpoint_->run == Run::io) {
-      response_ = core_->router.run(*endpoint_, request_);
-      co_return;
-    }
-    if (auto brief = core_->router.run_brief(*endpoint_, request_)) {
-      response_ = std::move(*brief);
-      co_return;
-    }
-    if (peer_->requests >= core_->options.client_requests) {
-      core_->observer.refused(Refusal::client_requests);
-      response_ = problem(
-          429, "too-many-requests",
-          "This client already has " + std::to_string(peer_->requests) + " requests waiting or computing",
-          request_.id);
-      co_return;
-    }
-    if (endpoint_->run == Run::compute) watch();
-    const Outcome outcome = co_await work();
-    switch (outcome) {
-      case Outcome::done:
-        response_ = std::move(made_);
-        break;
-      case Outcome::full:
-        core_->observer.refused(Refusal::worker_queue);
-        response_ = problem(503, "unavailable", "Too many requests are waiting", request_.id);
-        break;
-      case Outcome::late:
-        refuse(Refusal::deadline, 503, "deadline",
-               "The answer was not ready within http.request_deadline_s; ask for less at once");
-        break;
-      case Outcome::departed:
-        refuse(Refusal::departed, 499, "cancelled", "The client closed its side before the answer was ready");
-        break;
-      case Outcome::cut:
-        break;
-    }
-  }
-
-  // False when the answer could not be sent whole.
-  Task<bool> send() {
-    if (cut_) co_return false;
-    if (core_->stopping) keep_alive_ = false;
-    const bool old_client = !refused_ && parser_->get().version() < 11;
-    const bool chunked = response_.stream && !old_client;
-    const bool streamed = response_.stream && request_.method != Method::head;
-    if (response_.stream && old_client) keep_alive_ = false;
-    write_head(chunked);
-    std::string_view body;
-    if (request_.method != Method::head && response_.status != 204 && response_.status != 304)
-      body = body_of(response_);
-    response_bytes_ = head_.size() + body.size();
-    const std::array<net::const_buffer, 2> whole{net::buffer(head_), net::buffer(body.data(), body.size())};
-    bool sent = co_await write(whole);
-    if (sent && streamed) sent = co_await send_stream(chunked);
-    observe(streamed);
-    co_return sent;
-  }
-
-  Task<bool> send_stream(bool chunked) {
-    const auto source = response_.stream;
-    watch_source();
-    watch();
-    if (departed_) cut();
-    auto next = StreamSource::Next::more;
-    while (next != StreamSource::Next::end && !cut_) {
-      pull_again_ = false;
-      piece_.clear();
-      if (core_->stopping && source->endless()) {
-        next = StreamSource::Next::end;
-      } else if (!source->on_worker()) {
-        next = source->pull(piece_);
-      } else {
-        const Outcome outcome = co_await work();
-        if (outcome == Outcome::late) core_->observer.refused(Refusal::deadline);
-        next = outcome == Outcome::done ? pulled_ : StreamSource::Next::abort;
-      }
-      if (next == StreamSource::Next::abort) {
-        if (source->hopeless() && !cut_) core_->observer.refused(Refusal::slow_stream);
-        co_return false;
-      }
-      if (!piece_.empty() && !cut_) {
-        response_bytes_ += piece_.size();
-        const net::const_buffer plain = net::buffer(piece_);
-        const auto chunk = bhttp::make_chunk(plain);
-        bool written = false;
-        if (chunked) {
-          written = co_await write(chunk);
-        } else {
-          written = co_await write(plain);
-        }
-        if (!written) co_return false;
-      }
-      if (next == StreamSource::Next::wait) patience_ = core_->options.request_deadline;
-      const auto poll = Clock::now() + poll_stream_every;
-      while (next == StreamSource::Next::wait && !pull_again_ && !cut_ && Clock::now() < poll)
-        co_await event();
-    }
-    streaming_ = false;
-    if (cut_ || !chunked) co_return !cut_;
-    const auto last = bhttp::make_chunk_last();
-    const bool ended = co_await write(last);
-    co_return ended;
-  }
-
-  // The deadline is on progress: a slow client that takes some of it gains time.
-  template <class Buffers>
-  Task<bool> write(const Buffers& buffers) {
-    arm(core_->options.write_timeout);
-    error_code error;
-    const auto progress = [this](const error_code& failed, std::size_t sent) -> std::size_t {
-      if (sent > 0) deadline_ = Clock::now() + core_->options.write_timeout;
-      return failed ? 0 : 256 * 1024;
-    };
-    co_await net::async_write(stream_, buffers, progress, net::redirect_error(use_task, error));
-    deadline_ = never;
-    if (expired_ && !cut_) {
-      core_->observer.refused(Refusal::write_timeout);
-      cut();
-    }
-    co_return !error && !cut_;
-  }
-
-  // Closing with unread bytes in the socket makes the kernel discard the answer on its way to the client; so
-  // send our end first and read on for a while.
-  Task<void> linger() {
-    state_ = State::ending;
-    co_await end_stream(stream_);
-    arm(core_->stopping ? linger_time_at_stop : linger_time);
-    bool more = true;
-    while (more) {
-      if (!reading_ahead_) buffer_.consume(buffer_.size());
-      more = co_await read_some();
-    }
-  }
-
-  Stream stream_;
-};
 
 }  // namespace
 
@@ -329,7 +61,7 @@ void Session::start() {
       core_->io, [self = shared_from_this()] { return self->run(); },
       [self = shared_from_this()](const std::exception_ptr&) {
         self->cut();
-        self->core_->bodies_bytes -= std::exchange(self->body_bytes_, 0);
+        self->release_body();
         self->core_->sessions.erase(self.get());
         self->peer_.reset();
         const auto known = self->core_->peers.find(self->address_);
@@ -342,6 +74,11 @@ void Session::release_place() {
   --peer_->connections;
   --(guest_ ? core_->guests : core_->connections);
   core_->observer.connections(core_->connections + core_->guests);
+}
+
+void Session::release_body() {
+  if (parser_) parser_->get().body() = std::string();
+  core_->bodies_bytes -= std::exchange(body_bytes_, 0);
 }
 
 void Session::cut() {
@@ -391,12 +128,12 @@ void Session::wake() {
 }
 
 void Session::begin_request() {
+  release_body();
   parser_.emplace();
   parser_->header_limit(core_->options.max_header_bytes);
   parser_->body_limit(core_->options.max_body_bytes);
   if (buffer_.size() == 0 && buffer_.capacity() > kept_buffer_bytes && !reading_ahead_)
     buffer_.shrink_to_fit();
-  core_->bodies_bytes -= std::exchange(body_bytes_, 0);
   request_.body = std::string();
   request_.json.reset();
   response_.body = std::string();
@@ -472,36 +209,12 @@ bool Session::refuse(Refusal refusal, unsigned status, std::string_view slug, st
     request_.id = core_->id_prefix + std::to_string(core_->next_id++);
     request_.method = Method::other;
     request_.target = {};
+    release_body();
   }
   refused_ = true;
   keep_alive_ = false;
   response_ = problem(status, slug, detail, request_.id);
   return false;
-}
-
-void Session::write_head(bool chunked) {
-  const unsigned status = response_.status;
-  const bool bodyless = status == 204 || status == 304 || status < 200;
-  head_.assign("HTTP/1.1 ").append(std::to_string(status)).append(" ").append(reason_phrase(status));
-  head_.append("\r\nDate: ").append(core_->date).append("\r\n");
-  if (!response_.content_type.empty() && !bodyless)
-    append_header(head_, "Content-Type", response_.content_type);
-  if (chunked) {
-    head_.append("Transfer-Encoding: chunked\r\n");
-  } else if (!response_.stream && !bodyless) {
-    head_.append("Content-Length: ").append(std::to_string(body_of(response_).size())).append("\r\n");
-  }
-  if (!keep_alive_) {
-    head_.append("Connection: close\r\n");
-  } else if (parser_->get().version() < 11) {
-    head_.append("Connection: keep-alive\r\n");
-  }
-  head_.append("X-Request-Id: ").append(request_.id).append("\r\nX-Content-Type-Options: nosniff\r\n");
-  if (std::ranges::none_of(response_.headers,
-                           [](const auto& h) { return equals_ignoring_case(h.first, "Cache-Control"); }))
-    head_.append("Cache-Control: no-store\r\n");
-  for (const auto& [name, value] : response_.headers) append_header(head_, name, value);
-  head_.append("\r\n");
 }
 
 void Session::observe(bool streamed) {

@@ -100,7 +100,6 @@ class Session : public std::enable_shared_from_this<Session> {
   bool parse();
   void fill_request();
   bool refuse(Refusal refusal, unsigned status, std::string_view slug, std::string_view detail);
-  void write_head(bool chunked);
   void observe(bool streamed);
   void watch_source();
   Task<void> event();
@@ -109,6 +108,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void do_work();
   void arm(Clock::duration time);
   void release_place();
+  void release_body();
 
   const std::shared_ptr<Core> core_;  // first: everything else needs the io_context in it
   std::shared_ptr<Peer> peer_;
