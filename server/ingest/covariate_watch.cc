@@ -30,7 +30,8 @@ void count(history::CovariateSummary& summary, std::int64_t until_utime_us) {
 void CovariateWatch::take(const telemetry::CovariateMessage& message, const Fault& fault) {
   for (const telemetry::Covariate& covariate : message.covariates) {
     if (const auto implausible = telemetry::check_plausible(covariate)) {
-      fault(IngestFault::implausible, "covariate " + covariate.name + ": " + telemetry::describe(*implausible));
+      fault(IngestFault::implausible,
+            "covariate " + covariate.name + ": " + telemetry::describe(*implausible));
       continue;
     }
     CovariateChange change;

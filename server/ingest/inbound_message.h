@@ -22,7 +22,8 @@ struct RefusedMessage {
 // A message off the wire that passed the guard, or of which the robot whose channel it came on is told.
 struct InboundMessage {
   std::string robot_id;
-  std::variant<telemetry::Sample, telemetry::MissionEvent, telemetry::CovariateMessage, RefusedMessage> content;
+  std::variant<telemetry::Sample, telemetry::MissionEvent, telemetry::CovariateMessage, RefusedMessage>
+      content;
   std::int64_t host_utime_us = 0;
   telemetry::Sender sender = {};
 };

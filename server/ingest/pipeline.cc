@@ -8,12 +8,13 @@ namespace joulecast::server {
 namespace {
 
 constexpr std::size_t waiting_units = 131'072;  // some 30 MB of messages
-constexpr std::int64_t stranger_silence_us = 60'000'000, forget_period_us = 1'000'000, tell_period_us = 600'000'000;
+constexpr std::int64_t stranger_silence_us = 60'000'000, forget_period_us = 1'000'000,
+                       tell_period_us = 600'000'000;
 
 }  // namespace
 
-Pipeline::Pipeline(const SessionSettings& settings, std::size_t max_unknown_robots, const ModelRegistry& models,
-                   SessionOutputs outputs)
+Pipeline::Pipeline(const SessionSettings& settings, std::size_t max_unknown_robots,
+                   const ModelRegistry& models, SessionOutputs outputs)
     : settings_(settings),
       max_unknown_robots_(max_unknown_robots),
       models_(models),
@@ -61,7 +62,8 @@ bool Pipeline::forget_a_stranger(std::int64_t host_utime_us) {
   forgot_utime_us_ = host_utime_us;
   const auto silent = std::ranges::min_element(
       strangers_, {}, [](const auto& each) { return each.second.snapshot.received_utime_us; });
-  if (silent == strangers_.end() || host_utime_us - silent->second.snapshot.received_utime_us < stranger_silence_us)
+  if (silent == strangers_.end() ||
+      host_utime_us - silent->second.snapshot.received_utime_us < stranger_silence_us)
     return false;
   outputs_.fleet.remove(silent->first);
   strangers_.erase(silent);

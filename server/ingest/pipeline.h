@@ -12,8 +12,8 @@
 
 namespace joulecast::server {
 
-// Decoded messages in, history out: one session a robot that has a model, in one thread. Of other ids only messages are
-// counted, of a bounded number of ids. The daemon and the offline replay run this same code.
+// Decoded messages in, history out: one session a robot that has a model, in one thread. Of other ids only
+// messages are counted, of a bounded number of ids. The daemon and the offline replay run this same code.
 class Pipeline {
  public:
   Pipeline(const SessionSettings& settings, std::size_t max_unknown_robots, const ModelRegistry& models,

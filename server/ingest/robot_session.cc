@@ -20,7 +20,8 @@ constexpr std::int64_t clock_ahead_us = 10'000'000;          // beyond what tran
 constexpr auto json_replace = nlohmann::json::error_handler_t::replace;
 constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
 constexpr std::int64_t tell_period_us = 600'000'000;
-// Events that a robot may send at once, and how many each sample earns it: recordings are replayed faster than they were.
+// Events that a robot may send at once, and how many each sample earns it: recordings are replayed faster
+// than they were.
 constexpr double event_burst = 100, events_a_sample = 0.2;
 
 history::MissionState state_of(telemetry::MissionEnd end) {
@@ -68,7 +69,7 @@ struct RobotSession::OpenMission {
   // Gaps that an earlier run of the daemon counted; the meter counts those of this run.
   std::int64_t earlier_gaps = 0;
   double earlier_gap_s = 0;
-  bool resumed_silent = false;  // resumed after a restart, and nothing came since
+  bool resumed_silent = false;                   // resumed after a restart, and nothing came since
   std::optional<std::int64_t> stepped_utime_us;  // host's, when the robot's clock was first set
   std::int64_t booked_us = 0;                    // since then
 };
@@ -180,7 +181,8 @@ void RobotSession::on_fault(IngestFault fault, std::uint64_t count, std::string 
   note_fault(fault, count, std::move(why), snapshot_.received_utime_us);
 }
 
-void RobotSession::note_fault(IngestFault fault, std::uint64_t count, std::string why, std::int64_t host_utime_us) {
+void RobotSession::note_fault(IngestFault fault, std::uint64_t count, std::string why,
+                              std::int64_t host_utime_us) {
   const std::string name = name_of(fault);
   snapshot_.faults[name] += count;
   if (open_ != nullptr) open_->record.sample_faults[name] += static_cast<std::int64_t>(count);
@@ -199,9 +201,10 @@ void RobotSession::note_fault(IngestFault fault, std::uint64_t count, std::strin
 bool RobotSession::is_too_far_ahead(std::int64_t utime_us, std::int64_t host_utime_us) {
   const std::int64_t ahead_us = utime_us - host_utime_us;  // of plausible clocks: no overflow
   if (ahead_us <= settings_.max_ahead_us) return false;
-  on_fault(IngestFault::too_far_ahead, 1,
-           fmt::format("utime is {:.0f} s ahead of the service's clock; at most {:.0f} s are accepted",
-                       static_cast<double>(ahead_us) * 1e-6, static_cast<double>(settings_.max_ahead_us) * 1e-6));
+  on_fault(
+      IngestFault::too_far_ahead, 1,
+      fmt::format("utime is {:.0f} s ahead of the service's clock; at most {:.0f} s are accepted",
+                  static_cast<double>(ahead_us) * 1e-6, static_cast<double>(settings_.max_ahead_us) * 1e-6));
   return true;
 }
 
@@ -241,11 +244,13 @@ bool RobotSession::is_too_fast(std::int64_t elapsed_us) {
     return false;
   }
   interrupt();
-  on_fault(IngestFault::too_fast, 1,
-           fmt::format("since the robot's clock was set, samples of {:.1f} s came in {:.1f} s; at most {:.0f} s more than "
-                       "passed are accounted for",
-                       static_cast<double>(open_->booked_us + elapsed_us) * 1e-6, static_cast<double>(passed_us) * 1e-6,
-                       static_cast<double>(settings_.booked_margin_us) * 1e-6));
+  on_fault(
+      IngestFault::too_fast, 1,
+      fmt::format(
+          "since the robot's clock was set, samples of {:.1f} s came in {:.1f} s; at most {:.0f} s more than "
+          "passed are accounted for",
+          static_cast<double>(open_->booked_us + elapsed_us) * 1e-6, static_cast<double>(passed_us) * 1e-6,
+          static_cast<double>(settings_.booked_margin_us) * 1e-6));
   return true;
 }
 
@@ -413,12 +418,14 @@ void RobotSession::on_own_sample(const telemetry::Sample& sample) {
 }
 
 bool RobotSession::may_send_event(std::int64_t host_utime_us) {
-  const double passed_s = 1e-6 * static_cast<double>(std::max<std::int64_t>(0, host_utime_us - event_utime_us_));
+  const double passed_s =
+      1e-6 * static_cast<double>(std::max<std::int64_t>(0, host_utime_us - event_utime_us_));
   event_utime_us_ = host_utime_us;
   event_allowance_ = std::min(event_burst, event_allowance_ + passed_s * settings_.event_rate_hz);
   if (event_allowance_ < 1) {
-    on_fault(IngestFault::event_flood, 1,
-             fmt::format("more than {:g} mission events a second are not looked at", settings_.event_rate_hz));
+    on_fault(
+        IngestFault::event_flood, 1,
+        fmt::format("more than {:g} mission events a second are not looked at", settings_.event_rate_hz));
     return false;
   }
   --event_allowance_;
@@ -455,7 +462,8 @@ void RobotSession::on_covariates(const telemetry::CovariateMessage& message, std
     return on_fault(IngestFault::implausible, 1, "covariates: " + telemetry::describe(*fault));
   if (is_too_far_ahead(message.utime_us, host_utime_us)) return;
   const std::size_t before = covariates_.pending();
-  covariates_.take(message, [this](IngestFault fault, std::string why) { on_fault(fault, 1, std::move(why)); });
+  covariates_.take(message,
+                   [this](IngestFault fault, std::string why) { on_fault(fault, 1, std::move(why)); });
   outputs_.counters.covariate_changes.fetch_add(covariates_.pending() - before, std::memory_order_relaxed);
   if (open_ == nullptr || covariates_.pending() < settings_.checkpoint_samples) return;
   if (!open_->stored) begin_record();

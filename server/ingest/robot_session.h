@@ -33,12 +33,13 @@ struct SessionSettings {
   telemetry::SequenceLimits sequence;
   telemetry::MissionLimits mission;
   bool implicit_missions = true;
-  std::int64_t reorder_us = 500'000;              // how long samples wait for one that is missing before them
-  std::int64_t sender_takeover_us = 2'000'000;    // silence of a robot's sender after which another one may speak
-  std::int64_t max_ahead_us = INT64_MAX;          // of robots' clocks ahead of the host's; a log has none
-  std::int64_t booked_margin_us = 60'000'000;     // see RobotSession::is_too_fast
-  double event_rate_hz = 5;                       // of mission events, in the long run
-  std::size_t checkpoint_samples = 1024;  // a mission is checkpointed at this many samples at the latest
+  std::int64_t reorder_us = 500'000;  // how long samples wait for one that is missing before them
+  std::int64_t sender_takeover_us =
+      2'000'000;                          // silence of a robot's sender after which another one may speak
+  std::int64_t max_ahead_us = INT64_MAX;  // of robots' clocks ahead of the host's; a log has none
+  std::int64_t booked_margin_us = 60'000'000;  // see RobotSession::is_too_fast
+  double event_rate_hz = 5;                    // of mission events, in the long run
+  std::size_t checkpoint_samples = 1024;       // a mission is checkpointed at this many samples at the latest
 };
 
 // What a session acts on. `post` hands a command to the store's writer and may wait for it.
@@ -98,8 +99,8 @@ class RobotSession {
   void on_clock_step(const telemetry::Sample& sample);
   // What is integrated next does not continue what was.
   void interrupt();
-  // Once a robot's clock was set within a mission, its time may pass no faster than the host's, but for a margin:
-  // else a clock that is set again and again would book more energy than there was time for.
+  // Once a robot's clock was set within a mission, its time may pass no faster than the host's, but for a
+  // margin: else a clock that is set again and again would book more energy than there was time for.
   bool is_too_fast(std::int64_t elapsed_us);
   bool is_too_far_ahead(std::int64_t utime_us, std::int64_t host_utime_us);
   bool may_send_event(std::int64_t host_utime_us);

@@ -14,8 +14,10 @@ bool SampleOrder::take(const telemetry::Sample& sample, std::int64_t host_utime_
     return true;
   }
   if (step < 0) {
-    const std::int64_t newest_us = waiting_.empty() ? newest_utime_us_ : waiting_.rbegin()->second.sample.utime_us;
-    const bool restart = sample.utime_us > newest_us || sample.utime_us < newest_utime_us_ - backward_jump_us_;
+    const std::int64_t newest_us =
+        waiting_.empty() ? newest_utime_us_ : waiting_.rbegin()->second.sample.utime_us;
+    const bool restart =
+        sample.utime_us > newest_us || sample.utime_us < newest_utime_us_ - backward_jump_us_;
     if (restart) {
       flush();
       pass(sample);

@@ -15,8 +15,8 @@ constexpr std::int64_t contest_memory_us = 60 * second_us;
 constexpr std::size_t waiting_units_a_robot = 16'384;
 // What may be lost between two samples of one stream.
 constexpr std::int64_t stream_step = 1000, stream_span_us = 60 * second_us;
-// Going back to a stream that was left happens to a robot that boots while its last datagrams are late; going back and
-// forth does not.
+// Going back to a stream that was left happens to a robot that boots while its last datagrams are late; going
+// back and forth does not.
 constexpr int most_returns = 3;
 constexpr std::int64_t returns_memory_us = 10 * second_us;
 // Publishers that open a socket for each message go on with their numbers.
@@ -45,7 +45,7 @@ bool SenderGate::is_of_first(const InboundMessage& message, const telemetry::Sam
   // Missions may be announced by somebody else, such as a fleet manager.
   const bool waits = !waiting_.empty() && message.sender == other_;
   const bool live = message.host_utime_us - heard_us_ < takeover_us_;
-  return !waits && !(first_sends_events_ && live);
+  return !waits && !(announcer_ == first_ && live);
 }
 
 SenderGate::Verdict SenderGate::take(const InboundMessage& message) {
@@ -63,8 +63,7 @@ SenderGate::Verdict SenderGate::take_first(const InboundMessage& message, const 
   Verdict verdict;
   verdict.pass = true;
   if (sample == nullptr) {
-    if (message.sender == first_ && std::holds_alternative<telemetry::MissionEvent>(message.content))
-      first_sends_events_ = true;
+    if (std::holds_alternative<telemetry::MissionEvent>(message.content)) announcer_ = message.sender;
     return verdict;
   }
   if (is_second_stream(*sample, message.host_utime_us)) {
@@ -114,8 +113,9 @@ bool SenderGate::is_second_stream(const telemetry::Sample& sample, std::int64_t 
     side_ = std::exchange(main_, now);
     return false;
   }
-  const bool repeated = sample.sequence <= main_.sequence && main_.sequence - sample.sequence <= stream_step &&
-                        std::abs(sample.utime_us - main_.utime_us) <= stream_span_us && sample.utime_us <= main_.utime_us;
+  const bool repeated =
+      sample.sequence <= main_.sequence && main_.sequence - sample.sequence <= stream_step &&
+      std::abs(sample.utime_us - main_.utime_us) <= stream_span_us && sample.utime_us <= main_.utime_us;
   if (!repeated) side_ = std::exchange(main_, now);
   return false;
 }
@@ -123,7 +123,8 @@ bool SenderGate::is_second_stream(const telemetry::Sample& sample, std::int64_t 
 std::int64_t SenderGate::patience_us(std::int64_t host_utime_us) const {
   if (contested_us_ > 0 && host_utime_us - contested_us_ < contest_memory_us) return takeover_us_;
   const double usual = missed_intervals * interval_us_;
-  return std::min(takeover_us_, std::max(least_patience_us, static_cast<std::int64_t>(std::min(usual, 1e12))));
+  return std::min(takeover_us_,
+                  std::max(least_patience_us, static_cast<std::int64_t>(std::min(usual, 1e12))));
 }
 
 std::vector<InboundMessage> SenderGate::release(std::int64_t host_utime_us) {
@@ -137,14 +138,15 @@ std::vector<InboundMessage> SenderGate::release(std::int64_t host_utime_us) {
 }
 
 std::vector<InboundMessage> SenderGate::hand_over() {
-  std::vector<InboundMessage> released(std::make_move_iterator(waiting_.begin()), std::make_move_iterator(waiting_.end()));
+  std::vector<InboundMessage> released(std::make_move_iterator(waiting_.begin()),
+                                       std::make_move_iterator(waiting_.end()));
   heard_us_ = released.back().host_utime_us;
   first_ = other_;
-  first_sends_events_ = false;
   main_ = side_ = {};
   for (const InboundMessage& message : released) {
-    if (const auto* sample = std::get_if<telemetry::Sample>(&message.content)) main_ = {sample->sequence, sample->utime_us};
-    first_sends_events_ |= std::holds_alternative<telemetry::MissionEvent>(message.content);
+    if (const auto* sample = std::get_if<telemetry::Sample>(&message.content))
+      main_ = {sample->sequence, sample->utime_us};
+    if (std::holds_alternative<telemetry::MissionEvent>(message.content)) announcer_ = first_;
   }
   drop_waiting();
   return released;
@@ -163,8 +165,8 @@ std::string SenderGate::describe() const {
            " sends two streams of sequence numbers under this robot's id; the one at sequence " +
            std::to_string(side_.sequence) + " is not accounted for";
   }
-  return telemetry::to_string(other_) + " publishes under this robot's id beside " + telemetry::to_string(first_) +
-         ", which alone is accounted for";
+  return telemetry::to_string(other_) + " publishes under this robot's id beside " +
+         telemetry::to_string(first_) + ", which alone is accounted for";
 }
 
 }  // namespace joulecast::server

@@ -10,14 +10,15 @@
 
 namespace joulecast::server {
 
-// Lets one sender speak for a robot. Where a second one sends under the robot's id, told apart by its address or, behind
-// one address, by its own stream of sequence numbers, its messages wait: when the first one speaks again they are
-// refused, so that no energy is booked twice; when it has fallen silent they pass, so that a robot whose publisher was
-// started anew or whose address changed loses nothing. Messages of unknown senders (logs) have the streams only.
+// Lets one sender speak for a robot. Where a second one sends under the robot's id, told apart by its address
+// or, behind one address, by its own stream of sequence numbers, its messages wait: when the first one speaks
+// again they are refused, so that no energy is booked twice; when it has fallen silent they pass, so that a
+// robot whose publisher was started anew or whose address changed loses nothing. Messages of unknown senders
+// (logs) have the streams only.
 class SenderGate {
  public:
-  // `takeover_us`: silence after which another sender takes over at the latest. `room`: units (about one sample) that
-  // all gates together may let wait.
+  // `takeover_us`: silence after which another sender takes over at the latest. `room`: units (about one
+  // sample) that all gates together may let wait.
   SenderGate(std::int64_t takeover_us, std::size_t& room) : takeover_us_(takeover_us), room_(room) {}
   ~SenderGate() { drop_waiting(); }
   SenderGate(const SenderGate&) = delete;
@@ -53,11 +54,12 @@ class SenderGate {
   std::int64_t takeover_us_;
   std::size_t& room_;
   telemetry::Sender first_, other_;
-  bool any_ = false;                 // first_ is known
-  bool first_sends_events_ = false;  // so nobody else is expected to
-  std::int64_t heard_us_ = 0;        // of first_
-  double interval_us_ = 0;           // between its messages
-  std::int64_t contested_us_ = 0;    // when both were last heard; 0: never
+  telemetry::Sender
+      announcer_;     // of the last event; where it is first_, nobody else is expected to announce missions
+  bool any_ = false;  // first_ is known
+  std::int64_t heard_us_ = 0;           // of first_
+  double interval_us_ = 0;              // between its messages
+  std::int64_t contested_us_ = 0;       // when both were last heard; 0: never
   std::deque<InboundMessage> waiting_;  // of other_, since first_ spoke last
   std::size_t waiting_units_ = 0;
   Stream main_, side_;
