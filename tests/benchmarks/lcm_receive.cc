@@ -16,6 +16,7 @@
 #include <functional>
 #include <string>
 #include <thread>
+#include <type_traits>
 #include <vector>
 
 #include "server/ingest/inbound_message.h"
@@ -118,7 +119,7 @@ int main() {
 
   lcm_t* lcm = lcm_create(url);
   if (lcm == nullptr) return 1;
-  using Decode = decltype(decode);
+  using Decode = std::remove_const_t<decltype(decode)>;
   lcm_subscription_t* all = lcm_subscribe(
       lcm, "ROBOT_TELEMETRY\\..+",
       [](const lcm_recv_buf_t* buffer, const char* channel, void* user) {

@@ -105,7 +105,7 @@ TEST_F(HostileTest, TwoStreamsOfOneSenderAreToldApart) {
   // But for what came before it was clear that there are two.
   EXPECT_NEAR(static_cast<double>(mission.samples), 500, 10);
   EXPECT_LE(mission.accounts.duration_s, 10.0);
-  EXPECT_NEAR(mission.accounts.measured_j, 480, 30);
+  EXPECT_NEAR(mission.accounts.measured_j, 480, 50);  // 0.1 s of the other
 }
 
 TEST_F(HostileTest, APublisherThatIsStartedAnewLosesNothing) {
