@@ -31,11 +31,13 @@ void export_metrics(Metrics& metrics, const IngestCounters& counters, const Inge
       std::vector<std::string>(ingest_fault_names.begin(), ingest_fault_names.end()));
   const Counter datagrams =
       metrics.counter("joulecast_lcm_datagrams_total", "Datagrams received on the LCM group");
-  const std::vector<Counter> lost = metrics.counters(
-      "joulecast_lcm_datagrams_dropped_total",
-      "Datagrams that gave no message; kernel: lost for want of receive buffer, other_channel: LCM traffic of others",
-      "reason",
-      std::vector<std::string>(telemetry::datagram_fault_names.begin(), telemetry::datagram_fault_names.end()));
+  const std::vector<Counter> lost =
+      metrics.counters("joulecast_lcm_datagrams_dropped_total",
+                       "Datagrams that gave no message; kernel: lost for want of receive buffer, "
+                       "other_channel: LCM traffic of others",
+                       "reason",
+                       std::vector<std::string>(telemetry::datagram_fault_names.begin(),
+                                                telemetry::datagram_fault_names.end()));
   const Gauge queue = metrics.gauge("joulecast_ingest_queue_messages", "Messages waiting to be accounted");
   const Gauge receiving = metrics.gauge("joulecast_ingest_receiving", "1 while LCM is being received");
   const Gauge known = metrics.gauge("joulecast_robots_known", "Robots heard of since the daemon started");

@@ -13,11 +13,14 @@ constexpr double megabyte = 1024.0 * 1024.0;
 constexpr Setting table[] = {
     {"lcm.url", Type::text, telemetry::default_lcm_url, 0, 0, "",
      "LCM provider; ttl is how far the messages that joulecastd sends may travel and does not limit what it "
-     "receives, recv_buf_size asks the kernel for a receive buffer of so many bytes, at most net.core.rmem_max"},
+     "receives, recv_buf_size asks the kernel for a receive buffer of so many bytes, at most "
+     "net.core.rmem_max"},
     {"lcm.bind_address", Type::text, "", 0, 0, "",
-     "IPv4 address of the interface to receive on; empty: the one that the system routes the multicast group to"},
+     "IPv4 address of the interface to receive on; empty: the one that the system routes the multicast group "
+     "to"},
     {"lcm.accept_from", Type::text, "local", 0, 0, "",
-     "senders whose datagrams are taken, separated by commas: networks such as 10.1.0.0/16, addresses, any, or local: "
+     "senders whose datagrams are taken, separated by commas: networks such as 10.1.0.0/16, addresses, any, "
+     "or local: "
      "loopback and the networks of this host's interfaces; further ones are counted"},
 
     {"http.address", Type::text, "127.0.0.1", 0, 0, "", "IP address to listen on"},
@@ -73,20 +76,24 @@ constexpr Setting table[] = {
     {"ingest.implicit_missions", Type::boolean, "true", 0, 0, "",
      "open a mission for a robot that sends telemetry without having announced one"},
     {"ingest.max_unknown_robots", Type::integer, "100", 0, 1000000, "",
-     "ids without a model whose messages are counted apart, silent ones give way after a minute; robots with a model "
+     "ids without a model whose messages are counted apart, silent ones give way after a minute; robots with "
+     "a model "
      "are always followed"},
     {"ingest.reorder_s", Type::number, "0.5", 0, 60, "s",
      "how long samples wait for one that is missing before them, to be accounted in order; 0: not at all"},
     {"ingest.sender_takeover_s", Type::number, "2", 0.1, 3600, "s",
-     "silence of a robot's sender after which another one under the same robot_id takes over at the latest; until then "
+     "silence of a robot's sender after which another one under the same robot_id takes over at the latest; "
+     "until then "
      "its messages wait, and are refused if the first speaks again"},
     {"ingest.max_clock_ahead_s", Type::number, "300", 0, 1e9, "s",
      "samples and events stamped further ahead of the host's clock are refused"},
     {"ingest.booked_time_margin_s", Type::number, "60", 0, 86400, "s",
-     "once a robot's clock was set within a mission, its time may run ahead of the host's by so much; samples beyond are "
+     "once a robot's clock was set within a mission, its time may run ahead of the host's by so much; "
+     "samples beyond are "
      "refused"},
     {"ingest.event_rate_hz", Type::number, "5", 0.01, 10000, "Hz",
-     "mission events a second that a robot may send, beyond a burst of 100 and one for five samples; further ones are "
+     "mission events a second that a robot may send, beyond a burst of 100 and one for five samples; further "
+     "ones are "
      "refused"},
 
     {"robots.directory", Type::text, "", 0, 0, "", "robot files (*.json) loaded at start; empty: none"},

@@ -37,8 +37,8 @@ class IngestService::Impl {
     if (!link) return tl::unexpected(std::move(link.error()));
     link_ = std::make_unique<telemetry::LcmLink>(std::move(*link));
     const auto handler = [this](const telemetry::Received& received) {
-      std::optional<InboundMessage> message = decode_message(
-          received.channel, received.data, host_utime_us(), outputs_.counters, received.sender);
+      std::optional<InboundMessage> message = decode_message(received.channel, received.data, host_utime_us(),
+                                                             outputs_.counters, received.sender);
       if (message) batch_.push_back(std::move(*message));
     };
     if (Result<void> done = link_->listen(handler, outputs_.counters.datagrams, options_.listen); !done)

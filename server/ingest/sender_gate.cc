@@ -45,7 +45,7 @@ bool SenderGate::is_of_first(const InboundMessage& message, const signals::Sampl
   // Missions may be announced by somebody else, such as a fleet manager.
   const bool waits = !waiting_.empty() && message.sender == other_;
   const bool live = message.host_utime_us - heard_us_ < takeover_us_;
-  return !waits && !(first_sends_events_ && live);
+  return !waits && !(announcer_ == first_ && live);
 }
 
 SenderGate::Verdict SenderGate::take(const InboundMessage& message) {
@@ -63,8 +63,7 @@ SenderGate::Verdict SenderGate::take_first(const InboundMessage& message, const 
   Verdict verdict;
   verdict.pass = true;
   if (sample == nullptr) {
-    if (message.sender == first_ && std::holds_alternative<signals::MissionEvent>(message.content))
-      first_sends_events_ = true;
+    if (std::holds_alternative<signals::MissionEvent>(message.content)) announcer_ = message.sender;
     return verdict;
   }
   if (is_second_stream(*sample, message.host_utime_us)) {
@@ -143,12 +142,11 @@ std::vector<InboundMessage> SenderGate::hand_over() {
                                        std::make_move_iterator(waiting_.end()));
   heard_us_ = released.back().host_utime_us;
   first_ = other_;
-  first_sends_events_ = false;
   main_ = side_ = {};
   for (const InboundMessage& message : released) {
     if (const auto* sample = std::get_if<signals::Sample>(&message.content))
       main_ = {sample->sequence, sample->utime_us};
-    first_sends_events_ |= std::holds_alternative<signals::MissionEvent>(message.content);
+    if (std::holds_alternative<signals::MissionEvent>(message.content)) announcer_ = first_;
   }
   drop_waiting();
   return released;

@@ -54,8 +54,9 @@ class SenderGate {
   std::int64_t takeover_us_;
   std::size_t& room_;
   telemetry::Sender first_, other_;
-  bool any_ = false;                    // first_ is known
-  bool first_sends_events_ = false;     // so nobody else is expected to
+  telemetry::Sender
+      announcer_;     // of the last event; where it is first_, nobody else is expected to announce missions
+  bool any_ = false;  // first_ is known
   std::int64_t heard_us_ = 0;           // of first_
   double interval_us_ = 0;              // between its messages
   std::int64_t contested_us_ = 0;       // when both were last heard; 0: never

@@ -37,7 +37,8 @@ std::optional<ChannelName> parse_channel(std::string_view channel) noexcept {
 
 std::string channel_pattern(Subject subject) {
   std::string pattern(prefix_of(subject));
-  return pattern.insert(pattern.size() - 1, "\\") + ".+";  // of the prefix only the last character, a '.', is special
+  return pattern.insert(pattern.size() - 1, "\\") +
+         ".+";  // of the prefix only the last character, a '.', is special
 }
 
 }  // namespace joulecast::telemetry

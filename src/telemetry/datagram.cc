@@ -54,7 +54,8 @@ std::nullopt_t DatagramReader::refuse(DatagramFault fault) noexcept {
   return std::nullopt;
 }
 
-std::optional<ChannelMessage> DatagramReader::take(const Sender& sender, std::span<const std::uint8_t> datagram,
+std::optional<ChannelMessage> DatagramReader::take(const Sender& sender,
+                                                   std::span<const std::uint8_t> datagram,
                                                    std::int64_t now_us) {
   counters_.received.fetch_add(1, std::memory_order_relaxed);
   if (datagram.size() < short_header) return refuse(DatagramFault::malformed);
@@ -68,17 +69,24 @@ std::optional<ChannelMessage> DatagramReader::take(const Sender& sender, std::sp
   return ChannelMessage{channel, data};
 }
 
-std::optional<DatagramReader::Fragment> DatagramReader::parse_fragment(std::span<const std::uint8_t> datagram) {
+std::optional<DatagramReader::Fragment> DatagramReader::parse_fragment(
+    std::span<const std::uint8_t> datagram) {
   if (datagram.size() < fragment_header) return refuse(DatagramFault::malformed);
-  Fragment f{read32(datagram, 4),  read32(datagram, 8),  read32(datagram, 12), read16(datagram, 16),
-             read16(datagram, 18), {},                   datagram.subspan(fragment_header)};
+  Fragment f{read32(datagram, 4),
+             read32(datagram, 8),
+             read32(datagram, 12),
+             read16(datagram, 16),
+             read16(datagram, 18),
+             {},
+             datagram.subspan(fragment_header)};
   if (f.size > max_message_bytes) return refuse(DatagramFault::too_large);
   if (f.number == 0) {
     f.channel = take_channel(f.data);
     if (f.channel.empty()) return refuse(DatagramFault::malformed);
   }
-  const bool possible = f.number < f.count && f.count <= max_fragments && !f.data.empty() && f.offset < f.size &&
-                        f.data.size() <= f.size - f.offset && (f.number > 0 || f.offset == 0);
+  const bool possible = f.number < f.count && f.count <= max_fragments && !f.data.empty() &&
+                        f.offset < f.size && f.data.size() <= f.size - f.offset &&
+                        (f.number > 0 || f.offset == 0);
   if (!possible) return refuse(DatagramFault::bad_fragment);
   if (f.number == 0 && !is_robots(f.channel)) return refuse(DatagramFault::other_channel);
   return f;
@@ -87,12 +95,12 @@ std::optional<DatagramReader::Fragment> DatagramReader::parse_fragment(std::span
 bool DatagramReader::fits(const Begun& message, const Fragment& fragment) {
   const auto end = static_cast<std::uint32_t>(fragment.offset + fragment.data.size());
   return message.count == fragment.count && message.data.size() == fragment.size &&
-         std::ranges::all_of(message.spans, [&](const auto& span) {
-           return end <= span[0] || span[1] <= fragment.offset;
-         });
+         std::ranges::all_of(message.spans,
+                             [&](const auto& span) { return end <= span[0] || span[1] <= fragment.offset; });
 }
 
-std::vector<DatagramReader::Begun>::iterator DatagramReader::begin(const Sender& sender, const Fragment& fragment,
+std::vector<DatagramReader::Begun>::iterator DatagramReader::begin(const Sender& sender,
+                                                                   const Fragment& fragment,
                                                                    std::int64_t now_us) {
   const auto is_senders = [&](const Begun& message) { return message.sender == sender; };
   const auto of_sender = static_cast<std::size_t>(std::ranges::count_if(begun_, is_senders));
@@ -134,7 +142,8 @@ std::optional<ChannelMessage> DatagramReader::take_fragment(const Sender& sender
   std::memcpy(message->data.data() + fragment->offset, fragment->data.data(), fragment->data.size());
   message->came.set(fragment->number);
   message->bytes += fragment->data.size();
-  message->spans.push_back({fragment->offset, static_cast<std::uint32_t>(fragment->offset + fragment->data.size())});
+  message->spans.push_back(
+      {fragment->offset, static_cast<std::uint32_t>(fragment->offset + fragment->data.size())});
   if (message->came.count() < message->count) return std::nullopt;
   const bool whole = message->bytes == message->data.size();  // no two overlap, so all bytes have come
   completed_ = std::move(*message);
@@ -144,8 +153,8 @@ std::optional<ChannelMessage> DatagramReader::take_fragment(const Sender& sender
 }
 
 void DatagramReader::expire(std::int64_t now_us) {
-  const auto dropped =
-      std::erase_if(begun_, [&](const Begun& message) { return now_us - message.since_us > limits_.timeout_us; });
+  const auto dropped = std::erase_if(
+      begun_, [&](const Begun& message) { return now_us - message.since_us > limits_.timeout_us; });
   if (dropped > 0) counters_.add(DatagramFault::incomplete, dropped);
 }
 

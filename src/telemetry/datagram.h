@@ -11,21 +11,22 @@
 #include <string_view>
 #include <vector>
 
-// LCM's UDP format, read without trusting it. A short message is one datagram: "LC02", sequence number (4 bytes), the
-// channel's name with a final zero byte, the message. A longer one comes in fragments: "LC03", sequence number, size
-// of the message, offset of the fragment (4 bytes each), number of the fragment, their count (2 bytes each), in the
-// first the channel's name, then bytes of the message. All numbers are big-endian.
+// LCM's UDP format, read without trusting it. A short message is one datagram: "LC02", sequence number (4
+// bytes), the channel's name with a final zero byte, the message. A longer one comes in fragments: "LC03",
+// sequence number, size of the message, offset of the fragment (4 bytes each), number of the fragment, their
+// count (2 bytes each), in the first the channel's name, then bytes of the message. All numbers are
+// big-endian.
 namespace joulecast::telemetry {
 
 // LCM counts in int; no message of the contract comes near this.
 inline constexpr std::size_t max_message_bytes = 64 * 1024;
 
-// Who sent a datagram: IPv4 address and port in host byte order. Zeros: unknown, it did not come by UDP.
+// Who sent a datagram: IPv4 address and port in host byte order. Port 0: unknown, it did not come by UDP.
 struct Sender {
   std::uint32_t address = 0;
   std::uint16_t port = 0;
 
-  [[nodiscard]] bool known() const noexcept { return address != 0; }
+  [[nodiscard]] bool known() const noexcept { return port != 0; }
   friend bool operator==(const Sender&, const Sender&) = default;
 };
 
@@ -75,8 +76,8 @@ class DatagramReader {
   explicit DatagramReader(DatagramCounters& counters, ReassemblyLimits limits = {})
       : counters_(counters), limits_(limits) {}
 
-  // The message that the datagram is or completes; the views end with the datagram's bytes or the next call. `now_us`
-  // of any clock that does not go back.
+  // The message that the datagram is or completes; the views end with the datagram's bytes or the next call.
+  // `now_us` of any clock that does not go back.
   std::optional<ChannelMessage> take(const Sender& sender, std::span<const std::uint8_t> datagram,
                                      std::int64_t now_us);
   // Gives up what has waited too long for its fragments.

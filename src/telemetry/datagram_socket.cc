@@ -55,7 +55,8 @@ Result<void> read_option(UdpmUrl& parsed, std::string_view option) {
   const std::string_view name = next(option, '=');
   const std::optional<int> value = parse_whole<int>(option);
   if (name == "ttl") {
-    if (!value || *value < 0 || *value > 255) return invalid("lcm.url", "ttl must be an integer from 0 to 255");
+    if (!value || *value < 0 || *value > 255)
+      return invalid("lcm.url", "ttl must be an integer from 0 to 255");
   } else if (name == "recv_buf_size") {
     if (!value || *value < 1) return invalid("lcm.url", "recv_buf_size must be a positive integer");
     parsed.receive_buffer_bytes = *value;
@@ -77,16 +78,19 @@ Result<UdpmUrl> parse_udpm_url(std::string_view url) {
   if (!host.empty()) {
     const auto group = parse_address(host);
     if (!group || *group >> 28 != 0xe)
-      return invalid("lcm.url", "'" + std::string(host) + "' is no IPv4 multicast address (224.0.0.0 to 239.255.255.255)");
+      return invalid("lcm.url", "'" + std::string(host) +
+                                    "' is no IPv4 multicast address (224.0.0.0 to 239.255.255.255)");
     parsed.group = *group;
   }
   if (!network.empty()) {
     const auto port = parse_whole<std::uint16_t>(network);
-    if (!port || *port == 0) return invalid("lcm.url", "'" + std::string(network) + "' is no port (1 to 65535)");
+    if (!port || *port == 0)
+      return invalid("lcm.url", "'" + std::string(network) + "' is no port (1 to 65535)");
     parsed.port = *port;
   }
   while (!options.empty()) {
-    if (Result<void> read = read_option(parsed, next(options, '&')); !read) return tl::unexpected(std::move(read.error()));
+    if (Result<void> read = read_option(parsed, next(options, '&')); !read)
+      return tl::unexpected(std::move(read.error()));
   }
   return parsed;
 }
@@ -107,9 +111,12 @@ Result<AcceptedSenders> AcceptedSenders::parse(std::string_view list) {
     }
     const std::string whole(entry);
     const std::optional<std::uint32_t> address = parse_address(next(entry, '/'));
-    const std::optional<int> bits = entry.empty() ? (whole.ends_with('/') ? std::nullopt : std::optional(32)) : parse_whole<int>(entry);
+    const std::optional<int> bits =
+        entry.empty() ? (whole.ends_with('/') ? std::nullopt : std::optional(32)) : parse_whole<int>(entry);
     if (!address || !bits || *bits < 0 || *bits > 32)
-      return invalid("lcm.accept_from", "'" + whole + "' is neither an IPv4 address, a network such as 10.1.0.0/16, any nor local");
+      return invalid(
+          "lcm.accept_from",
+          "'" + whole + "' is neither an IPv4 address, a network such as 10.1.0.0/16, any nor local");
     const std::uint32_t mask = *bits == 0 ? 0 : ~std::uint32_t{0} << (32 - *bits);
     accepted.networks_.push_back({*address & mask, mask});
   }
@@ -131,11 +138,14 @@ bool AcceptedSenders::accepts(std::uint32_t address, std::int64_t now_us) {
 }
 
 void AcceptedSenders::read_interfaces() {
-  interfaces_ = {{INADDR_LOOPBACK & 0xff000000, 0xff000000}};
+  // What this host sends over an interface without an address, such as a loopback in a namespace, comes from
+  // 0.0.0.0; Linux takes it from no wire.
+  interfaces_ = {{INADDR_LOOPBACK & 0xff000000, 0xff000000}, {0, 0xffffffff}};
   ifaddrs* all = nullptr;
   if (::getifaddrs(&all) != 0) return;
   for (const ifaddrs* each = all; each != nullptr; each = each->ifa_next) {
-    if (each->ifa_addr == nullptr || each->ifa_addr->sa_family != AF_INET || each->ifa_netmask == nullptr) continue;
+    if (each->ifa_addr == nullptr || each->ifa_addr->sa_family != AF_INET || each->ifa_netmask == nullptr)
+      continue;
     const auto read = [](const sockaddr* from) {
       sockaddr_in address{};
       std::memcpy(&address, from, sizeof address);
@@ -149,7 +159,10 @@ void AcceptedSenders::read_interfaces() {
 
 struct DatagramSocket::State {
   State(AcceptedSenders accepted_senders, DatagramCounters& counted)
-      : accepted(std::move(accepted_senders)), counters(counted), reader(counted), bytes(batch * datagram_bytes) {
+      : accepted(std::move(accepted_senders)),
+        counters(counted),
+        reader(counted),
+        bytes(batch * datagram_bytes) {
     for (std::size_t k = 0; k < batch; ++k) {
       parts[k] = {bytes.data() + k * datagram_bytes, datagram_bytes};
       messages[k].msg_hdr.msg_iov = &parts[k];
@@ -229,7 +242,8 @@ Result<DatagramSocket> DatagramSocket::open(const UdpmUrl& url, const std::strin
     return failed("lcm.url", "cannot bind to the group");
   if (!state->set(IPPROTO_IP, IP_ADD_MEMBERSHIP, membership)) {
     return failed(interface_address.empty() ? "lcm.url" : "lcm.bind_address",
-                  "cannot join the group" + (interface_address.empty() ? " (is there a route to it?)" : " on " + interface_address));
+                  "cannot join the group" + (interface_address.empty() ? " (is there a route to it?)"
+                                                                       : " on " + interface_address));
   }
   return DatagramSocket(std::move(state));
 }
@@ -245,11 +259,13 @@ Result<int> DatagramSocket::receive(int max_datagrams, const Handler& handler) {
       header.msg_control = s.controls[k].data();
       header.msg_controllen = sizeof s.controls[k];
     }
-    const auto wanted = static_cast<unsigned>(std::min<std::size_t>(batch, static_cast<std::size_t>(max_datagrams - handled)));
+    const auto wanted = static_cast<unsigned>(
+        std::min<std::size_t>(batch, static_cast<std::size_t>(max_datagrams - handled)));
     const int count = ::recvmmsg(s.descriptor, s.messages.data(), wanted, MSG_DONTWAIT, nullptr);
     if (count < 0) {
       // What an interface that goes down reports passes with it.
-      for (const int passing : {EAGAIN, EINTR, ENOBUFS, ENOMEM, ENETDOWN, ENETUNREACH, EHOSTUNREACH, ECONNREFUSED})
+      for (const int passing :
+           {EAGAIN, EINTR, ENOBUFS, ENOMEM, ENETDOWN, ENETUNREACH, EHOSTUNREACH, ECONNREFUSED})
         if (errno == passing) return handled;
       return fail(Fault::unavailable, "lcm.url", std::string("cannot receive: ") + std::strerror(errno));
     }
@@ -262,8 +278,10 @@ Result<int> DatagramSocket::receive(int max_datagrams, const Handler& handler) {
         s.counters.add(DatagramFault::foreign_sender);
         continue;
       }
-      const std::span<const std::uint8_t> datagram(s.bytes.data() + k * datagram_bytes, s.messages[k].msg_len);
-      if (const auto message = s.reader.take(sender, datagram, now_us)) handler(sender, *message, recv_utime_us);
+      const std::span<const std::uint8_t> datagram(s.bytes.data() + k * datagram_bytes,
+                                                   s.messages[k].msg_len);
+      if (const auto message = s.reader.take(sender, datagram, now_us))
+        handler(sender, *message, recv_utime_us);
     }
     if (count > 0) s.count_dropped(s.messages[static_cast<std::size_t>(count) - 1].msg_hdr);
     handled += count;

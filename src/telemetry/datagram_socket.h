@@ -18,15 +18,15 @@ struct UdpmUrl {
   int receive_buffer_bytes = 0;  // 0: the system's usual
 };
 
-// "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"; group and port may be left out. ttl is the sender's and only
-// checked here.
+// "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"; group and port may be left out. ttl is the
+// sender's and only checked here.
 [[nodiscard]] Result<UdpmUrl> parse_udpm_url(std::string_view url);
 
 // Which addresses may send to us.
 class AcceptedSenders {
  public:
-  // Networks separated by commas: "10.1.0.0/16", "192.168.1.7", "any", "local" for loopback and the networks of this
-  // host's interfaces, which are looked at again when a sender is not known.
+  // Networks separated by commas: "10.1.0.0/16", "192.168.1.7", "any", "local" for loopback and the networks
+  // of this host's interfaces, which are looked at again when a sender is not known.
   static Result<AcceptedSenders> parse(std::string_view list);
 
   // `now_us` of any clock that does not go back.
@@ -44,15 +44,15 @@ class AcceptedSenders {
   std::int64_t read_us_ = 0;
 };
 
-// Receives the robots' messages of one multicast group. Bound to the group's address, so that unicast and other groups
-// of the port do not come in.
+// Receives the robots' messages of one multicast group. Bound to the group's address, so that unicast and
+// other groups of the port do not come in.
 class DatagramSocket {
  public:
   // The views end with the call.
   using Handler = std::function<void(const Sender&, const ChannelMessage&, std::int64_t recv_utime_us)>;
 
-  // `interface_address`: IPv4 of the interface to listen on; empty: the one that the system routes the group to.
-  // Errors name the setting that is at fault.
+  // `interface_address`: IPv4 of the interface to listen on; empty: the one that the system routes the group
+  // to. Errors name the setting that is at fault.
   static Result<DatagramSocket> open(const UdpmUrl& url, const std::string& interface_address,
                                      AcceptedSenders accepted, DatagramCounters& counters);
   DatagramSocket(DatagramSocket&&) noexcept;

@@ -20,7 +20,8 @@
 namespace joulecast::telemetry {
 namespace {
 
-constexpr int queue_capacity = 100'000;  // messages that liblcm holds unhandled before it drops new ones silently
+constexpr int queue_capacity =
+    100'000;  // messages that liblcm holds unhandled before it drops new ones silently
 
 struct LcmDestroyer {
   void operator()(lcm_t* lcm) const noexcept { lcm_destroy(lcm); }
@@ -42,7 +43,8 @@ struct LcmLink::State {
     State& state = *static_cast<State*>(user);
     if (state.thrown) return;
     try {
-      state.handler({channel, {static_cast<const std::uint8_t*>(buffer->data), buffer->data_size}, buffer->recv_utime});
+      state.handler(
+          {channel, {static_cast<const std::uint8_t*>(buffer->data), buffer->data_size}, buffer->recv_utime});
     } catch (...) {
       state.thrown = std::current_exception();
     }
@@ -53,7 +55,8 @@ struct LcmLink::State {
     if (lcm_handle(lcm.get()) != 0) return fail(Fault::unavailable, "lcm", "the provider ended: " + url);
     if (thrown) std::rethrow_exception(std::exchange(thrown, nullptr));
     waiting.revents = 0;
-    if (::poll(&waiting, 1, 0) < 0 && errno != EINTR) return fail(Fault::unavailable, "lcm", std::strerror(errno));
+    if (::poll(&waiting, 1, 0) < 0 && errno != EINTR)
+      return fail(Fault::unavailable, "lcm", std::strerror(errno));
     return (waiting.revents & POLLIN) != 0;
   }
 
@@ -121,7 +124,9 @@ Result<void> LcmLink::publish(const std::string& channel, std::span<const std::u
 Result<int> LcmLink::poll(std::chrono::milliseconds timeout, int max_messages) {
   State& state = *state_;
   // liblcm would open its own receiver to give a descriptor of UDP; poll() passes over negative ones.
-  const int source = state.socket ? state.socket->descriptor() : state.udpm ? -1 : lcm_get_fileno(state.lcm.get());
+  const int source = state.socket ? state.socket->descriptor()
+                     : state.udpm ? -1
+                                  : lcm_get_fileno(state.lcm.get());
   std::array<pollfd, 2> waiting{pollfd{source, POLLIN, 0}, pollfd{state.wake_fd, POLLIN, 0}};
   const auto wait_ms = std::clamp<std::chrono::milliseconds::rep>(timeout.count(), 0, 1'000'000'000);
   if (::poll(waiting.data(), waiting.size(), static_cast<int>(wait_ms)) < 0) {
@@ -133,9 +138,10 @@ Result<int> LcmLink::poll(std::chrono::milliseconds timeout, int max_messages) {
     [[maybe_unused]] const ssize_t got = ::read(state.wake_fd, &count, sizeof count);
   }
   if (state.socket) {
-    return state.socket->receive(max_messages, [&](const Sender& sender, const ChannelMessage& message, std::int64_t utime_us) {
-      state.handler({message.channel, message.data, utime_us, sender});
-    });
+    return state.socket->receive(
+        max_messages, [&](const Sender& sender, const ChannelMessage& message, std::int64_t utime_us) {
+          state.handler({message.channel, message.data, utime_us, sender});
+        });
   }
   int handled = 0;
   for (bool more = (waiting[0].revents & POLLIN) != 0; more && handled < max_messages; ++handled) {

@@ -13,10 +13,10 @@
 
 namespace joulecast::telemetry {
 
-// The group and port that LCM programs share unless told; ttl=0 keeps what is sent on this machine. The kernel's
-// usual receive buffer holds some 30 ms of 6,000 messages a second, less than a busy machine may keep the
-// receiver waiting, and drops the rest unseen; 4 MiB hold more than a second of them, where net.core.rmem_max
-// allows so much.
+// The group and port that LCM programs share unless told; ttl=0 keeps what is sent on this machine. The
+// kernel's usual receive buffer holds some 30 ms of 6,000 messages a second, less than a busy machine may
+// keep the receiver waiting, and drops the rest unseen; 4 MiB hold more than a second of them, where
+// net.core.rmem_max allows so much.
 inline constexpr std::string_view default_lcm_url = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
 
 struct Received {
@@ -37,10 +37,10 @@ struct ListenOptions {
 // Not thread-safe but for wake() and publish(), which any thread may call.
 //
 // Providers: "udpm://239.255.76.67:7667?ttl=0" (network), "memq://" (this instance alone, for tests),
-// "file:///path/to.log?speed=0" (a log's events as if received; 0 = as fast as they are read), "tcpq://host:port".
-// UDP is received by DatagramSocket, which checks what it is sent; liblcm 1.3.1 writes beyond its buffer when a
-// fragment says so. All else is liblcm's. LCM has no authentication: whoever reaches the segment and is accepted by
-// ListenOptions may publish.
+// "file:///path/to.log?speed=0" (a log's events as if received; 0 = as fast as they are read),
+// "tcpq://host:port". UDP is received by DatagramSocket, which checks what it is sent; liblcm 1.3.1 writes
+// beyond its buffer when a fragment says so. All else is liblcm's. LCM has no authentication: whoever reaches
+// the segment and is accepted by ListenOptions may publish.
 class LcmLink {
  public:
   using Handler = std::function<void(const Received&)>;
@@ -50,15 +50,17 @@ class LcmLink {
   LcmLink& operator=(LcmLink&&) noexcept;
   ~LcmLink();
 
-  // Receives the messages of the channels that robots publish on, until the link goes; once a link. `counters` of the
-  // datagrams that came by UDP, and must outlive the link. Errors name the setting that is at fault.
+  // Receives the messages of the channels that robots publish on, until the link goes; once a link.
+  // `counters` of the datagrams that came by UDP, and must outlive the link. Errors name the setting that is
+  // at fault.
   Result<void> listen(Handler handler, DatagramCounters& counters, const ListenOptions& options = {});
 
   Result<void> publish(const std::string& channel, std::span<const std::uint8_t> data);
 
   // Wait at most `timeout` for messages, then handle all that are waiting, `max_messages` at most. Returns
-  // the number handled (of UDP that of datagrams); 0 after a timeout or wake(). An exception of a handler leaves through here, after LCM
-  // has returned. Fault::unavailable when the provider ended: the end of a file, or a broken socket.
+  // the number handled (of UDP that of datagrams); 0 after a timeout or wake(). An exception of a handler
+  // leaves through here, after LCM has returned. Fault::unavailable when the provider ended: the end of a
+  // file, or a broken socket.
   Result<int> poll(std::chrono::milliseconds timeout, int max_messages = 1'000);
 
   // Make a poll that waits (or the next one) return at once.

@@ -3,12 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <functional>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "telemetry/datagram_socket.h"
+#include "tests/fuzz/datagram_script.h"
 
 namespace joulecast::telemetry {
 namespace {
@@ -19,11 +22,13 @@ constexpr Sender robot{0x0a000005, 40'000}, other{0x0a000006, 40'000};
 constexpr char channel[] = "ROBOT_TELEMETRY.amr-07";
 
 void append(Bytes& bytes, std::uint64_t value, int size) {
-  for (int shift = 8 * (size - 1); shift >= 0; shift -= 8) bytes.push_back(static_cast<std::uint8_t>(value >> shift));
+  for (int shift = 8 * (size - 1); shift >= 0; shift -= 8)
+    bytes.push_back(static_cast<std::uint8_t>(value >> shift));
 }
 
 Bytes short_message(const std::string& name, const Bytes& data) {
-  Bytes bytes{'L', 'C', '0', '2', 0, 0, 0, 1};
+  Bytes bytes;
+  append(bytes, 0x4c433032'00000001, 8);  // "LC02"
   bytes.insert(bytes.end(), name.begin(), name.end());
   bytes.push_back(0);
   bytes.insert(bytes.end(), data.begin(), data.end());
@@ -61,10 +66,11 @@ std::vector<Bytes> fragments_of(const Bytes& message, std::size_t piece, std::ui
   std::vector<Bytes> all;
   for (std::size_t k = 0; k < count; ++k) {
     const std::size_t from = k * piece, to = std::min(message.size(), from + piece);
-    all.push_back(fragment({sequence, static_cast<std::uint32_t>(message.size()), static_cast<std::uint32_t>(from),
-                            static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(count)},
-                           Bytes(message.begin() + static_cast<std::ptrdiff_t>(from),
-                                 message.begin() + static_cast<std::ptrdiff_t>(to))));
+    all.push_back(
+        fragment({sequence, static_cast<std::uint32_t>(message.size()), static_cast<std::uint32_t>(from),
+                  static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(count)},
+                 Bytes(message.begin() + static_cast<std::ptrdiff_t>(from),
+                       message.begin() + static_cast<std::ptrdiff_t>(to))));
   }
   return all;
 }
@@ -98,7 +104,8 @@ TEST_F(DatagramTest, RefusesWhatIsNoMessageOfARobot) {
   EXPECT_FALSE(take(short_message(std::string(64, 'x'), {1})));
   EXPECT_FALSE(take({'L', 'C', '0', '4', 0, 0, 0, 1, 'c', 0}));
   EXPECT_EQ(count(DatagramFault::malformed), whole.size() + 3);
-  for (const char* name : {"POSE", "ENERGY_STATE.amr-07", "ROBOT_TELEMETRY.", "ROBOT_TELEMETRY.a/b", "ROBOT_TELEMETRYxa"})
+  for (const char* name :
+       {"POSE", "ENERGY_STATE.amr-07", "ROBOT_TELEMETRY.", "ROBOT_TELEMETRY.a/b", "ROBOT_TELEMETRYxa"})
     EXPECT_FALSE(take(short_message(name, {1})));
   EXPECT_EQ(count(DatagramFault::other_channel), 5u);
 }
@@ -107,7 +114,8 @@ TEST_F(DatagramTest, PutsFragmentsOfAnySizeAndOrderTogether) {
   std::mt19937 random(1);
   std::uint32_t sequence = 0;
   for (const std::size_t size : {1u, 2u, 1399u, 1400u, 1401u, 9000u, 65'535u, 65'536u}) {
-    for (const std::size_t piece : {size, std::max<std::size_t>(1, size / 2), std::max<std::size_t>(257, size / 200)}) {
+    for (const std::size_t piece :
+         {size, std::max<std::size_t>(1, size / 2), std::max<std::size_t>(257, size / 200)}) {
       const Bytes message = numbered(size);
       std::vector<Bytes> all = fragments_of(message, piece, ++sequence);
       std::ranges::shuffle(all, random);
@@ -123,7 +131,8 @@ TEST_F(DatagramTest, RefusesImpossibleHeaders) {
   const Bytes data = numbered(100);
   std::uint64_t refused = 0;
   // Sizes, offsets and numbers at every limit; what is possible is a whole message or the beginning of one.
-  const std::uint32_t extremes[] = {0, 1, 99, 100, 101, 200, 65'535, 65'536, 65'537, 0x7fffffff, 0x80000000, 0xffffff9b, 0xffffffff};
+  const std::uint32_t extremes[] = {0,      1,      99,         100,        101,        200,       65'535,
+                                    65'536, 65'537, 0x7fffffff, 0x80000000, 0xffffff9b, 0xffffffff};
   const std::uint16_t counts[] = {0, 1, 2, 255, 256, 257, 0xffff};
   std::uint32_t sequence = 0;
   for (const std::uint32_t size : extremes) {
@@ -188,7 +197,8 @@ TEST_F(DatagramTest, DuplicatesDoNoHarm) {
 
 TEST_F(DatagramTest, SendersAndMessagesDoNotMix) {
   const Bytes a = numbered(3000), b(3000, 9);
-  const auto from_a = fragments_of(a, 1000, 7), from_b = fragments_of(b, 1000, 7), next = fragments_of(b, 1000, 8);
+  const auto from_a = fragments_of(a, 1000, 7), from_b = fragments_of(b, 1000, 7),
+             next = fragments_of(b, 1000, 8);
   EXPECT_FALSE(take(from_a[0]));
   EXPECT_FALSE(take(from_b[0], other));
   EXPECT_FALSE(take(next[0]));
@@ -216,9 +226,22 @@ TEST_F(DatagramTest, MemoryIsBoundedAndWaitingEnds) {
   // A robot that sends its fragments at once is not kept from it by such a flood.
   const auto own = fragments_of(numbered(3000), 1400);
   EXPECT_FALSE(take(own[0], robot, 2'000'000));
-  for (std::uint16_t k = 0; k < 60; ++k) take(fragment({k, 65'536, 0, 0, 2}, numbered(100)), {0x0a000007, k}, 2'000'000);
+  for (std::uint16_t k = 0; k < 60; ++k)
+    take(fragment({k, 65'536, 0, 0, 2}, numbered(100)), {0x0a000007, k}, 2'000'000);
   EXPECT_FALSE(take(own[1], robot, 2'000'000));
   EXPECT_TRUE(take(own[2], robot, 2'000'000));
+}
+
+TEST(DatagramScripts, SeedsOfTheFuzzTargetHold) {
+  std::size_t count = 0;
+  for (const auto& seed :
+       std::filesystem::directory_iterator(JOULECAST_SOURCE_DIR "/tests/fuzz/seeds/datagram")) {
+    std::ifstream file(seed.path(), std::ios::binary);
+    const Bytes bytes{std::istreambuf_iterator<char>(file), {}};
+    testing::run_datagram_script(bytes);
+    ++count;
+  }
+  EXPECT_GE(count, 10u);
 }
 
 TEST(UdpmUrl, IsReadWholeOrRefused) {
@@ -229,9 +252,9 @@ TEST(UdpmUrl, IsReadWholeOrRefused) {
   EXPECT_EQ(full.group, 0xef010203u);
   EXPECT_EQ(full.port, 7701);
   EXPECT_EQ(full.receive_buffer_bytes, 1000);
-  for (const char* bad : {"udp://", "udpm://10.0.0.1", "udpm://host:7667", "udpm://239.1.2.3:0", "udpm://239.1.2.3:70000",
-                          "udpm://239.1.2.3:7667?ttl=-1", "udpm://239.1.2.3:7667?ttl=x", "udpm://?recv_buf_size=0",
-                          "udpm://?speed=1"}) {
+  for (const char* bad : {"udp://", "udpm://10.0.0.1", "udpm://host:7667", "udpm://239.1.2.3:0",
+                          "udpm://239.1.2.3:70000", "udpm://239.1.2.3:7667?ttl=-1",
+                          "udpm://239.1.2.3:7667?ttl=x", "udpm://?recv_buf_size=0", "udpm://?speed=1"}) {
     const auto read = parse_udpm_url(bad);
     ASSERT_FALSE(read) << bad;
     EXPECT_EQ(read.error().field, "lcm.url");
@@ -248,8 +271,10 @@ TEST(AcceptedSenders, AreThoseOfTheList) {
   EXPECT_TRUE(AcceptedSenders::parse("any").value().accepts(0x01020304, 0));
   auto local = AcceptedSenders::parse("local").value();
   EXPECT_TRUE(local.accepts(0x7f000001, 0));
+  EXPECT_TRUE(local.accepts(0, 0));
   EXPECT_FALSE(local.accepts(0xcb007107, 0));  // 203.0.113.7, of a network for documents
-  for (const char* bad : {"", " ", "10.1.0.0/33", "10.1.0.0/", "10.1.0", "hosts", "10.1.0.0/16;10.2.0.0/16", "::1"}) {
+  for (const char* bad :
+       {"", " ", "10.1.0.0/33", "10.1.0.0/", "10.1.0", "hosts", "10.1.0.0/16;10.2.0.0/16", "::1"}) {
     const auto parsed = AcceptedSenders::parse(bad);
     ASSERT_FALSE(parsed) << bad;
     EXPECT_EQ(parsed.error().field, "lcm.accept_from");

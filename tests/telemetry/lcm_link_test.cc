@@ -35,7 +35,8 @@ TEST(LcmLink, CarriesBytesOfRobotsChannelsOnly) {
   };
   ASSERT_TRUE(link.listen(handler, counters));
   EXPECT_EQ(link.listen(handler, counters).error().fault, Fault::conflict);
-  for (const char* other : {"XROBOT_TELEMETRY.a", "ROBOT_TELEMETRY_a", "ROBOT_TELEMETRYxa", "ENERGY_STATE.a", "POSE"})
+  for (const char* other :
+       {"XROBOT_TELEMETRY.a", "ROBOT_TELEMETRY_a", "ROBOT_TELEMETRYxa", "ENERGY_STATE.a", "POSE"})
     ASSERT_TRUE(link.publish(other, Bytes{3}));
   for (const char* ours : {"ROBOT_TELEMETRY.a", "MISSION_EVENT.b-1", "ROBOT_COVARIATES.c"})
     ASSERT_TRUE(link.publish(ours, Bytes{1, 2}));
@@ -133,7 +134,8 @@ TEST(LcmLink, ReceivesItsOwnDatagramsWithTheirSender) {
   }
   EXPECT_EQ(data, fragmented);
   EXPECT_EQ(counted.received, 3u);
-  EXPECT_FALSE(LcmLink::open("udpm://239.255.76.67:7799?ttl=0")->listen([](const Received&) {}, counted, {"203.0.113.9", "any"}));
+  EXPECT_FALSE(LcmLink::open("udpm://239.255.76.67:7799?ttl=0")
+                   ->listen([](const Received&) {}, counted, {"203.0.113.9", "any"}));
 }
 
 // The longest robot id still fits LCM's channel names, over the provider that is strictest about them.
