@@ -228,7 +228,7 @@ class Builder {
   Result<void> room(double knots) {
     if (static_cast<double>(knots_) + knots > static_cast<double>(most_knots)) {
       return fail(Fault::too_large, "",
-                  "the path needs more than 2000000 knots; give a coarser resolution_m");
+                  "the path needs more than 2000000 knots; ask for it in parts");
     }
     knots_ += static_cast<std::size_t>(knots);
     return {};

@@ -182,28 +182,36 @@ TEST(Estimate, UsualDrivingIsWhatTheForecastSays) {
 
 // What the I/O thread may answer is decided before any path is made: a way of many knots is declined at once.
 TEST(Profile, OnlyShortStretchesAreBrief) {
-  const auto brief = [](const json& path) {
-    const auto input = read_profile({{"path", path}}, model().robot);
+  const auto brief = [](std::initializer_list<json> path) {
+    const auto input = read_profile({{"path", json(json::array_t(path))}}, model().robot);
     EXPECT_TRUE(input) << describe(input.error());
-    return is_brief(input->drive.path);
+    return input && is_brief(input->drive.path);
   };
-  const json straight = {{"kind", "straight"}, {"length_m", 5000}};
+  const json straight = {{"kind", "straight"}, {"length_m", 5000}},
+             dwell = {{"kind", "dwell"}, {"duration_s", 3}}, turn = {{"kind", "turn"}, {"angle_rad", 3}};
+  const auto arc = [](double radius_m) {
+    return json{{"kind", "arc"}, {"radius_m", radius_m}, {"angle_rad", -1}};
+  };
   EXPECT_TRUE(brief({straight}));
-  EXPECT_TRUE(brief({{{"kind", "dwell"}, {"duration_s", 3}}, {{"kind", "turn"}, {"angle_rad", 3}}}));
-  EXPECT_TRUE(brief({{{"kind", "arc"}, {"radius_m", 2}, {"angle_rad", -3}}}));
+  EXPECT_TRUE(brief({dwell, turn}));
+  EXPECT_TRUE(brief({arc(2)}));
   EXPECT_FALSE(brief({straight, straight}));
-  EXPECT_FALSE(brief({{{"kind", "dwell"}, {"duration_s", 3}}}));
-  EXPECT_FALSE(brief({{{"kind", "arc"}, {"radius_m", 1e5}, {"angle_rad", 1}}}));
+  EXPECT_FALSE(brief({dwell}));
+  EXPECT_FALSE(brief({arc(1e5)}));
   EXPECT_FALSE(
       brief({{{"kind", "clothoid"}, {"length_m", 1}, {"start_curvature_1_m", 0}, {"end_curvature_1_m", 1}}}));
 }
 
 // Brief or not, the answer is the same.
 TEST(Profile, AnswersAtOnceWhatItWouldAnswer) {
-  const ModelInForce with = model();
+  robot::RobotModel slow = testing::nomad();  // at its cheapest below its limits
+  slow.idle_power_w /= 10;
+  slow.limits.speed_m_s *= 2;
+  slow.limits.acceleration_m_s2 *= 2;
+  const ModelInForce with = **model_in_force(slow, 1);
   int answered = 0;
   for (const double length_m : {0.5, 3.0, 40.0}) {
-    const json request = {{"path", {{{"kind", "straight"}, {"length_m", length_m}}}}, {"deadline_s", 200}};
+    const json request = {{"path", {{{"kind", "straight"}, {"length_m", length_m}}}}};
     const auto input = read_profile(request, with.robot);
     const auto at_once = profile_at_once(*input, with);
     if (!at_once) continue;
