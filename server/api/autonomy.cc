@@ -45,8 +45,9 @@ void write_stage(JsonWriter& json, const forecast::TaskOutlook& stage) {
 void write_outlook(JsonWriter& json, const forecast::Outlook& outlook, const AutonomyRequest& request) {
   json.begin_object();
   json.field("success_probability", outlook.probability);
-  json.field("expected_energy_j", outlook.mean_j).field("duration_s", outlook.duration_s);
+  json.field("expected_energy_j", outlook.mean_j).field("duration_s", outlook.duration_s[1]);
   write_quantiles(json, "energy_j", outlook.energy_j);
+  write_quantiles(json, "duration_quantiles_s", outlook.duration_s);
   json.key("legs").begin_array();
   for (std::size_t k = 0; k < outlook.tasks.size(); ++k) {
     json.begin_object().field("name", request.tasks[k].name);
@@ -97,9 +98,9 @@ void write_minimum_energy(JsonWriter& json, const Autonomy& a) {
   const forecast::Outlook &best = *a.minimum_energy_outlook, &usual = *a.outlook;
   json.begin_object();
   json.field("success_probability", best.probability);
-  json.field("expected_energy_j", best.mean_j).field("duration_s", best.duration_s);
+  json.field("expected_energy_j", best.mean_j).field("duration_s", best.duration_s[1]);
   json.field("saved_j", usual.mean_j - best.mean_j);
-  json.field("saved_s", usual.duration_s - best.duration_s);
+  json.field("saved_s", usual.duration_s[1] - best.duration_s[1]);
   const auto last = [](const forecast::Outlook& o) {
     if (o.charger) return o.charger->charge;
     return o.tasks.empty() ? std::array<double, 3>{std::nan(""), std::nan(""), std::nan("")}
@@ -114,24 +115,24 @@ struct Pricing {
   std::vector<PricedLeg> from_here;
 };
 
-Pricing at_pace(const AutonomyRequest& request, const forecast::LegPricer& pricer,
-                const forecast::Pace& habit) {
+Pricing as_usual(const AutonomyRequest& request, const forecast::LegPricer& pricer,
+                 const forecast::Forecaster& forecaster) {
+  const auto price = [&](const std::vector<forecast::PlannedLeg>& legs, const StatedPace& pace) {
+    return forecast::price(forecaster, pricer, legs, pace, request.halts_stated);
+  };
   Pricing priced;
   priced.tasks.reserve(request.tasks.size());
-  for (const TaskRequest& task : request.tasks) {
-    const forecast::Pace pace = task.pace.over(habit);
-    priced.tasks.push_back({forecast::price(pricer, task.legs, pace),
-                            forecast::price(pricer, task.to_charger, request.pace.over(habit))});
-  }
-  priced.from_here = forecast::price(pricer, request.from_here, request.pace.over(habit));
+  for (const TaskRequest& task : request.tasks)
+    priced.tasks.push_back({price(task.legs, task.pace), price(task.to_charger, request.pace)});
+  priced.from_here = price(request.from_here, request.pace);
   return priced;
 }
 
-Result<Pricing> at_least_energy(const AutonomyRequest& request, LeastEnergy& least, double pause_s) {
+Result<Pricing> at_least_energy(const AutonomyRequest& request, LeastEnergy& least) {
   Pricing priced;
   const auto add = [&](const std::vector<forecast::PlannedLeg>& legs,
                        std::vector<PricedLeg>& into) -> Result<void> {
-    auto one = least.price(legs, pause_s);
+    auto one = least.price(legs, !request.halts_stated);
     if (!one) return tl::unexpected(one.error());
     into = std::move(*one);
     return {};
@@ -143,6 +144,18 @@ Result<Pricing> at_least_energy(const AutonomyRequest& request, LeastEnergy& lea
   }
   if (auto done = add(request.from_here, priced.from_here); !done) return tl::unexpected(done.error());
   return priced;
+}
+
+// Whether the request says how fast every leg is driven.
+bool paces_stated(const AutonomyRequest& request) {
+  const auto stated = [](const std::vector<forecast::PlannedLeg>& legs, const StatedPace& pace) {
+    return std::ranges::all_of(legs, [&](const auto& leg) { return pace.cruise(leg.motion); });
+  };
+  if (request.tasks.empty() && request.from_here.empty()) return request.pace.cruise(Motion::drive);
+  return stated(request.from_here, request.pace) &&
+         std::ranges::all_of(request.tasks, [&](const TaskRequest& task) {
+           return stated(task.legs, task.pace) && stated(task.to_charger, request.pace);
+         });
 }
 
 }  // namespace
@@ -197,53 +210,57 @@ Result<Autonomy> autonomy_of(const AutonomyRequest& request, const server::Robot
     if (request.tasks[k].greatest_payload_kg > limit)
       return too_heavy(fmt::format("/tasks/{}/payload_kg", k), request.tasks[k].greatest_payload_kg);
 
-  const bool all_stated =
-      request.pace.whole() ||
-      (!request.tasks.empty() && request.from_here.empty() &&
-       std::ranges::all_of(request.tasks, [](const TaskRequest& task) { return task.pace.whole(); }));
   out.minimum_energy = request.minimum_energy;
-  out.driving = request.minimum_energy || all_stated ? Driving::stated : Driving::usual;
-  out.pace = request.pace.over(forecaster.usual);
+  out.driving = request.minimum_energy || paces_stated(request) ? Driving::stated : Driving::usual;
+  out.pace = forecaster.habit.with(request.pace).middle;
+  if (request.halts_stated) out.pace.pause_s = 0;
 
   const forecast::LegPricer pricer(model.robot, model.drive);
+  out.limitation = forecast::limitation(pricer, model.robot, out.pace, out.payload_kg);
+  for (const TaskRequest& task : request.tasks) {
+    if (out.limitation) break;
+    out.limitation = forecast::limitation(pricer, model.robot, forecaster.habit.with(task.pace).middle,
+                                          task.greatest_payload_kg);
+  }
+  const bool moves = !out.limitation || out.limitation->moves;
+  const bool with_plan = moves && (!request.tasks.empty() || !request.from_here.empty());
   std::optional<LeastEnergy> least;
-  const bool with_plan = !request.tasks.empty() || !request.from_here.empty();
   if (request.minimum_energy || (request.compare_minimum_energy && with_plan)) {
     auto made = LeastEnergy::make(model, tables, request.value_of_time_w);
     if (!made) return tl::unexpected(made.error());
     least.emplace(std::move(*made));
   }
 
+  std::vector<PricedLeg> typical;
   if (request.minimum_energy) {
-    const auto priced = least->price(forecast::typical_legs(forecaster, out.payload_kg), out.pace.pause_s);
+    auto priced = least->price(forecast::typical_legs(forecaster, out.payload_kg), forecaster.typical.empty());
     if (!priced) return tl::unexpected(priced.error());
-    out.reach = forecast::reach(forecaster, Driving::stated, *robot.battery, out.charge,
-                                forecast::sum_of(forecaster, Driving::stated, *priced));
+    typical = std::move(*priced);
   } else {
-    const auto priced = forecast::price_typical(forecaster, pricer, out.pace, out.payload_kg);
-    out.reach = forecast::reach(forecaster, out.driving, *robot.battery, out.charge,
-                                forecast::sum_of(forecaster, out.driving, priced));
+    typical = forecast::price_typical(forecaster, pricer, request.pace, out.payload_kg);
   }
+  out.reach = forecast::reach(forecaster, *robot.battery, out.charge, forecast::sum_of(forecaster, typical));
   if (!with_plan) return out;
 
   std::optional<Pricing> best;
   if (least) {
-    auto priced = at_least_energy(request, *least, out.pace.pause_s);
+    auto priced = at_least_energy(request, *least);
     if (priced)
       best = std::move(*priced);
     else if (request.minimum_energy)
       return tl::unexpected(priced.error());
   }
-  const auto look = [&](const Pricing& priced, Driving driving) {
-    return forecast::look_ahead(forecaster, driving, *robot.battery, out.charge, priced.tasks,
-                                priced.from_here, pricer.standing_w(), request.confidence);
+  const auto look = [&](const Pricing& priced) {
+    return forecast::look_ahead(forecaster, *robot.battery, out.charge, priced.tasks, priced.from_here,
+                                pricer.standing_w(), request.confidence);
   };
   if (request.minimum_energy) {
-    out.outlook = look(*best, Driving::stated);
+    out.outlook = look(*best);
     return out;
   }
-  out.outlook = look(at_pace(request, pricer, forecaster.usual), out.driving);
-  if (best) out.minimum_energy_outlook = look(*best, Driving::stated);
+  const Pricing usual = as_usual(request, pricer, forecaster);
+  out.outlook = look(usual);
+  if (best) out.minimum_energy_outlook = look(*best);
   return out;
 }
 
@@ -254,6 +271,7 @@ std::string autonomy_json(const Autonomy& a, const AutonomyRequest& request,
         request.dialect, battery_status(robot.model->robot.battery, *robot.battery, a.charge, a.reach, live));
   }
   const forecast::Forecaster& forecaster = *robot.forecaster;
+  const forecast::Pace& pace = a.limitation && !a.minimum_energy ? a.limitation->reached : a.pace;
   JsonWriter json;
   json.begin_object();
   json.field("robot_id", robot.model->robot.robot_id).field("model_version", robot.model->version);
@@ -264,15 +282,19 @@ std::string autonomy_json(const Autonomy& a, const AutonomyRequest& request,
   json.field("payload_kg", a.payload_kg);
   json.key("driving").begin_object();
   json.field("kind", a.minimum_energy ? "minimum_energy" : a.driving == Driving::stated ? "stated" : "usual");
-  json.field("speed_m_s", a.pace.speed_m_s).field("acceleration_m_s2", a.pace.acceleration_m_s2);
-  json.field("yaw_rate_rad_s", a.pace.yaw_rate_rad_s).field("pause_s", a.pace.pause_s).end_object();
+  json.field("speed_m_s", pace.speed_m_s).field("acceleration_m_s2", pace.acceleration_m_s2);
+  json.field("yaw_rate_rad_s", pace.yaw_rate_rad_s).field("pause_s", pace.pause_s);
+  json.key("limitation");
+  a.limitation ? json.value(a.limitation->sentence) : json.null();
+  json.end_object();
   json.key("consumption").begin_object();
   json.field("basis", forecaster.missions > 0   ? "recent_missions"
                       : forecaster.siblings > 0 ? "siblings"
                                                 : "model");
   json.field("missions", forecaster.missions).field("siblings", forecaster.siblings);
   json.field("energy_per_m_j", a.reach.energy_per_m_j).field("mean_power_w", a.reach.mean_power_w);
-  const forecast::Forecaster::Track& track = forecaster.track(a.driving);
+  const forecast::Forecaster::Track& track = forecaster.track(
+      a.driving == Driving::stated ? forecast::Subject::stated_energy : forecast::Subject::usual_energy);
   json.field("common_deviation", track.inflation * track.common);
   json.field("leg_deviation", track.inflation * track.scatter[static_cast<std::size_t>(Motion::drive)]);
   json.end_object();

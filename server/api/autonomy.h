@@ -5,6 +5,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "forecast/limitation.h"
 #include "forecast/outlook.h"
 #include "planning/cost_table_cache.h"
 #include "server/api/autonomy_request.h"
@@ -21,6 +22,7 @@ struct Autonomy {
   forecast::Driving driving = forecast::Driving::usual;
   bool minimum_energy = false;
   forecast::Pace pace;
+  std::optional<forecast::Limitation> limitation;  // the motors do not reach the pace
   forecast::Reach reach;
   std::optional<forecast::Outlook> outlook;                 // with a task list or a charger
   std::optional<forecast::Outlook> minimum_energy_outlook;  // the same, driven as the planner would

@@ -99,14 +99,6 @@ std::vector<PlannedLeg> read_legs(Fields& fields, planning::Pose& pose, double& 
 
 }  // namespace
 
-forecast::Pace StatedPace::over(forecast::Pace habit) const {
-  habit.speed_m_s = speed_m_s.value_or(habit.speed_m_s);
-  habit.acceleration_m_s2 = acceleration_m_s2.value_or(habit.acceleration_m_s2);
-  habit.yaw_rate_rad_s = yaw_rate_rad_s.value_or(habit.yaw_rate_rad_s);
-  habit.yaw_acceleration_rad_s2 = yaw_acceleration_rad_s2.value_or(habit.yaw_acceleration_rad_s2);
-  return habit;
-}
-
 AutonomyRequest read_autonomy(Fields& fields, const Whereabouts& now, bool single) {
   AutonomyRequest request;
   request.state_of_charge = fields.optional_number("state_of_charge", fraction);
@@ -156,6 +148,9 @@ AutonomyRequest read_autonomy(Fields& fields, const Whereabouts& now, bool singl
     if (const auto carried = own.optional_number("payload_kg", payload)) payload_kg = *carried;
     task.pace = merged(read_pace(own), request.pace);
     task.legs = read_legs(own, pose, payload_kg);
+    request.halts_stated =
+        request.halts_stated || own.has("dwell_s") ||
+        std::ranges::any_of(task.legs, [](const PlannedLeg& leg) { return leg.motion == Motion::stand; });
     for (const PlannedLeg& leg : task.legs)
       task.greatest_payload_kg = std::max(task.greatest_payload_kg, leg.payload_kg);
     const std::optional<double> distance_m = own.optional_number("to_charger_m", way);

@@ -12,13 +12,7 @@
 
 namespace joulecast::api {
 
-// Part of a pace; what is absent is the robot's habit.
-struct StatedPace {
-  std::optional<double> speed_m_s, acceleration_m_s2, yaw_rate_rad_s, yaw_acceleration_rad_s2;
-
-  forecast::Pace over(forecast::Pace habit) const;
-  bool whole() const { return speed_m_s.has_value(); }
-};
+using forecast::StatedPace;
 
 struct TaskRequest {
   std::string name;
@@ -43,6 +37,7 @@ struct AutonomyRequest {
   StatedPace pace;
   double confidence = 0.95;
   std::vector<TaskRequest> tasks;
+  bool halts_stated = false;  // a task dwells, or says that it does not: no others are foreseen
   std::vector<forecast::PlannedLeg> from_here;  // to the charger
   Dialect dialect = Dialect::joulecast;
 };

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -21,6 +22,11 @@ struct Leg {
   double curvature_1_m = 0;  // net heading change over the way, >= 0; 0 unless driving
   double payload_kg = 0;
   double battery_j = 0;  // measured at the terminals; NaN where a part of it was not measured
+};
+
+struct PastMission {
+  std::int64_t start_utime_us = 0;
+  std::vector<Leg> legs;
 };
 
 // Slower than this, of body and wheel rims, a robot stands: 1 % of its speed limit.

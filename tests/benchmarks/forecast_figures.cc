@@ -132,7 +132,7 @@ int run(int each, int missions, std::uint64_t seed) {
   virtual_robot::Rng rng(seed);
   for (int r = 0; r < each; ++r) {
     for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
-      const VirtualRobotRun robot = run_virtual_robot(kinds[kind], missions, seed++);
+      const RobotRun robot = run_virtual_robot(kinds[kind], missions, seed++);
       const ChargeMap battery{battery::Circuit(robot.robot.battery)};
       RobotForecast forecast(robot.robot, robot.drive);
       std::array<Siblings, driving_count> siblings;
@@ -144,7 +144,7 @@ int run(int each, int missions, std::uint64_t seed) {
       forecast.set_siblings(std::move(siblings));
       double own_measured = 0, own_raw = 0;
       for (std::size_t k = 0; k < robot.missions.size(); ++k) {
-        const VirtualMission& mission = robot.missions[k];
+        const DrivenMission& mission = robot.missions[k];
         const auto f = forecast.forecaster();
         Row row;
         row.measured_j = mission.true_j;

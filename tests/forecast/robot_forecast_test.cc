@@ -177,10 +177,10 @@ TEST(VirtualRobots, AreForecastWithHonestIntervals) {
   int inside = 0, missions = 0;
   std::vector<double> errors;
   for (const auto& [kind, seed] : {std::pair{"amr", 501u}, {"nomad", 502u}, {"tug", 503u}}) {
-    const VirtualRobotRun run = run_virtual_robot(kind, 40, seed);
+    const RobotRun run = run_virtual_robot(kind, 40, seed);
     RobotForecast forecast(run.robot, run.drive);
     for (std::size_t k = 0; k < run.missions.size(); ++k) {
-      const VirtualMission& mission = run.missions[k];
+      const DrivenMission& mission = run.missions[k];
       const auto f = forecast.forecaster();
       if (k >= 15) {
         PlanSum sum;
