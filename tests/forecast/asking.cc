@@ -103,13 +103,13 @@ void judge(const RobotRun& run, std::size_t learnt, Asked asked, Coverage& cover
   }
 }
 
-std::array<std::size_t, 2> expected_hits(std::size_t count) {
+std::array<std::size_t, 2> expected_hits(std::size_t count, double share) {
   double term = std::pow(0.1, static_cast<double>(count)), below = 0;
   std::array<std::size_t, 2> hits{count, count};
   for (std::size_t k = 0; k <= count; ++k) {
     below += term;
-    if (below > 0.025 && hits[0] == count) hits[0] = k;
-    if (below >= 0.975) {
+    if (below > 0.5 * (1 - share) && hits[0] == count) hits[0] = k;
+    if (below >= 0.5 * (1 + share)) {
       hits[1] = k;
       break;
     }

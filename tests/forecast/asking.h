@@ -49,7 +49,7 @@ struct Coverage {
 // Learns the first missions of a robot, then asks for all others and counts them in.
 void judge(const RobotRun& run, std::size_t learnt, Asked asked, Coverage& coverage);
 
-// The numbers of hits that hold 95 % of a binomial with 0.9.
-std::array<std::size_t, 2> expected_hits(std::size_t count);
+// The least and most hits of so many 90 % intervals, of which at most (1 - share)/2 lie beyond either.
+std::array<std::size_t, 2> expected_hits(std::size_t count, double share);
 
 }  // namespace joulecast::forecast
