@@ -29,8 +29,8 @@ struct Pace {
 };
 
 Pace draw_pace(const RobotParameters& robot, const ScriptOptions& options, Rng& rng) {
-  return {robot.speed_limit_m_s * rng.uniform(options.slowest_fraction, 0.9),
-          robot.acceleration_limit_m_s2 * rng.uniform(0.35, 0.95)};
+  return {robot.speed_limit_m_s * rng.uniform(options.slowest_fraction, options.fastest_fraction),
+          robot.acceleration_limit_m_s2 * rng.uniform(options.gentlest_fraction, options.hardest_fraction)};
 }
 
 }  // namespace
@@ -125,7 +125,7 @@ MissionScript plan_mission(const RobotParameters& robot, const ScriptOptions& op
   while (duration_s < options.duration_s) {
     if (!rng.chance(options.arc_share) || !try_arc()) go_somewhere();
     if (rng.chance(options.dwell_share)) {
-      const double halt_s = rng.uniform(1.0, 4.0);
+      const double halt_s = rng.uniform(options.shortest_halt_s, options.longest_halt_s);
       script.legs.emplace_back(Dwell{halt_s});
       duration_s += halt_s;
       if (rng.chance(options.pickup_share)) {

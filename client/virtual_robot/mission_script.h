@@ -44,9 +44,14 @@ struct ScriptOptions {
   double map_half_width_m = 8;    // the walls stand at +- this in x and y
   double clearance_m = 1.2;       // that planned points keep from the walls
   double duration_s = 110;        // of a mission, about; legs are added until it is reached
-  double slowest_fraction = 0.3;  // of the speed limit
+  double slowest_fraction = 0.3;  // of the speed limit, cruise
+  double fastest_fraction = 0.9;
+  double gentlest_fraction = 0.35;  // of the acceleration limit
+  double hardest_fraction = 0.95;
   double arc_share = 0.2;         // of the legs
   double dwell_share = 0.25;      // of the legs are followed by a halt
+  double shortest_halt_s = 1;
+  double longest_halt_s = 4;
   double pickup_share = 0;        // of the halts change the payload
   double undeclared_share = 0;    // of the missions carry more than they declare ...
   double undeclared_most = 0.6;   // ... by a quarter of this to all of it, of the payload limit

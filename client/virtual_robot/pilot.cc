@@ -8,7 +8,6 @@
 namespace joulecast::virtual_robot {
 namespace {
 
-constexpr double settle_s = 0.4;  // at rest between legs
 constexpr double steer_gain_1_s = 1.2;
 constexpr double steer_limit_rad_s = 0.25;
 constexpr double steer_until_m = 0.6;  // nearer than this the bearing swings too fast to follow
@@ -65,7 +64,7 @@ void Pilot::begin_leg(double x_m, double y_m, double heading_rad) {
   time_s_ = 0;
   begun_ = true;
   profile_ = {};
-  const double settled = settle_s;
+  const double settled = settle_s_;
   duration_s_ = std::visit(
       Overloaded{[&](const GoTo& leg) {
                    profile_ = {std::hypot(leg.x_m - x_m, leg.y_m - y_m), leg.speed_m_s, leg.acceleration_m_s2,

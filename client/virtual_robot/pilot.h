@@ -28,8 +28,9 @@ class Trapezoid {
 // so errors of wheels and track do not grow over a mission.
 class Pilot {
  public:
-  explicit Pilot(const RobotParameters& robot, bool smooth_ramps = false)
-      : robot_(robot), smooth_ramps_(smooth_ramps) {}
+  // `settle_s`: at rest between legs.
+  Pilot(const RobotParameters& robot, bool smooth_ramps, double settle_s)
+      : robot_(robot), smooth_ramps_(smooth_ramps), settle_s_(settle_s) {}
 
   void begin(MissionScript script);
   bool done() const { return leg_ >= script_.legs.size(); }
@@ -44,6 +45,7 @@ class Pilot {
 
   RobotParameters robot_;
   bool smooth_ramps_;
+  double settle_s_;
   MissionScript script_;
   std::size_t leg_ = 0;
   bool begun_ = false;

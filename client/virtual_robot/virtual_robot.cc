@@ -40,7 +40,7 @@ VirtualRobot::VirtualRobot(const SimulationSpec& spec, std::uint64_t seed)
       plant_(spec.robot, spec.imperfections, spec.world),
       pack_(spec.robot, spec.imperfections.battery_resistance, spec.initial_charge),
       controller_(spec.robot, spec.controller),
-      pilot_(spec.robot, spec.smooth_ramps),
+      pilot_(spec.robot, spec.smooth_ramps, spec.settle_s),
       sensors_(spec.sensors, spec.imperfections, spec.world, spec.robot, Rng::stream(seed, sensors_stream)) {
   steps_per_period_ = static_cast<int>(std::ceil(SpeedController::period_s / plant_.longest_step_s()));
   step_s_ = SpeedController::period_s / steps_per_period_;

@@ -39,6 +39,7 @@ struct SimulationSpec {
   ScriptOptions script;
   Charger charger;
   bool smooth_ramps = false;  // commands without jumps of acceleration
+  double settle_s = 0.4;      // at rest between legs
   double latency_s = 0;       // of every electrical channel, beside the effect sensor_delay
   double rate_hz = 50;        // of telemetry
   int missions = 5;           // 0: one after another without end

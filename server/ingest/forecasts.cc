@@ -12,7 +12,7 @@
 namespace joulecast::server {
 namespace {
 
-using forecast::driving_count;
+using forecast::subject_count;
 using nlohmann::json;
 
 constexpr std::string_view topic = "legs";
@@ -120,7 +120,7 @@ void Forecasts::bring_up(Entry& entry, const std::shared_ptr<const ModelInForce>
 
 void Forecasts::lend(Entry& entry) {
   auto found =
-      std::make_shared<const std::array<forecast::OwnFinding, driving_count>>(entry.forecast->findings());
+      std::make_shared<const std::array<forecast::OwnFinding, subject_count>>(entry.forecast->findings());
   const std::lock_guard lock(mutex_);
   Kind& kind = kinds_[entry.kind];
   auto& slot = kind.findings[entry.robot_id];
@@ -129,7 +129,7 @@ void Forecasts::lend(Entry& entry) {
 }
 
 void Forecasts::borrow(Entry& entry) {
-  std::vector<std::shared_ptr<const std::array<forecast::OwnFinding, driving_count>>> lenders;
+  std::vector<std::shared_ptr<const std::array<forecast::OwnFinding, subject_count>>> lenders;
   {
     const std::lock_guard lock(mutex_);
     Kind& kind = kinds_[entry.kind];
@@ -144,8 +144,8 @@ void Forecasts::borrow(Entry& entry) {
   std::ranges::partial_sort(lenders, lenders.begin() + static_cast<std::ptrdiff_t>(count),
                             std::ranges::greater{}, [](const auto& l) { return (*l)[0].missions; });
   lenders.resize(count);
-  std::array<forecast::Siblings, driving_count> siblings;
-  for (std::size_t k = 0; k < driving_count; ++k) {
+  std::array<forecast::Siblings, subject_count> siblings;
+  for (std::size_t k = 0; k < subject_count; ++k) {
     std::vector<const forecast::OwnFinding*> others;
     for (const auto& lender : lenders) others.push_back(&(*lender)[k]);
     siblings[k] = forecast::pool(others);
@@ -171,15 +171,13 @@ forecast::Reach Forecasts::reach(const std::shared_ptr<const ModelInForce>& mode
   bring_up(slot, model);
   borrow(slot);
   const std::shared_ptr<const forecast::Forecaster>& forecaster = slot.outlook.forecaster;
-  constexpr auto habit = forecast::Driving::usual;
   if (slot.typical.forecaster != forecaster || slot.typical.payload_kg != payload_kg) {
     const forecast::LegPricer pricer(model->robot, model->drive);
     slot.typical = {
         forecaster, payload_kg,
-        forecast::sum_of(*forecaster, habit,
-                         forecast::price_typical(*forecaster, pricer, forecaster->usual, payload_kg))};
+        forecast::sum_of(*forecaster, forecast::price_typical(*forecaster, pricer, {}, payload_kg))};
   }
-  return forecast::reach(*forecaster, habit, *slot.outlook.battery, charge, slot.typical.sum);
+  return forecast::reach(*forecaster, *slot.outlook.battery, charge, slot.typical.sum);
 }
 
 RobotOutlook Forecasts::of(std::shared_ptr<const ModelInForce> model) {

@@ -44,7 +44,7 @@ class Forecasts {
  private:
   struct Entry;
   struct Kind {
-    std::map<std::string, std::shared_ptr<const std::array<forecast::OwnFinding, forecast::driving_count>>>
+    std::map<std::string, std::shared_ptr<const std::array<forecast::OwnFinding, forecast::subject_count>>>
         findings;
     std::int64_t missions = 0;  // learnt by all
   };

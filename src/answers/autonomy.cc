@@ -58,7 +58,7 @@ Result<std::vector<PlannedLeg>> legs_of(const AutonomyTask& task, planning::Pose
     pose.x_m += distance * std::cos(pose.heading_rad);
     pose.y_m += distance * std::sin(pose.heading_rad);
   }
-  if (task.dwell_s > 0) legs.push_back({Motion::stand, 0, 0, payload_kg, task.dwell_s});
+  if (task.dwell_s.value_or(0) > 0) legs.push_back({Motion::stand, 0, 0, payload_kg, *task.dwell_s});
   return legs;
 }
 
@@ -67,23 +67,25 @@ struct Pricing {
   std::vector<PricedLeg> from_here;
 };
 
-Pricing at_pace(const AutonomyInput& input, const TaskPlan& plan, const forecast::LegPricer& pricer,
-                const forecast::Pace& habit) {
+Pricing as_usual(const AutonomyInput& input, const TaskPlan& plan, const forecast::LegPricer& pricer,
+                 const forecast::Forecaster& forecaster) {
+  const auto price = [&](const std::vector<PlannedLeg>& legs, const StatedPace& pace) {
+    return forecast::price(forecaster, pricer, legs, pace, plan.halts_stated);
+  };
   Pricing priced;
   priced.tasks.reserve(plan.tasks.size());
-  const forecast::Pace common = input.pace.over(habit);
   for (std::size_t k = 0; k < plan.tasks.size(); ++k)
-    priced.tasks.push_back({forecast::price(pricer, plan.tasks[k].legs, input.tasks[k].pace.over(habit)),
-                            forecast::price(pricer, plan.tasks[k].to_charger, common)});
-  priced.from_here = forecast::price(pricer, plan.from_here, common);
+    priced.tasks.push_back(
+        {price(plan.tasks[k].legs, input.tasks[k].pace), price(plan.tasks[k].to_charger, input.pace)});
+  priced.from_here = price(plan.from_here, input.pace);
   return priced;
 }
 
-Result<Pricing> at_least_energy(const TaskPlan& plan, LeastEnergy& least, double pause_s) {
+Result<Pricing> at_least_energy(const TaskPlan& plan, LeastEnergy& least) {
   Pricing priced;
   const auto add = [&](const std::vector<forecast::PlannedLeg>& legs,
                        std::vector<PricedLeg>& into) -> Result<void> {
-    auto one = least.price(legs, pause_s);
+    auto one = least.price(legs, !plan.halts_stated);
     if (!one) return tl::unexpected(one.error());
     into = std::move(*one);
     return {};
@@ -97,15 +99,33 @@ Result<Pricing> at_least_energy(const TaskPlan& plan, LeastEnergy& least, double
   return priced;
 }
 
-}  // namespace
-
-forecast::Pace StatedPace::over(forecast::Pace habit) const {
-  habit.speed_m_s = speed_m_s.value_or(habit.speed_m_s);
-  habit.acceleration_m_s2 = acceleration_m_s2.value_or(habit.acceleration_m_s2);
-  habit.yaw_rate_rad_s = yaw_rate_rad_s.value_or(habit.yaw_rate_rad_s);
-  habit.yaw_acceleration_rad_s2 = yaw_acceleration_rad_s2.value_or(habit.yaw_acceleration_rad_s2);
-  return habit;
+// Whether the request says how fast every leg is driven.
+bool paces_stated(const AutonomyInput& input, const TaskPlan& plan) {
+  const auto stated = [](const std::vector<PlannedLeg>& legs, const StatedPace& pace) {
+    return std::ranges::all_of(legs, [&](const auto& leg) { return pace.cruise(leg.motion); });
+  };
+  if (plan.tasks.empty() && plan.from_here.empty()) return input.pace.cruise(Motion::drive).has_value();
+  if (!stated(plan.from_here, input.pace)) return false;
+  for (std::size_t k = 0; k < plan.tasks.size(); ++k) {
+    if (!stated(plan.tasks[k].legs, input.tasks[k].pace) || !stated(plan.tasks[k].to_charger, input.pace))
+      return false;
+  }
+  return true;
 }
+
+// Where the motors do not reach the pace of the whole request, or else of one of its tasks.
+std::optional<forecast::Limitation> limitation_of(const AutonomyInput& input, const TaskPlan& plan,
+                                                  const forecast::LegPricer& pricer,
+                                                  const RobotOutlook& robot, const AutonomyOutput& out) {
+  const robot::RobotModel& model = robot.model->robot;
+  auto limitation = forecast::limitation(pricer, model, out.pace, out.payload_kg);
+  for (std::size_t k = 0; k < input.tasks.size() && !limitation; ++k)
+    limitation = forecast::limitation(pricer, model, robot.forecaster->habit.with(input.tasks[k].pace).middle,
+                                      plan.tasks[k].greatest_payload_kg);
+  return limitation;
+}
+
+}  // namespace
 
 Result<TaskPlan> task_plan(const AutonomyInput& input, const LiveRobot& now) {
   planning::Pose pose = input.start_pose.value_or(now.pose.value_or(planning::Pose{}));
@@ -123,6 +143,9 @@ Result<TaskPlan> task_plan(const AutonomyInput& input, const LiveRobot& now) {
     }
     TaskPlan::Task& into = plan.tasks.emplace_back();
     into.legs = std::move(*legs);
+    plan.halts_stated =
+        plan.halts_stated || task.dwell_s ||
+        std::ranges::any_of(into.legs, [](const PlannedLeg& leg) { return leg.motion == Motion::stand; });
     for (const PlannedLeg& leg : into.legs)
       into.greatest_payload_kg = std::max(into.greatest_payload_kg, leg.payload_kg);
     into.to_charger = to_charger(input.charger, pose, task.to_charger_m, payload_kg);
@@ -165,52 +188,51 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
       return too_heavy(fmt::format("/tasks/{}/payload_kg", k), plan.tasks[k].greatest_payload_kg);
 
   const bool minimum_energy = input.driving == Driving::minimum_energy;
-  const bool all_stated =
-      input.pace.whole() ||
-      (!input.tasks.empty() && plan.from_here.empty() &&
-       std::ranges::all_of(input.tasks, [](const AutonomyTask& task) { return task.pace.whole(); }));
-  out.track = minimum_energy || all_stated ? Track::stated : Track::usual;
-  out.pace = input.pace.over(forecaster.usual);
+  out.track = minimum_energy || paces_stated(input, plan) ? Track::stated : Track::usual;
+  out.pace = forecaster.habit.with(input.pace).middle;
+  if (plan.halts_stated) out.pace.pause_s = 0;
 
   const forecast::LegPricer pricer(model.robot, model.drive);
+  out.limitation = limitation_of(input, plan, pricer, robot, out);
+  const bool moves = !out.limitation || out.limitation->moves;
+  const bool with_plan = moves && (!input.tasks.empty() || !plan.from_here.empty());
   std::optional<LeastEnergy> least;
-  const bool with_plan = !input.tasks.empty() || !plan.from_here.empty();
   if (minimum_energy || (input.compare_minimum_energy && with_plan)) {
     auto made = LeastEnergy::make(model, tables, input.value_of_time_w);
     if (!made) return tl::unexpected(made.error());
     least.emplace(std::move(*made));
   }
 
+  std::vector<PricedLeg> typical;
   if (minimum_energy) {
-    const auto priced = least->price(forecast::typical_legs(forecaster, out.payload_kg), out.pace.pause_s);
+    auto priced =
+        least->price(forecast::typical_legs(forecaster, out.payload_kg), forecaster.typical.empty());
     if (!priced) return tl::unexpected(priced.error());
-    out.reach = forecast::reach(forecaster, Track::stated, *robot.battery, out.charge,
-                                forecast::sum_of(forecaster, Track::stated, *priced));
+    typical = std::move(*priced);
   } else {
-    const auto priced = forecast::price_typical(forecaster, pricer, out.pace, out.payload_kg);
-    out.reach = forecast::reach(forecaster, out.track, *robot.battery, out.charge,
-                                forecast::sum_of(forecaster, out.track, priced));
+    typical = forecast::price_typical(forecaster, pricer, input.pace, out.payload_kg);
   }
+  out.reach = forecast::reach(forecaster, *robot.battery, out.charge, forecast::sum_of(forecaster, typical));
   if (!with_plan) return out;
 
   std::optional<Pricing> best;
   if (least) {
-    auto priced = at_least_energy(plan, *least, out.pace.pause_s);
+    auto priced = at_least_energy(plan, *least);
     if (priced)
       best = std::move(*priced);
     else if (minimum_energy)
       return tl::unexpected(priced.error());
   }
-  const auto look = [&](const Pricing& priced, Track driving) {
-    return forecast::look_ahead(forecaster, driving, *robot.battery, out.charge, priced.tasks,
-                                priced.from_here, pricer.standing_w(), input.confidence);
+  const auto look = [&](const Pricing& priced) {
+    return forecast::look_ahead(forecaster, *robot.battery, out.charge, priced.tasks, priced.from_here,
+                                pricer.standing_w(), input.confidence);
   };
   if (minimum_energy) {
-    out.outlook = look(*best, Track::stated);
+    out.outlook = look(*best);
     return out;
   }
-  out.outlook = look(at_pace(input, plan, pricer, forecaster.usual), out.track);
-  if (best) out.minimum_energy_outlook = look(*best, Track::stated);
+  out.outlook = look(as_usual(input, plan, pricer, forecaster));
+  if (best) out.minimum_energy_outlook = look(*best);
   return out;
 }
 

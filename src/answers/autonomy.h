@@ -7,18 +7,13 @@
 #include "answers/drive.h"
 #include "answers/live.h"
 #include "answers/model.h"
+#include "forecast/limitation.h"
 #include "forecast/outlook.h"
 #include "planning/cost_table_cache.h"
 
 namespace joulecast::answers {
 
-// Part of a pace; what is absent is the robot's habit.
-struct StatedPace {
-  std::optional<double> speed_m_s, acceleration_m_s2, yaw_rate_rad_s, yaw_acceleration_rad_s2;
-
-  forecast::Pace over(forecast::Pace habit) const;
-  bool whole() const { return speed_m_s.has_value(); }
-};
+using forecast::StatedPace;
 
 // Drives the path, or where there is none turns and drives straight; then stands.
 struct AutonomyTask {
@@ -26,7 +21,8 @@ struct AutonomyTask {
   std::optional<double> payload_kg;  // absent: as before
   StatedPace pace;
   std::vector<planning::Segment> path;
-  double turn_rad = 0, distance_m = 0, dwell_s = 0;
+  double turn_rad = 0, distance_m = 0;
+  std::optional<double> dwell_s;
   std::optional<double> to_charger_m;  // from where the task ends
 };
 
@@ -60,6 +56,7 @@ struct TaskPlan {
   };
   std::vector<Task> tasks;
   std::vector<forecast::PlannedLeg> from_here;  // to the charger
+  bool halts_stated = false;  // a task dwells, or says that it does not: no others are foreseen
 };
 
 // Builds each task's path once. Errors name "/tasks/<index>/path/...".
@@ -71,6 +68,7 @@ struct AutonomyOutput {
   double payload_kg = 0;
   forecast::Driving track = forecast::Driving::usual;  // of the forecast
   forecast::Pace pace;
+  std::optional<forecast::Limitation> limitation;  // the motors do not reach the pace
   forecast::Reach reach;
   std::optional<forecast::Outlook> outlook;                 // with a task list or a charger
   std::optional<forecast::Outlook> minimum_energy_outlook;  // the same, driven as the planner would

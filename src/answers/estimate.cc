@@ -114,18 +114,17 @@ Result<EstimateOutput> of_habit(const DriveInput& drive, const RobotOutlook& rob
   if (!path) return tl::unexpected(path.error());
   const forecast::Forecaster& forecaster = *robot.forecaster;
   const forecast::LegPricer pricer(robot.model->robot, robot.model->drive);
-  constexpr auto habit = forecast::Driving::usual;
   const forecast::PlanSum sum = forecast::sum_of(
-      forecaster, habit, forecast::price(pricer, forecast::planned_legs(*path), forecaster.usual));
-  const forecast::Prediction expected = forecaster.predict(sum, habit);
+      forecaster, forecast::price(forecaster, pricer, forecast::planned_legs(*path), {}, false));
+  const forecast::Prediction expected = forecaster.energy(sum);
   EstimateOutput out;
-  out.energy_j = expected.mean_j();
-  out.duration_s = sum.duration_s;
+  out.energy_j = expected.mean();
+  out.duration_s = forecaster.duration(sum).quantile(0.5);
   out.distance_m = path->distance_m();
   out.turned_rad = path->turned_rad();
   auto& quantiles = out.energy_quantiles_j.emplace();
   std::ranges::transform(forecast::told_quantiles, quantiles.begin(),
-                         [&](double q) { return expected.quantile_j(q); });
+                         [&](double q) { return expected.quantile(q); });
   return out;
 }
 

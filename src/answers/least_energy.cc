@@ -74,15 +74,14 @@ Result<LegCost> LeastEnergy::cost(const PlannedLeg& leg) {
   return cost;
 }
 
-Result<std::vector<PricedLeg>> LeastEnergy::price(const std::vector<PlannedLeg>& legs, double pause_s) {
+Result<std::vector<PricedLeg>> LeastEnergy::price(const std::vector<PlannedLeg>& legs, bool may_halt) {
   std::vector<PricedLeg> priced;
-  priced.reserve(2 * legs.size());
+  priced.reserve(legs.size());
   for (const PlannedLeg& leg : legs) {
     const Result<LegCost> best = cost(leg);
     if (!best) return tl::unexpected(best.error());
-    priced.push_back({leg.motion, leg.payload_kg, leg.motion == Motion::drive ? leg.way : 0, *best});
-    if (leg.motion != Motion::stand && pause_s > 0)
-      priced.push_back({Motion::stand, leg.payload_kg, 0, {pause_s, standing_w_ * pause_s, 0, 0}});
+    priced.push_back({leg.motion, leg.payload_kg, leg.motion == Motion::drive ? leg.way : 0, *best,
+                      forecast::Driving::stated, may_halt && leg.motion != Motion::stand});
   }
   return priced;
 }

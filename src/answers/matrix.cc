@@ -22,7 +22,6 @@ using planning::CostTable;
 using planning::Obstacle;
 
 constexpr std::size_t threads = 2;
-constexpr auto habit = forecast::Driving::usual;
 
 struct Robot {
   std::shared_ptr<const ModelInForce> model;  // null: see `problem`
@@ -119,13 +118,14 @@ std::vector<Cell> Matrix::State::usual_cells(std::size_t r, std::vector<double>&
         legs.push_back({s.turn ? Motion::turn : Motion::drive, s.way, 0, s.loaded ? task.payload_kg : 0, 0});
     if (const double dwell_s = task.pickup_dwell_s + task.dropoff_dwell_s; dwell_s > 0)
       legs.push_back({Motion::stand, 0, 0, 0, dwell_s});
+    const bool halts_stated = task.pickup_dwell_s + task.dropoff_dwell_s > 0;
     const forecast::PlanSum sum =
-        forecast::sum_of(forecaster, habit, forecast::price(pricer, legs, forecaster.usual));
-    cell.energy_j = forecaster.predict(sum, habit).mean_j();
-    cell.duration_s = sum.duration_s;
+        forecast::sum_of(forecaster, forecast::price(forecaster, pricer, legs, {}, halts_stated));
+    cell.energy_j = forecaster.energy(sum).mean();
+    cell.duration_s = forecaster.duration(sum).quantile(0.5);
     if (robot.charge)
       probability[t] =
-          forecast::probability_of_reserve(forecaster, habit, *robot.outlook.battery, *robot.charge, sum);
+          forecast::probability_of_reserve(forecaster, *robot.outlook.battery, *robot.charge, sum);
   }
   return cells;
 }

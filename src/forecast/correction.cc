@@ -23,18 +23,27 @@ Eigen::Map<const Square> square(const std::array<Features, feature_count>& m) {
   return Eigen::Map<const Square>(m.front().data());
 }
 
+Features moving_features(Motion motion, double payload_fraction, double amount, const LegCost& cost) {
+  Features x{};
+  if (motion == Motion::turn) x[2] = amount;
+  if (motion == Motion::drive) {
+    x[1] = amount;
+    x[3] = amount * payload_fraction;
+    x[4] = amount * (cost.speed_fraction - middle_speed);
+  }
+  return x;
+}
+
 }  // namespace
 
 Features features_of(Motion motion, double payload_fraction, const LegCost& cost) {
-  Features x{};
+  Features x = moving_features(motion, payload_fraction, cost.motor_j, cost);
   x[0] = cost.standing_j;
-  if (motion == Motion::turn) x[2] = cost.motor_j;
-  if (motion == Motion::drive) {
-    x[1] = cost.motor_j;
-    x[3] = cost.motor_j * payload_fraction;
-    x[4] = cost.motor_j * (cost.speed_fraction - middle_speed);
-  }
   return x;
+}
+
+Features duration_features_of(Motion motion, double payload_fraction, const LegCost& cost) {
+  return moving_features(motion, payload_fraction, cost.duration_s, cost);
 }
 
 double Correction::energy_j(const Features& x) const {

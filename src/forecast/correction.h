@@ -14,6 +14,8 @@ inline constexpr std::size_t feature_count = 5;
 using Features = std::array<double, feature_count>;
 
 Features features_of(Motion motion, double payload_fraction, const LegCost& cost);
+// The same of durations [s], of moving legs: how long is stood is nothing to be corrected.
+Features duration_features_of(Motion motion, double payload_fraction, const LegCost& cost);
 
 // The robot against its model: energy = sum of mean[k] * features[k]. (1, 1, 1, 0, 0) is the model itself.
 struct Correction {

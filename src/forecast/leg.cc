@@ -34,7 +34,35 @@ void LegTracker::begin() {
   last_.reset();
   current_.reset();
   pending_.reset();
+  slowed_.reset();
+  peak_ = 0;
   legs_.clear();
+}
+
+void LegTracker::end_current() {
+  if (slowed_) current_->join(*std::exchange(slowed_, std::nullopt));
+  if (pending_) current_->join(*std::exchange(pending_, std::nullopt));
+  close(*current_);
+  current_.reset();
+  peak_ = 0;
+}
+
+void LegTracker::go_on(const Piece& piece, double rim_m_s) {
+  constexpr double stopped = 0.1, going = 0.2;  // of the leg's greatest speed
+  if (slowed_ && rim_m_s > going * peak_) {
+    close(*current_);
+    current_ = std::exchange(slowed_, std::nullopt);
+    peak_ = rim_m_s;
+  }
+  peak_ = std::max(peak_, rim_m_s);
+  if (piece.motion != Motion::stand && rim_m_s < stopped * peak_ && (!slowed_ || rim_m_s < slowest_)) {
+    if (slowed_) current_->join(*slowed_);
+    current_->join(piece);
+    slowed_ = Piece{piece.motion, 0, 0, 0, 0, 0, 0, piece.payload_kg, 0};
+    slowest_ = rim_m_s;
+  } else {
+    (slowed_ ? *slowed_ : *current_).join(piece);
+  }
 }
 
 Motion LegTracker::motion_of(double speed_m_s, double yaw_rate_rad_s) const {
@@ -60,28 +88,26 @@ void LegTracker::add(const LegSample& sample) {
   piece.payload_kg = std::isfinite(sample.payload_kg) ? sample.payload_kg : 0;
   piece.battery_j = 0.5 * (before->power_w + sample.power_w) * h;
 
-  if (current_ && piece.payload_kg != current_->payload_kg) {
-    if (pending_) current_->join(*pending_);
-    close(*current_);
-    current_.reset();
-    pending_.reset();
-  }
+  if (current_ && piece.payload_kg != current_->payload_kg) end_current();
+  const double rim_m_s = std::fabs(speed) + half_track_m_ * std::fabs(yaw);
   if (!current_) {
     current_ = piece;
+    peak_ = rim_m_s;
   } else if (piece.motion == current_->motion) {
-    if (pending_) current_->join(*pending_);
-    pending_.reset();
-    current_->join(piece);
+    if (pending_) (slowed_ ? *slowed_ : *current_).join(*std::exchange(pending_, std::nullopt));
+    go_on(piece, rim_m_s);
   } else {
     if (pending_ && pending_->motion == piece.motion) {
       pending_->join(piece);
     } else {
-      if (pending_) current_->join(*pending_);
+      if (pending_) (slowed_ ? *slowed_ : *current_).join(*pending_);
       pending_ = piece;
     }
     if (pending_->duration_s >= settle_s) {
-      close(*current_);
-      current_ = std::exchange(pending_, std::nullopt);
+      const std::optional<Piece> next = std::exchange(pending_, std::nullopt);
+      end_current();
+      current_ = next;
+      peak_ = rim_m_s;
     }
   }
 }
@@ -105,10 +131,7 @@ void LegTracker::close(const Piece& piece) {
 }
 
 std::vector<Leg> LegTracker::take() {
-  if (current_) {
-    if (pending_) current_->join(*pending_);
-    close(*current_);
-  }
+  if (current_) end_current();
   std::vector<Leg> legs = std::exchange(legs_, {});
   begin();
   return legs;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -23,6 +24,11 @@ struct Leg {
   double battery_j = 0;  // measured at the terminals; NaN where a part of it was not measured
 };
 
+struct PastMission {
+  std::int64_t start_utime_us = 0;
+  std::vector<Leg> legs;
+};
+
 // Slower than this, of body and wheel rims, a robot stands: 1 % of its speed limit.
 double still_speed_m_s(const robot::RobotModel& robot);
 
@@ -36,7 +42,8 @@ struct LegSample {
 };
 
 // Cuts a mission into legs as its samples come. A change of motion counts once it has lasted `settle_s`;
-// shorter ones stay with the leg they interrupt.
+// shorter ones stay with the leg they interrupt. A leg also ends where its speed falls below a tenth of what
+// it was and rises to twice that again: a stop without a halt.
 class LegTracker {
  public:
   static constexpr double settle_s = 0.15;
@@ -62,11 +69,16 @@ class LegTracker {
 
   Motion motion_of(double speed_m_s, double yaw_rate_rad_s) const;
   void close(const Piece& piece);
+  // Adds to the current leg, which ends at its slowest when it has slowed down and goes on.
+  void go_on(const Piece& piece, double speed);
+  void end_current();
 
   double half_track_m_;
   double still_m_s_;
   std::optional<LegSample> last_;
   std::optional<Piece> current_, pending_;
+  std::optional<Piece> slowed_;    // of the current leg, since its slowest after it slowed down
+  double peak_ = 0, slowest_ = 0;  // speeds of the current leg, of the wheels' rims [m/s]
   std::vector<Leg> legs_;
 };
 

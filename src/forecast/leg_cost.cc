@@ -4,67 +4,15 @@
 #include <cmath>
 #include <utility>
 
-#include "base/median.h"
-
 namespace joulecast::forecast {
 namespace {
 
-constexpr double usual_share = 0.7;    // of the limits
-constexpr std::size_t least_legs = 5;  // that a habit is read from
-constexpr double least_ramp_s = 0.02;  // a jump of speed would cost infinite power
-constexpr double no_plateau = 1.8;     // cruise over mean speed beyond which a leg is all ramp
 constexpr std::array<double, 4> node{0.06943184420297371, 0.33000947820757187, 0.6699905217924281,
                                      0.9305681557970263};
 constexpr std::array<double, 4> weight{0.17392742256872692, 0.32607257743127307, 0.32607257743127307,
                                        0.17392742256872692};
 
 }  // namespace
-
-Pace default_pace(const robot::RobotModel& robot) {
-  const robot::Limits& most = robot.limits;
-  return {usual_share * most.speed_m_s, usual_share * most.acceleration_m_s2,
-          usual_share * most.yaw_rate_rad_s,
-          usual_share * most.acceleration_m_s2 / robot.kinematics.half_track_m, 0};
-}
-
-Pace usual_pace(const robot::RobotModel& robot, std::span<const Leg> past) {
-  Pace pace = default_pace(robot);
-  std::vector<double> speed, acceleration, rate, yaw_acceleration, pause;
-  const auto ramp_s = [](const Leg& leg) { return leg.duration_s - leg.way / leg.speed; };
-  // How long a leg is slower than what counts as still, at either end.
-  const auto tail_s = [&](const Leg& leg) {
-    if (leg.motion == Motion::stand || !(ramp_s(leg) > least_ramp_s)) return 0.0;
-    const double still = still_speed_m_s(robot);
-    const double rim = leg.motion == Motion::turn ? robot.kinematics.half_track_m : 1;
-    return std::min(ramp_s(leg), still / (rim * leg.speed) * ramp_s(leg));
-  };
-  for (std::size_t k = 0; k < past.size(); ++k) {
-    const Leg& leg = past[k];
-    if (leg.motion == Motion::stand) {
-      if (k > 0 && k + 1 < past.size())
-        pause.push_back(std::max(0.0, leg.duration_s - tail_s(past[k - 1]) - tail_s(past[k + 1])));
-      continue;
-    }
-    if (!(ramp_s(leg) > least_ramp_s)) continue;
-    const bool plateau = leg.speed * leg.duration_s < no_plateau * leg.way;
-    if (leg.motion == Motion::drive) {
-      if (plateau) speed.push_back(leg.speed);
-      acceleration.push_back(leg.speed / ramp_s(leg));
-    } else {
-      if (plateau) rate.push_back(leg.speed);
-      yaw_acceleration.push_back(leg.speed / ramp_s(leg));
-    }
-  }
-  const auto take = [](std::vector<double>& shown, double& into) {
-    if (shown.size() >= least_legs) into = upper_median(shown);
-  };
-  take(speed, pace.speed_m_s);
-  take(acceleration, pace.acceleration_m_s2);
-  take(rate, pace.yaw_rate_rad_s);
-  take(yaw_acceleration, pace.yaw_acceleration_rad_s2);
-  take(pause, pace.pause_s);
-  return pace;
-}
 
 std::vector<PlannedLeg> planned_legs(const planning::Path& path) {
   std::vector<PlannedLeg> legs;
@@ -88,13 +36,17 @@ std::vector<PlannedLeg> planned_legs(const planning::Path& path) {
 }
 
 LegPricer::LegPricer(const robot::RobotModel& robot, const dynamics::DriveModel& drive)
-    : drive_(&drive), limits_(robot.limits), standing_w_(drive.battery_power_for({0, 0})) {}
+    : drive_(&drive),
+      limits_(robot.limits),
+      voltage_limit_v_(robot.battery.nominal_voltage_v),
+      current_limit_a_(robot.limits.current_a),
+      standing_w_(drive.battery_power_for({0, 0})) {}
 
 LegCost LegPricer::standing(double duration_s) const {
   return {duration_s, standing_w_ * duration_s, 0, 0};
 }
 
-double LegPricer::power_w(const Power& kind, double v, double a) const {
+dynamics::Instant LegPricer::instant(const Power& kind, double v, double a) const {
   const dynamics::Parameters<double>& p = drive_->parameters();
   const bool turning = kind.motion == Motion::turn;
   dynamics::Instant at;
@@ -102,7 +54,58 @@ double LegPricer::power_w(const Power& kind, double v, double a) const {
   at.wheel_speed_rad_s = dynamics::wheels_of_body(p, turning ? 0 : v, turning ? v : v * kind.curvature_1_m);
   at.wheel_acceleration_rad_s2 =
       dynamics::wheels_of_body(p, turning ? 0 : a, turning ? a : a * kind.curvature_1_m);
-  return drive_->flow(at).battery_power_w - standing_w_;
+  return at;
+}
+
+double LegPricer::power_w(const Power& kind, double v, double a) const {
+  return drive_->flow(instant(kind, v, a)).battery_power_w - standing_w_;
+}
+
+bool LegPricer::reaches(const Power& kind, double v, double a) const {
+  const auto flow = drive_->flow(instant(kind, v, a));
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (voltage_limit_v_ > 0 && std::fabs(flow.voltage_v[side]) > voltage_limit_v_) return false;
+    if (current_limit_a_ > 0 && std::fabs(flow.current_a[side]) > current_limit_a_) return false;
+  }
+  return true;
+}
+
+Reachable LegPricer::reachable(const Power& kind, const Cruise& wanted) const {
+  Reachable found{wanted, true, 0, 0};
+  const bool turning = kind.motion == Motion::turn;
+  const double top = turning ? limits_.yaw_rate_rad_s : limits_.speed_m_s;
+  const double steepest =
+      turning ? limits_.acceleration_m_s2 / drive_->parameters().half_track_m : limits_.acceleration_m_s2;
+  if (kind.unbound && wanted.speed <= top && wanted.acceleration <= steepest) return found;
+  if (reaches(kind, wanted.speed, wanted.acceleration)) return found;
+  constexpr int halvings = 30;
+  constexpr double creeping = 5e-3;  // of the cruise wanted
+  const auto greatest = [&](double low, double high, const auto& holds) {
+    for (int k = 0; k < halvings; ++k) (holds(0.5 * (low + high)) ? low : high) = 0.5 * (low + high);
+    return low;
+  };
+  const auto flow = drive_->flow(instant(kind, creeping * wanted.speed, 0));
+  for (std::size_t side = 0; side < 2; ++side) {
+    found.creeping_voltage_v = std::max(found.creeping_voltage_v, std::fabs(flow.voltage_v[side]));
+    found.creeping_current_a = std::max(found.creeping_current_a, std::fabs(flow.current_a[side]));
+  }
+  found.moves = reaches(kind, creeping * wanted.speed, creeping * wanted.acceleration);
+  if (!found.moves) return found;
+  double& speed = found.cruise.speed;
+  if (!reaches(kind, speed, 0)) {
+    constexpr double usable = 0.95;  // of the speed at which nothing is left to accelerate with
+    speed = usable * greatest(creeping * speed, speed, [&](double v) { return reaches(kind, v, 0); });
+  }
+  if (double& a = found.cruise.acceleration; !reaches(kind, speed, a)) {
+    a = greatest(0, a, [&](double less) { return reaches(kind, speed, less); });
+    found.moves = a > 0;
+  }
+  return found;
+}
+
+Reachable LegPricer::reachable(Motion motion, double curvature_1_m, double payload_kg,
+                               const Cruise& wanted) const {
+  return reachable(power_of(motion, curvature_1_m, payload_kg, false), wanted);
 }
 
 // Six evaluations give the six coefficients; three more must agree with them, braking hard among them, where
@@ -132,22 +135,30 @@ std::optional<dynamics::QuadraticPower> LegPricer::closed_form(const Power& kind
   return q;
 }
 
-const LegPricer::Power& LegPricer::power_of(Motion motion, double curvature_1_m, double payload_kg) const {
+const LegPricer::Power& LegPricer::power_of(Motion motion, double curvature_1_m, double payload_kg,
+                                            bool often) const {
   const auto found = std::ranges::find_if(known_, [&](const Power& k) {
     return k.motion == motion && k.curvature_1_m == curvature_1_m && k.payload_kg == payload_kg;
   });
-  if (found != known_.end()) return *found;
-  // Curves seldom share their curvature: the closed form would cost more than it saves.
-  constexpr std::size_t most = 32;
-  if (known_.size() == most) known_.clear();
-  Power kind{motion, curvature_1_m, payload_kg, {}};
-  if (curvature_1_m == 0) kind.closed = closed_form(kind);
-  return known_.emplace_back(kind);
+  Power* kind = found != known_.end() ? &*found : nullptr;
+  if (kind == nullptr) {
+    constexpr std::size_t most = 32;
+    if (known_.size() == most) known_.clear();
+    kind = &known_.emplace_back(Power{motion, curvature_1_m, payload_kg, {}});
+    const bool turning = motion == Motion::turn;
+    kind->unbound = reaches(
+        *kind, turning ? limits_.yaw_rate_rad_s : limits_.speed_m_s,
+        turning ? limits_.acceleration_m_s2 / drive_->parameters().half_track_m : limits_.acceleration_m_s2);
+  }
+  // Curves seldom share their curvature: for one price, the closed form would cost more than it saves.
+  if (!kind->tried && (often || curvature_1_m == 0)) {
+    kind->closed = closed_form(*kind);
+    kind->tried = true;
+  }
+  return *kind;
 }
 
-LegCost LegPricer::trapezoid(Motion motion, double way, double curvature_1_m, double payload_kg, double speed,
-                             double ramp_s) const {
-  const Power& kind = power_of(motion, curvature_1_m, payload_kg);
+LegCost LegPricer::trapezoid(const Power& kind, double way, double speed, double ramp_s) const {
   ramp_s = std::max(ramp_s, least_ramp_s);
   const double cruise_s = std::max(0.0, way / speed - ramp_s), a = speed / ramp_s;
   LegCost cost;
@@ -164,33 +175,67 @@ LegCost LegPricer::trapezoid(Motion motion, double way, double curvature_1_m, do
           weight[k] * ramp_s * (power_w(kind, speed * node[k], a) + power_w(kind, speed * node[k], -a));
     cost.motor_j += cruise_s * power_w(kind, speed, 0);
   }
-  cost.speed_fraction = speed / (motion == Motion::turn ? limits_.yaw_rate_rad_s : limits_.speed_m_s);
+  cost.speed_fraction = speed / (kind.motion == Motion::turn ? limits_.yaw_rate_rad_s : limits_.speed_m_s);
   return cost;
 }
 
 LegCost LegPricer::driven(const Leg& leg) const {
   if (leg.motion == Motion::stand || !(leg.way > 0)) return standing(leg.duration_s);
-  LegCost cost = trapezoid(leg.motion, leg.way, leg.curvature_1_m, leg.payload_kg, leg.speed,
+  LegCost cost = trapezoid(power_of(leg.motion, leg.curvature_1_m, leg.payload_kg, false), leg.way, leg.speed,
                            leg.duration_s - leg.way / leg.speed);
   cost.duration_s = leg.duration_s;
   cost.standing_j = standing_w_ * leg.duration_s;
   return cost;
 }
 
-LegCost LegPricer::paced(const PlannedLeg& leg, const Pace& pace) const {
-  if (leg.motion == Motion::stand || !(leg.way > 0)) return standing(leg.duration_s);
-  double speed = pace.yaw_rate_rad_s, acceleration = pace.yaw_acceleration_rad_s2;
-  if (leg.motion == Motion::drive) {
-    speed = pace.speed_m_s;
-    acceleration = pace.acceleration_m_s2;
-    if (leg.curvature_1_m > 0) speed = std::min(speed, limits_.yaw_rate_rad_s / leg.curvature_1_m);
+LegCost LegPricer::priced(const Power& kind, double way, Cruise cruise) const {
+  if (kind.motion == Motion::drive && kind.curvature_1_m > 0)
+    cruise.speed = std::min(cruise.speed, limits_.yaw_rate_rad_s / kind.curvature_1_m);
+  cruise.speed = std::min(cruise.speed, std::sqrt(way * cruise.acceleration));
+  const Reachable within = reachable(kind, cruise);
+  if (!within.moves) {
+    LegCost cost;
+    cost.impossible = true;
+    return cost;
   }
-  speed = std::min(speed, std::sqrt(leg.way * acceleration));
-  return trapezoid(leg.motion, leg.way, leg.curvature_1_m, leg.payload_kg, speed, speed / acceleration);
+  const double speed = std::min(within.cruise.speed, std::sqrt(way * within.cruise.acceleration));
+  LegCost cost = trapezoid(kind, way, speed, speed / within.cruise.acceleration);
+  cost.slower = within.cruise.speed < cruise.speed || within.cruise.acceleration < cruise.acceleration;
+  return cost;
 }
 
-LegCost LegPricer::paced(const Leg& leg, const Pace& pace) const {
-  return paced(PlannedLeg{leg.motion, leg.way, leg.curvature_1_m, leg.payload_kg, leg.duration_s}, pace);
+LegCost LegPricer::paced(const PlannedLeg& leg, const Cruise& cruise) const {
+  if (leg.motion == Motion::stand || !(leg.way > 0)) return standing(leg.duration_s);
+  return priced(power_of(leg.motion, leg.curvature_1_m, leg.payload_kg, false), leg.way, cruise);
+}
+
+LegCost LegPricer::paced(const PlannedLeg& leg, const Pace& pace) const {
+  return paced(leg, leg.motion == Motion::turn ? Cruise{pace.yaw_rate_rad_s, pace.yaw_acceleration_rad_s2}
+                                               : Cruise{pace.speed_m_s, pace.acceleration_m_s2});
+}
+
+LegCost LegPricer::usual(const PlannedLeg& leg, const Habit& habit) const {
+  if (leg.motion == Motion::stand || !(leg.way > 0)) return standing(leg.duration_s);
+  const LegKind kind = kind_of(leg.motion, leg.way, leg.curvature_1_m);
+  const auto& cruises = habit.cruises[static_cast<std::size_t>(kind)];
+  const Power& power = power_of(leg.motion, kind == LegKind::curve ? leg.curvature_1_m : 0, leg.payload_kg,
+                                cruises.size() > 1);
+  const double share = 1 / static_cast<double>(cruises.size());
+  LegCost mean;
+  for (const Cruise& cruise : cruises) {
+    const LegCost one = priced(power, leg.way, cruise);
+    mean.duration_s += share * one.duration_s;
+    mean.standing_j += share * one.standing_j;
+    mean.motor_j += share * one.motor_j;
+    mean.speed_fraction += share * one.speed_fraction;
+    mean.slower = mean.slower || one.slower;
+    mean.impossible = mean.impossible || one.impossible;
+  }
+  return mean;
+}
+
+LegCost LegPricer::usual(const Leg& leg, const Habit& habit) const {
+  return usual(PlannedLeg{leg.motion, leg.way, leg.curvature_1_m, leg.payload_kg, leg.duration_s}, habit);
 }
 
 }  // namespace joulecast::forecast

@@ -8,26 +8,12 @@
 
 #include "dynamics/drive_model.h"
 #include "dynamics/straight.h"
+#include "forecast/habit.h"
 #include "forecast/leg.h"
 #include "planning/path.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::forecast {
-
-// How fast a robot drives and turns: cruise and ramps of a trapezoid, and how long it stands at each stop.
-struct Pace {
-  double speed_m_s = 0;
-  double acceleration_m_s2 = 0;
-  double yaw_rate_rad_s = 0;
-  double yaw_acceleration_rad_s2 = 0;
-  double pause_s = 0;
-};
-
-// The pace of a robot whose habit is not known: 0.7 of its limits, without pauses.
-Pace default_pace(const robot::RobotModel& robot);
-
-// The medians of what past legs show; what too few (5) show is the default's.
-Pace usual_pace(const robot::RobotModel& robot, std::span<const Leg> past);
 
 // A stretch of a planned task, from stop to stop.
 struct PlannedLeg {
@@ -47,11 +33,21 @@ struct LegCost {
   double standing_j = 0;
   double motor_j = 0;
   double speed_fraction = 0;  // cruise over the robot's limit
+  bool slower = false;        // than asked, by what the motors reach
+  bool impossible = false;    // the motors cannot move the robot; the costs are of standing still
 };
 
-// Prices legs driven as trapezoids through a drive model, by 4-point Gauss-Legendre over each ramp (exact
-// where power is a polynomial of speed up to degree 7). Places are unknown: effects tied to the floor do
-// nothing.
+// What the motors make of a cruise: within the current limit and the battery's nominal voltage.
+struct Reachable {
+  Cruise cruise;
+  bool moves = true;
+  double creeping_voltage_v = 0;  // of the worse armature, hardly moving
+  double creeping_current_a = 0;
+};
+
+// Prices legs driven as trapezoids, no faster than the motors reach, through a drive model, by 4-point
+// Gauss-Legendre over each ramp (exact where power is a polynomial of speed up to degree 7). Places are
+// unknown: effects tied to the floor do nothing.
 class LegPricer {
  public:
   LegPricer(const robot::RobotModel& robot, const dynamics::DriveModel& drive);
@@ -60,9 +56,13 @@ class LegPricer {
 
   // A past leg as it was driven.
   LegCost driven(const Leg& leg) const;
-  // A past leg's way, at a pace.
-  LegCost paced(const Leg& leg, const Pace& pace) const;
+  LegCost paced(const PlannedLeg& leg, const Cruise& cruise) const;
   LegCost paced(const PlannedLeg& leg, const Pace& pace) const;
+  // The mean over a habit's cruises.
+  LegCost usual(const PlannedLeg& leg, const Habit& habit) const;
+  // A past leg's way, likewise.
+  LegCost usual(const Leg& leg, const Habit& habit) const;
+  Reachable reachable(Motion motion, double curvature_1_m, double payload_kg, const Cruise& wanted) const;
   LegCost standing(double duration_s) const;
 
  private:
@@ -72,16 +72,23 @@ class LegPricer {
     double curvature_1_m = 0;
     double payload_kg = 0;
     std::optional<dynamics::QuadraticPower> closed;
+    bool tried = false;    // to find the closed form
+    bool unbound = false;  // the motors reach the robot's limits of speed and acceleration together
   };
 
-  LegCost trapezoid(Motion motion, double way, double curvature_1_m, double payload_kg, double speed,
-                    double ramp_s) const;
+  LegCost priced(const Power& kind, double way, Cruise cruise) const;
+  LegCost trapezoid(const Power& kind, double way, double speed, double ramp_s) const;
+  dynamics::Instant instant(const Power& kind, double speed, double acceleration) const;
+  bool reaches(const Power& kind, double speed, double acceleration) const;
+  Reachable reachable(const Power& kind, const Cruise& wanted) const;
   double power_w(const Power& kind, double speed, double acceleration) const;
-  const Power& power_of(Motion motion, double curvature_1_m, double payload_kg) const;
+  // `often`: so many prices are asked of it that a curve's closed form is worth finding.
+  const Power& power_of(Motion motion, double curvature_1_m, double payload_kg, bool often) const;
   std::optional<dynamics::QuadraticPower> closed_form(const Power& kind) const;
 
   const dynamics::DriveModel* drive_;
   robot::Limits limits_;
+  double voltage_limit_v_, current_limit_a_;  // 0: none
   double standing_w_;
   mutable std::vector<Power> known_;
 };

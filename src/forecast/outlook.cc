@@ -39,28 +39,27 @@ double joined(double middle, double offset_a, double offset_b, double sign) {
   return middle + sign * std::sqrt(offset_a * offset_a + offset_b * offset_b);
 }
 
-TaskOutlook stage(const Forecaster& forecaster, Driving driving, const ChargeMap& battery,
-                  const Charge& charge, double lowest, const PlanSum& sum) {
-  const Prediction p = forecaster.predict(sum, driving);
-  const double power = mean_power(sum, p.corrected_j);
+TaskOutlook stage(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge, double lowest,
+                  const PlanSum& sum) {
+  const Prediction p = forecaster.energy(sum);
+  const double power = mean_power(sum, p.expected());
   const Budget spend = budget(battery, charge, lowest, power);
   TaskOutlook out;
-  out.duration_s = sum.duration_s;
+  out.duration_s = forecaster.duration(sum).quantile(0.5);
   out.probability = p.probability_below(spend.energy_j, spend.deviation_j);
-  for (std::size_t k = 0; k < told_quantiles.size(); ++k) out.energy_j[k] = p.quantile_j(told_quantiles[k]);
+  for (std::size_t k = 0; k < told_quantiles.size(); ++k) out.energy_j[k] = p.quantile(told_quantiles[k]);
   out.charge = arrival_charge(p, battery, charge, power);
   return out;
 }
 
 // The longest stand after which the plan still holds with the confidence.
-double longest_wait(const Forecaster& forecaster, Driving driving, const ChargeMap& battery,
-                    const Charge& charge, double lowest, const PlanSum& plan, double standing_w,
-                    double confidence) {
+double longest_wait(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
+                    double lowest, const PlanSum& plan, double standing_w, double confidence) {
   const auto holds = [&](double wait_s) {
     PlanSum waited = plan;
-    forecaster.extend(waited, driving, Motion::stand, 0, {wait_s, standing_w * wait_s, 0, 0}, 0);
-    const Prediction p = forecaster.predict(waited, driving);
-    const Budget spend = budget(battery, charge, lowest, mean_power(waited, p.corrected_j));
+    forecaster.extend(waited, {Motion::stand, 0, 0, {wait_s, standing_w * wait_s, 0, 0}});
+    const Prediction p = forecaster.energy(waited);
+    const Budget spend = budget(battery, charge, lowest, mean_power(waited, p.expected()));
     return p.probability_below(spend.energy_j, spend.deviation_j) >= confidence;
   };
   if (!(standing_w > 0)) return std::numeric_limits<double>::infinity();
@@ -79,8 +78,7 @@ std::array<double, 3> arrival_charge(const Prediction& prediction, const ChargeM
                                      const Charge& charge, double mean_power_w) {
   std::array<double, 3> out;
   for (std::size_t k = 0; k < told_quantiles.size(); ++k)
-    out[k] =
-        battery.charge_after(charge.fraction, prediction.quantile_j(1 - told_quantiles[k]), mean_power_w);
+    out[k] = battery.charge_after(charge.fraction, prediction.quantile(1 - told_quantiles[k]), mean_power_w);
   const double middle = out[1];
   const double deviation =
       std::hypot(charge.deviation, battery.relative_deviation() * (charge.fraction - middle));
@@ -91,25 +89,26 @@ std::array<double, 3> arrival_charge(const Prediction& prediction, const ChargeM
   return out;
 }
 
-void extend(PlanSum& sum, const Forecaster& forecaster, Driving driving, std::span<const PricedLeg> legs) {
-  for (const PricedLeg& leg : legs)
-    forecaster.extend(sum, driving, leg.motion, leg.payload_kg, leg.cost, leg.way_m);
+void extend(PlanSum& sum, const Forecaster& forecaster, std::span<const PricedLeg> legs) {
+  for (const PricedLeg& leg : legs) forecaster.extend(sum, leg);
 }
 
-PlanSum sum_of(const Forecaster& forecaster, Driving driving, std::span<const PricedLeg> legs) {
+PlanSum sum_of(const Forecaster& forecaster, std::span<const PricedLeg> legs) {
   PlanSum sum;
-  extend(sum, forecaster, driving, legs);
+  extend(sum, forecaster, legs);
   return sum;
 }
 
-std::vector<PricedLeg> price(const LegPricer& pricer, std::span<const PlannedLeg> legs, const Pace& pace) {
+std::vector<PricedLeg> price(const Forecaster& forecaster, const LegPricer& pricer,
+                             std::span<const PlannedLeg> legs, const StatedPace& stated, bool halts_stated) {
+  const Habit habit = forecaster.habit.with(stated);
   std::vector<PricedLeg> priced;
-  priced.reserve(2 * legs.size());
+  priced.reserve(legs.size());
   for (const PlannedLeg& leg : legs) {
-    priced.push_back(
-        {leg.motion, leg.payload_kg, leg.motion == Motion::drive ? leg.way : 0, pricer.paced(leg, pace)});
-    if (leg.motion != Motion::stand && pace.pause_s > 0)
-      priced.push_back({Motion::stand, leg.payload_kg, 0, pricer.standing(pace.pause_s)});
+    const bool moving = leg.motion != Motion::stand;
+    priced.push_back({leg.motion, leg.payload_kg, leg.motion == Motion::drive ? leg.way : 0,
+                      pricer.usual(leg, habit), stated.cruise(leg.motion) ? Driving::stated : Driving::usual,
+                      moving && !halts_stated && !stated.whole(leg.motion)});
   }
   return priced;
 }
@@ -122,16 +121,15 @@ std::vector<PlannedLeg> typical_legs(const Forecaster& forecaster, double payloa
   return legs;
 }
 
-std::vector<PricedLeg> price_typical(const Forecaster& forecaster, const LegPricer& pricer, Pace pace,
-                                     double payload_kg) {
-  if (!forecaster.typical.empty()) pace.pause_s = 0;
-  return price(pricer, typical_legs(forecaster, payload_kg), pace);
+std::vector<PricedLeg> price_typical(const Forecaster& forecaster, const LegPricer& pricer,
+                                     const StatedPace& stated, double payload_kg) {
+  return price(forecaster, pricer, typical_legs(forecaster, payload_kg), stated, !forecaster.typical.empty());
 }
 
-double probability_of_reserve(const Forecaster& forecaster, Driving driving, const ChargeMap& battery,
-                              const Charge& charge, const PlanSum& plan) {
-  const Prediction p = forecaster.predict(plan, driving);
-  const double power = mean_power(plan, p.corrected_j);
+double probability_of_reserve(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
+                              const PlanSum& plan) {
+  const Prediction p = forecaster.energy(plan);
+  const double power = mean_power(plan, p.expected());
   const Budget spend = budget(battery, charge, lowest_charge(battery, charge, power), power);
   return p.probability_below(spend.energy_j, spend.deviation_j);
 }
@@ -154,36 +152,35 @@ double QuickSuccess::probability(double energy_j, double duration_s, double load
   constexpr double usual_speed = 0.6;  // of the limit, where the correction's part for speed is zero
   empty.speed_fraction = loaded.speed_fraction = usual_speed;
   PlanSum sum;
-  forecaster_->extend(sum, Driving::stated, Motion::stand, 0, stand, 0);
+  forecaster_->extend(sum, {Motion::stand, 0, 0, stand});
   for (const auto& [part, payload] : {std::pair{&empty, 0.0}, std::pair{&loaded, payload_kg}}) {
     part->motor_j /= legs / 2;
-    forecaster_->extend(sum, Driving::stated, Motion::drive, payload, *part, 0, legs / 2);
+    forecaster_->extend(sum, {Motion::drive, payload, 0, *part}, legs / 2);
   }
-  return forecaster_->predict(sum, Driving::stated).probability_below(budget_j_, deviation_j_);
+  return forecaster_->energy(sum).probability_below(budget_j_, deviation_j_);
 }
 
-Outlook look_ahead(const Forecaster& forecaster, Driving driving, const ChargeMap& battery,
-                   const Charge& charge, std::span<const PricedTask> tasks,
-                   std::span<const PricedLeg> from_here, double standing_w, double confidence) {
+Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
+                   std::span<const PricedTask> tasks, std::span<const PricedLeg> from_here, double standing_w,
+                   double confidence) {
   Outlook out;
   out.charger_given = !from_here.empty() || (!tasks.empty() && !tasks.front().to_charger.empty());
   std::vector<PlanSum> sums(tasks.size() + 1);  // after so many tasks
   for (std::size_t k = 0; k < tasks.size(); ++k) {
     sums[k + 1] = sums[k];
-    extend(sums[k + 1], forecaster, driving, tasks[k].legs);
+    extend(sums[k + 1], forecaster, tasks[k].legs);
   }
   PlanSum whole = sums.back();
-  if (out.charger_given)
-    extend(whole, forecaster, driving, tasks.empty() ? from_here : tasks.back().to_charger);
-  const Prediction all = forecaster.predict(whole, driving);
-  const double lowest = lowest_charge(battery, charge, mean_power(whole, all.corrected_j));
+  if (out.charger_given) extend(whole, forecaster, tasks.empty() ? from_here : tasks.back().to_charger);
+  const Prediction all = forecaster.energy(whole);
+  const double lowest = lowest_charge(battery, charge, mean_power(whole, all.expected()));
   // What the mean lies above the corrected energy is shared out by energy, so that the parts add up to it.
-  const double mean_share = all.corrected_j > 0 ? all.mean_j() / all.corrected_j : 1;
+  const double mean_share = all.expected() > 0 ? all.mean() / all.expected() : 1;
 
   double corrected_before = 0, probability_before = 1, worst = 0;
   const auto note = [&](TaskOutlook& stage_outlook, const PlanSum& sum, std::size_t index) {
-    stage_outlook = stage(forecaster, driving, battery, charge, lowest, sum);
-    const double corrected = forecaster.predict(sum, driving).corrected_j;
+    stage_outlook = stage(forecaster, battery, charge, lowest, sum);
+    const double corrected = forecaster.energy(sum).expected();
     stage_outlook.mean_j = mean_share * (corrected - corrected_before);
     corrected_before = corrected;
     // Energy only grows along the way, so a reserve once broken stays broken.
@@ -198,53 +195,59 @@ Outlook look_ahead(const Forecaster& forecaster, Driving driving, const ChargeMa
   out.tasks.resize(tasks.size());
   for (std::size_t k = 0; k < tasks.size(); ++k) note(out.tasks[k], sums[k + 1], k);
   if (out.charger_given) note(out.charger.emplace(), whole, tasks.size());
-  out.mean_j = all.mean_j();
-  for (std::size_t k = 0; k < told_quantiles.size(); ++k) out.energy_j[k] = all.quantile_j(told_quantiles[k]);
-  out.duration_s = whole.duration_s;
+  out.mean_j = all.mean();
+  for (std::size_t k = 0; k < told_quantiles.size(); ++k) out.energy_j[k] = all.quantile(told_quantiles[k]);
+  const Prediction duration = forecaster.duration(whole);
+  for (std::size_t k = 0; k < told_quantiles.size(); ++k)
+    out.duration_s[k] = duration.quantile(told_quantiles[k]);
   out.probability = probability_before;
   if (tasks.empty() && !out.charger_given)
-    out.probability = probability_of_reserve(forecaster, driving, battery, charge, whole);
+    out.probability = probability_of_reserve(forecaster, battery, charge, whole);
 
   if (!out.charger_given) return out;
   std::optional<PlanSum> leaving;
   for (std::size_t k = 0; k <= tasks.size(); ++k) {
     PlanSum plan = sums[k];
-    extend(plan, forecaster, driving, k == 0 ? from_here : tasks[k - 1].to_charger);
-    const Prediction p = forecaster.predict(plan, driving);
-    const Budget spend = budget(battery, charge, lowest, mean_power(plan, p.corrected_j));
+    extend(plan, forecaster, k == 0 ? from_here : tasks[k - 1].to_charger);
+    const Prediction p = forecaster.energy(plan);
+    const Budget spend = budget(battery, charge, lowest, mean_power(plan, p.expected()));
     const double probability = p.probability_below(spend.energy_j, spend.deviation_j);
     if (probability < confidence) break;
-    out.latest_departure = Departure{k, sums[k].duration_s, 0, probability};
+    out.latest_departure = Departure{k, forecaster.duration(sums[k]).quantile(0.5), 0, probability};
     leaving = plan;
   }
   if (leaving)
     out.latest_departure->wait_s =
-        longest_wait(forecaster, driving, battery, charge, lowest, *leaving, standing_w, confidence);
+        longest_wait(forecaster, battery, charge, lowest, *leaving, standing_w, confidence);
   return out;
 }
 
-Reach reach(const Forecaster& forecaster, Driving driving, const ChargeMap& battery, const Charge& charge,
+Reach reach(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
             const PlanSum& once) {
-  Prediction p = forecaster.predict(once, driving);
+  Prediction p = forecaster.energy(once);
   Reach out;
   out.energy_per_m_j = nowhere;
-  const double power_w = mean_power(once, p.corrected_j);
+  const double power_w = mean_power(once, p.expected());
   const Budget spend = budget(battery, charge, lowest_charge(battery, charge, power_w), power_w);
   out.usable_j = std::max(0.0, spend.energy_j);
   out.usable_deviation_j = spend.deviation_j;
-  if (!(p.corrected_j > 0)) return out;
+  if (once.impossible) {
+    out.range_m.fill(nowhere);
+    out.run_time_s.fill(nowhere);
+    out.mean_power_w = nowhere;
+  }
+  if (once.impossible || !(p.expected() > 0)) return out;
   // As often as the charge lasts: what the legs scatter averages out, what they share does not.
-  const double copies = std::max(1.0, out.usable_j / p.corrected_j);
+  const double copies = std::max(1.0, out.usable_j / p.expected());
   PlanSum often = once;
-  for (double& x : often.features) x *= copies;
-  for (double& x : often.square_j2) x *= copies;
-  p = forecaster.predict(often, driving);
-  out.mean_power_w = mean_power(once, p.quantile_j(0.5) / copies);
-  if (once.way_m > 0) out.energy_per_m_j = p.quantile_j(0.5) / (copies * once.way_m);
-  const double middle = out.usable_j / p.quantile_j(0.5);
+  often.repeat(copies);
+  p = forecaster.energy(often);
+  out.mean_power_w = mean_power(once, p.quantile(0.5) / copies);
+  if (once.way_m > 0) out.energy_per_m_j = p.quantile(0.5) / (copies * once.way_m);
+  const double middle = out.usable_j / p.quantile(0.5);
   for (std::size_t k = 0; k < told_quantiles.size(); ++k) {
-    const double by_energy = out.usable_j / p.quantile_j(1 - told_quantiles[k]) - middle;
-    const double by_charge = normal_quantile[k] * out.usable_deviation_j / p.quantile_j(0.5);
+    const double by_energy = out.usable_j / p.quantile(1 - told_quantiles[k]) - middle;
+    const double by_charge = normal_quantile[k] * out.usable_deviation_j / p.quantile(0.5);
     const double times =
         copies * std::max(0.0, joined(middle, by_energy, by_charge, told_quantiles[k] < 0.5 ? -1 : 1));
     out.range_m[k] = once.way_m > 0 ? times * once.way_m : nowhere;

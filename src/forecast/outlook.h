@@ -14,14 +14,6 @@ namespace joulecast::forecast {
 
 inline constexpr std::array<double, 3> told_quantiles{0.05, 0.5, 0.95};
 
-// A leg whose model cost is known.
-struct PricedLeg {
-  Motion motion = Motion::stand;
-  double payload_kg = 0;
-  double way_m = 0;  // driven
-  LegCost cost;
-};
-
 struct PricedTask {
   std::vector<PricedLeg> legs;
   std::vector<PricedLeg> to_charger;  // from where this task ends
@@ -36,7 +28,7 @@ struct Charge {
 
 struct TaskOutlook {
   double mean_j = 0;                 // of this task alone
-  double duration_s = 0;             // from now to its end
+  double duration_s = 0;             // from now to its end, median
   double probability = 0;            // of holding the reserve to its end
   std::array<double, 3> energy_j{};  // from now, at told_quantiles
   std::array<double, 3> charge{};    // on arrival, at told_quantiles
@@ -55,7 +47,7 @@ struct Outlook {
   std::optional<TaskOutlook> charger;  // the way to the charger after the last task
   double mean_j = 0;                   // of everything, the way to the charger included
   std::array<double, 3> energy_j{};
-  double duration_s = 0;
+  std::array<double, 3> duration_s{};   // at told_quantiles
   double probability = 0;               // of finishing everything with the reserve
   std::optional<std::size_t> fails_at;  // first task (tasks.size(): the way to the charger) likelier to break
                                         // the reserve than not
@@ -66,9 +58,9 @@ struct Outlook {
 
 // `from_here` are the legs to the charger from where the robot is, empty when no charger is given; every task
 // then has its own.
-Outlook look_ahead(const Forecaster& forecaster, Driving driving, const ChargeMap& battery,
-                   const Charge& charge, std::span<const PricedTask> tasks,
-                   std::span<const PricedLeg> from_here, double standing_w, double confidence);
+Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
+                   std::span<const PricedTask> tasks, std::span<const PricedLeg> from_here, double standing_w,
+                   double confidence);
 
 // How far and how long a robot still goes when it goes on as in its typical legs.
 struct Reach {
@@ -79,19 +71,19 @@ struct Reach {
   std::array<double, 3> range_m{};  // at told_quantiles: the first is nearly always exceeded
   std::array<double, 3> run_time_s{};
 };
-Reach reach(const Forecaster& forecaster, Driving driving, const ChargeMap& battery, const Charge& charge,
+Reach reach(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
             const PlanSum& typical);
 
 // The robot's recent legs carrying another payload; a straight drive stands for legs not known yet.
 std::vector<PlannedLeg> typical_legs(const Forecaster& forecaster, double payload_kg);
 
-// The same priced at a pace. Recorded halts are among the legs, so that nothing is added for pauses then.
-std::vector<PricedLeg> price_typical(const Forecaster& forecaster, const LegPricer& pricer, Pace pace,
-                                     double payload_kg);
+// The same priced by the robot's habit. Recorded halts are among the legs, so that none are added.
+std::vector<PricedLeg> price_typical(const Forecaster& forecaster, const LegPricer& pricer,
+                                     const StatedPace& stated, double payload_kg);
 
 // That a plan ends with the reserve.
-double probability_of_reserve(const Forecaster& forecaster, Driving driving, const ChargeMap& battery,
-                              const Charge& charge, const PlanSum& plan);
+double probability_of_reserve(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
+                              const PlanSum& plan);
 
 // The same for many short plans of one robot, given by sums alone: model energies and durations of
 // minimum-energy drives, split into with and without payload. The legs of a plan count as four of equal size.
@@ -114,11 +106,13 @@ std::array<double, 3> arrival_charge(const Prediction& prediction, const ChargeM
                                      const Charge& charge, double mean_power_w);
 
 // The legs of a plan, summed.
-PlanSum sum_of(const Forecaster& forecaster, Driving driving, std::span<const PricedLeg> legs);
+PlanSum sum_of(const Forecaster& forecaster, std::span<const PricedLeg> legs);
 // Adds them to a plan.
-void extend(PlanSum& sum, const Forecaster& forecaster, Driving driving, std::span<const PricedLeg> legs);
+void extend(PlanSum& sum, const Forecaster& forecaster, std::span<const PricedLeg> legs);
 
-// Legs priced at a pace, each stop followed by the pace's pause.
-std::vector<PricedLeg> price(const LegPricer& pricer, std::span<const PlannedLeg> legs, const Pace& pace);
+// Legs priced at the pace stated, else by the robot's habit. Where its pace is not wholly stated, a leg may
+// be followed by a halt as the robot is used to make, unless the plan itself says where it stands.
+std::vector<PricedLeg> price(const Forecaster& forecaster, const LegPricer& pricer,
+                             std::span<const PlannedLeg> legs, const StatedPace& stated, bool halts_stated);
 
 }  // namespace joulecast::forecast

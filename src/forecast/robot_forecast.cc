@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 namespace joulecast::forecast {
@@ -16,7 +15,7 @@ constexpr std::int64_t watch_after = 5;   // missions: earlier scores are of a m
 constexpr std::int64_t drift_shown = 20;  // missions
 constexpr double drift_forgets = 0.05;    // share of old evidence and scores that survives a drift
 constexpr std::size_t typical_legs = 40;
-constexpr double least_energy_j = 1;
+constexpr double least_amount = 1;   // J, s
 constexpr double floor_share = 0.3;  // of the median leg: scatter of short legs does not shrink with them
 
 // What scatter is assumed before any is seen, and how many legs or missions the assumption counts for.
@@ -24,8 +23,8 @@ struct Assumed {
   std::array<double, motion_count> leg;
   double common;
 };
-constexpr std::array<Assumed, driving_count> assumed{
-    {{{0.05, 0.08, 0.15}, 0.03}, {{0.05, 0.25, 0.25}, 0.04}}};
+constexpr std::array<Assumed, subject_count> assumed{
+    {{{0.05, 0.08, 0.15}, 0.03}, {{0.05, 0.25, 0.25}, 0.04}, {{0.05, 0.25, 0.25}, 0.04}}};
 constexpr double assumed_legs = 10, assumed_missions = 4;
 
 std::vector<Leg> measured(std::vector<Leg> legs) {
@@ -35,71 +34,97 @@ std::vector<Leg> measured(std::vector<Leg> legs) {
 
 }  // namespace
 
-double Prediction::quantile_j(double probability) const {
-  return corrected_j * std::exp(spread * scores->quantile(probability));
+void PlanSum::repeat(double copies) {
+  for (Features& x : features)
+    for (double& value : x) value *= copies;
+  for (auto& motions : squares)
+    for (double& value : motions) value *= copies;
+  for (double& count : stops) count *= copies;
+  stated_s *= copies;
+  duration_s *= copies;
+  way_m *= copies;
 }
 
-double Prediction::mean_j() const {
-  return corrected_j * scores->mean_factor(spread);
+double Forecaster::amount(const Features& features, Subject subject) const {
+  return track(subject).correction.energy_j(features);
 }
 
-double Prediction::probability_below(double energy_j, double deviation_j) const {
-  const auto budget_covers = [&](double spent_j) {
-    if (!(deviation_j > 0)) return spent_j <= energy_j ? 1.0 : 0.0;
-    return 0.5 * std::erfc((spent_j - energy_j) / (deviation_j * std::numbers::sqrt2));
-  };
-  if (!(corrected_j > 0)) return budget_covers(0);
-  constexpr double narrow = 0.5;  // deviation of the budget over that of the energy
-  if (deviation_j <= narrow * corrected_j * spread) {
-    // It widens the ratio as independent parts do, and leaves its shape.
-    const double share = deviation_j / corrected_j;
-    return scores->probability(std::log(std::max(energy_j / corrected_j, 1e-9)) / std::hypot(spread, share));
+void Forecaster::count(PlanSum& sum, Subject subject, Motion motion, const Features& x, double copies) const {
+  const auto s = static_cast<std::size_t>(subject);
+  const double one = amount(x, subject);
+  for (std::size_t k = 0; k < feature_count; ++k) sum.features[s][k] += copies * x[k];
+  sum.squares[s][static_cast<std::size_t>(motion)] += copies * one * one;
+}
+
+void Forecaster::extend(PlanSum& sum, const PricedLeg& leg, double copies) const {
+  const double loaded = payload_limit_kg > 0 ? leg.payload_kg / payload_limit_kg : 0;
+  const Features x = features_of(leg.motion, loaded, leg.cost);
+  if (leg.driving == Driving::stated || leg.motion == Motion::stand) {
+    count(sum, Subject::stated_energy, leg.motion, x, copies);
+    sum.stated_s += copies * leg.cost.duration_s;
+  } else {
+    count(sum, Subject::usual_energy, leg.motion, x, copies);
+    count(sum, Subject::usual_duration, leg.motion, duration_features_of(leg.motion, loaded, leg.cost),
+          copies);
   }
-  // Atoms four at a time: the budget's deviation blurs what lies between them.
-  constexpr std::size_t together = 4;
-  const auto atoms = scores->atoms();
-  double sum = 0;
-  for (std::size_t k = 0; k < atoms.size(); k += together) {
-    sum += budget_covers(corrected_j * std::exp(spread * 0.5 * (atoms[k + 1] + atoms[k + 2])));
-  }
-  return sum * together / static_cast<double>(atoms.size());
+  if (leg.may_halt) sum.stops[leg.motion == Motion::turn ? 1 : 0] += copies;
+  sum.duration_s += copies * leg.cost.duration_s;
+  sum.way_m += copies * leg.way_m;
+  sum.slower = sum.slower || leg.cost.slower;
+  sum.impossible = sum.impossible || leg.cost.impossible;
 }
 
-void Forecaster::extend(PlanSum& sum, Driving driving, Motion motion, double payload_kg, const LegCost& cost,
-                        double way_m, double copies) const {
-  const Features x = features_of(motion, payload_limit_kg > 0 ? payload_kg / payload_limit_kg : 0, cost);
-  const double energy = track(driving).correction.energy_j(x);
-  for (std::size_t k = 0; k < feature_count; ++k) sum.features[k] += copies * x[k];
-  sum.square_j2[static_cast<std::size_t>(motion)] += copies * energy * energy;
-  sum.duration_s += copies * cost.duration_s;
-  sum.way_m += copies * way_m;
-}
-
-Prediction Forecaster::predict(const PlanSum& sum, Driving driving) const {
-  const Track& t = track(driving);
+// What legs scatter and how well corrections are known is independent; what all legs of a mission share is
+// shared by both ways of driving too.
+Prediction Forecaster::joined(const PlanSum& sum, std::span<const Subject> subjects, double halt_unit) const {
   Prediction p;
-  p.scores = &t.scores;
-  p.corrected_j = t.correction.energy_j(sum.features);
-  if (!(p.corrected_j > 0)) {
-    p.corrected_j = 0;
-    return p;
+  double variance = 0, common = 0;
+  for (const Subject subject : subjects) {
+    const auto s = static_cast<std::size_t>(subject);
+    const Track& t = tracks[s];
+    const double part = std::max(0.0, amount(sum.features[s], subject));
+    if (p.scores == nullptr || part > 0) {
+      p.scores = &t.scores;
+      p.inflation = t.inflation;
+    }
+    if (!(part > 0)) continue;
+    p.legs += part;
+    variance += t.correction.variance_j2(sum.features[s]);
+    for (std::size_t k = 0; k < motion_count; ++k)
+      variance += t.scatter[k] * t.scatter[k] * sum.squares[s][k];
+    common += t.common * part;
   }
-  double variance = t.correction.variance_j2(sum.features);
-  for (std::size_t k = 0; k < motion_count; ++k) variance += t.scatter[k] * t.scatter[k] * sum.square_j2[k];
-  p.spread = t.inflation * std::sqrt(variance / (p.corrected_j * p.corrected_j) + t.common * t.common);
+  if (p.legs > 0) p.spread = std::sqrt(variance + common * common) / p.legs;
+  p.halts = habit.standing(sum.stops, halt_unit);
+  return p;
+}
+
+Prediction Forecaster::energy(const PlanSum& sum) const {
+  constexpr std::array subjects{Subject::stated_energy, Subject::usual_energy};
+  return joined(sum, subjects, standing_w * track(Subject::usual_energy).correction.mean[0]);
+}
+
+Prediction Forecaster::duration(const PlanSum& sum) const {
+  constexpr std::array subjects{Subject::usual_duration};
+  Prediction p = joined(sum, subjects, 1);
+  p.fixed = sum.stated_s;
   return p;
 }
 
 RobotForecast::RobotForecast(robot::RobotModel robot, dynamics::DriveModel drive)
-    : robot_(std::move(robot)), drive_(std::move(drive)), pace_(default_pace(robot_)) {}
+    : robot_(std::move(robot)),
+      drive_(std::move(drive)),
+      habit_(habit_of(robot_, {})),
+      standing_w_(drive_.battery_power_for({0, 0})) {}
 
 void RobotForecast::set_model(robot::RobotModel robot, dynamics::DriveModel drive) {
   robot_ = std::move(robot);
   drive_ = std::move(drive);
+  standing_w_ = drive_.battery_power_for({0, 0});
   learn_anew();
 }
 
-void RobotForecast::set_siblings(std::array<Siblings, driving_count> siblings) {
+void RobotForecast::set_siblings(std::array<Siblings, subject_count> siblings) {
   siblings_ = std::move(siblings);
 }
 
@@ -110,13 +135,13 @@ void RobotForecast::learn_anew() {
   drift_watch_ = {};
   drift_.reset();
   learnt_ = learnt_at_drift_ = 0;
-  pace_ = default_pace(robot_);
+  habit_ = habit_of(robot_, {});
   for (PastMission& mission : missions) learn(std::move(mission));
 }
 
-std::array<OwnFinding, driving_count> RobotForecast::findings() const {
-  std::array<OwnFinding, driving_count> found;
-  for (std::size_t k = 0; k < driving_count; ++k) {
+std::array<OwnFinding, subject_count> RobotForecast::findings() const {
+  std::array<OwnFinding, subject_count> found;
+  for (std::size_t k = 0; k < subject_count; ++k) {
     found[k].correction = learning_[k].fit.posterior(untried());
     found[k].scores = learning_[k].scores.entries();
     found[k].missions = learnt_;
@@ -124,8 +149,11 @@ std::array<OwnFinding, driving_count> RobotForecast::findings() const {
   return found;
 }
 
-Forecaster::Track RobotForecast::track(const Learning& learning, const Siblings& siblings) const {
-  const Assumed& start = assumed[static_cast<std::size_t>(&learning - learning_.data())];
+Forecaster::Track RobotForecast::track(Subject subject) const {
+  const auto s = static_cast<std::size_t>(subject);
+  const Assumed& start = assumed[s];
+  const Learning& learning = learning_[s];
+  const Siblings& siblings = siblings_[s];
   Forecaster::Track t;
   t.correction = learning.fit.posterior(siblings.prior);
   for (std::size_t k = 0; k < motion_count; ++k) {
@@ -142,53 +170,79 @@ Forecaster::Track RobotForecast::track(const Learning& learning, const Siblings&
   return t;
 }
 
-LegCost RobotForecast::cost(Driving driving, const Leg& leg) const {
-  const LegPricer pricer(robot_, drive_);
-  return driving == Driving::stated ? pricer.driven(leg) : pricer.paced(leg, pace_);
+Forecaster RobotForecast::with_track(Subject subject) const {
+  Forecaster now;
+  now.tracks[static_cast<std::size_t>(subject)] = track(subject);
+  now.habit = habit_;
+  now.standing_w = standing_w_;
+  now.payload_limit_kg = robot_.limits.payload_kg;
+  return now;
 }
 
-std::vector<Evidence> RobotForecast::evidence(Driving driving, const PastMission& mission,
-                                              const Forecaster::Track& now) const {
-  std::vector<Evidence> legs;
-  legs.reserve(mission.legs.size());
-  const double limit = robot_.limits.payload_kg;
+RobotForecast::Seen RobotForecast::seen(Subject subject, const PastMission& mission,
+                                        const Forecaster& now) const {
+  const LegPricer pricer(robot_, drive_);
+  const bool stated = subject == Subject::stated_energy, time = subject == Subject::usual_duration;
+  const auto s = static_cast<std::size_t>(subject);
+  Seen seen;
+  const auto add = [&](const Leg& leg) {
+    PricedLeg priced{leg.motion,
+                     leg.payload_kg,
+                     0,
+                     stated ? pricer.driven(leg) : pricer.usual(leg, habit_),
+                     stated ? Driving::stated : Driving::usual,
+                     !stated && leg.motion != Motion::stand};
+    const double loaded = now.payload_limit_kg > 0 ? leg.payload_kg / now.payload_limit_kg : 0;
+    seen.legs.push_back({time ? duration_features_of(leg.motion, loaded, priced.cost)
+                              : features_of(leg.motion, loaded, priced.cost),
+                         time ? leg.duration_s : leg.battery_j, 0});
+    seen.motions.push_back(leg.motion);
+    return priced;
+  };
   double sum = 0;
   for (const Leg& leg : mission.legs) {
-    legs.push_back({features_of(leg.motion, limit > 0 ? leg.payload_kg / limit : 0, cost(driving, leg)),
-                    leg.battery_j, 0});
-    sum += std::max(0.0, now.correction.energy_j(legs.back().features));
+    if (!stated && leg.motion == Motion::stand) {
+      seen.halted += time ? leg.duration_s : leg.battery_j;
+      continue;
+    }
+    now.extend(seen.sum, add(leg));
+    seen.measured += seen.legs.back().battery_j;
+    sum += std::max(0.0, now.amount(seen.legs.back().features, subject));
   }
-  const double floor = std::max(least_energy_j, floor_share * sum / static_cast<double>(legs.size()));
-  for (std::size_t k = 0; k < legs.size(); ++k) {
-    const double energy = std::max(floor, now.correction.energy_j(legs[k].features));
-    legs[k].deviation_j = energy * now.scatter[static_cast<std::size_t>(mission.legs[k].motion)];
+  seen.foreseen = seen.legs.size();
+  if (subject == Subject::usual_energy) {
+    for (const Leg& leg : mission.legs)
+      if (leg.motion == Motion::stand) add(leg);
   }
-  return legs;
+  const double floor =
+      std::max(least_amount, floor_share * sum / std::max(1.0, static_cast<double>(seen.foreseen)));
+  for (std::size_t k = 0; k < seen.legs.size(); ++k) {
+    const double amount = std::max(floor, now.amount(seen.legs[k].features, subject));
+    seen.legs[k].deviation_j = amount * now.tracks[s].scatter[static_cast<std::size_t>(seen.motions[k])];
+  }
+  return seen;
 }
 
-double RobotForecast::score(Driving driving, const PastMission& mission, double& log_ratio) {
-  Learning& learning = learning_[static_cast<std::size_t>(driving)];
-  const Forecaster::Track now = track(learning, siblings_[static_cast<std::size_t>(driving)]);
-  const std::vector<Evidence> legs = evidence(driving, mission, now);
+double RobotForecast::score(Subject subject, const PastMission& mission, double& log_ratio) {
+  const auto s = static_cast<std::size_t>(subject);
+  Learning& learning = learning_[s];
+  const Forecaster with = with_track(subject);
+  const Forecaster::Track& now = with.tracks[s];
+  const Seen legs = seen(subject, mission, with);
+  if (legs.foreseen == 0) return 0;
+  const Prediction told =
+      subject == Subject::usual_duration ? with.duration(legs.sum) : with.energy(legs.sum);
+  const double z = told.score_of(std::max(least_amount, legs.measured + legs.halted));
 
-  PlanSum sum;
-  double spent_j = 0;
-  for (std::size_t k = 0; k < legs.size(); ++k) {
-    const double energy = now.correction.energy_j(legs[k].features);
-    for (std::size_t f = 0; f < feature_count; ++f) sum.features[f] += legs[k].features[f];
-    sum.square_j2[static_cast<std::size_t>(mission.legs[k].motion)] += energy * energy;
-    spent_j += legs[k].battery_j;
-  }
-  const double expected_j = std::max(least_energy_j, now.correction.energy_j(sum.features));
-  spent_j = std::max(least_energy_j, spent_j);
-  log_ratio = std::log(spent_j / expected_j);
-  const double relative = 1 / (expected_j * expected_j);
-  const double estimate_part = relative * now.correction.variance_j2(sum.features);
+  const double expected = std::max(least_amount, told.legs);
+  const double measured = std::max(least_amount, legs.measured);
+  log_ratio = std::log(measured / expected);
+  const double relative = 1 / (expected * expected);
+  const double estimate_part = relative * now.correction.variance_j2(legs.sum.features[s]);
   double leg_part = 0;
   for (std::size_t k = 0; k < motion_count; ++k)
-    leg_part += relative * now.scatter[k] * now.scatter[k] * sum.square_j2[k];
+    leg_part += relative * now.scatter[k] * now.scatter[k] * legs.sum.squares[s][k];
   const double common_part = now.common * now.common;
-  const double z = log_ratio / std::sqrt(estimate_part + leg_part + common_part);
 
   const double beyond = 0.5 * (1 - interval);
   if (learnt_ > 0) {
@@ -202,22 +256,8 @@ double RobotForecast::score(Driving driving, const PastMission& mission, double&
   // about a corrected one.
   learning.scores.add(z, 1 - estimate_part / (estimate_part + leg_part + common_part));
 
-  // Scatter between legs, with what the whole mission was off taken out; and between missions, less what legs
-  // and the estimate explain.
-  const double ratio = spent_j / expected_j;
-  for (Sum& part : learning.scatter) part.squares *= scatter_keep, part.weight *= scatter_keep;
-  const double mean_j = expected_j / static_cast<double>(legs.size());
-  for (std::size_t k = 0; k < legs.size(); ++k) {
-    const double energy = ratio * now.correction.energy_j(legs[k].features);
-    Sum& part = learning.scatter[static_cast<std::size_t>(mission.legs[k].motion)];
-    constexpr double clipped = 9;  // a leg that a person pushed says nothing of scatter
-    const double assumed_square =
-        assumed[static_cast<std::size_t>(driving)].leg[static_cast<std::size_t>(mission.legs[k].motion)];
-    const double off = (legs[k].battery_j - energy) / mean_j, scale = energy / mean_j;
-    part.squares += std::min(off * off, clipped * assumed_square * scale * scale);
-    part.weight += scale * scale;
-  }
-  // A mission that the estimate's own error dominates tells little of the rest.
+  learn_scatter(subject, legs, now, measured / expected);
+  // A mission that the estimate's own error dominates tells little of what missions share.
   const double weight = common_part / (common_part + estimate_part);
   const double beyond_legs = log_ratio * log_ratio - leg_part - estimate_part;
   constexpr double outlier = 9;
@@ -227,16 +267,36 @@ double RobotForecast::score(Driving driving, const PastMission& mission, double&
   learning.common.weight = scatter_keep * learning.common.weight + weight;
 
   learning.fit.forget(evidence_keep);
-  learning.fit.add(legs, now.common, now.correction);
+  learning.fit.add(legs.legs, now.common, now.correction);
   return z;
 }
 
-void RobotForecast::refit(Driving driving, std::size_t from) {
-  Learning& learning = learning_[static_cast<std::size_t>(driving)];
+// Scatter between legs, with what the whole mission was off taken out.
+void RobotForecast::learn_scatter(Subject subject, const Seen& seen, const Forecaster::Track& now,
+                                  double ratio) {
+  const auto s = static_cast<std::size_t>(subject);
+  Learning& learning = learning_[s];
+  for (Sum& part : learning.scatter) part.squares *= scatter_keep, part.weight *= scatter_keep;
+  const double mean = seen.measured / ratio / static_cast<double>(seen.foreseen);
+  for (std::size_t k = 0; k < seen.legs.size(); ++k) {
+    const double amount = ratio * now.correction.energy_j(seen.legs[k].features);
+    const auto motion = static_cast<std::size_t>(seen.motions[k]);
+    Sum& part = learning.scatter[motion];
+    constexpr double clipped = 9;  // a leg that a person pushed says nothing of scatter
+    const double assumed_square = assumed[s].leg[motion];
+    const double off = (seen.legs[k].battery_j - amount) / mean, scale = amount / mean;
+    part.squares += std::min(off * off, clipped * assumed_square * scale * scale);
+    part.weight += scale * scale;
+  }
+}
+
+void RobotForecast::refit(Subject subject, std::size_t from) {
+  Learning& learning = learning_[static_cast<std::size_t>(subject)];
   for (std::size_t k = from; k < missions_.size(); ++k) {
-    const Forecaster::Track now = track(learning, siblings_[static_cast<std::size_t>(driving)]);
+    const Forecaster now = with_track(subject);
+    const Seen legs = seen(subject, missions_[k], now);
     learning.fit.forget(evidence_keep);
-    learning.fit.add(evidence(driving, missions_[k], now), now.common, now.correction);
+    learning.fit.add(legs.legs, now.track(subject).common, now.track(subject).correction);
   }
 }
 
@@ -253,10 +313,10 @@ std::optional<Drift> RobotForecast::watch(double score, double log_ratio) {
   drift_ = Drift{(missions_.end() - since)->start_utime_us, missions_.back().start_utime_us,
                  std::exp(sum / static_cast<double>(since)), since};
   learnt_at_drift_ = learnt_;
-  for (std::size_t k = 0; k < driving_count; ++k) {
+  for (std::size_t k = 0; k < subject_count; ++k) {
     learning_[k].fit.forget(drift_forgets);
     learning_[k].scores.discount(drift_forgets);
-    refit(static_cast<Driving>(k), missions_.size() - static_cast<std::size_t>(since));
+    refit(static_cast<Subject>(k), missions_.size() - static_cast<std::size_t>(since));
   }
   return drift_;
 }
@@ -265,33 +325,36 @@ std::optional<Drift> RobotForecast::learn(PastMission mission) {
   mission.legs = measured(std::move(mission.legs));
   double spent_j = 0;
   for (const Leg& leg : mission.legs) spent_j += leg.battery_j;
-  if (mission.legs.empty() || spent_j < least_energy_j) return std::nullopt;
+  if (mission.legs.empty() || spent_j < least_amount) return std::nullopt;
 
   double log_ratio = 0, usual_ratio = 0;
-  const double z = score(Driving::stated, mission, log_ratio);
-  score(Driving::usual, mission, usual_ratio);
+  const double z = score(Subject::stated_energy, mission, log_ratio);
+  for (const Subject usual : {Subject::usual_energy, Subject::usual_duration})
+    score(usual, mission, usual_ratio);
   missions_.push_back(std::move(mission));
   if (missions_.size() > most_missions) missions_.pop_front();
   ++learnt_;
 
-  std::vector<Leg> recent;
-  constexpr std::size_t habit_legs = 300;
-  for (auto m = missions_.rbegin(); m != missions_.rend() && recent.size() < habit_legs; ++m)
-    recent.insert(recent.end(), m->legs.begin(), m->legs.end());
-  pace_ = usual_pace(robot_, recent);
+  constexpr std::size_t habit_missions = 40;
+  const std::size_t recent = std::min(missions_.size(), habit_missions);
+  habit_ =
+      habit_of(robot_, std::vector(missions_.end() - static_cast<std::ptrdiff_t>(recent), missions_.end()));
   // While the habit is being found, what was learnt against it is learnt again.
   constexpr std::array<std::int64_t, 5> habit_settles{2, 4, 8, 16, 32};
   if (std::ranges::find(habit_settles, learnt_) != habit_settles.end()) {
-    learning_[static_cast<std::size_t>(Driving::usual)].fit = {};
-    refit(Driving::usual, 0);
+    for (const Subject usual : {Subject::usual_energy, Subject::usual_duration}) {
+      learning_[static_cast<std::size_t>(usual)].fit = {};
+      refit(usual, 0);
+    }
   }
   return watch(z, log_ratio);
 }
 
 std::shared_ptr<const Forecaster> RobotForecast::forecaster() const {
   auto made = std::make_shared<Forecaster>();
-  for (std::size_t k = 0; k < driving_count; ++k) made->tracks[k] = track(learning_[k], siblings_[k]);
-  made->usual = pace_;
+  for (std::size_t k = 0; k < subject_count; ++k) made->tracks[k] = track(static_cast<Subject>(k));
+  made->habit = habit_;
+  made->standing_w = standing_w_;
   made->payload_limit_kg = robot_.limits.payload_kg;
   made->missions = learnt_;
   made->siblings = siblings_[0].robots;

@@ -13,15 +13,11 @@
 #include "forecast/drift.h"
 #include "forecast/leg.h"
 #include "forecast/leg_cost.h"
+#include "forecast/prediction.h"
 #include "forecast/scores.h"
 #include "forecast/siblings.h"
 
 namespace joulecast::forecast {
-
-struct PastMission {
-  std::int64_t start_utime_us = 0;
-  std::vector<Leg> legs;
-};
 
 // A lasting change of what a robot spends.
 struct Drift {
@@ -31,24 +27,28 @@ struct Drift {
   std::int64_t missions = 0;           // since the change
 };
 
-// The parts of a plan that its energy and uncertainty depend on; plans add up leg by leg.
-struct PlanSum {
-  Features features{};
-  std::array<double, motion_count> square_j2{};  // of the corrected energies of its legs, by motion
-  double duration_s = 0;
-  double way_m = 0;
+// A leg whose model cost is known.
+struct PricedLeg {
+  Motion motion = Motion::stand;
+  double payload_kg = 0;
+  double way_m = 0;  // driven
+  LegCost cost;
+  Driving driving = Driving::stated;
+  bool may_halt = false;  // after it the robot stands as often and long as it is used to
 };
 
-// Energy of a plan: corrected * exp(spread * z), z distributed as `scores`.
-struct Prediction {
-  double corrected_j = 0;  // the model's, with the robot's correction
-  double spread = 0;
-  const ScoreDistribution* scores = nullptr;  // of the Forecaster
+// The parts of a plan that its energy, duration and uncertainty depend on; plans add up leg by leg.
+struct PlanSum {
+  std::array<Features, subject_count> features{};
+  std::array<std::array<double, motion_count>, subject_count> squares{};  // of its legs' corrected amounts
+  std::array<double, 2> stops{};  // after drives, after turns, at which the robot may halt
+  double stated_s = 0;            // of stated legs
+  double duration_s = 0;          // expected by the model
+  double way_m = 0;
+  bool slower = false, impossible = false;  // a leg is driven slower than wanted, or cannot be driven
 
-  double quantile_j(double probability) const;
-  double mean_j() const;
-  // That the energy stays at or below an amount known with a standard deviation (0: exactly).
-  double probability_below(double energy_j, double deviation_j = 0) const;
+  // As many times the same.
+  void repeat(double copies);
 };
 
 // All that forecasts need of one robot at one moment; immutable.
@@ -62,20 +62,26 @@ class Forecaster {
     double inflation = 1;  // of the spread, by adaptive conformal inference
   };
 
-  std::array<Track, driving_count> tracks;
-  Pace usual;
+  std::array<Track, subject_count> tracks;
+  Habit habit;
+  double standing_w = 0;
   std::vector<Leg> typical;  // recent legs, for range and run time
   double payload_limit_kg = 0;
   std::int64_t missions = 0;  // learnt from
   std::int64_t siblings = 0;  // robots that lent their findings
   std::optional<Drift> drift;
 
-  const Track& track(Driving driving) const { return tracks[static_cast<std::size_t>(driving)]; }
+  const Track& track(Subject subject) const { return tracks[static_cast<std::size_t>(subject)]; }
 
-  // Adds a leg whose model cost is known. `copies` of it, each with its own scatter.
-  void extend(PlanSum& sum, Driving driving, Motion motion, double payload_kg, const LegCost& cost,
-              double way_m, double copies = 1) const;
-  Prediction predict(const PlanSum& sum, Driving driving) const;
+  // Adds `copies` of a leg, each with its own scatter.
+  void extend(PlanSum& sum, const PricedLeg& leg, double copies = 1) const;
+  Prediction energy(const PlanSum& sum) const;    // J
+  Prediction duration(const PlanSum& sum) const;  // s
+  double amount(const Features& features, Subject subject) const;
+
+ private:
+  void count(PlanSum& sum, Subject subject, Motion motion, const Features& x, double copies) const;
+  Prediction joined(const PlanSum& sum, std::span<const Subject> subjects, double halt_unit) const;
 };
 
 // Learns from the missions of one robot as they end, against its model in force. Each mission is first
@@ -97,9 +103,9 @@ class RobotForecast {
   // Puts another model in force and learns the kept missions anew.
   void set_model(robot::RobotModel robot, dynamics::DriveModel drive);
 
-  // One a Driving.
-  void set_siblings(std::array<Siblings, driving_count> siblings);
-  std::array<OwnFinding, driving_count> findings() const;
+  // One a Subject.
+  void set_siblings(std::array<Siblings, subject_count> siblings);
+  std::array<OwnFinding, subject_count> findings() const;
 
   // Of what was learnt so far.
   std::shared_ptr<const Forecaster> forecaster() const;
@@ -116,22 +122,33 @@ class RobotForecast {
     double log_inflation = 0;
   };
 
+  // A mission's legs as a subject sees them: first those that it foresees, then such that only teach it.
+  struct Seen {
+    std::vector<Evidence> legs;
+    std::vector<Motion> motions;
+    std::size_t foreseen = 0;
+    double measured = 0;  // of the foreseen
+    double halted = 0;    // measured while standing, where halts are not foreseen one by one
+    PlanSum sum;          // of the foreseen
+  };
+
   void learn_anew();
-  Forecaster::Track track(const Learning& learning, const Siblings& siblings) const;
-  LegCost cost(Driving driving, const Leg& leg) const;
-  std::vector<Evidence> evidence(Driving driving, const PastMission& mission,
-                                 const Forecaster::Track& now) const;
-  double score(Driving driving, const PastMission& mission, double& log_ratio);
-  void refit(Driving driving, std::size_t from);
+  Forecaster::Track track(Subject subject) const;
+  Seen seen(Subject subject, const PastMission& mission, const Forecaster& now) const;
+  Forecaster with_track(Subject subject) const;
+  double score(Subject subject, const PastMission& mission, double& log_ratio);
+  void learn_scatter(Subject subject, const Seen& seen, const Forecaster::Track& now, double ratio);
+  void refit(Subject subject, std::size_t from);
   std::optional<Drift> watch(double score, double log_ratio);
 
   robot::RobotModel robot_;
   dynamics::DriveModel drive_;
-  Pace pace_;
+  Habit habit_;
+  double standing_w_ = 0;
   std::deque<PastMission> missions_;
   std::deque<double> log_ratios_;  // of the stated track, one a mission
-  std::array<Learning, driving_count> learning_;
-  std::array<Siblings, driving_count> siblings_;
+  std::array<Learning, subject_count> learning_;
+  std::array<Siblings, subject_count> siblings_;
   DriftWatch drift_watch_;
   std::optional<Drift> drift_;
   std::int64_t learnt_ = 0, learnt_at_drift_ = 0;

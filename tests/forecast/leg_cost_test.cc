@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "forecast/limitation.h"
 #include "planning/baseline.h"
 #include "robots.h"
 
@@ -99,37 +100,38 @@ TEST(LegPricer, ADrivenTrapezoidCostsAsAPacedOne) {
   EXPECT_NEAR(driven.standing_j, paced.standing_j, 1e-9 * paced.standing_j);
 }
 
-TEST(UsualPace, IsTheMedianOfWhatLegsShowOnceThereAreFive) {
-  const robot::RobotModel robot = shipped("amr");
-  const Pace habit{0.8, 0.4, 1.0, 2.0, 0.5};
-  const dynamics::DriveModel drive = *dynamics::drive_model(robot);
-  const LegPricer pricer(robot, drive);
-  std::vector<Leg> legs;
-  const auto add = [&](Motion motion, double way, double scale) {
-    Pace pace = habit;
-    pace.speed_m_s *= scale;
-    pace.yaw_rate_rad_s *= scale;
-    const LegCost cost = pricer.paced(PlannedLeg{motion, way, 0, 0, 0}, pace);
-    legs.push_back({motion, cost.duration_s, way,
-                    motion == Motion::turn ? pace.yaw_rate_rad_s : pace.speed_m_s, 0, 0, 0});
-    legs.push_back({Motion::stand, habit.pause_s, 0, 0, 0, 0, 0});
-  };
-  for (const double scale : {0.9, 0.95, 1.0, 1.05, 1.1}) {
-    add(Motion::turn, 3, scale);
-    add(Motion::drive, 8, scale);
-  }
-  const Pace found = usual_pace(robot, legs);
-  EXPECT_NEAR(found.speed_m_s, habit.speed_m_s, 1e-9);
-  EXPECT_NEAR(found.acceleration_m_s2, habit.acceleration_m_s2, 1e-9);
-  EXPECT_NEAR(found.yaw_rate_rad_s, habit.yaw_rate_rad_s, 1e-9);
-  EXPECT_NEAR(found.yaw_acceleration_rad_s2, habit.yaw_acceleration_rad_s2, 1e-9);
-  // The halts hold the neighbours' creeping ends too: still speed over acceleration at either side.
-  const double still = still_speed_m_s(robot);
-  EXPECT_NEAR(found.pause_s, habit.pause_s - still / 0.4 - still / (robot.kinematics.half_track_m * 2.0),
-              1e-9);
+// Motors that a resistance of 500 ohm leaves without force, and a gear that leaves them without speed.
+TEST(LegPricer, DrivesNoFasterThanTheMotorsReach) {
+  const robot::RobotModel able = shipped("amr");
+  const PlannedLeg leg{Motion::drive, 10, 0, 20, 0};
+  const Pace pace = default_pace(able);
+  EXPECT_FALSE(LegPricer(able, *dynamics::drive_model(able)).paced(leg, pace).slower);
+  EXPECT_FALSE(limitation(LegPricer(able, *dynamics::drive_model(able)), able, pace, 20));
 
-  legs.resize(8);
-  EXPECT_EQ(usual_pace(robot, legs).speed_m_s, default_pace(robot).speed_m_s);
+  robot::RobotModel geared = able;
+  geared.motor.gear_ratio = 1000;
+  const dynamics::DriveModel slow = *dynamics::drive_model(geared);
+  const LegPricer pricer(geared, slow);
+  const LegCost cost = pricer.paced(leg, pace);
+  EXPECT_TRUE(cost.slower);
+  const Reachable reached = pricer.reachable(Motion::drive, 0, 20, {pace.speed_m_s, pace.acceleration_m_s2});
+  // The voltage that the gear's speed induces alone bounds it.
+  EXPECT_LT(reached.cruise.speed, able.battery.nominal_voltage_v / geared.motor.voltage_constant_v_s_rad / 1000 *
+                                      able.kinematics.wheel_radius_m);
+  EXPECT_GT(cost.duration_s, 10 / reached.cruise.speed);
+  const auto told = limitation(pricer, geared, pace, 20);
+  ASSERT_TRUE(told);
+  EXPECT_TRUE(told->moves);
+  EXPECT_EQ(told->reached.speed_m_s, reached.cruise.speed);
+
+  robot::RobotModel feeble = able;
+  feeble.motor.resistance_ohm = 500;
+  const dynamics::DriveModel none = *dynamics::drive_model(feeble);
+  EXPECT_TRUE(LegPricer(feeble, none).paced(leg, pace).impossible);
+  const auto why = limitation(LegPricer(feeble, none), feeble, pace, 20);
+  ASSERT_TRUE(why);
+  EXPECT_FALSE(why->moves);
+  EXPECT_NE(why->sentence.find("cannot drive"), std::string::npos) << why->sentence;
 }
 
 TEST(PlannedLegs, FollowThePath) {

@@ -38,9 +38,9 @@ TEST(Prediction, WhatLegsScatterAveragesOutAndWhatTheyShareDoesNot) {
   const Forecaster f = forecaster(0.03, 0.2);
   for (const int count : {1, 4, 25, 100}) {
     PlanSum sum;
-    for (int k = 0; k < count; ++k) f.extend(sum, Driving::usual, Motion::drive, 0, drive(500).cost, 10);
-    const Prediction p = f.predict(sum, Driving::usual);
-    EXPECT_NEAR(p.corrected_j, 500 * count, 1e-9 * p.corrected_j);
+    for (int k = 0; k < count; ++k) f.extend(sum, drive(500));
+    const Prediction p = f.energy(sum);
+    EXPECT_NEAR(p.legs, 500 * count, 1e-9 * p.legs);
     EXPECT_NEAR(p.spread, std::sqrt(0.03 * 0.03 + 0.2 * 0.2 / count), 1e-12);
   }
 }
@@ -51,8 +51,8 @@ TEST(Prediction, WhatLegsScatterAveragesOutAndWhatTheyShareDoesNot) {
 TEST(Prediction, ProbabilityIsTheShareOfDraws) {
   const Forecaster f = forecaster(0.05, 0.1);
   PlanSum sum;
-  for (int k = 0; k < 6; ++k) f.extend(sum, Driving::stated, Motion::drive, 0, drive(800).cost, 10);
-  const Prediction p = f.predict(sum, Driving::stated);
+  for (int k = 0; k < 6; ++k) f.extend(sum, drive(800));
+  const Prediction p = f.energy(sum);
   Rng rng(9);
   // Budgets as exact as the plan's energy, and uncertain ones many times as large, as of a charge that is
   // hardly known.
@@ -65,14 +65,14 @@ TEST(Prediction, ProbabilityIsTheShareOfDraws) {
   }
   for (const double factor : {0.0, 5.0, 100.0, 1000.0}) {
     for (const double share : {0.2, 0.4, 0.6, 1.5})
-      cases.push_back({factor, share * std::max(1.0, factor) * p.corrected_j});
+      cases.push_back({factor, share * std::max(1.0, factor) * p.legs});
   }
   for (const auto& [factor, deviation_j] : cases) {
-    const double budget = factor * p.corrected_j;
+    const double budget = factor * p.legs;
     int within = 0;
     constexpr int draws = 20'000;
     for (int k = 0; k < draws; ++k) {
-      const double energy = p.corrected_j * std::exp(p.spread * p.scores->quantile(rng.uniform()));
+      const double energy = p.legs * std::exp(p.spread * p.scores->quantile(rng.uniform()));
       within += energy <= budget + deviation_j * rng.normal();
     }
     const double shape = deviation_j > 0 ? 0.02 : 0.5 / static_cast<double>(ScoreDistribution::count);
@@ -88,7 +88,7 @@ TEST(Outlook, TellsEachLegAndWhereItFails) {
   const double usable = map.energy_j(0.5, 0.15, 100);
   std::vector<PricedTask> tasks(5);
   for (PricedTask& task : tasks) task.legs = {drive(0.3 * usable, 100)};
-  const Outlook out = look_ahead(f, Driving::usual, map, {0.5, 0, 0.15}, tasks, {}, standing_w, 0.95);
+  const Outlook out = look_ahead(f, map, {0.5, 0, 0.15}, tasks, {}, standing_w, 0.95);
   ASSERT_EQ(out.tasks.size(), 5u);
   ASSERT_TRUE(out.fails_at);
   EXPECT_EQ(*out.fails_at, 3u);  // 0.9 of the usable energy after three, 1.2 after four
@@ -121,7 +121,7 @@ TEST(Outlook, LatestDepartureKeepsTheConfidence) {
     task.to_charger = {drive(0.1 * usable, 50)};
   }
   const std::vector<PricedLeg> from_here{drive(0.1 * usable, 50)};
-  const Outlook out = look_ahead(f, Driving::usual, map, {0.5, 0, 0.15}, tasks, from_here, standing_w, 0.95);
+  const Outlook out = look_ahead(f, map, {0.5, 0, 0.15}, tasks, from_here, standing_w, 0.95);
   ASSERT_TRUE(out.latest_departure);
   EXPECT_EQ(out.latest_departure->after_tasks, 4u);  // 0.8 + 0.1 fits, 1.0 + 0.1 does not
   EXPECT_GE(out.latest_departure->probability, 0.95);
@@ -135,7 +135,7 @@ TEST(Outlook, LatestDepartureKeepsTheConfidence) {
   tasks.back().legs.push_back(
       {Motion::stand, 0, 0, {out.latest_departure->wait_s, standing_w * out.latest_departure->wait_s, 0, 0}});
   const Outlook waited =
-      look_ahead(f, Driving::usual, map, {0.5, 0, 0.15}, tasks, from_here, standing_w, 0.95);
+      look_ahead(f, map, {0.5, 0, 0.15}, tasks, from_here, standing_w, 0.95);
   EXPECT_NEAR(waited.probability, 0.95, 0.01);
 }
 
@@ -143,7 +143,7 @@ TEST(Outlook, TooLateEvenFromHere) {
   const Forecaster f = forecaster(0.03, 0.05);
   const ChargeMap map = battery();
   const std::vector<PricedLeg> from_here{drive(map.energy_j(0.2, 0.1, 100), 50)};
-  const Outlook out = look_ahead(f, Driving::usual, map, {0.2, 0, 0.15}, {}, from_here, standing_w, 0.95);
+  const Outlook out = look_ahead(f, map, {0.2, 0, 0.15}, {}, from_here, standing_w, 0.95);
   EXPECT_FALSE(out.latest_departure);
   EXPECT_LT(out.probability, 0.01);
   ASSERT_TRUE(out.fails_at);
@@ -155,8 +155,8 @@ TEST(Outlook, AnUncertainChargeWidensArrivalAndLowersSureThings) {
   const ChargeMap map = battery();
   std::vector<PricedTask> tasks(1);
   tasks[0].legs = {drive(0.9 * map.energy_j(0.5, 0.15, 100), 100)};
-  const Outlook sure = look_ahead(f, Driving::usual, map, {0.5, 0, 0.15}, tasks, {}, standing_w, 0.95);
-  const Outlook vague = look_ahead(f, Driving::usual, map, {0.5, 0.05, 0.15}, tasks, {}, standing_w, 0.95);
+  const Outlook sure = look_ahead(f, map, {0.5, 0, 0.15}, tasks, {}, standing_w, 0.95);
+  const Outlook vague = look_ahead(f, map, {0.5, 0.05, 0.15}, tasks, {}, standing_w, 0.95);
   EXPECT_LT(vague.probability, sure.probability);
   EXPECT_LT(vague.tasks[0].charge[0], sure.tasks[0].charge[0]);
   EXPECT_GT(vague.tasks[0].charge[2], sure.tasks[0].charge[2]);
@@ -172,8 +172,8 @@ TEST(Outlook, ATypicalCurveIsTrustedLessThanTheBatterysOwn) {
   const ChargeMap known{battery::Circuit(own)};
   std::vector<PricedTask> tasks(1);
   tasks[0].legs = {drive(0.985 * known.energy_j(0.8, 0.15, 100), 100)};
-  const Outlook sure = look_ahead(f, Driving::usual, known, {0.8, 0, 0.15}, tasks, {}, standing_w, 0.95);
-  const Outlook vague = look_ahead(f, Driving::usual, typical, {0.8, 0, 0.15}, tasks, {}, standing_w, 0.95);
+  const Outlook sure = look_ahead(f, known, {0.8, 0, 0.15}, tasks, {}, standing_w, 0.95);
+  const Outlook vague = look_ahead(f, typical, {0.8, 0, 0.15}, tasks, {}, standing_w, 0.95);
   EXPECT_LT(vague.probability, sure.probability);
   EXPECT_EQ(vague.tasks[0].charge[1], sure.tasks[0].charge[1]);
   // The voltage's own part, at least.
@@ -186,7 +186,7 @@ TEST(Reach, GoesAsFarAsTheChargeLastsAndIsOrdered) {
   const Forecaster f = forecaster(0.04, 0.2);
   const ChargeMap map = battery();
   const std::vector<PricedLeg> typical{drive(500, 10), {Motion::stand, 0, 0, {5, 100, 0, 0}}};
-  const Reach r = reach(f, Driving::usual, map, {0.6, 0, 0.15}, sum_of(f, Driving::usual, typical));
+  const Reach r = reach(f, map, {0.6, 0, 0.15}, sum_of(f, typical));
   EXPECT_NEAR(r.energy_per_m_j, 60, 1e-9);
   EXPECT_NEAR(r.mean_power_w, 60, 1e-9);
   EXPECT_NEAR(r.usable_j, map.energy_j(0.6, 0.15, 60), 1e-6);
@@ -202,7 +202,7 @@ TEST(Reach, GoesAsFarAsTheChargeLastsAndIsOrdered) {
 TEST(Reach, NothingAboveTheReserveIsNoRange) {
   const Forecaster f = forecaster(0.04, 0.2);
   const std::vector<PricedLeg> typical{drive(500)};
-  const Reach r = reach(f, Driving::usual, battery(), {0.1, 0, 0.15}, sum_of(f, Driving::usual, typical));
+  const Reach r = reach(f, battery(), {0.1, 0, 0.15}, sum_of(f, typical));
   EXPECT_EQ(r.usable_j, 0);
   EXPECT_EQ(r.range_m[2], 0);
 }

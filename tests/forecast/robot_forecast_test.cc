@@ -7,7 +7,6 @@
 
 #include "client/virtual_robot/rng.h"
 #include "robots.h"
-#include "virtual_missions.h"
 
 namespace joulecast::forecast {
 namespace {
@@ -53,8 +52,7 @@ PlanSum plan_of(const Forecaster& f, const MadeMissions& made) {
   const LegPricer pricer(made.robot, made.drive);
   PlanSum sum;
   for (int k = 0; k < 20; ++k)
-    f.extend(sum, Driving::stated, Motion::drive, 0,
-             pricer.paced(PlannedLeg{Motion::drive, 6, 0, 0, 0}, default_pace(made.robot)), 6);
+    f.extend(sum, {Motion::drive, 0, 6, pricer.paced(PlannedLeg{Motion::drive, 6, 0, 0, 0}, default_pace(made.robot))});
   return sum;
 }
 
@@ -64,9 +62,9 @@ TEST(RobotForecast, WithoutPastIsTheModelWithinFifteenPercent) {
   const auto f = forecast.forecaster();
   const PlanSum sum = plan_of(*f, made);
   double model = 0;
-  for (std::size_t k = 0; k < 3; ++k) model += sum.features[k];
-  const Prediction p = f->predict(sum, Driving::stated);
-  EXPECT_NEAR(p.corrected_j, model, 1e-9 * model);
+  for (std::size_t k = 0; k < 3; ++k) model += sum.features[0][k];
+  const Prediction p = f->energy(sum);
+  EXPECT_NEAR(p.legs, model, 1e-9 * model);
   EXPECT_GT(p.spread, 0.08);
   EXPECT_LT(p.spread, 0.2);
   EXPECT_EQ(f->missions, 0);
@@ -76,12 +74,12 @@ TEST(RobotForecast, LearnsARobotThatSpendsMore) {
   MadeMissions made(2);
   RobotForecast forecast(made.robot, made.drive);
   const double before =
-      forecast.forecaster()->predict(plan_of(*forecast.forecaster(), made), Driving::stated).corrected_j;
+      forecast.forecaster()->energy(plan_of(*forecast.forecaster(), made)).legs;
   for (int k = 0; k < 20; ++k) forecast.learn(made.next(1.3, 0.02, 0.05));
   const auto f = forecast.forecaster();
-  const Prediction p = f->predict(plan_of(*f, made), Driving::stated);
+  const Prediction p = f->energy(plan_of(*f, made));
   // Twenty missions of 2 % tell the level to 0.5 %; four of those.
-  EXPECT_NEAR(p.corrected_j / before, 1.3, 1.3 * 4 * 0.02 / std::sqrt(20.0) + 0.01);
+  EXPECT_NEAR(p.legs / before, 1.3, 1.3 * 4 * 0.02 / std::sqrt(20.0) + 0.01);
   EXPECT_LT(p.spread, 0.05);
   EXPECT_EQ(f->missions, 20);
   EXPECT_FALSE(f->drift);
@@ -110,9 +108,9 @@ TEST(RobotForecast, SaysWhenTheRobotChangesAndFollows) {
   const auto f = forecast.forecaster();
   const PlanSum sum = plan_of(*f, made);
   double model = 0;
-  for (std::size_t k = 0; k < 3; ++k) model += sum.features[k];
+  for (std::size_t k = 0; k < 3; ++k) model += sum.features[0][k];
   // What came before the change keeps a twentieth of its weight: 1.5 missions against some ten.
-  EXPECT_NEAR(f->predict(sum, Driving::stated).corrected_j / model, 1.15,
+  EXPECT_NEAR(f->energy(sum).legs / model, 1.15,
               0.15 * 0.2 + 4 * 0.02 / std::sqrt(8.0));
   // Twenty missions after the last news of it, it is none any more.
   for (int k = 0; k < 45; ++k) forecast.learn(made.next(1.15, 0.02, 0.05));
@@ -121,27 +119,27 @@ TEST(RobotForecast, SaysWhenTheRobotChangesAndFollows) {
 
 TEST(RobotForecast, SiblingsSpareANewcomerTheLearning) {
   MadeMissions made(4);
-  std::array<std::vector<OwnFinding>, driving_count> found;
+  std::array<std::vector<OwnFinding>, subject_count> found;
   for (int r = 0; r < 3; ++r) {
     RobotForecast forecast(made.robot, made.drive);
     for (int k = 0; k < 20; ++k) forecast.learn(made.next(1.25, 0.02, 0.05));
     const auto own = forecast.findings();
-    for (std::size_t d = 0; d < driving_count; ++d) found[d].push_back(own[d]);
+    for (std::size_t d = 0; d < subject_count; ++d) found[d].push_back(own[d]);
   }
   RobotForecast newcomer(made.robot, made.drive);
   const double alone =
-      newcomer.forecaster()->predict(plan_of(*newcomer.forecaster(), made), Driving::stated).corrected_j;
-  std::array<Siblings, driving_count> siblings;
-  for (std::size_t d = 0; d < driving_count; ++d) {
+      newcomer.forecaster()->energy(plan_of(*newcomer.forecaster(), made)).legs;
+  std::array<Siblings, subject_count> siblings;
+  for (std::size_t d = 0; d < subject_count; ++d) {
     std::vector<const OwnFinding*> others;
     for (const OwnFinding& f : found[d]) others.push_back(&f);
     siblings[d] = pool(others);
   }
   newcomer.set_siblings(std::move(siblings));
   const auto f = newcomer.forecaster();
-  const Prediction p = f->predict(plan_of(*f, made), Driving::stated);
+  const Prediction p = f->energy(plan_of(*f, made));
   EXPECT_EQ(f->siblings, 3);
-  EXPECT_NEAR(p.corrected_j / alone, 1.25, 0.05);
+  EXPECT_NEAR(p.legs / alone, 1.25, 0.05);
 }
 
 TEST(RobotForecast, AnotherModelIsLearntAgainstAnew) {
@@ -168,34 +166,6 @@ TEST(RobotForecast, MissionsWithoutMeasurementTeachNothing) {
   for (Leg& leg : mission.legs) leg.battery_j = std::nan("");
   EXPECT_FALSE(forecast.learn(mission));
   EXPECT_EQ(forecast.forecaster()->missions, 0);
-}
-
-// The project's plant, which shares no physics with the model, with errors that the service does not know.
-// Each mission is forecast from those before it. 3 robots, 25 missions after 15 of warming up: the number
-// inside the 90 % interval is binomial, four deviations allowed; half of the missions must be within 3 %.
-TEST(VirtualRobots, AreForecastWithHonestIntervals) {
-  int inside = 0, missions = 0;
-  std::vector<double> errors;
-  for (const auto& [kind, seed] : {std::pair{"amr", 501u}, {"nomad", 502u}, {"tug", 503u}}) {
-    const VirtualRobotRun run = run_virtual_robot(kind, 40, seed);
-    RobotForecast forecast(run.robot, run.drive);
-    for (std::size_t k = 0; k < run.missions.size(); ++k) {
-      const VirtualMission& mission = run.missions[k];
-      const auto f = forecast.forecaster();
-      if (k >= 15) {
-        PlanSum sum;
-        extend(sum, *f, Driving::stated, price_plan(run, mission, *f, Driving::stated));
-        const Prediction p = f->predict(sum, Driving::stated);
-        inside += mission.true_j >= p.quantile_j(0.05) && mission.true_j <= p.quantile_j(0.95);
-        errors.push_back(std::fabs(p.quantile_j(0.5) / mission.true_j - 1));
-        ++missions;
-      }
-      forecast.learn(mission.past);
-    }
-  }
-  std::ranges::sort(errors);
-  EXPECT_LT(errors[errors.size() / 2], 0.03);
-  EXPECT_NEAR(static_cast<double>(inside) / missions, 0.9, 4 * std::sqrt(0.9 * 0.1 / missions));
 }
 
 }  // namespace

@@ -1,12 +1,12 @@
 #include "virtual_missions.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <string>
 
 #include "client/virtual_robot/fleet.h"
-#include "energy/meter.h"
 #include "robot/robot_file.h"
 #include "signals/mission_event.h"
 
@@ -50,7 +50,7 @@ std::vector<vr::EffectStrength> draw_effects(vr::Rng& rng, double idle_power_w) 
   return effects;
 }
 
-std::vector<StatedLeg> plan_of(const vr::MissionTruth& truth) {
+std::vector<StatedLeg> plan_of(const vr::MissionTruth& truth, double settle_s) {
   std::vector<StatedLeg> plan;
   vr::ScriptPose at = truth.start;
   double payload_kg = truth.script.payload_kg;
@@ -88,85 +88,92 @@ std::vector<StatedLeg> plan_of(const vr::MissionTruth& truth) {
       continue;
     }
     if (s.leg.motion == Motion::stand || s.leg.way > 1e-6) plan.push_back(s);
+    if (s.leg.motion != Motion::stand && settle_s > 0) {
+      StatedLeg settle;
+      settle.leg.payload_kg = payload_kg;
+      settle.leg.duration_s = settle_s;
+      plan.push_back(settle);
+    }
   }
   return plan;
 }
 
-VirtualRobotRun run(std::string_view kind, int missions, std::uint64_t seed,
-                    const std::vector<vr::EffectStrength>* given) {
+RobotRun run(std::string_view kind, int missions, std::uint64_t seed,
+             const std::vector<vr::EffectStrength>* given, const VirtualHabit& habit) {
   const auto shipped = std::ranges::find(vr::shipped_robots(), kind, &vr::ShippedRobot::kind);
   const std::string text(shipped->json_text);
   vr::SimulationSpec spec;
   spec.robot = *vr::parse_robot(text);
+  spec.script = habit.script;
+  spec.settle_s = habit.settle_s;
   vr::Rng rng = vr::Rng::stream(seed, 77);
   spec.world = vr::draw_world(rng, spec.script.map_half_width_m);
-  const std::vector<vr::EffectStrength> effects =
-      given != nullptr ? *given : draw_effects(rng, spec.robot.idle_power_w);
-  spec.imperfections = *vr::make_imperfections(effects);
+  spec.imperfections =
+      *vr::make_imperfections(given != nullptr ? *given : draw_effects(rng, spec.robot.idle_power_w));
   spec.missions = missions;
   const vr::Simulation done = vr::simulate_missions(spec, seed);
 
+  std::vector<telemetry::Recording> recordings;
+  std::size_t next = 0;
+  for (const signals::MissionEvent& event : done.events) {
+    if (event.phase == signals::MissionPhase::started) continue;
+    telemetry::Recording& mission = recordings.emplace_back();
+    while (next < done.samples.size() && done.samples[next].utime_us < event.utime_us)
+      mission.samples.push_back(done.samples[next++]);
+  }
   robot::RobotModel robot = *robot::parse_robot(text);
   dynamics::DriveModel drive = *dynamics::drive_model(robot);
-  VirtualRobotRun out{robot, drive, effects, {}};
-  LegTracker tracker(robot);
-  energy::Meter meter(drive, {}, [&](const energy::MeterPoint& p) {
-    tracker.add({p.bridged ? p.interval_s : 0, p.speed_m_s, p.yaw_rate_rad_s, p.measured_power_w,
-                 p.sample.payload_kg});
-  });
-  std::size_t next = 0, index = 0;
-  for (const signals::MissionEvent& event : done.events) {
-    if (event.phase == signals::MissionPhase::started) {
-      meter.begin();
-      tracker.begin();
-      continue;
-    }
-    while (next < done.samples.size() && done.samples[next].utime_us < event.utime_us)
-      (void)meter.add(done.samples[next++]);
-    (void)meter.flush();
-    const vr::MissionTruth& truth = done.truth.missions[index++];
-    VirtualMission m;
-    m.plan = plan_of(truth);
-    m.past = {event.utime_us, tracker.take()};
-    m.metered_j = meter.accounts().measured_j;
+  RobotRun out{std::string(kind), robot, drive, driven(robot, drive, recordings)};
+  for (std::size_t k = 0; k < out.missions.size(); ++k) {
+    const vr::MissionTruth& truth = done.truth.missions[k];
+    DrivenMission& m = out.missions[k];
+    m.plan = plan_of(truth, habit.settle_s);
     m.true_j = truth.battery_energy_j;
+    m.duration_s = truth.duration_s;
     m.distance_m = truth.distance_m;
     m.charge_at_start = truth.charge_at_start;
     m.charge_at_end = truth.charge_at_end;
-    out.missions.push_back(std::move(m));
   }
   return out;
 }
 
+vr::ScriptOptions script(double halts, double shortest_s, double longest_s, double slowest, double fastest,
+                         double gentlest, double hardest, double arcs) {
+  vr::ScriptOptions options;
+  options.dwell_share = halts;
+  options.shortest_halt_s = shortest_s;
+  options.longest_halt_s = longest_s;
+  options.slowest_fraction = slowest;
+  options.fastest_fraction = fastest;
+  options.gentlest_fraction = gentlest;
+  options.hardest_fraction = hardest;
+  options.arc_share = arcs;
+  return options;
+}
+
 }  // namespace
 
-VirtualRobotRun run_virtual_robot(std::string_view kind, int missions, std::uint64_t seed, bool departing) {
+std::span<const VirtualHabit> virtual_habits() {
+  static const std::array<VirtualHabit, 6> habits{
+      {{"as simulated", {}, 0.4},
+       {"seldom and long halts", script(0.04, 15, 40, 0.3, 0.9, 0.35, 0.95, 0.2), 0},
+       {"often and short halts", script(0.7, 0.3, 1.5, 0.3, 0.9, 0.35, 0.95, 0.2), 0},
+       {"no halts, gentle", script(0, 1, 2, 0.25, 0.45, 0.2, 0.4, 0.2), 0},
+       {"no halts, hard", script(0, 1, 2, 0.7, 0.95, 0.8, 0.98, 0.2), 0},
+       {"arcs instead of turns", script(0.15, 1, 4, 0.3, 0.9, 0.35, 0.95, 0.9), 0}}};
+  return habits;
+}
+
+RobotRun run_virtual_robot(std::string_view kind, int missions, std::uint64_t seed, bool departing,
+                           const VirtualHabit& habit) {
   const std::vector<vr::EffectStrength> none;
-  return run(kind, missions, seed, departing ? nullptr : &none);
+  return run(kind, missions, seed, departing ? nullptr : &none, habit);
 }
 
-VirtualRobotRun run_virtual_robot(std::string_view kind, int missions, std::uint64_t seed,
-                                  const std::vector<vr::EffectStrength>& effects) {
-  return run(kind, missions, seed, &effects);
-}
-
-std::vector<PricedLeg> price_plan(const VirtualRobotRun& run, const VirtualMission& mission,
-                                  const Forecaster& forecaster, Driving driving) {
-  const LegPricer pricer(run.robot, run.drive);
-  std::vector<PricedLeg> priced;
-  for (const StatedLeg& stated : mission.plan) {
-    Pace pace = forecaster.usual;
-    if (driving == Driving::stated && stated.leg.motion == Motion::drive) {
-      pace.speed_m_s = stated.speed;
-      pace.acceleration_m_s2 = stated.acceleration;
-    } else if (driving == Driving::stated) {
-      pace.yaw_rate_rad_s = stated.speed;
-      pace.yaw_acceleration_rad_s2 = stated.acceleration;
-    }
-    const std::vector<PricedLeg> one = price(pricer, std::span(&stated.leg, 1), pace);
-    priced.insert(priced.end(), one.begin(), one.end());
-  }
-  return priced;
+RobotRun run_virtual_robot(std::string_view kind, int missions, std::uint64_t seed,
+                           const std::vector<virtual_robot::EffectStrength>& effects,
+                           const VirtualHabit& habit) {
+  return run(kind, missions, seed, &effects, habit);
 }
 
 }  // namespace joulecast::forecast

@@ -54,7 +54,7 @@ AutonomyTask read_task(const nlohmann::json& value, std::string at, const Autono
     task.turn_rad = own.number("turn_rad", {.minimum = -1e3, .maximum = 1e3}, 0);
     task.distance_m = own.number("distance_m", way, 0);
   }
-  task.dwell_s = own.number("dwell_s", dwell, 0);
+  task.dwell_s = own.optional_number("dwell_s", dwell);
   task.to_charger_m = own.optional_number("to_charger_m", way);
   if (!task.to_charger_m && !input.charger && input.to_charger_m)
     own.fault("to_charger_m", "is required for every task where the charger's place is not given");
@@ -105,8 +105,9 @@ void write_stage(JsonWriter& json, const forecast::TaskOutlook& stage) {
 void write_outlook(JsonWriter& json, const forecast::Outlook& outlook, const AutonomyInput& input) {
   json.begin_object();
   json.field("success_probability", outlook.probability);
-  json.field("expected_energy_j", outlook.mean_j).field("duration_s", outlook.duration_s);
+  json.field("expected_energy_j", outlook.mean_j).field("duration_s", outlook.duration_s[1]);
   write_quantiles(json, "energy_j", outlook.energy_j);
+  write_quantiles(json, "duration_quantiles_s", outlook.duration_s);
   json.key("legs").begin_array();
   for (std::size_t k = 0; k < outlook.tasks.size(); ++k) {
     json.begin_object().field("task_id", input.tasks[k].task_id);
@@ -157,9 +158,9 @@ void write_minimum_energy(JsonWriter& json, const AutonomyOutput& a) {
   const forecast::Outlook &best = *a.minimum_energy_outlook, &usual = *a.outlook;
   json.begin_object();
   json.field("success_probability", best.probability);
-  json.field("expected_energy_j", best.mean_j).field("duration_s", best.duration_s);
+  json.field("expected_energy_j", best.mean_j).field("duration_s", best.duration_s[1]);
   json.field("saved_j", usual.mean_j - best.mean_j);
-  json.field("saved_s", usual.duration_s - best.duration_s);
+  json.field("saved_s", usual.duration_s[1] - best.duration_s[1]);
   const auto last = [](const forecast::Outlook& o) {
     if (o.charger) return o.charger->charge;
     return o.tasks.empty() ? std::array<double, 3>{std::nan(""), std::nan(""), std::nan("")}
@@ -224,15 +225,22 @@ std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& 
                         : a.track == forecast::Driving::stated   ? "stated"
                                                                  : "usual");
   json.key("pace").begin_object();
-  json.field("speed_m_s", a.pace.speed_m_s).field("acceleration_m_s2", a.pace.acceleration_m_s2);
-  json.field("yaw_rate_rad_s", a.pace.yaw_rate_rad_s).field("pause_s", a.pace.pause_s).end_object();
+  const forecast::Pace& pace =
+      a.limitation && input.driving != Driving::minimum_energy ? a.limitation->reached : a.pace;
+  json.field("speed_m_s", pace.speed_m_s).field("acceleration_m_s2", pace.acceleration_m_s2);
+  json.field("yaw_rate_rad_s", pace.yaw_rate_rad_s).field("pause_s", pace.pause_s);
+  json.key("limitation");
+  a.limitation ? json.value(a.limitation->sentence) : json.null();
+  json.end_object();
   json.key("consumption").begin_object();
   json.field("basis", forecaster.missions > 0   ? "recent_missions"
                       : forecaster.siblings > 0 ? "siblings"
                                                 : "model");
   json.field("missions", forecaster.missions).field("siblings", forecaster.siblings);
   json.field("energy_per_m_j", a.reach.energy_per_m_j).field("mean_power_w", a.reach.mean_power_w);
-  const forecast::Forecaster::Track& track = forecaster.track(a.track);
+  const forecast::Forecaster::Track& track =
+      forecaster.track(a.track == forecast::Driving::stated ? forecast::Subject::stated_energy
+                                                            : forecast::Subject::usual_energy);
   json.field("common_deviation", track.inflation * track.common);
   json.field("leg_deviation",
              track.inflation * track.scatter[static_cast<std::size_t>(forecast::Motion::drive)]);

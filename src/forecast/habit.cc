@@ -1,0 +1,237 @@
+#include "forecast/habit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/median.h"
+
+namespace joulecast::forecast {
+namespace {
+
+constexpr double usual_share = 0.7;     // of the limits
+constexpr std::size_t least_legs = 5;   // that a habit is read from
+constexpr double no_plateau = 1.8;      // cruise over mean speed beyond which a leg is all ramp
+constexpr std::size_t parts = 8;        // that a habit's cruises are told in
+constexpr double assumed_missions = 4;  // that a dispersion of 1 counts for
+
+struct Seen {
+  Cruise cruise;
+  bool capped = false;  // the way was too short for its cruise, which is greater than this
+  double weight = 1;
+};
+
+// The weight of a leg that never reached its cruise goes to those that cruised faster (Efron 1967,
+// redistribution to the right); the fastest keeps its own.
+void redistribute(std::vector<Seen>& seen) {
+  std::ranges::sort(seen, {}, [](const Seen& s) { return std::pair(s.cruise.speed, s.capped); });
+  for (std::size_t k = 0; k + 1 < seen.size(); ++k) {
+    if (!seen[k].capped) continue;
+    const double each = seen[k].weight / static_cast<double>(seen.size() - k - 1);
+    for (std::size_t later = k + 1; later < seen.size(); ++later) seen[later].weight += each;
+    seen[k].weight = 0;
+  }
+}
+
+// Equal parts of the weight, slowest first, each with the harmonic mean of its cruises and accelerations.
+std::vector<Cruise> in_parts(std::vector<Seen> seen) {
+  redistribute(seen);
+  double total = 0;
+  for (const Seen& s : seen) total += s.weight;
+  std::vector<Cruise> cruises;
+  const double part = total / static_cast<double>(parts);
+  double room = part, slowness = 0, softness = 0;
+  for (const Seen& s : seen) {
+    double left = s.weight;
+    while (left > 0) {
+      const double taken = std::min(left, room);
+      slowness += taken / s.cruise.speed;
+      softness += taken / s.cruise.acceleration;
+      left -= taken;
+      room -= taken;
+      if (room > 1e-9 * part) continue;
+      cruises.push_back({part / slowness, part / softness});
+      room = part;
+      slowness = softness = 0;
+    }
+  }
+  if (cruises.size() < parts && slowness > 0)
+    cruises.push_back({(part - room) / slowness, (part - room) / softness});
+  return cruises;
+}
+
+Cruise middle_of(const std::vector<Seen>& seen) {
+  std::vector<double> speed, acceleration;
+  for (const Seen& s : seen) {
+    if (!s.capped) speed.push_back(s.cruise.speed);
+    acceleration.push_back(s.cruise.acceleration);
+  }
+  if (speed.size() < least_legs) {
+    speed.clear();
+    for (const Seen& s : seen) speed.push_back(s.cruise.speed);
+  }
+  return {upper_median(speed), upper_median(acceleration)};
+}
+
+// What each moving leg of a mission was followed by [s], in order.
+struct Stop {
+  Motion after;
+  double halt_s;
+};
+std::vector<Stop> stops_of(const PastMission& mission) {
+  std::vector<Stop> stops;
+  double before_s = 0;
+  for (const Leg& leg : mission.legs) {
+    if (leg.motion != Motion::stand)
+      stops.push_back({leg.motion, 0});
+    else
+      (stops.empty() ? before_s : stops.back().halt_s) += leg.duration_s;
+  }
+  if (!stops.empty()) stops.back().halt_s += before_s;
+  return stops;
+}
+
+std::size_t place(Motion motion) {
+  return motion == Motion::turn ? 1 : 0;
+}
+
+void learn_halts(Habit& habit, std::span<const PastMission> missions) {
+  std::array<double, 2> squares{};
+  for (const PastMission& mission : missions) {
+    for (const Stop& stop : stops_of(mission)) {
+      Halts& halts = habit.halts[place(stop.after)];
+      halts.legs += 1;
+      halts.share += stop.halt_s > 0 ? 1 : 0;
+      halts.mean_s += stop.halt_s;
+      squares[place(stop.after)] += stop.halt_s * stop.halt_s;
+    }
+  }
+  double all_s = 0, all = 0;
+  for (std::size_t k = 0; k < 2; ++k) {
+    Halts& halts = habit.halts[k];
+    all_s += halts.mean_s;
+    all += halts.legs;
+    if (halts.legs == 0) continue;
+    halts.share /= halts.legs;
+    halts.mean_s /= halts.legs;
+    halts.variance_s2 = std::max(0.0, squares[k] / halts.legs - halts.mean_s * halts.mean_s);
+  }
+  habit.middle.pause_s = all > 0 ? all_s / all : 0;
+  double off = assumed_missions, count = assumed_missions;
+  for (const PastMission& mission : missions) {
+    double beyond_s = 0, variance_s2 = 0;
+    for (const Stop& stop : stops_of(mission)) {
+      const Halts& halts = habit.halts[place(stop.after)];
+      beyond_s += stop.halt_s - halts.mean_s;
+      variance_s2 += halts.variance_s2;
+    }
+    if (!(variance_s2 > 0)) continue;
+    off += beyond_s * beyond_s / variance_s2;
+    count += 1;
+  }
+  habit.halt_dispersion = off / count;
+}
+
+}  // namespace
+
+Pace default_pace(const robot::RobotModel& robot) {
+  const robot::Limits& most = robot.limits;
+  return {usual_share * most.speed_m_s, usual_share * most.acceleration_m_s2,
+          usual_share * most.yaw_rate_rad_s,
+          usual_share * most.acceleration_m_s2 / robot.kinematics.half_track_m, 0};
+}
+
+LegKind kind_of(Motion motion, double way, double curvature_1_m) {
+  if (motion == Motion::turn) return LegKind::turn;
+  return way * curvature_1_m < straight_until_rad ? LegKind::straight : LegKind::curve;
+}
+
+bool StatedPace::cruise(Motion motion) const {
+  return motion == Motion::stand || (motion == Motion::turn ? yaw_rate_rad_s : speed_m_s).has_value();
+}
+
+bool StatedPace::whole(Motion motion) const {
+  return motion == Motion::stand ||
+         (cruise(motion) &&
+          (motion == Motion::turn ? yaw_acceleration_rad_s2 : acceleration_m_s2).has_value());
+}
+
+Habit Habit::with(const StatedPace& stated) const {
+  Habit habit = *this;
+  Pace& p = habit.middle;
+  p.speed_m_s = stated.speed_m_s.value_or(p.speed_m_s);
+  p.acceleration_m_s2 = stated.acceleration_m_s2.value_or(p.acceleration_m_s2);
+  p.yaw_rate_rad_s = stated.yaw_rate_rad_s.value_or(p.yaw_rate_rad_s);
+  p.yaw_acceleration_rad_s2 = stated.yaw_acceleration_rad_s2.value_or(p.yaw_acceleration_rad_s2);
+  for (std::size_t k = 0; k < leg_kind_count; ++k) {
+    const Motion motion = k == static_cast<std::size_t>(LegKind::turn) ? Motion::turn : Motion::drive;
+    const auto& [speed, acceleration] = motion == Motion::turn
+                                            ? std::pair(stated.yaw_rate_rad_s, stated.yaw_acceleration_rad_s2)
+                                            : std::pair(stated.speed_m_s, stated.acceleration_m_s2);
+    for (Cruise& cruise : habit.cruises[k]) {
+      cruise.speed = speed.value_or(cruise.speed);
+      cruise.acceleration = acceleration.value_or(cruise.acceleration);
+    }
+    if (stated.whole(motion)) habit.cruises[k].resize(1);
+  }
+  return habit;
+}
+
+Habit Habit::without_halts() const {
+  Habit habit = *this;
+  habit.halts = {};
+  habit.middle.pause_s = 0;
+  return habit;
+}
+
+HaltDistribution Habit::standing(const std::array<double, 2>& stops, double unit) const {
+  double mean = 0, variance = 0, log_none = 0;
+  for (std::size_t k = 0; k < stops.size(); ++k) {
+    const Halts& h = halts[k];
+    if (!(stops[k] > 0) || !(h.share > 0)) continue;
+    mean += stops[k] * h.mean_s;
+    variance += (halt_dispersion + stops[k] / h.legs) * stops[k] * h.variance_s2;
+    log_none += stops[k] * std::log1p(-h.share);
+  }
+  return {unit * mean, unit * unit * variance, std::exp(log_none)};
+}
+
+Habit habit_of(const robot::RobotModel& robot, std::span<const PastMission> missions) {
+  std::array<std::vector<Seen>, leg_kind_count> seen;
+  for (const PastMission& mission : missions) {
+    for (const Leg& leg : mission.legs) {
+      if (leg.motion == Motion::stand) continue;
+      const double ramp_s = leg.duration_s - leg.way / leg.speed;
+      if (!(ramp_s > least_ramp_s)) continue;
+      seen[static_cast<std::size_t>(kind_of(leg.motion, leg.way, leg.curvature_1_m))].push_back(
+          {{leg.speed, leg.speed / ramp_s}, leg.speed * leg.duration_s >= no_plateau * leg.way});
+    }
+  }
+  Habit habit;
+  Pace& p = habit.middle = default_pace(robot);
+  const auto enough = [](const std::vector<Seen>& legs) { return legs.size() >= least_legs; };
+  const auto of = [&](LegKind kind) -> std::vector<Seen>& { return seen[static_cast<std::size_t>(kind)]; };
+  if (enough(of(LegKind::straight))) {
+    const Cruise middle = middle_of(of(LegKind::straight));
+    p.speed_m_s = middle.speed;
+    p.acceleration_m_s2 = middle.acceleration;
+  }
+  if (enough(of(LegKind::turn))) {
+    const Cruise middle = middle_of(of(LegKind::turn));
+    p.yaw_rate_rad_s = middle.speed;
+    p.yaw_acceleration_rad_s2 = middle.acceleration;
+  }
+  // A robot that seldom drives one kind drives it as the other.
+  if (!enough(of(LegKind::curve))) of(LegKind::curve) = of(LegKind::straight);
+  if (!enough(of(LegKind::straight))) of(LegKind::straight) = of(LegKind::curve);
+  for (std::size_t k = 0; k < leg_kind_count; ++k) {
+    const Cruise usual = k == static_cast<std::size_t>(LegKind::turn)
+                             ? Cruise{p.yaw_rate_rad_s, p.yaw_acceleration_rad_s2}
+                             : Cruise{p.speed_m_s, p.acceleration_m_s2};
+    habit.cruises[k] = enough(seen[k]) ? in_parts(std::move(seen[k])) : std::vector{usual};
+  }
+  learn_halts(habit, missions);
+  return habit;
+}
+
+}  // namespace joulecast::forecast

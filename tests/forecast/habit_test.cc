@@ -1,0 +1,125 @@
+#include "forecast/habit.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "forecast/leg_cost.h"
+#include "robots.h"
+
+namespace joulecast::forecast {
+namespace {
+
+Leg driven(Motion motion, double way, Cruise cruise) {
+  cruise.speed = std::min(cruise.speed, std::sqrt(way * cruise.acceleration));
+  return {motion, way / cruise.speed + cruise.speed / cruise.acceleration, way, cruise.speed, 0, 0, 0};
+}
+
+Leg halt(double duration_s) {
+  return {Motion::stand, duration_s, 0, 0, 0, 0, 0};
+}
+
+double mean_duration_s(const Habit& habit, LegKind kind, double way) {
+  double sum = 0;
+  for (const Cruise& cruise : habit.cruises[static_cast<std::size_t>(kind)])
+    sum += driven(kind == LegKind::turn ? Motion::turn : Motion::drive, way, cruise).duration_s;
+  return sum / static_cast<double>(habit.cruises[static_cast<std::size_t>(kind)].size());
+}
+
+TEST(Habit, TakesAsLongInTheMeanAsTheLegsThatItIsReadFrom) {
+  const robot::RobotModel robot = shipped("amr");
+  PastMission mission;
+  double drives_s = 0, turns_s = 0;
+  constexpr int legs = 40;
+  for (int k = 0; k < legs; ++k) {
+    const double scale = 0.4 + 0.03 * k;
+    mission.legs.push_back(driven(Motion::turn, 6, {0.8 * scale, 2}));
+    turns_s += mission.legs.back().duration_s;
+    mission.legs.push_back(driven(Motion::drive, 20, {scale, 0.5}));
+    drives_s += mission.legs.back().duration_s;
+  }
+  const Habit habit = habit_of(robot, std::span(&mission, 1));
+  EXPECT_NEAR(mean_duration_s(habit, LegKind::straight, 20), drives_s / legs, 0.01 * drives_s / legs);
+  EXPECT_NEAR(mean_duration_s(habit, LegKind::turn, 6), turns_s / legs, 0.01 * turns_s / legs);
+  EXPECT_EQ(habit.middle.pause_s, 0);
+}
+
+// Of the cruises 0.4 to 1.5, the faster never show on 1 m: they go to what long legs show of them.
+TEST(Habit, LegsTooShortForTheirCruiseDoNotSlowIt) {
+  const robot::RobotModel robot = shipped("amr");
+  PastMission mixed, longer;
+  for (int k = 0; k < 40; ++k) {
+    const Cruise cruise{0.4 + 0.0275 * k, 0.5};
+    longer.legs.push_back(driven(Motion::drive, 20, cruise));
+    mixed.legs.push_back(longer.legs.back());
+    mixed.legs.push_back(driven(Motion::drive, 1, cruise));
+  }
+  const double truth_s = mean_duration_s(habit_of(robot, std::span(&longer, 1)), LegKind::straight, 20);
+  EXPECT_NEAR(mean_duration_s(habit_of(robot, std::span(&mixed, 1)), LegKind::straight, 20), truth_s,
+              0.03 * truth_s);
+}
+
+TEST(Habit, HaltsCountAsOftenAsTheyHappen) {
+  const robot::RobotModel robot = shipped("amr");
+  std::vector<PastMission> missions(10);
+  for (PastMission& mission : missions) {
+    mission.legs.push_back(halt(1));  // before the first leg: with what it stands after its last
+    for (int k = 0; k < 10; ++k) {
+      mission.legs.push_back(driven(Motion::turn, 2, {1, 2}));
+      mission.legs.push_back(driven(Motion::drive, 8, {0.8, 0.5}));
+      if (k == 4) mission.legs.push_back(halt(3));
+    }
+    mission.legs.push_back(halt(2));
+  }
+  const Habit habit = habit_of(robot, missions);
+  EXPECT_EQ(habit.halts[0].legs, 100);
+  EXPECT_NEAR(habit.halts[0].share, 0.2, 1e-12);
+  EXPECT_NEAR(habit.halts[0].mean_s, 0.6, 1e-12);
+  EXPECT_EQ(habit.halts[1].mean_s, 0);
+  EXPECT_NEAR(habit.middle.pause_s, 0.3, 1e-12);
+  // As regular as these are, they scatter less than independent halts.
+  EXPECT_LT(habit.halt_dispersion, 1);
+  const HaltDistribution ten = habit.standing({10, 10}, 2);
+  EXPECT_NEAR(ten.mean(), 12, 1e-12);
+  EXPECT_NEAR(ten.probability_of_none(), std::pow(0.8, 10), 1e-12);
+  EXPECT_TRUE(habit.standing({0, 10}, 2).none());
+  EXPECT_TRUE(habit.without_halts().standing({10, 10}, 1).none());
+}
+
+TEST(Habit, WhatIsStatedReplacesIt) {
+  const robot::RobotModel robot = shipped("amr");
+  const Habit habit = habit_of(robot, {});
+  EXPECT_EQ(habit.middle.speed_m_s, default_pace(robot).speed_m_s);
+  StatedPace stated;
+  stated.speed_m_s = 0.5;
+  EXPECT_TRUE(stated.cruise(Motion::drive));
+  EXPECT_FALSE(stated.whole(Motion::drive));
+  EXPECT_FALSE(stated.cruise(Motion::turn));
+  EXPECT_TRUE(stated.whole(Motion::stand));
+  stated.acceleration_m_s2 = 0.3;
+  EXPECT_TRUE(stated.whole(Motion::drive));
+  const Habit with = habit.with(stated);
+  for (const LegKind kind : {LegKind::straight, LegKind::curve}) {
+    ASSERT_EQ(with.cruises[static_cast<std::size_t>(kind)].size(), 1u);
+    EXPECT_EQ(with.cruises[static_cast<std::size_t>(kind)][0].speed, 0.5);
+  }
+}
+
+// Seldom and long: the median plan stands not at all, one in ten for long.
+TEST(Prediction, HaltsThatSeldomComeLieInItsTail) {
+  const ScoreDistribution scores;
+  Prediction p;
+  p.legs = 100;
+  p.spread = 0.01;
+  p.scores = &scores;
+  p.halts = HaltDistribution(3, 100, 0.9);
+  EXPECT_NEAR(p.quantile(0.5), 100.2, 0.5);
+  EXPECT_GT(p.quantile(0.97), 120);
+  EXPECT_NEAR(p.mean(), 103, 0.2);
+  for (const double probability : {0.1, 0.5, 0.8, 0.95})
+    EXPECT_NEAR(p.probability_below(p.quantile(probability)), probability, 0.01);
+  EXPECT_NEAR(p.score_of(p.quantile(0.5)), scores.quantile(0.5), 0.01);
+}
+
+}  // namespace
+}  // namespace joulecast::forecast
