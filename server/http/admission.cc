@@ -48,30 +48,47 @@ std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>
   const auto malformed = [](std::string detail) {
     return Denial{Refusal::malformed, 400, "malformed-request", std::move(detail)};
   };
-  const auto codings = head.count(bhttp::field::transfer_encoding);
-  if (codings > 0 && (codings > 1 || head.version() < 11 ||
-                      !equals_ignoring_case(trim(view(head[bhttp::field::transfer_encoding])), "chunked")))
+  std::size_t codings = 0, lengths = 0, hosts = 0, origins = 0;
+  std::string_view coding, length, host, origin, expect = "100-continue";
+  for (const auto& field : head) {
+    const std::string_view value = view(field.value());
+    switch (field.name()) {
+      case bhttp::field::transfer_encoding:
+        ++codings, coding = trim(value);
+        break;
+      case bhttp::field::content_length:
+        ++lengths, length = value;
+        break;
+      case bhttp::field::host:
+        ++hosts, host = value;
+        break;
+      case bhttp::field::origin:
+        ++origins, origin = value;
+        break;
+      case bhttp::field::expect:
+        expect = trim(value);
+        break;
+      default:
+        break;
+    }
+  }
+  if (codings > 0 && (codings > 1 || head.version() < 11 || !equals_ignoring_case(coding, "chunked")))
     return malformed("Transfer-Encoding must be exactly chunked, once, in HTTP/1.1");
   // A repeated or listed length is allowed by the RFC where all agree; others may read it otherwise.
-  if (head.count(bhttp::field::content_length) > 1 ||
-      view(head[bhttp::field::content_length]).find_first_not_of("0123456789") != std::string_view::npos)
+  if (lengths > 1 || length.find_first_not_of("0123456789") != std::string_view::npos)
     return malformed("Content-Length must be one number");
-  const auto hosts = head.count(bhttp::field::host);
   if (hosts > 1 || (hosts == 0 && head.version() >= 11))
     return malformed("HTTP/1.1 needs exactly one Host header");
-  const auto expect = head.find(bhttp::field::expect);
-  if (expect != head.end() && head.version() >= 11 &&
-      !equals_ignoring_case(trim(view(expect->value())), "100-continue"))
+  if (head.version() >= 11 && !equals_ignoring_case(expect, "100-continue"))
     return Denial{Refusal::malformed, 417, "expectation-failed",
                   "Only the expectation 100-continue is known here"};
-  const auto host = view(head[bhttp::field::host]);
   if (hosts > 0 && !is_own(name_of(host)))
     return Denial{Refusal::host, 421, "misdirected",
                   "Host names no address or name of this service; http.allowed_hosts adds names"};
-  const auto origin = view(head[bhttp::field::origin]);
-  if (!origin.empty() && changes_something(head.method())) {
+  if (origins > 0 && changes_something(head.method())) {
     const auto scheme = origin.find("://");
-    if (scheme == std::string_view::npos || !equals_ignoring_case(origin.substr(scheme + 3), host))
+    if (origins > 1 || scheme == std::string_view::npos ||
+        !equals_ignoring_case(origin.substr(scheme + 3), host))
       return Denial{Refusal::origin, 403, "foreign-origin",
                     "A page may change something only under the host it came from; Origin differs from Host"};
   }

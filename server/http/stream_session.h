@@ -149,24 +149,18 @@ class StreamSession final : public Session {
     }
     if (endpoint_->run == Run::compute) watch();
     const Outcome outcome = co_await work();
-    switch (outcome) {
-      case Outcome::done:
-        response_ = std::move(made_);
-        break;
-      case Outcome::full:
-        core_->observer.refused(Refusal::worker_queue);
-        response_ = problem(503, "unavailable", "Too many requests are waiting", request_.id);
-        break;
-      case Outcome::late:
-        refuse(Refusal::deadline, 503, "deadline",
-               "The answer was not ready within http.request_deadline_s; ask for less at once");
-        break;
-      case Outcome::departed:
-        refuse(Refusal::departed, 499, "cancelled", "The client closed its side before the answer was ready");
-        break;
-      case Outcome::cut:
-        break;
+    if (outcome == Outcome::done) {
+      response_ = std::move(made_);
+    } else if (outcome == Outcome::full) {
+      core_->observer.refused(Refusal::worker_queue);
+      response_ = problem(503, "unavailable", "Too many requests are waiting", request_.id);
+    } else if (outcome == Outcome::late) {
+      refuse(Refusal::deadline, 503, "deadline",
+             "The answer was not ready within http.request_deadline_s; ask for less at once");
+    } else if (outcome == Outcome::departed) {
+      refuse(Refusal::departed, 499, "cancelled", "The client closed its side before the answer was ready");
     }
+    co_return;
   }
 
   // False when the answer could not be sent whole.
