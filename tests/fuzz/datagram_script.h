@@ -38,7 +38,8 @@ inline void run_datagram_script(std::span<const std::uint8_t> script) {
     std::vector<std::uint8_t> datagram;
     if (kind >> 3 == 0) {
       std::size_t length = next();
-      length = std::min(script.size(), length << 8 | next());
+      length = length << 8 | next();
+      length = std::min(script.size(), length);
       datagram.assign(script.begin(), script.begin() + static_cast<std::ptrdiff_t>(length));
       script = script.subspan(length);
     } else {
