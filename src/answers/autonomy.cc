@@ -104,7 +104,7 @@ bool paces_stated(const AutonomyInput& input, const TaskPlan& plan) {
   const auto stated = [](const std::vector<PlannedLeg>& legs, const StatedPace& pace) {
     return std::ranges::all_of(legs, [&](const auto& leg) { return pace.cruise(leg.motion); });
   };
-  if (plan.tasks.empty() && plan.from_here.empty()) return input.pace.cruise(Motion::drive).has_value();
+  if (plan.tasks.empty() && plan.from_here.empty()) return input.pace.cruise(Motion::drive);
   if (!stated(plan.from_here, input.pace)) return false;
   for (std::size_t k = 0; k < plan.tasks.size(); ++k) {
     if (!stated(plan.tasks[k].legs, input.tasks[k].pace) || !stated(plan.tasks[k].to_charger, input.pace))
