@@ -233,7 +233,8 @@ Result<Autonomy> autonomy_of(const AutonomyRequest& request, const server::Robot
 
   std::vector<PricedLeg> typical;
   if (request.minimum_energy) {
-    auto priced = least->price(forecast::typical_legs(forecaster, out.payload_kg), forecaster.typical.empty());
+    auto priced =
+        least->price(forecast::typical_legs(forecaster, out.payload_kg), forecaster.typical.empty());
     if (!priced) return tl::unexpected(priced.error());
     typical = std::move(*priced);
   } else {

@@ -9,11 +9,11 @@
 namespace joulecast::forecast {
 namespace {
 
-constexpr double usual_share = 0.7;      // of the limits
-constexpr std::size_t least_legs = 5;    // that a habit is read from
-constexpr double no_plateau = 1.8;       // cruise over mean speed beyond which a leg is all ramp
-constexpr std::size_t parts = 8;         // that a habit's cruises are told in
-constexpr double assumed_missions = 4;   // that a dispersion of 1 counts for
+constexpr double usual_share = 0.7;     // of the limits
+constexpr std::size_t least_legs = 5;   // that a habit is read from
+constexpr double no_plateau = 1.8;      // cruise over mean speed beyond which a leg is all ramp
+constexpr std::size_t parts = 8;        // that a habit's cruises are told in
+constexpr double assumed_missions = 4;  // that a dispersion of 1 counts for
 
 struct Seen {
   Cruise cruise;
@@ -55,7 +55,8 @@ std::vector<Cruise> in_parts(std::vector<Seen> seen) {
       slowness = softness = 0;
     }
   }
-  if (cruises.size() < parts && slowness > 0) cruises.push_back({(part - room) / slowness, (part - room) / softness});
+  if (cruises.size() < parts && slowness > 0)
+    cruises.push_back({(part - room) / slowness, (part - room) / softness});
   return cruises;
 }
 
@@ -151,7 +152,8 @@ bool StatedPace::cruise(Motion motion) const {
 
 bool StatedPace::whole(Motion motion) const {
   return motion == Motion::stand ||
-         (cruise(motion) && (motion == Motion::turn ? yaw_acceleration_rad_s2 : acceleration_m_s2).has_value());
+         (cruise(motion) &&
+          (motion == Motion::turn ? yaw_acceleration_rad_s2 : acceleration_m_s2).has_value());
 }
 
 Habit Habit::with(const StatedPace& stated) const {
@@ -163,9 +165,9 @@ Habit Habit::with(const StatedPace& stated) const {
   p.yaw_acceleration_rad_s2 = stated.yaw_acceleration_rad_s2.value_or(p.yaw_acceleration_rad_s2);
   for (std::size_t k = 0; k < leg_kind_count; ++k) {
     const Motion motion = k == static_cast<std::size_t>(LegKind::turn) ? Motion::turn : Motion::drive;
-    const auto& [speed, acceleration] =
-        motion == Motion::turn ? std::pair(stated.yaw_rate_rad_s, stated.yaw_acceleration_rad_s2)
-                               : std::pair(stated.speed_m_s, stated.acceleration_m_s2);
+    const auto& [speed, acceleration] = motion == Motion::turn
+                                            ? std::pair(stated.yaw_rate_rad_s, stated.yaw_acceleration_rad_s2)
+                                            : std::pair(stated.speed_m_s, stated.acceleration_m_s2);
     for (Cruise& cruise : habit.cruises[k]) {
       cruise.speed = speed.value_or(cruise.speed);
       cruise.acceleration = acceleration.value_or(cruise.acceleration);

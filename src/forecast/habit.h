@@ -62,9 +62,9 @@ struct Habit {
   // Equally likely ones, for each LegKind: the harmonic means of eight parts of what was seen, so that
   // durations are right in the mean. Never empty.
   std::array<std::vector<Cruise>, leg_kind_count> cruises;
-  std::array<Halts, 2> halts;   // after drives, after turns
-  double halt_dispersion = 1;   // variance of what a mission stands, over that of independent halts
-  Pace middle;                  // medians, and the mean halt
+  std::array<Halts, 2> halts;  // after drives, after turns
+  double halt_dispersion = 1;  // variance of what a mission stands, over that of independent halts
+  Pace middle;                 // medians, and the mean halt
 
   // What is stated replaces the habit.
   Habit with(const StatedPace& stated) const;

@@ -42,8 +42,8 @@ struct LegSample {
 };
 
 // Cuts a mission into legs as its samples come. A change of motion counts once it has lasted `settle_s`;
-// shorter ones stay with the leg they interrupt. A leg also ends where its speed falls below a tenth of what it
-// was and rises to twice that again: a stop without a halt.
+// shorter ones stay with the leg they interrupt. A leg also ends where its speed falls below a tenth of what
+// it was and rises to twice that again: a stop without a halt.
 class LegTracker {
  public:
   static constexpr double settle_s = 0.15;
@@ -77,8 +77,8 @@ class LegTracker {
   double still_m_s_;
   std::optional<LegSample> last_;
   std::optional<Piece> current_, pending_;
-  std::optional<Piece> slowed_;     // of the current leg, since its slowest after it slowed down
-  double peak_ = 0, slowest_ = 0;   // speeds of the current leg, of the wheels' rims [m/s]
+  std::optional<Piece> slowed_;    // of the current leg, since its slowest after it slowed down
+  double peak_ = 0, slowest_ = 0;  // speeds of the current leg, of the wheels' rims [m/s]
   std::vector<Leg> legs_;
 };
 

@@ -146,10 +146,9 @@ const LegPricer::Power& LegPricer::power_of(Motion motion, double curvature_1_m,
     if (known_.size() == most) known_.clear();
     kind = &known_.emplace_back(Power{motion, curvature_1_m, payload_kg, {}});
     const bool turning = motion == Motion::turn;
-    kind->unbound =
-        reaches(*kind, turning ? limits_.yaw_rate_rad_s : limits_.speed_m_s,
-                turning ? limits_.acceleration_m_s2 / drive_->parameters().half_track_m
-                        : limits_.acceleration_m_s2);
+    kind->unbound = reaches(
+        *kind, turning ? limits_.yaw_rate_rad_s : limits_.speed_m_s,
+        turning ? limits_.acceleration_m_s2 / drive_->parameters().half_track_m : limits_.acceleration_m_s2);
   }
   // Curves seldom share their curvature: for one price, the closed form would cost more than it saves.
   if (!kind->tried && (often || curvature_1_m == 0)) {

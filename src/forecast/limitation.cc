@@ -38,8 +38,8 @@ std::optional<Limitation> limitation(const LegPricer& pricer, const robot::Robot
   tell(turn.cruise.speed, wanted.yaw_rate_rad_s, "rad/s");
   tell(turn.cruise.acceleration, wanted.yaw_acceleration_rad_s2, "rad/s^2");
   if (what.empty()) return std::nullopt;
-  slower.sentence = fmt::format("With {:.4g} kg the robot's motors, which have {}, reach {}.", payload_kg,
-                                allowed, what);
+  slower.sentence =
+      fmt::format("With {:.4g} kg the robot's motors, which have {}, reach {}.", payload_kg, allowed, what);
   return slower;
 }
 

@@ -7,8 +7,8 @@
 
 namespace joulecast::forecast {
 
-// That a robot's motors do not reach a pace with a payload, within its current limit and its battery's nominal
-// voltage.
+// That a robot's motors do not reach a pace with a payload, within its current limit and its battery's
+// nominal voltage.
 struct Limitation {
   bool moves = true;  // slower, at `reached`; else not at all
   Pace reached;

@@ -39,8 +39,8 @@ double joined(double middle, double offset_a, double offset_b, double sign) {
   return middle + sign * std::sqrt(offset_a * offset_a + offset_b * offset_b);
 }
 
-TaskOutlook stage(const Forecaster& forecaster, const ChargeMap& battery,
-                  const Charge& charge, double lowest, const PlanSum& sum) {
+TaskOutlook stage(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge, double lowest,
+                  const PlanSum& sum) {
   const Prediction p = forecaster.energy(sum);
   const double power = mean_power(sum, p.expected());
   const Budget spend = budget(battery, charge, lowest, power);
@@ -53,9 +53,8 @@ TaskOutlook stage(const Forecaster& forecaster, const ChargeMap& battery,
 }
 
 // The longest stand after which the plan still holds with the confidence.
-double longest_wait(const Forecaster& forecaster, const ChargeMap& battery,
-                    const Charge& charge, double lowest, const PlanSum& plan, double standing_w,
-                    double confidence) {
+double longest_wait(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
+                    double lowest, const PlanSum& plan, double standing_w, double confidence) {
   const auto holds = [&](double wait_s) {
     PlanSum waited = plan;
     forecaster.extend(waited, {Motion::stand, 0, 0, {wait_s, standing_w * wait_s, 0, 0}});
@@ -79,8 +78,7 @@ std::array<double, 3> arrival_charge(const Prediction& prediction, const ChargeM
                                      const Charge& charge, double mean_power_w) {
   std::array<double, 3> out;
   for (std::size_t k = 0; k < told_quantiles.size(); ++k)
-    out[k] =
-        battery.charge_after(charge.fraction, prediction.quantile(1 - told_quantiles[k]), mean_power_w);
+    out[k] = battery.charge_after(charge.fraction, prediction.quantile(1 - told_quantiles[k]), mean_power_w);
   const double middle = out[1];
   const double deviation =
       std::hypot(charge.deviation, battery.relative_deviation() * (charge.fraction - middle));
@@ -125,12 +123,11 @@ std::vector<PlannedLeg> typical_legs(const Forecaster& forecaster, double payloa
 
 std::vector<PricedLeg> price_typical(const Forecaster& forecaster, const LegPricer& pricer,
                                      const StatedPace& stated, double payload_kg) {
-  return price(forecaster, pricer, typical_legs(forecaster, payload_kg), stated,
-               !forecaster.typical.empty());
+  return price(forecaster, pricer, typical_legs(forecaster, payload_kg), stated, !forecaster.typical.empty());
 }
 
-double probability_of_reserve(const Forecaster& forecaster, const ChargeMap& battery,
-                              const Charge& charge, const PlanSum& plan) {
+double probability_of_reserve(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
+                              const PlanSum& plan) {
   const Prediction p = forecaster.energy(plan);
   const double power = mean_power(plan, p.expected());
   const Budget spend = budget(battery, charge, lowest_charge(battery, charge, power), power);
@@ -164,8 +161,8 @@ double QuickSuccess::probability(double energy_j, double duration_s, double load
 }
 
 Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
-                   std::span<const PricedTask> tasks,
-                   std::span<const PricedLeg> from_here, double standing_w, double confidence) {
+                   std::span<const PricedTask> tasks, std::span<const PricedLeg> from_here, double standing_w,
+                   double confidence) {
   Outlook out;
   out.charger_given = !from_here.empty() || (!tasks.empty() && !tasks.front().to_charger.empty());
   std::vector<PlanSum> sums(tasks.size() + 1);  // after so many tasks
@@ -174,8 +171,7 @@ Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const
     extend(sums[k + 1], forecaster, tasks[k].legs);
   }
   PlanSum whole = sums.back();
-  if (out.charger_given)
-    extend(whole, forecaster, tasks.empty() ? from_here : tasks.back().to_charger);
+  if (out.charger_given) extend(whole, forecaster, tasks.empty() ? from_here : tasks.back().to_charger);
   const Prediction all = forecaster.energy(whole);
   const double lowest = lowest_charge(battery, charge, mean_power(whole, all.expected()));
   // What the mean lies above the corrected energy is shared out by energy, so that the parts add up to it.
@@ -202,7 +198,8 @@ Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const
   out.mean_j = all.mean();
   for (std::size_t k = 0; k < told_quantiles.size(); ++k) out.energy_j[k] = all.quantile(told_quantiles[k]);
   const Prediction duration = forecaster.duration(whole);
-  for (std::size_t k = 0; k < told_quantiles.size(); ++k) out.duration_s[k] = duration.quantile(told_quantiles[k]);
+  for (std::size_t k = 0; k < told_quantiles.size(); ++k)
+    out.duration_s[k] = duration.quantile(told_quantiles[k]);
   out.probability = probability_before;
   if (tasks.empty() && !out.charger_given)
     out.probability = probability_of_reserve(forecaster, battery, charge, whole);

@@ -58,8 +58,9 @@ struct Outlook {
 
 // `from_here` are the legs to the charger from where the robot is, empty when no charger is given; every task
 // then has its own.
-Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge, std::span<const PricedTask> tasks,
-                   std::span<const PricedLeg> from_here, double standing_w, double confidence);
+Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
+                   std::span<const PricedTask> tasks, std::span<const PricedLeg> from_here, double standing_w,
+                   double confidence);
 
 // How far and how long a robot still goes when it goes on as in its typical legs.
 struct Reach {
@@ -81,8 +82,8 @@ std::vector<PricedLeg> price_typical(const Forecaster& forecaster, const LegPric
                                      const StatedPace& stated, double payload_kg);
 
 // That a plan ends with the reserve.
-double probability_of_reserve(const Forecaster& forecaster, const ChargeMap& battery,
-                              const Charge& charge, const PlanSum& plan);
+double probability_of_reserve(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
+                              const PlanSum& plan);
 
 // The same for many short plans of one robot, given by sums alone: model energies and durations of
 // minimum-energy drives, split into with and without payload. The legs of a plan count as four of equal size.
@@ -109,8 +110,8 @@ PlanSum sum_of(const Forecaster& forecaster, std::span<const PricedLeg> legs);
 // Adds them to a plan.
 void extend(PlanSum& sum, const Forecaster& forecaster, std::span<const PricedLeg> legs);
 
-// Legs priced at the pace stated, else by the robot's habit. Where its pace is not wholly stated, a leg may be
-// followed by a halt as the robot is used to make, unless the plan itself says where it stands.
+// Legs priced at the pace stated, else by the robot's habit. Where its pace is not wholly stated, a leg may
+// be followed by a halt as the robot is used to make, unless the plan itself says where it stands.
 std::vector<PricedLeg> price(const Forecaster& forecaster, const LegPricer& pricer,
                              std::span<const PlannedLeg> legs, const StatedPace& stated, bool halts_stated);
 

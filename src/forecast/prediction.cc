@@ -115,8 +115,7 @@ double Prediction::probability_below(double amount, double deviation) const {
   const auto atoms = scores->atoms();
   double sum = 0;
   for (std::size_t k = 0; k < atoms.size(); k += together) {
-    const double spent =
-        fixed + legs * std::exp(inflation * spread * 0.5 * (atoms[k + 1] + atoms[k + 2]));
+    const double spent = fixed + legs * std::exp(inflation * spread * 0.5 * (atoms[k + 1] + atoms[k + 2]));
     if (halts.none()) {
       sum += budget_covers(spent);
       continue;

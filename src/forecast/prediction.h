@@ -28,9 +28,9 @@ class HaltDistribution {
   std::array<double, count> values_{};
 };
 
-// Energy [J] or duration [s] of a plan: fixed + legs * exp(spread * n) + halts, n standard normal, is what the
-// parts make of it; its quantile at Phi(inflation * z), z distributed as `scores`, is the forecast. The scores
-// are those of past missions under the same formula, so that they calibrate it whatever its shape.
+// Energy [J] or duration [s] of a plan: fixed + legs * exp(spread * n) + halts, n standard normal, is what
+// the parts make of it; its quantile at Phi(inflation * z), z distributed as `scores`, is the forecast. The
+// scores are those of past missions under the same formula, so that they calibrate it whatever its shape.
 struct Prediction {
   double fixed = 0;  // known exactly
   double legs = 0;

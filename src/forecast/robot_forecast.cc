@@ -15,7 +15,7 @@ constexpr std::int64_t watch_after = 5;   // missions: earlier scores are of a m
 constexpr std::int64_t drift_shown = 20;  // missions
 constexpr double drift_forgets = 0.05;    // share of old evidence and scores that survives a drift
 constexpr std::size_t typical_legs = 40;
-constexpr double least_amount = 1;  // J, s
+constexpr double least_amount = 1;   // J, s
 constexpr double floor_share = 0.3;  // of the median leg: scatter of short legs does not shrink with them
 
 // What scatter is assumed before any is seen, and how many legs or missions the assumption counts for.
@@ -90,7 +90,8 @@ Prediction Forecaster::joined(const PlanSum& sum, std::span<const Subject> subje
     if (!(part > 0)) continue;
     p.legs += part;
     variance += t.correction.variance_j2(sum.features[s]);
-    for (std::size_t k = 0; k < motion_count; ++k) variance += t.scatter[k] * t.scatter[k] * sum.squares[s][k];
+    for (std::size_t k = 0; k < motion_count; ++k)
+      variance += t.scatter[k] * t.scatter[k] * sum.squares[s][k];
     common += t.common * part;
   }
   if (p.legs > 0) p.spread = std::sqrt(variance + common * common) / p.legs;
@@ -185,8 +186,12 @@ RobotForecast::Seen RobotForecast::seen(Subject subject, const PastMission& miss
   const auto s = static_cast<std::size_t>(subject);
   Seen seen;
   const auto add = [&](const Leg& leg) {
-    PricedLeg priced{leg.motion, leg.payload_kg, 0, stated ? pricer.driven(leg) : pricer.usual(leg, habit_),
-                     stated ? Driving::stated : Driving::usual, !stated && leg.motion != Motion::stand};
+    PricedLeg priced{leg.motion,
+                     leg.payload_kg,
+                     0,
+                     stated ? pricer.driven(leg) : pricer.usual(leg, habit_),
+                     stated ? Driving::stated : Driving::usual,
+                     !stated && leg.motion != Motion::stand};
     const double loaded = now.payload_limit_kg > 0 ? leg.payload_kg / now.payload_limit_kg : 0;
     seen.legs.push_back({time ? duration_features_of(leg.motion, loaded, priced.cost)
                               : features_of(leg.motion, loaded, priced.cost),
@@ -225,7 +230,8 @@ double RobotForecast::score(Subject subject, const PastMission& mission, double&
   const Forecaster::Track& now = with.tracks[s];
   const Seen legs = seen(subject, mission, with);
   if (legs.foreseen == 0) return 0;
-  const Prediction told = subject == Subject::usual_duration ? with.duration(legs.sum) : with.energy(legs.sum);
+  const Prediction told =
+      subject == Subject::usual_duration ? with.duration(legs.sum) : with.energy(legs.sum);
   const double z = told.score_of(std::max(least_amount, legs.measured + legs.halted));
 
   const double expected = std::max(least_amount, told.legs);
@@ -331,7 +337,8 @@ std::optional<Drift> RobotForecast::learn(PastMission mission) {
 
   constexpr std::size_t habit_missions = 40;
   const std::size_t recent = std::min(missions_.size(), habit_missions);
-  habit_ = habit_of(robot_, std::vector(missions_.end() - static_cast<std::ptrdiff_t>(recent), missions_.end()));
+  habit_ =
+      habit_of(robot_, std::vector(missions_.end() - static_cast<std::ptrdiff_t>(recent), missions_.end()));
   // While the habit is being found, what was learnt against it is learnt again.
   constexpr std::array<std::int64_t, 5> habit_settles{2, 4, 8, 16, 32};
   if (std::ranges::find(habit_settles, learnt_) != habit_settles.end()) {

@@ -16,8 +16,8 @@ namespace joulecast::forecast {
 enum class Driving { stated, usual };
 inline constexpr std::size_t driving_count = 2;
 
-// What is learnt of a robot: what it spends on legs whose pace is known, what it spends, and how long it takes,
-// on legs that it drives as it likes.
+// What is learnt of a robot: what it spends on legs whose pace is known, what it spends, and how long it
+// takes, on legs that it drives as it likes.
 enum class Subject { stated_energy, usual_energy, usual_duration };
 inline constexpr std::size_t subject_count = 3;
 
