@@ -48,14 +48,14 @@ struct ScriptOptions {
   double fastest_fraction = 0.9;
   double gentlest_fraction = 0.35;  // of the acceleration limit
   double hardest_fraction = 0.95;
-  double arc_share = 0.2;         // of the legs
-  double dwell_share = 0.25;      // of the legs are followed by a halt
+  double arc_share = 0.2;     // of the legs
+  double dwell_share = 0.25;  // of the legs are followed by a halt
   double shortest_halt_s = 1;
   double longest_halt_s = 4;
-  double pickup_share = 0;        // of the halts change the payload
-  double undeclared_share = 0;    // of the missions carry more than they declare ...
-  double undeclared_most = 0.6;   // ... by a quarter of this to all of it, of the payload limit
-  bool manoeuvre = false;         // every mission is the calibration drive
+  double pickup_share = 0;       // of the halts change the payload
+  double undeclared_share = 0;   // of the missions carry more than they declare ...
+  double undeclared_most = 0.6;  // ... by a quarter of this to all of it, of the payload limit
+  bool manoeuvre = false;        // every mission is the calibration drive
 };
 
 // Where a script begins and, after planning, where it ends.

@@ -18,9 +18,10 @@ class LeastEnergy {
   static Result<LeastEnergy> make(const ModelInForce& model, planning::CostTableCache& tables,
                                   double value_of_time_w = 0);
 
-  // `may_halt`: after each leg the robot stands as it is used to. Error: a leg that cannot be driven within the
-  // limits.
-  Result<std::vector<forecast::PricedLeg>> price(const std::vector<forecast::PlannedLeg>& legs, bool may_halt);
+  // `may_halt`: after each leg the robot stands as it is used to. Error: a leg that cannot be driven within
+  // the limits.
+  Result<std::vector<forecast::PricedLeg>> price(const std::vector<forecast::PlannedLeg>& legs,
+                                                 bool may_halt);
 
  private:
   struct Curve {

@@ -1,10 +1,12 @@
-// How good forecasts are, asked as the daemon is asked, in worlds unlike each other: a fleet recorded from another
-// plant, recordings of a real robot, and virtual robots of several habits, whose plants share no physics with the
-// model and have two to four effects that it does not know. A robot's first missions are learnt, the others asked.
+// How good forecasts are, asked as the daemon is asked, in worlds unlike each other: a fleet recorded from
+// another plant, recordings of a real robot, and virtual robots of several habits, whose plants share no
+// physics with the model and have two to four effects that it does not know. A robot's first missions are
+// learnt, the others asked.
 //
 //   forecast_figures [robots of each virtual kind = 2] [first seed = 90000] [habit, of all = -1]
 //
-// Coverage of the 90 % interval with the share that a binomial holds at 95 %. Takes some 0.1 s of CPU a mission.
+// Coverage of the 90 % interval with the share that a binomial holds at 95 %. Takes some 0.1 s of CPU a
+// mission.
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -83,8 +85,9 @@ int main(int count, char** arguments) {
   const auto number = [&](int index, int fallback) {
     return index < count ? std::atoi(arguments[index]) : fallback;
   };
-  std::printf("%-24s %-13s %5s %9s %8s %10s %8s   %s\n", "world", "asked", "n", "energy", "in 90 %", "duration",
-              "in 90 %", "of a binomial");
+  std::printf("%-24s %-13s %5s %9s %8s %10s %8s   %s\n", "world", "asked", "n", "energy", "in 90 %",
+              "duration", "in 90 %", "of a binomial");
   if (number(3, -1) < 0) joulecast::forecast::recorded_worlds();
-  joulecast::forecast::virtual_worlds(number(1, 2), static_cast<std::uint64_t>(number(2, 90'000)), number(3, -1));
+  joulecast::forecast::virtual_worlds(number(1, 2), static_cast<std::uint64_t>(number(2, 90'000)),
+                                      number(3, -1));
 }

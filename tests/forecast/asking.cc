@@ -89,7 +89,8 @@ Told Asking::ask(const DrivenMission& mission, Asked asked, std::shared_ptr<cons
 
 void judge(const RobotRun& run, std::size_t learnt, Asked asked, Coverage& coverage) {
   RobotForecast forecast(run.robot, run.drive);
-  for (std::size_t k = 0; k < std::min(learnt, run.missions.size()); ++k) forecast.learn(run.missions[k].past);
+  for (std::size_t k = 0; k < std::min(learnt, run.missions.size()); ++k)
+    forecast.learn(run.missions[k].past);
   const auto forecaster = forecast.forecaster();
   Asking asking(run);
   for (std::size_t k = learnt; k < run.missions.size(); ++k) {

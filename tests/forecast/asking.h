@@ -14,12 +14,13 @@ namespace joulecast::forecast {
 
 // What a request says of a planned mission.
 enum class Asked {
-  ways,       // turns, distances and arcs, with the payload
-  dwells,     // where it stands, too
-  stated,     // and how fast it drives and turns, ramps included
-  one_path,   // as `ways`, all in one path
+  ways,      // turns, distances and arcs, with the payload
+  dwells,    // where it stands, too
+  stated,    // and how fast it drives and turns, ramps included
+  one_path,  // as `ways`, all in one path
 };
-inline constexpr std::array<std::string_view, 4> asked_names{"ways", "ways, dwells", "all stated", "one path"};
+inline constexpr std::array<std::string_view, 4> asked_names{"ways", "ways, dwells", "all stated",
+                                                             "one path"};
 
 struct Told {
   std::array<double, 3> energy_j{};    // 5, 50 and 95 %
@@ -41,7 +42,7 @@ class Asking {
 
 // How the forecasts of some missions met what came.
 struct Coverage {
-  std::vector<double> energy_error, duration_error;  // relative, absolute
+  std::vector<double> energy_error, duration_error;    // relative, absolute
   std::size_t energy_inside = 0, duration_inside = 0;  // the 90 % interval
   std::size_t count() const { return energy_error.size(); }
 };

@@ -116,8 +116,8 @@ TEST(LegPricer, DrivesNoFasterThanTheMotorsReach) {
   EXPECT_TRUE(cost.slower);
   const Reachable reached = pricer.reachable(Motion::drive, 0, 20, {pace.speed_m_s, pace.acceleration_m_s2});
   // The voltage that the gear's speed induces alone bounds it.
-  EXPECT_LT(reached.cruise.speed, able.battery.nominal_voltage_v / geared.motor.voltage_constant_v_s_rad / 1000 *
-                                      able.kinematics.wheel_radius_m);
+  EXPECT_LT(reached.cruise.speed, able.battery.nominal_voltage_v / geared.motor.voltage_constant_v_s_rad /
+                                      1000 * able.kinematics.wheel_radius_m);
   EXPECT_GT(cost.duration_s, 10 / reached.cruise.speed);
   const auto told = limitation(pricer, geared, pace, 20);
   ASSERT_TRUE(told);

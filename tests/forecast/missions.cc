@@ -34,7 +34,9 @@ std::vector<StatedLeg> commanded_plan(const telemetry::Recording& mission) {
     leg.leg.motion = static_cast<Motion>(kind == Commanded::stand ? 0 : kind == Commanded::drive ? 1 : 2);
     double turned = 0, duration_s = 0;
     for (; k < samples.size() && commanded(samples[k]) == kind; ++k) {
-      const double h = k + 1 < samples.size() ? 1e-6 * static_cast<double>(samples[k + 1].utime_us - samples[k].utime_us) : 0;
+      const double h = k + 1 < samples.size()
+                           ? 1e-6 * static_cast<double>(samples[k + 1].utime_us - samples[k].utime_us)
+                           : 0;
       const double now = std::fabs(samples[k].velocity_command[kind == Commanded::turn ? 1 : 0]);
       if (kind == Commanded::stand) leg.leg.duration_s += h;
       leg.leg.way += now * h;

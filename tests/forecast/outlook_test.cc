@@ -134,8 +134,7 @@ TEST(Outlook, LatestDepartureKeepsTheConfidence) {
   tasks.resize(4);
   tasks.back().legs.push_back(
       {Motion::stand, 0, 0, {out.latest_departure->wait_s, standing_w * out.latest_departure->wait_s, 0, 0}});
-  const Outlook waited =
-      look_ahead(f, map, {0.5, 0, 0.15}, tasks, from_here, standing_w, 0.95);
+  const Outlook waited = look_ahead(f, map, {0.5, 0, 0.15}, tasks, from_here, standing_w, 0.95);
   EXPECT_NEAR(waited.probability, 0.95, 0.01);
 }
 

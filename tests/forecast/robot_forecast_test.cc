@@ -52,7 +52,8 @@ PlanSum plan_of(const Forecaster& f, const MadeMissions& made) {
   const LegPricer pricer(made.robot, made.drive);
   PlanSum sum;
   for (int k = 0; k < 20; ++k)
-    f.extend(sum, {Motion::drive, 0, 6, pricer.paced(PlannedLeg{Motion::drive, 6, 0, 0, 0}, default_pace(made.robot))});
+    f.extend(sum, {Motion::drive, 0, 6,
+                   pricer.paced(PlannedLeg{Motion::drive, 6, 0, 0, 0}, default_pace(made.robot))});
   return sum;
 }
 
@@ -73,8 +74,7 @@ TEST(RobotForecast, WithoutPastIsTheModelWithinFifteenPercent) {
 TEST(RobotForecast, LearnsARobotThatSpendsMore) {
   MadeMissions made(2);
   RobotForecast forecast(made.robot, made.drive);
-  const double before =
-      forecast.forecaster()->energy(plan_of(*forecast.forecaster(), made)).legs;
+  const double before = forecast.forecaster()->energy(plan_of(*forecast.forecaster(), made)).legs;
   for (int k = 0; k < 20; ++k) forecast.learn(made.next(1.3, 0.02, 0.05));
   const auto f = forecast.forecaster();
   const Prediction p = f->energy(plan_of(*f, made));
@@ -110,8 +110,7 @@ TEST(RobotForecast, SaysWhenTheRobotChangesAndFollows) {
   double model = 0;
   for (std::size_t k = 0; k < 3; ++k) model += sum.features[0][k];
   // What came before the change keeps a twentieth of its weight: 1.5 missions against some ten.
-  EXPECT_NEAR(f->energy(sum).legs / model, 1.15,
-              0.15 * 0.2 + 4 * 0.02 / std::sqrt(8.0));
+  EXPECT_NEAR(f->energy(sum).legs / model, 1.15, 0.15 * 0.2 + 4 * 0.02 / std::sqrt(8.0));
   // Twenty missions after the last news of it, it is none any more.
   for (int k = 0; k < 45; ++k) forecast.learn(made.next(1.15, 0.02, 0.05));
   EXPECT_FALSE(forecast.forecaster()->drift);
@@ -127,8 +126,7 @@ TEST(RobotForecast, SiblingsSpareANewcomerTheLearning) {
     for (std::size_t d = 0; d < subject_count; ++d) found[d].push_back(own[d]);
   }
   RobotForecast newcomer(made.robot, made.drive);
-  const double alone =
-      newcomer.forecaster()->energy(plan_of(*newcomer.forecaster(), made)).legs;
+  const double alone = newcomer.forecaster()->energy(plan_of(*newcomer.forecaster(), made)).legs;
   std::array<Siblings, subject_count> siblings;
   for (std::size_t d = 0; d < subject_count; ++d) {
     std::vector<const OwnFinding*> others;
