@@ -267,27 +267,14 @@ function List({ given, list, total, onSort }) {
   );
 }
 
-// What the address says; changed by the view, by a link to it, or by the browser's back.
-function useGiven(asked) {
+export function Missions({ given: asked }) {
+  useTitleOf('Missions');
   const [given, setGiven] = useState(asked);
-  const address = useRef(JSON.stringify(asked));
-  useEffect(() => {
-    if (JSON.stringify(asked) === address.current) return;
-    address.current = JSON.stringify(asked);
-    setGiven(asked);
-  }, [asked]);
   const change = (next) => {
-    const kept = Object.fromEntries(Object.entries(next).filter(([, v]) => v));
-    address.current = JSON.stringify(kept);
+    const kept = Object.fromEntries(Object.entries(next).filter(([, value]) => value));
     setGiven(kept);
     keepInAddress(kept);
   };
-  return [given, change];
-}
-
-export function Missions({ given: asked }) {
-  useTitleOf('Missions');
-  const [given, change] = useGiven(asked);
   const filter = useMemo(() => filterOf(given), [given]);
   const list = useList(filter, given.name ? searchRows : pageRows);
   const totals = useGet(`/v1/mission-totals${query(filter)}`);
