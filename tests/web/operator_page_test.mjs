@@ -472,6 +472,23 @@ await check('missions are sorted by their columns and found by a part of the nam
   await page.getByText('1 found in the newest 8 of 8 loaded').waitFor();
 });
 
+await check('missions are summed by day', async () => {
+  const { missions } = await get('/v1/missions?robot_id=worn-01&limit=50');
+  const end = new Date(missions[0].end_utime_us / 1000);
+  const local = new Date(end - end.getTimezoneOffset() * 60_000 + 60_000).toISOString().slice(0, 16);
+  await go(page, `#/missions?robot=worn-01&to=${local}&trend=day`);
+  await page.locator('.trends tbody tr').first().waitFor();
+  const counts = (await page.locator('.trends tbody td:nth-child(2)').allTextContents()).map(number);
+  equal(
+    counts.reduce((a, b) => a + b),
+    missions.length,
+    'missions of all days',
+  );
+  const energies = (await page.locator('.trends tbody td:nth-child(3)').allTextContents()).map(joulesOf);
+  const sum = missions.reduce((total, m) => total + m.energy.battery_j, 0);
+  expect(Math.abs(energies.reduce((a, b) => a + b) / sum - 1) < 0.01, `${energies} against ${sum} J`);
+});
+
 await check('a proposed model says what it changes, and is adopted only when confirmed', async () => {
   await go(page, '#/robots/worn-01');
   const panel = page.locator('.panel', {
@@ -1050,7 +1067,10 @@ await check('what was found is tested on other missions, adopted and rolled back
   equal(adopted.model_version, 2, 'version');
   equal(Object.keys(adopted.model.effects)[0], 'coulomb_friction', 'adopted effect');
   await go(page, '#/robots/worn-01');
-  await page.getByRole('link', { name: `diagnosis ${diagnosis}`, exact: true }).waitFor();
+  await page
+    .getByRole('link', { name: `diagnosis ${diagnosis}`, exact: true })
+    .first()
+    .waitFor();
   await adopt(page, 'Put version 1 in force again', 'Put version 1 in force');
   await adopt(page, 'Put version 2 in force again', 'Put version 2 in force');
   await until('version 2', async () => (await get('/v1/robots/worn-01')).model_version === 2);
