@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Static analysis: cppcheck over all sources, fast enough for every run. With a build folder as argument, clang-tidy too
-# (.clang-tidy), which takes about as long as a build.
+# Static analysis: cppcheck over all C++ sources, eslint and prettier over the page's, fast enough for every run. With a
+# build folder as argument, clang-tidy too (.clang-tidy), which takes about as long as a build.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 # Suppressed: what cppcheck 2.10 gets wrong on C++20 (a range-for over a call that moves its argument; a back_inserter,
@@ -8,6 +8,16 @@ cd "$(dirname "$0")/.."
 cppcheck --std=c++20 --language=c++ --enable=warning,portability --inline-suppr --quiet --error-exitcode=1 -j "$(nproc)" \
   --suppress=missingIncludeSystem --suppress=internalAstError --suppress=syntaxError --suppress=accessMoved \
   --suppress=invalidContainer --suppress=duplicateAssignExpression -I src -I . src server client
+# eslint and prettier in the versions of server/web/package-lock.json; npm brings them once.
+lock=server/web/package-lock.json
+tools=server/web/node_modules
+cmp -s "$lock" "$tools/.installed.json" || {
+  npm ci --prefix server/web --ignore-scripts --no-audit --no-fund --silent
+  cp "$lock" "$tools/.installed.json"
+}
+"$tools/.bin/eslint" --config server/web/eslint.config.mjs --max-warnings 0 server/web tests/web
+"$tools/.bin/prettier" --config server/web/.prettierrc.json --log-level warn --check \
+  'server/web/*.mjs' 'server/web/source/**/*.{js,jsx,css}' 'tests/web/*.mjs'
 if [ $# -gt 0 ]; then
   git ls-files -- 'src/*.cc' 'server/*.cc' 'client/*.cc' | xargs -P "$(nproc)" -n 4 clang-tidy -p "$1" --quiet
 fi

@@ -6,7 +6,7 @@ import { createServer } from 'node:net';
 const children = new Set();
 process.on('exit', () => children.forEach((child) => child.kill('SIGKILL')));
 
-export async function free_port() {
+export async function freePort() {
   const server = createServer().listen(0, '127.0.0.1');
   await once(server, 'listening');
   const { port } = server.address();
@@ -32,11 +32,12 @@ export async function run(program, args) {
 }
 
 // Starts and waits until `ready(child)` is true.
-export async function start_until(program, args, ready, seconds = 20) {
+export async function startUntil(program, args, ready, seconds = 20) {
   const child = start(program, args);
   const end = Date.now() + seconds * 1000;
   while (!(await ready(child))) {
-    if (child.exitCode !== null || Date.now() > end) throw new Error(`${program} did not get ready: ${child.said}`);
+    if (child.exitCode !== null || Date.now() > end)
+      throw new Error(`${program} did not get ready: ${child.said}`);
     await new Promise((wait) => setTimeout(wait, 50));
   }
   return child;

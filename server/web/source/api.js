@@ -10,10 +10,10 @@ class Problem extends Error {
 
 async function answer(response) {
   if (response.ok) return response.json();
-  const told = await response.json().catch(() => ({}));
+  const problem = await response.json().catch(() => ({}));
   throw Object.assign(
-    new Problem(response.status, told.title ?? response.statusText, told.detail ?? '', told.field),
-    { told },
+    new Problem(response.status, problem.title ?? response.statusText, problem.detail ?? '', problem.field),
+    { body: problem },
   );
 }
 
@@ -56,20 +56,20 @@ export const idPath = (id) => encodeURIComponent(id);
 // {value, error, loading, reload}; asks again when `path` changes, keeps the last value while it does.
 // An empty or null path asks nothing.
 export function useGet(path) {
-  const [told, setTold] = useState({ value: null, error: null, loading: Boolean(path), path });
+  const [state, setState] = useState({ value: null, error: null, loading: Boolean(path), path });
   const [turn, setTurn] = useState(0);
   const shown = useRef(path);
   useEffect(() => {
     if (!path) return undefined;
     const abort = new AbortController();
     shown.current = path;
-    setTold((before) => ({ ...before, loading: true }));
+    setState((before) => ({ ...before, loading: true }));
     get(path, abort.signal).then(
-      (value) => setTold({ value, error: null, loading: false, path }),
+      (value) => setState({ value, error: null, loading: false, path }),
       (error) =>
-        error.name === 'AbortError' || setTold((before) => ({ ...before, error, loading: false, path })),
+        error.name === 'AbortError' || setState((before) => ({ ...before, error, loading: false, path })),
     );
     return () => abort.abort();
   }, [path, turn]);
-  return { ...told, reload: () => setTurn((n) => n + 1) };
+  return { ...state, reload: () => setTurn((n) => n + 1) };
 }

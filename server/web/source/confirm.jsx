@@ -1,13 +1,12 @@
 // A button that asks once before it does what it says; its children tell what will change.
-import { useRef, useState } from 'preact/hooks';
+import { useEffect, useRef, useState } from 'preact/hooks';
 
 export function ConfirmButton({ label, title, action, onConfirm, disabled, class: name, children }) {
   const dialog = useRef(null);
   const [open, setOpen] = useState(false);
-  const ask = () => {
-    setOpen(true);
-    dialog.current.showModal();
-  };
+  useEffect(() => {
+    if (open) dialog.current.showModal(); // with its content, so that a control in it gets the focus
+  }, [open]);
   const answer = (event) => {
     event.preventDefault();
     dialog.current.close();
@@ -15,7 +14,7 @@ export function ConfirmButton({ label, title, action, onConfirm, disabled, class
   };
   return (
     <>
-      <button type="button" class={name} disabled={disabled} onClick={ask}>
+      <button type="button" class={name} disabled={disabled} onClick={() => setOpen(true)}>
         {label}
       </button>
       <dialog ref={dialog} aria-label={title} onClose={() => setOpen(false)}>

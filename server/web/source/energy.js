@@ -23,8 +23,8 @@ export const toggleEnergyUnit = () => choice.set(choice.get() === 'Wh' ? 'J' : '
 const decimals = (value, significant) =>
   Math.max(0, Math.min(4, significant - 1 - (value > 0 ? Math.floor(Math.log10(value)) : 0)));
 
-// {u, joule, places}: one unit and number of decimals for all of `values`: the unit by the greatest, the decimals
-// so that the middle one has `significant` digits.
+// {u, joule, places}: one unit and number of decimals for all of `values`: the unit by the greatest, the
+// decimals so that the middle one has `significant` digits.
 export function energyScale(values, significant = 3) {
   const sizes = values.filter((v) => known(v) && v !== 0).map(Math.abs);
   sizes.sort((a, b) => a - b);

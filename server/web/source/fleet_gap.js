@@ -9,21 +9,21 @@ const mostRobots = 100; // one question for each kind of robot; larger fleets wo
 const driftKinds = ['gap_drift', 'consumption_drift'];
 const changeOf = { gap_drift: (d) => d.ratio_after - d.ratio_before, consumption_drift: (d) => d.ratio - 1 };
 
-// Robots of one kind are told in one answer.
-async function readRatios(ids, told, signal) {
+// One answer holds all robots of a kind.
+async function readRatios(ids, gaps, signal) {
   const asked = new Set();
   for (const id of ids) {
     if (asked.has(id)) continue;
     const { siblings } = await get(`/v1/robots/${idPath(id)}/gap-history?limit=1`, signal);
     for (const s of siblings) {
       asked.add(s.robot_id);
-      told.set(s.robot_id, { ratio: s.ratio, standsOut: s.stands_out });
+      gaps.set(s.robot_id, { ratio: s.ratio, standsOut: s.stands_out });
     }
   }
 }
 
 // A drift counts until another model is in force.
-async function readDrifts(told, signal) {
+async function readDrifts(gaps, signal) {
   const events = await newestEvents({ count: 1000, signal });
   const settled = new Set();
   for (const { robot_id: id, kind, detail } of events) {
@@ -31,8 +31,8 @@ async function readDrifts(told, signal) {
     if (kind === 'model_adopted' || kind === 'model_activated') settled.add(id);
     if (!driftKinds.includes(kind)) continue;
     settled.add(id);
-    told.set(id, {
-      ...told.get(id),
+    gaps.set(id, {
+      ...gaps.get(id),
       drift: changeOf[kind](detail),
       driftUs: detail.since_utime_us ?? detail.utime_us,
     });
@@ -41,7 +41,7 @@ async function readDrifts(told, signal) {
 
 // Map from robot to {ratio, standsOut, drift, driftUs}; empty until it is read.
 export function useFleetGap(ids) {
-  const [told, setTold] = useState(new Map());
+  const [gaps, setGaps] = useState(new Map());
   const key = ids.length > mostRobots ? '' : ids.join('\n');
   useEffect(() => {
     if (key === '') return undefined;
@@ -50,7 +50,7 @@ export function useFleetGap(ids) {
       const next = new Map();
       await readRatios(key.split('\n'), next, abort.signal);
       await readDrifts(next, abort.signal);
-      setTold(next);
+      setGaps(next);
     };
     const quietly = () => read().catch(() => {}); // the live view says when the service is gone
     const first = setTimeout(quietly, 300); // after the first view is drawn
@@ -61,5 +61,5 @@ export function useFleetGap(ids) {
       clearInterval(timer);
     };
   }, [key]);
-  return told;
+  return gaps;
 }

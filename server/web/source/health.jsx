@@ -52,7 +52,7 @@ export function Health({ state }) {
 export function chargeNote({ charging, charge, state_of_charge_sd: sd }) {
   const leftS = charge?.time_to_charged_s;
   const left = format.known(leftS) ? `, ${format.about(leftS)}` : '';
-  if (charging?.phase === 'full') return { text: 'charged', what: 'At its charger, which has ended' };
+  if (charging?.phase === 'full') return { text: 'charged', what: 'At its charger, charging has ended' };
   if (charging) return { text: `charging${left}`, what: `At its charger${left}` };
   return { text: format.known(sd) ? `± ${format.text(format.percent(sd))}` : '', what: 'standard deviation' };
 }

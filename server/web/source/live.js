@@ -1,5 +1,5 @@
-// The live fleet: the list once, then the event stream. Events change the map at once; components are told at
-// most once an animation frame and five times a second, however many robots report.
+// The live fleet: the list once, then the event stream. Events change the map at once; components are
+// notified at most once an animation frame and five times a second, however many robots report.
 import { useEffect, useState } from 'preact/hooks';
 import { get } from './api.js';
 
@@ -56,21 +56,21 @@ function changed() {
   else requestAnimationFrame(tell);
 }
 
-function take(told) {
-  let entry = robots.get(told.robot_id);
+function take(next) {
+  let entry = robots.get(next.robot_id);
   if (entry === undefined) {
-    entry = { id: told.robot_id, revision: 0, power: new Track(powerSamples), path: new Track(pathSamples) };
-    robots.set(told.robot_id, entry);
+    entry = { id: next.robot_id, revision: 0, power: new Track(powerSamples), path: new Track(pathSamples) };
+    robots.set(next.robot_id, entry);
   }
-  told.heardUs = told.silent_s === null ? null : (Date.now() - 1000 * told.silent_s) * 1000;
-  const fresh = entry.state === undefined || entry.state.utime_us !== told.utime_us;
-  entry.state = told;
+  next.heardUs = next.silent_s === null ? null : (Date.now() - 1000 * next.silent_s) * 1000;
+  const fresh = entry.state === undefined || entry.state.utime_us !== next.utime_us;
+  entry.state = next;
   entry.revision += 1;
-  if (fresh && told.utime_us !== null) {
-    entry.power.push([told.utime_us, told.measured_power_w ?? NaN, told.modelled_power_w ?? NaN]);
-    const [x, y, heading] = told.pose;
+  if (fresh && next.utime_us !== null) {
+    entry.power.push([next.utime_us, next.measured_power_w ?? NaN, next.modelled_power_w ?? NaN]);
+    const [x, y, heading] = next.pose;
     if (x !== null && y !== null)
-      entry.path.push([x, y, heading ?? 0, told.measured_power_w ?? told.modelled_power_w ?? NaN]);
+      entry.path.push([x, y, heading ?? 0, next.measured_power_w ?? next.modelled_power_w ?? NaN]);
   }
 }
 

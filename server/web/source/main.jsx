@@ -104,7 +104,7 @@ function App() {
           type="button"
           class="unit-choice"
           onClick={toggleEnergyUnit}
-          aria-label={`Energy in ${unit === 'Wh' ? 'watt hours; show joules' : 'joules; show watt hours'}`}
+          aria-label={unit === 'Wh' ? 'Wh: show energy in joules' : 'J: show energy in watt hours'}
           title={unit === 'Wh' ? 'Show energy in joules' : 'Show energy in watt hours'}
         >
           {unit}
@@ -126,7 +126,7 @@ function App() {
       <main id="main" tabindex="-1" ref={main}>
         <Guard view={location.hash}>
           {View ? (
-            <View key={`${route.view}/${route.id ?? ''}`} id={route.id} given={route.given} />
+            <View key={route.hash} id={route.id} given={route.given} />
           ) : (
             <Empty title="There is no such page">
               Go to the <a href="#/fleet">fleet</a>.

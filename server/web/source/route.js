@@ -5,15 +5,15 @@ export function routeOf(hash) {
   const [path, values] = hash.replace(/^#\/?/, '').split('?');
   const [view = '', id] = path.split('/');
   const given = Object.fromEntries(new URLSearchParams(values ?? ''));
-  if (view === '') return { view: 'fleet', given };
-  if (id === undefined || id === '') return { view: view === 'robots' ? 'fleet' : view, given };
+  if (view === '') return { view: 'fleet', given, hash };
+  if (id === undefined || id === '') return { view: view === 'robots' ? 'fleet' : view, given, hash };
   let name = id;
   try {
     name = decodeURIComponent(id);
   } catch {
     // not one of the page's own addresses; shown as it stands
   }
-  return { view: view === 'missions' ? 'mission' : view, id: name, given };
+  return { view: view === 'missions' ? 'mission' : view, id: name, given, hash };
 }
 
 export const robotLink = (id) => `#/robots/${encodeURIComponent(id)}`;

@@ -2,7 +2,7 @@ import { Component } from 'preact';
 import { useEffect, useMemo, useState } from 'preact/hooks';
 import * as format from './format.js';
 
-// A number with its unit; `of` is what a function of format.js gave.
+// A number with its unit; `of` comes from a function of format.js or energy.js.
 export function Quantity({ of, sign }) {
   const n = sign ? format.signed(of.n) : of.n;
   return (

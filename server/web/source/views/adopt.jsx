@@ -55,7 +55,7 @@ function useAdoption(job, effect) {
         adopted: version ?? before.adopted,
       }));
     } catch (error) {
-      setState((before) => ({ ...before, test: error.told?.back_test ?? before.test, error, busy: '' }));
+      setState((before) => ({ ...before, test: error.body?.back_test ?? before.test, error, busy: '' }));
     }
   };
   return [state, ask];
@@ -95,7 +95,7 @@ export function Adopt({ job }) {
   const effect = groups.map((g) => chosen[g.id] ?? '');
   const robot = useGet(`/v1/robots/${idPath(job.robot_id)}`);
   const [state, ask] = useAdoption(job, effect);
-  const refused = state.error?.status === 409 && state.error.told?.back_test !== undefined;
+  const refused = state.error?.status === 409 && (state.error.body?.back_test ?? null) !== null;
   const hold = state.busy !== '' || effect.includes('');
   const confirm = (label, name, more) => (
     <ConfirmButton

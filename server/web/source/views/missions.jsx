@@ -7,10 +7,22 @@ import { useLive } from '../live.js';
 import { useModels } from '../models.js';
 import { keepInAddress } from '../route.js';
 import { SortChoice, sorted, turned } from '../table.jsx';
-import { Answer, Empty, Failure, Loading, Readout, stateNotes, useOptions, useTitleOf } from '../widgets.jsx';
+import {
+  Answer,
+  Choice,
+  Empty,
+  Failure,
+  Loading,
+  Readout,
+  stateNotes,
+  useOptions,
+  useTitleOf,
+} from '../widgets.jsx';
 import { MissionTable, missionColumns } from './mission_rows.jsx';
+import { Trends } from './trends.jsx';
 
 const pageRows = 50;
+const periods = { day: 'By day', week: 'By week' };
 const searchRows = 1000; // a search by a part of the name looks at this many at a time
 
 // "2026-11-21T06:10" in local time, as the inputs of the browser give it, to microseconds.
@@ -29,9 +41,10 @@ function filterOf(given) {
   };
 }
 
-// What chooses among the missions, without their order.
-const choosing = (given) =>
-  Object.entries(given).some(([key, value]) => value && key !== 'sort' && key !== 'down');
+const views = ['sort', 'down', 'trend']; // how missions are shown, not which
+
+// Whether the address chooses among the missions.
+const choosing = (given) => Object.entries(given).some(([key, value]) => value && !views.includes(key));
 
 const Field = ({ label, children }) => (
   <label class="field">
@@ -116,7 +129,7 @@ function Filters({ given, change }) {
         type="button"
         class="plain"
         disabled={!choosing(given)}
-        onClick={() => change({ sort: given.sort, down: given.down })}
+        onClick={() => change(Object.fromEntries(views.map((key) => [key, given[key]])))}
       >
         Clear
       </button>
@@ -267,27 +280,14 @@ function List({ given, list, total, onSort }) {
   );
 }
 
-// What the address says; changed by the view, by a link to it, or by the browser's back.
-function useGiven(asked) {
+export function Missions({ given: asked }) {
+  useTitleOf('Missions');
   const [given, setGiven] = useState(asked);
-  const address = useRef(JSON.stringify(asked));
-  useEffect(() => {
-    if (JSON.stringify(asked) === address.current) return;
-    address.current = JSON.stringify(asked);
-    setGiven(asked);
-  }, [asked]);
   const change = (next) => {
-    const kept = Object.fromEntries(Object.entries(next).filter(([, v]) => v));
-    address.current = JSON.stringify(kept);
+    const kept = Object.fromEntries(Object.entries(next).filter(([, value]) => value));
     setGiven(kept);
     keepInAddress(kept);
   };
-  return [given, change];
-}
-
-export function Missions({ given: asked }) {
-  useTitleOf('Missions');
-  const [given, change] = useGiven(asked);
   const filter = useMemo(() => filterOf(given), [given]);
   const list = useList(filter, given.name ? searchRows : pageRows);
   const totals = useGet(`/v1/mission-totals${query(filter)}`);
@@ -315,11 +315,20 @@ export function Missions({ given: asked }) {
           Local times ({Intl.DateTimeFormat().resolvedOptions().timeZone}).
           {given.sort && list.next !== null && ' Sorted among the missions that are loaded.'}
         </span>
+        <Choice
+          label="List or sums"
+          value={given.trend ?? ''}
+          onChange={(trend) => change({ ...given, trend })}
+          options={[['', 'List'], ...Object.entries(periods)]}
+        />
         <Export filter={filter} total={total ?? 0} />
       </div>
+      {given.trend in periods && <Trends kind={given.trend} filter={filter} />}
       {list.rows === null && list.error && <Failure error={list.error} retry={list.reload} />}
       {list.rows === null && !list.error && <Loading what="missions" />}
-      {list.rows !== null && <List given={given} list={list} total={total} onSort={onSort} />}
+      {list.rows !== null && !(given.trend in periods) && (
+        <List given={given} list={list} total={total} onSort={onSort} />
+      )}
     </>
   );
 }

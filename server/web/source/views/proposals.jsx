@@ -39,7 +39,7 @@ function Proposal({ of: p, robot, inForce, onChange }) {
       setResult({ busy: '', test: answer.back_test, error: null });
       if (answer.adopted) onChange();
     } catch (error) {
-      setResult({ busy: '', test: error.told?.back_test ?? result.test, error });
+      setResult({ busy: '', test: error.body?.back_test ?? result.test, error });
     }
   };
   const changes = parameterChanges(p, inForce);
