@@ -12,6 +12,7 @@
 
 #include "energy/motion_estimate.h"
 #include "planning/baseline.h"
+#include "planning/gauss.h"
 #include "planning/planner.h"
 #include "server/api/fields.h"
 #include "server/api/json_writer.h"
@@ -52,9 +53,11 @@ void write_certificate(JsonWriter& json, const planning::Certificate& c) {
 
 void write_columns(JsonWriter& json, const planning::Profile& p) {
   json.key("profile").begin_object();
-  json.column("time_s", p.time_s).column("distance_m", p.distance_m);
+  // Accelerations follow from these: their spans may last some tens of microseconds.
+  constexpr int nano = 9;
+  json.column("time_s", p.time_s, nano).column("distance_m", p.distance_m);
   json.column("x_m", p.x_m, 4).column("y_m", p.y_m, 4).column("heading_rad", p.heading_rad, 5);
-  json.column("speed_m_s", p.speed_m_s).column("yaw_rate_rad_s", p.yaw_rate_rad_s);
+  json.column("speed_m_s", p.speed_m_s, nano).column("yaw_rate_rad_s", p.yaw_rate_rad_s, nano);
   json.column("acceleration_m_s2", p.acceleration_m_s2)
       .column("yaw_acceleration_rad_s2", p.yaw_acceleration_rad_s2);
   json.column("payload_kg", p.payload_kg, 3)
@@ -96,8 +99,6 @@ Result<void> write_baselines(JsonWriter& json, const planning::Planner& planner,
 planning::Profile series_of(const dynamics::DriveModel& drive, const std::vector<energy::MotionPoint>& points,
                             double payload_kg, const std::optional<energy::StartPose>& start,
                             planning::Peaks& peaks) {
-  constexpr std::array<std::pair<double, double>, 3> gauss{
-      {{0.1127016653792583, 5.0 / 18}, {0.5, 8.0 / 18}, {0.8872983346207417, 5.0 / 18}}};
   constexpr int cuts = 4;  // of a span, so that power's bow shows
   planning::Profile p;
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -140,7 +141,7 @@ planning::Profile series_of(const dynamics::DriveModel& drive, const std::vector
       p.power_w.push_back(power(t));
       p.energy_j.push_back(energy);
       if (cut == cuts) break;
-      for (const auto& [node, weight] : gauss) energy += weight * h * power(t + node * h);
+      for (const auto& [node, weight] : planning::gauss3) energy += weight * h * power(t + node * h);
       const double way = (v + 0.5 * slope * h) * h, turned = (yaw + 0.5 * bend * h) * h;
       const double heading = pose.heading_rad + 0.5 * turned;
       pose.x_m += way * std::cos(heading), pose.y_m += way * std::sin(heading);
@@ -164,6 +165,7 @@ Result<Question> read_question(const nlohmann::json& body, const server::ModelIn
   question.drive = read_drive(fields, model.robot);
   question.columns = fields.boolean("columns", true);
   question.baseline_columns = fields.boolean("baseline_columns", false);
+  question.drive.problem.rows = question.columns;
   question.pareto_points = fields.integer("pareto_points", 0, max_pareto_points, 0);
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
   return question;
@@ -279,8 +281,9 @@ Result<std::string> estimate_answer(const nlohmann::json& body, const server::Mo
     accounts = *priced;
     series = series_of(model.drive, points, payload, start, peaks);
   } else {
-    const DriveRequest request = read_drive(fields, model.robot);
+    DriveRequest request = read_drive(fields, model.robot);
     if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+    request.problem.rows = columns;
     Result<planning::Plan> plan = planning::plan(model.robot, request.path, request.problem);
     if (!plan) return tl::unexpected(std::move(plan.error()));
     accounts.battery_j = accounts.modelled_j = plan->summary.energy_j;

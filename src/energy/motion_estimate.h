@@ -34,7 +34,7 @@ struct StartPose {
 
 // Energy accounts of a motion through the drive model, by CVODE over each span (relative tolerance 1e-8):
 // what a robot that drove it would be metered to spend. Nothing is measured: battery_j equals modelled_j and
-// nothing is unexplained. Times must increase and there must be at least two points; a jump in speed is
+// nothing is unexplained. Times must increase by 1e-9 s at least and there must be at least two points; a jump in speed is
 // refused, since it costs infinite power.
 Result<Accounts> estimate_motion(const dynamics::DriveModel& model, std::span<const MotionPoint> points,
                                  double payload_kg, const std::optional<StartPose>& start = std::nullopt);

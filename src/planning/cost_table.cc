@@ -7,6 +7,7 @@
 
 #include "dynamics/drive_model.h"
 #include "planning/planner.h"
+#include "planning/run_planner.h"
 
 namespace joulecast::planning {
 namespace {
@@ -168,7 +169,8 @@ LegCost CostTable::Grid::at(double length, double payload_kg) const {
   return sum;
 }
 
-Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOptions& options) {
+Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOptions& options,
+                                  std::stop_token stop) {
   const auto adopted = dynamics::active_effects(robot);
   if (!adopted) return tl::unexpected(adopted.error());
   CostTable table;
@@ -185,7 +187,7 @@ Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOpti
   problem.limits = limits_of(placeless);
   problem.value_of_time_w = options.value_of_time_w;
   const auto solver = [&](int turn) {
-    return [&planner, &problem, &table, turn](double length, double payload_kg) -> Result<LegCost> {
+    return [&planner, &problem, &table, &stop, turn](double length, double payload_kg) -> Result<LegCost> {
       Path path;
       Run run;
       run.turn = turn;
@@ -193,7 +195,7 @@ Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOpti
       run.knots = {{0, 0, {}}, {length, 0, turn == 0 ? Pose{length, 0, 0} : Pose{0, 0, length}}};
       path.runs = {std::move(run)};
       path.final_payload_kg = payload_kg;
-      const auto cost = planner->cost(path, problem);
+      const auto cost = planner->cost(path, problem, stop);
       if (!cost) return tl::unexpected(cost.error());
       table.numerical_ = table.numerical_ || !cost->closed_form;
       return LegCost{cost->energy_j, cost->duration_s};
@@ -206,6 +208,7 @@ Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOpti
   Grid straight, turn;
   straight.build(solver(0), shortest_leg_m, longest_leg_m, payload_limit, table);
   turn.build(solver(1), smallest_turn_rad, widest_turn_rad, payload_limit, table);
+  if (stop.stop_requested()) return stopped();
   table.straight_ = std::move(straight);
   table.turn_ = std::move(turn);
   return table;

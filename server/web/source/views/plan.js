@@ -110,7 +110,7 @@ function haste({ duration_s, time_multiplier_w: price_w }, shortest_s) {
   return duration_s - shortest_s < 1 ? `less time costs ${format.text(format.energy(price_w))} a second or more` : `a second less costs ${format.text(format.energy(price_w))} or more`;
 }
 
-const methods = { closed_form: 'formulas', interior_point: 'an interior-point method', mixed: 'formulas and an interior-point method' };
+const methods = { closed_form: 'formulas', quadrature: 'quadrature', interior_point: 'an interior-point method', mixed: 'several methods' };
 
 // What is saved against a usual profile; one that breaks the limits is no choice, and may cost less.
 function against(baseline) {
