@@ -344,10 +344,9 @@ Result<const Recording*> slowest_of(std::vector<Recording>& recordings) {
   for (const Recording& recording : recordings)
     seen += fmt::format("{}{} ({:.1f} h, {:.2f} Ah)", seen.empty() ? "" : ", ", recording.name,
                         recording.duration_s() / 3600, recording.charge_ah());
-  return invalid("recordings",
-                 fmt::format("need a full discharge without pause over more than {} h for the "
-                             "open-circuit voltage; none of these is one: {}",
-                             slow_hours, seen));
+  return invalid("recordings", fmt::format("need a full discharge without pause over more than {} h for the "
+                                           "open-circuit voltage; none of these is one: {}",
+                                           slow_hours, seen));
 }
 
 // What the fit is to follow: every other recording that draws a share of the charge.

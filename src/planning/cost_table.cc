@@ -187,13 +187,29 @@ Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOpti
   problem.limits = limits_of(placeless);
   problem.value_of_time_w = options.value_of_time_w;
   const auto solver = [&](int turn) {
-    return [&planner, &problem, &table, &stop, turn](double length, double payload_kg) -> Result<LegCost> {
-      Path path;
+    const auto along = [turn](double length, double payload_kg) {
       Run run;
       run.turn = turn;
       run.payload_kg = payload_kg;
       run.knots = {{0, 0, {}}, {length, 0, turn == 0 ? Pose{length, 0, 0} : Pose{0, 0, length}}};
-      path.runs = {std::move(run)};
+      return run;
+    };
+    // Loads depend on the payload alone: what closed forms need of them is kept for other lengths.
+    auto last = std::make_shared<std::pair<Run, std::optional<RunPlanner>>>();
+    return [&planner, &placeless, &problem, &table, &stop, along, last](
+               double length, double payload_kg) -> Result<LegCost> {
+      auto& [unit, closed] = *last;
+      if (!closed || unit.payload_kg != payload_kg) {
+        unit = along(1, payload_kg);
+        auto made = RunPlanner::make(placeless, planner->loads(), unit, problem, 0, 0);
+        closed = made ? std::optional(std::move(*made)) : std::nullopt;
+      }
+      if (closed && !stop.stop_requested()) {
+        if (const auto answer = closed->closed_form(problem.value_of_time_w, length))
+          return LegCost{answer->energy_j, answer->duration_s};
+      }
+      Path path;
+      path.runs = {along(length, payload_kg)};
       path.final_payload_kg = payload_kg;
       const auto cost = planner->cost(path, problem, stop);
       if (!cost) return tl::unexpected(cost.error());

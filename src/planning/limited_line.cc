@@ -136,15 +136,20 @@ const LineMotion::Piece& LineMotion::at(double& time_s) const {
 
 namespace {
 
-// How many times more even cells than `count` an extremal needs so that the speed, taken as linear between
-// them, covers its distance but for `distance_told`.
-double finer(const LineProfile& profile, double count) {
-  constexpr double distance_told = 8e-5;
-  const double step = profile.duration_s() / count;
-  double sum = 0.5 * (profile.speed(0) + profile.speed(profile.duration_s()));
-  for (double i = 1; i < count; ++i) sum += profile.speed(i * step);
-  const double error = std::fabs(sum * step / profile.distance() - 1);
-  return std::max(1.0, std::sqrt(error / distance_told));
+// As many even cells as an extremal needs so that the speed, taken as linear between them, covers its
+// distance but for `distance_told`; at least `count`.
+double enough_cells(const LineProfile& profile, double count) {
+  constexpr double distance_told = 8e-5, most = 20'000;
+  const double ends = 0.5 * (profile.speed(0) + profile.speed(profile.duration_s()));
+  while (count < most) {
+    const double step = profile.duration_s() / count;
+    double sum = ends;
+    for (double i = 1; i < count; ++i) sum += profile.speed(i * step);
+    const double error = std::fabs(sum * step / profile.distance() - 1);
+    if (error <= distance_told) break;
+    count = std::ceil(count * std::clamp(1.02 * std::sqrt(error / distance_told), 1.02, 4.0));
+  }
+  return count;
 }
 
 }  // namespace
@@ -161,8 +166,7 @@ std::vector<double> LineMotion::times(std::size_t cells) const {
     // changes.
     const double wanted = piece.free ? share : piece.acceleration != 0 ? 0.25 * share : 0;
     double count = std::max(1.0, std::ceil(static_cast<double>(cells) * wanted));
-    if (piece.free) count *= finer(*piece.free, count);
-    count = std::ceil(count);
+    if (piece.free) count = enough_cells(*piece.free, count);
     for (double i = 1; i <= count; ++i) times.push_back(piece.start_s + piece.duration_s * i / count);
   }
   times.back() = duration_;

@@ -542,8 +542,8 @@ Result<double> Planner::needed_speed(const Path& path, const Problem& problem, s
   return 1 / pace;
 }
 
-Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& problem,
-                                              std::size_t count, std::stop_token stop) const {
+Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& problem, std::size_t count,
+                                              std::stop_token stop) const {
   if (count < 2) return invalid("count", "must be at least 2");
   auto request = Request::make(robot_, loads_, path, problem, stop);
   if (!request) return tl::unexpected(std::move(request.error()));

@@ -51,8 +51,8 @@ struct Certificate {
   // when `convex`; otherwise near this answer.
   double gap_j = 0;
   // How far the answer may lie above the optimum of a continuous acceleration. By quadrature, the integral of
-  // what each cell's constant acceleration costs more than the best at each speed; of a grid, what one of half
-  // as many cells costs more, three times Richardson's estimate.
+  // what each cell's constant acceleration costs more than the best at each speed; of a grid, what one of
+  // half as many cells costs more, three times Richardson's estimate.
   double discretisation_j = 0;
   double residual = 0;  // largest stationarity residual over the cost, 0 for the closed form to rounding
   bool convex = true;

@@ -406,10 +406,11 @@ Result<void> RunPlanner::build_grid() {
   return check_feasible();
 }
 
-std::optional<RunAnswer> RunPlanner::closed_form(double price_w) const {
+std::optional<RunAnswer> RunPlanner::closed_form(double price_w, double length) const {
   if (!line_) return {};
   const Electric& e = loads_->electric();
   LineTask task = *line_;
+  task.distance = length;
   task.value_of_time_w = price_w;
   const double ceiling = std::sqrt(ceiling_at(0));
   const auto line = line_within(task, ceiling, acceleration_limit());
@@ -444,25 +445,20 @@ bool RunPlanner::tighten(const std::vector<double>& z) {
   bool any = false;
   for (std::size_t k = 0; k < n; ++k) {
     const double q = (z[k + 1] - z[k]) / (2 * grid_->step[k]);
-    double excess = 0, holding = 0;
-    for (double f : {0.001, 0.999}) {
+    const auto use = [&](double f, double acceleration) {
       const double way = nodes_[k] + f * grid_->step[k], v = std::sqrt(z[k] + f * (z[k + 1] - z[k]));
       const double slope = run_->turn == 0 ? run_->curvature_slope(way) : 0;
-      const Knot knot = run_->at(way);
-      const auto use = [&](double acceleration) {
-        const auto at = loads_->instant(*run_, knot, slope, v, acceleration);
-        if (creeps(at.wheel_speed_rad_s)) return 0.0;
-        const auto flow = loads_->model().flow(at);
-        double most = 0;
-        for (std::size_t s : {0u, 1u}) {
-          most = std::max({most, std::fabs(flow.torque_nm[s]) / grid_->torque_limit_nm,
-                           std::fabs(flow.voltage_v[s]) / grid_->voltage_limit_v});
-        }
-        return most;
-      };
-      excess = std::max(excess, use(q) - 1);
-      holding = std::max(holding, use(0));
-    }
+      const auto at = loads_->instant(*run_, run_->at(way), slope, v, acceleration);
+      if (creeps(at.wheel_speed_rad_s)) return 0.0;
+      const auto flow = loads_->model().flow(at);
+      double most = 0;
+      for (std::size_t s : {0u, 1u}) {
+        most = std::max({most, std::fabs(flow.torque_nm[s]) / grid_->torque_limit_nm,
+                         std::fabs(flow.voltage_v[s]) / grid_->voltage_limit_v});
+      }
+      return most;
+    };
+    const double excess = std::max(use(0.001, q), use(0.999, q)) - 1, holding = use(0.5, 0);
     if (excess > UniformMotion::motor_tolerance) {
       if (grid_->motor_share.empty()) grid_->motor_share.assign(n, 1);
       double& share = grid_->motor_share[k];
@@ -498,8 +494,7 @@ Result<RunAnswer> RunPlanner::solve(double price_w, const std::stop_token& stop)
 }
 
 Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_token& stop) {
-  if (const double standing = standing_power_w(*grid_) + price_w; !(standing > 0))
-    return endless(standing);
+  if (const double standing = standing_power_w(*grid_) + price_w; !(standing > 0)) return endless(standing);
   if (!solver_) solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
   SpeedSolution s = solver_->solve(price_w, refined_ ? fine_tolerance : coarse_tolerance, stop);
   int iterations = s.iterations;
@@ -524,10 +519,33 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     iterations += s.iterations;
   }
   if (stop.stop_requested()) return stopped();
-  if (!s.converged) return fail(Fault::internal, "path", "the speed profile of a run did not converge");
+  if (!s.converged) {
+    s = best_capped(price_w);
+    if (s.z.empty()) return fail(Fault::internal, "path", "the speed profile of a run did not converge");
+    return s;
+  }
   discretisation_j_ += std::max(0.0, s.cost_j - before_tightening);
   s.iterations = iterations;
   return s;
+}
+
+// Where the solver finds nothing: the cheapest of the fastest profiles under lower and lower ceilings.
+// Nothing bounds the optimum from below then but that energy is not negative.
+SpeedSolution RunPlanner::best_capped(double price_w) {
+  SpeedSolution best;
+  best.cost_j = std::numeric_limits<double>::infinity();
+  SpeedGrid capped = *grid_;
+  capped.motor_share.clear();
+  for (double part = 1; part > 1e-3; part *= 0.95) {
+    for (std::size_t k = 1; k + 1 < nodes_.size(); ++k) capped.ceiling[k] = part * part * grid_->ceiling[k];
+    const SpeedEnvelope envelope = speed_envelope(capped);
+    if (!envelope.feasible) break;
+    const double cost = SpeedSolver(capped, envelope).cost_j(envelope.fastest, price_w);
+    if (!(cost < best.cost_j)) continue;
+    best.z = envelope.fastest, best.cost_j = best.gap_j = cost, best.duration_s = envelope.shortest_s;
+  }
+  best.convex = false;
+  return best;
 }
 
 RunAnswer RunPlanner::answer_of(const SpeedSolution& s, double price_w) const {
@@ -561,7 +579,8 @@ Result<RunAnswer> RunPlanner::fastest() {
   if (motion_) {
     auto motion = motion_->fastest();
     if (!motion)
-      return fail(Fault::infeasible, "deadline_s", "is the shortest time, which needs a limit of acceleration");
+      return fail(Fault::infeasible, "deadline_s",
+                  "is the shortest time, which needs a limit of acceleration");
     return answer_of(std::move(*motion));
   }
   if (!grid_) {

@@ -20,7 +20,7 @@ struct RunAnswer {
   Method method = Method::closed_form;
   std::unique_ptr<LineMotion> line;  // closed form, over the run's coordinate
   std::vector<double> way, speed;    // else nodes of it, the acceleration being constant in between
-  double energy_j = 0;             // on the solver's own quadrature, idle power included
+  double energy_j = 0;               // on the solver's own quadrature, idle power included
   double duration_s = 0;
   double gap_j = 0, discretisation_j = 0, residual = 0;
   bool convex = true;
@@ -45,9 +45,9 @@ class RunPlanner {
   // At an infinite price as fast as the limits allow, in shortest_s(); infeasible where none bounds the
   // acceleration.
   Result<RunAnswer> solve(double price_w, const std::stop_token& stop = {});
-  // The same where the closed form answers.
-  std::optional<RunAnswer> closed_form(double price_w) const;
-
+  // The same where the closed form answers, over the run's length or another one.
+  std::optional<RunAnswer> closed_form(double price_w) const { return closed_form(price_w, run_->length()); }
+  std::optional<RunAnswer> closed_form(double price_w, double length) const;
 
   const Run& run() const { return *run_; }
   bool uniform() const { return uniform_; }  // loads are the same all along
@@ -66,6 +66,7 @@ class RunPlanner {
   RunAnswer answer_of(SteppedMotion motion) const;
   Result<RunAnswer> fastest();
   Result<SpeedSolution> solve_grid(double price_w, const std::stop_token& stop);
+  SpeedSolution best_capped(double price_w);
   RunAnswer answer_of(const SpeedSolution& solution, double price_w) const;
   bool motors_break(double speed, double acceleration) const;
   Result<void> build_grid();

@@ -22,13 +22,13 @@ namespace joulecast::planning {
 // whose matrix is tridiagonal; then dy_j = mu/s_j - y_j + (y_j/s_j) grad g_j' dz. Slacks of linear bounds and
 // multipliers keep a share of themselves in each step (19.9); a line search makes the barrier function fall
 // (3.4); an indefinite matrix is corrected along its diagonal (Waechter & Biegler, Math. Program. 106 (2006),
-// algorithm IC). mu falls by a factor (their (7)) when its problem is about solved. As sum y_j s_j bounds what
-// F can still lose where the problem is convex, it is told as the gap.
+// algorithm IC). mu falls by a factor (their (7)) when its problem is about solved. As sum y_j s_j bounds
+// what F can still lose where the problem is convex, it is told as the gap.
 //
-// Where braking begins to return energy, F has terms half_jump |E|, E the energy of a motor in a cell. They are
-// smoothed to sqrt(E^2 + width^2), the width falling with mu, and the slope E/sqrt(...) is a dual variable of
-// its own in (-1, 1), as y is; that keeps Newton's steps long at the kink (Andersen, Christiansen, Conn &
-// Overton, SIAM J. Sci. Comput. 22 (2000), sec. 3).
+// Where braking begins to return energy, F has terms half_jump |E|, E the energy of a motor in a cell. They
+// are smoothed to sqrt(E^2 + width^2), the width falling with mu, and the slope E/sqrt(...) is a dual
+// variable of its own in (-1, 1), as y is; that keeps Newton's steps long at the kink (Andersen,
+// Christiansen, Conn & Overton, SIAM J. Sci. Comput. 22 (2000), sec. 3).
 namespace {
 
 constexpr double to_boundary = 0.995;         // of a slack may be used up: tau of N&W (19.9)
@@ -287,8 +287,8 @@ void SpeedSolver::assemble(double mu) {
     const double v00 = r0 > 0 ? -0.125 / (z0 * r0) : 0, v11 = r1 > 0 ? -0.125 / (z1 * r1) : 0, p = 0.5 / h;
     cost_here_ += l.f * h;
     double lv = l.dual_v * h, lq = l.dual_q * h;  // of the Lagrangian
-    double hv = l.fv;                         // what multiplies the second derivative of v
-    double bv = l.fv, bq = l.fq;              // of the barrier problem
+    double hv = l.fv;                             // what multiplies the second derivative of v
+    double bv = l.fv, bq = l.fq;                  // of the barrier problem
     each_bound(k, v, q, [&](unsigned j, double g, double gv, double gq, double gvv, double gvq, double gqq) {
       const double slack = -g, y = c.multiplier[j];
       c.slack[j] = slack;
@@ -558,7 +558,9 @@ std::array<bool, bound_count> SpeedSolver::binding(double unit_j) const {
     for (unsigned j = 0; j < most_bounds; ++j) {
       if (bounds_[k] >> j & 1u) {
         binds(cells_[k].multiplier[j], cells_[k].slack[j],
-              j < 2 ? Bound::acceleration : j < 6 ? Bound::current : Bound::voltage);
+              j < 2   ? Bound::acceleration
+              : j < 6 ? Bound::current
+                      : Bound::voltage);
       }
     }
     if (k > 0) binds(ceiling_multiplier_[k], 1 - z_[k] / grid_.ceiling[k], Bound::speed);
@@ -584,9 +586,7 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::st
   z_.front() = grid_.start, z_.back() = grid_.end;
   if (!inside(z_)) return solution;
   BarrierSchedule barrier(grid_, static_cast<double>(bound_total_), std::fabs(merit(z_, 0)), tolerance, warm);
-  const auto smooth = [&] {
-    smoothing_ = barrier.kink_width(), gear_smoothing_ = barrier.gear_width();
-  };
+  const auto smooth = [&] { smoothing_ = barrier.kink_width(), gear_smoothing_ = barrier.gear_width(); };
   smooth();
   start_duals(barrier.mu());
   double damping = 0;

@@ -17,7 +17,8 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double rounding = 1e-9;  // relative: of distances and speeds that the request gives
 constexpr double spare = 1e-7;     // of the distance: less is spread over the nodes
 constexpr int speed_samples = 64;  // where f is looked at for its minima
-constexpr int most_cuts = 8;      // in halves, of a cell in which the acceleration or a motor's limit changes fast
+constexpr int most_cuts =
+    8;  // in halves, of a cell in which the acceleration or a motor's limit changes fast
 
 // x with x + gear |x| = t.
 double through_gear(double t, double gear) {
@@ -113,8 +114,7 @@ double UniformMotion::best(const Local& l, double direction, double rate_w, doub
     // Where a motor begins to brake, the slope jumps; the optimum likes to be there, which is coasting.
     for (const std::size_t s : {0u, 1u}) {
       const WheelLoad& w = task_.loads[s];
-      const double kink =
-          (through_gear(-l.inside[s], w.gear) - l.through[s]) / (direction * w.inertia);
+      const double kink = (through_gear(-l.inside[s], w.gear) - l.through[s]) / (direction * w.inertia);
       if (!(kink > low && kink < high)) continue;
       const double below = excess(kink * (1 - 1e-10)), above = excess(kink * (1 + 1e-10));
       if (below <= 0 && above >= 0) return kink;
@@ -131,8 +131,10 @@ double UniformMotion::best(const Local& l, double direction, double rate_w, doub
     (y <= 0 ? low : high) = a;
     double next = std::sqrt(std::max(0.0, a * a - 2 * y / here.bend));
     if (std::fabs(next - a) <= 1e-12 * a) return a;
-    if (next >= most && !at_most) next = most;
-    else if (!(next > low && next < high) || k % 4 == 3) next = std::isfinite(high) ? 0.5 * (low + high) : 2 * low + 1e-3;
+    if (next >= most && !at_most)
+      next = most;
+    else if (!(next > low && next < high) || k % 4 == 3)
+      next = std::isfinite(high) ? 0.5 * (low + high) : 2 * low + 1e-3;
     a = next;
   }
   return a;
@@ -179,11 +181,12 @@ void UniformMotion::piece(const End& from, const End& to, double change, const P
   const auto [least, greatest] = std::minmax({from.acceleration, at_middle.acceleration, to.acceleration});
   const bool jumps = greatest > change * least && halvings < most_cuts;
   bool beyond = false;
-  if (!price.rough && at_middle.bounded && at_middle.bound != Bound::acceleration) {
+  if (!price.rough && has_motor_limits()) {
     for (const double end : {from.v, to.v}) {
       const double allowed = most(local(end), direction, motor_tolerance).acceleration;
-      beyond = beyond || at_middle.acceleration > allowed;
-      if (halvings >= most_cuts) at_middle.acceleration = std::clamp(allowed, 1e-6 * allowed, at_middle.acceleration);
+      if (at_middle.acceleration <= allowed) continue;
+      beyond = true;
+      if (halvings >= most_cuts) at_middle.acceleration = std::max(allowed, 1e-3 * at_middle.acceleration);
     }
   }
   if (jumps || (beyond && halvings < most_cuts)) {
@@ -198,7 +201,8 @@ void UniformMotion::piece(const End& from, const End& to, double change, const P
 template <class Visit>
 void UniformMotion::leg(double from, double to, bool pivot_at_end, const Price& price, Visit&& visit) const {
   if (from == to) return;
-  const double pivot = pivot_at_end ? to : from, end = pivot_at_end ? from : to, direction = to > from ? 1 : -1;
+  const double pivot = pivot_at_end ? to : from, end = pivot_at_end ? from : to,
+               direction = to > from ? 1 : -1;
   const double x = stretch(pivot, end, price), whole = std::sinh(x), count = static_cast<double>(task_.cells);
   End last{from, wanted(from, direction, price).acceleration};
   for (std::size_t j = 1; j <= task_.cells; ++j) {
@@ -242,8 +246,10 @@ UniformMotion::Shape UniformMotion::turning(Shape shape, double nearest, double 
   double near = nearest, at_near = near > 0 && at_far > 0 ? missing(near) : 0;
   while (near == 0 && at_far > 0) {
     const double v = 0.5 * far, at = missing(v);
-    if (at < 0) near = v, at_near = at;
-    else far = v, at_far = at;
+    if (at < 0)
+      near = v, at_near = at;
+    else
+      far = v, at_far = at;
   }
   double v = at_far > 0 ? zero_between(missing, near, at_near, far, at_far, 1e-11) : far;
   shape.price.rough = false;
@@ -327,9 +333,8 @@ SteppedMotion UniformMotion::written(const Shape& shape) const {
   SteppedMotion motion;
   const double idle_w = task_.electric.idle_w;
   double covered = distance(shape), way = 0;
-  const double cruise = shape.cruises && task_.distance > covered * (1 + spare)
-                            ? task_.distance - covered
-                            : 0;
+  const double cruise =
+      shape.cruises && task_.distance > covered * (1 + spare) ? task_.distance - covered : 0;
   covered += cruise;
   // What is left of the distance by rounding goes into the spacing of the nodes.
   const double scale = task_.distance / covered;
@@ -395,9 +400,8 @@ std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
   }
   if (const auto shape = motion.fastest_shape()) {
     double covered = 0, took = 0;
-    motion.pieces(*shape, [&](const Piece& piece) {
-      covered += piece.distance(), took += piece.duration_s();
-    });
+    motion.pieces(*shape,
+                  [&](const Piece& piece) { covered += piece.distance(), took += piece.duration_s(); });
     motion.shortest_s_ = took + std::max(0.0, task.distance - covered) / shape->middle;
   } else {
     motion.shortest_s_ = infinite;

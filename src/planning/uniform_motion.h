@@ -33,7 +33,8 @@ struct SteppedMotion {
   std::array<bool, bound_count> binding{};
 };
 
-// Why no best end time exists: power at standstill and price of time, together `standing_w`, are not positive.
+// Why no best end time exists: power at standstill and price of time, together `standing_w`, are not
+// positive.
 tl::unexpected<Error> endless(double standing_w);
 
 // Minimum of energy + price * duration where power depends on speed and acceleration alone. With lambda, the
@@ -44,11 +45,11 @@ tl::unexpected<Error> endless(double standing_w);
 // the speed,
 //   integral of L(v, a)/|a| dv,
 // in which each speed has its own acceleration: that of least L/|a| within the limits of acceleration,
-// current and voltage there. L is convex in a, hence it is where a dL/da = L, or at the limit. The speed turns
-// where L(v, 0) = 0: lambda = f(v_turn) with f(v) = (P(v, 0) + idle + price)/v. f falls from infinity to its
-// least value at the speed of least cost a metre, or to the speed limit, and a motion from rest has its peak
-// at the speed below that at which the distance comes out; long ways cruise there. End speeds above it are
-// left likewise.
+// current and voltage there. L is convex in a, hence it is where a dL/da = L, or at the limit. The speed
+// turns where L(v, 0) = 0: lambda = f(v_turn) with f(v) = (P(v, 0) + idle + price)/v. f falls from infinity
+// to its least value at the speed of least cost a metre, or to the speed limit, and a motion from rest has
+// its peak at the speed below that at which the distance comes out; long ways cruise there. End speeds above
+// it are left likewise.
 //
 // Between nodes of the speed the acceleration is constant, so the answer is a motion that can be driven as it
 // is told. A cell's acceleration obeys current and voltage limits at its middle, and passes them at its ends
@@ -86,8 +87,8 @@ class UniformMotion {
   };
   // The trade between time and distance. Fastest: the greatest accelerations whatever they cost.
   struct Price {
-    double fixed_w = 0;   // idle power and price of time
-    double lambda = 0;    // W s/x
+    double fixed_w = 0;  // idle power and price of time
+    double lambda = 0;   // W s/x
     bool fastest = false;
     bool rough = false;  // motors' limits at the middle of cells only
   };

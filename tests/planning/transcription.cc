@@ -10,8 +10,12 @@ namespace {
 
 class Motion {
  public:
-  Motion(const robot::RobotModel& robot, const dynamics::DriveModel& model, const Run& run, const Limits& limits)
-      : model_(model), run_(run), limits_(limits), half_track_m_(robot.kinematics.half_track_m),
+  Motion(const robot::RobotModel& robot, const dynamics::DriveModel& model, const Run& run,
+         const Limits& limits)
+      : model_(model),
+        run_(run),
+        limits_(limits),
+        half_track_m_(robot.kinematics.half_track_m),
         radius_m_(robot.kinematics.wheel_radius_m) {
     const double turn = run.turn == 0 ? std::fabs(run.knots[0].curvature_1_m) : 1;
     top_ = run.turn == 0 ? limits.speed_m_s : 1e3;
@@ -25,7 +29,8 @@ class Motion {
   dynamics::PowerFlow<double> flow(double v, double a) const {
     const double bend = run_.turn == 0 ? run_.knots[0].curvature_1_m : run_.turn, u = run_.turn == 0 ? 1 : 0;
     dynamics::Instant at;
-    at.wheel_speed_rad_s = {(u + half_track_m_ * bend) * v / radius_m_, (u - half_track_m_ * bend) * v / radius_m_};
+    at.wheel_speed_rad_s = {(u + half_track_m_ * bend) * v / radius_m_,
+                            (u - half_track_m_ * bend) * v / radius_m_};
     at.wheel_acceleration_rad_s2 = {(u + half_track_m_ * bend) * a / radius_m_,
                                     (u - half_track_m_ * bend) * a / radius_m_};
     at.payload_kg = run_.payload_kg;
@@ -45,13 +50,15 @@ class Motion {
     return sum;
   }
 
-  // Largest of the motors' and the acceleration's shares of their limits.
-  double motor_use(double v, double a) const {
+  // Shares that currents and voltages have of their limits.
+  std::array<double, 4> motor_uses(double v, double a) const {
     const auto f = flow(v, a);
-    double use = 0;
-    for (std::size_t s : {0u, 1u})
-      use = std::max({use, std::fabs(f.current_a[s]) / limits_.current_a, std::fabs(f.voltage_v[s]) / limits_.voltage_v});
-    return use;
+    return {std::fabs(f.current_a[0]) / limits_.current_a, std::fabs(f.current_a[1]) / limits_.current_a,
+            std::fabs(f.voltage_v[0]) / limits_.voltage_v, std::fabs(f.voltage_v[1]) / limits_.voltage_v};
+  }
+  double motor_use(double v, double a) const {
+    const auto uses = motor_uses(v, a);
+    return *std::max_element(uses.begin(), uses.end());
   }
 
  private:
@@ -78,7 +85,7 @@ class Grid {
   double way(std::size_t k) const { return way_[k]; }
 
   struct Price {
-    double energy_j, duration_s, excess;
+    double energy_j, duration_s, excess, squares;  // of the excesses
   };
   Price price(std::size_t k, double v0, double v1, double width_w) const {
     const double t = 2 * (way_[k + 1] - way_[k]) / (v0 + v1), a = (v1 - v0) / t, mean = 0.5 * (v0 + v1);
@@ -86,36 +93,39 @@ class Grid {
     double energy = 0;
     for (const auto& [place, weight] : {std::pair{-off, 5.0}, {0.0, 8.0}, {off, 5.0}})
       energy += weight / 18 * motion_.power_w(mean + place * (v1 - v0), a, width_w);
-    const double excess = std::max({motion_.motor_use(mean, a), std::fabs(a) / motion_.most(),
-                                    std::max(v0, v1) / motion_.top()}) - 1;
-    return {energy * t, t, std::max(0.0, excess)};
+    Price p{energy * t, t, 0, 0};
+    const auto uses = motion_.motor_uses(mean, a);
+    for (const double use :
+         {uses[0], uses[1], uses[2], uses[3], std::fabs(a) / motion_.most(), v1 / motion_.top()}) {
+      const double over = std::max(0.0, use - 1);
+      p.excess = std::max(p.excess, over), p.squares += over * over;
+    }
+    return p;
   }
-  double cost(std::size_t k, double v0, double v1, const Sharpness& s) const {
-    const Price p = price(k, v0, v1, s.width_w);
-    return p.energy_j + (price_ + s.penalty_w * p.excess * p.excess) * p.duration_s;
+  double cost(std::size_t k, double z0, double z1, const Sharpness& s) const {
+    const Price p = price(k, std::sqrt(std::max(0.0, z0)), std::sqrt(std::max(0.0, z1)), s.width_w);
+    return p.energy_j + (price_ + s.penalty_w * p.squares) * p.duration_s;
   }
-  double cost(const std::vector<double>& v, const Sharpness& s) const {
+  double cost(const std::vector<double>& z, const Sharpness& s) const {
     double sum = 0;
-    for (std::size_t k = 0; k < cells(); ++k) sum += cost(k, v[k], v[k + 1], s);
+    for (std::size_t k = 0; k < cells(); ++k) sum += cost(k, z[k], z[k + 1], s);
     return sum;
   }
 
-  // One damped Newton step; how much it gained.
-  double improve(std::vector<double>& v, const Sharpness& s, double& damping) const {
+  // One damped Newton step in the squared speeds, in which the problem is convex; how much it gained.
+  double improve(std::vector<double>& z, const Sharpness& s, double& damping) const {
     const std::size_t n = cells();
-    std::vector<double> g(n + 1, 0), d(n + 1, 0), off(n + 1, 0), step(n + 1, 0), pivot(n + 1), trial;
+    std::vector<double> g(n + 1, 0), d(n + 1, 0), off(n + 1, 0), step(n + 1, 0), pivot(n + 1, 0), trial(z);
     for (std::size_t k = 0; k < n; ++k) {
-      const double h0 = 1e-4 * (v[k] + 1e-3), h1 = 1e-4 * (v[k + 1] + 1e-3);
-      const auto f = [&](double i, double j) {
-        return cost(k, std::max(0.0, v[k] + i * h0), std::max(0.0, v[k + 1] + j * h1), s);
-      };
+      const double h0 = 1e-4 * z[k] + 1e-9, h1 = 1e-4 * z[k + 1] + 1e-9;
+      const auto f = [&](double i, double j) { return cost(k, z[k] + i * h0, z[k + 1] + j * h1, s); };
       const double here = f(0, 0), l = f(-1, 0), r = f(1, 0), b = f(0, -1), t = f(0, 1);
       if (k > 0) g[k] += (r - l) / (2 * h0), d[k] += (r - 2 * here + l) / (h0 * h0);
       if (k + 1 < n) g[k + 1] += (t - b) / (2 * h1), d[k + 1] += (t - 2 * here + b) / (h1 * h1);
       if (k > 0 && k + 1 < n) off[k] = (f(1, 1) - f(1, -1) - f(-1, 1) + f(-1, -1)) / (4 * h0 * h1);
     }
-    const double before = cost(v, s);
-    for (; damping < 1e12; damping = 10 * damping + 1e-9) {
+    const double before = cost(z, s);
+    for (; damping < 1e12; damping = 10 * damping + 1e-7) {
       bool definite = true;
       double l = 0;
       for (std::size_t k = 1; k < n; ++k) {
@@ -128,11 +138,11 @@ class Grid {
       if (!definite) continue;
       step[n - 1] /= pivot[n - 1];
       for (std::size_t k = n - 1; k-- > 1;) step[k] = (step[k] - off[k] * step[k + 1]) / pivot[k];
-      trial = v;
-      for (std::size_t k = 1; k < n; ++k) trial[k] = std::clamp(v[k] + step[k], 0.3 * v[k], 3 * v[k]);
+      trial = z;
+      for (std::size_t k = 1; k < n; ++k) trial[k] = std::clamp(z[k] + step[k], 0.2 * z[k], 5 * z[k]);
       const double after = cost(trial, s);
       if (after < before) {
-        v = trial, damping *= 0.1;
+        z = trial, damping *= 0.1;
         return before - after;
       }
     }
@@ -148,29 +158,31 @@ class Grid {
 
 }  // namespace
 
-TranscribedAnswer transcribed(const robot::RobotModel& robot, const dynamics::DriveModel& model, const Run& run,
-                              const Limits& limits, double start_speed, double end_speed, double price_w,
-                              int cells) {
+TranscribedAnswer transcribed(const robot::RobotModel& robot, const dynamics::DriveModel& model,
+                              const Run& run, const Limits& limits, double start_speed, double end_speed,
+                              double price_w, int cells) {
   const Motion motion(robot, model, run, limits);
   const Grid grid(motion, run.length(), cells, price_w);
   // From a gentle ramp.
-  std::vector<double> v;
+  std::vector<double> z;
   const double gentle = 0.1 * std::min(motion.most(), 10.0), ceiling = 0.5 * std::min(motion.top(), 10.0);
   for (std::size_t k = 0; k <= grid.cells(); ++k) {
     const double s = grid.way(k), rest = run.length() - s;
-    v.push_back(std::sqrt(std::min({ceiling * ceiling, start_speed * start_speed + 2 * gentle * s,
-                                    end_speed * end_speed + 2 * gentle * rest})));
+    z.push_back(std::min({ceiling * ceiling, start_speed * start_speed + 2 * gentle * s,
+                          end_speed * end_speed + 2 * gentle * rest}));
   }
-  v.front() = start_speed, v.back() = end_speed;
+  z.front() = start_speed * start_speed, z.back() = end_speed * end_speed;
   const double idle = model.parameters().idle_power_w + price_w + 1;
   double damping = 1e-3;
-  for (double sharp = 1; sharp < 1e6; sharp *= 4) {
+  for (double sharp = 1; sharp < 3e6; sharp *= 6) {
     const Sharpness s{0.3 * idle / std::sqrt(sharp), 30 * idle * sharp};
-    for (int k = 0; k < 60 && grid.improve(v, s, damping) > 1e-8 * grid.cost(v, s); ++k) continue;
+    int still = 0;  // steps that gained nothing worth mentioning
+    for (int k = 0; k < 200 && still < 3; ++k)
+      still = grid.improve(z, s, damping) > 1e-9 * grid.cost(z, s) ? 0 : still + 1;
   }
   TranscribedAnswer answer;
   for (std::size_t k = 0; k < grid.cells(); ++k) {
-    const auto p = grid.price(k, v[k], v[k + 1], 0);
+    const auto p = grid.price(k, std::sqrt(z[k]), std::sqrt(z[k + 1]), 0);
     answer.energy_j += p.energy_j, answer.duration_s += p.duration_s;
     answer.excess = std::max(answer.excess, p.excess);
   }
