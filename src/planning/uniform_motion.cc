@@ -203,16 +203,21 @@ void UniformMotion::leg(double from, double to, bool pivot_at_end, const Price& 
   if (from == to) return;
   const double pivot = pivot_at_end ? to : from, end = pivot_at_end ? from : to,
                direction = to > from ? 1 : -1;
-  const double x = stretch(pivot, end, price), whole = std::sinh(x), count = static_cast<double>(task_.cells);
-  End last{from, wanted(from, direction, price).acceleration};
-  for (std::size_t j = 1; j <= task_.cells; ++j) {
-    const double i = static_cast<double>(pivot_at_end ? task_.cells - j : j);
+  const std::size_t cells = price.rough ? std::max<std::size_t>(8, task_.cells / 4) : task_.cells;
+  const double x = stretch(pivot, end, price), whole = std::sinh(x), count = static_cast<double>(cells);
+  const bool may_jump = !price.rough && (has_motor_limits() || task_.electric.up != task_.electric.down);
+  const auto end_at = [&](double v) {
+    return End{v, may_jump ? wanted(v, direction, price).acceleration : 0};
+  };
+  End last = end_at(from);
+  for (std::size_t j = 1; j <= cells; ++j) {
+    const double i = static_cast<double>(pivot_at_end ? cells - j : j);
     const double root = std::sinh(x * i / count) / whole;
-    const double v = j == task_.cells ? to : pivot + root * root * (end - pivot);
-    const End next{v, wanted(v, direction, price).acceleration};
+    const double v = j == cells ? to : pivot + root * root * (end - pivot);
+    const End next = end_at(v);
     // Towards the pivot the acceleration vanishes as the root of what is left of the speed.
     const double least = pivot_at_end ? i : i - 1;
-    piece(last, next, least > 0 ? 1.5 * (least + 1) / least : infinite, price, 0, visit);
+    piece(last, next, may_jump && least > 0 ? 1.5 * (least + 1) / least : infinite, price, 0, visit);
     last = next;
   }
 }
@@ -241,26 +246,28 @@ UniformMotion::Shape UniformMotion::turning(Shape shape, double nearest, double 
     if (!shape.price.fastest) shape.price.lambda = steady_cost(v, shape.price.fixed_w);
     return std::log(distance(shape) / task_.distance);
   };
+  // Few cells find about where it is, all of them the place.
   shape.price.rough = true;
   double far = farthest, at_far = missing(far);
   double near = nearest, at_near = near > 0 && at_far > 0 ? missing(near) : 0;
   while (near == 0 && at_far > 0) {
     const double v = 0.5 * far, at = missing(v);
-    if (at < 0)
+    if (at < 0) {
       near = v, at_near = at;
-    else
+    } else {
       far = v, at_far = at;
+    }
   }
-  double v = at_far > 0 ? zero_between(missing, near, at_near, far, at_far, 1e-11) : far;
+  double v = at_far > 0 ? zero_between(missing, near, at_near, far, at_far, 1e-6) : far;
+  const double aside = v - 1e-3 * (v - nearest), slope = (missing(v) - missing(aside)) / (v - aside);
   shape.price.rough = false;
-  if (at_far > 0 && has_motor_limits()) {
-    // Finer cells move it a little.
-    const double aside = 1e-3 * (far - near), low = v - aside, high = v + aside;
-    const double at_low = missing(low), at_high = missing(high);
-    if (at_low < 0 && at_high > 0) v = zero_between(missing, low, at_low, high, at_high, 1e-9);
-  }
   // The rest of the way, if any, is driven at the speed of the turn: the motion must not be too long.
-  for (double aside = 1e-9; missing(v) > spare && aside < 1e-2; aside *= 4) v += aside * (nearest - v);
+  for (int k = 0; k < 12; ++k) {
+    const double m = missing(v);
+    if (m <= spare && (m >= -spare || v == farthest || k > 8)) break;
+    const double next = v - (m + 0.5 * spare) / slope - (k > 5 ? 1e-4 * (v - nearest) : 0);
+    v = std::clamp(next, std::min(nearest, farthest), std::max(nearest, farthest));
+  }
   return shape;
 }
 
@@ -363,7 +370,8 @@ SteppedMotion UniformMotion::written(const Shape& shape) const {
     motion.duration_s += duration * scale;
     motion.energy_j += (power + idle_w) * duration * scale;
     if (!shape.price.fastest)
-      motion.discretisation_j += std::max(0.0, least * duration - pointwise_least(piece, shape.price));
+      motion.discretisation_j += std::clamp(least * duration - pointwise_least(piece, shape.price), 0.0,
+                                            std::max(0.0, least * duration));  // L is not negative
     if (piece.bounded) motion.binding[static_cast<std::size_t>(piece.bound)] = true;
     way += piece.distance();
     motion.way.push_back(way * scale), motion.speed.push_back(piece.to);
@@ -398,14 +406,8 @@ std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
     if (*speed > motion.top_ * (1 + rounding)) return std::nullopt;
     *speed = std::min(*speed, motion.top_);
   }
-  if (const auto shape = motion.fastest_shape()) {
-    double covered = 0, took = 0;
-    motion.pieces(*shape,
-                  [&](const Piece& piece) { covered += piece.distance(), took += piece.duration_s(); });
-    motion.shortest_s_ = took + std::max(0.0, task.distance - covered) / shape->middle;
-  } else {
-    motion.shortest_s_ = infinite;
-  }
+  const auto shape = motion.fastest_shape();
+  motion.shortest_s_ = shape ? motion.written(*shape).duration_s : infinite;
   return motion;
 }
 

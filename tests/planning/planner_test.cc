@@ -442,7 +442,7 @@ TEST(Planner, StopsWhenAsked) {
 TEST(Planner, RowsMayBeLeftOutAndAreBounded) {
   const robot::RobotModel robot = test::amr();
   Polyline line;
-  for (int k = 1; k <= 4000; ++k) line.points.push_back({0.5 * k, k % 2 ? 0.3 : 0.0});
+  for (int k = 1; k <= 9000; ++k) line.points.push_back({0.5 * k, k % 2 ? 0.3 : 0.0});
   const Path path = made({line});
   Problem problem = limited(robot);
   const auto refused = plan(robot, path, problem);
