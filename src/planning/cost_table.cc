@@ -186,6 +186,7 @@ Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOpti
   Problem problem;
   problem.limits = limits_of(placeless);
   problem.value_of_time_w = options.value_of_time_w;
+  problem.intervals_per_run = 24;  // finer than what the table's own nodes tell
   const auto solver = [&](int turn) {
     const auto along = [turn](double length, double payload_kg) {
       Run run;
@@ -213,7 +214,7 @@ Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOpti
       path.final_payload_kg = payload_kg;
       const auto cost = planner->cost(path, problem, stop);
       if (!cost) return tl::unexpected(cost.error());
-      table.numerical_ = table.numerical_ || !cost->closed_form;
+      table.numerical_ = true;
       return LegCost{cost->energy_j, cost->duration_s};
     };
   };
