@@ -55,7 +55,7 @@ Result<Response> profile(const Services& services, const Request& r) {
   const ReadProfile read = read_profile(services, r);
   if (!read) return tl::unexpected(read.error());
   const auto& [model, input] = **read;
-  const auto output = answers::profile(input, *model);
+  const auto output = answers::profile(input, *model, r.stop);
   if (!output) return tl::unexpected(output.error());
   return http::json_response(answers::profile_json(input, *output, *model));
 }
@@ -67,7 +67,8 @@ Result<Response> estimate(const Services& services, const Request& r) {
   if (!input) return tl::unexpected(input.error());
   const bool usual = input->driving == answers::Driving::usual;
   const auto output = answers::estimate(
-      *input, usual ? services.forecasts.of(*model) : answers::RobotOutlook{*model, nullptr, nullptr});
+      *input, usual ? services.forecasts.of(*model) : answers::RobotOutlook{*model, nullptr, nullptr},
+      r.stop);
   if (!output) return tl::unexpected(output.error());
   return http::json_response(answers::estimate_json(*input, *output, **model));
 }

@@ -17,6 +17,7 @@ std::string_view slug_of(Fault fault) {
       return "infeasible";
     case Fault::too_large:
       return "too-large";
+    case Fault::stopped:
     case Fault::unavailable:
       return "unavailable";
     case Fault::corrupt:
@@ -40,6 +41,7 @@ unsigned status_of(Fault fault) {
       return 409;
     case Fault::too_large:
       return 413;
+    case Fault::stopped:
     case Fault::unavailable:
       return 503;
     case Fault::corrupt:

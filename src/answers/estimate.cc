@@ -16,8 +16,6 @@ namespace {
 planning::Profile series_of(const dynamics::DriveModel& drive, const GivenMotion& motion,
                             planning::Peaks& peaks) {
   const auto& [points, payload_kg, start] = motion;
-  constexpr std::array<std::pair<double, double>, 3> gauss{
-      {{0.1127016653792583, 5.0 / 18}, {0.5, 8.0 / 18}, {0.8872983346207417, 5.0 / 18}}};
   constexpr int cuts = 4;  // of a span, so that power's bow shows
   planning::Profile p;
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -60,7 +58,7 @@ planning::Profile series_of(const dynamics::DriveModel& drive, const GivenMotion
       p.power_w.push_back(power(t));
       p.energy_j.push_back(energy);
       if (cut == cuts) break;
-      for (const auto& [node, weight] : gauss) energy += weight * h * power(t + node * h);
+      for (const auto& [node, weight] : planning::gauss3) energy += weight * h * power(t + node * h);
       const double way = (v + 0.5 * slope * h) * h, turned = (yaw + 0.5 * bend * h) * h;
       const double heading = pose.heading_rad + 0.5 * turned;
       pose.x_m += way * std::cos(heading), pose.y_m += way * std::sin(heading);
@@ -95,8 +93,10 @@ Result<EstimateOutput> of_motion(const GivenMotion& motion, bool columns, const 
   return out;
 }
 
-Result<EstimateOutput> of_optimum(const DriveInput& drive, bool columns, const ModelInForce& model) {
-  auto best = plan(drive, model);
+Result<EstimateOutput> of_optimum(DriveInput drive, bool columns, const ModelInForce& model,
+                                  const std::stop_token& stop) {
+  drive.problem.rows = columns;
+  auto best = plan(drive, model, stop);
   if (!best) return tl::unexpected(std::move(best.error()));
   signals::Accounts accounts;
   accounts.battery_j = accounts.modelled_j = best->summary.energy_j;
@@ -130,12 +130,13 @@ Result<EstimateOutput> of_habit(const DriveInput& drive, const RobotOutlook& rob
 
 }  // namespace
 
-Result<EstimateOutput> estimate(const EstimateInput& input, const RobotOutlook& robot) {
+Result<EstimateOutput> estimate(const EstimateInput& input, const RobotOutlook& robot,
+                                const std::stop_token& stop) {
   if (const auto* motion = std::get_if<GivenMotion>(&input.motion))
     return of_motion(*motion, input.columns, *robot.model);
   const auto& drive = std::get<DriveInput>(input.motion);
   if (input.driving == Driving::usual) return of_habit(drive, robot);
-  return of_optimum(drive, input.columns, *robot.model);
+  return of_optimum(drive, input.columns, *robot.model, stop);
 }
 
 }  // namespace joulecast::answers

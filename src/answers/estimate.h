@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <stop_token>
 #include <variant>
 #include <vector>
 
@@ -28,7 +29,7 @@ struct EstimateInput {
 struct EstimateOutput {
   double energy_j = 0;  // from the battery; of usual driving its expectation
   double duration_s = 0, distance_m = 0, turned_rad = 0;
-  std::optional<signals::Accounts> accounts;                 // not of usual driving
+  std::optional<signals::Accounts> accounts;                // not of usual driving
   std::optional<std::array<double, 3>> energy_quantiles_j;  // of usual driving, at forecast::told_quantiles
   std::vector<planning::BrokenLimit> beyond_limits;         // by a given motion
   std::optional<planning::Profile> columns;                 // where they are asked for
@@ -36,6 +37,8 @@ struct EstimateOutput {
 
 // Energy of a motion: of a given one by CVODE, of a path's minimum-energy motion by the planner, of usual
 // driving by the robot's forecast. Errors name "/path/...", "/profile/..." or the field of the problem.
-Result<EstimateOutput> estimate(const EstimateInput& input, const RobotOutlook& robot);
+// A stop ends planning with Fault::stopped.
+Result<EstimateOutput> estimate(const EstimateInput& input, const RobotOutlook& robot,
+                                const std::stop_token& stop = {});
 
 }  // namespace joulecast::answers

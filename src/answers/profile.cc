@@ -18,19 +18,19 @@ std::optional<ProfileOutput::Baseline> baseline(const planning::Planner& planner
 }
 
 Result<ProfileOutput> compared(const planning::Planner& planner, const ProfileInput& input,
-                               const planning::Path& path, planning::Plan plan) {
+                               const planning::Path& path, planning::Plan plan, const std::stop_token& stop) {
   const planning::Problem& problem = input.drive.problem;
   ProfileOutput out;
   out.trapezoid = baseline(planner, input, path, plan, 1.0 / 3);
   out.triangle = baseline(planner, input, path, plan, 0.5);
   out.plan = std::move(plan);
   if (problem.deadline_s) {
-    const auto speed = planner.needed_speed(path, problem);
+    const auto speed = planner.needed_speed(path, problem, stop);
     if (!speed) return tl::unexpected(speed.error());
     out.needed_speed_m_s = *speed;
   }
   if (input.pareto_points >= 2) {
-    auto front = planner.pareto(path, problem, input.pareto_points);
+    auto front = planner.pareto(path, problem, input.pareto_points, stop);
     if (!front) return tl::unexpected(std::move(front.error()));
     out.pareto = std::move(*front);
   }
@@ -48,24 +48,25 @@ Result<const planning::Planner*> planner_for(const DriveInput& input, const Mode
 
 }  // namespace
 
-Result<planning::Plan> plan(const DriveInput& input, const ModelInForce& model) {
+Result<planning::Plan> plan(const DriveInput& input, const ModelInForce& model, const std::stop_token& stop) {
   const auto path = path_of(input.path, input.options);
   if (!path) return tl::unexpected(path.error());
   std::optional<planning::Planner> own;
   const auto planner = planner_for(input, model, own);
   if (!planner) return tl::unexpected(planner.error());
-  return (*planner)->plan(*path, input.problem);
+  return (*planner)->plan(*path, input.problem, stop);
 }
 
-Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& model) {
+Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& model,
+                              const std::stop_token& stop) {
   const auto path = path_of(input.drive.path, input.drive.options);
   if (!path) return tl::unexpected(path.error());
   std::optional<planning::Planner> own;
   const auto planner = planner_for(input.drive, model, own);
   if (!planner) return tl::unexpected(planner.error());
-  auto plan = (*planner)->plan(*path, input.drive.problem);
+  auto plan = (*planner)->plan(*path, input.drive.problem, stop);
   if (!plan) return tl::unexpected(std::move(plan.error()));
-  return compared(**planner, input, *path, std::move(*plan));
+  return compared(**planner, input, *path, std::move(*plan), stop);
 }
 
 std::optional<ProfileOutput> profile_at_once(const ProfileInput& input, const ModelInForce& model) {
@@ -75,7 +76,7 @@ std::optional<ProfileOutput> profile_at_once(const ProfileInput& input, const Mo
   if (!path) return std::nullopt;
   auto plan = model.planner.plan_at_once(*path, input.drive.problem);
   if (!plan) return std::nullopt;
-  auto out = compared(model.planner, input, *path, std::move(*plan));
+  auto out = compared(model.planner, input, *path, std::move(*plan), {});
   return out ? std::optional(std::move(*out)) : std::nullopt;
 }
 

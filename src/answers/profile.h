@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <stop_token>
 #include <vector>
 
 #include "answers/drive.h"
@@ -33,13 +34,16 @@ struct ProfileOutput {
   std::vector<planning::PlanCost> pareto;
 };
 
-// The minimum-energy motion along the path within the limits, against a trapezoid and a triangle.
-Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& model);
+// The minimum-energy motion along the path within the limits, against a trapezoid and a triangle. A stop ends
+// planning with Fault::stopped.
+Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& model,
+                              const std::stop_token& stop = {});
 
 // The same where it takes no more than some tens of microseconds; nothing for longer ones and for errors.
 std::optional<ProfileOutput> profile_at_once(const ProfileInput& input, const ModelInForce& model);
 
 // The same without what it is compared with. With another regeneration than the model's a planner is made.
-Result<planning::Plan> plan(const DriveInput& input, const ModelInForce& model);
+Result<planning::Plan> plan(const DriveInput& input, const ModelInForce& model,
+                            const std::stop_token& stop = {});
 
 }  // namespace joulecast::answers

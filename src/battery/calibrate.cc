@@ -306,10 +306,10 @@ std::optional<Thermal> thermal_fit(const std::vector<Target>& targets, const Cur
   return best;
 }
 
-}  // namespace
+// ---- which recording serves what ----
 
-Result<Calibration> calibrate(const std::vector<Recording>& given, const CalibrationOptions& options) {
-  Calibration out;
+// The parts of the recordings before they charge; those that draw nothing are passed over.
+Result<std::vector<Recording>> discharges(const std::vector<Recording>& given, Calibration& out) {
   std::vector<Recording> recordings;
   for (const Recording& recording : given) {
     Recording part = without_charging(recording);
@@ -324,8 +324,12 @@ Result<Calibration> calibrate(const std::vector<Recording>& given, const Calibra
               " charges while its voltage falls; current must be positive while the battery discharges");
     out.passed_over.push_back({recording.name, "draws no charge"});
   }
+  return recordings;
+}
+
+// The longest full discharge without pause, its rests cut off.
+Result<const Recording*> slowest_of(std::vector<Recording>& recordings) {
   const Recording* slowest = nullptr;
-  std::vector<Target> targets;
   for (Recording& recording : recordings) {
     const Recording core = without_rests(recording);
     if (core.duration_s() <= slow_hours * 3600 ||
@@ -335,49 +339,45 @@ Result<Calibration> calibrate(const std::vector<Recording>& given, const Calibra
     recording = core;
     slowest = &recording;
   }
-  if (slowest == nullptr) {
-    std::string seen;
-    for (const Recording& recording : recordings)
-      seen += fmt::format("{}{} ({:.1f} h, {:.2f} Ah)", seen.empty() ? "" : ", ", recording.name,
-                          recording.duration_s() / 3600, recording.charge_ah());
-    return invalid("recordings",
-                   fmt::format("need a full discharge without pause over more than {} h for the "
-                               "open-circuit voltage; none of these is one: {}",
-                               slow_hours, seen));
-  }
-  const SlowTest slow = slow_test(*slowest);
-  robot::Battery known;
-  known.nominal_voltage_v = Curve(slow.voltage).mean();
+  if (slowest != nullptr) return slowest;
+  std::string seen;
+  for (const Recording& recording : recordings)
+    seen += fmt::format("{}{} ({:.1f} h, {:.2f} Ah)", seen.empty() ? "" : ", ", recording.name,
+                        recording.duration_s() / 3600, recording.charge_ah());
+  return invalid("recordings", fmt::format("need a full discharge without pause over more than {} h for the "
+                                           "open-circuit voltage; none of these is one: {}",
+                                           slow_hours, seen));
+}
+
+// What the fit is to follow: every other recording that draws a share of the charge.
+Result<std::vector<Target>> targets_of(const std::vector<Recording>& recordings, const Recording& slowest,
+                                       const SlowTest& slow, double nominal_voltage_v, Calibration& out) {
+  std::vector<Target> targets;
   for (const Recording& recording : recordings) {
-    if (&recording == slowest) continue;
+    if (&recording == &slowest) continue;
     if (const double charge_ah = recording.charge_ah();
         !(charge_ah > 0.1 * slow.capacity_ah && charge_ah <= 1.2 * slow.capacity_ah)) {
       out.passed_over.push_back(
           {recording.name,
            fmt::format("draws {:.3f} Ah, must be between 0.1 and 1.2 times the {:.3f} Ah of {}", charge_ah,
-                       slow.capacity_ah, slowest->name)});
+                       slow.capacity_ah, slowest.name)});
       continue;
     }
-    targets.push_back({&recording, weights(recording, known.nominal_voltage_v, slow.capacity_ah)});
+    targets.push_back({&recording, weights(recording, nominal_voltage_v, slow.capacity_ah)});
   }
-  if (targets.empty()) {
-    std::string unused;
-    for (const PassedOver& p : out.passed_over)
-      unused += fmt::format("{} {} {}", unused.empty() ? ";" : ",", p.name, p.reason);
-    return invalid("recordings", "need a constant-current or pulse discharge besides the slow one" + unused);
-  }
+  if (!targets.empty()) return targets;
+  std::string unused;
+  for (const PassedOver& p : out.passed_over)
+    unused += fmt::format("{} {} {}", unused.empty() ? ";" : ",", p.name, p.reason);
+  return invalid("recordings", "need a constant-current or pulse discharge besides the slow one" + unused);
+}
 
-  known.capacity_ah = options.rated_capacity_ah.value_or(slow.capacity_ah);
-  if (options.rated_capacity_ah) known.ageing_factor = slow.capacity_ah / *options.rated_capacity_ah;
-  known.reserve_fraction = options.reserve_fraction;
-  known.cutoff_voltage_v = std::round(slow.end_voltage_v * 1000) / 1000;
-
-  const Layout layout{resistance_knots(targets, slow.capacity_ah),
-                      temperature_span_k(targets) >= least_temperature_span_k};
+// The parameters of least misfit, within their ranges.
+Result<std::vector<double>> fitted(const Layout& layout, const SlowTest& slow, const robot::Battery& known,
+                                   const std::vector<Target>& targets, int& iterations) {
   std::vector<double> p(layout.size());
   std::size_t rows = layout.knots.size() - 2;
   for (const Target& target : targets) rows += target.recording->size();
-
   ceres::Problem problem;
   auto* cost = new ceres::DynamicNumericDiffCostFunction<Residuals, ceres::CENTRAL>(
       new Residuals{layout, slow, known, targets});
@@ -412,29 +412,59 @@ Result<Calibration> calibrate(const std::vector<Recording>& given, const Calibra
   ceres::Solve(solver, &problem, &summary);
   if (!summary.IsSolutionUsable())
     return fail(Fault::infeasible, "recordings", "the fit found no parameters: " + summary.message);
+  iterations = static_cast<int>(summary.iterations.size());
+  return p;
+}
 
-  out.iterations = static_cast<int>(summary.iterations.size());
-  out.battery = battery_of(layout, p.data(), slow, known);
-  if (layout.with_activation) {
-    if (const auto thermal =
-            thermal_fit(targets, Curve(out.battery.open_circuit_voltage), slow.capacity_ah)) {
-      out.battery.thermal_resistance_k_w = thermal->resistance_k_w;
-      out.battery.thermal_time_constant_s = thermal->time_constant_s;
-    }
-  }
+// How far the fitted battery's voltage is from each recording that was used, in the order given.
+void tell_misfits(const Recording& slowest, const std::vector<Target>& targets, Calibration& out) {
   const Circuit circuit(out.battery);
   std::vector<double> voltage;
-  std::vector<const Recording*> used{slowest};
+  std::vector<const Recording*> used{&slowest};
   for (const Target& target : targets) used.push_back(target.recording);
-  std::ranges::sort(used);  // in the order given
+  std::ranges::sort(used);
   for (const Recording* recording : used) {
     simulate(circuit, *recording, voltage);
     double sum = 0;
     for (std::size_t row = 0; row < voltage.size(); ++row)
       sum += std::pow(voltage[row] - recording->voltage_v[row], 2);
     out.recordings.push_back(
-        {recording->name, recording == slowest, std::sqrt(sum / static_cast<double>(voltage.size()))});
+        {recording->name, recording == &slowest, std::sqrt(sum / static_cast<double>(voltage.size()))});
   }
+}
+
+}  // namespace
+
+Result<Calibration> calibrate(const std::vector<Recording>& given, const CalibrationOptions& options) {
+  Calibration out;
+  auto recordings = discharges(given, out);
+  if (!recordings) return tl::unexpected(std::move(recordings.error()));
+  const auto slowest = slowest_of(*recordings);
+  if (!slowest) return tl::unexpected(slowest.error());
+  const SlowTest slow = slow_test(**slowest);
+  robot::Battery known;
+  known.nominal_voltage_v = Curve(slow.voltage).mean();
+  const auto targets = targets_of(*recordings, **slowest, slow, known.nominal_voltage_v, out);
+  if (!targets) return tl::unexpected(targets.error());
+
+  known.capacity_ah = options.rated_capacity_ah.value_or(slow.capacity_ah);
+  if (options.rated_capacity_ah) known.ageing_factor = slow.capacity_ah / *options.rated_capacity_ah;
+  known.reserve_fraction = options.reserve_fraction;
+  known.cutoff_voltage_v = std::round(slow.end_voltage_v * 1000) / 1000;
+
+  const Layout layout{resistance_knots(*targets, slow.capacity_ah),
+                      temperature_span_k(*targets) >= least_temperature_span_k};
+  const auto p = fitted(layout, slow, known, *targets, out.iterations);
+  if (!p) return tl::unexpected(p.error());
+  out.battery = battery_of(layout, p->data(), slow, known);
+  if (layout.with_activation) {
+    if (const auto thermal =
+            thermal_fit(*targets, Curve(out.battery.open_circuit_voltage), slow.capacity_ah)) {
+      out.battery.thermal_resistance_k_w = thermal->resistance_k_w;
+      out.battery.thermal_time_constant_s = thermal->time_constant_s;
+    }
+  }
+  tell_misfits(**slowest, *targets, out);
   return out;
 }
 

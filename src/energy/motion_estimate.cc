@@ -15,6 +15,7 @@ constexpr std::size_t pose_index = account::count;  // x, y, heading
 constexpr std::size_t heat_index = pose_index + 3;  // two
 constexpr std::size_t state_size = heat_index + 2;
 constexpr double tolerance = 1e-8;
+constexpr double least_span_s = 1e-9;
 constexpr double finest_floor_m = 0.05;  // regions of the floor are resolved to this length
 
 // One span of constant acceleration, in time since its beginning.
@@ -111,8 +112,8 @@ Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
     y[pose_index + 2] = start->heading_rad;
   }
   for (std::size_t k = 1; k < points.size(); ++k) {
-    if (!(points[k].time_s > points[k - 1].time_s))
-      return invalid("time_s/" + std::to_string(k), "must be later than the one before");
+    if (!(points[k].time_s - points[k - 1].time_s >= least_span_s))
+      return invalid("time_s/" + std::to_string(k), "must be later than the one before, by 1e-9 s at least");
     const auto climb = climb_of_span(points[k - 1], points[k]);
     if (!climb) return invalid("height_m/" + std::to_string(k), climb.error().message);
     span.begin(points[k - 1], points[k], *climb);

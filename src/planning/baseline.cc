@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "planning/gauss.h"
+
 namespace joulecast::planning {
 namespace {
 
@@ -69,11 +71,10 @@ class Ramp {
   }
 
   double gauss_j(const Span& span, double begin_s, double length_s) {
-    constexpr double node = 0.7745966692414834;
-    const auto at = [&](double x) {
-      return power_w(begin_s + 0.5 * (1 + x) * length_s, span.from, span.acceleration);
-    };
-    return length_s / 18 * (5 * at(-node) + 8 * at(0) + 5 * at(node));
+    double sum = 0;
+    for (const auto& [at, weight] : gauss3)
+      sum += weight * power_w(begin_s + at * length_s, span.from, span.acceleration);
+    return length_s * sum;
   }
 
   double power_w(double t, double from, double acceleration) {

@@ -7,6 +7,7 @@
 
 #include "dynamics/drive_model.h"
 #include "planning/planner.h"
+#include "planning/run_planner.h"
 
 namespace joulecast::planning {
 namespace {
@@ -168,7 +169,8 @@ LegCost CostTable::Grid::at(double length, double payload_kg) const {
   return sum;
 }
 
-Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOptions& options) {
+Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOptions& options,
+                                  std::stop_token stop) {
   const auto adopted = dynamics::active_effects(robot);
   if (!adopted) return tl::unexpected(adopted.error());
   CostTable table;
@@ -184,18 +186,35 @@ Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOpti
   Problem problem;
   problem.limits = limits_of(placeless);
   problem.value_of_time_w = options.value_of_time_w;
+  problem.intervals_per_run = 24;  // finer than what the table's own nodes tell
   const auto solver = [&](int turn) {
-    return [&planner, &problem, &table, turn](double length, double payload_kg) -> Result<LegCost> {
-      Path path;
+    const auto along = [turn](double length, double payload_kg) {
       Run run;
       run.turn = turn;
       run.payload_kg = payload_kg;
       run.knots = {{0, 0, {}}, {length, 0, turn == 0 ? Pose{length, 0, 0} : Pose{0, 0, length}}};
-      path.runs = {std::move(run)};
+      return run;
+    };
+    // Loads depend on the payload alone: what closed forms need of them is kept for other lengths.
+    auto last = std::make_shared<std::pair<Run, std::optional<RunPlanner>>>();
+    return [&planner, &placeless, &problem, &table, &stop, along, last](
+               double length, double payload_kg) -> Result<LegCost> {
+      auto& [unit, closed] = *last;
+      if (!closed || unit.payload_kg != payload_kg) {
+        unit = along(1, payload_kg);
+        auto made = RunPlanner::make(placeless, planner->loads(), unit, problem, 0, 0);
+        closed = made ? std::optional(std::move(*made)) : std::nullopt;
+      }
+      if (closed && !stop.stop_requested()) {
+        if (const auto answer = closed->closed_form(problem.value_of_time_w, length))
+          return LegCost{answer->energy_j, answer->duration_s};
+      }
+      Path path;
+      path.runs = {along(length, payload_kg)};
       path.final_payload_kg = payload_kg;
-      const auto cost = planner->cost(path, problem);
+      const auto cost = planner->cost(path, problem, stop);
       if (!cost) return tl::unexpected(cost.error());
-      table.numerical_ = table.numerical_ || !cost->closed_form;
+      table.numerical_ = true;
       return LegCost{cost->energy_j, cost->duration_s};
     };
   };
@@ -206,6 +225,7 @@ Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOpti
   Grid straight, turn;
   straight.build(solver(0), shortest_leg_m, longest_leg_m, payload_limit, table);
   turn.build(solver(1), smallest_turn_rad, widest_turn_rad, payload_limit, table);
+  if (stop.stop_requested()) return stopped();
   table.straight_ = std::move(straight);
   table.turn_ = std::move(turn);
   return table;

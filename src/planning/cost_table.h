@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -43,7 +44,9 @@ class CostTable {
  public:
   // Effects tied to places or headings of the floor are left out, since a leg here has no place; see
   // neglected(). Limits are those of the robot file.
-  static Result<CostTable> make(const robot::RobotModel& robot, const CostOptions& options);
+  // Fault::stopped soon after a stop is requested.
+  static Result<CostTable> make(const robot::RobotModel& robot, const CostOptions& options,
+                                std::stop_token stop = {});
 
   // 0 <= distance_m <= longest_leg_m, 0 <= payload_kg <= the robot's limit.
   LegCost straight(double distance_m, double payload_kg) const;

@@ -42,13 +42,14 @@ std::shared_ptr<const CostTable> CostTableCache::find(const robot::RobotModel& r
 }
 
 Result<std::shared_ptr<const CostTable>> CostTableCache::get(const robot::RobotModel& robot,
-                                                             const CostOptions& options) {
+                                                             const CostOptions& options,
+                                                             std::stop_token stop) {
   robot::RobotModel drive = drive_of(robot);
   {
     const std::lock_guard lock(mutex_);
     if (auto table = find(drive, options)) return table;
   }
-  auto made = CostTable::make(drive, options);
+  auto made = CostTable::make(drive, options, std::move(stop));
   if (!made) return tl::unexpected(std::move(made.error()));
   auto table = std::make_shared<const CostTable>(std::move(*made));
   const std::lock_guard lock(mutex_);

@@ -15,7 +15,8 @@ class CostTableCache {
  public:
   explicit CostTableCache(std::size_t capacity = 4096) : capacity_(capacity) {}
 
-  Result<std::shared_ptr<const CostTable>> get(const robot::RobotModel& robot, const CostOptions& options);
+  Result<std::shared_ptr<const CostTable>> get(const robot::RobotModel& robot, const CostOptions& options,
+                                               std::stop_token stop = {});
   std::size_t size() const;
 
  private:

@@ -134,6 +134,26 @@ const LineMotion::Piece& LineMotion::at(double& time_s) const {
   return pieces_[k];
 }
 
+namespace {
+
+// As many even cells as an extremal needs so that the speed, taken as linear between them, covers its
+// distance but for `distance_told`; at least `count`.
+double enough_cells(const LineProfile& profile, double count) {
+  constexpr double distance_told = 8e-5, most = 20'000;
+  const double ends = 0.5 * (profile.speed(0) + profile.speed(profile.duration_s()));
+  while (count < most) {
+    const double step = profile.duration_s() / count;
+    double sum = ends;
+    for (double i = 1; i < count; ++i) sum += profile.speed(i * step);
+    const double error = std::fabs(sum * step / profile.distance() - 1);
+    if (error <= distance_told) break;
+    count = std::ceil(count * std::clamp(1.02 * std::sqrt(error / distance_told), 1.02, 4.0));
+  }
+  return count;
+}
+
+}  // namespace
+
 std::vector<double> LineMotion::times(std::size_t cells) const {
   std::vector<double> times{0};
   for (std::size_t k = 0; k < count_; ++k) {
@@ -145,7 +165,8 @@ std::vector<double> LineMotion::times(std::size_t cells) const {
     // At constant acceleration a row says all that there is to say until the next; a few more show how power
     // changes.
     const double wanted = piece.free ? share : piece.acceleration != 0 ? 0.25 * share : 0;
-    const double count = std::max(1.0, std::ceil(static_cast<double>(cells) * wanted));
+    double count = std::max(1.0, std::ceil(static_cast<double>(cells) * wanted));
+    if (piece.free) count = enough_cells(*piece.free, count);
     for (double i = 1; i <= count; ++i) times.push_back(piece.start_s + piece.duration_s * i / count);
   }
   times.back() = duration_;
@@ -219,8 +240,9 @@ std::optional<LineMotion> line_within(const LineTask& task, double speed_limit, 
 double shortest_time_within(const LineTask& task, double speed_limit, double acceleration_limit) {
   const double v0 = task.start_speed, v1 = task.end_speed, a = acceleration_limit;
   if (!std::isfinite(a)) return std::isfinite(speed_limit) ? task.distance / speed_limit : 0;
-  const double top = std::min(speed_limit, std::sqrt(a * task.distance + 0.5 * (v0 * v0 + v1 * v1)));
-  if (!(top >= std::max(v0, v1))) return std::numeric_limits<double>::infinity();
+  double top = std::min(speed_limit, std::sqrt(a * task.distance + 0.5 * (v0 * v0 + v1 * v1)));
+  if (!(top >= std::max(v0, v1) * (1 - 1e-9))) return std::numeric_limits<double>::infinity();
+  top = std::max({top, v0, v1});
   const double ramps = (2 * top * top - v0 * v0 - v1 * v1) / (2 * a);
   return (2 * top - v0 - v1) / a + std::max(0.0, task.distance - ramps) / top;
 }

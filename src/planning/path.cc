@@ -5,6 +5,8 @@
 #include <numbers>
 #include <string>
 
+#include "planning/gauss.h"
+
 namespace joulecast::planning {
 namespace {
 
@@ -213,9 +215,8 @@ class Builder {
         align(tangent);
         heading = pose_.heading_rad;
       } else {
-        // Gauss-Legendre with 3 points between parameters.
-        const double h = 1 / cuts, mid = u - h / 2, off = h / 2 * 0.7745966692414834;
-        way += h * (5 * speed(mid - off) + 8 * speed(mid) + 5 * speed(mid + off)) / 18;
+        const double h = 1 / cuts;
+        for (const auto& [at, weight] : gauss3) way += h * weight * speed(u - h + at * h);
         heading += wrapped(tangent - heading);
       }
       piece.push_back({way, curvature, {j.at.x_m, j.at.y_m, heading}});
@@ -227,8 +228,7 @@ class Builder {
 
   Result<void> room(double knots) {
     if (static_cast<double>(knots_) + knots > static_cast<double>(most_knots)) {
-      return fail(Fault::too_large, "",
-                  "the path needs more than 2000000 knots; ask for it in parts");
+      return fail(Fault::too_large, "", "the path needs more than 2000000 knots; ask for it in parts");
     }
     knots_ += static_cast<std::size_t>(knots);
     return {};
@@ -240,10 +240,9 @@ class Builder {
       return pose_.heading_rad + s * (k0 + (k1 - k0) * s / (2 * length));
     };
     double x = 0, y = 0;
-    const double off = 0.7745966692414834;
-    for (auto [node, weight] : {std::pair{-off, 5.0}, {0.0, 8.0}, {off, 5.0}}) {
-      const double h = heading(length * (1 + node) / 2);
-      x += weight / 18 * std::cos(h), y += weight / 18 * std::sin(h);
+    for (const auto& [at, weight] : gauss3) {
+      const double h = heading(length * at);
+      x += weight * std::cos(h), y += weight * std::sin(h);
     }
     const double end = heading(length);
     pose_ = {pose_.x_m + length * x, pose_.y_m + length * y, end};

@@ -16,6 +16,10 @@ struct BrokenLimit {
   double allowed = 0;
 };
 
+// Whether both wheels turn so slowly that their dry friction, which the drive model smooths through
+// standstill, is missing: what the motors then seem to bear is not what a robot's motors bear.
+bool creeps(const std::array<double, 2>& wheel_speed_rad_s);
+
 // The greatest of what a motion reaches, of all that limits bound.
 struct Peaks {
   double peak_speed_m_s = 0;
@@ -25,9 +29,10 @@ struct Peaks {
   double peak_current_a = 0, peak_voltage_v = 0;  // of the armatures
 
   void reach(const Peaks& other);
-  // What wheels and armatures do at an instant.
+  // What wheels and armatures do at an instant; armatures only unless the wheels creep.
   void reach(const std::array<double, 2>& wheel_speed_rad_s, const dynamics::PowerFlow<double>& flow);
-  // The limits broken by more than rounding, in the order above.
+  // The limits broken by more than rounding, in the order above: by 1e-6 of them, where the slope of rounded
+  // speeds tells, acceleration, current and voltage, by 1.5e-3.
   std::vector<BrokenLimit> beyond(const Limits& limits) const;
 };
 

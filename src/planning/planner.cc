@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
+#include <utility>
 
+#include "planning/gauss.h"
 #include "planning/root.h"
 #include "planning/run_planner.h"
 
@@ -15,15 +18,17 @@ namespace {
 // `least_s` is told rounded up, so that it can be asked for.
 tl::unexpected<Error> too_soon(double deadline_s, double least_s) {
   return fail(Fault::infeasible, "deadline_s",
-              fmt::format("is {} s, the limits allow no less than {:.4f} s", deadline_s,
-                          std::ceil(least_s * 1e4) / 1e4));
+              fmt::format("is {} s, the limits allow no less than {:.6f} s", deadline_s,
+                          std::ceil(least_s * 1e6) / 1e6));
 }
+
+constexpr double at_once_w = std::numeric_limits<double>::infinity();  // the price of the fastest motion
 
 // Everything that one request needs: its runs, each with its solver, and the dwells between them.
 class Request {
  public:
   static Result<Request> make(const robot::RobotModel& robot, const DriveLoads& loads, const Path& path,
-                              const Problem& problem) {
+                              const Problem& problem, const std::stop_token& stop) {
     if (path.runs.empty() && path.dwell_s() == 0) return invalid("path", "has neither way nor dwell");
     const auto& l = problem.limits;
     for (auto [name, value] : {std::pair{"limits/speed_m_s", l.speed_m_s},
@@ -55,8 +60,10 @@ class Request {
     if (moving_end && (path.runs.empty() || path.runs.back().turn != 0 || path.dwell_after_s > 0)) {
       return invalid("end_speed_m_s", "must be 0 where the path ends with a stop or a turn in place");
     }
-    Request request(loads, path, problem);
+    Request request(loads, path, problem, stop);
+    request.runs_.reserve(path.runs.size());
     for (std::size_t k = 0; k < path.runs.size(); ++k) {
+      if (stop.stop_requested()) return stopped();
       const Run& run = path.runs[k];
       if (robot.limits.payload_kg > 0 && run.payload_kg > robot.limits.payload_kg) {
         return fail(Fault::infeasible, "payload_kg",
@@ -72,13 +79,15 @@ class Request {
     return request;
   }
 
-  // Solves every run at one price of time.
+  // Solves every run at one price of time; as fast as the limits allow at an infinite one.
   Result<void> solve(double price_w) {
     price_w_ = price_w;
     answers_.clear();
+    answers_.reserve(runs_.size());
     for (RunPlanner& run : runs_) {
-      auto answer = run.solve(price_w);
+      auto answer = run.solve(price_w, stop_);
       if (!answer) return tl::unexpected(std::move(answer.error()));
+      if (brief() && run.uniform()) answer->forget_motion();
       answers_.push_back(std::move(*answer));
     }
     shortest_s_ = least_time_s();
@@ -94,16 +103,19 @@ class Request {
 
   // Solves at the value of time, or at the price that meets the deadline.
   Result<void> solve() {
-    if (auto ok = solve(problem_.value_of_time_w); !ok) return ok;
-    if (!problem_.deadline_s || duration_s() <= *problem_.deadline_s) return {};
-    return meet(*problem_.deadline_s, 1e-4 * *problem_.deadline_s);
-  }
-
-  // The shortest time is known as finely as the grids are, which become finer while solving: a deadline found
-  // to be beyond reach on the way is refused as one that was known to be.
-  Result<void> within_reach(double deadline) const {
-    if (deadline >= shortest_s_ * (1 + 1e-6)) return {};
-    return too_soon(deadline, shortest_s_ * (1 + 1e-5));
+    auto solved = solve(problem_.value_of_time_w);
+    if (!problem_.deadline_s) return solved;
+    const double deadline = *problem_.deadline_s;
+    if (!solved) {
+      // Without idle power, friction and value of time only a deadline ends the motion.
+      if (solved.error().fault != Fault::infeasible || solved.error().field != "value_of_time_w")
+        return solved;
+      endless_ = true;
+      if (auto ok = solve(1.0); !ok) return ok;
+    } else if (duration_s() <= deadline) {
+      return {};
+    }
+    return meet(deadline, std::clamp(1e-3 * (deadline - shortest_s_), 1e-6 * deadline, 1e-4 * deadline));
   }
 
   // Whether closed forms answer every run at the value of time, and no deadline asks for more; then solved.
@@ -121,35 +133,41 @@ class Request {
 
   // Ends at most `early_s` before the deadline.
   Result<void> meet(double deadline, double early_s) {
-    if (auto ok = within_reach(deadline); !ok) return ok;
+    // The shortest time is known as finely as the grids are, which become finer while solving: a deadline
+    // found to be beyond reach on the way is refused as one that was known to be.
+    const auto beyond_reach = [&] { return deadline < shortest_s_ * (1 - 1e-9); };
+    if (beyond_reach()) return too_soon(deadline, shortest_s_);
     deadline_binds_ = true;
+    if (deadline <= shortest_s_ * (1 + 1e-7)) return solve(at_once_w);
     // log(T - T_min) falls nearly linearly in log(idle + price): a bracket there, drawn in by the secant
     // through its ends (Illinois) or, where that stalls, by halving. Done a little
     // early.
-    const double idle = std::max(loads_.electric().idle_w, 1e-3 * average_power_w());
+    const double idle = endless_ ? 0 : std::max(loads_.electric().idle_w, 1e-3 * average_power_w());
     const auto late = [&] {
       return std::log(std::max(1e-12, duration_s() - shortest_s_) / (deadline - shortest_s_));
     };
     const auto met = [&] { return duration_s() <= deadline && duration_s() > deadline - early_s; };
     const auto at = [&](double x) -> Result<void> {
       if (auto ok = solve(std::exp(x) - idle); !ok) return ok;
-      return within_reach(deadline);
+      if (beyond_reach()) return too_soon(deadline, shortest_s_);
+      return {};
     };
+    constexpr double steepest = 40;  // e^40 W: no price of time is higher
     double slow = std::log(idle + price_w_), late_slow = late(), fast = slow, late_fast = late_slow;
-    for (int k = 0; k < 40 && late_slow <= 0; ++k) {  // a Pareto front asks from the fast side
+    for (int k = 0; k < 60 && late_slow <= 0; ++k) {  // a Pareto front asks from the fast side
       fast = slow, late_fast = late_slow;
-      slow = std::max(slow - 0.7, std::log(idle + problem_.value_of_time_w));
+      slow = endless_ ? slow - 1 : std::max(slow - 0.7, std::log(idle + problem_.value_of_time_w));
       if (auto ok = at(slow); !ok) return ok;
       late_slow = late();
     }
-    for (int k = 0; k < 40 && late_fast > 0; ++k) {
+    while (late_fast > 0 && fast < steepest) {
       slow = fast, late_slow = late_fast;
       fast += std::clamp(1.2 * late_fast, 0.3, 3.0);
       if (auto ok = at(fast); !ok) return ok;
       late_fast = late();
     }
     int side = 0;
-    for (int k = 0; k < 60 && !met(); ++k) {
+    for (int k = 0; k < 60 && late_fast <= 0 && !met(); ++k) {
       const double aim = 0.5 * early_s / (deadline - shortest_s_);
       double x = slow + (fast - slow) * (late_slow + aim) / (late_slow - late_fast);
       if (k % 4 == 3 || !(x > slow && x < fast)) x = 0.5 * (slow + fast);
@@ -169,7 +187,8 @@ class Request {
     if (met()) return {};
     if (auto ok = at(fast); !ok) return ok;
     if (duration_s() <= deadline) return {};
-    return fail(Fault::internal, "deadline_s", "the price of time that meets the deadline was not found");
+    // Closer to the shortest time than any finite price comes.
+    return solve(at_once_w);
   }
 
   double duration_s() const {
@@ -187,32 +206,37 @@ class Request {
   PlanCost cost() const {
     PlanCost cost{energy_j(), duration_s(), price_w_, 0, true};
     for (std::size_t k = 0; k < runs_.size(); ++k) {
-      cost.closed_form = cost.closed_form && answers_[k].line.has_value();
+      cost.closed_form = cost.closed_form && answers_[k].method != Method::interior_point;
       if (runs_[k].run().turn == 0)
-        cost.peak_speed_m_s = std::max(cost.peak_speed_m_s, answers_[k].peak_speed());
+        cost.peak_speed_m_s = std::max(cost.peak_speed_m_s, answers_[k].peak_speed);
     }
     return cost;
   }
 
-  Plan written() const;
+  Result<Plan> written();
 
  private:
-  Request(const DriveLoads& loads, const Path& path, const Problem& problem)
-      : loads_(loads), path_(path), problem_(problem) {}
+  Request(const DriveLoads& loads, const Path& path, const Problem& problem, std::stop_token stop)
+      : loads_(loads), path_(path), problem_(problem), stop_(std::move(stop)) {}
+
+  // Long paths keep no motion that can be found again when it is written.
+  bool brief() const { return runs_.size() > 100; }
 
   const DriveLoads& loads_;
   const Path& path_;
   const Problem& problem_;
+  std::stop_token stop_;
   std::vector<RunPlanner> runs_;
   std::vector<RunAnswer> answers_;
   double dwell_s_ = 0, shortest_s_ = 0, price_w_ = 0;
   bool deadline_binds_ = false;
+  bool endless_ = false;  // without a price of time
 };
 
 // Writes rows and integrates the drive model's power flow along them.
 class Writer {
  public:
-  explicit Writer(const DriveLoads& loads) : loads_(loads) {}
+  Writer(const DriveLoads& loads, bool rows) : loads_(loads), rows_(rows) {}
 
   struct State {
     double way = 0, speed = 0, acceleration = 0;
@@ -227,17 +251,14 @@ class Writer {
       here_ = loads_.instant(run, run.at(0), 0, 1, 1);
       pace_ = here_.wheel_speed_rad_s;
     }
-    reserve(plan_.profile.size() + times.size());
+    if (rows_) reserve(plan_.profile.size() + times.size());
     for (std::size_t k = 0; k < times.size(); ++k) {
       const bool last = k + 1 == times.size();
       const State s = last ? at(k - 1, 1.0) : at(k, 0.0);
       row(planner, s, start_s_ + times[k]);
       if (last) break;
       const double span = times[k + 1] - times[k];
-      for (const double node : gauss) {
-        const State g = at(k, 0.5 * (1 + node));
-        add(flow(planner, g), 0.5 * span);
-      }
+      for (const auto& [place, weight] : gauss2) add(flow(planner, at(k, place)), weight * span);
     }
     if (run.turn == 0) driven_m_ += run.length();
     start_s_ += times.back();
@@ -260,9 +281,8 @@ class Writer {
   Plan& plan() { return plan_; }
 
  private:
-  // Exact for power that is cubic in time: a quadratic of the speed, and drag, at constant acceleration.
-  static constexpr std::array<double, 2> gauss{-0.5773502691896258, 0.5773502691896258};
-
+  // Two places a span: exact for power that is cubic in time, a quadratic of the speed, and drag, at constant
+  // acceleration.
   dynamics::PowerFlow<double> flow(const RunPlanner& planner, const State& s) {
     if (uniform_) {
       for (std::size_t side : {0u, 1u}) {
@@ -310,6 +330,11 @@ class Writer {
 
   void push(double time_s, double distance_m, const Pose& pose, double speed, double yaw, double acceleration,
             double yaw_acceleration, double payload_kg, double power_w) {
+    Summary& s = plan_.summary;
+    s.peak_speed_m_s = std::max(s.peak_speed_m_s, speed);
+    s.peak_yaw_rate_rad_s = std::max(s.peak_yaw_rate_rad_s, std::fabs(yaw));
+    s.peak_power_w = std::max(s.peak_power_w, power_w);
+    if (!rows_) return;
     Profile& p = plan_.profile;
     p.time_s.push_back(time_s);
     p.distance_m.push_back(distance_m);
@@ -319,13 +344,10 @@ class Writer {
     p.payload_kg.push_back(payload_kg);
     p.power_w.push_back(power_w);
     p.energy_j.push_back(plan_.summary.energy_j);
-    Summary& s = plan_.summary;
-    s.peak_speed_m_s = std::max(s.peak_speed_m_s, speed);
-    s.peak_yaw_rate_rad_s = std::max(s.peak_yaw_rate_rad_s, std::fabs(yaw));
-    s.peak_power_w = std::max(s.peak_power_w, power_w);
   }
 
   const DriveLoads& loads_;
+  const bool rows_;
   Plan plan_;
   // Of a run whose loads are the same all along: its instant but for the motion, and the wheels' turning a
   // unit of way.
@@ -335,22 +357,26 @@ class Writer {
   double start_s_ = 0, driven_m_ = 0;
 };
 
-Plan Request::written() const {
-  Writer writer(loads_);
+Result<Plan> Request::written() {
+  Writer writer(loads_, problem_.rows);
   Certificate& c = writer.plan().certificate;
-  bool closed = false, numeric = false;
   std::array<bool, bound_count> binding{};
   Pose pose;
   for (std::size_t k = 0; k < runs_.size(); ++k) {
+    if (stop_.stop_requested()) return stopped();
     const RunPlanner& planner = runs_[k];
     const Run& run = planner.run();
-    const RunAnswer& answer = answers_[k];
+    RunAnswer& answer = answers_[k];
+    if (!answer.has_motion()) {
+      auto again = runs_[k].solve(price_w_, stop_);
+      if (!again) return tl::unexpected(std::move(again.error()));
+      answer = std::move(*again);
+    }
     writer.plan().run_duration_s.push_back(answer.duration_s);
     writer.dwell(run.dwell_before_s, run.knots.front().pose, run.payload_kg);
     pose = run.knots.back().pose;
     std::vector<double> times;
     if (answer.line) {
-      closed = true;
       const LineMotion& line = *answer.line;
       times = line.times(std::max<std::size_t>(8, problem_.intervals_per_run));
       writer.run(planner, times, [&](std::size_t i, double f) {
@@ -359,21 +385,24 @@ Plan Request::written() const {
         return Writer::State{s.position, std::max(0.0, s.speed), s.acceleration};
       });
     } else {
-      numeric = true;
-      const auto& nodes = planner.nodes();
-      std::vector<double> speed(answer.z.size());
-      for (std::size_t i = 0; i < speed.size(); ++i) speed[i] = std::sqrt(answer.z[i]);
+      const std::vector<double>&way = answer.way, &speed = answer.speed;
       times.push_back(0);
-      for (std::size_t i = 0; i + 1 < nodes.size(); ++i) {
-        times.push_back(times.back() + 2 * (nodes[i + 1] - nodes[i]) / (speed[i] + speed[i + 1]));
-      }
+      for (std::size_t i = 0; i + 1 < way.size(); ++i)
+        times.push_back(times.back() + 2 * (way[i + 1] - way[i]) / (speed[i] + speed[i + 1]));
       writer.run(planner, times, [&](std::size_t i, double f) {
         const double span = times[i + 1] - times[i], a = (speed[i + 1] - speed[i]) / span,
                      v = speed[i] + f * span * a;
-        return Writer::State{nodes[i] + f * span * 0.5 * (speed[i] + v), v, a};
+        return Writer::State{way[i] + f * span * 0.5 * (speed[i] + v), v, a};
       });
       c.discretisation_j += answer.discretisation_j;
     }
+    if (brief()) answer.forget_motion();
+    if (writer.plan().profile.size() > most_rows) {
+      return fail(Fault::too_large, "columns",
+                  fmt::format("the motion has more than {} rows; ask for it without columns, or in parts",
+                              most_rows));
+    }
+    c.method = k == 0 || c.method == answer.method ? answer.method : Method::mixed;
     c.gap_j += answer.gap_j;
     c.residual = std::max(c.residual, answer.residual);
     c.convex = c.convex && answer.convex;
@@ -381,7 +410,6 @@ Plan Request::written() const {
     for (std::size_t b = 0; b < bound_count; ++b) binding[b] = binding[b] || answer.binding[b];
   }
   writer.dwell(path_.dwell_after_s, pose, path_.final_payload_kg);
-  c.method = closed && numeric ? Method::mixed : numeric ? Method::interior_point : Method::closed_form;
   c.time_multiplier_w = price_w_;
   c.shortest_time_s = least_time_s();
   binding[static_cast<std::size_t>(Bound::deadline)] = deadline_binds_;
@@ -412,6 +440,8 @@ std::string_view name_of(Method method) {
   switch (method) {
     case Method::closed_form:
       return "closed_form";
+    case Method::quadrature:
+      return "quadrature";
     case Method::interior_point:
       return "interior_point";
     case Method::mixed:
@@ -432,8 +462,8 @@ Result<Planner> Planner::make(const robot::RobotModel& robot, std::optional<doub
   return Planner(robot, std::move(*loads));
 }
 
-Result<Plan> Planner::plan(const Path& path, const Problem& problem) const {
-  auto request = Request::make(robot_, loads_, path, problem);
+Result<Plan> Planner::plan(const Path& path, const Problem& problem, std::stop_token stop) const {
+  auto request = Request::make(robot_, loads_, path, problem, stop);
   if (!request) return tl::unexpected(std::move(request.error()));
   if (auto solved = request->solve(); !solved) return tl::unexpected(std::move(solved.error()));
   return request->written();
@@ -441,26 +471,28 @@ Result<Plan> Planner::plan(const Path& path, const Problem& problem) const {
 
 std::optional<Plan> Planner::plan_at_once(const Path& path, const Problem& problem) const {
   if (path.runs.size() != 1 || !loads_.uniform(path.runs[0])) return std::nullopt;
-  auto request = Request::make(robot_, loads_, path, problem);
+  auto request = Request::make(robot_, loads_, path, problem, {});
   if (!request || !request->solve_at_once()) return std::nullopt;
-  return request->written();
+  auto plan = request->written();
+  if (!plan) return std::nullopt;
+  return std::move(*plan);
 }
 
-Result<PlanCost> Planner::cost(const Path& path, const Problem& problem) const {
-  auto request = Request::make(robot_, loads_, path, problem);
+Result<PlanCost> Planner::cost(const Path& path, const Problem& problem, std::stop_token stop) const {
+  auto request = Request::make(robot_, loads_, path, problem, stop);
   if (!request) return tl::unexpected(std::move(request.error()));
   if (auto solved = request->solve(); !solved) return tl::unexpected(std::move(solved.error()));
   return request->cost();
 }
 
-Result<double> Planner::needed_speed(const Path& path, const Problem& problem) const {
+Result<double> Planner::needed_speed(const Path& path, const Problem& problem, std::stop_token stop) const {
   if (!problem.deadline_s) return invalid("deadline_s", "is required");
   const double deadline = *problem.deadline_s;
   Problem limited = problem;
   // Seconds late under a speed limit; the end speeds must remain allowed.
   const auto late = [&](double speed) -> Result<double> {
     limited.limits.speed_m_s = speed;
-    const auto request = Request::make(robot_, loads_, path, limited);
+    const auto request = Request::make(robot_, loads_, path, limited, stop);
     if (!request) return tl::unexpected(request.error());
     return request->least_time_s() - deadline;
   };
@@ -497,10 +529,10 @@ Result<double> Planner::needed_speed(const Path& path, const Problem& problem) c
   return 1 / pace;
 }
 
-Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& problem,
-                                              std::size_t count) const {
+Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& problem, std::size_t count,
+                                              std::stop_token stop) const {
   if (count < 2) return invalid("count", "must be at least 2");
-  auto request = Request::make(robot_, loads_, path, problem);
+  auto request = Request::make(robot_, loads_, path, problem, stop);
   if (!request) return tl::unexpected(std::move(request.error()));
   if (auto solved = request->solve(problem.value_of_time_w); !solved)
     return tl::unexpected(std::move(solved.error()));
@@ -526,10 +558,11 @@ Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& p
   return front;
 }
 
-Result<Plan> plan(const robot::RobotModel& robot, const Path& path, const Problem& problem) {
+Result<Plan> plan(const robot::RobotModel& robot, const Path& path, const Problem& problem,
+                  std::stop_token stop) {
   auto planner = Planner::make(robot, problem.regeneration);
   if (!planner) return tl::unexpected(std::move(planner.error()));
-  return planner->plan(path, problem);
+  return planner->plan(path, problem, std::move(stop));
 }
 
 }  // namespace joulecast::planning

@@ -35,6 +35,7 @@ struct Problem {
   std::optional<double>
       regeneration;  // fraction of braking power that returns, 0 to 1; else the robot's effects say
   std::size_t intervals_per_run = 64;  // speed grid of a run whose power does not change along its way
+  bool rows = true;                    // whether the plan carries its profile
 };
 
 }  // namespace joulecast::planning

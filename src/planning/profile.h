@@ -36,7 +36,7 @@ struct Summary {
   double recovered_j = 0;  // of it, what reached the battery
 };
 
-enum class Method { closed_form, interior_point, mixed };
+enum class Method { closed_form, quadrature, interior_point, mixed };
 std::string_view name_of(Method method);
 
 enum class Bound { speed, yaw_rate, wheel_speed, acceleration, current, voltage, deadline };
@@ -50,8 +50,9 @@ struct Certificate {
   // complementarity gap of the multipliers plus what smoothing the regeneration kink can hide. Holds globally
   // when `convex`; otherwise near this answer.
   double gap_j = 0;
-  // How far the grid's optimum may lie above the continuous one: Richardson's estimate from two grids; on the
-  // way's own knots, from none.
+  // How far the answer may lie above the optimum of a continuous acceleration. By quadrature, the integral of
+  // what each cell's constant acceleration costs more than the best at each speed; of a grid, what one of
+  // half as many cells costs more, three times Richardson's estimate.
   double discretisation_j = 0;
   double residual = 0;  // largest stationarity residual over the cost, 0 for the closed form to rounding
   bool convex = true;

@@ -32,4 +32,14 @@ double zero_between(F&& f, double low, double f_low, double high, double f_high,
   return a;
 }
 
+// The last place between `low`, where `holds` does, and `high`, where it does not, by bisection.
+template <class Predicate>
+double last_that(Predicate&& holds, double low, double high, int halvings) {
+  for (int k = 0; k < halvings; ++k) {
+    const double middle = 0.5 * (low + high);
+    (holds(middle) ? low : high) = middle;
+  }
+  return low;
+}
+
 }  // namespace joulecast::planning

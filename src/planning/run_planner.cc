@@ -4,21 +4,41 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
+
+#include "planning/peaks.h"
 
 namespace joulecast::planning {
 namespace {
 
 constexpr std::size_t most_cells = 200'000;
 
+constexpr double coarse_tolerance = 1e-5, fine_tolerance = 1e-6;  // of the cost
+
 std::string number(double x) {
   return std::to_string(x);
 }
 
+// What a robot draws that stands with its friction to overcome [W].
+double standing_power_w(const SpeedGrid& grid) {
+  double sum = grid.electric.idle_w;
+  for (const std::size_t s : {0u, 1u}) {
+    const WheelLoad& w = grid.load(0)[s];
+    const double torque = w.t0 + w.gear * std::fabs(w.t0) + w.f0 + w.stribeck;
+    sum += grid.electric.copper_w_n2_m2[s] * torque * torque;
+  }
+  return sum;
+}
+
 }  // namespace
 
-double RunAnswer::peak_speed() const {
-  if (line) return line->peak_speed();
-  return z.empty() ? 0 : std::sqrt(*std::max_element(z.begin(), z.end()));
+void RunAnswer::forget_motion() {
+  line.reset();
+  way = {}, speed = {};
+}
+
+tl::unexpected<Error> stopped() {
+  return fail(Fault::stopped, "", "the answer is no longer wanted");
 }
 
 // The squared speed that speed, yaw rate and wheel speed limits allow.
@@ -96,8 +116,37 @@ void RunPlanner::find_line() {
                          !motors_break(top, -most) && !motors_break(top, most));
   shortest_s_ = std::max(start_, end_) <= top ? shortest_time_within(task, top, most)
                                               : std::numeric_limits<double>::infinity();
-  if (std::fabs(start_ * start_ - end_ * end_) > 2 * most * task.distance)
+  if (std::fabs(start_ * start_ - end_ * end_) > 2 * most * task.distance * (1 + 1e-9))
     shortest_s_ = std::numeric_limits<double>::infinity();
+}
+
+// Prepares the quadrature over the speed.
+void RunPlanner::find_motion() {
+  UniformTask task;
+  task.loads = loads_here_;
+  task.electric = loads_->electric();
+  task.distance = run_->length();
+  task.start_speed = start_, task.end_speed = end_;
+  task.speed_limit = std::sqrt(ceiling_at(0));
+  task.acceleration_limit = acceleration_limit();
+  task.torque_limit_nm = problem_->limits.current_a * task.electric.torque_constant_nm_a;
+  task.voltage_limit_v = problem_->limits.voltage_v;
+  task.cells = std::max<std::size_t>(8, problem_->intervals_per_run);
+  if (auto motion = UniformMotion::make(task)) motion_ = std::make_unique<UniformMotion>(std::move(*motion));
+}
+
+RunAnswer RunPlanner::answer_of(SteppedMotion motion) const {
+  RunAnswer answer;
+  answer.method = Method::quadrature;
+  answer.peak_speed = *std::max_element(motion.speed.begin(), motion.speed.end());
+  answer.way = std::move(motion.way), answer.speed = std::move(motion.speed);
+  answer.duration_s = motion.duration_s, answer.energy_j = motion.energy_j;
+  answer.discretisation_j = motion.discretisation_j;
+  answer.binding = motion.binding;
+  constexpr auto speed = static_cast<std::size_t>(Bound::speed);
+  if (std::exchange(answer.binding[speed], false))
+    answer.binding[static_cast<std::size_t>(ceiling_bound(0))] = true;
+  return answer;
 }
 
 void RunPlanner::build(std::vector<double> nodes) {
@@ -127,6 +176,7 @@ void RunPlanner::build(std::vector<double> nodes) {
   solver_.reset();
   grid_ = std::move(grid);
   envelope_ = std::make_unique<SpeedEnvelope>(speed_envelope(*grid_));
+  shortest_s_ = envelope_->shortest_s;
 }
 
 Result<void> RunPlanner::check_feasible() const {
@@ -334,6 +384,12 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
     planner.find_line();
     // Without motors to mind, the closed form knows what is feasible; the grid waits until it is needed.
     if (planner.line_ && planner.motors_never_break_ && std::isfinite(planner.shortest_s_)) return planner;
+    planner.find_motion();
+    if (planner.motion_ && std::isfinite(planner.motion_->shortest_s())) {
+      planner.shortest_s_ = planner.motion_->shortest_s();
+      return planner;
+    }
+    planner.motion_.reset();
   }
   if (auto ok = planner.build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
   return planner;
@@ -350,10 +406,11 @@ Result<void> RunPlanner::build_grid() {
   return check_feasible();
 }
 
-std::optional<RunAnswer> RunPlanner::closed_form(double price_w) const {
+std::optional<RunAnswer> RunPlanner::closed_form(double price_w, double length) const {
   if (!line_) return {};
   const Electric& e = loads_->electric();
   LineTask task = *line_;
+  task.distance = length;
   task.value_of_time_w = price_w;
   const double ceiling = std::sqrt(ceiling_at(0));
   const auto line = line_within(task, ceiling, acceleration_limit());
@@ -376,7 +433,8 @@ std::optional<RunAnswer> RunPlanner::closed_form(double price_w) const {
   answer.residual = line->residual_w() / (task.power.c0 + price_w);
   answer.binding[static_cast<std::size_t>(Bound::acceleration)] = line->holds_acceleration();
   if (top >= ceiling * (1 - 1e-9)) answer.binding[static_cast<std::size_t>(ceiling_bound(0))] = true;
-  answer.line = *line;
+  answer.peak_speed = top;
+  answer.line = std::make_unique<LineMotion>(*line);
   return answer;
 }
 
@@ -387,20 +445,27 @@ bool RunPlanner::tighten(const std::vector<double>& z) {
   bool any = false;
   for (std::size_t k = 0; k < n; ++k) {
     const double q = (z[k + 1] - z[k]) / (2 * grid_->step[k]);
-    double excess = 0;
-    for (double f : {0.001, 0.999}) {
+    const auto use = [&](double f, double acceleration) {
       const double way = nodes_[k] + f * grid_->step[k], v = std::sqrt(z[k] + f * (z[k + 1] - z[k]));
       const double slope = run_->turn == 0 ? run_->curvature_slope(way) : 0;
-      const auto flow = loads_->model().flow(loads_->instant(*run_, run_->at(way), slope, v, q));
+      const auto at = loads_->instant(*run_, run_->at(way), slope, v, acceleration);
+      if (creeps(at.wheel_speed_rad_s)) return 0.0;
+      const auto flow = loads_->model().flow(at);
+      double most = 0;
       for (std::size_t s : {0u, 1u}) {
-        excess = std::max(excess, std::fabs(flow.torque_nm[s]) / grid_->torque_limit_nm - 1);
-        excess = std::max(excess, std::fabs(flow.voltage_v[s]) / grid_->voltage_limit_v - 1);
+        most = std::max({most, std::fabs(flow.torque_nm[s]) / grid_->torque_limit_nm,
+                         std::fabs(flow.voltage_v[s]) / grid_->voltage_limit_v});
       }
-    }
-    if (excess > 1e-4) {
+      return most;
+    };
+    const double excess = std::max(use(0.001, q), use(0.999, q)) - 1, holding = use(0.5, 0);
+    if (excess > UniformMotion::motor_tolerance) {
       if (grid_->motor_share.empty()) grid_->motor_share.assign(n, 1);
-      grid_->motor_share[k] *= (1 - 1e-5) / (1 + excess);
-      any = true;
+      double& share = grid_->motor_share[k];
+      // A steady speed must stay possible.
+      const double less = std::max(share * (1 - 1e-5) / (1 + excess), std::min(share, 1.001 * holding));
+      any = any || less < share;
+      share = less;
     }
   }
   if (any) {
@@ -410,53 +475,92 @@ bool RunPlanner::tighten(const std::vector<double>& z) {
   return any;
 }
 
-Result<RunAnswer> RunPlanner::solve(double price_w) {
+Result<RunAnswer> RunPlanner::solve(double price_w, const std::stop_token& stop) {
+  if (stop.stop_requested()) return stopped();
+  if (!std::isfinite(price_w)) return fastest();
   if (auto answer = closed_form(price_w)) return std::move(*answer);
-  const double idle = loads_->electric().idle_w;
+  if (uniform_ && !motion_ && !grid_) find_motion();
+  if (motion_) {
+    auto motion = motion_->solve(price_w);
+    if (!motion) return tl::unexpected(std::move(motion.error()));
+    return answer_of(std::move(*motion));
+  }
   if (!grid_) {
     if (auto ok = build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
   }
+  const auto solution = solve_grid(price_w, stop);
+  if (!solution) return tl::unexpected(solution.error());
+  return answer_of(*solution, price_w);
+}
+
+Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_token& stop) {
+  if (const double standing = standing_power_w(*grid_) + price_w; !(standing > 0)) return endless(standing);
   if (!solver_) solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
-  SpeedSolution s;
-  int iterations = 0;
-  if (!refined_) {
-    // A coarse solution starts the fine one, places its nodes where they are free, and by Richardson tells
-    // its error: order 2.
-    s = solver_->solve(price_w, 1e-5);
-    iterations = s.iterations;
-    if (s.converged) {
-      const std::vector<double> coarse_nodes = nodes_, coarse = s.z;
-      const double coarse_cost = s.cost_j;
-      build(uniform_ ? refined_nodes(coarse, std::max<std::size_t>(8, problem_->intervals_per_run))
-                     : std::move(fine_nodes_));
-      if (auto ok = check_feasible(); !ok) return tl::unexpected(std::move(ok.error()));
-      solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
-      solver_->start_from(resampled(coarse_nodes, coarse, nodes_));
-      s = solver_->solve(price_w);
-      discretisation_j_ = std::fabs(coarse_cost - s.cost_j) / 3;
-      refined_ = true;
-    }
-  } else {
-    s = solver_->solve(price_w);
-  }
-  for (int round = 0; round < 4 && s.converged; ++round) {
-    if (!solver_->bounds_motors() || !tighten(s.z)) break;
+  SpeedSolution s = solver_->solve(price_w, refined_ ? fine_tolerance : coarse_tolerance, stop);
+  int iterations = s.iterations;
+  if (!refined_ && s.converged) {
+    // A coarse solution starts the fine one, places its nodes where they are free, and tells its error.
+    const std::vector<double> coarse_nodes = nodes_, coarse = s.z;
+    const double coarse_cost = s.cost_j;
+    build(uniform_ ? refined_nodes(coarse, std::max<std::size_t>(8, problem_->intervals_per_run))
+                   : std::move(fine_nodes_));
     if (auto ok = check_feasible(); !ok) return tl::unexpected(std::move(ok.error()));
+    solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
+    solver_->start_from(resampled(coarse_nodes, coarse, nodes_));
+    s = solver_->solve(price_w, fine_tolerance, stop);
     iterations += s.iterations;
-    s = solver_->solve(price_w);
+    discretisation_j_ = std::fabs(coarse_cost - s.cost_j);
+    refined_ = true;
   }
+  const double before_tightening = s.cost_j;
+  for (int round = 0; round < 4 && s.converged && solver_->bounds_motors() && tighten(s.z); ++round) {
+    if (auto ok = check_feasible(); !ok) return tl::unexpected(std::move(ok.error()));
+    s = solver_->solve(price_w, fine_tolerance, stop);
+    iterations += s.iterations;
+  }
+  if (stop.stop_requested()) return stopped();
   if (!s.converged) {
-    return fail(Fault::internal, "path", "the speed profile of a run did not converge");
+    s = best_capped(price_w);
+    if (s.z.empty()) return fail(Fault::internal, "path", "the speed profile of a run did not converge");
+    return s;
   }
+  discretisation_j_ += std::max(0.0, s.cost_j - before_tightening);
+  s.iterations = iterations;
+  return s;
+}
+
+// Where the solver finds nothing: the cheapest of the fastest profiles under lower and lower ceilings.
+// Nothing bounds the optimum from below then but that energy is not negative.
+SpeedSolution RunPlanner::best_capped(double price_w) {
+  SpeedSolution best;
+  best.cost_j = std::numeric_limits<double>::infinity();
+  SpeedGrid capped = *grid_;
+  capped.motor_share.clear();
+  for (double part = 1; part > 1e-3; part *= 0.95) {
+    for (std::size_t k = 1; k + 1 < nodes_.size(); ++k) capped.ceiling[k] = part * part * grid_->ceiling[k];
+    const SpeedEnvelope envelope = speed_envelope(capped);
+    if (!envelope.feasible) break;
+    const double cost = SpeedSolver(capped, envelope).cost_j(envelope.fastest, price_w);
+    if (!(cost < best.cost_j)) continue;
+    best.z = envelope.fastest, best.cost_j = best.gap_j = cost, best.duration_s = envelope.shortest_s;
+  }
+  best.convex = false;
+  return best;
+}
+
+RunAnswer RunPlanner::answer_of(const SpeedSolution& s, double price_w) const {
   RunAnswer answer;
-  answer.z = s.z;
+  answer.method = Method::interior_point;
+  answer.way = nodes_;
+  for (const double z : s.z) answer.speed.push_back(std::sqrt(z));
+  answer.peak_speed = *std::max_element(answer.speed.begin(), answer.speed.end());
   answer.duration_s = s.duration_s;
   answer.energy_j = s.cost_j - price_w * s.duration_s;
   answer.gap_j = s.gap_j;
   answer.discretisation_j = discretisation_j_;
   answer.residual = s.residual;
-  answer.convex = s.convex && idle + price_w >= 0;
-  answer.iterations = iterations + s.iterations;
+  answer.convex = s.convex && loads_->electric().idle_w + price_w >= 0;
+  answer.iterations = s.iterations;
   answer.binding = s.binding;
   if (s.binding[static_cast<std::size_t>(Bound::speed)]) {
     // Tell which of the limits behind the ceiling it was, where the profile is closest to it.
@@ -468,6 +572,27 @@ Result<RunAnswer> RunPlanner::solve(double price_w) {
     }
   }
   return answer;
+}
+
+Result<RunAnswer> RunPlanner::fastest() {
+  if (uniform_ && !motion_ && !grid_) find_motion();
+  if (motion_) {
+    auto motion = motion_->fastest();
+    if (!motion)
+      return fail(Fault::infeasible, "deadline_s",
+                  "is the shortest time, which needs a limit of acceleration");
+    return answer_of(std::move(*motion));
+  }
+  if (!grid_) {
+    if (auto ok = build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
+  }
+  grid_->motor_share.clear();
+  const SpeedEnvelope envelope = speed_envelope(*grid_);
+  SpeedSolution solution;
+  solution.z = envelope.fastest;
+  solution.duration_s = envelope.shortest_s;
+  solution.cost_j = SpeedSolver(*grid_, envelope).cost_j(solution.z, 0);
+  return answer_of(solution, 0);
 }
 
 }  // namespace joulecast::planning

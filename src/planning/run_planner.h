@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <vector>
 
 #include "planning/limited_line.h"
@@ -10,22 +11,29 @@
 #include "planning/problem.h"
 #include "planning/profile.h"
 #include "planning/speed_solver.h"
+#include "planning/uniform_motion.h"
 
 namespace joulecast::planning {
 
 // The optimum of one run at one price of time.
 struct RunAnswer {
-  std::optional<LineMotion> line;  // closed form, over the run's coordinate
-  std::vector<double> z;           // else squared speeds at `nodes`
-  double energy_j = 0;             // on the solver's own quadrature, idle power included
+  Method method = Method::closed_form;
+  std::unique_ptr<LineMotion> line;  // closed form, over the run's coordinate
+  std::vector<double> way, speed;    // else nodes of it, the acceleration being constant in between
+  double energy_j = 0;               // on the solver's own quadrature, idle power included
   double duration_s = 0;
   double gap_j = 0, discretisation_j = 0, residual = 0;
   bool convex = true;
   int iterations = 0;
   std::array<bool, bound_count> binding{};
 
-  double peak_speed() const;  // along the run's coordinate
+  double peak_speed = 0;  // along the run's coordinate
+
+  bool has_motion() const { return line || !way.empty(); }
+  void forget_motion();
 };
+
+tl::unexpected<Error> stopped();
 
 // Solves one run for any price of time; keeps its grid and last solution between calls.
 class RunPlanner {
@@ -34,14 +42,17 @@ class RunPlanner {
   static Result<RunPlanner> make(const robot::RobotModel& robot, const DriveLoads& loads, const Run& run,
                                  const Problem& problem, double start_speed, double end_speed);
 
-  Result<RunAnswer> solve(double price_w);
-  // The same where the closed form answers.
-  std::optional<RunAnswer> closed_form(double price_w) const;
+  // At an infinite price as fast as the limits allow, in shortest_s(); infeasible where none bounds the
+  // acceleration.
+  Result<RunAnswer> solve(double price_w, const std::stop_token& stop = {});
+  // The same where the closed form answers, over the run's length or another one.
+  std::optional<RunAnswer> closed_form(double price_w) const { return closed_form(price_w, run_->length()); }
+  std::optional<RunAnswer> closed_form(double price_w, double length) const;
 
   const Run& run() const { return *run_; }
-  const std::vector<double>& nodes() const { return nodes_; }
-  // Of the grid once there is one, which may lengthen it by its coarseness.
-  double shortest_s() const { return envelope_ ? envelope_->shortest_s : shortest_s_; }
+  bool uniform() const { return uniform_; }  // loads are the same all along
+  // Of a grid: of the finest so far.
+  double shortest_s() const { return shortest_s_; }
 
  private:
   RunPlanner(const robot::RobotModel& robot, const DriveLoads& loads, const Run& run, const Problem& problem)
@@ -51,6 +62,12 @@ class RunPlanner {
   Bound ceiling_bound(double way) const;
   double acceleration_limit() const;
   void find_line();
+  void find_motion();
+  RunAnswer answer_of(SteppedMotion motion) const;
+  Result<RunAnswer> fastest();
+  Result<SpeedSolution> solve_grid(double price_w, const std::stop_token& stop);
+  SpeedSolution best_capped(double price_w);
+  RunAnswer answer_of(const SpeedSolution& solution, double price_w) const;
   bool motors_break(double speed, double acceleration) const;
   Result<void> build_grid();
   void build(std::vector<double> nodes);
@@ -74,6 +91,7 @@ class RunPlanner {
   bool motors_never_break_ = false;  // at any speed and acceleration within the other limits
   double shortest_s_ = 0;
   double discretisation_j_ = 0;
+  std::unique_ptr<UniformMotion> motion_;  // of a uniform run, where wanted
   std::vector<double> nodes_;
   std::vector<double> fine_nodes_;   // of a run whose loads vary along the way, until the first solve
   std::unique_ptr<SpeedGrid> grid_;  // the solver refers to them

@@ -4,132 +4,52 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "dynamics/stribeck_curve.h"
 
 namespace joulecast::planning {
+
+// The discrete problem is: minimise F(z) over the inner nodes' squared speeds, subject to g_j(z) <= 0, the
+// limits of acceleration, torque, voltage, ceiling and floor, each over its bound. F is a sum over cells, and
+// each g_j belongs to one cell, that is to two neighbouring nodes.
+//
+// With slacks s_j = -g_j the barrier problem is to minimise F - mu sum log s_j (Nocedal & Wright, Numerical
+// Optimization, 2nd ed., (19.4)); its conditions are
+//   grad F + sum y_j grad g_j = 0,   s_j y_j = mu                                              (19.2)
+// in z and multipliers y > 0. Newton's method on them, with dy eliminated (19.12-19.13), solves
+//   (Hess F + sum y_j Hess g_j + sum (y_j/s_j) grad g_j grad g_j') dz = -(grad F + sum (mu/s_j) grad g_j),
+// whose matrix is tridiagonal; then dy_j = mu/s_j - y_j + (y_j/s_j) grad g_j' dz. Slacks of linear bounds and
+// multipliers keep a share of themselves in each step (19.9); a line search makes the barrier function fall
+// (3.4); an indefinite matrix is corrected along its diagonal (Waechter & Biegler, Math. Program. 106 (2006),
+// algorithm IC). mu falls by a factor (their (7)) when its problem is about solved. As sum y_j s_j bounds
+// what F can still lose where the problem is convex, it is told as the gap.
+//
+// Where braking begins to return energy, F has terms half_jump |E|, E the energy of a motor in a cell. They
+// are smoothed to sqrt(E^2 + width^2), the width falling with mu, and the slope E/sqrt(...) is a dual
+// variable of its own in (-1, 1), as y is; that keeps Newton's steps long at the kink (Andersen,
+// Christiansen, Conn & Overton, SIAM J. Sci. Comput. 22 (2000), sec. 3).
 namespace {
 
-double speed_of(double z0, double z1) {
-  return 0.5 * (std::sqrt(z0) + std::sqrt(z1));
-}
+constexpr double to_boundary = 0.995;         // of a slack may be used up: tau of N&W (19.9)
+constexpr double sufficient_decrease = 1e-4;  // c_1 of N&W (3.4)
+constexpr double first_correction = 1e-9;     // of the diagonal, W&B algorithm IC
+constexpr double correction_growth = 8;       // kappa_w+ of W&B algorithm IC
+constexpr double first_damping = 1e-4;        // of the diagonal, after a failed line search: delta_w0 of W&B
+constexpr double least_pivot = 1e-13;         // of the diagonal's terms: less is their cancellation
+constexpr double first_gap = 3e-2;            // bounds * mu over the cost, where the search begins
+constexpr double first_gap_warm = 1e-3;       // from a solution of a like problem
+constexpr double finest_gap = 1e-9;           // no tolerance is less
+constexpr double barrier_decrease = 0.2;      // kappa_mu of W&B (7)
+constexpr double quick_decrease = 0.05;       // after a full step whose decrement is below the gap
+constexpr int most_iterations = 200;
 
-// Torque of a wheel without smoothing.
-double torque_of(const WheelLoad& w, double v, double q) {
-  const double through = w.inertia * q + w.t0 + v * (w.t1 + v * w.t2);
-  double t = through + w.gear * std::fabs(through) + w.f0 + v * (w.f1 + v * w.f2);
-  if (w.stribeck != 0) t += w.stribeck * dynamics::stribeck_curve(v / w.stribeck_speed, w.stribeck_exponent);
-  return t;
-}
-
-bool motors_allow(const SpeedGrid& grid, std::size_t cell, double v, double q) {
-  for (std::size_t s : {0u, 1u}) {
-    const WheelLoad& w = grid.load(cell)[s];
-    const double t = torque_of(w, v, q);
-    if (std::fabs(t) > grid.torque_limit_nm * grid.share(cell)) return false;
-    const Electric& e = grid.electric;
-    const double volts =
-        e.resistance_ohm[s] / e.torque_constant_nm_a * t + e.voltage_constant_v_s_rad * w.pace * v;
-    if (std::fabs(volts) > grid.voltage_limit_v * grid.share(cell)) return false;
-  }
-  return true;
-}
-
-// The slowest profile whose acceleration stays within a bound; at rest in between where the way is long
-// enough.
-std::vector<double> slowest_profile(const SpeedGrid& grid, double acceleration) {
-  const std::size_t n = grid.cells();
-  std::vector<double> slowest(n + 1, 0);
-  if (!std::isfinite(acceleration)) return slowest;
-  double z = grid.start;
-  for (std::size_t k = 0; k <= n; ++k) {
-    slowest[k] = std::max(0.0, z);
-    if (k < n) z -= 2 * grid.step[k] * acceleration;
-  }
-  z = grid.end;
-  for (std::size_t k = n + 1; k-- > 0;) {
-    slowest[k] = std::max(slowest[k], z);
-    if (k > 0) z -= 2 * grid.step[k - 1] * acceleration;
-  }
-  return slowest;
+// Shortens a step so that a positive value keeps its share: N&W (19.9).
+void shorten(double value, double change, double& step) {
+  if (change < 0 && -change * step > to_boundary * value) step = to_boundary * value / -change;
 }
 
 }  // namespace
-
-double duration_of(const SpeedGrid& grid, const std::vector<double>& z) {
-  double sum = 0;
-  for (std::size_t k = 0; k < grid.cells(); ++k) sum += grid.step[k] / speed_of(z[k], z[k + 1]);
-  return sum;
-}
-
-SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
-  const std::size_t n = grid.cells();
-  SpeedEnvelope e;
-  e.fastest = grid.ceiling;
-  e.fastest.front() = grid.start;
-  e.fastest.back() = grid.end;
-
-  const bool motors = std::isfinite(grid.torque_limit_nm) || std::isfinite(grid.voltage_limit_v);
-  const auto allowed = [&](std::size_t cell, double z0, double z1) {
-    return motors_allow(grid, cell, speed_of(z0, z1), (z1 - z0) / (2 * grid.step[cell]));
-  };
-  // Where a steady speed is already too much for the motors, the ceiling is lower.
-  if (motors) {
-    for (std::size_t k = 0; k <= n; ++k) {
-      const std::size_t before = k > 0 ? k - 1 : 0, after = std::min(k, n - 1);
-      const auto fits = [&](double z) {
-        return motors_allow(grid, before, std::sqrt(z), 0) && motors_allow(grid, after, std::sqrt(z), 0);
-      };
-      if (fits(e.fastest[k])) continue;
-      double low = 0, high = e.fastest[k];
-      for (int i = 0; i < 40; ++i) {
-        const double middle = 0.5 * (low + high);
-        (fits(middle) ? low : high) = middle;
-      }
-      e.fastest[k] = low;
-    }
-  }
-  // The largest z at the far end of a cell that can be reached by speeding up from the near end; bisection
-  // only where motors bind. Slowing down is the other sweep's concern.
-  const auto reach = [&](std::size_t cell, double near, double cap, bool forward) {
-    if (cap <= near) return cap;
-    const double top = std::isfinite(grid.acceleration_limit)
-                           ? std::min(cap, near + 2 * grid.step[cell] * grid.acceleration_limit)
-                           : cap;
-    const auto fits = [&](double far) {
-      return forward ? allowed(cell, near, far) : allowed(cell, far, near);
-    };
-    if (!motors || fits(top)) return top;
-    const bool steady = fits(near);
-    double low = steady ? near : 0, high = steady ? top : near;
-    for (int k = 0; k < 40; ++k) {
-      const double middle = 0.5 * (low + high);
-      (fits(middle) ? low : high) = middle;
-    }
-    return low;
-  };
-  for (int sweep = 0; sweep < (motors ? 2 : 1); ++sweep) {
-    for (std::size_t k = 0; k < n; ++k) e.fastest[k + 1] = reach(k, e.fastest[k], e.fastest[k + 1], true);
-    for (std::size_t k = n; k-- > 0;) e.fastest[k] = reach(k, e.fastest[k + 1], e.fastest[k], false);
-  }
-  e.slowest = slowest_profile(grid, grid.acceleration_limit);
-  const double slack = 1e-9;
-  if (e.fastest.front() < grid.start * (1 - slack) || e.fastest.back() < grid.end * (1 - slack)) {
-    e.feasible = false;
-    e.broken_at = e.fastest.front() < grid.start * (1 - slack) ? 0 : n;
-    return e;
-  }
-  for (std::size_t k = 1; k < n; ++k) {
-    if (!(e.fastest[k] > e.slowest[k])) {
-      e.feasible = false;
-      e.broken_at = k;
-      return e;
-    }
-  }
-  e.shortest_s = duration_of(grid, e.fastest);
-  e.feasible = std::isfinite(e.shortest_s);
-  return e;
-}
 
 SpeedSolver::SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope)
     : grid_(grid), envelope_(envelope) {
@@ -215,7 +135,7 @@ double SpeedSolver::cost(std::size_t cell, double v, double q) const {
   return f * grid_.step[cell];
 }
 
-// visit(index, g, gv, gq, gvv, gvq, gqq, scale) for each bound g <= 0 of the cell.
+// visit(index, g, gv, gq, gvv, gvq, gqq) for each bound g <= 0 of the cell.
 template <class Visit>
 void SpeedSolver::each_bound(std::size_t cell, double v, double q, Visit&& visit) const {
   const unsigned mask = bounds_[cell];
@@ -255,7 +175,7 @@ bool SpeedSolver::inside(const std::vector<double>& z) const {
   }
   for (std::size_t k = 0; k < n; ++k) {
     bool ok = true;
-    each_bound(k, speed_of(z[k], z[k + 1]), (z[k + 1] - z[k]) / (2 * grid_.step[k]),
+    each_bound(k, mean_speed(z[k], z[k + 1]), (z[k + 1] - z[k]) / (2 * grid_.step[k]),
                [&](unsigned, double g, auto...) { ok = ok && g < 0; });
     if (!ok) return false;
   }
@@ -271,7 +191,7 @@ double SpeedSolver::merit(const std::vector<double>& z, double mu) const {
     if (product < 1e-200) logs += std::log(product), product = 1;
   };
   for (std::size_t k = 0; k < n; ++k) {
-    const double v = speed_of(z[k], z[k + 1]), q = (z[k + 1] - z[k]) / (2 * grid_.step[k]);
+    const double v = mean_speed(z[k], z[k + 1]), q = (z[k + 1] - z[k]) / (2 * grid_.step[k]);
     bool ok = true;
     each_bound(k, v, q, [&](unsigned, double g, auto...) {
       ok = ok && g < 0;
@@ -297,11 +217,60 @@ void SpeedSolver::start_from(const std::vector<double>& z) {
   started_ = true;
 }
 
+// Cost over the way of a cell, its derivatives, and its part of the kinks' gap.
+SpeedSolver::Local SpeedSolver::local(std::size_t k) {
+  const Electric& e = grid_.electric;
+  const Cell& c = cells_[k];
+  const double v = c.v, q = c.q;
+  Local l;
+  l.f = idle_ / v, l.fv = -l.f / v, l.fvv = -2 * l.fv / v;
+  l.dual_v = l.fv;
+  for (std::size_t s : {0u, 1u}) {
+    const WheelLoad& w = grid_.load(k)[s];
+    const Torque t = torque(w, v, q);
+    const double rho = e.copper_w_n2_m2[s], i = 1 / v;
+    double density = rho * t.t * i;                    // rho T/v
+    double slope = 2 * density + e.back_emf * w.pace;  // d(energy)/dT
+    double energy = (density + e.back_emf * w.pace) * t.t;
+    double direct_v = -density * t.t * i;  // d(energy)/dv at constant T
+    double bend = 2 * rho * i;             // d2/dT2
+    double cross = -2 * density * i;       // d2/dT dv
+    double direct_vv = 2 * density * t.t * i * i;
+    if (e.brush_w_nm != 0) {
+      const double width = e.brush_width_nm * e.brush_width_nm, root = std::sqrt(t.t * t.t + width);
+      const double y = e.brush_w_nm * t.t * t.t / root;
+      const double y1 = e.brush_w_nm * t.t * (t.t * t.t + 2 * width) / (root * root * root);
+      const double y2 = e.brush_w_nm * width * (2 * width - t.t * t.t) / (root * root * root * root * root);
+      energy += y * i, slope += y1 * i, bend += std::max(0.0, y2) * i;
+      direct_v -= y * i * i, cross -= y1 * i * i, direct_vv += 2 * y * i * i * i;
+    }
+    const double ev = direct_v + slope * t.tv, eq = slope * t.tq;
+    const double evv = direct_vv + 2 * cross * t.tv + bend * t.tv * t.tv + slope * t.tvv;
+    const double evq = cross * t.tq + bend * t.tv * t.tq + slope * t.tvq;
+    const double eqq = bend * t.tq * t.tq + slope * t.tqq;
+    double first = mean_slope_, second = 0;
+    if (half_jump_ != 0) {
+      const double root = std::sqrt(energy * energy + smoothing_ * smoothing_);
+      first += half_jump_ * energy / root;
+      second = half_jump_ * std::max(0.0, 1 - c.kink[s] * energy / root) / root;
+      l.f += half_jump_ * root;
+    }
+    l.f += mean_slope_ * energy;
+    l.fv += first * ev, l.fq += first * eq;
+    l.dual_v += (mean_slope_ + half_jump_ * c.kink[s]) * ev,
+        l.dual_q += (mean_slope_ + half_jump_ * c.kink[s]) * eq;
+    kink_gap_ += grid_.step[k] * half_jump_ * (std::fabs(energy) - c.kink[s] * energy);
+    l.fvv += first * evv + second * ev * ev;
+    l.fvq += first * evq + second * ev * eq;
+    l.fqq += first * eqq + second * eq * eq;
+  }
+  return l;
+}
+
 // Gradient and tridiagonal Hessian of the Lagrangian with the bounds condensed, at z_.
 void SpeedSolver::assemble(double mu) {
   cost_here_ = kink_gap_ = 0;
   const std::size_t n = grid_.cells();
-  const Electric& e = grid_.electric;
   std::fill(gradient_.begin(), gradient_.end(), 0.0);
   std::fill(stationarity_.begin(), stationarity_.end(), 0.0);
   std::fill(diagonal_.begin(), diagonal_.end(), 0.0);
@@ -311,56 +280,15 @@ void SpeedSolver::assemble(double mu) {
     Cell& c = cells_[k];
     const double z0 = z_[k], z1 = z_[k + 1], r0 = std::sqrt(z0), r1 = std::sqrt(z1), h = grid_.step[k];
     const double v = c.v = 0.5 * (r0 + r1), q = c.q = (z1 - z0) / (2 * h);
-    Local l;
-    l.f = idle_ / v, l.fv = -l.f / v, l.fvv = -2 * l.fv / v;
-    double dual_v = l.fv, dual_q = 0;  // with the dual slope in place of phi's
-    for (std::size_t s : {0u, 1u}) {
-      const WheelLoad& w = grid_.load(k)[s];
-      const Torque t = torque(w, v, q);
-      const double rho = e.copper_w_n2_m2[s], i = 1 / v;
-      double density = rho * t.t * i;                    // rho T/v
-      double slope = 2 * density + e.back_emf * w.pace;  // d(energy)/dT
-      double energy = (density + e.back_emf * w.pace) * t.t;
-      double direct_v = -density * t.t * i;  // d(energy)/dv at constant T
-      double bend = 2 * rho * i;             // d2/dT2
-      double cross = -2 * density * i;       // d2/dT dv
-      double direct_vv = 2 * density * t.t * i * i;
-      if (e.brush_w_nm != 0) {
-        const double width = e.brush_width_nm * e.brush_width_nm, root = std::sqrt(t.t * t.t + width);
-        const double y = e.brush_w_nm * t.t * t.t / root;
-        const double y1 = e.brush_w_nm * t.t * (t.t * t.t + 2 * width) / (root * root * root);
-        const double y2 = e.brush_w_nm * width * (2 * width - t.t * t.t) / (root * root * root * root * root);
-        energy += y * i, slope += y1 * i, bend += std::max(0.0, y2) * i;
-        direct_v -= y * i * i, cross -= y1 * i * i, direct_vv += 2 * y * i * i * i;
-      }
-      const double ev = direct_v + slope * t.tv, eq = slope * t.tq;
-      const double evv = direct_vv + 2 * cross * t.tv + bend * t.tv * t.tv + slope * t.tvv;
-      const double evq = cross * t.tq + bend * t.tv * t.tq + slope * t.tvq;
-      const double eqq = bend * t.tq * t.tq + slope * t.tqq;
-      double first = mean_slope_, second = 0;
-      if (half_jump_ != 0) {
-        const double root = std::sqrt(energy * energy + smoothing_ * smoothing_);
-        first += half_jump_ * energy / root;
-        second = half_jump_ * std::max(0.0, 1 - c.kink[s] * energy / root) / root;
-        l.f += half_jump_ * root;
-      }
-      l.f += mean_slope_ * energy;
-      l.fv += first * ev, l.fq += first * eq;
-      dual_v += (mean_slope_ + half_jump_ * c.kink[s]) * ev,
-          dual_q += (mean_slope_ + half_jump_ * c.kink[s]) * eq;
-      kink_gap_ += h * half_jump_ * (std::fabs(energy) - c.kink[s] * energy);
-      l.fvv += first * evv + second * ev * ev;
-      l.fvq += first * evq + second * ev * eq;
-      l.fqq += first * eqq + second * eq * eq;
-    }
+    Local l = local(k);
     l.fv *= h, l.fq *= h, l.fvv *= h, l.fvq *= h, l.fqq *= h;
     // From (v, q) to (z0, z1).
     const double v0 = r0 > 0 ? 0.25 / r0 : 0, v1 = r1 > 0 ? 0.25 / r1 : 0;
     const double v00 = r0 > 0 ? -0.125 / (z0 * r0) : 0, v11 = r1 > 0 ? -0.125 / (z1 * r1) : 0, p = 0.5 / h;
     cost_here_ += l.f * h;
-    double lv = dual_v * h, lq = dual_q * h;  // of the Lagrangian
-    double hv = l.fv;                         // what multiplies the second derivative of v
-    double bv = l.fv, bq = l.fq;              // of the barrier problem
+    double lv = l.dual_v * h, lq = l.dual_q * h;  // of the Lagrangian
+    double hv = l.fv;                             // what multiplies the second derivative of v
+    double bv = l.fv, bq = l.fq;                  // of the barrier problem
     each_bound(k, v, q, [&](unsigned j, double g, double gv, double gq, double gvv, double gvq, double gqq) {
       const double slack = -g, y = c.multiplier[j];
       c.slack[j] = slack;
@@ -393,11 +321,11 @@ void SpeedSolver::assemble(double mu) {
 bool SpeedSolver::factorise() {
   const std::size_t n = grid_.cells();
   pivot_[1] = diagonal_[1];
-  if (!(pivot_[1] > 1e-13 * magnitude_[1])) return false;
+  if (!(pivot_[1] > least_pivot * magnitude_[1])) return false;
   for (std::size_t k = 2; k < n; ++k) {
     lower_[k] = off_[k - 1] / pivot_[k - 1];
     pivot_[k] = diagonal_[k] - lower_[k] * off_[k - 1];
-    if (!(pivot_[k] > 1e-13 * magnitude_[k])) return false;
+    if (!(pivot_[k] > least_pivot * magnitude_[k])) return false;
   }
   return true;
 }
@@ -411,85 +339,92 @@ void SpeedSolver::solve_step() {
   for (std::size_t k = n - 1; k-- > 1;) step_[k] = step_[k] / pivot_[k] - lower_[k + 1] * step_[k + 1];
 }
 
-SpeedSolution SpeedSolver::solve(double price_w, double tolerance) {
+// Between the slowest and the fastest profile of the envelope, near the cruising speed that balances idle
+// power and viscosity.
+std::vector<double> SpeedSolver::initial_point() const {
   const std::size_t n = grid_.cells();
   const Electric& e = grid_.electric;
-  idle_ = e.idle_w + price_w;
-  SpeedSolution solution;
-
-  const bool warm = started_;
-  if (!started_) {
-    // Both profiles of the envelope may press against the same bound; the lower one is drawn with less
-    // acceleration.
-    std::vector<double> slowest = envelope_.slowest;
-    if (grid_.start > 0 || grid_.end > 0) {
-      for (double part : {0.3, 0.6, 0.8, 0.9, 0.97, 0.99, 0.999}) {
-        slowest = slowest_profile(grid_, part * grid_.acceleration_limit);
-        bool below = true;
-        for (std::size_t k = 1; k < n; ++k) below = below && slowest[k] < envelope_.fastest[k];
-        if (below) break;
-      }
+  // Both profiles may press against the same bound; the lower one is drawn with less acceleration.
+  std::vector<double> slowest = envelope_.slowest;
+  if (grid_.start > 0 || grid_.end > 0) {
+    for (double part : {0.3, 0.6, 0.8, 0.9, 0.97, 0.99, 0.999}) {
+      slowest = slowest_profile(grid_, part * grid_.acceleration_limit);
+      bool below = true;
+      for (std::size_t k = 1; k < n; ++k) below = below && slowest[k] < envelope_.fastest[k];
+      if (below) break;
     }
-    // Between the slowest and the fastest profile, near the cruising speed that balances idle power and
-    // viscosity.
-    double top = 0;
-    for (double z : envelope_.fastest) top = std::max(top, z);
-    double standing = idle_, viscous = 1e-300, losses = 0;
-    for (std::size_t s : {0u, 1u}) {
-      const dynamics::QuadraticPower p = motor_power(e, s, grid_.load(n / 2)[s]);
-      standing += p.c0, viscous += std::max(0.0, p.c2), losses += p.c1;
-    }
-    // Without a limit on acceleration the fastest profile jumps; start on one whose copper loss matches idle
-    // power.
-    std::vector<double> gentle(n + 1, std::numeric_limits<double>::infinity());
-    if (!std::isfinite(grid_.acceleration_limit) && losses > 0) {
-      const double a = std::sqrt(std::max(standing, 1e-3) / losses);
-      double way = 0, rest = 0;
-      for (double h : grid_.step) rest += h;
-      for (std::size_t k = 0; k <= n; ++k) {
-        gentle[k] = std::min(grid_.start + 2 * a * way, grid_.end + 2 * a * rest);
-        if (k < n) way += grid_.step[k], rest -= grid_.step[k];
-      }
-    }
-    double share = std::clamp(standing / viscous / top, 0.02, 0.85);
-    for (int attempt = 0; attempt < 40; ++attempt) {
-      for (std::size_t k = 1; k < n; ++k) {
-        const double top_here = std::min(envelope_.fastest[k], std::max(gentle[k], 2 * slowest[k]));
-        trial_[k] = slowest[k] + share * (top_here - slowest[k]);
-      }
-      trial_[0] = grid_.start, trial_[n] = grid_.end;
-      if (inside(trial_)) break;
-      share = 0.7 * share + (attempt % 2 ? 0.0 : 0.29);
-    }
-    z_ = trial_;
   }
-  z_[0] = grid_.start, z_[n] = grid_.end;
-  if (!inside(z_)) return solution;
-
-  smoothing_ = 0, gear_smoothing_ = 0;
-  double scale = std::fabs(merit(z_, 0)) + 1e-300;
-  double length = 0;
-  for (double h : grid_.step) length += h;
-  double torque_scale = 0;
+  const double top = *std::max_element(envelope_.fastest.begin(), envelope_.fastest.end());
+  double standing = idle_, viscous = 1e-300, losses = 0;
   for (std::size_t s : {0u, 1u}) {
-    torque_scale =
-        std::max(torque_scale, std::fabs(grid_.load(n / 2)[s].t0) + std::fabs(grid_.load(n / 2)[s].f0) +
-                                   0.1 * std::fabs(grid_.load(n / 2)[s].inertia));
+    const dynamics::QuadraticPower p = motor_power(e, s, grid_.load(n / 2)[s]);
+    standing += p.c0, viscous += std::max(0.0, p.c2), losses += p.c1;
   }
-  const auto count = static_cast<double>(bound_total_);
-  double finest = std::max(tolerance, 1e-9) * scale / count;
-  double mu = (warm ? 1e-3 : 3e-2) * scale / count;
-  const auto smooth = [&] {
-    // Twice the half jump times the width times the length is what smoothing can hide.
-    const double finest_width = 2 * tolerance * scale / length;
-    smoothing_ = std::max(finest_width, 0.3 * scale / length * std::sqrt(mu * count / scale));
-    if (mu <= finest) smoothing_ = finest_width;
-    gear_smoothing_ = std::max(1e-4, std::sqrt(mu * count / scale)) * torque_scale;
-  };
-  smooth();
+  // Without a limit on acceleration the fastest profile jumps; start on one whose copper loss matches idle
+  // power.
+  std::vector<double> gentle(n + 1, std::numeric_limits<double>::infinity());
+  if (!std::isfinite(grid_.acceleration_limit) && losses > 0) {
+    const double a = std::sqrt(std::max(standing, 1e-3) / losses);
+    double way = 0, rest = 0;
+    for (double h : grid_.step) rest += h;
+    for (std::size_t k = 0; k <= n; ++k) {
+      gentle[k] = std::min(grid_.start + 2 * a * way, grid_.end + 2 * a * rest);
+      if (k < n) way += grid_.step[k], rest -= grid_.step[k];
+    }
+  }
+  std::vector<double> z(n + 1);
+  z[0] = grid_.start, z[n] = grid_.end;
+  double share = std::clamp(standing / viscous / top, 0.02, 0.85);
+  for (int attempt = 0; attempt < 40; ++attempt) {
+    for (std::size_t k = 1; k < n; ++k) {
+      const double top_here = std::min(envelope_.fastest[k], std::max(gentle[k], 2 * slowest[k]));
+      z[k] = slowest[k] + share * (top_here - slowest[k]);
+    }
+    if (inside(z)) break;
+    share = 0.7 * share + (attempt % 2 ? 0.0 : 0.29);
+  }
+  return z;
+}
+
+SpeedSolver::BarrierSchedule::BarrierSchedule(const SpeedGrid& grid, double bounds, double cost_j,
+                                              double tolerance, bool warm)
+    : tolerance_(tolerance), bounds_(bounds), scale_(cost_j + 1e-300) {
+  for (double h : grid.step) length_ += h;
+  for (const WheelLoad& w : grid.load(grid.cells() / 2))
+    torque_nm_ = std::max(torque_nm_, std::fabs(w.t0) + std::fabs(w.f0) + 0.1 * std::fabs(w.inertia));
+  mu_ = (warm ? first_gap_warm : first_gap) * scale_ / bounds_;
+  finest_ = std::max(tolerance_, finest_gap) * scale_ / bounds_;
+}
+
+void SpeedSolver::BarrierSchedule::follow(double cost_j) {
+  if (at_finest() || !(cost_j > 0)) return;
+  scale_ = cost_j;
+  finest_ = std::max(tolerance_, finest_gap) * scale_ / bounds_;
+}
+
+bool SpeedSolver::BarrierSchedule::lower(double decrement, double step_length) {
+  const bool solved = step_length > 0.9, quick = solved && decrement < mu_ * bounds_;
+  if (at_finest() || !(solved || decrement < 10 * mu_ * bounds_)) return false;
+  mu_ = std::max(finest_, (quick ? quick_decrease : barrier_decrease) * mu_);
+  return true;
+}
+
+double SpeedSolver::BarrierSchedule::kink_width() const {
+  // Twice the half jump times the width times the length is what smoothing can hide.
+  const double finest = 2 * tolerance_ * scale_ / length_;
+  if (at_finest()) return finest;
+  return std::max(finest, 0.3 * scale_ / length_ * std::sqrt(mu_ * bounds_ / scale_));
+}
+
+double SpeedSolver::BarrierSchedule::gear_width() const {
+  return std::max(1e-4, std::sqrt(mu_ * bounds_ / scale_)) * torque_nm_;
+}
+
+void SpeedSolver::start_duals(double mu) {
+  const std::size_t n = grid_.cells();
   for (std::size_t k = 0; k < n; ++k) {
     Cell& c = cells_[k];
-    const double v = speed_of(z_[k], z_[k + 1]), q = (z_[k + 1] - z_[k]) / (2 * grid_.step[k]);
+    const double v = mean_speed(z_[k], z_[k + 1]), q = (z_[k + 1] - z_[k]) / (2 * grid_.step[k]);
     each_bound(k, v, q, [&](unsigned j, double g, auto...) { c.multiplier[j] = mu / -g; });
     c.kink = {0, 0};
   }
@@ -497,151 +432,198 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance) {
     const double share = z_[k] / grid_.ceiling[k];
     ceiling_multiplier_[k] = mu / (1 - share), floor_multiplier_[k] = mu / share;
   }
+}
 
-  double damping = 0;
-  bool corrected = false;
-  for (int iteration = 0; iteration < 200; ++iteration) {
-    solution.iterations = iteration + 1;
-    assemble(mu);
-    // Tolerances follow the cost as it falls, so that the answer does not depend on where the search began.
-    if (mu > finest && cost_here_ > 0) {
-      scale = cost_here_;
-      finest = std::max(tolerance, 1e-9) * scale / count;
-    }
-    corrected = false;
-    if (damping > 0) {
-      for (std::size_t k = 1; k < n; ++k) diagonal_[k] += damping * magnitude_[k];
-    }
-    for (double add = std::max(1e-9, damping); !factorise(); add *= 8) {
-      corrected = true;
-      for (std::size_t k = 1; k < n; ++k) diagonal_[k] += add * magnitude_[k];
-      if (add > 1e12) return solution;
-    }
-    solve_step();
-    double decrement = 0;
-    for (std::size_t k = 1; k < n; ++k) decrement -= gradient_[k] * step_[k];
-
-    double gap = 0;
-    for (std::size_t k = 1; k < n; ++k) {
-      const double share = z_[k] / grid_.ceiling[k];
-      gap += ceiling_multiplier_[k] * (1 - share) + floor_multiplier_[k] * share;
-    }
-    for (std::size_t k = 0; k < n; ++k) {
-      for (unsigned j = 0; j < most_bounds; ++j) {
-        if (bounds_[k] >> j & 1u) gap += cells_[k].multiplier[j] * cells_[k].slack[j];
-      }
-    }
-    if (mu <= finest && gap < 3 * tolerance * scale &&
-        decrement < (iteration < 60 ? 1e-3 : 0.3) * tolerance * scale) {
-      solution.converged = true;
-      solution.gap_j = gap + kink_gap_;
-      double worst = 0, range = 0;
-      for (std::size_t k = 1; k < n; ++k) {
-        worst = std::max(worst, std::fabs(stationarity_[k]) * z_[k]);
-        range = std::max(range, z_[k]);
-      }
-      solution.residual = worst / scale;
-      solution.convex = !corrected && damping == 0;
-      break;
-    }
-
-    // Longest step that keeps every linear bound and multiplier positive.
-    double longest = 1, dual = 1;
-    constexpr double keep = 0.995;
-    const auto limit = [&](double value, double change, double& bound) {
-      if (change < 0 && -change * bound > keep * value) bound = keep * value / -change;
-    };
-    for (std::size_t k = 1; k < n; ++k) {
-      limit(z_[k], step_[k], longest);
-      limit(grid_.ceiling[k] - z_[k], -step_[k], longest);
-    }
-    for (std::size_t k = 0; k < n; ++k) {
-      if (!(bounds_[k] & 3u)) continue;
-      const double dq = (step_[k + 1] - step_[k]) / (2 * grid_.step[k]);
-      limit(grid_.acceleration_limit - cells_[k].q, -dq, longest);
-      limit(grid_.acceleration_limit + cells_[k].q, dq, longest);
-    }
-    // Line search on the barrier function.
-    const double here = merit(z_, mu);
-    double length_taken = longest;
-    bool accepted = false;
-    for (int halving = 0; halving < 30; ++halving) {
-      for (std::size_t k = 0; k <= n; ++k) trial_[k] = z_[k] + length_taken * step_[k];
-      const double there = merit(trial_, mu);
-      if (there <= here - 1e-4 * length_taken * decrement + 1e-13 * scale) {
-        accepted = true;
-        break;
-      }
-      length_taken *= halving < 2 ? 0.6 : 0.3;
-    }
-    if (!accepted) {
-      if (damping > 1e6) return solution;
-      damping = std::max(1e-4, 10 * damping);
-      continue;
-    }
-    // Multipliers and slopes follow their linearised equations.
-    for (std::size_t k = 0; k < n; ++k) {
-      Cell& c = cells_[k];
-      const double r0 = std::sqrt(z_[k]), r1 = std::sqrt(z_[k + 1]);
-      const double dv = (r0 > 0 ? 0.25 / r0 * step_[k] : 0) + (r1 > 0 ? 0.25 / r1 * step_[k + 1] : 0);
-      const double dq = (step_[k + 1] - step_[k]) / (2 * grid_.step[k]);
-      each_bound(k, c.v, c.q, [&](unsigned j, double g, double gv, double gq, auto...) {
-        const double slack = -g;
-        const double change = mu / slack - c.multiplier[j] + c.multiplier[j] / slack * (gv * dv + gq * dq);
-        c.slack[j] = change;  // reused until the next assembly
-        limit(c.multiplier[j], change, dual);
-      });
-      if (half_jump_ != 0) {
-        for (std::size_t s : {0u, 1u}) {
-          const WheelLoad& w = grid_.load(k)[s];
-          const Torque t = torque(w, c.v, c.q);
-          const double density = e.copper_w_n2_m2[s] * t.t / c.v, slope = 2 * density + e.back_emf * w.pace;
-          const double energy = (density + e.back_emf * w.pace) * t.t;
-          const double change = (slope * t.tv - density * t.t / c.v) * dv + slope * t.tq * dq;
-          const double root = std::sqrt(energy * energy + smoothing_ * smoothing_);
-          c.kink[s] = std::clamp((energy + (1 - c.kink[s] * energy / root) * change) / root, -1.0, 1.0);
-        }
-      }
-    }
-    for (std::size_t k = 0; k < n; ++k) {
-      for (unsigned j = 0; j < most_bounds; ++j) {
-        if (bounds_[k] >> j & 1u) cells_[k].multiplier[j] += dual * cells_[k].slack[j];
-      }
-    }
-    for (std::size_t k = 1; k < n; ++k) {
-      const double a = 1 / grid_.ceiling[k], high = 1 - z_[k] * a, low = z_[k] * a, d = step_[k] * a;
-      const double up = mu / high - ceiling_multiplier_[k] + ceiling_multiplier_[k] / high * d;
-      const double down = mu / low - floor_multiplier_[k] - floor_multiplier_[k] / low * d;
-      ceiling_multiplier_[k] = std::max(0.005 * ceiling_multiplier_[k], ceiling_multiplier_[k] + up);
-      floor_multiplier_[k] = std::max(0.005 * floor_multiplier_[k], floor_multiplier_[k] + down);
-    }
-    std::swap(z_, trial_);
-    if (length_taken > 0.5) damping = damping > 1e-4 ? 0.1 * damping : 0;
-    if (mu > finest && (decrement < 10 * mu * count || length_taken > 0.9)) {
-      mu = std::max(finest, (length_taken > 0.9 && decrement < mu * count ? 0.05 : 0.2) * mu);
-      smooth();
-    }
+// The matrix of the step, made positive definite where it is not; false when nothing makes it so.
+bool SpeedSolver::regularise(double damping, bool& corrected) {
+  const std::size_t n = grid_.cells();
+  const auto add_to_diagonal = [&](double share) {
+    for (std::size_t k = 1; k < n; ++k) diagonal_[k] += share * magnitude_[k];
+  };
+  corrected = false;
+  if (damping > 0) add_to_diagonal(damping);
+  for (double add = std::max(first_correction, damping); !factorise(); add *= correction_growth) {
+    corrected = true;
+    add_to_diagonal(add);
+    if (add > 1e12) return false;
   }
-  started_ = solution.converged;
-  solution.z = z_;
-  smoothing_ = 0;
-  solution.cost_j = merit(z_, 0);
-  solution.duration_s = duration_of(grid_, z_);
+  return true;
+}
 
-  // A bound binds where its multiplier outweighs its slack.
-  const auto binds = [&](Bound b) { solution.binding[static_cast<std::size_t>(b)] = true; };
+// Sum of multipliers times slacks.
+double SpeedSolver::complementarity() const {
+  const std::size_t n = grid_.cells();
+  double gap = 0;
+  for (std::size_t k = 1; k < n; ++k) {
+    const double share = z_[k] / grid_.ceiling[k];
+    gap += ceiling_multiplier_[k] * (1 - share) + floor_multiplier_[k] * share;
+  }
   for (std::size_t k = 0; k < n; ++k) {
     for (unsigned j = 0; j < most_bounds; ++j) {
-      if (!(bounds_[k] >> j & 1u) || cells_[k].slack[j] > 1e-3) continue;
-      if (cells_[k].multiplier[j] * 1e-3 > cells_[k].slack[j] * scale / count) {
-        binds(j < 2 ? Bound::acceleration : j < 6 ? Bound::current : Bound::voltage);
-      }
+      if (bounds_[k] >> j & 1u) gap += cells_[k].multiplier[j] * cells_[k].slack[j];
+    }
+  }
+  return gap;
+}
+
+// Largest residual of the stationarity, each by its speed squared.
+double SpeedSolver::stationarity_residual() const {
+  double worst = 0;
+  for (std::size_t k = 1; k < grid_.cells(); ++k)
+    worst = std::max(worst, std::fabs(stationarity_[k]) * z_[k]);
+  return worst;
+}
+
+// Longest step that keeps a share of every linear bound's slack.
+double SpeedSolver::step_to_boundary() const {
+  const std::size_t n = grid_.cells();
+  double longest = 1;
+  for (std::size_t k = 1; k < n; ++k) {
+    shorten(z_[k], step_[k], longest);
+    shorten(grid_.ceiling[k] - z_[k], -step_[k], longest);
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    if (!(bounds_[k] & 3u)) continue;
+    const double dq = (step_[k + 1] - step_[k]) / (2 * grid_.step[k]);
+    shorten(grid_.acceleration_limit - cells_[k].q, -dq, longest);
+    shorten(grid_.acceleration_limit + cells_[k].q, dq, longest);
+  }
+  return longest;
+}
+
+// Backtracks until the barrier function falls enough; 0 when it does not. The accepted point is in trial_.
+double SpeedSolver::line_search(double longest, double decrement, double mu, double scale) {
+  const double here = merit(z_, mu), noise = 1e-13 * scale;
+  double length = longest;
+  for (int halving = 0; halving < 30; ++halving) {
+    for (std::size_t k = 0; k <= grid_.cells(); ++k) trial_[k] = z_[k] + length * step_[k];
+    if (merit(trial_, mu) <= here - sufficient_decrease * length * decrement + noise) return length;
+    length *= halving < 2 ? 0.6 : 0.3;
+  }
+  return 0;
+}
+
+// Multipliers and the kinks' slopes follow their linearised equations along the step.
+void SpeedSolver::update_duals(double mu) {
+  const std::size_t n = grid_.cells();
+  double longest = 1;
+  for (std::size_t k = 0; k < n; ++k) {
+    Cell& c = cells_[k];
+    const double r0 = std::sqrt(z_[k]), r1 = std::sqrt(z_[k + 1]);
+    const double dv = (r0 > 0 ? 0.25 / r0 * step_[k] : 0) + (r1 > 0 ? 0.25 / r1 * step_[k + 1] : 0);
+    const double dq = (step_[k + 1] - step_[k]) / (2 * grid_.step[k]);
+    each_bound(k, c.v, c.q, [&](unsigned j, double g, double gv, double gq, auto...) {
+      const double slack = -g;
+      const double change = mu / slack - c.multiplier[j] + c.multiplier[j] / slack * (gv * dv + gq * dq);
+      c.slack[j] = change;  // reused until the next assembly
+      shorten(c.multiplier[j], change, longest);
+    });
+    if (half_jump_ != 0) follow_kinks(k, dv, dq);
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    for (unsigned j = 0; j < most_bounds; ++j) {
+      if (bounds_[k] >> j & 1u) cells_[k].multiplier[j] += longest * cells_[k].slack[j];
     }
   }
   for (std::size_t k = 1; k < n; ++k) {
-    const double slack = 1 - z_[k] / grid_.ceiling[k];
-    if (slack < 1e-3 && ceiling_multiplier_[k] * 1e-3 > slack * scale / count) binds(Bound::speed);
+    const double a = 1 / grid_.ceiling[k], high = 1 - z_[k] * a, low = z_[k] * a, d = step_[k] * a;
+    const double up = mu / high - ceiling_multiplier_[k] + ceiling_multiplier_[k] / high * d;
+    const double down = mu / low - floor_multiplier_[k] - floor_multiplier_[k] / low * d;
+    for (auto [multiplier, change] : {std::pair{&ceiling_multiplier_[k], up}, {&floor_multiplier_[k], down}})
+      *multiplier = std::max((1 - to_boundary) * *multiplier, *multiplier + change);
   }
+}
+
+void SpeedSolver::follow_kinks(std::size_t k, double dv, double dq) {
+  Cell& c = cells_[k];
+  const Electric& e = grid_.electric;
+  for (std::size_t s : {0u, 1u}) {
+    const WheelLoad& w = grid_.load(k)[s];
+    const Torque t = torque(w, c.v, c.q);
+    const double density = e.copper_w_n2_m2[s] * t.t / c.v, slope = 2 * density + e.back_emf * w.pace;
+    const double energy = (density + e.back_emf * w.pace) * t.t;
+    const double change = (slope * t.tv - density * t.t / c.v) * dv + slope * t.tq * dq;
+    const double root = std::sqrt(energy * energy + smoothing_ * smoothing_);
+    c.kink[s] = std::clamp((energy + (1 - c.kink[s] * energy / root) * change) / root, -1.0, 1.0);
+  }
+}
+
+// A bound binds where its multiplier outweighs its slack; `unit_j` is the scale of multipliers.
+std::array<bool, bound_count> SpeedSolver::binding(double unit_j) const {
+  std::array<bool, bound_count> binding{};
+  const auto binds = [&](double multiplier, double slack, Bound b) {
+    if (slack <= 1e-3 && multiplier * 1e-3 > slack * unit_j) binding[static_cast<std::size_t>(b)] = true;
+  };
+  for (std::size_t k = 0; k < grid_.cells(); ++k) {
+    for (unsigned j = 0; j < most_bounds; ++j) {
+      if (bounds_[k] >> j & 1u) {
+        binds(cells_[k].multiplier[j], cells_[k].slack[j],
+              j < 2   ? Bound::acceleration
+              : j < 6 ? Bound::current
+                      : Bound::voltage);
+      }
+    }
+    if (k > 0) binds(ceiling_multiplier_[k], 1 - z_[k] / grid_.ceiling[k], Bound::speed);
+  }
+  return binding;
+}
+
+double SpeedSolver::cost_j(const std::vector<double>& z, double price_w) {
+  idle_ = grid_.electric.idle_w + price_w;
+  smoothing_ = 0;
+  double sum = 0;
+  for (std::size_t k = 0; k < grid_.cells(); ++k)
+    sum += cost(k, mean_speed(z[k], z[k + 1]), (z[k + 1] - z[k]) / (2 * grid_.step[k]));
+  return sum;
+}
+
+SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::stop_token& stop) {
+  idle_ = grid_.electric.idle_w + price_w;
+  smoothing_ = gear_smoothing_ = 0;
+  SpeedSolution solution;
+  const bool warm = started_;
+  if (!started_) z_ = initial_point();
+  z_.front() = grid_.start, z_.back() = grid_.end;
+  if (!inside(z_)) return solution;
+  BarrierSchedule barrier(grid_, static_cast<double>(bound_total_), std::fabs(merit(z_, 0)), tolerance, warm);
+  const auto smooth = [&] { smoothing_ = barrier.kink_width(), gear_smoothing_ = barrier.gear_width(); };
+  smooth();
+  start_duals(barrier.mu());
+  double damping = 0;
+  bool corrected = false;
+  for (int iteration = 0; iteration < most_iterations && !stop.stop_requested(); ++iteration) {
+    solution.iterations = iteration + 1;
+    assemble(barrier.mu());
+    // Tolerances follow the cost as it falls, so that the answer does not depend on where the search began.
+    barrier.follow(cost_here_);
+    if (!regularise(damping, corrected)) return solution;
+    solve_step();
+    double decrement = 0;
+    for (std::size_t k = 1; k < grid_.cells(); ++k) decrement -= gradient_[k] * step_[k];
+    const double gap = complementarity(), allowed = tolerance * barrier.scale();
+    if (barrier.at_finest() && gap < 3 * allowed && decrement < (iteration < 60 ? 1e-3 : 0.3) * allowed) {
+      solution.converged = true;
+      solution.gap_j = gap + kink_gap_;
+      solution.residual = stationarity_residual() / barrier.scale();
+      solution.convex = !corrected && damping == 0;
+      break;
+    }
+    const double length = line_search(step_to_boundary(), decrement, barrier.mu(), barrier.scale());
+    if (length == 0) {
+      if (damping > 1e6) return solution;
+      damping = std::max(first_damping, 10 * damping);
+      continue;
+    }
+    update_duals(barrier.mu());
+    std::swap(z_, trial_);
+    if (length > 0.5) damping = damping > first_damping ? 0.1 * damping : 0;
+    if (barrier.lower(decrement, length)) smooth();
+  }
+  started_ = solution.converged;
+  solution.z = z_;
+  solution.cost_j = cost_j(z_, price_w);
+  solution.duration_s = duration_of(grid_, z_);
+  solution.binding = binding(barrier.scale() / static_cast<double>(bound_total_));
   return solution;
 }
 

@@ -2,43 +2,14 @@
 
 #include <array>
 #include <cstdint>
+#include <stop_token>
 #include <vector>
 
 #include "planning/load.h"
 #include "planning/profile.h"
+#include "planning/speed_grid.h"
 
 namespace joulecast::planning {
-
-// One run on a grid: which speed at which node costs least. Unknowns are the squared speeds z at the nodes;
-// between nodes the acceleration q = (z1 - z0)/(2 step) is constant and loads are taken at the cell's middle.
-struct SpeedGrid {
-  std::vector<double> step;       // n cells
-  std::vector<WheelLoads> loads;  // n, or 1 when the same everywhere
-  std::vector<double> ceiling;    // n + 1 upper bounds of z
-  double start = 0, end = 0;      // z at the ends
-  double acceleration_limit = 0;  // of q; may be infinite
-  double torque_limit_nm = 0;     // from the current limit
-  double voltage_limit_v = 0;
-  std::vector<double> motor_share;  // of the torque and voltage limits that a cell may use; empty: all
-  Electric electric;
-
-  double share(std::size_t cell) const { return motor_share.empty() ? 1 : motor_share[cell]; }
-  std::size_t cells() const { return step.size(); }
-  const WheelLoads& load(std::size_t cell) const { return loads.size() == 1 ? loads[0] : loads[cell]; }
-};
-
-// The fastest and the slowest profile that the limits allow. Where `fastest` falls below `slowest` there is
-// none.
-struct SpeedEnvelope {
-  std::vector<double> fastest, slowest;
-  double shortest_s = 0;  // duration of the fastest
-  bool feasible = true;
-  std::size_t broken_at = 0;  // node, when not feasible
-};
-SpeedEnvelope speed_envelope(const SpeedGrid& grid);
-
-// Duration of a profile [s].
-double duration_of(const SpeedGrid& grid, const std::vector<double>& z);
 
 struct SpeedSolution {
   std::vector<double> z;
@@ -62,7 +33,11 @@ class SpeedSolver {
   SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope);
 
   // `price_w` is added to the idle power. Starts from the last solution where there is one.
-  SpeedSolution solve(double price_w, double tolerance = 1e-6);
+  // Not converged when a stop is requested.
+  SpeedSolution solve(double price_w, double tolerance = 1e-6, const std::stop_token& stop = {});
+
+  // Cost of a profile by the grid's midpoint rule.
+  double cost_j(const std::vector<double>& z, double price_w);
 
   // Whether a current or voltage limit can bind anywhere.
   bool bounds_motors() const { return bounds_motors_; }
@@ -75,12 +50,29 @@ class SpeedSolver {
 
   struct Local {
     double f = 0, fv = 0, fq = 0, fvv = 0, fvq = 0, fqq = 0;
+    double dual_v = 0, dual_q = 0;  // slopes with the kink's dual in place of its own
   };
   struct Cell {
     double v = 0, q = 0;
     std::array<double, 2> kink{};  // dual of phi's slope, in (-1, 1)
     std::array<double, most_bounds> multiplier{};
     std::array<double, most_bounds> slack{};
+  };
+
+  // The barrier parameter mu, and the widths that smoothing has at it.
+  class BarrierSchedule {
+   public:
+    BarrierSchedule(const SpeedGrid& grid, double bounds, double cost_j, double tolerance, bool warm);
+    double mu() const { return mu_; }
+    double scale() const { return scale_; }  // the cost that tolerances are shares of
+    bool at_finest() const { return mu_ <= finest_; }
+    void follow(double cost_j);
+    bool lower(double decrement, double step_length);
+    double kink_width() const;  // of the energy over the way [J/x]
+    double gear_width() const;  // [N m]
+
+   private:
+    double tolerance_, bounds_, scale_, length_ = 0, torque_nm_ = 0, mu_ = 0, finest_ = 0;
   };
 
   struct Torque {
@@ -92,10 +84,20 @@ class SpeedSolver {
   void each_bound(std::size_t cell, double v, double q, Visit&& visit) const;
   double merit(const std::vector<double>& z, double mu) const;
   bool inside(const std::vector<double>& z) const;
-  void set_point(const std::vector<double>& z);
+  std::vector<double> initial_point() const;
+  void start_duals(double mu);
+  Local local(std::size_t cell);
   void assemble(double mu);
   bool factorise();
+  bool regularise(double damping, bool& corrected);
   void solve_step();
+  double complementarity() const;
+  double stationarity_residual() const;
+  double step_to_boundary() const;
+  double line_search(double longest, double decrement, double mu, double scale);
+  void update_duals(double mu);
+  void follow_kinks(std::size_t cell, double dv, double dq);
+  std::array<bool, bound_count> binding(double unit_j) const;
 
   const SpeedGrid& grid_;
   const SpeedEnvelope& envelope_;

@@ -90,7 +90,7 @@ TEST(LimitedLine, CostsWhatTheNumericalSolverFinds) {
     problem.regeneration = 1 - 1e-9;
     const auto numeric = plan(robot, *path, problem);
     ASSERT_TRUE(numeric);
-    ASSERT_EQ(numeric->certificate.method, Method::interior_point);
+    ASSERT_EQ(numeric->certificate.method, Method::quadrature);
     const double w = problem.value_of_time_w;
     const double ours = closed->summary.energy_j + w * closed->summary.duration_s,
                  theirs = numeric->summary.energy_j + w * numeric->summary.duration_s;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "planning/cost_table.h"
 #include "planning/line.h"
 #include "tests/planning/robots.h"
 
@@ -58,17 +59,24 @@ TEST(Planner, AnswersAtOnceWhatClosedFormsAnswer) {
   EXPECT_FALSE(planner->plan_at_once(line, problem));
 }
 
-// The solver on a problem whose closed form is known: a regeneration of 1 - 1e-9 keeps the closed form out.
+// The solvers on a problem whose closed form is known: a regeneration of 1 - 1e-9 keeps the closed form out,
+// a curvature that changes a little the quadrature.
 TEST(Planner, SolverConvergesToTheClosedFormWithSecondOrder) {
   const robot::RobotModel robot = test::amr();
   const Path path = made({Straight{5}});
+  const Path bent =
+      *make_path(std::vector<Segment>{Clothoid{5, 0, 1e-7}}, PathOptions{.start = {}, .resolution_m = 1});
   const double exact = plan(robot, path, Problem{})->summary.energy_j;
   double last = 0;
   for (std::size_t cells : {32u, 64u, 128u}) {
     Problem problem;
     problem.regeneration = 1 - 1e-9;
     problem.intervals_per_run = cells;
-    const auto answer = plan(robot, path, problem);
+    const auto quadrature = plan(robot, path, problem);
+    ASSERT_TRUE(quadrature) << describe(quadrature.error());
+    EXPECT_EQ(quadrature->certificate.method, Method::quadrature);
+    EXPECT_NEAR(quadrature->summary.energy_j, exact, 1e-4 * exact);
+    const auto answer = plan(robot, bent, problem);
     ASSERT_TRUE(answer) << describe(answer.error());
     EXPECT_EQ(answer->certificate.method, Method::interior_point);
     const double error = answer->summary.energy_j - exact;
@@ -304,7 +312,7 @@ TEST(Planner, LoadsThatAreLinearInTheSpeedKeepTheClosedForm) {
   problem.regeneration = 1 - 1e-9;
   const auto numeric = plan(robot, made({Straight{10}}, 40), problem);
   ASSERT_TRUE(numeric);
-  EXPECT_EQ(numeric->certificate.method, Method::interior_point);
+  EXPECT_EQ(numeric->certificate.method, Method::quadrature);
   EXPECT_NEAR(closed->summary.energy_j, numeric->summary.energy_j, 3e-4 * numeric->summary.energy_j);
 }
 
@@ -322,6 +330,130 @@ TEST(Planner, ProfileRowsIntegrate) {
     EXPECT_NEAR(p.speed_m_s[k], p.speed_m_s[k - 1] + dt * p.acceleration_m_s2[k - 1], 1e-9);
   }
   EXPECT_NEAR(distance, 5.2, 1e-9);
+}
+
+TEST(Planner, StopsAtExactlyTheBrakingDistanceAndJustBeyond) {
+  const robot::RobotModel robot = test::amr();
+  const double v = 1.4, least = v * v / (2 * robot.limits.acceleration_m_s2);
+  Problem problem = limited(robot);
+  problem.start_speed_m_s = v;
+  const double energy = plan(robot, made({Straight{1.01 * least}}), problem)->summary.energy_j;
+  for (const double more : {0.0, 1e-12, 1e-10, 1e-8, 1e-6, 1e-4, 3e-4, 1e-3}) {
+    const auto answer = plan(robot, made({Straight{least * (1 + more)}}), problem);
+    ASSERT_TRUE(answer) << more << ": " << describe(answer.error());
+    EXPECT_NEAR(answer->summary.duration_s, v / robot.limits.acceleration_m_s2, 2e-3);
+    EXPECT_NEAR(answer->summary.energy_j, energy, 0.05 * energy);
+  }
+  EXPECT_EQ(plan(robot, made({Straight{least * (1 - 1e-6)}}), problem).error().field, "end_speed_m_s");
+}
+
+TEST(Planner, NothingToSpendOnTimeNeedsADeadline) {
+  robot::RobotModel robot = test::amr();
+  robot.idle_power_w = 0;
+  robot.motor.viscous_friction_nm_s_rad = 0;
+  robot.motor.friction_torque_nm = {0, 0};
+  for (const double regeneration : {1.0, 0.0}) {
+    Problem problem = limited(robot, regeneration);
+    const auto endless = plan(robot, made({Straight{5}}), problem);
+    ASSERT_FALSE(endless);
+    EXPECT_EQ(endless.error().fault, Fault::infeasible);
+    EXPECT_EQ(endless.error().field, "value_of_time_w");
+    problem.deadline_s = 30;
+    const auto answer = plan(robot, made({Straight{5}}), problem);
+    ASSERT_TRUE(answer) << describe(answer.error());
+    EXPECT_LE(answer->summary.duration_s, 30);
+    EXPECT_GT(answer->summary.duration_s, 29.99);
+  }
+}
+
+// As slow as a gear ratio of 2000 makes a robot: its motors' voltage is all that friction and speed leave.
+TEST(Planner, AnswersOrRefusesClearlyWhateverTheGear) {
+  for (robot::RobotModel robot : test::all_robots()) {
+    for (const double gear : {0.05, 0.3, 3.0, 200.0, 2000.0}) {
+      robot.motor.gear_ratio = gear;
+      for (const double regeneration : {1.0, 0.0}) {
+        for (const auto& segments :
+             {std::vector<Segment>{Straight{10}}, {TurnInPlace{1}}, {Arc{2, 1}, Straight{1}}}) {
+          const auto answer = plan(robot, made(segments), limited(robot, regeneration));
+          if (!answer) {
+            EXPECT_EQ(answer.error().fault, Fault::infeasible) << gear << describe(answer.error());
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Planner, CurrentJustAboveFrictionIsEnough) {
+  for (const robot::RobotModel& robot : test::all_robots()) {
+    const auto& m = robot.motor;
+    const double friction =
+        std::max(m.friction_torque_nm[0], m.friction_torque_nm[1]) / (m.torque_constant_nm_a * m.gear_ratio);
+    if (friction == 0) continue;
+    for (const double above : {1.001, 1.01, 1.05, 1.1}) {
+      Problem problem = limited(robot);
+      problem.limits.current_a = above * friction;
+      for (const auto& segments :
+           {std::vector<Segment>{Straight{5}}, {TurnInPlace{1}}, {Clothoid{5, 0, 0.2}}}) {
+        if (segments[0].index() == 6 && above < 1.05) continue;  // the outer wheel bears more
+        const auto answer = plan(robot, made(segments), problem);
+        ASSERT_TRUE(answer) << robot.robot_id << " " << above << ": " << describe(answer.error());
+      }
+    }
+  }
+}
+
+// What a robot covers that plays the rows, its speed linear in time between them.
+TEST(Planner, RowsThatArePlayedArrive) {
+  for (const robot::RobotModel& robot : test::all_robots()) {
+    for (const double idle_w : {1e-3, robot.idle_power_w}) {
+      robot::RobotModel slow = robot;
+      slow.idle_power_w = idle_w;
+      for (const double regeneration : {1.0, 0.0}) {
+        for (const double length : {0.5, 5.0, 40.0}) {
+          const auto answer = plan(slow, made({Straight{length}}), limited(slow, regeneration));
+          ASSERT_TRUE(answer) << describe(answer.error());
+          const Profile& p = answer->profile;
+          double played = 0;
+          for (std::size_t k = 1; k < p.size(); ++k)
+            played += 0.5 * (p.speed_m_s[k] + p.speed_m_s[k - 1]) * (p.time_s[k] - p.time_s[k - 1]);
+          EXPECT_NEAR(played, length, 1e-4 * length)
+              << robot.robot_id << " " << idle_w << " " << regeneration;
+        }
+      }
+    }
+  }
+}
+
+TEST(Planner, StopsWhenAsked) {
+  const robot::RobotModel robot = test::amr();
+  const auto planner = Planner::make(robot, 0.3);
+  ASSERT_TRUE(planner);
+  std::stop_source source;
+  source.request_stop();
+  const Path path = made({Straight{3}, Arc{1, 1}, Straight{2}, TurnInPlace{1}, Straight{4}});
+  const Problem problem = limited(robot, 0.3);
+  EXPECT_EQ(planner->plan(path, problem, source.get_token()).error().fault, Fault::stopped);
+  EXPECT_EQ(planner->cost(path, problem, source.get_token()).error().fault, Fault::stopped);
+  EXPECT_EQ(planner->pareto(path, problem, 50, source.get_token()).error().fault, Fault::stopped);
+  EXPECT_EQ(CostTable::make(robot, {}, source.get_token()).error().fault, Fault::stopped);
+}
+
+TEST(Planner, RowsMayBeLeftOutAndAreBounded) {
+  const robot::RobotModel robot = test::amr();
+  Polyline line;
+  for (int k = 1; k <= 9000; ++k) line.points.push_back({0.5 * k, k % 2 ? 0.3 : 0.0});
+  const Path path = made({line});
+  Problem problem = limited(robot);
+  const auto refused = plan(robot, path, problem);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().fault, Fault::too_large);
+  EXPECT_EQ(refused.error().field, "columns");
+  problem.rows = false;
+  const auto answer = plan(robot, path, problem);
+  ASSERT_TRUE(answer) << describe(answer.error());
+  EXPECT_EQ(answer->profile.size(), 0u);
+  EXPECT_NEAR(answer->ledger.total(), answer->summary.energy_j, 1e-9 * answer->summary.energy_j);
 }
 
 }  // namespace

@@ -144,9 +144,11 @@ Driving read_driving(Fields& fields, Driving fallback) {
 
 void write_profile_columns(JsonWriter& json, const planning::Profile& p) {
   json.key("profile").begin_object();
-  json.column("time_s", p.time_s).column("distance_m", p.distance_m);
+  // Accelerations follow from these: their spans may last some tens of microseconds.
+  constexpr int nano = 9;
+  json.column("time_s", p.time_s, nano).column("distance_m", p.distance_m);
   json.column("x_m", p.x_m, 4).column("y_m", p.y_m, 4).column("heading_rad", p.heading_rad, 5);
-  json.column("speed_m_s", p.speed_m_s).column("yaw_rate_rad_s", p.yaw_rate_rad_s);
+  json.column("speed_m_s", p.speed_m_s, nano).column("yaw_rate_rad_s", p.yaw_rate_rad_s, nano);
   json.column("acceleration_m_s2", p.acceleration_m_s2)
       .column("yaw_acceleration_rad_s2", p.yaw_acceleration_rad_s2);
   json.column("payload_kg", p.payload_kg, 3)

@@ -63,6 +63,7 @@ Result<ProfileInput> read_profile(const nlohmann::json& request, const robot::Ro
   input.drive = read_drive(fields, robot);
   input.columns = fields.boolean("columns", true);
   input.baseline_columns = fields.boolean("baseline_columns", false);
+  input.drive.problem.rows = input.columns;
   input.pareto_points = static_cast<std::size_t>(fields.integer("pareto_points", 0, max_pareto_points, 0));
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
   return input;

@@ -11,7 +11,8 @@ import { priceOfHaste } from './plan_charts.jsx';
 const methods = {
   closed_form: 'closed formulas',
   interior_point: 'an interior-point method',
-  mixed: 'closed formulas and an interior-point method',
+  mixed: 'several methods',
+  quadrature: 'quadrature over the speed',
 };
 
 // Numerical errors, in joules in either unit: their size is what matters.

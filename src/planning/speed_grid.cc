@@ -1,0 +1,128 @@
+#include "planning/speed_grid.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dynamics/stribeck_curve.h"
+#include "planning/root.h"
+#include "planning/uniform_motion.h"
+
+namespace joulecast::planning {
+namespace {
+
+constexpr int bisections = 40;
+
+// Torque of a wheel without smoothing.
+double torque_of(const WheelLoad& w, double v, double q) {
+  const double through = w.inertia * q + w.t0 + v * (w.t1 + v * w.t2);
+  double t = through + w.gear * std::fabs(through) + w.f0 + v * (w.f1 + v * w.f2);
+  if (w.stribeck != 0) t += w.stribeck * dynamics::stribeck_curve(v / w.stribeck_speed, w.stribeck_exponent);
+  return t;
+}
+
+bool motors_allow(const SpeedGrid& grid, std::size_t cell, double v, double q, double tolerance = 0) {
+  const double share = grid.share(cell) * (1 + tolerance);
+  for (std::size_t s : {0u, 1u}) {
+    const WheelLoad& w = grid.load(cell)[s];
+    const double t = torque_of(w, v, q);
+    if (std::fabs(t) > grid.torque_limit_nm * share) return false;
+    const Electric& e = grid.electric;
+    const double volts =
+        e.resistance_ohm[s] / e.torque_constant_nm_a * t + e.voltage_constant_v_s_rad * w.pace * v;
+    if (std::fabs(volts) > grid.voltage_limit_v * share) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+double mean_speed(double z0, double z1) {
+  return 0.5 * (std::sqrt(z0) + std::sqrt(z1));
+}
+
+std::vector<double> slowest_profile(const SpeedGrid& grid, double acceleration) {
+  const std::size_t n = grid.cells();
+  std::vector<double> slowest(n + 1, 0);
+  if (!std::isfinite(acceleration)) return slowest;
+  double z = grid.start;
+  for (std::size_t k = 0; k <= n; ++k) {
+    slowest[k] = std::max(0.0, z);
+    if (k < n) z -= 2 * grid.step[k] * acceleration;
+  }
+  z = grid.end;
+  for (std::size_t k = n + 1; k-- > 0;) {
+    slowest[k] = std::max(slowest[k], z);
+    if (k > 0) z -= 2 * grid.step[k - 1] * acceleration;
+  }
+  return slowest;
+}
+
+double duration_of(const SpeedGrid& grid, const std::vector<double>& z) {
+  double sum = 0;
+  for (std::size_t k = 0; k < grid.cells(); ++k) sum += grid.step[k] / mean_speed(z[k], z[k + 1]);
+  return sum;
+}
+
+SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
+  const std::size_t n = grid.cells();
+  SpeedEnvelope e;
+  e.fastest = grid.ceiling;
+  e.fastest.front() = grid.start;
+  e.fastest.back() = grid.end;
+
+  const bool motors = std::isfinite(grid.torque_limit_nm) || std::isfinite(grid.voltage_limit_v);
+  // As UniformMotion: the limits at the middle of a cell, a tolerance more at its ends.
+  const auto allowed = [&](std::size_t cell, double z0, double z1) {
+    const double q = (z1 - z0) / (2 * grid.step[cell]);
+    return motors_allow(grid, cell, mean_speed(z0, z1), q) &&
+           motors_allow(grid, cell, std::sqrt(z0), q, UniformMotion::motor_tolerance) &&
+           motors_allow(grid, cell, std::sqrt(z1), q, UniformMotion::motor_tolerance);
+  };
+  // Where a steady speed is already too much for the motors, the ceiling is lower.
+  if (motors) {
+    for (std::size_t k = 0; k <= n; ++k) {
+      const std::size_t before = k > 0 ? k - 1 : 0, after = std::min(k, n - 1);
+      const auto fits = [&](double z) {
+        return motors_allow(grid, before, std::sqrt(z), 0) && motors_allow(grid, after, std::sqrt(z), 0);
+      };
+      if (!fits(e.fastest[k])) e.fastest[k] = last_that(fits, 0, e.fastest[k], bisections);
+    }
+  }
+  // The largest z at the far end of a cell that can be reached by speeding up from the near end; bisection
+  // only where motors bind. Slowing down is the other sweep's concern.
+  const auto reach = [&](std::size_t cell, double near, double cap, bool forward) {
+    if (cap <= near) return cap;
+    const double top = std::isfinite(grid.acceleration_limit)
+                           ? std::min(cap, near + 2 * grid.step[cell] * grid.acceleration_limit)
+                           : cap;
+    const auto fits = [&](double far) {
+      return forward ? allowed(cell, near, far) : allowed(cell, far, near);
+    };
+    if (!motors || fits(top)) return top;
+    const bool steady = fits(near);
+    return last_that(fits, steady ? near : 0, steady ? top : near, bisections);
+  };
+  for (int sweep = 0; sweep < (motors ? 2 : 1); ++sweep) {
+    for (std::size_t k = 0; k < n; ++k) e.fastest[k + 1] = reach(k, e.fastest[k], e.fastest[k + 1], true);
+    for (std::size_t k = n; k-- > 0;) e.fastest[k] = reach(k, e.fastest[k + 1], e.fastest[k], false);
+  }
+  e.slowest = slowest_profile(grid, grid.acceleration_limit);
+  const double slack = 1e-9;
+  if (e.fastest.front() < grid.start * (1 - slack) || e.fastest.back() < grid.end * (1 - slack)) {
+    e.feasible = false;
+    e.broken_at = e.fastest.front() < grid.start * (1 - slack) ? 0 : n;
+    return e;
+  }
+  for (std::size_t k = 1; k < n; ++k) {
+    if (!(e.fastest[k] > e.slowest[k])) {
+      e.feasible = false;
+      e.broken_at = k;
+      return e;
+    }
+  }
+  e.shortest_s = duration_of(grid, e.fastest);
+  e.feasible = std::isfinite(e.shortest_s);
+  return e;
+}
+
+}  // namespace joulecast::planning

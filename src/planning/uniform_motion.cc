@@ -1,0 +1,430 @@
+#include "planning/uniform_motion.h"
+
+#include <algorithm>
+#include <boost/math/tools/minima.hpp>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "dynamics/stribeck_curve.h"
+#include "planning/gauss.h"
+#include "planning/root.h"
+
+namespace joulecast::planning {
+namespace {
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
+constexpr double rounding = 1e-9;  // relative: of distances and speeds that the request gives
+constexpr double spare = 1e-7;     // of the distance: less is spread over the nodes
+constexpr int speed_samples = 64;  // where f is looked at for its minima
+constexpr int most_cuts =
+    8;  // in halves, of a cell in which the acceleration or a motor's limit changes fast
+
+// x with x + gear |x| = t.
+double through_gear(double t, double gear) {
+  return t / (t > 0 ? 1 + gear : 1 - gear);
+}
+
+}  // namespace
+
+tl::unexpected<Error> endless(double standing_w) {
+  return fail(Fault::infeasible, "value_of_time_w",
+              "plus the power at standstill is " + std::to_string(standing_w) +
+                  " W, must be positive for a best end time to exist; a deadline_s bounds it too");
+}
+
+double UniformMotion::Piece::duration_s() const {
+  return std::fabs(to - from) / acceleration;
+}
+
+bool UniformMotion::has_motor_limits() const {
+  return std::isfinite(task_.torque_limit_nm) || std::isfinite(task_.voltage_limit_v);
+}
+
+UniformMotion::Local UniformMotion::local(double v) const {
+  Local l;
+  l.v = v;
+  for (const std::size_t s : {0u, 1u}) {
+    const WheelLoad& w = task_.loads[s];
+    l.through[s] = w.t0 + v * (w.t1 + v * w.t2);
+    l.inside[s] = w.f0 + v * (w.f1 + v * w.f2);
+    if (w.stribeck != 0)
+      l.inside[s] += w.stribeck * dynamics::stribeck_curve(v / w.stribeck_speed, w.stribeck_exponent);
+  }
+  return l;
+}
+
+UniformMotion::Power UniformMotion::motors(const Local& l, double acceleration) const {
+  const Electric& e = task_.electric;
+  Power sum;
+  for (const std::size_t s : {0u, 1u}) {
+    const WheelLoad& w = task_.loads[s];
+    const double x = l.through[s] + w.inertia * acceleration, t = x + w.gear * std::fabs(x) + l.inside[s];
+    const double by_acceleration = w.inertia * (1 + std::copysign(w.gear, w.gear * x));
+    const double emf = e.back_emf * w.pace * l.v, copper = e.copper_w_n2_m2[s];
+    double power = (copper * t + emf) * t, slope = 2 * copper * t + emf, bend = 2 * copper;
+    if (e.brush_w_nm != 0) {
+      const double width = e.brush_width_nm * e.brush_width_nm, root = std::sqrt(t * t + width);
+      power += e.brush_w_nm * t * t / root;
+      slope += e.brush_w_nm * t * (t * t + 2 * width) / (root * root * root);
+    }
+    const double share = power > 0 ? e.up : e.down;
+    sum.w += share * power;
+    sum.slope += share * slope * by_acceleration;
+    sum.bend += share * bend * by_acceleration * by_acceleration;
+  }
+  return sum;
+}
+
+// The greatest acceleration (direction 1) or braking (-1) that limits allow, motors' by 1 + `tolerance`.
+UniformMotion::Most UniformMotion::most(const Local& l, double direction, double tolerance) const {
+  Most most{task_.acceleration_limit, Bound::acceleration};
+  if (!has_motor_limits()) return most;
+  const Electric& e = task_.electric;
+  const double torque_limit = task_.torque_limit_nm * (1 + tolerance),
+               voltage_limit = task_.voltage_limit_v * (1 + tolerance);
+  for (const std::size_t s : {0u, 1u}) {
+    const WheelLoad& w = task_.loads[s];
+    const double ohm = e.resistance_ohm[s] / e.torque_constant_nm_a,
+                 emf = e.voltage_constant_v_s_rad * w.pace * l.v;
+    for (const double side : {-1.0, 1.0}) {
+      const double by_voltage = (voltage_limit - side * emf) / ohm;
+      const bool by_current = torque_limit <= by_voltage;
+      const double torque = side * (by_current ? torque_limit : by_voltage);
+      const double room = through_gear(torque - l.inside[s], w.gear) - l.through[s];
+      // Bounded on this side where `direction` pushes towards it.
+      const double push = direction * w.inertia * side;
+      const double allowed = side * room < 0 ? -1 : push > 0 ? side * room / push : infinite;
+      if (allowed < most.acceleration) most = {allowed, by_current ? Bound::current : Bound::voltage};
+    }
+  }
+  return most;
+}
+
+// The zero of a dL/da - L, by Newton's method in a^2 within a bracket: exact where power is quadratic.
+double UniformMotion::best(const Local& l, double direction, double rate_w, double most) const {
+  Power here;
+  const auto excess = [&](double a) {
+    here = motors(l, direction * a);
+    return a * direction * here.slope - here.w - rate_w;
+  };
+  const double standing = std::max(-excess(0), 1e-14 * (std::fabs(here.w) + std::fabs(rate_w)));
+  double low = 0, high = most;
+  if (task_.electric.up != task_.electric.down) {
+    // Where a motor begins to brake, the slope jumps; the optimum likes to be there, which is coasting.
+    for (const std::size_t s : {0u, 1u}) {
+      const WheelLoad& w = task_.loads[s];
+      const double kink = (through_gear(-l.inside[s], w.gear) - l.through[s]) / (direction * w.inertia);
+      if (!(kink > low && kink < high)) continue;
+      const double below = excess(kink * (1 - 1e-10)), above = excess(kink * (1 + 1e-10));
+      if (below <= 0 && above >= 0) return kink;
+      (below > 0 ? high : low) = kink;
+    }
+    excess(low > 0 ? low * (1 + 1e-10) : 0);
+  }
+  double a = std::clamp(std::sqrt(2 * standing / here.bend), low, high);
+  bool at_most = false;
+  for (int k = 0; k < 100 && high - low > 1e-12 * low; ++k) {
+    at_most = at_most || a == most;
+    const double y = excess(a);
+    if (y <= 0 && a == most) return most;
+    (y <= 0 ? low : high) = a;
+    double next = std::sqrt(std::max(0.0, a * a - 2 * y / here.bend));
+    if (std::fabs(next - a) <= 1e-12 * a) return a;
+    if (next >= most && !at_most)
+      next = most;
+    else if (!(next > low && next < high) || k % 4 == 3)
+      next = std::isfinite(high) ? 0.5 * (low + high) : 2 * low + 1e-3;
+    a = next;
+  }
+  return a;
+}
+
+double UniformMotion::steady_cost(double v, double fixed_w) const {
+  return (motors(local(v), 0).w + fixed_w) / v;
+}
+
+double UniformMotion::cheapest_speed(double fixed_w) const {
+  const auto f = [&](double v) { return steady_cost(v, fixed_w); };
+  if (f(top_) <= f(top_ * (1 - 1e-7))) return top_;
+  constexpr int bits = std::numeric_limits<double>::digits / 2;
+  return boost::math::tools::brent_find_minima(f, 1e-9 * top_, top_, bits).first;
+}
+
+// How to space speeds from the pivot, where the acceleration is least: at y = sinh^2(X j/n) of the stretch,
+// which is evenly in time on an extremal whose L(v, 0) is a quadratic.
+double UniformMotion::stretch(double pivot, double end, const Price& price) const {
+  if (price.fastest) return 2;
+  const auto standing = [&](double v) { return motors(local(v), 0).w + price.fixed_w - price.lambda * v; };
+  const double at = standing(pivot), half = standing(0.5 * (pivot + end)) - at, whole = standing(end) - at;
+  const double linear = 4 * half - whole, square = 2 * whole - 4 * half;
+  if (!(square > 0)) return 0.01;
+  return std::clamp(std::asinh(std::sqrt(square / std::max(linear, 1e-6 * square))), 0.01, 3.0);
+}
+
+UniformMotion::Most UniformMotion::wanted(double v, double direction, const Price& price) const {
+  const Local here = local(v);
+  Most within = most(here, direction, 0);
+  within.acceleration = std::max(within.acceleration, 0.0);
+  if (price.fastest) return {within.acceleration, within.bound, true};
+  const double a = best(here, direction, price.fixed_w - price.lambda * v, within.acceleration);
+  return {a, within.bound, a >= within.acceleration};
+}
+
+// `change` is by how much the acceleration may differ between the ends of a cell; where it jumps within one,
+// from braking to coasting, the cell is cut there.
+template <class Visit>
+void UniformMotion::piece(const End& from, const End& to, double change, const Price& price, int halvings,
+                          Visit&& visit) const {
+  const double direction = to.v > from.v ? 1 : -1, middle = 0.5 * (from.v + to.v);
+  Most at_middle = wanted(middle, direction, price);
+  const auto [least, greatest] = std::minmax({from.acceleration, at_middle.acceleration, to.acceleration});
+  const bool jumps = greatest > change * least && halvings < most_cuts;
+  bool beyond = false;
+  if (!price.rough && has_motor_limits()) {
+    for (const double end : {from.v, to.v}) {
+      const double allowed = most(local(end), direction, motor_tolerance).acceleration;
+      if (at_middle.acceleration <= allowed) continue;
+      beyond = true;
+      if (halvings >= most_cuts) at_middle.acceleration = std::max(allowed, 1e-3 * at_middle.acceleration);
+    }
+  }
+  if (jumps || (beyond && halvings < most_cuts)) {
+    const End cut{middle, at_middle.acceleration};
+    piece(from, cut, change, price, halvings + 1, visit);
+    piece(cut, to, change, price, halvings + 1, visit);
+  } else {
+    visit(Piece{from.v, to.v, at_middle.acceleration, at_middle.bound, at_middle.bounded});
+  }
+}
+
+template <class Visit>
+void UniformMotion::leg(double from, double to, bool pivot_at_end, const Price& price, Visit&& visit) const {
+  if (from == to) return;
+  const double pivot = pivot_at_end ? to : from, end = pivot_at_end ? from : to,
+               direction = to > from ? 1 : -1;
+  const std::size_t cells = price.rough ? std::max<std::size_t>(8, task_.cells / 4) : task_.cells;
+  const double x = stretch(pivot, end, price), whole = std::sinh(x), count = static_cast<double>(cells);
+  const bool may_jump = !price.rough && (has_motor_limits() || task_.electric.up != task_.electric.down);
+  const auto end_at = [&](double v) {
+    return End{v, may_jump ? wanted(v, direction, price).acceleration : 0};
+  };
+  End last = end_at(from);
+  for (std::size_t j = 1; j <= cells; ++j) {
+    const double i = static_cast<double>(pivot_at_end ? cells - j : j);
+    const double root = std::sinh(x * i / count) / whole;
+    const double v = j == cells ? to : pivot + root * root * (end - pivot);
+    const End next = end_at(v);
+    // Towards the pivot the acceleration vanishes as the root of what is left of the speed.
+    const double least = pivot_at_end ? i : i - 1;
+    piece(last, next, may_jump && least > 0 ? 1.5 * (least + 1) / least : infinite, price, 0, visit);
+    last = next;
+  }
+}
+
+template <class Visit>
+void UniformMotion::pieces(const Shape& shape, Visit&& visit) const {
+  const double v0 = task_.start_speed, v1 = task_.end_speed;
+  if (shape.cruises || (shape.middle - v0) * (shape.middle - v1) < 0) {
+    leg(v0, shape.middle, true, shape.price, visit);
+    leg(shape.middle, v1, false, shape.price, visit);
+  } else {
+    leg(v0, v1, std::fabs(v1 - shape.middle) < std::fabs(v0 - shape.middle), shape.price, visit);
+  }
+}
+
+double UniformMotion::distance(const Shape& shape) const {
+  double sum = 0;
+  pieces(shape, [&](const Piece& piece) { sum += piece.distance(); });
+  return sum;
+}
+
+// Finds the speed at which a motion turns, between one that is too near and one that is far enough.
+UniformMotion::Shape UniformMotion::turning(Shape shape, double nearest, double farthest) const {
+  const auto missing = [&](double v) {
+    shape.middle = v;
+    if (!shape.price.fastest) shape.price.lambda = steady_cost(v, shape.price.fixed_w);
+    return std::log(distance(shape) / task_.distance);
+  };
+  // Few cells find about where it is, all of them the place.
+  shape.price.rough = true;
+  double far = farthest, at_far = missing(far);
+  double near = nearest, at_near = near > 0 && at_far > 0 ? missing(near) : 0;
+  while (near == 0 && at_far > 0) {
+    const double v = 0.5 * far, at = missing(v);
+    if (at < 0) {
+      near = v, at_near = at;
+    } else {
+      far = v, at_far = at;
+    }
+  }
+  double v = at_far > 0 ? zero_between(missing, near, at_near, far, at_far, 1e-6) : far;
+  const double aside = v - 1e-3 * (v - nearest), slope = (missing(v) - missing(aside)) / (v - aside);
+  shape.price.rough = false;
+  // The rest of the way, if any, is driven at the speed of the turn: the motion must not be too long.
+  for (int k = 0; k < 12; ++k) {
+    const double m = missing(v);
+    if (m <= spare && (m >= -spare || v == farthest || k > 8)) break;
+    const double next = v - (m + 0.5 * spare) / slope - (k > 5 ? 1e-4 * (v - nearest) : 0);
+    v = std::clamp(next, std::min(nearest, farthest), std::max(nearest, farthest));
+  }
+  return shape;
+}
+
+// No turn: lambda is less than where the acceleration would vanish on the way.
+std::optional<UniformMotion::Shape> UniformMotion::monotone(Shape shape, double highest_lambda) const {
+  shape.cruises = false;
+  Shape fast = shape;
+  fast.price.fastest = true;
+  const double least = distance(fast);
+  if (task_.distance < least * (1 - rounding)) return std::nullopt;
+  if (task_.distance <= least * (1 + rounding)) return fast;
+  const auto missing = [&](double log_drop) {
+    shape.price.lambda = highest_lambda - std::exp(log_drop);
+    return -std::log(distance(shape) / task_.distance);
+  };
+  const double start = std::log(std::fabs(highest_lambda) + 1e-3);
+  double low = start, at_low = missing(low), high = low, at_high = at_low;
+  for (int k = 0; k < 60 && at_low >= 0; ++k) at_low = missing(low -= 1);
+  for (int k = 0; k < 60 && at_high < 0; ++k) at_high = missing(high += 1);
+  if (at_low >= 0) return shape;
+  if (at_high < 0) return fast;
+  missing(zero_between(missing, low, at_low, high, at_high, 0, 1e-12));
+  return shape;
+}
+
+std::optional<UniformMotion::Shape> UniformMotion::fastest_shape() const {
+  const double nearest = std::max(task_.start_speed, task_.end_speed);
+  Shape shape;
+  shape.price.fastest = true;
+  if (nearest > 0) {
+    shape.middle = nearest;
+    const double least = distance(shape);
+    if (task_.distance < least * (1 - rounding)) return std::nullopt;
+    if (task_.distance <= least * (1 + rounding)) return shape;
+  }
+  return turning(shape, nearest, top_);
+}
+
+std::optional<UniformMotion::Shape> UniformMotion::shape_at(double fixed_w) const {
+  const double fast = std::max(task_.start_speed, task_.end_speed),
+               slow = std::min(task_.start_speed, task_.end_speed), cheapest = cheapest_speed(fixed_w);
+  Shape shape;
+  shape.price.fixed_w = fixed_w;
+  const bool below = fast <= cheapest, above = slow >= cheapest;
+  // The speed of an end nearest to the cheapest, where the motion turns if it does not cover the way.
+  shape.middle = below ? fast : above ? slow : cheapest;
+  if (shape.middle > 0) {
+    shape.price.lambda = steady_cost(shape.middle, fixed_w);
+    if (distance(shape) > task_.distance) return monotone(shape, shape.price.lambda);
+  }
+  if (!below && !above) return shape;
+  return turning(shape, shape.middle, cheapest);
+}
+
+// The integral of the least L/|a| over the speeds of a piece.
+double UniformMotion::pointwise_least(const Piece& piece, const Price& price) const {
+  const double change = piece.to - piece.from, direction = change > 0 ? 1 : -1;
+  double sum = 0;
+  for (const auto& [at, weight] : gauss3) {
+    const Local here = local(piece.from + at * change);
+    const double rate = price.fixed_w - price.lambda * here.v;
+    const double bound = std::max(most(here, direction, 0).acceleration, 1e-3 * piece.acceleration);
+    const double a = best(here, direction, rate, bound);
+    sum += weight * (motors(here, direction * a).w + rate) / a;
+  }
+  return sum * std::fabs(change);
+}
+
+SteppedMotion UniformMotion::written(const Shape& shape) const {
+  SteppedMotion motion;
+  const double idle_w = task_.electric.idle_w;
+  double covered = distance(shape), way = 0;
+  const double cruise =
+      shape.cruises && task_.distance > covered * (1 + spare) ? task_.distance - covered : 0;
+  covered += cruise;
+  // What is left of the distance by rounding goes into the spacing of the nodes.
+  const double scale = task_.distance / covered;
+  motion.way.push_back(0), motion.speed.push_back(task_.start_speed);
+  const auto hold = [&] {
+    if (!(cruise > 0)) return;
+    const double duration = cruise / shape.middle;
+    motion.duration_s += duration;
+    motion.energy_j += (motors(local(shape.middle), 0).w + idle_w) * duration;
+    way += cruise;
+    motion.way.push_back(way * scale), motion.speed.push_back(shape.middle);
+    if (shape.middle >= task_.speed_limit * (1 - rounding))
+      motion.binding[static_cast<std::size_t>(Bound::speed)] = true;
+  };
+  bool held = false;
+  if (task_.start_speed == shape.middle) hold(), held = true;
+  pieces(shape, [&](const Piece& piece) {
+    const double duration = piece.duration_s(), change = piece.to - piece.from;
+    double power = 0, least = 0;
+    for (const auto& [at, weight] : gauss3) {
+      const Local here = local(piece.from + at * change);
+      const double motor_w = motors(here, std::copysign(piece.acceleration, change)).w;
+      power += weight * motor_w;
+      least += weight * (motor_w + shape.price.fixed_w - shape.price.lambda * here.v);
+    }
+    motion.duration_s += duration * scale;
+    motion.energy_j += (power + idle_w) * duration * scale;
+    if (!shape.price.fastest)
+      motion.discretisation_j += std::clamp(least * duration - pointwise_least(piece, shape.price), 0.0,
+                                            std::max(0.0, least * duration));  // L is not negative
+    if (piece.bounded) motion.binding[static_cast<std::size_t>(piece.bound)] = true;
+    way += piece.distance();
+    motion.way.push_back(way * scale), motion.speed.push_back(piece.to);
+    if (!held && piece.to == shape.middle) hold(), held = true;
+  });
+  motion.way.back() = task_.distance;
+  return motion;
+}
+
+std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
+  UniformMotion motion(task);
+  const auto holds = [&](double v) { return motion.most(motion.local(v), 1, 0).acceleration > 0; };
+  if (!holds(0)) return std::nullopt;
+  motion.top_ = task.speed_limit;
+  double last = 0;
+  for (int k = 1; k <= speed_samples; ++k) {
+    const double v = task.speed_limit * k / speed_samples;
+    if (!holds(v)) {
+      motion.top_ = last_that(holds, last, v, 60);
+      break;
+    }
+    last = v;
+  }
+  // v f'(v) = P'(v) v - P(v) over v is to cross any price of time once: P(v) must be convex.
+  const auto steady_w = [&](double part) { return motion.motors(motion.local(part * motion.top_), 0).w; };
+  for (int k = 1; k < speed_samples; ++k) {
+    const double step = 1.0 / speed_samples, before = steady_w((k - 1) * step), here = steady_w(k * step),
+                 after = steady_w((k + 1) * step);
+    if (before - 2 * here + after < -1e-9 * (std::fabs(before) + std::fabs(after))) return std::nullopt;
+  }
+  for (double* speed : {&motion.task_.start_speed, &motion.task_.end_speed}) {
+    if (*speed > motion.top_ * (1 + rounding)) return std::nullopt;
+    *speed = std::min(*speed, motion.top_);
+  }
+  const auto shape = motion.fastest_shape();
+  motion.shortest_s_ = shape ? motion.written(*shape).duration_s : infinite;
+  return motion;
+}
+
+Result<SteppedMotion> UniformMotion::solve(double price_w) const {
+  const double fixed_w = task_.electric.idle_w + price_w, standing_w = motors(local(0), 0).w + fixed_w;
+  if (!(standing_w > 0)) return endless(standing_w);
+  const auto shape = shape_at(fixed_w);
+  if (!shape) return fail(Fault::infeasible, "path", "the way is too short for the end speeds");
+  return written(*shape);
+}
+
+std::optional<SteppedMotion> UniformMotion::fastest() const {
+  const auto shape = fastest_shape();
+  if (!shape) return std::nullopt;
+  for (const double direction : {-1.0, 1.0})
+    if (!std::isfinite(most(local(0.5 * top_), direction, 0).acceleration)) return std::nullopt;
+  return written(*shape);
+}
+
+}  // namespace joulecast::planning

@@ -1,0 +1,144 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "base/error.h"
+#include "planning/load.h"
+#include "planning/profile.h"
+
+namespace joulecast::planning {
+
+// A run along which loads and limits stay the same: a straight line, an arc, a turn in place. Speeds are of
+// the run's coordinate [m/s or rad/s], limits may be infinite.
+struct UniformTask {
+  WheelLoads loads;
+  Electric electric;
+  double distance = 0;
+  double start_speed = 0, end_speed = 0;
+  double speed_limit = 0;  // finite
+  double acceleration_limit = 0;
+  double torque_limit_nm = 0, voltage_limit_v = 0;
+  std::size_t cells = 64;  // of the speed range on either side of the cruise
+};
+
+// Speeds at places along the way, the acceleration being constant in between.
+struct SteppedMotion {
+  std::vector<double> way, speed;
+  double duration_s = 0;
+  double energy_j = 0;          // idle power included
+  double discretisation_j = 0;  // what constant acceleration between the nodes costs
+  std::array<bool, bound_count> binding{};
+};
+
+// Why no best end time exists: power at standstill and price of time, together `standing_w`, are not
+// positive.
+tl::unexpected<Error> endless(double standing_w);
+
+// Minimum of energy + price * duration where power depends on speed and acceleration alone. With lambda, the
+// multiplier of the distance, the problem is to minimise the integral of
+//   L(v, a) = P(v, a) + idle + price - lambda v
+// over time. L does not depend on time, so the Hamiltonian is constant, and zero in free time (Bryson & Ho,
+// Applied Optimal Control, sec. 2.7). Where the speed rises or falls, dt = dv/|a| makes the integral one over
+// the speed,
+//   integral of L(v, a)/|a| dv,
+// in which each speed has its own acceleration: that of least L/|a| within the limits of acceleration,
+// current and voltage there. L is convex in a, hence it is where a dL/da = L, or at the limit. The speed
+// turns where L(v, 0) = 0: lambda = f(v_turn) with f(v) = (P(v, 0) + idle + price)/v. f falls from infinity
+// to its least value at the speed of least cost a metre, or to the speed limit, and a motion from rest has
+// its peak at the speed below that at which the distance comes out; long ways cruise there. End speeds above
+// it are left likewise.
+//
+// Between nodes of the speed the acceleration is constant, so the answer is a motion that can be driven as it
+// is told. A cell's acceleration obeys current and voltage limits at its middle, and passes them at its ends
+// by motor_tolerance at most.
+class UniformMotion {
+ public:
+  static constexpr double motor_tolerance = 1e-3;
+
+  // Nothing when f has several minima within the speed limit (friction that falls steeply with the speed), or
+  // the motors cannot hold a steady speed from rest to the end speeds.
+  static std::optional<UniformMotion> make(const UniformTask& task);
+
+  // Fault::infeasible when the way is too short for the end speeds, or when no finite time is best.
+  Result<SteppedMotion> solve(double price_w) const;
+  // As fast as the limits allow; its price of time is infinite. Nothing where the way is too short for the
+  // end speeds, or no limit bounds the acceleration.
+  std::optional<SteppedMotion> fastest() const;
+  // Time of that motion; distance over speed limit when the acceleration is unbounded, infinite when the way
+  // is too short.
+  double shortest_s() const { return shortest_s_; }
+
+ private:
+  // What the motors bear at a speed, acceleration left out.
+  struct Local {
+    double v = 0;
+    std::array<double, 2> through{}, inside{};  // torques [N m]
+  };
+  struct Power {
+    double w = 0, slope = 0, bend = 0;  // of the motors at the battery, by acceleration
+  };
+  struct Most {
+    double acceleration = 0;  // negative: even a steady speed is beyond the limits
+    Bound bound = Bound::acceleration;
+    bool bounded = true;
+  };
+  // The trade between time and distance. Fastest: the greatest accelerations whatever they cost.
+  struct Price {
+    double fixed_w = 0;  // idle power and price of time
+    double lambda = 0;   // W s/x
+    bool fastest = false;
+    bool rough = false;  // motors' limits at the middle of cells only
+  };
+  struct End {
+    double v = 0, acceleration = 0;
+  };
+  struct Piece {
+    double from = 0, to = 0, acceleration = 0;  // > 0
+    Bound bound = Bound::acceleration;
+    bool bounded = false;
+
+    double duration_s() const;
+    double distance() const { return 0.5 * (from + to) * duration_s(); }
+  };
+  // From the start speed to the end speed by way of a third; the rest of the way is driven at that one.
+  struct Shape {
+    Price price;
+    double middle = 0;
+    bool cruises = true;
+  };
+
+  explicit UniformMotion(const UniformTask& task) : task_(task) {}
+
+  Local local(double v) const;
+  Power motors(const Local& l, double acceleration) const;
+  Most most(const Local& l, double direction, double tolerance) const;
+  double best(const Local& l, double direction, double rate_w, double most) const;
+  double steady_cost(double v, double fixed_w) const;
+  double cheapest_speed(double fixed_w) const;
+  double stretch(double pivot, double end, const Price& price) const;
+  bool has_motor_limits() const;
+  Most wanted(double v, double direction, const Price& price) const;
+  template <class Visit>
+  void piece(const End& from, const End& to, double change, const Price& price, int halvings,
+             Visit&& visit) const;
+  template <class Visit>
+  void leg(double from, double to, bool pivot_at_end, const Price& price, Visit&& visit) const;
+  template <class Visit>
+  void pieces(const Shape& shape, Visit&& visit) const;
+  double distance(const Shape& shape) const;
+  std::optional<Shape> shape_at(double fixed_w) const;
+  Shape turning(Shape shape, double nearest, double farthest) const;
+  std::optional<Shape> monotone(Shape shape, double highest_lambda) const;
+  std::optional<Shape> fastest_shape() const;
+  SteppedMotion written(const Shape& shape) const;
+  double pointwise_least(const Piece& piece, const Price& price) const;
+
+  UniformTask task_;
+  double top_ = 0;  // the speed limit, or what the motors can hold
+  double shortest_s_ = 0;
+};
+
+}  // namespace joulecast::planning

@@ -1,0 +1,157 @@
+// Plans whose current, voltage or acceleration limits bind, or whose braking is not returned, against direct
+// transcription.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "planning/peaks.h"
+#include "planning/planner.h"
+#include "tests/planning/robots.h"
+#include "tests/planning/transcription.h"
+
+namespace joulecast::planning {
+namespace {
+
+struct LimitedProblem {
+  robot::RobotModel robot;
+  Path path;
+  Problem problem;
+  std::string label;
+};
+
+LimitedProblem limited_problem(std::uint64_t seed) {
+  std::mt19937_64 random(seed * 104729 + 7);
+  const auto between = [&](double a, double b) { return std::uniform_real_distribution(a, b)(random); };
+  LimitedProblem p;
+  p.robot = test::all_robots()[seed % 4];
+  const double payload = between(0, p.robot.limits.payload_kg);
+  const int kind = static_cast<int>(random() % 4);
+  std::vector<Segment> segments{Straight{std::exp(between(std::log(0.5), std::log(12)))}};
+  if (kind == 2) segments = {TurnInPlace{between(0.5, 3)}};
+  if (kind == 3) segments = {Arc{between(0.6, 3), between(0.6, 2)}};
+  p.path = *make_path(segments, PathOptions{.start = {}, .payload_kg = payload});
+  p.problem.limits = limits_of(p.robot);
+  const double fractions[] = {1, 0.4, 0};
+  p.problem.regeneration = fractions[random() % 3];
+  const auto& m = p.robot.motor;
+  const double kn = m.torque_constant_nm_a * m.gear_ratio;
+  const double friction = std::max(m.friction_torque_nm[0], m.friction_torque_nm[1]) / kn;
+  const double push = p.robot.total_mass_kg(payload) * p.robot.kinematics.wheel_radius_m / 2 / kn;
+  const int limit = static_cast<int>(random() % 3);
+  if (limit == 0)
+    p.problem.limits.current_a =
+        1.05 * friction + push * between(0.05, 0.3) + m.viscous_friction_nm_s_rad * 4 / kn;
+  if (limit == 1) p.problem.limits.voltage_v *= between(0.3, 0.7);
+  p.problem.value_of_time_w = random() % 2 ? between(0, 100) : 0;
+  p.label = p.robot.robot_id +
+            (kind == 2   ? " turn"
+             : kind == 3 ? " arc"
+                         : " straight") +
+            " limit " + std::to_string(limit);
+  return p;
+}
+
+class LimitedProblems : public testing::TestWithParam<int> {};
+
+TEST_P(LimitedProblems, PlansAreOptimalAndTheirCertificatesTrue) {
+  const LimitedProblem p = limited_problem(static_cast<std::uint64_t>(GetParam()));
+  SCOPED_TRACE(p.label);
+  const auto planner = Planner::make(p.robot, p.problem.regeneration);
+  ASSERT_TRUE(planner);
+  const planning::Run& run = p.path.runs[0];
+  const auto free = planner->plan(p.path, p.problem);
+  ASSERT_TRUE(free) << describe(free.error());
+  const double shortest = free->certificate.shortest_time_s;
+  EXPECT_NEAR(shortest, test::least_time_s(p.robot, planner->loads().model(), run, p.problem.limits),
+              3e-4 * shortest);
+  // Every deadline from the shortest time on is met.
+  for (const double share : {0.0, 1e-5, 1e-3, 0.03, 0.5}) {
+    Problem hurried = p.problem;
+    hurried.deadline_s = shortest + share * (free->summary.duration_s - shortest) + 1e-9;
+    const auto plan = planner->plan(p.path, hurried);
+    ASSERT_TRUE(plan) << share << ": " << describe(plan.error());
+    EXPECT_LE(plan->summary.duration_s, *hurried.deadline_s * (1 + 1e-9));
+    EXPECT_GE(plan->summary.energy_j,
+              free->summary.energy_j * (1 - 1e-5) -
+                  p.problem.value_of_time_w * (free->summary.duration_s - *hurried.deadline_s));
+  }
+  for (const double share : {1.0, 0.1}) {
+    Problem hurried = p.problem;
+    if (share < 1) hurried.deadline_s = shortest + share * (free->summary.duration_s - shortest);
+    const auto plan = share < 1 ? planner->plan(p.path, hurried) : free;
+    ASSERT_TRUE(plan) << describe(plan.error());
+    const double price = share < 1 ? plan->certificate.time_multiplier_w : p.problem.value_of_time_w;
+    const double cost = plan->summary.energy_j + price * plan->summary.duration_s;
+    const auto best =
+        test::transcribed(p.robot, planner->loads().model(), run, p.problem.limits, 0, 0, price, 120);
+    const Certificate& c = plan->certificate;
+    if (best.excess > 5e-3) continue;  // the transcription did not converge
+    // The transcription may cost less by what it exceeds the limits, and by its own cells.
+    const double own = (2e-4 + 0.3 * best.excess) * best.cost_j;
+    EXPECT_LT(cost, best.cost_j + c.gap_j + c.discretisation_j + own) << share;
+    EXPECT_GT(cost, best.cost_j * (1 - 0.01)) << share;
+    EXPECT_LT(c.gap_j + c.discretisation_j, 5e-4 * cost);
+  }
+}
+
+// Costs that IPOPT found for a transcription with 300 cells by code of its own, limits kept at every cell's
+// ends: the optimum is not above them.
+struct Found {
+  const char* label;
+  robot::RobotModel robot;
+  Segment segment;
+  double payload_kg, end_speed_m_s, value_of_time_w, cost_j;
+};
+
+robot::RobotModel small_robot(double current_a) {
+  robot::RobotModel r;
+  r.kinematics = {0.095, 0.165, 0};
+  r.mass = {6.04, 1.48, 0.25, 0};
+  r.motor = {0.7, 0.0007, 0.88, 0.88, 1, 0.0713, 0.039, {0, 0}};
+  r.battery.nominal_voltage_v = 12.6;
+  r.idle_power_w = 6;
+  r.limits = {1.21, 0.5, 2.0, current_a, 7.6};
+  return r;
+}
+
+TEST(Limited, CostsNoMoreThanWhatAnotherProgramFound) {
+  robot::RobotModel husky;
+  husky.kinematics = {0.1651, 0.2775, 0};
+  husky.mass = {45, 5, 4.5, 0.14};
+  husky.motor = {0.5638177040327738,
+                 0,
+                 0.0445,
+                 0.0445,
+                 79,
+                 0.3,
+                 0.3656618334599215,
+                 {1.7465258089244993, 6.153505316111003}};
+  husky.battery.nominal_voltage_v = 24;
+  husky.idle_power_w = 74.49969075041963;
+  husky.limits = {1, 1, 2, 2.687276324210236, 75};
+  robot::RobotModel lossy = small_robot(0.21009445300006452);
+  lossy.effects = {{"no_regeneration", {{"fraction", 1.0}}}};
+  for (const Found& f :
+       {Found{"straight, no regeneration", lossy, Straight{2.379181799515453}, 0, 0, 0, 62.3985},
+        {"straight, dear time", husky, Straight{3.180264367278835}, 2.386986224355134, 0, 62.08576509084941,
+         627.265 + 62.08576509084941 * 5.2082},
+        {"turn", small_robot(0.23089633903750997), TurnInPlace{1.2844687099238992}, 4.521179818919879, 0, 0,
+         14.7623}}) {
+    const auto path =
+        make_path(std::vector<Segment>{f.segment}, PathOptions{.start = {}, .payload_kg = f.payload_kg});
+    Problem problem;
+    problem.limits = limits_of(f.robot);
+    problem.value_of_time_w = f.value_of_time_w;
+    const auto answer = plan(f.robot, *path, problem);
+    ASSERT_TRUE(answer) << describe(answer.error());
+    const double cost = answer->summary.energy_j + f.value_of_time_w * answer->summary.duration_s;
+    EXPECT_LT(cost, f.cost_j * (1 + 1e-5)) << f.label;
+    EXPECT_GT(cost, f.cost_j * (1 - 5e-3)) << f.label;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(TwelveProblems, LimitedProblems, testing::Range(0, 12));
+
+}  // namespace
+}  // namespace joulecast::planning
