@@ -4,7 +4,7 @@ import { get, query } from './api.js';
 const pageEntries = 1000;
 
 async function lastId(signal) {
-  const after = async (id) => (await get(`/v1/audit-log${query({ after: id, limit: 1 })}`, signal)).events;
+  const after = async (id) => (await get(`/v1/audit-log${query({ cursor: id > 0 ? id : undefined, limit: 1 })}`, signal)).events;
   let low = 0; // there is an entry with a greater id, unless the log is empty
   let high = 1;
   while ((await after(high)).length > 0) [low, high] = [high, 4 * high];
@@ -21,7 +21,7 @@ export async function newestEvents({ robotId, count = 200, signal }) {
   let after = robotId ? 0 : Math.max(0, (await lastId(signal)) - count);
   const found = [];
   for (;;) {
-    const path = `/v1/audit-log${query({ robot_id: robotId, after, limit: pageEntries })}`;
+    const path = `/v1/audit-log${query({ robot_id: robotId, cursor: after > 0 ? after : undefined, limit: pageEntries })}`;
     const { events } = await get(path, signal);
     found.push(...events);
     if (events.length < pageEntries) return found.reverse();

@@ -18,7 +18,7 @@ const quantities = {
 
 function Sides({ telemetry, mission, quantity }) {
   const [, label, column] = quantities[quantity];
-  const { right, left } = telemetry[column];
+  const [right, left] = telemetry[column];
   const data = useMemo(
     () => [telemetry.utime_us.map((t) => (t - mission.start_utime_us) / 1e6), right, left],
     [telemetry, quantity],
