@@ -6,8 +6,8 @@
 #include <atomic>
 #include <memory>
 
-#include "base/utc_time.h"
 #include "base/host_clock.h"
+#include "base/utc_time.h"
 
 namespace joulecast {
 namespace {

@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "client/commands/table.h"
-#include "report/exploration_drawing.h"
 #include "client/files.h"
 #include "client/progress.h"
 #include "client/virtual_robot/fleet.h"
 #include "exploration/exploration_json.h"
 #include "exploration/map_file.h"
+#include "report/exploration_drawing.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::client {

@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "base/utc_time.h"
 #include "base/host_clock.h"
+#include "base/utc_time.h"
 #include "client/files.h"
 #include "client/wrapped.h"
 #include "gap/verdict/adopt.h"

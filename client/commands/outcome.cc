@@ -14,6 +14,7 @@ Exit exit_of(Fault fault) {
       return Exit::fault;
     case Fault::infeasible:
       return Exit::infeasible;
+    case Fault::stopped:
     case Fault::unavailable:
       return Exit::unreachable;
     case Fault::internal:

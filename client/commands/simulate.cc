@@ -15,9 +15,9 @@
 #include <variant>
 #include <vector>
 
-#include "base/utc_time.h"
 #include "base/host_clock.h"
 #include "base/text_file.h"
+#include "base/utc_time.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/http_client.h"

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 #include "answers/profile.h"
 #include "forecast/outlook.h"
+#include "planning/gauss.h"
 
 namespace joulecast::answers {
 namespace {

@@ -17,7 +17,6 @@
 namespace joulecast::telemetry {
 namespace {
 
-
 enum class Text { id, optional_id, note, covariate_name };
 
 // What is wrong with a string of the contract, empty when nothing is.
