@@ -50,8 +50,6 @@ TEST(Curve, InterpolatesHoldsAndExtends) {
   EXPECT_EQ(curve.held(2), 3.5);
   EXPECT_EQ(curve.held(9), 4);
   EXPECT_EQ(curve.extended(5), 5);
-  EXPECT_EQ(curve.slope(0.5), 2);
-  EXPECT_EQ(curve.slope(1), 0.5);
   EXPECT_DOUBLE_EQ(curve.mean(), (2.0 + 7.0) / 3);
   EXPECT_EQ(Curve({{0.5, 7}}).extended(3), 7);
 }

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "answers/json/autonomy_json.h"
 #include "forecast/habit.h"
-#include "server/api/autonomy.h"
 
 namespace joulecast::forecast {
 namespace {
@@ -75,13 +75,13 @@ std::array<double, 3> quantiles(const json& told) {
 }  // namespace
 
 Asking::Asking(const RobotRun& run) {
-  outlook_.model = *server::model_in_force(run.robot, 1);
+  outlook_.model = *answers::model_in_force(run.robot, 1);
   outlook_.battery = std::make_shared<const ChargeMap>(battery::Circuit(run.robot.battery));
 }
 
 Told Asking::ask(const DrivenMission& mission, Asked asked, std::shared_ptr<const Forecaster> forecaster) {
   outlook_.forecaster = std::move(forecaster);
-  const auto answer = api::autonomy_answer(request_of(mission, asked), outlook_, nullptr, tables_);
+  const auto answer = answers::autonomy_answer(request_of(mission, asked), outlook_, {}, tables_);
   if (!answer) throw std::runtime_error(describe(answer.error()));
   const json plan = json::parse(*answer)["plan"];
   return {quantiles(plan["energy_j"]), quantiles(plan["duration_quantiles_s"])};

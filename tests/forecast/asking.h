@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
+#include "answers/model.h"
 #include "missions.h"
 #include "planning/cost_table_cache.h"
-#include "server/ingest/forecasts.h"
 
 namespace joulecast::forecast {
 
@@ -36,7 +36,7 @@ class Asking {
   Told ask(const DrivenMission& mission, Asked asked, std::shared_ptr<const Forecaster> forecaster);
 
  private:
-  server::RobotOutlook outlook_;
+  answers::RobotOutlook outlook_;
   planning::CostTableCache tables_;
 };
 

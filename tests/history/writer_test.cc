@@ -408,7 +408,7 @@ TEST_F(WriterTest, StopSpoolsWhatItCouldNotCommitAndTheNextStartTakesItIn) {
     m.note = "spooled";
     m.samples = 30;
     m.sample_faults["late"] = 2;
-    m.accounts.ledger[energy::Term::copper] = 3.5;
+    m.accounts.ledger[signals::Term::copper] = 3.5;
     CovariateSummary load;
     load.name = "cpu_load";
     load.mean = 0.25;
@@ -433,7 +433,7 @@ TEST_F(WriterTest, StopSpoolsWhatItCouldNotCommitAndTheNextStartTakesItIn) {
   const Mission stored_mission = need(store_.mission(m.key));
   EXPECT_EQ(stored_mission.note, "spooled");
   EXPECT_EQ(stored_mission.sample_faults, m.sample_faults);
-  EXPECT_EQ(stored_mission.accounts.ledger[energy::Term::copper], 3.5);
+  EXPECT_EQ(stored_mission.accounts.ledger[signals::Term::copper], 3.5);
   ASSERT_EQ(stored_mission.covariates.size(), 1U);
   EXPECT_EQ(stored_mission.covariates[0].mean, 0.25);
   EXPECT_EQ(need(store_.telemetry(m.key, {}, {.limit = 100, .cursor = {}})).samples.size(), 30U);

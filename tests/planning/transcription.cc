@@ -42,7 +42,7 @@ class Motion {
     const auto f = flow(v, a);
     const auto& p = model_.parameters();
     const double up = 1 + p.driver_loss, down = 1 - p.unreturned - p.driver_loss;
-    double sum = f.accessories_w;
+    double sum = f.ledger[signals::Term::accessories];
     for (std::size_t s : {0u, 1u}) {
       const double motor = f.voltage_v[s] * f.current_a[s];
       sum += 0.5 * (up + down) * motor + 0.5 * (up - down) * std::hypot(motor, width_w);
