@@ -139,6 +139,7 @@ void Pipeline::publish() {
 
 void Pipeline::finish() {
   tick(std::numeric_limits<std::int64_t>::max());
+  publish();
 }
 
 void Pipeline::suspend() {
