@@ -386,13 +386,17 @@ Result<Plan> Request::written() {
       });
     } else {
       const std::vector<double>&way = answer.way, &speed = answer.speed;
+      const double most = planner.acceleration_limit();
       times.push_back(0);
       for (std::size_t i = 0; i + 1 < way.size(); ++i)
         times.push_back(times.back() + 2 * (way[i + 1] - way[i]) / (speed[i] + speed[i + 1]));
       writer.run(planner, times, [&](std::size_t i, double f) {
-        const double span = times[i + 1] - times[i], a = (speed[i + 1] - speed[i]) / span,
-                     v = speed[i] + f * span * a;
-        return Writer::State{way[i] + f * span * 0.5 * (speed[i] + v), v, a};
+        const double span = times[i + 1] - times[i], rate = (speed[i + 1] - speed[i]) / span,
+                     v = speed[i] + f * span * rate;
+        // A difference over a short span passes the limit by its rounding.
+        const bool rounded = std::fabs(rate) <= most * (1 + 1e-6);
+        return Writer::State{way[i] + f * span * 0.5 * (speed[i] + v), v,
+                             rounded ? std::clamp(rate, -most, most) : rate};
       });
       c.discretisation_j += answer.discretisation_j;
     }

@@ -54,13 +54,15 @@ class RunPlanner {
   // Of a grid: of the finest so far.
   double shortest_s() const { return shortest_s_; }
 
+  // Of the run's coordinate.
+  double acceleration_limit() const;
+
  private:
   RunPlanner(const robot::RobotModel& robot, const DriveLoads& loads, const Run& run, const Problem& problem)
       : robot_(&robot), loads_(&loads), run_(&run), problem_(&problem) {}
 
   double ceiling_at(double way) const;
   Bound ceiling_bound(double way) const;
-  double acceleration_limit() const;
   void find_line();
   void find_motion();
   RunAnswer answer_of(SteppedMotion motion) const;
