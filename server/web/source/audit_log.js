@@ -4,7 +4,8 @@ import { get, query } from './api.js';
 const pageEntries = 1000;
 
 async function lastId(signal) {
-  const after = async (id) => (await get(`/v1/audit-log${query({ cursor: id > 0 ? id : undefined, limit: 1 })}`, signal)).events;
+  const after = async (id) =>
+    (await get(`/v1/audit-log${query({ cursor: id > 0 ? id : undefined, limit: 1 })}`, signal)).events;
   let low = 0; // there is an entry with a greater id, unless the log is empty
   let high = 1;
   while ((await after(high)).length > 0) [low, high] = [high, 4 * high];
