@@ -516,6 +516,7 @@ await check('a proposed model says what it changes, and is adopted only when con
   faultsWanted = true;
   const request = page.waitForRequest('**/v1/robots/worn-01/model');
   await panel.getByRole('button', { name: 'Adopt', exact: true }).click();
+  await page.getByRole('dialog').locator('button:focus').waitFor();
   await page.keyboard.press('Enter'); // the dialog's first button has the focus
   const body = (await request).postDataJSON();
   equal(`${body.proposal_id} ${body.expected_version}`, `${proposals[0].id} 1`, 'what is asked for');
