@@ -52,7 +52,6 @@ Session::Session(std::shared_ptr<Core> core, const net::ip::address& peer, bool 
   ++peer_->connections;
   ++(guest_ ? core_->guests : core_->connections);
   core_->observer.connections(core_->connections + core_->guests);
-  request_.stop = stop_.get_token();
 }
 
 void Session::start() {
@@ -134,8 +133,9 @@ void Session::begin_request() {
   parser_->body_limit(core_->options.max_body_bytes);
   if (buffer_.size() == 0 && buffer_.capacity() > kept_buffer_bytes && !reading_ahead_)
     buffer_.shrink_to_fit();
-  request_.body = std::string();
-  request_.json.reset();
+  // Nothing of the request before on this connection: what was read of that one is not this one's.
+  request_ = Request{};
+  request_.stop = stop_.get_token();
   response_.body = std::string();
   response_.stream.reset();
   endpoint_ = nullptr;
@@ -191,7 +191,6 @@ void Session::fill_request() {
   const auto& message = parser_->get();
   request_.method = method_of(message.method());
   request_.target = view(message.target());
-  request_.headers.clear();
   for (const auto& field : message)
     request_.headers.emplace_back(view(field.name_string()), view(field.value()));
   request_.body = std::move(parser_->get().body());

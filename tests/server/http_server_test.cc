@@ -116,6 +116,14 @@ class HttpServerTest : public ::testing::Test {
       if (!request.json->at("quick").get<bool>()) return std::nullopt;
       return json_response("\"brief\"");
     };
+    row(Method::post, "/read-once", http::Run::worker, [](const Request& request) -> Result<Response> {
+      return json_response(std::any_cast<std::string>(request.input));
+    });
+    rows.back().request_schema = "any";
+    rows.back().brief = [](Request& request) -> std::optional<Response> {
+      if (!request.input.has_value()) request.input = request.json->at("n").dump();
+      return std::nullopt;
+    };
     row(Method::get, "/fault", http::Run::io,
         [](const Request&) -> Result<Response> { return fail(Fault::internal, "", "secret cause"); });
     row(Method::get, "/throws", http::Run::worker,
@@ -378,6 +386,16 @@ TEST_F(HttpServerTest, AnswersBriefRequestsWithoutAWorker) {
   running.send(get_text("/blocked"));
   ASSERT_TRUE(soon([&] { return blocked_ == 1; }));
   EXPECT_EQ(ask(client, R"({"quick": true})").body, "\"brief\"");
+}
+
+TEST_F(HttpServerTest, WhatWasReadOfARequestIsNotTheNextOnesOnTheConnection) {
+  start();
+  RawClient client(port());
+  for (const char* n : {"1", "2", "3"}) {
+    client.send(
+        post_text("/read-once", R"({"n": )" + std::string(n) + "}", "Content-Type: application/json\r\n"));
+    EXPECT_EQ(client.reply().body, n);
+  }
 }
 
 TEST_F(HttpServerTest, NamesTheRequestAndKeepsItsOwnFaultsToItself) {
