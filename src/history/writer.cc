@@ -354,16 +354,20 @@ class Writer::Impl {
 
   // False when stop() did not wait for this any longer.
   bool settle(std::vector<Outcome>& outcomes, bool idle, double duration_s) {
-    // Before flush() can return: who waits for it may look for what was refused.
+    // Before flush() can return: who waits for it may look for what was reported.
     auto item = batch_.items.begin();
     for (const Outcome& outcome : outcomes)
       if (const Item& settled = *item++; !outcome && !settled.waiter) tell(outcome.error());
     bool recovered = false;
     {
       const std::lock_guard lock(mutex_);
+      recovered = !why_.empty() && !ended_;
+    }
+    if (recovered) tell(unavailable("commits succeed again"));
+    {
+      const std::lock_guard lock(mutex_);
       attempt_since_.reset();
       if (ended_) return false;
-      recovered = !why_.empty();
       why_.clear();
       if (!idle && !outcomes.empty()) {
         ++status_.commits;
@@ -385,7 +389,6 @@ class Writer::Impl {
     }
     room_.notify_all();
     committed_.notify_all();
-    if (recovered) tell(unavailable("commits succeed again"));
     return true;
   }
 
