@@ -29,8 +29,8 @@
 #include "server/http/openapi.h"
 #include "server/http/operations.h"
 #include "server/http/static_files.h"
-#include "server/ingest/ingest_service.h"
-#include "server/ingest/model_loading.h"
+#include "ingest/ingest_service.h"
+#include "ingest/model_loading.h"
 #include "server/logging.h"
 #include "server/metrics.h"
 
@@ -98,8 +98,8 @@ history::WriterOptions writer_options(const Settings& settings) {
   return options;
 }
 
-server::IngestOptions ingest_options(const Settings& settings) {
-  server::IngestOptions options;
+ingest::IngestOptions ingest_options(const Settings& settings) {
+  ingest::IngestOptions options;
   options.lcm_url = settings.text("lcm.url");
   options.listen = {settings.text("lcm.bind_address"), settings.text("lcm.accept_from")};
   options.queue_messages = static_cast<std::size_t>(settings.integer("ingest.queue_messages"));
@@ -256,11 +256,11 @@ struct Application::Parts {
 
   // A faulty file costs its robot, not the fleet.
   Result<void> load_robot_files(const std::string& directory) {
-    const Result<server::RobotFiles> files = server::read_robot_files(directory);
+    const Result<ingest::RobotFiles> files = ingest::read_robot_files(directory);
     if (!files) return tl::unexpected(files.error());
     for (const Error& faulty : files->faulty) log_error("robot file left out", faulty);
     for (const auto& [path, robot] : files->robots) {
-      if (Result<void> loaded = server::load_robot(robot, path, *store, *writer, host_utime_us()); !loaded)
+      if (Result<void> loaded = ingest::load_robot(robot, path, *store, *writer, host_utime_us()); !loaded)
         return loaded;
     }
     metrics.gauge("joulecast_robot_files_faulty", "Robot files left out at the start for being faulty")
@@ -293,15 +293,15 @@ struct Application::Parts {
   const Settings settings;
   Metrics metrics;
   http::EventHub events;
-  server::ModelRegistry models;
-  server::FleetView fleet;
-  std::unique_ptr<server::Forecasts> forecasts;
+  ingest::ModelRegistry models;
+  ingest::FleetView fleet;
+  std::unique_ptr<ingest::Forecasts> forecasts;
   planning::CostTableCache cost_tables;
-  server::IngestCounters counters;
+  ingest::IngestCounters counters;
   std::function<void(const std::string&, const std::string&)> warn;
   std::unique_ptr<history::Store> store;
   std::unique_ptr<history::Writer> writer;
-  std::unique_ptr<server::IngestService> ingest;
+  std::unique_ptr<ingest::IngestService> ingest;
   std::unique_ptr<server::DriftView> drift_view;
   std::unique_ptr<server::ModelAdoption> adoption;
   std::unique_ptr<server::ProposalAcceptor> acceptor;  // null: a person adopts
@@ -337,27 +337,27 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   if (const std::string& directory = settings.text("robots.directory"); !directory.empty()) {
     if (Result<void> loaded = p.load_robot_files(directory); !loaded) return tl::unexpected(loaded.error());
   }
-  if (Result<void> models = server::load_stored_models(*p.store, p.models); !models)
+  if (Result<void> models = ingest::load_stored_models(*p.store, p.models); !models)
     return tl::unexpected(std::move(models.error()));
 
-  p.forecasts = std::make_unique<server::Forecasts>(*p.store);
+  p.forecasts = std::make_unique<ingest::Forecasts>(*p.store);
   history::Writer& writer = *p.writer;
   const auto post = [&writer, warn = p.warn](history::Command command) {
     if (const Result<void> posted = writer.offer(std::move(command)); !posted)
       warn("", describe(posted.error()));
   };
-  server::SessionOutputs outputs{*p.store, post, p.fleet, p.counters, p.warn};
-  outputs.mission_ended = [&p, post](const std::shared_ptr<const server::ModelInForce>& model,
+  ingest::SessionOutputs outputs{*p.store, post, p.fleet, p.counters, p.warn};
+  outputs.mission_ended = [&p, post](const std::shared_ptr<const ingest::ModelInForce>& model,
                                      forecast::PastMission mission) {
     // A mission that ran into a new version is learnt against the one in force now.
     const auto in_force = p.models.find(model->robot.robot_id);
-    server::Forecasts::Learnt learnt =
+    ingest::Forecasts::Learnt learnt =
         p.forecasts->learn(in_force != nullptr ? in_force : model, std::move(mission));
     post(history::PutLearned{std::move(learnt.document)});
     if (learnt.drift) p.report_drift(model->robot.robot_id, *learnt.drift, post);
   };
   p.ingest =
-      std::make_unique<server::IngestService>(ingest_options(settings), p.models, *p.forecasts, outputs);
+      std::make_unique<ingest::IngestService>(ingest_options(settings), p.models, *p.forecasts, outputs);
   if (Result<void> started = p.ingest->start(); !started) return tl::unexpected(std::move(started.error()));
 
   p.drift_view = std::make_unique<server::DriftView>(*p.store, p.models, drift_options(settings));
@@ -381,7 +381,7 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
                                                              *p.adoption, *p.diagnoses, host_utime_us});
   std::vector<http::ReadinessCheck> checks;
   checks.push_back({"ingest", [&p]() -> Result<void> {
-                      const server::IngestStatus status = p.ingest->status();
+                      const ingest::IngestStatus status = p.ingest->status();
                       if (!status.receiving)
                         return fail(Fault::unavailable, "ingest",
                                     "LCM is not being received: " + status.error);
@@ -419,7 +419,7 @@ std::uint16_t Application::http_port() const {
 }
 
 bool Application::alive() {
-  const server::IngestStatus ingest = parts_->ingest->status();
+  const ingest::IngestStatus ingest = parts_->ingest->status();
   const history::WriterStatus writing = parts_->writer->status();
   constexpr milliseconds longest_silence{5000};
   const bool turning =
@@ -436,7 +436,7 @@ bool Application::alive() {
 std::vector<Error> faulty_robot_files(const Settings& settings) {
   const std::string& directory = settings.text("robots.directory");
   if (directory.empty()) return {};
-  const Result<server::RobotFiles> files = server::read_robot_files(directory);
+  const Result<ingest::RobotFiles> files = ingest::read_robot_files(directory);
   return files ? files->faulty : std::vector<Error>{files.error()};
 }
 

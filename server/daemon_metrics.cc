@@ -11,8 +11,8 @@ namespace joulecast::server {
 
 static_assert(history::MissionState{} == history::MissionState::open);
 
-void export_metrics(Metrics& metrics, const IngestCounters& counters, const IngestService& ingest,
-                    const FleetView& fleet, const history::Writer& writer, const history::Store& store,
+void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters, const ingest::IngestService& ingest,
+                    const ingest::FleetView& fleet, const history::Writer& writer, const history::Store& store,
                     const http::EventHub& events, std::function<std::int64_t()> now_utime_us) {
   const Counter messages =
       metrics.counter("joulecast_ingest_messages_total", "Messages received on the robots' channels");
@@ -28,7 +28,7 @@ void export_metrics(Metrics& metrics, const IngestCounters& counters, const Inge
       metrics.counters("joulecast_missions_ended_total", "Missions ended", "state", states);
   const std::vector<Counter> faults = metrics.counters(
       "joulecast_ingest_faults_total", "Messages, samples and events turned away or repaired", "reason",
-      std::vector<std::string>(ingest_fault_names.begin(), ingest_fault_names.end()));
+      std::vector<std::string>(ingest::ingest_fault_names.begin(), ingest::ingest_fault_names.end()));
   const Counter datagrams =
       metrics.counter("joulecast_lcm_datagrams_total", "Datagrams received on the LCM group");
   const std::vector<Counter> lost =
@@ -83,7 +83,7 @@ void export_metrics(Metrics& metrics, const IngestCounters& counters, const Inge
         datagrams.raise_to(static_cast<double>(counters.datagrams.received));
         for (std::size_t k = 0; k < lost.size(); ++k)
           lost[k].raise_to(static_cast<double>(counters.datagrams.faults[k]));
-        const IngestStatus ingesting = ingest.status();
+        const ingest::IngestStatus ingesting = ingest.status();
         queue.set(static_cast<double>(ingesting.queue_messages));
         receiving.set(ingesting.receiving ? 1 : 0);
 

@@ -6,9 +6,9 @@
 
 #include "history/store.h"
 #include "server/http/event_hub.h"
-#include "server/ingest/fleet_view.h"
-#include "server/ingest/forecasts.h"
-#include "server/ingest/model_registry.h"
+#include "ingest/fleet_view.h"
+#include "ingest/forecasts.h"
+#include "ingest/model_registry.h"
 
 namespace joulecast::server {
 
@@ -16,7 +16,7 @@ namespace joulecast::server {
 // for each mission that ended. One thread.
 class FleetEvents {
  public:
-  FleetEvents(const FleetView& fleet, const ModelRegistry& models, Forecasts& forecasts,
+  FleetEvents(const ingest::FleetView& fleet, const ingest::ModelRegistry& models, ingest::Forecasts& forecasts,
               const history::Store& store, http::EventHub& hub)
       : fleet_(fleet), models_(models), forecasts_(forecasts), store_(store), hub_(hub) {}
 
@@ -24,12 +24,12 @@ class FleetEvents {
 
  private:
   struct Told {
-    std::shared_ptr<const RobotSnapshot> snapshot;
+    std::shared_ptr<const ingest::RobotSnapshot> snapshot;
     bool live = false;
   };
-  const FleetView& fleet_;
-  const ModelRegistry& models_;
-  Forecasts& forecasts_;
+  const ingest::FleetView& fleet_;
+  const ingest::ModelRegistry& models_;
+  ingest::Forecasts& forecasts_;
   const history::Store& store_;
   http::EventHub& hub_;
   std::map<std::string, Told> told_;

@@ -13,9 +13,9 @@
 #include "client/log_progress.h"
 #include "history/sqlite_store.h"
 #include "history/writer.h"
-#include "server/ingest/forecasts.h"
-#include "server/ingest/model_loading.h"
-#include "server/ingest/pipeline.h"
+#include "ingest/forecasts.h"
+#include "ingest/model_loading.h"
+#include "ingest/pipeline.h"
 #include "telemetry/event_log.h"
 
 namespace joulecast::client {
@@ -23,10 +23,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-Result<bool> read_log(const std::string& path, server::Pipeline& pipeline, server::IngestCounters& counters,
+Result<bool> read_log(const std::string& path, ingest::Pipeline& pipeline, ingest::IngestCounters& counters,
                       LogProgress& progress, telemetry::LogTally& tally) {
   const auto take = [&](const telemetry::LogEvent& event) -> Result<bool> {
-    if (const auto message = server::decode_message(event.channel, event.data, event.timestamp_us, counters))
+    if (const auto message = ingest::decode_message(event.channel, event.data, event.timestamp_us, counters))
       pipeline.handle(*message);
     progress.passed(event);
     return true;
@@ -55,7 +55,7 @@ void print_table(const std::vector<history::Mission>& missions) {
 }
 
 // Robots whose telemetry could not be accounted for; how many they are.
-std::size_t tell_strangers(const server::FleetView& fleet, const std::string& store_path) {
+std::size_t tell_strangers(const ingest::FleetView& fleet, const std::string& store_path) {
   std::size_t count = 0;
   for (const auto& robot : fleet.all()) {
     if (robot->has_model) continue;
@@ -79,20 +79,20 @@ Exit replay_into(const ReplayInto& options) {
   auto store = history::open_sqlite_store(sqlite);
   if (!store) return report(store.error());
   history::Writer writer(**store, {});
-  server::ModelRegistry models;
+  ingest::ModelRegistry models;
   for (const std::string& file : options.robot_files) {
-    const auto robot = server::read_robot_file(file);
+    const auto robot = ingest::read_robot_file(file);
     if (!robot) return report(robot.error());
-    if (Result<void> loaded = server::load_robot(*robot, file, **store, writer, host_utime_us()); !loaded)
+    if (Result<void> loaded = ingest::load_robot(*robot, file, **store, writer, host_utime_us()); !loaded)
       return report(loaded.error());
   }
-  if (Result<void> loaded = server::load_stored_models(**store, models); !loaded)
+  if (Result<void> loaded = ingest::load_stored_models(**store, models); !loaded)
     return report(loaded.error());
 
-  server::FleetView fleet;
-  server::IngestCounters counters;
+  ingest::FleetView fleet;
+  ingest::IngestCounters counters;
   std::set<history::MissionKey> touched;
-  server::SessionOutputs outputs{**store,
+  ingest::SessionOutputs outputs{**store,
                                  [&](history::Command command) {
                                    if (const auto* begun = std::get_if<history::StartMission>(&command))
                                      touched.insert(begun->mission.key);
@@ -103,15 +103,15 @@ Exit replay_into(const ReplayInto& options) {
                                  [](const std::string& robot, const std::string& text) {
                                    std::fprintf(stderr, "joulecast: %s: %s\n", robot.c_str(), text.c_str());
                                  }};
-  server::Forecasts forecasts(**store);
-  outputs.mission_ended = [&](const std::shared_ptr<const server::ModelInForce>& model,
+  ingest::Forecasts forecasts(**store);
+  outputs.mission_ended = [&](const std::shared_ptr<const ingest::ModelInForce>& model,
                               forecast::PastMission mission) {
-    server::Forecasts::Learnt learnt = forecasts.learn(model, std::move(mission));
+    ingest::Forecasts::Learnt learnt = forecasts.learn(model, std::move(mission));
     if (const Result<void> posted = writer.post(history::PutLearned{std::move(learnt.document)}); !posted)
       report(posted.error());
   };
   constexpr std::size_t any_number_of_robots = 1'000'000;
-  server::Pipeline pipeline({}, any_number_of_robots, models, outputs);
+  ingest::Pipeline pipeline({}, any_number_of_robots, models, outputs);
   telemetry::LogTally tally;
   LogProgress progress("accounting", options.logs);
   const auto began = Clock::now();
@@ -133,8 +133,8 @@ Exit replay_into(const ReplayInto& options) {
     JsonWriter json;
     json.begin_object().field("messages", tally.events).field("damaged_places", tally.damaged_places);
     json.field("skipped_bytes", tally.skipped_bytes).key("faults").begin_object();
-    for (std::size_t k = 0; k < server::ingest_fault_count; ++k)
-      json.field(server::ingest_fault_names[k], counters.faults[k].load());
+    for (std::size_t k = 0; k < ingest::ingest_fault_count; ++k)
+      json.field(ingest::ingest_fault_names[k], counters.faults[k].load());
     json.end_object().key("missions").begin_array();
     for (const history::Mission& mission : missions) answers::write_mission(json, mission);
     json.end_array().end_object();
@@ -144,9 +144,9 @@ Exit replay_into(const ReplayInto& options) {
     std::printf("%llu messages in %.2f s (%.0f a second); * = incomplete\n",
                 static_cast<unsigned long long>(tally.events), wall_s,
                 static_cast<double>(tally.events) / std::max(wall_s, 1e-9));
-    for (std::size_t k = 0; k < server::ingest_fault_count; ++k) {
+    for (std::size_t k = 0; k < ingest::ingest_fault_count; ++k) {
       if (const auto count = counters.faults[k].load(); count > 0) {
-        std::printf("%s: %llu\n", std::string(server::ingest_fault_names[k]).c_str(),
+        std::printf("%s: %llu\n", std::string(ingest::ingest_fault_names[k]).c_str(),
                     static_cast<unsigned long long>(count));
       }
     }

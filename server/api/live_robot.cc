@@ -4,7 +4,7 @@
 
 namespace joulecast::api {
 
-answers::LiveRobot live_robot(const server::RobotSnapshot* snapshot) {
+answers::LiveRobot live_robot(const ingest::RobotSnapshot* snapshot) {
   answers::LiveRobot now;
   if (snapshot == nullptr) return now;
   now.state_of_charge = snapshot->state_of_charge;

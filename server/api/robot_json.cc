@@ -8,7 +8,7 @@ namespace {
 
 constexpr double live_s = 5;
 
-double silence_s(const server::RobotSnapshot& s, std::int64_t now_utime_us) {
+double silence_s(const ingest::RobotSnapshot& s, std::int64_t now_utime_us) {
   return s.received_utime_us > 0 ? static_cast<double>(now_utime_us - s.received_utime_us) * 1e-6
                                  : signals::unmeasured;
 }
@@ -19,7 +19,7 @@ void write_sides(JsonWriter& json, std::string_view name, const std::array<doubl
 
 }  // namespace
 
-void write_charge(JsonWriter& json, const server::ChargeView& charge) {
+void write_charge(JsonWriter& json, const ingest::ChargeView& charge) {
   const battery::ChargeEstimate& estimate = charge.estimate;
   json.key("charge").begin_object();
   json.field("source", battery::name(estimate.source));
@@ -45,11 +45,11 @@ void write_charge(JsonWriter& json, const server::ChargeView& charge) {
   json.end_object();
 }
 
-bool is_live(const server::RobotSnapshot& snapshot, std::int64_t now_utime_us) {
+bool is_live(const ingest::RobotSnapshot& snapshot, std::int64_t now_utime_us) {
   return silence_s(snapshot, now_utime_us) <= live_s;  // false for NaN
 }
 
-void write_state(JsonWriter& json, const server::RobotSnapshot& s,
+void write_state(JsonWriter& json, const ingest::RobotSnapshot& s,
                  const std::optional<forecast::Reach>& reach, std::int64_t now_utime_us) {
   json.begin_object();
   json.field("robot_id", s.robot_id);

@@ -4,19 +4,19 @@
 
 #include "base/json_writer.h"
 #include "forecast/outlook.h"
-#include "server/ingest/fleet_view.h"
+#include "ingest/fleet_view.h"
 
 namespace joulecast::api {
 
 // Heard of within the last seconds.
-bool is_live(const server::RobotSnapshot& snapshot, std::int64_t now_utime_us);
+bool is_live(const ingest::RobotSnapshot& snapshot, std::int64_t now_utime_us);
 
 // The fields "charge" and "charging" of a robot's state.
-void write_charge(JsonWriter& json, const server::ChargeView& charge);
+void write_charge(JsonWriter& json, const ingest::ChargeView& charge);
 
 // The live state of a robot: what GET /v1/robots/{id}/state answers and the fleet's event stream sends.
 // `reach` is by the robot's forecast; empty when it has no model.
-void write_state(JsonWriter& json, const server::RobotSnapshot& snapshot,
+void write_state(JsonWriter& json, const ingest::RobotSnapshot& snapshot,
                  const std::optional<forecast::Reach>& reach, std::int64_t now_utime_us);
 
 }  // namespace joulecast::api

@@ -20,13 +20,13 @@ constexpr std::int64_t most_robots = 10'000;  // a page
 void write_robot_state(JsonWriter& json, const Services& services, const std::string& robot_id) {
   const auto model = services.models.find(robot_id);
   auto snapshot = services.fleet.find(robot_id);
-  server::RobotSnapshot silent;
+  ingest::RobotSnapshot silent;
   if (snapshot == nullptr) {
     silent.robot_id = robot_id;
     silent.has_model = model != nullptr;
     silent.model_version = model != nullptr ? model->version : 0;
   }
-  const server::RobotSnapshot& now = snapshot != nullptr ? *snapshot : silent;
+  const ingest::RobotSnapshot& now = snapshot != nullptr ? *snapshot : silent;
   std::optional<forecast::Reach> reach;
   if (model != nullptr) reach = services.forecasts.reach(model, now);
   write_state(json, now, reach, services.now_utime_us());
@@ -92,7 +92,7 @@ Result<Response> put(Services& services, const Request& request) {
 Result<Response> state(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
   if (services.models.find(id) == nullptr && services.fleet.find(id) == nullptr) {
-    return tl::unexpected(server::unknown_robot("id", id));
+    return tl::unexpected(ingest::unknown_robot("id", id));
   }
   JsonWriter json;
   write_robot_state(json, services, id);

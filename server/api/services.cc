@@ -34,11 +34,11 @@ std::vector<http::Endpoint> described_endpoints() {
   return all;
 }
 
-Result<std::shared_ptr<const server::ModelInForce>> model_of(const Services& services,
+Result<std::shared_ptr<const ingest::ModelInForce>> model_of(const Services& services,
                                                              const std::string& robot_id, std::string field) {
   if (auto model = services.models.find(robot_id)) return model;
   if (services.fleet.find(robot_id) == nullptr)
-    return tl::unexpected(server::unknown_robot(std::move(field), robot_id));
+    return tl::unexpected(ingest::unknown_robot(std::move(field), robot_id));
   return fail(Fault::not_found, std::move(field),
               "robot " + robot_id + " publishes telemetry but has no model yet: PUT /v1/robots/" + robot_id);
 }

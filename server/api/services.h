@@ -11,9 +11,9 @@
 #include "server/diagnosis/drift_view.h"
 #include "server/diagnosis/model_adoption.h"
 #include "server/http/router.h"
-#include "server/ingest/fleet_view.h"
-#include "server/ingest/forecasts.h"
-#include "server/ingest/model_registry.h"
+#include "ingest/fleet_view.h"
+#include "ingest/forecasts.h"
+#include "ingest/model_registry.h"
 
 namespace joulecast::api {
 
@@ -21,9 +21,9 @@ namespace joulecast::api {
 struct Services {
   history::Store& store;
   history::Writer& writer;
-  server::ModelRegistry& models;
-  const server::FleetView& fleet;
-  server::Forecasts& forecasts;
+  ingest::ModelRegistry& models;
+  const ingest::FleetView& fleet;
+  ingest::Forecasts& forecasts;
   planning::CostTableCache& cost_tables;
   const server::DriftView& drift;
   server::ModelAdoption& adoption;
@@ -62,7 +62,7 @@ std::vector<TableRow> mission_rows();
 std::vector<TableRow> planning_rows();
 
 // The model of a robot that `field` of the request names, or the error that says why there is none.
-Result<std::shared_ptr<const server::ModelInForce>> model_of(const Services& services,
+Result<std::shared_ptr<const ingest::ModelInForce>> model_of(const Services& services,
                                                              const std::string& robot_id,
                                                              std::string field = "id");
 

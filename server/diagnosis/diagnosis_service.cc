@@ -73,7 +73,7 @@ bool is_held_back(std::size_t index, std::size_t count, double share) {
 
 class DiagnosisService::Impl {
  public:
-  Impl(const history::Store& store, history::Writer& writer, const ModelRegistry& models,
+  Impl(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
        const DriftView& drift, std::function<std::int64_t()> now_utime_us, const DiagnosisOptions& options,
        std::function<void(const Error&)> on_error, Ended on_ended)
       : store_(store),
@@ -106,7 +106,7 @@ class DiagnosisService::Impl {
 
   Result<std::int64_t> submit(const DiagnosisRequest& request) {
     const auto model = models_.find(request.robot_id);
-    if (model == nullptr) return tl::unexpected(unknown_robot("/robot_id", request.robot_id));
+    if (model == nullptr) return tl::unexpected(ingest::unknown_robot("/robot_id", request.robot_id));
     for (std::size_t k = 0; k < request.missions.size(); ++k) {
       const auto mission = store_.mission(request.missions[k]);
       const std::string field = "/missions/" + std::to_string(k);
@@ -307,7 +307,7 @@ class DiagnosisService::Impl {
 
   // Result, summary, report and model of a diagnosis.
   void tell(Job& job, const gap::Diagnosis& diagnosis, const telemetry::RecordingSet& recordings,
-            const ModelInForce& model, std::optional<std::int64_t> since_utime_us) {
+            const ingest::ModelInForce& model, std::optional<std::int64_t> since_utime_us) {
     DiagnosisRecord& record = job.record;
     ordered_json result = gap::diagnosis_to_json(diagnosis);
     result["model_version"] = model.version;
@@ -357,7 +357,7 @@ class DiagnosisService::Impl {
 
   const history::Store& store_;
   history::Writer& writer_;
-  const ModelRegistry& models_;
+  const ingest::ModelRegistry& models_;
   const DriftView& drift_;
   std::function<std::int64_t()> now_utime_us_;
   DiagnosisOptions options_;
@@ -375,7 +375,7 @@ class DiagnosisService::Impl {
 };
 
 DiagnosisService::DiagnosisService(const history::Store& store, history::Writer& writer,
-                                   const ModelRegistry& models, const DriftView& drift,
+                                   const ingest::ModelRegistry& models, const DriftView& drift,
                                    std::function<std::int64_t()> now_utime_us,
                                    const DiagnosisOptions& options,
                                    std::function<void(const Error&)> on_error, Ended on_ended)

@@ -12,7 +12,7 @@
 #include "history/store.h"
 #include "history/writer.h"
 #include "server/diagnosis/drift_view.h"
-#include "server/ingest/model_registry.h"
+#include "ingest/model_registry.h"
 
 namespace joulecast::server {
 
@@ -58,7 +58,7 @@ class DiagnosisService {
   using Ended = std::function<void(const history::DiagnosisRecord&)>;
 
   // `on_ended` is told of every job that has ended and is stored; called on the service's thread.
-  DiagnosisService(const history::Store& store, history::Writer& writer, const ModelRegistry& models,
+  DiagnosisService(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
                    const DriftView& drift, std::function<std::int64_t()> now_utime_us,
                    const DiagnosisOptions& options, std::function<void(const Error&)> on_error,
                    Ended on_ended = {});

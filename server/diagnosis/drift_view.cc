@@ -54,7 +54,7 @@ Result<std::optional<std::int64_t>> DriftView::last_change(const std::string& ro
   });
 }
 
-Result<std::vector<drift::MissionRatio>> DriftView::recent(const ModelInForce& model) const {
+Result<std::vector<drift::MissionRatio>> DriftView::recent(const ingest::ModelInForce& model) const {
   // Some of the newest may be of a version before.
   return missions(model.robot.robot_id, 4 * newest).map([&](auto found) {
     std::erase_if(found, [&](const auto& m) { return m.model_version != model.version; });

@@ -10,7 +10,7 @@
 #include "drift/marks.h"
 #include "drift/siblings.h"
 #include "history/store.h"
-#include "server/ingest/model_registry.h"
+#include "ingest/model_registry.h"
 
 namespace joulecast::server {
 
@@ -23,7 +23,7 @@ struct DriftOptions {
 // diagnoses and adoption. Safe to use from any thread.
 class DriftView {
  public:
-  DriftView(const history::Store& store, const ModelRegistry& models, const DriftOptions& options)
+  DriftView(const history::Store& store, const ingest::ModelRegistry& models, const DriftOptions& options)
       : store_(store), models_(models), options_(options) {}
 
   // The finished missions of a robot that measured energy, as the meter accounted them, newest `limit`,
@@ -37,7 +37,7 @@ class DriftView {
   Result<std::optional<std::int64_t>> last_change(const std::string& robot_id, std::int64_t version) const;
 
   // Its newest missions under the model in force: how it does now.
-  Result<std::vector<drift::MissionRatio>> recent(const ModelInForce& model) const;
+  Result<std::vector<drift::MissionRatio>> recent(const ingest::ModelInForce& model) const;
 
   // Robots of its kind (robot/kind.h), itself among them.
   std::vector<std::string> robots_of_kind(const std::string& robot_id) const;
@@ -48,11 +48,11 @@ class DriftView {
   Result<std::vector<std::vector<drift::SiblingRatio>>> kinds() const;
 
  private:
-  using Models = std::vector<std::shared_ptr<const ModelInForce>>;
+  using Models = std::vector<std::shared_ptr<const ingest::ModelInForce>>;
   Result<std::vector<drift::SiblingRatio>> compare(const Models& kind) const;
 
   const history::Store& store_;
-  const ModelRegistry& models_;
+  const ingest::ModelRegistry& models_;
   DriftOptions options_;
 };
 

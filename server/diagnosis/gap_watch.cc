@@ -54,7 +54,7 @@ json mark_json(const drift::Mark& mark) {
 
 }  // namespace
 
-GapWatch::GapWatch(const history::Store& store, history::Writer& writer, const ModelRegistry& models,
+GapWatch::GapWatch(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
                    const DriftView& drift, DiagnosisService& diagnoses,
                    std::function<std::int64_t()> now_utime_us, const WatchOptions& options,
                    std::function<void(const Error&)> on_error)
@@ -168,7 +168,7 @@ Result<void> GapWatch::compare_kinds(WatchCounts& counts) {
   return {};
 }
 
-Result<void> GapWatch::look_at(const ModelInForce& model, WatchCounts& counts) {
+Result<void> GapWatch::look_at(const ingest::ModelInForce& model, WatchCounts& counts) {
   const std::string& robot_id = model.robot.robot_id;
   const auto marks = drift_.marks(robot_id);
   if (!marks) return tl::unexpected(marks.error());

@@ -12,7 +12,7 @@
 #include "history/writer.h"
 #include "server/diagnosis/diagnosis_service.h"
 #include "server/diagnosis/drift_view.h"
-#include "server/ingest/model_registry.h"
+#include "ingest/model_registry.h"
 
 namespace joulecast::server {
 
@@ -36,7 +36,7 @@ struct WatchCounts {
 // spend more or less than its kind is an event "gap_sibling".
 class GapWatch {
  public:
-  GapWatch(const history::Store& store, history::Writer& writer, const ModelRegistry& models,
+  GapWatch(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
            const DriftView& drift, DiagnosisService& diagnoses, std::function<std::int64_t()> now_utime_us,
            const WatchOptions& options, std::function<void(const Error&)> on_error);
   ~GapWatch();
@@ -54,7 +54,7 @@ class GapWatch {
   WatchCounts counts() const;
 
  private:
-  Result<void> look_at(const ModelInForce& model, WatchCounts& counts);
+  Result<void> look_at(const ingest::ModelInForce& model, WatchCounts& counts);
   Result<void> compare_kinds(WatchCounts& counts);
   Result<void> remember(const std::string& robot_id, std::int64_t announced_utime_us, bool stood_out);
   bool watches(const std::string& robot_id) const;
@@ -62,7 +62,7 @@ class GapWatch {
 
   const history::Store& store_;
   history::Writer& writer_;
-  const ModelRegistry& models_;
+  const ingest::ModelRegistry& models_;
   const DriftView& drift_;
   DiagnosisService& diagnoses_;
   std::function<std::int64_t()> now_utime_us_;

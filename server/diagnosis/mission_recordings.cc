@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/ingest/charge_watch.h"
+#include "ingest/charge_watch.h"
 
 namespace joulecast::server {
 namespace {
@@ -63,7 +63,7 @@ class Reader {
       return ++out.no_telemetry, Result<void>{};
     if (const auto charging = mission.sample_faults.find("charging");
         charging != mission.sample_faults.end() && charging->second > 0)
-      out.charging_samples += drop_charging(wanted_.battery_capacity_ah, *samples);
+      out.charging_samples += ingest::drop_charging(wanted_.battery_capacity_ah, *samples);
     if (samples->size() < 2) return ++out.no_telemetry, Result<void>{};
     Result<std::vector<signals::CovariateSeries>> covariates = covariates_of(store_, mission.key);
     if (!covariates) return tl::unexpected(std::move(covariates.error()));

@@ -60,7 +60,7 @@ std::string refusal_of(const energy::BackTest& test) {
 
 }  // namespace
 
-ModelAdoption::ModelAdoption(const history::Store& store, history::Writer& writer, ModelRegistry& models,
+ModelAdoption::ModelAdoption(const history::Store& store, history::Writer& writer, ingest::ModelRegistry& models,
                              const DriftView& drift, std::function<std::int64_t()> now_utime_us,
                              const AdoptionOptions& options)
     : store_(store),
@@ -75,7 +75,7 @@ Result<void> ModelAdoption::record(const std::string& robot_id, const std::strin
   return writer_.offer(history::AppendEvent{{0, now_utime_us_(), robot_id, kind, std::move(detail_json)}});
 }
 
-Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request, const ModelInForce& before,
+Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request, const ingest::ModelInForce& before,
                                                 std::optional<std::int64_t>& since_utime_us) const {
   constexpr std::size_t enough_missions = 3;
   RecordingsWanted wanted;
@@ -106,7 +106,7 @@ Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request, 
 
 Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std::function<bool()>& go_on) {
   const std::string& robot_id = request.model.robot_id;
-  const std::shared_ptr<const ModelInForce> before = models_.find(robot_id);
+  const std::shared_ptr<const ingest::ModelInForce> before = models_.find(robot_id);
   if (before == nullptr)
     return fail(Fault::not_found, "id",
                 "robot " + robot_id + " has no model to test a new one against: PUT /v1/robots/" + robot_id);
@@ -198,7 +198,7 @@ Result<std::int64_t> ModelAdoption::activate(const std::string& robot_id, std::i
   Result<robot::RobotModel> robot = robot::parse_robot(stored->model_json);
   if (!robot) return tl::unexpected(std::move(robot.error()));
   const std::lock_guard lock(putting_);
-  const std::shared_ptr<const ModelInForce> before = models_.find(robot_id);
+  const std::shared_ptr<const ingest::ModelInForce> before = models_.find(robot_id);
   const std::int64_t previous = before != nullptr ? before->version : 0;
   if (previous == version) return previous;
   if (const history::Outcome done = writer_.execute(history::ActivateModel{robot_id, version}); !done)

@@ -15,7 +15,7 @@
 #include "robot/robot_model.h"
 #include "server/diagnosis/drift_view.h"
 #include "server/diagnosis/mission_recordings.h"
-#include "server/ingest/model_registry.h"
+#include "ingest/model_registry.h"
 
 namespace joulecast::server {
 
@@ -70,7 +70,7 @@ struct AdoptionOptions {
 // telemetry without declared missions may run for days and changes over at once.
 class ModelAdoption {
  public:
-  ModelAdoption(const history::Store& store, history::Writer& writer, ModelRegistry& models,
+  ModelAdoption(const history::Store& store, history::Writer& writer, ingest::ModelRegistry& models,
                 const DriftView& drift, std::function<std::int64_t()> now_utime_us,
                 const AdoptionOptions& options);
 
@@ -85,13 +85,13 @@ class ModelAdoption {
   AdoptionCounts counts() const { return {adopted_, forced_, refused_}; }
 
  private:
-  Result<StoredRecordings> history(const AdoptionRequest& request, const ModelInForce& before,
+  Result<StoredRecordings> history(const AdoptionRequest& request, const ingest::ModelInForce& before,
                                    std::optional<std::int64_t>& since_utime_us) const;
   Result<void> record(const std::string& robot_id, const std::string& kind, std::string detail_json);
 
   const history::Store& store_;
   history::Writer& writer_;
-  ModelRegistry& models_;
+  ingest::ModelRegistry& models_;
   const DriftView& drift_;
   std::function<std::int64_t()> now_utime_us_;
   AdoptionOptions options_;

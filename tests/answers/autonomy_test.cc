@@ -10,7 +10,7 @@
 #include "answers/json/profile_json.h"
 #include "server/api/live_robot.h"
 #include "server/api/robot_json.h"
-#include "server/ingest/forecasts.h"
+#include "ingest/forecasts.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
 
@@ -37,7 +37,7 @@ class AutonomyAnswer : public ::testing::Test {
     EXPECT_TRUE(text) << (text ? "" : describe(text.error())) << request;
     return text ? json::parse(*text) : json::object();
   }
-  Error fault(const json& request, const server::RobotSnapshot* live) {
+  Error fault(const json& request, const ingest::RobotSnapshot* live) {
     const auto text = autonomy_answer(request, robot_, api::live_robot(live), tables_);
     EXPECT_FALSE(text) << request;
     return text ? Error{} : text.error();
@@ -45,7 +45,7 @@ class AutonomyAnswer : public ::testing::Test {
 
   planning::CostTableCache tables_;
   RobotOutlook robot_;
-  server::RobotSnapshot live_;
+  ingest::RobotSnapshot live_;
 };
 
 TEST_F(AutonomyAnswer, OfARobotAsItIs) {
@@ -69,7 +69,7 @@ TEST_F(AutonomyAnswer, OfARobotAsItIs) {
 // What the robot's state and its energy state on LCM tell is this answer, not another one.
 TEST_F(AutonomyAnswer, IsWhatTheLiveStateTells) {
   testing::PipelineHarness harness;
-  server::Forecasts forecasts(*harness.store);
+  ingest::Forecasts forecasts(*harness.store);
   live_.charge.estimate.sd = 0.02;
   for (const double payload_kg : {2.0, 5.0, 2.0}) {
     live_.sample.payload_kg = payload_kg;

@@ -10,7 +10,7 @@
 
 #include "history/sqlite_store.h"
 #include "history/writer.h"
-#include "server/ingest/pipeline.h"
+#include "ingest/pipeline.h"
 #include "telemetry/codec.h"
 #include "tests/benchmarks/noisy_drive.h"
 
@@ -64,20 +64,20 @@ class Timer {
 };
 
 double decode_only(const std::vector<Message>& all) {
-  server::IngestCounters counters;
+  ingest::IngestCounters counters;
   const Timer timer("guard and decode", all.size());
   for (const Message& m : all) {
-    if (!server::decode_message(m.channel, m.bytes, 0, counters)) std::abort();
+    if (!ingest::decode_message(m.channel, m.bytes, 0, counters)) std::abort();
   }
   return timer.stop();
 }
 
 double meter_only(const std::vector<Message>& all) {
-  server::IngestCounters counters;
+  ingest::IngestCounters counters;
   std::vector<signals::Sample> samples;
   for (std::size_t k = 0; k < all.size(); k += robots) {
     samples.push_back(std::get<signals::Sample>(
-        server::decode_message(all[k].channel, all[k].bytes, 0, counters)->content));
+        ingest::decode_message(all[k].channel, all[k].bytes, 0, counters)->content));
   }
   energy::Meter meter(*dynamics::drive_model(benchmarks::robot_named("bench-0")), {},
                       [](const energy::MeterPoint&) {});
@@ -96,16 +96,16 @@ double pipeline(const std::vector<Message>& all, const char* what, bool store_sa
   auto store = history::open_sqlite_store(options);
   if (!store) std::abort();
   history::Writer writer(**store, {});
-  server::ModelRegistry models;
+  ingest::ModelRegistry models;
   for (int r = 0; r < robots; ++r) {
     const std::string id = "bench-" + std::to_string(r);
     if (!writer.execute(history::AddModel{id, 1, history::ModelOrigin::file, "", "{}", std::nullopt}))
       std::abort();
     if (!models.put(benchmarks::robot_named(id), 1)) std::abort();
   }
-  server::FleetView fleet;
-  server::IngestCounters counters;
-  server::Pipeline ingest(
+  ingest::FleetView fleet;
+  ingest::IngestCounters counters;
+  ingest::Pipeline ingest(
       {}, 100, models,
       {**store,
        [&](history::Command command) {
@@ -114,7 +114,7 @@ double pipeline(const std::vector<Message>& all, const char* what, bool store_sa
        fleet, counters, [](const std::string&, const std::string& text) { std::puts(text.c_str()); }});
   const Timer timer(what, all.size());
   for (const Message& m : all) {
-    if (const auto message = server::decode_message(m.channel, m.bytes, 0, counters)) ingest.handle(*message);
+    if (const auto message = ingest::decode_message(m.channel, m.bytes, 0, counters)) ingest.handle(*message);
   }
   ingest.finish();
   if (!writer.flush()) std::abort();

@@ -19,7 +19,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "server/ingest/inbound_message.h"
+#include "ingest/inbound_message.h"
 #include "telemetry/lcm_link.h"
 
 namespace joulecast {
@@ -105,12 +105,12 @@ double run(const char* what, std::atomic<std::uint64_t>& received, const std::fu
 
 int main() {
   using namespace joulecast;
-  server::IngestCounters counters;
-  std::vector<server::InboundMessage> batch_of_messages;
+  ingest::IngestCounters counters;
+  std::vector<ingest::InboundMessage> batch_of_messages;
   std::atomic<std::uint64_t> received = 0;
   const auto decode = [&](std::string_view channel, std::span<const std::uint8_t> data,
                           const telemetry::Sender& sender) {
-    auto message = server::decode_message(channel, data, 0, counters, sender);
+    auto message = ingest::decode_message(channel, data, 0, counters, sender);
     if (!message) return;
     batch_of_messages.push_back(std::move(*message));
     if (batch_of_messages.size() >= 1000) batch_of_messages.clear();

@@ -9,7 +9,7 @@
 #include "tests/client/robots.h"
 #include "tests/ingest/harness.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 namespace {
 
 using testing::PipelineHarness;
@@ -200,4 +200,4 @@ TEST(ChargingOfVirtualRobots, IsAccountedApartAndForecast) {
 }
 
 }  // namespace
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -10,7 +10,7 @@
 
 #include "history/sqlite_store.h"
 #include "robot/robot_file.h"
-#include "server/ingest/pipeline.h"
+#include "ingest/pipeline.h"
 
 namespace joulecast::testing {
 
@@ -37,7 +37,7 @@ class TemporaryFolder {
 // The pipeline on a store in a temporary folder; commands are applied at once instead of by a writer thread.
 class PipelineHarness {
  public:
-  explicit PipelineHarness(server::SessionSettings settings = {}) : settings_(settings) { restart(); }
+  explicit PipelineHarness(ingest::SessionSettings settings = {}) : settings_(settings) { restart(); }
 
   // As if the daemon was killed (nothing is flushed) and started again on the same store.
   void restart() {
@@ -48,9 +48,9 @@ class PipelineHarness {
     auto opened = history::open_sqlite_store(options);
     if (!opened) throw std::runtime_error(describe(opened.error()));
     store = std::move(*opened);
-    pipeline = std::make_unique<server::Pipeline>(
+    pipeline = std::make_unique<ingest::Pipeline>(
         settings_, 100, models,
-        server::SessionOutputs{
+        ingest::SessionOutputs{
             *store, [this](history::Command command) { apply(std::move(command)); }, fleet, counters,
             [this](const std::string&, const std::string& text) { warnings.push_back(text); }});
     if (auto recovered = pipeline->recover(); !recovered)
@@ -72,16 +72,16 @@ class PipelineHarness {
     return found;
   }
 
-  std::uint64_t faults(server::IngestFault fault) const {
+  std::uint64_t faults(ingest::IngestFault fault) const {
     return counters.faults[static_cast<std::size_t>(fault)];
   }
 
-  server::ModelRegistry models;
-  server::FleetView fleet;
-  server::IngestCounters counters;
+  ingest::ModelRegistry models;
+  ingest::FleetView fleet;
+  ingest::IngestCounters counters;
   std::vector<std::string> warnings;
   std::unique_ptr<history::Store> store;
-  std::unique_ptr<server::Pipeline> pipeline;
+  std::unique_ptr<ingest::Pipeline> pipeline;
 
  private:
   void apply(history::Command command) {
@@ -91,7 +91,7 @@ class PipelineHarness {
   }
 
   TemporaryFolder folder_;
-  server::SessionSettings settings_;
+  ingest::SessionSettings settings_;
 };
 
 }  // namespace joulecast::testing

@@ -5,11 +5,11 @@
 #include <limits>
 #include <random>
 
-#include "server/ingest/pipeline.h"
+#include "ingest/pipeline.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 namespace {
 
 using signals::MissionEvent;
@@ -360,4 +360,4 @@ TEST_F(HostileTest, AnImplausibleValueIsNamedWithItsFieldAndBound) {
 }
 
 }  // namespace
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -1,4 +1,4 @@
-#include "server/ingest/pipeline.h"
+#include "ingest/pipeline.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 namespace {
 
 using signals::MissionEvent;
@@ -298,7 +298,7 @@ TEST_F(PipelineTest, StampsInTheFutureAreAccountedAndCounted) {
 
 // What belongs to no mission is not accounted for, but the fleet sees what the robot does now.
 TEST(PipelineOutsideMissions, ARobotIsSeenAsItIs) {
-  server::SessionSettings settings;
+  ingest::SessionSettings settings;
   settings.implicit_missions = false;
   PipelineHarness harness(settings);
   harness.add_robot(testing::nomad());
@@ -617,4 +617,4 @@ TEST_F(PipelineTest, TheSameMessagesGiveTheSameBits) {
 }
 
 }  // namespace
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -12,7 +12,7 @@
 #include "tests/ingest/harness.h"
 #include "tests/support/shared_folder.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 namespace {
 
 namespace fs = std::filesystem;
@@ -82,4 +82,4 @@ TEST(PracticeLogs, MeasuredEnergyAgreesWithAnIndependentQuadrature) {
 }
 
 }  // namespace
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -1,10 +1,10 @@
-#include "server/ingest/trace_builder.h"
+#include "ingest/trace_builder.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 namespace {
 
 energy::MeterPoint point(std::int64_t utime_us, double interval_s, double power_w) {
@@ -49,4 +49,4 @@ TEST(TraceBuilder, HandsOutTheOpenBucketAgainWhenItGrows) {
 }
 
 }  // namespace
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

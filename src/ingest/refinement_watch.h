@@ -10,7 +10,7 @@
 #include "robot/robot_model.h"
 #include "signals/sample.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 // Refines one robot's friction and idle power from its missions as they come, tells payloads that were not
 // declared, and proposes a new model version when the refined one departs from that in force.
@@ -51,4 +51,4 @@ class RefinementWatch {
   std::vector<history::MissionKey> learned_from_;
 };
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

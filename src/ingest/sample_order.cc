@@ -1,9 +1,9 @@
-#include "server/ingest/sample_order.h"
+#include "ingest/sample_order.h"
 
 #include <algorithm>
 #include <utility>
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 bool SampleOrder::take(const signals::Sample& sample, std::int64_t host_utime_us) {
   release(host_utime_us);
@@ -70,4 +70,4 @@ void SampleOrder::pass_run() {
               })->second.host_utime_us;
 }
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

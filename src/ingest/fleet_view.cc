@@ -1,9 +1,9 @@
-#include "server/ingest/fleet_view.h"
+#include "ingest/fleet_view.h"
 
 #include <mutex>
 #include <utility>
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 void FleetView::publish(std::shared_ptr<const RobotSnapshot> snapshot) {
   {
@@ -38,4 +38,4 @@ std::vector<std::shared_ptr<const RobotSnapshot>> FleetView::all() const {
   return snapshots;
 }
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

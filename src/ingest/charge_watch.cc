@@ -1,10 +1,10 @@
-#include "server/ingest/charge_watch.h"
+#include "ingest/charge_watch.h"
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 namespace {
 
 using nlohmann::json;
@@ -152,4 +152,4 @@ void ChargeWatch::take_over(const ChargeWatch& old) {
   utime_us_ = old.utime_us_;
 }
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -6,7 +6,7 @@
 #include "energy/meter.h"
 #include "history/records.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 // Folds the meter's points into the store's one-second trace buckets.
 class TraceBuilder {
@@ -40,4 +40,4 @@ class TraceBuilder {
   bool touched_ = false;
 };
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -7,7 +7,7 @@
 
 #include "signals/sample.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 // Puts one robot's samples back into the order of their sequence numbers: behind a hole samples wait for
 // those that are missing, for `window_us` of the host's clock at most. In a stream without holes nothing
@@ -48,4 +48,4 @@ class SampleOrder {
   std::int64_t newest_utime_us_ = 0;         // of those passed on
 };
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -10,12 +10,12 @@
 #include "dynamics/climb.h"
 #include "dynamics/parameters.h"
 #include "history/records.h"
-#include "server/ingest/counters.h"
+#include "ingest/counters.h"
 #include "signals/covariates.h"
 #include "signals/sample.h"
 #include "telemetry/covariate_tracker.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 // One robot's covariates: what holds, what the open mission has of them and is to be stored, and the climb
 // that follows from its pitch or its height.
@@ -57,4 +57,4 @@ class CovariateWatch {
   double height_m_ = signals::unmeasured;
 };
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -11,7 +11,7 @@
 #include "robot/robot_model.h"
 #include "signals/sample.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 // What is known of a robot's battery at one moment.
 struct ChargeView {
@@ -61,4 +61,4 @@ class ChargeWatch {
   std::int64_t utime_us_ = 0;
 };
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -1,4 +1,4 @@
-#include "server/ingest/forecasts.h"
+#include "ingest/forecasts.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include "forecast/siblings.h"
 #include "robot/kind.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 namespace {
 
 using forecast::subject_count;
@@ -206,4 +206,4 @@ Forecasts::Learnt Forecasts::learn(const std::shared_ptr<const ModelInForce>& mo
   return learnt;
 }
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -11,10 +11,10 @@
 #include "forecast/outlook.h"
 #include "forecast/robot_forecast.h"
 #include "history/store.h"
-#include "server/ingest/fleet_view.h"
-#include "server/ingest/model_registry.h"
+#include "ingest/fleet_view.h"
+#include "ingest/model_registry.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 using answers::RobotOutlook;
 
@@ -67,4 +67,4 @@ forecast::Charge live_charge(const RobotSnapshot& live, const robot::Battery& ba
 std::string legs_json(const std::deque<forecast::PastMission>& missions);
 std::optional<std::deque<forecast::PastMission>> legs_from_json(const std::string& text);
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -1,9 +1,9 @@
-#include "server/ingest/trace_builder.h"
+#include "ingest/trace_builder.h"
 
 #include <cmath>
 #include <utility>
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 void TraceBuilder::Sum::add(double value, double weight_s) {
   if (!std::isfinite(value)) return;
@@ -70,4 +70,4 @@ std::vector<history::TraceBucket> TraceBuilder::take() {
   return out;
 }
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

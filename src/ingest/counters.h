@@ -8,7 +8,7 @@
 #include "history/records.h"
 #include "telemetry/datagram.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 // Why a message, a sample or an event was turned away or repaired. Each has one counter for the daemon and
 // one in the mission it happened in; names are labels of the metrics and keys of a mission's `sample_faults`.
@@ -65,4 +65,4 @@ struct IngestCounters {
   }
 };
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

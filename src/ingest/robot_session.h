@@ -13,21 +13,21 @@
 #include "forecast/robot_forecast.h"
 #include "history/commands.h"
 #include "history/store.h"
-#include "server/ingest/charge_watch.h"
-#include "server/ingest/counters.h"
-#include "server/ingest/covariate_watch.h"
-#include "server/ingest/fleet_view.h"
-#include "server/ingest/model_registry.h"
-#include "server/ingest/refinement_watch.h"
-#include "server/ingest/sample_order.h"
-#include "server/ingest/trace_builder.h"
+#include "ingest/charge_watch.h"
+#include "ingest/counters.h"
+#include "ingest/covariate_watch.h"
+#include "ingest/fleet_view.h"
+#include "ingest/model_registry.h"
+#include "ingest/refinement_watch.h"
+#include "ingest/sample_order.h"
+#include "ingest/trace_builder.h"
 #include "signals/mission_event.h"
 #include "signals/sample.h"
 #include "telemetry/mission_tracker.h"
 #include "telemetry/payload.h"
 #include "telemetry/sequence_tracker.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 struct SessionSettings {
   energy::MeterSettings meter;
@@ -162,4 +162,4 @@ class RobotSession {
   bool changed_ = false;
 };
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -1,8 +1,8 @@
-#include "server/ingest/inbound_message.h"
+#include "ingest/inbound_message.h"
 
 #include <utility>
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 std::optional<InboundMessage> decode_message(std::string_view channel, std::span<const std::uint8_t> data,
                                              std::int64_t host_utime_us, IngestCounters& counters,
@@ -39,4 +39,4 @@ std::optional<InboundMessage> decode_message(std::string_view channel, std::span
   return message;
 }
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

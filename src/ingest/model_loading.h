@@ -7,9 +7,9 @@
 #include "base/error.h"
 #include "history/store.h"
 #include "history/writer.h"
-#include "server/ingest/model_registry.h"
+#include "ingest/model_registry.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 // Puts the store's active models in force. A stored model that no longer reads is an error naming robot and
 // version.
@@ -32,4 +32,4 @@ struct RobotFiles {
 // Fault::not_found when the directory cannot be read.
 Result<RobotFiles> read_robot_files(const std::string& directory);
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -1,4 +1,4 @@
-#include "server/ingest/refinement_watch.h"
+#include "ingest/refinement_watch.h"
 
 #include <algorithm>
 #include <cassert>
@@ -9,7 +9,7 @@
 #include "base/json_number.h"
 #include "robot/robot_file.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 namespace {
 
 using nlohmann::json;
@@ -170,4 +170,4 @@ void RefinementWatch::recall(const std::string& text) {
   }
 }
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -1,4 +1,4 @@
-#include "server/ingest/model_loading.h"
+#include "ingest/model_loading.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 #include "robot/robot_file.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 Result<void> load_stored_models(const history::Store& store, ModelRegistry& models) {
   Result<std::vector<history::RobotRecord>> robots = store.robots();
@@ -81,4 +81,4 @@ Result<RobotFiles> read_robot_files(const std::string& directory) {
   return files;
 }
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -11,7 +11,7 @@
 
 #include "answers/model.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 using answers::model_in_force;
 using answers::ModelInForce;
@@ -40,4 +40,4 @@ class ModelRegistry {
   std::atomic<std::uint64_t> epoch_ = 0;
 };
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -7,11 +7,11 @@
 #include <string_view>
 #include <variant>
 
-#include "server/ingest/counters.h"
+#include "ingest/counters.h"
 #include "telemetry/codec.h"
 #include "telemetry/datagram.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 // A message on a robot's channel that was turned away before it was read; counted already.
 struct RefusedMessage {
@@ -32,4 +32,4 @@ std::optional<InboundMessage> decode_message(std::string_view channel, std::span
                                              std::int64_t host_utime_us, IngestCounters& counters,
                                              const telemetry::Sender& sender = {});
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "server/ingest/inbound_message.h"
+#include "ingest/inbound_message.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 // Lets one sender speak for a robot. Where a second one sends under the robot's id, told apart by its address
 // or, behind one address, by its own stream of sequence numbers, its messages wait: when the first one speaks
@@ -67,4 +67,4 @@ class SenderGate {
   std::int64_t returned_us_ = 0;
 };
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

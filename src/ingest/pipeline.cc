@@ -1,10 +1,10 @@
-#include "server/ingest/pipeline.h"
+#include "ingest/pipeline.h"
 
 #include <algorithm>
 #include <limits>
 #include <utility>
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 namespace {
 
 constexpr std::size_t waiting_units = 131'072;  // some 30 MB of messages
@@ -150,4 +150,4 @@ void Pipeline::suspend() {
   }
 }
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

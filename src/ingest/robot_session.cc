@@ -1,4 +1,4 @@
-#include "server/ingest/robot_session.h"
+#include "ingest/robot_session.h"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include "robot/robot_file.h"
 #include "telemetry/validation.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 namespace {
 
 constexpr std::string_view charge_topic = "charge";          // of what is learned of the battery
@@ -656,4 +656,4 @@ void RobotSession::publish() {
   outputs_.fleet.publish(std::make_shared<const RobotSnapshot>(snapshot_));
 }
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -1,4 +1,4 @@
-#include "server/ingest/ingest_service.h"
+#include "ingest/ingest_service.h"
 
 #include <atomic>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include "base/host_clock.h"
 #include "signals/energy_state.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -217,4 +217,4 @@ IngestStatus IngestService::status() const {
   return impl_->status();
 }
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

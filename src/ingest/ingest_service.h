@@ -6,11 +6,11 @@
 #include <string>
 
 #include "base/error.h"
-#include "server/ingest/forecasts.h"
-#include "server/ingest/pipeline.h"
+#include "ingest/forecasts.h"
+#include "ingest/pipeline.h"
 #include "telemetry/lcm_link.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 struct IngestOptions {
   std::string lcm_url;
@@ -50,4 +50,4 @@ class IngestService {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -1,4 +1,4 @@
-#include "server/ingest/covariate_watch.h"
+#include "ingest/covariate_watch.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include "telemetry/recording_climb.h"
 #include "telemetry/validation.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 namespace {
 
 using signals::CovariateChange;
@@ -102,4 +102,4 @@ double CovariateWatch::climb_at(const dynamics::Parameters<double>& parameters,
   return climb_.add(telemetry::climb_reading(parameters, sample, height_m_));
 }
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -6,11 +6,11 @@
 #include <string>
 
 #include "base/error.h"
-#include "server/ingest/inbound_message.h"
-#include "server/ingest/robot_session.h"
-#include "server/ingest/sender_gate.h"
+#include "ingest/inbound_message.h"
+#include "ingest/robot_session.h"
+#include "ingest/sender_gate.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 // Decoded messages in, history out: one session a robot that has a model, in one thread. Of other ids only
 // messages are counted, of a bounded number of ids. The daemon and the offline replay run this same code.
@@ -64,4 +64,4 @@ class Pipeline {
   std::int64_t forgot_utime_us_ = 0, told_utime_us_ = 0;
 };
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

@@ -9,11 +9,11 @@
 #include <string_view>
 #include <vector>
 
-#include "server/ingest/charge_watch.h"
+#include "ingest/charge_watch.h"
 #include "signals/ledger.h"
 #include "signals/sample.h"
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 // What is known of one robot at one moment; immutable once published.
 struct RobotSnapshot {
@@ -55,4 +55,4 @@ class FleetView {
   std::map<std::string, std::unique_ptr<Slot>, std::less<>> slots_;
 };
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

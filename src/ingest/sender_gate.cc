@@ -1,10 +1,10 @@
-#include "server/ingest/sender_gate.h"
+#include "ingest/sender_gate.h"
 
 #include <algorithm>
 #include <limits>
 #include <utility>
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 namespace {
 
 constexpr std::int64_t second_us = 1'000'000;
@@ -169,4 +169,4 @@ std::string SenderGate::describe() const {
          telemetry::to_string(first_) + ", which alone is accounted for";
 }
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest

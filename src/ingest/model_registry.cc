@@ -1,9 +1,9 @@
-#include "server/ingest/model_registry.h"
+#include "ingest/model_registry.h"
 
 #include <mutex>
 #include <utility>
 
-namespace joulecast::server {
+namespace joulecast::ingest {
 
 Error unknown_robot(std::string field, std::string_view robot_id) {
   return {Fault::not_found, std::move(field),
@@ -33,4 +33,4 @@ std::vector<std::shared_ptr<const ModelInForce>> ModelRegistry::all() const {
   return models;
 }
 
-}  // namespace joulecast::server
+}  // namespace joulecast::ingest
