@@ -3,17 +3,17 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/output_file.h"
 
 namespace joulecast::client {
 
-// The bytes of a file; "-" reads standard input. Fault::not_found when it cannot be opened.
+// The bytes of a file, of 1 GiB at most; "-" reads standard input. Errors as read_text_file.
 [[nodiscard]] Result<std::string> read_file(const std::string& path);
 
-// Whether the file that an option names may be written: Fault::conflict of that option where there is one
-// already and `force` does not say to write over it. Devices and pipes may always be written.
-[[nodiscard]] Result<void> may_write(const std::string& option, const std::string& path, bool force);
-
-// Replaces the file. Fault::unavailable when not every byte reached the system.
-[[nodiscard]] Result<void> write_file(const std::string& path, const std::string& text);
+// What --force says of files that are there already.
+inline Existing existing(bool force) {
+  return force ? Existing::replace : Existing::refuse;
+}
+inline constexpr const char* force_help = "write over files that are there already";
 
 }  // namespace joulecast::client

@@ -52,6 +52,7 @@ struct Options {
   double timeout_s = 60;
   bool json = false;
   std::string plot_file;
+  bool force = false;
   std::deque<Member<double>> numbers;  // whose places CLI11 keeps
   std::deque<Member<std::string>> texts;
   std::optional<double> length_m;
@@ -161,7 +162,7 @@ Result<void> plot(const Options& options, const Question& question, json request
   if (!document.is_object()) return fail(Fault::corrupt, options.server, "did not answer with a JSON object");
   const auto drawing = draw_answer(document);
   if (!drawing) return tl::unexpected(drawing.error());
-  return write_file(options.plot_file, *drawing);
+  return write_text_file(options.plot_file, *drawing, existing(options.force));
 }
 
 double number(const json& object, const char* name) {
@@ -369,6 +370,7 @@ void add_driving(CLI::App& command, Options& options, const char* help) {
 void add_drive_flags(CLI::App& command, Options& options) {
   command.add_option("--plot", options.plot_file,
                      "draw speed, power and energy over time into this SVG, against the baselines");
+  command.add_flag("--force", options.force, force_help);
   command
       .add_option("--turn", options.turn,
                   "turn in place by that angle (to the left), before --length: 1.57 (rad) or 90deg")

@@ -26,6 +26,7 @@ struct Options {
   double reserve_fraction = battery::CalibrationOptions{}.reserve_fraction;
   std::string out;
   bool json = false;
+  bool force = false;
 };
 
 struct Read {
@@ -87,6 +88,8 @@ void print_text(const battery::Calibration& calibration) {
 }
 
 Exit run(const Options& options) {
+  if (const auto may = may_write("--out", options.out, existing(options.force)); !may)
+    return report(may.error());
   auto read = read_all(options.sources);
   if (!read) return report(read.error());
   auto calibration =
@@ -100,7 +103,8 @@ Exit run(const Options& options) {
   const std::string text = robot::to_json_text(calibration->battery);
   // What is written must be readable again, whatever was measured.
   if (const auto checked = robot::parse_battery(text); !checked) return report(checked.error());
-  if (const auto written = write_file(options.out, text + '\n'); !written) return report(written.error());
+  if (const auto written = write_text_file(options.out, text + '\n', existing(options.force)); !written)
+    return report(written.error());
   if (options.json) {
     print_json(*calibration);
   } else {
@@ -135,6 +139,7 @@ void add_calibrate(CLI::App& program, Exit& exit) {
       ->check(CLI::Range(0.0, 0.99))
       ->capture_default_str();
   command->add_option("--out", options->out, "file for the battery object of a robot file")->required();
+  command->add_flag("--force", options->force, force_help);
   command->add_flag("--json", options->json, "print the result as JSON");
   command->callback([options, &exit] { exit = run(*options); });
 }

@@ -34,6 +34,7 @@ struct Options {
   std::vector<std::string> known;
   energy::CalibrationOptions calibration;
   bool json = false;
+  bool force = false;
 };
 
 const std::map<std::string, CalibrationMethod> methods{{"steady", CalibrationMethod::steady},
@@ -171,6 +172,8 @@ void print_text(const Outcome& outcome) {
 }
 
 Exit run(Options& options) {
+  if (const auto may = may_write("--out", options.out, existing(options.force)); !may)
+    return report(may.error());
   for (const std::string& known : options.known) {
     options.calibration.resistance_known |= known == "resistance";
     options.calibration.constants_known |= known == "constants";
@@ -181,7 +184,8 @@ Exit run(Options& options) {
   if (const auto valid = robot::validate(outcome->calibration.robot); !valid) return report(valid.error());
   if (!options.out.empty()) {
     const std::string text = robot::to_json_text(outcome->calibration.robot) + "\n";
-    if (const auto written = write_file(options.out, text); !written) return report(written.error());
+    if (const auto written = write_text_file(options.out, text, existing(options.force)); !written)
+      return report(written.error());
   }
   options.json ? print_json(options, *outcome) : print_text(*outcome);
   return Exit::ok;
@@ -198,6 +202,7 @@ void add_calibrate_drive(CLI::App& calibrate, Exit& exit) {
   command->add_option("--robot", options->robot_file, "robot file to begin with; says whose missions count")
       ->required();
   command->add_option("--out", options->out, "robot file to write");
+  command->add_flag("--force", options->force, force_help);
   command
       ->add_option("--train", options->train,
                    "missions to fit to, comma-separated; the others test (default: all)")

@@ -30,6 +30,7 @@ struct Options {
   std::optional<double> turn_rate_rad_s;
   std::string svg_file;
   bool json = false;
+  bool force = false;
 };
 
 Result<Map> chosen_map(const Options& options) {
@@ -110,7 +111,8 @@ Exit run(const Options& options) {
   if (!options.svg_file.empty()) {
     const std::string drawing =
         report::draw_exploration(title + " explored by " + robot->robot_id, *map, *exploration, energy);
-    if (auto ok = write_file(options.svg_file, drawing); !ok) return report(ok.error());
+    if (auto ok = write_text_file(options.svg_file, drawing, existing(options.force)); !ok)
+      return report(ok.error());
   }
   if (options.json)
     std::printf("%s\n", to_json(*map, *exploration, energy).dump(2).c_str());
@@ -139,6 +141,7 @@ void add_explore(CLI::App& program, Exit& exit) {
                       "rate of turns in place [rad/s]; the robot's limit when not given");
   command->add_option("--plot,--svg", options->svg_file, "draw the exploration into this file");
   command->add_flag("--json", options->json, "print the exploration log as JSON");
+  command->add_flag("--force", options->force, force_help);
   command->callback([options, &exit] { exit = run(*options); });
 }
 

@@ -110,7 +110,7 @@ Exit apply(const Options& options, const Judged& judged) {
   if (judged.test && !judged.test->improves() && !options.force)
     return report(
         {Fault::conflict, "--apply", "the back-test shows no improvement; --force writes it all the same"});
-  return write_robot(*judged.extended, options.apply);
+  return write_robot(*judged.extended, options.apply, options.force);
 }
 
 Exit gap_of_logs(const Options& options, const robot::RobotModel& robot) {
@@ -119,8 +119,9 @@ Exit gap_of_logs(const Options& options, const robot::RobotModel& robot) {
   if (!recordings) return report(recordings.error());
   const report::ReportOrigin origin = report_origin(options.logs, options.robot_file);
   if (!options.compare_by.empty())
-    return gap_between_groups(*recordings, robot,
-                              {options.compare_by, options.controls, options.json, options.report}, origin);
+    return gap_between_groups(
+        *recordings, robot,
+        {options.compare_by, options.controls, options.json, options.report, options.force}, origin);
   const Result<Judged> judged = judge(options, *recordings, robot);
   if (!judged) return report(judged.error());
   nlohmann::ordered_json document = gap::diagnosis_to_json(judged->diagnosis);
@@ -133,14 +134,15 @@ Exit gap_of_logs(const Options& options, const robot::RobotModel& robot) {
   }
   if (!options.report.empty()) {
     const auto page = report::report_html(judged->diagnosis, robot, origin);
-    if (const auto written = write_file(options.report, page); !written) return report(written.error());
+    if (const auto written = write_text_file(options.report, page, existing(options.force)); !written)
+      return report(written.error());
   }
   return options.apply.empty() ? Exit::ok : apply(options, *judged);
 }
 
 Exit run(const Options& options) {
   for (const auto& [option, file] : {std::pair{"--report", &options.report}, {"--apply", &options.apply}})
-    if (const auto may = may_write(option, *file, options.force); !may) return report(may.error());
+    if (const auto may = may_write(option, *file, existing(options.force)); !may) return report(may.error());
   if (!options.server.empty()) {
     return gap_from_server({options.server,
                             options.robot_id,

@@ -51,7 +51,7 @@ void print_rest(const gap::Comparison& c) {
 }  // namespace
 
 Exit tell(const gap::Comparison& comparison, const robot::RobotModel& robot, bool json,
-          const std::string& report_file, const report::ReportOrigin& origin) {
+          const std::string& report_file, bool force, const report::ReportOrigin& origin) {
   const nlohmann::ordered_json document = gap::comparison_to_json(comparison);
   if (json) {
     fmt::print("{}\n", document.dump(2));
@@ -60,7 +60,8 @@ Exit tell(const gap::Comparison& comparison, const robot::RobotModel& robot, boo
     print_rest(comparison);
   }
   if (report_file.empty()) return Exit::ok;
-  const auto written = write_file(report_file, report::report_html(comparison, robot, origin));
+  const auto written =
+      write_text_file(report_file, report::report_html(comparison, robot, origin), existing(force));
   return written ? Exit::ok : report(written.error());
 }
 
@@ -76,7 +77,7 @@ Exit gap_between_groups(const telemetry::RecordingSet& recordings, const robot::
     return gap::compare_recordings(recordings, *groups, robot, settings);
   }();
   if (!comparison) return report(comparison.error());
-  return tell(*comparison, robot, options.json, options.report, origin);
+  return tell(*comparison, robot, options.json, options.report, options.force, origin);
 }
 
 }  // namespace joulecast::client

@@ -15,6 +15,7 @@ struct GapCompareOptions {
   std::optional<std::size_t> controls;  // permutations of the groups for each finding
   bool json = false;
   std::string report;  // HTML file to write; empty: none
+  bool force = false;  // write over it
 };
 
 // What changes between groups of the recordings.
@@ -23,6 +24,6 @@ Exit gap_between_groups(const telemetry::RecordingSet& recordings, const robot::
 
 // Prints a comparison and writes its page.
 Exit tell(const gap::Comparison& comparison, const robot::RobotModel& robot, bool json,
-          const std::string& report_file, const report::ReportOrigin& origin);
+          const std::string& report_file, bool force, const report::ReportOrigin& origin);
 
 }  // namespace joulecast::client

@@ -66,7 +66,7 @@ Exit compare(const GapMissionsOptions& options, const gap::RunSet& runs, const r
     return gap::compare_runs(runs, *groups, robot, settings);
   }();
   if (!comparison) return report(comparison.error());
-  return tell(*comparison, robot, options.json, options.report,
+  return tell(*comparison, robot, options.json, options.report, options.force,
               report_origin(options.runs, options.robot_file));
 }
 
@@ -106,12 +106,14 @@ Exit gap_from_missions(const GapMissionsOptions& options, const robot::RobotMode
   }
   if (!options.report.empty()) {
     const auto page = report::report_html(*diagnosis, robot, report_origin(options.runs, options.robot_file));
-    if (const auto written = write_file(options.report, page); !written) return report(written.error());
+    if (const auto written = write_text_file(options.report, page, existing(options.force)); !written)
+      return report(written.error());
   }
   if (options.apply.empty()) return Exit::ok;
   const auto extended =
       gap::take(gap::offer_of(diagnosis->diagnosis), robot, {options.effect, options.force});
-  return extended ? write_robot(*extended, options.apply) : report(of_option(extended.error(), "--apply"));
+  return extended ? write_robot(*extended, options.apply, options.force)
+                  : report(of_option(extended.error(), "--apply"));
 }
 
 }  // namespace joulecast::client

@@ -214,8 +214,8 @@ Error of_option(Error error, const std::string& option) {
   return error;
 }
 
-Exit write_robot(const robot::RobotModel& robot, const std::string& path) {
-  const auto written = write_file(path, robot::to_json_text(robot) + '\n');
+Exit write_robot(const robot::RobotModel& robot, const std::string& path, bool force) {
+  const auto written = write_text_file(path, robot::to_json_text(robot) + '\n', existing(force));
   return written ? Exit::ok : report(written.error());
 }
 

@@ -20,7 +20,7 @@ void print_diagnosis(const nlohmann::json& diagnosis);
 // What is wrong with adopting, as of the option that asked for it; a choice among effects is --effect's.
 Error of_option(Error error, const std::string& option);
 
-Exit write_robot(const robot::RobotModel& robot, const std::string& path);
+Exit write_robot(const robot::RobotModel& robot, const std::string& path, bool force);
 
 // What a report says of where it comes from: names of files without their folders, and now.
 report::ReportOrigin report_origin(const std::vector<std::string>& sources, const std::string& robot_file);

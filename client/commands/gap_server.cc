@@ -94,9 +94,10 @@ void print_test(const json& test) {
              100 * number(test["power_gap_before"]), 100 * number(test["power_gap_after"]));
 }
 
-Result<void> write_report(const Daemon& daemon, const json& job, const std::string& path) {
+Result<void> write_report(const Daemon& daemon, const json& job, const GapServerOptions& options) {
   const auto page = daemon.ask(HttpMethod::get, target_of(job, "/report"));
-  return page ? write_file(path, page->body) : tl::unexpected(page.error());
+  return page ? write_text_file(options.report, page->body, existing(options.choice.force))
+              : tl::unexpected(page.error());
 }
 
 // The robot file that was diagnosed, with what was found.
@@ -111,7 +112,8 @@ Result<void> write_model(const Daemon& daemon, const GapServerOptions& options, 
   if (!robot) return tl::unexpected(robot.error());
   const auto extended = gap::take(*offer, *robot, options.choice);
   if (!extended) return tl::unexpected(of_option(extended.error(), "--apply"));
-  return write_file(options.apply, robot::to_json_text(*extended) + '\n');
+  return write_text_file(options.apply, robot::to_json_text(*extended) + '\n',
+                         existing(options.choice.force));
 }
 
 // What came of adopting; Fault::conflict where the daemon refuses.
@@ -138,7 +140,7 @@ Result<Exit> carry_out(const GapServerOptions& options) {
   const auto job = follow(daemon, std::move(*begun));
   if (!job) return tl::unexpected(job.error());
   if (!options.report.empty()) {
-    if (const auto written = write_report(daemon, *job, options.report); !written)
+    if (const auto written = write_report(daemon, *job, options); !written)
       return tl::unexpected(written.error());
   }
   if (!options.json) print_result(*job);

@@ -27,6 +27,7 @@ struct Options {
   std::string robot_id;
   double pause_s = 60;
   bool json = false;
+  bool force = false;
 };
 
 struct Imported {
@@ -74,8 +75,8 @@ Result<std::vector<Imported>> import_all(const Options& options) {
   return all;
 }
 
-Result<void> write_log(const std::string& path, const std::vector<Imported>& all) {
-  auto log = telemetry::EventLogWriter::create(path);
+Result<void> write_log(const Options& options, const std::vector<Imported>& all) {
+  auto log = telemetry::EventLogWriter::create(options.out, existing(options.force));
   if (!log) return tl::unexpected(log.error());
   for (const Imported& one : all) {
     if (auto written = telemetry::write_recording(*log, one.import.recording); !written) return written;
@@ -129,9 +130,11 @@ void print_text(const Options& options, const std::vector<Imported>& all) {
 }
 
 Exit run(const Options& options) {
+  if (const auto may = may_write("--out", options.out, existing(options.force)); !may)
+    return report(may.error());
   const auto all = import_all(options);
   if (!all) return report(all.error());
-  if (const auto written = write_log(options.out, *all); !written) return report(written.error());
+  if (const auto written = write_log(options, *all); !written) return report(written.error());
   if (!options.json) {
     print_text(options, *all);
     return Exit::ok;
@@ -158,6 +161,7 @@ void add_import(CLI::App& program, Exit& exit) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->add_option("--robot-id", options->robot_id, "instead of the mapping's");
+  command->add_flag("--force", options->force, force_help);
   command->add_flag("--json", options->json, "print the report as JSON");
   command->callback([options, &exit] { exit = run(*options); });
 }

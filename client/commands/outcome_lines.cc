@@ -1,5 +1,6 @@
 #include "client/commands/outcome_lines.h"
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 namespace joulecast::client {
@@ -8,6 +9,8 @@ Result<OutcomeLines> OutcomeLines::open(const std::string& path) {
   OutcomeLines lines;
   lines.path_ = path;
   if (path.empty()) return lines;
+  if (std::filesystem::is_symlink(path))
+    return fail(Fault::conflict, path, "is a symbolic link; name the file itself");
   lines.out_.open(path, std::ios::app);
   if (!lines.out_) return fail(Fault::unavailable, path, "cannot be opened for writing");
   return lines;

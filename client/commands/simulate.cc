@@ -233,7 +233,7 @@ Result<void> write_truth(const Options& options, const std::vector<Member>& memb
     truths.push_back({spec.robot.robot_id, options.seed, vr::effects_of(spec.imperfections), spec.world,
                       fleet.robot(k).finished()});
   }
-  return write_file(options.truth, vr::truth_json(truths));
+  return write_text_file(options.truth, vr::truth_json(truths), existing(options.force));
 }
 
 // Of missions in order of time: when they are run by the clock, the UTC second at which they start; in a log,
@@ -262,14 +262,14 @@ Result<void> check_options(const Options& options, bool over_lcm) {
         "--speed",
         "above 1 needs an end, so that no stamp lies in the future: give --duration or --missions");
   for (const auto& [flag, file] : {std::pair{"--log", &options.log}, {"--truth", &options.truth}})
-    if (const auto may = may_write(flag, *file, options.force); !may) return may;
+    if (const auto may = may_write(flag, *file, existing(options.force)); !may) return may;
   return {};
 }
 
 Result<Outlets> open_outlets(const Options& options, bool over_lcm) {
   Outlets outlets;
   if (!options.log.empty()) {
-    auto log = telemetry::EventLogWriter::create(options.log);
+    auto log = telemetry::EventLogWriter::create(options.log, existing(options.force));
     if (!log) return tl::unexpected(log.error());
     outlets.log = std::move(*log);
   }

@@ -119,10 +119,10 @@ Result<std::uint64_t> drive_case(const TrialCase& c, const CaseFiles& files) {
   std::error_code failed;
   std::filesystem::create_directories(files.folder, failed);
   if (failed) return fail(Fault::unavailable, files.folder.string(), "cannot be made: " + failed.message());
-  if (auto done = client::write_file(files.robot().string(), c.robot_json); !done)
+  if (auto done = write_text_file(files.robot().string(), c.robot_json, Existing::replace); !done)
     return tl::unexpected(done.error());
   if (auto done = write_log(c, files.log()); !done) return tl::unexpected(done.error());
-  if (auto done = client::write_file(files.truth().string(), truth_text(c)); !done)
+  if (auto done = write_text_file(files.truth().string(), truth_text(c), Existing::replace); !done)
     return tl::unexpected(done.error());
   return digest_of(files);
 }

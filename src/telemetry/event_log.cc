@@ -82,14 +82,15 @@ EventLogReader::EventLogReader(Source source, LogLimits limits)
 
 std::span<const std::uint8_t> EventLogReader::peek(std::size_t wanted) {
   if (filled_ - begin_ < wanted && !exhausted_) {
-    if (begin_ > 0) {
-      std::memmove(buffer_.data(), buffer_.data() + begin_, filled_ - begin_);
+    // The bytes are moved to the front only where twice as many do not fit behind them: however often events
+    // are sought, each byte is moved about once.
+    if (buffer_.size() - begin_ < wanted) {
+      if (begin_ > 0) std::memmove(buffer_.data(), buffer_.data() + begin_, filled_ - begin_);
       filled_ -= begin_;
       begin_ = 0;
+      if (buffer_.size() < 2 * wanted) buffer_.resize(std::max(2 * wanted, limits_.read_size));
     }
-    const std::size_t room = std::max(wanted, limits_.read_size);
-    if (buffer_.size() < room) buffer_.resize(room);
-    while (filled_ < wanted && !exhausted_) {
+    while (filled_ - begin_ < wanted && !exhausted_) {
       const std::ptrdiff_t got = source_(std::span(buffer_).subspan(filled_));
       failed_ = got < 0;
       exhausted_ = got <= 0;
@@ -211,10 +212,10 @@ Result<bool> read_events(const std::string& path, const std::function<Result<boo
   }
 }
 
-Result<EventLogWriter> EventLogWriter::create(const std::string& path) {
-  std::FILE* file = std::fopen(path.c_str(), "wbe");
-  if (file == nullptr) return fail(Fault::unavailable, path, std::strerror(errno));
-  return EventLogWriter(file, path);
+Result<EventLogWriter> EventLogWriter::create(const std::string& path, Existing existing) {
+  auto file = OutputFile::create(path, existing);
+  if (!file) return tl::unexpected(std::move(file.error()));
+  return EventLogWriter(std::move(*file));
 }
 
 Result<void> EventLogWriter::write(std::int64_t timestamp_us, std::string_view channel,
@@ -226,26 +227,23 @@ Result<void> EventLogWriter::write(std::int64_t timestamp_us, std::string_view c
   if (data.size() > limits.max_data_length) {
     return invalid("data", "must have at most " + std::to_string(limits.max_data_length) + " bytes");
   }
-  if (!file_) return fail(Fault::unavailable, path_, "the log is closed");
   std::array<std::uint8_t, log_header_size> header{};
   std::uint8_t* at = put(header.data(), log_sync_word);
   at = put(at, static_cast<std::uint64_t>(count_));
   at = put(at, static_cast<std::uint64_t>(timestamp_us));
   at = put(at, static_cast<std::uint32_t>(channel.size()));
   put(at, static_cast<std::uint32_t>(data.size()));
-  if (std::fwrite(header.data(), 1, header.size(), file_.get()) != header.size() ||
-      std::fwrite(channel.data(), 1, channel.size(), file_.get()) != channel.size() ||
-      (!data.empty() && std::fwrite(data.data(), 1, data.size(), file_.get()) != data.size())) {
-    return fail(Fault::unavailable, path_, std::strerror(errno));
-  }
+  const auto text = [](std::span<const std::uint8_t> bytes) {
+    return std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  };
+  for (const std::string_view part : {text(header), channel, text(data)})
+    if (auto written = file_.write(part); !written) return written;
   ++count_;
   return {};
 }
 
 Result<void> EventLogWriter::close() {
-  if (!file_) return {};
-  if (std::fclose(file_.release()) != 0) return fail(Fault::unavailable, path_, std::strerror(errno));
-  return {};
+  return file_.commit();
 }
 
 }  // namespace joulecast::telemetry

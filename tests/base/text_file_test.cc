@@ -36,5 +36,12 @@ TEST_F(TextFile, WhatIsAbsentDiffersFromWhatCannotBeRead) {
   EXPECT_NE(endless.error().message.find("cannot be opened: "), std::string::npos);
 }
 
+TEST_F(TextFile, WhatIsTooLargeOrNeverEndsIsRefused) {
+  std::ofstream(folder_ / "file", std::ios::binary) << std::string(1 << 20, 'x');
+  EXPECT_EQ(read_text_file(folder_ / "file", 1 << 20).value().size(), std::size_t{1} << 20);
+  EXPECT_EQ(read_text_file(folder_ / "file", (1 << 20) - 1).error().fault, Fault::too_large);
+  EXPECT_EQ(read_text_file("/dev/zero").error().fault, Fault::too_large);
+}
+
 }  // namespace
 }  // namespace joulecast

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <lcm/lcm.h>
 
+#include <chrono>
 #include <cstring>
 #include <memory>
 
@@ -181,6 +182,22 @@ TEST(EventLog, ResyncAfterATruncatedTailEndsAtTheEnd) {
   EXPECT_EQ(reader.next().status, LogStatus::truncated);
   EXPECT_EQ(reader.resync(), whole_size - 1 - starts[2]);
   EXPECT_EQ(reader.next().status, LogStatus::end);
+}
+
+// Sync words that each declare 15 MB, of which none is followed by another event.
+TEST(EventLog, ResyncOverManyPlausibleHeadersTakesTimeInProportionToTheFile) {
+  Bytes header = three_events();
+  header.resize(log_header_size);
+  header[24] = 0, header[25] = 0xF0, header[26] = 0, header[27] = 0;
+  Bytes bytes{0};
+  for (std::size_t k = 0; k < 50'000; ++k) bytes.insert(bytes.end(), header.begin(), header.end());
+  bytes.resize(bytes.size() + (std::size_t{34} << 20));
+  const auto began = std::chrono::steady_clock::now();
+  EventLogReader reader = reader_of(bytes);
+  EXPECT_EQ(reader.next().status, LogStatus::corrupt);
+  EXPECT_EQ(reader.resync(), bytes.size());
+  // 250 s where every header moves 15 MB.
+  EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(10));
 }
 
 TEST(EventLog, UnreadableSourceIsNoEnd) {

@@ -264,10 +264,12 @@ Result<std::uint64_t> write_motion_case(const MotionCase& c, const CaseFiles& fi
   std::error_code failed;
   std::filesystem::create_directories(files.folder, failed);
   if (failed) return fail(Fault::unavailable, files.folder.string(), "cannot be made: " + failed.message());
-  if (auto done = client::write_file(files.robot().string(), robot::to_json_text(c.base->file) + "\n"); !done)
+  if (auto done = write_text_file(files.robot().string(), robot::to_json_text(c.base->file) + "\n",
+                                  Existing::replace);
+      !done)
     return tl::unexpected(std::move(done.error()));
   if (auto done = write_log(c, files.log()); !done) return tl::unexpected(std::move(done.error()));
-  if (auto done = client::write_file(files.truth().string(), truth_text(c)); !done)
+  if (auto done = write_text_file(files.truth().string(), truth_text(c), Existing::replace); !done)
     return tl::unexpected(std::move(done.error()));
   return digest_of(files);
 }
