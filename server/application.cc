@@ -13,10 +13,13 @@
 #include <vector>
 
 #include "answers/json/autonomy_json.h"
+#include "base/fault_boundary.h"
 #include "base/host_clock.h"
 #include "history/spool.h"
 #include "history/sqlite_store.h"
 #include "history/writer.h"
+#include "ingest/ingest_service.h"
+#include "ingest/model_loading.h"
 #include "server/api/services.h"
 #include "server/daemon_metrics.h"
 #include "server/diagnosis/proposal_acceptor.h"
@@ -29,8 +32,6 @@
 #include "server/http/openapi.h"
 #include "server/http/operations.h"
 #include "server/http/static_files.h"
-#include "ingest/ingest_service.h"
-#include "ingest/model_loading.h"
 #include "server/logging.h"
 #include "server/metrics.h"
 
@@ -92,6 +93,8 @@ history::WriterOptions writer_options(const Settings& settings) {
   }
   if (const auto bytes = settings.integer("store.retention_bytes"); bytes > 0)
     options.retention.telemetry_max_bytes = bytes;
+  if (const double days = settings.number("store.retention_missions_days"); days > 0)
+    options.missions_max_age_us = microseconds(days * seconds_per_day);
   options.queue_bytes = static_cast<std::size_t>(settings.integer("store.queue_bytes"));
   options.spool_path = spool_path(settings);
   options.on_error = [](const Error& error) { log_error("store", error); };
@@ -135,6 +138,8 @@ server::DiagnosisOptions diagnosis_options(const Settings& settings) {
   options.max_samples = static_cast<std::size_t>(settings.integer("diagnosis.max_samples"));
   options.controls = static_cast<std::size_t>(settings.integer("diagnosis.controls"));
   options.threads = static_cast<std::size_t>(settings.integer("diagnosis.threads"));
+  options.max_memory_bytes = static_cast<std::uint64_t>(settings.integer("diagnosis.max_memory_bytes"));
+  options.deadline = seconds(settings.number("diagnosis.deadline_s"));
   return options;
 }
 
@@ -208,7 +213,24 @@ struct Application::Parts {
           log_warning(text, {{"robot_id", robot}});
         }) {}
 
-  ~Parts() { (void)stop(); }
+  ~Parts() {
+    (void)stop();
+    observe_faults({});
+  }
+
+  // What a thread survived becomes a log line, a count and an entry of the audit log.
+  void tell_of_faults() {
+    const Counter survived =
+        metrics.counter("joulecast_internal_faults_total",
+                        "Exceptions that a thread survived: each cost one message, one commit or one job");
+    observe_faults([survived, &writer = *writer](std::string_view part, std::string_view why) {
+      survived.add(1);
+      log_error("internal fault", Error{Fault::internal, std::string(part), std::string(why)});
+      JsonWriter detail;
+      detail.begin_object().field("part", part).field("why", why).end_object();
+      (void)writer.offer(history::AppendEvent{{0, host_utime_us(), "", "internal_fault", detail.take()}});
+    });
+  }
 
   // Whatever does not end is left behind, so that the store is always brought to its end.
   bool stop() {
@@ -275,7 +297,7 @@ struct Application::Parts {
   void warm_forecasts() {
     for (const auto& model : models.all()) {
       if (stopped) return;
-      forecasts->of(model);
+      survive("forecasts", [&] { forecasts->of(model); });
     }
   }
 
@@ -284,7 +306,7 @@ struct Application::Parts {
     std::unique_lock lock(beat_mutex);
     while (beating) {
       lock.unlock();
-      fleet_events.publish(host_utime_us());
+      survive("fleet events", [&] { fleet_events.publish(host_utime_us()); });
       lock.lock();
       beat_wake.wait_for(lock, milliseconds(1000), [&] { return !beating; });
     }
@@ -333,6 +355,7 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   p.store = std::move(*store);
   take_in_spool(settings, *p.store);
   p.writer = std::make_unique<history::Writer>(*p.store, writer_options(settings));
+  p.tell_of_faults();
 
   if (const std::string& directory = settings.text("robots.directory"); !directory.empty()) {
     if (Result<void> loaded = p.load_robot_files(directory); !loaded) return tl::unexpected(loaded.error());

@@ -11,9 +11,10 @@ namespace joulecast::server {
 
 static_assert(history::MissionState{} == history::MissionState::open);
 
-void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters, const ingest::IngestService& ingest,
-                    const ingest::FleetView& fleet, const history::Writer& writer, const history::Store& store,
-                    const http::EventHub& events, std::function<std::int64_t()> now_utime_us) {
+void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
+                    const ingest::IngestService& ingest, const ingest::FleetView& fleet,
+                    const history::Writer& writer, const history::Store& store, const http::EventHub& events,
+                    std::function<std::int64_t()> now_utime_us) {
   const Counter messages =
       metrics.counter("joulecast_ingest_messages_total", "Messages received on the robots' channels");
   const Counter samples = metrics.counter("joulecast_ingest_samples_total", "Samples accounted for");
@@ -63,6 +64,8 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters, co
                                          "Commit attempts that failed and were tried again");
   const Counter refused = metrics.counter("joulecast_store_refused_total", "Commands that the store refused");
   const Counter seconds = metrics.counter("joulecast_store_commit_seconds_total", "Time spent in commits");
+  const Counter pruned_missions =
+      metrics.counter("joulecast_store_pruned_missions_total", "Missions dropped by the retention");
   const Counter pruned = metrics.counter("joulecast_store_pruned_chunks_total",
                                          "Raw telemetry chunks that the retention dropped");
   const Gauge streams = metrics.gauge("joulecast_event_streams", "Clients of the event stream");
@@ -110,6 +113,7 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters, co
         failed.raise_to(static_cast<double>(writing.failed_commits));
         refused.raise_to(static_cast<double>(writing.refused));
         seconds.raise_to(writing.total_commit_s);
+        pruned_missions.raise_to(static_cast<double>(writing.pruned_missions));
         pruned.raise_to(static_cast<double>(writing.pruned_chunks));
         if (const auto size = store.size()) {
           database.set(static_cast<double>(size->database_bytes));

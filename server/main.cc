@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "history/store_care.h"
 #include "server/application.h"
 #include "server/logging.h"
 #include "server/settings.h"
@@ -91,6 +92,39 @@ int check(const joulecast::Settings& settings) {
   return faulty.empty() ? print(std::string("the settings are valid\n")) : 2;
 }
 
+int check_store(const std::string& path) {
+  const auto check = joulecast::history::check_store(path);
+  if (!check) {
+    complain(check.error());
+    return check.error().fault == joulecast::Fault::corrupt ? 3 : 1;
+  }
+  for (const std::string& fault : check->faults) std::printf("%s\n", fault.c_str());
+  std::printf("%s: %lld missions and %lld chunks of recordings are %s\n", path.c_str(),
+              static_cast<long long>(check->missions), static_cast<long long>(check->chunks),
+              check->faults.empty() ? "sound" : "not all sound");
+  return check->faults.empty() ? 0 : 3;
+}
+
+int salvage(const std::string& path, const std::string& into) {
+  const auto salvaged = joulecast::history::salvage_store(path, into);
+  if (!salvaged) return print(tl::unexpected(salvaged.error()));
+  for (const std::string& loss : salvaged->losses) std::printf("lost: %s\n", loss.c_str());
+  std::printf("%lld rows kept in %s\n", static_cast<long long>(salvaged->rows), into.c_str());
+  return 0;
+}
+
+int back_up(const std::string& path, const std::string& file) {
+  return print(joulecast::history::back_up_store(path, file).map([&](const auto& check) {
+    return std::to_string(check.missions) + " missions copied into " + file + "\n";
+  }));
+}
+
+int restore(const std::string& file, const std::string& path) {
+  return print(joulecast::history::restore_store(file, path).map([&](const std::string& before) {
+    return path + " is restored" + (before.empty() ? "" : "; what was there is " + before) + "\n";
+  }));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -112,6 +146,14 @@ int main(int argc, char** argv) {
       return print(joulecast::openapi_document());
     case Invocation::Action::print_config_schema:
       return print(joulecast::settings_schema());
+    case Invocation::Action::check_store:
+      return check_store(invocation->settings.text("store.path"));
+    case Invocation::Action::backup:
+      return back_up(invocation->settings.text("store.path"), invocation->file);
+    case Invocation::Action::restore:
+      return restore(invocation->file, invocation->settings.text("store.path"));
+    case Invocation::Action::salvage:
+      return salvage(invocation->settings.text("store.path"), invocation->file);
     case Invocation::Action::run:
       return serve(invocation->settings);
   }

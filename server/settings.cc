@@ -264,18 +264,27 @@ namespace {
 
 using Action = Invocation::Action;
 
-constexpr std::array<std::pair<std::string_view, Action>, 6> actions{{
+constexpr std::array<std::pair<std::string_view, Action>, 10> actions{{
     {"--help", Action::help},
     {"--version", Action::version},
     {"--check-config", Action::check_config},
     {"--print-config", Action::print_config},
     {"--print-openapi", Action::print_openapi},
     {"--print-config-schema", Action::print_config_schema},
+    {"--check-store", Action::check_store},
+    {"--backup", Action::backup},
+    {"--restore", Action::restore},
+    {"--salvage", Action::salvage},
 }};
+
+bool names_a_file(Action action) {
+  return action == Action::backup || action == Action::restore || action == Action::salvage;
+}
 
 // What flags and environment say before any of it is in force.
 struct Given {
   std::optional<Action> action;
+  std::string file;  // of the action
   std::optional<std::string> config;
   std::vector<Pending> flags, variables;
 };
@@ -301,6 +310,10 @@ Result<void> read_flags(const std::vector<std::string>& arguments, Given& given)
       if (given.action.value_or(action->second) != action->second)
         return invalid(argument, "only one such command can be given");
       given.action = action->second;
+      if (names_a_file(action->second)) {
+        if (i + 1 == arguments.size() || arguments[i + 1].empty()) return invalid(argument, "needs a file");
+        given.file = arguments[++i];
+      }
       continue;
     }
     const auto equals = argument.find('=');
@@ -355,6 +368,7 @@ Result<Invocation> read_settings(const std::vector<std::string>& arguments,
   read_environment(environment, given, problems);
   Invocation invocation;
   if (given.action) invocation.action = *given.action;
+  invocation.file = given.file;
   if (invocation.action == Action::help || invocation.action == Action::version) return invocation;
   if (given.config) {
     const auto text = read_text_file(*given.config);
@@ -384,6 +398,11 @@ std::string settings_help() {
       "  --print-config         print the effective settings with their origin and exit\n"
       "  --print-config-schema  print the JSON Schema of the settings file and exit\n"
       "  --print-openapi        print the OpenAPI document and exit\n"
+      "  --check-store          check the history: pages, references, ledgers, recordings; exit code 3: "
+      "damaged\n"
+      "  --backup FILE          copy the history into a new file, also while a daemon runs\n"
+      "  --restore FILE         put a copy in the place of the history, which is kept beside it\n"
+      "  --salvage FILE         read what can be read of a damaged history into a new file\n"
       "  --help, --version\n\n"
       "A setting comes from flag > environment > file > default; --http-port is JOULECAST_HTTP_PORT in the\n"
       "environment and {\"http\": {\"port\": ...}} in the file.\n\n"
@@ -400,7 +419,8 @@ std::string settings_help() {
       "\nexit codes\n"
       "  0  stopped as asked, or printed what was asked for\n"
       "  1  the service could not start; its log says which setting stands in the way\n"
-      "  2  the command line, an environment variable or the settings file is wrong\n";
+      "  2  the command line, an environment variable or the settings file is wrong\n"
+      "  3  --check-store found the history damaged\n";
   return text;
 }
 

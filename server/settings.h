@@ -75,9 +75,14 @@ struct Invocation {
     check_config,
     print_config,
     print_openapi,
-    print_config_schema
+    print_config_schema,
+    check_store,
+    backup,
+    restore,
+    salvage
   };
   Action action = Action::run;
+  std::string file;  // that the action names, where it names one
   Settings settings;
 };
 

@@ -64,6 +64,10 @@ constexpr Setting table[] = {
      "age at which raw telemetry is deleted, at most 5 % of it an hour; 0: never"},
     {"store.retention_bytes", Type::integer, "10737418240", 0, 1e15, "B",
      "size of raw telemetry beyond which the oldest is deleted; 0: no limit"},
+    {"store.retention_missions_days", Type::number, "0", 0, 36500, "d",
+     "age since their end, by the robot's clock, at which missions are deleted with all that is stored of "
+     "them, "
+     "at most 5 % of them an hour; 0: never"},
     {"store.queue_bytes", Type::integer, "67108864", 1048576, 1e12, "B",
      "memory for what waits while the store takes no data; beyond: raw samples are left out and counted"},
 
@@ -117,6 +121,10 @@ constexpr Setting table[] = {
     {"diagnosis.controls", Type::integer, "20", 0, 1000, "",
      "surrogates of the recordings on which every finding of a diagnosis is tried; 0: none"},
     {"diagnosis.threads", Type::integer, "2", 1, 64, "", "threads that these may take, at low priority"},
+    {"diagnosis.max_memory_bytes", Type::integer, "1073741824", 67108864, 1e12, "B",
+     "memory that a diagnosis, a process of its own, may take beyond the daemon's; it fails beyond"},
+    {"diagnosis.deadline_s", Type::number, "3600", 1, 604800, "s",
+     "time after which a diagnosis that has not ended fails"},
     {"watch.period_s", Type::number, "3600", 0, 31536000, "s",
      "how often every robot's missions are looked at for a drift of the gap; 0: never"},
     {"watch.robots", Type::text, "", 0, 0, "", "robots to watch, separated by commas; empty: all"},

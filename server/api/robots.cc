@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <chrono>
 #include <optional>
 #include <set>
+#include <thread>
 #include <utility>
 
 #include "robot/robot_file.h"
@@ -89,6 +91,48 @@ Result<Response> put(Services& services, const Request& request) {
   return http::json_response(json.take());
 }
 
+// Nothing of the robot is on its way to the store any more: its session has ended. False when that takes too
+// long.
+bool wait_for_end_of_session(const Services& services, const std::string& id) {
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  for (;;) {
+    const auto snapshot = services.fleet.find(id);
+    if (snapshot == nullptr || !snapshot->has_model) return true;
+    if (std::chrono::steady_clock::now() >= until) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+Result<Response> remove(Services& services, const Request& request) {
+  const std::string& id = request.param("id");
+  const std::string history(request.query_value("history").value_or("keep"));
+  const auto robots = services.store.robots();
+  if (!robots) return tl::unexpected(robots.error());
+  if (std::ranges::find(*robots, id, &history::RobotRecord::robot_id) == robots->end())
+    return tl::unexpected(ingest::unknown_robot("id", id));
+  if (services.diagnoses.waits_or_runs(id))
+    return fail(Fault::conflict, "id", "a diagnosis of robot " + id + " waits or runs; cancel it first");
+  const auto model = services.models.find(id);
+  services.models.remove(id);
+  const history::Outcome missions =
+      wait_for_end_of_session(services, id)
+          ? services.writer.execute(history::RemoveRobot{id, history == "purge"})
+          : fail(Fault::unavailable, "", "accounting does not let the robot go; try again later");
+  if (!missions) {
+    if (model != nullptr) (void)services.models.put(model->robot, model->version);
+    return tl::unexpected(missions.error());
+  }
+  JsonWriter detail;
+  detail.begin_object().field("history", history).field("missions_deleted", *missions).end_object();
+  const auto recorded = services.writer.offer(
+      history::AppendEvent{{0, services.now_utime_us(), id, "robot_removed", detail.take()}});
+  if (!recorded) return tl::unexpected(recorded.error());
+  JsonWriter json;
+  json.begin_object().field("robot_id", id).field("history", history);
+  json.field("missions_deleted", *missions).end_object();
+  return http::json_response(json.take());
+}
+
 Result<Response> state(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
   if (services.models.find(id) == nullptr && services.fleet.find(id) == nullptr) {
@@ -159,6 +203,20 @@ std::vector<TableRow> robot_rows() {
                    .error_statuses = {422},
                    .run = http::Run::write},
                   answered_by(put)});
+  rows.push_back(
+      {{.method = Method::del,
+        .path = "/v1/robots/{id}",
+        .operation_id = "removeRobot",
+        .summary = "Takes a robot's model out of force and ends its mission; with history=purge deletes "
+                   "all that is stored of it, but for the audit log",
+        .parameters = {{.name = "history",
+                        .type = http::Parameter::Type::text,
+                        .description = "what becomes of its missions and models",
+                        .choices = {"keep", "purge"}}},
+        .response_schema = "robot-removal",
+        .error_statuses = {404, 409},
+        .run = http::Run::write},
+       answered_by(remove)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/robots/{id}/state",
                    .operation_id = "getRobotState",

@@ -13,12 +13,14 @@
 #include <thread>
 #include <utility>
 
+#include "base/fault_boundary.h"
 #include "base/utc_time.h"
 #include "gap/diagnose/recordings.h"
 #include "gap/verdict/diagnosis_json.h"
 #include "gap/verdict/offer.h"
 #include "report/report.h"
 #include "robot/robot_file.h"
+#include "server/diagnosis/confined.h"
 #include "server/diagnosis/mission_recordings.h"
 
 namespace joulecast::server {
@@ -228,7 +230,11 @@ class DiagnosisService::Impl {
         waiting_.pop_front();
       }
       const auto began = std::chrono::steady_clock::now();
-      run(*job);
+      if (!survive("diagnosis", [&] { run(*job); })) {
+        survive("diagnosis", [&] { finish(*job, DiagnosisState::failed, "an internal fault", {}); });
+        const std::lock_guard lock(mutex_);
+        running_.reset();
+      }
       const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
       const std::lock_guard lock(mutex_);
       counts_.seconds += seconds;
@@ -295,41 +301,62 @@ class DiagnosisService::Impl {
     gap::DiagnosisSettings settings;
     settings.controls = request.controls.value_or(options_.controls);
     settings.threads = options_.threads;
-    settings.progress = [&job](double fraction) {
-      job.fraction = fraction;
-      return !job.cancelled.load();
-    };
-    Result<gap::Diagnosis> diagnosis = gap::diagnose(*set, model->robot, settings);
-    if (!diagnosis) return tl::unexpected(std::move(diagnosis.error()));
-    tell(job, *diagnosis, *set, *model, wanted.since_utime_us);
+    const std::string made_at = format_utc(now_utime_us_());
+    const auto answer = run_confined(
+        {options_.max_memory_bytes, options_.deadline},
+        [&](const Report& report) -> Result<std::string> {
+          settings.progress = report;
+          const Result<gap::Diagnosis> diagnosis = gap::diagnose(*set, model->robot, settings);
+          if (!diagnosis) return tl::unexpected(diagnosis.error());
+          return told_of(record, *diagnosis, *set, *model, wanted.since_utime_us, made_at).dump();
+        },
+        [&job](double fraction) {
+          job.fraction = fraction;
+          return !job.cancelled.load();
+        });
+    if (!answer) {
+      if (answer.error().fault == Fault::internal || answer.error().fault == Fault::too_large)
+        report_fault("diagnosis", answer.error().message);
+      return tl::unexpected(answer.error());
+    }
+    const ordered_json told = ordered_json::parse(*answer);
+    record.result_json = told["result"].dump();
+    record.summary_json = told["summary"].dump();
+    record.model_json = told["model"].get<std::string>();
+    report_ = told["report"].get<std::string>();
+    if (const auto& error = told["error"]; error != "")
+      on_error_({Fault::internal, "model", error.get<std::string>()});
     return {};
   }
 
-  // Result, summary, report and model of a diagnosis.
-  void tell(Job& job, const gap::Diagnosis& diagnosis, const telemetry::RecordingSet& recordings,
-            const ingest::ModelInForce& model, std::optional<std::int64_t> since_utime_us) {
-    DiagnosisRecord& record = job.record;
+  // Result, summary, report and model of a diagnosis; the model's text is empty where there is nothing to
+  // adopt.
+  static ordered_json told_of(const DiagnosisRecord& record, const gap::Diagnosis& diagnosis,
+                              const telemetry::RecordingSet& recordings, const ingest::ModelInForce& model,
+                              std::optional<std::int64_t> since_utime_us, const std::string& made_at) {
     ordered_json result = gap::diagnosis_to_json(diagnosis);
     result["model_version"] = model.version;
     result["since_utime_us"] = since_utime_us ? ordered_json(*since_utime_us) : ordered_json(nullptr);
-    record.result_json = result.dump();
-    record.summary_json = summary_of(result).dump();
     report::ReportOrigin origin;
     for (const telemetry::Recording& mission : recordings.missions)
       origin.sources.push_back(mission.mission_id);
     origin.model = "version " + std::to_string(model.version) + " of " + record.robot_id;
-    origin.made_at = format_utc(now_utime_us_());
+    origin.made_at = made_at;
     origin.software = "joulecastd " JOULECAST_VERSION;
-    report_ = report::report_html(diagnosis, model.robot, origin);
+    ordered_json told = {{"summary", summary_of(result)},
+                         {"report", report::report_html(diagnosis, model.robot, origin)},
+                         {"model", ""},
+                         {"error", ""}};
+    told["result"] = std::move(result);
     // What a person who insists would get; of effects that are not told apart nobody has chosen one yet.
     const gap::Offer offer = gap::offer_of(diagnosis);
-    if (offer.effects.empty()) return;
+    if (offer.effects.empty()) return told;
     const Result<robot::RobotModel> extended = gap::take(offer, model.robot, {{}, true});
-    if (extended) {
-      record.model_json = robot::to_json_text(*extended);
-    } else if (extended.error().fault != Fault::conflict) {
-      on_error_(extended.error());
-    }
+    if (extended)
+      told["model"] = robot::to_json_text(*extended);
+    else if (extended.error().fault != Fault::conflict)
+      told["error"] = describe(extended.error());
+    return told;
   }
 
   void finish(Job& job, DiagnosisState state, std::string error, std::string report) {

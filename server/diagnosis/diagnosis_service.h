@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -11,8 +12,8 @@
 #include "base/error.h"
 #include "history/store.h"
 #include "history/writer.h"
-#include "server/diagnosis/drift_view.h"
 #include "ingest/model_registry.h"
+#include "server/diagnosis/drift_view.h"
 
 namespace joulecast::server {
 
@@ -22,6 +23,8 @@ struct DiagnosisOptions {
   std::size_t max_samples = 500'000;  // of one job: bounds its memory and time
   std::size_t controls = 20;          // surrogates on which every finding is tried, unless a request says so
   std::size_t threads = 1;            // that these may take
+  std::uint64_t max_memory_bytes = std::uint64_t{1} << 30;  // of a job beyond the daemon's own
+  std::chrono::milliseconds deadline{3'600'000};            // of a job
 };
 
 struct DiagnosisRequest {
@@ -51,7 +54,8 @@ struct DiagnosisCounts {
   double seconds = 0;  // spent on jobs
 };
 
-// Diagnoses as jobs: a bounded queue and one thread of low priority. Jobs and results are kept in the store;
+// Diagnoses as jobs: a bounded queue and one thread of low priority, each job a process of its own
+// (server/diagnosis/confined.h) that can crash without the service. Jobs and results are kept in the store;
 // those that a stop of the service cuts off are marked so when it starts again.
 class DiagnosisService {
  public:

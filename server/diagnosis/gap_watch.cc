@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/fault_boundary.h"
 #include "base/median.h"
 #include "gap/traits.h"
 
@@ -80,7 +81,7 @@ void GapWatch::start() {
     std::unique_lock lock(mutex_);
     while (!wake_.wait_for(lock, period, [this] { return stopping_; })) {
       lock.unlock();
-      look();
+      survive("gap watch", [this] { look(); });
       lock.lock();
     }
   });

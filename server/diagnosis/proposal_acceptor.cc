@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/fault_boundary.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::server {
@@ -69,7 +70,7 @@ void ProposalAcceptor::start(std::chrono::milliseconds period) {
     std::unique_lock lock(mutex_);
     while (running_) {
       lock.unlock();
-      look();
+      survive("proposal acceptor", [this] { look(); });
       lock.lock();
       wake_.wait_for(lock, period, [this] { return !running_; });
     }

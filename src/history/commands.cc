@@ -64,6 +64,12 @@ std::size_t content_bytes(const AddProposal& c) {
 std::size_t content_bytes(const CloseProposal&) {
   return 0;
 }
+std::size_t content_bytes(const PruneMissions&) {
+  return 0;
+}
+std::size_t content_bytes(const RemoveRobot& c) {
+  return c.robot_id.size();
+}
 
 }  // namespace
 

@@ -111,9 +111,25 @@ struct CloseProposal {
   std::optional<std::int64_t> adopted_version;
 };
 
+// Deletes ended missions, their accounts, traces and recordings among it, that ended longer ago than
+// `max_age_us` by the robots' clocks, oldest first, at most `max_missions` of them. Outcome: how many.
+struct PruneMissions {
+  std::int64_t max_age_us = 0;
+  std::int64_t max_missions = 0;
+};
+
+// Takes a robot's model out of force. With `purge` all that is stored of the robot goes, but for its events:
+// models, missions, recordings, what was learned, diagnoses, proposals. Else all of it stays, and missions
+// that are open are interrupted. Outcome: the number of missions deleted. Fault::not_found when the robot is
+// unknown.
+struct RemoveRobot {
+  std::string robot_id;
+  bool purge = false;
+};
+
 using Command = std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutResumeState,
                              PutLearned, AppendEvent, Prune, AddDiagnosis, UpdateDiagnosis,
-                             InterruptDiagnoses, AddProposal, CloseProposal>;
+                             InterruptDiagnoses, AddProposal, CloseProposal, PruneMissions, RemoveRobot>;
 
 // Approximate memory that a queued command holds, in bytes.
 std::size_t weight_bytes(const Command& command);

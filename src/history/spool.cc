@@ -120,6 +120,14 @@ template <class Archive>
 void members(Archive& a, CloseProposal& c) {
   a(c.id, c.state, c.adopted_version);
 }
+template <class Archive>
+void members(Archive& a, PruneMissions& c) {
+  a(c.max_age_us, c.max_missions);
+}
+template <class Archive>
+void members(Archive& a, RemoveRobot& c) {
+  a(c.robot_id, c.purge);
+}
 
 template <class T>
 concept Plain = std::is_arithmetic_v<T> || std::is_enum_v<T>;

@@ -1,5 +1,6 @@
 #include "history/sqlite_changes.h"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -45,7 +46,24 @@ std::vector<Outcome> SqliteChanges::apply(std::span<const Command> commands) {
   Transaction transaction(database_, Transaction::Kind::write);
   for (const Command& command : commands) outcomes.push_back(apply_whole(command));
   transaction.commit();
+  const auto deletes = [](const Command& c) {
+    return std::holds_alternative<Prune>(c) || std::holds_alternative<PruneMissions>(c) ||
+           std::holds_alternative<RemoveRobot>(c);
+  };
+  if (std::ranges::any_of(commands, deletes)) give_back();
   return outcomes;
+}
+
+void SqliteChanges::give_back() {
+  // Free pages are used again; only a store that has shrunk gives them back, 16 MB at a time. A store of
+  // before incremental vacuum has none to give until it is restored from a backup.
+  constexpr std::int64_t most_free_share = 8, pages = 4096;
+  try {
+    if (database_.integer("PRAGMA freelist_count") * most_free_share > database_.integer("PRAGMA page_count"))
+      database_.execute("PRAGMA incremental_vacuum(" + std::to_string(pages) + ")");
+  } catch (const SqliteError&) {
+    // The changes are committed; the next ones try again.
+  }
 }
 
 Outcome SqliteChanges::apply_whole(const Command& command) {
@@ -223,6 +241,36 @@ Outcome SqliteChanges::run(const Prune& c) {
   const Retention& keep = c.retention;
   if (c.max_chunks < 1) return invalid("max_chunks", "must be at least 1");
   return chunks::prune(database_, keep, c.max_chunks, now_utime_us_());
+}
+
+Outcome SqliteChanges::run(const PruneMissions& c) {
+  if (c.max_missions < 1) return invalid("max_missions", "must be at least 1");
+  return Rows(database_.statement("DELETE FROM mission WHERE mission_key IN (SELECT mission_key FROM mission "
+                                  "WHERE state <> 'open' "
+                                  "AND end_utime_us < ? ORDER BY start_utime_us, mission_key LIMIT ?)"))
+      .bind(now_utime_us_() - c.max_age_us)
+      .bind(c.max_missions)
+      .run();
+}
+
+Outcome SqliteChanges::run(const RemoveRobot& c) {
+  const auto change = [&](std::string_view sql) {
+    return Rows(database_.statement(sql)).bind(c.robot_id).run();
+  };
+  if (change("UPDATE robot SET active_version = NULL WHERE robot_id = ?") == 0)
+    return fail(Fault::not_found, "robot_id", "no robot is called '" + c.robot_id + "'");
+  if (!c.purge) {
+    change("UPDATE mission SET state = 'interrupted' WHERE robot_id = ? AND state = 'open'");
+    return 0;
+  }
+  for (const char* sql :
+       {"DELETE FROM diagnosis WHERE robot_id = ?", "DELETE FROM proposal WHERE robot_id = ?",
+        "DELETE FROM learned WHERE robot_id = ?", "DELETE FROM energy_state WHERE robot_id = ?"})
+    change(sql);
+  const std::int64_t missions = change("DELETE FROM mission WHERE robot_id = ?");
+  change("DELETE FROM model WHERE robot_id = ?");
+  change("DELETE FROM robot WHERE robot_id = ?");
+  return missions;
 }
 
 }  // namespace joulecast::history

@@ -36,7 +36,11 @@ class SqliteChanges {
   Outcome run(const InterruptDiagnoses& command);
   Outcome run(const AddProposal& command);
   Outcome run(const CloseProposal& command);
+  Outcome run(const PruneMissions& command);
+  Outcome run(const RemoveRobot& command);
 
+  // Gives free pages back to the disk, some at a time, where they are many.
+  void give_back();
   void make_robot(const std::string& robot_id);
   void put(const ResumeState& state);
 

@@ -1,7 +1,5 @@
 #include "history/sqlite_store.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -17,6 +15,7 @@
 #include <vector>
 
 #include "base/host_clock.h"
+#include "history/file_lock.h"
 #include "history/schema.h"
 #include "history/sqlite.h"
 #include "history/sqlite_changes.h"
@@ -41,29 +40,6 @@ auto guarded(Work work) -> decltype(work()) {
     return fail(Fault::unavailable, "database", error.what());
   }
 }
-
-// Keeps a second daemon off the same file; the kernel lets go of it however the process ends.
-class FileLock {
- public:
-  explicit FileLock(int descriptor) : descriptor_(descriptor) {}
-  ~FileLock() { close(descriptor_); }
-  FileLock(const FileLock&) = delete;
-  FileLock& operator=(const FileLock&) = delete;
-
-  static Result<std::unique_ptr<FileLock>> acquire(const std::string& path) {
-    const int descriptor = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-    if (descriptor < 0)
-      return fail(Fault::unavailable, "database", "cannot open " + path + ": " + std::strerror(errno));
-    auto lock = std::make_unique<FileLock>(descriptor);
-    if (flock(descriptor, LOCK_EX | LOCK_NB) != 0)
-      return fail(Fault::conflict, "database",
-                  path + " is locked: another joulecast program, a daemon perhaps, has this store open");
-    return lock;
-  }
-
- private:
-  int descriptor_;
-};
 
 // The files that were opened, known again by device and inode.
 class OpenedFiles {
@@ -290,6 +266,7 @@ class SqliteStore final : public Store {
       size.journal_bytes = absent ? 0 : static_cast<std::int64_t>(journal);
       size.telemetry_bytes = chunks::encoded_bytes(database);
       size.telemetry_chunks = chunks::count(database);
+      size.missions = database.integer("SELECT count(*) FROM mission");
       return size;
     });
   }
@@ -333,21 +310,18 @@ class SqliteStore final : public Store {
 }  // namespace
 
 Result<std::unique_ptr<Store>> open_sqlite_store(const SqliteOptions& options) {
-  // The lock file keeps others off before anything is read; the database's own lock holds where the lock file
-  // is deleted. Its descriptor is closed after SQLite's, whose locks would go with it.
-  std::vector<std::unique_ptr<FileLock>> locks;
-  for (const char* suffix : {".lock", ""}) {
-    auto lock = FileLock::acquire(options.path + suffix);
-    if (!lock) return tl::unexpected(lock.error());
-    locks.push_back(std::move(*lock));
-  }
+  // Their descriptors are closed after SQLite's, whose locks would go with the database's.
+  auto locks = lock_store(options.path);
+  if (!locks) return tl::unexpected(locks.error());
   return guarded([&]() -> Result<std::unique_ptr<Store>> {
     auto writer =
         std::make_unique<Database>(options.path, OpenMode::read_write_create, options.busy_timeout_ms);
+    // Before the first table is made; a store that has some keeps what it has. Nothing is written yet.
+    writer->execute("PRAGMA auto_vacuum = INCREMENTAL");
     // The schema first, so that a file which is refused is left exactly as it was.
     if (auto ready = bring_to_schema(*writer, store_schema()); !ready) return tl::unexpected(ready.error());
     configure_writer(*writer);
-    return std::make_unique<SqliteStore>(options, std::move(locks), std::move(writer));
+    return std::make_unique<SqliteStore>(options, std::move(*locks), std::move(writer));
   });
 }
 

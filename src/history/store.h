@@ -83,6 +83,7 @@ struct StoreSize {
   std::int64_t journal_bytes = 0;    // committed, not yet in the database's pages
   std::int64_t telemetry_bytes = 0;  // encoded raw telemetry and covariates
   std::int64_t telemetry_chunks = 0;
+  std::int64_t missions = 0;
 };
 
 // What came of one command: a number that its description names, or why it was refused.

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/fault_boundary.h"
 #include "history/spool.h"
 
 namespace joulecast::history {
@@ -245,7 +246,13 @@ class Writer::Impl {
   }
 
   void loop() {
-    while (take_batch() && commit()) prune_when_due();
+    for (bool going = true; going;) {
+      survive("store writer", [&] {
+        // What an exception left in the batch goes first.
+        going = (!batch_.items.empty() || take_batch()) && commit();
+        if (going) prune_when_due();
+      });
+    }
     const std::lock_guard lock(mutex_);
     if (!ended_) end();
   }
@@ -265,6 +272,7 @@ class Writer::Impl {
     });
     const std::size_t count = std::min(queue_.size(), std::max<std::size_t>(options_.batch_commands, 1));
     const auto end = std::next(queue_.begin(), static_cast<std::ptrdiff_t>(count));
+    batch_.commands.reserve(count);
     batch_.items.splice(batch_.items.end(), queue_, queue_.begin(), end);
     for (Item& item : batch_.items) {
       forget(item);
@@ -293,6 +301,8 @@ class Writer::Impl {
         outcomes = tl::unexpected(sound.error());
       if (outcomes) return settle(*outcomes, idle, Seconds(Clock::now() - begin).count());
       if (!wait_before_retry(outcomes.error(), pause)) return false;
+      // What the retention lets go makes room where the disk is full.
+      prune_when_due();
       pause = std::min(2 * pause, options_.retry_last);
     }
   }
@@ -396,20 +406,25 @@ class Writer::Impl {
     const auto now = Clock::now();
     if (steps_.take_step_us() != 0) distrust_until_ = now + options_.clock_distrust;
     const Retention& keep = options_.retention;
-    if (!keep.telemetry_max_age_us && !keep.telemetry_max_bytes) return;
+    if (!keep.telemetry_max_age_us && !keep.telemetry_max_bytes && !options_.missions_max_age_us) return;
     if (now - last_prune_ < options_.prune_interval) return;
     bool more_is_due = false;
-    if (keep.telemetry_max_age_us && now >= distrust_until_) {
-      const auto size = store_.size();
-      const double share =
-          size ? options_.age_share_per_hour * static_cast<double>(size->telemetry_chunks) : 0;
+    if ((keep.telemetry_max_age_us || options_.missions_max_age_us) && now >= distrust_until_) {
+      const StoreSize size = store_.size().value_or(StoreSize{});
       const double hours = Seconds(now - last_prune_).count() / seconds_per_hour;
-      // What an hour allows, saved up; of a small store one chunk at least.
-      age_allowance_ = std::min(age_allowance_ + share * hours, std::max(share, 1.0));
-      if (age_allowance_ >= 1) {
-        const auto most = static_cast<std::int64_t>(age_allowance_);
-        age_allowance_ -= static_cast<double>(prune({{keep.telemetry_max_age_us, {}}, most}));
-      }
+      // What an hour allows, saved up; of a small store one at least.
+      const auto allow = [&](double& allowance, std::int64_t there) {
+        const double share = options_.age_share_per_hour * static_cast<double>(there);
+        allowance = std::min(allowance + share * hours, std::max(share, 1.0));
+        return static_cast<std::int64_t>(allowance);
+      };
+      if (keep.telemetry_max_age_us)
+        if (const auto most = allow(age_allowance_, size.telemetry_chunks); most >= 1)
+          age_allowance_ -= static_cast<double>(prune(Prune{{keep.telemetry_max_age_us, {}}, most}));
+      if (options_.missions_max_age_us)
+        if (const auto most = allow(mission_allowance_, size.missions); most >= 1)
+          mission_allowance_ -=
+              static_cast<double>(prune(PruneMissions{*options_.missions_max_age_us, most}));
     }
     if (keep.telemetry_max_bytes) {
       const Prune by_size{{{}, keep.telemetry_max_bytes}};
@@ -419,9 +434,8 @@ class Writer::Impl {
     if (!more_is_due) last_prune_ = now;
   }
 
-  // The number of chunks dropped.
-  std::int64_t prune(const Prune& measure) {
-    const Command command = measure;
+  // The number of chunks or missions dropped.
+  std::int64_t prune(const Command& command) {
     const auto outcomes = store_.apply({&command, 1});
     const Outcome outcome = outcomes ? outcomes->front() : Outcome(tl::unexpected(outcomes.error()));
     if (!outcome) {
@@ -429,7 +443,8 @@ class Writer::Impl {
       return 0;
     }
     const std::lock_guard lock(mutex_);
-    status_.pruned_chunks += static_cast<std::uint64_t>(*outcome);
+    (std::holds_alternative<Prune>(command) ? status_.pruned_chunks : status_.pruned_missions) +=
+        static_cast<std::uint64_t>(*outcome);
     return *outcome;
   }
 
@@ -489,7 +504,7 @@ class Writer::Impl {
   WriterStatus status_;
   // The writing thread's own.
   Clock::time_point last_prune_, distrust_until_;
-  double age_allowance_ = 0;  // chunks that may be dropped by age
+  double age_allowance_ = 0, mission_allowance_ = 0;  // chunks and missions that may be dropped by age
   ClockSteps steps_;
 
   std::thread thread_;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "base/error.h"
@@ -16,13 +17,15 @@ struct WriterOptions {
   std::size_t queue_bytes = std::size_t{64} << 20;  // bound on the commands that wait, by weight_bytes()
   std::string spool_path;             // where stop() writes what was not committed; empty: it is lost
   std::size_t batch_commands = 1000;  // a transaction is committed at this many commands
-  std::chrono::milliseconds batch_delay{200};  // or this long after its first command came
-  std::chrono::milliseconds retry_first{50};   // pause after a failed commit, doubled each time
-  std::chrono::milliseconds retry_last{5000};  // up to this
-  Retention retention;                         // enforced every prune_interval
+  std::chrono::milliseconds batch_delay{200};       // or this long after its first command came
+  std::chrono::milliseconds retry_first{50};        // pause after a failed commit, doubled each time
+  std::chrono::milliseconds retry_last{5000};       // up to this
+  Retention retention;                              // enforced every prune_interval
+  std::optional<std::int64_t> missions_max_age_us;  // as PruneMissions; absent: missions are kept for ever
   std::chrono::milliseconds prune_interval{60'000};
   // Retention by age goes by the wall clock, so it rests for this long after a step of that clock, and never
-  // drops more than this share of the telemetry in an hour: a wrong clock must not cost the recordings.
+  // drops more than this share of the telemetry, or of the missions, in an hour: a wrong clock must not cost
+  // the recordings.
   std::chrono::milliseconds clock_distrust{3'600'000};
   double age_share_per_hour = 0.05;
   ClockSteps::Clock wall_clock = host_utime_us, steady_clock = host_boot_us;
@@ -44,7 +47,7 @@ struct WriterStatus {
   std::uint64_t refused = 0;       // commands that the store refused (bad content, not trouble with the disk)
   std::uint64_t commits = 0;       // transactions committed
   std::uint64_t failed_commits = 0;  // attempts that failed and were tried again
-  std::uint64_t pruned_chunks = 0;
+  std::uint64_t pruned_chunks = 0, pruned_missions = 0;
   double last_commit_s = 0;  // duration of the last successful apply()
   double max_commit_s = 0;
   double total_commit_s = 0;  // over all `commits`

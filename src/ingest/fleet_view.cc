@@ -1,40 +1,31 @@
 #include "ingest/fleet_view.h"
 
-#include <mutex>
 #include <utility>
 
 namespace joulecast::ingest {
 
 void FleetView::publish(std::shared_ptr<const RobotSnapshot> snapshot) {
-  {
-    const std::shared_lock lock(mutex_);
-    if (const auto found = slots_.find(snapshot->robot_id); found != slots_.end()) {
-      found->second->latest.store(std::move(snapshot), std::memory_order_release);
-      return;
-    }
-  }
-  const std::unique_lock lock(mutex_);
-  auto& slot = slots_[snapshot->robot_id];
-  if (slot == nullptr) slot = std::make_unique<Slot>();
-  slot->latest.store(std::move(snapshot), std::memory_order_release);
+  const std::lock_guard lock(mutex_);
+  // The one before is freed after the lock is.
+  std::swap(latest_[snapshot->robot_id], snapshot);
 }
 
 void FleetView::remove(std::string_view robot_id) {
-  const std::unique_lock lock(mutex_);
-  if (const auto found = slots_.find(robot_id); found != slots_.end()) slots_.erase(found);
+  const std::lock_guard lock(mutex_);
+  if (const auto found = latest_.find(robot_id); found != latest_.end()) latest_.erase(found);
 }
 
 std::shared_ptr<const RobotSnapshot> FleetView::find(std::string_view robot_id) const {
-  const std::shared_lock lock(mutex_);
-  const auto found = slots_.find(robot_id);
-  return found == slots_.end() ? nullptr : found->second->latest.load(std::memory_order_acquire);
+  const std::lock_guard lock(mutex_);
+  const auto found = latest_.find(robot_id);
+  return found == latest_.end() ? nullptr : found->second;
 }
 
 std::vector<std::shared_ptr<const RobotSnapshot>> FleetView::all() const {
-  const std::shared_lock lock(mutex_);
+  const std::lock_guard lock(mutex_);
   std::vector<std::shared_ptr<const RobotSnapshot>> snapshots;
-  snapshots.reserve(slots_.size());
-  for (const auto& [id, slot] : slots_) snapshots.push_back(slot->latest.load(std::memory_order_acquire));
+  snapshots.reserve(latest_.size());
+  for (const auto& [id, snapshot] : latest_) snapshots.push_back(snapshot);
   return snapshots;
 }
 

@@ -1,10 +1,9 @@
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <shared_mutex>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -39,7 +38,8 @@ struct RobotSnapshot {
   std::map<std::string, std::string> fault_notes;  // reason -> what was wrong with the last one
 };
 
-// The latest snapshot of every robot. One thread publishes, any thread reads without waiting for it.
+// The latest snapshot of every robot. Any thread publishes and reads; nobody holds the lock for longer than a
+// pointer takes to copy, or one for each robot.
 class FleetView {
  public:
   void publish(std::shared_ptr<const RobotSnapshot> snapshot);
@@ -48,11 +48,8 @@ class FleetView {
   std::vector<std::shared_ptr<const RobotSnapshot>> all() const;
 
  private:
-  struct Slot {
-    std::atomic<std::shared_ptr<const RobotSnapshot>> latest;
-  };
-  mutable std::shared_mutex mutex_;  // of the map
-  std::map<std::string, std::unique_ptr<Slot>, std::less<>> slots_;
+  mutable std::mutex mutex_;
+  std::map<std::string, std::shared_ptr<const RobotSnapshot>, std::less<>> latest_;
 };
 
 }  // namespace joulecast::ingest

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/fault_boundary.h"
 #include "base/host_clock.h"
 #include "signals/energy_state.h"
 
@@ -37,9 +38,11 @@ class IngestService::Impl {
     if (!link) return tl::unexpected(std::move(link.error()));
     link_ = std::make_unique<telemetry::LcmLink>(std::move(*link));
     const auto handler = [this](const telemetry::Received& received) {
-      std::optional<InboundMessage> message = decode_message(received.channel, received.data, host_utime_us(),
-                                                             outputs_.counters, received.sender);
-      if (message) batch_.push_back(std::move(*message));
+      survive("receiving", [&] {
+        std::optional<InboundMessage> message = decode_message(
+            received.channel, received.data, host_utime_us(), outputs_.counters, received.sender);
+        if (message) batch_.push_back(std::move(*message));
+      });
     };
     if (Result<void> done = link_->listen(handler, outputs_.counters.datagrams, options_.listen); !done)
       return done;
@@ -100,8 +103,11 @@ class IngestService::Impl {
         const std::size_t room = options_.queue_messages - std::min(options_.queue_messages, queue_.size());
         const std::size_t taken = std::min(room, batch_.size());
         dropped = batch_.size() - taken;
-        queue_.insert(queue_.end(), std::make_move_iterator(batch_.begin()),
-                      std::make_move_iterator(batch_.begin() + static_cast<std::ptrdiff_t>(taken)));
+        const bool queued = survive("receiving", [&] {
+          queue_.insert(queue_.end(), std::make_move_iterator(batch_.begin()),
+                        std::make_move_iterator(batch_.begin() + static_cast<std::ptrdiff_t>(taken)));
+        });
+        if (!queued) dropped = batch_.size();
       }
       batch_.clear();
       if (dropped > 0) outputs_.counters.add(IngestFault::queue_full, dropped);
@@ -120,24 +126,25 @@ class IngestService::Impl {
         work.swap(queue_);
         last = draining_ && work.empty();
       }
-      for (const InboundMessage& message : work) pipeline_.handle(message);
+      for (const InboundMessage& message : work) survive("accounting", [&] { pipeline_.handle(message); });
       work.clear();
-      if (const std::int64_t step_us = clock_steps_.take_step_us(); step_us != 0) on_clock_step(step_us);
+      if (const std::int64_t step_us = clock_steps_.take_step_us(); step_us != 0)
+        survive("accounting", [&] { on_clock_step(step_us); });
       const auto now = Clock::now();
       if (now >= next_tick) {
-        pipeline_.tick(host_utime_us());
         next_tick = now + std::chrono::milliseconds(500);
+        survive("accounting", [&] { pipeline_.tick(host_utime_us()); });
       }
       if (now >= next_publish) {
-        pipeline_.publish();
         next_publish = now + options_.publish_period;
+        survive("accounting", [&] { pipeline_.publish(); });
       }
       if (now >= next_energy) {
-        publish_energy_states();
         next_energy = now + options_.energy_state_period;
+        survive("accounting", [&] { publish_energy_states(); });
       }
     }
-    pipeline_.suspend();
+    survive("accounting", [&] { pipeline_.suspend(); });
   }
 
   void on_clock_step(std::int64_t step_us) {

@@ -19,6 +19,12 @@ Result<void> ModelRegistry::put(robot::RobotModel robot, std::int64_t version) {
   return {};
 }
 
+void ModelRegistry::remove(std::string_view robot_id) {
+  const std::unique_lock lock(mutex_);
+  if (const auto found = models_.find(robot_id); found != models_.end()) models_.erase(found);
+  epoch_.fetch_add(1, std::memory_order_release);
+}
+
 std::shared_ptr<const ModelInForce> ModelRegistry::find(std::string_view robot_id) const {
   const std::shared_lock lock(mutex_);
   const auto found = models_.find(robot_id);

@@ -25,13 +25,16 @@ class ModelRegistry {
   // Puts a robot's model in force; an effect that the catalogue rejects is an error and changes nothing.
   Result<void> put(robot::RobotModel robot, std::int64_t version);
 
+  // Takes it out of force.
+  void remove(std::string_view robot_id);
+
   // Null when the robot's model is not known.
   std::shared_ptr<const ModelInForce> find(std::string_view robot_id) const;
 
   // All, by robot id.
   std::vector<std::shared_ptr<const ModelInForce>> all() const;
 
-  // Grows with every put, so that users know when to look again.
+  // Grows with every change, so that users know when to look again.
   std::uint64_t epoch() const { return epoch_.load(std::memory_order_acquire); }
 
  private:

@@ -25,7 +25,9 @@ Pipeline::Robot& Pipeline::add(const std::string& robot_id) {
   strangers_.erase(robot_id);
   auto made = std::unique_ptr<Robot>(
       new Robot{{robot_id, settings_, outputs_}, {settings_.sender_takeover_us, waiting_room_}});
-  made->session.set_model(models_.find(robot_id));
+  const auto model = models_.find(robot_id);
+  made->had_model = model != nullptr;
+  made->session.set_model(model);
   return *robots_.emplace(robot_id, std::move(made)).first->second;
 }
 
@@ -50,7 +52,20 @@ void Pipeline::refresh_models() {
   const std::uint64_t now = models_.epoch();
   if (now == epoch_) return;
   epoch_ = now;
-  for (auto& [id, robot] : robots_) robot->session.set_model(models_.find(id));
+  for (auto each = robots_.begin(); each != robots_.end();) {
+    const auto model = models_.find(each->first);
+    if (model != nullptr || !each->second->had_model) {
+      each->second->had_model = model != nullptr;
+      (each++)->second->session.set_model(model);
+      continue;
+    }
+    // A robot that was removed: its mission ends, and it is a stranger from now on.
+    for (const InboundMessage& held : each->second->gate.release(std::numeric_limits<std::int64_t>::max()))
+      deliver(each->second->session, held);
+    each->second->session.on_tick(std::numeric_limits<std::int64_t>::max());
+    outputs_.fleet.remove(each->first);
+    each = robots_.erase(each);
+  }
   for (auto stranger = strangers_.begin(); stranger != strangers_.end();) {
     const std::string id = (stranger++)->first;
     if (models_.find(id) != nullptr) add(id);

@@ -39,6 +39,7 @@ class Pipeline {
   struct Robot {
     RobotSession session;
     SenderGate gate;
+    bool had_model = false;
   };
   struct Stranger {
     RobotSnapshot snapshot;

@@ -1,0 +1,324 @@
+#include "history/store_care.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <utility>
+
+#include "base/host_clock.h"
+#include "base/output_file.h"
+#include "base/utc_time.h"
+#include "history/covariate_chunk.h"
+#include "history/file_lock.h"
+#include "history/schema.h"
+#include "history/sqlite.h"
+#include "history/telemetry_chunk.h"
+#include "signals/ledger.h"
+
+namespace joulecast::history {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t busy_timeout_ms = 10'000;
+constexpr std::size_t most_faults = 100;
+
+template <class Work>
+auto guarded(const std::string& path, Work work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const SqliteError& error) {
+    return fail(error.fault(), path, error.what());
+  } catch (const std::exception& error) {
+    return fail(Fault::unavailable, path, error.what());
+  }
+}
+
+Result<std::unique_ptr<Database>> open_existing(const std::string& path) {
+  if (!fs::is_regular_file(path)) return fail(Fault::not_found, path, "there is no such file");
+  return guarded(path, [&]() -> Result<std::unique_ptr<Database>> {
+    auto database = std::make_unique<Database>(path, OpenMode::read_only, busy_timeout_ms);
+    if (database->integer("PRAGMA application_id") != store_application_id)
+      return fail(Fault::corrupt, path, "is not a joulecast store");
+    const std::int64_t version = database->integer("PRAGMA user_version");
+    if (version != store_schema().version)
+      return fail(Fault::conflict, path,
+                  "has schema version " + std::to_string(version) + "; this program's is " +
+                      std::to_string(store_schema().version) +
+                      (version < store_schema().version ? ", to which a start of the daemon brings it" : ""));
+    return database;
+  });
+}
+
+// SQL for the signed sum of a mission's ledger, and for the sum of its terms' sizes.
+std::pair<std::string, std::string> ledger_sums() {
+  std::string total = "0", size = "1";
+  for (std::size_t k = 0; k < signals::term_count; ++k) {
+    const std::string column = "coalesce(ledger_" + std::string(signals::term_names[k]) + "_j, 0)";
+    total += (signals::sign(static_cast<signals::Term>(k)) < 0 ? " - " : " + ") + column;
+    size += " + abs(" + column + ")";
+  }
+  return {total, size};
+}
+
+class Inspection {
+ public:
+  explicit Inspection(Database& database) : database_(database) {}
+
+  StoreCheck run() {
+    each("PRAGMA integrity_check(100)", [](Rows& row) {
+      std::string text = row.text();
+      return text == "ok" ? std::string() : text;
+    });
+    each("SELECT \"table\", coalesce(rowid, 0), parent FROM pragma_foreign_key_check", [](Rows& row) {
+      const std::string table = row.text();
+      const std::int64_t id = row.integer();
+      return table + ", row " + std::to_string(id) + ": refers to nothing in " + row.text();
+    });
+    ledgers();
+    chunks("telemetry_chunk", "samples", [](std::span<const std::byte> body) { return decode_chunk(body); });
+    chunks("covariate_chunk", "changes",
+           [](std::span<const std::byte> body) { return decode_covariates(body); });
+    return std::move(check_);
+  }
+
+ private:
+  void add(std::string fault) {
+    if (!fault.empty() && check_.faults.size() < most_faults) check_.faults.push_back(std::move(fault));
+  }
+
+  // A fault, or none, of each row.
+  void each(const std::string& sql, const std::function<std::string(Rows&)>& look) {
+    try {
+      Rows rows(database_.statement(sql));
+      while (rows.next()) add(look(rows));
+    } catch (const SqliteError& error) {
+      add(error.what());
+    }
+  }
+
+  // Ledgers are sums of many rounded steps, so they close to a part of what they hold.
+  void ledgers() {
+    const auto [total, size] = ledger_sums();
+    each("SELECT mission_key, battery_j - (" + total + "), battery_j IS NOT NULL AND abs(battery_j - (" +
+             total + ")) > 1e-6 * (" + size + ") FROM mission",
+         [this](Rows& row) {
+           ++check_.missions;
+           const std::int64_t key = row.integer();
+           const double rest = row.real();
+           return row.boolean() ? "mission " + std::to_string(key) + ": its ledger is " +
+                                      std::to_string(rest) + " J short"
+                                : std::string();
+         });
+  }
+
+  template <class Decode>
+  void chunks(const std::string& table, const std::string& count, const Decode& decode) {
+    each("SELECT chunk_key, mission_key, " + count + ", body FROM " + table, [&](Rows& row) {
+      ++check_.chunks;
+      const std::int64_t key = row.integer(), mission = row.integer(), declared = row.integer();
+      const auto content = decode(row.blob());
+      const std::string name = table + " " + std::to_string(key) + " of mission " + std::to_string(mission);
+      if (!content) return name + ": " + content.error().message;
+      return std::cmp_equal(content->size(), declared) ? std::string()
+                                                       : name + ": holds another number of " + count;
+    });
+  }
+
+  Database& database_;
+  StoreCheck check_;
+};
+
+// A new file that takes its name when it is whole.
+class NewFile {
+ public:
+  explicit NewFile(std::string path) : path_(std::move(path)), part_(path_ + ".part") { remove(); }
+  ~NewFile() { remove(); }
+  NewFile(const NewFile&) = delete;
+  NewFile& operator=(const NewFile&) = delete;
+  const std::string& part() const { return part_; }
+
+  Result<void> commit() {
+    const int file = open(part_.c_str(), O_RDONLY | O_CLOEXEC);
+    const bool synced = file >= 0 && fsync(file) == 0;
+    if (file >= 0) close(file);
+    if (!synced || std::rename(part_.c_str(), path_.c_str()) != 0)
+      return fail(Fault::unavailable, path_, std::string("cannot be written: ") + std::strerror(errno));
+    return {};
+  }
+
+ private:
+  void remove() {
+    std::error_code ignored;
+    for (const char* suffix : {"", "-wal", "-shm", "-journal"}) fs::remove(part_ + suffix, ignored);
+  }
+  std::string path_, part_;
+};
+
+std::string quoted(const std::string& text) {
+  std::string sql = "'";
+  for (const char c : text) sql += c == '\'' ? std::string("''") : std::string(1, c);
+  return sql + "'";
+}
+
+// A compact copy, which gives free pages back from now on.
+Result<void> copy_into(Database& from, const std::string& file) {
+  return guarded(file, [&]() -> Result<void> {
+    from.execute("PRAGMA auto_vacuum = INCREMENTAL");
+    from.execute("VACUUM INTO " + quoted(file));
+    return {};
+  });
+}
+
+// The tables in an order in which what refers comes after what it refers to, as the schema creates them.
+std::vector<std::pair<std::string, std::string>> tables_and_keys(Database& database) {
+  std::vector<std::pair<std::string, std::string>> tables;
+  Rows rows(database.statement(
+      "SELECT name, sql LIKE '%WITHOUT ROWID%' FROM main.sqlite_schema WHERE type = 'table' "
+      "AND name NOT LIKE 'sqlite_%' ORDER BY rowid"));
+  while (rows.next()) {
+    std::string name = rows.text();
+    tables.emplace_back(std::move(name), rows.boolean() ? "mission_key" : "rowid");
+  }
+  return tables;
+}
+
+// Copies the rows of keys from..to; where they cannot be read, those of either half, down to single keys.
+void salvage_range(Database& database, const std::string& table, const std::string& key, std::int64_t from,
+                   std::int64_t to, Salvage& salvage) {
+  try {
+    salvage.rows +=
+        Rows(database.statement("INSERT OR IGNORE INTO main." + table + " SELECT * FROM damaged." + table +
+                                " WHERE " + key + " BETWEEN ? AND ?"))
+            .bind(from)
+            .bind(to)
+            .run();
+  } catch (const SqliteError& error) {
+    if (error.fault() != Fault::corrupt) throw;
+    if (from == to) {
+      if (salvage.losses.size() < most_faults)
+        salvage.losses.push_back(table + ", " + key + " " + std::to_string(from) + ": " + error.what());
+      return;
+    }
+    const std::int64_t middle = from + (to - from) / 2;
+    salvage_range(database, table, key, from, middle, salvage);
+    salvage_range(database, table, key, middle + 1, to, salvage);
+  }
+}
+
+std::int64_t greatest(Database& database, const std::string& table, const std::string& key) {
+  try {
+    return database.integer("SELECT coalesce(max(" + key + "), 0) FROM damaged." + table);
+  } catch (const SqliteError&) {
+    return std::int64_t{1} << 24;  // the path to the last row is damaged
+  }
+}
+
+void drop_loose_ends(Database& database) {
+  for (const char* table : {"model", "mission", "energy_state", "learned", "diagnosis", "proposal"})
+    database.execute(
+        "INSERT OR IGNORE INTO robot (robot_id, created_utime_us) SELECT DISTINCT robot_id, 0 FROM " +
+        std::string(table));
+  const std::string trigger =
+      database.text("SELECT sql FROM sqlite_schema WHERE name = 'model_is_immutable'");
+  database.execute("DROP TRIGGER model_is_immutable");
+  const auto clear = [&](const std::string& table, const std::string& column, const std::string& instead) {
+    database.execute("UPDATE " + table + " SET " + column + " = " + instead + " WHERE " + column +
+                     " IS NOT NULL AND NOT EXISTS (SELECT 1 FROM model AS m WHERE m.robot_id = " + table +
+                     ".robot_id AND m.version = " + table + "." + column + ")");
+  };
+  clear("robot", "active_version", "(SELECT max(version) FROM model AS m WHERE m.robot_id = robot.robot_id)");
+  clear("model", "parent_version", "NULL");
+  clear("mission", "model_version", "NULL");
+  clear("diagnosis", "model_version", "NULL");
+  clear("proposal", "base_version", "NULL");
+  clear("proposal", "adopted_version", "NULL");
+  database.execute(trigger);
+  for (const char* table : {"trace", "telemetry_chunk", "covariate_chunk"})
+    database.execute("DELETE FROM " + std::string(table) +
+                     " WHERE mission_key NOT IN (SELECT mission_key FROM mission)");
+  database.execute(
+      "DELETE FROM diagnosis_report WHERE diagnosis_id NOT IN (SELECT diagnosis_id FROM diagnosis)");
+}
+
+}  // namespace
+
+Result<StoreCheck> check_store(const std::string& path) {
+  auto database = open_existing(path);
+  if (!database) return tl::unexpected(database.error());
+  return guarded(path, [&]() -> Result<StoreCheck> { return Inspection(**database).run(); });
+}
+
+Result<StoreCheck> back_up_store(const std::string& path, const std::string& copy) {
+  if (auto may = may_write(copy, copy, Existing::refuse); !may)
+    return fail(Fault::conflict, copy, "is there already");
+  auto database = open_existing(path);
+  if (!database) return tl::unexpected(database.error());
+  NewFile file(copy);
+  if (auto copied = copy_into(**database, file.part()); !copied) return tl::unexpected(copied.error());
+  auto check = check_store(file.part());
+  if (!check) return check;
+  if (!check->faults.empty()) return fail(Fault::corrupt, path, "is damaged: " + check->faults.front());
+  if (auto done = file.commit(); !done) return tl::unexpected(done.error());
+  return check;
+}
+
+Result<std::string> restore_store(const std::string& from, const std::string& path) {
+  std::error_code unknown;
+  if (fs::equivalent(from, path, unknown)) return invalid(from, "is the store itself");
+  const bool replaces = fs::exists(path);
+  auto locks = lock_store(path);
+  if (!locks) return tl::unexpected(locks.error());
+  if (!replaces) fs::remove(path, unknown);  // the lock has made an empty one
+  NewFile file(path);
+  {
+    auto check = check_store(from);
+    if (!check) return tl::unexpected(check.error());
+    if (!check->faults.empty()) return fail(Fault::corrupt, from, "is damaged: " + check->faults.front());
+    auto source = open_existing(from);
+    if (!source) return tl::unexpected(source.error());
+    if (auto copied = copy_into(**source, file.part()); !copied) return tl::unexpected(copied.error());
+  }
+  std::string before;
+  if (replaces) {
+    before = path + ".before-" + format_utc(host_utime_us(), "%Y%m%dT%H%M%S");
+    for (const char* suffix : {"", "-wal", "-shm", ".spool"}) {
+      fs::rename(path + suffix, before + suffix, unknown);
+      if (unknown && fs::exists(path + suffix))
+        return fail(Fault::unavailable, path + suffix, "cannot be put aside: " + unknown.message());
+    }
+  }
+  if (auto done = file.commit(); !done) return tl::unexpected(done.error());
+  return before;
+}
+
+Result<Salvage> salvage_store(const std::string& damaged, const std::string& into) {
+  if (auto may = may_write(into, into, Existing::refuse); !may)
+    return fail(Fault::conflict, into, "is there already");
+  if (auto readable = open_existing(damaged); !readable) return tl::unexpected(readable.error());
+  NewFile file(into);
+  Salvage salvage;
+  auto done = guarded(damaged, [&]() -> Result<void> {
+    Database database(file.part(), OpenMode::read_write_create, busy_timeout_ms);
+    database.execute("PRAGMA auto_vacuum = INCREMENTAL");
+    if (auto made = bring_to_schema(database, store_schema()); !made) return made;
+    database.execute("PRAGMA synchronous = OFF");
+    database.execute("ATTACH " + quoted(damaged) + " AS damaged");
+    for (const auto& [table, key] : tables_and_keys(database))
+      salvage_range(database, table, key, 0, greatest(database, table, key), salvage);
+    drop_loose_ends(database);
+    return {};
+  });
+  if (!done) return tl::unexpected(done.error());
+  if (auto named = file.commit(); !named) return tl::unexpected(named.error());
+  return salvage;
+}
+
+}  // namespace joulecast::history

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+
+// The care of a store's file: is it sound, a copy of it, a copy put in its place, and what can still be read
+// of a damaged one. None of it opens the store as Store does, and nothing is migrated.
+namespace joulecast::history {
+
+struct StoreCheck {
+  std::int64_t missions = 0;
+  std::int64_t chunks = 0;          // of telemetry and covariates, each decoded and its checksum tried
+  std::vector<std::string> faults;  // the first of each kind of check, a hundred at most; empty: sound
+};
+
+// Looks at pages and indexes, references, the sum of every ledger, and every chunk of recordings. May run
+// beside a daemon. Fault::not_found when there is no such file, ::corrupt when it is no store at all,
+// ::conflict when it is of another version.
+Result<StoreCheck> check_store(const std::string& path);
+
+// Copies the store into a new file, compact, while others use it, and checks the copy. Fault::conflict when
+// there is a file already; ::corrupt when the store is damaged: then there is no copy.
+Result<StoreCheck> back_up_store(const std::string& path, const std::string& copy);
+
+// Puts a copy of the store `from` in the place of the one at `path`, which is kept beside it under the name
+// answered, with its journal and spool (empty: there was none). Fault::conflict while a daemon holds the
+// store;
+// ::corrupt when `from` is not sound: then nothing is changed.
+Result<std::string> restore_store(const std::string& from, const std::string& path);
+
+struct Salvage {
+  std::int64_t rows = 0;            // kept
+  std::vector<std::string> losses;  // what could not be read, one range of a table each
+};
+
+// Reads what can be read of a damaged store, table by table, into a new one, and drops what then refers to
+// nothing. Fault::conflict when there is a file already.
+Result<Salvage> salvage_store(const std::string& damaged, const std::string& into);
+
+}  // namespace joulecast::history
