@@ -76,12 +76,15 @@ Result<std::vector<Imported>> import_all(const Options& options) {
 }
 
 Result<void> write_log(const Options& options, const std::vector<Imported>& all) {
-  auto log = telemetry::EventLogWriter::create(options.out, existing(options.force));
+  auto file = OutputFile::create(options.out, existing(options.force));
+  if (!file) return tl::unexpected(file.error());
+  auto log = telemetry::EventLogWriter::create(file->written_to());
   if (!log) return tl::unexpected(log.error());
   for (const Imported& one : all) {
     if (auto written = telemetry::write_recording(*log, one.import.recording); !written) return written;
   }
-  return log->close();
+  if (auto closed = log->close(); !closed) return closed;
+  return file->commit();
 }
 
 nlohmann::json to_json(const Imported& one) {

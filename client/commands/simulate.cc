@@ -200,6 +200,7 @@ Encoded encoded(const std::string& robot_id, const signals::CovariateMessage& co
 struct Outlets {
   std::optional<telemetry::LcmLink> link;
   std::optional<telemetry::EventLogWriter> log;
+  std::optional<OutputFile> log_file;
 
   Result<void> send(const std::string& robot_id, const vr::Emission& emission) {
     const auto bytes =
@@ -269,9 +270,12 @@ Result<void> check_options(const Options& options, bool over_lcm) {
 Result<Outlets> open_outlets(const Options& options, bool over_lcm) {
   Outlets outlets;
   if (!options.log.empty()) {
-    auto log = telemetry::EventLogWriter::create(options.log, existing(options.force));
+    auto file = OutputFile::create(options.log, existing(options.force));
+    if (!file) return tl::unexpected(file.error());
+    auto log = telemetry::EventLogWriter::create(file->written_to());
     if (!log) return tl::unexpected(log.error());
     outlets.log = std::move(*log);
+    outlets.log_file.emplace(std::move(*file));
   }
   if (over_lcm) {
     auto link = telemetry::LcmLink::open(options.lcm_url);
@@ -341,6 +345,7 @@ Result<Sent> publish(vr::Fleet& fleet, std::int64_t start_us, const Options& opt
   }
   if (outlets.log) {
     if (auto closed = outlets.log->close(); !closed) return tl::unexpected(closed.error());
+    if (auto placed = outlets.log_file->commit(); !placed) return tl::unexpected(placed.error());
   }
   return sent;
 }

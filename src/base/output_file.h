@@ -26,6 +26,9 @@ class OutputFile {
   OutputFile& operator=(OutputFile&&) = delete;
   ~OutputFile();  // what was not put in place is removed
 
+  // Where the bytes go until commit(), for those who write them by other means than write().
+  const std::string& written_to() const { return part_.empty() ? path_ : part_; }
+
   Result<void> write(std::string_view bytes);
   // Puts the file in its place. Fault::unavailable when not every byte reached the disk, ::conflict when a
   // file came there meanwhile and is not to be replaced; then there is no new file.

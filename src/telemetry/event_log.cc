@@ -212,10 +212,10 @@ Result<bool> read_events(const std::string& path, const std::function<Result<boo
   }
 }
 
-Result<EventLogWriter> EventLogWriter::create(const std::string& path, Existing existing) {
-  auto file = OutputFile::create(path, existing);
-  if (!file) return tl::unexpected(std::move(file.error()));
-  return EventLogWriter(std::move(*file));
+Result<EventLogWriter> EventLogWriter::create(const std::string& path) {
+  std::FILE* file = std::fopen(path.c_str(), "wbe");
+  if (file == nullptr) return fail(Fault::unavailable, path, std::strerror(errno));
+  return EventLogWriter(file, path);
 }
 
 Result<void> EventLogWriter::write(std::int64_t timestamp_us, std::string_view channel,
@@ -227,23 +227,26 @@ Result<void> EventLogWriter::write(std::int64_t timestamp_us, std::string_view c
   if (data.size() > limits.max_data_length) {
     return invalid("data", "must have at most " + std::to_string(limits.max_data_length) + " bytes");
   }
+  if (!file_) return fail(Fault::unavailable, path_, "the log is closed");
   std::array<std::uint8_t, log_header_size> header{};
   std::uint8_t* at = put(header.data(), log_sync_word);
   at = put(at, static_cast<std::uint64_t>(count_));
   at = put(at, static_cast<std::uint64_t>(timestamp_us));
   at = put(at, static_cast<std::uint32_t>(channel.size()));
   put(at, static_cast<std::uint32_t>(data.size()));
-  const auto text = [](std::span<const std::uint8_t> bytes) {
-    return std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  };
-  for (const std::string_view part : {text(header), channel, text(data)})
-    if (auto written = file_.write(part); !written) return written;
+  if (std::fwrite(header.data(), 1, header.size(), file_.get()) != header.size() ||
+      std::fwrite(channel.data(), 1, channel.size(), file_.get()) != channel.size() ||
+      (!data.empty() && std::fwrite(data.data(), 1, data.size(), file_.get()) != data.size())) {
+    return fail(Fault::unavailable, path_, std::strerror(errno));
+  }
   ++count_;
   return {};
 }
 
 Result<void> EventLogWriter::close() {
-  return file_.commit();
+  if (!file_) return {};
+  if (std::fclose(file_.release()) != 0) return fail(Fault::unavailable, path_, std::strerror(errno));
+  return {};
 }
 
 }  // namespace joulecast::telemetry

@@ -2,15 +2,15 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "base/error.h"
-#include "base/output_file.h"
 
 // The event log of lcm-logger: a run of events, each big-endian
 //   u32 sync 0xEDA1DA01 | i64 number | i64 timestamp [us] | i32 channel length | i32 data length | channel |
@@ -101,19 +101,23 @@ Result<bool> read_events(const std::string& path, const std::function<Result<boo
 // Writes what lcm-logger writes; numbers count from 0.
 class EventLogWriter {
  public:
-  // The log appears under its name when it is closed. Errors as OutputFile::create.
-  static Result<EventLogWriter> create(const std::string& path, Existing existing = Existing::replace);
+  static Result<EventLogWriter> create(const std::string& path);
 
   Result<void> write(std::int64_t timestamp_us, std::string_view channel, std::span<const std::uint8_t> data);
-  // Puts the log in its place, and says whether every byte reached the disk. Without it there is no log.
+  // Flush and close, and say whether every byte reached the system. The destructor closes without saying.
   Result<void> close();
 
   [[nodiscard]] std::int64_t count() const noexcept { return count_; }
 
  private:
-  explicit EventLogWriter(OutputFile file) : file_(std::move(file)) {}
+  struct FileCloser {
+    void operator()(std::FILE* file) const noexcept { std::fclose(file); }
+  };
 
-  OutputFile file_;
+  EventLogWriter(std::FILE* file, std::string path) : file_(file), path_(std::move(path)) {}
+
+  std::unique_ptr<std::FILE, FileCloser> file_;
+  std::string path_;
   std::int64_t count_ = 0;
 };
 

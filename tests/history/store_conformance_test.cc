@@ -909,6 +909,61 @@ TEST_P(StoreConformance, ReadersSeeWholeTransactionsWhileOneWrites) {
   EXPECT_GE(reads, 6);
 }
 
+TEST_P(StoreConformance, ARobotIsRemovedAndItsHistoryKept) {
+  EXPECT_EQ(apply(RemoveRobot{"amr-1"}).error().fault, Fault::not_found);
+  need(apply(AddModel{"amr-1", 5, ModelOrigin::http, "", R"({"a": 1})", {}}));
+  const Mission ended = add_missions("amr-1", 1).front();
+  const Mission open = start_mission(*store_, "amr-1", "open", 9'000'000'000);
+  EXPECT_EQ(apply(RemoveRobot{"amr-1"}), 0);
+  EXPECT_EQ(need(store_->robots()).front().active_version, std::nullopt);
+  EXPECT_EQ(need(store_->mission(ended.key)).state, MissionState::finished);
+  EXPECT_EQ(need(store_->mission(open.key)).state, MissionState::interrupted);
+  EXPECT_TRUE(need(store_->recover()).empty());
+  // It comes back with the next version.
+  EXPECT_EQ(apply(AddModel{"amr-1", 6, ModelOrigin::http, "", R"({"a": 1})", {}}), 2);
+  EXPECT_EQ(need(store_->model_versions("amr-1")).size(), 2u);
+}
+
+TEST_P(StoreConformance, APurgedRobotLeavesItsEventsAlone) {
+  for (const char* id : {"amr-1", "amr-2"}) {
+    need(apply(AddModel{id, 5, ModelOrigin::http, "", R"({"a": 1})", {}}));
+    need(apply(AddModel{id, 6, ModelOrigin::http, "", R"({"a": 2})", {}}));
+    Mission m = start_mission(*store_, id, "m", 1'000'000);
+    m.model_version = 2;
+    need(apply(CheckpointMission{m, {}, some_samples(0, 0, 10), {}}));
+    need(apply(PutLearned{{id, "topic", 1, "{}"}}));
+    DiagnosisRecord diagnosis;
+    diagnosis.robot_id = id;
+    diagnosis.request_json = "{}";
+    const std::int64_t number = need(apply(AddDiagnosis{diagnosis}));
+    diagnosis.id = number;
+    need(apply(UpdateDiagnosis{diagnosis, "<html>"}));
+    need(apply(AppendEvent{{0, 7, id, "kind", "{}"}}));
+  }
+  EXPECT_EQ(apply(RemoveRobot{"amr-1", true}), 1);
+  const auto robots = need(store_->robots());
+  ASSERT_EQ(robots.size(), 1u);
+  EXPECT_EQ(robots.front().robot_id, "amr-2");
+  EXPECT_EQ(store_->model("amr-1").error().fault, Fault::not_found);
+  EXPECT_EQ(need(store_->totals({})).missions, 1);
+  EXPECT_EQ(need(store_->diagnoses(std::nullopt, whole_future, 10)).size(), 1u);
+  EXPECT_EQ(need(store_->learned("amr-1", "topic")), std::nullopt);
+  EXPECT_EQ(need(store_->events(0, 10, "amr-1")).size(), 1u);
+  EXPECT_EQ(need(store_->size()).missions, 1);
+  EXPECT_EQ(apply(AddModel{"amr-1", 8, ModelOrigin::http, "", R"({"a": 3})", {}}), 1);
+}
+
+TEST_P(StoreConformance, OldMissionsAreDroppedOldestFirst) {
+  const std::vector<Mission> missions = add_missions("amr-1", 5);  // they end when they start
+  const Mission open = start_mission(*store_, "amr-1", "open", 1'000'000);
+  now_utime_us_ = missions[3].end_utime_us + 10;
+  EXPECT_EQ(apply(PruneMissions{9, 0}).error().fault, Fault::invalid);
+  EXPECT_EQ(apply(PruneMissions{9, 3}), 3);
+  EXPECT_EQ(apply(PruneMissions{9, 3}), 1);
+  EXPECT_EQ(apply(PruneMissions{9, 3}), 0);
+  EXPECT_EQ(walk({}, 10), (std::vector<MissionKey>{missions[4].key, open.key}));
+}
+
 INSTANTIATE_TEST_SUITE_P(Stores, StoreConformance, testing::Values(sqlite),
                          [](const auto& kind) { return kind.param.name; });
 

@@ -1,0 +1,319 @@
+#!/usr/bin/env python3
+"""A daemon with honest robots, hostile ones and clients that write, under random faults from a seeded list, and a checker of
+what came of it: every write that was acknowledged is stored and in force, every write that was refused was not done, every
+accepted sample is in exactly one mission, every ledger closes, the store is sound. By hand: --hours N --seed S."""
+import argparse
+import collections
+import json
+import os
+import random
+import shutil
+import socket
+import sqlite3
+import struct
+import subprocess
+import threading
+import time
+import urllib.error
+import urllib.request
+
+import harness
+from harness import GROUP, Programs, check, need_multicast
+
+ROBOTS, RATE_HZ = 4, 20
+LOST_S = 1.3  # of each robot's samples, by a kill; or between the copy of a store and its coming into place
+READY_S = 30
+TERMS = ("accessories driver copper brush friction_internal friction_rolling friction_scrub friction_zone friction_slip drag "
+         "kinetic potential braking recovered sensor unexplained").split()
+
+
+def options_of():
+    parser = argparse.ArgumentParser()
+    for name in ("daemon", "client", "source", "shared"):
+        parser.add_argument("--" + name, required=name != "shared")
+    parser.add_argument("--hours", type=float, default=120 / 3600)
+    parser.add_argument("--seed", type=int, default=1)
+    return parser.parse_args()
+
+
+class Writers(threading.Thread):
+    """Gives robots new models one after the other and keeps what was answered."""
+
+    def __init__(self, programs, model):
+        super().__init__(daemon=True)
+        self.programs, self.model = programs, model
+        self.pause = threading.Lock()  # held while a write is under way
+        self.written = {f"written-{k}": [] for k in range(3)}  # robot -> [(idle power, outcome)]
+        self.ended = False
+
+    def run(self):
+        power = 10
+        while not self.ended:
+            for robot, history in self.written.items():
+                with self.pause:
+                    power += 1
+                    history.append((power, self.put(robot, power)))
+                time.sleep(0.05)
+
+    def put(self, robot, power):
+        try:
+            self.programs.put(f"/v1/robots/{robot}", self.model | {"robot_id": robot, "idle_power_w": power})
+            return "done"
+        except urllib.error.HTTPError as error:
+            check(error.code == 503, f"PUT of {robot}: {error.code} {error.read()[:500]}")
+            return "not done"
+        except OSError:
+            return "unknown"  # no answer: either is right
+
+
+class Hostile(threading.Thread):
+    """Sends what no robot sends, and what a robot of its own sends with some of it wrong. Never as an honest robot."""
+
+    def __init__(self, programs, seed):
+        super().__init__(daemon=True)
+        self.random = random.Random(seed)
+        self.port, self.ended, self.sent = programs.lcm_port, False, 0
+        self.heard = collections.deque(maxlen=50)
+
+    def run(self):
+        listener = harness.Listener(self.port)
+        sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+        while not self.ended:
+            for _, channel, payload in listener.messages(0.05):
+                if channel.startswith("ROBOT_") and "hostile" not in channel:
+                    self.heard.append((channel.split(".")[0], payload))
+                    break
+            for _ in range(10):
+                sender.sendto(self.packet(), (GROUP, self.port))
+                self.sent += 1
+            time.sleep(0.02)
+
+    def packet(self):
+        r = self.random
+        kind = r.randrange(4)
+        if kind == 0 or not self.heard:
+            return r.randbytes(r.randrange(1, 200))
+        subject, payload = r.choice(self.heard)
+        if kind == 1:  # a fragment that lies about itself
+            return (b"LC03" + struct.pack(">IIIHH", r.getrandbits(32), r.choice([1000, 2**31, 2**32 - 1]),
+                                          r.choice([0, 999, 2**32 - 1]), r.randrange(3), r.randrange(3))
+                    + f"{subject}.hostile\0".encode() + payload[:r.randrange(1, 200)])
+        payload = bytearray(payload)
+        for _ in range(r.randrange(1, 20)):
+            payload[r.randrange(len(payload))] = r.randrange(256)
+        name = r.choice(["hostile", f"hostile-{r.randrange(5000)}", "../x", ""])
+        return b"LC02" + struct.pack(">I", r.getrandbits(32)) + f"{subject}.{name}\0".encode() + bytes(payload)
+
+
+class Nemesis:
+    def __init__(self, options):
+        self.options = options
+        self.random = random.Random(options.seed)
+        self.programs = Programs(options)
+        self.faults = collections.Counter()
+        self.accepted = 0  # samples, of daemons that ended
+        self.losses = 0    # times that up to LOST_S was lost
+        self.worst_ready_s = 0
+        self.volume = self.programs.path("volume")
+        os.mkdir(self.volume)
+        self.mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=96m", "tmpfs", self.volume],
+                                      capture_output=True).returncode == 0
+        self.programs.store = os.path.join(self.volume, "history.db")
+        self.kinds = ["kill", "kill", "pause", "lock", "term", "replaced", "deleted"] + ["full"] * self.mounted
+
+    def metric(self, name):
+        with urllib.request.urlopen(self.programs.url + "/metrics", timeout=10) as reply:
+            return next(float(line.split()[-1]) for line in reply.read().decode().splitlines() if line.startswith(name + " "))
+
+    def ready(self):
+        try:
+            with urllib.request.urlopen(self.programs.url + "/readyz", timeout=5):
+                return True
+        except OSError:
+            return False
+
+    def wait(self, truth, text, seconds=READY_S):
+        until = time.monotonic() + seconds
+        while not truth():
+            check(self.programs.process.poll() is None, f"the daemon ended ({self.programs.process.poll()}): {text}")
+            check(time.monotonic() < until, f"not within {seconds} s: {text}")
+            time.sleep(0.05)
+
+    def start(self):
+        began = time.monotonic()
+        self.programs.start()
+        self.wait(self.ready, "ready after a start")
+        self.worst_ready_s = max(self.worst_ready_s, time.monotonic() - began)
+
+    def count(self):
+        self.accepted += self.metric("joulecast_ingest_samples_total")
+
+    def kill(self):
+        self.count()
+        self.programs.kill()
+        self.losses += 1
+        self.start()
+
+    def term(self):
+        check(self.programs.stop() == 0, "stop")
+        self.start()
+
+    def pause(self):
+        self.programs.process.send_signal(19)
+        time.sleep(self.random.uniform(0.5, 3))
+        self.programs.process.send_signal(18)
+
+    def lock(self):
+        holder = sqlite3.connect(self.programs.store, isolation_level=None, timeout=10)
+        holder.execute("BEGIN EXCLUSIVE")
+        time.sleep(self.random.uniform(1, 5))
+        holder.close()
+
+    def full(self):
+        ballast = os.path.join(self.volume, "ballast")
+        with open(ballast, "wb", buffering=0) as file:
+            try:
+                while True:
+                    file.write(bytes(1 << 16))
+            except OSError:
+                pass
+        self.wait(lambda: not self.ready(), "a full disk is noticed")
+        time.sleep(self.random.uniform(0, 3))
+        os.remove(ballast)
+
+    def replaced(self, deleted=False):
+        """A copy of the store comes into its place, or nothing does until the daemon has ended."""
+        store, copy = self.programs.store, self.programs.path("copy.db")
+        with self.writers.pause:
+            with sqlite3.connect(store, timeout=10) as source, sqlite3.connect(copy) as target:
+                source.backup(target)
+            for suffix in ("", "-wal", "-shm"):
+                if os.path.exists(store + suffix):
+                    os.remove(store + suffix)
+            if not deleted:
+                shutil.copy(copy, store)
+        self.losses += 1
+        self.wait(lambda: not self.ready(), "a store that is gone is noticed", 5)
+        time.sleep(0.5)
+        self.count()
+        check(self.programs.stop() == 0, "stop")
+        if deleted:
+            shutil.copy(copy, store)
+        os.remove(copy)
+        self.start()
+
+    def deleted(self):
+        self.replaced(deleted=True)
+
+    def run(self):
+        model = json.load(open(os.path.join(self.options.source, "deploy/robots/amr.json")))
+        self.start()
+        self.programs.put("/v1/robots/hostile", model | {"robot_id": "hostile"})
+        fleet = subprocess.Popen([self.options.client, "simulate", "--robots", str(ROBOTS), "--lcm-url", self.programs.lcm_url,
+                                  "--server", self.programs.url, "--rate", str(RATE_HZ), "--mission-duration", "8", "--quiet"])
+        self.writers = Writers(self.programs, model)
+        hostile = Hostile(self.programs, self.options.seed)
+        try:
+            self.wait(lambda: self.metric("joulecast_robots_live") >= ROBOTS, "robots are live", 60)
+            self.writers.start()
+            hostile.start()
+            until = time.monotonic() + 3600 * self.options.hours
+            while time.monotonic() < until:
+                time.sleep(self.random.uniform(1, 4))
+                kind = self.random.choice(self.kinds)
+                if kind == "term":
+                    self.count()
+                getattr(self, kind)()
+                self.faults[kind] += 1
+                self.wait(self.ready, f"ready after {kind}")
+        finally:
+            fleet.terminate()
+            fleet.wait()
+        self.writers.ended = hostile.ended = True
+        self.writers.join()
+        hostile.join()
+        check(fleet.returncode in (0, -15, 130, 143), f"simulate ended {fleet.returncode}")
+        self.count()
+        self.term()
+        print(f"seed {self.options.seed}: {dict(self.faults)}, {hostile.sent} hostile packets, worst restart "
+              f"{self.worst_ready_s:.2f} s")
+
+    def check_writes(self):
+        outcomes = collections.Counter()
+        for robot, history in self.writers.written.items():
+            outcomes.update(outcome for _, outcome in history)
+            versions = []
+            cursor = ""
+            while cursor is not None:
+                page = self.programs.get(f"/v1/robots/{robot}/versions?limit=1000{cursor and '&cursor='}{cursor}")
+                versions += page["versions"]
+                cursor = page["next_cursor"]
+            stored = {v["model"]["idle_power_w"] for v in versions}
+            for power, outcome in history:
+                check(outcome != "done" or power in stored, f"{robot}: acknowledged {power} W is not stored")
+                check(outcome != "not done" or power not in stored, f"{robot}: refused {power} W is stored")
+            last = max(k for k, (_, outcome) in enumerate(history) if outcome == "done")
+            possible = {history[last][0]} | {power for power, outcome in history[last:] if outcome == "unknown"}
+            now = self.programs.get(f"/v1/robots/{robot}")["model"]["idle_power_w"]
+            check(now in possible, f"{robot}: {now} W is in force, acknowledged was {possible}")
+        print(f"writes: {dict(outcomes)}")
+
+    def check_samples(self):
+        stored = in_missions = 0
+        robots = [r["robot_id"] for r in self.programs.get("/v1/robots")["robots"]]
+        for robot in robots:
+            if robot.startswith("written"):
+                continue
+            missions, cursor = [], ""
+            while cursor is not None:
+                page = self.programs.get(f"/v1/missions?limit=1000&robot_id={robot}{cursor and '&cursor='}{cursor}")
+                missions += page["missions"]
+                cursor = page["next_cursor"]
+            seen = {}
+            for mission in missions:
+                telemetry = self.programs.get(f"/v1/missions/{mission['id']}/telemetry?limit=100000")
+                in_missions += mission["samples"]
+                stored += len(telemetry["sequence"])
+                check(len(telemetry["sequence"]) == mission["samples"],
+                      f"{robot} {mission['mission_id']}: {len(telemetry['sequence'])} samples of {mission['samples']} stored")
+                for sample in zip(telemetry["utime_us"], telemetry["sequence"]):
+                    check(sample not in seen, f"{robot}: sample {sample} is in {mission['id']} and {seen.get(sample)}")
+                    seen[sample] = mission["id"]
+        lost = self.accepted - stored
+        allowed = self.losses * LOST_S * ROBOTS * RATE_HZ
+        print(f"samples: {self.accepted:.0f} accepted, {stored} stored once, {self.losses} times some may be lost")
+        check(stored > 0 and lost <= allowed, f"{lost} samples are lost, {allowed:.0f} may be")
+
+    def check_store(self):
+        check(self.programs.stop() == 0, "stop")
+        ledger = " + ".join(("-" if term == "recovered" else "") + f"coalesce(ledger_{term}_j, 0)" for term in TERMS)
+        with sqlite3.connect(f"file:{self.programs.store}?mode=ro", uri=True) as store:
+            check(store.execute("PRAGMA integrity_check").fetchone()[0] == "ok", "the history is damaged")
+            check(not store.execute("PRAGMA foreign_key_check").fetchall(), "a reference does not hold")
+            missions, = store.execute("SELECT count(*) FROM mission").fetchone()
+            open_ = store.execute(f"SELECT mission_id, battery_j, {ledger} FROM mission WHERE abs(battery_j - ({ledger})) > "
+                                  "1e-6 * (1 + abs(battery_j))").fetchall()
+            check(not open_, f"ledgers do not close: {open_[:5]}")
+        done = subprocess.run([self.options.daemon, "--store-path", self.programs.store, "--check-store"],
+                              capture_output=True, text=True)
+        check(done.returncode == 0, f"--check-store: {done.stdout}{done.stderr}")
+        print(done.stdout.strip(), f"({missions} missions)")
+
+
+def main():
+    options = options_of()
+    need_multicast()
+    nemesis = Nemesis(options)
+    try:
+        nemesis.run()
+        nemesis.check_writes()
+        nemesis.check_samples()
+        nemesis.check_store()
+    finally:
+        nemesis.programs.end()
+        if nemesis.mounted:
+            subprocess.run(["umount", "-l", nemesis.volume])
+
+
+main()

@@ -1,0 +1,161 @@
+#include "history/store_care.h"
+
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include <fstream>
+
+#include "temporary_store.h"
+
+namespace joulecast::history {
+namespace {
+
+namespace fs = std::filesystem;
+
+class StoreCare : public testing::Test {
+ protected:
+  StoreCare() : path_(folder_.file("store.db")) { open(); }
+
+  void open() {
+    SqliteOptions options;
+    options.path = path_;
+    store_ = need(open_sqlite_store(options));
+  }
+
+  // So many missions of a robot with a model, of 1,000 samples each.
+  void fill(int missions, const std::string& robot_id = "amr-1") {
+    need(apply_one(*store_, AddModel{robot_id, 5, ModelOrigin::http, "", R"({"a": 1})", {}}));
+    for (int k = 0; k < missions; ++k) {
+      Mission m = start_mission(*store_, robot_id, "m" + std::to_string(k), 1'000'000'000LL * (k + 1));
+      m.state = MissionState::finished;
+      m.model_version = 1;
+      m.samples = 1000;
+      m.accounts.battery_j = 30;
+      m.accounts.ledger[signals::Term::copper] = 40;
+      m.accounts.ledger[signals::Term::recovered] = 10;
+      need(apply_one(*store_, CheckpointMission{m, {}, some_samples(m.start_utime_us, 0, 1000), {}}));
+    }
+  }
+
+  std::int64_t missions_of(const std::string& path) {
+    const auto check = check_store(path);
+    EXPECT_TRUE(check) << describe(check.error());
+    EXPECT_TRUE(check && check->faults.empty()) << check->faults.front();
+    return check ? check->missions : -1;
+  }
+
+  // Past the store's own means.
+  void write(const std::string& sql) {
+    sqlite3* database = nullptr;
+    ASSERT_EQ(sqlite3_open(path_.c_str(), &database), SQLITE_OK);
+    EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK)
+        << sqlite3_errmsg(database);
+    sqlite3_close(database);
+  }
+
+  TemporaryFolder folder_;
+  std::string path_;
+  std::unique_ptr<Store> store_;
+};
+
+TEST_F(StoreCare, ASoundStoreIsSoundWhileItIsUsed) {
+  fill(3);
+  const auto check = need(check_store(path_));
+  EXPECT_TRUE(check.faults.empty());
+  EXPECT_EQ(check.missions, 3);
+  EXPECT_EQ(check.chunks, 3);
+}
+
+TEST_F(StoreCare, WhatIsNoStoreIsTold) {
+  EXPECT_EQ(check_store(folder_.file("absent")).error().fault, Fault::not_found);
+  std::ofstream(folder_.file("text")) << std::string(10'000, 'x');
+  EXPECT_EQ(check_store(folder_.file("text")).error().fault, Fault::corrupt);
+  store_.reset();
+  write("PRAGMA user_version = 1");
+  EXPECT_EQ(check_store(path_).error().fault, Fault::conflict);
+}
+
+TEST_F(StoreCare, LedgersReferencesAndChunksAreChecked) {
+  fill(3);
+  store_.reset();
+  const auto fault_after = [&](const std::string& sql) {
+    write(sql);
+    const auto check = need(check_store(path_));
+    return check.faults.empty() ? std::string() : check.faults.back();
+  };
+  EXPECT_EQ(fault_after("UPDATE mission SET ledger_copper_j = 40.00001 WHERE mission_key = 1"), "");
+  EXPECT_NE(fault_after("UPDATE mission SET ledger_copper_j = 41 WHERE mission_key = 1")
+                .find("mission 1: its ledger is -1.0"),
+            std::string::npos);
+  EXPECT_NE(fault_after("UPDATE telemetry_chunk SET body = zeroblob(bytes) WHERE chunk_key = 2")
+                .find("telemetry_chunk 2 of mission 2"),
+            std::string::npos);
+  EXPECT_NE(fault_after("UPDATE telemetry_chunk SET samples = 7 WHERE chunk_key = 3")
+                .find("another number of samples"),
+            std::string::npos);
+  write("UPDATE mission SET ledger_copper_j = 40; DELETE FROM telemetry_chunk");
+  EXPECT_NE(fault_after("PRAGMA foreign_keys = OFF; DELETE FROM model").find("refers to nothing in model"),
+            std::string::npos);
+}
+
+TEST_F(StoreCare, ABackupIsTakenWhileTheStoreIsUsedAndRestored) {
+  fill(3);
+  const std::string copy = folder_.file("copy.db");
+  EXPECT_EQ(need(back_up_store(path_, copy)).missions, 3);
+  EXPECT_EQ(back_up_store(path_, copy).error().fault, Fault::conflict);
+  need(apply_one(*store_, RemoveRobot{"amr-1", true}));
+  EXPECT_EQ(restore_store(copy, path_).error().fault, Fault::conflict) << "the store is open";
+  store_.reset();
+  const std::string before = need(restore_store(copy, path_));
+  EXPECT_EQ(missions_of(path_), 3);
+  EXPECT_EQ(missions_of(before), 0);
+  EXPECT_EQ(missions_of(copy), 3);
+  open();
+  EXPECT_EQ(need(store_->totals({})).missions, 3);
+  store_.reset();
+  EXPECT_EQ(restore_store(path_, path_).error().fault, Fault::invalid);
+  EXPECT_EQ(need(restore_store(copy, folder_.file("new.db"))), "");
+  EXPECT_EQ(missions_of(folder_.file("new.db")), 3);
+}
+
+TEST_F(StoreCare, ADamagedPageIsFoundAndTheRestIsSalvaged) {
+  fill(60);
+  fill(2, "amr-2");
+  store_.reset();
+  write("PRAGMA wal_checkpoint(TRUNCATE)");
+  // The middle of the file is chunks of telemetry.
+  const auto size = fs::file_size(path_);
+  {
+    std::fstream file(path_, std::ios::binary | std::ios::in | std::ios::out);
+    file.seekp(static_cast<std::streamoff>(size / 2 / 4096 * 4096));
+    file << std::string(4096, '\xa5');
+  }
+  const auto check = need(check_store(path_));
+  EXPECT_FALSE(check.faults.empty());
+  const std::string copy = folder_.file("copy.db"), whole = folder_.file("whole.db");
+  EXPECT_EQ(back_up_store(path_, copy).error().fault, Fault::corrupt);
+  EXPECT_FALSE(fs::exists(copy));
+  EXPECT_EQ(restore_store(path_, copy).error().fault, Fault::corrupt);
+  EXPECT_FALSE(fs::exists(copy));
+
+  const Salvage salvage = need(salvage_store(path_, whole));
+  EXPECT_GT(salvage.rows, 100);
+  EXPECT_EQ(missions_of(whole), 62);
+  const auto sound = need(check_store(whole));
+  EXPECT_LT(sound.chunks, 62);
+  EXPECT_GE(sound.chunks, 55);
+  EXPECT_EQ(salvage_store(path_, whole).error().fault, Fault::conflict);
+  EXPECT_NE(need(restore_store(whole, path_)), "");
+  open();
+  EXPECT_EQ(need(store_->robots()).size(), 2u);
+}
+
+TEST_F(StoreCare, TheFileShrinksWhenARobotIsPurged) {
+  fill(200);
+  const auto before = need(store_->size()).database_bytes;
+  need(apply_one(*store_, RemoveRobot{"amr-1", true}));
+  EXPECT_LT(need(store_->size()).database_bytes, before / 4);
+}
+
+}  // namespace
+}  // namespace joulecast::history
