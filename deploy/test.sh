@@ -1,10 +1,13 @@
 #!/usr/bin/env bash
 # Installs, checks formatting and lint, builds everything without a warning, benchmarks too, and passes the tests. With
-# --sanitize the tests also run under the address and undefined-behaviour sanitizers, in a build of their own.
+# --sanitize the tests also run under the address and undefined-behaviour sanitizers, in a build of their own; with
+# --sanitize thread only the tests of what threads share run, under the thread sanitizer.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 sanitize=false
 [ "${1:-}" = --sanitize ] && sanitize=true
+threads=false
+[ "${1:-} ${2:-}" = "--sanitize thread" ] && threads=true
 
 deploy/install-dependencies.sh
 deploy/check-format.sh
@@ -19,6 +22,14 @@ isolated() {
   fi
 }
 
+if $threads; then
+  cmake --preset sanitize-thread
+  cmake --build --preset sanitize-thread
+  isolated build/sanitize-thread/tests/ingest/ingest_test
+  build/sanitize-thread/tests/history/history_test --gtest_filter='*Writer*:*Conformance*'
+  build/sanitize-thread/tests/server/http_server_test
+  exit
+fi
 if $sanitize; then
   cmake --preset sanitize
   cmake --build --preset sanitize
