@@ -29,6 +29,7 @@ namespace fs = std::filesystem;
 
 constexpr std::int64_t busy_timeout_ms = 10'000;
 constexpr std::size_t most_faults = 100;
+constexpr int most_failures = 10'000;  // of reads of one table
 
 template <class Work>
 auto guarded(const std::string& path, Work work) -> decltype(work()) {
@@ -41,10 +42,12 @@ auto guarded(const std::string& path, Work work) -> decltype(work()) {
   }
 }
 
-Result<std::unique_ptr<Database>> open_existing(const std::string& path) {
+// SQLite copies only what it might write.
+Result<std::unique_ptr<Database>> open_existing(const std::string& path,
+                                                OpenMode mode = OpenMode::read_only) {
   if (!fs::is_regular_file(path)) return fail(Fault::not_found, path, "there is no such file");
   return guarded(path, [&]() -> Result<std::unique_ptr<Database>> {
-    auto database = std::make_unique<Database>(path, OpenMode::read_only, busy_timeout_ms);
+    auto database = std::make_unique<Database>(path, mode, busy_timeout_ms);
     if (database->integer("PRAGMA application_id") != store_application_id)
       return fail(Fault::corrupt, path, "is not a joulecast store");
     const std::int64_t version = database->integer("PRAGMA user_version");
@@ -190,9 +193,10 @@ std::vector<std::pair<std::string, std::string>> tables_and_keys(Database& datab
   return tables;
 }
 
-// Copies the rows of keys from..to; where they cannot be read, those of either half, down to single keys.
+// Copies the rows of keys from..to; where they cannot be read, those of either half, down to single keys, as
+// long as that promises something.
 void salvage_range(Database& database, const std::string& table, const std::string& key, std::int64_t from,
-                   std::int64_t to, Salvage& salvage) {
+                   std::int64_t to, int& failures, Salvage& salvage) {
   try {
     salvage.rows +=
         Rows(database.statement("INSERT OR IGNORE INTO main." + table + " SELECT * FROM damaged." + table +
@@ -202,14 +206,15 @@ void salvage_range(Database& database, const std::string& table, const std::stri
             .run();
   } catch (const SqliteError& error) {
     if (error.fault() != Fault::corrupt) throw;
-    if (from == to) {
+    if (from == to || ++failures > most_failures) {
       if (salvage.losses.size() < most_faults)
-        salvage.losses.push_back(table + ", " + key + " " + std::to_string(from) + ": " + error.what());
+        salvage.losses.push_back(table + ", " + key + " " + std::to_string(from) +
+                                 (from == to ? "" : " to " + std::to_string(to)) + ": " + error.what());
       return;
     }
     const std::int64_t middle = from + (to - from) / 2;
-    salvage_range(database, table, key, from, middle, salvage);
-    salvage_range(database, table, key, middle + 1, to, salvage);
+    salvage_range(database, table, key, from, middle, failures, salvage);
+    salvage_range(database, table, key, middle + 1, to, failures, salvage);
   }
 }
 
@@ -259,7 +264,7 @@ Result<StoreCheck> check_store(const std::string& path) {
 Result<StoreCheck> back_up_store(const std::string& path, const std::string& copy) {
   if (auto may = may_write(copy, copy, Existing::refuse); !may)
     return fail(Fault::conflict, copy, "is there already");
-  auto database = open_existing(path);
+  auto database = open_existing(path, OpenMode::read_write_create);
   if (!database) return tl::unexpected(database.error());
   NewFile file(copy);
   if (auto copied = copy_into(**database, file.part()); !copied) return tl::unexpected(copied.error());
@@ -282,7 +287,7 @@ Result<std::string> restore_store(const std::string& from, const std::string& pa
     auto check = check_store(from);
     if (!check) return tl::unexpected(check.error());
     if (!check->faults.empty()) return fail(Fault::corrupt, from, "is damaged: " + check->faults.front());
-    auto source = open_existing(from);
+    auto source = open_existing(from, OpenMode::read_write_create);
     if (!source) return tl::unexpected(source.error());
     if (auto copied = copy_into(**source, file.part()); !copied) return tl::unexpected(copied.error());
   }
@@ -311,8 +316,10 @@ Result<Salvage> salvage_store(const std::string& damaged, const std::string& int
     if (auto made = bring_to_schema(database, store_schema()); !made) return made;
     database.execute("PRAGMA synchronous = OFF");
     database.execute("ATTACH " + quoted(damaged) + " AS damaged");
-    for (const auto& [table, key] : tables_and_keys(database))
-      salvage_range(database, table, key, 0, greatest(database, table, key), salvage);
+    for (const auto& [table, key] : tables_and_keys(database)) {
+      int failures = 0;
+      salvage_range(database, table, key, 0, greatest(database, table, key), failures, salvage);
+    }
     drop_loose_ends(database);
     return {};
   });
