@@ -11,8 +11,8 @@
 #include "base/error.h"
 #include "history/store.h"
 #include "history/writer.h"
-#include "server/diagnosis/drift_view.h"
 #include "ingest/model_registry.h"
+#include "server/diagnosis/drift_view.h"
 
 namespace joulecast::server {
 

@@ -10,9 +10,9 @@
 
 #include "history/store.h"
 #include "history/writer.h"
+#include "ingest/model_registry.h"
 #include "server/diagnosis/diagnosis_service.h"
 #include "server/diagnosis/drift_view.h"
-#include "ingest/model_registry.h"
 
 namespace joulecast::server {
 

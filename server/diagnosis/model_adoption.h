@@ -12,10 +12,10 @@
 #include "energy/back_test.h"
 #include "history/store.h"
 #include "history/writer.h"
+#include "ingest/model_registry.h"
 #include "robot/robot_model.h"
 #include "server/diagnosis/drift_view.h"
 #include "server/diagnosis/mission_recordings.h"
-#include "ingest/model_registry.h"
 
 namespace joulecast::server {
 
