@@ -87,6 +87,9 @@ class ModelAdoption {
  private:
   Result<StoredRecordings> history(const AdoptionRequest& request, const ingest::ModelInForce& before,
                                    std::optional<std::int64_t>& since_utime_us) const;
+  // The back-test on the history: fills what of the adoption it decides.
+  Result<void> test(const AdoptionRequest& request, const ingest::ModelInForce& before,
+                    const std::function<bool()>& go_on, Adoption& adoption);
   Result<void> record(const std::string& robot_id, const std::string& kind, std::string detail_json);
 
   const history::Store& store_;

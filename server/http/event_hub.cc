@@ -246,7 +246,7 @@ Result<std::shared_ptr<StreamSource>> EventHub::subscribe(std::string_view last_
 
 Result<Response> EventHub::respond(const Request& request, std::string_view topic) {
   auto source = subscribe(request.header("last-event-id"), topic);
-  if (!source) return tl::unexpected<Error>(source.error());
+  if (!source) return tl::unexpected(source.error());
   Response response;
   response.content_type = "text/event-stream";
   response.headers.emplace_back("Cache-Control", "no-store");

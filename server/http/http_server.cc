@@ -253,7 +253,7 @@ bool HttpServer::Impl::settled() {
 Result<std::unique_ptr<HttpServer>> HttpServer::start(const ServerOptions& options, const Router& router,
                                                       ServerObserver* observer) {
   auto impl = std::make_unique<Impl>(options, router, observer != nullptr ? *observer : nobody());
-  if (auto opened = impl->open(); !opened) return tl::unexpected<Error>(opened.error());
+  if (auto opened = impl->open(); !opened) return tl::unexpected(opened.error());
   impl->run();
   return std::unique_ptr<HttpServer>(new HttpServer(std::move(impl)));
 }

@@ -31,7 +31,7 @@ class Components {
 
   // {"$ref": ...} to the component of schemas/<name>.schema.json, which is taken in with all it refers to.
   Result<ordered_json> reference(const std::string& name) {
-    if (auto added = add(name); !added) return tl::unexpected<Error>(added.error());
+    if (auto added = add(name); !added) return tl::unexpected(added.error());
     return ordered_json{{"$ref", "#/components/schemas/" + name}};
   }
   ordered_json take() {
@@ -181,7 +181,7 @@ Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<
     if (!parameters.empty()) operation["parameters"] = std::move(parameters);
     if (!endpoint.request_schema.empty()) {
       auto schema = components.reference(endpoint.request_schema);
-      if (!schema) return tl::unexpected<Error>(schema.error());
+      if (!schema) return tl::unexpected(schema.error());
       operation["requestBody"] = {{"required", true},
                                   {"content", {{"application/json", {{"schema", *schema}}}}}};
     }
@@ -193,7 +193,7 @@ Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<
         content["schema"] = {{"type", "string"}};
       } else {
         auto schema = components.reference(endpoint.response_schema);
-        if (!schema) return tl::unexpected<Error>(schema.error());
+        if (!schema) return tl::unexpected(schema.error());
         content["schema"] = *schema;
       }
       success["content"][endpoint.response_type.substr(0, endpoint.response_type.find(';'))] =
@@ -209,7 +209,7 @@ Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<
   }
 
   auto problem_reference = components.reference("problem");
-  if (!problem_reference) return tl::unexpected<Error>(problem_reference.error());
+  if (!problem_reference) return tl::unexpected(problem_reference.error());
   ordered_json responses = ordered_json::object();
   for (const unsigned status : statuses) {
     responses["problem_" + std::to_string(status)] = {
@@ -232,7 +232,7 @@ Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<
 Result<std::vector<Endpoint>> with_openapi(std::vector<Endpoint> endpoints,
                                            std::span<const EmbeddedFile> schemas) {
   auto document = openapi_document(endpoints, schemas);
-  if (!document) return tl::unexpected<Error>(document.error());
+  if (!document) return tl::unexpected(document.error());
   endpoints.push_back(self_endpoint(std::make_shared<const std::string>(std::move(*document))));
   return endpoints;
 }

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/bounds.h"
 #include "base/json_text.h"
 #include "server/http/problem.h"
 #include "server/http/text.h"
@@ -92,12 +93,9 @@ std::optional<std::string> broken_constraint(const Parameter& parameter, std::st
       }
       if (!value)
         return parameter.type == Parameter::Type::integer ? "must be an integer" : "must be a finite number";
-      if (parameter.minimum && *value < *parameter.minimum) {
-        return "must be at least " + number_text(*parameter.minimum) + ", is " + std::string(text);
-      }
-      if (parameter.maximum && *value > *parameter.maximum) {
-        return "must be at most " + number_text(*parameter.maximum) + ", is " + std::string(text);
-      }
+      const Bounds none,
+          bounds{parameter.minimum.value_or(none.minimum), parameter.maximum.value_or(none.maximum)};
+      if (!bounds.contain(*value)) return out_of_bounds(*value, bounds);
       return std::nullopt;
     }
   }

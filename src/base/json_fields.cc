@@ -57,13 +57,7 @@ double Fields::number(std::string_view name, const Bounds& bounds, std::optional
     return 0;
   }
   const double value = found->get<double>();
-  if (!std::isfinite(value)) fault(name, "must be finite");
-  if (bounds.exclusive_minimum ? !(value > bounds.minimum) : !(value >= bounds.minimum)) {
-    fault(name, fmt::format("is {}, must be {} {}", value,
-                            bounds.exclusive_minimum ? "greater than" : "at least", bounds.minimum));
-  }
-  if (!(value <= bounds.maximum))
-    fault(name, fmt::format("is {}, must be at most {}", value, bounds.maximum));
+  if (!std::isfinite(value) || !bounds.contain(value)) fault(name, out_of_bounds(value, bounds));
   return value;
 }
 
@@ -90,7 +84,7 @@ std::int64_t Fields::integer(std::string_view name, std::int64_t minimum, std::i
   }
   const auto value = found->get<std::int64_t>();
   if (value < minimum || value > maximum)
-    fault(name, fmt::format("is {}, must be from {} to {}", value, minimum, maximum));
+    fault(name, fmt::format("is {}, must be at least {} and at most {}", value, minimum, maximum));
   return value;
 }
 
@@ -149,10 +143,9 @@ std::vector<double> Fields::numbers(std::string_view name, std::size_t minimum, 
   for (std::size_t k = 0; k < found->size(); ++k) {
     const json& item = (*found)[k];
     const double value = item.is_number() ? item.get<double>() : std::nan("");
-    const bool low = bounds.exclusive_minimum ? !(value > bounds.minimum) : !(value >= bounds.minimum);
-    if (!std::isfinite(value) || low || !(value <= bounds.maximum)) {
+    if (!std::isfinite(value) || !bounds.contain(value)) {
       fault(fmt::format("{}/{}", name, k),
-            fmt::format("must be a number from {} to {}", bounds.minimum, bounds.maximum));
+            item.is_number() ? out_of_bounds(value, bounds) : "must be a number");
       return values;
     }
     values.push_back(value);

@@ -10,21 +10,10 @@
 #include <variant>
 #include <vector>
 
+#include "base/bounds.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::robot {
-
-// The interval a number must lie in; infinite ends are no bound. Not-a-number lies in none.
-struct Bounds {
-  double low = -std::numeric_limits<double>::infinity();
-  double high = std::numeric_limits<double>::infinity();
-  bool low_excluded = false;
-  bool high_excluded = false;
-
-  bool contain(double value) const {
-    return (low_excluded ? value > low : value >= low) && (high_excluded ? value < high : value <= high);
-  }
-};
 
 using Curve = std::vector<std::pair<double, double>>;  // (state of charge, value)
 

@@ -69,17 +69,6 @@ std::string child(const std::string& pointer, std::string_view key) {
   return pointer + (json::json_pointer() / std::string(key)).to_string();
 }
 
-std::string with_unit(double value, std::string_view unit) {
-  return unit.empty() ? fmt::format("{}", value) : fmt::format("{} {}", value, unit);
-}
-
-// "is -2 kg, must be greater than 0 kg and at most 100000 kg"
-std::string out_of_bounds(double value, const Bounds& bounds, std::string_view unit) {
-  return fmt::format("is {}, must be {} {} and {} {}", with_unit(value, unit),
-                     bounds.low_excluded ? "greater than" : "at least", with_unit(bounds.low, unit),
-                     bounds.high_excluded ? "less than" : "at most", with_unit(bounds.high, unit));
-}
-
 std::optional<double> number(const json& value, const std::string& pointer, Problems& problems) {
   if (!value.is_number()) {
     problems.add(pointer, fmt::format("is {}, must be a number", value.type_name()));

@@ -81,7 +81,7 @@ TEST_F(SettingsTest, UnknownKeysAreErrorsThatSuggestTheNearest) {
 }
 
 TEST_F(SettingsTest, ValuesAreCheckedAgainstTypeAndBounds) {
-  EXPECT_EQ(fault({"--http-port", "65536"}).message, "must lie in [0, 65535], is \"65536\"");
+  EXPECT_EQ(fault({"--http-port", "65536"}).message, "is 65536, must be at least 0 and at most 65535");
   EXPECT_EQ(fault({"--http-port", "80x"}).message, "must be an integer, is \"80x\"");
   EXPECT_EQ(fault({"--http-port", ""}).field, "--http-port");
   EXPECT_EQ(fault({"--http-read-timeout-s", "nan"}).message, "must be a finite number, is \"nan\"");
