@@ -35,6 +35,9 @@ class Application {
   std::unique_ptr<Parts> parts_;
 };
 
+// What is wrong with who may use the service: an address open to all, a token file that cannot be read.
+std::vector<Error> faults_of_access(const Settings& settings);
+
 // What is wrong with the robot files that the settings name, one a file; or with their directory.
 std::vector<Error> faulty_robot_files(const Settings& settings);
 

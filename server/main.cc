@@ -86,7 +86,8 @@ int print(const joulecast::Result<std::string>& text) {
 }
 
 int check(const joulecast::Settings& settings) {
-  const auto faulty = joulecast::faulty_robot_files(settings);
+  auto faulty = joulecast::faults_of_access(settings);
+  for (joulecast::Error& error : joulecast::faulty_robot_files(settings)) faulty.push_back(std::move(error));
   for (const joulecast::Error& error : faulty) complain(error);
   return faulty.empty() ? print(std::string("the settings are valid\n")) : 2;
 }

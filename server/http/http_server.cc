@@ -65,6 +65,12 @@ ServerObserver& nobody() {
 
 }  // namespace
 
+bool is_loopback(std::string_view text) {
+  boost::system::error_code error;
+  const net::ip::address address = net::ip::make_address(std::string(text), error);
+  return !error && address.is_loopback();
+}
+
 std::string_view to_string(Refusal refusal) {
   switch (refusal) {
     case Refusal::connections:

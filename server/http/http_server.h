@@ -79,6 +79,9 @@ class ServerObserver {
   virtual void connections(std::size_t open) { (void)open; }
 };
 
+// Whether only this machine reaches that IP address; false for what is none.
+bool is_loopback(std::string_view address);
+
 // HTTP/1.1 server: one I/O thread, small worker pools, keep-alive, pipelining answered in order. A client, or
 // peer, is an IPv4 address or the /64 network of an IPv6 address.
 // Thread-safe where stated; router and observer must outlive it.

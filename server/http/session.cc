@@ -194,6 +194,8 @@ void Session::fill_request() {
   for (const auto& field : message)
     request_.headers.emplace_back(view(field.name_string()), view(field.value()));
   request_.body = std::move(parser_->get().body());
+  error_code gone;
+  request_.address = socket().remote_endpoint(gone).address().to_string();
   keep_alive_ = parser_->keep_alive() && !guest_;
   const auto id = request_.header("x-request-id");
   request_.id = is_sane_id(id) ? std::string(id) : core_->id_prefix + std::to_string(core_->next_id++);
