@@ -240,7 +240,7 @@ Result<Response> Gate::sign_in(const Request& request) {
   Fields fields(*request.json);
   const std::string secret = fields.text("token", longest_secret);
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
-  if (!enabled()) return fail(Fault::conflict, "", "this service has no tokens: nobody needs to sign in");
+  if (!enabled()) return fail(Fault::conflict, "/token", "this service has no tokens: nobody needs to sign in");
   refresh();
   const std::lock_guard lock(mutex_);
   const std::int64_t now = options_.now_utime_us();
