@@ -17,6 +17,8 @@
 #include "history/spool.h"
 #include "history/sqlite_store.h"
 #include "history/writer.h"
+#include "ingest/ingest_service.h"
+#include "ingest/model_loading.h"
 #include "server/api/services.h"
 #include "server/daemon_metrics.h"
 #include "server/diagnosis/proposal_acceptor.h"
@@ -30,8 +32,6 @@
 #include "server/http/openapi.h"
 #include "server/http/operations.h"
 #include "server/http/static_files.h"
-#include "ingest/ingest_service.h"
-#include "ingest/model_loading.h"
 #include "server/logging.h"
 #include "server/metrics.h"
 
@@ -158,6 +158,8 @@ http::ServerOptions http_options(const Settings& settings) {
   options.address = settings.text("http.address");
   options.port = static_cast<std::uint16_t>(settings.integer("http.port"));
   options.allowed_hosts = listed(settings.text("http.allowed_hosts"));
+  options.tls_certificate = settings.text("http.tls_certificate");
+  options.tls_key = settings.text("http.tls_key");
   options.worker_threads = static_cast<unsigned>(settings.integer("http.worker_threads"));
   options.compute_threads = static_cast<unsigned>(settings.integer("http.compute_threads"));
   options.worker_queue = static_cast<std::size_t>(settings.integer("http.worker_queue"));
@@ -184,7 +186,15 @@ http::EventHub::Options event_options(const Settings& settings) {
 // Without tokens only this machine is served, unless the settings say otherwise.
 Result<void> check_exposure(const Settings& settings) {
   const std::string& address = settings.text("http.address");
-  if (http::is_loopback(address) || !settings.text("auth.token_file").empty()) return {};
+  if (http::is_loopback(address)) return {};
+  if (!settings.text("auth.token_file").empty()) {
+    if (settings.text("http.tls_certificate").empty())
+      log_warning(
+          "tokens travel unencrypted to this address: set http.tls_certificate, or listen on 127.0.0.1 "
+          "behind a proxy that speaks TLS",
+          {{"address", address}});
+    return {};
+  }
   if (settings.boolean("http.insecure")) {
     log_warning("everybody who reaches this address may read and change everything (http.insecure)",
                 {{"address", address}});
@@ -409,9 +419,11 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   p.services = std::make_unique<api::Services>(api::Services{*p.store, *p.writer, p.models, p.fleet,
                                                              *p.forecasts, p.cost_tables, *p.drift_view,
                                                              *p.adoption, *p.diagnoses, host_utime_us});
-  Result<std::unique_ptr<http::Gate>> gate = http::Gate::open({.token_file = settings.text("auth.token_file"),
-                                                               .now_utime_us = host_utime_us,
-                                                               .audit = audit_into(*p.writer)});
+  Result<std::unique_ptr<http::Gate>> gate =
+      http::Gate::open({.token_file = settings.text("auth.token_file"),
+                        .secure = !settings.text("http.tls_certificate").empty(),
+                        .now_utime_us = host_utime_us,
+                        .audit = audit_into(*p.writer)});
   if (!gate) return tl::unexpected(std::move(gate.error()));
   p.gate = std::move(*gate);
   std::vector<http::ReadinessCheck> checks;
@@ -429,19 +441,18 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
                     }});
   if (!settings.text("auth.token_file").empty())
     checks.push_back({"tokens", [&p] { return p.gate->check(); }});
-  Result<std::vector<http::Endpoint>> table =
-      endpoint_table(*p.services, p.metrics, p.events, *p.gate, std::move(checks),
-                     settings.text("http.web_directory"));
+  Result<std::vector<http::Endpoint>> table = endpoint_table(
+      *p.services, p.metrics, p.events, *p.gate, std::move(checks), settings.text("http.web_directory"));
   if (!table) return tl::unexpected(std::move(table.error()));
   const auto log_fault = [](const http::Endpoint& endpoint, const http::Request& request,
                             const Error& error) {
     log_error("request failed",
               {{"operation", endpoint.operation_id}, {"request_id", request.id}, {"cause", describe(error)}});
   };
-  p.router = std::make_unique<http::Router>(
-      std::move(*table), log_fault, [&p](const http::Endpoint& endpoint, http::Request& request) {
-        return p.gate->refuse(endpoint, request);
-      });
+  p.router = std::make_unique<http::Router>(std::move(*table), log_fault,
+                                            [&p](const http::Endpoint& endpoint, http::Request& request) {
+                                              return p.gate->refuse(endpoint, request);
+                                            });
   p.http_metrics = std::make_unique<http::HttpMetrics>(p.metrics);
   server::export_metrics(p.metrics, p.counters, *p.ingest, p.fleet, *p.writer, *p.store, p.events,
                          host_utime_us);
@@ -457,6 +468,15 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
 
 std::uint16_t Application::http_port() const {
   return parts_->http->port();
+}
+
+void Application::reload() {
+  parts_->gate->refresh();
+  if (const Result<void> reloaded = parts_->http->reload_tls(); !reloaded) {
+    log_error("the certificate from before stays", reloaded.error());
+  } else {
+    log_info("reloaded");
+  }
 }
 
 bool Application::alive() {

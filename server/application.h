@@ -24,6 +24,10 @@ class Application {
   // True while every loop turns: receiving, accounting, writing, HTTP. What the watchdog asks.
   bool alive();
 
+  // Reads again what may change while it runs: the tokens and the certificate. What cannot be read is logged,
+  // and what was in force stays.
+  void reload();
+
   // Stops in order: receiving, accounting (open missions are checkpointed), HTTP, writing. What the store
   // does not take goes to the spool beside it. False when a part did not end in time: the process is to end
   // by _exit().

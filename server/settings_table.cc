@@ -23,7 +23,13 @@ constexpr Setting table[] = {
      "or local: "
      "loopback and the networks of this host's interfaces; further ones are counted"},
 
-    {"http.address", Type::text, "127.0.0.1", 0, 0, "", "IP address to listen on; one that is not loopback needs auth.token_file or http.insecure"},
+    {"http.address", Type::text, "127.0.0.1", 0, 0, "",
+     "IP address to listen on; one that is not loopback needs auth.token_file or http.insecure"},
+    {"http.tls_certificate", Type::text, "", 0, 0, "",
+     "PEM file of the certificate and those that it builds on, read again at SIGHUP; with http.tls_key: "
+     "HTTPS "
+     "alone, TLS 1.2 or newer"},
+    {"http.tls_key", Type::text, "", 0, 0, "", "PEM file of the certificate's private key"},
     {"http.insecure", Type::boolean, "false", 0, 0, "",
      "let everybody who reaches http.address do everything, though there are no tokens"},
     {"http.port", Type::integer, "8080", 0, 65535, "", "port to listen on; 0 lets the system choose"},

@@ -18,14 +18,15 @@ struct Options {
 };
 
 void print_entry(const history::AuditEntry& entry) {
-  const nlohmann::ordered_json line{{"id", entry.id},
-                                    {"time", utc_text(entry.utime_us)},
-                                    {"actor", entry.actor},
-                                    {"address", entry.address},
-                                    {"request_id", entry.request_id},
-                                    {"action", entry.action},
-                                    {"detail", nlohmann::ordered_json::parse(entry.detail_json, nullptr, false)},
-                                    {"hash", entry.hash}};
+  const nlohmann::ordered_json line{
+      {"id", entry.id},
+      {"time", utc_text(entry.utime_us)},
+      {"actor", entry.actor},
+      {"address", entry.address},
+      {"request_id", entry.request_id},
+      {"action", entry.action},
+      {"detail", nlohmann::ordered_json::parse(entry.detail_json, nullptr, false)},
+      {"hash", entry.hash}};
   fmt::print("{}\n", line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 
@@ -56,9 +57,10 @@ void add_audit(CLI::App& program, Exit& exit) {
   };
   add("list", "Print every entry, one JSON object a line, as far as the chain holds", list);
   add("verify", "Find the first entry that was changed, removed or put in", verify)
-      ->add_option("--head", options->head,
-                   "hash that an earlier verify said: fail also where no entry has it any more, so that an end "
-                   "which was cut off is found");
+      ->add_option(
+          "--head", options->head,
+          "hash that an earlier verify said: fail also where no entry has it any more, so that an end "
+          "which was cut off is found");
 }
 
 }  // namespace joulecast::client

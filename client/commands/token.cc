@@ -16,8 +16,8 @@
 #include "client/commands/table.h"
 
 // The tokens that joulecastd takes, in the file of its auth.token_file. The file and not the store, which a
-// running daemon keeps for itself: so it is the same whether the daemon runs or not, and the first token needs
-// none.
+// running daemon keeps for itself: so it is the same whether the daemon runs or not, and the first token
+// needs none.
 namespace joulecast::client {
 namespace {
 
@@ -60,7 +60,8 @@ Exit list(const Options& options) {
   const Result<std::vector<Token>> tokens = access::read_tokens(options.file);
   if (!tokens) return report(tokens.error());
   const std::int64_t now = host_utime_us();
-  fmt::print("{:<24} {:<8} {:<20} {:<16} {:<16}\n", "name", "role", "robots", "created (UTC)", "expires (UTC)");
+  fmt::print("{:<24} {:<8} {:<20} {:<16} {:<16}\n", "name", "role", "robots", "created (UTC)",
+             "expires (UTC)");
   for (const Token& token : *tokens)
     fmt::print("{:<24} {:<8} {:<20} {:<16} {:<16}\n", token.name, access::name(token.role),
                token.robots.empty() ? "all" : token.robots, format_utc(token.created_utime_us),
@@ -89,7 +90,8 @@ void add_token(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
   const auto add = [&](const char* name, const char* what, Exit (*run)(const Options&)) {
     auto* command = group->add_subcommand(name, what);
-    command->add_option("--file", options->file, "the file that the daemon's auth.token_file names")->required();
+    command->add_option("--file", options->file, "the file that the daemon's auth.token_file names")
+        ->required();
     command->callback([options, run, &exit] { exit = run(*options); });
     return command;
   };

@@ -175,7 +175,8 @@ std::optional<std::string> Gate::why_not(const Token& token, const Endpoint& end
   if (token.robots.empty()) return std::nullopt;
   const std::optional<std::string> robot = robot_of(endpoint, request);
   if (!robot) return "This needs a token for all robots; " + token.name + " is for " + token.robots;
-  if (!access::is_for_robot(token, *robot)) return token.name + " is for the robots " + token.robots + " alone";
+  if (!access::is_for_robot(token, *robot))
+    return token.name + " is for the robots " + token.robots + " alone";
   return std::nullopt;
 }
 
@@ -186,11 +187,11 @@ std::optional<Response> Gate::refuse(const Endpoint& endpoint, Request& request)
   bool presented = false;
   const Token* token = token_of(request, presented);
   if (token == nullptr) {
-    Response response =
-        problem(401, "unauthorized",
-                presented ? "The token or session is unknown, expired or revoked"
-                          : "This needs a token: Authorization: Bearer TOKEN, or a session of POST /v1/session",
-                request.id, "Authorization", "must be a bearer token that is in force");
+    Response response = problem(
+        401, "unauthorized",
+        presented ? "The token or session is unknown, expired or revoked"
+                  : "This needs a token: Authorization: Bearer TOKEN, or a session of POST /v1/session",
+        request.id, "Authorization", "must be a bearer token that is in force");
     response.headers.emplace_back(
         "WWW-Authenticate",
         presented ? R"(Bearer realm="joulecast", error="invalid_token")" : R"(Bearer realm="joulecast")");
@@ -232,15 +233,17 @@ Endpoint Gate::audited(Endpoint endpoint) {
 }
 
 std::string Gate::cookie(std::string_view value, std::int64_t max_age_s) const {
-  return std::string(session_cookie) + "=" + std::string(value) + "; Path=/; Max-Age=" +
-         std::to_string(max_age_s) + "; HttpOnly; SameSite=Strict" + (options_.secure ? "; Secure" : "");
+  return std::string(session_cookie) + "=" + std::string(value) +
+         "; Path=/; Max-Age=" + std::to_string(max_age_s) + "; HttpOnly; SameSite=Strict" +
+         (options_.secure ? "; Secure" : "");
 }
 
 Result<Response> Gate::sign_in(const Request& request) {
   Fields fields(*request.json);
   const std::string secret = fields.text("token", longest_secret);
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
-  if (!enabled()) return fail(Fault::conflict, "/token", "this service has no tokens: nobody needs to sign in");
+  if (!enabled())
+    return fail(Fault::conflict, "/token", "this service has no tokens: nobody needs to sign in");
   refresh();
   const std::lock_guard lock(mutex_);
   const std::int64_t now = options_.now_utime_us();
@@ -286,15 +289,16 @@ Result<Response> Gate::sign_out(const Request& request) {
 
 std::vector<Endpoint> described_session_endpoints() {
   std::vector<Endpoint> rows;
-  rows.push_back({.method = Method::post,
-                  .path = "/v1/session",
-                  .operation_id = "createSession",
-                  .role = Role::open,
-                  .summary = "Signs a browser in: a session cookie for a token, for 12 h or until it is revoked",
-                  .request_schema = "session-request",
-                  .response_schema = "session",
-                  .error_statuses = {401, 409},
-                  .run = Run::io});
+  rows.push_back(
+      {.method = Method::post,
+       .path = "/v1/session",
+       .operation_id = "createSession",
+       .role = Role::open,
+       .summary = "Signs a browser in: a session cookie for a token, for 12 h or until it is revoked",
+       .request_schema = "session-request",
+       .response_schema = "session",
+       .error_statuses = {401, 409},
+       .run = Run::io});
   rows.push_back({.method = Method::del,
                   .path = "/v1/session",
                   .operation_id = "deleteSession",

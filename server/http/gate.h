@@ -26,8 +26,9 @@ struct AccessEvent {
 };
 
 // Who may what. With a token file every request needs the role of its endpoint, by a bearer token or by the
-// cookie of a session that a token began; without one everybody may do everything. The file is read again when
-// it has changed; one that cannot be read leaves the tokens as they were and is told of by check(). Any thread.
+// cookie of a session that a token began; without one everybody may do everything. The file is read again
+// when it has changed; one that cannot be read leaves the tokens as they were and is told of by check(). Any
+// thread.
 class Gate {
  public:
   struct Options {

@@ -67,8 +67,8 @@ class Router {
   // Told of every fault of ours (answered with status 500), since the client gets only the request id.
   using FaultSink = std::function<void(const Endpoint&, const Request&, const Error&)>;
 
-  // Answers instead of an endpoint whoever may not use it; asked before anything of the request but method and
-  // path is checked.
+  // Answers instead of an endpoint whoever may not use it; asked before anything of the request but method
+  // and path is checked.
   using Guard = std::function<std::optional<Response>(const Endpoint&, Request&)>;
 
   // Two endpoints with the same method and path shape, or a malformed template, are our bug and abort.

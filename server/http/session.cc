@@ -4,6 +4,7 @@
 #include "server/http/problem.h"
 #include "server/http/stream_session.h"
 #include "server/http/text.h"
+#include "server/http/tls.h"
 
 namespace joulecast::http {
 namespace {
@@ -38,6 +39,7 @@ bool is_sane_id(std::string_view id) {
 
 std::shared_ptr<Session> make_session(std::shared_ptr<Core> core, Socket socket, const net::ip::address& peer,
                                       bool guest) {
+  if (core->tls) return make_tls_session(std::move(core), std::move(socket), peer, guest);
   return std::make_shared<StreamSession<Socket>>(std::move(core), std::move(socket), peer, guest);
 }
 

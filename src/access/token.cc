@@ -40,7 +40,8 @@ Result<Token> read_token(const json& object, const std::string& at) {
                       token.sha256.find_first_not_of("0123456789abcdef") != std::string::npos))
     fields.fault("sha256", "must be 64 hexadecimal digits");
   if (fields.ok())
-    if (Result<void> sound = check_token_name(token.name); !sound) fields.fault("name", sound.error().message);
+    if (Result<void> sound = check_token_name(token.name); !sound)
+      fields.fault("name", sound.error().message);
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
   return token;
 }

@@ -18,8 +18,8 @@ AuditEntry read_entry(Rows& rows) {
   AuditEntry entry;
   entry.id = rows.integer();
   entry.utime_us = rows.integer();
-  for (std::string* text : {&entry.actor, &entry.address, &entry.request_id, &entry.action,
-                            &entry.detail_json, &entry.hash})
+  for (std::string* text :
+       {&entry.actor, &entry.address, &entry.request_id, &entry.action, &entry.detail_json, &entry.hash})
     *text = rows.text();
   return entry;
 }
@@ -29,7 +29,8 @@ Result<AuditState> follow(Database& database, const std::string& path, std::stri
   if (database.integer("PRAGMA application_id") != store_application_id)
     return fail(Fault::corrupt, path, "is not a joulecast store");
   if (database.integer("SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name = 'audit'") != 1)
-    return fail(Fault::corrupt, path, "has no audit; a store made before 0.2 gets one when it is next opened");
+    return fail(Fault::corrupt, path,
+                "has no audit; a store made before 0.2 gets one when it is next opened");
   AuditState state;
   bool seen = seen_head.empty();
   std::string previous = before_the_first;
@@ -38,11 +39,11 @@ Result<AuditState> follow(Database& database, const std::string& path, std::stri
     AuditEntry entry = read_entry(rows);
     const std::int64_t expected = state.entries + 1;
     if (entry.id != expected || entry.hash != audit_hash(previous, entry))
-      return fail(Fault::corrupt, path,
-                  "the audit is broken at entry " + std::to_string(expected) +
-                      (entry.id != expected ? ", which is missing"
-                                            : " of " + utc_text(entry.utime_us) +
-                                                  ": it or its hash was changed"));
+      return fail(
+          Fault::corrupt, path,
+          "the audit is broken at entry " + std::to_string(expected) +
+              (entry.id != expected ? ", which is missing"
+                                    : " of " + utc_text(entry.utime_us) + ": it or its hash was changed"));
     previous = entry.hash;
     seen = seen || entry.hash == seen_head;
     ++state.entries;

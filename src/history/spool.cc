@@ -90,7 +90,8 @@ void members(Archive& a, AppendEvent& c) {
 }
 template <class Archive>
 void members(Archive& a, AppendAudit& c) {
-  a(c.entry.utime_us, c.entry.actor, c.entry.address, c.entry.request_id, c.entry.action, c.entry.detail_json);
+  a(c.entry.utime_us, c.entry.actor, c.entry.address, c.entry.request_id, c.entry.action,
+    c.entry.detail_json);
 }
 template <class Archive>
 void members(Archive& a, Prune& c) {

@@ -262,7 +262,8 @@ TEST_F(AccessTest, ABrowserSignsInAndOut) {
 
 TEST_F(AccessTest, ASessionEndsWithItsTokenAndAfterTwelveHours) {
   const auto sign_in = [this] {
-    const std::string set = header(ask(Method::post, "/v1/session", "", "", R"({"token": "s-plan"})"), "Set-Cookie");
+    const std::string set =
+        header(ask(Method::post, "/v1/session", "", "", R"({"token": "s-plan"})"), "Set-Cookie");
     return set.substr(0, set.find(';'));
   };
   const std::string first = sign_in();
@@ -277,7 +278,8 @@ TEST_F(AccessTest, ASessionEndsWithItsTokenAndAfterTwelveHours) {
 
 TEST_F(AccessTest, UnderTlsTheCookieIsSecure) {
   open(true);
-  EXPECT_NE(header(ask(Method::post, "/v1/session", "", "", R"({"token": "s-plan"})"), "Set-Cookie").find("; Secure"),
+  EXPECT_NE(header(ask(Method::post, "/v1/session", "", "", R"({"token": "s-plan"})"), "Set-Cookie")
+                .find("; Secure"),
             std::string::npos);
 }
 
@@ -290,8 +292,10 @@ TEST_F(AccessTest, WithoutATokenFileEverybodyMayDoEverything) {
 }
 
 TEST_F(AccessTest, AChangeIsAuditedBeforeItIsMadeAndWithItsAnswer) {
-  for (const auto& [method, path] : {std::pair{Method::put, "/v1/robots/7"}, {Method::post, "/v1/robots/7/model"},
-                                     {Method::post, "/v1/diagnoses"}, {Method::del, "/v1/diagnoses/7"}}) {
+  for (const auto& [method, path] : {std::pair{Method::put, "/v1/robots/7"},
+                                     {Method::post, "/v1/robots/7/model"},
+                                     {Method::post, "/v1/diagnoses"},
+                                     {Method::del, "/v1/diagnoses/7"}}) {
     events_.clear();
     const Response answer = ask(method, path, "Bearer s-admin", "", method == Method::del ? "" : "{}");
     ASSERT_EQ(answer.status, 200U) << path << answer.body;
