@@ -332,6 +332,8 @@ void read_environment(const std::vector<std::string>& environment, Given& given,
       if (!given.config) given.config = std::move(value);
       continue;
     }
+    // The command line's own.
+    if (name == "JOULECAST_TOKEN") continue;
     const auto setting = std::find_if(table.begin(), table.end(),
                                       [&](const Setting& each) { return each.environment() == name; });
     if (setting == table.end()) {

@@ -23,7 +23,15 @@ constexpr Setting table[] = {
      "or local: "
      "loopback and the networks of this host's interfaces; further ones are counted"},
 
-    {"http.address", Type::text, "127.0.0.1", 0, 0, "", "IP address to listen on"},
+    {"http.address", Type::text, "127.0.0.1", 0, 0, "",
+     "IP address to listen on; one that is not loopback needs auth.token_file or http.insecure"},
+    {"http.tls_certificate", Type::text, "", 0, 0, "",
+     "PEM file of the certificate and those that it builds on, read again at SIGHUP; with http.tls_key: "
+     "HTTPS "
+     "alone, TLS 1.2 or newer"},
+    {"http.tls_key", Type::text, "", 0, 0, "", "PEM file of the certificate's private key"},
+    {"http.insecure", Type::boolean, "false", 0, 0, "",
+     "let everybody who reaches http.address do everything, though there are no tokens"},
     {"http.port", Type::integer, "8080", 0, 65535, "", "port to listen on; 0 lets the system choose"},
     {"http.allowed_hosts", Type::text, "", 0, 0, "",
      "names under which clients may address the service besides IP addresses, localhost and this host's "
@@ -58,6 +66,10 @@ constexpr Setting table[] = {
      "clients of the event stream at once; beyond: 503"},
     {"http.web_directory", Type::text, "", 0, 0, "",
      "serve the operator page from this directory; empty: the page built in"},
+
+    {"auth.token_file", Type::text, "", 0, 0, "",
+     "file of the tokens that requests need, made by joulecast token create and read again when it changes; "
+     "empty: none is needed"},
 
     {"store.path", Type::text, "joulecast.db", 0, 0, "", "SQLite file of the history"},
     {"store.retention_days", Type::number, "30", 0, 36500, "d",

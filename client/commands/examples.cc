@@ -54,6 +54,13 @@ constexpr Examples table[] = {
     {"explore",
      "joulecast explore --case 1 --plot case1.svg\n"
      "joulecast explore --map yard.json --robot amr.json --payload 0 --payload 20"},
+    {"token create",
+     "joulecast token create --file tokens.json --name dispatcher --role plan\n"
+     "joulecast token create --file tokens.json --name yard --role operate --robots 'amr-*' --days 30"},
+    {"token list", "joulecast token list --file tokens.json"},
+    {"token revoke", "joulecast token revoke --file tokens.json --name yard"},
+    {"audit list", "joulecast audit list --store history.db"},
+    {"audit verify", "joulecast audit verify --store history.db"},
     {"thesis", "joulecast thesis\njoulecast thesis --table 4-1 --json\njoulecast thesis --figure 4-2a --csv"},
     {"completion",
      "source <(joulecast completion bash)\n"

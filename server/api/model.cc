@@ -252,6 +252,7 @@ std::vector<TableRow> model_rows() {
       {{.method = Method::post,
         .path = "/v1/robots/{id}/model",
         .operation_id = "adoptModel",
+        .role = http::Role::operate,
         .summary = "Adopts a robot file, a diagnosis or a proposal as the next model version, after a "
                    "back-test on missions that it was not fitted on; or puts an earlier version in force",
         .request_schema = "model-request",
@@ -262,6 +263,7 @@ std::vector<TableRow> model_rows() {
   rows.push_back({{.method = Method::get,
                    .path = "/v1/robots/{id}/versions/diff",
                    .operation_id = "compareRobotVersions",
+                   .role = http::Role::read,
                    .summary = "What two versions of a robot's model differ in",
                    .parameters = {{.name = "from",
                                    .type = Type::integer,
@@ -278,6 +280,7 @@ std::vector<TableRow> model_rows() {
       {{.method = Method::get,
         .path = "/v1/robots/{id}/proposals",
         .operation_id = "listProposals",
+        .role = http::Role::read,
         .summary = "Models that were suggested for a robot, newest first",
         .parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
         .response_schema = "proposal-list",

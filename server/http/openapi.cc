@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/json_text.h"
+#include "server/http/gate.h"
 #include "server/http/problem.h"
 #include "server/http/uri.h"
 
@@ -130,6 +131,7 @@ ordered_json parameter_of(const Parameter& parameter) {
 std::set<unsigned> errors_of(const Endpoint& endpoint) {
   std::set<unsigned> statuses(endpoint.error_statuses.begin(), endpoint.error_statuses.end());
   statuses.insert({400, 406, 421, 500});
+  if (endpoint.role != Role::open) statuses.insert({401, 403});
   if (endpoint.method != Method::get) statuses.insert(403);
   if (!endpoint.parameters.empty()) statuses.insert(422);
   if (!endpoint.request_schema.empty()) statuses.insert({413, 415, 422});
@@ -137,11 +139,20 @@ std::set<unsigned> errors_of(const Endpoint& endpoint) {
   return statuses;
 }
 
+// The role stands in the list of each way to prove it: OpenAPI 3.1 has roles there for schemes that are not
+// OAuth2.
+ordered_json security_of(Role role) {
+  if (role == Role::open) return ordered_json::array();
+  const ordered_json roles = ordered_json::array({access::name(role)});
+  return ordered_json::array({{{"bearer", roles}}, {{"session", roles}}});
+}
+
 // The endpoint that serves the document.
 Endpoint self_endpoint(std::shared_ptr<const std::string> text) {
   Endpoint self;
   self.path = "/openapi.json";
   self.operation_id = "getOpenApi";
+  self.role = Role::read;
   self.summary = "This description of the interface, OpenAPI 3.1";
   self.run = Run::io;
   self.response_schema = "openapi";
@@ -167,6 +178,9 @@ Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<
     ordered_json operation;
     operation["operationId"] = endpoint.operation_id;
     operation["summary"] = endpoint.summary;
+    if (endpoint.role == Role::unstated)
+      return fail(Fault::internal, endpoint.operation_id, "the table states no role for it");
+    operation["security"] = security_of(endpoint.role);
     ordered_json parameters = ordered_json::array();
     const auto target = parse_target(endpoint.path);
     if (!target) return fail(Fault::internal, endpoint.path, "malformed path template");
@@ -226,6 +240,17 @@ Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<
                       {"version", JOULECAST_VERSION}};
   document["paths"] = std::move(paths);
   document["components"] = {{"schemas", components.take()}, {"responses", std::move(responses)}};
+  document["components"]["securitySchemes"] = {
+      {"bearer",
+       {{"type", "http"},
+        {"scheme", "bearer"},
+        {"description",
+         "A token, where the service has auth.token_file; roles: read < plan < operate < admin"}}},
+      {"session",
+       {{"type", "apiKey"},
+        {"in", "cookie"},
+        {"name", session_cookie},
+        {"description", "What POST /v1/session gives a browser for a token"}}}};
   return document.dump(2) + "\n";
 }
 

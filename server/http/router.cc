@@ -137,8 +137,11 @@ struct Router::Node {
   }
 };
 
-Router::Router(std::vector<Endpoint> endpoints, FaultSink on_fault)
-    : endpoints_(std::move(endpoints)), on_fault_(std::move(on_fault)), root_(std::make_unique<Node>()) {
+Router::Router(std::vector<Endpoint> endpoints, FaultSink on_fault, Guard guard)
+    : endpoints_(std::move(endpoints)),
+      on_fault_(std::move(on_fault)),
+      guard_(std::move(guard)),
+      root_(std::make_unique<Node>()) {
   for (const Endpoint& endpoint : endpoints_) {
     const auto target = parse_target(endpoint.path);
     if (!target || !target->query.empty()) refuse_table(endpoint, "malformed path template");
@@ -227,6 +230,9 @@ Router::Match Router::match(Request& request) const {
     request.path_params.emplace_back(slot->names[i], *captured[i]);
   }
 
+  if (guard_) {
+    if (auto refused = guard_(endpoint, request)) return {&endpoint, std::move(refused)};
+  }
   if (!accepts(request.header("accept"), endpoint.response_type)) {
     return {nullptr, problem(406, "not-acceptable", "This resource is served as " + endpoint.response_type,
                              request.id, "Accept", "must admit " + endpoint.response_type)};

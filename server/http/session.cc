@@ -4,6 +4,7 @@
 #include "server/http/problem.h"
 #include "server/http/stream_session.h"
 #include "server/http/text.h"
+#include "server/http/tls.h"
 
 namespace joulecast::http {
 namespace {
@@ -38,6 +39,7 @@ bool is_sane_id(std::string_view id) {
 
 std::shared_ptr<Session> make_session(std::shared_ptr<Core> core, Socket socket, const net::ip::address& peer,
                                       bool guest) {
+  if (core->tls) return make_tls_session(std::move(core), std::move(socket), peer, guest);
   return std::make_shared<StreamSession<Socket>>(std::move(core), std::move(socket), peer, guest);
 }
 
@@ -194,6 +196,8 @@ void Session::fill_request() {
   for (const auto& field : message)
     request_.headers.emplace_back(view(field.name_string()), view(field.value()));
   request_.body = std::move(parser_->get().body());
+  error_code gone;
+  request_.address = socket().remote_endpoint(gone).address().to_string();
   keep_alive_ = parser_->keep_alive() && !guest_;
   const auto id = request_.header("x-request-id");
   request_.id = is_sane_id(id) ? std::string(id) : core_->id_prefix + std::to_string(core_->next_id++);

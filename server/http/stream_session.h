@@ -251,8 +251,8 @@ class StreamSession final : public Session {
   // send our end first and read on for a while.
   Task<void> linger() {
     state_ = State::ending;
-    co_await end_stream(stream_);
     arm(core_->stopping ? linger_time_at_stop : linger_time);
+    co_await end_stream(stream_);
     bool more = true;
     while (more) {
       if (!reading_ahead_) buffer_.consume(buffer_.size());

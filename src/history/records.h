@@ -136,7 +136,19 @@ struct Learned {
   std::string body_json = "{}";
 };
 
-// An entry of the audit log.
+// An entry of the audit: who changed something or was refused. Entries are chained, see history/audit.h.
+struct AuditEntry {
+  std::int64_t id = 0;  // 1, 2, 3 ...; given by the store
+  std::int64_t utime_us = 0;
+  std::string actor;       // name of a token; empty: nobody who is known
+  std::string address;     // IP address of the client; empty: the daemon itself
+  std::string request_id;  // empty: no request
+  std::string action;      // operation id of the request, or what else happened, e.g. "token_added"
+  std::string detail_json = "{}";
+  std::string hash;  // given by the store
+};
+
+// What happened in the fleet, in the order it was stored.
 struct Event {
   std::int64_t id = 0;  // increasing in order of commit; given by the store
   std::int64_t utime_us = 0;

@@ -8,7 +8,7 @@ extern const std::string_view store_sql;  // schemas/store.sql, embedded at buil
 
 namespace {
 
-constexpr std::int64_t store_version = 6;
+constexpr std::int64_t store_version = 7;
 constexpr Migration store_migrations[] = {
     {1, R"(
 CREATE TABLE learned (
@@ -98,6 +98,23 @@ CREATE TABLE covariate_chunk (
 
 CREATE INDEX covariate_chunk_by_age ON covariate_chunk (stored_utime_us, sealed, bytes);
 CREATE INDEX covariate_chunk_tail ON covariate_chunk (mission_key, first_ordinal) WHERE sealed = 0;
+)sql"},
+    {6, R"sql(
+CREATE TABLE audit (
+  audit_id INTEGER NOT NULL PRIMARY KEY,  -- 1, 2, 3 ...
+  utime_us INTEGER NOT NULL,
+  actor TEXT NOT NULL,       -- name of a token; empty: nobody who is known
+  address TEXT NOT NULL,     -- IP address of the client; empty: the daemon itself
+  request_id TEXT NOT NULL,
+  action TEXT NOT NULL CHECK (action <> ''),
+  detail_json TEXT NOT NULL CHECK (json_valid(detail_json)),
+  hash TEXT NOT NULL CHECK (length(hash) = 64)  -- over this entry and the hash before, see src/history/audit.h
+) STRICT;
+
+CREATE TRIGGER audit_keeps_entries BEFORE DELETE ON audit
+BEGIN SELECT RAISE(ABORT, 'the audit is only appended to'); END;
+CREATE TRIGGER audit_keeps_content BEFORE UPDATE ON audit
+BEGIN SELECT RAISE(ABORT, 'the audit is only appended to'); END;
 )sql"},
 };
 

@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "history/audit.h"
 #include "history/sqlite_chunks.h"
 #include "history/sqlite_rows.h"
 
@@ -217,6 +218,10 @@ Outcome SqliteChanges::run(const AppendEvent& c) {
   const std::int64_t id = rows.integer();
   rows.run();
   return id;
+}
+
+Outcome SqliteChanges::run(const AppendAudit& c) {
+  return append_audit(database_, c.entry);
 }
 
 Outcome SqliteChanges::run(const Prune& c) {

@@ -320,6 +320,7 @@ def exercise(checker, source):
                 body = None if method == "GET" else {"path": PATH}
                 checker.check(method, template, template.replace("{id}", "no-such-robot"), body, expect=404)
     checker.check("POST", "/v1/robots/{id}/profile", f"/v1/robots/{name}/profile", {"path": PATH}, expect=200)
+    checker.check("POST", "/v1/session", body={"token": "none is needed here"}, expect=409)
     for template, body, status, field, constraint in (
             ("/v1/robots/{id}/profile", {}, 422, "/path", "is required"),
             ("/v1/robots/{id}/profile", {"paht": PATH}, 422, "/path", "is required; not known here: paht"),

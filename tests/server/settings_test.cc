@@ -109,6 +109,10 @@ TEST_F(SettingsTest, EveryFaultyValueIsToldAtOnce) {
   EXPECT_EQ(std::count(all.begin(), all.end(), '\n'), 4) << all;
 }
 
+TEST_F(SettingsTest, LeavesTheCommandLinesTokenAlone) {
+  EXPECT_TRUE(read_settings({}, {"JOULECAST_TOKEN=jc_1"}));
+}
+
 TEST_F(SettingsTest, CommandsAreKnown) {
   using Action = Invocation::Action;
   EXPECT_EQ(read_settings({"--help"}, {}).value().action, Action::help);

@@ -8,8 +8,17 @@ class Problem extends Error {
   }
 }
 
+const unauthorized = new EventTarget();
+
+// Calls back when a request was refused for want of a token; gives what ends that.
+export function onUnauthorized(callback) {
+  unauthorized.addEventListener('refused', callback);
+  return () => unauthorized.removeEventListener('refused', callback);
+}
+
 async function answer(response) {
   if (response.ok) return response.json();
+  if (response.status === 401) unauthorized.dispatchEvent(new Event('refused'));
   const problem = await response.json().catch(() => ({}));
   throw Object.assign(
     new Problem(response.status, problem.title ?? response.statusText, problem.detail ?? '', problem.field),

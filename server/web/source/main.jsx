@@ -6,6 +6,7 @@ import { toggleEnergyUnit, useEnergyUnit } from './energy.js';
 import { startLive, useLive } from './live.js';
 import { toggleTheme, useTheme } from './theme.js';
 import { routeOf } from './route.js';
+import { SignIn } from './sign_in.jsx';
 import { Empty, Guard } from './widgets.jsx';
 import { Fleet } from './views/fleet.jsx';
 import { later } from './views/later.jsx';
@@ -123,6 +124,7 @@ function App() {
         </button>
       </header>
       <OfflineBanner />
+      <SignIn />
       <main id="main" tabindex="-1" ref={main}>
         <Guard view={location.hash}>
           {View ? (
