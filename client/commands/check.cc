@@ -170,7 +170,7 @@ Result<void> check_tables(const std::vector<std::string>& tables, const Options&
       continue;
     }
     for (telemetry::Import& import : *imports) {
-      judge_import(import, table, report.findings);
+      judge(import, table, report.findings);
       for (const signals::Sample& sample : import.recording.samples)
         report.watch.add(import.recording.robot_id, sample);
       recordings.push_back(std::move(import.recording));

@@ -94,6 +94,28 @@ void judge_fields(const std::string& channel, const telemetry::ChannelTally& tal
   }
 }
 
+void judge(const telemetry::Import& import, const std::string& table, Findings& findings) {
+  const telemetry::ImportReport& report = import.report;
+  const auto counted = [&](std::size_t count, const std::string& field, const std::string& says) {
+    if (count > 0)
+      findings.push_back(
+          {false, table, field, fmt::format("{} {}", count, says), static_cast<double>(count)});
+  };
+  counted(report.rows_without_motion, "", "rows without both wheel speeds give no sample");
+  counted(report.rows_out_of_time, "", "rows are not after the row before and give no sample");
+  counted(report.rows_glitched, "", "rows are dropped for a value out of its limits");
+  counted(report.glitches.size(), "", "values are out of their limits; the import's report lists them");
+  for (const telemetry::JoinReport& join : report.joins) {
+    counted(join.rows_unsorted, join.table, "rows are not after the row before; put in order");
+    counted(join.beyond_tolerance, join.table,
+            fmt::format("rows of the main table find no reading within the tolerance, {} do, {:.3f} s late at the "
+                        "median",
+                        join.matched, join.median_lag_s));
+    if (join.matched == 0)
+      findings.push_back({true, table, join.table, "no row meets one of the main table: are the clocks the same?"});
+  }
+}
+
 nlohmann::json to_json(const Findings& findings) {
   nlohmann::json out = nlohmann::json::array();
   for (const Finding& f : findings)

@@ -10,6 +10,7 @@
 #include "gap/checks/check.h"
 #include "robot/robot_model.h"
 #include "telemetry/channel_watch.h"
+#include "telemetry/csv_import.h"
 #include "telemetry/recording_set.h"
 
 // What `joulecast check` finds, whatever it looks at.
@@ -34,6 +35,9 @@ void judge(const telemetry::RecordingSet& recordings, const robot::RobotModel& r
 
 // Of channels alone, where no robot file says what to expect: those that never move though the robot does.
 void judge_fields(const std::string& channel, const telemetry::ChannelTally& tally, Findings& findings);
+
+// Of a table as read: what was dropped, filled, out of its limits or could not be joined.
+void judge(const telemetry::Import& import, const std::string& table, Findings& findings);
 
 [[nodiscard]] nlohmann::json to_json(const Findings& findings);
 void print(const Findings& findings);

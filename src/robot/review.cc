@@ -93,11 +93,6 @@ void Review::movement() {
                  model_.motor.resistance_ohm, motion_.friction_nm,
                  motion_.friction_current_a * model_.motor.resistance_ohm, motion_.voltage_v);
   const double share = motion_.top_speed_m_s / limits.speed_m_s;
-  if (share < 0.05)
-    return fault("/limits/speed_m_s", motion_.top_speed_m_s,
-                 "is {:.4g} m/s, but at {:.4g} V and a gear ratio of {:.4g} the motors reach {:.3g} m/s: no "
-                 "motion can be planned with such a limit",
-                 limits.speed_m_s, motion_.voltage_v, motion_.ratio, motion_.top_speed_m_s);
   if (share < 0.95)
     warn("/limits/speed_m_s", motion_.top_speed_m_s,
          "is {:.4g} m/s, but at {:.4g} V the motors reach {:.3g} m/s on the flat: that bounds every plan",

@@ -81,12 +81,12 @@ TEST(Review, RefusesARobotThatCannotMove) {
   RobotModel weak = shipped("amr");
   weak.limits.current_a = 0.5;  // 0.88 N m / (0.055 N m/A * 21) = 0.76 A
   EXPECT_EQ(plannable(review(weak)).error().field, "/limits/current_a");
+  EXPECT_EQ(plannable(review(weak)).error().fault, Fault::invalid);
+  // Slow as it is, it moves.
   RobotModel slow = shipped("amr");
   slow.motor.gear_ratio = 2000;
-  const auto refused = plannable(review(slow));
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().fault, Fault::invalid);
-  EXPECT_EQ(refused.error().field, "/limits/speed_m_s");
+  EXPECT_TRUE(plannable(review(slow)));
+  EXPECT_THAT(fields_of(slow), Contains("/limits/speed_m_s"));
 }
 
 }  // namespace
