@@ -39,10 +39,8 @@ class Reader {
       return false;
     }
     for (const auto& [key, member] : value.items()) {
-      if (std::find(known.begin(), known.end(), key) == known.end()) {
+      if (std::find(known.begin(), known.end(), key) == known.end())
         refuse(pointer + "/" + key, "is no member that a mapping knows");
-        return false;
-      }
     }
     return true;
   }
