@@ -426,7 +426,8 @@ std::vector<MappingWarning> suspicious(const ImportMapping& mapping) {
     found.push_back({"/fields/battery_voltage",
                      "is a constant: power is the current times it, but nothing is learnt from the voltage"});
   for (const FieldTarget& target : content.targets)
-    if (!target.name.starts_with("battery_voltage") && is_constant(target.name))
+    // A constant pitch is a statement: that a dynamometer is flat.
+    if (target.name != "battery_voltage" && target.name != "pitch" && is_constant(target.name))
       found.push_back({"/fields/" + target.name, "is a constant, not a measurement: leave it out"});
   const auto same = [&](const std::string& field) {
     const auto right = given.find(field + "[0]"), left = given.find(field + "[1]");
