@@ -94,10 +94,11 @@ Result<void> check_robot_file(const std::string& path, Report& report) {
   const robot::RobotModel model = robot::read_robot(*document).value();
   check_model(model, path, report);
   const robot::Figures figures = robot::figures_of(model);
-  report.subjects.back()["figures"] = {{"top_speed_m_s", figures.top_speed_m_s},
-                                       {"acceleration_m_s2", figures.acceleration_m_s2},
-                                       {"energy_wh", figures.energy_wh},
-                                       {"standing_h", model.idle_power_w > 0 ? json(figures.standing_h) : json()}};
+  report.subjects.back()["figures"] = {
+      {"top_speed_m_s", figures.top_speed_m_s},
+      {"acceleration_m_s2", figures.acceleration_m_s2},
+      {"energy_wh", figures.energy_wh},
+      {"standing_h", model.idle_power_w > 0 ? json(figures.standing_h) : json()}};
   return {};
 }
 
@@ -118,7 +119,8 @@ Result<void> check_mapping(const std::string& path, Report& report) {
 // Recordings of one robot against the robot file, as far as there is one.
 void check_recordings(Result<telemetry::RecordingSet> set, const std::string& name, Report& report) {
   if (!set)
-    report.findings.push_back({true, name, set.error().field, set.error().message});
+    report.findings.push_back(
+        {false, name, "", "is not held against the robot file: " + describe(set.error())});
   else if (report.robot)
     judge(*set, *report.robot, report.findings);
 }
@@ -143,16 +145,17 @@ Result<void> check_logs(const std::vector<std::string>& logs, const Options& opt
     if (auto read = telemetry::read_events(log, take, tally); !read) return tl::unexpected(read.error());
     report.tell(log, "log", {{"events", tally.events - before.events}});
     if (tally.damaged_places > before.damaged_places)
-      report.findings.push_back({true, log, "",
-                                 fmt::format("{} damaged places, {} bytes skipped",
-                                             tally.damaged_places - before.damaged_places,
-                                             tally.skipped_bytes - before.skipped_bytes)});
+      report.findings.push_back(
+          {true, log, "",
+           fmt::format("{} damaged places, {} bytes skipped", tally.damaged_places - before.damaged_places,
+                       tally.skipped_bytes - before.skipped_bytes)});
   }
   if (report.watch.channels().empty())
-    report.findings.push_back(
-        {true, logs.front(), "", "holds no channel of joulecast's (ROBOT_TELEMETRY.<robot_id> and the like)"});
+    report.findings.push_back({true, logs.front(), "",
+                               "holds no channel of joulecast's (ROBOT_TELEMETRY.<robot_id> and the like)"});
   check_channels(false, report);
-  if (report.robot) check_recordings(telemetry::load_recordings(logs, options.robot_id), logs.front(), report);
+  if (report.robot)
+    check_recordings(telemetry::load_recordings(logs, options.robot_id), logs.front(), report);
   return {};
 }
 
@@ -315,9 +318,10 @@ void add_check(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
   auto* command = program.add_subcommand(
       "check", "Tell what is wrong or suspicious in robot files, mappings, recordings or a running robot");
-  command->add_option("file", options->files,
-                      "robot files, import mappings, LCM event logs, or tables with --mapping; none: a running "
-                      "robot");
+  command->add_option(
+      "file", options->files,
+      "robot files, import mappings, LCM event logs, or tables with --mapping; none: a running "
+      "robot");
   command->add_option("--robot", options->robot,
                       "robot file that recordings and running robots are held against");
   command->add_option("--mapping", options->mapping, "of tables: which column is what");

@@ -42,8 +42,9 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
   if (tally.subject != telemetry::Subject::telemetry) return;
   const double rate_hz = tally.rate_hz();
   if (tally.messages > 1 && (rate_hz < 0.9 * least_rate_hz || rate_hz > 1.1 * greatest_rate_hz))
-    add(false, "", fmt::format("{:.4g} messages a second; {} to {} are expected", rate_hz, least_rate_hz,
-                               greatest_rate_hz),
+    add(false, "",
+        fmt::format("{:.4g} messages a second; {} to {} are expected", rate_hz, least_rate_hz,
+                    greatest_rate_hz),
         rate_hz);
   const telemetry::SequenceCounters& s = tally.sequence;
   const auto counted = [&](std::uint64_t count, bool fault, const char* field, const char* says) {
@@ -69,8 +70,7 @@ void judge(const telemetry::RecordingSet& recordings, const robot::RobotModel& r
   for (const gap::Check& check : gap::check_recordings(recordings, robot))
     findings.push_back({check.contradicted, recordings.robot_id, check.channel, check.id + ": " + check.says,
                         std::isfinite(check.value) ? std::optional(check.value) : std::nullopt});
-  for (const std::string& note : recordings.notes)
-    findings.push_back({false, recordings.robot_id, "", note});
+  for (const std::string& note : recordings.notes) findings.push_back({false, recordings.robot_id, "", note});
 }
 
 void judge_fields(const std::string& channel, const telemetry::ChannelTally& tally, Findings& findings) {
@@ -108,11 +108,13 @@ void judge(const telemetry::Import& import, const std::string& table, Findings& 
   for (const telemetry::JoinReport& join : report.joins) {
     counted(join.rows_unsorted, join.table, "rows are not after the row before; put in order");
     counted(join.beyond_tolerance, join.table,
-            fmt::format("rows of the main table find no reading within the tolerance, {} do, {:.3f} s late at the "
-                        "median",
-                        join.matched, join.median_lag_s));
+            fmt::format(
+                "rows of the main table find no reading within the tolerance, {} do, {:.3f} s late at the "
+                "median",
+                join.matched, join.median_lag_s));
     if (join.matched == 0)
-      findings.push_back({true, table, join.table, "no row meets one of the main table: are the clocks the same?"});
+      findings.push_back(
+          {true, table, join.table, "no row meets one of the main table: are the clocks the same?"});
   }
 }
 
@@ -129,7 +131,11 @@ nlohmann::json to_json(const Findings& findings) {
 
 void print(const Findings& findings) {
   for (const Finding& f : findings) {
-    const std::string where = f.about + (f.field.empty() ? "" : f.field.starts_with('/') ? "#" : " ") + f.field;
+    const std::string where = f.about +
+                              (f.field.empty()            ? ""
+                               : f.field.starts_with('/') ? "#"
+                                                          : " ") +
+                              f.field;
     fmt::print("{}\n", wrapped(fmt::format("{} {}: {}", f.fault ? "fault  " : "warning", where, f.says),
                                help_width(), 8));
   }

@@ -129,14 +129,15 @@ void print_text(const Options& options, const std::vector<Imported>& all) {
     const telemetry::ImportReport& report = one.import.report;
     fmt::print("{:<20} {:<32} {:>8.1f} {:>8} {:>9} {:>8} {:>9}\n", r.robot_id, r.mission_id,
                1e-6 * static_cast<double>(r.samples.back().utime_us - r.samples.front().utime_us),
-               report.rows, report.samples,
-               report.rows + report.samples_added - report.samples, report.glitches.size());
+               report.rows, report.samples, report.rows + report.samples_added - report.samples,
+               report.glitches.size());
   }
   for (const Imported& one : all) {
     constexpr std::size_t shown = 10;
     for (const telemetry::JoinReport& join : one.import.report.joins)
       fmt::print(
-          "{} with {}: {} rows, {} matched, {} beyond the tolerance; lag {:.3f} s (median), {:.3f} s (greatest)\n",
+          "{} with {}: {} rows, {} matched, {} beyond the tolerance; lag {:.3f} s (median), {:.3f} s "
+          "(greatest)\n",
           one.table, join.table, join.rows, join.matched, join.beyond_tolerance, join.median_lag_s,
           join.greatest_lag_s);
     const auto& glitches = one.import.report.glitches;
@@ -167,7 +168,10 @@ Exit run(const Options& options) {
 void add_import(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
   auto* command = program.add_subcommand("import", "Turn CSV tables of foreign robots into an LCM event log");
-  command->add_option("table", options->tables, "CSV files, one mission each unless a column names them; in any order")->required();
+  command
+      ->add_option("table", options->tables,
+                   "CSV files, one mission each unless a column names them; in any order")
+      ->required();
   command->add_option("--mapping", options->mapping, "which column is what (deploy/import)")->required();
   command->add_option("--out", options->out, "LCM event log to write")->required();
   command->add_option(

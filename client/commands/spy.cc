@@ -62,17 +62,18 @@ std::string faults_of(const telemetry::ChannelTally& tally) {
 }
 
 std::string page(const Listened& listened, std::int64_t now_utime_us, std::size_t width) {
-  std::string text = cut(fmt::format("{:<32} {:>9} {:>8} {:>7} {:>9}", "channel", "messages", "Hz", "silent",
-                                     "clock"),
-                         width) +
-                     '\n';
+  std::string text =
+      cut(fmt::format("{:<32} {:>9} {:>8} {:>7} {:>9}", "channel", "messages", "Hz", "silent", "clock"),
+          width) +
+      '\n';
   for (const auto& [channel, tally] : listened.watch.channels()) {
     const double silent_s = 1e-6 * static_cast<double>(now_utime_us - tally.last_utime_us);
     text += cut(fmt::format("{:<32} {:>9} {:>8.1f} {:>5.0f} s {:>+7.2f} s", channel, tally.messages,
                             tally.rate_hz(), silent_s, 1e-6 * static_cast<double>(tally.clock_ahead_us)),
                 width) +
             '\n';
-    if (const std::string values = values_of(tally); !values.empty()) text += cut("    " + values, width) + '\n';
+    if (const std::string values = values_of(tally); !values.empty())
+      text += cut("    " + values, width) + '\n';
     if (const std::string faults = faults_of(tally); !faults.empty())
       text += cut("    faults: " + faults, width) + '\n';
   }
@@ -93,9 +94,7 @@ Exit run(const Options& options) {
   const double seconds = options.seconds > 0 ? options.seconds : terminal ? 0 : 10;
   auto redraw = [&](const Listened& listened) {
     if (!terminal) return;
-    std::fputs(("\033[H\033[J" + page(listened, host_utime_us(), terminal_width()) +
-                "ctrl-C ends\n")
-                   .c_str(),
+    std::fputs(("\033[H\033[J" + page(listened, host_utime_us(), terminal_width()) + "ctrl-C ends\n").c_str(),
                stdout);
     std::fflush(stdout);
   };

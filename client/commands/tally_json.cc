@@ -44,9 +44,9 @@ json tally_json(const std::string& channel, const telemetry::ChannelTally& tally
            {"faults", std::move(faults)}};
   if (tally.subject != telemetry::Subject::telemetry) return out;
   const telemetry::SequenceCounters& s = tally.sequence;
-  out["sequence"] = {{"missing", s.missing},       {"duplicate", s.duplicate},
-                     {"late", s.late},             {"restarts", s.restarts},
-                     {"clock_backward", s.clock_backward}, {"clock_forward", s.clock_forward}};
+  out["sequence"] = {
+      {"missing", s.missing},   {"duplicate", s.duplicate},           {"late", s.late},
+      {"restarts", s.restarts}, {"clock_backward", s.clock_backward}, {"clock_forward", s.clock_forward}};
   return out;
 }
 

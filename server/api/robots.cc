@@ -91,7 +91,11 @@ Result<Response> put(Services& services, const Request& request) {
   JsonWriter json;
   json.begin_object().field("robot_id", id).field("model_version", *version).key("warnings").begin_array();
   for (const robot::ReviewFinding& warning : findings)
-    json.begin_object().field("field", warning.field).field("value", warning.value).field("says", warning.says).end_object();
+    json.begin_object()
+        .field("field", warning.field)
+        .field("value", warning.value)
+        .field("says", warning.says)
+        .end_object();
   json.end_array().end_object();
   return http::json_response(json.take());
 }

@@ -34,15 +34,13 @@ Motion::Motion(const RobotModel& model)
       energy_wh(voltage_v * model.battery.capacity_ah) {
   const Motor& motor = model.motor;
   const double r = model.kinematics.wheel_radius_m;
-  top_speed_m_s =
-      r * (voltage_v - motor.resistance_ohm * friction_current_a) /
-      (motor.voltage_constant_v_s_rad * ratio +
-       motor.resistance_ohm * motor.viscous_friction_nm_s_rad / torque_nm_a);
-  const double stall_a = motor.resistance_ohm > 0 ? voltage_v / motor.resistance_ohm
-                                                  : std::numeric_limits<double>::infinity();
+  top_speed_m_s = r * (voltage_v - motor.resistance_ohm * friction_current_a) /
+                  (motor.voltage_constant_v_s_rad * ratio +
+                   motor.resistance_ohm * motor.viscous_friction_nm_s_rad / torque_nm_a);
+  const double stall_a =
+      motor.resistance_ohm > 0 ? voltage_v / motor.resistance_ohm : std::numeric_limits<double>::infinity();
   const double current_a = std::min(model.limits.current_a, stall_a);
-  wheel_load_kg =
-      mass_kg + 2 * (model.mass.wheel_inertia_kg_m2 + motor.rotor_inertia_kg_m2) / (r * r);
+  wheel_load_kg = mass_kg + 2 * (model.mass.wheel_inertia_kg_m2 + motor.rotor_inertia_kg_m2) / (r * r);
   acceleration_m_s2 = 2 * (torque_nm_a * current_a - friction_nm) / r / wheel_load_kg;
 }
 
@@ -145,15 +143,17 @@ void Review::battery() {
   const Battery& battery = model_.battery;
   const double density = motion_.energy_wh / motion_.mass_kg;
   if (density > greatest_energy_wh_kg)
-    warn("/battery/capacity_ah", density,
-         "is {:.4g} Ah, {:.3g} Wh a kilogram of the whole robot; lithium-ion cells have {:.4g}: is it in mAh?",
-         battery.capacity_ah, density, greatest_energy_wh_kg);
+    warn(
+        "/battery/capacity_ah", density,
+        "is {:.4g} Ah, {:.3g} Wh a kilogram of the whole robot; lithium-ion cells have {:.4g}: is it in mAh?",
+        battery.capacity_ah, density, greatest_energy_wh_kg);
   const double drop = battery.internal_resistance_ohm * battery.capacity_ah / battery.nominal_voltage_v;
   if (drop > 0.5)
-    warn("/battery/internal_resistance_ohm", drop,
-         "is {:.4g} ohm: the current that empties the battery in an hour would take {:.3g} of its voltage: is "
-         "it in milliohm?",
-         battery.internal_resistance_ohm, drop);
+    warn(
+        "/battery/internal_resistance_ohm", drop,
+        "is {:.4g} ohm: the current that empties the battery in an hour would take {:.3g} of its voltage: is "
+        "it in milliohm?",
+        battery.internal_resistance_ohm, drop);
   if (model_.idle_power_w <= 0)
     return warn("/idle_power_w", 0.0,
                 "is 0 W: computer, drivers and sensors draw something whenever the robot is on");

@@ -19,9 +19,9 @@ namespace joulecast::telemetry {
 
 // One number of a channel's messages.
 struct FieldTally {
-  std::string name;             // of the message, with part or index: "motor_current.right"
-  std::uint64_t measured = 0;   // messages in which it was a number
-  std::uint64_t changes = 0;    // of those that said another than the one before
+  std::string name;            // of the message, with part or index: "motor_current.right"
+  std::uint64_t measured = 0;  // messages in which it was a number
+  std::uint64_t changes = 0;   // of those that said another than the one before
   double last = signals::unmeasured, least = signals::unmeasured, greatest = signals::unmeasured;
 
   void take(double value);
@@ -37,8 +37,8 @@ struct ChannelTally {
   std::string last_text;                               // of an event: "finished m-12"
   std::vector<FieldTally> fields;                      // in the order of the message; of events none
   SequenceCounters sequence;                           // of telemetry
-  std::int64_t clock_ahead_us = 0;                     // of the message's stamp before its receiving; the last
-  std::vector<Sender> senders;  // who sent it, of UDP; the first few
+  std::int64_t clock_ahead_us = 0;  // of the message's stamp before its receiving; the last
+  std::vector<Sender> senders;      // who sent it, of UDP; the first few
   // Messages that joulecastd would turn away, by its reasons ("undecodable", "wrong_channel", "implausible"),
   // with a sentence on the last.
   std::map<std::string, std::pair<std::uint64_t, std::string>> faults;

@@ -261,8 +261,8 @@ Result<void> Importer::read_joined() {
       text = given->second;
       source += " with " + joined.table->name;
     }
-    auto series = TableSeries::read(text, main ? mapping_.layout : joined.table->layout, joined.columns, source,
-                                    main ? "" : joined.table->name + ":", open_.report.glitches);
+    auto series = TableSeries::read(text, main ? mapping_.layout : joined.table->layout, joined.columns,
+                                    source, main ? "" : joined.table->name + ":", open_.report.glitches);
     if (!series) return tl::unexpected(std::move(series.error()));
     joined.report.rows = series->rows();
     joined.report.rows_unsorted = series->rows_unsorted();
@@ -346,9 +346,8 @@ Result<void> Importer::take_cells(const std::vector<std::string_view>& row) {
     }
     const auto value = parse_number(text, mapping_.layout.decimal_comma);
     if (!value) return refuse(column.name, text, "is no number");
-    column.value =
-        limited(*value, column.limits != nullptr ? *column.limits : finite, column.value, column.name,
-                table_.line());
+    column.value = limited(*value, column.limits != nullptr ? *column.limits : finite, column.value,
+                           column.name, table_.line());
   }
   return {};
 }
@@ -403,7 +402,8 @@ double Importer::combined(const BoundExpression& bound) const {
   } else if (expression.source == FieldExpression::Source::columns) {
     const bool product = expression.combine == Combine::product;
     value = product ? 1 : 0;
-    for (const Reference& term : bound.terms) value = product ? value * value_of(term) : value + value_of(term);
+    for (const Reference& term : bound.terms)
+      value = product ? value * value_of(term) : value + value_of(term);
     if (expression.combine == Combine::mean) value /= static_cast<double>(bound.terms.size());
   }
   for (const Reference& divisor : bound.over) value /= value_of(divisor);
@@ -579,7 +579,8 @@ Result<std::vector<Import>> Importer::run() {
     result_.back().report.rows_without_motion += last.rows_without_motion;
   }
   report_joins();
-  std::ranges::stable_sort(result_, {}, [](const Import& one) { return one.recording.samples.front().utime_us; });
+  std::ranges::stable_sort(result_, {},
+                           [](const Import& one) { return one.recording.samples.front().utime_us; });
   return std::move(result_);
 }
 

@@ -49,7 +49,7 @@ struct ImportOptions {
   std::string source_name;  // file name, for {stem} and {folder} in mission_id, and for messages
   std::optional<std::string> robot_id;
   std::optional<std::string> mission_id;
-  std::optional<std::int64_t> start_utime_us;  // robot clock of the first row
+  std::optional<std::int64_t> start_utime_us;      // robot clock of the first row
   std::map<std::string, std::string> joined = {};  // text of each joined table, by its name in the mapping
 };
 
@@ -63,25 +63,25 @@ struct Glitch {
 // How the readings of a joined table met the main one's rows.
 struct JoinReport {
   std::string table;
-  std::size_t rows = 0;             // of it
-  std::size_t rows_unsorted = 0;    // not after the row before; put in order
-  std::size_t matched = 0;          // rows of the main table that found a reading of every column ...
-  std::size_t beyond_tolerance = 0; // ... and that did not, for the nearest one is too far
-  double median_lag_s = 0;          // from the reading to the row that uses it
+  std::size_t rows = 0;              // of it
+  std::size_t rows_unsorted = 0;     // not after the row before; put in order
+  std::size_t matched = 0;           // rows of the main table that found a reading of every column ...
+  std::size_t beyond_tolerance = 0;  // ... and that did not, for the nearest one is too far
+  double median_lag_s = 0;           // from the reading to the row that uses it
   double greatest_lag_s = 0;
 };
 
 struct ImportReport {
   std::size_t rows = 0;
-  std::size_t samples = 0;        // `samples_added` among them
-  std::size_t samples_added = 0;  // just before readings that hold change
-  std::size_t rows_without_motion = 0;  // dropped: a wheel velocity is not known (yet)
-  std::size_t rows_out_of_time = 0;     // dropped: time did not advance
-  std::size_t rows_outside_mission = 0; // dropped: the mission's column is empty
-  std::size_t rows_glitched = 0;        // dropped by a limit's policy
-  std::size_t cells_filled = 0;         // empty cells of used columns that repeat the value before
-  std::vector<Glitch> glitches;         // every value out of its column's limits
-  std::vector<JoinReport> joins;        // of the whole main table
+  std::size_t samples = 0;               // `samples_added` among them
+  std::size_t samples_added = 0;         // just before readings that hold change
+  std::size_t rows_without_motion = 0;   // dropped: a wheel velocity is not known (yet)
+  std::size_t rows_out_of_time = 0;      // dropped: time did not advance
+  std::size_t rows_outside_mission = 0;  // dropped: the mission's column is empty
+  std::size_t rows_glitched = 0;         // dropped by a limit's policy
+  std::size_t cells_filled = 0;          // empty cells of used columns that repeat the value before
+  std::vector<Glitch> glitches;          // every value out of its column's limits
+  std::vector<JoinReport> joins;         // of the whole main table
 };
 
 struct Import {

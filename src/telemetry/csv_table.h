@@ -32,7 +32,8 @@ class CsvTable {
   static Result<CsvTable> open(std::string_view text, const CsvFormat& format);
 
   [[nodiscard]] const std::vector<std::string>& header() const noexcept { return header_; }
-  // Place of the column with this name, blanks around names left out; empty when absent. Of equal names the first.
+  // Place of the column with this name, blanks around names left out; empty when absent. Of equal names the
+  // first.
   [[nodiscard]] std::optional<std::size_t> find(std::string_view name) const noexcept;
 
   // The next row with exactly as many fields as the header; false at the end. Views are valid until the next

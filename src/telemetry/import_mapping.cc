@@ -279,8 +279,8 @@ class Reader {
     if (value.contains("separator")) {
       const std::string separator = text(value["separator"], pointer + "/separator");
       result.format.blanks = separator == "blanks";
-      if (!result.format.blanks && (separator.size() != 1 || separator == "\"" || separator == "\n" ||
-                                    separator == "\r"))
+      if (!result.format.blanks &&
+          (separator.size() != 1 || separator == "\"" || separator == "\n" || separator == "\r"))
         refuse(pointer + "/separator", "must be \"blanks\" or one character, not a quote or line end");
       else
         result.format.separator = separator[0];
@@ -292,7 +292,8 @@ class Reader {
       refuse(pointer + "/decimal", "is the separator too: give separator, often \";\"");
     if (value.contains("comment")) result.format.comment = text(value["comment"], pointer + "/comment");
     if (value.contains("skip_lines")) {
-      if (value["skip_lines"].is_number_integer() && value["skip_lines"] >= 0 && value["skip_lines"] <= 10'000)
+      if (value["skip_lines"].is_number_integer() && value["skip_lines"] >= 0 &&
+          value["skip_lines"] <= 10'000)
         result.format.skip_lines = value["skip_lines"].get<std::size_t>();
       else
         refuse(pointer + "/skip_lines", "must be a whole number from 0 to 10000");
@@ -313,8 +314,8 @@ class Reader {
       table.name = name;
       if (name.empty() || name.find(':') != std::string::npos) refuse(here, "must be a name without ':'");
       if (!object(member, here,
-                  {"file", "delay_s", "tolerance_s", "separator", "decimal", "comment", "skip_lines", "header",
-                   "column_prefix", "time"}))
+                  {"file", "delay_s", "tolerance_s", "separator", "decimal", "comment", "skip_lines",
+                   "header", "column_prefix", "time"}))
         continue;
       table.file = text(member.value("file", json()), here + "/file");
       if (member.contains("delay_s")) table.delay_s = number(member["delay_s"], here + "/delay_s");
@@ -359,11 +360,11 @@ class Reader {
 
   ImportMapping::Content mapping(const json& value) {
     ImportMapping::Content content;
-    if (!object(
-            value, "",
-            {"$schema", "description", "robot_id", "mission_id", "mission", "payload_kg", "separator",
-             "decimal", "comment", "skip_lines", "header", "column_prefix", "time", "tables", "interpolation",
-             "empty_cells", "require", "column_limits", "fields", "covariates", "labels"})) {
+    if (!object(value, "",
+                {"$schema",   "description", "robot_id",      "mission_id",  "mission", "payload_kg",
+                 "separator", "decimal",     "comment",       "skip_lines",  "header",  "column_prefix",
+                 "time",      "tables",      "interpolation", "empty_cells", "require", "column_limits",
+                 "fields",    "covariates",  "labels"})) {
       return content;
     }
     names(value, content);
@@ -417,8 +418,9 @@ std::vector<MappingWarning> suspicious(const ImportMapping& mapping) {
   const bool battery = has("battery_voltage") && has("battery_current");
   const bool motors = has("motor_voltage[0]") && has("motor_current[0]");
   if (!battery && !motors)
-    found.push_back({"/fields", "give neither the battery's voltage and current nor the motors': no power "
-                                "will be known"});
+    found.push_back({"/fields",
+                     "give neither the battery's voltage and current nor the motors': no power "
+                     "will be known"});
   const auto is_constant = [&](std::string_view name) {
     return has(name) && given[name]->source == FieldExpression::Source::constant;
   };

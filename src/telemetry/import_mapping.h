@@ -87,8 +87,8 @@ struct TableLayout {
   std::string column_prefix;
   std::string time_column;
   std::int64_t time_unit_ns = 1'000'000'000;  // 0: ISO 8601
-  std::string utc_offset;                     // of ISO stamps that name no zone: "Z", "+01:00"; empty: refused
-  std::int64_t epoch_us = 0;                  // robot clock where the time column reads 0
+  std::string utc_offset;     // of ISO stamps that name no zone: "Z", "+01:00"; empty: refused
+  std::int64_t epoch_us = 0;  // robot clock where the time column reads 0
 };
 
 enum class Interpolation { hold, linear };

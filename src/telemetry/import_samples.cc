@@ -61,12 +61,11 @@ std::size_t add_steps(std::vector<signals::Sample>& samples, const std::vector<s
   if (numbers.empty()) return 0;
   std::vector<signals::Sample> stepped;
   for (const signals::Sample& sample : samples) {
-    const bool changes =
-        !stepped.empty() && std::ranges::any_of(numbers, [&](std::size_t number) {
-          const double before = *signals::numbers_of(stepped.back())[number];
-          const double now = *signals::numbers_of(sample)[number];
-          return before != now && !std::isnan(before) && !std::isnan(now);
-        });
+    const bool changes = !stepped.empty() && std::ranges::any_of(numbers, [&](std::size_t number) {
+      const double before = *signals::numbers_of(stepped.back())[number];
+      const double now = *signals::numbers_of(sample)[number];
+      return before != now && !std::isnan(before) && !std::isnan(now);
+    });
     if (changes && sample.utime_us - stepped.back().utime_us > 2 * step_us) {
       signals::Sample corner = sample;
       corner.utime_us -= step_us;

@@ -85,8 +85,7 @@ Result<TableSeries> TableSeries::read(std::string_view csv, const TableLayout& l
       series.columns_[k].points.push_back({utime_us, reading});
     }
   }
-  for (Column& column : series.columns_)
-    std::ranges::stable_sort(column.points, {}, &Point::utime_us);
+  for (Column& column : series.columns_) std::ranges::stable_sort(column.points, {}, &Point::utime_us);
   return series;
 }
 
@@ -108,8 +107,8 @@ TableSeries::Reading TableSeries::at(std::size_t column, std::int64_t utime_us,
   if (next == points.end() || next->utime_us - before.utime_us > tolerance_us)
     return {signals::unmeasured, age_us, true};
   const double share = static_cast<double>(age_us) / static_cast<double>(next->utime_us - before.utime_us);
-  return {before.value + share * (next->value - before.value),
-          std::min(age_us, next->utime_us - utime_us), false};
+  return {before.value + share * (next->value - before.value), std::min(age_us, next->utime_us - utime_us),
+          false};
 }
 
 }  // namespace joulecast::telemetry

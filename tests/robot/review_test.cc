@@ -40,7 +40,8 @@ TEST(Review, NamesTheMistakenField) {
     return fields_of(model);
   };
   EXPECT_THAT(mistaken([](RobotModel& m) { m.motor.gear_ratio = 1; }), Contains("/motor/gear_ratio"));
-  EXPECT_THAT(mistaken([](RobotModel& m) { m.battery.nominal_voltage_v = 20; }), Contains("/limits/speed_m_s"));
+  EXPECT_THAT(mistaken([](RobotModel& m) { m.battery.nominal_voltage_v = 20; }),
+              Contains("/limits/speed_m_s"));
   EXPECT_THAT(mistaken([](RobotModel& m) { m.battery.capacity_ah = 20'000; }),
               Contains("/battery/capacity_ah"));
   EXPECT_THAT(mistaken([](RobotModel& m) { m.battery.internal_resistance_ohm = 1.9; }),
@@ -48,7 +49,9 @@ TEST(Review, NamesTheMistakenField) {
   EXPECT_THAT(mistaken([](RobotModel& m) { m.motor.inductance_h = 0.42; }), Contains("/motor/inductance_h"));
   EXPECT_THAT(mistaken([](RobotModel& m) { m.motor.torque_constant_nm_a *= 2; }),
               Contains("/motor/torque_constant_nm_a"));
-  EXPECT_THAT(mistaken([](RobotModel& m) { m.motor.friction_torque_nm = {8.4, 8.8}; }),
+  EXPECT_THAT(mistaken([](RobotModel& m) {
+                m.motor.friction_torque_nm = {8.4, 8.8};
+              }),
               Contains("/motor/friction_torque_nm"));
   EXPECT_THAT(mistaken([](RobotModel& m) { m.limits.yaw_rate_rad_s = 90; }),
               Contains("/limits/yaw_rate_rad_s"));

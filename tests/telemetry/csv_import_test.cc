@@ -320,11 +320,13 @@ TEST(CsvImport, ReadsCommentsBlanksDecimalCommasAndTablesWithoutHeader) {
 TEST(CsvImport, ProductsAndQuotientsOfColumns) {
   const std::string csv = "t,r,l,p,v,z\n0,1,1,240,24,0\n1,1,1,250,25,0\n";
   EXPECT_THAT(battery_voltages(csv, "", R"({"column": "p", "over": ["v"]})"), testing::ElementsAre(10, 10));
-  EXPECT_THAT(battery_voltages(csv, "", R"({"columns": ["p", {"column": "v", "scale": 2}], "combine": "product"})"),
-              testing::ElementsAre(11'520, 12'500));
+  EXPECT_THAT(
+      battery_voltages(csv, "", R"({"columns": ["p", {"column": "v", "scale": 2}], "combine": "product"})"),
+      testing::ElementsAre(11'520, 12'500));
   EXPECT_THAT(battery_voltages(csv, "", R"({"columns": ["p", {"column": "v", "scale": -0.5}]})"),
               testing::ElementsAre(228, 237.5));
-  EXPECT_THAT(battery_voltages(csv, "", R"({"column": "p", "over": ["z"]})"), testing::Each(testing::IsNan()));
+  EXPECT_THAT(battery_voltages(csv, "", R"({"column": "p", "over": ["z"]})"),
+              testing::Each(testing::IsNan()));
 }
 
 // Counts of an encoder of 16 bits that turns evenly, then half as fast, against the clock's shake.
@@ -337,22 +339,27 @@ TEST(CsvImport, PositionsBecomeSpeeds) {
     counts += k < 100 ? 40 : 20;
   }
   const auto missions = missions_of(
-      csv, R"({"robot_id": "r", "mission_id": "m", "time": {"column": "t", "unit": "s"}, "fields": {"wheel_velocity": [
+      csv,
+      R"({"robot_id": "r", "mission_id": "m", "time": {"column": "t", "unit": "s"}, "fields": {"wheel_velocity": [
       {"column": "r", "divide_by": 100, "rate": {"window_s": 0.1, "wraps_at": 655.36}}, {"column": "l", "rate": {}}]}})");
   ASSERT_EQ(missions.size(), 1u);
   const auto& samples = missions[0].recording.samples;
   ASSERT_EQ(samples.size(), 200u);
-  for (const std::size_t k : {0u, 10u, 50u, 90u}) EXPECT_NEAR(samples[k].wheel_velocity_rad_s[0], 20, 1e-6) << k;
-  for (const std::size_t k : {110u, 150u, 199u}) EXPECT_NEAR(samples[k].wheel_velocity_rad_s[0], 10, 1e-6) << k;
+  for (const std::size_t k : {0u, 10u, 50u, 90u})
+    EXPECT_NEAR(samples[k].wheel_velocity_rad_s[0], 20, 1e-6) << k;
+  for (const std::size_t k : {110u, 150u, 199u})
+    EXPECT_NEAR(samples[k].wheel_velocity_rad_s[0], 10, 1e-6) << k;
   for (const signals::Sample& sample : samples) EXPECT_NEAR(sample.wheel_velocity_rad_s[1], -5, 1e-6);
 }
 
 TEST(CsvImport, AColumnNamesTheMissions) {
   const std::string csv =
-      "t,r,l,run,v,kind\n0,1,1,a b,5,ice\n1,1,1,a b,5,\n2,1,1,,5,\n3,1,1,c,6,\n4,1,1,c,6,mud\n5,1,1,a b,7,mud\n";
+      "t,r,l,run,v,kind\n0,1,1,a b,5,ice\n1,1,1,a b,5,\n2,1,1,,5,\n3,1,1,c,6,\n4,1,1,c,6,mud\n5,1,1,a "
+      "b,7,mud\n";
   const auto mapping = [](const std::string& cells) {
-    return R"({"robot_id": "r", "mission": {"column": "run"}, "time": {"column": "t", "unit": "s"}, )" + cells +
-           R"("labels": {"floor": {"column": "kind"}}, "covariates": {"v": {"column": "v"}}, )" + wheels + "}}";
+    return R"({"robot_id": "r", "mission": {"column": "run"}, "time": {"column": "t", "unit": "s"}, )" +
+           cells + R"("labels": {"floor": {"column": "kind"}}, "covariates": {"v": {"column": "v"}}, )" +
+           wheels + "}}";
   };
   const auto held = missions_of(csv, mapping(""));
   ASSERT_EQ(held.size(), 3u);
@@ -361,8 +368,10 @@ TEST(CsvImport, AColumnNamesTheMissions) {
   EXPECT_EQ(held[1].recording.mission_id, "c");
   EXPECT_EQ(held[2].recording.mission_id, "a_b-2");
   // What holds from before holds in the mission too.
-  EXPECT_THAT(signals::find_series(held[1].recording.covariates, "v")->utime_us, testing::ElementsAre(3'000'000));
-  EXPECT_THAT(signals::find_series(held[1].recording.covariates, "floor=ice")->value, testing::ElementsAre(1, 0));
+  EXPECT_THAT(signals::find_series(held[1].recording.covariates, "v")->utime_us,
+              testing::ElementsAre(3'000'000));
+  EXPECT_THAT(signals::find_series(held[1].recording.covariates, "floor=ice")->value,
+              testing::ElementsAre(1, 0));
   const auto blank = missions_of(csv, mapping(R"("empty_cells": "unmeasured", )"));
   ASSERT_EQ(blank.size(), 3u);
   EXPECT_EQ(blank[0].recording.samples.size(), 2u);
@@ -422,8 +431,8 @@ TEST(CsvImport, EnergyOfHeldReadingsIsThatOfTheirSteps) {
       i = k / 2 % 3 == 0 ? 60 : 2 + k % 7;
       v = 26 - 0.1 * i;
     }
-    csv += std::to_string(0.05 * k) + "," + std::to_string(0.1 * k) + ",1," + (fresh ? std::to_string(v) : "") + "," +
-           (fresh ? std::to_string(i) : "") + "\n";
+    csv += std::to_string(0.05 * k) + "," + std::to_string(0.1 * k) + ",1," +
+           (fresh ? std::to_string(v) : "") + "," + (fresh ? std::to_string(i) : "") + "\n";
   }
   const auto energy_j = [&](const std::string& how) {
     const auto missions = missions_of(
@@ -434,8 +443,10 @@ TEST(CsvImport, EnergyOfHeldReadingsIsThatOfTheirSteps) {
     for (std::size_t k = 1; k < samples.size(); ++k) {
       const signals::Sample &a = samples[k - 1], &b = samples[k];
       const double dt = 1e-6 * static_cast<double>(b.utime_us - a.utime_us);
-      sum_j += dt * ((a.battery_voltage_v * a.battery_current_a + b.battery_voltage_v * b.battery_current_a) / 2 -
-                     (b.battery_voltage_v - a.battery_voltage_v) * (b.battery_current_a - a.battery_current_a) / 6);
+      sum_j +=
+          dt *
+          ((a.battery_voltage_v * a.battery_current_a + b.battery_voltage_v * b.battery_current_a) / 2 -
+           (b.battery_voltage_v - a.battery_voltage_v) * (b.battery_current_a - a.battery_current_a) / 6);
       EXPECT_EQ(b.sequence, static_cast<std::int64_t>(k));
     }
     return sum_j;
@@ -445,13 +456,15 @@ TEST(CsvImport, EnergyOfHeldReadingsIsThatOfTheirSteps) {
 }
 
 TEST(ImportMapping, TellsEveryFaultAtOnceAndWhatIsSuspicious) {
-  const auto faulty = ImportMapping::parse(mapping_text(R"("robt_id": 1, "payload_kg": -1, "decimal": ",", )"));
+  const auto faulty =
+      ImportMapping::parse(mapping_text(R"("robt_id": 1, "payload_kg": -1, "decimal": ",", )"));
   ASSERT_FALSE(faulty);
   const std::string all = faulty.error().field + " " + faulty.error().message;
   for (const char* pointer : {"/robt_id", "/payload_kg", "/decimal"}) EXPECT_THAT(all, HasSubstr(pointer));
   const auto warned = [](const std::string& fields) {
     std::vector<std::string> pointers;
-    for (const MappingWarning& warning : suspicious(mapping_of("", fields))) pointers.push_back(warning.field);
+    for (const MappingWarning& warning : suspicious(mapping_of("", fields)))
+      pointers.push_back(warning.field);
     return pointers;
   };
   EXPECT_THAT(warned(R"(, "battery_voltage": {"column": "v"}, "battery_current": {"column": "i"})"),
