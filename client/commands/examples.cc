@@ -35,8 +35,7 @@ constexpr Examples table[] = {
      "joulecast missions --server http://127.0.0.1:8080 --from 2026-11-21 --state finished"},
     {"check",
      "joulecast check amr.json mapping.json\n"
-     "joulecast check amr.lcmlog --robot amr.json\n"
-     "joulecast check runs.csv --mapping mapping.json --json"},
+     "joulecast check amr.lcmlog --robot amr.json --json"},
     {"spy", "joulecast spy --seconds 3\njoulecast spy --seconds 3 --json"},
     {"import",
      "joulecast import runs.csv --mapping mapping.json --start 2026-03-01T08:00:00Z --out imported.lcmlog"},
