@@ -33,6 +33,10 @@ constexpr Examples table[] = {
     {"missions",
      "joulecast missions --server http://127.0.0.1:8080 --robot-id amr --limit 20\n"
      "joulecast missions --server http://127.0.0.1:8080 --from 2026-11-21 --state finished"},
+    {"check",
+     "joulecast check amr.json mapping.json\n"
+     "joulecast check amr.lcmlog --robot amr.json --json"},
+    {"spy", "joulecast spy --seconds 3\njoulecast spy --seconds 3 --json"},
     {"import",
      "joulecast import runs.csv --mapping mapping.json --start 2026-03-01T08:00:00Z --out imported.lcmlog"},
     {"replay",

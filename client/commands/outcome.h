@@ -11,7 +11,8 @@ enum class Exit : int {
   usage = 2,        // the command line itself is wrong, or a value given in it
   unreachable = 3,  // server, network or disk did not answer
   infeasible = 4,   // well-formed, but nothing satisfies it
-  internal = 5      // a bug of joulecast's
+  internal = 5,     // a bug of joulecast's
+  warned = 6        // of check: nothing is wrong, something is suspicious
 };
 
 inline constexpr const char* exit_codes_help =
@@ -21,7 +22,8 @@ inline constexpr const char* exit_codes_help =
     "  2  the command line is wrong, or a value given in it\n"
     "  3  server, network or disk could not be reached\n"
     "  4  nothing satisfies the request\n"
-    "  5  a bug of joulecast's";
+    "  5  a bug of joulecast's\n"
+    "  6  check: warnings, but no fault";
 
 [[nodiscard]] Exit exit_of(Fault fault);
 

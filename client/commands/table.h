@@ -21,6 +21,7 @@ void add_audit(CLI::App& program, Exit& exit);
 void add_autonomy(CLI::App& program, Exit& exit);
 void add_battery(CLI::App& program, Exit& exit);
 void add_calibrate(CLI::App& program, Exit& exit);
+void add_check(CLI::App& program, Exit& exit);
 void add_completion(CLI::App& program, Exit& exit);
 void add_effects(CLI::App& program, Exit& exit);
 void add_estimate(CLI::App& program, Exit& exit);
@@ -32,6 +33,7 @@ void add_missions(CLI::App& program, Exit& exit);
 void add_profile(CLI::App& program, Exit& exit);
 void add_replay(CLI::App& program, Exit& exit);
 void add_simulate(CLI::App& program, Exit& exit);
+void add_spy(CLI::App& program, Exit& exit);
 void add_thesis(CLI::App& program, Exit& exit);
 void add_token(CLI::App& program, Exit& exit);
 

@@ -28,6 +28,8 @@ constexpr auto table = std::to_array<Named>({
     {"", "--turn", "ANGLE", ""},
     {"matrix", "request", "FILE", "*.json"},
     {"", "log", "FILE", "*.lcmlog"},
+    {"check", "file", "FILE", "*.json"},
+    {"check", "--mapping", "FILE", "*.json"},
     {"import", "table", "FILE", "*.csv"},
     {"import", "--mapping", "FILE", "*.json"},
     {"import", "--out", "FILE", "*.lcmlog"},

@@ -3,6 +3,7 @@
 #include <set>
 #include <utility>
 
+#include "robot/review.h"
 #include "robot/robot_file.h"
 #include "server/api/common_parameters.h"
 #include "server/api/robot_json.h"
@@ -75,6 +76,9 @@ Result<Response> put(Services& services, const Request& request) {
   // The catalogue's bounds are checked before anything is stored.
   if (auto effects = dynamics::active_effects(*robot); !effects)
     return tl::unexpected(std::move(effects.error()));
+  const std::vector<robot::ReviewFinding> findings = robot::review(*robot);
+  if (auto plannable = robot::plannable(findings); !plannable)
+    return tl::unexpected(std::move(plannable.error()));
   history::AddModel command;
   command.robot_id = id;
   command.utime_us = services.now_utime_us();
@@ -85,7 +89,14 @@ Result<Response> put(Services& services, const Request& request) {
   if (Result<void> placed = services.models.put(std::move(*robot), *version); !placed)
     return tl::unexpected(std::move(placed.error()));
   JsonWriter json;
-  json.begin_object().field("robot_id", id).field("model_version", *version).end_object();
+  json.begin_object().field("robot_id", id).field("model_version", *version).key("warnings").begin_array();
+  for (const robot::ReviewFinding& warning : findings)
+    json.begin_object()
+        .field("field", warning.field)
+        .field("value", warning.value)
+        .field("says", warning.says)
+        .end_object();
+  json.end_array().end_object();
   return http::json_response(json.take());
 }
 
