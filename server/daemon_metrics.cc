@@ -11,9 +11,10 @@ namespace joulecast::server {
 
 static_assert(history::MissionState{} == history::MissionState::open);
 
-void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters, const ingest::IngestService& ingest,
-                    const ingest::FleetView& fleet, const history::Writer& writer, const history::Store& store,
-                    const http::EventHub& events, std::function<std::int64_t()> now_utime_us) {
+void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
+                    const ingest::IngestService& ingest, const ingest::FleetView& fleet,
+                    const history::Writer& writer, const history::Store& store, const http::EventHub& events,
+                    std::function<std::int64_t()> now_utime_us) {
   const Counter messages =
       metrics.counter("joulecast_ingest_messages_total", "Messages received on the robots' channels");
   const Counter samples = metrics.counter("joulecast_ingest_samples_total", "Samples accounted for");

@@ -125,7 +125,10 @@ const fleet = await startUntil(
 );
 await writeFile(
   hourRobot,
-  JSON.stringify({ ...(await get('/v1/robots/amr-01')).model, robot_id: 'hour-01' }),
+  JSON.stringify({
+    ...(await get('/v1/robots/amr-01')).model,
+    robot_id: 'hour-01',
+  }),
 );
 await stop(daemon);
 await run(given.client, [
@@ -156,7 +159,10 @@ async function withEffect(robotId, effect, more = []) {
   const file = path.join(given.out, `${robotId}.json`);
   await writeFile(
     file,
-    JSON.stringify({ ...JSON.parse(await readFile(hourRobot, 'utf8')), robot_id: robotId }),
+    JSON.stringify({
+      ...JSON.parse(await readFile(hourRobot, 'utf8')),
+      robot_id: robotId,
+    }),
   );
   await run(given.client, [
     'simulate',
@@ -252,7 +258,9 @@ await check('the fleet is live', async () => {
   await page.waitForSelector('.fleet tbody th a');
   equal(await page.locator('.fleet tbody tr:not(.spacer)').count(), 4, 'rows of robots that were heard');
   await page
-    .getByRole('button', { name: 'Show 3 robots without telemetry since the service started' })
+    .getByRole('button', {
+      name: 'Show 3 robots without telemetry since the service started',
+    })
     .click();
   await until(
     'rows of all robots',
@@ -296,7 +304,10 @@ await check('the fleet is found, chosen and ordered', async () => {
 await check('a robot that stands, is silent or was restarted is shown as that', async () => {
   const fresh = await openPage();
   await fresh.route('**/v1/events', (route) =>
-    route.fulfill({ contentType: 'text/event-stream', body: 'retry: 600000\n\n' }),
+    route.fulfill({
+      contentType: 'text/event-stream',
+      body: 'retry: 600000\n\n',
+    }),
   );
   const heard = {
     live: true,
@@ -308,14 +319,20 @@ await check('a robot that stands, is silent or was restarted is shown as that', 
     faults: {},
   };
   const told = [
-    { ...heard, robot_id: 'restarted', faults: { restart: 1, gap: 1, outside_mission: 40 } },
+    {
+      ...heard,
+      robot_id: 'restarted',
+      faults: { restart: 1, gap: 1, outside_mission: 40 },
+    },
     { ...heard, robot_id: 'lossy', faults: { missing: 3, restart: 1 } },
     { ...heard, robot_id: 'quiet', live: false, silent_s: 7200 },
     { ...heard, robot_id: 'standing', speed_m_s: 0, measured_power_w: 20 },
   ];
   await fresh.route('**/v1/robots', async (route) => {
     const { robots } = await (await route.fetch()).json();
-    await route.fulfill({ json: { robots: told.map((own) => ({ ...robots[0], ...own })) } });
+    await route.fulfill({
+      json: { robots: told.map((own) => ({ ...robots[0], ...own })) },
+    });
   });
   faultsWanted = true; // the stream ends at once
   await go(fresh, '#/fleet');
@@ -376,7 +393,7 @@ await check('missions are filtered, summed and kept in the address', async () =>
     'the totals',
     async () => number(await page.locator('.readouts dd .number').first().textContent()) >= totals.missions,
   );
-  await page.getByLabel('Payload, from kg').fill('100000');
+  await page.getByLabel('Payload, kg, from').fill('100000');
   await page.keyboard.press('Enter');
   await page.getByText('No mission matches').waitFor();
   await page.getByRole('button', { name: 'Clear' }).click();
@@ -469,24 +486,86 @@ await check('missions are sorted by their columns and found by a part of the nam
     'one mission',
     async () => (await page.locator('.missions tbody th').allTextContents()).join() === 'worn-01-s12-m3',
   );
-  await page.getByText('1 found in the newest 8 of 8 loaded').waitFor();
+  await page.getByText('1 of 1 loaded').waitFor();
 });
 
-await check('missions are summed by day', async () => {
+await check(
+  'missions are found by a range of their ratio, and the headers sort by the keyboard',
+  async () => {
+    const { missions } = await get('/v1/missions?robot_id=worn-01&sort=ratio&order=desc&limit=50');
+    const least = missions[2].ratio;
+    await go(page, `#/missions?robot=worn-01&ratio_min=${least}`);
+    await until('three missions', async () => (await page.locator('.missions tbody tr').count()) === 3);
+    await page.getByRole('button', { name: 'Energy', exact: true }).focus();
+    await page.keyboard.press('Enter');
+    await page.locator('.missions th[aria-sort=descending]', { hasText: 'Energy' }).waitFor();
+    const some = missions.slice(0, 3).sort((one, other) => other.energy.battery_j - one.energy.battery_j);
+    await until(
+      'falling energies',
+      async () =>
+        (await page.locator('.missions tbody th').allTextContents()).join() ===
+        some.map((m) => m.mission_id).join(),
+    );
+    await page.getByRole('combobox', { name: 'Robot', exact: true }).selectOption(robot);
+    await page.getByRole('button', { name: 'Leave out worn-01' }).click();
+    await until('the other robot alone', () => page.url().includes(`robot=${robot}&`));
+  },
+);
+
+await check('trends sum missions by day and week, of the fleet and of robots side by side', async () => {
   const { missions } = await get('/v1/missions?robot_id=worn-01&limit=50');
-  const end = new Date(missions[0].end_utime_us / 1000);
-  const local = new Date(end - end.getTimezoneOffset() * 60_000 + 60_000).toISOString().slice(0, 16);
-  await go(page, `#/missions?robot=worn-01&to=${local}&trend=day`);
-  await page.locator('.trends tbody tr').first().waitFor();
-  const counts = (await page.locator('.trends tbody td:nth-child(2)').allTextContents()).map(number);
-  equal(
-    counts.reduce((a, b) => a + b),
-    missions.length,
-    'missions of all days',
-  );
-  const energies = (await page.locator('.trends tbody td:nth-child(3)').allTextContents()).map(joulesOf);
-  const sum = missions.reduce((total, m) => total + m.energy.battery_j, 0);
-  expect(Math.abs(energies.reduce((a, b) => a + b) / sum - 1) < 0.01, `${energies} against ${sum} J`);
+  const day = new Date(Math.min(...missions.map((m) => m.start_utime_us)) / 1000 - 86_400_000);
+  const from = day.toISOString().slice(0, 10);
+  const rows = page.locator('.trends tbody tr');
+  for (const by of ['day', 'week']) {
+    await go(page, `#/trends?robot=worn-01&from=${from}&by=${by}`);
+    await rows.first().waitFor();
+    const counts = (await page.locator('.trends tbody td:nth-child(2)').allTextContents()).map(number);
+    equal(
+      counts.reduce((a, b) => a + b),
+      missions.length,
+      `missions by ${by}`,
+    );
+    const energies = (await page.locator('.trends tbody td:nth-child(3)').allTextContents()).map(joulesOf);
+    const sum = missions.reduce((total, m) => total + m.energy.battery_j, 0);
+    expect(Math.abs(energies.reduce((a, b) => a + b) / sum - 1) < 0.01, `${energies} against ${sum} J`);
+    equal(await page.locator('.trend-charts .uplot').count(), 3, 'charts');
+  }
+  await page.getByRole('combobox', { name: 'Robot', exact: true }).selectOption('oval-01');
+  await page.locator('.trend-key', { hasText: 'oval-01' }).waitFor();
+  const button = page.getByRole('button', { name: 'Export CSV' });
+  const [download] = await Promise.all([page.waitForEvent('download'), button.click()]);
+  const [head, ...lines] = (await readFile(await download.path(), 'utf8')).trim().split('\r\n');
+  expect(head.startsWith('robots,from,to,missions,') && lines.length > 0, head);
+});
+
+await check('robots, periods and missions are compared side by side', async () => {
+  const figures = async (row) => {
+    const cells = page
+      .locator('.compare tbody tr', {
+        has: page.getByText(row, { exact: true }),
+      })
+      .locator('td');
+    await cells.first().waitFor();
+    return cells.allTextContents();
+  };
+  await go(page, '#/compare?a_robot=worn-01&b_robot=oval-01');
+  for (const [k, id] of ['worn-01', 'oval-01'].entries()) {
+    const totals = await get(`/v1/mission-totals?robot_id=${id}`);
+    equal(number((await figures('Missions'))[k]), totals.missions, `missions of ${id}`);
+    expect(
+      Math.abs(joulesOf((await figures('Battery energy'))[k]) / totals.energy.battery_j - 1) < 0.01,
+      `${await figures('Battery energy')}`,
+    );
+  }
+  const { missions } = await get('/v1/missions?robot_id=worn-01&sort=ratio&limit=50');
+  const [first, last] = [missions[0], missions.at(-1)];
+  await go(page, `#/compare?kind=missions&a_mission=${first.id}&b_mission=${last.id}`);
+  const ratios = await figures('Ratio');
+  equal(`${ratios[0]} ${ratios[1]}`, `${first.ratio.toFixed(3)} ${last.ratio.toFixed(3)}`, 'ratios');
+  await page.getByRole('button', { name: 'Periods', exact: true }).click();
+  await page.getByText('Second period').waitFor();
+  await page.locator('.compare tbody tr').first().waitFor();
 });
 
 await check('a proposed model says what it changes, and is adopted only when confirmed', async () => {
@@ -525,19 +604,36 @@ await check('a proposed model says what it changes, and is adopted only when con
   await page.unroute('**/v1/robots/worn-01/model');
   await page.route('**/v1/robots/worn-01/proposals?*', (route) =>
     route.fulfill({
-      json: { robot_id: 'worn-01', proposals: [{ ...proposals[0], base_version: 7 }] },
+      json: {
+        robot_id: 'worn-01',
+        proposals: [
+          {
+            ...proposals[0],
+            state: 'superseded',
+            closed_reason: 'made for version 7',
+          },
+        ],
+      },
     }),
   );
   await page.reload();
   await page.getByText('1 closed proposal').click();
-  await page.getByText('it was made for version 7, and version 1 is in force').waitFor();
+  await page.getByText('made for version 7').waitFor();
   await page.unroute('**/v1/robots/worn-01/proposals?*');
 });
 
 await check('an undeclared payload is shown with the mission', async () => {
   const { missions } = await get('/v1/missions?robot_id=worn-01&limit=1');
-  const payload = { verdict: 'undeclared', declared_kg: 0, undeclared_kg: 12.3, undeclared_sd_kg: 1.1 };
-  const loaded = { ...missions[0], findings: { ...missions[0].findings, payload } };
+  const payload = {
+    verdict: 'undeclared',
+    declared_kg: 0,
+    undeclared_kg: 12.3,
+    undeclared_sd_kg: 1.1,
+  };
+  const loaded = {
+    ...missions[0],
+    findings: { ...missions[0].findings, payload },
+  };
   await page.route('**/v1/missions?*', (route) =>
     route.fulfill({ json: { missions: [loaded], next_cursor: null } }),
   );
@@ -789,7 +885,9 @@ await check('what is not there is said', async () => {
 await check('waiting and faults are said, and tried again', async () => {
   const fresh = await openPage();
   const shot = (name) =>
-    fresh.screenshot({ path: path.join(given.out, 'screenshots', `${name}-laptop.png`) });
+    fresh.screenshot({
+      path: path.join(given.out, 'screenshots', `${name}-laptop.png`),
+    });
   let letGo;
   const held = new Promise((goOn) => (letGo = goOn));
   await fresh.route('**/v1/missions?*', async (route) => {
@@ -797,7 +895,11 @@ await check('waiting and faults are said, and tried again', async () => {
     await route.fulfill({
       status: 503,
       contentType: 'application/problem+json',
-      body: JSON.stringify({ title: 'Service Unavailable', status: 503, detail: 'the store is busy' }),
+      body: JSON.stringify({
+        title: 'Service Unavailable',
+        status: 503,
+        detail: 'the store is busy',
+      }),
     });
   });
   await go(fresh, '#/missions');
@@ -849,7 +951,9 @@ await check('the other views come when asked for, and say when they cannot', asy
   await fresh.route('**/views.js', (route) => route.abort());
   await fresh.getByRole('link', { name: 'Gap', exact: true }).click();
   await fresh.getByText('This part of the page could not be loaded').waitFor();
-  await fresh.screenshot({ path: path.join(given.out, 'screenshots', 'gap-not-loaded-laptop.png') });
+  await fresh.screenshot({
+    path: path.join(given.out, 'screenshots', 'gap-not-loaded-laptop.png'),
+  });
   await fresh.context().close();
   faultsWanted = false;
 });
@@ -857,7 +961,9 @@ await check('the other views come when asked for, and say when they cannot', asy
 await check('a diagnosis is started by keyboard, followed and read', async () => {
   await go(page, '#/gap');
   await page.getByText('No diagnosis yet').waitFor();
-  await page.screenshot({ path: path.join(given.out, 'screenshots', 'gap-empty-laptop.png') });
+  await page.screenshot({
+    path: path.join(given.out, 'screenshots', 'gap-empty-laptop.png'),
+  });
   equal(
     await page
       .getByRole('combobox', { name: 'Robot', exact: true })
@@ -875,7 +981,9 @@ await check('a diagnosis is started by keyboard, followed and read', async () =>
   await page.keyboard.press('Enter');
   await page.getByRole('heading', { level: 1, name: /^Diagnosis \d+$/ }).waitFor();
   diagnosis = Number((await page.getByRole('heading', { level: 1 }).textContent()).match(/\d+/)[0]);
-  await page.screenshot({ path: path.join(given.out, 'screenshots', 'gap-running-laptop.png') });
+  await page.screenshot({
+    path: path.join(given.out, 'screenshots', 'gap-running-laptop.png'),
+  });
   await page.getByText('Effects found').waitFor({ timeout: 120_000 });
   const { result, held_back: heldBack } = await get(`/v1/diagnoses/${diagnosis}`);
   equal(result.effects[0].id, 'coulomb_friction', 'the effect');
@@ -957,7 +1065,10 @@ await check('a diagnosis shows its checks, what would fit, and effects to choose
   await choice.selectOption('viscous_friction');
   const asked = page.waitForRequest(`**/v1/robots/worn-01/model`);
   await page.route(`**/v1/robots/worn-01/model`, (route) =>
-    route.fulfill({ status: 409, json: { status: 409, title: 'Conflict', detail: 'told by the test' } }),
+    route.fulfill({
+      status: 409,
+      json: { status: 409, title: 'Conflict', detail: 'told by the test' },
+    }),
   );
   faultsWanted = true;
   await adopt(page, 'Adopt');
@@ -965,7 +1076,10 @@ await check('a diagnosis shows its checks, what would fit, and effects to choose
   await page.getByText('told by the test').waitFor();
   faultsWanted = false;
   await page.unroute(`**/v1/robots/worn-01/model`);
-  Object.assign(refused.result.adoption, { refusal: 'the verdict is inconclusive', choice_settles: false });
+  Object.assign(refused.result.adoption, {
+    refusal: 'the verdict is inconclusive',
+    choice_settles: false,
+  });
   refused.result.adoption.effects[0].instead = [];
   await go(page, '#/gap');
   await go(page, `#/gap/${diagnosis}`);
@@ -1012,7 +1126,9 @@ await check('no gap is shown without regions and without adoption; a zoom is in 
 await check('a mission tells the conditions of its drive', async () => {
   const mission = (await get('/v1/missions?robot_id=worn-01')).missions[0];
   await go(page, `#/missions/${mission.id}`);
-  const conditions = page.locator('.panel', { has: page.getByRole('heading', { name: 'Conditions' }) });
+  const conditions = page.locator('.panel', {
+    has: page.getByRole('heading', { name: 'Conditions' }),
+  });
   await conditions.getByRole('rowheader', { name: 'cpu load' }).waitFor();
   const { covariates } = await get(`/v1/missions/${mission.id}/covariates`);
   const loads = covariates.find((c) => c.name === 'cpu_load').value;
@@ -1163,6 +1279,8 @@ const views = {
   diagnosis: `#/gap/${diagnosis}`,
   outside: `#/gap/${outside}`,
   worn: '#/robots/worn-01',
+  trends: '#/trends?by=day&from=2020-01-01',
+  compare: '#/compare?a_robot=worn-01&b_robot=oval-01',
   audit: '#/audit',
   help: '#/help',
 };
@@ -1175,7 +1293,9 @@ for (const [size, viewport] of Object.entries(sizes)) {
         async () => {
           await go(shown, hash);
           await shown
-            .locator('main .readouts, main .plan-result, main .jobs, main .events, main .glossary')
+            .locator(
+              'main .readouts, main .plan-result, main .jobs, main .events, main .glossary, main .trends, main .compare',
+            )
             .first()
             .waitFor();
           await until('an end of loading', async () => (await shown.locator('.loading').count()) === 0);
@@ -1254,7 +1374,9 @@ await check('a lost service is told, and found again', async () => {
   faultsWanted = true;
   await stop(daemon);
   await page.getByText('No connection to the service since').waitFor();
-  await page.screenshot({ path: path.join(given.out, 'screenshots', 'offline-laptop.png') });
+  await page.screenshot({
+    path: path.join(given.out, 'screenshots', 'offline-laptop.png'),
+  });
   daemon = await startUntil(given.daemon, daemonArgs, ready);
   await until(
     'the banner to go',
@@ -1326,7 +1448,9 @@ await check('500 live robots leave the page free', async () => {
     async () =>
       (await busy.locator('.fleet tbody tr[aria-rowindex]').first().getAttribute('aria-rowindex')) > 100,
   );
-  await busy.screenshot({ path: path.join(given.out, 'screenshots', 'fleet-500-laptop.png') });
+  await busy.screenshot({
+    path: path.join(given.out, 'screenshots', 'fleet-500-laptop.png'),
+  });
   await busy.context().close();
   expect(
     figures.main_thread_share_500_robots < 0.5,
@@ -1436,11 +1560,15 @@ await check('500 live robots stay live on the page', async () => {
     (await get('/v1/mission-totals')).missions >= plentyMissions && missions.length === 1,
     'missions in the history',
   );
-  await watched.screenshot({ path: path.join(given.out, 'screenshots', 'fleet-500-service-laptop.png') });
+  await watched.screenshot({
+    path: path.join(given.out, 'screenshots', 'fleet-500-service-laptop.png'),
+  });
   await watched.goto(`${base}/#/missions`);
   await watched.getByRole('button', { name: 'Load older' }).click();
   await watched.getByText('100 of').waitFor();
-  await watched.screenshot({ path: path.join(given.out, 'screenshots', 'missions-100000-laptop.png') });
+  await watched.screenshot({
+    path: path.join(given.out, 'screenshots', 'missions-100000-laptop.png'),
+  });
   await watched.context().close();
 });
 await stop(plenty);
