@@ -37,8 +37,8 @@ void export_robot_metrics(Metrics& metrics, const ingest::FleetView& fleet, cons
     const auto robots = fleet.all();
     const std::size_t shown = std::min(most_robots, robots.size());
     left_out.set(static_cast<double>(robots.size() - shown));
+    if (most_robots == 0) return std::vector<Metrics::Series>{};
     std::vector<Metrics::Series> all = empty_series();
-    if (shown == 0) return std::vector<Metrics::Series>{};
     const std::int64_t at_utime_us = now();
     const std::map<std::string, double> ratios = watch.counts().ratios;
     for (std::size_t k = 0; k < shown; ++k) {

@@ -11,6 +11,7 @@
 #include <ostream>
 #include <set>
 #include <thread>
+#include <tuple>
 
 #include "temporary_store.h"
 

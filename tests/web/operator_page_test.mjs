@@ -1,6 +1,6 @@
 // The operator page in headless Chromium against a running daemon with live robots.
 // node operator_page_test.mjs --daemon joulecastd --client joulecast --page server/web --out directory
-//   [--chromium /usr/bin/chromium]
+//   [--chromium /usr/bin/chromium] [--only PATTERN]
 // Screenshots and figures.json go to --out. Leaves with 1 when a check fails.
 import { readFile, mkdir, rm, writeFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
@@ -18,6 +18,7 @@ const { values: given } = parseArgs({
     page: { type: 'string' },
     out: { type: 'string' },
     chromium: { type: 'string', default: '/usr/bin/chromium' },
+    only: { type: 'string', default: '' },
   },
 });
 for (const name of ['daemon', 'client', 'page', 'out']) {
@@ -39,6 +40,7 @@ let failed = 0;
 let passed = 0;
 
 async function check(name, body) {
+  if (!new RegExp(given.only).test(name)) return;
   const began = Date.now();
   try {
     await body();
