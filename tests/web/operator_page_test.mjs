@@ -127,10 +127,7 @@ const fleet = await startUntil(
 );
 await writeFile(
   hourRobot,
-  JSON.stringify({
-    ...(await get('/v1/robots/amr-01')).model,
-    robot_id: 'hour-01',
-  }),
+  JSON.stringify({ ...(await get('/v1/robots/amr-01')).model, robot_id: 'hour-01' }),
 );
 await stop(daemon);
 await run(given.client, [
@@ -161,10 +158,7 @@ async function withEffect(robotId, effect, more = []) {
   const file = path.join(given.out, `${robotId}.json`);
   await writeFile(
     file,
-    JSON.stringify({
-      ...JSON.parse(await readFile(hourRobot, 'utf8')),
-      robot_id: robotId,
-    }),
+    JSON.stringify({ ...JSON.parse(await readFile(hourRobot, 'utf8')), robot_id: robotId }),
   );
   await run(given.client, [
     'simulate',
@@ -260,9 +254,7 @@ await check('the fleet is live', async () => {
   await page.waitForSelector('.fleet tbody th a');
   equal(await page.locator('.fleet tbody tr:not(.spacer)').count(), 4, 'rows of robots that were heard');
   await page
-    .getByRole('button', {
-      name: 'Show 3 robots without telemetry since the service started',
-    })
+    .getByRole('button', { name: 'Show 3 robots without telemetry since the service started' })
     .click();
   await until(
     'rows of all robots',
@@ -306,10 +298,7 @@ await check('the fleet is found, chosen and ordered', async () => {
 await check('a robot that stands, is silent or was restarted is shown as that', async () => {
   const fresh = await openPage();
   await fresh.route('**/v1/events', (route) =>
-    route.fulfill({
-      contentType: 'text/event-stream',
-      body: 'retry: 600000\n\n',
-    }),
+    route.fulfill({ contentType: 'text/event-stream', body: 'retry: 600000\n\n' }),
   );
   const heard = {
     live: true,
@@ -321,20 +310,14 @@ await check('a robot that stands, is silent or was restarted is shown as that', 
     faults: {},
   };
   const told = [
-    {
-      ...heard,
-      robot_id: 'restarted',
-      faults: { restart: 1, gap: 1, outside_mission: 40 },
-    },
+    { ...heard, robot_id: 'restarted', faults: { restart: 1, gap: 1, outside_mission: 40 } },
     { ...heard, robot_id: 'lossy', faults: { missing: 3, restart: 1 } },
     { ...heard, robot_id: 'quiet', live: false, silent_s: 7200 },
     { ...heard, robot_id: 'standing', speed_m_s: 0, measured_power_w: 20 },
   ];
   await fresh.route('**/v1/robots', async (route) => {
     const { robots } = await (await route.fetch()).json();
-    await route.fulfill({
-      json: { robots: told.map((own) => ({ ...robots[0], ...own })) },
-    });
+    await route.fulfill({ json: { robots: told.map((own) => ({ ...robots[0], ...own })) } });
   });
   faultsWanted = true; // the stream ends at once
   await go(fresh, '#/fleet');
@@ -608,13 +591,7 @@ await check('a proposed model says what it changes, and is adopted only when con
     route.fulfill({
       json: {
         robot_id: 'worn-01',
-        proposals: [
-          {
-            ...proposals[0],
-            state: 'superseded',
-            closed_reason: 'made for version 7',
-          },
-        ],
+        proposals: [{ ...proposals[0], state: 'superseded', closed_reason: 'made for version 7' }],
       },
     }),
   );
@@ -626,16 +603,8 @@ await check('a proposed model says what it changes, and is adopted only when con
 
 await check('an undeclared payload is shown with the mission', async () => {
   const { missions } = await get('/v1/missions?robot_id=worn-01&limit=1');
-  const payload = {
-    verdict: 'undeclared',
-    declared_kg: 0,
-    undeclared_kg: 12.3,
-    undeclared_sd_kg: 1.1,
-  };
-  const loaded = {
-    ...missions[0],
-    findings: { ...missions[0].findings, payload },
-  };
+  const payload = { verdict: 'undeclared', declared_kg: 0, undeclared_kg: 12.3, undeclared_sd_kg: 1.1 };
+  const loaded = { ...missions[0], findings: { ...missions[0].findings, payload } };
   await page.route('**/v1/missions?*', (route) =>
     route.fulfill({ json: { missions: [loaded], next_cursor: null } }),
   );
@@ -887,9 +856,7 @@ await check('what is not there is said', async () => {
 await check('waiting and faults are said, and tried again', async () => {
   const fresh = await openPage();
   const shot = (name) =>
-    fresh.screenshot({
-      path: path.join(given.out, 'screenshots', `${name}-laptop.png`),
-    });
+    fresh.screenshot({ path: path.join(given.out, 'screenshots', `${name}-laptop.png`) });
   let letGo;
   const held = new Promise((goOn) => (letGo = goOn));
   await fresh.route('**/v1/missions?*', async (route) => {
@@ -897,11 +864,7 @@ await check('waiting and faults are said, and tried again', async () => {
     await route.fulfill({
       status: 503,
       contentType: 'application/problem+json',
-      body: JSON.stringify({
-        title: 'Service Unavailable',
-        status: 503,
-        detail: 'the store is busy',
-      }),
+      body: JSON.stringify({ title: 'Service Unavailable', status: 503, detail: 'the store is busy' }),
     });
   });
   await go(fresh, '#/missions');
@@ -953,9 +916,7 @@ await check('the other views come when asked for, and say when they cannot', asy
   await fresh.route('**/views.js', (route) => route.abort());
   await fresh.getByRole('link', { name: 'Gap', exact: true }).click();
   await fresh.getByText('This part of the page could not be loaded').waitFor();
-  await fresh.screenshot({
-    path: path.join(given.out, 'screenshots', 'gap-not-loaded-laptop.png'),
-  });
+  await fresh.screenshot({ path: path.join(given.out, 'screenshots', 'gap-not-loaded-laptop.png') });
   await fresh.context().close();
   faultsWanted = false;
 });
@@ -963,9 +924,7 @@ await check('the other views come when asked for, and say when they cannot', asy
 await check('a diagnosis is started by keyboard, followed and read', async () => {
   await go(page, '#/gap');
   await page.getByText('No diagnosis yet').waitFor();
-  await page.screenshot({
-    path: path.join(given.out, 'screenshots', 'gap-empty-laptop.png'),
-  });
+  await page.screenshot({ path: path.join(given.out, 'screenshots', 'gap-empty-laptop.png') });
   equal(
     await page
       .getByRole('combobox', { name: 'Robot', exact: true })
@@ -983,9 +942,7 @@ await check('a diagnosis is started by keyboard, followed and read', async () =>
   await page.keyboard.press('Enter');
   await page.getByRole('heading', { level: 1, name: /^Diagnosis \d+$/ }).waitFor();
   diagnosis = Number((await page.getByRole('heading', { level: 1 }).textContent()).match(/\d+/)[0]);
-  await page.screenshot({
-    path: path.join(given.out, 'screenshots', 'gap-running-laptop.png'),
-  });
+  await page.screenshot({ path: path.join(given.out, 'screenshots', 'gap-running-laptop.png') });
   await page.getByText('Effects found').waitFor({ timeout: 120_000 });
   const { result, held_back: heldBack } = await get(`/v1/diagnoses/${diagnosis}`);
   equal(result.effects[0].id, 'coulomb_friction', 'the effect');
@@ -1067,10 +1024,7 @@ await check('a diagnosis shows its checks, what would fit, and effects to choose
   await choice.selectOption('viscous_friction');
   const asked = page.waitForRequest(`**/v1/robots/worn-01/model`);
   await page.route(`**/v1/robots/worn-01/model`, (route) =>
-    route.fulfill({
-      status: 409,
-      json: { status: 409, title: 'Conflict', detail: 'told by the test' },
-    }),
+    route.fulfill({ status: 409, json: { status: 409, title: 'Conflict', detail: 'told by the test' } }),
   );
   faultsWanted = true;
   await adopt(page, 'Adopt');
@@ -1078,10 +1032,7 @@ await check('a diagnosis shows its checks, what would fit, and effects to choose
   await page.getByText('told by the test').waitFor();
   faultsWanted = false;
   await page.unroute(`**/v1/robots/worn-01/model`);
-  Object.assign(refused.result.adoption, {
-    refusal: 'the verdict is inconclusive',
-    choice_settles: false,
-  });
+  Object.assign(refused.result.adoption, { refusal: 'the verdict is inconclusive', choice_settles: false });
   refused.result.adoption.effects[0].instead = [];
   await go(page, '#/gap');
   await go(page, `#/gap/${diagnosis}`);
@@ -1128,9 +1079,7 @@ await check('no gap is shown without regions and without adoption; a zoom is in 
 await check('a mission tells the conditions of its drive', async () => {
   const mission = (await get('/v1/missions?robot_id=worn-01')).missions[0];
   await go(page, `#/missions/${mission.id}`);
-  const conditions = page.locator('.panel', {
-    has: page.getByRole('heading', { name: 'Conditions' }),
-  });
+  const conditions = page.locator('.panel', { has: page.getByRole('heading', { name: 'Conditions' }) });
   await conditions.getByRole('rowheader', { name: 'cpu load' }).waitFor();
   const { covariates } = await get(`/v1/missions/${mission.id}/covariates`);
   const loads = covariates.find((c) => c.name === 'cpu_load').value;
@@ -1376,9 +1325,7 @@ await check('a lost service is told, and found again', async () => {
   faultsWanted = true;
   await stop(daemon);
   await page.getByText('No connection to the service since').waitFor();
-  await page.screenshot({
-    path: path.join(given.out, 'screenshots', 'offline-laptop.png'),
-  });
+  await page.screenshot({ path: path.join(given.out, 'screenshots', 'offline-laptop.png') });
   daemon = await startUntil(given.daemon, daemonArgs, ready);
   await until(
     'the banner to go',
@@ -1450,9 +1397,7 @@ await check('500 live robots leave the page free', async () => {
     async () =>
       (await busy.locator('.fleet tbody tr[aria-rowindex]').first().getAttribute('aria-rowindex')) > 100,
   );
-  await busy.screenshot({
-    path: path.join(given.out, 'screenshots', 'fleet-500-laptop.png'),
-  });
+  await busy.screenshot({ path: path.join(given.out, 'screenshots', 'fleet-500-laptop.png') });
   await busy.context().close();
   expect(
     figures.main_thread_share_500_robots < 0.5,
@@ -1562,15 +1507,11 @@ await check('500 live robots stay live on the page', async () => {
     (await get('/v1/mission-totals')).missions >= plentyMissions && missions.length === 1,
     'missions in the history',
   );
-  await watched.screenshot({
-    path: path.join(given.out, 'screenshots', 'fleet-500-service-laptop.png'),
-  });
+  await watched.screenshot({ path: path.join(given.out, 'screenshots', 'fleet-500-service-laptop.png') });
   await watched.goto(`${base}/#/missions`);
   await watched.getByRole('button', { name: 'Load older' }).click();
   await watched.getByText('100 of').waitFor();
-  await watched.screenshot({
-    path: path.join(given.out, 'screenshots', 'missions-100000-laptop.png'),
-  });
+  await watched.screenshot({ path: path.join(given.out, 'screenshots', 'missions-100000-laptop.png') });
   await watched.context().close();
 });
 await stop(plenty);
