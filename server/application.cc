@@ -18,6 +18,8 @@
 #include "history/spool.h"
 #include "history/sqlite_store.h"
 #include "history/writer.h"
+#include "ingest/ingest_service.h"
+#include "ingest/model_loading.h"
 #include "server/api/services.h"
 #include "server/daemon_metrics.h"
 #include "server/diagnosis/proposal_acceptor.h"
@@ -29,13 +31,11 @@
 #include "server/http/http_server.h"
 #include "server/http/openapi.h"
 #include "server/http/operations.h"
-#include "server/process_metrics.h"
-#include "server/robot_metrics.h"
 #include "server/http/static_files.h"
-#include "ingest/ingest_service.h"
-#include "ingest/model_loading.h"
 #include "server/logging.h"
 #include "server/metrics.h"
+#include "server/process_metrics.h"
+#include "server/robot_metrics.h"
 
 namespace joulecast {
 namespace {
@@ -266,8 +266,7 @@ struct Application::Parts {
       if (Result<void> loaded = ingest::load_robot(robot, path, *store, *writer, host_utime_us()); !loaded)
         return loaded;
     }
-    metrics.gauge("joulecast_robot_files_faulty", "Robot files left out at the start for being faulty")
-        .set(static_cast<double>(files->faulty.size()));
+    faulty_files.set(static_cast<double>(files->faulty.size()));
     log_info("robot files read", {{"directory", directory},
                                   {"files", std::to_string(files->robots.size())},
                                   {"faulty", std::to_string(files->faulty.size())}});
@@ -314,6 +313,8 @@ struct Application::Parts {
 
   const Settings settings;
   Metrics metrics;
+  const Gauge faulty_files =
+      metrics.gauge("joulecast_robot_files_faulty", "Robot files left out at the start for being faulty");
   http::EventHub events;
   ingest::ModelRegistry models;
   ingest::FleetView fleet;
