@@ -123,7 +123,7 @@ function rowsOf(one, other, ledgers) {
   const terms = Object.keys(ledgers?.[0]?.terms_j ?? {}).filter((term) =>
     ledgers.some((ledger) => Math.abs(ledger.terms_j[term] ?? 0) > 0),
   );
-  const perKilometre = (totals, joule) =>
+  const perMetre = (totals, joule) =>
     totals.energy.distance_m > 0.1 && joule !== null ? joule / totals.energy.distance_m : null;
   return [
     ...(one.missions === undefined
@@ -152,13 +152,16 @@ function rowsOf(one, other, ledgers) {
     row('Consumption', (t) => (t.wh_per_km === null ? null : 3.6 * t.wh_per_km), plain(consumption)),
     ...terms.map((term) => ({
       name: `of it ${format.words(term)}`,
-      values: [one, other].map((t, k) => perKilometre(t, ledgers[k].terms_j[term])),
+      values: [one, other].map((t, k) => perMetre(t, ledgers[k].terms_j[term])),
+      least: Math.abs(perMetre(one, one.energy.battery_j) ?? 0) / 100,
       cell: plain(consumption),
     })),
   ];
 }
 
-const change = ([a, b]) => (format.known(a) && format.known(b) && a !== 0 ? (b - a) / Math.abs(a) : null);
+// Nothing of what is next to nothing itself: its relative change says nothing.
+const change = ([a, b], least = 0) =>
+  format.known(a) && format.known(b) && Math.abs(a) > least ? (b - a) / Math.abs(a) : null;
 
 function Figures({ shown, values, ledgers }) {
   const columns = [
@@ -173,7 +176,7 @@ function Figures({ shown, values, ledgers }) {
       key: 'change',
       title: 'Second to first',
       class: 'figure',
-      cell: (r) => <Quantity of={format.percent(change(r.values), 1)} sign />,
+      cell: (r) => <Quantity of={format.percent(change(r.values, r.least), 1)} sign />,
     },
   ];
   return (

@@ -49,9 +49,14 @@ function useSeries(given, kind) {
   return { ...state, reload: () => setTurn((n) => n + 1) };
 }
 
-// {x: seconds of each period that any series has, of: (series, value) => its column}
-function aligned(series) {
-  const x = [...new Set(series.flatMap((s) => s.groups.map((g) => g.from_utime_us)))].sort((a, b) => a - b);
+// {x: seconds of each period that any series has, column(series, value)}. Where periods are missing stands one
+// that no series has, so that no line spans the gap.
+function aligned(series, kind) {
+  const all = new Set(series.flatMap((s) => s.groups.map((g) => g.from_utime_us)));
+  const longest = (kind === 'week' ? 7.5 : 1.5) * dayMs * 1000;
+  const x = [...all]
+    .sort((a, b) => a - b)
+    .flatMap((at, k, sorted) => (k > 0 && at - sorted[k - 1] > longest ? [at - 1, at] : [at]));
   const rows = series.map((s) => new Map(s.groups.map((g) => [g.from_utime_us, g])));
   return {
     x: x.map((v) => v / 1e6),
@@ -59,9 +64,11 @@ function aligned(series) {
   };
 }
 
-function TrendChart({ series, label, value, unit, zero }) {
+const dates = { ...clockAxis, values: (_, splits) => splits.map((second) => dayOf(second * 1e6)), space: 90 };
+
+function TrendChart({ series, kind, label, value, unit, zero }) {
   const data = useMemo(() => {
-    const { x, column } = aligned(series);
+    const { x, column } = aligned(series, kind);
     return [x, ...series.map((_, k) => column(k, value))];
   }, [series, unit]);
   const make = () => {
@@ -69,7 +76,7 @@ function TrendChart({ series, label, value, unit, zero }) {
     const colours = [p.measured, p.modelled, p.gap, p.ink, p.muted];
     return {
       scales: { y: zero ? { range: (_, low, high) => [Math.min(0, low), high > 0 ? 1.08 * high : 1] } : {} },
-      axes: [axis('', clockAxis), axis(unit)],
+      axes: [axis('', dates), axis(unit)],
       series: [
         {},
         ...series.map((s, k) => ({
@@ -147,6 +154,7 @@ function Shown({ series, kind }) {
         <Panel title={`Energy a ${period}`}>
           <TrendChart
             series={series}
+            kind={kind}
             label={`Energy a ${period}`}
             unit={scale.u}
             value={(g) => g.energy.battery_j / scale.joule}
@@ -156,6 +164,7 @@ function Shown({ series, kind }) {
         <Panel title="Consumption">
           <TrendChart
             series={series}
+            kind={kind}
             label="Energy over distance"
             unit={inUnit.u}
             value={(g) =>
@@ -167,6 +176,7 @@ function Shown({ series, kind }) {
         <Panel title="Measured over modelled">
           <TrendChart
             series={series}
+            kind={kind}
             label="Measured over modelled energy"
             unit="ratio"
             value={(g) => g.ratio}
