@@ -49,8 +49,8 @@ function useSeries(given, kind) {
   return { ...state, reload: () => setTurn((n) => n + 1) };
 }
 
-// {x: seconds of each period that any series has, column(series, value)}. Where periods are missing stands one
-// that no series has, so that no line spans the gap.
+// {x: seconds of each period that any series has, column(series, value)}. Where periods are missing stands
+// one that no series has, so that no line spans the gap.
 function aligned(series, kind) {
   const all = new Set(series.flatMap((s) => s.groups.map((g) => g.from_utime_us)));
   const longest = (kind === 'week' ? 7.5 : 1.5) * dayMs * 1000;
