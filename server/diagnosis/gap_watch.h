@@ -3,17 +3,17 @@
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <set>
-#include <map>
 #include <string>
 #include <thread>
 
 #include "history/store.h"
 #include "history/writer.h"
+#include "ingest/model_registry.h"
 #include "server/diagnosis/diagnosis_service.h"
 #include "server/diagnosis/drift_view.h"
-#include "ingest/model_registry.h"
 
 namespace joulecast::server {
 

@@ -285,7 +285,8 @@ Result<MissionPage> missions(Database& database, const MissionFilter& filter, co
 Result<Totals> totals(Database& database, const MissionFilter& filter) {
   if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
   const Where where(filter);
-  Statement statement = database.prepare("SELECT " + select_totals() + where.sql());
+  const std::string sql = "SELECT " + select_totals() + where.sql();
+  Statement statement = database.prepare(sql);
   Rows rows(statement);
   where.bind(rows);
   rows.next();
@@ -301,8 +302,9 @@ Result<std::vector<TotalsGroup>> grouped_totals(Database& database, const Missio
   const std::string group = by == Grouping::robot ? "robot_id"
                                                   : "start_utime_us - ((start_utime_us + ?) % " + period +
                                                         " + " + period + ") % " + period;
-  Statement statement = database.prepare("SELECT " + group + ", " + select_totals() + where.sql() +
-                                         " GROUP BY 1 ORDER BY 1 LIMIT " + std::to_string(max_groups + 1));
+  const std::string sql = "SELECT " + group + ", " + select_totals() + where.sql() +
+                          " GROUP BY 1 ORDER BY 1 LIMIT " + std::to_string(max_groups + 1);
+  Statement statement = database.prepare(sql);
   Rows rows(statement);
   // 1970 began on a Thursday, three days after a Monday.
   if (by != Grouping::robot)
