@@ -75,6 +75,7 @@ function TrendChart({ series, kind, label, value, unit, zero }) {
     const p = palette();
     const colours = [p.measured, p.modelled, p.gap, p.ink, p.muted];
     return {
+      padding: [8, 30, 0, 0],
       scales: { y: zero ? { range: (_, low, high) => [Math.min(0, low), high > 0 ? 1.08 * high : 1] } : {} },
       axes: [axis('', dates), axis(unit)],
       series: [
