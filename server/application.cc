@@ -1,5 +1,6 @@
 #include "server/application.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -34,6 +35,8 @@
 #include "server/http/static_files.h"
 #include "server/logging.h"
 #include "server/metrics.h"
+#include "server/process_metrics.h"
+#include "server/robot_metrics.h"
 
 namespace joulecast {
 namespace {
@@ -300,11 +303,29 @@ struct Application::Parts {
       if (Result<void> loaded = ingest::load_robot(robot, path, *store, *writer, host_utime_us()); !loaded)
         return loaded;
     }
-    metrics.gauge("joulecast_robot_files_faulty", "Robot files left out at the start for being faulty")
-        .set(static_cast<double>(files->faulty.size()));
+    faulty_files.set(static_cast<double>(files->faulty.size()));
     log_info("robot files read", {{"directory", directory},
                                   {"files", std::to_string(files->robots.size())},
                                   {"faulty", std::to_string(files->faulty.size())}});
+    return {};
+  }
+
+  // What is known of robots until they speak again: their charge when they were last heard.
+  Result<void> recall_states() {
+    const auto robots = store->robots();
+    if (!robots) return tl::unexpected(robots.error());
+    for (const history::RobotRecord& robot : *robots) {
+      const auto last = store->resume_state(robot.robot_id);
+      if (!last) return tl::unexpected(last.error());
+      if (!last->has_value()) continue;
+      auto snapshot = std::make_shared<ingest::RobotSnapshot>();
+      snapshot->robot_id = robot.robot_id;
+      snapshot->received_utime_us = std::min((*last)->utime_us, host_utime_us());
+      snapshot->sample.utime_us = (*last)->utime_us;
+      snapshot->state_of_charge = (*last)->state_of_charge;
+      snapshot->charge.estimate.charge = (*last)->state_of_charge;
+      fleet.publish(std::move(snapshot));
+    }
     return {};
   }
 
@@ -330,6 +351,8 @@ struct Application::Parts {
 
   const Settings settings;
   Metrics metrics;
+  const Gauge faulty_files =
+      metrics.gauge("joulecast_robot_files_faulty", "Robot files left out at the start for being faulty");
   http::EventHub events;
   ingest::ModelRegistry models;
   ingest::FleetView fleet;
@@ -379,6 +402,9 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   }
   if (Result<void> models = ingest::load_stored_models(*p.store, p.models); !models)
     return tl::unexpected(std::move(models.error()));
+
+  if (Result<void> recalled = p.recall_states(); !recalled)
+    return tl::unexpected(std::move(recalled.error()));
 
   p.forecasts = std::make_unique<ingest::Forecasts>(*p.store);
   history::Writer& writer = *p.writer;
@@ -457,6 +483,9 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   server::export_metrics(p.metrics, p.counters, *p.ingest, p.fleet, *p.writer, *p.store, p.events,
                          host_utime_us);
   server::export_gap_metrics(p.metrics, *p.diagnoses, *p.watch, *p.adoption);
+  server::export_process_metrics(p.metrics);
+  server::export_robot_metrics(p.metrics, p.fleet, *p.watch, host_utime_us,
+                               static_cast<std::size_t>(settings.integer("metrics.robots")));
   Result<std::unique_ptr<http::HttpServer>> http =
       http::HttpServer::start(http_options(settings), *p.router, p.http_metrics.get());
   if (!http) return tl::unexpected(std::move(http.error()));

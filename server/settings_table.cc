@@ -136,6 +136,9 @@ constexpr Setting table[] = {
      "change of measured over modelled energy that counts as drift"},
     {"watch.diagnose", Type::boolean, "true", 0, 0, "", "start a diagnosis when a drift is found"},
 
+    {"metrics.robots", Type::integer, "200", 0, 10000, "",
+     "robots with metrics of their own at /metrics, the first by id, about 25 series each; 0: none"},
+
     {"log.format", Type::choice, "text", 0, 0, "", "one JSON object a line, or text for a terminal",
      log_formats},
     {"log.level", Type::choice, "info", 0, 0, "", "least level that is written", log_levels},

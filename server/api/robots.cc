@@ -27,6 +27,13 @@ void write_robot_state(JsonWriter& json, const Services& services, const std::st
     silent.has_model = model != nullptr;
     silent.model_version = model != nullptr ? model->version : 0;
   }
+  // Of a robot not heard since the start the store's last state is known, and the model may have changed.
+  if (snapshot != nullptr && snapshot->samples == 0) {
+    silent = *snapshot;
+    silent.has_model = model != nullptr;
+    silent.model_version = model != nullptr ? model->version : 0;
+    snapshot.reset();
+  }
   const ingest::RobotSnapshot& now = snapshot != nullptr ? *snapshot : silent;
   std::optional<forecast::Reach> reach;
   if (model != nullptr) reach = services.forecasts.reach(model, now);

@@ -202,7 +202,7 @@ class DiagnosisService::Impl {
   Result<void> any_ended(const DiagnosisRequest& request) const {
     using State = history::MissionState;
     history::MissionFilter ended;
-    ended.robot_id = request.robot_id;
+    ended.robot_ids = {request.robot_id};
     ended.start_from_utime_us = request.since_utime_us;
     ended.states = {State::finished, State::aborted, State::unfinished, State::superseded,
                     State::interrupted};

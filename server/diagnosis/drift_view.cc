@@ -16,7 +16,7 @@ constexpr std::size_t newest = 10;  // missions that tell how a robot does now
 Result<std::vector<drift::MissionRatio>> DriftView::missions(const std::string& robot_id,
                                                              std::size_t limit) const {
   history::MissionFilter filter;
-  filter.robot_id = robot_id;
+  filter.robot_ids = {robot_id};
   history::PageRequest page;
   page.limit = history::max_page_size;
   std::vector<drift::MissionRatio> ratios;

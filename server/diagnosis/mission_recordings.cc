@@ -101,7 +101,7 @@ Result<StoredRecordings> read_recordings(const history::Store& store, const Reco
   if (!wanted.only.empty()) return reader.finish();
 
   history::MissionFilter filter;
-  filter.robot_id = wanted.robot_id;
+  filter.robot_ids = {wanted.robot_id};
   filter.start_from_utime_us = wanted.since_utime_us;
   history::PageRequest page;
   do {

@@ -36,6 +36,7 @@ struct Request {
   std::any input;                              // what an endpoint's `brief` read of it, for its `handler`
   std::string address;                         // of the client's end of the connection
   std::string actor;                           // name of the token that it came with; empty: none
+  bool csv = false;                            // Accept asks for text/csv of an endpoint that has it
   std::string id;                              // request id: the client's X-Request-Id when sane, else ours
   // Set when the answer is no longer wanted: past http.request_deadline_s or when the client has gone (see
   // Run), and when the server's patience at a stop has ended. What the handler then returns is not sent.

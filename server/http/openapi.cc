@@ -212,6 +212,7 @@ Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<
       }
       success["content"][endpoint.response_type.substr(0, endpoint.response_type.find(';'))] =
           std::move(content);
+      if (endpoint.csv) success["content"]["text/csv"] = {{"schema", {{"type", "string"}}}};
     }
     operation["responses"][std::to_string(endpoint.success_status)] = std::move(success);
     for (const unsigned status : errors_of(endpoint)) {

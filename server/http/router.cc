@@ -63,6 +63,19 @@ bool accepts(std::string_view accept, std::string_view type) {
   return allowed;
 }
 
+// Whether Accept names text/csv, before application/json where it names that too.
+bool asks_for_csv(std::string_view accept) {
+  while (!accept.empty()) {
+    const auto comma = accept.find(',');
+    const auto item = accept.substr(0, comma);
+    const auto range = trim(item.substr(0, item.find(';')));
+    if (equals_ignoring_case(range, "application/json")) return false;
+    if (equals_ignoring_case(range, "text/csv")) return accepts(item, "text/csv");
+    accept.remove_prefix(comma == std::string_view::npos ? accept.size() : comma + 1);
+  }
+  return false;
+}
+
 bool is_json_type(std::string_view type) {
   const auto base = trim(type.substr(0, type.find(';')));
   return equals_ignoring_case(base, "application/json") ||
@@ -233,7 +246,8 @@ Router::Match Router::match(Request& request) const {
   if (guard_) {
     if (auto refused = guard_(endpoint, request)) return {&endpoint, std::move(refused)};
   }
-  if (!accepts(request.header("accept"), endpoint.response_type)) {
+  request.csv = endpoint.csv && asks_for_csv(request.header("accept"));
+  if (!request.csv && !accepts(request.header("accept"), endpoint.response_type)) {
     return {nullptr, problem(406, "not-acceptable", "This resource is served as " + endpoint.response_type,
                              request.id, "Accept", "must admit " + endpoint.response_type)};
   }

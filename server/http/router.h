@@ -48,6 +48,7 @@ struct Endpoint {
   std::string request_schema = {};   // name of schemas/<name>.schema.json; empty when there is no body
   std::string response_schema = {};  // likewise; empty when the answer is not JSON
   std::string response_type = "application/json";
+  bool csv = false;  // also served as text/csv: Request::csv says when
   unsigned success_status = 200;
   std::vector<unsigned> error_statuses = {};  // beyond those the frame itself can answer
   Run run = Run::worker;

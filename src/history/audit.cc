@@ -30,7 +30,7 @@ Result<AuditState> follow(Database& database, const std::string& path, std::stri
     return fail(Fault::corrupt, path, "is not a joulecast store");
   if (database.integer("SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name = 'audit'") != 1)
     return fail(Fault::corrupt, path,
-                "has no audit; a store made before 0.2 gets one when it is next opened");
+                "has no audit; a store made by an earlier version gets one when it is next opened");
   AuditState state;
   bool seen = seen_head.empty();
   std::string previous = before_the_first;

@@ -33,6 +33,9 @@ struct RobotSnapshot {
   std::int64_t mission_key = 0;
   std::int64_t mission_start_utime_us = 0;
   signals::Accounts accounts;  // of the open mission
+  // Within missions since the daemon started, J.
+  double drawn_j = 0, returned_j = 0;
+  signals::Ledger ledger;
   std::uint64_t samples = 0;
   std::map<std::string, std::uint64_t>
       faults;  // reason -> messages rejected or repaired, since the daemon started

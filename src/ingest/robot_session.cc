@@ -617,6 +617,10 @@ void RobotSession::on_point(const energy::MeterPoint& point) {
   snapshot_.speed_m_s = point.speed_m_s;
   snapshot_.yaw_rate_rad_s = point.yaw_rate_rad_s;
   snapshot_.winding_temperature_c = point.winding_temperature_c;
+  snapshot_.drawn_j += accounts.drawn_j - snapshot_.accounts.drawn_j;
+  snapshot_.returned_j += accounts.returned_j - snapshot_.accounts.returned_j;
+  for (std::size_t k = 0; k < signals::term_count; ++k)
+    snapshot_.ledger.value[k] += accounts.ledger.value[k] - snapshot_.accounts.ledger.value[k];
   snapshot_.accounts = accounts;
 }
 

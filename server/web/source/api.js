@@ -41,6 +41,14 @@ export function get(path, signal) {
   return call(path, { signal });
 }
 
+// {text, next}: an answer of that type, and the path of the page after it or null.
+export async function getText(path, type, signal) {
+  const response = await fetch(path, { headers: { accept: type }, signal });
+  if (!response.ok) await answer(response);
+  const next = /<([^>]+)>; rel="next"/.exec(response.headers.get('link') ?? '')?.[1] ?? null;
+  return { text: await response.text(), next };
+}
+
 export function post(path, body, signal) {
   return call(path, {
     method: 'POST',

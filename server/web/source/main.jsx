@@ -16,6 +16,8 @@ const views = {
   robots: later('Robot'),
   missions: later('Missions'),
   mission: later('Mission'),
+  trends: later('Trends'),
+  compare: later('Compare'),
   plan: later('Plan'),
   gap: later('Gap'),
   audit: later('Audit'),
@@ -70,7 +72,7 @@ function App() {
     }
   }, [route.view, route.id]);
   const View = views[route.view];
-  const here = { robots: 'fleet', mission: 'missions' }[route.view] ?? route.view;
+  const here = { robots: 'fleet', mission: 'missions', compare: 'trends' }[route.view] ?? route.view;
   const tab = (view, name) => (
     <a href={`#/${view}`} aria-current={here === view ? 'page' : undefined}>
       {name}
@@ -95,6 +97,7 @@ function App() {
         <nav aria-label="Views">
           {tab('fleet', 'Fleet')}
           {tab('missions', 'Missions')}
+          {tab('trends', 'Trends')}
           {tab('plan', 'Plan')}
           {tab('gap', 'Gap')}
           {tab('audit', 'Log')}

@@ -1,6 +1,7 @@
 #include "answers/json/mission_json.h"
 
 #include "answers/json/ledger_json.h"
+#include "signals/account_ratios.h"
 
 namespace joulecast::answers {
 
@@ -21,6 +22,8 @@ void write_mission(JsonWriter& json, const history::Mission& m) {
   json.field("model_version", m.model_version);
   json.key("energy");
   write_accounts(json, m.accounts);
+  json.field("ratio", signals::energy_ratio(m.accounts));
+  json.field("wh_per_km", signals::energy_per_distance_wh_km(m.accounts));
   json.field("samples", m.samples);
   json.key("sample_faults").begin_object();
   for (const auto& [reason, count] : m.sample_faults) json.field(reason, count);
