@@ -209,7 +209,8 @@ Result<Totals> totals(Database& database, const MissionFilter& filter) {
       database.statement("SELECT count(*), coalesce(sum(measured_s > 0), 0), coalesce(sum(incomplete), 0), "
                          "coalesce(sum(samples), 0), "
                          "coalesce(sum(gap_count), 0), coalesce(sum(gap_s), 0.0), " +
-                         sums + " FROM mission" + where(filter)));
+                         sums + " FROM mission" + where(filter) +
+                         " AND (findings_json IS NULL OR json_type(findings_json, '$.annulled') IS NULL)"));
   bind_filter(rows, filter);
   rows.next();
   Totals t;
