@@ -11,9 +11,10 @@ namespace joulecast::server {
 
 static_assert(history::MissionState{} == history::MissionState::open);
 
-void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters, const ingest::IngestService& ingest,
-                    const ingest::FleetView& fleet, const history::Writer& writer, const history::Store& store,
-                    const http::EventHub& events, std::function<std::int64_t()> now_utime_us) {
+void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
+                    const ingest::IngestService& ingest, const ingest::FleetView& fleet,
+                    const history::Writer& writer, const history::Store& store, const http::EventHub& events,
+                    std::function<std::int64_t()> now_utime_us) {
   const Counter messages =
       metrics.counter("joulecast_ingest_messages_total", "Messages received on the robots' channels");
   const Counter samples = metrics.counter("joulecast_ingest_samples_total", "Samples accounted for");
@@ -29,15 +30,17 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters, co
   const std::vector<Counter> faults = metrics.counters(
       "joulecast_ingest_faults_total", "Messages, samples and events turned away or repaired", "reason",
       std::vector<std::string>(ingest::ingest_fault_names.begin(), ingest::ingest_fault_names.end()));
-  const std::vector<Counter> contradictions = metrics.counters(
-      "joulecast_contradictions_total", "Contradictions of robots' telemetry told, each at most once an hour",
-      "kind",
-      std::vector<std::string>(ingest::contradiction_kind_names.begin(), ingest::contradiction_kind_names.end()));
-  const Gauge contradicted = metrics.gauge("joulecast_contradicted_robots",
-                                           "Live robots whose telemetry is contradicted so that nothing is learnt");
-  const std::vector<Counter> left_out =
-      metrics.counters("joulecast_missions_left_out_total", "Missions that nothing was learnt from", "reason",
-                       std::vector<std::string>(ingest::left_out_names.begin(), ingest::left_out_names.end()));
+  const std::vector<Counter> contradictions =
+      metrics.counters("joulecast_contradictions_total",
+                       "Contradictions of robots' telemetry told, each at most once an hour", "kind",
+                       std::vector<std::string>(ingest::contradiction_kind_names.begin(),
+                                                ingest::contradiction_kind_names.end()));
+  const Gauge contradicted =
+      metrics.gauge("joulecast_contradicted_robots",
+                    "Live robots whose telemetry is contradicted so that nothing is learnt");
+  const std::vector<Counter> left_out = metrics.counters(
+      "joulecast_missions_left_out_total", "Missions that nothing was learnt from", "reason",
+      std::vector<std::string>(ingest::left_out_names.begin(), ingest::left_out_names.end()));
   const Counter datagrams =
       metrics.counter("joulecast_lcm_datagrams_total", "Datagrams received on the LCM group");
   const std::vector<Counter> lost =

@@ -5,10 +5,10 @@
 #include <string>
 
 #include "history/store.h"
-#include "server/http/event_hub.h"
 #include "ingest/fleet_view.h"
 #include "ingest/forecasts.h"
 #include "ingest/model_registry.h"
+#include "server/http/event_hub.h"
 
 namespace joulecast::server {
 
@@ -17,8 +17,8 @@ namespace joulecast::server {
 // contradiction that is told. One thread.
 class FleetEvents {
  public:
-  FleetEvents(const ingest::FleetView& fleet, const ingest::ModelRegistry& models, ingest::Forecasts& forecasts,
-              const history::Store& store, http::EventHub& hub)
+  FleetEvents(const ingest::FleetView& fleet, const ingest::ModelRegistry& models,
+              ingest::Forecasts& forecasts, const history::Store& store, http::EventHub& hub)
       : fleet_(fleet), models_(models), forecasts_(forecasts), store_(store), hub_(hub) {}
 
   void publish(std::int64_t now_utime_us);

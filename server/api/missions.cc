@@ -173,7 +173,8 @@ class MissionSummaries {
   std::unordered_map<history::MissionKey, std::shared_ptr<const std::string>> texts_;
 };
 
-// Takes an ended mission out of all sums and of what forecasts learnt. It stays in the lists, with the reason.
+// Takes an ended mission out of all sums and of what forecasts learnt. It stays in the lists, with the
+// reason.
 Result<Response> annul(Services& services, const Request& request) {
   Fields fields(*request.json);
   const std::string reason = fields.text("reason", most_reason);
@@ -191,9 +192,9 @@ Result<Response> annul(Services& services, const Request& request) {
     return tl::unexpected(std::move(done.error()));
   const nlohmann::json detail{
       {"mission", mission->key}, {"mission_id", mission->mission_id}, {"reason", reason}};
-  if (auto done = services.writer.execute(history::AppendEvent{
-          {0, now, mission->robot_id, "mission_annulled",
-           detail.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)}});
+  if (auto done = services.writer.execute(
+          history::AppendEvent{{0, now, mission->robot_id, "mission_annulled",
+                                detail.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)}});
       !done)
     return tl::unexpected(std::move(done.error()));
   if (const auto model = services.models.find(mission->robot_id)) {
@@ -366,16 +367,17 @@ std::vector<TableRow> mission_rows() {
                       return summaries->read(request);
                     };
                   }});
-  rows.push_back({{.method = Method::post,
-                   .path = "/v1/missions/{id}/annul",
-                   .operation_id = "annulMission",
-                   .summary = "Takes an ended mission out of all sums and of what is learnt, for a reason that "
-                              "lists and the audit log keep",
-                   .request_schema = "annul-request",
-                   .response_schema = "mission",
-                   .error_statuses = {404, 409, 422},
-                   .run = http::Run::write},
-                  answered_by(annul)});
+  rows.push_back(
+      {{.method = Method::post,
+        .path = "/v1/missions/{id}/annul",
+        .operation_id = "annulMission",
+        .summary = "Takes an ended mission out of all sums and of what is learnt, for a reason that "
+                   "lists and the audit log keep",
+        .request_schema = "annul-request",
+        .response_schema = "mission",
+        .error_statuses = {404, 409, 422},
+        .run = http::Run::write},
+       answered_by(annul)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/missions/{id}/ledger",
                    .operation_id = "getMissionLedger",

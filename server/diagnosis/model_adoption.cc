@@ -62,9 +62,9 @@ std::string refusal_of(const energy::BackTest& test) {
 
 }  // namespace
 
-ModelAdoption::ModelAdoption(const history::Store& store, history::Writer& writer, ingest::ModelRegistry& models,
-                             const DriftView& drift, std::function<std::int64_t()> now_utime_us,
-                             const AdoptionOptions& options)
+ModelAdoption::ModelAdoption(const history::Store& store, history::Writer& writer,
+                             ingest::ModelRegistry& models, const DriftView& drift,
+                             std::function<std::int64_t()> now_utime_us, const AdoptionOptions& options)
     : store_(store),
       writer_(writer),
       models_(models),
@@ -77,7 +77,8 @@ Result<void> ModelAdoption::record(const std::string& robot_id, const std::strin
   return writer_.offer(history::AppendEvent{{0, now_utime_us_(), robot_id, kind, std::move(detail_json)}});
 }
 
-Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request, const ingest::ModelInForce& before,
+Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request,
+                                                const ingest::ModelInForce& before,
                                                 std::optional<std::int64_t>& since_utime_us) const {
   constexpr std::size_t enough_missions = 3;
   RecordingsWanted wanted;

@@ -16,8 +16,9 @@ namespace {
 constexpr std::uint64_t window_messages = 50;
 constexpr double wrong_share = 0.2;
 constexpr std::uint64_t first_samples = 300;  // of a mission, before its channels are compared
-constexpr double constant_s = 10;  // of motion: coarse readings of a steady drive may stay the same for some seconds
-constexpr double says_enough_s = 60;          // of motion, from which on what is not seen any more is gone
+constexpr double constant_s =
+    10;  // of motion: coarse readings of a steady drive may stay the same for some seconds
+constexpr double says_enough_s = 60;  // of motion, from which on what is not seen any more is gone
 // Of the speed or yaw rate limit: beyond what any robot overshoots, the readings are not its motion.
 constexpr double absurd_limit = 3;
 
@@ -68,7 +69,8 @@ constexpr Telling tellings[] = {
     {IngestFault::second_sender, ContradictionKind::sender, "second_sender", "", false,
      "come from a second sender under this robot's id, and are turned away: each robot needs its own id"},
     {IngestFault::too_far_ahead, ContradictionKind::clock, "clock_far_ahead", "utime", false,
-     "are stamped too far ahead of the service's clock and turned away: is the robot's clock set (NTP), and utime "
+     "are stamped too far ahead of the service's clock and turned away: is the robot's clock set (NTP), and "
+     "utime "
      "in microseconds?"},
     {IngestFault::clock_ahead, ContradictionKind::clock, "clock_ahead", "utime", false,
      "are stamped more than 10 s ahead of the service's clock: is the robot's clock set (NTP)?"},
@@ -76,9 +78,11 @@ constexpr Telling tellings[] = {
      "are stamped no later than the one before: utime stands or goes back; joulecast wants the instant of "
      "sampling"},
     {IngestFault::clock_forward, ContradictionKind::clock, "clock_leaping", "utime", true,
-     "are stamped more than an hour after the one before: utime must be the instant of sampling, in microseconds"},
+     "are stamped more than an hour after the one before: utime must be the instant of sampling, in "
+     "microseconds"},
     {IngestFault::restart, ContradictionKind::sequence, "sequence_standing", "sequence", false,
-     "do not count on: sequence stands or begins anew, so that lost messages cannot be told; joulecast wants it "
+     "do not count on: sequence stands or begins anew, so that lost messages cannot be told; joulecast wants "
+     "it "
      "one higher with each message"},
 };
 

@@ -252,9 +252,11 @@ void RobotSession::tell_contradictions() {
     if (first || now - told->second >= tell_contradiction_us || now < told->second) {
       told->second = now;
       outputs_.warn(robot_id_, "contradiction: " + c.says);
-      outputs_.counters.contradictions[static_cast<std::size_t>(c.kind)].fetch_add(1, std::memory_order_relaxed);
+      outputs_.counters.contradictions[static_cast<std::size_t>(c.kind)].fetch_add(1,
+                                                                                   std::memory_order_relaxed);
       nlohmann::json detail = json_of(c);
-      detail["mission"] = open_ != nullptr && open_->record.key > 0 ? nlohmann::json(open_->record.key) : nullptr;
+      detail["mission"] =
+          open_ != nullptr && open_->record.key > 0 ? nlohmann::json(open_->record.key) : nullptr;
       outputs_.post(history::AppendEvent{
           {0, now, robot_id_, "contradiction", detail.dump(-1, ' ', false, json_replace)}});
     }
@@ -418,7 +420,8 @@ bool RobotSession::teaches(const std::vector<Contradiction>& found) {
   const signals::Accounts& a = record.accounts;
   const bool barely = a.measured_s > 0 && a.measured_s < least_measured * a.duration_s;
   if (untrue.empty() && !barely) return true;
-  const auto why = static_cast<std::size_t>(untrue.empty() ? LeftOut::barely_measured : LeftOut::contradicted);
+  const auto why =
+      static_cast<std::size_t>(untrue.empty() ? LeftOut::barely_measured : LeftOut::contradicted);
   ++snapshot_.missions_left_out[std::string(left_out_names[why])];
   outputs_.counters.missions_left_out[why].fetch_add(1, std::memory_order_relaxed);
   if (!untrue.empty()) {

@@ -59,11 +59,14 @@ struct MistakenUnit {
   std::string_view field, unit;
   double factor;
 };
-constexpr MistakenUnit mistaken_units[] = {
-    {"motor_voltage", "mV", 1000},          {"motor_current", "mA", 1000},
-    {"battery_voltage", "mV", 1000},        {"battery_current", "mA", 1000},
-    {"yaw_rate", "degrees a second", 57.3}, {"pitch", "degrees", 57.3},
-    {"payload_mass", "g", 1000},            {"wheel_velocity", "rpm of the motor shaft", 9.55}};
+constexpr MistakenUnit mistaken_units[] = {{"motor_voltage", "mV", 1000},
+                                           {"motor_current", "mA", 1000},
+                                           {"battery_voltage", "mV", 1000},
+                                           {"battery_current", "mA", 1000},
+                                           {"yaw_rate", "degrees a second", 57.3},
+                                           {"pitch", "degrees", 57.3},
+                                           {"payload_mass", "g", 1000},
+                                           {"wheel_velocity", "rpm of the motor shaft", 9.55}};
 
 std::string_view mistaken_unit(const Implausible& fault, const PlausibleRange& range) {
   for (const MistakenUnit& u : mistaken_units) {

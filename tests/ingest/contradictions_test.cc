@@ -4,16 +4,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
 
+#include "base/text_file.h"
+#include "ingest/contradiction_watch.h"
+#include "ingest/forecasts.h"
+#include "ingest/model_loading.h"
 #include "ingest/pipeline.h"
-#include "telemetry/codec.h"
+#include "telemetry/csv_import.h"
 #include "tests/gap/checks/made_recordings.h"
 #include "tests/ingest/harness.h"
+#include "tests/support/shared_folder.h"
 
 namespace joulecast::ingest {
 namespace {
@@ -160,7 +166,9 @@ std::vector<Mistake> usual_mistakes() {
       {"battery voltage in mV", K::implausible, "", true, "is it in mV?",
        [](M&, Sample& s, const R&) { s.battery_voltage_v *= 1000; }},
       {"wheels NaN", K::implausible, "", true, "wheel_velocity[0] must be measured",
-       [](M&, Sample& s, const R&) { s.wheel_velocity_rad_s = {nan, nan}; }},
+       [](M&, Sample& s, const R&) {
+         s.wheel_velocity_rad_s = {nan, nan};
+       }},
       {"another id than the channel's", K::identity, "robot_id", false, "another robot_id",
        [](M& message, Sample&, const R&) {
          message.content = RefusedMessage{IngestFault::wrong_channel, "carries messages of robot_id other"};
@@ -203,15 +211,18 @@ TEST_P(UsualMistakes, AreToldWithinOneMissionAndNothingIsLearntFromIt) {
   const Contradiction* told = sent.find(mistake.kind, mistake.channel);
   ASSERT_NE(told, nullptr) << sent.told();
   EXPECT_NE(told->says.find(mistake.cause), std::string::npos) << told->says;
-  EXPECT_TRUE(std::ranges::any_of(told->says, [](unsigned char c) { return std::isdigit(c) != 0; })) << told->says;
+  EXPECT_TRUE(std::ranges::any_of(told->says, [](unsigned char c) { return std::isdigit(c) != 0; }))
+      << told->says;
   EXPECT_EQ(told->untrue, mistake.untrue);
   for (const Contradiction& c : sent.live) EXPECT_TRUE(c.kind == mistake.kind || !c.untrue) << sent.told();
   EXPECT_EQ(std::ranges::count(sent.events, "contradiction", &history::Event::kind),
             static_cast<std::ptrdiff_t>(sent.counted));
   EXPECT_GE(sent.counted, 1u);
-  EXPECT_TRUE(std::ranges::any_of(sent.warnings, [&](const std::string& w) { return w.starts_with("contradiction: "); }));
+  EXPECT_TRUE(std::ranges::any_of(sent.warnings,
+                                  [&](const std::string& w) { return w.starts_with("contradiction: "); }));
   for (const history::Mission& mission : sent.missions) {
-    EXPECT_EQ(history::findings_of(mission).teaches(), !mistake.untrue) << mission.findings_json << sent.told();
+    EXPECT_EQ(history::findings_of(mission).teaches(), !mistake.untrue)
+        << mission.findings_json << sent.told();
   }
 }
 
@@ -226,7 +237,8 @@ std::string name_of(const ::testing::TestParamInfo<std::tuple<Mistake, Case>>& i
 INSTANTIATE_TEST_SUITE_P(Robots, UsualMistakes,
                          ::testing::Combine(::testing::ValuesIn(usual_mistakes()),
                                             ::testing::Values(Case{"amr", true, 40}, Case{"amr", false, 40},
-                                                              Case{"nomad", true, 40}, Case{"tug", false, 60})),
+                                                              Case{"nomad", true, 40},
+                                                              Case{"tug", false, 60})),
                          name_of);
 
 TEST(Contradictions, OfTwoSendersOneIsTurnedAwayAndNothingIsBookedTwice) {
@@ -247,13 +259,12 @@ TEST(Contradictions, SoundRobotsHaveNone) {
     bool motors;
     std::vector<virtual_robot::EffectStrength> effects;
   };
-  for (const Sound& of : {Sound{"amr", true, {}}, Sound{"nomad", true, {}}, Sound{"p3dx", true, {}},
-                          Sound{"tug", true, {}}, Sound{"amr", false, {}}, Sound{"nomad", false, {}},
-                          Sound{"p3dx", false, {}}, Sound{"tug", false, {}},
-                          Sound{"amr", true, {{"coulomb_friction", 1.5}}},
-                          Sound{"tug", false, {{"current_sensor_gain", 0.2}}},
-                          Sound{"nomad", false, {{"turning_scrub", 0.5}}}, Sound{"amr", false, {{"slope", 0.05}}},
-                          Sound{"p3dx", true, {{"torque_constant_loss", 0.3}}}}) {
+  for (const Sound& of :
+       {Sound{"amr", true, {}}, Sound{"nomad", true, {}}, Sound{"p3dx", true, {}}, Sound{"tug", true, {}},
+        Sound{"amr", false, {}}, Sound{"nomad", false, {}}, Sound{"p3dx", false, {}}, Sound{"tug", false, {}},
+        Sound{"amr", true, {{"coulomb_friction", 1.5}}}, Sound{"tug", false, {{"current_sensor_gain", 0.2}}},
+        Sound{"nomad", false, {{"turning_scrub", 0.5}}}, Sound{"amr", false, {{"slope", 0.05}}},
+        Sound{"p3dx", true, {{"torque_constant_loss", 0.3}}}}) {
     for (const double length_s : {8.0, 20.0, 110.0}) {
       for (const std::uint64_t seed : {41u, 42u, 43u}) {
         Robot robot(made::virtual_robot(of.kind, seed, [&](virtual_robot::SimulationSpec& spec) {
@@ -264,7 +275,8 @@ TEST(Contradictions, SoundRobotsHaveNone) {
           spec.imperfections = *virtual_robot::make_imperfections(of.effects);
         }));
         const Sent sent = robot.send();
-        EXPECT_TRUE(sent.live.empty()) << of.kind << " " << length_s << " s, seed " << seed << "\n" << sent.told();
+        EXPECT_TRUE(sent.live.empty()) << of.kind << " " << length_s << " s, seed " << seed << "\n"
+                                       << sent.told();
         EXPECT_EQ(sent.counted, 0u) << of.kind << " " << length_s << " s, seed " << seed;
         EXPECT_TRUE(history::findings_of(sent.missions.at(0)).teaches());
       }
@@ -322,6 +334,74 @@ TEST(Contradictions, TheChargeIsThatOfBeforeTheContradictedMission) {
     s.battery_voltage_v = s.battery_current_a = 0;
   });
   EXPECT_NEAR(robot.harness->fleet.find(robot.model().robot_id)->state_of_charge, before, 0.02);
+}
+
+// Recordings that nobody made for these checks, mission by mission.
+TEST(Contradictions, RealRecordingsHaveNone) {
+  struct Source {
+    const char *folder, *ending, *mapping, *robot;
+  };
+  const std::string shared = JOULECAST_SHARED "/data/real/", source = JOULECAST_SOURCE_DIR "/deploy/";
+  JOULECAST_NEED_SHARED(std::filesystem::exists(shared), "real recordings");
+  std::size_t missions = 0;
+  for (const Source& of : {Source{"warthog_grass", ".csv", "warthog_grass", "warthog-grass"},
+                           Source{"borealtc_husky", ".csv", "borealtc_husky", "borealtc-husky"},
+                           Source{"frc3314_drivetrain", "_low.csv", "frc3314_low", "frc3314-low"},
+                           Source{"frc3314_drivetrain", "_high.csv", "frc3314_high", "frc3314-high"}}) {
+    const auto robot = robot::load_robot(source + "robots/" + of.robot + ".json");
+    const auto mapping_text = read_text_file(source + "import/" + of.mapping + ".json");
+    ASSERT_TRUE(robot && mapping_text);
+    const auto mapping = telemetry::ImportMapping::parse(*mapping_text);
+    ASSERT_TRUE(mapping);
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(shared + of.folder)) {
+      if (!entry.path().string().ends_with(of.ending)) continue;
+      const auto text = read_text_file(entry.path().string());
+      const auto import = telemetry::import_csv(*text, *mapping,
+                                                {.source_name = entry.path().string(),
+                                                 .robot_id = {},
+                                                 .mission_id = {},
+                                                 .start_utime_us = 1'700'000'000'000'000});
+      if (!import) continue;
+      ++missions;
+      ContradictionWatch watch(*robot);
+      watch.begin_mission("m", import->recording.payload_kg);
+      std::string told;
+      const auto note = [&] {
+        for (const Contradiction& c : watch.all()) told += (c.untrue ? "X " : "  ") + c.says + "\n";
+      };
+      for (const Sample& sample : import->recording.samples) {
+        watch.add(sample);
+        if (watch.take_changed()) note();
+      }
+      (void)watch.end_mission();
+      note();
+      EXPECT_EQ(told, "") << entry.path();
+    }
+  }
+  EXPECT_GT(missions, 10u);
+}
+
+TEST(Forecasts, ForgetAMissionAsIfItHadNotBeen) {
+  const auto model = model_in_force(drive("amr", true, 36, 8).model, 1);
+  const auto mission = [](std::int64_t start_utime_us, double battery_j) {
+    forecast::PastMission made{start_utime_us, {}};
+    for (int k = 0; k < 5; ++k) made.legs.push_back({forecast::Motion::drive, 10, 8, 0.8, 0, 0, battery_j});
+    return made;
+  };
+  PipelineHarness harness, other;
+  Forecasts both(*harness.store), right(*other.store);
+  (void)both.learn(model, mission(1, 400));
+  (void)both.learn(model, mission(2, 9000));
+  (void)right.learn(model, mission(1, 400));
+  const auto learned = both.forget(model, 2);
+  ASSERT_TRUE(learned);
+  EXPECT_EQ(legs_from_json(learned->body_json)->size(), 1u);
+  EXPECT_FALSE(both.forget(model, 2));
+  const auto a = both.of(model).forecaster, b = right.of(model).forecaster;
+  EXPECT_EQ(a->missions, 1);
+  EXPECT_EQ(a->standing_w, b->standing_w);
+  EXPECT_EQ(a->tracks[0].common, b->tracks[0].common);
+  EXPECT_EQ(a->tracks[0].inflation, b->tracks[0].inflation);
 }
 
 }  // namespace

@@ -348,7 +348,8 @@ TEST_F(HostileTest, AnImplausibleValueIsNamedWithItsFieldAndBound) {
     s.battery_voltage_v = 25'400;
     send(s, s.utime_us);
   }
-  EXPECT_EQ(note("implausible"), "battery_voltage is 25400; no robot reports values outside -1 to 1000; is it in mV?");
+  EXPECT_EQ(note("implausible"),
+            "battery_voltage is 25400; no robot reports values outside -1 to 1000; is it in mV?");
   ASSERT_EQ(harness.warnings.size(), 1u);
   EXPECT_NE(harness.warnings[0].find("battery_voltage"), std::string::npos);
   Sample s = sample(100, start_us);

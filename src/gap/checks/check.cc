@@ -90,8 +90,8 @@ class Asking {
   }
   void ask_effects() {
     if (effects_) return;
-    checks.push_back(make_check("robot_file", "", {},
-                                "The robot file's effects are left out: " + describe(effects_.error()) + "."));
+    checks.push_back(make_check(
+        "robot_file", "", {}, "The robot file's effects are left out: " + describe(effects_.error()) + "."));
   }
 
   std::vector<Check> checks;
@@ -113,8 +113,8 @@ std::vector<Check> check_observations(std::span<const Observation> observations,
   asking.ask(check_silence);
   asking.ask(check_signs_and_units);
   asking.ask_effects();
-  for (const auto check :
-       {check_limits, check_motors, check_robot_file, check_kinematics, check_delays, check_steps, check_readings})
+  for (const auto check : {check_limits, check_motors, check_robot_file, check_kinematics, check_delays,
+                           check_steps, check_readings})
     asking.ask(check);
   shorten(asking.checks);
   return std::move(asking.checks);
@@ -126,7 +126,8 @@ std::vector<Check> check_contradictions(std::span<const Observation> observation
   Asking asking(observations, robot, 0);
   asking.ask(check_clock);
   if (!contradicts_clock(asking.checks)) {
-    for (const auto check : {check_silence, check_signs_and_units, check_limits, check_readings}) asking.ask(check);
+    for (const auto check : {check_silence, check_signs_and_units, check_limits, check_readings})
+      asking.ask(check);
   }
   std::erase_if(asking.checks, [](const Check& c) {
     return !c.contradicted && !c.id.ends_with("_over_limit") && c.id != "thrown_readings" &&

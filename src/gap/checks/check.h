@@ -47,9 +47,9 @@ std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
 std::vector<Check> check_observations(std::span<const Observation> observations,
                                       const robot::RobotModel& robot);
 
-// Of these checks those that need one mission alone and no delays, to be asked while it goes on: clock, signs,
-// units, sides, silent channels, limits and readings that are thrown for a row. Observations may be without
-// lags.
+// Of these checks those that need one mission alone and no delays, to be asked while it goes on: clock,
+// signs, units, sides, silent channels, limits and readings that are thrown for a row. Observations may be
+// without lags.
 std::vector<Check> check_contradictions(std::span<const Observation> observations,
                                         const robot::RobotModel& robot);
 
