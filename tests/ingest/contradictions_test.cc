@@ -14,7 +14,6 @@
 #include "base/text_file.h"
 #include "ingest/contradiction_watch.h"
 #include "ingest/forecasts.h"
-#include "ingest/model_loading.h"
 #include "ingest/pipeline.h"
 #include "telemetry/csv_import.h"
 #include "tests/gap/checks/made_recordings.h"
@@ -382,7 +381,9 @@ TEST(Contradictions, RealRecordingsHaveNone) {
 }
 
 TEST(Forecasts, ForgetAMissionAsIfItHadNotBeen) {
-  const auto model = model_in_force(drive("amr", true, 36, 8).model, 1);
+  const auto made_model = model_in_force(drive("amr", true, 36, 8).model, 1);
+  ASSERT_TRUE(made_model);
+  const std::shared_ptr<const ModelInForce>& model = *made_model;
   const auto mission = [](std::int64_t start_utime_us, double battery_j) {
     forecast::PastMission made{start_utime_us, {}};
     for (int k = 0; k < 5; ++k) made.legs.push_back({forecast::Motion::drive, 10, 8, 0.8, 0, 0, battery_j});
