@@ -34,6 +34,18 @@ ContradictionKind kind_of(std::string_view id) {
   return ContradictionKind::constant;
 }
 
+// Whether any of the channels enters a mission's accounts or what is learnt from them: commands and gyros do
+// not.
+bool enters_accounts(std::string_view channels) {
+  for (std::size_t from = 0; from < channels.size();) {
+    const std::size_t end = std::min(channels.find(", ", from), channels.size());
+    const std::string_view one = channels.substr(from, end - from);
+    if (!one.starts_with("velocity_command") && !one.starts_with("yaw_rate")) return true;
+    from = end + 2;
+  }
+  return false;
+}
+
 std::vector<Contradiction> contradictions_of(const gap::Observation& seen, const robot::RobotModel& robot) {
   std::vector<Contradiction> found;
   for (gap::Check& check : gap::check_contradictions({&seen, 1}, robot)) {
@@ -41,7 +53,8 @@ std::vector<Contradiction> contradictions_of(const gap::Observation& seen, const
     if (kind == ContradictionKind::constant && seen.moving_s < constant_s) continue;
     Contradiction& c = found.emplace_back();
     c.kind = kind;
-    c.untrue = check.contradicted || (c.kind == ContradictionKind::limit && check.value > absurd_limit);
+    c.untrue = (check.contradicted || (c.kind == ContradictionKind::limit && check.value > absurd_limit)) &&
+               enters_accounts(check.channel);
     c.id = std::move(check.id);
     c.channel = std::move(check.channel);
     c.value = check.value;
