@@ -4,12 +4,14 @@ import{$ as H,A as ye,Aa as Ut,B as At,Ba as Ht,C as Nt,Da as Jt,Ea as ne,F as e
 The terms of the page, the documents and the messages. The page shows this text under Help.
 
 - **adopt**: to put a model into force that a diagnosis or a proposal suggests, after a back-test.
+- **annulled**: taken out of all sums and of what is learnt by somebody, with a reason (of a mission).
 - **audit log**: the list of what happened to robots and their models, in order.
 - **autonomy**: how far and how long a robot still goes, and whether it can do a list of tasks.
 - **back-test**: comparison of a model with measured energy of missions that it was not fitted on.
 - **baseline**: a usual way to do the same thing, to compare with: a trapezoid of speed, a plain regression.
 - **battery energy**: energy out of the battery's terminals; measured where measured, modelled elsewhere.
 - **confounded with**: not distinguishable from another effect with the missions at hand.
+- **contradicted**: spoken against by the robot's other channels, its file or the clock (of telemetry); such missions teach nothing.
 - **covariate**: a condition that a robot reports beside its motion, such as processor load or the kind of floor.
 - **deadline**: the time by which a drive has to end.
 - **diagnosis**: a search for the effects that explain a robot's gap, with their strength and probability.
