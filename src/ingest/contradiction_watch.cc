@@ -157,7 +157,7 @@ void ContradictionWatch::add(const signals::Sample& sample) {
   if (!in_mission_) return;
   observer_.add(sample);
   if (++samples_ < next_) return;
-  next_ += next_ / 2;
+  next_ *= 2;
   const gap::Observation seen = observer_.so_far();
   judge_channels(contradictions_of(seen, robot_), seen.moving_s >= says_enough_s);
 }

@@ -15,7 +15,7 @@ namespace joulecast::ingest {
 
 // Holds one robot's channels against each other and against its file while its missions run (gap/checks), and
 // counts what is wrong with its messages. Work and memory a sample do not grow; the channels are compared
-// after some hundred samples of a mission, then whenever it has become half as long again, and at its end.
+// after some hundred samples of a mission, then whenever it has become twice as long, and at its end.
 class ContradictionWatch {
  public:
   explicit ContradictionWatch(const robot::RobotModel& robot);
