@@ -13,7 +13,8 @@
 namespace joulecast::server {
 
 // Tells the event stream what changed in the fleet: `state` for each robot whose snapshot is new, `mission`
-// for each mission that ended. One thread.
+// for each mission that ended, `contradiction` for each
+// contradiction that is told. One thread.
 class FleetEvents {
  public:
   FleetEvents(const ingest::FleetView& fleet, const ingest::ModelRegistry& models,
@@ -26,7 +27,10 @@ class FleetEvents {
   struct Told {
     std::shared_ptr<const ingest::RobotSnapshot> snapshot;
     bool live = false;
+    std::map<std::string, std::int64_t> contradictions;  // host's time when each was told
   };
+  void tell_contradictions(const ingest::RobotSnapshot& now, Told& told);
+
   const ingest::FleetView& fleet_;
   const ingest::ModelRegistry& models_;
   ingest::Forecasts& forecasts_;

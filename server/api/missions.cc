@@ -1,12 +1,14 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <unordered_map>
 #include <utility>
 
 #include "answers/json/ledger_json.h"
 #include "answers/json/mission_json.h"
+#include "base/json_fields.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
 #include "server/api/services.h"
@@ -18,6 +20,8 @@ using http::Method;
 using http::Parameter;
 using http::Request;
 using http::Response;
+
+constexpr std::size_t most_reason = 1024;  // bytes
 
 Result<history::TimeRange> range_of(const Request& request) {
   const auto from = time_of(request, "from"), to = time_of(request, "to");
@@ -76,6 +80,41 @@ class MissionSummaries {
   std::uint64_t commits_ = 0;
   std::unordered_map<history::MissionKey, std::shared_ptr<const std::string>> texts_;
 };
+
+// Takes an ended mission out of all sums and of what forecasts learnt. It stays in the lists, with the
+// reason.
+Result<Response> annul(Services& services, const Request& request) {
+  Fields fields(*request.json);
+  const std::string reason = fields.text("reason", most_reason);
+  if (fields.ok() && reason.empty()) fields.fault("reason", "must say why the mission does not count");
+  if (Result<void> read = fields.finish(); !read) return tl::unexpected(std::move(read.error()));
+  Result<history::Mission> mission = mission_of(services, request);
+  if (!mission) return tl::unexpected(mission.error());
+  if (mission->state == history::MissionState::open)
+    return fail(Fault::conflict, "id", "the mission is still open; only one that ended can be annulled");
+  if (!history::findings_of(*mission).annulled.empty())
+    return fail(Fault::conflict, "id", "the mission is annulled already");
+  const std::int64_t now = services.now_utime_us();
+  mission->findings_json = history::annulled_findings(*mission, now, reason);
+  if (auto done = services.writer.execute(history::CheckpointMission{*mission, {}, {}, std::nullopt}); !done)
+    return tl::unexpected(std::move(done.error()));
+  const nlohmann::json detail{
+      {"mission", mission->key}, {"mission_id", mission->mission_id}, {"reason", reason}};
+  if (auto done = services.writer.execute(
+          history::AppendEvent{{0, now, mission->robot_id, "mission_annulled",
+                                detail.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)}});
+      !done)
+    return tl::unexpected(std::move(done.error()));
+  if (const auto model = services.models.find(mission->robot_id)) {
+    if (auto learned = services.forecasts.forget(model, mission->start_utime_us)) {
+      if (auto done = services.writer.execute(history::PutLearned{std::move(*learned)}); !done)
+        return tl::unexpected(std::move(done.error()));
+    }
+  }
+  JsonWriter json;
+  answers::write_mission(json, *mission);
+  return http::json_response(json.take());
+}
 
 Result<Response> ledger(const Services& services, const Request& request) {
   const Result<history::Mission> mission = mission_of(services, request);
@@ -251,6 +290,18 @@ std::vector<TableRow> mission_rows() {
                       return summaries->read(request);
                     };
                   }});
+  rows.push_back(
+      {{.method = Method::post,
+        .path = "/v1/missions/{id}/annul",
+        .operation_id = "annulMission",
+        .role = http::Role::operate,
+        .summary = "Takes an ended mission out of all sums and of what is learnt, for a reason that "
+                   "lists and the audit log keep",
+        .request_schema = "annul-request",
+        .response_schema = "mission",
+        .error_statuses = {404, 409, 422},
+        .run = http::Run::write},
+       answered_by(annul)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/missions/{id}/ledger",
                    .operation_id = "getMissionLedger",

@@ -275,9 +275,12 @@ class DiagnosisService::Impl {
     Result<StoredRecordings> history = read_recordings(store_, wanted);
     if (!history) return tl::unexpected(std::move(history.error()));
     if (history->missions.empty())
-      return invalid("/missions", "none of the robot's missions has its telemetry stored (" +
+      return invalid("/missions", "none of the robot's missions can be diagnosed (their telemetry: " +
                                       std::to_string(history->left_out.no_telemetry) + " without, " +
-                                      std::to_string(history->left_out.open) + " still open)");
+                                      std::to_string(history->left_out.open) + " still open, " +
+                                      std::to_string(history->left_out.contradicted) +
+                                      " contradict themselves: see the robot's contradictions, " +
+                                      std::to_string(history->left_out.annulled) + " annulled)");
     std::vector<telemetry::Recording> recordings;
     for (std::size_t k = 0; k < history->missions.size(); ++k) {
       StoredRecording& mission = history->missions[k];

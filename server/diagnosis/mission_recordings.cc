@@ -53,6 +53,9 @@ class Reader {
     LeftOut& out = result_.left_out;
     if (wanted_.except.contains(mission.key)) return ++out.excepted, Result<void>{};
     if (mission.state == history::MissionState::open) return ++out.open, Result<void>{};
+    const history::MissionFindings findings = history::findings_of(mission);
+    if (!findings.annulled.empty()) return ++out.annulled, Result<void>{};
+    if (!findings.teaches() && wanted_.only.empty()) return ++out.contradicted, Result<void>{};
     if (full() || result_.samples + static_cast<std::size_t>(std::max<std::int64_t>(mission.samples, 0)) >
                       wanted_.max_samples)
       return ++out.too_many, Result<void>{};

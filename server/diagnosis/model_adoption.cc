@@ -22,6 +22,8 @@ json report_of(const Adoption& adoption) {
   report["left_out"] = {{"fitted_on", out.excepted},
                         {"open", out.open},
                         {"no_telemetry", out.no_telemetry},
+                        {"contradicted", out.contradicted},
+                        {"annulled", out.annulled},
                         {"beyond_limits", out.too_many},
                         {"charging_samples", out.charging_samples}};
   report["since_utime_us"] = adoption.since_utime_us ? json(*adoption.since_utime_us) : json();

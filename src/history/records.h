@@ -85,10 +85,26 @@ struct Mission {
   std::int64_t samples = 0;                           // accepted and accounted for
   std::map<std::string, std::int64_t> sample_faults;  // reason -> samples counted out or repaired
   std::int64_t gap_count = 0;
-  double gap_s = 0;           // time without samples, bridged or not
-  std::string findings_json;  // what its motion says of payload and friction; empty: nothing
+  double gap_s = 0;  // time without samples, bridged or not
+  // An object; empty: nothing. What its motion says of payload and friction, or "contradictions": why it is
+  // not what its accounts say. "annulled": when and why somebody took it out of all sums.
+  std::string findings_json;
   std::vector<CovariateSummary> covariates;
 };
+
+// The parts of findings_json, as JSON each.
+struct MissionFindings {
+  std::string motion;  // empty: none
+  std::string contradictions = "[]";
+  std::string annulled;  // empty: not annulled
+
+  // Whether anything may be learnt from the mission.
+  bool teaches() const { return contradictions == "[]" && annulled.empty(); }
+};
+[[nodiscard]] MissionFindings findings_of(const Mission& mission);
+// The mission's findings_json once it is annulled. `reason` is any UTF-8 text.
+[[nodiscard]] std::string annulled_findings(const Mission& mission, std::int64_t utime_us,
+                                            const std::string& reason);
 
 // Least, mean and greatest of a quantity; all NaN when it was not measured.
 struct Band {

@@ -209,6 +209,10 @@ bool has_mission(Database& database, MissionKey key) {
   return rows.bind(key).next();
 }
 
+// Annulled missions are in no sum.
+constexpr std::string_view not_annulled =
+    " AND (findings_json IS NULL OR json_type(findings_json, '$.annulled') IS NULL)";
+
 const std::string& select_totals() {
   static const std::string sql = [] {
     std::string sums = "sum(";
@@ -285,7 +289,7 @@ Result<MissionPage> missions(Database& database, const MissionFilter& filter, co
 Result<Totals> totals(Database& database, const MissionFilter& filter) {
   if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
   const Where where(filter);
-  const std::string sql = "SELECT " + select_totals() + where.sql();
+  const std::string sql = "SELECT " + select_totals() + where.sql() + std::string(not_annulled);
   Statement statement = database.prepare(sql);
   Rows rows(statement);
   where.bind(rows);
@@ -302,7 +306,7 @@ Result<std::vector<TotalsGroup>> grouped_totals(Database& database, const Missio
   const std::string group = by == Grouping::robot ? "robot_id"
                                                   : "start_utime_us - ((start_utime_us + ?) % " + period +
                                                         " + " + period + ") % " + period;
-  const std::string sql = "SELECT " + group + ", " + select_totals() + where.sql() +
+  const std::string sql = "SELECT " + group + ", " + select_totals() + where.sql() + std::string(not_annulled) +
                           " GROUP BY 1 ORDER BY 1 LIMIT " + std::to_string(max_groups + 1);
   Statement statement = database.prepare(sql);
   Rows rows(statement);

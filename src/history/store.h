@@ -71,8 +71,8 @@ struct MissionPage {
   std::string next_cursor;  // empty: the last page
 };
 
-// Sums over missions. A mission that did not measure a quantity adds nothing to it; a quantity that none
-// measured is NaN.
+// Sums over missions, but for those that were annulled (MissionFindings). A mission that did not measure a
+// quantity adds nothing to it; a quantity that none measured is NaN.
 struct Totals {
   std::int64_t missions = 0;
   std::int64_t measured_missions = 0;  // those with measured energy

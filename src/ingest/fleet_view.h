@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ingest/charge_watch.h"
+#include "ingest/contradiction.h"
 #include "signals/ledger.h"
 #include "signals/sample.h"
 
@@ -40,6 +41,9 @@ struct RobotSnapshot {
   std::map<std::string, std::uint64_t>
       faults;  // reason -> messages rejected or repaired, since the daemon started
   std::map<std::string, std::string> fault_notes;  // reason -> what was wrong with the last one
+  std::vector<Contradiction> contradictions;
+  // Reason -> missions that nothing was learnt from, since the daemon started.
+  std::map<std::string, std::uint64_t> missions_left_out;
 };
 
 // The latest snapshot of every robot. One thread publishes, any thread reads without waiting for it.

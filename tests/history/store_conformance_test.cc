@@ -695,6 +695,11 @@ TEST_P(StoreConformance, SumsOverMissions) {
   EXPECT_EQ(all.gap_s, 1.5);
   EXPECT_EQ(all.accounts.measured_j, 30);
   EXPECT_EQ(all.accounts.ledger[signals::Term::drag], 5);
+  missions[1].findings_json = annulled_findings(missions[1], 17, "a \"test\"");
+  need(apply(CheckpointMission{missions[1], {}, {}, {}}));
+  EXPECT_EQ(need(store_->totals({})).missions, 3);
+  EXPECT_EQ(need(store_->totals({})).accounts.measured_j, 20);
+  EXPECT_EQ(need(store_->missions({}, {.limit = 10, .cursor = {}})).missions.size(), 4U);
   MissionFilter nobody;
   nobody.robot_ids = {"nobody"};
   EXPECT_EQ(need(store_->totals(nobody)).missions, 0);

@@ -312,6 +312,11 @@ await check('a robot that stands, is silent or was restarted is shown as that', 
   const told = [
     { ...heard, robot_id: 'restarted', faults: { restart: 1, gap: 1, outside_mission: 40 } },
     { ...heard, robot_id: 'lossy', faults: { missing: 3, restart: 1 } },
+    {
+      ...heard,
+      robot_id: 'negated',
+      contradictions: [{ kind: 'sign', id: 'x', channel: 'battery_current', says: 'It is -1.', untrue: true }],
+    },
     { ...heard, robot_id: 'quiet', live: false, silent_s: 7200 },
     { ...heard, robot_id: 'standing', speed_m_s: 0, measured_power_w: 20 },
   ];
@@ -328,6 +333,7 @@ await check('a robot that stands, is silent or was restarted is shown as that', 
     );
   equal((await cells('restarted'))[0], 'live', 'after a restart');
   expect((await cells('lossy'))[0].includes('3 missing'), `lost samples: ${(await cells('lossy'))[0]}`);
+  expect((await cells('negated'))[0].includes('battery_current: sign'), 'a contradiction');
   const quiet = await cells('quiet');
   expect(/^silent since (\d\d:\d\d|\w+ \d+)$/.test(quiet[0]), `silence: ${quiet[0]}`);
   equal([quiet[1], quiet[6], quiet[8]].join(' '), '– – –', 'power, speed and mission of a silent robot');

@@ -30,8 +30,12 @@ void write_mission(JsonWriter& json, const history::Mission& m) {
   json.end_object();
   json.field("gap_count", m.gap_count);
   json.field("gap_s", m.gap_s);
+  const history::MissionFindings findings = history::findings_of(m);
   json.key("findings");
-  m.findings_json.empty() ? json.null() : json.raw(m.findings_json);
+  findings.motion.empty() ? json.null() : json.raw(findings.motion);
+  json.key("contradictions").raw(findings.contradictions);
+  json.key("annulled");
+  findings.annulled.empty() ? json.null() : json.raw(findings.annulled);
   json.key("covariates").begin_array();
   for (const history::CovariateSummary& c : m.covariates) {
     json.begin_object().field("name", c.name).field("mean", c.mean).field("min", c.min).field("max", c.max);

@@ -47,6 +47,12 @@ std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
 std::vector<Check> check_observations(std::span<const Observation> observations,
                                       const robot::RobotModel& robot);
 
+// Of these checks those that need one mission alone and no delays, to be asked while it goes on: clock,
+// signs, units, sides, silent channels, limits and readings that are thrown for a row. Observations may be
+// without lags.
+std::vector<Check> check_contradictions(std::span<const Observation> observations,
+                                        const robot::RobotModel& robot);
+
 // Missions before a `step_between_missions` and from it on, each side with three at least; empty where no
 // check tells of a step. `checks` are of these recordings. Notes and what could not be read belong to the
 // whole and stay out.

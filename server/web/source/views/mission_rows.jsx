@@ -19,6 +19,16 @@ function StateCell({ mission: m }) {
           incomplete
         </span>
       )}
+      {m.annulled && (
+        <span class="flag" title={m.annulled.reason}>
+          annulled
+        </span>
+      )}
+      {m.contradictions.length > 0 && (
+        <span class="flag" title={m.contradictions.map((c) => c.says).join(' ')}>
+          contradicted
+        </span>
+      )}
       {payload?.verdict === 'undeclared' && (
         <span class="flag" title="Undeclared payload, estimated from the motion">
           {format.signed(format.digits(payload.undeclared_kg, 2))} kg undeclared
