@@ -165,7 +165,11 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse, bool unexpl
         probability_text(d.outside.probability))));
   }
   if (d.effects.empty() && d.verdict == Verdict::inconclusive) {
-    if (d.power_absolute_relative - d.noise_floor > 0.012) {
+    if (!std::isfinite(d.noise_floor)) {
+      reasons.emplace_back(
+          "Power was measured, but the motion that asks for it is not known: see the checks of the "
+          "recordings.");
+    } else if (d.power_absolute_relative - d.noise_floor > 0.012) {
       reasons.push_back(sentence(fmt::format(
           "{} of the power is missed where nothing could remove {}, and no effect of the catalogue "
           "accounts for it well enough to be named",
