@@ -52,8 +52,9 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
                                                 telemetry::datagram_fault_names.end()));
   const Gauge queue = metrics.gauge("joulecast_ingest_queue_messages", "Messages waiting to be accounted");
   const Gauge receiving = metrics.gauge("joulecast_ingest_receiving", "1 while LCM is being received");
-  const Gauge known = metrics.gauge("joulecast_robots_known", "Robots heard of since the daemon started");
-  const Gauge live = metrics.gauge("joulecast_robots_live", "Robots heard of within the last seconds");
+  const Gauge known =
+      metrics.gauge("joulecast_robots_known", "Robots received from since the daemon started");
+  const Gauge live = metrics.gauge("joulecast_robots_live", "Robots received from within the last seconds");
   const Gauge fleet_power =
       metrics.gauge("joulecast_fleet_power_watts", "Measured battery power of all live robots");
   const Gauge write_queue =

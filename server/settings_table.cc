@@ -58,7 +58,8 @@ constexpr Setting table[] = {
     {"http.read_timeout_s", Type::number, "10", 0.1, 3600, "s", "from a request's first byte to its last"},
     {"http.write_timeout_s", Type::number, "30", 0.1, 3600, "s", "without progress of an answer"},
     {"http.idle_timeout_s", Type::number, "60", 0.1, 86400, "s", "between the requests of a connection"},
-    {"http.stop_deadline_s", Type::number, "5", 0, 600, "s", "patience with running requests when stopping"},
+    {"http.stop_deadline_s", Type::number, "5", 0, 600, "s",
+     "time for running requests to finish when stopping"},
     {"http.event_queue_bytes", Type::integer, "8388608", 4096, 64 * megabyte, "B",
      "unsent events a client of the event stream may have before it is dropped; of a robot's states only the "
      "newest waits, about 2 kB"},

@@ -96,7 +96,7 @@ void add_example(CLI::App& command, const char* request) {
         std::puts(request);
         throw CLI::Success();
       },
-      "print a request as JSON to begin with, and leave");
+      "print an example request as JSON and exit");
 }
 
 void add_examples(CLI::App& program) {

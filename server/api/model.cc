@@ -328,7 +328,7 @@ std::vector<TableRow> model_rows() {
       {{.method = Method::get,
         .path = "/v1/proposals",
         .operation_id = "listFleetProposals",
-                   .role = http::Role::read,
+        .role = http::Role::read,
         .summary = "Models that were suggested for the robots of the fleet, newest first",
         .parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
         .response_schema = "proposal-list"},

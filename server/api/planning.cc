@@ -24,7 +24,7 @@ Result<Response> json_or_error(Result<std::string> text) {
   return http::json_response(std::move(*text));
 }
 
-// A profile request, read once: by whoever comes first of `brief` and `handler`.
+// A profile request, read once: by the first of `brief` and `handler`.
 struct ProfileRequest {
   Model model;
   answers::ProfileInput input;

@@ -8,7 +8,7 @@
 
 namespace joulecast::api {
 
-// Heard of within the last seconds.
+// Received from within the last seconds.
 bool is_live(const ingest::RobotSnapshot& snapshot, std::int64_t now_utime_us);
 
 // The fields "charge" and "charging" of a robot's state.

@@ -153,15 +153,16 @@ Result<Response> versions(const Services& services, const Request& request) {
 
 std::vector<TableRow> robot_rows() {
   std::vector<TableRow> rows;
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/robots",
-                   .operation_id = "listRobots",
-                   .role = http::Role::read,
-                   .summary = "The fleet: every robot that has a model or was heard of, by id, with its live "
-                              "state",
-                   .parameters = {limit_parameter("robots a page", most_robots), cursor_parameter()},
-                   .response_schema = "robot-list"},
-                  answered_by(list)});
+  rows.push_back(
+      {{.method = Method::get,
+        .path = "/v1/robots",
+        .operation_id = "listRobots",
+        .role = http::Role::read,
+        .summary = "The fleet: every robot that has a model or has sent telemetry, by id, with its live "
+                   "state",
+        .parameters = {limit_parameter("robots a page", most_robots), cursor_parameter()},
+        .response_schema = "robot-list"},
+       answered_by(list)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/robots/{id}",
                    .operation_id = "getRobot",

@@ -29,7 +29,7 @@ using history::DiagnosisState;
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-// Nice level of the working thread: everything that answers somebody goes first.
+// Nice level of the working thread: requests go first.
 constexpr int low_priority = 10;
 
 struct Job {
@@ -324,7 +324,7 @@ class DiagnosisService::Impl {
     origin.made_at = format_utc(now_utime_us_());
     origin.software = "joulecastd " JOULECAST_VERSION;
     report_ = report::report_html(diagnosis, model.robot, origin);
-    // What a person who insists would get; of effects that are not told apart nobody has chosen one yet.
+    // What a forced adoption would take; of effects that are indistinguishable none has been chosen yet.
     const gap::Offer offer = gap::offer_of(diagnosis);
     if (offer.effects.empty()) return;
     const Result<robot::RobotModel> extended = gap::take(offer, model.robot, {{}, true});
@@ -340,7 +340,7 @@ class DiagnosisService::Impl {
     record.state = state;
     record.error = std::move(error);
     record.finished_utime_us = now_utime_us_();
-    // The result is in the store before the job leaves the queue, so that whoever looks finds it in one of
+    // The result is in the store before the job leaves the queue, so that it is always found in one of
     // them.
     history::UpdateDiagnosis update{record, std::move(report)};
     if (const auto stored = writer_.execute(update); !stored) {

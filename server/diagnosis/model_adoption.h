@@ -30,11 +30,10 @@ struct AdoptionRequest {
   std::optional<std::int64_t> since_utime_us;
   std::optional<std::int64_t> expected_version;  // conflict when another one is in force
   std::optional<std::int64_t> diagnosis_id,
-      proposal_id;  // where it comes from; an adopted proposal is closed
-  std::string
-      overridden;  // why the diagnosis says that it is not to be adopted, where somebody insists; else empty
-  bool force = false;    // adopt even when the back-test does not show that it improves
-  bool dry_run = false;  // back-test only
+      proposal_id;         // where it comes from; an adopted proposal is closed
+  std::string overridden;  // why the diagnosis refuses adoption, where it is forced; else empty
+  bool force = false;      // adopt even when the back-test does not show that it improves
+  bool dry_run = false;    // back-test only
 };
 
 struct Adoption {

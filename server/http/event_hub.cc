@@ -94,7 +94,7 @@ struct EventHub::State::Subscriber : public StreamSource {
     wake = nullptr;
     empty_queue();
   }
-  bool hopeless() const override { return overflowed; }
+  bool must_close() const override { return overflowed; }
   bool endless() const override { return true; }
   bool on_worker() const override { return false; }
 

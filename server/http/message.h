@@ -75,7 +75,7 @@ class StreamSource {
   // The client left or the server stops; may come while pull() runs on another thread.
   virtual void cancel() {}
   // True when the source wants its connection closed even though a piece is still on its way (a slow client).
-  virtual bool hopeless() const { return false; }
+  virtual bool must_close() const { return false; }
   // True for streams that never end by themselves: a graceful stop closes them at once.
   virtual bool endless() const { return false; }
   // Where pull() runs: true when it computes or blocks.

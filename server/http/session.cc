@@ -239,7 +239,7 @@ void Session::watch_source() {
       self->wake_posted_ = false;
       if (!self->streaming_ || self->cut_) return;
       self->pull_again_ = true;
-      if (self->response_.stream->hopeless()) {
+      if (self->response_.stream->must_close()) {
         self->core_->observer.refused(Refusal::slow_stream);
         self->cut();
       }

@@ -202,7 +202,7 @@ class StreamSession final : public Session {
         next = outcome == Outcome::done ? pulled_ : StreamSource::Next::abort;
       }
       if (next == StreamSource::Next::abort) {
-        if (source->hopeless() && !cut_) core_->observer.refused(Refusal::slow_stream);
+        if (source->must_close() && !cut_) core_->observer.refused(Refusal::slow_stream);
         co_return false;
       }
       if (!piece_.empty() && !cut_) {

@@ -13,7 +13,7 @@
 namespace joulecast {
 
 // Reads one JSON object of a request, field by field, and remembers the first fault: the JSON pointer of the
-// field and the constraint that it broke. A null counts as absent. finish() also refuses keys that nobody
+// field and the constraint that it broke. A null counts as absent. finish() also refuses keys that no one
 // read, and names them beside a required one that misses: often the one is the other, misspelt.
 class Fields {
  public:

@@ -22,7 +22,7 @@ namespace joulecast::forecast {
 // A lasting change of what a robot spends.
 struct Drift {
   std::int64_t since_utime_us = 0;     // start of the first mission after the change
-  std::int64_t detected_utime_us = 0;  // start of the mission that gave it away
+  std::int64_t detected_utime_us = 0;  // start of the mission that revealed it
   double ratio = 1;                    // measured over expected, geometric mean since the change
   std::int64_t missions = 0;           // since the change
 };
@@ -99,7 +99,7 @@ class RobotForecast {
   // `drive` must be the drive model of `robot`.
   RobotForecast(robot::RobotModel robot, dynamics::DriveModel drive);
 
-  // Learns with what siblings told so far. Returns the drift when this mission gave it away. Missions without
+  // Learns with what siblings told so far. Returns the drift when this mission reveals it. Missions without
   // measured legs teach nothing.
   std::optional<Drift> learn(PastMission mission);
 

@@ -40,7 +40,7 @@ struct ModelVersion {
 struct RobotRecord {
   std::string robot_id;
   std::int64_t created_utime_us = 0;
-  std::optional<std::int64_t> active_version;  // absent: the robot was heard of, but nobody gave its model
+  std::optional<std::int64_t> active_version;  // absent: the robot has sent telemetry, but has no model
 };
 
 enum class MissionState {
@@ -207,7 +207,7 @@ enum class ProposalState { open, adopted, dismissed, superseded };
 std::string_view name(ProposalState state);
 std::optional<ProposalState> proposal_state_from(std::string_view text);
 
-// A model that something suggests, to be adopted or dismissed by somebody.
+// A model that something suggests, to be adopted or dismissed by an operator.
 struct Proposal {
   std::int64_t id = 0;  // increasing; given by the store
   std::string robot_id;

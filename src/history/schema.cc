@@ -151,7 +151,7 @@ Result<void> bring_to_schema(Database& database, const Schema& schema) {
   } else if (version > schema.version) {
     return fail(Fault::conflict, "database",
                 "schema version " + std::to_string(version) + " is newer than version " +
-                    std::to_string(schema.version) + ", the newest that this program knows");
+                    std::to_string(schema.version) + ", the newest that this program supports");
   } else if (version < schema.version) {
     if (auto migrated = migrate(database, schema, version); !migrated) return migrated;
     if (database.integer("SELECT count(*) FROM pragma_foreign_key_check") != 0)

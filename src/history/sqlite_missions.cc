@@ -306,8 +306,9 @@ Result<std::vector<TotalsGroup>> grouped_totals(Database& database, const Missio
   const std::string group = by == Grouping::robot ? "robot_id"
                                                   : "start_utime_us - ((start_utime_us + ?) % " + period +
                                                         " + " + period + ") % " + period;
-  const std::string sql = "SELECT " + group + ", " + select_totals() + where.sql() + std::string(not_annulled) +
-                          " GROUP BY 1 ORDER BY 1 LIMIT " + std::to_string(max_groups + 1);
+  const std::string sql = "SELECT " + group + ", " + select_totals() + where.sql() +
+                          std::string(not_annulled) + " GROUP BY 1 ORDER BY 1 LIMIT " +
+                          std::to_string(max_groups + 1);
   Statement statement = database.prepare(sql);
   Rows rows(statement);
   // 1970 began on a Thursday, three days after a Monday.

@@ -128,7 +128,7 @@ struct StoreSize {
 // What came of one command: a number that its description names, or why it was refused.
 using Outcome = Result<std::int64_t>;
 
-// The history of a fleet. One implementation a database; everything else speaks to this.
+// The history of a fleet: one implementation for each database.
 //
 // Threads: apply() from one thread at a time (the Writer's); everything else from any thread, also during
 // apply(). A query sees what was committed before it began. Errors: Fault::not_found for a named thing that

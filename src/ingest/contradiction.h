@@ -34,7 +34,7 @@ struct Contradiction {
   std::string id;       // "battery_current_reversed", "wheel_velocity_scale", "second_sender", ...
   std::string channel;  // fields of robot_telemetry_t; empty: none
   double value = 0;     // the number that says it: a ratio, a share of the messages
-  std::string says;     // what was found, its likely cause, and what joulecast wants
+  std::string says;     // what was found, its likely cause, and what joulecast expects
   // A mission in which it holds is not what its accounts say: nothing is learnt from it.
   bool untrue = false;
   std::int64_t told_utime_us = 0;  // host's, when it was last told as an event

@@ -88,13 +88,14 @@ constexpr Telling tellings[] = {
     {IngestFault::clock_ahead, ContradictionKind::clock, "clock_ahead", "utime", false,
      "are stamped more than 10 s ahead of the service's clock: is the robot's clock set (NTP)?"},
     {IngestFault::clock_backward, ContradictionKind::clock, "clock_standing", "utime", true,
-     "are stamped no later than the one before: utime stands or goes back; joulecast wants the instant of "
+     "are stamped no later than the one before: utime stands or goes back; joulecast expects the instant of "
      "sampling"},
     {IngestFault::clock_forward, ContradictionKind::clock, "clock_leaping", "utime", true,
      "are stamped more than an hour after the one before: utime must be the instant of sampling, in "
      "microseconds"},
     {IngestFault::restart, ContradictionKind::sequence, "sequence_standing", "sequence", false,
-     "do not count on: sequence stands or begins anew, so that lost messages cannot be told; joulecast wants "
+     "do not count on: sequence stands or begins anew, so that lost messages cannot be told; joulecast "
+     "expects "
      "it "
      "one higher with each message"},
 };

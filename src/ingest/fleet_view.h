@@ -21,7 +21,7 @@ struct RobotSnapshot {
   std::string robot_id;
   bool has_model = false;
   std::int64_t model_version = 0;
-  std::int64_t received_utime_us = 0;  // host clock at the last message; 0 = never heard
+  std::int64_t received_utime_us = 0;  // host clock at the last message; 0 = never received
   signals::Sample sample;              // the last one accounted for
   double measured_power_w = signals::unmeasured;
   double modelled_power_w = signals::unmeasured;

@@ -383,7 +383,7 @@ void RobotSession::on_charger_sample(const signals::Sample& sample) {
   keep(sample);
 }
 
-// A sample that no mission accounts for still tells what the robot does now.
+// A sample that no mission accounts for still shows what the robot does now.
 void RobotSession::show(const signals::Sample& sample) {
   snapshot_.sample = sample;
   snapshot_.measured_power_w = sample.battery_voltage_v * sample.battery_current_a;
@@ -590,13 +590,13 @@ void RobotSession::begin_record() {
   if (!key) outputs_.warn(robot_id_, describe(key.error()));
   record.key = key.value_or(0);
   if (record.key > 0) outputs_.post(history::StartMission{record});
-  if (!record.implicit) tell_of_namesake();
+  if (!record.implicit) report_earlier_mission();
   snapshot_.mission_key = record.key;
   outputs_.counters.missions_started[record.implicit ? 1 : 0].fetch_add(1, std::memory_order_relaxed);
 }
 
 // People look missions up by the robot's name for them: they should know when it is no longer unique.
-void RobotSession::tell_of_namesake() {
+void RobotSession::report_earlier_mission() {
   const history::Mission& record = open_->record;
   const Result<std::optional<history::MissionKey>> earlier =
       outputs_.store.earlier_mission(robot_id_, record.mission_id, record.start_utime_us);

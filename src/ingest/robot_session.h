@@ -67,7 +67,7 @@ class RobotSession {
 
   // Null: the model is not known; samples are counted out until it is. A declared mission goes on with the
   // model that it began with, so that its accounts are one model's, and the change takes effect when it ends;
-  // else, and in missions that nobody declared, which may last for days, at the next sample.
+  // else, and in missions that were not declared, which may last for days, at the next sample.
   void set_model(std::shared_ptr<const ModelInForce> model);
 
   // Goes on with a mission that was open when the last daemon stopped.
@@ -126,7 +126,7 @@ class RobotSession {
   void open(const telemetry::MissionAction& action);
   // Stores the open mission, which its first sample makes worth it.
   void begin_record();
-  void tell_of_namesake();
+  void report_earlier_mission();
   void close(const telemetry::MissionAction& action);
   void checkpoint();
   void on_point(const energy::MeterPoint& point);

@@ -44,7 +44,7 @@ struct JoinedFile {
 [[nodiscard]] std::vector<JoinedFile> joined_files(const ImportMapping& mapping,
                                                    const std::string& source_name);
 
-// What the caller knows better than the mapping.
+// What the caller states instead of the mapping.
 struct ImportOptions {
   std::string source_name;  // file name, for {stem} and {folder} in mission_id, and for messages
   std::optional<std::string> robot_id;

@@ -40,7 +40,7 @@ class Reader {
     }
     for (const auto& [key, member] : value.items()) {
       if (std::find(known.begin(), known.end(), key) == known.end())
-        refuse(pointer + "/" + key, "is no member that a mapping knows");
+        refuse(pointer + "/" + key, "is not a member of a mapping");
     }
     return true;
   }

@@ -22,7 +22,7 @@ struct BeyondRange {
 // The missions of event logs, in the order in which they began.
 struct LogRecordings {
   std::vector<Recording> recordings;          // their samples in order of time; a mission may hold none
-  std::set<std::string, std::less<>> robots;  // all that were heard, wanted or not
+  std::set<std::string, std::less<>> robots;  // all that occur, requested or not
   std::size_t samples_outside = 0;            // of no mission: before its start, or just after an end
   // Messages and covariates that decode to nothing, break a limit or come late, samples of one time, and
   // damaged places of the files.

@@ -995,7 +995,7 @@ await check('a diagnosis shows its checks, what would fit, and effects to choose
       ],
       corrections: [{ parameter: 'idle_power_w', file: 20, fits: 31, sd: 0.4 }],
       adoption: {
-        refusal: 'coulomb_friction is not told from viscous_friction: name the one to adopt',
+        refusal: 'coulomb_friction is not distinguished from viscous_friction: name the one to adopt',
         choice_settles: true,
         corrects_file: true,
         effects: [

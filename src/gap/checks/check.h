@@ -26,7 +26,7 @@ struct Check {
   std::string channel;
   double value = 0;                  // the number that says it: a ratio, a period [s], a step
   std::array<double, 2> interval{};  // of the value, 95 %; NaN where none applies
-  std::string says;                  // what was found, against what, its likely cause, what joulecast wants
+  std::string says;                  // what was found, against what, its likely cause, what joulecast expects
   // The channel takes no part in the diagnosis. A contradicted "utime" leaves nothing to be diagnosed.
   bool contradicted = false;
   // Of `step_between_missions`: the first mission after the step, in the order given. Missions before it and

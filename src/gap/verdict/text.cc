@@ -204,7 +204,8 @@ std::string refusal_of(const Diagnosis& d, bool worse, bool against) {
   if (d.verdict == Verdict::inconclusive || against) return "the verdict is inconclusive";
   for (const DiagnosedEffect& e : d.effects) {
     if (e.alternatives.empty()) continue;
-    return fmt::format("{} is not told from {}: name the one to adopt", e.id, enumerate(e.alternatives));
+    return fmt::format("{} is not distinguished from {}: name the one to adopt", e.id,
+                       enumerate(e.alternatives));
   }
   return {};
 }
