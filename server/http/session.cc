@@ -135,11 +135,10 @@ void Session::begin_request() {
   parser_->body_limit(core_->options.max_body_bytes);
   if (buffer_.size() == 0 && buffer_.capacity() > kept_buffer_bytes && !reading_ahead_)
     buffer_.shrink_to_fit();
-  // Nothing of the request before on this connection: what was read of that one is not this one's.
+  // Nothing of the exchange before on this connection: what was read of that request is not this one's.
   request_ = Request{};
   request_.stop = stop_.get_token();
-  response_.body = std::string();
-  response_.stream.reset();
+  response_ = Response{};
   endpoint_ = nullptr;
   refused_ = false;
   request_bytes_ = 0;

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -56,7 +55,6 @@ inline constexpr std::size_t max_effect_parameters = 64;
 // LCM channels carry at most 63 characters, of which "ROBOT_TELEMETRY." takes 16.
 inline constexpr std::string_view robot_id_pattern = "^[A-Za-z0-9._-]{1,47}$";
 inline constexpr std::string_view effect_name_pattern = "^[a-z0-9_]{1,64}$";
-inline constexpr Bounds charge_bounds{0.0, 1.0};
 
 // Every key of the robot file, once: parsing, validation, writing and the schema's test walk this table.
 std::span<const Field> fields();

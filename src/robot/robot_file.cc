@@ -221,7 +221,7 @@ void check_curve(const Curve& curve, const Field& field, const std::string& poin
   }
   for (std::size_t i = 0; i < curve.size(); ++i) {
     const std::string charge_pointer = fmt::format("{}/charge/{}", pointer, i);
-    check_bounds(curve[i].first, charge_bounds, charge_pointer, "charge", problems);
+    check_bounds(curve[i].first, fraction, charge_pointer, "charge", problems);
     check_bounds(curve[i].second, field.bounds, fmt::format("{}/{}/{}", pointer, field.value_key, i),
                  field.value_key, problems);
     if (i > 0 && !(curve[i].first > curve[i - 1].first))

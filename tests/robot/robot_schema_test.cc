@@ -80,7 +80,7 @@ Statements from_table() {
     const std::string pointer(field.pointer);
     const bool required = field.presence == Presence::required;
     if (!field.value_key.empty()) {
-      out[pointer + "/charge"] = {charge_bounds, true};
+      out[pointer + "/charge"] = {fraction, true};
       out[pointer + "/" + std::string(field.value_key)] = {field.bounds, true};
     } else if (std::holds_alternative<std::vector<BatteryBranch>& (*)(RobotModel&)>(field.member)) {
       for (const auto& branch : branch_fields())
