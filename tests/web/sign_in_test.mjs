@@ -1,4 +1,5 @@
-// The page of a daemon with tokens in headless Chromium: it asks for a token, keeps it from scripts, and works then.
+// The page of a daemon with tokens in headless Chromium: it asks for a token, keeps it from scripts,
+// and works then.
 // node sign_in_test.mjs --daemon joulecastd --client joulecast --out directory [--chromium /usr/bin/chromium]
 import assert from 'node:assert/strict';
 import { mkdir, rm } from 'node:fs/promises';
