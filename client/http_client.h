@@ -28,8 +28,9 @@ struct HttpReply {
 enum class HttpMethod { get, post, put, del };
 
 // One request on its own connection. `target` begins with a slash; `json_body` is sent with GET and DELETE
-// not at all. Fault::unavailable when the server cannot be reached or does not answer within `timeout` (for
-// the whole exchange); a reply of any status is a success here.
+// not at all. The token of the environment's JOULECAST_TOKEN goes with it. Fault::unavailable when the server
+// cannot be reached or does not answer within `timeout` (for the whole exchange); a reply of any status is a
+// success here.
 [[nodiscard]] Result<HttpReply> http_request(const ServerAddress& server, HttpMethod method,
                                              std::string_view target, std::string json_body,
                                              std::chrono::milliseconds timeout);

@@ -4,6 +4,7 @@
 // asio.h stays first of Boost.
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http.hpp>
+#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -94,6 +95,8 @@ Result<HttpReply> http_request(const ServerAddress& server, HttpMethod method, s
   request.set(http::field::host, (bracketed ? "[" + server.host + "]" : server.host) + ":" + server.port);
   request.set(http::field::user_agent, "joulecast/" JOULECAST_VERSION);
   request.set(http::field::accept, "application/json, application/problem+json, text/html;q=0.5");
+  if (const char* token = std::getenv("JOULECAST_TOKEN"); token != nullptr && *token != '\0')
+    request.set(http::field::authorization, std::string("Bearer ") + token);
   request.keep_alive(false);
   if (method != HttpMethod::get && method != HttpMethod::del) {
     request.set(http::field::content_type, "application/json");

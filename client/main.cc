@@ -13,8 +13,8 @@ int main(int argc, char** argv) {
   CLI::App program("joulecast: what a fleet of differential-drive robots spends, will spend and could save",
                    "joulecast");
   program.formatter(std::make_shared<joulecast::client::HelpFormatter>(joulecast::client::help_width()));
-  program.get_help_ptr()->description("say this and leave");
-  program.set_version_flag("--version", "joulecast " JOULECAST_VERSION, "say the version and leave");
+  program.get_help_ptr()->description("print this help and exit");
+  program.set_version_flag("--version", "joulecast " JOULECAST_VERSION, "print the version and exit");
   program.footer(joulecast::client::exit_codes_help);
   program.require_subcommand(1);
   Exit exit = Exit::ok;

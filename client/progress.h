@@ -29,7 +29,7 @@ class Progress {
     draw_if_due();
   }
   void set_total(std::uint64_t total) { total_ = total; }
-  // For work that tells its share done, 0 to 1, and asks whether to go on; the total is 100 then. Not to
+  // For work that reports its share done, 0 to 1, and asks whether to go on; the total is 100 then. Not to
   // outlive this.
   [[nodiscard]] std::function<bool(double)> shares() {
     return [this](double share) {

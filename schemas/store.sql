@@ -1,4 +1,4 @@
--- The history of a fleet, schema version 6 (user_version; src/history/schema.cc lists the migrations to it).
+-- The history of a fleet, schema version 7 (user_version; src/history/schema.cc lists the migrations to it).
 -- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a REAL column: not measured.
 -- Energy leaving the battery is positive. Sides: right, left.
 
@@ -221,3 +221,20 @@ CREATE TABLE proposal (
 ) STRICT;
 
 CREATE INDEX proposal_by_robot ON proposal (robot_id, proposal_id);
+
+-- Who changed what, and who was refused; each entry's hash covers the one before.
+CREATE TABLE audit (
+  audit_id INTEGER NOT NULL PRIMARY KEY,  -- 1, 2, 3 ...
+  utime_us INTEGER NOT NULL,
+  actor TEXT NOT NULL,       -- name of a token; empty: nobody who is known
+  address TEXT NOT NULL,     -- IP address of the client; empty: the daemon itself
+  request_id TEXT NOT NULL,
+  action TEXT NOT NULL CHECK (action <> ''),
+  detail_json TEXT NOT NULL CHECK (json_valid(detail_json)),
+  hash TEXT NOT NULL CHECK (length(hash) = 64)  -- over this entry and the hash before, see src/history/audit.h
+) STRICT;
+
+CREATE TRIGGER audit_keeps_entries BEFORE DELETE ON audit
+BEGIN SELECT RAISE(ABORT, 'the audit is only appended to'); END;
+CREATE TRIGGER audit_keeps_content BEFORE UPDATE ON audit
+BEGIN SELECT RAISE(ABORT, 'the audit is only appended to'); END;

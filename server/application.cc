@@ -1,5 +1,6 @@
 #include "server/application.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -27,6 +28,7 @@
 #include "server/fleet_events.h"
 #include "server/gap_metrics.h"
 #include "server/http/event_hub.h"
+#include "server/http/gate.h"
 #include "server/http/http_metrics.h"
 #include "server/http/http_server.h"
 #include "server/http/openapi.h"
@@ -34,6 +36,8 @@
 #include "server/http/static_files.h"
 #include "server/logging.h"
 #include "server/metrics.h"
+#include "server/process_metrics.h"
+#include "server/robot_metrics.h"
 
 namespace joulecast {
 namespace {
@@ -162,6 +166,8 @@ http::ServerOptions http_options(const Settings& settings) {
   options.address = settings.text("http.address");
   options.port = static_cast<std::uint16_t>(settings.integer("http.port"));
   options.allowed_hosts = listed(settings.text("http.allowed_hosts"));
+  options.tls_certificate = settings.text("http.tls_certificate");
+  options.tls_key = settings.text("http.tls_key");
   options.worker_threads = static_cast<unsigned>(settings.integer("http.worker_threads"));
   options.compute_threads = static_cast<unsigned>(settings.integer("http.compute_threads"));
   options.worker_queue = static_cast<std::size_t>(settings.integer("http.worker_queue"));
@@ -185,12 +191,46 @@ http::EventHub::Options event_options(const Settings& settings) {
   return options;
 }
 
+// Without tokens only this machine is served, unless the settings say otherwise.
+Result<void> check_exposure(const Settings& settings) {
+  const std::string& address = settings.text("http.address");
+  if (http::is_loopback(address)) return {};
+  if (!settings.text("auth.token_file").empty()) {
+    if (settings.text("http.tls_certificate").empty())
+      log_warning(
+          "tokens travel unencrypted to this address: set http.tls_certificate, or listen on 127.0.0.1 "
+          "behind a proxy that speaks TLS",
+          {{"address", address}});
+    return {};
+  }
+  if (settings.boolean("http.insecure")) {
+    log_warning("everybody who reaches this address may read and change everything (http.insecure)",
+                {{"address", address}});
+    return {};
+  }
+  return invalid("http.address",
+                 "is " + address +
+                     ", which others reach, and no auth.token_file says who may do what: make one with "
+                     "joulecast token create, listen on 127.0.0.1, or set http.insecure");
+}
+
+// Who changed something or was refused, into the store's audit.
+std::function<Result<void>(http::AccessEvent)> audit_into(history::Writer& writer) {
+  return [&writer](http::AccessEvent event) {
+    return writer.offer(history::AppendAudit{{0, host_utime_us(), std::move(event.actor),
+                                              std::move(event.address), std::move(event.request_id),
+                                              std::move(event.action), std::move(event.detail_json), ""}});
+  };
+}
+
 // Every documented endpoint and the page.
 Result<std::vector<http::Endpoint>> endpoint_table(api::Services& services, Metrics& metrics,
-                                                   http::EventHub& events,
+                                                   http::EventHub& events, http::Gate& gate,
                                                    std::vector<http::ReadinessCheck> checks,
                                                    const std::string& web_directory) {
-  std::vector<http::Endpoint> table = api::endpoints(services);
+  std::vector<http::Endpoint> table;
+  for (http::Endpoint& row : api::endpoints(services)) table.push_back(gate.audited(std::move(row)));
+  for (http::Endpoint& row : gate.session_endpoints()) table.push_back(std::move(row));
   table.push_back(http::events_endpoint(events));
   for (http::Endpoint& row : http::operations_endpoints(metrics, std::move(checks)))
     table.push_back(std::move(row));
@@ -285,11 +325,29 @@ struct Application::Parts {
       if (Result<void> loaded = ingest::load_robot(robot, path, *store, *writer, host_utime_us()); !loaded)
         return loaded;
     }
-    metrics.gauge("joulecast_robot_files_faulty", "Robot files left out at the start for being faulty")
-        .set(static_cast<double>(files->faulty.size()));
+    faulty_files.set(static_cast<double>(files->faulty.size()));
     log_info("robot files read", {{"directory", directory},
                                   {"files", std::to_string(files->robots.size())},
                                   {"faulty", std::to_string(files->faulty.size())}});
+    return {};
+  }
+
+  // What is known of robots until they speak again: their charge when they were last heard.
+  Result<void> recall_states() {
+    const auto robots = store->robots();
+    if (!robots) return tl::unexpected(robots.error());
+    for (const history::RobotRecord& robot : *robots) {
+      const auto last = store->resume_state(robot.robot_id);
+      if (!last) return tl::unexpected(last.error());
+      if (!last->has_value()) continue;
+      auto snapshot = std::make_shared<ingest::RobotSnapshot>();
+      snapshot->robot_id = robot.robot_id;
+      snapshot->received_utime_us = std::min((*last)->utime_us, host_utime_us());
+      snapshot->sample.utime_us = (*last)->utime_us;
+      snapshot->state_of_charge = (*last)->state_of_charge;
+      snapshot->charge.estimate.charge = (*last)->state_of_charge;
+      fleet.publish(std::move(snapshot));
+    }
     return {};
   }
 
@@ -307,6 +365,7 @@ struct Application::Parts {
     while (beating) {
       lock.unlock();
       survive("fleet events", [&] { fleet_events.publish(host_utime_us()); });
+      survive("tokens", [&] { gate->refresh(); });
       lock.lock();
       beat_wake.wait_for(lock, milliseconds(1000), [&] { return !beating; });
     }
@@ -314,6 +373,8 @@ struct Application::Parts {
 
   const Settings settings;
   Metrics metrics;
+  const Gauge faulty_files =
+      metrics.gauge("joulecast_robot_files_faulty", "Robot files left out at the start for being faulty");
   http::EventHub events;
   ingest::ModelRegistry models;
   ingest::FleetView fleet;
@@ -330,6 +391,7 @@ struct Application::Parts {
   std::unique_ptr<server::DiagnosisService> diagnoses;
   std::unique_ptr<server::GapWatch> watch;
   std::unique_ptr<api::Services> services;
+  std::unique_ptr<http::Gate> gate;
   std::unique_ptr<http::Router> router;
   std::unique_ptr<http::HttpMetrics> http_metrics;
   std::unique_ptr<http::HttpServer> http;
@@ -348,6 +410,7 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   auto parts = std::make_unique<Parts>(settings);
   Parts& p = *parts;
 
+  if (const Result<void> safe = check_exposure(settings); !safe) return tl::unexpected(safe.error());
   history::SqliteOptions sqlite;
   sqlite.path = settings.text("store.path");
   Result<std::unique_ptr<history::Store>> store = history::open_sqlite_store(sqlite);
@@ -362,6 +425,9 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   }
   if (Result<void> models = ingest::load_stored_models(*p.store, p.models); !models)
     return tl::unexpected(std::move(models.error()));
+
+  if (Result<void> recalled = p.recall_states(); !recalled)
+    return tl::unexpected(std::move(recalled.error()));
 
   p.forecasts = std::make_unique<ingest::Forecasts>(*p.store);
   history::Writer& writer = *p.writer;
@@ -402,6 +468,13 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   p.services = std::make_unique<api::Services>(api::Services{*p.store, *p.writer, p.models, p.fleet,
                                                              *p.forecasts, p.cost_tables, *p.drift_view,
                                                              *p.adoption, *p.diagnoses, host_utime_us});
+  Result<std::unique_ptr<http::Gate>> gate =
+      http::Gate::open({.token_file = settings.text("auth.token_file"),
+                        .secure = !settings.text("http.tls_certificate").empty(),
+                        .now_utime_us = host_utime_us,
+                        .audit = audit_into(*p.writer)});
+  if (!gate) return tl::unexpected(std::move(gate.error()));
+  p.gate = std::move(*gate);
   std::vector<http::ReadinessCheck> checks;
   checks.push_back({"ingest", [&p]() -> Result<void> {
                       const ingest::IngestStatus status = p.ingest->status();
@@ -415,19 +488,27 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
                       if (!status.healthy) return fail(Fault::unavailable, "store", status.error);
                       return {};
                     }});
+  if (!settings.text("auth.token_file").empty())
+    checks.push_back({"tokens", [&p] { return p.gate->check(); }});
   Result<std::vector<http::Endpoint>> table = endpoint_table(
-      *p.services, p.metrics, p.events, std::move(checks), settings.text("http.web_directory"));
+      *p.services, p.metrics, p.events, *p.gate, std::move(checks), settings.text("http.web_directory"));
   if (!table) return tl::unexpected(std::move(table.error()));
-  p.router = std::make_unique<http::Router>(std::move(*table), [](const http::Endpoint& endpoint,
-                                                                  const http::Request& request,
-                                                                  const Error& error) {
+  const auto log_fault = [](const http::Endpoint& endpoint, const http::Request& request,
+                            const Error& error) {
     log_error("request failed",
               {{"operation", endpoint.operation_id}, {"request_id", request.id}, {"cause", describe(error)}});
-  });
+  };
+  p.router = std::make_unique<http::Router>(std::move(*table), log_fault,
+                                            [&p](const http::Endpoint& endpoint, http::Request& request) {
+                                              return p.gate->refuse(endpoint, request);
+                                            });
   p.http_metrics = std::make_unique<http::HttpMetrics>(p.metrics);
   server::export_metrics(p.metrics, p.counters, *p.ingest, p.fleet, *p.writer, *p.store, p.events,
                          host_utime_us);
   server::export_gap_metrics(p.metrics, *p.diagnoses, *p.watch, *p.adoption);
+  server::export_process_metrics(p.metrics);
+  server::export_robot_metrics(p.metrics, p.fleet, *p.watch, host_utime_us,
+                               static_cast<std::size_t>(settings.integer("metrics.robots")));
   Result<std::unique_ptr<http::HttpServer>> http =
       http::HttpServer::start(http_options(settings), *p.router, p.http_metrics.get());
   if (!http) return tl::unexpected(std::move(http.error()));
@@ -439,6 +520,15 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
 
 std::uint16_t Application::http_port() const {
   return parts_->http->port();
+}
+
+void Application::reload() {
+  parts_->gate->refresh();
+  if (const Result<void> reloaded = parts_->http->reload_tls(); !reloaded) {
+    log_error("the certificate from before stays", reloaded.error());
+  } else {
+    log_info("reloaded");
+  }
 }
 
 bool Application::alive() {
@@ -456,6 +546,16 @@ bool Application::alive() {
   return turning;
 }
 
+std::vector<Error> faults_of_access(const Settings& settings) {
+  std::vector<Error> faults;
+  if (const Result<void> safe = check_exposure(settings); !safe) faults.push_back(safe.error());
+  if (const Result<std::unique_ptr<http::Gate>> gate =
+          http::Gate::open({.token_file = settings.text("auth.token_file")});
+      !gate)
+    faults.push_back(gate.error());
+  return faults;
+}
+
 std::vector<Error> faulty_robot_files(const Settings& settings) {
   const std::string& directory = settings.text("robots.directory");
   if (directory.empty()) return {};
@@ -471,6 +571,7 @@ Result<std::string> openapi_document() {
   Metrics metrics;
   http::EventHub events;
   std::vector<http::Endpoint> table = api::described_endpoints();
+  for (http::Endpoint& row : http::described_session_endpoints()) table.push_back(std::move(row));
   table.push_back(http::events_endpoint(events));
   for (http::Endpoint& row : http::operations_endpoints(metrics, {})) table.push_back(std::move(row));
   return http::openapi_document(table, embedded_schemas());

@@ -24,6 +24,10 @@ class Application {
   // True while every loop turns: receiving, accounting, writing, HTTP. What the watchdog asks.
   bool alive();
 
+  // Reads again what may change while it runs: the tokens and the certificate. What cannot be read is logged,
+  // and what was in force stays.
+  void reload();
+
   // Stops in order: receiving, accounting (open missions are checkpointed), HTTP, writing. What the store
   // does not take goes to the spool beside it. False when a part did not end in time: the process is to end
   // by _exit().
@@ -34,6 +38,9 @@ class Application {
   explicit Application(std::unique_ptr<Parts> parts);
   std::unique_ptr<Parts> parts_;
 };
+
+// What is wrong with who may use the service: an address open to all, a token file that cannot be read.
+std::vector<Error> faults_of_access(const Settings& settings);
 
 // What is wrong with the robot files that the settings name, one a file; or with their directory.
 std::vector<Error> faulty_robot_files(const Settings& settings);

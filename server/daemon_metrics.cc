@@ -30,6 +30,17 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
   const std::vector<Counter> faults = metrics.counters(
       "joulecast_ingest_faults_total", "Messages, samples and events turned away or repaired", "reason",
       std::vector<std::string>(ingest::ingest_fault_names.begin(), ingest::ingest_fault_names.end()));
+  const std::vector<Counter> contradictions =
+      metrics.counters("joulecast_contradictions_total",
+                       "Contradictions of robots' telemetry told, each at most once an hour", "kind",
+                       std::vector<std::string>(ingest::contradiction_kind_names.begin(),
+                                                ingest::contradiction_kind_names.end()));
+  const Gauge contradicted =
+      metrics.gauge("joulecast_contradicted_robots",
+                    "Live robots whose telemetry is contradicted so that nothing is learnt");
+  const std::vector<Counter> left_out = metrics.counters(
+      "joulecast_missions_left_out_total", "Missions that nothing was learnt from", "reason",
+      std::vector<std::string>(ingest::left_out_names.begin(), ingest::left_out_names.end()));
   const Counter datagrams =
       metrics.counter("joulecast_lcm_datagrams_total", "Datagrams received on the LCM group");
   const std::vector<Counter> lost =
@@ -41,8 +52,9 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
                                                 telemetry::datagram_fault_names.end()));
   const Gauge queue = metrics.gauge("joulecast_ingest_queue_messages", "Messages waiting to be accounted");
   const Gauge receiving = metrics.gauge("joulecast_ingest_receiving", "1 while LCM is being received");
-  const Gauge known = metrics.gauge("joulecast_robots_known", "Robots heard of since the daemon started");
-  const Gauge live = metrics.gauge("joulecast_robots_live", "Robots heard of within the last seconds");
+  const Gauge known =
+      metrics.gauge("joulecast_robots_known", "Robots received from since the daemon started");
+  const Gauge live = metrics.gauge("joulecast_robots_live", "Robots received from within the last seconds");
   const Gauge fleet_power =
       metrics.gauge("joulecast_fleet_power_watts", "Measured battery power of all live robots");
   const Gauge write_queue =
@@ -83,6 +95,10 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
           ended[k].raise_to(static_cast<double>(counters.missions_ended[k + 1]));
         for (std::size_t k = 0; k < faults.size(); ++k)
           faults[k].raise_to(static_cast<double>(counters.faults[k]));
+        for (std::size_t k = 0; k < contradictions.size(); ++k)
+          contradictions[k].raise_to(static_cast<double>(counters.contradictions[k]));
+        for (std::size_t k = 0; k < left_out.size(); ++k)
+          left_out[k].raise_to(static_cast<double>(counters.missions_left_out[k]));
         datagrams.raise_to(static_cast<double>(counters.datagrams.received));
         for (std::size_t k = 0; k < lost.size(); ++k)
           lost[k].raise_to(static_cast<double>(counters.datagrams.faults[k]));
@@ -92,14 +108,16 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
 
         const auto robots = fleet.all();
         double power = 0;
-        double alive = 0;
+        double alive = 0, doubtful = 0;
         for (const auto& robot : robots) {
           if (!api::is_live(*robot, now())) continue;
           ++alive;
+          doubtful += std::ranges::any_of(robot->contradictions, &ingest::Contradiction::untrue) ? 1 : 0;
           if (robot->measured_power_w == robot->measured_power_w) power += robot->measured_power_w;
         }
         known.set(static_cast<double>(robots.size()));
         live.set(alive);
+        contradicted.set(doubtful);
         fleet_power.set(power);
 
         const history::WriterStatus writing = writer.status();

@@ -2,17 +2,18 @@
 
 #include "history/store.h"
 #include "history/writer.h"
-#include "server/http/event_hub.h"
 #include "ingest/counters.h"
 #include "ingest/fleet_view.h"
 #include "ingest/ingest_service.h"
+#include "server/http/event_hub.h"
 #include "server/metrics.h"
 
 namespace joulecast::server {
 
 // What the parts count, as metrics refreshed at each scrape. The parts must outlive `metrics`.
-void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters, const ingest::IngestService& ingest,
-                    const ingest::FleetView& fleet, const history::Writer& writer, const history::Store& store,
-                    const http::EventHub& events, std::function<std::int64_t()> now_utime_us);
+void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
+                    const ingest::IngestService& ingest, const ingest::FleetView& fleet,
+                    const history::Writer& writer, const history::Store& store, const http::EventHub& events,
+                    std::function<std::int64_t()> now_utime_us);
 
 }  // namespace joulecast::server

@@ -5,6 +5,19 @@
 
 namespace joulecast::server {
 
+void FleetEvents::tell_contradictions(const ingest::RobotSnapshot& now, Told& told) {
+  for (const ingest::Contradiction& c : now.contradictions) {
+    std::int64_t& last = told.contradictions[c.id + ' ' + c.channel];
+    if (last == c.told_utime_us) continue;
+    last = c.told_utime_us;
+    JsonWriter json;
+    json.begin_object().field("robot_id", now.robot_id).key("contradiction");
+    api::write_contradiction(json, c);
+    json.end_object();
+    hub_.publish("contradiction", json.text(), now.robot_id);
+  }
+}
+
 void FleetEvents::publish(std::int64_t now_utime_us) {
   std::erase_if(told_, [&](const auto& each) { return fleet_.find(each.first) == nullptr; });
   for (const auto& snapshot : fleet_.all()) {
@@ -19,13 +32,15 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
       }
     }
     if (told.snapshot == snapshot && told.live == live) continue;
+    tell_contradictions(*snapshot, told);
     const auto model = models_.find(snapshot->robot_id);
     JsonWriter json;
     std::optional<forecast::Reach> reach;
     if (model != nullptr) reach = forecasts_.reach(model, *snapshot);
     api::write_state(json, *snapshot, reach, now_utime_us);
     hub_.publish_newest("state", json.text(), snapshot->robot_id);
-    told = {snapshot, live};
+    told.snapshot = snapshot;
+    told.live = live;
   }
 }
 

@@ -5,19 +5,20 @@
 #include <string>
 
 #include "history/store.h"
-#include "server/http/event_hub.h"
 #include "ingest/fleet_view.h"
 #include "ingest/forecasts.h"
 #include "ingest/model_registry.h"
+#include "server/http/event_hub.h"
 
 namespace joulecast::server {
 
 // Tells the event stream what changed in the fleet: `state` for each robot whose snapshot is new, `mission`
-// for each mission that ended. One thread.
+// for each mission that ended, `contradiction` for each
+// contradiction that is told. One thread.
 class FleetEvents {
  public:
-  FleetEvents(const ingest::FleetView& fleet, const ingest::ModelRegistry& models, ingest::Forecasts& forecasts,
-              const history::Store& store, http::EventHub& hub)
+  FleetEvents(const ingest::FleetView& fleet, const ingest::ModelRegistry& models,
+              ingest::Forecasts& forecasts, const history::Store& store, http::EventHub& hub)
       : fleet_(fleet), models_(models), forecasts_(forecasts), store_(store), hub_(hub) {}
 
   void publish(std::int64_t now_utime_us);
@@ -26,7 +27,10 @@ class FleetEvents {
   struct Told {
     std::shared_ptr<const ingest::RobotSnapshot> snapshot;
     bool live = false;
+    std::map<std::string, std::int64_t> contradictions;  // host's time when each was told
   };
+  void tell_contradictions(const ingest::RobotSnapshot& now, Told& told);
+
   const ingest::FleetView& fleet_;
   const ingest::ModelRegistry& models_;
   ingest::Forecasts& forecasts_;

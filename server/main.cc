@@ -24,18 +24,22 @@ joulecast::LogLevel log_level(const std::string& name) {
   return joulecast::LogLevel::info;
 }
 
-// Waits for SIGINT or SIGTERM, feeding the watchdog while every loop turns.
+// Waits for SIGINT or SIGTERM, reloads at SIGHUP, feeding the watchdog while every loop turns.
 void run(joulecast::Application& application) {
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGHUP);
   std::uint64_t watchdog_us = 0;
   const bool watched = sd_watchdog_enabled(0, &watchdog_us) > 0;
   const std::uint64_t period_us = watched ? watchdog_us / 3 : 10'000'000;
   const timespec period{static_cast<time_t>(period_us / 1'000'000),
                         static_cast<long>(period_us % 1'000'000 * 1000)};
-  while (sigtimedwait(&signals, nullptr, &period) < 0) {
+  for (;;) {
+    const int signal = sigtimedwait(&signals, nullptr, &period);
+    if (signal == SIGINT || signal == SIGTERM) return;
+    if (signal == SIGHUP) application.reload();
     if (application.alive() && watched) sd_notify(0, "WATCHDOG=1");
   }
 }
@@ -49,6 +53,7 @@ int serve(const joulecast::Settings& settings) {
   sigemptyset(&signals);
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
 
@@ -57,10 +62,12 @@ int serve(const joulecast::Settings& settings) {
     joulecast::log_error("cannot start", application.error());
     return 1;
   }
-  joulecast::log_info("ready", {{"http", "http://" + settings.text("http.address") + ":" +
-                                             std::to_string((*application)->http_port())},
-                                {"lcm", settings.text("lcm.url")},
-                                {"store", settings.text("store.path")}});
+  joulecast::log_info(
+      "ready",
+      {{"http", (settings.text("http.tls_certificate").empty() ? "http://" : "https://") +
+                    settings.text("http.address") + ":" + std::to_string((*application)->http_port())},
+       {"lcm", settings.text("lcm.url")},
+       {"store", settings.text("store.path")}});
   sd_notify(0, "READY=1");
   run(**application);
   sd_notify(0, "STOPPING=1");
@@ -87,7 +94,8 @@ int print(const joulecast::Result<std::string>& text) {
 }
 
 int check(const joulecast::Settings& settings) {
-  const auto faulty = joulecast::faulty_robot_files(settings);
+  auto faulty = joulecast::faults_of_access(settings);
+  for (joulecast::Error& error : joulecast::faulty_robot_files(settings)) faulty.push_back(std::move(error));
   for (const joulecast::Error& error : faulty) complain(error);
   return faulty.empty() ? print(std::string("the settings are valid\n")) : 2;
 }

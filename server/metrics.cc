@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <map>
 #include <mutex>
+#include <utility>
 
 namespace joulecast {
 namespace {
@@ -19,7 +20,8 @@ std::map<std::string, std::string> to_map(const Labels& labels) {
 }
 
 void check_name(const std::string& name, bool is_counter) {
-  bool good = name.starts_with("joulecast_") && name.ends_with("_total") == is_counter;
+  bool good = (name.starts_with("joulecast_") || name.starts_with("process_")) &&
+              name.ends_with("_total") == is_counter;
   for (const char c : name) good = good && ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_');
   if (good) return;
   std::fprintf(stderr, "metric name %s breaks the convention joulecast_<what>_<unit>[_total]\n",
@@ -56,7 +58,27 @@ struct Metrics::State {
   prometheus::Registry registry;
   mutable std::mutex mutex;
   std::vector<std::function<void()>> refreshers;
+  std::vector<std::function<std::vector<Series>()>> readers;
 };
+
+namespace {
+
+prometheus::MetricFamily family_of(const Metrics::Series& series) {
+  const bool counter = series.name.ends_with("_total");
+  check_name(series.name, counter);
+  prometheus::MetricFamily family;
+  family.name = series.name;
+  family.help = series.help;
+  family.type = counter ? prometheus::MetricType::Counter : prometheus::MetricType::Gauge;
+  for (const auto& [labels, value] : series.rows) {
+    prometheus::ClientMetric& metric = family.metric.emplace_back();
+    for (const auto& [name, text] : labels) metric.label.push_back({name, text});
+    (counter ? metric.counter.value : metric.gauge.value) = value;
+  }
+  return family;
+}
+
+}  // namespace
 
 Metrics::Metrics() : state_(std::make_unique<State>()) {}
 Metrics::~Metrics() = default;
@@ -96,11 +118,19 @@ void Metrics::before_scrape(std::function<void()> refresh) {
   state_->refreshers.push_back(std::move(refresh));
 }
 
+void Metrics::series(std::function<std::vector<Series>()> read) {
+  const std::lock_guard lock(state_->mutex);
+  state_->readers.push_back(std::move(read));
+}
+
 std::string Metrics::text() const {
   // The lock also keeps concurrent scrapes from raising one counter twice.
   const std::lock_guard lock(state_->mutex);
   for (const auto& refresh : state_->refreshers) refresh();
-  return prometheus::TextSerializer().Serialize(state_->registry.Collect());
+  std::vector<prometheus::MetricFamily> families = state_->registry.Collect();
+  for (const auto& read : state_->readers)
+    for (const Series& series : read()) families.push_back(family_of(series));
+  return prometheus::TextSerializer().Serialize(families);
 }
 
 const std::vector<double>& Metrics::request_seconds() {

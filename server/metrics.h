@@ -70,6 +70,16 @@ class Metrics {
   // Called before each text(): sets gauges from state kept elsewhere. Must be thread-safe.
   void before_scrape(std::function<void()> refresh);
 
+  // Metrics whose labels' values come and go, each read anew before each text(): what is left out is gone.
+  // The reader bounds their number, and must be thread-safe. Names as above, or process_<what> as all
+  // programs that Prometheus asks have them.
+  struct Series {
+    std::string name;
+    std::string help;
+    std::vector<std::pair<Labels, double>> rows = {};
+  };
+  void series(std::function<std::vector<Series>()> read);
+
   // Prometheus text exposition format 0.0.4.
   std::string text() const;
 

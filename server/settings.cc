@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/bounds.h"
 #include "base/json_text.h"
 #include "base/nearest_word.h"
 #include "base/text_file.h"
@@ -79,10 +80,8 @@ std::optional<std::string> broken_constraint(const Setting& setting, std::string
     number = parse_number<double>(value);
     if (!number) return "must be a finite number" + shown;
   }
-  if (*number < setting.minimum || *number > setting.maximum) {
-    return "must lie in [" + number_text(setting.minimum) + ", " + number_text(setting.maximum) + "]" +
-           (setting.unit.empty() ? "" : " " + std::string(setting.unit)) + shown;
-  }
+  if (const Bounds bounds{setting.minimum, setting.maximum}; !bounds.contain(*number))
+    return out_of_bounds(*number, bounds, setting.unit);
   return std::nullopt;
 }
 
@@ -346,6 +345,8 @@ void read_environment(const std::vector<std::string>& environment, Given& given,
       if (!given.config) given.config = std::move(value);
       continue;
     }
+    // The command line's own.
+    if (name == "JOULECAST_TOKEN") continue;
     const auto setting = std::find_if(table.begin(), table.end(),
                                       [&](const Setting& each) { return each.environment() == name; });
     if (setting == table.end()) {

@@ -23,7 +23,15 @@ constexpr Setting table[] = {
      "or local: "
      "loopback and the networks of this host's interfaces; further ones are counted"},
 
-    {"http.address", Type::text, "127.0.0.1", 0, 0, "", "IP address to listen on"},
+    {"http.address", Type::text, "127.0.0.1", 0, 0, "",
+     "IP address to listen on; one that is not loopback needs auth.token_file or http.insecure"},
+    {"http.tls_certificate", Type::text, "", 0, 0, "",
+     "PEM file of the certificate and those that it builds on, read again at SIGHUP; with http.tls_key: "
+     "HTTPS "
+     "alone, TLS 1.2 or newer"},
+    {"http.tls_key", Type::text, "", 0, 0, "", "PEM file of the certificate's private key"},
+    {"http.insecure", Type::boolean, "false", 0, 0, "",
+     "let everybody who reaches http.address do everything, though there are no tokens"},
     {"http.port", Type::integer, "8080", 0, 65535, "", "port to listen on; 0 lets the system choose"},
     {"http.allowed_hosts", Type::text, "", 0, 0, "",
      "names under which clients may address the service besides IP addresses, localhost and this host's "
@@ -50,7 +58,8 @@ constexpr Setting table[] = {
     {"http.read_timeout_s", Type::number, "10", 0.1, 3600, "s", "from a request's first byte to its last"},
     {"http.write_timeout_s", Type::number, "30", 0.1, 3600, "s", "without progress of an answer"},
     {"http.idle_timeout_s", Type::number, "60", 0.1, 86400, "s", "between the requests of a connection"},
-    {"http.stop_deadline_s", Type::number, "5", 0, 600, "s", "patience with running requests when stopping"},
+    {"http.stop_deadline_s", Type::number, "5", 0, 600, "s",
+     "time for running requests to finish when stopping"},
     {"http.event_queue_bytes", Type::integer, "8388608", 4096, 64 * megabyte, "B",
      "unsent events a client of the event stream may have before it is dropped; of a robot's states only the "
      "newest waits, about 2 kB"},
@@ -58,6 +67,10 @@ constexpr Setting table[] = {
      "clients of the event stream at once; beyond: 503"},
     {"http.web_directory", Type::text, "", 0, 0, "",
      "serve the operator page from this directory; empty: the page built in"},
+
+    {"auth.token_file", Type::text, "", 0, 0, "",
+     "file of the tokens that requests need, made by joulecast token create and read again when it changes; "
+     "empty: none is needed"},
 
     {"store.path", Type::text, "joulecast.db", 0, 0, "", "SQLite file of the history"},
     {"store.retention_days", Type::number, "30", 0, 36500, "d",
@@ -131,6 +144,9 @@ constexpr Setting table[] = {
     {"watch.least_change", Type::number, "0.01", 0.001, 1, "",
      "change of measured over modelled energy that counts as drift"},
     {"watch.diagnose", Type::boolean, "true", 0, 0, "", "start a diagnosis when a drift is found"},
+
+    {"metrics.robots", Type::integer, "200", 0, 10000, "",
+     "robots with metrics of their own at /metrics, the first by id, about 25 series each; 0: none"},
 
     {"log.format", Type::choice, "text", 0, 0, "", "one JSON object a line, or text for a terminal",
      log_formats},

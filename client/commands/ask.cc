@@ -301,15 +301,17 @@ const Question profile{"profile", "Plan the minimum-energy motion along a path",
   "payload_kg": 5,
   "deadline_s": 40
 })"};
-constexpr Question estimate{"estimate", "Price a motion: a given one, or a path at least energy or as usual",
-                            answers::estimate_answer, print_estimate, R"({
+constexpr Question estimate{
+    "estimate",
+    "Compute the energy of a motion: a given one, or a path at minimum energy or as usually driven",
+    answers::estimate_answer, print_estimate, R"({
   "path": [{"kind": "straight", "length_m": 6}, {"kind": "dwell", "duration_s": 10}, {"kind": "straight", "length_m": 4}],
   "payload_kg": 5,
   "driving": "usual"
 })"};
 constexpr Question autonomy{
     "autonomy",
-    "Ask how far and how long a robot still goes, and whether it can do a list of tasks",
+    "Compute a robot's remaining range and time, and whether it can do a list of tasks",
     autonomy_offline,
     [](json answer) { print_autonomy(answer); },
     R"({
@@ -328,13 +330,13 @@ std::pair<CLI::App*, std::shared_ptr<Options>> add(CLI::App& program, Exit& exit
   auto* server = command->add_option("--server", options->server, "joulecastd to ask, host:port");
   auto* id = command->add_option(
       "--robot-id", options->robot_id,
-      question.fleet ? "which robot of the server; without it, all of them" : "which robot of the server");
+      question.fleet ? "robot of the server; all of them when not given" : "robot of the server");
   server->excludes(file);
   if (!question.fleet) server->needs(id);
   id->needs(server);
   command->add_option(
       "--request", options->request_file,
-      "request as JSON (schemas/*-request.schema.json), - for standard input; flags go over it");
+      "request as JSON (schemas/*-request.schema.json), - for standard input; flags override it");
   command->add_option("--timeout", options->timeout_s, "seconds to wait for the server")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
@@ -377,14 +379,15 @@ void add_drive_flags(CLI::App& command, Options& options) {
       ->check([](const std::string& text) {
         return radians(text) ? std::string() : "must be an angle such as 1.57 (rad) or 90deg, is " + text;
       });
-  command.add_option("--length", options.length_m, "drive straight for so many m");
-  add_numbers(command, options,
-              {{"--payload", "payload_kg", "what the robot carries, kg"},
-               {"--deadline", "deadline_s", "arrive after so many s at the latest"},
-               {"--value-of-time", "value_of_time_w", "what a second is worth, J"},
-               {"--start-speed", "start_speed_m_s", "speed at the start, m/s; standing by default"},
-               {"--end-speed", "end_speed_m_s", "speed at the end, m/s; standing by default"},
-               {"--regeneration", "regeneration", "share of braking power that returns, 0 to 1"}});
+  command.add_option("--length", options.length_m, "length of a straight drive, m");
+  add_numbers(
+      command, options,
+      {{"--payload", "payload_kg", "payload, kg"},
+       {"--deadline", "deadline_s", "latest arrival, s after the start"},
+       {"--value-of-time", "value_of_time_w", "value of one second, J"},
+       {"--start-speed", "start_speed_m_s", "speed at the start, m/s; standing by default"},
+       {"--end-speed", "end_speed_m_s", "speed at the end, m/s; standing by default"},
+       {"--regeneration", "regeneration", "share of braking power that returns to the battery, 0 to 1"}});
 }
 
 }  // namespace
@@ -404,14 +407,14 @@ void add_estimate(CLI::App& program, Exit& exit) {
 
 void add_autonomy(CLI::App& program, Exit& exit) {
   auto [command, options] = add(program, exit, autonomy);
-  add_numbers(*command, *options,
-              {{"--charge", "state_of_charge", "state of charge instead of the live one, 0 to 1"},
-               {"--charge-sd", "state_of_charge_sd", "its standard deviation"},
-               {"--reserve", "reserve_fraction", "charge to keep instead of the robot file's, 0 to 1"},
-               {"--payload", "payload_kg", "what the robot carries now, kg"},
-               {"--speed", "speed_m_s", "m/s that the plan states, instead of the robot's habit"},
-               {"--confidence", "confidence",
-                "how sure the latest departure to the charger shall be, 0.01 to 0.999"}});
+  add_numbers(
+      *command, *options,
+      {{"--charge", "state_of_charge", "state of charge instead of the live one, 0 to 1"},
+       {"--charge-sd", "state_of_charge_sd", "its standard deviation"},
+       {"--reserve", "reserve_fraction", "charge to keep instead of the robot file's, 0 to 1"},
+       {"--payload", "payload_kg", "payload now, kg"},
+       {"--speed", "speed_m_s", "cruising speed of the plan, m/s, instead of the robot's habit"},
+       {"--confidence", "confidence", "confidence of the latest departure to the charger, 0.01 to 0.999"}});
   add_driving(*command, *options, "as the robot usually drives (the default), or by minimum-energy profiles");
   command
       ->add_option("--dialect",

@@ -115,7 +115,7 @@ Exit run(const Options& options) {
 }  // namespace
 
 void add_battery(CLI::App& program, Exit& exit) {
-  auto* group = program.add_subcommand("battery", "Ask a battery's model");
+  auto* group = program.add_subcommand("battery", "Predict with a battery model");
   group->require_subcommand(1);
   auto options = std::make_shared<Options>();
   auto* command = group->add_subcommand("predict",

@@ -48,8 +48,7 @@ void add_completion(CLI::App& program, Exit& exit) {
     std::vector<std::string> words;
   };
   auto options = std::make_shared<Options>();
-  auto* command = program.add_subcommand(
-      "completion", "Print what lets a shell complete joulecast's commands, options and their values");
+  auto* command = program.add_subcommand("completion", "Print a completion script for a shell");
   command->add_option("shell", options->shell, "which shell")
       ->check(CLI::IsMember({"bash", "zsh", "fish"}))
       ->capture_default_str();

@@ -33,6 +33,10 @@ constexpr Examples table[] = {
     {"missions",
      "joulecast missions --server http://127.0.0.1:8080 --robot-id amr --limit 20\n"
      "joulecast missions --server http://127.0.0.1:8080 --from 2026-11-21 --state finished"},
+    {"check",
+     "joulecast check amr.json mapping.json\n"
+     "joulecast check amr.lcmlog --robot amr.json --json"},
+    {"spy", "joulecast spy --seconds 3\njoulecast spy --seconds 3 --json"},
     {"import",
      "joulecast import runs.csv --mapping mapping.json --start 2026-03-01T08:00:00Z --out imported.lcmlog"},
     {"replay",
@@ -54,6 +58,13 @@ constexpr Examples table[] = {
     {"explore",
      "joulecast explore --case 1 --plot case1.svg\n"
      "joulecast explore --map yard.json --robot amr.json --payload 0 --payload 20"},
+    {"token create",
+     "joulecast token create --file tokens.json --name dispatcher --role plan\n"
+     "joulecast token create --file tokens.json --name yard --role operate --robots 'amr-*' --days 30"},
+    {"token list", "joulecast token list --file tokens.json"},
+    {"token revoke", "joulecast token revoke --file tokens.json --name yard"},
+    {"audit list", "joulecast audit list --store history.db"},
+    {"audit verify", "joulecast audit verify --store history.db"},
     {"thesis", "joulecast thesis\njoulecast thesis --table 4-1 --json\njoulecast thesis --figure 4-2a --csv"},
     {"completion",
      "source <(joulecast completion bash)\n"
@@ -85,7 +96,7 @@ void add_example(CLI::App& command, const char* request) {
         std::puts(request);
         throw CLI::Success();
       },
-      "print a request as JSON to begin with, and leave");
+      "print an example request as JSON and exit");
 }
 
 void add_examples(CLI::App& program) {

@@ -207,7 +207,7 @@ void add_gap(CLI::App& program, Exit& exit) {
       "write the robot file with what was found, or corrected where it is not this robot's; refused, "
       "with the reason, where the diagnosis does not bear it out");
   command->add_option("--effect", options->effect,
-                      "with --apply or --adopt: the one to take of effects that cannot be told apart");
+                      "with --apply or --adopt: the one to take of effects that cannot be distinguished");
   command
       ->add_option(
           "--test", options->test,

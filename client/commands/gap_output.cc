@@ -173,7 +173,8 @@ void print_effect(const json& e) {
     }
   }
   print_controls(e.value("controls", json()));
-  for (const json& other : e["alternatives"]) fmt::print("    cannot be told from {}\n", text(other));
+  for (const json& other : e["alternatives"])
+    fmt::print("    cannot be distinguished from {}\n", text(other));
   if (const std::string look = text(e.value("workshop", json())); !look.empty())
     fmt::print("    to check: {}\n", wrapped(look, help_width(), 6));
 }

@@ -11,7 +11,7 @@
 
 namespace joulecast::client {
 
-// One effect of a diagnosis's JSON with its strength and what it cannot be told from.
+// One effect of a diagnosis's JSON with its strength and what it cannot be distinguished from.
 void print_effect(const nlohmann::json& effect);
 
 // A diagnosis of recordings as its JSON tells it, offline or by a daemon.

@@ -16,7 +16,7 @@ struct GapServerOptions {
   std::string report;                   // file for the HTML report; empty: none
   std::string apply;                    // file for the robot file with the effects found; empty: none
   std::optional<std::size_t> controls;  // absent: as the daemon's settings have it
-  gap::Choice choice;                   // of effects that cannot be told apart; by force also what is refused
+  gap::Choice choice;  // of effects that cannot be distinguished; by force also what is refused
   bool json = false;
   bool adopt = false;  // in the daemon, after a back-test
 };

@@ -1,6 +1,9 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -8,9 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "client/commands/import_tables.h"
 #include "client/commands/parse_time.h"
 #include "client/commands/table.h"
-#include "client/files.h"
 #include "client/progress.h"
 #include "telemetry/csv_import.h"
 #include "telemetry/event_log.h"
@@ -33,20 +36,17 @@ struct Options {
 struct Imported {
   std::string table;
   telemetry::Import import;
+
+  std::int64_t begin_utime_us() const { return import.recording.samples.front().utime_us; }
+  std::int64_t end_utime_us() const { return import.recording.samples.back().utime_us; }
 };
 
 // Recordings without a date count from zero; real clocks are later than this.
 constexpr std::int64_t year_2000_utime_us = 946'684'800'000'000;
 
 Result<std::vector<Imported>> import_all(const Options& options) {
-  const auto mapping_text = read_file(options.mapping);
-  if (!mapping_text) return tl::unexpected(mapping_text.error());
-  const auto mapping = telemetry::ImportMapping::parse(*mapping_text);
-  if (!mapping)
-    return tl::unexpected(
-        Error{mapping.error().fault,
-              options.mapping + (mapping.error().field.empty() ? "" : "#" + mapping.error().field),
-              mapping.error().message});
+  const auto mapping = read_mapping(options.mapping);
+  if (!mapping) return tl::unexpected(mapping.error());
   telemetry::ImportOptions how;
   if (!options.robot_id.empty()) how.robot_id = options.robot_id;
   if (!options.start.empty()) {
@@ -56,22 +56,24 @@ Result<std::vector<Imported>> import_all(const Options& options) {
   }
   std::vector<Imported> all;
   Progress progress("importing", "tables", options.tables.size());
+  std::uint64_t done = 0;
   for (const std::string& table : options.tables) {
-    progress.reach(all.size());
-    const auto text = read_file(table);
-    if (!text) return tl::unexpected(text.error());
-    how.source_name = table;
-    auto import = telemetry::import_csv(*text, *mapping, how);
-    if (!import) return tl::unexpected(import.error());
-    const auto& samples = import->recording.samples;
-    if (samples.front().utime_us < year_2000_utime_us)
-      return invalid("--start", table + " does not say when it was recorded: give its start");
-    if (!all.empty() && samples.front().utime_us <= all.back().import.recording.samples.back().utime_us)
-      return invalid(table, "begins before " + all.back().table + " ends; give the tables in order of time");
+    progress.reach(done++);
+    auto missions = import_table(table, *mapping, how);
+    if (!missions) return tl::unexpected(missions.error());
+    for (telemetry::Import& import : *missions) {
+      if (import.recording.samples.front().utime_us < year_2000_utime_us)
+        return invalid("--start", table + " does not say when it was recorded: give its start");
+      all.push_back({table, std::move(import)});
+    }
     if (how.start_utime_us)
-      how.start_utime_us = samples.back().utime_us + static_cast<std::int64_t>(options.pause_s * 1e6);
-    all.push_back({table, std::move(*import)});
+      how.start_utime_us = all.back().end_utime_us() + std::llround(1e6 * options.pause_s);
   }
+  // Tables may be given in any order; a robot is on one mission at a time.
+  std::ranges::stable_sort(all, {}, &Imported::begin_utime_us);
+  for (std::size_t k = 1; k < all.size(); ++k)
+    if (all[k].begin_utime_us() <= all[k - 1].end_utime_us())
+      return invalid(all[k].table, "begins before " + all[k - 1].table + " ends");
   return all;
 }
 
@@ -96,6 +98,15 @@ nlohmann::json to_json(const Imported& one) {
   nlohmann::json covariates = nlohmann::json::array();
   for (const signals::CovariateSeries& series : recording.covariates)
     covariates.push_back({{"name", series.name}, {"changes", series.value.size()}});
+  nlohmann::json joins = nlohmann::json::array();
+  for (const telemetry::JoinReport& join : report.joins)
+    joins.push_back({{"table", join.table},
+                     {"rows", join.rows},
+                     {"rows_unsorted", join.rows_unsorted},
+                     {"matched", join.matched},
+                     {"beyond_tolerance", join.beyond_tolerance},
+                     {"median_lag_s", join.median_lag_s},
+                     {"greatest_lag_s", join.greatest_lag_s}});
   return {{"table", one.table},
           {"robot_id", recording.robot_id},
           {"mission_id", recording.mission_id},
@@ -103,11 +114,14 @@ nlohmann::json to_json(const Imported& one) {
           {"end_utime_us", recording.samples.back().utime_us},
           {"rows", report.rows},
           {"samples", report.samples},
+          {"samples_added", report.samples_added},
           {"rows_without_motion", report.rows_without_motion},
           {"rows_out_of_time", report.rows_out_of_time},
+          {"rows_outside_mission", report.rows_outside_mission},
           {"rows_glitched", report.rows_glitched},
           {"cells_filled", report.cells_filled},
           {"covariates", covariates},
+          {"joins", joins},
           {"glitches", glitches}};
 }
 
@@ -119,10 +133,17 @@ void print_text(const Options& options, const std::vector<Imported>& all) {
     const telemetry::ImportReport& report = one.import.report;
     fmt::print("{:<20} {:<32} {:>8.1f} {:>8} {:>9} {:>8} {:>9}\n", r.robot_id, r.mission_id,
                1e-6 * static_cast<double>(r.samples.back().utime_us - r.samples.front().utime_us),
-               report.rows, report.samples, report.rows - report.samples, report.glitches.size());
+               report.rows, report.samples, report.rows + report.samples_added - report.samples,
+               report.glitches.size());
   }
   for (const Imported& one : all) {
     constexpr std::size_t shown = 10;
+    for (const telemetry::JoinReport& join : one.import.report.joins)
+      fmt::print(
+          "{} with {}: {} rows, {} matched, {} beyond the tolerance; lag {:.3f} s (median), {:.3f} s "
+          "(greatest)\n",
+          one.table, join.table, join.rows, join.matched, join.beyond_tolerance, join.median_lag_s,
+          join.greatest_lag_s);
     const auto& glitches = one.import.report.glitches;
     for (std::size_t k = 0; k < std::min(shown, glitches.size()); ++k)
       fmt::print("{}: line {}: {} reads {}, outside its limits: {}\n", one.table, glitches[k].line,
@@ -153,13 +174,16 @@ Exit run(const Options& options) {
 void add_import(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
   auto* command = program.add_subcommand("import", "Turn CSV tables of foreign robots into an LCM event log");
-  command->add_option("table", options->tables, "CSV files, one mission each, in order of time")->required();
+  command
+      ->add_option("table", options->tables,
+                   "CSV files, one mission each unless a column names them; in any order")
+      ->required();
   command->add_option("--mapping", options->mapping, "which column is what (deploy/import)")->required();
   command->add_option("--out", options->out, "LCM event log to write")->required();
   command->add_option(
       "--start", options->start,
       "UTC (2024-07-18T09:10:45Z) or microseconds since 1970 of the first row, for tables without "
-      "a date; each further table follows the one before");
+      "a date; each further table follows the one before, as given");
   command->add_option("--pause", options->pause_s, "seconds between one table and the next, with --start")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();

@@ -28,7 +28,7 @@ using nlohmann::json;
 constexpr std::int64_t file_version = 1;
 constexpr std::size_t most_columns = 8;  // of the printed table
 
-// Two tasks that any robot can price: their ways are given, so that nobody need know where it stands.
+// Two tasks that any robot can price: their ways are given, so that no position is needed.
 constexpr const char* example = R"({
   "driving": "minimum_energy",
   "tasks": [{"task_id": "fetch", "payload_kg": 2, "empty": {"distance_m": 12},
@@ -155,7 +155,7 @@ Exit run(const Options& options) {
 
 void add_matrix(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
-  auto* command = program.add_subcommand("matrix", "Price every robot on every task");
+  auto* command = program.add_subcommand("matrix", "Compute the energy of every robot on every task");
   command
       ->add_option("request", options->request_file,
                    "request as JSON (schemas/energy-matrix-request.schema.json), - for standard input")

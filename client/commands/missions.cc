@@ -112,11 +112,11 @@ Exit run(const Options& options) {
 
 void add_missions(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
-  auto* command = program.add_subcommand("missions", "List what robots did and what it cost, newest first");
+  auto* command = program.add_subcommand("missions", "List missions with their energy, newest first");
   command->add_option("--server", options->server, "joulecastd to ask, host:port")->required();
   constexpr std::array<std::array<const char*, 3>, 10> filters{{
       {"--robot-id", "robot_id", "only this robot's"},
-      {"--mission-id", "mission_id", "only those that the robot called so"},
+      {"--mission-id", "mission_id", "only those with this mission id"},
       {"--state", "state", "only those in this state"},
       {"--incomplete", "incomplete", "true: only those with unmeasured parts; false: only those without"},
       {"--from", "from_utime_us",
@@ -125,7 +125,7 @@ void add_missions(CLI::App& program, Exit& exit) {
       {"--payload-min", "payload_min_kg", "kg"},
       {"--payload-max", "payload_max_kg", "kg"},
       {"--limit", "limit", "missions on the page"},
-      {"--cursor", "cursor", "goes on where an earlier page ended"},
+      {"--cursor", "cursor", "continue where an earlier page ended"},
   }};
   options->query.reserve(filters.size());
   for (const auto& [flag, name, help] : filters) {

@@ -4,14 +4,15 @@
 
 namespace joulecast::client {
 
-// What the program tells its caller; part of the command line's contract.
+// The program's exit codes; part of the command line's contract.
 enum class Exit : int {
   ok = 0,
   fault = 1,        // the work failed: an input was read and found wrong, missing or damaged
   usage = 2,        // the command line itself is wrong, or a value given in it
   unreachable = 3,  // server, network or disk did not answer
   infeasible = 4,   // well-formed, but nothing satisfies it
-  internal = 5      // a bug of joulecast's
+  internal = 5,     // an internal error
+  warned = 6        // of check: nothing is wrong, something is suspicious
 };
 
 inline constexpr const char* exit_codes_help =
@@ -21,7 +22,8 @@ inline constexpr const char* exit_codes_help =
     "  2  the command line is wrong, or a value given in it\n"
     "  3  server, network or disk could not be reached\n"
     "  4  nothing satisfies the request\n"
-    "  5  a bug of joulecast's";
+    "  5  an internal error\n"
+    "  6  check: warnings, but no fault";
 
 [[nodiscard]] Exit exit_of(Fault fault);
 

@@ -55,7 +55,7 @@ void print_table(const std::vector<history::Mission>& missions) {
 }
 
 // Robots whose telemetry could not be accounted for; how many they are.
-std::size_t tell_strangers(const ingest::FleetView& fleet, const std::string& store_path) {
+std::size_t print_unknown_robots(const ingest::FleetView& fleet, const std::string& store_path) {
   std::size_t count = 0;
   for (const auto& robot : fleet.all()) {
     if (robot->has_model) continue;
@@ -151,7 +151,8 @@ Exit replay_into(const ReplayInto& options) {
       }
     }
   }
-  return tally.damaged_places == 0 && tell_strangers(fleet, options.store_path) == 0 ? Exit::ok : Exit::fault;
+  return tally.damaged_places == 0 && print_unknown_robots(fleet, options.store_path) == 0 ? Exit::ok
+                                                                                           : Exit::fault;
 }
 
 }  // namespace joulecast::client

@@ -453,8 +453,7 @@ void add_simulate(CLI::App& program, Exit& exit) {
                       "write an LCM event log; without --lcm-url nothing is published");
   command->add_option("--truth", options->truth,
                       "write what was put into the robots and their true energies, JSON");
-  command->add_flag("--force", options->force,
-                    "write over files of --log and --truth that are there already");
+  command->add_flag("--force", options->force, "overwrite existing files of --log and --truth");
   command->add_option("--server", options->server,
                       "put the robot files into this joulecastd first, http://host:port");
   command->add_option("--rate", options->rate_hz, "telemetry of each robot, Hz")

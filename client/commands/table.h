@@ -17,9 +17,11 @@ using AddCommand = void (*)(CLI::App& program, Exit& exit);
 // Every subcommand of joulecast, in the order that --help lists them. A new one is a file and a line here.
 [[nodiscard]] std::span<const AddCommand> commands();
 
+void add_audit(CLI::App& program, Exit& exit);
 void add_autonomy(CLI::App& program, Exit& exit);
 void add_battery(CLI::App& program, Exit& exit);
 void add_calibrate(CLI::App& program, Exit& exit);
+void add_check(CLI::App& program, Exit& exit);
 void add_completion(CLI::App& program, Exit& exit);
 void add_effects(CLI::App& program, Exit& exit);
 void add_estimate(CLI::App& program, Exit& exit);
@@ -31,7 +33,9 @@ void add_missions(CLI::App& program, Exit& exit);
 void add_profile(CLI::App& program, Exit& exit);
 void add_replay(CLI::App& program, Exit& exit);
 void add_simulate(CLI::App& program, Exit& exit);
+void add_spy(CLI::App& program, Exit& exit);
 void add_thesis(CLI::App& program, Exit& exit);
+void add_token(CLI::App& program, Exit& exit);
 
 // Subcommands of calibrate.
 void add_calibrate_drive(CLI::App& calibrate, Exit& exit);

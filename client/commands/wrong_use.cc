@@ -34,7 +34,7 @@ bool takes_words(const CLI::App& app) {
                              [](const CLI::Option* option) { return option->get_positional(); });
 }
 
-// What nobody took explains more than what is missing for want of it.
+// An argument that was not accepted explains more than the option that is missing because of it.
 std::string about_rest(const CLI::App& app, const std::vector<std::string>& rest) {
   const auto commands = names_of_commands(app);
   const bool takes_command = !commands.empty() && !takes_words(app);
@@ -46,7 +46,7 @@ std::string about_rest(const CLI::App& app, const std::vector<std::string>& rest
     const std::string name = option->substr(0, option->find('='));
     return "has no option " + name + did_you_mean(name, names_of_options(app));
   }
-  return "has no use for " + rest.front();
+  return "does not accept " + rest.front();
 }
 
 const CLI::Option* option_of(const CLI::App& app, const std::string& name) {
@@ -68,7 +68,7 @@ std::string wrong_use(const CLI::App& program, const CLI::ParseError& error) {
   if (!rest.empty() && (missing || error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError))) {
     text = about_rest(*app, rest);
   } else if (missing && text.starts_with("A subcommand")) {
-    text = fmt::format("wants a command: {}", fmt::join(names_of_commands(*app), ", "));
+    text = fmt::format("requires a command: {}", fmt::join(names_of_commands(*app), ", "));
   } else if (error.get_name() == "ArgumentMismatch" || error.get_name() == "ConversionError") {
     // "--robot: 1 required TEXT missing"; "Could not convert: --length = three".
     const std::size_t dashes = text.find("--");
@@ -81,7 +81,7 @@ std::string wrong_use(const CLI::App& program, const CLI::ParseError& error) {
       text =
           name + " wants a " + kind + (equals == std::string::npos ? "" : ", not " + text.substr(equals + 3));
   }
-  return fmt::format("{}: {}\n{} --help says what it takes\n", command, text, command);
+  return fmt::format("{}: {}\n{} --help lists what it accepts\n", command, text, command);
 }
 
 }  // namespace joulecast::client

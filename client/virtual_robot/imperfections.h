@@ -12,7 +12,7 @@
 namespace joulecast::virtual_robot {
 
 // How the plant departs from its robot file. One strength per effect, 0 = none. Fractions unless a unit is
-// named. Ids are the catalogue's; those that begin with x_ stand for what no catalogue knows.
+// named. Ids are the catalogue's; those that begin with x_ stand for what no catalogue has.
 struct Imperfections {
   // Torque at the wheel.
   double coulomb_friction = 0;         // of T_m

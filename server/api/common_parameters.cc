@@ -1,6 +1,7 @@
 #include "server/api/common_parameters.h"
 
 #include <charconv>
+#include <iterator>
 #include <utility>
 
 #include "base/utc_time.h"
@@ -45,6 +46,19 @@ Result<std::optional<std::int64_t>> id_cursor(const http::Request& request) {
 void write_cursor(JsonWriter& json, std::string_view cursor) {
   json.key("next_cursor");
   cursor.empty() ? json.null() : json.value(cursor);
+}
+
+history::PageRequest page_of(const http::Request& request, std::int64_t limit) {
+  history::PageRequest page;
+  page.limit = request.query_integer("limit").value_or(limit);
+  page.cursor = std::string(request.query_value("cursor").value_or(""));
+  return page;
+}
+
+std::vector<Parameter> with(std::vector<Parameter> parameters, std::vector<Parameter> more) {
+  parameters.insert(parameters.end(), std::make_move_iterator(more.begin()),
+                    std::make_move_iterator(more.end()));
+  return parameters;
 }
 
 std::vector<Parameter> time_parameters(const std::string& name, const std::string& what) {

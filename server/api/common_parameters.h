@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/json_writer.h"
+#include "history/store.h"
 #include "server/http/router.h"
 
 // Parameters that several endpoints share.
@@ -32,6 +33,11 @@ template <class Items, class Id>
 void write_id_cursor(JsonWriter& json, const Items& items, std::int64_t limit, Id id_of) {
   write_cursor(json, std::cmp_less(items.size(), limit) ? "" : std::to_string(id_of(items.back())));
 }
+
+// ?limit= and ?cursor= of a list that the store pages.
+history::PageRequest page_of(const http::Request& request, std::int64_t limit);
+
+std::vector<http::Parameter> with(std::vector<http::Parameter> parameters, std::vector<http::Parameter> more);
 
 // ?<name>= in ISO 8601 and ?<name>_utime_us=: one time in either form. `what` begins the description.
 std::vector<http::Parameter> time_parameters(const std::string& name, const std::string& what);

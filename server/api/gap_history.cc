@@ -119,6 +119,7 @@ std::vector<TableRow> gap_history_rows() {
       {{.method = Method::get,
         .path = "/v1/robots/{id}/gap-history",
         .operation_id = "getGapHistory",
+        .role = http::Role::read,
         .summary = "Measured over modelled energy of a robot's missions with marks where it drifted, the "
                    "models adopted, and the robots of its kind",
         .parameters = {limit_parameter("missions, newest first", most_missions)},
@@ -129,6 +130,7 @@ std::vector<TableRow> gap_history_rows() {
       {{.method = Method::get,
         .path = "/v1/audit-log",
         .operation_id = "listAuditLog",
+        .role = http::Role::read,
         .summary = "What happened to robots and their models: adoptions, drifts, diagnoses, reused mission "
                    "ids, in order",
         .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},

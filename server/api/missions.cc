@@ -1,13 +1,16 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <unordered_map>
 #include <utility>
 
 #include "answers/json/ledger_json.h"
 #include "answers/json/mission_json.h"
+#include "base/json_fields.h"
 #include "server/api/common_parameters.h"
+#include "server/api/csv.h"
 #include "server/api/services.h"
 
 namespace joulecast::api {
@@ -18,104 +21,13 @@ using http::Parameter;
 using http::Request;
 using http::Response;
 
-Result<history::MissionFilter> filter_of(const Request& request) {
-  history::MissionFilter filter;
-  if (const auto robot = request.query_value("robot_id")) filter.robot_id = std::string(*robot);
-  if (const auto mission = request.query_value("mission_id")) filter.mission_id = std::string(*mission);
-  const auto from = time_of(request, "from"), to = time_of(request, "to");
-  if (!from) return tl::unexpected(from.error());
-  if (!to) return tl::unexpected(to.error());
-  filter.start_from_utime_us = *from;
-  filter.start_to_utime_us = *to;
-  filter.incomplete = request.query_boolean("incomplete");
-  filter.payload_min_kg = request.query_number("payload_min_kg");
-  filter.payload_max_kg = request.query_number("payload_max_kg");
-  if (const auto state = request.query_value("state"))
-    filter.states.push_back(*history::mission_state_from(*state));
-  return filter;
-}
-
-std::vector<Parameter> with(std::vector<Parameter> parameters, std::vector<Parameter> more) {
-  parameters.insert(parameters.end(), std::make_move_iterator(more.begin()),
-                    std::make_move_iterator(more.end()));
-  return parameters;
-}
-
-std::vector<Parameter> filter_parameters() {
-  using Type = Parameter::Type;
-  const std::vector<Parameter> times =
-      with(time_parameters("from", "only missions that started at or after this time"),
-           time_parameters("to", "only missions that started before this time"));
-  return with(
-      times,
-      {
-          {.name = "robot_id", .type = Type::text, .description = "only missions of this robot"},
-          {.name = "mission_id", .type = Type::text, .description = "only missions that the robot called so"},
-          {.name = "state",
-           .type = Type::text,
-           .description = "only missions in this state",
-           .choices = {"open", "finished", "aborted", "unfinished", "superseded", "interrupted"}},
-          {.name = "incomplete",
-           .type = Type::boolean,
-           .description = "only missions with (true) or without (false) unmeasured parts"},
-          {.name = "payload_min_kg",
-           .type = Type::number,
-           .description = "only missions with at least this payload",
-           .minimum = 0},
-          {.name = "payload_max_kg",
-           .type = Type::number,
-           .description = "only missions with at most this payload",
-           .minimum = 0},
-      });
-}
+constexpr std::size_t most_reason = 1024;  // bytes
 
 Result<history::TimeRange> range_of(const Request& request) {
   const auto from = time_of(request, "from"), to = time_of(request, "to");
   if (!from) return tl::unexpected(from.error());
   if (!to) return tl::unexpected(to.error());
   return history::TimeRange{from->value_or(history::whole_past), to->value_or(history::whole_future)};
-}
-
-history::PageRequest page_of(const Request& request, std::int64_t limit) {
-  history::PageRequest page;
-  page.limit = request.query_integer("limit").value_or(limit);
-  page.cursor = std::string(request.query_value("cursor").value_or(""));
-  return page;
-}
-
-Result<Response> list(const Services& services, const Request& request) {
-  const Result<history::MissionFilter> filter = filter_of(request);
-  if (!filter) return tl::unexpected(filter.error());
-  Result<history::MissionPage> found = services.store.missions(*filter, page_of(request, 50));
-  if (!found) return tl::unexpected(std::move(found.error()));
-  JsonWriter json;
-  json.begin_object().key("missions").begin_array();
-  for (const history::Mission& mission : found->missions) answers::write_mission(json, mission);
-  json.end_array();
-  write_cursor(json, found->next_cursor);
-  json.end_object();
-  return http::json_response(json.take());
-}
-
-Result<Response> totals(const Services& services, const Request& request) {
-  const Result<history::MissionFilter> filter = filter_of(request);
-  if (!filter) return tl::unexpected(filter.error());
-  Result<history::Totals> found = services.store.totals(*filter);
-  if (!found) return tl::unexpected(std::move(found.error()));
-  JsonWriter json;
-  json.begin_object();
-  json.field("missions", found->missions);
-  json.field("measured_missions", found->measured_missions);
-  json.field("incomplete_missions", found->incomplete_missions);
-  json.field("samples", found->samples);
-  json.field("gap_count", found->gap_count);
-  json.field("gap_s", found->gap_s);
-  json.key("energy");
-  answers::write_accounts(json, found->accounts);
-  json.key("ledger");
-  answers::write_ledger(json, found->accounts);
-  json.end_object();
-  return http::json_response(json.take());
 }
 
 Result<history::Mission> mission_of(const Services& services, const Request& request) {
@@ -169,6 +81,41 @@ class MissionSummaries {
   std::unordered_map<history::MissionKey, std::shared_ptr<const std::string>> texts_;
 };
 
+// Takes an ended mission out of all sums and of what forecasts learnt. It stays in the lists, with the
+// reason.
+Result<Response> annul(Services& services, const Request& request) {
+  Fields fields(*request.json);
+  const std::string reason = fields.text("reason", most_reason);
+  if (fields.ok() && reason.empty()) fields.fault("reason", "must say why the mission does not count");
+  if (Result<void> read = fields.finish(); !read) return tl::unexpected(std::move(read.error()));
+  Result<history::Mission> mission = mission_of(services, request);
+  if (!mission) return tl::unexpected(mission.error());
+  if (mission->state == history::MissionState::open)
+    return fail(Fault::conflict, "id", "the mission is still open; only one that ended can be annulled");
+  if (!history::findings_of(*mission).annulled.empty())
+    return fail(Fault::conflict, "id", "the mission is annulled already");
+  const std::int64_t now = services.now_utime_us();
+  mission->findings_json = history::annulled_findings(*mission, now, reason);
+  if (auto done = services.writer.execute(history::CheckpointMission{*mission, {}, {}, std::nullopt}); !done)
+    return tl::unexpected(std::move(done.error()));
+  const nlohmann::json detail{
+      {"mission", mission->key}, {"mission_id", mission->mission_id}, {"reason", reason}};
+  if (auto done = services.writer.execute(
+          history::AppendEvent{{0, now, mission->robot_id, "mission_annulled",
+                                detail.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)}});
+      !done)
+    return tl::unexpected(std::move(done.error()));
+  if (const auto model = services.models.find(mission->robot_id)) {
+    if (auto learned = services.forecasts.forget(model, mission->start_utime_us)) {
+      if (auto done = services.writer.execute(history::PutLearned{std::move(*learned)}); !done)
+        return tl::unexpected(std::move(done.error()));
+    }
+  }
+  JsonWriter json;
+  answers::write_mission(json, *mission);
+  return http::json_response(json.take());
+}
+
 Result<Response> ledger(const Services& services, const Request& request) {
   const Result<history::Mission> mission = mission_of(services, request);
   if (!mission) return tl::unexpected(mission.error());
@@ -184,6 +131,34 @@ Result<Response> ledger(const Services& services, const Request& request) {
   return http::json_response(json.take());
 }
 
+Response trace_csv(const history::Trace& trace, history::MissionKey key) {
+  Csv csv({"start_utime_us", "covered_s", "measured_power_min_w", "measured_power_mean_w",
+           "measured_power_max_w", "modelled_power_min_w", "modelled_power_mean_w", "modelled_power_max_w",
+           "speed_min_m_s", "speed_mean_m_s", "speed_max_m_s", "state_of_charge", "measured_j", "modelled_j",
+           "x_m", "y_m"});
+  for (const history::TraceBucket& b : trace.buckets) {
+    csv.field(b.start_utime_us).field(b.covered_s);
+    for (const history::Band& band : {b.measured_power_w, b.modelled_power_w, b.speed_m_s})
+      csv.field(band.min).field(band.mean).field(band.max);
+    csv.field(b.state_of_charge).field(b.measured_j).field(b.modelled_j).field(b.x_m).field(b.y_m).end_row();
+  }
+  return csv.response("mission-" + std::to_string(key) + "-trace");
+}
+
+Response telemetry_csv(const Request& request, const history::TelemetryPage& page, history::MissionKey key) {
+  std::vector<std::string> names{"utime_us", "sequence"};
+  for (const signals::SampleField& field : signals::sample_fields)
+    names.push_back(std::string(field.key) +
+                    (field.part == "right" || field.part == "left" ? "." + std::string(field.part) : ""));
+  Csv csv(names);
+  for (const signals::Sample& sample : page.samples) {
+    csv.field(sample.utime_us).field(sample.sequence);
+    for (const double* number : signals::numbers_of(sample)) csv.exact(*number);
+    csv.end_row();
+  }
+  return csv.response("mission-" + std::to_string(key) + "-telemetry", request, page.next_cursor);
+}
+
 Result<Response> trace(const Services& services, const Request& request) {
   const Result<history::MissionKey> key = path_id(request, "mission");
   if (!key) return tl::unexpected(key.error());
@@ -192,6 +167,7 @@ Result<Response> trace(const Services& services, const Request& request) {
   const Result<history::Trace> found =
       services.store.trace(*key, *range, request.query_integer("points").value_or(1000));
   if (!found) return tl::unexpected(found.error());
+  if (request.csv) return trace_csv(*found, *key);
   JsonWriter json;
   json.begin_object();
   json.field("id", *key);
@@ -241,6 +217,7 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
   if (!range) return tl::unexpected(range.error());
   const Result<history::TelemetryPage> found = services.store.telemetry(*key, *range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
+  if (request.csv) return telemetry_csv(request, *found, *key);
   const auto& samples = found->samples;
   JsonWriter json;
   json.begin_object();
@@ -299,25 +276,10 @@ std::vector<TableRow> mission_rows() {
   const std::vector<Parameter> span =
       with(time_parameters("from", "from this time on"), time_parameters("to", "before this time"));
   std::vector<TableRow> rows;
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/missions",
-        .operation_id = "listMissions",
-        .summary = "Missions, newest first, in pages that stay stable while missions come",
-        .parameters = with(filter_parameters(),
-                           {limit_parameter("missions a page", history::max_page_size), cursor_parameter()}),
-        .response_schema = "mission-page"},
-       answered_by(list)});
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/mission-totals",
-                   .operation_id = "totalMissions",
-                   .summary = "Sums of energy and ledger over the missions that the filters choose",
-                   .parameters = filter_parameters(),
-                   .response_schema = "mission-totals"},
-                  answered_by(totals)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/missions/{id}",
                    .operation_id = "getMission",
+                   .role = http::Role::read,
                    .summary = "One mission: its energy, measured and modelled",
                    .response_schema = "mission",
                    .error_statuses = {404}},
@@ -328,9 +290,22 @@ std::vector<TableRow> mission_rows() {
                       return summaries->read(request);
                     };
                   }});
+  rows.push_back(
+      {{.method = Method::post,
+        .path = "/v1/missions/{id}/annul",
+        .operation_id = "annulMission",
+        .role = http::Role::operate,
+        .summary = "Takes an ended mission out of all sums and of what is learnt, for a reason that "
+                   "lists and the audit log keep",
+        .request_schema = "annul-request",
+        .response_schema = "mission",
+        .error_statuses = {404, 409, 422},
+        .run = http::Run::write},
+       answered_by(annul)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/missions/{id}/ledger",
                    .operation_id = "getMissionLedger",
+                   .role = http::Role::read,
                    .summary = "Where the energy of a mission went; the terms add up to the battery's energy",
                    .response_schema = "mission-ledger",
                    .error_statuses = {404}},
@@ -339,6 +314,7 @@ std::vector<TableRow> mission_rows() {
       {{.method = Method::get,
         .path = "/v1/missions/{id}/trace",
         .operation_id = "getMissionTrace",
+        .role = http::Role::read,
         .summary =
             "Power, speed, charge and position over a mission, as least, mean and greatest of equal spans",
         .parameters = with(span, {{.name = "points",
@@ -347,22 +323,26 @@ std::vector<TableRow> mission_rows() {
                                    .minimum = 1,
                                    .maximum = static_cast<double>(history::max_trace_points)}}),
         .response_schema = "mission-trace",
+        .csv = true,
         .error_statuses = {404}},
        answered_by(trace)});
   rows.push_back(
       {{.method = Method::get,
         .path = "/v1/missions/{id}/telemetry",
         .operation_id = "getMissionTelemetry",
+        .role = http::Role::read,
         .summary = "The samples of a mission as received, as far as the retention keeps them",
         .parameters = with(
             span, {limit_parameter("samples a page", history::max_telemetry_samples), cursor_parameter()}),
         .response_schema = "mission-telemetry",
+        .csv = true,
         .error_statuses = {404}},
        answered_by(raw_telemetry)});
   rows.push_back(
       {{.method = Method::get,
         .path = "/v1/missions/{id}/covariates",
         .operation_id = "getMissionCovariates",
+        .role = http::Role::read,
         .summary = "What changed of a mission's covariates, as far as the retention keeps them",
         .parameters = with(
             span, {limit_parameter("changes a page", history::max_telemetry_samples), cursor_parameter()}),

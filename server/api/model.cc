@@ -82,6 +82,31 @@ Result<robot::RobotModel> candidate_of(const std::string& model_json, const std:
   return robot::parse_robot(model_json);
 }
 
+// Why an open proposal is none any more: what it would change is not in force.
+std::optional<std::string> moot_of(const Services& services, const history::Proposal& p) {
+  const auto now = services.models.find(p.robot_id);
+  if (p.state != history::ProposalState::open || !p.base_version || now == nullptr ||
+      now->version == *p.base_version)
+    return std::nullopt;
+  return "the proposal was made for version " + std::to_string(*p.base_version) + ", and version " +
+         std::to_string(now->version) + " is in force";
+}
+
+// Why a proposal can no longer be adopted; absent of one that can.
+std::optional<std::string> closed_reason(const Services& services, const history::Proposal& p) {
+  switch (p.state) {
+    case history::ProposalState::adopted:
+      return "adopted" + (p.adopted_version ? " as version " + std::to_string(*p.adopted_version) : "");
+    case history::ProposalState::dismissed:
+      return "dismissed";
+    case history::ProposalState::superseded:
+      return "a later proposal took its place";
+    case history::ProposalState::open:
+      break;
+  }
+  return moot_of(services, p);
+}
+
 Result<server::AdoptionRequest> adoption_of(const Services& services, const std::string& robot_id,
                                             const ModelRequest& r) {
   server::AdoptionRequest adoption;
@@ -126,7 +151,8 @@ Result<server::AdoptionRequest> adoption_of(const Services& services, const std:
     adoption.origin = history::ModelOrigin::calibration;
     adoption.note = r.note.value_or(proposal->note);
     fitted_on = std::move(proposal->fitted_on);
-    if (!adoption.expected_version && !r.force) adoption.expected_version = proposal->base_version;
+    if (const auto moot = moot_of(services, *proposal); moot && !r.force)
+      return fail(Fault::conflict, "/proposal_id", *moot + "; set force to adopt it all the same");
   }
   if (!model) return tl::unexpected(std::move(model.error()));
   if (auto effects = dynamics::active_effects(*model); !effects) {
@@ -218,17 +244,19 @@ Result<Response> diff(const Services& services, const Request& request) {
   return http::json_response(out.take());
 }
 
-void write_proposal(JsonWriter& out, const history::Proposal& p) {
+void write_proposal(JsonWriter& out, const Services& services, const history::Proposal& p) {
+  const bool moot = moot_of(services, p).has_value();
+  const auto state = moot ? history::ProposalState::superseded : p.state;
   out.begin_object().field("id", p.id).field("robot_id", p.robot_id).time("created", p.created_utime_us);
-  out.field("kind", p.kind).field("state", history::name(p.state)).field("note", p.note);
+  out.field("kind", p.kind).field("state", history::name(state));
+  out.field("closed_reason", closed_reason(services, p)).field("note", p.note);
   out.field("base_version", p.base_version).field("adopted_version", p.adopted_version);
   out.array("fitted_on", p.fitted_on);
   out.key("model").raw(p.model_json).key("detail").raw(p.detail_json).end_object();
 }
 
-Result<Response> proposals(const Services& services, const Request& request) {
-  const std::string& id = request.param("id");
-  if (auto known = model_of(services, id); !known) return tl::unexpected(std::move(known.error()));
+Result<Response> proposals_of(const Services& services, const Request& request,
+                              const std::optional<std::string>& id) {
   const auto cursor = id_cursor(request);
   if (!cursor) return tl::unexpected(cursor.error());
   const std::int64_t limit = request.query_integer("limit").value_or(50);
@@ -236,11 +264,21 @@ Result<Response> proposals(const Services& services, const Request& request) {
   if (!found) return tl::unexpected(found.error());
   JsonWriter out;
   out.begin_object().field("robot_id", id).key("proposals").begin_array();
-  for (const history::Proposal& proposal : *found) write_proposal(out, proposal);
+  for (const history::Proposal& proposal : *found) write_proposal(out, services, proposal);
   out.end_array();
   write_id_cursor(out, *found, limit, [](const history::Proposal& p) { return p.id; });
   out.end_object();
   return http::json_response(out.take());
+}
+
+Result<Response> proposals(const Services& services, const Request& request) {
+  const std::string& id = request.param("id");
+  if (auto known = model_of(services, id); !known) return tl::unexpected(std::move(known.error()));
+  return proposals_of(services, request, id);
+}
+
+Result<Response> all_proposals(const Services& services, const Request& request) {
+  return proposals_of(services, request, std::nullopt);
 }
 
 }  // namespace
@@ -252,6 +290,7 @@ std::vector<TableRow> model_rows() {
       {{.method = Method::post,
         .path = "/v1/robots/{id}/model",
         .operation_id = "adoptModel",
+        .role = http::Role::operate,
         .summary = "Adopts a robot file, a diagnosis or a proposal as the next model version, after a "
                    "back-test on missions that it was not fitted on; or puts an earlier version in force",
         .request_schema = "model-request",
@@ -262,6 +301,7 @@ std::vector<TableRow> model_rows() {
   rows.push_back({{.method = Method::get,
                    .path = "/v1/robots/{id}/versions/diff",
                    .operation_id = "compareRobotVersions",
+                   .role = http::Role::read,
                    .summary = "What two versions of a robot's model differ in",
                    .parameters = {{.name = "from",
                                    .type = Type::integer,
@@ -278,11 +318,21 @@ std::vector<TableRow> model_rows() {
       {{.method = Method::get,
         .path = "/v1/robots/{id}/proposals",
         .operation_id = "listProposals",
+        .role = http::Role::read,
         .summary = "Models that were suggested for a robot, newest first",
         .parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
         .response_schema = "proposal-list",
         .error_statuses = {404}},
        answered_by(proposals)});
+  rows.push_back(
+      {{.method = Method::get,
+        .path = "/v1/proposals",
+        .operation_id = "listFleetProposals",
+        .role = http::Role::read,
+        .summary = "Models that were suggested for the robots of the fleet, newest first",
+        .parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
+        .response_schema = "proposal-list"},
+       answered_by(all_proposals)});
   return rows;
 }
 

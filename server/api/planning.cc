@@ -24,7 +24,7 @@ Result<Response> json_or_error(Result<std::string> text) {
   return http::json_response(std::move(*text));
 }
 
-// A profile request, read once: by whoever comes first of `brief` and `handler`.
+// A profile request, read once: by the first of `brief` and `handler`.
 struct ProfileRequest {
   Model model;
   answers::ProfileInput input;
@@ -106,6 +106,7 @@ std::vector<TableRow> planning_rows() {
       {{.method = Method::post,
         .path = "/v1/robots/{id}/profile",
         .operation_id = "computeProfile",
+        .role = http::Role::plan,
         .summary =
             "The minimum-energy motion along a path, with its certificate, against trapezoid and triangle",
         .request_schema = "profile-request",
@@ -120,6 +121,7 @@ std::vector<TableRow> planning_rows() {
       {{.method = Method::post,
         .path = "/v1/robots/{id}/estimate",
         .operation_id = "estimateEnergy",
+        .role = http::Role::plan,
         .summary = "Energy of a path driven by its minimum-energy motion (the default: it needs no past of "
                    "the robot) or as the robot usually drives, or of a given motion",
         .request_schema = "estimate-request",
@@ -131,6 +133,7 @@ std::vector<TableRow> planning_rows() {
       {{.method = Method::post,
         .path = "/v1/energy-matrix",
         .operation_id = "computeEnergyMatrix",
+        .role = http::Role::plan,
         .summary =
             "Energy and duration of every robot doing every task, row by row, driven by minimum-energy "
             "motions (the default: the same for equal robots, whatever their past) or as each robot "
@@ -144,6 +147,7 @@ std::vector<TableRow> planning_rows() {
       {{.method = Method::post,
         .path = "/v1/robots/{id}/autonomy",
         .operation_id = "computeAutonomy",
+        .role = http::Role::plan,
         .summary =
             "How far and how long a robot still goes, and whether it can do a list of tasks, driven as "
             "it usually drives (the default: the charge must last for that) or by minimum-energy motions",
@@ -155,6 +159,7 @@ std::vector<TableRow> planning_rows() {
   rows.push_back({{.method = Method::post,
                    .path = "/v1/autonomy",
                    .operation_id = "computeFleetAutonomy",
+                   .role = http::Role::plan,
                    .summary = "The autonomy of many robots in one call",
                    .request_schema = "fleet-autonomy-request",
                    .response_schema = "fleet-autonomy",

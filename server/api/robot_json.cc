@@ -45,6 +45,15 @@ void write_charge(JsonWriter& json, const ingest::ChargeView& charge) {
   json.end_object();
 }
 
+void write_contradiction(JsonWriter& json, const ingest::Contradiction& c) {
+  json.begin_object();
+  json.field("kind", ingest::contradiction_kind_names[static_cast<std::size_t>(c.kind)]);
+  json.field("id", c.id).field("channel", c.channel).field("value", c.value).field("says", c.says);
+  json.field("untrue", c.untrue);
+  json.time("told", c.told_utime_us);
+  json.end_object();
+}
+
 bool is_live(const ingest::RobotSnapshot& snapshot, std::int64_t now_utime_us) {
   return silence_s(snapshot, now_utime_us) <= live_s;  // false for NaN
 }
@@ -97,6 +106,12 @@ void write_state(JsonWriter& json, const ingest::RobotSnapshot& s,
   json.end_object();
   json.key("fault_notes").begin_object();
   for (const auto& [reason, note] : s.fault_notes) json.field(reason, note);
+  json.end_object();
+  json.key("contradictions").begin_array();
+  for (const ingest::Contradiction& c : s.contradictions) write_contradiction(json, c);
+  json.end_array();
+  json.key("missions_left_out").begin_object();
+  for (const auto& [reason, count] : s.missions_left_out) json.field(reason, count);
   json.end_object();
   json.end_object();
 }

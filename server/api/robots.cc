@@ -5,6 +5,7 @@
 #include <thread>
 #include <utility>
 
+#include "robot/review.h"
 #include "robot/robot_file.h"
 #include "server/api/common_parameters.h"
 #include "server/api/robot_json.h"
@@ -27,6 +28,13 @@ void write_robot_state(JsonWriter& json, const Services& services, const std::st
     silent.robot_id = robot_id;
     silent.has_model = model != nullptr;
     silent.model_version = model != nullptr ? model->version : 0;
+  }
+  // Of a robot not heard since the start the store's last state is known, and the model may have changed.
+  if (snapshot != nullptr && snapshot->samples == 0) {
+    silent = *snapshot;
+    silent.has_model = model != nullptr;
+    silent.model_version = model != nullptr ? model->version : 0;
+    snapshot.reset();
   }
   const ingest::RobotSnapshot& now = snapshot != nullptr ? *snapshot : silent;
   std::optional<forecast::Reach> reach;
@@ -77,6 +85,9 @@ Result<Response> put(Services& services, const Request& request) {
   // The catalogue's bounds are checked before anything is stored.
   if (auto effects = dynamics::active_effects(*robot); !effects)
     return tl::unexpected(std::move(effects.error()));
+  const std::vector<robot::ReviewFinding> findings = robot::review(*robot);
+  if (auto plannable = robot::plannable(findings); !plannable)
+    return tl::unexpected(std::move(plannable.error()));
   history::AddModel command;
   command.robot_id = id;
   command.utime_us = services.now_utime_us();
@@ -87,7 +98,14 @@ Result<Response> put(Services& services, const Request& request) {
   if (Result<void> placed = services.models.put(std::move(*robot), *version); !placed)
     return tl::unexpected(std::move(placed.error()));
   JsonWriter json;
-  json.begin_object().field("robot_id", id).field("model_version", *version).end_object();
+  json.begin_object().field("robot_id", id).field("model_version", *version).key("warnings").begin_array();
+  for (const robot::ReviewFinding& warning : findings)
+    json.begin_object()
+        .field("field", warning.field)
+        .field("value", warning.value)
+        .field("says", warning.says)
+        .end_object();
+  json.end_array().end_object();
   return http::json_response(json.take());
 }
 
@@ -179,17 +197,20 @@ Result<Response> versions(const Services& services, const Request& request) {
 
 std::vector<TableRow> robot_rows() {
   std::vector<TableRow> rows;
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/robots",
-                   .operation_id = "listRobots",
-                   .summary = "The fleet: every robot that has a model or was heard of, by id, with its live "
-                              "state",
-                   .parameters = {limit_parameter("robots a page", most_robots), cursor_parameter()},
-                   .response_schema = "robot-list"},
-                  answered_by(list)});
+  rows.push_back(
+      {{.method = Method::get,
+        .path = "/v1/robots",
+        .operation_id = "listRobots",
+        .role = http::Role::read,
+        .summary = "The fleet: every robot that has a model or has sent telemetry, by id, with its live "
+                   "state",
+        .parameters = {limit_parameter("robots a page", most_robots), cursor_parameter()},
+        .response_schema = "robot-list"},
+       answered_by(list)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/robots/{id}",
                    .operation_id = "getRobot",
+                   .role = http::Role::read,
                    .summary = "A robot's model in force",
                    .response_schema = "robot-detail",
                    .error_statuses = {404}},
@@ -197,6 +218,7 @@ std::vector<TableRow> robot_rows() {
   rows.push_back({{.method = Method::put,
                    .path = "/v1/robots/{id}",
                    .operation_id = "putRobot",
+                   .role = http::Role::admin,
                    .summary = "Gives a robot a model; a changed one is a new version, used at once",
                    .request_schema = "robot",
                    .response_schema = "robot-version",
@@ -220,6 +242,7 @@ std::vector<TableRow> robot_rows() {
   rows.push_back({{.method = Method::get,
                    .path = "/v1/robots/{id}/state",
                    .operation_id = "getRobotState",
+                   .role = http::Role::read,
                    .summary = "A robot's live state: power, charge, mission, health of its telemetry",
                    .response_schema = "robot-state",
                    .error_statuses = {404},
@@ -229,6 +252,7 @@ std::vector<TableRow> robot_rows() {
       {{.method = Method::get,
         .path = "/v1/robots/{id}/versions",
         .operation_id = "listRobotVersions",
+        .role = http::Role::read,
         .summary = "Every version of a robot's model, newest first",
         .parameters = {limit_parameter("versions a page", history::max_page_size), cursor_parameter()},
         .response_schema = "robot-version-list",

@@ -6,14 +6,14 @@
 
 #include "history/store.h"
 #include "history/writer.h"
+#include "ingest/fleet_view.h"
+#include "ingest/forecasts.h"
+#include "ingest/model_registry.h"
 #include "planning/cost_table_cache.h"
 #include "server/diagnosis/diagnosis_service.h"
 #include "server/diagnosis/drift_view.h"
 #include "server/diagnosis/model_adoption.h"
 #include "server/http/router.h"
-#include "ingest/fleet_view.h"
-#include "ingest/forecasts.h"
-#include "ingest/model_registry.h"
 
 namespace joulecast::api {
 
@@ -58,6 +58,7 @@ std::vector<TableRow> robot_rows();
 std::vector<TableRow> model_rows();
 std::vector<TableRow> diagnosis_rows();
 std::vector<TableRow> gap_history_rows();
+std::vector<TableRow> mission_list_rows();
 std::vector<TableRow> mission_rows();
 std::vector<TableRow> planning_rows();
 

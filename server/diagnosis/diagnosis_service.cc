@@ -31,7 +31,7 @@ using history::DiagnosisState;
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-// Nice level of the working thread: everything that answers somebody goes first.
+// Nice level of the working thread: requests go first.
 constexpr int low_priority = 10;
 
 struct Job {
@@ -204,7 +204,7 @@ class DiagnosisService::Impl {
   Result<void> any_ended(const DiagnosisRequest& request) const {
     using State = history::MissionState;
     history::MissionFilter ended;
-    ended.robot_id = request.robot_id;
+    ended.robot_ids = {request.robot_id};
     ended.start_from_utime_us = request.since_utime_us;
     ended.states = {State::finished, State::aborted, State::unfinished, State::superseded,
                     State::interrupted};
@@ -281,9 +281,12 @@ class DiagnosisService::Impl {
     Result<StoredRecordings> history = read_recordings(store_, wanted);
     if (!history) return tl::unexpected(std::move(history.error()));
     if (history->missions.empty())
-      return invalid("/missions", "none of the robot's missions has its telemetry stored (" +
+      return invalid("/missions", "none of the robot's missions can be diagnosed (their telemetry: " +
                                       std::to_string(history->left_out.no_telemetry) + " without, " +
-                                      std::to_string(history->left_out.open) + " still open)");
+                                      std::to_string(history->left_out.open) + " still open, " +
+                                      std::to_string(history->left_out.contradicted) +
+                                      " contradict themselves: see the robot's contradictions, " +
+                                      std::to_string(history->left_out.annulled) + " annulled)");
     std::vector<telemetry::Recording> recordings;
     for (std::size_t k = 0; k < history->missions.size(); ++k) {
       StoredRecording& mission = history->missions[k];
@@ -348,7 +351,7 @@ class DiagnosisService::Impl {
                          {"model", ""},
                          {"error", ""}};
     told["result"] = std::move(result);
-    // What a person who insists would get; of effects that are not told apart nobody has chosen one yet.
+    // What a forced adoption would take; of effects that are indistinguishable none has been chosen yet.
     const gap::Offer offer = gap::offer_of(diagnosis);
     if (offer.effects.empty()) return told;
     const Result<robot::RobotModel> extended = gap::take(offer, model.robot, {{}, true});
@@ -364,7 +367,7 @@ class DiagnosisService::Impl {
     record.state = state;
     record.error = std::move(error);
     record.finished_utime_us = now_utime_us_();
-    // The result is in the store before the job leaves the queue, so that whoever looks finds it in one of
+    // The result is in the store before the job leaves the queue, so that it is always found in one of
     // them.
     history::UpdateDiagnosis update{record, std::move(report)};
     if (const auto stored = writer_.execute(update); !stored) {

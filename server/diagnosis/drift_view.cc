@@ -16,7 +16,7 @@ constexpr std::size_t newest = 10;  // missions that tell how a robot does now
 Result<std::vector<drift::MissionRatio>> DriftView::missions(const std::string& robot_id,
                                                              std::size_t limit) const {
   history::MissionFilter filter;
-  filter.robot_id = robot_id;
+  filter.robot_ids = {robot_id};
   history::PageRequest page;
   page.limit = history::max_page_size;
   std::vector<drift::MissionRatio> ratios;
@@ -27,7 +27,7 @@ Result<std::vector<drift::MissionRatio>> DriftView::missions(const std::string& 
       const signals::Accounts& a = m.accounts;
       // Only whole missions compare: what was not measured is in neither energy.
       if (m.state == history::MissionState::open || !(a.measured_s > 0.9 * a.duration_s) ||
-          !(a.measured_j > 0))
+          !(a.measured_j > 0) || !history::findings_of(m).teaches())
         continue;
       const double modelled_j = a.measured_j - a.ledger[signals::Term::unexplained];
       if (!(modelled_j > 0)) continue;

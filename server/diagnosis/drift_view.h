@@ -26,8 +26,8 @@ class DriftView {
   DriftView(const history::Store& store, const ingest::ModelRegistry& models, const DriftOptions& options)
       : store_(store), models_(models), options_(options) {}
 
-  // The finished missions of a robot that measured energy, as the meter accounted them, newest `limit`,
-  // oldest first.
+  // The finished missions of a robot that measured energy and may be learnt from, as the meter accounted
+  // them, newest `limit`, oldest first.
   Result<std::vector<drift::MissionRatio>> missions(const std::string& robot_id, std::size_t limit) const;
 
   // Where its ratio changed, oldest first.

@@ -153,6 +153,7 @@ Result<void> GapWatch::compare_kinds(WatchCounts& counts) {
     for (const drift::SiblingRatio& s : kind) {
       if (!watches(s.robot_id)) continue;
       counts.standing_out += s.stands_out;
+      counts.ratios[s.robot_id] = s.ratio;
       const Result<Memory> memory = read_memory(store_, s.robot_id);
       if (!memory) return tl::unexpected(memory.error());
       if (memory->stood_out == s.stands_out) continue;

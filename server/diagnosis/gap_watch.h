@@ -3,6 +3,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <set>
 #include <string>
@@ -10,9 +11,9 @@
 
 #include "history/store.h"
 #include "history/writer.h"
+#include "ingest/model_registry.h"
 #include "server/diagnosis/diagnosis_service.h"
 #include "server/diagnosis/drift_view.h"
-#include "ingest/model_registry.h"
 
 namespace joulecast::server {
 
@@ -28,6 +29,7 @@ struct WatchCounts {
   std::size_t drifting = 0;      // robots whose newest mark no model adopted since has answered
   std::size_t standing_out = 0;  // robots that stand out among their kind
   double ratio_min = 1, ratio_median = 1, ratio_max = 1;  // of the robots' newest missions; NaN: none
+  std::map<std::string, double> ratios;                   // of the robots that are compared with their kind
 };
 
 // Looks at every robot's missions from time to time: a change of measured over modelled energy is an event

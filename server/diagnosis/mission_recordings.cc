@@ -53,6 +53,9 @@ class Reader {
     LeftOut& out = result_.left_out;
     if (wanted_.except.contains(mission.key)) return ++out.excepted, Result<void>{};
     if (mission.state == history::MissionState::open) return ++out.open, Result<void>{};
+    const history::MissionFindings findings = history::findings_of(mission);
+    if (!findings.annulled.empty()) return ++out.annulled, Result<void>{};
+    if (!findings.teaches() && wanted_.only.empty()) return ++out.contradicted, Result<void>{};
     if (full() || result_.samples + static_cast<std::size_t>(std::max<std::int64_t>(mission.samples, 0)) >
                       wanted_.max_samples)
       return ++out.too_many, Result<void>{};
@@ -101,7 +104,7 @@ Result<StoredRecordings> read_recordings(const history::Store& store, const Reco
   if (!wanted.only.empty()) return reader.finish();
 
   history::MissionFilter filter;
-  filter.robot_id = wanted.robot_id;
+  filter.robot_ids = {wanted.robot_id};
   filter.start_from_utime_us = wanted.since_utime_us;
   history::PageRequest page;
   do {

@@ -38,7 +38,9 @@ struct LeftOut {
   std::size_t excepted = 0;
   std::size_t open = 0;          // still running
   std::size_t no_telemetry = 0;  // the retention dropped it
-  std::size_t too_many = 0;      // beyond the bounds
+  std::size_t contradicted = 0;  // its channels contradict each other; but where it was asked for by name
+  std::size_t annulled = 0;
+  std::size_t too_many = 0;  // beyond the bounds
   std::size_t charging_samples = 0;
 };
 

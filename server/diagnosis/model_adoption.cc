@@ -22,6 +22,8 @@ json report_of(const Adoption& adoption) {
   report["left_out"] = {{"fitted_on", out.excepted},
                         {"open", out.open},
                         {"no_telemetry", out.no_telemetry},
+                        {"contradicted", out.contradicted},
+                        {"annulled", out.annulled},
                         {"beyond_limits", out.too_many},
                         {"charging_samples", out.charging_samples}};
   report["since_utime_us"] = adoption.since_utime_us ? json(*adoption.since_utime_us) : json();
@@ -60,9 +62,9 @@ std::string refusal_of(const energy::BackTest& test) {
 
 }  // namespace
 
-ModelAdoption::ModelAdoption(const history::Store& store, history::Writer& writer, ingest::ModelRegistry& models,
-                             const DriftView& drift, std::function<std::int64_t()> now_utime_us,
-                             const AdoptionOptions& options)
+ModelAdoption::ModelAdoption(const history::Store& store, history::Writer& writer,
+                             ingest::ModelRegistry& models, const DriftView& drift,
+                             std::function<std::int64_t()> now_utime_us, const AdoptionOptions& options)
     : store_(store),
       writer_(writer),
       models_(models),
@@ -75,7 +77,8 @@ Result<void> ModelAdoption::record(const std::string& robot_id, const std::strin
   return writer_.offer(history::AppendEvent{{0, now_utime_us_(), robot_id, kind, std::move(detail_json)}});
 }
 
-Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request, const ingest::ModelInForce& before,
+Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request,
+                                                const ingest::ModelInForce& before,
                                                 std::optional<std::int64_t>& since_utime_us) const {
   constexpr std::size_t enough_missions = 3;
   RecordingsWanted wanted;
@@ -104,6 +107,35 @@ Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request, 
   return read_recordings(store_, wanted);
 }
 
+Result<void> ModelAdoption::test(const AdoptionRequest& request, const ingest::ModelInForce& before,
+                                 const std::function<bool()>& go_on, Adoption& adoption) {
+  const std::unique_lock lock(testing_, std::try_to_lock);
+  if (!lock) return fail(Fault::unavailable, "", "another model is being tested; try again in some seconds");
+  const Result<StoredRecordings> history = this->history(request, before, adoption.since_utime_us);
+  if (!history) return tl::unexpected(history.error());
+  adoption.left_out = history->left_out;
+  std::vector<energy::DriveRun> runs;
+  for (const StoredRecording& mission : history->missions) {
+    const double payload_kg = mission.recording.payload_kg;
+    // The key names the run: mission ids may repeat.
+    runs.push_back(
+        {std::to_string(mission.key), mission.recording.samples, std::isfinite(payload_kg) ? payload_kg : 0});
+  }
+  energy::BackTestSettings settings;
+  settings.meter = options_.meter;
+  settings.go_on = go_on;
+  Result<energy::BackTest> test = energy::back_test(runs, before.robot, request.model, settings);
+  if (!test) return tl::unexpected(std::move(test.error()));
+  adoption.test = std::move(*test);
+  for (energy::RunComparison& run : adoption.test.runs) {
+    const history::MissionKey key = std::stoll(run.name);
+    adoption.tested_on.push_back(key);
+    for (const StoredRecording& mission : history->missions)
+      if (mission.key == key) run.name = mission.recording.mission_id;
+  }
+  return {};
+}
+
 Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std::function<bool()>& go_on) {
   const std::string& robot_id = request.model.robot_id;
   const std::shared_ptr<const ingest::ModelInForce> before = models_.find(robot_id);
@@ -118,33 +150,8 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
 
   Adoption adoption;
   adoption.previous_version = adoption.version = before->version;
-  {
-    const std::unique_lock lock(testing_, std::try_to_lock);
-    if (!lock)
-      return fail(Fault::unavailable, "", "another model is being tested; try again in some seconds");
-    const Result<StoredRecordings> history = this->history(request, *before, adoption.since_utime_us);
-    if (!history) return tl::unexpected(history.error());
-    adoption.left_out = history->left_out;
-    std::vector<energy::DriveRun> runs;
-    for (const StoredRecording& mission : history->missions) {
-      const double payload_kg = mission.recording.payload_kg;
-      // The key names the run: mission ids may repeat.
-      runs.push_back({std::to_string(mission.key), mission.recording.samples,
-                      std::isfinite(payload_kg) ? payload_kg : 0});
-    }
-    energy::BackTestSettings settings;
-    settings.meter = options_.meter;
-    settings.go_on = go_on;
-    Result<energy::BackTest> test = energy::back_test(runs, before->robot, request.model, settings);
-    if (!test) return tl::unexpected(std::move(test.error()));
-    adoption.test = std::move(*test);
-    for (energy::RunComparison& run : adoption.test.runs) {
-      const history::MissionKey key = std::stoll(run.name);
-      adoption.tested_on.push_back(key);
-      for (const StoredRecording& mission : history->missions)
-        if (mission.key == key) run.name = mission.recording.mission_id;
-    }
-  }
+  if (Result<void> tested = test(request, *before, go_on, adoption); !tested)
+    return tl::unexpected(std::move(tested.error()));
   const json report = report_of(adoption);
   adoption.back_test_json = report.dump();
   adoption.refusal = refusal_of(adoption.test);

@@ -12,10 +12,10 @@
 #include "energy/back_test.h"
 #include "history/store.h"
 #include "history/writer.h"
+#include "ingest/model_registry.h"
 #include "robot/robot_model.h"
 #include "server/diagnosis/drift_view.h"
 #include "server/diagnosis/mission_recordings.h"
-#include "ingest/model_registry.h"
 
 namespace joulecast::server {
 
@@ -30,11 +30,10 @@ struct AdoptionRequest {
   std::optional<std::int64_t> since_utime_us;
   std::optional<std::int64_t> expected_version;  // conflict when another one is in force
   std::optional<std::int64_t> diagnosis_id,
-      proposal_id;  // where it comes from; an adopted proposal is closed
-  std::string
-      overridden;  // why the diagnosis says that it is not to be adopted, where somebody insists; else empty
-  bool force = false;    // adopt even when the back-test does not show that it improves
-  bool dry_run = false;  // back-test only
+      proposal_id;         // where it comes from; an adopted proposal is closed
+  std::string overridden;  // why the diagnosis refuses adoption, where it is forced; else empty
+  bool force = false;      // adopt even when the back-test does not show that it improves
+  bool dry_run = false;    // back-test only
 };
 
 struct Adoption {
@@ -87,6 +86,9 @@ class ModelAdoption {
  private:
   Result<StoredRecordings> history(const AdoptionRequest& request, const ingest::ModelInForce& before,
                                    std::optional<std::int64_t>& since_utime_us) const;
+  // The back-test on the history: fills what of the adoption it decides.
+  Result<void> test(const AdoptionRequest& request, const ingest::ModelInForce& before,
+                    const std::function<bool()>& go_on, Adoption& adoption);
   Result<void> record(const std::string& robot_id, const std::string& kind, std::string detail_json);
 
   const history::Store& store_;

@@ -94,7 +94,7 @@ struct EventHub::State::Subscriber : public StreamSource {
     wake = nullptr;
     empty_queue();
   }
-  bool hopeless() const override { return overflowed; }
+  bool must_close() const override { return overflowed; }
   bool endless() const override { return true; }
   bool on_worker() const override { return false; }
 
@@ -246,7 +246,7 @@ Result<std::shared_ptr<StreamSource>> EventHub::subscribe(std::string_view last_
 
 Result<Response> EventHub::respond(const Request& request, std::string_view topic) {
   auto source = subscribe(request.header("last-event-id"), topic);
-  if (!source) return tl::unexpected<Error>(source.error());
+  if (!source) return tl::unexpected(source.error());
   Response response;
   response.content_type = "text/event-stream";
   response.headers.emplace_back("Cache-Control", "no-store");

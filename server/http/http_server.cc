@@ -12,7 +12,7 @@
 #include <tuple>
 #include <vector>
 
-#include "server/http/session.h"
+#include "server/http/tls.h"
 
 namespace joulecast::http {
 namespace {
@@ -64,6 +64,12 @@ ServerObserver& nobody() {
 }
 
 }  // namespace
+
+bool is_loopback(std::string_view text) {
+  boost::system::error_code error;
+  const net::ip::address address = net::ip::make_address(std::string(text), error);
+  return !error && address.is_loopback();
+}
 
 std::string_view to_string(Refusal refusal) {
   switch (refusal) {
@@ -136,6 +142,11 @@ Result<void> HttpServer::Impl::open() {
   boost::system::error_code error;
   const auto address = net::ip::make_address(core->options.address, error);
   if (error) return invalid("http.address", "must be an IPv4 or IPv6 address, is " + core->options.address);
+  if (!core->options.tls_certificate.empty() || !core->options.tls_key.empty()) {
+    auto tls = make_tls(core->options.tls_certificate, core->options.tls_key);
+    if (!tls) return tl::unexpected<Error>(tls.error());
+    core->tls = std::move(*tls);
+  }
   const Tcp::endpoint endpoint(address, core->options.port);
   acceptor.open(endpoint.protocol(), error);
   if (!error) acceptor.set_option(Tcp::acceptor::reuse_address(true), error);
@@ -253,7 +264,7 @@ bool HttpServer::Impl::settled() {
 Result<std::unique_ptr<HttpServer>> HttpServer::start(const ServerOptions& options, const Router& router,
                                                       ServerObserver* observer) {
   auto impl = std::make_unique<Impl>(options, router, observer != nullptr ? *observer : nobody());
-  if (auto opened = impl->open(); !opened) return tl::unexpected<Error>(opened.error());
+  if (auto opened = impl->open(); !opened) return tl::unexpected(opened.error());
   impl->run();
   return std::unique_ptr<HttpServer>(new HttpServer(std::move(impl)));
 }
@@ -270,6 +281,15 @@ HttpServer::~HttpServer() {
 
 std::uint16_t HttpServer::port() const {
   return impl_->port;
+}
+
+Result<void> HttpServer::reload_tls() {
+  const ServerOptions& options = impl_->core->options;
+  if (options.tls_certificate.empty()) return {};
+  auto tls = make_tls(options.tls_certificate, options.tls_key);
+  if (!tls) return tl::unexpected<Error>(tls.error());
+  net::post(impl_->core->io, [core = impl_->core, fresh = std::move(*tls)] { core->tls = fresh; });
+  return {};
 }
 
 std::chrono::milliseconds HttpServer::silence() const {

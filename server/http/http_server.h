@@ -19,6 +19,9 @@ struct ServerOptions {
   std::uint16_t port = 0;  // 0: the system chooses, see HttpServer::port()
   // Names of this service for its clients besides IP addresses, localhost and the host's name; "*": any.
   std::vector<std::string> allowed_hosts = {};
+  // PEM files of a certificate chain and its key; both empty: plain HTTP.
+  std::string tls_certificate = {};
+  std::string tls_key = {};
   unsigned worker_threads = 2;         // of Run::worker endpoints
   unsigned compute_threads = 2;        // of Run::compute endpoints
   std::size_t worker_queue = 256;      // requests waiting for one kind of threads; beyond: 503
@@ -79,6 +82,9 @@ class ServerObserver {
   virtual void connections(std::size_t open) { (void)open; }
 };
 
+// Whether only this machine reaches that IP address; false for what is none.
+bool is_loopback(std::string_view address);
+
 // HTTP/1.1 server: one I/O thread, small worker pools, keep-alive, pipelining answered in order. A client, or
 // peer, is an IPv4 address or the /64 network of an IPv6 address.
 // Thread-safe where stated; router and observer must outlive it.
@@ -94,6 +100,10 @@ class HttpServer {
 
   // The port really bound.
   std::uint16_t port() const;
+
+  // Reads the certificate and key again, for connections from now on; on an error the old ones stay. Any
+  // thread.
+  Result<void> reload_tls();
 
   // Time since the I/O thread last ran its tick (every 100 ms): what a watchdog looks at. Any thread.
   std::chrono::milliseconds silence() const;

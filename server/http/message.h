@@ -34,6 +34,9 @@ struct Request {
   std::string body;
   std::shared_ptr<const nlohmann::json> json;  // the parsed body where the endpoint declares a request schema
   std::any input;                              // what an endpoint's `brief` read of it, for its `handler`
+  std::string address;                         // of the client's end of the connection
+  std::string actor;                           // name of the token that it came with; empty: none
+  bool csv = false;                            // Accept asks for text/csv of an endpoint that has it
   std::string id;                              // request id: the client's X-Request-Id when sane, else ours
   // Set when the answer is no longer wanted: past http.request_deadline_s or when the client has gone (see
   // Run), and when the server's patience at a stop has ended. What the handler then returns is not sent.
@@ -72,7 +75,7 @@ class StreamSource {
   // The client left or the server stops; may come while pull() runs on another thread.
   virtual void cancel() {}
   // True when the source wants its connection closed even though a piece is still on its way (a slow client).
-  virtual bool hopeless() const { return false; }
+  virtual bool must_close() const { return false; }
   // True for streams that never end by themselves: a graceful stop closes them at once.
   virtual bool endless() const { return false; }
   // Where pull() runs: true when it computes or blocks.

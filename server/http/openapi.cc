@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/json_text.h"
+#include "server/http/gate.h"
 #include "server/http/problem.h"
 #include "server/http/uri.h"
 
@@ -31,7 +32,7 @@ class Components {
 
   // {"$ref": ...} to the component of schemas/<name>.schema.json, which is taken in with all it refers to.
   Result<ordered_json> reference(const std::string& name) {
-    if (auto added = add(name); !added) return tl::unexpected<Error>(added.error());
+    if (auto added = add(name); !added) return tl::unexpected(added.error());
     return ordered_json{{"$ref", "#/components/schemas/" + name}};
   }
   ordered_json take() {
@@ -130,6 +131,7 @@ ordered_json parameter_of(const Parameter& parameter) {
 std::set<unsigned> errors_of(const Endpoint& endpoint) {
   std::set<unsigned> statuses(endpoint.error_statuses.begin(), endpoint.error_statuses.end());
   statuses.insert({400, 406, 421, 500});
+  if (endpoint.role != Role::open) statuses.insert({401, 403});
   if (endpoint.method != Method::get) statuses.insert(403);
   if (!endpoint.parameters.empty()) statuses.insert(422);
   if (!endpoint.request_schema.empty()) statuses.insert({413, 415, 422});
@@ -137,11 +139,20 @@ std::set<unsigned> errors_of(const Endpoint& endpoint) {
   return statuses;
 }
 
+// The role stands in the list of each way to prove it: OpenAPI 3.1 has roles there for schemes that are not
+// OAuth2.
+ordered_json security_of(Role role) {
+  if (role == Role::open) return ordered_json::array();
+  const ordered_json roles = ordered_json::array({access::name(role)});
+  return ordered_json::array({{{"bearer", roles}}, {{"session", roles}}});
+}
+
 // The endpoint that serves the document.
 Endpoint self_endpoint(std::shared_ptr<const std::string> text) {
   Endpoint self;
   self.path = "/openapi.json";
   self.operation_id = "getOpenApi";
+  self.role = Role::read;
   self.summary = "This description of the interface, OpenAPI 3.1";
   self.run = Run::io;
   self.response_schema = "openapi";
@@ -167,6 +178,9 @@ Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<
     ordered_json operation;
     operation["operationId"] = endpoint.operation_id;
     operation["summary"] = endpoint.summary;
+    if (endpoint.role == Role::unstated)
+      return fail(Fault::internal, endpoint.operation_id, "the table states no role for it");
+    operation["security"] = security_of(endpoint.role);
     ordered_json parameters = ordered_json::array();
     const auto target = parse_target(endpoint.path);
     if (!target) return fail(Fault::internal, endpoint.path, "malformed path template");
@@ -181,7 +195,7 @@ Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<
     if (!parameters.empty()) operation["parameters"] = std::move(parameters);
     if (!endpoint.request_schema.empty()) {
       auto schema = components.reference(endpoint.request_schema);
-      if (!schema) return tl::unexpected<Error>(schema.error());
+      if (!schema) return tl::unexpected(schema.error());
       operation["requestBody"] = {{"required", true},
                                   {"content", {{"application/json", {{"schema", *schema}}}}}};
     }
@@ -193,11 +207,12 @@ Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<
         content["schema"] = {{"type", "string"}};
       } else {
         auto schema = components.reference(endpoint.response_schema);
-        if (!schema) return tl::unexpected<Error>(schema.error());
+        if (!schema) return tl::unexpected(schema.error());
         content["schema"] = *schema;
       }
       success["content"][endpoint.response_type.substr(0, endpoint.response_type.find(';'))] =
           std::move(content);
+      if (endpoint.csv) success["content"]["text/csv"] = {{"schema", {{"type", "string"}}}};
     }
     operation["responses"][std::to_string(endpoint.success_status)] = std::move(success);
     for (const unsigned status : errors_of(endpoint)) {
@@ -209,7 +224,7 @@ Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<
   }
 
   auto problem_reference = components.reference("problem");
-  if (!problem_reference) return tl::unexpected<Error>(problem_reference.error());
+  if (!problem_reference) return tl::unexpected(problem_reference.error());
   ordered_json responses = ordered_json::object();
   for (const unsigned status : statuses) {
     responses["problem_" + std::to_string(status)] = {
@@ -226,13 +241,24 @@ Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<
                       {"version", JOULECAST_VERSION}};
   document["paths"] = std::move(paths);
   document["components"] = {{"schemas", components.take()}, {"responses", std::move(responses)}};
+  document["components"]["securitySchemes"] = {
+      {"bearer",
+       {{"type", "http"},
+        {"scheme", "bearer"},
+        {"description",
+         "A token, where the service has auth.token_file; roles: read < plan < operate < admin"}}},
+      {"session",
+       {{"type", "apiKey"},
+        {"in", "cookie"},
+        {"name", session_cookie},
+        {"description", "What POST /v1/session gives a browser for a token"}}}};
   return document.dump(2) + "\n";
 }
 
 Result<std::vector<Endpoint>> with_openapi(std::vector<Endpoint> endpoints,
                                            std::span<const EmbeddedFile> schemas) {
   auto document = openapi_document(endpoints, schemas);
-  if (!document) return tl::unexpected<Error>(document.error());
+  if (!document) return tl::unexpected(document.error());
   endpoints.push_back(self_endpoint(std::make_shared<const std::string>(std::move(*document))));
   return endpoints;
 }

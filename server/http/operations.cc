@@ -15,6 +15,7 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
   Endpoint health;
   health.path = "/healthz";
   health.operation_id = "getHealth";
+  health.role = Role::open;
   health.summary = "The process answers";
   health.response_schema = "health";
   health.run = Run::io;
@@ -25,6 +26,7 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
   Endpoint ready;
   ready.path = "/readyz";
   ready.operation_id = "getReadiness";
+  ready.role = Role::open;
   ready.summary = "All parts of the service can do their work";
   ready.response_schema = "readiness";
   ready.run = Run::operations;
@@ -47,6 +49,7 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
   Endpoint scrape;
   scrape.path = "/metrics";
   scrape.operation_id = "getMetrics";
+  scrape.role = Role::read;
   scrape.summary = "Prometheus metrics";
   scrape.response_type = Metrics::content_type();
   scrape.run = Run::operations;
@@ -62,6 +65,7 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
   Endpoint version;
   version.path = "/version";
   version.operation_id = "getVersion";
+  version.role = Role::read;
   version.summary = "What is running";
   version.response_schema = "version";
   version.run = Run::io;
@@ -78,6 +82,7 @@ Endpoint events_endpoint(EventHub& hub) {
   Endpoint endpoint;
   endpoint.path = "/v1/events";
   endpoint.operation_id = "streamEvents";
+  endpoint.role = Role::read;
   endpoint.summary =
       "The live fleet as server-sent events. A returning client's Last-Event-ID gets it what it missed, or "
       "an event "

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/bounds.h"
 #include "base/json_text.h"
 #include "server/http/problem.h"
 #include "server/http/text.h"
@@ -62,6 +63,19 @@ bool accepts(std::string_view accept, std::string_view type) {
   return allowed;
 }
 
+// Whether Accept names text/csv, before application/json where it names that too.
+bool asks_for_csv(std::string_view accept) {
+  while (!accept.empty()) {
+    const auto comma = accept.find(',');
+    const auto item = accept.substr(0, comma);
+    const auto range = trim(item.substr(0, item.find(';')));
+    if (equals_ignoring_case(range, "application/json")) return false;
+    if (equals_ignoring_case(range, "text/csv")) return accepts(item, "text/csv");
+    accept.remove_prefix(comma == std::string_view::npos ? accept.size() : comma + 1);
+  }
+  return false;
+}
+
 bool is_json_type(std::string_view type) {
   const auto base = trim(type.substr(0, type.find(';')));
   return equals_ignoring_case(base, "application/json") ||
@@ -92,12 +106,9 @@ std::optional<std::string> broken_constraint(const Parameter& parameter, std::st
       }
       if (!value)
         return parameter.type == Parameter::Type::integer ? "must be an integer" : "must be a finite number";
-      if (parameter.minimum && *value < *parameter.minimum) {
-        return "must be at least " + number_text(*parameter.minimum) + ", is " + std::string(text);
-      }
-      if (parameter.maximum && *value > *parameter.maximum) {
-        return "must be at most " + number_text(*parameter.maximum) + ", is " + std::string(text);
-      }
+      const Bounds none,
+          bounds{parameter.minimum.value_or(none.minimum), parameter.maximum.value_or(none.maximum)};
+      if (!bounds.contain(*value)) return out_of_bounds(*value, bounds);
       return std::nullopt;
     }
   }
@@ -139,8 +150,11 @@ struct Router::Node {
   }
 };
 
-Router::Router(std::vector<Endpoint> endpoints, FaultSink on_fault)
-    : endpoints_(std::move(endpoints)), on_fault_(std::move(on_fault)), root_(std::make_unique<Node>()) {
+Router::Router(std::vector<Endpoint> endpoints, FaultSink on_fault, Guard guard)
+    : endpoints_(std::move(endpoints)),
+      on_fault_(std::move(on_fault)),
+      guard_(std::move(guard)),
+      root_(std::make_unique<Node>()) {
   for (const Endpoint& endpoint : endpoints_) {
     const auto target = parse_target(endpoint.path);
     if (!target || !target->query.empty()) refuse_table(endpoint, "malformed path template");
@@ -229,7 +243,11 @@ Router::Match Router::match(Request& request) const {
     request.path_params.emplace_back(slot->names[i], *captured[i]);
   }
 
-  if (!accepts(request.header("accept"), endpoint.response_type)) {
+  if (guard_) {
+    if (auto refused = guard_(endpoint, request)) return {&endpoint, std::move(refused)};
+  }
+  request.csv = endpoint.csv && asks_for_csv(request.header("accept"));
+  if (!request.csv && !accepts(request.header("accept"), endpoint.response_type)) {
     return {nullptr, problem(406, "not-acceptable", "This resource is served as " + endpoint.response_type,
                              request.id, "Accept", "must admit " + endpoint.response_type)};
   }

@@ -8,9 +8,12 @@
 #include <string_view>
 #include <vector>
 
+#include "access/role.h"
 #include "server/http/message.h"
 
 namespace joulecast::http {
+
+using access::Role;
 
 // Where an endpoint runs; each but `io` has threads and a queue of its own, so that none waits for another.
 enum class Run : std::uint8_t {
@@ -39,11 +42,13 @@ struct Endpoint {
   Method method = Method::get;
   std::string path = {};          // template, e.g. "/v1/robots/{id}/profile"
   std::string operation_id = {};  // e.g. "computeProfile"; also the label of the request metrics
+  Role role = Role::unstated;     // that a request needs where tokens exist; one unstated nobody has
   std::string summary = {};
   std::vector<Parameter> parameters = {};
   std::string request_schema = {};   // name of schemas/<name>.schema.json; empty when there is no body
   std::string response_schema = {};  // likewise; empty when the answer is not JSON
   std::string response_type = "application/json";
+  bool csv = false;  // also served as text/csv: Request::csv says when
   unsigned success_status = 200;
   std::vector<unsigned> error_statuses = {};  // beyond those the frame itself can answer
   Run run = Run::worker;
@@ -63,15 +68,19 @@ class Router {
   // Told of every fault of ours (answered with status 500), since the client gets only the request id.
   using FaultSink = std::function<void(const Endpoint&, const Request&, const Error&)>;
 
+  // Answers instead of an endpoint whoever may not use it; asked before anything of the request but method
+  // and path is checked.
+  using Guard = std::function<std::optional<Response>(const Endpoint&, Request&)>;
+
   // Two endpoints with the same method and path shape, or a malformed template, are our bug and abort.
-  explicit Router(std::vector<Endpoint> endpoints, FaultSink on_fault = {});
+  explicit Router(std::vector<Endpoint> endpoints, FaultSink on_fault = {}, Guard guard = {});
   ~Router();
   Router(const Router&) = delete;
   Router& operator=(const Router&) = delete;
 
   // What a request's head leads to: an endpoint to run, or an answer that is already certain.
   struct Match {
-    const Endpoint* endpoint = nullptr;
+    const Endpoint* endpoint = nullptr;  // also set beside the answer of a guard
     std::optional<Response> answer;
   };
 
@@ -96,6 +105,7 @@ class Router {
 
   std::vector<Endpoint> endpoints_;
   FaultSink on_fault_;
+  Guard guard_;
   std::unique_ptr<Node> root_;
 };
 

@@ -4,6 +4,7 @@
 #include "server/http/problem.h"
 #include "server/http/stream_session.h"
 #include "server/http/text.h"
+#include "server/http/tls.h"
 
 namespace joulecast::http {
 namespace {
@@ -38,6 +39,7 @@ bool is_sane_id(std::string_view id) {
 
 std::shared_ptr<Session> make_session(std::shared_ptr<Core> core, Socket socket, const net::ip::address& peer,
                                       bool guest) {
+  if (core->tls) return make_tls_session(std::move(core), std::move(socket), peer, guest);
   return std::make_shared<StreamSession<Socket>>(std::move(core), std::move(socket), peer, guest);
 }
 
@@ -133,11 +135,10 @@ void Session::begin_request() {
   parser_->body_limit(core_->options.max_body_bytes);
   if (buffer_.size() == 0 && buffer_.capacity() > kept_buffer_bytes && !reading_ahead_)
     buffer_.shrink_to_fit();
-  // Nothing of the request before on this connection: what was read of that one is not this one's.
+  // Nothing of the exchange before on this connection: what was read of that request is not this one's.
   request_ = Request{};
   request_.stop = stop_.get_token();
-  response_.body = std::string();
-  response_.stream.reset();
+  response_ = Response{};
   endpoint_ = nullptr;
   refused_ = false;
   request_bytes_ = 0;
@@ -194,6 +195,8 @@ void Session::fill_request() {
   for (const auto& field : message)
     request_.headers.emplace_back(view(field.name_string()), view(field.value()));
   request_.body = std::move(parser_->get().body());
+  error_code gone;
+  request_.address = socket().remote_endpoint(gone).address().to_string();
   keep_alive_ = parser_->keep_alive() && !guest_;
   const auto id = request_.header("x-request-id");
   request_.id = is_sane_id(id) ? std::string(id) : core_->id_prefix + std::to_string(core_->next_id++);
@@ -235,7 +238,7 @@ void Session::watch_source() {
       self->wake_posted_ = false;
       if (!self->streaming_ || self->cut_) return;
       self->pull_again_ = true;
-      if (self->response_.stream->hopeless()) {
+      if (self->response_.stream->must_close()) {
         self->core_->observer.refused(Refusal::slow_stream);
         self->cut();
       }

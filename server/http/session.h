@@ -18,6 +18,10 @@
 #include "server/http/http_server.h"
 #include "server/http/worker_pool.h"
 
+namespace boost::asio::ssl {
+class context;
+}
+
 namespace joulecast::http {
 
 namespace net = boost::asio;
@@ -51,6 +55,7 @@ struct Core {
   const Router& router;
   ServerObserver& observer;
   const Admission admission;
+  std::shared_ptr<net::ssl::context> tls;  // of connections from now on; null: plain HTTP
   net::io_context io{1};
   std::map<Run, std::unique_ptr<WorkerPool>> pools;
   std::map<net::ip::address, std::shared_ptr<Peer>> peers;
@@ -151,7 +156,7 @@ class Session : public std::enable_shared_from_this<Session> {
   std::atomic<bool> wake_posted_{false};
 };
 
-// A session on an accepted connection.
+// A session on an accepted connection, over TLS where the core has a certificate.
 std::shared_ptr<Session> make_session(std::shared_ptr<Core> core, Socket socket, const net::ip::address& peer,
                                       bool guest);
 

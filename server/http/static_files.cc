@@ -116,6 +116,7 @@ void add_endpoints(std::vector<Endpoint>& endpoints, std::string_view name, std:
   Endpoint endpoint;
   endpoint.path = "/" + std::string(name);
   endpoint.operation_id = "getAsset";
+  endpoint.role = Role::open;
   endpoint.summary = "File of the operator page";
   endpoint.response_type = asset->content_type;
   endpoint.run = Run::io;

@@ -202,7 +202,7 @@ class StreamSession final : public Session {
         next = outcome == Outcome::done ? pulled_ : StreamSource::Next::abort;
       }
       if (next == StreamSource::Next::abort) {
-        if (source->hopeless() && !cut_) core_->observer.refused(Refusal::slow_stream);
+        if (source->must_close() && !cut_) core_->observer.refused(Refusal::slow_stream);
         co_return false;
       }
       if (!piece_.empty() && !cut_) {
@@ -251,8 +251,8 @@ class StreamSession final : public Session {
   // send our end first and read on for a while.
   Task<void> linger() {
     state_ = State::ending;
-    co_await end_stream(stream_);
     arm(core_->stopping ? linger_time_at_stop : linger_time);
+    co_await end_stream(stream_);
     bool more = true;
     while (more) {
       if (!reading_ahead_) buffer_.consume(buffer_.size());

@@ -23,7 +23,7 @@ struct GivenMotion {
 struct EstimateInput {
   std::variant<DriveInput, GivenMotion> motion;
   Driving driving = Driving::minimum_energy;  // of a path
-  bool columns = false;                       // not of usual driving, whose motion nobody plans
+  bool columns = false;                       // not of usual driving, whose motion is not planned
 };
 
 struct EstimateOutput {

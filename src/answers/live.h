@@ -8,7 +8,7 @@
 
 namespace joulecast::answers {
 
-// What is heard of a robot now, as far as answers need it. NaN: not known.
+// A robot's live state, as far as answers need it. NaN: not known.
 struct LiveRobot {
   std::optional<planning::Pose> pose;
   std::optional<double> payload_kg;

@@ -17,7 +17,7 @@ inline constexpr double at_the_limit = 1e-3;
 
 struct ProfileInput {
   DriveInput drive;
-  bool columns = true;            // the answer tells the profile
+  bool columns = true;            // the answer contains the profile
   bool baseline_columns = false;  // and those of the baselines
   std::size_t pareto_points = 0;  // of the front of energy against time; fewer than 2: none
 };

@@ -15,7 +15,7 @@ enum class Fault {
                 // feasible value
   too_large,    // a stated limit on size or count is exceeded
   unavailable,  // a resource is missing for now (disk, network, shutting down)
-  stopped,      // the caller no longer wants the answer
+  stopped,      // the caller no longer waits for the answer
   corrupt,      // stored or received bytes cannot be trusted
   internal      // our bug
 };

@@ -16,7 +16,7 @@ inline std::int64_t host_utime_us() {
       .count();
 }
 
-// Microseconds since the host was booted, its sleep included. Nobody sets this clock.
+// Microseconds since the host was booted, its sleep included. It is never set.
 inline std::int64_t host_boot_us() {
   timespec now{};
   clock_gettime(CLOCK_BOOTTIME, &now);

@@ -13,6 +13,19 @@ namespace joulecast {
 
 using nlohmann::json;
 
+namespace {
+
+// Why the value is not a number within the bounds; nothing when it is.
+std::optional<std::string> fault_of_number(const json& value, const Bounds& bounds) {
+  if (!value.is_number()) return "must be a number";
+  const double number = value.get<double>();
+  if (!std::isfinite(number)) return "must be finite";
+  if (!bounds.contain(number)) return out_of_bounds(number, bounds);
+  return std::nullopt;
+}
+
+}  // namespace
+
 Fields::Fields(const json& object, std::string at) : object_(object), at_(std::move(at)) {
   if (!object_.is_object()) error_ = Error{Fault::invalid, at_, "must be an object"};
 }
@@ -52,19 +65,11 @@ const json* Fields::required(std::string_view name, bool has_fallback) {
 double Fields::number(std::string_view name, const Bounds& bounds, std::optional<double> fallback) {
   const json* found = required(name, fallback.has_value());
   if (found == nullptr) return fallback.value_or(0);
-  if (!found->is_number()) {
-    fault(name, "must be a number");
+  if (auto why = fault_of_number(*found, bounds)) {
+    fault(name, std::move(*why));
     return 0;
   }
-  const double value = found->get<double>();
-  if (!std::isfinite(value)) fault(name, "must be finite");
-  if (bounds.exclusive_minimum ? !(value > bounds.minimum) : !(value >= bounds.minimum)) {
-    fault(name, fmt::format("is {}, must be {} {}", value,
-                            bounds.exclusive_minimum ? "greater than" : "at least", bounds.minimum));
-  }
-  if (!(value <= bounds.maximum))
-    fault(name, fmt::format("is {}, must be at most {}", value, bounds.maximum));
-  return value;
+  return found->get<double>();
 }
 
 std::optional<double> Fields::optional_number(std::string_view name, const Bounds& bounds) {
@@ -90,7 +95,7 @@ std::int64_t Fields::integer(std::string_view name, std::int64_t minimum, std::i
   }
   const auto value = found->get<std::int64_t>();
   if (value < minimum || value > maximum)
-    fault(name, fmt::format("is {}, must be from {} to {}", value, minimum, maximum));
+    fault(name, fmt::format("is {}, must be at least {} and at most {}", value, minimum, maximum));
   return value;
 }
 
@@ -148,14 +153,11 @@ std::vector<double> Fields::numbers(std::string_view name, std::size_t minimum, 
   values.reserve(found->size());
   for (std::size_t k = 0; k < found->size(); ++k) {
     const json& item = (*found)[k];
-    const double value = item.is_number() ? item.get<double>() : std::nan("");
-    const bool low = bounds.exclusive_minimum ? !(value > bounds.minimum) : !(value >= bounds.minimum);
-    if (!std::isfinite(value) || low || !(value <= bounds.maximum)) {
-      fault(fmt::format("{}/{}", name, k),
-            fmt::format("must be a number from {} to {}", bounds.minimum, bounds.maximum));
+    if (auto why = fault_of_number(item, bounds)) {
+      fault(fmt::format("{}/{}", name, k), std::move(*why));
       return values;
     }
-    values.push_back(value);
+    values.push_back(item.get<double>());
   }
   return values;
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <limits>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <set>
@@ -8,22 +7,13 @@
 #include <string_view>
 #include <vector>
 
+#include "base/bounds.h"
 #include "base/error.h"
 
 namespace joulecast {
 
-// Bounds of a number in a request; inclusive unless said otherwise.
-struct Bounds {
-  double minimum = -std::numeric_limits<double>::infinity();
-  double maximum = std::numeric_limits<double>::infinity();
-  bool exclusive_minimum = false;
-};
-inline constexpr Bounds positive{0, std::numeric_limits<double>::infinity(), true};
-inline constexpr Bounds not_negative{0, std::numeric_limits<double>::infinity(), false};
-inline constexpr Bounds fraction{0, 1, false};
-
 // Reads one JSON object of a request, field by field, and remembers the first fault: the JSON pointer of the
-// field and the constraint that it broke. A null counts as absent. finish() also refuses keys that nobody
+// field and the constraint that it broke. A null counts as absent. finish() also refuses keys that no one
 // read, and names them beside a required one that misses: often the one is the other, misspelt.
 class Fields {
  public:

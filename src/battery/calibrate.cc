@@ -217,7 +217,7 @@ struct Residuals {
       for (std::size_t row = 0; row < voltage.size(); ++row)
         *residual++ = softened((voltage[row] - target.recording->voltage_v[row]) * target.weight[row]);
     }
-    // A mild wish for ln r without kinks, which holds knots that the tests hardly touch.
+    // A weak smoothness penalty on ln r determines knots that the tests hardly constrain.
     for (std::size_t i = 1; i + 1 < layout.knots.size(); ++i) {
       const double* ln_r = parameters[0] + i;
       *residual++ = ln_r[-1] - 2 * ln_r[0] + ln_r[1];

@@ -25,7 +25,7 @@ struct ChargeTrust {
   double gain_sd = 0.02;                // of current or capacity, over correlation_charge
   double modelled_current_sd = 0.15;    // of a current that was not measured but follows from the model
   double modelled_current_s = 600;      // over which that error stays the same
-  double unknown_current_per_h = 0.25;  // of the capacity an hour: what may flow while nobody looks
+  double unknown_current_per_h = 0.25;  // of the capacity an hour: what may flow while nothing is measured
   double unknown_charge_sd = 0.3;
 };
 

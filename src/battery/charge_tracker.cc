@@ -39,7 +39,7 @@ ChargeTracker::ChargeTracker(const robot::Battery& battery, double idle_power_w,
 
 void ChargeTracker::add(const ChargeReading& reading) {
   if (!last_) {
-    // Between a remembered time and the first reading nobody looked.
+    // Nothing was measured between a remembered time and the first reading.
     if (counted_utime_us_ != 0 && reading.utime_us > counted_utime_us_)
       filter_.gap(static_cast<double>(reading.utime_us - counted_utime_us_) * microseconds);
     last_ = reading;

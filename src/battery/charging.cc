@@ -17,7 +17,7 @@ constexpr double fallen_share = 0.93;  // of the plateau: below it the taper has
 constexpr double fallen_confirm_s = 20;
 constexpr double complete_share = 0.25;  // of the plateau: a charger that leaves below it has ended
 constexpr double longest_gap_s = 15;
-constexpr double least_taper = 0.4;  // of an e-fold, before its time constant is believed
+constexpr double least_taper = 0.4;  // of an e-fold, before its time constant is used
 constexpr double memory_count = 12;
 
 constexpr double usual_taper_charge = 0.85, usual_taper_charge_sd = 0.08;

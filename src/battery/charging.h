@@ -48,8 +48,8 @@ struct ChargingStay {
   bool complete = false;  // to the charger's end
 };
 
-// Tells charging from regeneration, follows it, and learns the charger's habit: current into the battery of a
-// robot that stands. Depends on the readings' clock alone.
+// Distinguishes charging from regeneration, follows it, and learns the charger's habit: current into the
+// battery of a robot that stands. Depends on the readings' clock alone.
 class ChargingObserver {
  public:
   explicit ChargingObserver(double capacity_ah) : capacity_ah_(capacity_ah) {}

@@ -8,8 +8,9 @@
 namespace joulecast::drift {
 
 inline constexpr double gaussian_mad = 1.4826;  // standard deviations of a normal in its median deviation
-inline constexpr double least_scatter = 0.002;  // of a mission's ratio: rounding and conditions nobody logs
-inline constexpr double false_alarm = 0.01;     // of a stretch without a change, and of robots that are alike
+inline constexpr double least_scatter =
+    0.002;  // of a mission's ratio: rounding and conditions that are not logged
+inline constexpr double false_alarm = 0.01;  // of a stretch without a change, and of robots that are alike
 
 // What |t| exceeds with `probability`; a stretch too short to judge by counts as one of 2 degrees of freedom.
 inline double threshold(double probability, double freedom) {

@@ -4,6 +4,7 @@
 #include <string>
 #include <tuple>
 
+#include "base/bounds.h"
 #include "base/nearest_word.h"
 #include "dynamics/effect_list.h"
 
@@ -51,11 +52,8 @@ Result<ActiveEffect> activate(const robot::AdoptedEffect& adopted) {
     const auto found =
         std::ranges::find_if(parameters, [&](const EffectParameter& p) { return p.name == name; });
     if (found == parameters.end()) return invalid(at + "/" + name, "is not a parameter of this effect");
-    if (!(value >= found->minimum && value <= found->maximum)) {
-      return invalid(at + "/" + name, "is " + std::to_string(value) + ", must be from " +
-                                          std::to_string(found->minimum) + " to " +
-                                          std::to_string(found->maximum) + " " + std::string(found->unit));
-    }
+    if (const Bounds bounds{found->minimum, found->maximum}; !bounds.contain(value))
+      return invalid(at + "/" + name, out_of_bounds(value, bounds, found->unit));
     const auto index = static_cast<std::size_t>(found - parameters.begin());
     active.values[index] = value;
     strength_given = strength_given || index == 0;

@@ -26,7 +26,7 @@ struct Span {
   }
 };
 
-// Spans shorter than this are not told apart: sampling noise would fill the power gap.
+// Spans shorter than this are not distinguished: sampling noise would fill the power gap.
 constexpr double bin_s = 0.5;
 
 struct Replay {

@@ -372,8 +372,9 @@ class Calibrator {
       }
     }
     if (weakest < 0) return false;
-    weakest <= viscous ? hold(weakest, 0, "came out negative; held at zero")
-                       : hold(weakest, file_.torque[weakest], "not told from zero; held at the file's");
+    weakest <= viscous
+        ? hold(weakest, 0, "came out negative; held at zero")
+        : hold(weakest, file_.torque[weakest], "not distinguishable from zero; held at the file's");
     return true;
   }
 

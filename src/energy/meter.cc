@@ -161,14 +161,13 @@ Result<void> Meter::flush() {
   return outcome;
 }
 
-Result<void> Meter::settle(std::size_t index) {
-  const signals::Sample& sample = waiting_[index].sample;
+// The filter's window: samples within reach of waiting_[index] and its neighbours, not across a gap. Returns
+// the place of waiting_[index] in it.
+std::size_t Meter::fill_window(std::size_t index) {
   const double reach_us = reach_s() / microseconds, bridge_us = settings_.gap_bridge_s / microseconds;
   const auto span_us = [&](std::size_t from, std::size_t to) {
     return static_cast<double>(waiting_[to].sample.utime_us - waiting_[from].sample.utime_us);
   };
-
-  // The filter's window: samples within reach and the neighbours, not across a gap.
   std::size_t first = index, last = index;
   while (first > 0 && (first == index || span_us(first - 1, index) <= reach_us) &&
          span_us(first - 1, first) <= bridge_us)
@@ -178,15 +177,82 @@ Result<void> Meter::settle(std::size_t index) {
     ++last;
   window_.clear();
   for (std::size_t k = first; k <= last; ++k) {
-    window_.push_back({static_cast<double>(waiting_[k].sample.utime_us - sample.utime_us) * microseconds,
-                       waiting_[k].sample.wheel_velocity_rad_s});
+    window_.push_back({span_us(index, k) * microseconds, waiting_[k].sample.wheel_velocity_rad_s});
   }
+  return index - first;
+}
+
+void Meter::book(const Rates& increment, Coverage coverage, double interval_s) {
+  accounts_.battery_j += increment[account::battery];
+  accounts_.measured_j += increment[account::measured];
+  if (coverage.battery) accounts_.measured_s += interval_s;
+  if (coverage.motors) accounts_.motor_measured_s += interval_s;
+  accounts_.modelled_j += increment[account::modelled];
+  for (std::size_t s : {0u, 1u}) {
+    accounts_.measured_motor_j[s] += increment[account::measured_motor + s];
+    accounts_.modelled_motor_j[s] += increment[account::modelled_motor + s];
+  }
+  accounts_.drawn_j += increment[account::drawn];
+  accounts_.returned_j += increment[account::returned];
+  accounts_.charge_ah += increment[account::charge_a] / seconds_per_hour;
+  accounts_.distance_m += increment[account::distance];
+  accounts_.turned_rad += increment[account::turned];
+  accounts_.duration_s += interval_s;
+  for (std::size_t k = 0; k < signals::term_count; ++k)
+    accounts_.ledger.value[k] += increment[account::ledger + k];
+}
+
+Result<void> Meter::integrate_to(const Node& node, double interval_s) {
+  const Coverage both{node.coverage.battery && last_->coverage.battery,
+                      node.coverage.motors && last_->coverage.motors};
+  Reading from = last_->reading;
+  from.motion.copper_heat_w = copper_heat_w_;
+  Reading to = node.reading;
+  // Known at one end only, the climb would enter with a jump.
+  if (std::isnan(from.motion.climb_rad) || std::isnan(to.motion.climb_rad))
+    from.motion.climb_rad = to.motion.climb_rad = dynamics::unknown;
+  const Result<Rates> integrated = segment_->integrate(from, to, both, interval_s, copper_heat_w_);
+  book(integrated ? *integrated : segment_->chord(), both, interval_s);
+  if (!integrated) return tl::unexpected(integrated.error());
+  return {};
+}
+
+void Meter::skip_gap(double interval_s) {
+  ++gaps_;
+  gap_seconds_ += interval_s;
+  // Without readings, the windings are taken to cool without current.
+  const double decay = std::exp(-interval_s / model_.parameters().thermal_time_constant_s);
+  for (double& heat : copper_heat_w_) heat *= decay;
+}
+
+void Meter::describe_state(const Node& node, MeterPoint& point) const {
+  std::array<double, 2> copper{};
+  const Rates now = rates_at(model_, node.reading, node.coverage, copper);
+  const dynamics::Body<double> body =
+      dynamics::body_of_wheels(model_.parameters(), node.reading.motion.wheel_speed_rad_s,
+                               node.reading.motion.wheel_acceleration_rad_s2);
+  point.t_s = static_cast<double>(point.sample.utime_us - origin_utime_us_) * microseconds;
+  point.speed_m_s = body.speed_m_s;
+  point.yaw_rate_rad_s = body.yaw_rate_rad_s;
+  point.measured_power_w = node.coverage.battery ? now[account::measured] : signals::unmeasured;
+  point.modelled_power_w = now[account::modelled];
+  for (std::size_t s : {0u, 1u}) {
+    point.winding_temperature_c[s] =
+        std::isfinite(point.sample.motor_temperature_c[s])
+            ? point.sample.motor_temperature_c[s]
+            : settings_.winding_reference_c + model_.parameters().thermal_resistance_k_w * copper_heat_w_[s];
+  }
+}
+
+Result<void> Meter::settle(std::size_t index) {
+  const signals::Sample& sample = waiting_[index].sample;
+  const std::size_t place = fill_window(index);
   if (std::isfinite(sample.payload_kg)) payload_kg_ = sample.payload_kg;
 
   MeterPoint point;
   point.sample = sample;
   point.climb_rad = waiting_[index].climb_rad;
-  point.wheel_acceleration_rad_s2 = fitted_acceleration(window_, index - first);
+  point.wheel_acceleration_rad_s2 = fitted_acceleration(window_, place);
   Node node{sample.utime_us,
             reading_of(sample, point.wheel_acceleration_rad_s2, payload_kg_, point.climb_rad, copper_heat_w_),
             {std::isfinite(sample.battery_voltage_v) && std::isfinite(sample.battery_current_a),
@@ -199,62 +265,13 @@ Result<void> Meter::settle(std::size_t index) {
   } else {
     point.interval_s = static_cast<double>(sample.utime_us - last_->utime_us) * microseconds;
     point.bridged = point.interval_s <= settings_.gap_bridge_s;
-    if (point.bridged) {
-      const Coverage both{node.coverage.battery && last_->coverage.battery,
-                          node.coverage.motors && last_->coverage.motors};
-      Reading from = last_->reading;
-      from.motion.copper_heat_w = copper_heat_w_;
-      Reading to = node.reading;
-      // Known at one end only, the climb would enter with a jump.
-      if (std::isnan(from.motion.climb_rad) || std::isnan(to.motion.climb_rad))
-        from.motion.climb_rad = to.motion.climb_rad = dynamics::unknown;
-      Result<Rates> integrated = segment_->integrate(from, to, both, point.interval_s, copper_heat_w_);
-      if (!integrated) outcome = tl::unexpected(integrated.error());
-      const Rates increment = integrated ? *integrated : segment_->chord();
-
-      accounts_.battery_j += increment[account::battery];
-      accounts_.measured_j += increment[account::measured];
-      if (both.battery) accounts_.measured_s += point.interval_s;
-      if (both.motors) accounts_.motor_measured_s += point.interval_s;
-      accounts_.modelled_j += increment[account::modelled];
-      for (std::size_t s : {0u, 1u}) {
-        accounts_.measured_motor_j[s] += increment[account::measured_motor + s];
-        accounts_.modelled_motor_j[s] += increment[account::modelled_motor + s];
-      }
-      accounts_.drawn_j += increment[account::drawn];
-      accounts_.returned_j += increment[account::returned];
-      accounts_.charge_ah += increment[account::charge_a] / seconds_per_hour;
-      accounts_.distance_m += increment[account::distance];
-      accounts_.turned_rad += increment[account::turned];
-      accounts_.duration_s += point.interval_s;
-      for (std::size_t k = 0; k < signals::term_count; ++k)
-        accounts_.ledger.value[k] += increment[account::ledger + k];
-    } else {
-      ++gaps_;
-      gap_seconds_ += point.interval_s;
-      // Windings cool while nobody looks.
-      const double decay = std::exp(-point.interval_s / model_.parameters().thermal_time_constant_s);
-      for (double& heat : copper_heat_w_) heat *= decay;
-    }
+    if (point.bridged)
+      outcome = integrate_to(node, point.interval_s);
+    else
+      skip_gap(point.interval_s);
   }
   node.reading.motion.copper_heat_w = copper_heat_w_;
-
-  std::array<double, 2> copper{};
-  const Rates now = rates_at(model_, node.reading, node.coverage, copper);
-  const dynamics::Body<double> body =
-      dynamics::body_of_wheels(model_.parameters(), node.reading.motion.wheel_speed_rad_s,
-                               node.reading.motion.wheel_acceleration_rad_s2);
-  point.t_s = static_cast<double>(sample.utime_us - origin_utime_us_) * microseconds;
-  point.speed_m_s = body.speed_m_s;
-  point.yaw_rate_rad_s = body.yaw_rate_rad_s;
-  point.measured_power_w = node.coverage.battery ? now[account::measured] : signals::unmeasured;
-  point.modelled_power_w = now[account::modelled];
-  for (std::size_t s : {0u, 1u}) {
-    point.winding_temperature_c[s] =
-        std::isfinite(sample.motor_temperature_c[s])
-            ? sample.motor_temperature_c[s]
-            : settings_.winding_reference_c + model_.parameters().thermal_resistance_k_w * copper_heat_w_[s];
-  }
+  describe_state(node, point);
   last_ = std::make_unique<Node>(node);
   emit_(point);
   return outcome;

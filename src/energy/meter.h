@@ -10,6 +10,7 @@
 #include "dynamics/drive_model.h"
 #include "energy/acceleration_filter.h"
 #include "energy/cvode.h"
+#include "energy/rates.h"
 #include "signals/ledger.h"
 #include "signals/sample.h"
 
@@ -94,6 +95,11 @@ class Meter {
   double reach_s() const { return settings_.half_window_s + 0.5 * usual_interval_s_; }
   // Everything that the window of waiting_[index] may hold has come.
   bool window_complete(std::size_t index) const;
+  std::size_t fill_window(std::size_t index);
+  void book(const Rates& increment, Coverage coverage, double interval_s);
+  Result<void> integrate_to(const Node& node, double interval_s);
+  void skip_gap(double interval_s);
+  void describe_state(const Node& node, MeterPoint& point) const;
   Result<void> settle(std::size_t index);
 
   dynamics::DriveModel model_;

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "base/bounds.h"
 #include "base/json_text.h"
 #include "base/text_file.h"
 
@@ -58,10 +59,8 @@ Result<ConvexPolygon> square(const json& value, const std::string& pointer) {
   if (!center) return tl::unexpected(center.error());
   const auto side = member(value, pointer, "side_m");
   if (!side) return tl::unexpected(side.error());
-  if (!(*side > 0 && *side <= max_side_m)) {
-    return invalid(pointer + "/side_m",
-                   fmt::format("is {}, must be greater than 0 and at most {}", *side, max_side_m));
-  }
+  if (const Bounds bounds{0, max_side_m, true}; !bounds.contain(*side))
+    return invalid(pointer + "/side_m", out_of_bounds(*side, bounds, "m"));
   return ConvexPolygon::square(*center, *side);
 }
 

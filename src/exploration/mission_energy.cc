@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "base/bounds.h"
 #include "dynamics/drive_model.h"
 #include "dynamics/straight.h"
 #include "planning/line.h"
@@ -42,10 +43,8 @@ Result<MissionEnergy> mission_energy(const robot::RobotModel& robot, std::span<c
   if (auto ok = positive("turn_rate_rad_s", mission.turn_rate_rad_s); !ok) return tl::unexpected(ok.error());
   if (auto ok = positive("triangle_peak_m_s", options.triangle_peak_m_s); !ok)
     return tl::unexpected(ok.error());
-  if (!(options.payload_kg >= 0 && options.payload_kg <= robot.limits.payload_kg)) {
-    return invalid("payload_kg", fmt::format("is {} kg, must be at least 0 and at most {} kg",
-                                             options.payload_kg, robot.limits.payload_kg));
-  }
+  if (const Bounds bounds{0, robot.limits.payload_kg}; !bounds.contain(options.payload_kg))
+    return invalid("payload_kg", out_of_bounds(options.payload_kg, bounds, "kg"));
 
   const dynamics::DriveModel model(robot, std::span<const dynamics::ActiveEffect>{});
   const double left_w = turning_power_w(model, mission.turn_rate_rad_s, options.payload_kg);

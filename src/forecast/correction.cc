@@ -66,6 +66,11 @@ void CorrectionFit::forget(double keep) {
   ColumnMap(weighted_.data()) *= keep;
 }
 
+void CorrectionFit::remove(const CorrectionFit& other, double share) {
+  SquareMap(information_.front().data()) -= share * square(other.information_);
+  ColumnMap(weighted_.data()) -= share * column(other.weighted_);
+}
+
 void CorrectionFit::add(std::span<const Evidence> mission, double common, const Correction& now) {
   Square information = Square::Zero();
   Column weighted = Column::Zero(), across = Column::Zero();

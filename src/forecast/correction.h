@@ -41,6 +41,8 @@ struct Evidence {
 class CorrectionFit {
  public:
   void forget(double keep);
+  // Takes out what another fit holds, `share` of it.
+  void remove(const CorrectionFit& other, double share);
   // The legs of one mission: each with its own scatter, and one factor of standard deviation `common` that
   // all share (generalised least squares: a mission tells the common level once, however many legs it has).
   void add(std::span<const Evidence> mission, double common, const Correction& now);

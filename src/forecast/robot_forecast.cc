@@ -15,6 +15,7 @@ constexpr std::int64_t watch_after = 5;   // missions: earlier scores are of a m
 constexpr std::int64_t drift_shown = 20;  // missions
 constexpr double drift_forgets = 0.05;    // share of old evidence and scores that survives a drift
 constexpr std::size_t typical_legs = 40;
+constexpr std::size_t habit_missions = 40;
 constexpr double least_amount = 1;   // J, s
 constexpr double floor_share = 0.3;  // of the median leg: scatter of short legs does not shrink with them
 
@@ -26,6 +27,14 @@ struct Assumed {
 constexpr std::array<Assumed, subject_count> assumed{
     {{{0.05, 0.08, 0.15}, 0.03}, {{0.05, 0.25, 0.25}, 0.04}, {{0.05, 0.25, 0.25}, 0.04}}};
 constexpr double assumed_legs = 10, assumed_missions = 4;
+
+// The newest missions but one, which a habit is read from.
+std::vector<PastMission> recent(const std::deque<PastMission>& missions, std::size_t without) {
+  std::vector<PastMission> kept;
+  for (std::size_t k = missions.size() - std::min(missions.size(), habit_missions); k < missions.size(); ++k)
+    if (k != without) kept.push_back(missions[k]);
+  return kept;
+}
 
 std::vector<Leg> measured(std::vector<Leg> legs) {
   std::erase_if(legs, [](const Leg& leg) { return !std::isfinite(leg.battery_j); });
@@ -135,6 +144,7 @@ void RobotForecast::learn_anew() {
   drift_watch_ = {};
   drift_.reset();
   learnt_ = learnt_at_drift_ = 0;
+  settles_at_ = 2;
   habit_ = habit_of(robot_, {});
   for (PastMission& mission : missions) learn(std::move(mission));
 }
@@ -179,6 +189,14 @@ Forecaster RobotForecast::with_track(Subject subject) const {
   return now;
 }
 
+Prediction RobotForecast::Seen::told(Subject subject, const Forecaster& by) const {
+  return subject == Subject::usual_duration ? by.duration(sum) : by.energy(sum);
+}
+
+double RobotForecast::Seen::score(Subject subject, const Forecaster& by) const {
+  return told(subject, by).score_of(std::max(least_amount, measured + halted));
+}
+
 RobotForecast::Seen RobotForecast::seen(Subject subject, const PastMission& mission,
                                         const Forecaster& now) const {
   const LegPricer pricer(robot_, drive_);
@@ -189,7 +207,7 @@ RobotForecast::Seen RobotForecast::seen(Subject subject, const PastMission& miss
     PricedLeg priced{leg.motion,
                      leg.payload_kg,
                      0,
-                     stated ? pricer.driven(leg) : pricer.usual(leg, habit_),
+                     stated ? pricer.driven(leg) : pricer.usual(leg, now.habit),
                      stated ? Driving::stated : Driving::usual,
                      !stated && leg.motion != Motion::stand};
     const double loaded = now.payload_limit_kg > 0 ? leg.payload_kg / now.payload_limit_kg : 0;
@@ -230,11 +248,9 @@ double RobotForecast::score(Subject subject, const PastMission& mission, double&
   const Forecaster::Track& now = with.tracks[s];
   const Seen legs = seen(subject, mission, with);
   if (legs.foreseen == 0) return 0;
-  const Prediction told =
-      subject == Subject::usual_duration ? with.duration(legs.sum) : with.energy(legs.sum);
-  const double z = told.score_of(std::max(least_amount, legs.measured + legs.halted));
+  const double z = legs.score(subject, with);
 
-  const double expected = std::max(least_amount, told.legs);
+  const double expected = std::max(least_amount, legs.told(subject, with).legs);
   const double measured = std::max(least_amount, legs.measured);
   log_ratio = std::log(measured / expected);
   const double relative = 1 / (expected * expected);
@@ -300,6 +316,43 @@ void RobotForecast::refit(Subject subject, std::size_t from) {
   }
 }
 
+// While the habit is being found, what was learnt against it is learnt again.
+void RobotForecast::settle() {
+  if (learnt_at_drift_ > 0 || learnt_ > static_cast<std::int64_t>(most_missions)) return;
+  for (const Subject usual : {Subject::usual_energy, Subject::usual_duration}) {
+    learning_[static_cast<std::size_t>(usual)].fit = {};
+    refit(usual, 0);
+  }
+  for (std::size_t k = 0; k < subject_count; ++k) score_anew(static_cast<Subject>(k));
+}
+
+void RobotForecast::score_anew(Subject subject) {
+  const auto s = static_cast<std::size_t>(subject);
+  Learning& learning = learning_[s];
+  Forecaster without = with_track(subject);
+  const Forecaster::Track now = without.tracks[s];
+  CorrectionFit all;
+  std::vector<CorrectionFit> own(missions_.size());
+  std::vector<double> kept(missions_.size(), 1);
+  for (std::size_t k = 0; k < missions_.size(); ++k) {
+    const Seen legs = seen(subject, missions_[k], without);
+    own[k].add(legs.legs, now.common, now.correction);
+    all.forget(evidence_keep);
+    all.add(legs.legs, now.common, now.correction);
+    kept[k] = std::pow(evidence_keep, static_cast<double>(missions_.size() - 1 - k));
+  }
+  learning.scores = {};
+  learning.log_inflation = 0;
+  for (std::size_t k = 0; k < missions_.size(); ++k) {
+    CorrectionFit others = all;
+    others.remove(own[k], kept[k]);
+    without.tracks[s].correction = others.posterior(siblings_[s].prior);
+    if (subject != Subject::stated_energy) without.habit = habit_of(robot_, recent(missions_, k));
+    const Seen legs = seen(subject, missions_[k], without);
+    if (legs.foreseen > 0) learning.scores.add(legs.score(subject, without));
+  }
+}
+
 std::optional<Drift> RobotForecast::watch(double score, double log_ratio) {
   log_ratios_.push_back(log_ratio);
   if (log_ratios_.size() > most_missions) log_ratios_.pop_front();
@@ -335,17 +388,10 @@ std::optional<Drift> RobotForecast::learn(PastMission mission) {
   if (missions_.size() > most_missions) missions_.pop_front();
   ++learnt_;
 
-  constexpr std::size_t habit_missions = 40;
-  const std::size_t recent = std::min(missions_.size(), habit_missions);
-  habit_ =
-      habit_of(robot_, std::vector(missions_.end() - static_cast<std::ptrdiff_t>(recent), missions_.end()));
-  // While the habit is being found, what was learnt against it is learnt again.
-  constexpr std::array<std::int64_t, 5> habit_settles{2, 4, 8, 16, 32};
-  if (std::ranges::find(habit_settles, learnt_) != habit_settles.end()) {
-    for (const Subject usual : {Subject::usual_energy, Subject::usual_duration}) {
-      learning_[static_cast<std::size_t>(usual)].fit = {};
-      refit(usual, 0);
-    }
+  habit_ = habit_of(robot_, recent(missions_, missions_.size()));
+  if (learnt_ == settles_at_) {
+    settle();
+    settles_at_ += std::max<std::int64_t>(2, learnt_ / 4);
   }
   return watch(z, log_ratio);
 }

@@ -22,7 +22,7 @@ namespace joulecast::forecast {
 // A lasting change of what a robot spends.
 struct Drift {
   std::int64_t since_utime_us = 0;     // start of the first mission after the change
-  std::int64_t detected_utime_us = 0;  // start of the mission that gave it away
+  std::int64_t detected_utime_us = 0;  // start of the mission that revealed it
   double ratio = 1;                    // measured over expected, geometric mean since the change
   std::int64_t missions = 0;           // since the change
 };
@@ -85,9 +85,12 @@ class Forecaster {
 };
 
 // Learns from the missions of one robot as they end, against its model in force. Each mission is first
-// predicted from what came before it; its score then calibrates the intervals (prequential split conformal),
-// the hit or miss of the 90 % interval adapts their width (Gibbs and Candes 2021, on the logarithm of the
-// width), and a CUSUM of the scores watches for drift, upon which what came before the change is set aside.
+// predicted from what came before it; its score then calibrates the intervals (prequential split conformal).
+// Scores of a robot hardly known are those of another forecast than the one in force: they lean to one side
+// and are of another width. Each time that the missions have grown by a quarter all are therefore scored
+// anew, each by what the others tell (jackknife+, Barber, Candes, Ramdas and Tibshirani 2021). The hit or
+// miss of the 90 % interval adapts their width (Gibbs and Candes 2021, on the logarithm of the width), and a
+// CUSUM of the scores watches for drift, upon which what came before the change is set aside.
 class RobotForecast {
  public:
   static constexpr std::size_t most_missions = 120;  // kept to learn anew when the model changes
@@ -96,7 +99,7 @@ class RobotForecast {
   // `drive` must be the drive model of `robot`.
   RobotForecast(robot::RobotModel robot, dynamics::DriveModel drive);
 
-  // Learns with what siblings told so far. Returns the drift when this mission gave it away. Missions without
+  // Learns with what siblings told so far. Returns the drift when this mission reveals it. Missions without
   // measured legs teach nothing.
   std::optional<Drift> learn(PastMission mission);
 
@@ -130,6 +133,9 @@ class RobotForecast {
     double measured = 0;  // of the foreseen
     double halted = 0;    // measured while standing, where halts are not foreseen one by one
     PlanSum sum;          // of the foreseen
+
+    Prediction told(Subject subject, const Forecaster& by) const;
+    double score(Subject subject, const Forecaster& by) const;
   };
 
   void learn_anew();
@@ -139,6 +145,8 @@ class RobotForecast {
   double score(Subject subject, const PastMission& mission, double& log_ratio);
   void learn_scatter(Subject subject, const Seen& seen, const Forecaster::Track& now, double ratio);
   void refit(Subject subject, std::size_t from);
+  void settle();
+  void score_anew(Subject subject);
   std::optional<Drift> watch(double score, double log_ratio);
 
   robot::RobotModel robot_;
@@ -151,7 +159,7 @@ class RobotForecast {
   std::array<Siblings, subject_count> siblings_;
   DriftWatch drift_watch_;
   std::optional<Drift> drift_;
-  std::int64_t learnt_ = 0, learnt_at_drift_ = 0;
+  std::int64_t learnt_ = 0, learnt_at_drift_ = 0, settles_at_ = 2;
 };
 
 }  // namespace joulecast::forecast

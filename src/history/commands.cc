@@ -39,6 +39,10 @@ std::size_t content_bytes(const PutLearned& c) {
 std::size_t content_bytes(const AppendEvent& c) {
   return c.event.robot_id.size() + c.event.kind.size() + c.event.detail_json.size();
 }
+std::size_t content_bytes(const AppendAudit& c) {
+  const AuditEntry& e = c.entry;
+  return e.actor.size() + e.address.size() + e.request_id.size() + e.action.size() + e.detail_json.size();
+}
 std::size_t content_bytes(const Prune&) {
   return 0;
 }

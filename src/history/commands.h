@@ -64,6 +64,11 @@ struct AppendEvent {
   Event event;
 };
 
+// Adds an entry to the audit. Outcome: the entry's id; `entry.id` and `entry.hash` are ignored.
+struct AppendAudit {
+  AuditEntry entry;
+};
+
 // How much raw telemetry, covariates among it, to keep; an absent bound does not bind.
 struct Retention {
   std::optional<std::int64_t> telemetry_max_age_us;  // since it was stored: a replayed old log is young
@@ -129,7 +134,8 @@ struct RemoveRobot {
 
 using Command = std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutResumeState,
                              PutLearned, AppendEvent, Prune, AddDiagnosis, UpdateDiagnosis,
-                             InterruptDiagnoses, AddProposal, CloseProposal, PruneMissions, RemoveRobot>;
+                             InterruptDiagnoses, AddProposal, CloseProposal, AppendAudit, PruneMissions,
+                             RemoveRobot>;
 
 // Approximate memory that a queued command holds, in bytes.
 std::size_t weight_bytes(const Command& command);

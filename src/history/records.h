@@ -40,7 +40,7 @@ struct ModelVersion {
 struct RobotRecord {
   std::string robot_id;
   std::int64_t created_utime_us = 0;
-  std::optional<std::int64_t> active_version;  // absent: the robot was heard of, but nobody gave its model
+  std::optional<std::int64_t> active_version;  // absent: the robot has sent telemetry, but has no model
 };
 
 enum class MissionState {
@@ -85,10 +85,26 @@ struct Mission {
   std::int64_t samples = 0;                           // accepted and accounted for
   std::map<std::string, std::int64_t> sample_faults;  // reason -> samples counted out or repaired
   std::int64_t gap_count = 0;
-  double gap_s = 0;           // time without samples, bridged or not
-  std::string findings_json;  // what its motion says of payload and friction; empty: nothing
+  double gap_s = 0;  // time without samples, bridged or not
+  // An object; empty: nothing. What its motion says of payload and friction, or "contradictions": why it is
+  // not what its accounts say. "annulled": when and why somebody took it out of all sums.
+  std::string findings_json;
   std::vector<CovariateSummary> covariates;
 };
+
+// The parts of findings_json, as JSON each.
+struct MissionFindings {
+  std::string motion;  // empty: none
+  std::string contradictions = "[]";
+  std::string annulled;  // empty: not annulled
+
+  // Whether anything may be learnt from the mission.
+  bool teaches() const { return contradictions == "[]" && annulled.empty(); }
+};
+[[nodiscard]] MissionFindings findings_of(const Mission& mission);
+// The mission's findings_json once it is annulled. `reason` is any UTF-8 text.
+[[nodiscard]] std::string annulled_findings(const Mission& mission, std::int64_t utime_us,
+                                            const std::string& reason);
 
 // Least, mean and greatest of a quantity; all NaN when it was not measured.
 struct Band {
@@ -136,7 +152,19 @@ struct Learned {
   std::string body_json = "{}";
 };
 
-// An entry of the audit log.
+// An entry of the audit: who changed something or was refused. Entries are chained, see history/audit.h.
+struct AuditEntry {
+  std::int64_t id = 0;  // 1, 2, 3 ...; given by the store
+  std::int64_t utime_us = 0;
+  std::string actor;       // name of a token; empty: nobody who is known
+  std::string address;     // IP address of the client; empty: the daemon itself
+  std::string request_id;  // empty: no request
+  std::string action;      // operation id of the request, or what else happened, e.g. "token_added"
+  std::string detail_json = "{}";
+  std::string hash;  // given by the store
+};
+
+// What happened in the fleet, in the order it was stored.
 struct Event {
   std::int64_t id = 0;  // increasing in order of commit; given by the store
   std::int64_t utime_us = 0;
@@ -179,7 +207,7 @@ enum class ProposalState { open, adopted, dismissed, superseded };
 std::string_view name(ProposalState state);
 std::optional<ProposalState> proposal_state_from(std::string_view text);
 
-// A model that something suggests, to be adopted or dismissed by somebody.
+// A model that something suggests, to be adopted or dismissed by an operator.
 struct Proposal {
   std::int64_t id = 0;  // increasing; given by the store
   std::string robot_id;

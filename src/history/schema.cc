@@ -8,7 +8,7 @@ extern const std::string_view store_sql;  // schemas/store.sql, embedded at buil
 
 namespace {
 
-constexpr std::int64_t store_version = 6;
+constexpr std::int64_t store_version = 7;
 constexpr Migration store_migrations[] = {
     {1, R"(
 CREATE TABLE learned (
@@ -99,6 +99,23 @@ CREATE TABLE covariate_chunk (
 CREATE INDEX covariate_chunk_by_age ON covariate_chunk (stored_utime_us, sealed, bytes);
 CREATE INDEX covariate_chunk_tail ON covariate_chunk (mission_key, first_ordinal) WHERE sealed = 0;
 )sql"},
+    {6, R"sql(
+CREATE TABLE audit (
+  audit_id INTEGER NOT NULL PRIMARY KEY,  -- 1, 2, 3 ...
+  utime_us INTEGER NOT NULL,
+  actor TEXT NOT NULL,       -- name of a token; empty: nobody who is known
+  address TEXT NOT NULL,     -- IP address of the client; empty: the daemon itself
+  request_id TEXT NOT NULL,
+  action TEXT NOT NULL CHECK (action <> ''),
+  detail_json TEXT NOT NULL CHECK (json_valid(detail_json)),
+  hash TEXT NOT NULL CHECK (length(hash) = 64)  -- over this entry and the hash before, see src/history/audit.h
+) STRICT;
+
+CREATE TRIGGER audit_keeps_entries BEFORE DELETE ON audit
+BEGIN SELECT RAISE(ABORT, 'the audit is only appended to'); END;
+CREATE TRIGGER audit_keeps_content BEFORE UPDATE ON audit
+BEGIN SELECT RAISE(ABORT, 'the audit is only appended to'); END;
+)sql"},
 };
 
 Result<void> migrate(Database& database, const Schema& schema, std::int64_t version) {
@@ -134,7 +151,7 @@ Result<void> bring_to_schema(Database& database, const Schema& schema) {
   } else if (version > schema.version) {
     return fail(Fault::conflict, "database",
                 "schema version " + std::to_string(version) + " is newer than version " +
-                    std::to_string(schema.version) + ", the newest that this program knows");
+                    std::to_string(schema.version) + ", the newest that this program supports");
   } else if (version < schema.version) {
     if (auto migrated = migrate(database, schema, version); !migrated) return migrated;
     if (database.integer("SELECT count(*) FROM pragma_foreign_key_check") != 0)

@@ -89,6 +89,11 @@ void members(Archive& a, AppendEvent& c) {
   a(c.event.id, c.event.utime_us, c.event.robot_id, c.event.kind, c.event.detail_json);
 }
 template <class Archive>
+void members(Archive& a, AppendAudit& c) {
+  a(c.entry.utime_us, c.entry.actor, c.entry.address, c.entry.request_id, c.entry.action,
+    c.entry.detail_json);
+}
+template <class Archive>
 void members(Archive& a, Prune& c) {
   a(c.retention.telemetry_max_age_us, c.retention.telemetry_max_bytes, c.max_chunks);
 }

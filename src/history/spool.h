@@ -20,7 +20,7 @@ Result<void> write_spool(const std::string& path, std::span<const Command* const
 Result<std::vector<Command>> read_spool(const std::string& path);
 
 // Applies what a spool holds, in one transaction, and removes the file. Answers the number of commands, 0
-// when there is no file. A command that the store refuses is left out and told to `refused`.
+// when there is no file. A command that the store refuses is left out and reported to `refused`.
 Result<std::size_t> take_in_spool(const std::string& path, Store& store,
                                   const std::function<void(const Error&)>& refused);
 

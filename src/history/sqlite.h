@@ -104,6 +104,8 @@ class Database {
   void execute(const std::string& sql);
   // The statement of that text, prepared once and kept.
   Statement& statement(std::string_view sql);
+  // A statement that is not kept: for texts of which there are many.
+  Statement prepare(std::string_view sql) { return {handle_, sql}; }
   // The first column of the first row of a query without parameters.
   std::int64_t integer(std::string_view sql);
   std::string text(std::string_view sql);

@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "history/audit.h"
 #include "history/sqlite_chunks.h"
 #include "history/sqlite_rows.h"
 
@@ -235,6 +236,10 @@ Outcome SqliteChanges::run(const AppendEvent& c) {
   const std::int64_t id = rows.integer();
   rows.run();
   return id;
+}
+
+Outcome SqliteChanges::run(const AppendAudit& c) {
+  return append_audit(database_, c.entry);
 }
 
 Outcome SqliteChanges::run(const Prune& c) {

@@ -30,6 +30,7 @@ class SqliteChanges {
   Outcome run(const PutResumeState& command);
   Outcome run(const PutLearned& command);
   Outcome run(const AppendEvent& command);
+  Outcome run(const AppendAudit& command);
   Outcome run(const Prune& command);
   Outcome run(const AddDiagnosis& command);
   Outcome run(const UpdateDiagnosis& command);

@@ -1,20 +1,13 @@
 #include "history/sqlite_queries.h"
 
-#include <bit>
-#include <cmath>
 #include <utility>
 
-#include "history/cursor.h"
 #include "history/sqlite_chunks.h"
 #include "history/sqlite_rows.h"
 #include "history/trace_merge.h"
 
 namespace joulecast::history::queries {
 namespace {
-
-tl::unexpected<Error> no_mission(MissionKey key) {
-  return fail(Fault::not_found, "mission", "no mission has key " + std::to_string(key));
-}
 
 tl::unexpected<Error> no_robot(std::string_view robot_id) {
   return fail(Fault::not_found, "robot_id", "no robot is called '" + std::string(robot_id) + "'");
@@ -52,76 +45,16 @@ Result<ModelVersion> read_model(Rows& rows) {
   return m;
 }
 
-// The WHERE clause of a filter, which also tells filters apart for cursors when its values are added.
-std::string where(const MissionFilter& f) {
-  std::string sql = " WHERE 1";
-  if (f.robot_id) sql += " AND robot_id = ?";
-  if (f.mission_id) sql += " AND mission_id = ?";
-  if (f.start_from_utime_us) sql += " AND start_utime_us >= ?";
-  if (f.start_to_utime_us) sql += " AND start_utime_us < ?";
-  if (!f.states.empty()) {
-    sql += " AND state IN (?";
-    for (std::size_t k = 1; k < f.states.size(); ++k) sql += ", ?";
-    sql += ")";
-  }
-  if (f.incomplete) sql += " AND incomplete = ?";
-  if (f.payload_min_kg) sql += " AND payload_kg >= ?";
-  if (f.payload_max_kg) sql += " AND payload_kg <= ?";
-  return sql;
-}
-
-void bind_filter(Rows& rows, const MissionFilter& f) {
-  if (f.robot_id) rows.bind(*f.robot_id);
-  if (f.mission_id) rows.bind(*f.mission_id);
-  if (f.start_from_utime_us) rows.bind(*f.start_from_utime_us);
-  if (f.start_to_utime_us) rows.bind(*f.start_to_utime_us);
-  for (const MissionState state : f.states) rows.bind(name(state));
-  if (f.incomplete) rows.bind(*f.incomplete);
-  if (f.payload_min_kg) rows.bind(*f.payload_min_kg);
-  if (f.payload_max_kg) rows.bind(*f.payload_max_kg);
-}
-
-// Text values carry their length, so that no two filters read alike.
-std::string identity(const MissionFilter& f) {
-  std::string text = "missions" + where(f);
-  const auto add_text = [&](std::string_view value) {
-    text += '|' + std::to_string(value.size()) + ':' + std::string(value);
-  };
-  if (f.robot_id) add_text(*f.robot_id);
-  if (f.mission_id) add_text(*f.mission_id);
-  for (const auto& bound : {f.start_from_utime_us, f.start_to_utime_us})
-    if (bound) text += '|' + std::to_string(*bound);
-  for (const MissionState state : f.states) add_text(name(state));
-  if (f.incomplete) text += *f.incomplete ? "|1" : "|0";
-  for (const auto& bound : {f.payload_min_kg, f.payload_max_kg})
-    if (bound) text += '|' + std::to_string(std::bit_cast<std::uint64_t>(*bound));
-  return text;
-}
-
-// At most 6 states: more are repeats, and would make endless statement texts.
-Result<void> check_filter(const MissionFilter& f) {
-  if (f.states.size() > mission_state_count) return invalid("state", "names a state more than once");
-  if (f.start_from_utime_us && f.start_to_utime_us && *f.start_from_utime_us > *f.start_to_utime_us)
-    return invalid("from_utime_us", "must not be later than to_utime_us");
-  if ((f.payload_min_kg && std::isnan(*f.payload_min_kg)) ||
-      (f.payload_max_kg && std::isnan(*f.payload_max_kg)))
-    return invalid("payload_min_kg", "must be a number, like payload_max_kg");
-  if (f.payload_min_kg && f.payload_max_kg && *f.payload_min_kg > *f.payload_max_kg)
-    return invalid("payload_min_kg", "must not be greater than payload_max_kg");
-  return {};
-}
-
 Result<void> check_range(TimeRange range) {
   if (range.from_utime_us <= range.to_utime_us) return {};
   return invalid("from_utime_us", "must not be later than to_utime_us");
 }
 
-std::string select_missions() {
-  return "SELECT " + std::string(mission_identity_columns) + ", " + mission_content_columns() +
-         " FROM mission";
-}
-
 }  // namespace
+
+tl::unexpected<Error> no_mission(MissionKey key) {
+  return fail(Fault::not_found, "mission", "no mission has key " + std::to_string(key));
+}
 
 Result<void> check_limit(std::string_view field, std::int64_t limit, std::int64_t greatest) {
   if (limit >= 1 && limit <= greatest) return {};
@@ -160,74 +93,6 @@ Result<std::vector<ModelVersion>> model_versions(Database& database, std::string
   Rows rows(database.statement(sql));
   rows.bind(robot_id);
   return read_all<ModelVersion>(rows, read_model);
-}
-
-Result<Mission> mission(Database& database, MissionKey key) {
-  static const std::string sql = select_missions() + " WHERE mission_key = ?";
-  Rows rows(database.statement(sql));
-  if (!rows.bind(key).next()) return no_mission(key);
-  return read_mission(rows);
-}
-
-Result<MissionPage> missions(Database& database, const MissionFilter& filter, const PageRequest& page) {
-  if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
-  if (auto ok = check_limit("limit", page.limit, max_page_size); !ok) return tl::unexpected(ok.error());
-  const std::string query = identity(filter);
-  std::optional<CursorPlace> after;
-  if (!page.cursor.empty()) {
-    const auto place = decode_cursor(query, page.cursor);
-    if (!place) return tl::unexpected(place.error());
-    after = *place;
-  }
-  std::string sql = select_missions() + where(filter);
-  if (after) sql += " AND (start_utime_us, mission_key) < (?, ?)";
-  sql += " ORDER BY start_utime_us DESC, mission_key DESC LIMIT ?";
-  Rows rows(database.statement(sql));
-  bind_filter(rows, filter);
-  if (after) rows.bind((*after)[0]).bind((*after)[1]);
-  // One more than asked for tells whether a page follows.
-  rows.bind(page.limit + 1);
-  auto read = read_all<Mission>(rows, read_mission);
-  if (!read) return tl::unexpected(read.error());
-  MissionPage result{std::move(*read), {}};
-  if (static_cast<std::int64_t>(result.missions.size()) > page.limit) {
-    result.missions.pop_back();
-    const Mission& last = result.missions.back();
-    result.next_cursor = encode_cursor(query, {last.start_utime_us, last.key});
-  }
-  return result;
-}
-
-Result<Totals> totals(Database& database, const MissionFilter& filter) {
-  if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
-  static const std::string sums = [] {
-    std::string text = "sum(";
-    for (const char c : accounts_columns()) text += c == ',' ? std::string("), sum(") : std::string(1, c);
-    return text + ")";
-  }();
-  Rows rows(
-      database.statement("SELECT count(*), coalesce(sum(measured_s > 0), 0), coalesce(sum(incomplete), 0), "
-                         "coalesce(sum(samples), 0), "
-                         "coalesce(sum(gap_count), 0), coalesce(sum(gap_s), 0.0), " +
-                         sums + " FROM mission" + where(filter)));
-  bind_filter(rows, filter);
-  rows.next();
-  Totals t;
-  t.missions = rows.integer();
-  t.measured_missions = rows.integer();
-  t.incomplete_missions = rows.integer();
-  t.samples = rows.integer();
-  t.gap_count = rows.integer();
-  t.gap_s = rows.real();
-  t.accounts = read_accounts(rows);
-  return t;
-}
-
-Result<std::vector<Mission>> open_missions(Database& database) {
-  static const std::string sql =
-      select_missions() + " WHERE state = 'open' ORDER BY start_utime_us, mission_key";
-  Rows rows(database.statement(sql));
-  return read_all<Mission>(rows, read_mission);
 }
 
 std::optional<MissionKey> key_of(Database& database, std::string_view robot_id, std::string_view mission_id,

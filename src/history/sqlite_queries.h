@@ -25,6 +25,8 @@ Result<std::vector<T>> read_all(Rows& rows, Read read) {
   return all;
 }
 
+tl::unexpected<Error> no_mission(MissionKey key);
+
 // Fault::invalid on `field` unless 1 <= limit <= greatest.
 Result<void> check_limit(std::string_view field, std::int64_t limit, std::int64_t greatest);
 
@@ -34,8 +36,11 @@ Result<ModelVersion> model(Database& database, std::string_view robot_id,
 Result<std::vector<ModelVersion>> model_versions(Database& database, std::string_view robot_id);
 
 Result<Mission> mission(Database& database, MissionKey key);
-Result<MissionPage> missions(Database& database, const MissionFilter& filter, const PageRequest& page);
+Result<MissionPage> missions(Database& database, const MissionFilter& filter, const PageRequest& page,
+                             MissionSort sort);
 Result<Totals> totals(Database& database, const MissionFilter& filter);
+Result<std::vector<TotalsGroup>> grouped_totals(Database& database, const MissionFilter& filter, Grouping by,
+                                                std::int64_t utc_offset_s);
 Result<std::vector<Mission>> open_missions(Database& database);
 std::optional<MissionKey> key_of(Database& database, std::string_view robot_id, std::string_view mission_id,
                                  std::int64_t start_utime_us);

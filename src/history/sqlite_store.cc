@@ -201,12 +201,19 @@ class SqliteStore final : public Store {
     return read([&](Database& database) { return queries::mission(database, key); });
   }
 
-  Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page) const override {
-    return read([&](Database& database) { return queries::missions(database, filter, page); });
+  Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page,
+                               MissionSort sort) const override {
+    return read([&](Database& database) { return queries::missions(database, filter, page, sort); });
   }
 
   Result<Totals> totals(const MissionFilter& filter) const override {
     return read([&](Database& database) { return queries::totals(database, filter); });
+  }
+
+  Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& filter, Grouping by,
+                                                  std::int64_t utc_offset_s) const override {
+    return read(
+        [&](Database& database) { return queries::grouped_totals(database, filter, by, utc_offset_s); });
   }
 
   Result<Trace> trace(MissionKey key, TimeRange range, std::int64_t max_points) const override {

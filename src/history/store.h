@@ -16,8 +16,9 @@ namespace joulecast::history {
 
 // Which missions; an absent member does not filter. Bounds are half-open: from <= value < to.
 struct MissionFilter {
-  std::optional<std::string> robot_id;
+  std::vector<std::string> robot_ids;  // empty: any
   std::optional<std::string> mission_id;
+  std::optional<std::string> name_contains;  // a part of mission_id; ASCII letters in any case
   std::optional<std::int64_t> start_from_utime_us;
   std::optional<std::int64_t> start_to_utime_us;
   std::vector<MissionState> states;  // empty: any
@@ -25,6 +26,33 @@ struct MissionFilter {
   // Closed: min <= payload <= max. Either one excludes missions of undeclared payload.
   std::optional<double> payload_min_kg;
   std::optional<double> payload_max_kg;
+  // Closed, of signals::energy_ratio(). Either one excludes missions without a ratio.
+  std::optional<double> ratio_min;
+  std::optional<double> ratio_max;
+};
+
+inline constexpr std::size_t max_filter_robots = 10'000;
+
+// What missions are listed by. Texts are compared by their bytes, states in the order of MissionState.
+enum class MissionOrder {
+  start,
+  robot,
+  mission,  // mission_id
+  state,
+  duration,
+  distance,
+  payload,
+  energy,  // battery_j
+  modelled,
+  ratio,      // signals::energy_ratio()
+  wh_per_km,  // signals::energy_per_distance_wh_km()
+  charge      // charge_ah
+};
+
+// Ties go by key in the same direction; missions without a value come last in both.
+struct MissionSort {
+  MissionOrder by = MissionOrder::start;
+  bool ascending = false;
 };
 
 inline constexpr std::int64_t max_page_size = 1000;
@@ -36,14 +64,15 @@ struct PageRequest {
   std::string cursor;
 };
 
-// Newest start first (ties: greatest key first). A mission that starts between two pages shifts nothing.
+// A mission that starts between two pages shifts nothing; one whose value changes meanwhile, which only an
+// open mission's does, may come twice or not at all.
 struct MissionPage {
   std::vector<Mission> missions;
   std::string next_cursor;  // empty: the last page
 };
 
-// Sums over missions. A mission that did not measure a quantity adds nothing to it; a quantity that none
-// measured is NaN.
+// Sums over missions, but for those that were annulled (MissionFindings). A mission that did not measure a
+// quantity adds nothing to it; a quantity that none measured is NaN.
 struct Totals {
   std::int64_t missions = 0;
   std::int64_t measured_missions = 0;  // those with measured energy
@@ -52,6 +81,17 @@ struct Totals {
   std::int64_t gap_count = 0;
   double gap_s = 0;
   signals::Accounts accounts;
+};
+
+enum class Grouping { robot, day, week };
+
+inline constexpr std::size_t max_groups = 10'000;
+
+// The totals of one robot, or of the missions that started within one day or week.
+struct TotalsGroup {
+  std::string robot_id;            // by robot
+  std::int64_t from_utime_us = 0;  // by day or week: its beginning
+  Totals totals;
 };
 
 inline constexpr std::int64_t whole_past = std::numeric_limits<std::int64_t>::min();
@@ -89,7 +129,7 @@ struct StoreSize {
 // What came of one command: a number that its description names, or why it was refused.
 using Outcome = Result<std::int64_t>;
 
-// The history of a fleet. One implementation a database; everything else speaks to this.
+// The history of a fleet: one implementation for each database.
 //
 // Threads: apply() from one thread at a time (the Writer's); everything else from any thread, also during
 // apply(). A query sees what was committed before it began. Errors: Fault::not_found for a named thing that
@@ -129,8 +169,13 @@ class Store {
   virtual Result<std::vector<ModelVersion>> model_versions(std::string_view robot_id) const = 0;
 
   virtual Result<Mission> mission(MissionKey key) const = 0;
-  virtual Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page) const = 0;
+  virtual Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page,
+                                       MissionSort sort = {}) const = 0;
   virtual Result<Totals> totals(const MissionFilter& filter) const = 0;
+  // Groups that have missions, ascending. Days begin at midnight, weeks on Monday, of a clock that is
+  // `utc_offset_s` ahead of UTC. Fault::invalid on "group_by" for more than max_groups.
+  virtual Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& filter, Grouping by,
+                                                          std::int64_t utc_offset_s) const = 0;
 
   // At most max_points buckets (1 to max_trace_points): neighbours are merged by least, time-weighted mean
   // and greatest, cumulative values by the last. not_found when the mission is unknown.

@@ -89,7 +89,7 @@ class Writer::Impl {
     if (!has_room(bytes)) return tl::unexpected(unavailable("the writer's queue is full; not done"));
     const auto waiter = std::make_shared<Waiter>();
     const auto item = push(std::move(command), waiter);
-    hurry_ = true;
+    commit_now_ = true;
     work_.notify_one();
     const auto answered = [&] { return waiter->outcome.has_value(); };
     if (!waiter->done.wait_until(lock, deadline, answered) && waiter->queued) {
@@ -106,7 +106,7 @@ class Writer::Impl {
     std::unique_lock lock(mutex_);
     const std::uint64_t target = last_id_;
     const auto committed = [&] { return oldest_id() > target; };
-    hurry_ = true;
+    commit_now_ = true;
     work_.notify_one();
     committed_.wait_for(lock, timeout, [&] { return committed() || ended_; });
     if (committed() && left_ == 0) return {};
@@ -145,7 +145,7 @@ class Writer::Impl {
   }
 
  private:
-  // Somebody who waits for a command's outcome.
+  // A caller that waits for a command's outcome.
   struct Waiter {
     bool queued = true;  // the command may still be withdrawn
     std::optional<Outcome> outcome;
@@ -157,7 +157,7 @@ class Writer::Impl {
     Command command;
     std::size_t bytes = 0;
     Clock::time_point since;
-    std::shared_ptr<Waiter> waiter;  // null when nobody waits
+    std::shared_ptr<Waiter> waiter;  // null when no caller waits
   };
   using Place = std::list<Item>::iterator;
 
@@ -267,7 +267,7 @@ class Writer::Impl {
     if (queue_.empty()) return !stopping_;
     if (stopping_ && Clock::now() >= stop_deadline_) return false;
     work_.wait_until(lock, queue_.front().since + options_.batch_delay, [this] {
-      return stopping_ || hurry_ || queue_.size() >= options_.batch_commands ||
+      return stopping_ || commit_now_ || queue_.size() >= options_.batch_commands ||
              2 * queued_bytes_ >= options_.queue_bytes;
     });
     const std::size_t count = std::min(queue_.size(), std::max<std::size_t>(options_.batch_commands, 1));
@@ -279,7 +279,7 @@ class Writer::Impl {
       if (item.waiter) item.waiter->queued = false;
       batch_.commands.push_back(std::move(item.command));
     }
-    if (queue_.empty()) hurry_ = false;
+    if (queue_.empty()) commit_now_ = false;
     return true;
   }
 
@@ -307,7 +307,7 @@ class Writer::Impl {
     }
   }
 
-  // Whoever waits for a command is told that it was not done, and it is not tried again.
+  // A command that a caller waits for is answered as not done, and is not tried again.
   void withdraw_awaited(const Error& why) {
     const auto answer = [&](const Item& item) {
       item.waiter->outcome = tl::unexpected(unavailable(why.message + "; not done"));
@@ -356,7 +356,8 @@ class Writer::Impl {
       const auto at = Clock::now();
       if (ended_ || (stopping_ && at >= stop_deadline_)) return false;
       if (at >= until) return true;
-      // Stopping cuts the pause short to the deadline, not to nothing: a sick disk is not hammered.
+      // Stopping cuts the pause short to the deadline, not to nothing: a failing disk is not retried without
+      // pause.
       const auto wake = std::min(until, at + Clock::duration(longest_sleep));
       work_.wait_until(lock, stopping_ ? std::min(wake, stop_deadline_) : wake);
     }
@@ -448,7 +449,7 @@ class Writer::Impl {
     return *outcome;
   }
 
-  // Answers who waits, and spools what nobody waits for: with the mutex held, once.
+  // Answers the callers that wait, and spools the other commands: with the mutex held, once.
   void end() {
     ended_ = true;
     if (why_.empty() && attempt_since_) why_ = trouble().value_or("a commit did not return");
@@ -497,7 +498,7 @@ class Writer::Impl {
   std::optional<Clock::time_point> attempt_since_;  // a commit runs
   std::string why_;                                 // the last commit failed; empty: it did not
   Clock::time_point failing_since_, told_;
-  bool hurry_ = false;  // somebody waits: commit what there is
+  bool commit_now_ = false;  // a caller waits: commit at once
   bool stopping_ = false;
   bool ended_ = false;
   Clock::time_point stop_deadline_;

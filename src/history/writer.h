@@ -29,7 +29,7 @@ struct WriterOptions {
   std::chrono::milliseconds clock_distrust{3'600'000};
   double age_share_per_hour = 0.05;
   ClockSteps::Clock wall_clock = host_utime_us, steady_clock = host_boot_us;
-  // Told of failed commits (the first, then once a minute), refused posted commands and recovery; called on
+  // Receives failed commits (the first, then once a minute), refused posted commands and recovery; called on
   // the writer's thread.
   std::function<void(const Error&)> on_error;
 };

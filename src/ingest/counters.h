@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "history/records.h"
+#include "ingest/contradiction.h"
 #include "telemetry/datagram.h"
 
 namespace joulecast::ingest {
@@ -50,6 +51,15 @@ inline constexpr std::array<std::string_view, ingest_fault_count> ingest_fault_n
     "event_flood",   "empty_mission", "reused_mission_id", "too_many_covariates",
     "solver"};
 
+// Why nothing is learnt from a mission that ended.
+enum class LeftOut : std::size_t {
+  contradicted,    // its channels contradict each other, the robot file or the clock
+  barely_measured  // the battery was measured for less than half of its time
+};
+inline constexpr std::size_t left_out_count = 2;
+inline constexpr std::array<std::string_view, left_out_count> left_out_names = {"contradicted",
+                                                                                "barely_measured"};
+
 // Written by the ingest threads, read by the metrics.
 struct IngestCounters {
   std::atomic<std::uint64_t> messages = 0;                       // received on our channels
@@ -58,6 +68,8 @@ struct IngestCounters {
   std::array<std::atomic<std::uint64_t>, 2> missions_started{};  // announced, implicit
   std::array<std::atomic<std::uint64_t>, history::mission_state_count> missions_ended{};  // by state
   std::array<std::atomic<std::uint64_t>, ingest_fault_count> faults{};
+  std::array<std::atomic<std::uint64_t>, contradiction_kind_count> contradictions{};  // told
+  std::array<std::atomic<std::uint64_t>, left_out_count> missions_left_out{};
   telemetry::DatagramCounters datagrams;
 
   void add(IngestFault fault, std::uint64_t count = 1) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "ingest/charge_watch.h"
+#include "ingest/contradiction.h"
 #include "signals/ledger.h"
 #include "signals/sample.h"
 
@@ -19,7 +20,7 @@ struct RobotSnapshot {
   std::string robot_id;
   bool has_model = false;
   std::int64_t model_version = 0;
-  std::int64_t received_utime_us = 0;  // host clock at the last message; 0 = never heard
+  std::int64_t received_utime_us = 0;  // host clock at the last message; 0 = never received
   signals::Sample sample;              // the last one accounted for
   double measured_power_w = signals::unmeasured;
   double modelled_power_w = signals::unmeasured;
@@ -32,10 +33,16 @@ struct RobotSnapshot {
   std::int64_t mission_key = 0;
   std::int64_t mission_start_utime_us = 0;
   signals::Accounts accounts;  // of the open mission
+  // Within missions since the daemon started, J.
+  double drawn_j = 0, returned_j = 0;
+  signals::Ledger ledger;
   std::uint64_t samples = 0;
   std::map<std::string, std::uint64_t>
       faults;  // reason -> messages rejected or repaired, since the daemon started
   std::map<std::string, std::string> fault_notes;  // reason -> what was wrong with the last one
+  std::vector<Contradiction> contradictions;
+  // Reason -> missions that nothing was learnt from, since the daemon started.
+  std::map<std::string, std::uint64_t> missions_left_out;
 };
 
 // The latest snapshot of every robot. Any thread publishes and reads; nobody holds the lock for longer than a

@@ -201,9 +201,29 @@ Forecasts::Learnt Forecasts::learn(const std::shared_ptr<const ModelInForce>& mo
   while (slot.kept.size() > kept_missions) slot.kept.pop_front();
   lend(slot);
   slot.outlook.forecaster = slot.forecast->forecaster();
-  learnt.document = {slot.robot_id, std::string(topic),
-                     slot.kept.empty() ? 0 : slot.kept.back().start_utime_us, legs_json(slot.kept)};
+  learnt.document = document_of(slot);
   return learnt;
+}
+
+history::Learned Forecasts::document_of(const Entry& entry) {
+  return {entry.robot_id, std::string(topic), entry.kept.empty() ? 0 : entry.kept.back().start_utime_us,
+          legs_json(entry.kept)};
+}
+
+std::optional<history::Learned> Forecasts::forget(const std::shared_ptr<const ModelInForce>& model,
+                                                  std::int64_t start_utime_us) {
+  Entry& slot = entry(*model);
+  const std::lock_guard lock(slot.mutex);
+  bring_up(slot, model);
+  const auto is_it = [&](const forecast::PastMission& m) { return m.start_utime_us == start_utime_us; };
+  if (std::erase_if(slot.kept, is_it) == 0) return std::nullopt;
+  slot.forecast = std::make_unique<forecast::RobotForecast>(model->robot, model->drive);
+  slot.borrowed_at = -1;
+  borrow(slot);
+  for (const forecast::PastMission& mission : slot.kept) slot.forecast->learn(mission);
+  lend(slot);
+  slot.outlook.forecaster = slot.forecast->forecaster();
+  return document_of(slot);
 }
 
 }  // namespace joulecast::ingest

@@ -41,6 +41,11 @@ class Forecasts {
   };
   Learnt learn(const std::shared_ptr<const ModelInForce>& model, forecast::PastMission mission);
 
+  // As if the mission that started then had not been. What is left is learnt anew. Empty: it was not learnt
+  // from, or is no longer kept.
+  std::optional<history::Learned> forget(const std::shared_ptr<const ModelInForce>& model,
+                                         std::int64_t start_utime_us);
+
  private:
   struct Entry;
   struct Kind {
@@ -50,6 +55,7 @@ class Forecasts {
   };
 
   Entry& entry(const ModelInForce& model);
+  static history::Learned document_of(const Entry& entry);
   void bring_up(Entry& entry, const std::shared_ptr<const ModelInForce>& model);
   void borrow(Entry& entry);
   void lend(Entry& entry);

@@ -17,7 +17,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::int64_t live_us = 5'000'000;  // a robot not heard of for longer publishes no energy state
+constexpr std::int64_t live_us = 5'000'000;  // a robot not received from for longer publishes no energy state
 
 }  // namespace
 

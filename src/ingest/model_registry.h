@@ -16,7 +16,7 @@ namespace joulecast::ingest {
 using answers::model_in_force;
 using answers::ModelInForce;
 
-// What every answer says of a robot id that nobody has.
+// The error of every answer about a robot id that does not exist.
 Error unknown_robot(std::string field, std::string_view robot_id);
 
 // The models in force, by robot. Any thread.

@@ -72,7 +72,7 @@ void Pipeline::refresh_models() {
   }
 }
 
-bool Pipeline::forget_a_stranger(std::int64_t host_utime_us) {
+bool Pipeline::discard_unknown_robot(std::int64_t host_utime_us) {
   if (host_utime_us - forgot_utime_us_ < forget_period_us && host_utime_us >= forgot_utime_us_) return false;
   forgot_utime_us_ = host_utime_us;
   const auto silent = std::ranges::min_element(
@@ -85,7 +85,7 @@ bool Pipeline::forget_a_stranger(std::int64_t host_utime_us) {
   return true;
 }
 
-void Pipeline::count_stranger(const InboundMessage& message) {
+void Pipeline::count_unknown_robot(const InboundMessage& message) {
   IngestFault fault = IngestFault::unknown_robot;
   if (const auto* refused = std::get_if<RefusedMessage>(&message.content)) {
     fault = refused->fault;  // counted already
@@ -94,7 +94,7 @@ void Pipeline::count_stranger(const InboundMessage& message) {
   }
   auto found = strangers_.find(message.robot_id);
   if (found == strangers_.end()) {
-    if (strangers_.size() >= max_unknown_robots_ && !forget_a_stranger(message.host_utime_us))
+    if (strangers_.size() >= max_unknown_robots_ && !discard_unknown_robot(message.host_utime_us))
       return outputs_.counters.add(IngestFault::too_many_robots);
     found = strangers_.try_emplace(message.robot_id).first;
     found->second.snapshot.robot_id = message.robot_id;
@@ -122,7 +122,7 @@ void Pipeline::deliver(RobotSession& session, const InboundMessage& message) {
 void Pipeline::handle(const InboundMessage& message) {
   refresh_models();
   Robot* robot = find(message.robot_id);
-  if (robot == nullptr) return count_stranger(message);
+  if (robot == nullptr) return count_unknown_robot(message);
   if (const auto* refused = std::get_if<RefusedMessage>(&message.content))
     return robot->session.note_fault(refused->fault, 1, refused->why, message.host_utime_us);
   const SenderGate::Verdict verdict = robot->gate.take(message);

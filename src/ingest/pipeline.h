@@ -49,9 +49,9 @@ class Pipeline {
   Robot* find(const std::string& robot_id);
   Robot& add(const std::string& robot_id);
   static void deliver(RobotSession& session, const InboundMessage& message);
-  void count_stranger(const InboundMessage& message);
-  // Makes room for another stranger by forgetting one that has long been silent.
-  bool forget_a_stranger(std::int64_t host_utime_us);
+  void count_unknown_robot(const InboundMessage& message);
+  // Makes room for another unknown robot by discarding one that has long been silent.
+  bool discard_unknown_robot(std::int64_t host_utime_us);
   void refresh_models();
 
   SessionSettings settings_;

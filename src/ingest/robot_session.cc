@@ -20,6 +20,8 @@ constexpr std::int64_t clock_ahead_us = 10'000'000;          // beyond what tran
 constexpr auto json_replace = nlohmann::json::error_handler_t::replace;
 constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
 constexpr std::int64_t tell_period_us = 600'000'000;
+constexpr std::int64_t tell_contradiction_us = 3'600'000'000;
+constexpr double least_measured = 0.5;  // of a mission's time, for forecasts to learn from it
 // Events that a robot may send at once, and how many each sample earns it: recordings are replayed faster
 // than they were.
 constexpr double event_burst = 100, events_a_sample = 0.2;
@@ -42,6 +44,14 @@ history::MissionState state_of(telemetry::MissionEnd end) {
 
 std::string name_of(IngestFault fault) {
   return std::string(ingest_fault_names[static_cast<std::size_t>(fault)]);
+}
+
+nlohmann::json json_of(const Contradiction& c) {
+  return {{"kind", contradiction_kind_names[static_cast<std::size_t>(c.kind)]},
+          {"id", c.id},
+          {"channel", c.channel},
+          {"value", json_number(c.value)},
+          {"says", c.says}};
 }
 
 Result<std::shared_ptr<const ModelInForce>> stored_model(const history::Store& store,
@@ -72,6 +82,7 @@ struct RobotSession::OpenMission {
   bool resumed_silent = false;                   // resumed after a restart, and nothing came since
   std::optional<std::int64_t> stepped_utime_us;  // host's, when the robot's clock was first set
   std::int64_t booked_us = 0;                    // since then
+  std::string charge_memory;                     // of its begin
 };
 
 RobotSession::RobotSession(std::string robot_id, const SessionSettings& settings, SessionOutputs outputs)
@@ -128,6 +139,7 @@ void RobotSession::meter_with(std::shared_ptr<const ModelInForce> model) {
       charge->recall(stored_charge_utime_us_, snapshot_.state_of_charge);
     }
     charge_ = std::move(charge);
+    contradictions_ = std::make_unique<ContradictionWatch>(model_->robot);
     if (refinement_ != nullptr) {
       refinement_->use(model_->robot, model_->version);
     } else {
@@ -140,6 +152,7 @@ void RobotSession::meter_with(std::shared_ptr<const ModelInForce> model) {
       open_->earlier_gap_s = open_->record.gap_s;
       open_->record.model_version = model_->version;
       meter_->resume(accounts.duration_s > 0 ? accounts : open_->record.accounts);
+      contradictions_->begin_mission(open_->record.mission_id, open_->record.payload_kg);
     }
   }
   changed_ = true;
@@ -172,7 +185,10 @@ void RobotSession::resume(const history::Mission& mission) {
   snapshot_.mission_key = mission.key;
   snapshot_.mission_start_utime_us = mission.start_utime_us;
   snapshot_.accounts = mission.accounts;
-  if (meter_ != nullptr) meter_->resume(mission.accounts);
+  if (meter_ != nullptr) {
+    meter_->resume(mission.accounts);
+    contradictions_->begin_mission(mission.mission_id, mission.payload_kg);
+  }
   changed_ = true;
 }
 
@@ -187,6 +203,12 @@ void RobotSession::note_fault(IngestFault fault, std::uint64_t count, std::strin
   snapshot_.faults[name] += count;
   if (open_ != nullptr) open_->record.sample_faults[name] += static_cast<std::int64_t>(count);
   changed_ = true;
+  if (contradictions_ != nullptr) {
+    const bool no_sample = fault == IngestFault::wrong_channel || fault == IngestFault::undecodable ||
+                           fault == IngestFault::second_sender;
+    if (no_sample) contradictions_->hear(count);
+    contradictions_->hear(fault, count, why);
+  }
   if (why.empty()) return;
   const auto [told, first] = told_.try_emplace(fault);
   told->second.since += count;
@@ -211,11 +233,45 @@ bool RobotSession::is_too_far_ahead(std::int64_t utime_us, std::int64_t host_uti
 void RobotSession::on_sample(const signals::Sample& sample, std::int64_t host_utime_us) {
   snapshot_.received_utime_us = host_utime_us;
   if (model_ == nullptr) return on_fault(IngestFault::unknown_robot);
+  contradictions_->hear();
   if (const auto fault = telemetry::check_plausible(sample))
     return on_fault(IngestFault::implausible, 1, telemetry::describe(*fault));
   if (is_too_far_ahead(sample.utime_us, host_utime_us)) return;
   if (sample.utime_us - host_utime_us > clock_ahead_us) on_fault(IngestFault::clock_ahead);
   if (!order_.take(sample, host_utime_us)) on_fault(IngestFault::duplicate);
+  tell_contradictions();
+}
+
+void RobotSession::tell_contradictions() {
+  if (contradictions_ == nullptr || !contradictions_->take_changed()) return;
+  changed_ = true;
+  snapshot_.contradictions = contradictions_->all();
+  for (Contradiction& c : snapshot_.contradictions) {
+    const std::int64_t now = snapshot_.received_utime_us;
+    const auto [told, first] = contradictions_told_.try_emplace(c.id + ' ' + c.channel, now);
+    if (first || now - told->second >= tell_contradiction_us || now < told->second) {
+      told->second = now;
+      outputs_.warn(robot_id_, "contradiction: " + c.says);
+      outputs_.counters.contradictions[static_cast<std::size_t>(c.kind)].fetch_add(1,
+                                                                                   std::memory_order_relaxed);
+      nlohmann::json detail = json_of(c);
+      detail["mission"] =
+          open_ != nullptr && open_->record.key > 0 ? nlohmann::json(open_->record.key) : nullptr;
+      outputs_.post(history::AppendEvent{
+          {0, now, robot_id_, "contradiction", detail.dump(-1, ' ', false, json_replace)}});
+    }
+    c.told_utime_us = told->second;
+  }
+  if (contradictions_->doubts_battery()) restore_charge();
+}
+
+void RobotSession::restore_charge() {
+  if (open_ == nullptr || open_->charge_memory.empty()) return;
+  const std::string memory = std::exchange(open_->charge_memory, {});
+  charge_ = std::make_unique<ChargeWatch>(model_->robot);
+  charge_->recall(memory);
+  snapshot_.state_of_charge = charge_->estimate().charge;
+  remember_charge();
 }
 
 void RobotSession::interrupt() {
@@ -271,7 +327,10 @@ void RobotSession::place(const signals::Sample& sample) {
   last_sequence_ = sample.sequence;
 
   const double modelled_power_w = open_ != nullptr ? snapshot_.modelled_power_w : signals::unmeasured;
-  const ChargeWatch::Share share = charge_->add(sample, modelled_power_w);
+  signals::Sample trusted = sample;
+  if (contradictions_->doubts_battery())
+    trusted.battery_voltage_v = trusted.battery_current_a = signals::unmeasured;
+  const ChargeWatch::Share share = charge_->add(trusted, modelled_power_w);
   snapshot_.state_of_charge = charge_->estimate().charge;
   changed_ = true;
   switch (share) {
@@ -324,7 +383,7 @@ void RobotSession::on_charger_sample(const signals::Sample& sample) {
   keep(sample);
 }
 
-// A sample that no mission accounts for still tells what the robot does now.
+// A sample that no mission accounts for still shows what the robot does now.
 void RobotSession::show(const signals::Sample& sample) {
   snapshot_.sample = sample;
   snapshot_.measured_power_w = sample.battery_voltage_v * sample.battery_current_a;
@@ -350,6 +409,26 @@ void RobotSession::leave_charger() {
   if (open_ != nullptr) detail["mission"] = open_->record.key;
   outputs_.post(history::AppendEvent{{0, snapshot_.received_utime_us, robot_id_, "charged", detail.dump()}});
   remember_charge();
+}
+
+bool RobotSession::teaches(const std::vector<Contradiction>& found) {
+  history::Mission& record = open_->record;
+  nlohmann::json untrue = nlohmann::json::array();
+  for (const Contradiction& c : found) {
+    if (c.untrue) untrue.push_back(json_of(c));
+  }
+  const signals::Accounts& a = record.accounts;
+  const bool barely = a.measured_s > 0 && a.measured_s < least_measured * a.duration_s;
+  if (untrue.empty() && !barely) return true;
+  const auto why =
+      static_cast<std::size_t>(untrue.empty() ? LeftOut::barely_measured : LeftOut::contradicted);
+  ++snapshot_.missions_left_out[std::string(left_out_names[why])];
+  outputs_.counters.missions_left_out[why].fetch_add(1, std::memory_order_relaxed);
+  if (!untrue.empty()) {
+    record.findings_json =
+        nlohmann::json{{"contradictions", std::move(untrue)}}.dump(-1, ' ', false, json_replace);
+  }
+  return false;
 }
 
 void RobotSession::judge_mission() {
@@ -414,6 +493,7 @@ void RobotSession::on_own_sample(const signals::Sample& sample) {
   }
   refinement_->add(counted, climb_rad);
   keep(sample);  // as it came
+  contradictions_->add(sample);
   changed_ = true;
 }
 
@@ -484,7 +564,9 @@ void RobotSession::open(const telemetry::MissionAction& action) {
   trace_.begin();
   legs_->begin();
   covariates_.begin_mission(action.utime_us);
+  contradictions_->begin_mission(action.mission_id, action.payload_kg);
   open_ = std::make_unique<OpenMission>();
+  open_->charge_memory = charge_->memory_json();
   history::Mission& record = open_->record;
   record.robot_id = robot_id_;
   record.mission_id = action.mission_id;
@@ -508,13 +590,13 @@ void RobotSession::begin_record() {
   if (!key) outputs_.warn(robot_id_, describe(key.error()));
   record.key = key.value_or(0);
   if (record.key > 0) outputs_.post(history::StartMission{record});
-  if (!record.implicit) tell_of_namesake();
+  if (!record.implicit) report_earlier_mission();
   snapshot_.mission_key = record.key;
   outputs_.counters.missions_started[record.implicit ? 1 : 0].fetch_add(1, std::memory_order_relaxed);
 }
 
 // People look missions up by the robot's name for them: they should know when it is no longer unique.
-void RobotSession::tell_of_namesake() {
+void RobotSession::report_earlier_mission() {
   const history::Mission& record = open_->record;
   const Result<std::optional<history::MissionKey>> earlier =
       outputs_.store.earlier_mission(robot_id_, record.mission_id, record.start_utime_us);
@@ -549,13 +631,18 @@ void RobotSession::close(const telemetry::MissionAction& action) {
   if (!action.note.empty() && action.note != record.note)
     record.note += (record.note.empty() ? "" : "; ") + action.note;
   record.end_utime_us = std::max(record.end_utime_us, action.utime_us);
+  const std::vector<Contradiction> found =
+      contradictions_ != nullptr ? contradictions_->end_mission() : std::vector<Contradiction>{};
+  tell_contradictions();
   if (open_->stored) {
     outputs_.counters.missions_ended[static_cast<std::size_t>(record.state)].fetch_add(
         1, std::memory_order_relaxed);
-    judge_mission();
+    refresh_record();
+    const bool learn = teaches(found);
+    if (learn) judge_mission();
     checkpoint();
     remember_charge();
-    if (outputs_.mission_ended && model_ != nullptr)
+    if (learn && outputs_.mission_ended && model_ != nullptr)
       outputs_.mission_ended(model_, {record.start_utime_us, legs_->take()});
   } else {
     on_fault(IngestFault::empty_mission);
@@ -617,11 +704,16 @@ void RobotSession::on_point(const energy::MeterPoint& point) {
   snapshot_.speed_m_s = point.speed_m_s;
   snapshot_.yaw_rate_rad_s = point.yaw_rate_rad_s;
   snapshot_.winding_temperature_c = point.winding_temperature_c;
+  snapshot_.drawn_j += accounts.drawn_j - snapshot_.accounts.drawn_j;
+  snapshot_.returned_j += accounts.returned_j - snapshot_.accounts.returned_j;
+  for (std::size_t k = 0; k < signals::term_count; ++k)
+    snapshot_.ledger.value[k] += accounts.ledger.value[k] - snapshot_.accounts.ledger.value[k];
   snapshot_.accounts = accounts;
 }
 
 void RobotSession::on_tick(std::int64_t host_utime_us) {
   order_.release(host_utime_us);
+  tell_contradictions();
   if (snapshot_.received_utime_us > 0) {
     carry_out(missions_.on_silence(host_utime_us - snapshot_.received_utime_us));
   } else if (open_ != nullptr) {

@@ -14,6 +14,7 @@
 #include "history/commands.h"
 #include "history/store.h"
 #include "ingest/charge_watch.h"
+#include "ingest/contradiction_watch.h"
 #include "ingest/counters.h"
 #include "ingest/covariate_watch.h"
 #include "ingest/fleet_view.h"
@@ -50,7 +51,7 @@ struct SessionOutputs {
   FleetView& fleet;
   IngestCounters& counters;
   std::function<void(const std::string& robot_id, const std::string& text)> warn;
-  // Told of each mission that ended, with its legs; may be empty.
+  // Told of each mission that ended and may be learnt from, with its legs; may be empty.
   std::function<void(const std::shared_ptr<const ModelInForce>& model, forecast::PastMission mission)>
       mission_ended = {};
 };
@@ -66,7 +67,7 @@ class RobotSession {
 
   // Null: the model is not known; samples are counted out until it is. A declared mission goes on with the
   // model that it began with, so that its accounts are one model's, and the change takes effect when it ends;
-  // else, and in missions that nobody declared, which may last for days, at the next sample.
+  // else, and in missions that were not declared, which may last for days, at the next sample.
   void set_model(std::shared_ptr<const ModelInForce> model);
 
   // Goes on with a mission that was open when the last daemon stopped.
@@ -115,12 +116,17 @@ class RobotSession {
   void leave_charger();
   void remember_charge();
   void judge_mission();
+  void tell_contradictions();
+  // As it was when the open mission began.
+  void restore_charge();
+  // Whether anything may be learnt from the open mission, which ends with these contradictions.
+  bool teaches(const std::vector<Contradiction>& found);
   void keep(const signals::Sample& sample);
   void carry_out(const telemetry::MissionActions& actions);
   void open(const telemetry::MissionAction& action);
   // Stores the open mission, which its first sample makes worth it.
   void begin_record();
-  void tell_of_namesake();
+  void report_earlier_mission();
   void close(const telemetry::MissionAction& action);
   void checkpoint();
   void on_point(const energy::MeterPoint& point);
@@ -146,6 +152,8 @@ class RobotSession {
   std::int64_t remembered_utime_us_ = 0;
   std::deque<signals::Sample> held_;  // until it is clear whether a charger feeds the robot
   bool at_charger_ = false;
+  std::unique_ptr<ContradictionWatch> contradictions_;
+  std::map<std::string, std::int64_t> contradictions_told_;  // host's time when each was last told
   CovariateWatch covariates_;
   TraceBuilder trace_;
   std::optional<forecast::LegTracker> legs_;

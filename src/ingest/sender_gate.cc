@@ -8,7 +8,8 @@ namespace joulecast::ingest {
 namespace {
 
 constexpr std::int64_t second_us = 1'000'000;
-// A sender that has missed so many of its usual intervals is gone, unless two were heard side by side lately.
+// A sender that has missed so many of its usual intervals is gone, unless two were received side by side
+// lately.
 constexpr double missed_intervals = 50;
 constexpr std::int64_t least_patience_us = second_us / 10;
 constexpr std::int64_t contest_memory_us = 60 * second_us;
@@ -42,7 +43,7 @@ bool SenderGate::is_of_first(const InboundMessage& message, const signals::Sampl
     return message.sender.address == first_.address && main_.continued_by(*sample) &&
            sample->sequence - main_.sequence <= port_step && (waiting_.empty() || message.sender != other_);
   }
-  // Missions may be announced by somebody else, such as a fleet manager.
+  // Missions may be announced by another sender, such as a fleet manager.
   const bool waits = !waiting_.empty() && message.sender == other_;
   const bool live = message.host_utime_us - heard_us_ < takeover_us_;
   return !waits && !(announcer_ == first_ && live);

@@ -55,11 +55,11 @@ class SenderGate {
   std::size_t& room_;
   telemetry::Sender first_, other_;
   telemetry::Sender
-      announcer_;     // of the last event; where it is first_, nobody else is expected to announce missions
-  bool any_ = false;  // first_ is known
+      announcer_;  // of the last event; where it is first_, no other sender is expected to announce missions
+  bool any_ = false;                    // first_ is known
   std::int64_t heard_us_ = 0;           // of first_
   double interval_us_ = 0;              // between its messages
-  std::int64_t contested_us_ = 0;       // when both were last heard; 0: never
+  std::int64_t contested_us_ = 0;       // when both were last received; 0: never
   std::deque<InboundMessage> waiting_;  // of other_, since first_ spoke last
   std::size_t waiting_units_ = 0;
   Stream main_, side_;

@@ -9,7 +9,7 @@
 namespace joulecast::planning {
 namespace {
 
-// Stations closer than this are one place, towards which nobody turns.
+// Stations closer than this are one place, towards which no robot turns.
 constexpr double same_place_m = 1e-6;
 
 double angle_between(double from, double to) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "base/bounds.h"
 #include "dynamics/stribeck_curve.h"
 
 namespace joulecast::planning {
@@ -12,9 +13,8 @@ namespace joulecast::planning {
 using dynamics::Instant;
 
 Result<DriveLoads> DriveLoads::make(const robot::RobotModel& robot, std::optional<double> regeneration) {
-  if (regeneration && !(*regeneration >= 0 && *regeneration <= 1)) {
-    return invalid("regeneration", "is " + std::to_string(*regeneration) + ", must be from 0 to 1");
-  }
+  if (regeneration && !fraction.contain(*regeneration))
+    return invalid("regeneration", out_of_bounds(*regeneration, fraction));
   auto effects = dynamics::active_effects(robot);
   if (!effects) return tl::unexpected(std::move(effects.error()));
   if (regeneration) {

@@ -15,7 +15,7 @@
 namespace joulecast::planning {
 namespace {
 
-// `least_s` is told rounded up, so that it can be asked for.
+// `least_s` is rounded up, so that it can be asked for.
 tl::unexpected<Error> too_soon(double deadline_s, double least_s) {
   return fail(Fault::infeasible, "deadline_s",
               fmt::format("is {} s, the limits allow no less than {:.6f} s", deadline_s,

@@ -43,7 +43,7 @@ enum class Bound { speed, yaw_rate, wheel_speed, acceleration, current, voltage,
 inline constexpr std::size_t bound_count = 7;
 std::string_view name_of(Bound bound);
 
-// Why the answer may be believed.
+// How far the answer is from the optimum.
 struct Certificate {
   Method method = Method::closed_form;
   // energy + price of time, less this, bounds the optimum over all speed profiles on the grid from below: the

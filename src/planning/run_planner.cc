@@ -132,11 +132,6 @@ void RunPlanner::find_motion() {
   task.torque_limit_nm = problem_->limits.current_a * task.electric.torque_constant_nm_a;
   task.voltage_limit_v = problem_->limits.voltage_v;
   task.cells = std::max<std::size_t>(8, problem_->intervals_per_run);
-  // Where nothing bounds it, braking that neither costs nor returns anything is a jump; losses of a gear turn
-  // with the sign of the torque.
-  const bool bounded = std::isfinite(task.acceleration_limit) || std::isfinite(task.torque_limit_nm) ||
-                       std::isfinite(task.voltage_limit_v);
-  if ((!bounded && !(task.electric.down > 0)) || loads_here_[0].gear != 0 || loads_here_[1].gear != 0) return;
   if (auto motion = UniformMotion::make(task)) motion_ = std::make_unique<UniformMotion>(std::move(*motion));
 }
 

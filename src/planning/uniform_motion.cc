@@ -383,6 +383,9 @@ SteppedMotion UniformMotion::written(const Shape& shape) const {
 
 std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
   UniformMotion motion(task);
+  const bool bounded = std::isfinite(task.acceleration_limit) || motion.has_motor_limits();
+  if ((!bounded && !(task.electric.down > 0)) || task.loads[0].gear != 0 || task.loads[1].gear != 0)
+    return std::nullopt;
   const auto holds = [&](double v) { return motion.most(motion.local(v), 1, 0).acceleration > 0; };
   if (!holds(0)) return std::nullopt;
   motion.top_ = task.speed_limit;

@@ -58,8 +58,9 @@ class UniformMotion {
  public:
   static constexpr double motor_tolerance = 1e-3;
 
-  // Nothing when f has several minima within the speed limit (friction that falls steeply with the speed), or
-  // the motors cannot hold a steady speed from rest to the end speeds.
+  // Nothing when f has several minima within the speed limit (friction that falls steeply with the speed),
+  // the motors cannot hold a steady speed from rest to the end speeds, nothing bounds braking that neither
+  // costs nor returns anything (it is a jump), or losses of a gear turn with the sign of the torque.
   static std::optional<UniformMotion> make(const UniformTask& task);
 
   // Fault::infeasible when the way is too short for the end speeds, or when no finite time is best.

@@ -10,8 +10,9 @@ namespace joulecast::report {
 
 // Of any report:
 
-// The effects found, each with what it means, how strong and how sure it is, what it cannot be told from and
-// what to check in the workshop. `mean_power_w` stands beside the power that each moves; 0: not said.
+// The effects found, each with what it means, how strong and how sure it is, what it cannot be distinguished
+// from and what to check in the workshop. `mean_power_w` stands beside the power that each moves; 0: not
+// said.
 void effects_section(Page& page, std::span<const gap::DiagnosedEffect> effects, double mean_power_w = 0);
 void origin_section(Page& page, const ReportOrigin& origin, const robot::RobotModel& robot);
 

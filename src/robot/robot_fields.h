@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -10,21 +9,10 @@
 #include <variant>
 #include <vector>
 
+#include "base/bounds.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::robot {
-
-// The interval a number must lie in; infinite ends are no bound. Not-a-number lies in none.
-struct Bounds {
-  double low = -std::numeric_limits<double>::infinity();
-  double high = std::numeric_limits<double>::infinity();
-  bool low_excluded = false;
-  bool high_excluded = false;
-
-  bool contain(double value) const {
-    return (low_excluded ? value > low : value >= low) && (high_excluded ? value < high : value <= high);
-  }
-};
 
 using Curve = std::vector<std::pair<double, double>>;  // (state of charge, value)
 
@@ -67,7 +55,6 @@ inline constexpr std::size_t max_effect_parameters = 64;
 // LCM channels carry at most 63 characters, of which "ROBOT_TELEMETRY." takes 16.
 inline constexpr std::string_view robot_id_pattern = "^[A-Za-z0-9._-]{1,47}$";
 inline constexpr std::string_view effect_name_pattern = "^[a-z0-9_]{1,64}$";
-inline constexpr Bounds charge_bounds{0.0, 1.0};
 
 // Every key of the robot file, once: parsing, validation, writing and the schema's test walk this table.
 std::span<const Field> fields();

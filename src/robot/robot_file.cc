@@ -19,11 +19,6 @@ using nlohmann::json;
 constexpr std::size_t max_file_bytes = 1 << 20;
 constexpr std::string_view battery_prefix = "/battery";
 
-struct Problem {
-  std::string pointer;
-  std::string text;
-};
-
 // Collects problems; a pointer that has one is not reported again by later checks.
 class Problems {
  public:
@@ -33,18 +28,19 @@ class Problems {
 
   // Whether this pointer, one above or one below it has a problem already.
   bool at(std::string_view pointer) const {
-    return std::any_of(list_.begin(), list_.end(), [&](const Problem& problem) {
+    return std::any_of(list_.begin(), list_.end(), [&](const RobotProblem& problem) {
       return problem.pointer == pointer || is_below(problem.pointer, pointer) ||
              is_below(pointer, problem.pointer);
     });
   }
 
   bool none() const { return list_.empty(); }
+  const std::vector<RobotProblem>& list() const { return list_; }
 
   Error error() const {
-    Error error{Fault::invalid, list_.front().pointer, list_.front().text};
+    Error error{Fault::invalid, list_.front().pointer, list_.front().says};
     for (auto problem = list_.begin() + 1; problem != list_.end(); ++problem)
-      error.message += fmt::format("; {}: {}", problem->pointer, problem->text);
+      error.message += fmt::format("; {}: {}", problem->pointer, problem->says);
     return error;
   }
 
@@ -53,7 +49,7 @@ class Problems {
     return pointer.size() > parent.size() && pointer.starts_with(parent) && pointer[parent.size()] == '/';
   }
 
-  std::vector<Problem> list_;
+  std::vector<RobotProblem> list_;
   std::set<std::string> pointers_;
 };
 
@@ -67,17 +63,6 @@ Overloaded(Cases...) -> Overloaded<Cases...>;
 // The pointer of a member.
 std::string child(const std::string& pointer, std::string_view key) {
   return pointer + (json::json_pointer() / std::string(key)).to_string();
-}
-
-std::string with_unit(double value, std::string_view unit) {
-  return unit.empty() ? fmt::format("{}", value) : fmt::format("{} {}", value, unit);
-}
-
-// "is -2 kg, must be greater than 0 kg and at most 100000 kg"
-std::string out_of_bounds(double value, const Bounds& bounds, std::string_view unit) {
-  return fmt::format("is {}, must be {} {} and {} {}", with_unit(value, unit),
-                     bounds.low_excluded ? "greater than" : "at least", with_unit(bounds.low, unit),
-                     bounds.high_excluded ? "less than" : "at most", with_unit(bounds.high, unit));
 }
 
 std::optional<double> number(const json& value, const std::string& pointer, Problems& problems) {
@@ -236,7 +221,7 @@ void check_curve(const Curve& curve, const Field& field, const std::string& poin
   }
   for (std::size_t i = 0; i < curve.size(); ++i) {
     const std::string charge_pointer = fmt::format("{}/charge/{}", pointer, i);
-    check_bounds(curve[i].first, charge_bounds, charge_pointer, "charge", problems);
+    check_bounds(curve[i].first, fraction, charge_pointer, "charge", problems);
     check_bounds(curve[i].second, field.bounds, fmt::format("{}/{}/{}", pointer, field.value_key, i),
                  field.value_key, problems);
     if (i > 0 && !(curve[i].first > curve[i - 1].first))
@@ -449,6 +434,14 @@ Result<json> parse_text(std::string_view text) {
   return parse_json(text);
 }
 
+RobotModel read_robot(const json& document, Problems& problems) {
+  RobotModel model;
+  read_document(
+      document, "", [](const Field&) { return true; }, model, problems);
+  check_robot(model, problems);
+  return model;
+}
+
 Result<Battery> parse_battery_document(const json& document) {
   Problems problems;
   RobotModel model;
@@ -531,12 +524,15 @@ std::string dumped(const json& document, int indent) {
 
 }  // namespace
 
+std::vector<RobotProblem> problems_of(const json& document) {
+  Problems problems;
+  read_robot(document, problems);
+  return problems.list();
+}
+
 Result<RobotModel> read_robot(const json& document) {
   Problems problems;
-  RobotModel model;
-  read_document(
-      document, "", [](const Field&) { return true; }, model, problems);
-  check_robot(model, problems);
+  RobotModel model = read_robot(document, problems);
   if (!problems.none()) return tl::unexpected(problems.error());
   return model;
 }

@@ -4,6 +4,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/error.h"
 #include "robot/robot_model.h"
@@ -16,6 +17,13 @@ namespace joulecast::robot {
 // numbers only; their catalogue knows the rest.
 Result<RobotModel> parse_robot(std::string_view json_text);
 Result<RobotModel> read_robot(const nlohmann::json& document);
+
+struct RobotProblem {
+  std::string pointer, says;
+};
+
+// What read_robot tells in one message, one by one; empty: nothing is wrong.
+std::vector<RobotProblem> problems_of(const nlohmann::json& document);
 
 // As parse_robot; an unreadable file is Fault::not_found, and its path stands before the message.
 Result<RobotModel> load_robot(const std::filesystem::path& path);

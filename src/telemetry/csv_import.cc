@@ -1,85 +1,55 @@
 #include "telemetry/csv_import.h"
 
-#include <charconv>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <string>
 #include <unordered_map>
 
 #include "signals/ids.h"
 #include "telemetry/codec.h"
 #include "telemetry/csv_table.h"
+#include "telemetry/import_cells.h"
 #include "telemetry/import_covariates.h"
 #include "telemetry/import_mapping.h"
+#include "telemetry/import_samples.h"
+#include "telemetry/import_series.h"
 
 namespace joulecast::telemetry {
 namespace {
 
-constexpr std::int64_t latest_utime_us = 4'102'444'800'000'000;  // the year 2100
-
-std::string_view name_of(OutsidePolicy policy) noexcept {
-  switch (policy) {
-    case OutsidePolicy::hold:
-      return "hold";
-    case OutsidePolicy::clamp:
-      return "clamp";
-    case OutsidePolicy::blank:
-      return "unmeasured";
-    case OutsidePolicy::drop_row:
-      return "drop_row";
-  }
-  return "";
-}
-
-std::string_view trimmed(std::string_view text) noexcept {
-  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
-  return text;
-}
-
-std::optional<double> parse_number(std::string_view text) noexcept {
-  if (text.starts_with('+')) text.remove_prefix(1);
-  double value = 0;
-  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (fault != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
-// Time since the column's zero in us. Whole numbers stay exact: ns since 1970 do not fit a double.
-std::optional<std::int64_t> parse_time_us(std::string_view text, std::int64_t unit_ns) noexcept {
-  std::int64_t whole = 0;
-  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), whole);
-  if (fault == std::errc{} && end == text.data() + text.size()) {
-    if (unit_ns < 1000) return whole / (1000 / unit_ns);
-    std::int64_t scaled = 0;
-    if (__builtin_mul_overflow(whole, unit_ns / 1000, &scaled)) return std::nullopt;
-    return scaled;
-  }
-  const auto real = parse_number(text);
-  if (!real) return std::nullopt;
-  const double us = *real * static_cast<double>(unit_ns) / 1000;
-  if (!(std::abs(us) <= static_cast<double>(latest_utime_us))) return std::nullopt;
-  return std::llround(us);
-}
+constexpr std::size_t main_table = SIZE_MAX;
 
 // A column that the mapping uses, with the value it holds at the present row.
 struct Column {
   std::string name;
-  std::size_t place = 0;
+  std::size_t place = 0;  // in the main table, or in its series
   const ValueLimits* limits = nullptr;
   double value = signals::unmeasured;
+  std::size_t series = main_table;  // read at the row's time from there
 };
 
 struct Reference {
   std::size_t column = 0;  // in Importer::columns_
-  bool negate = false;
+  double scale = 1;
+};
+
+// A joined table, or the main one's columns that run straight between their readings.
+struct Joined {
+  const JoinedTable* table = nullptr;  // null: the main table
+  std::vector<SeriesColumn> columns;
+  std::optional<TableSeries> series;
+  std::int64_t tolerance_us = INT64_MAX;
+  JoinReport report;
+  std::vector<std::int64_t> lags_us;
 };
 
 struct BoundExpression {
   const FieldExpression* expression = nullptr;
   std::string name;  // of the number it gives, e.g. motor_current[1]
-  std::vector<Reference> terms;
+  std::vector<Reference> terms, over;
   std::vector<Reference> sign_from;
 };
 
@@ -95,24 +65,38 @@ struct BoundLabels {
 
 class Importer {
  public:
-  Importer(CsvTable table, const ImportMapping::Content& mapping, const ImportOptions& options)
-      : table_(std::move(table)), mapping_(mapping), options_(options) {}
+  Importer(CsvTable table, std::string_view csv, const ImportMapping::Content& mapping,
+           const ImportOptions& options)
+      : table_(std::move(table)), csv_(csv), mapping_(mapping), options_(options) {}
 
-  Result<Import> run();
+  Result<std::vector<Import>> run();
 
  private:
   Result<void> bind();
-  Result<std::size_t> place_of(const std::string& column) const;
+  Result<void> read_joined();
+  Result<std::size_t> main_place(const std::string& column) const {
+    return place_of(table_, mapping_.layout, column, options_.source_name);
+  }
+  std::size_t series_column(std::size_t series, const std::string& column, const std::string& name);
   Result<Reference> bind_term(const ColumnTerm& term);
   Result<BoundExpression> bind_expression(const FieldExpression& expression, std::string name);
   Result<std::vector<Reference>> bind_terms(const std::vector<ColumnTerm>& terms);
+  bool is_held(const FieldExpression& expression) const;
   Result<void> check_required(const std::vector<std::string_view>& row) const;
   Result<std::int64_t> time_of(const std::vector<std::string_view>& row);
   Result<void> take_cells(const std::vector<std::string_view>& row);
+  void take_joined(std::int64_t utime_us);
   Result<void> take_covariates(const std::vector<std::string_view>& row);
-  double limited(double value, const ValueLimits& limits, double held, const std::string& name);
+  Result<void> take_mission(const std::vector<std::string_view>& row);
+  Result<void> take_row(const std::vector<std::string_view>& row);
+  double limited(double value, const ValueLimits& limits, double held, const std::string& name,
+                 std::size_t line);
+  double combined(const BoundExpression& bound) const;
   double evaluate(const BoundExpression& bound);
-  Result<Recording> name_recording() const;
+  Result<Recording> name_recording(const std::string& mission) const;
+  Result<void> close_mission();
+  void finish_samples(Import& mission);
+  void report_joins();
 
   [[nodiscard]] tl::unexpected<Error> refuse(const std::string& column, std::string_view text,
                                              const std::string& what) const {
@@ -125,42 +109,64 @@ class Importer {
   }
 
   CsvTable table_;
+  std::string_view csv_;
   const ImportMapping::Content& mapping_;
   const ImportOptions& options_;
   std::vector<Column> columns_;
+  std::vector<Joined> joined_;  // of the mapping, then of the main table
   std::unordered_map<std::string, std::size_t> column_index_;
   std::vector<BoundTarget> targets_;
   std::vector<BoundExpression> covariate_targets_;
   std::vector<BoundLabels> label_targets_;
   ImportedCovariates covariates_;
   std::vector<std::pair<std::size_t, const std::string*>> required_;
-  std::size_t time_place_ = 0;
+  std::vector<std::size_t> stepped_;  // numbers of electrical readings that hold
+  std::size_t time_place_ = 0, mission_place_ = 0;
   std::optional<std::int64_t> shift_us_;
   bool drop_row_ = false;
-  Import result_;
+  std::string mission_;  // that the present rows belong to; empty where a column is to name it
+  std::map<std::string, std::size_t> missions_called_;
+  Import open_;
+  std::vector<Import> result_;
 };
 
-Result<std::size_t> Importer::place_of(const std::string& column) const {
-  auto place = table_.find(column);
-  if (!place && !mapping_.column_prefix.empty()) place = table_.find(mapping_.column_prefix + column);
-  if (!place)
-    return fail(Fault::invalid, options_.source_name + ": line 1", "column '" + column + "' is missing");
-  return *place;
+// The place in columns_ of a column that is read from a series.
+std::size_t Importer::series_column(std::size_t series, const std::string& column, const std::string& name) {
+  Joined& joined = joined_[series];
+  const auto limits = mapping_.column_limits.find(name);
+  const auto how = mapping_.interpolation.find(name);
+  joined.columns.push_back({column, limits == mapping_.column_limits.end() ? nullptr : &limits->second,
+                            how == mapping_.interpolation.end() ? Interpolation::hold : how->second});
+  columns_.push_back({name, joined.columns.size() - 1, nullptr, signals::unmeasured, series});
+  return columns_.size() - 1;
 }
 
 Result<Reference> Importer::bind_term(const ColumnTerm& term) {
-  if (const auto known = column_index_.find(term.column); known != column_index_.end()) {
-    return Reference{known->second, term.negate};
+  if (const auto known = column_index_.find(term.column); known != column_index_.end())
+    return Reference{known->second, term.scale};
+  std::size_t index = 0;
+  const std::size_t colon = term.column.find(':');
+  const auto joined = std::ranges::find_if(joined_, [&](const Joined& one) {
+    return one.table != nullptr && colon != std::string::npos &&
+           one.table->name == std::string_view(term.column).substr(0, colon);
+  });
+  const auto how = mapping_.interpolation.find(term.column);
+  if (joined != joined_.end()) {
+    index = series_column(static_cast<std::size_t>(joined - joined_.begin()), term.column.substr(colon + 1),
+                          term.column);
+  } else if (how != mapping_.interpolation.end() && how->second == Interpolation::linear) {
+    index = series_column(joined_.size() - 1, term.column, term.column);
+  } else {
+    auto place = main_place(term.column);
+    if (!place) return tl::unexpected(std::move(place.error()));
+    Column column{term.column, *place};
+    if (const auto limits = mapping_.column_limits.find(term.column); limits != mapping_.column_limits.end())
+      column.limits = &limits->second;
+    columns_.push_back(std::move(column));
+    index = columns_.size() - 1;
   }
-  auto place = place_of(term.column);
-  if (!place) return tl::unexpected(std::move(place.error()));
-  Column column{term.column, *place, nullptr, signals::unmeasured};
-  if (const auto limits = mapping_.column_limits.find(term.column); limits != mapping_.column_limits.end()) {
-    column.limits = &limits->second;
-  }
-  columns_.push_back(std::move(column));
-  column_index_[term.column] = columns_.size() - 1;
-  return Reference{columns_.size() - 1, term.negate};
+  column_index_[term.column] = index;
+  return Reference{index, term.scale};
 }
 
 Result<std::vector<Reference>> Importer::bind_terms(const std::vector<ColumnTerm>& terms) {
@@ -176,17 +182,40 @@ Result<std::vector<Reference>> Importer::bind_terms(const std::vector<ColumnTerm
 Result<BoundExpression> Importer::bind_expression(const FieldExpression& expression, std::string name) {
   auto terms = bind_terms(expression.terms);
   if (!terms) return tl::unexpected(std::move(terms.error()));
+  auto over = bind_terms(expression.over);
+  if (!over) return tl::unexpected(std::move(over.error()));
   auto signs = bind_terms(expression.sign_from);
   if (!signs) return tl::unexpected(std::move(signs.error()));
-  return BoundExpression{&expression, std::move(name), std::move(*terms), std::move(*signs)};
+  return BoundExpression{&expression, std::move(name), std::move(*terms), std::move(*over),
+                         std::move(*signs)};
+}
+
+// Whether a column that it is computed from is declared to hold.
+bool Importer::is_held(const FieldExpression& expression) const {
+  const auto holds = [&](const ColumnTerm& term) {
+    const auto how = mapping_.interpolation.find(term.column);
+    return how != mapping_.interpolation.end() && how->second == Interpolation::hold;
+  };
+  return std::ranges::any_of(expression.terms, holds) || std::ranges::any_of(expression.over, holds);
 }
 
 Result<void> Importer::bind() {
-  auto time_place = place_of(mapping_.time_column);
+  for (const JoinedTable& table : mapping_.joined) {
+    joined_.push_back({.table = &table});
+    joined_.back().tolerance_us = std::llround(1e6 * table.tolerance_s);
+    joined_.back().report.table = table.name;
+  }
+  joined_.push_back({});
+  auto time_place = main_place(mapping_.layout.time_column);
   if (!time_place) return tl::unexpected(std::move(time_place.error()));
   time_place_ = *time_place;
+  if (!mapping_.mission_column.empty()) {
+    const auto place = main_place(mapping_.mission_column);
+    if (!place) return tl::unexpected(place.error());
+    mission_place_ = *place;
+  }
   for (const auto& [column, wanted] : mapping_.require) {
-    auto place = place_of(column);
+    auto place = main_place(column);
     if (!place) return tl::unexpected(std::move(place.error()));
     required_.emplace_back(*place, &wanted);
   }
@@ -194,6 +223,11 @@ Result<void> Importer::bind() {
     auto bound = bind_expression(target.expression, target.name);
     if (!bound) return tl::unexpected(std::move(bound.error()));
     targets_.push_back({&target, std::move(*bound)});
+    // What turns and drives has inertia; only electrical readings step.
+    const std::string_view field = signals::sample_fields[target.number].name;
+    if ((field.starts_with("battery_") || field == "motor_voltage" || field == "motor_current") &&
+        is_held(target.expression))
+      stepped_.push_back(target.number);
   }
   for (const CovariateTarget& target : mapping_.covariates) {
     auto bound = bind_expression(target.expression, target.name);
@@ -201,14 +235,39 @@ Result<void> Importer::bind() {
     covariate_targets_.push_back(std::move(*bound));
   }
   for (const LabelTarget& target : mapping_.labels) {
-    auto place = place_of(target.column);
+    auto place = main_place(target.column);
     if (!place) return tl::unexpected(std::move(place.error()));
     label_targets_.push_back({&target, *place});
   }
-  for (const auto& [column, limits] : mapping_.column_limits) {
-    if (!column_index_.contains(column)) {
+  for (const auto& [column, limits] : mapping_.column_limits)
+    if (!column_index_.contains(column))
       return invalid("/column_limits/" + column, "no field and no covariate uses this column");
+  for (const auto& [column, how] : mapping_.interpolation)
+    if (!column_index_.contains(column))
+      return invalid("/interpolation/" + column, "no field and no covariate uses this column");
+  return read_joined();
+}
+
+Result<void> Importer::read_joined() {
+  for (Joined& joined : joined_) {
+    if (joined.columns.empty()) continue;
+    const bool main = joined.table == nullptr;
+    std::string_view text = csv_;
+    std::string source = options_.source_name;
+    if (!main) {
+      const auto given = options_.joined.find(joined.table->name);
+      if (given == options_.joined.end())
+        return invalid("/tables/" + joined.table->name, "the table is not given");
+      text = given->second;
+      source += " with " + joined.table->name;
     }
+    auto series = TableSeries::read(text, main ? mapping_.layout : joined.table->layout, joined.columns,
+                                    source, main ? "" : joined.table->name + ":", open_.report.glitches);
+    if (!series) return tl::unexpected(std::move(series.error()));
+    joined.report.rows = series->rows();
+    joined.report.rows_unsorted = series->rows_unsorted();
+    if (!main) series->shift(-std::llround(1e6 * joined.table->delay_s));
+    joined.series = std::move(*series);
   }
   return {};
 }
@@ -224,27 +283,38 @@ Result<void> Importer::check_required(const std::vector<std::string_view>& row) 
 }
 
 Result<std::int64_t> Importer::time_of(const std::vector<std::string_view>& row) {
+  const std::string& column = mapping_.layout.time_column;
   const std::string_view text = trimmed(row[time_place_]);
-  const auto since_zero_us = parse_time_us(text, mapping_.time_unit_ns);
-  if (!since_zero_us) return refuse(mapping_.time_column, text, "is no time");
+  const auto since_zero_us = parse_time_us(text, mapping_.layout);
+  if (!since_zero_us)
+    return refuse(column, text,
+                  mapping_.layout.time_unit_ns == 0 && mapping_.layout.utc_offset.empty()
+                      ? "is no time; time/utc_offset is for stamps that name no zone"
+                      : "is no time");
   if (!shift_us_) {
-    shift_us_ = mapping_.epoch_us;
-    if (options_.start_utime_us &&
-        __builtin_sub_overflow(*options_.start_utime_us, *since_zero_us, &*shift_us_)) {
-      return refuse(mapping_.time_column, text, "is no time");
+    shift_us_ = mapping_.layout.epoch_us;
+    if (options_.start_utime_us) {
+      if (__builtin_sub_overflow(*options_.start_utime_us, *since_zero_us, &*shift_us_))
+        return refuse(column, text, "is no time");
+      // Tables of one recording count from one zero.
+      for (Joined& joined : joined_)
+        if (joined.series)
+          joined.series->shift(*shift_us_ - (joined.table == nullptr ? mapping_.layout.epoch_us
+                                                                     : joined.table->layout.epoch_us));
     }
   }
   std::int64_t utime_us = 0;
   if (__builtin_add_overflow(*since_zero_us, *shift_us_, &utime_us) || utime_us < 0 ||
-      utime_us > latest_utime_us) {
-    return refuse(mapping_.time_column, text, "is not between the years 1970 and 2100");
+      utime_us > latest_import_utime_us) {
+    return refuse(column, text, "is not between the years 1970 and 2100");
   }
   return utime_us;
 }
 
-double Importer::limited(double value, const ValueLimits& limits, double held, const std::string& name) {
+double Importer::limited(double value, const ValueLimits& limits, double held, const std::string& name,
+                         std::size_t line) {
   if (std::isnan(value) || (value >= limits.low && value <= limits.high)) return value;
-  result_.report.glitches.push_back({table_.line(), name, value, std::string(name_of(limits.outside))});
+  open_.report.glitches.push_back({line, name, value, std::string(name_of(limits.outside))});
   switch (limits.outside) {
     case OutsidePolicy::hold:
       return held;
@@ -264,19 +334,20 @@ Result<void> Importer::take_cells(const std::vector<std::string_view>& row) {
   static constexpr ValueLimits finite{std::numeric_limits<double>::lowest(),
                                       std::numeric_limits<double>::max(), OutsidePolicy::blank};
   for (Column& column : columns_) {
+    if (column.series != main_table) continue;
     const std::string_view text = trimmed(row[column.place]);
     if (text.empty()) {
       if (!mapping_.hold_empty_cells) {
         column.value = signals::unmeasured;
       } else if (!std::isnan(column.value)) {
-        ++result_.report.cells_filled;
+        ++open_.report.cells_filled;
       }
       continue;
     }
-    const auto value = parse_number(text);
+    const auto value = parse_number(text, mapping_.layout.decimal_comma);
     if (!value) return refuse(column.name, text, "is no number");
-    column.value =
-        limited(*value, column.limits != nullptr ? *column.limits : finite, column.value, column.name);
+    column.value = limited(*value, column.limits != nullptr ? *column.limits : finite, column.value,
+                           column.name, table_.line());
   }
   return {};
 }
@@ -295,11 +366,31 @@ Result<void> Importer::take_covariates(const std::vector<std::string_view>& row)
   return {};
 }
 
-double Importer::evaluate(const BoundExpression& bound) {
+// Reads every column of a series at the row's time.
+void Importer::take_joined(std::int64_t utime_us) {
+  for (std::size_t k = 0; k < joined_.size(); ++k) {
+    Joined& joined = joined_[k];
+    if (!joined.series) continue;
+    std::int64_t lag_us = 0;
+    bool all = true, beyond = false;
+    for (Column& column : columns_) {
+      if (column.series != k) continue;
+      const auto reading = joined.series->at(column.place, utime_us, joined.tolerance_us);
+      column.value = reading.value;
+      all = all && !std::isnan(reading.value);
+      beyond = beyond || reading.beyond;
+      lag_us = std::max(lag_us, reading.lag_us);
+    }
+    joined.report.matched += all;
+    joined.report.beyond_tolerance += !all && beyond;
+    if (all) joined.lags_us.push_back(lag_us);
+  }
+}
+
+double Importer::combined(const BoundExpression& bound) const {
   const FieldExpression& expression = *bound.expression;
   const auto value_of = [&](const Reference& reference) {
-    const double value = columns_[reference.column].value;
-    return reference.negate ? -value : value;
+    return reference.scale * columns_[reference.column].value;
   };
   double value = expression.constant;
   if (expression.source == FieldExpression::Source::quaternion_yaw) {
@@ -309,13 +400,23 @@ double Importer::evaluate(const BoundExpression& bound) {
     const double w = value_of(bound.terms[3]);
     value = std::atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
   } else if (expression.source == FieldExpression::Source::columns) {
-    value = 0;
-    for (const Reference& term : bound.terms) value += value_of(term);
-    if (expression.mean) value /= static_cast<double>(bound.terms.size());
+    const bool product = expression.combine == Combine::product;
+    value = product ? 1 : 0;
+    for (const Reference& term : bound.terms)
+      value = product ? value * value_of(term) : value + value_of(term);
+    if (expression.combine == Combine::mean) value /= static_cast<double>(bound.terms.size());
   }
+  for (const Reference& divisor : bound.over) value /= value_of(divisor);
+  // A quotient by 0 is no value.
+  return std::isfinite(value) ? value : signals::unmeasured;
+}
+
+double Importer::evaluate(const BoundExpression& bound) {
+  const FieldExpression& expression = *bound.expression;
+  double value = combined(bound);
   if (expression.absolute) value = std::abs(value);
   for (const Reference& reference : bound.sign_from) {
-    const double sign = value_of(reference);
+    const double sign = reference.scale * columns_[reference.column].value;
     if (sign > 0 || sign < 0) {
       if (sign < 0) value = -value;
       break;
@@ -323,11 +424,11 @@ double Importer::evaluate(const BoundExpression& bound) {
   }
   if (expression.negate) value = -value;
   value = value * expression.scale / expression.divide_by + expression.offset;
-  if (!expression.limits) return value;
-  return limited(value, *expression.limits, signals::unmeasured, bound.name);
+  if (!expression.limits || expression.rate) return value;
+  return limited(value, *expression.limits, signals::unmeasured, bound.name, table_.line());
 }
 
-Result<Recording> Importer::name_recording() const {
+Result<Recording> Importer::name_recording(const std::string& mission) const {
   Recording recording;
   recording.robot_id = options_.robot_id.value_or(mapping_.robot_id);
   if (!signals::is_valid_robot_id(recording.robot_id))
@@ -335,7 +436,9 @@ Result<Recording> Importer::name_recording() const {
   recording.mission_id = options_.mission_id.value_or(mapping_.mission_id);
   const std::filesystem::path path(options_.source_name);
   const std::pair<std::string_view, std::string> places[] = {
-      {"{stem}", path.stem().string()}, {"{folder}", path.parent_path().filename().string()}};
+      {"{stem}", path.stem().string()},
+      {"{folder}", path.parent_path().filename().string()},
+      {"{mission}", mission}};
   for (const auto& [name, text] : places) {
     if (const auto at = recording.mission_id.find(name); at != std::string::npos) {
       recording.mission_id.replace(at, name.size(), text);
@@ -350,65 +453,170 @@ Result<Recording> Importer::name_recording() const {
   return recording;
 }
 
-Result<Import> Importer::run() {
-  auto named = name_recording();
-  if (!named) return tl::unexpected(std::move(named.error()));
-  result_.recording = std::move(*named);
-  if (auto bound = bind(); !bound) return tl::unexpected(std::move(bound.error()));
+// Where the row's mission is another than the one before, that one is complete.
+Result<void> Importer::take_mission(const std::vector<std::string_view>& row) {
+  if (mapping_.mission_column.empty()) return {};
+  std::string text(trimmed(row[mission_place_]));
+  if (text.empty() && mapping_.hold_empty_cells) return {};
+  for (char& c : text)
+    if (!signals::is_valid_mission_id(std::string_view(&c, 1))) c = '_';
+  if (text == mission_) return {};
+  if (auto closed = close_mission(); !closed) return closed;
+  mission_ = std::move(text);
+  return {};
+}
 
+Result<void> Importer::take_row(const std::vector<std::string_view>& row) {
+  drop_row_ = false;
+  if (auto met = check_required(row); !met) return met;
+  auto utime_us = time_of(row);
+  if (!utime_us) return tl::unexpected(std::move(utime_us.error()));
+  if (auto taken = take_mission(row); !taken) return taken;
+  ++open_.report.rows;
+  if (auto taken = take_cells(row); !taken) return taken;
+  take_joined(*utime_us);
+
+  std::vector<signals::Sample>& samples = open_.recording.samples;
+  ImportReport& report = open_.report;
+  signals::Sample sample;
+  sample.utime_us = *utime_us;
+  sample.sequence = static_cast<std::int64_t>(samples.size());
+  sample.payload_kg = mapping_.payload_kg;
+  const auto numbers = signals::numbers_of(sample);
+  for (const BoundTarget& bound : targets_) *numbers[bound.target->number] = evaluate(bound.value);
+  if (auto taken = take_covariates(row); !taken) return taken;
+  if (!mapping_.mission_column.empty() && mission_.empty()) {
+    ++report.rows_outside_mission;
+  } else if (drop_row_) {
+    ++report.rows_glitched;
+  } else if (std::isnan(sample.wheel_velocity_rad_s[0]) || std::isnan(sample.wheel_velocity_rad_s[1])) {
+    ++report.rows_without_motion;
+  } else if (!samples.empty() && *utime_us <= samples.back().utime_us) {
+    ++report.rows_out_of_time;
+  } else {
+    samples.push_back(sample);
+    covariates_.commit(*utime_us);
+  }
+  return {};
+}
+
+// Rates, what they leave without motion, and the steps of readings that hold.
+void Importer::finish_samples(Import& mission) {
+  std::vector<signals::Sample>& samples = mission.recording.samples;
+  for (const auto& [target, bound] : targets_) {
+    const FieldExpression& expression = *bound.expression;
+    if (!expression.rate) continue;
+    differentiate(samples, target->number, *expression.rate);
+    if (!expression.limits) continue;
+    for (signals::Sample& sample : samples) {
+      double& value = *signals::numbers_of(sample)[target->number];
+      value = limited(value, *expression.limits, signals::unmeasured, bound.name, 0);
+    }
+  }
+  mission.report.rows_without_motion += std::erase_if(samples, [](const signals::Sample& s) {
+    return std::isnan(s.wheel_velocity_rad_s[0]) || std::isnan(s.wheel_velocity_rad_s[1]);
+  });
+  mission.report.samples_added = add_steps(samples, stepped_);
+  mission.report.samples = samples.size();
+}
+
+Result<void> Importer::close_mission() {
+  if (open_.recording.samples.empty()) return {};  // its rows count with the next one's
+  std::string name = mission_;
+  // The id of a mission names one.
+  if (const std::size_t before = missions_called_[mission_]++; before > 0)
+    name += "-" + std::to_string(before + 1);
+  auto named = name_recording(name);
+  if (!named) return tl::unexpected(std::move(named.error()));
+  auto covariates = covariates_.finish();
+  if (!covariates) return located(std::move(covariates.error()));
+  finish_samples(open_);
+  named->samples = std::move(open_.recording.samples);
+  named->covariates = std::move(*covariates);
+  open_.recording = std::move(*named);
+  covariates_ = covariates_.next_mission();
+  if (!open_.recording.samples.empty()) result_.push_back(std::move(open_));
+  open_ = {};
+  return {};
+}
+
+void Importer::report_joins() {
+  for (Joined& joined : joined_) {
+    if (joined.table == nullptr) continue;
+    if (!joined.lags_us.empty()) {
+      const auto middle = joined.lags_us.begin() + static_cast<std::ptrdiff_t>(joined.lags_us.size() / 2);
+      std::ranges::nth_element(joined.lags_us, middle);
+      joined.report.median_lag_s = 1e-6 * static_cast<double>(*middle);
+      joined.report.greatest_lag_s = 1e-6 * static_cast<double>(std::ranges::max(joined.lags_us));
+    }
+    result_.front().report.joins.push_back(std::move(joined.report));
+  }
+}
+
+Result<std::vector<Import>> Importer::run() {
+  if (mapping_.mission_column.empty()) {
+    // Said before any row is read.
+    if (auto named = name_recording(""); !named) return tl::unexpected(std::move(named.error()));
+  }
+  if (auto bound = bind(); !bound) return tl::unexpected(std::move(bound.error()));
   std::vector<std::string_view> row;
-  std::vector<signals::Sample>& samples = result_.recording.samples;
-  ImportReport& report = result_.report;
-  while (true) {
+  std::size_t rows = 0;
+  for (;; ++rows) {
     auto read = table_.next(row);
     if (!read) return located(std::move(read.error()));
     if (!*read) break;
-    ++report.rows;
-    drop_row_ = false;
-    if (auto met = check_required(row); !met) return tl::unexpected(std::move(met.error()));
-    auto utime_us = time_of(row);
-    if (!utime_us) return tl::unexpected(std::move(utime_us.error()));
-    if (auto taken = take_cells(row); !taken) return tl::unexpected(std::move(taken.error()));
-
-    signals::Sample sample;
-    sample.utime_us = *utime_us;
-    sample.sequence = static_cast<std::int64_t>(samples.size());
-    sample.payload_kg = mapping_.payload_kg;
-    const auto numbers = signals::numbers_of(sample);
-    for (const BoundTarget& bound : targets_) *numbers[bound.target->number] = evaluate(bound.value);
-    if (auto taken = take_covariates(row); !taken) return tl::unexpected(std::move(taken.error()));
-    if (drop_row_) {
-      ++report.rows_glitched;
-    } else if (std::isnan(sample.wheel_velocity_rad_s[0]) || std::isnan(sample.wheel_velocity_rad_s[1])) {
-      ++report.rows_without_motion;
-    } else if (!samples.empty() && *utime_us <= samples.back().utime_us) {
-      ++report.rows_out_of_time;
-    } else {
-      samples.push_back(sample);
-      covariates_.commit(*utime_us);
-    }
+    if (auto taken = take_row(row); !taken) return tl::unexpected(std::move(taken.error()));
   }
-  report.samples = samples.size();
-  if (samples.empty()) {
+  const ImportReport last = open_.report;
+  const bool open = !open_.recording.samples.empty();
+  if (auto closed = close_mission(); !closed) return tl::unexpected(std::move(closed.error()));
+  if (result_.empty())
     return fail(Fault::corrupt, options_.source_name,
-                "none of " + std::to_string(report.rows) + " rows gives a sample");
+                "none of " + std::to_string(rows) + " rows gives a sample");
+  if (!open) {
+    result_.back().report.rows += last.rows;
+    result_.back().report.rows_outside_mission += last.rows_outside_mission;
+    result_.back().report.rows_without_motion += last.rows_without_motion;
   }
-  auto covariates = covariates_.finish();
-  if (!covariates) return located(std::move(covariates.error()));
-  result_.recording.covariates = std::move(*covariates);
+  report_joins();
+  std::ranges::stable_sort(result_, {},
+                           [](const Import& one) { return one.recording.samples.front().utime_us; });
   return std::move(result_);
 }
 
 }  // namespace
 
-Result<Import> import_csv(std::string_view csv, const ImportMapping& mapping, const ImportOptions& options) {
-  auto table = CsvTable::open(csv, mapping.content().separator);
+std::vector<JoinedFile> joined_files(const ImportMapping& mapping, const std::string& source_name) {
+  const std::filesystem::path path(source_name);
+  std::vector<JoinedFile> files;
+  for (const JoinedTable& table : mapping.content().joined) {
+    std::string name = table.file;
+    const std::pair<std::string_view, std::string> places[] = {
+        {"{stem}", path.stem().string()}, {"{folder}", path.parent_path().filename().string()}};
+    for (const auto& [place, text] : places)
+      if (const auto at = name.find(place); at != std::string::npos) name.replace(at, place.size(), text);
+    files.push_back({table.name, (path.parent_path() / name).string()});
+  }
+  return files;
+}
+
+Result<std::vector<Import>> import_missions(std::string_view csv, const ImportMapping& mapping,
+                                            const ImportOptions& options) {
+  auto table = CsvTable::open(csv, mapping.content().layout.format);
   if (!table) {
     Error error = std::move(table.error());
     error.field = options.source_name + ": " + error.field;
     return tl::unexpected(std::move(error));
   }
-  return Importer(std::move(*table), mapping.content(), options).run();
+  return Importer(std::move(*table), csv, mapping.content(), options).run();
+}
+
+Result<Import> import_csv(std::string_view csv, const ImportMapping& mapping, const ImportOptions& options) {
+  auto missions = import_missions(csv, mapping, options);
+  if (!missions) return tl::unexpected(std::move(missions.error()));
+  if (missions->size() > 1)
+    return invalid(options.source_name, "holds " + std::to_string(missions->size()) + " missions");
+  return std::move(missions->front());
 }
 
 }  // namespace joulecast::telemetry

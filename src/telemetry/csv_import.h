@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,29 +31,57 @@ class ImportMapping {
   std::shared_ptr<const Content> content_;
 };
 
-// What the caller knows better than the mapping.
+// What a mapping that can be used says that is hardly meant: JSON pointer and sentence.
+struct MappingWarning {
+  std::string field, says;
+};
+[[nodiscard]] std::vector<MappingWarning> suspicious(const ImportMapping& mapping);
+
+// A joined table of the mapping, and the file that belongs to a main table.
+struct JoinedFile {
+  std::string table, path;
+};
+[[nodiscard]] std::vector<JoinedFile> joined_files(const ImportMapping& mapping,
+                                                   const std::string& source_name);
+
+// What the caller states instead of the mapping.
 struct ImportOptions {
   std::string source_name;  // file name, for {stem} and {folder} in mission_id, and for messages
   std::optional<std::string> robot_id;
   std::optional<std::string> mission_id;
-  std::optional<std::int64_t> start_utime_us;  // robot clock of the first row
+  std::optional<std::int64_t> start_utime_us;      // robot clock of the first row
+  std::map<std::string, std::string> joined = {};  // text of each joined table, by its name in the mapping
 };
 
 struct Glitch {
-  std::size_t line = 0;  // 1 = header
+  std::size_t line = 0;  // from 1; 0 of a rate, which comes of several
   std::string column;
   double value = 0;    // as read
   std::string action;  // "hold", "clamp", "unmeasured" or "drop_row", as the mapping says
 };
 
+// How the readings of a joined table met the main one's rows.
+struct JoinReport {
+  std::string table;
+  std::size_t rows = 0;              // of it
+  std::size_t rows_unsorted = 0;     // not after the row before; put in order
+  std::size_t matched = 0;           // rows of the main table that found a reading of every column ...
+  std::size_t beyond_tolerance = 0;  // ... and that did not, for the nearest one is too far
+  double median_lag_s = 0;           // from the reading to the row that uses it
+  double greatest_lag_s = 0;
+};
+
 struct ImportReport {
   std::size_t rows = 0;
-  std::size_t samples = 0;
-  std::size_t rows_without_motion = 0;  // dropped: a wheel velocity is not known (yet)
-  std::size_t rows_out_of_time = 0;     // dropped: time did not advance
-  std::size_t rows_glitched = 0;        // dropped by a limit's policy
-  std::size_t cells_filled = 0;         // empty cells of used columns that repeat the value before
-  std::vector<Glitch> glitches;         // every value out of its column's limits
+  std::size_t samples = 0;               // `samples_added` among them
+  std::size_t samples_added = 0;         // just before readings that hold change
+  std::size_t rows_without_motion = 0;   // dropped: a wheel velocity is not known (yet)
+  std::size_t rows_out_of_time = 0;      // dropped: time did not advance
+  std::size_t rows_outside_mission = 0;  // dropped: the mission's column is empty
+  std::size_t rows_glitched = 0;         // dropped by a limit's policy
+  std::size_t cells_filled = 0;          // empty cells of used columns that repeat the value before
+  std::vector<Glitch> glitches;          // every value out of its column's limits
+  std::vector<JoinReport> joins;         // of the whole main table
 };
 
 struct Import {
@@ -60,8 +89,13 @@ struct Import {
   ImportReport report;
 };
 
+// The missions of a main table with what is joined to it, in order of time; one where no column names them.
 // On bad input the error's field is "<source name>: line N" and its message names the column and the text in
-// it.
+// it. Of the reports of several missions the first has what is not a mission's own.
+[[nodiscard]] Result<std::vector<Import>> import_missions(std::string_view csv, const ImportMapping& mapping,
+                                                          const ImportOptions& options = {});
+
+// The only mission of a table; Fault::invalid where there are several.
 [[nodiscard]] Result<Import> import_csv(std::string_view csv, const ImportMapping& mapping,
                                         const ImportOptions& options = {});
 

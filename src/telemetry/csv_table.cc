@@ -11,9 +11,18 @@ std::string line_name(std::size_t line) {
 
 }  // namespace
 
-Result<CsvTable> CsvTable::open(std::string_view text, char separator) {
+std::string_view trimmed(std::string_view text) noexcept {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
+  return text;
+}
+
+Result<CsvTable> CsvTable::open(std::string_view text, const CsvFormat& format) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
-  CsvTable table(text, separator);
+  CsvTable table(text, format);
+  for (std::size_t k = 0; k < format.skip_lines; ++k) table.skip_line();
+  table.header_ = format.header;
+  if (!table.header_.empty()) return table;
   std::vector<std::string_view> names;
   auto read = table.read_row(names);
   if (!read) return tl::unexpected(std::move(read.error()));
@@ -23,7 +32,8 @@ Result<CsvTable> CsvTable::open(std::string_view text, char separator) {
 }
 
 std::optional<std::size_t> CsvTable::find(std::string_view name) const noexcept {
-  const auto found = std::find(header_.begin(), header_.end(), name);
+  const auto found =
+      std::ranges::find(header_, trimmed(name), [](const std::string& one) { return trimmed(one); });
   if (found == header_.end()) return std::nullopt;
   return static_cast<std::size_t>(found - header_.begin());
 }
@@ -38,53 +48,90 @@ Result<bool> CsvTable::next(std::vector<std::string_view>& fields) {
   return read;
 }
 
+bool CsvTable::at_line_end() const noexcept {
+  return at_ >= text_.size() || text_[at_] == '\n' || text_[at_] == '\r';
+}
+
+bool CsvTable::at_separator() const noexcept {
+  if (at_ >= text_.size()) return false;
+  return format_.blanks ? text_[at_] == ' ' || text_[at_] == '\t' : text_[at_] == format_.separator;
+}
+
+void CsvTable::skip_line() noexcept {
+  while (at_ < text_.size() && text_[at_] != '\n') ++at_;
+  if (at_ >= text_.size()) return;
+  ++at_;
+  ++line_;
+}
+
+void CsvTable::skip_blanks() noexcept {
+  while (at_ < text_.size() && (text_[at_] == ' ' || text_[at_] == '\t')) ++at_;
+}
+
+// After the opening quote, to behind the closing one.
+Result<std::string_view> CsvTable::quoted_field() {
+  const std::size_t opened = line_;
+  const std::size_t begin = at_;
+  bool doubled = false;
+  while (at_ < text_.size() && (text_[at_] != '"' || (at_ + 1 < text_.size() && text_[at_ + 1] == '"'))) {
+    if (text_[at_] == '"') {
+      doubled = true;
+      ++at_;
+    } else if (text_[at_] == '\n') {
+      ++line_;
+    }
+    ++at_;
+  }
+  if (at_ >= text_.size()) return fail(Fault::corrupt, line_name(opened), "a quoted field is never closed");
+  const std::string_view field = text_.substr(begin, at_ - begin);
+  ++at_;
+  if (!at_line_end() && !at_separator())
+    return fail(Fault::corrupt, line_name(line_), "text follows a quoted field");
+  if (!doubled) return field;
+  std::string& plain = unquoted_.emplace_back();
+  for (std::size_t i = 0; i < field.size(); ++i) {
+    plain += field[i];
+    if (field[i] == '"') ++i;
+  }
+  return plain;
+}
+
 Result<bool> CsvTable::read_row(std::vector<std::string_view>& fields) {
   fields.clear();
   unquoted_.clear();
-  while (at_ < text_.size() && (text_[at_] == '\n' || text_[at_] == '\r')) {
-    if (text_[at_] == '\n') ++line_;
-    ++at_;
+  while (at_ < text_.size()) {
+    if (format_.blanks) skip_blanks();
+    if (at_ >= text_.size()) break;
+    if (format_.comment.find(text_[at_]) != std::string::npos) {
+      skip_line();
+    } else if (at_line_end()) {
+      if (text_[at_] == '\n') ++line_;
+      ++at_;
+    } else {
+      break;
+    }
   }
   if (at_ >= text_.size()) return false;
   row_line_ = line_;
   while (true) {
     if (at_ < text_.size() && text_[at_] == '"') {
-      const std::size_t opened = line_;
-      const std::size_t begin = ++at_;
-      bool doubled = false;
-      while (at_ < text_.size() && (text_[at_] != '"' || (at_ + 1 < text_.size() && text_[at_ + 1] == '"'))) {
-        if (text_[at_] == '"') {
-          doubled = true;
-          ++at_;
-        } else if (text_[at_] == '\n') {
-          ++line_;
-        }
-        ++at_;
-      }
-      if (at_ >= text_.size())
-        return fail(Fault::corrupt, line_name(opened), "a quoted field is never closed");
-      std::string_view field = text_.substr(begin, at_ - begin);
       ++at_;
-      if (doubled) {
-        std::string& plain = unquoted_.emplace_back();
-        for (std::size_t i = 0; i < field.size(); ++i) {
-          plain += field[i];
-          if (field[i] == '"') ++i;
-        }
-        field = plain;
-      }
-      fields.push_back(field);
-      if (at_ < text_.size() && text_[at_] != separator_ && text_[at_] != '\n' && text_[at_] != '\r') {
-        return fail(Fault::corrupt, line_name(line_), "text follows a quoted field");
-      }
+      auto field = quoted_field();
+      if (!field) return tl::unexpected(std::move(field.error()));
+      fields.push_back(*field);
     } else {
       const std::size_t begin = at_;
-      while (at_ < text_.size() && text_[at_] != separator_ && text_[at_] != '\n' && text_[at_] != '\r')
-        ++at_;
+      while (!at_line_end() && !at_separator()) ++at_;
       fields.push_back(text_.substr(begin, at_ - begin));
     }
-    if (at_ >= text_.size() || text_[at_] != separator_) return true;
-    ++at_;
+    if (format_.blanks) {
+      skip_blanks();
+      if (at_line_end()) return true;
+    } else if (at_separator()) {
+      ++at_;
+    } else {
+      return true;
+    }
   }
 }
 

@@ -64,6 +64,14 @@ void ImportedCovariates::commit(std::int64_t utime_us) {
     if (labels.known && labels.first_utime_us < 0) labels.first_utime_us = utime_us;
 }
 
+ImportedCovariates ImportedCovariates::next_mission() const {
+  ImportedCovariates next = *this;
+  next.committed_.clear();
+  next.changes_.clear();
+  for (auto& [quantity, labels] : next.labels_) labels.first_utime_us = -1;
+  return next;
+}
+
 Result<std::vector<signals::CovariateSeries>> ImportedCovariates::finish() {
   std::vector<signals::CovariateChange> before;
   for (const auto& [quantity, labels] : labels_) {

@@ -28,6 +28,9 @@ class ImportedCovariates {
 
   void commit(std::int64_t utime_us);
 
+  // For the mission that follows in the same table: knows what holds, and has committed nothing.
+  [[nodiscard]] ImportedCovariates next_mission() const;
+
   // A label that comes later in the table did not hold before. Fault::invalid for more names than a mission
   // may have.
   Result<std::vector<signals::CovariateSeries>> finish();

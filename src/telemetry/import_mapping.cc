@@ -5,9 +5,11 @@
 #include <functional>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <utility>
 
 #include "base/json_text.h"
+#include "base/utc_time.h"
 #include "signals/covariates.h"
 #include "signals/ids.h"
 #include "telemetry/codec.h"
@@ -17,13 +19,18 @@ namespace {
 
 using nlohmann::json;
 
-// Reads members of one JSON document; the first fault sticks and later reads give defaults.
+// Reads members of one JSON document; what is faulty gives defaults. All faults become one error: its field
+// is the first one's pointer.
 class Reader {
  public:
   std::optional<Error> error;
 
   void refuse(std::string pointer, std::string message) {
-    if (!error) error = Error{Fault::invalid, std::move(pointer), std::move(message)};
+    if (!refused_.insert(pointer).second) return;
+    if (error)
+      error->message += "; " + pointer + ": " + message;
+    else
+      error = Error{Fault::invalid, std::move(pointer), std::move(message)};
   }
 
   bool object(const json& value, const std::string& pointer, std::initializer_list<std::string_view> known) {
@@ -32,10 +39,8 @@ class Reader {
       return false;
     }
     for (const auto& [key, member] : value.items()) {
-      if (std::find(known.begin(), known.end(), key) == known.end()) {
-        refuse(pointer + "/" + key, "is no member that a mapping knows");
-        return false;
-      }
+      if (std::find(known.begin(), known.end(), key) == known.end())
+        refuse(pointer + "/" + key, "is not a member of a mapping");
     }
     return true;
   }
@@ -71,11 +76,16 @@ class Reader {
   }
 
   ColumnTerm term(const json& value, const std::string& pointer) {
-    if (value.is_string()) return {text(value, pointer), false};
     ColumnTerm result;
-    if (!object(value, pointer, {"column", "negate"})) return result;
+    if (value.is_string()) {
+      result.column = text(value, pointer);
+      return result;
+    }
+    if (!object(value, pointer, {"column", "negate", "scale"})) return result;
     result.column = text(value.value("column", json()), pointer + "/column");
-    if (value.contains("negate")) result.negate = boolean(value["negate"], pointer + "/negate");
+    if (value.contains("scale")) result.scale = number(value["scale"], pointer + "/scale");
+    if (value.contains("negate") && boolean(value["negate"], pointer + "/negate"))
+      result.scale = -result.scale;
     return result;
   }
 
@@ -107,13 +117,7 @@ class Reader {
     return result;
   }
 
-  FieldExpression expression(const json& value, const std::string& pointer) {
-    FieldExpression result;
-    if (!object(value, pointer,
-                {"constant", "column", "columns", "quaternion_yaw", "combine", "abs", "sign_from", "negate",
-                 "scale", "divide_by", "offset", "limits"})) {
-      return result;
-    }
+  void source(const json& value, const std::string& pointer, FieldExpression& result) {
     const auto sources = value.count("constant") + value.count("column") + value.count("columns") +
                          value.count("quaternion_yaw");
     if (sources != 1) refuse(pointer, "must have exactly one of constant, column, columns, quaternion_yaw");
@@ -121,7 +125,7 @@ class Reader {
       result.constant = number(value["constant"], pointer + "/constant");
     } else if (value.contains("column")) {
       result.source = FieldExpression::Source::columns;
-      result.terms = {{text(value["column"], pointer + "/column"), false}};
+      result.terms.emplace_back().column = text(value["column"], pointer + "/column");
     } else if (value.contains("columns")) {
       result.source = FieldExpression::Source::columns;
       result.terms = terms(value["columns"], pointer + "/columns");
@@ -131,9 +135,33 @@ class Reader {
       if (result.terms.size() != 4)
         refuse(pointer + "/quaternion_yaw", "must name the columns of x, y, z and w");
     }
-    if (value.contains("combine")) {
-      result.mean = choice<bool>(value["combine"], pointer + "/combine", {{"sum", false}, {"mean", true}});
+    if (value.contains("combine"))
+      result.combine =
+          choice<Combine>(value["combine"], pointer + "/combine",
+                          {{"sum", Combine::sum}, {"mean", Combine::mean}, {"product", Combine::product}});
+    if (value.contains("over")) result.over = terms(value["over"], pointer + "/over");
+  }
+
+  RateOf rate(const json& value, const std::string& pointer) {
+    RateOf result;
+    if (!object(value, pointer, {"window_s", "wraps_at"})) return result;
+    if (value.contains("window_s")) result.window_s = number(value["window_s"], pointer + "/window_s");
+    if (result.window_s < 0) refuse(pointer + "/window_s", "must not be negative");
+    if (value.contains("wraps_at")) {
+      result.wraps_at = number(value["wraps_at"], pointer + "/wraps_at");
+      if (*result.wraps_at <= 0) refuse(pointer + "/wraps_at", "must be above 0");
     }
+    return result;
+  }
+
+  FieldExpression expression(const json& value, const std::string& pointer, bool may_be_rate = true) {
+    FieldExpression result;
+    if (!object(value, pointer,
+                {"constant", "column", "columns", "quaternion_yaw", "combine", "over", "abs", "sign_from",
+                 "negate", "scale", "divide_by", "offset", "rate", "limits"})) {
+      return result;
+    }
+    source(value, pointer, result);
     if (value.contains("abs")) result.absolute = boolean(value["abs"], pointer + "/abs");
     if (value.contains("sign_from")) result.sign_from = terms(value["sign_from"], pointer + "/sign_from");
     if (value.contains("negate")) result.negate = boolean(value["negate"], pointer + "/negate");
@@ -142,6 +170,13 @@ class Reader {
     if (result.divide_by == 0) refuse(pointer + "/divide_by", "must not be 0");
     if (value.contains("offset")) result.offset = number(value["offset"], pointer + "/offset");
     if (value.contains("limits")) result.limits = limits(value["limits"], pointer + "/limits", false);
+    if (!value.contains("rate")) return result;
+    result.rate = rate(value["rate"], pointer + "/rate");
+    if (!may_be_rate) refuse(pointer + "/rate", "belongs to fields, not to covariates");
+    if (result.absolute || !result.sign_from.empty())
+      refuse(pointer + "/rate", "does not go with abs and sign_from, which would act on the position");
+    if (result.limits && result.limits->outside == OutsidePolicy::drop_row)
+      refuse(pointer + "/limits/outside", "must be clamp or unmeasured for a rate");
     return result;
   }
 
@@ -200,7 +235,7 @@ class Reader {
     if (value.contains("covariates")) {
       each_covariate(value["covariates"], "/covariates",
                      [&](const std::string& name, const json& member, const std::string& here) {
-                       content.covariates.push_back({name, expression(member, here)});
+                       content.covariates.push_back({name, expression(member, here, false)});
                      });
     }
     if (value.contains("labels")) {
@@ -216,49 +251,126 @@ class Reader {
              "must be at most " + std::to_string(signals::max_covariates) + ", labels among them");
   }
 
-  void time(const json& value, ImportMapping::Content& content) {
-    if (!object(value, "/time", {"column", "unit", "epoch_us"})) return;
-    content.time_column = text(value.value("column", json()), "/time/column");
-    content.time_unit_ns =
-        choice<std::int64_t>(value.value("unit", json()), "/time/unit",
-                             {{"s", 1'000'000'000}, {"ms", 1'000'000}, {"us", 1'000}, {"ns", 1}});
+  void time(const json& value, const std::string& pointer, TableLayout& layout) {
+    if (!object(value, pointer, {"column", "unit", "epoch_us", "utc_offset"})) return;
+    layout.time_column = text(value.value("column", json()), pointer + "/column");
+    layout.time_unit_ns = choice<std::int64_t>(
+        value.value("unit", json()), pointer + "/unit",
+        {{"s", 1'000'000'000}, {"ms", 1'000'000}, {"us", 1'000}, {"ns", 1}, {"iso8601", 0}});
+    if (value.contains("utc_offset")) {
+      layout.utc_offset = text(value["utc_offset"], pointer + "/utc_offset");
+      if (!parse_utc("2000-01-01T00:00:00" + layout.utc_offset))
+        refuse(pointer + "/utc_offset", "must be Z or like +01:00");
+      if (layout.time_unit_ns != 0) refuse(pointer + "/utc_offset", "goes with the unit iso8601 only");
+    }
     if (!value.contains("epoch_us")) return;
-    if (value["epoch_us"].is_number_integer() && value["epoch_us"] >= 0 &&
-        value["epoch_us"] <= 4'102'444'800'000'000) {  // the year 2100
-      content.epoch_us = value["epoch_us"].get<std::int64_t>();
+    if (layout.time_unit_ns == 0) {
+      refuse(pointer + "/epoch_us", "does not go with the unit iso8601");
+    } else if (value["epoch_us"].is_number_integer() && value["epoch_us"] >= 0 &&
+               value["epoch_us"] <= 4'102'444'800'000'000) {  // the year 2100
+      layout.epoch_us = value["epoch_us"].get<std::int64_t>();
     } else {
-      refuse("/time/epoch_us", "must be a whole number of microseconds from 0 to 4102444800000000");
+      refuse(pointer + "/epoch_us", "must be a whole number of microseconds from 0 to 4102444800000000");
     }
   }
 
-  ImportMapping::Content mapping(const json& value) {
-    ImportMapping::Content content;
-    if (!object(
-            value, "",
-            {"$schema", "description", "robot_id", "mission_id", "payload_kg", "separator", "column_prefix",
-             "time", "empty_cells", "require", "column_limits", "fields", "covariates", "labels"})) {
-      return content;
+  // The members that say how a table is written; `pointer` is of the object that holds them.
+  void layout(const json& value, const std::string& pointer, TableLayout& result) {
+    if (value.contains("separator")) {
+      const std::string separator = text(value["separator"], pointer + "/separator");
+      result.format.blanks = separator == "blanks";
+      if (!result.format.blanks &&
+          (separator.size() != 1 || separator == "\"" || separator == "\n" || separator == "\r"))
+        refuse(pointer + "/separator", "must be \"blanks\" or one character, not a quote or line end");
+      else
+        result.format.separator = separator[0];
     }
+    if (value.contains("decimal"))
+      result.decimal_comma =
+          choice<bool>(value["decimal"], pointer + "/decimal", {{".", false}, {",", true}});
+    if (result.decimal_comma && !result.format.blanks && result.format.separator == ',')
+      refuse(pointer + "/decimal", "is the separator too: give separator, often \";\"");
+    if (value.contains("comment")) result.format.comment = text(value["comment"], pointer + "/comment");
+    if (value.contains("skip_lines")) {
+      if (value["skip_lines"].is_number_integer() && value["skip_lines"] >= 0 &&
+          value["skip_lines"] <= 10'000)
+        result.format.skip_lines = value["skip_lines"].get<std::size_t>();
+      else
+        refuse(pointer + "/skip_lines", "must be a whole number from 0 to 10000");
+    }
+    if (value.contains("header"))
+      for (const ColumnTerm& term : terms(value["header"], pointer + "/header"))
+        result.format.header.push_back(term.column);
+    if (value.contains("column_prefix"))
+      result.column_prefix = text(value["column_prefix"], pointer + "/column_prefix");
+    time(value.value("time", json()), pointer + "/time", result);
+  }
+
+  void joined(const json& value, ImportMapping::Content& content) {
+    if (!value.is_object()) return refuse("/tables", "must be an object");
+    for (const auto& [name, member] : value.items()) {
+      const std::string here = "/tables/" + name;
+      JoinedTable table;
+      table.name = name;
+      if (name.empty() || name.find(':') != std::string::npos) refuse(here, "must be a name without ':'");
+      if (!object(member, here,
+                  {"file", "delay_s", "tolerance_s", "separator", "decimal", "comment", "skip_lines",
+                   "header", "column_prefix", "time"}))
+        continue;
+      table.file = text(member.value("file", json()), here + "/file");
+      if (member.contains("delay_s")) table.delay_s = number(member["delay_s"], here + "/delay_s");
+      if (std::abs(table.delay_s) > 3600) refuse(here + "/delay_s", "must be within an hour");
+      if (member.contains("tolerance_s"))
+        table.tolerance_s = number(member["tolerance_s"], here + "/tolerance_s");
+      if (table.tolerance_s <= 0 || table.tolerance_s > 1e6)
+        refuse(here + "/tolerance_s", "must be above 0 and at most 1000000");
+      layout(member, here, table.layout);
+      content.joined.push_back(std::move(table));
+    }
+  }
+
+  void interpolation(const json& value, ImportMapping::Content& content) {
+    if (!value.is_object()) return refuse("/interpolation", "must be an object");
+    for (const auto& [column, how] : value.items())
+      content.interpolation[column] =
+          choice<Interpolation>(how, "/interpolation/" + column,
+                                {{"hold", Interpolation::hold}, {"linear", Interpolation::linear}});
+  }
+
+  void names(const json& value, ImportMapping::Content& content) {
     content.robot_id = text(value.value("robot_id", json()), "/robot_id");
     if (!signals::is_valid_robot_id(content.robot_id)) {
       refuse("/robot_id", "must be 1 to " + std::to_string(signals::max_robot_id_length) +
                               " of letters, digits, '.', '_', '-'");
     }
+    if (value.contains("mission")) {
+      const json& mission = value["mission"];
+      if (object(mission, "/mission", {"column"}))
+        content.mission_column = text(mission.value("column", json()), "/mission/column");
+      content.mission_id = "{mission}";
+    }
     if (value.contains("mission_id")) content.mission_id = text(value["mission_id"], "/mission_id");
+    if (!content.mission_column.empty() && content.mission_id.find("{mission}") == std::string::npos)
+      refuse("/mission_id", "must hold {mission}, for a column names the missions");
     if (value.contains("payload_kg")) {
       content.payload_kg = number(value["payload_kg"], "/payload_kg");
       if (content.payload_kg < 0) refuse("/payload_kg", "must not be negative");
     }
-    if (value.contains("separator")) {
-      const std::string separator = text(value["separator"], "/separator");
-      content.separator = separator.empty() ? ',' : separator[0];
-      if (separator.size() != 1 || separator == "\"" || separator == "\n" || separator == "\r") {
-        refuse("/separator", "must be one character, not a quote or line end");
-      }
+  }
+
+  ImportMapping::Content mapping(const json& value) {
+    ImportMapping::Content content;
+    if (!object(value, "",
+                {"$schema",   "description", "robot_id",      "mission_id",  "mission", "payload_kg",
+                 "separator", "decimal",     "comment",       "skip_lines",  "header",  "column_prefix",
+                 "time",      "tables",      "interpolation", "empty_cells", "require", "column_limits",
+                 "fields",    "covariates",  "labels"})) {
+      return content;
     }
-    if (value.contains("column_prefix"))
-      content.column_prefix = text(value["column_prefix"], "/column_prefix");
-    time(value.value("time", json()), content);
+    names(value, content);
+    layout(value, "", content.layout);
+    if (value.contains("tables")) joined(value["tables"], content);
+    if (value.contains("interpolation")) interpolation(value["interpolation"], content);
     if (value.contains("empty_cells")) {
       content.hold_empty_cells =
           choice<bool>(value["empty_cells"], "/empty_cells", {{"hold", true}, {"unmeasured", false}});
@@ -281,6 +393,9 @@ class Reader {
     covariates(value, content);
     return content;
   }
+
+ private:
+  std::set<std::string> refused_;
 };
 
 }  // namespace
@@ -292,6 +407,42 @@ Result<ImportMapping> ImportMapping::parse(std::string_view text) {
   auto content = std::make_shared<const Content>(reader.mapping(*document));
   if (reader.error) return tl::unexpected(std::move(*reader.error));
   return ImportMapping(std::move(content));
+}
+
+std::vector<MappingWarning> suspicious(const ImportMapping& mapping) {
+  const ImportMapping::Content& content = mapping.content();
+  std::vector<MappingWarning> found;
+  std::map<std::string_view, const FieldExpression*> given;
+  for (const FieldTarget& target : content.targets) given[target.name] = &target.expression;
+  const auto has = [&](std::string_view name) { return given.contains(name); };
+  const bool battery = has("battery_voltage") && has("battery_current");
+  const bool motors = has("motor_voltage[0]") && has("motor_current[0]");
+  if (!battery && !motors)
+    found.push_back({"/fields",
+                     "give neither the battery's voltage and current nor the motors': no power "
+                     "will be known"});
+  const auto is_constant = [&](std::string_view name) {
+    return has(name) && given[name]->source == FieldExpression::Source::constant;
+  };
+  if (is_constant("battery_voltage"))
+    found.push_back({"/fields/battery_voltage",
+                     "is a constant: power is the current times it, but nothing is learnt from the voltage"});
+  for (const FieldTarget& target : content.targets)
+    // A constant pitch is a statement: that a dynamometer is flat.
+    if (target.name != "battery_voltage" && target.name != "pitch" && is_constant(target.name))
+      found.push_back({"/fields/" + target.name, "is a constant, not a measurement: leave it out"});
+  const auto same = [&](const std::string& field) {
+    const auto right = given.find(field + "[0]"), left = given.find(field + "[1]");
+    if (right == given.end() || left == given.end()) return false;
+    const auto& [a, b] = std::pair(right->second->terms, left->second->terms);
+    return !a.empty() && std::ranges::equal(a, b, [](const ColumnTerm& x, const ColumnTerm& y) {
+      return x.column == y.column && x.scale == y.scale;
+    });
+  };
+  for (const char* field : {"wheel_velocity", "motor_voltage", "motor_current"})
+    if (same(field))
+      found.push_back({std::string("/fields/") + field, "reads both sides from the same columns"});
+  return found;
 }
 
 }  // namespace joulecast::telemetry

@@ -12,6 +12,7 @@
 
 #include "signals/sample.h"
 #include "telemetry/csv_import.h"
+#include "telemetry/csv_table.h"
 
 // What a mapping file says, as data. Only the import's own sources use this.
 namespace joulecast::telemetry {
@@ -30,24 +31,35 @@ struct ValueLimits {
 };
 
 struct ColumnTerm {
-  std::string column;
-  bool negate = false;
+  std::string column;  // "<table>:<column>" of a joined table
+  double scale = 1;    // negation among it
 };
 
-// One number of a sample: combine(terms), then |.|, sign of the first non-zero reference, negation,
-// * scale / divide_by + offset, limits.
+enum class Combine { sum, mean, product };
+
+// A position becomes a speed: the slope of a straight line through the readings of a window about each
+// sample, its neighbours at least.
+struct RateOf {
+  double window_s = 0;
+  std::optional<double> wraps_at;  // the reading's period: it leaps back by this
+};
+
+// One number of a sample: combine(terms) / product(over), then |.|, sign of the first non-zero reference,
+// negation, * scale / divide_by + offset, rate, limits.
 struct FieldExpression {
   enum class Source { constant, columns, quaternion_yaw };
   Source source = Source::constant;
   double constant = signals::unmeasured;
   std::vector<ColumnTerm> terms;  // of a quaternion: x, y, z, w
-  bool mean = false;              // else the sum
+  Combine combine = Combine::sum;
+  std::vector<ColumnTerm> over;
   bool absolute = false;
   std::vector<ColumnTerm> sign_from;
   bool negate = false;
   double scale = 1;
   double divide_by = 1;
   double offset = 0;
+  std::optional<RateOf> rate;
   std::optional<ValueLimits> limits;
 };
 
@@ -68,15 +80,36 @@ struct LabelTarget {
   std::string column;
 };
 
+// How a table is written and where its time is.
+struct TableLayout {
+  CsvFormat format;
+  bool decimal_comma = false;
+  std::string column_prefix;
+  std::string time_column;
+  std::int64_t time_unit_ns = 1'000'000'000;  // 0: ISO 8601
+  std::string utc_offset;     // of ISO stamps that name no zone: "Z", "+01:00"; empty: refused
+  std::int64_t epoch_us = 0;  // robot clock where the time column reads 0
+};
+
+enum class Interpolation { hold, linear };
+
+// A table whose columns are read at the times of the main one.
+struct JoinedTable {
+  std::string name;
+  std::string file;  // {stem} and {folder} of the main table; relative to the main table's folder
+  TableLayout layout;
+  double delay_s = 0;      // taken from its stamps
+  double tolerance_s = 1;  // an older reading (linear: a wider gap) gives no value
+};
+
 struct ImportMapping::Content {
   std::string robot_id;
   std::string mission_id = "{stem}";
   double payload_kg = signals::unmeasured;
-  char separator = ',';
-  std::string column_prefix;
-  std::string time_column;
-  std::int64_t time_unit_ns = 1'000'000'000;
-  std::int64_t epoch_us = 0;  // robot clock where the time column reads 0
+  TableLayout layout;
+  std::vector<JoinedTable> joined;
+  std::map<std::string, Interpolation> interpolation;  // by column
+  std::string mission_column;                          // its text names the mission; empty: one a table
   bool hold_empty_cells = true;
   std::map<std::string, std::string> require;  // every non-empty cell of the column reads exactly this
   std::map<std::string, ValueLimits> column_limits;

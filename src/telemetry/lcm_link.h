@@ -13,7 +13,7 @@
 
 namespace joulecast::telemetry {
 
-// The group and port that LCM programs share unless told; ttl=0 keeps what is sent on this machine. The
+// The default group and port of LCM programs; ttl=0 keeps what is sent on this machine. The
 // kernel's usual receive buffer holds some 30 ms of 6,000 messages a second, less than a busy machine may
 // keep the receiver waiting, and drops the rest unseen; 4 MiB hold more than a second of them, where
 // net.core.rmem_max allows so much.

@@ -1,5 +1,6 @@
 #include "telemetry/log_recordings.h"
 
+#include <cmath>
 #include <map>
 #include <optional>
 #include <utility>
@@ -57,7 +58,15 @@ class Collector {
   void refuse() { ++result_.unreadable; }
 
   void add(const std::string& id, const signals::Sample& sample) {
-    if (check_plausible(sample)) return refuse();
+    if (const auto fault = check_plausible(sample)) {
+      if (fault->why == Implausibility::out_of_range) {
+        BeyondRange& beyond =
+            result_.beyond_range[std::string(fault->field.substr(0, fault->field.find('[')))];
+        ++beyond.samples;
+        if (std::fabs(fault->value) > std::fabs(beyond.farthest)) beyond.farthest = fault->value;
+      }
+      return refuse();
+    }
     Robot& robot = robots_[id];
     const SampleStep step = robot.missions.on_sample(sample.utime_us, sample.payload_kg);
     carry_out(id, robot, step.actions);

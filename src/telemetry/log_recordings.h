@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <map>
 #include <set>
 #include <span>
 #include <string>
@@ -12,14 +13,22 @@
 
 namespace joulecast::telemetry {
 
+// Samples left out for a value of one field that no robot reads (plausible_ranges()).
+struct BeyondRange {
+  std::size_t samples = 0;
+  double farthest = 0;  // from zero, of these values
+};
+
 // The missions of event logs, in the order in which they began.
 struct LogRecordings {
   std::vector<Recording> recordings;          // their samples in order of time; a mission may hold none
-  std::set<std::string, std::less<>> robots;  // all that were heard, wanted or not
+  std::set<std::string, std::less<>> robots;  // all that occur, requested or not
   std::size_t samples_outside = 0;            // of no mission: before its start, or just after an end
   // Messages and covariates that decode to nothing, break a limit or come late, samples of one time, and
   // damaged places of the files.
   std::size_t unreadable = 0;
+  // Of these, by field.
+  std::map<std::string, BeyondRange> beyond_range{};
 };
 
 // Reads LCM event logs, one going on where the other ends, into missions as the daemon would follow them

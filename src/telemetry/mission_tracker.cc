@@ -153,7 +153,7 @@ void MissionTracker::on_end(MissionActions& actions, const signals::MissionEvent
   } else if (current_ && event.utime_us > begin_us_ + limits_.reorder_us) {
     // A robot does one mission at a time: whose end is told now began after the open one, unheard.
     close(actions, event.utime_us, MissionEnd::superseded,
-          "holds mission " + event.mission_id + " too, whose start was not heard");
+          "holds mission " + event.mission_id + " too, whose start was not received");
     explicit_end_us_ = event.utime_us;
   }
   remember({event.mission_id, {}, event.utime_us});

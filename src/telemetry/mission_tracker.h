@@ -67,9 +67,9 @@ struct MissionCounters {
   std::uint64_t opened_explicit = 0;
   std::uint64_t opened_implicit = 0;
   std::uint64_t closed = 0;
-  std::uint64_t duplicate_events = 0;     // of a start or an end that was heard already
+  std::uint64_t duplicate_events = 0;     // of a start or an end that was received already
   std::uint64_t out_of_order_events = 0;  // older than the mission they would change
-  std::uint64_t unknown_missions = 0;     // an end of a mission whose start was never heard
+  std::uint64_t unknown_missions = 0;     // an end of a mission whose start was not received
   std::uint64_t samples_outside = 0;      // belong to no mission: before its start, or just after an end
 };
 
@@ -94,7 +94,7 @@ class MissionTracker {
   // to current() if it belongs.
   SampleStep on_sample(std::int64_t utime_us, double payload_kg);
   MissionActions on_event(const signals::MissionEvent& event);
-  // Nothing was heard of the robot for so long by the HOST's clock.
+  // Nothing was received from the robot for so long by the HOST's clock.
   MissionActions on_silence(std::int64_t silent_us);
   // The robot's clock was set (ClockStep of the sequence tracker): the open mission goes on in the new time.
   void on_clock_step(std::int64_t utime_us);
@@ -109,7 +109,7 @@ class MissionTracker {
   // A mission of the past, or one of which the end came without a start.
   struct Past {
     std::string mission_id;
-    std::optional<std::int64_t> start_us;     // as its STARTED said; absent: no start was heard
+    std::optional<std::int64_t> start_us;     // as its STARTED said; absent: no start was received
     std::optional<std::int64_t> said_end_us;  // as FINISHED or ABORTED said
     std::int64_t from_us = 0;                 // its span in the clock at its end
     std::int64_t to_us = -1;

@@ -118,6 +118,16 @@ Result<RecordingSet> load_recordings(std::span<const std::string> paths, const s
   if (log->unreadable > 0)
     set->notes.push_back(
         fmt::format("{} messages or values could not be read, break a limit or come twice", log->unreadable));
+  for (const auto& [field, beyond] : log->beyond_range) {
+    const bool current = field.ends_with("_current"), voltage = field.ends_with("_voltage");
+    set->notes.push_back(fmt::format(
+        "{} of these samples have a {} that no robot reads, as far as {:.4g}{}; what is left may be a biased "
+        "choice",
+        beyond.samples, field, beyond.farthest,
+        current   ? " (in mA?)"
+        : voltage ? " (in mV?)"
+                  : ""));
+  }
   if (log->samples_outside > 0)
     set->notes.push_back(
         fmt::format("{} samples lie before a mission's start or just after its end and were left out",

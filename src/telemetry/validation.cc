@@ -54,6 +54,28 @@ std::array<double, ranges.size()> channels(const signals::Sample& s) noexcept {
           s.payload_kg};
 }
 
+// Units that are mistaken for those wanted, and how many of them make one.
+struct MistakenUnit {
+  std::string_view field, unit;
+  double factor;
+};
+constexpr MistakenUnit mistaken_units[] = {{"motor_voltage", "mV", 1000},
+                                           {"motor_current", "mA", 1000},
+                                           {"battery_voltage", "mV", 1000},
+                                           {"battery_current", "mA", 1000},
+                                           {"yaw_rate", "degrees a second", 57.3},
+                                           {"pitch", "degrees", 57.3},
+                                           {"payload_mass", "g", 1000},
+                                           {"wheel_velocity", "rpm of the motor shaft", 9.55}};
+
+std::string_view mistaken_unit(const Implausible& fault, const PlausibleRange& range) {
+  for (const MistakenUnit& u : mistaken_units) {
+    const double value = fault.value / u.factor;
+    if (range.field.starts_with(u.field) && value >= range.low && value <= range.high) return u.unit;
+  }
+  return {};
+}
+
 std::optional<Implausible> check_clock(std::int64_t utime_us) noexcept {
   if (utime_us >= 0 && utime_us < year_2200_us) return std::nullopt;
   return Implausible{Implausibility::bad_clock, "utime", static_cast<double>(utime_us)};
@@ -140,6 +162,8 @@ std::string describe(const Implausible& fault) {
     std::snprintf(numbers, sizeof numbers, " is %.6g; no robot reports values outside %g to %g", fault.value,
                   range.low, range.high);
     text += numbers;
+    if (const std::string_view unit = mistaken_unit(fault, range); !unit.empty())
+      text.append("; is it in ").append(unit).append("?");
     return text;
   }
   return text + " of a label is neither 0 nor 1";

@@ -1,5 +1,5 @@
 // How good forecasts are, asked as the daemon is asked, in worlds unlike each other: a fleet recorded from
-// another plant, recordings of a real robot, and virtual robots of several habits, whose plants share no
+// another plant, and virtual robots of several habits, whose plants share no
 // physics with the model and have two to four effects that it does not know. A robot's first missions are
 // learnt, the others asked.
 //
@@ -62,20 +62,12 @@ void virtual_worlds(int each, std::uint64_t seed, int only) {
 }
 
 void recorded_worlds() {
-  const std::string data = JOULECAST_SHARED "/data/", source = JOULECAST_SOURCE_DIR;
+  const std::string data = JOULECAST_SHARED "/data/";
   for (const char* robot : {"amr", "tug"}) {
     Table table;
     if (const auto run = recorded_fleet_robot(data + "fleets/" + robot)) count(*run, learnt, table);
     print(std::string("another plant's ") + robot, table);
   }
-  Table table;
-  for (const char* ground : {"ASPHALT", "FLOORING", "ICE", "SANDY_LOAM", "SNOW"}) {
-    if (const auto run = recorded_tables(data + "real/borealtc_husky/" + ground,
-                                         source + "/deploy/robots/borealtc-husky.json",
-                                         source + "/deploy/import/borealtc_husky.json"))
-      count(*run, run->missions.size() / 2, table);
-  }
-  print("husky, five grounds", table);
 }
 
 }  // namespace

@@ -167,12 +167,12 @@ class WrongUse : public CommandLine {
 TEST_F(WrongUse, NamesTheNearestOptionAndCommand) {
   EXPECT_EQ(told({"profile", "--robot", "a.json", "--lenght", "3"}),
             "joulecast profile: has no option --lenght; did you mean --length?\njoulecast profile --help "
-            "says what it takes\n");
+            "lists what it accepts\n");
   EXPECT_THAT(told({"profil", "--robot", "a.json"}),
               HasSubstr("joulecast: has no command profil; did you mean profile?"));
   EXPECT_THAT(told({"calibrate", "drvie"}),
               HasSubstr("joulecast calibrate: has no command drvie; did you mean drive?"));
-  EXPECT_THAT(told({"effects", "all"}), HasSubstr("joulecast effects: has no use for all"));
+  EXPECT_THAT(told({"effects", "all"}), HasSubstr("joulecast effects: does not accept all"));
   EXPECT_THAT(told({"profile", "--frobnicate"}), Not(HasSubstr("did you mean")));
 }
 
@@ -182,7 +182,7 @@ TEST_F(WrongUse, SaysWhatIsWanted) {
               HasSubstr("--length wants a NUMBER, not three"));
   EXPECT_THAT(told({"profile", "--robot", "a.json"}), HasSubstr("--length, --turn or --request"));
   EXPECT_THAT(told({"autonomy", "--robot", "a.json"}), HasSubstr("--charge"));
-  EXPECT_THAT(told({"calibrate"}), HasSubstr("wants a command: drive, battery"));
+  EXPECT_THAT(told({"calibrate"}), HasSubstr("requires a command: drive, battery"));
 }
 
 TEST(Wrapped, KeepsWordsWholeAndIndentsWhatFollows) {

@@ -93,8 +93,8 @@ TEST(GapOutput, ARefusalNamesItsOptionAndEndsWithOne) {
   EXPECT_EQ(refused.field, "--apply");
   EXPECT_THAT(refused.message, HasSubstr("--force"));
   EXPECT_EQ(exit_of(refused.fault), Exit::fault);
-  const Error open =
-      of_option({Fault::conflict, "effect", "a is not told from b: name the one to adopt"}, "--apply");
+  const Error open = of_option(
+      {Fault::conflict, "effect", "a is not distinguished from b: name the one to adopt"}, "--apply");
   EXPECT_EQ(open.field, "--effect");
   EXPECT_THAT(open.message, Not(HasSubstr("--force")));
 }

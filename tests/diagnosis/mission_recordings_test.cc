@@ -70,6 +70,22 @@ TEST(MissionRecordings, HaveTheCovariatesOfTheLogThatTheyCameFrom) {
     }
     EXPECT_EQ(a.size(), 2u);
   }
+  // Missions that nothing is to be learnt from stay out, and are counted.
+  auto missions = harness.missions();
+  ASSERT_EQ(missions.size(), 2u);
+  missions[0].findings_json = R"({"contradictions":[{"id":"battery_current_reversed"}]})";
+  missions[1].findings_json = history::annulled_findings(missions[1], start_us, "a trial");
+  for (const history::Mission& mission : missions) {
+    const history::Command command = history::CheckpointMission{mission, {}, {}, {}};
+    ASSERT_TRUE(harness.store->apply({&command, 1}));
+  }
+  const auto none = read_recordings(*harness.store, wanted);
+  ASSERT_TRUE(none);
+  EXPECT_TRUE(none->missions.empty());
+  EXPECT_EQ(none->left_out.contradicted, 1u);
+  EXPECT_EQ(none->left_out.annulled, 1u);
+  wanted.only = {missions[0].key};
+  EXPECT_EQ(read_recordings(*harness.store, wanted)->missions.size(), 1u);
 }
 
 }  // namespace

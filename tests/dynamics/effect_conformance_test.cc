@@ -180,6 +180,66 @@ TEST(Dissipation, CostsPowerInDriving) {
   }
 }
 
+// What two effects do together does not depend on which is named first.
+TEST(TwoEffects, GiveTheSameInEitherOrder) {
+  const robot::RobotModel robot = offset_robot();
+  for (const Effect* one : catalogue()) {
+    for (const Effect* other : catalogue()) {
+      if (one == other) break;
+      const ActiveEffect forth[] = {moderate(*one), moderate(*other)}, back[] = {forth[1], forth[0]};
+      const DriveModel a(robot, forth), b(robot, back);
+      std::mt19937 random(5);
+      for (int k = 0; k < 20; ++k) {
+        const Instant at = random_motion(random);
+        const double power_w = a.flow(at).battery_power_w;
+        EXPECT_NEAR(power_w, b.flow(at).battery_power_w, 1e-9 * (1 + std::fabs(power_w)))
+            << one->info().id << " and " << other->info().id;
+      }
+    }
+  }
+}
+
+// Those that share T_m, as their parameters' meanings say: each scales what those named in it have made.
+TEST(TwoEffects, DryFrictionScalesWhatTheTextNames) {
+  const robot::RobotModel robot = testing::nomad();
+  const auto with = [](const char* id, double strength) {
+    ActiveEffect active = initial(*find_effect(id));
+    active.values[0] = strength;
+    return active;
+  };
+  const ActiveEffect both[] = {with("coulomb_friction", 1), with("friction_asymmetry", 1.5)};
+  const DriveModel nominal(robot, {}), worn(robot, both);
+  const auto dry = nominal.parameters().friction_torque_nm, of_worn = worn.parameters().friction_torque_nm;
+  EXPECT_NEAR(of_worn[0], 2 * 2.5 * dry[0], 1e-12);
+  EXPECT_NEAR(of_worn[1], 2 * dry[1], 1e-12);
+  Instant at;
+  at.wheel_speed_rad_s = {1, 1};
+  const ActiveEffect three[] = {both[0], both[1], with("stribeck_friction", 0.5)}, alone[] = {three[2]};
+  const DriveModel sticking(robot, three), sticking_alone(robot, alone);
+  for (const std::size_t s : {0u, 1u}) {
+    const double extra = sticking.balance(at).total_nm[s] - worn.balance(at).total_nm[s];
+    const double extra_alone = sticking_alone.balance(at).total_nm[s] - nominal.balance(at).total_nm[s];
+    EXPECT_GT(extra_alone, 0);
+    EXPECT_NEAR(extra / extra_alone, of_worn[s] / dry[s], 1e-9);
+  }
+}
+
+TEST(YawInertiaError, LeavesThePayloadsYawInertia) {
+  const robot::RobotModel robot = testing::nomad();
+  ActiveEffect error = initial(*find_effect("yaw_inertia_error"));
+  error.values[0] = 0.5;
+  const DriveModel nominal(robot, {}), with(robot, {&error, 1});
+  Instant at;
+  at.wheel_speed_rad_s = {1, -1};
+  at.wheel_acceleration_rad_s2 = {1, -1};
+  const auto extra = [&](double payload_kg) {
+    at.payload_kg = payload_kg;
+    return with.balance(at).total_nm[0] - nominal.balance(at).total_nm[0];
+  };
+  EXPECT_GT(extra(0), 0);
+  EXPECT_NEAR(extra(10), extra(0), 1e-9 * extra(0));
+}
+
 TEST(Catalogue, HoldsEachIdOnceAndNamesUnknownOnes) {
   std::set<std::string_view> ids;
   for (const Effect* effect : catalogue()) ids.insert(effect->info().id);

@@ -11,6 +11,7 @@
 #include <ostream>
 #include <set>
 #include <thread>
+#include <tuple>
 
 #include "temporary_store.h"
 
@@ -529,13 +530,13 @@ TEST_P(StoreConformance, FiltersMissions) {
   const MissionKey undeclared = start_mission(*store_, "amr-1", "undeclared", 0).key;
 
   MissionFilter f;
-  f.robot_id = "amr-2";
+  f.robot_ids = {"amr-2"};
   EXPECT_EQ(walk(f, 2).size(), 3U);
   f.mission_id = "m1";
   EXPECT_EQ(walk(f, 2).size(), 1U);
 
   f = {};
-  f.robot_id = "amr-1";
+  f.robot_ids = {"amr-1"};
   f.start_from_utime_us = missions[2].start_utime_us;
   f.start_to_utime_us = missions[5].start_utime_us;
   EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[4].key, missions[3].key, missions[2].key));
@@ -549,11 +550,102 @@ TEST_P(StoreConformance, FiltersMissions) {
   EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[4].key));
 
   f = {};
-  f.robot_id = "amr-1";
+  f.robot_ids = {"amr-1"};
   f.payload_max_kg = 1.0;
   EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[1].key, missions[0].key));
   f.payload_min_kg = 0.5;
   EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[1].key));
+}
+
+TEST_P(StoreConformance, SortsMissionsInStablePages) {
+  auto missions = add_missions("amr-1", 9);
+  // Ratios 1.5, 0.5, 1.5, 0.5 ..., none of the last two.
+  for (std::size_t k = 0; k < missions.size(); ++k) {
+    signals::Accounts& a = missions[k].accounts;
+    a.battery_j = 100.0 - static_cast<double>(k);
+    a.distance_m = static_cast<double>(k % 4) * 10;
+    a.measured_s = k < 7 ? 1 : 0;
+    a.measured_j = k % 2 == 0 ? 15 : 5;
+    a.ledger[signals::Term::unexplained] = a.measured_j - 10;
+    if (k == 5) missions[k].state = MissionState::aborted;
+    need(apply(CheckpointMission{missions[k], {}, {}, {}}));
+  }
+  start_mission(*store_, "amr-0", "m5-late", 1);
+  const auto sorted = [&](MissionSort sort, std::int64_t limit, const MissionFilter& filter = {}) {
+    std::vector<std::string> names;
+    PageRequest page{limit, {}};
+    do {
+      const MissionPage got = need(store_->missions(filter, page, sort));
+      for (const Mission& m : got.missions) names.push_back(m.mission_id);
+      page.cursor = got.next_cursor;
+    } while (!page.cursor.empty());
+    return names;
+  };
+  const std::vector<std::pair<MissionSort, std::vector<std::string>>> expected{
+      {{MissionOrder::energy, true}, {"m5-late", "m8", "m7", "m6", "m5", "m4", "m3", "m2", "m1", "m0"}},
+      {{MissionOrder::ratio, false}, {"m6", "m4", "m2", "m0", "m5", "m3", "m1", "m5-late", "m8", "m7"}},
+      {{MissionOrder::ratio, true}, {"m1", "m3", "m5", "m0", "m2", "m4", "m6", "m7", "m8", "m5-late"}},
+      {{MissionOrder::wh_per_km, false}, {"m1", "m5", "m2", "m6", "m3", "m7", "m5-late", "m8", "m4", "m0"}},
+      {{MissionOrder::mission, true}, {"m0", "m1", "m2", "m3", "m4", "m5", "m5-late", "m6", "m7", "m8"}},
+      {{MissionOrder::robot, true}, {"m5-late", "m0", "m1", "m2", "m3", "m4", "m5", "m6", "m7", "m8"}},
+      {{MissionOrder::state, true}, {"m5-late", "m0", "m1", "m2", "m3", "m4", "m6", "m7", "m8", "m5"}},
+      {{MissionOrder::start, true}, {"m5-late", "m0", "m1", "m2", "m3", "m4", "m5", "m6", "m7", "m8"}},
+  };
+  for (const auto& [sort, names] : expected)
+    for (const std::int64_t limit : {1, 3, 9, 50})
+      EXPECT_EQ(sorted(sort, limit), names) << static_cast<int>(sort.by) << " by " << limit;
+  const std::string cursor = need(store_->missions({}, {2, {}}, {MissionOrder::ratio, false})).next_cursor;
+  EXPECT_EQ(store_->missions({}, {2, cursor}, {MissionOrder::ratio, true}).error().field, "cursor");
+
+  MissionFilter f;
+  f.ratio_min = 0.4;
+  f.ratio_max = 0.6;
+  EXPECT_THAT(sorted({MissionOrder::start, true}, 2, f), testing::ElementsAre("m1", "m3", "m5"));
+  f.ratio_max = 0.3;
+  EXPECT_EQ(store_->missions(f, {}).error().field, "ratio_min");
+  f = {};
+  f.name_contains = "M5";
+  EXPECT_THAT(sorted({MissionOrder::start, true}, 1, f), testing::ElementsAre("m5-late", "m5"));
+  f.name_contains = "%";
+  EXPECT_TRUE(sorted({}, 1, f).empty());
+  f = {};
+  f.robot_ids = {"amr-0", "amr-2", "not \"a\" robot"};
+  EXPECT_THAT(sorted({}, 1, f), testing::ElementsAre("m5-late"));
+}
+
+TEST_P(StoreConformance, SumsOverRobotsDaysAndWeeks) {
+  constexpr std::int64_t hour_us = 3'600'000'000, day_us = 24 * hour_us;
+  const std::int64_t monday_us = 4 * day_us;  // 1970-01-05
+  const auto add = [&](const std::string& robot, std::int64_t start_utime_us, double joule) {
+    Mission m = start_mission(*store_, robot, "m" + std::to_string(start_utime_us), start_utime_us);
+    m.accounts.battery_j = joule;
+    need(apply(CheckpointMission{m, {}, {}, {}}));
+  };
+  add("amr-1", monday_us - hour_us, 1);
+  add("amr-1", monday_us + hour_us, 2);
+  add("amr-2", monday_us + 30 * hour_us, 4);
+  const auto sums = [&](Grouping by, std::int64_t utc_offset_s, const MissionFilter& filter = {}) {
+    std::vector<std::tuple<std::string, std::int64_t, double>> all;
+    for (const TotalsGroup& g : need(store_->grouped_totals(filter, by, utc_offset_s)))
+      all.emplace_back(g.robot_id, g.from_utime_us, g.totals.accounts.battery_j);
+    return all;
+  };
+  using Row = std::tuple<std::string, std::int64_t, double>;
+  EXPECT_THAT(sums(Grouping::robot, 0), testing::ElementsAre(Row{"amr-1", 0, 3}, Row{"amr-2", 0, 4}));
+  EXPECT_THAT(sums(Grouping::day, 0),
+              testing::ElementsAre(Row{"", monday_us - day_us, 1}, Row{"", monday_us, 2},
+                                   Row{"", monday_us + day_us, 4}));
+  EXPECT_THAT(sums(Grouping::week, 0),
+              testing::ElementsAre(Row{"", monday_us - 7 * day_us, 1}, Row{"", monday_us, 6}));
+  // Two hours ahead of UTC, the first mission is one of Monday.
+  EXPECT_THAT(sums(Grouping::week, 7200), testing::ElementsAre(Row{"", monday_us - 2 * hour_us, 7}));
+  EXPECT_THAT(sums(Grouping::day, -7200), testing::ElementsAre(Row{"", monday_us - 22 * hour_us, 3},
+                                                               Row{"", monday_us + 26 * hour_us, 4}));
+  MissionFilter f;
+  f.robot_ids = {"amr-2"};
+  EXPECT_THAT(sums(Grouping::day, 0, f), testing::ElementsAre(Row{"", monday_us + day_us, 4}));
+  f.robot_ids = {"nobody"};
+  EXPECT_TRUE(sums(Grouping::robot, 0, f).empty());
 }
 
 TEST_P(StoreConformance, RefusesBadQueries) {
@@ -569,7 +661,7 @@ TEST_P(StoreConformance, RefusesBadQueries) {
   refuses(f, {max_page_size + 1, {}}, "limit");
   refuses(f, {1, "garbage"}, "cursor");
   const std::string cursor = need(store_->missions(f, {1, {}})).next_cursor;
-  f.robot_id = "amr-1";
+  f.robot_ids = {"amr-1"};
   refuses(f, {1, cursor}, "cursor");
   f.start_from_utime_us = 2;
   f.start_to_utime_us = 1;
@@ -603,8 +695,13 @@ TEST_P(StoreConformance, SumsOverMissions) {
   EXPECT_EQ(all.gap_s, 1.5);
   EXPECT_EQ(all.accounts.measured_j, 30);
   EXPECT_EQ(all.accounts.ledger[signals::Term::drag], 5);
+  missions[1].findings_json = annulled_findings(missions[1], 17, "a \"test\"");
+  need(apply(CheckpointMission{missions[1], {}, {}, {}}));
+  EXPECT_EQ(need(store_->totals({})).missions, 3);
+  EXPECT_EQ(need(store_->totals({})).accounts.measured_j, 20);
+  EXPECT_EQ(need(store_->missions({}, {.limit = 10, .cursor = {}})).missions.size(), 4U);
   MissionFilter nobody;
-  nobody.robot_id = "nobody";
+  nobody.robot_ids = {"nobody"};
   EXPECT_EQ(need(store_->totals(nobody)).missions, 0);
   EXPECT_TRUE(std::isnan(need(store_->totals(nobody)).accounts.measured_j));
 }

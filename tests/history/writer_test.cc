@@ -59,10 +59,14 @@ class FailingStore final : public Store {
     return store_->model_versions(r);
   }
   Result<Mission> mission(MissionKey key) const override { return store_->mission(key); }
-  Result<MissionPage> missions(const MissionFilter& f, const PageRequest& p) const override {
-    return store_->missions(f, p);
+  Result<MissionPage> missions(const MissionFilter& f, const PageRequest& p, MissionSort s) const override {
+    return store_->missions(f, p, s);
   }
   Result<Totals> totals(const MissionFilter& f) const override { return store_->totals(f); }
+  Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& f, Grouping by,
+                                                  std::int64_t utc_offset_s) const override {
+    return store_->grouped_totals(f, by, utc_offset_s);
+  }
   Result<Trace> trace(MissionKey k, TimeRange r, std::int64_t n) const override {
     return store_->trace(k, r, n);
   }

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "history/sqlite_store.h"
-#include "robot/robot_file.h"
 #include "ingest/pipeline.h"
+#include "robot/robot_file.h"
 
 namespace joulecast::testing {
 

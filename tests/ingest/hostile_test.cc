@@ -88,7 +88,8 @@ TEST_F(HostileTest, ASecondSenderIsRefusedAndNamed) {
   EXPECT_EQ(
       note("second_sender"),
       "10.0.0.6:41000 publishes under this robot's id beside 10.0.0.5:40000, which alone is accounted for");
-  ASSERT_EQ(harness.warnings.size(), 1u);  // once, not 300 times
+  // Once, not 300 times, and once as a contradiction.
+  ASSERT_EQ(harness.warnings.size(), 2u);
 }
 
 TEST_F(HostileTest, TwoStreamsOfOneSenderAreToldApart) {
@@ -348,7 +349,8 @@ TEST_F(HostileTest, AnImplausibleValueIsNamedWithItsFieldAndBound) {
     s.battery_voltage_v = 25'400;
     send(s, s.utime_us);
   }
-  EXPECT_EQ(note("implausible"), "battery_voltage is 25400; no robot reports values outside -1 to 1000");
+  EXPECT_EQ(note("implausible"),
+            "battery_voltage is 25400; no robot reports values outside -1 to 1000; is it in mV?");
   ASSERT_EQ(harness.warnings.size(), 1u);
   EXPECT_NE(harness.warnings[0].find("battery_voltage"), std::string::npos);
   Sample s = sample(100, start_us);

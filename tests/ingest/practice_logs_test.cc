@@ -77,6 +77,7 @@ TEST(PracticeLogs, MeasuredEnergyAgreesWithAnIndependentQuadrature) {
       EXPECT_NEAR(m.accounts.ledger.total(), m.accounts.battery_j, 1e-9 * m.accounts.battery_j);
     }
     for (const auto& fault : harness.counters.faults) EXPECT_EQ(fault.load(), 0u) << entry.path();
+    for (const auto& told : harness.counters.contradictions) EXPECT_EQ(told.load(), 0u) << entry.path();
   }
   EXPECT_GT(logs, 0u);
 }

@@ -90,7 +90,7 @@ Diagnosis full_diagnosis() {
   d.corrections = {{"motor.friction_torque_nm", 0.842, 1.186, 0.028}};
   d.next_drive = {{"circles both ways", "slope from accessory_load", 15.9}};
   d.adoptable = {{"slope", {{"angle_rad", 0.01633}, {"uphill_rad", 2.912}}}};
-  d.refusal = "slope is not told from accessory_load";
+  d.refusal = "slope is not distinguished from accessory_load";
   d.figures.mean_power_w = 254.3;
   d.figures.maps = {{"speed, m/s",
                      {{.from = 0,

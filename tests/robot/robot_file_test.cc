@@ -140,14 +140,16 @@ TEST(RobotFile, EachNumberIsRefusedBeyondItsBounds) {
     if (!whole[pointer].is_number()) continue;
     const Bounds& bounds = field.bounds;
     const double infinity = std::numeric_limits<double>::infinity();
-    const double below = bounds.low_excluded ? bounds.low : std::nextafter(bounds.low, -infinity);
-    const double above = bounds.high_excluded ? bounds.high : std::nextafter(bounds.high, infinity);
+    const double below =
+        bounds.exclusive_minimum ? bounds.minimum : std::nextafter(bounds.minimum, -infinity);
+    const double above = bounds.exclusive_maximum ? bounds.maximum : std::nextafter(bounds.maximum, infinity);
     for (const double value : {below, above, std::numeric_limits<double>::quiet_NaN()}) {
       json document = whole;
       document[pointer] = value;
       const Error error = error_of(document);
       EXPECT_EQ(error.field, field.pointer);
-      EXPECT_THAT(error.message, HasSubstr(std::string(bounds.low_excluded ? "greater than " : "at least ")));
+      EXPECT_THAT(error.message,
+                  HasSubstr(std::string(bounds.exclusive_minimum ? "greater than " : "at least ")));
       EXPECT_THAT(error.message, HasSubstr(std::string(unit_of(field.key()))));
     }
   }

@@ -33,24 +33,26 @@ struct Statement {
 };
 
 void PrintTo(const Statement& s, std::ostream* out) {
-  *out << (s.bounds.low_excluded ? "(" : "[") << s.bounds.low << ", " << s.bounds.high
-       << (s.bounds.high_excluded ? ")" : "]") << (s.required ? " required" : " optional");
+  *out << (s.bounds.exclusive_minimum ? "(" : "[") << s.bounds.minimum << ", " << s.bounds.maximum
+       << (s.bounds.exclusive_maximum ? ")" : "]") << (s.required ? " required" : " optional");
 }
 
 bool operator==(const Statement& a, const Statement& b) {
-  return a.bounds.low == b.bounds.low && a.bounds.high == b.bounds.high &&
-         a.bounds.low_excluded == b.bounds.low_excluded && a.bounds.high_excluded == b.bounds.high_excluded &&
-         a.required == b.required;
+  return a.bounds.minimum == b.bounds.minimum && a.bounds.maximum == b.bounds.maximum &&
+         a.bounds.exclusive_minimum == b.bounds.exclusive_minimum &&
+         a.bounds.exclusive_maximum == b.bounds.exclusive_maximum && a.required == b.required;
 }
 
 using Statements = std::map<std::string, Statement>;
 
 Bounds bounds_of(const json& node) {
   Bounds bounds;
-  if (node.contains("minimum")) bounds.low = node["minimum"];
-  if (node.contains("exclusiveMinimum")) bounds.low = node["exclusiveMinimum"], bounds.low_excluded = true;
-  if (node.contains("maximum")) bounds.high = node["maximum"];
-  if (node.contains("exclusiveMaximum")) bounds.high = node["exclusiveMaximum"], bounds.high_excluded = true;
+  if (node.contains("minimum")) bounds.minimum = node["minimum"];
+  if (node.contains("exclusiveMinimum"))
+    bounds.minimum = node["exclusiveMinimum"], bounds.exclusive_minimum = true;
+  if (node.contains("maximum")) bounds.maximum = node["maximum"];
+  if (node.contains("exclusiveMaximum"))
+    bounds.maximum = node["exclusiveMaximum"], bounds.exclusive_maximum = true;
   return bounds;
 }
 
@@ -78,7 +80,7 @@ Statements from_table() {
     const std::string pointer(field.pointer);
     const bool required = field.presence == Presence::required;
     if (!field.value_key.empty()) {
-      out[pointer + "/charge"] = {charge_bounds, true};
+      out[pointer + "/charge"] = {fraction, true};
       out[pointer + "/" + std::string(field.value_key)] = {field.bounds, true};
     } else if (std::holds_alternative<std::vector<BatteryBranch>& (*)(RobotModel&)>(field.member)) {
       for (const auto& branch : branch_fields())

@@ -4,6 +4,7 @@
 rooms_test.py SOURCE
 
 - A room links exactly the rooms whose headers its files include; PUBLIC those that its own headers include.
+- Each hop of the walks in architecture.md, `file: function`, is a function of that file, and each file named there exists.
 - A room of src/ uses only rooms that deploy/documents/architecture.md lists above it, and the build lists them in
   that order.
 """
@@ -113,11 +114,26 @@ def faults_of_order(source, libraries):
     return faults
 
 
+def faults_of_walks(source):
+    architecture = (source / "deploy/documents/architecture.md").read_text()
+    walks = re.findall(r"^## The way of .*?(?=^## )", architecture, re.M | re.S)
+    hops = [hop for walk in walks for hop in re.findall(r"`((?:src|server|client)/[^`:]+\.(?:h|cc))(?:: ([^`]+))?`", walk)]
+    assert len(walks) == 3 and len(hops) > 25, "the walks are not read as they are written"
+    faults = []
+    for file, function in hops:
+        path = source / file
+        if not path.exists():
+            faults.append(f"architecture.md names {file}, which does not exist")
+        elif function and not re.search(rf"^[^/\n]*\b{re.escape(function)}\(", path.read_text(), re.M):
+            faults.append(f"architecture.md names {function} in {file}, which does not define it")
+    return faults
+
+
 def main():
     source = Path(sys.argv[1]).resolve()
     libraries, owner = libraries_of(source)
     assert len(libraries) > 20, "the build's lists are not read as they are written"
-    faults = faults_of_links(source, libraries, owner) + faults_of_order(source, libraries)
+    faults = faults_of_links(source, libraries, owner) + faults_of_order(source, libraries) + faults_of_walks(source)
     print("\n".join(sorted(faults)))
     sys.exit(1 if faults else 0)
 

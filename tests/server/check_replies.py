@@ -261,6 +261,31 @@ def hold_pages(checker, name):
             checker.fault(f"{times}: {told}")
 
 
+def hold_metric_names(checker, source, metrics):
+    """The dashboard and the alert rules ask for no metric that the daemon does not have."""
+    present = set(re.findall(r"^# TYPE (\w+) ", metrics, re.M))
+    for file in ("deploy/grafana-dashboard.json", "deploy/prometheus-rules.yml"):
+        asked = set(re.findall(r"\b(?:joulecast|process)_\w+", (source / file).read_text()))
+        if not asked or not asked <= present:
+            checker.fault(f"{file} asks for metrics that are not there: {sorted(asked - present)}")
+
+
+def hold_mission_lists(checker):
+    """Orders, filters, groups and CSV of missions, where there may be none."""
+    for query in ("sort=ratio&order=asc", "sort=wh_per_km", "robot_id=a,b&name_contains=x&ratio_min=0.5&ratio_max=2"):
+        checker.check("GET", "/v1/missions", f"/v1/missions?{query}", expect=200)
+    for query in ("sort=taste", "order=up", "ratio_min=2&ratio_max=1", "robot_id=,"):
+        checker.check("GET", "/v1/missions", f"/v1/missions?{query}", expect=422)
+    for group in ("robot", "day", "week", "kind"):
+        checker.check("GET", "/v1/mission-totals", f"/v1/mission-totals?group_by={group}&utc_offset_min=60", expect=200)
+    checker.check("GET", "/v1/mission-totals", "/v1/mission-totals?group_by=moon", expect=422)
+    for template, query in (("/v1/missions", ""), ("/v1/mission-totals", "?group_by=robot")):
+        text = checker.check("GET", template, template + query, expect=200, headers={"Accept": "text/csv"})
+        if not isinstance(text, bytes) or b",battery_j," not in text.split(b"\r\n")[0]:
+            checker.fault(f"{template} as CSV: {text!r}")
+    checker.check("GET", "/v1/proposals", expect=200)
+
+
 def main():
     arguments = argparse.ArgumentParser()
     arguments.add_argument("--source", required=True, type=pathlib.Path)
@@ -320,6 +345,7 @@ def exercise(checker, source):
                 body = None if method == "GET" else {"path": PATH}
                 checker.check(method, template, template.replace("{id}", "no-such-robot"), body, expect=404)
     checker.check("POST", "/v1/robots/{id}/profile", f"/v1/robots/{name}/profile", {"path": PATH}, expect=200)
+    checker.check("POST", "/v1/session", body={"token": "none is needed here"}, expect=409)
     for template, body, status, field, constraint in (
             ("/v1/robots/{id}/profile", {}, 422, "/path", "is required"),
             ("/v1/robots/{id}/profile", {"paht": PATH}, 422, "/path", "is required; not known here: paht"),
@@ -362,6 +388,7 @@ def exercise(checker, source):
     if served.count(" ") > compact.count(" ") or "\n" in served:
         checker.fault("a stored robot file is served with the space it was written with")
     metrics = ask(checker.url, "GET", "/metrics")[2].decode()
+    hold_metric_names(checker, source, metrics)
     if 'joulecast_missions_ended_total{state="finished"}' not in metrics or 'state="open"' in metrics:
         checker.fault("joulecast_missions_ended_total counts missions that are open, or none")
     fast = {"profile": {"time_s": [0, 1, 2], "speed_m_s": [0, 9, 0]}}  # beyond the robot's limits
@@ -383,6 +410,7 @@ def exercise(checker, source):
     checker.check("POST", "/v1/energy-matrix", body={"robots": [matrix["robots"][0]] * 2001, "tasks": [errand] * 2000}, expect=413)
     hold_driving(checker, name, matrix)
     hold_pages(checker, name)
+    hold_mission_lists(checker)
     status, kind, _ = ask(checker.url, "DELETE", "/v1/robots")
     if (status, kind) != (405, "application/problem+json"):
         checker.fault(f"DELETE /v1/robots: {status} {kind}")

@@ -81,7 +81,7 @@ TEST(EventHub, DropsAFullQueueOnceAndWakesIt) {
   int woken = 0;
   slow->on_wake([&] { ++woken; });
   for (int i = 0; i < 50; ++i) hub.publish("x", "0123456789");
-  EXPECT_TRUE(slow->hopeless());
+  EXPECT_TRUE(slow->must_close());
   EXPECT_EQ(hub.counts().dropped_clients, 1U);
   EXPECT_EQ(hub.counts().subscribers, 0U);
   EXPECT_EQ(woken, 2);  // for the first event and for the end

@@ -81,7 +81,7 @@ TEST_F(SettingsTest, UnknownKeysAreErrorsThatSuggestTheNearest) {
 }
 
 TEST_F(SettingsTest, ValuesAreCheckedAgainstTypeAndBounds) {
-  EXPECT_EQ(fault({"--http-port", "65536"}).message, "must lie in [0, 65535], is \"65536\"");
+  EXPECT_EQ(fault({"--http-port", "65536"}).message, "is 65536, must be at least 0 and at most 65535");
   EXPECT_EQ(fault({"--http-port", "80x"}).message, "must be an integer, is \"80x\"");
   EXPECT_EQ(fault({"--http-port", ""}).field, "--http-port");
   EXPECT_EQ(fault({"--http-read-timeout-s", "nan"}).message, "must be a finite number, is \"nan\"");
@@ -107,6 +107,10 @@ TEST_F(SettingsTest, EveryFaultyValueIsToldAtOnce) {
        {"http.port", "http.prot", "log.level", "--http-worker-threads", "JOULECAST_LCM_ULR"})
     EXPECT_NE(all.find(name), std::string::npos) << name << " is not in:\n" << all;
   EXPECT_EQ(std::count(all.begin(), all.end(), '\n'), 4) << all;
+}
+
+TEST_F(SettingsTest, LeavesTheCommandLinesTokenAlone) {
+  EXPECT_TRUE(read_settings({}, {"JOULECAST_TOKEN=jc_1"}));
 }
 
 TEST_F(SettingsTest, CommandsAreKnown) {

@@ -267,12 +267,225 @@ TEST(CsvImport, RefusesLabelsBeyondTheirLimits) {
   EXPECT_THAT(import_csv("t,r,l\n0,1,1\n", mapping).error().message, HasSubstr("'who' is missing"));
 }
 
+std::vector<Import> missions_of(const std::string& csv, const std::string& mapping,
+                                const ImportOptions& options = {}) {
+  const auto parsed = ImportMapping::parse(mapping);
+  EXPECT_TRUE(parsed) << describe(parsed.error());
+  auto missions = import_missions(csv, parsed.value(), options);
+  EXPECT_TRUE(missions) << describe(missions.error());
+  return missions ? std::move(*missions) : std::vector<Import>{};
+}
+
+const std::string wheels = R"("fields": {"wheel_velocity": [{"column": "r"}, {"column": "l"}])";
+
+TEST(CsvImport, ReadsIsoStampsWithAndWithoutZone) {
+  const auto first_us = [](const std::string& stamp, const std::string& more) {
+    const auto mapping = ImportMapping::parse(
+        R"({"robot_id": "r", "mission_id": "m", "time": {"column": "t", "unit": "iso8601")" + more + "}, " +
+        wheels + "}}");
+    EXPECT_TRUE(mapping) << describe(mapping.error());
+    const auto read = import_csv("t,r,l\n\"" + stamp + "\",1,2\n", mapping.value());
+    return read ? read->recording.samples[0].utime_us : std::int64_t{-1};
+  };
+  constexpr std::int64_t eight = 1'772'352'000'250'000;  // 2026-03-01 08:00:00.25 UTC
+  EXPECT_EQ(first_us("2026-03-01T08:00:00.25Z", ""), eight);
+  EXPECT_EQ(first_us("2026-03-01T09:00:00.25+01:00", ""), eight);
+  EXPECT_EQ(first_us("2026-03-01 03:00:00,25-05:00", ""), eight);
+  EXPECT_EQ(first_us("2026-03-01 09:00:00.25", R"(, "utc_offset": "+01:00")"), eight);
+  EXPECT_EQ(first_us("2026-03-01T08:00:00.25Z", R"(, "utc_offset": "+01:00")"), eight);
+  EXPECT_EQ(first_us("2026-03-01 09:00:00.25", ""), -1);
+  EXPECT_EQ(first_us("yesterday", ""), -1);
+}
+
+TEST(CsvImport, ReadsCommentsBlanksDecimalCommasAndTablesWithoutHeader) {
+  const auto samples = [](const std::string& csv, const std::string& layout) {
+    const auto missions = missions_of(csv, R"({"robot_id": "r", "mission_id": "m", )" + layout +
+                                               R"(, "time": {"column": "t", "unit": "s"}, )" + wheels + "}}");
+    std::vector<double> rights;
+    for (const Import& one : missions)
+      for (const signals::Sample& sample : one.recording.samples)
+        rights.push_back(sample.wheel_velocity_rad_s[0] + sample.wheel_velocity_rad_s[1]);
+    return rights;
+  };
+  EXPECT_THAT(samples("% made by hand\nt,r,l\n0,1,2\n# pause\n1,3,4\n", R"("comment": "%#")"),
+              testing::ElementsAre(3, 7));
+  EXPECT_THAT(samples("0 1\t2\n  1   3 4  \n", R"("separator": "blanks", "header": ["t", "r", "l"])"),
+              testing::ElementsAre(3, 7));
+  EXPECT_THAT(samples("t;r;l\n0,5;1,25;2\n1,5;3;-4,5e1\n", R"("separator": ";", "decimal": ",")"),
+              testing::ElementsAre(3.25, -42));
+  EXPECT_THAT(samples("a logger\n\n3 rows follow\nt,r,l\n0,1,2\n", R"("skip_lines": 3)"),
+              testing::ElementsAre(3));
+}
+
+TEST(CsvImport, ProductsAndQuotientsOfColumns) {
+  const std::string csv = "t,r,l,p,v,z\n0,1,1,240,24,0\n1,1,1,250,25,0\n";
+  EXPECT_THAT(battery_voltages(csv, "", R"({"column": "p", "over": ["v"]})"), testing::ElementsAre(10, 10));
+  EXPECT_THAT(
+      battery_voltages(csv, "", R"({"columns": ["p", {"column": "v", "scale": 2}], "combine": "product"})"),
+      testing::ElementsAre(11'520, 12'500));
+  EXPECT_THAT(battery_voltages(csv, "", R"({"columns": ["p", {"column": "v", "scale": -0.5}]})"),
+              testing::ElementsAre(228, 237.5));
+  EXPECT_THAT(battery_voltages(csv, "", R"({"column": "p", "over": ["z"]})"),
+              testing::Each(testing::IsNan()));
+}
+
+// Counts of an encoder of 16 bits that turns evenly, then half as fast, against the clock's shake.
+TEST(CsvImport, PositionsBecomeSpeeds) {
+  std::string csv = "t,r,l\n";
+  double counts = 65'000;
+  for (int k = 0; k < 200; ++k) {
+    csv += std::to_string(0.02 * k) + "," + std::to_string(std::fmod(counts, 65'536)) + "," +
+           std::to_string(-0.1 * k) + "\n";
+    counts += k < 100 ? 40 : 20;
+  }
+  const auto missions = missions_of(
+      csv,
+      R"({"robot_id": "r", "mission_id": "m", "time": {"column": "t", "unit": "s"}, "fields": {"wheel_velocity": [
+      {"column": "r", "divide_by": 100, "rate": {"window_s": 0.1, "wraps_at": 655.36}}, {"column": "l", "rate": {}}]}})");
+  ASSERT_EQ(missions.size(), 1u);
+  const auto& samples = missions[0].recording.samples;
+  ASSERT_EQ(samples.size(), 200u);
+  for (const std::size_t k : {0u, 10u, 50u, 90u})
+    EXPECT_NEAR(samples[k].wheel_velocity_rad_s[0], 20, 1e-6) << k;
+  for (const std::size_t k : {110u, 150u, 199u})
+    EXPECT_NEAR(samples[k].wheel_velocity_rad_s[0], 10, 1e-6) << k;
+  for (const signals::Sample& sample : samples) EXPECT_NEAR(sample.wheel_velocity_rad_s[1], -5, 1e-6);
+}
+
+TEST(CsvImport, AColumnNamesTheMissions) {
+  const std::string csv =
+      "t,r,l,run,v,kind\n0,1,1,a b,5,ice\n1,1,1,a b,5,\n2,1,1,,5,\n3,1,1,c,6,\n4,1,1,c,6,mud\n5,1,1,a "
+      "b,7,mud\n";
+  const auto mapping = [](const std::string& cells) {
+    return R"({"robot_id": "r", "mission": {"column": "run"}, "time": {"column": "t", "unit": "s"}, )" +
+           cells + R"("labels": {"floor": {"column": "kind"}}, "covariates": {"v": {"column": "v"}}, )" +
+           wheels + "}}";
+  };
+  const auto held = missions_of(csv, mapping(""));
+  ASSERT_EQ(held.size(), 3u);
+  EXPECT_EQ(held[0].recording.mission_id, "a_b");
+  EXPECT_EQ(held[0].recording.samples.size(), 3u);
+  EXPECT_EQ(held[1].recording.mission_id, "c");
+  EXPECT_EQ(held[2].recording.mission_id, "a_b-2");
+  // What holds from before holds in the mission too.
+  EXPECT_THAT(signals::find_series(held[1].recording.covariates, "v")->utime_us,
+              testing::ElementsAre(3'000'000));
+  EXPECT_THAT(signals::find_series(held[1].recording.covariates, "floor=ice")->value,
+              testing::ElementsAre(1, 0));
+  const auto blank = missions_of(csv, mapping(R"("empty_cells": "unmeasured", )"));
+  ASSERT_EQ(blank.size(), 3u);
+  EXPECT_EQ(blank[0].recording.samples.size(), 2u);
+  EXPECT_EQ(blank[1].report.rows_outside_mission + blank[0].report.rows_outside_mission, 1u);
+}
+
+TEST(CsvImport, JoinsTablesOfOtherRates) {
+  std::string csv = "t,r,l\n";
+  for (int k = 0; k < 50; ++k) csv += std::to_string(10 + 0.1 * k) + ",1,1\n";
+  ImportOptions options{"run.csv", {}, "m", {}};
+  // Its rows are not in order, its clock counts ms and is 0.25 s late; it ends early.
+  options.joined["battery"] = "ms volt\n10250 24\n11250 26\n10750 25\n12250 27\n";
+  const auto mapping = [](const std::string& how) {
+    return R"({"robot_id": "r", "time": {"column": "t", "unit": "s"}, "tables": {"battery": {"file": "{stem}_battery.txt",
+      "separator": "blanks", "delay_s": 0.25, "tolerance_s": 1.2, "time": {"column": "ms", "unit": "ms"}}},
+      "interpolation": {"battery:volt": ")" +
+           how + R"("}, )" + wheels + R"(, "battery_voltage": {"column": "battery:volt"}}})";
+  };
+  const auto parsed = ImportMapping::parse(mapping("linear")).value();
+  EXPECT_EQ(joined_files(parsed, "data/run.csv")[0].path, "data/run_battery.txt");
+  const auto straight = missions_of(csv, mapping("linear"), options);
+  ASSERT_EQ(straight.size(), 1u);
+  const auto& samples = straight[0].recording.samples;
+  ASSERT_EQ(samples.size(), 50u);
+  EXPECT_NEAR(samples[0].battery_voltage_v, 24, 1e-9);
+  EXPECT_NEAR(samples[4].battery_voltage_v, 24.8, 1e-9);
+  EXPECT_NEAR(samples[15].battery_voltage_v, 26.5, 1e-9);
+  EXPECT_TRUE(std::isnan(samples[21].battery_voltage_v));  // after the last
+  ASSERT_EQ(straight[0].report.joins.size(), 1u);
+  const JoinReport& join = straight[0].report.joins[0];
+  EXPECT_EQ(join.rows, 4u);
+  EXPECT_EQ(join.rows_unsorted, 1u);
+  EXPECT_EQ(join.matched, 21u);
+  EXPECT_EQ(join.beyond_tolerance, 29u);
+
+  const auto held = missions_of(csv, mapping("hold"), options);
+  ASSERT_EQ(held.size(), 1u);
+  const JoinReport& lags = held[0].report.joins[0];
+  EXPECT_EQ(lags.matched, 33u);  // 1.2 s after the last
+  EXPECT_NEAR(lags.greatest_lag_s, 1.2, 1e-9);
+  EXPECT_NEAR(lags.median_lag_s, 0.4, 0.11);
+  EXPECT_EQ(held[0].report.samples_added, 3u);
+
+  options.joined.clear();
+  EXPECT_EQ(import_missions(csv, parsed, options).error().field, "/tables/battery");
+}
+
+// Voltage sags as the current rises, every 100 ms, both held: the integral of the steps, where all is
+// integrated straight from sample to sample as the meter does.
+TEST(CsvImport, EnergyOfHeldReadingsIsThatOfTheirSteps) {
+  std::string csv = "t,r,l,v,i\n";
+  double expected_j = 0, v = 24, i = 0;
+  for (int k = 0; k <= 400; ++k) {
+    if (k > 0) expected_j += 0.05 * v * i;
+    const bool fresh = k % 2 == 0;
+    if (fresh) {
+      i = k / 2 % 3 == 0 ? 60 : 2 + k % 7;
+      v = 26 - 0.1 * i;
+    }
+    csv += std::to_string(0.05 * k) + "," + std::to_string(0.1 * k) + ",1," +
+           (fresh ? std::to_string(v) : "") + "," + (fresh ? std::to_string(i) : "") + "\n";
+  }
+  const auto energy_j = [&](const std::string& how) {
+    const auto missions = missions_of(
+        csv, R"({"robot_id": "r", "mission_id": "m", "time": {"column": "t", "unit": "s"}, )" + how + wheels +
+                 R"(, "battery_voltage": {"column": "v"}, "battery_current": {"column": "i"}}})");
+    double sum_j = 0;
+    const auto& samples = missions.at(0).recording.samples;
+    for (std::size_t k = 1; k < samples.size(); ++k) {
+      const signals::Sample &a = samples[k - 1], &b = samples[k];
+      const double dt = 1e-6 * static_cast<double>(b.utime_us - a.utime_us);
+      sum_j +=
+          dt *
+          ((a.battery_voltage_v * a.battery_current_a + b.battery_voltage_v * b.battery_current_a) / 2 -
+           (b.battery_voltage_v - a.battery_voltage_v) * (b.battery_current_a - a.battery_current_a) / 6);
+      EXPECT_EQ(b.sequence, static_cast<std::int64_t>(k));
+    }
+    return sum_j;
+  };
+  EXPECT_NEAR(energy_j(R"("interpolation": {"v": "hold", "i": "hold"}, )") / expected_j, 1, 1e-3);
+  EXPECT_GT(std::abs(energy_j("") / expected_j - 1), 5e-3);
+}
+
+TEST(ImportMapping, TellsEveryFaultAtOnceAndWhatIsSuspicious) {
+  const auto faulty =
+      ImportMapping::parse(mapping_text(R"("robt_id": 1, "payload_kg": -1, "decimal": ",", )"));
+  ASSERT_FALSE(faulty);
+  const std::string all = faulty.error().field + " " + faulty.error().message;
+  for (const char* pointer : {"/robt_id", "/payload_kg", "/decimal"}) EXPECT_THAT(all, HasSubstr(pointer));
+  const auto warned = [](const std::string& fields) {
+    std::vector<std::string> pointers;
+    for (const MappingWarning& warning : suspicious(mapping_of("", fields)))
+      pointers.push_back(warning.field);
+    return pointers;
+  };
+  EXPECT_THAT(warned(R"(, "battery_voltage": {"column": "v"}, "battery_current": {"column": "i"})"),
+              testing::IsEmpty());
+  EXPECT_THAT(warned(""), testing::ElementsAre("/fields"));
+  EXPECT_THAT(warned(R"(, "battery_voltage": {"constant": 24}, "battery_current": {"column": "i"})"),
+              testing::ElementsAre("/fields/battery_voltage"));
+}
+
 TEST(ImportMapping, FaultsPointToTheMember) {
   EXPECT_EQ(mapping_fault("{"), "");
   EXPECT_EQ(mapping_fault(mapping_text(R"("robt_id": 1, )")), "/robt_id");
   EXPECT_EQ(mapping_fault(mapping_text(R"("payload_kg": -1, )")), "/payload_kg");
   EXPECT_EQ(mapping_fault(mapping_text(R"("separator": ",,", )")), "/separator");
   EXPECT_EQ(mapping_fault(mapping_text(R"("empty_cells": "guess", )")), "/empty_cells");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("decimal": ",", )")), "/decimal");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("interpolation": {"r": "guess"}, )")), "/interpolation/r");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("tables": {"b": {"file": "b.csv"}}, )")), "/tables/b/time");
+  EXPECT_EQ(mapping_fault(mapping_text(R"("mission_id": "x", "mission": {"column": "r"}, )")), "/mission_id");
+  EXPECT_EQ(mapping_fault(mapping_text("", R"(, "yaw_rate": {"column": "h", "abs": true, "rate": {}})")),
+            "/fields/yaw_rate/rate");
   EXPECT_EQ(mapping_fault(mapping_text(R"("require": [], )")), "/require");
   EXPECT_EQ(
       mapping_fault(mapping_text(R"("column_limits": {"r": {"low": 2, "high": 1, "outside": "hold"}}, )")),

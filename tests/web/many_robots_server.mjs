@@ -81,6 +81,7 @@ function stateOf(k, nowMs) {
           },
     samples: 3000,
     faults: k % 29 === 0 ? { late: 3 } : {},
+    contradictions: [],
   };
 }
 

@@ -1,6 +1,6 @@
 // The operator page in headless Chromium against a running daemon with live robots.
 // node operator_page_test.mjs --daemon joulecastd --client joulecast --page server/web --out directory
-//   [--chromium /usr/bin/chromium]
+//   [--chromium /usr/bin/chromium] [--only PATTERN]
 // Screenshots and figures.json go to --out. Leaves with 1 when a check fails.
 import { readFile, mkdir, rm, writeFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
@@ -18,6 +18,7 @@ const { values: given } = parseArgs({
     page: { type: 'string' },
     out: { type: 'string' },
     chromium: { type: 'string', default: '/usr/bin/chromium' },
+    only: { type: 'string', default: '' },
   },
 });
 for (const name of ['daemon', 'client', 'page', 'out']) {
@@ -39,6 +40,7 @@ let failed = 0;
 let passed = 0;
 
 async function check(name, body) {
+  if (!new RegExp(given.only).test(name)) return;
   const began = Date.now();
   try {
     await body();
@@ -310,6 +312,11 @@ await check('a robot that stands, is silent or was restarted is shown as that', 
   const told = [
     { ...heard, robot_id: 'restarted', faults: { restart: 1, gap: 1, outside_mission: 40 } },
     { ...heard, robot_id: 'lossy', faults: { missing: 3, restart: 1 } },
+    {
+      ...heard,
+      robot_id: 'negated',
+      contradictions: [{ kind: 'sign', id: 'x', channel: 'battery_current', says: 'It is -1.', untrue: true }],
+    },
     { ...heard, robot_id: 'quiet', live: false, silent_s: 7200 },
     { ...heard, robot_id: 'standing', speed_m_s: 0, measured_power_w: 20 },
   ];
@@ -326,6 +333,7 @@ await check('a robot that stands, is silent or was restarted is shown as that', 
     );
   equal((await cells('restarted'))[0], 'live', 'after a restart');
   expect((await cells('lossy'))[0].includes('3 missing'), `lost samples: ${(await cells('lossy'))[0]}`);
+  expect((await cells('negated'))[0].includes('battery_current: sign'), 'a contradiction');
   const quiet = await cells('quiet');
   expect(/^silent since (\d\d:\d\d|\w+ \d+)$/.test(quiet[0]), `silence: ${quiet[0]}`);
   equal([quiet[1], quiet[6], quiet[8]].join(' '), '– – –', 'power, speed and mission of a silent robot');
@@ -376,7 +384,7 @@ await check('missions are filtered, summed and kept in the address', async () =>
     'the totals',
     async () => number(await page.locator('.readouts dd .number').first().textContent()) >= totals.missions,
   );
-  await page.getByLabel('Payload, from kg').fill('100000');
+  await page.getByLabel('Payload, kg, from').fill('100000');
   await page.keyboard.press('Enter');
   await page.getByText('No mission matches').waitFor();
   await page.getByRole('button', { name: 'Clear' }).click();
@@ -469,24 +477,86 @@ await check('missions are sorted by their columns and found by a part of the nam
     'one mission',
     async () => (await page.locator('.missions tbody th').allTextContents()).join() === 'worn-01-s12-m3',
   );
-  await page.getByText('1 found in the newest 8 of 8 loaded').waitFor();
+  await page.getByText('1 of 1 loaded').waitFor();
 });
 
-await check('missions are summed by day', async () => {
+await check(
+  'missions are found by a range of their ratio, and the headers sort by the keyboard',
+  async () => {
+    const { missions } = await get('/v1/missions?robot_id=worn-01&sort=ratio&order=desc&limit=50');
+    const least = missions[2].ratio;
+    await go(page, `#/missions?robot=worn-01&ratio_min=${least}`);
+    await until('three missions', async () => (await page.locator('.missions tbody tr').count()) === 3);
+    await page.getByRole('button', { name: 'Energy', exact: true }).focus();
+    await page.keyboard.press('Enter');
+    await page.locator('.missions th[aria-sort=descending]', { hasText: 'Energy' }).waitFor();
+    const some = missions.slice(0, 3).sort((one, other) => other.energy.battery_j - one.energy.battery_j);
+    await until(
+      'falling energies',
+      async () =>
+        (await page.locator('.missions tbody th').allTextContents()).join() ===
+        some.map((m) => m.mission_id).join(),
+    );
+    await page.getByRole('combobox', { name: 'Robot', exact: true }).selectOption(robot);
+    await page.getByRole('button', { name: 'Leave out worn-01' }).click();
+    await until('the other robot alone', () => page.url().includes(`robot=${robot}&`));
+  },
+);
+
+await check('trends sum missions by day and week, of the fleet and of robots side by side', async () => {
   const { missions } = await get('/v1/missions?robot_id=worn-01&limit=50');
-  const end = new Date(missions[0].end_utime_us / 1000);
-  const local = new Date(end - end.getTimezoneOffset() * 60_000 + 60_000).toISOString().slice(0, 16);
-  await go(page, `#/missions?robot=worn-01&to=${local}&trend=day`);
-  await page.locator('.trends tbody tr').first().waitFor();
-  const counts = (await page.locator('.trends tbody td:nth-child(2)').allTextContents()).map(number);
-  equal(
-    counts.reduce((a, b) => a + b),
-    missions.length,
-    'missions of all days',
-  );
-  const energies = (await page.locator('.trends tbody td:nth-child(3)').allTextContents()).map(joulesOf);
-  const sum = missions.reduce((total, m) => total + m.energy.battery_j, 0);
-  expect(Math.abs(energies.reduce((a, b) => a + b) / sum - 1) < 0.01, `${energies} against ${sum} J`);
+  const day = new Date(Math.min(...missions.map((m) => m.start_utime_us)) / 1000 - 86_400_000);
+  const from = day.toISOString().slice(0, 10);
+  const rows = page.locator('.trends tbody tr');
+  for (const by of ['day', 'week']) {
+    await go(page, `#/trends?robot=worn-01&from=${from}&by=${by}`);
+    await rows.first().waitFor();
+    const counts = (await page.locator('.trends tbody td:nth-child(2)').allTextContents()).map(number);
+    equal(
+      counts.reduce((a, b) => a + b),
+      missions.length,
+      `missions by ${by}`,
+    );
+    const energies = (await page.locator('.trends tbody td:nth-child(3)').allTextContents()).map(joulesOf);
+    const sum = missions.reduce((total, m) => total + m.energy.battery_j, 0);
+    expect(Math.abs(energies.reduce((a, b) => a + b) / sum - 1) < 0.01, `${energies} against ${sum} J`);
+    equal(await page.locator('.trend-charts .uplot').count(), 3, 'charts');
+  }
+  await page.getByRole('combobox', { name: 'Robot', exact: true }).selectOption('oval-01');
+  await page.locator('.trend-key', { hasText: 'oval-01' }).waitFor();
+  const button = page.getByRole('button', { name: 'Export CSV' });
+  const [download] = await Promise.all([page.waitForEvent('download'), button.click()]);
+  const [head, ...lines] = (await readFile(await download.path(), 'utf8')).trim().split('\r\n');
+  expect(head.startsWith('robots,from,to,missions,') && lines.length > 0, head);
+});
+
+await check('robots, periods and missions are compared side by side', async () => {
+  const figures = async (row) => {
+    const cells = page
+      .locator('.compare tbody tr', {
+        has: page.getByText(row, { exact: true }),
+      })
+      .locator('td');
+    await cells.first().waitFor();
+    return cells.allTextContents();
+  };
+  await go(page, '#/compare?a_robot=worn-01&b_robot=oval-01');
+  for (const [k, id] of ['worn-01', 'oval-01'].entries()) {
+    const totals = await get(`/v1/mission-totals?robot_id=${id}`);
+    equal(number((await figures('Missions'))[k]), totals.missions, `missions of ${id}`);
+    expect(
+      Math.abs(joulesOf((await figures('Battery energy'))[k]) / totals.energy.battery_j - 1) < 0.01,
+      `${await figures('Battery energy')}`,
+    );
+  }
+  const { missions } = await get('/v1/missions?robot_id=worn-01&sort=ratio&limit=50');
+  const [first, last] = [missions[0], missions.at(-1)];
+  await go(page, `#/compare?kind=missions&a_mission=${first.id}&b_mission=${last.id}`);
+  const ratios = await figures('Ratio');
+  equal(`${ratios[0]} ${ratios[1]}`, `${first.ratio.toFixed(3)} ${last.ratio.toFixed(3)}`, 'ratios');
+  await page.getByRole('button', { name: 'Periods', exact: true }).click();
+  await page.getByText('Second period').waitFor();
+  await page.locator('.compare tbody tr').first().waitFor();
 });
 
 await check('a proposed model says what it changes, and is adopted only when confirmed', async () => {
@@ -525,12 +595,15 @@ await check('a proposed model says what it changes, and is adopted only when con
   await page.unroute('**/v1/robots/worn-01/model');
   await page.route('**/v1/robots/worn-01/proposals?*', (route) =>
     route.fulfill({
-      json: { robot_id: 'worn-01', proposals: [{ ...proposals[0], base_version: 7 }] },
+      json: {
+        robot_id: 'worn-01',
+        proposals: [{ ...proposals[0], state: 'superseded', closed_reason: 'made for version 7' }],
+      },
     }),
   );
   await page.reload();
   await page.getByText('1 closed proposal').click();
-  await page.getByText('it was made for version 7, and version 1 is in force').waitFor();
+  await page.getByText('made for version 7').waitFor();
   await page.unroute('**/v1/robots/worn-01/proposals?*');
 });
 
@@ -922,7 +995,7 @@ await check('a diagnosis shows its checks, what would fit, and effects to choose
       ],
       corrections: [{ parameter: 'idle_power_w', file: 20, fits: 31, sd: 0.4 }],
       adoption: {
-        refusal: 'coulomb_friction is not told from viscous_friction: name the one to adopt',
+        refusal: 'coulomb_friction is not distinguished from viscous_friction: name the one to adopt',
         choice_settles: true,
         corrects_file: true,
         effects: [
@@ -1163,6 +1236,8 @@ const views = {
   diagnosis: `#/gap/${diagnosis}`,
   outside: `#/gap/${outside}`,
   worn: '#/robots/worn-01',
+  trends: '#/trends?by=day&from=2020-01-01',
+  compare: '#/compare?a_robot=worn-01&b_robot=oval-01',
   audit: '#/audit',
   help: '#/help',
 };
@@ -1175,7 +1250,9 @@ for (const [size, viewport] of Object.entries(sizes)) {
         async () => {
           await go(shown, hash);
           await shown
-            .locator('main .readouts, main .plan-result, main .jobs, main .events, main .glossary')
+            .locator(
+              'main .readouts, main .plan-result, main .jobs, main .events, main .glossary, main .trends, main .compare',
+            )
             .first()
             .waitFor();
           await until('an end of loading', async () => (await shown.locator('.loading').count()) === 0);

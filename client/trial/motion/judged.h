@@ -17,7 +17,7 @@ namespace joulecast::trial::motion {
 struct NamedEffect {
   std::string id;
   double probability = 0;
-  std::vector<std::string> alternatives;  // that the data cannot tell from it
+  std::vector<std::string> alternatives;  // that the data cannot distinguish from it
   double strength = 0, deviation = 0;
   double posterior = 0;  // before the table of probabilities
   std::string standing{};

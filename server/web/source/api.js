@@ -8,8 +8,17 @@ class Problem extends Error {
   }
 }
 
+const unauthorized = new EventTarget();
+
+// Calls back when a request was refused for want of a token; gives what ends that.
+export function onUnauthorized(callback) {
+  unauthorized.addEventListener('refused', callback);
+  return () => unauthorized.removeEventListener('refused', callback);
+}
+
 async function answer(response) {
   if (response.ok) return response.json();
+  if (response.status === 401) unauthorized.dispatchEvent(new Event('refused'));
   const problem = await response.json().catch(() => ({}));
   throw Object.assign(
     new Problem(response.status, problem.title ?? response.statusText, problem.detail ?? '', problem.field),
@@ -30,6 +39,14 @@ async function call(path, options) {
 
 export function get(path, signal) {
   return call(path, { signal });
+}
+
+// {text, next}: an answer of that type, and the path of the page after it or null.
+export async function getText(path, type, signal) {
+  const response = await fetch(path, { headers: { accept: type }, signal });
+  if (!response.ok) await answer(response);
+  const next = /<([^>]+)>; rel="next"/.exec(response.headers.get('link') ?? '')?.[1] ?? null;
+  return { text: await response.text(), next };
 }
 
 export function post(path, body, signal) {

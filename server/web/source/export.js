@@ -1,72 +1,51 @@
-// The filtered missions as a file, page by page; energies in joules, whatever the page shows.
-import { get, query } from './api.js';
+// What is listed as a file, page by page; energies in joules, whatever the page shows.
+import { get, getText, query } from './api.js';
 
 const pageRows = 1000;
-const columns = {
-  id: (m) => m.id,
-  robot_id: (m) => m.robot_id,
-  mission_id: (m) => m.mission_id,
-  state: (m) => m.state,
-  incomplete: (m) => m.incomplete,
-  incomplete_reason: (m) => m.incomplete_reason,
-  start_utime_us: (m) => m.start_utime_us,
-  end_utime_us: (m) => m.end_utime_us,
-  payload_kg: (m) => m.payload_kg,
-  model_version: (m) => m.model_version,
-  battery_j: (m) => m.energy.battery_j,
-  measured_j: (m) => m.energy.measured_j,
-  measured_s: (m) => m.energy.measured_s,
-  modelled_j: (m) => m.energy.modelled_j,
-  unexplained_j: (m) => m.energy.unexplained_j,
-  drawn_j: (m) => m.energy.drawn_j,
-  returned_j: (m) => m.energy.returned_j,
-  charge_ah: (m) => m.energy.charge_ah,
-  distance_m: (m) => m.energy.distance_m,
-  turned_rad: (m) => m.energy.turned_rad,
-  duration_s: (m) => m.energy.duration_s,
-  samples: (m) => m.samples,
-  gap_count: (m) => m.gap_count,
-  gap_s: (m) => m.gap_s,
-  note: (m) => m.note,
-};
 
-// RFC 4180; a text that a spreadsheet would take for a formula gets an apostrophe.
-function csvField(value) {
-  if (value === null || value === undefined) return '';
-  if (typeof value !== 'string') return String(value);
-  const safe = /^[=+\-@\t\r]/.test(value) ? `'${value}` : value;
-  return /[",\r\n]/.test(safe) ? `"${safe.replaceAll('"', '""')}"` : safe;
-}
-
-const csvRow = (mission) =>
-  `${Object.values(columns)
-    .map((value) => csvField(value(mission)))
-    .join(',')}\r\n`;
-
-function save(parts, name, type) {
+function save(parts, name, kind) {
+  const type = kind === 'csv' ? 'text/csv' : 'application/json';
   const url = URL.createObjectURL(new Blob(parts, { type }));
-  const anchor = Object.assign(document.createElement('a'), { href: url, download: name });
+  const stamp = new Date().toISOString().slice(0, 19).replaceAll(':', '');
+  const download = `joulecast-${name}-${stamp}.${kind}`;
+  const anchor = Object.assign(document.createElement('a'), { href: url, download });
   document.body.append(anchor);
   anchor.click();
   anchor.remove();
   setTimeout(() => URL.revokeObjectURL(url), 60_000);
 }
 
-export async function exportMissions(kind, filter, progress, signal) {
-  const parts = [kind === 'csv' ? `${Object.keys(columns).join(',')}\r\n` : '[\n'];
+// The CSV of `path`, with the pages that follow it. `progress` is told of the lines so far.
+export async function saveText(path, name, progress, signal) {
+  const parts = [];
+  let count = 0;
+  for (let at = path; at !== null;) {
+    const { text, next } = await getText(at, 'text/csv', signal);
+    parts.push(parts.length === 0 ? text : text.slice(text.indexOf('\n') + 1));
+    count += text.split('\r\n').length - 2;
+    progress?.(count);
+    at = next;
+  }
+  save(parts, name, 'csv');
+}
+
+async function saveJson(filter, progress, signal) {
+  const parts = ['[\n'];
   let cursor;
   let count = 0;
   do {
     const page = await get(`/v1/missions${query({ ...filter, limit: pageRows, cursor })}`, signal);
-    if (page.missions.length > 0) {
-      if (kind === 'csv') parts.push(page.missions.map(csvRow).join(''));
-      else parts.push((count > 0 ? ',\n' : '') + page.missions.map((m) => JSON.stringify(m)).join(',\n'));
-    }
+    if (page.missions.length > 0)
+      parts.push((count > 0 ? ',\n' : '') + page.missions.map((m) => JSON.stringify(m)).join(',\n'));
     count += page.missions.length;
     cursor = page.next_cursor;
     progress(count);
   } while (cursor !== null);
-  if (kind === 'json') parts.push('\n]\n');
-  const stamp = new Date().toISOString().slice(0, 19).replaceAll(':', '');
-  save(parts, `joulecast-missions-${stamp}.${kind}`, kind === 'csv' ? 'text/csv' : 'application/json');
+  parts.push('\n]\n');
+  save(parts, 'missions', 'json');
 }
+
+export const exportMissions = (kind, filter, progress, signal) =>
+  kind === 'csv'
+    ? saveText(`/v1/missions${query({ ...filter, limit: pageRows })}`, 'missions', progress, signal)
+    : saveJson(filter, progress, signal);

@@ -22,6 +22,13 @@ async function readRatios(ids, gaps, signal) {
   }
 }
 
+// Models that wait for somebody to adopt them.
+async function readProposals(gaps, signal) {
+  const { proposals } = await get('/v1/proposals?limit=1000', signal);
+  for (const p of proposals)
+    if (p.closed_reason === null) gaps.set(p.robot_id, { ...gaps.get(p.robot_id), proposed: true });
+}
+
 // A drift counts until another model is in force.
 async function readDrifts(gaps, signal) {
   const events = await newestEvents({ count: 1000, signal });
@@ -39,7 +46,7 @@ async function readDrifts(gaps, signal) {
   }
 }
 
-// Map from robot to {ratio, standsOut, drift, driftUs}; empty until it is read.
+// Map from robot to {ratio, standsOut, drift, driftUs, proposed}; empty until it is read.
 export function useFleetGap(ids) {
   const [gaps, setGaps] = useState(new Map());
   const key = ids.length > mostRobots ? '' : ids.join('\n');
@@ -50,6 +57,7 @@ export function useFleetGap(ids) {
       const next = new Map();
       await readRatios(key.split('\n'), next, abort.signal);
       await readDrifts(next, abort.signal);
+      await readProposals(next, abort.signal);
       setGaps(next);
     };
     const quietly = () => read().catch(() => {}); // the live view says when the service is gone

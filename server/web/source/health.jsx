@@ -32,6 +32,7 @@ export function Health({ state }) {
   const { level, text } = telemetryOf(state);
   const faults = Object.entries(state.faults).filter(([reason]) => !ordinary.includes(reason));
   const count = faults.reduce((sum, [, n]) => sum + n, 0);
+  const { contradictions } = state;
   const listed = faults.map(([reason, n]) => `${format.fixed(n)} ${format.words(reason)}`).join(', ');
   return (
     <>
@@ -44,7 +45,30 @@ export function Health({ state }) {
           {listed}
         </span>
       )}
+      {contradictions.length > 0 && (
+        <span class="below fault" title={contradictions.map((c) => c.says).join(' ')}>
+          {contradictions.map((c) => `${c.channel || 'messages'}: ${format.words(c.kind)}`).join(', ')}
+        </span>
+      )}
     </>
+  );
+}
+
+// What the robot's own channels, its file and the clock say against its telemetry.
+export function Contradictions({ of: list }) {
+  if (list.length === 0) return null;
+  return (
+    <div class="failure" role="alert">
+      <p>Its telemetry is contradicted:</p>
+      <ul class="reasons">
+        {list.map((c) => (
+          <li key={`${c.id} ${c.channel}`}>
+            {c.says}
+            {c.untrue && ' Nothing is learnt from such missions.'}
+          </li>
+        ))}
+      </ul>
+    </div>
   );
 }
 

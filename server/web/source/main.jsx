@@ -6,6 +6,7 @@ import { toggleEnergyUnit, useEnergyUnit } from './energy.js';
 import { startLive, useLive } from './live.js';
 import { toggleTheme, useTheme } from './theme.js';
 import { routeOf } from './route.js';
+import { SignIn } from './sign_in.jsx';
 import { Empty, Guard } from './widgets.jsx';
 import { Fleet } from './views/fleet.jsx';
 import { later } from './views/later.jsx';
@@ -15,6 +16,8 @@ const views = {
   robots: later('Robot'),
   missions: later('Missions'),
   mission: later('Mission'),
+  trends: later('Trends'),
+  compare: later('Compare'),
   plan: later('Plan'),
   gap: later('Gap'),
   audit: later('Audit'),
@@ -69,7 +72,7 @@ function App() {
     }
   }, [route.view, route.id]);
   const View = views[route.view];
-  const here = { robots: 'fleet', mission: 'missions' }[route.view] ?? route.view;
+  const here = { robots: 'fleet', mission: 'missions', compare: 'trends' }[route.view] ?? route.view;
   const tab = (view, name) => (
     <a href={`#/${view}`} aria-current={here === view ? 'page' : undefined}>
       {name}
@@ -94,6 +97,7 @@ function App() {
         <nav aria-label="Views">
           {tab('fleet', 'Fleet')}
           {tab('missions', 'Missions')}
+          {tab('trends', 'Trends')}
           {tab('plan', 'Plan')}
           {tab('gap', 'Gap')}
           {tab('audit', 'Log')}
@@ -123,6 +127,7 @@ function App() {
         </button>
       </header>
       <OfflineBanner />
+      <SignIn />
       <main id="main" tabindex="-1" ref={main}>
         <Guard view={location.hash}>
           {View ? (

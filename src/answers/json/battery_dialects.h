@@ -6,7 +6,7 @@
 
 namespace joulecast::answers {
 
-// Whose words an autonomy answer speaks.
+// The message format of an autonomy answer.
 enum class Dialect { joulecast, vda5050_3_0, vda5050_2_1, massrobotics, ros };
 inline constexpr const char* dialect_names[] = {"joulecast", "vda5050-3.0", "vda5050-2.1", "massrobotics",
                                                 "ros"};

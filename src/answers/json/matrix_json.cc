@@ -145,7 +145,7 @@ Result<MatrixInput> read_matrix(const json& request) {
   if (input.driving == Driving::usual)
     for (const char* name : {"value_of_time_w", "regeneration"})
       if (fields.has(name))
-        fields.fault(name, "must not be given beside \"driving\": \"usual\", whose motion nobody plans");
+        fields.fault(name, "must not be given beside \"driving\": \"usual\", whose motion is not planned");
   input.reserve_fraction = fields.optional_number("reserve_fraction", fraction);
   const json* robots = read_array(fields, "robots", max_robots);
   const json* tasks = read_array(fields, "tasks", max_tasks);

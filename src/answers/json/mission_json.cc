@@ -1,6 +1,7 @@
 #include "answers/json/mission_json.h"
 
 #include "answers/json/ledger_json.h"
+#include "signals/account_ratios.h"
 
 namespace joulecast::answers {
 
@@ -21,14 +22,20 @@ void write_mission(JsonWriter& json, const history::Mission& m) {
   json.field("model_version", m.model_version);
   json.key("energy");
   write_accounts(json, m.accounts);
+  json.field("ratio", signals::energy_ratio(m.accounts));
+  json.field("wh_per_km", signals::energy_per_distance_wh_km(m.accounts));
   json.field("samples", m.samples);
   json.key("sample_faults").begin_object();
   for (const auto& [reason, count] : m.sample_faults) json.field(reason, count);
   json.end_object();
   json.field("gap_count", m.gap_count);
   json.field("gap_s", m.gap_s);
+  const history::MissionFindings findings = history::findings_of(m);
   json.key("findings");
-  m.findings_json.empty() ? json.null() : json.raw(m.findings_json);
+  findings.motion.empty() ? json.null() : json.raw(findings.motion);
+  json.key("contradictions").raw(findings.contradictions);
+  json.key("annulled");
+  findings.annulled.empty() ? json.null() : json.raw(findings.annulled);
   json.key("covariates").begin_array();
   for (const history::CovariateSummary& c : m.covariates) {
     json.begin_object().field("name", c.name).field("mean", c.mean).field("min", c.min).field("max", c.max);

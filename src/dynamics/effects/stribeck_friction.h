@@ -6,10 +6,11 @@
 namespace joulecast::dynamics {
 
 struct StribeckFriction {
-  static constexpr std::array parameters =
-      std::to_array<EffectParameter>({{"ratio", "1", 0, 0, 20, "breakaway friction above T_m, over T_m"},
-                                      {"speed_rad_s", "rad/s", 2, 0.2, 20, "Stribeck speed of the wheel"},
-                                      {"exponent", "1", 2, 1, 2, "of the speed in the exponential"}});
+  static constexpr std::array parameters = std::to_array<EffectParameter>(
+      {{"ratio", "1", 0, 0, 20,
+        "breakaway friction above T_m, over T_m with coulomb_friction and friction_asymmetry"},
+       {"speed_rad_s", "rad/s", 2, 0.2, 20, "Stribeck speed of the wheel"},
+       {"exponent", "1", 2, 1, 2, "of the speed in the exponential"}});
   static constexpr EffectInfo info{"stribeck_friction",
                                    ActsOn::wheel_torque,
                                    "T = a T_m exp(-|w/w_s|^d) sgn(w)",

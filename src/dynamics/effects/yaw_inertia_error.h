@@ -6,7 +6,8 @@ namespace joulecast::dynamics {
 
 struct YawInertiaError {
   static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"ratio", "1", 0, -0.9, 20, "error of the yaw inertia over its nominal value"}});
+      {{"ratio", "1", 0, -0.9, 20,
+        "error of the robot file's yaw inertia over its value; a payload's is not scaled"}});
   static constexpr EffectInfo info{"yaw_inertia_error", ActsOn::inertia,    "I (1 + a)",
                                    "rigid body",        "thesis (2-12), I", parameters};
 

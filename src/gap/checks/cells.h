@@ -22,7 +22,7 @@ struct Cell {
   double motor_power_w = 0;  // of both
   double yaw_rate_rad_s = 0, pitch_rad = 0;
   std::array<double, 2> command{};
-  double payload_kg = 0;  // 0 where nobody says
+  double payload_kg = 0;  // 0 where not stated
 };
 
 // Cuts a mission's samples into cells, with the next one in hand.

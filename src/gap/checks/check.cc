@@ -68,39 +68,72 @@ Check make_check(std::string id, std::string channel, const Estimate& value, std
   return {std::move(id), std::move(channel), value.value, value.interval(), std::move(says), false};
 }
 
+namespace {
+
+// Checks that go on from one another: what one contradicts, the next do not ask again.
+class Asking {
+ public:
+  Asking(std::span<const Observation> observations, const robot::RobotModel& robot, double motor_delay_s)
+      : effects_(dynamics::active_effects(robot)),
+        model_(robot, effects_.value_or(std::vector<dynamics::ActiveEffect>{})),
+        context_{observations, robot, model_, motor_delay_s} {
+    for (const Observation& o : observations) {
+      for (std::size_t k = 0; k < reading_count; ++k) context_.tallies[k].append(o.of(k));
+    }
+  }
+
+  void ask(std::vector<Check> (*check)(const CheckContext&)) {
+    for (Check& found : check(context_)) {
+      if (found.contradicted) context_.silent.push_back(found.channel);
+      checks.push_back(std::move(found));
+    }
+  }
+  void ask_effects() {
+    if (effects_) return;
+    checks.push_back(make_check(
+        "robot_file", "", {}, "The robot file's effects are left out: " + describe(effects_.error()) + "."));
+  }
+
+  std::vector<Check> checks;
+
+ private:
+  Result<std::vector<dynamics::ActiveEffect>> effects_;
+  dynamics::DriveModel model_;
+  CheckContext context_;
+};
+
+}  // namespace
+
 std::vector<Check> check_observations(std::span<const Observation> observations,
                                       const robot::RobotModel& robot) {
   if (observations.empty()) return {};
-  const auto effects = dynamics::active_effects(robot);
-  const dynamics::DriveModel model(robot, effects.value_or(std::vector<dynamics::ActiveEffect>{}));
-  CheckContext context{observations, robot, model, motor_delay(observations).value_or(Delay{}).value_s};
-  for (const Observation& o : observations) {
-    for (std::size_t k = 0; k < reading_count; ++k) context.tallies[k].append(o.of(k));
+  Asking asking(observations, robot, motor_delay(observations).value_or(Delay{}).value_s);
+  asking.ask(check_clock);
+  if (contradicts_clock(asking.checks)) return std::move(asking.checks);
+  asking.ask(check_silence);
+  asking.ask(check_signs_and_units);
+  asking.ask_effects();
+  for (const auto check : {check_limits, check_motors, check_robot_file, check_kinematics, check_delays,
+                           check_steps, check_readings})
+    asking.ask(check);
+  shorten(asking.checks);
+  return std::move(asking.checks);
+}
+
+std::vector<Check> check_contradictions(std::span<const Observation> observations,
+                                        const robot::RobotModel& robot) {
+  if (observations.empty()) return {};
+  Asking asking(observations, robot, 0);
+  asking.ask(check_clock);
+  if (!contradicts_clock(asking.checks)) {
+    for (const auto check : {check_silence, check_signs_and_units, check_limits, check_readings})
+      asking.ask(check);
   }
-  std::vector<Check> checks;
-  const auto take = [&](std::vector<Check> found) {
-    for (Check& check : found) {
-      if (check.contradicted) context.silent.push_back(check.channel);
-      checks.push_back(std::move(check));
-    }
-  };
-  take(check_clock(context));
-  if (contradicts_clock(checks)) return checks;
-  take(check_silence(context));
-  take(check_signs_and_units(context));
-  if (!effects) {
-    checks.push_back(make_check("robot_file", "", {},
-                                "The robot file's effects are left out: " + describe(effects.error()) + "."));
-  }
-  take(check_limits(context));
-  take(check_motors(context));
-  take(check_robot_file(context));
-  take(check_kinematics(context));
-  take(check_delays(context));
-  take(check_steps(context));
-  take(check_readings(context));
-  shorten(checks);
-  return checks;
+  std::erase_if(asking.checks, [](const Check& c) {
+    return !c.contradicted && !c.id.ends_with("_over_limit") && c.id != "thrown_readings" &&
+           c.id != "utime_order" && c.id != "utime_year";
+  });
+  return std::move(asking.checks);
 }
 
 std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,

@@ -26,7 +26,7 @@ struct Check {
   std::string channel;
   double value = 0;                  // the number that says it: a ratio, a period [s], a step
   std::array<double, 2> interval{};  // of the value, 95 %; NaN where none applies
-  std::string says;                  // what was found, against what, its likely cause, what joulecast wants
+  std::string says;                  // what was found, against what, its likely cause, what joulecast expects
   // The channel takes no part in the diagnosis. A contradicted "utime" leaves nothing to be diagnosed.
   bool contradicted = false;
   // Of `step_between_missions`: the first mission after the step, in the order given. Missions before it and
@@ -46,6 +46,12 @@ std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
 // The same from observations made before, in the order of the missions.
 std::vector<Check> check_observations(std::span<const Observation> observations,
                                       const robot::RobotModel& robot);
+
+// Of these checks those that need one mission alone and no delays, to be asked while it goes on: clock,
+// signs, units, sides, silent channels, limits and readings that are thrown for a row. Observations may be
+// without lags.
+std::vector<Check> check_contradictions(std::span<const Observation> observations,
+                                        const robot::RobotModel& robot);
 
 // Missions before a `step_between_missions` and from it on, each side with three at least; empty where no
 // check tells of a step. `checks` are of these recordings. Notes and what could not be read belong to the

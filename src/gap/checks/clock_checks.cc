@@ -49,7 +49,7 @@ std::vector<Check> check_unit(const CheckContext& c) {
       return {clock_check(
           "utime_scale", 1 / unit.factor,
           fmt::format("utime looks given in {}: its rows would come every {:.3g} s, in {} every {:.3g} "
-                      "s; joulecast wants us since 1970.",
+                      "s; joulecast expects us since 1970.",
                       unit.name, period, unit.name, period * unit.factor),
           true)};
     }
@@ -58,7 +58,7 @@ std::vector<Check> check_unit(const CheckContext& c) {
     return {clock_check(
         "utime_year", std::floor(year),
         fmt::format("utime puts the recordings into the year {:.0f}, with rows every {:.3g} s: is it in "
-                    "ns, or from another epoch? joulecast wants us since 1970.",
+                    "ns, or from another epoch? joulecast expects us since 1970.",
                     std::floor(year), period),
         false)};
   }

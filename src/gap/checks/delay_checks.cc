@@ -11,17 +11,18 @@ namespace joulecast::gap {
 namespace {
 
 Check delay_check(const char* id, const char* channel, const char* name, const Delay& delay) {
-  return {id,
-          channel,
-          delay.value_s,
-          delay.interval,
-          fmt::format("{} {} the wheel speeds by {:.0f} ms ({:.0f} to {:.0f}): joulecast wants the readings "
-                      "of one message "
-                      "to be of one instant.",
-                      name, delay.value_s > 0 ? "lag" : "lead", 1e3 * std::fabs(delay.value_s),
-                      1e3 * std::min(std::fabs(delay.interval[0]), std::fabs(delay.interval[1])),
-                      1e3 * std::max(std::fabs(delay.interval[0]), std::fabs(delay.interval[1]))),
-          false};
+  return {
+      id,
+      channel,
+      delay.value_s,
+      delay.interval,
+      fmt::format("{} {} the wheel speeds by {:.0f} ms ({:.0f} to {:.0f}): joulecast expects the readings "
+                  "of one message "
+                  "to be of one instant.",
+                  name, delay.value_s > 0 ? "lag" : "lead", 1e3 * std::fabs(delay.value_s),
+                  1e3 * std::min(std::fabs(delay.interval[0]), std::fabs(delay.interval[1])),
+                  1e3 * std::max(std::fabs(delay.interval[0]), std::fabs(delay.interval[1]))),
+      false};
 }
 
 }  // namespace

@@ -46,10 +46,11 @@ Relation right_or_left(Relation right, std::size_t side) {
 
 }  // namespace
 
-Observer::Observer(const robot::RobotModel& robot)
+Observer::Observer(const robot::RobotModel& robot, bool delays)
     : robot_(robot),
       model_(robot, dynamics::active_effects(robot).value_or(std::vector<dynamics::ActiveEffect>{})),
-      limit_rad_s_(robot.limits.speed_m_s / robot.kinematics.wheel_radius_m) {}
+      limit_rad_s_(robot.limits.speed_m_s / robot.kinematics.wheel_radius_m),
+      delays_(delays) {}
 
 void Observer::begin(std::string mission_id, double declared_payload_kg) {
   seen_ = {};
@@ -68,7 +69,7 @@ void Observer::add(const Sample& sample) {
   const auto readings = signals::numbers_of(sample);
   for (std::size_t k = 0; k < reading_count; ++k) seen_.values[k].add(*readings[k]);
   if (!std::isfinite(sample.wheel_velocity_rad_s[0] + sample.wheel_velocity_rad_s[1])) return;
-  seen_.lags.add(sample);
+  if (delays_) seen_.lags.add(sample);
   if (waiting_) {
     Sample s = *waiting_;
     if (before_) {
@@ -185,8 +186,14 @@ Observation Observer::finish() {
   if (waiting_) take(*waiting_);
   waiting_.reset();
   for (Products& products : seen_.relations) products.finish();
-  seen_.lags.finish();
+  if (delays_) seen_.lags.finish();
   return std::move(seen_);
+}
+
+Observation Observer::so_far() const {
+  Observation seen = seen_;
+  for (Products& products : seen.relations) products.finish();
+  return seen;
 }
 
 std::vector<Products::Block> blocks_of(std::span<const Observation> observations, Relation relation) {

@@ -66,11 +66,14 @@ struct Observation {
 class Observer {
  public:
   // Effects of the file that the catalogue rejects are left out.
-  explicit Observer(const robot::RobotModel& robot);
+  // Without `delays` the lags stay empty, which saves most of the work a sample makes.
+  explicit Observer(const robot::RobotModel& robot, bool delays = true);
 
   void begin(std::string mission_id, double declared_payload_kg);
   void add(const signals::Sample& sample);
   Observation finish();
+  // What finish() would give now, but for the last sample; the mission goes on.
+  Observation so_far() const;
 
  private:
   void take(signals::Sample sample);
@@ -82,6 +85,7 @@ class Observer {
   robot::RobotModel robot_;
   dynamics::DriveModel model_;
   double limit_rad_s_;
+  bool delays_;
   Observation seen_;
   std::optional<CellCutter> cells_;
   SpanCutter spans_;

@@ -100,7 +100,7 @@ double BlockFit::sd(Eigen::Index k) const {
 
 namespace {
 
-// Weighted least squares; empty where the terms cannot be told apart.
+// Weighted least squares; empty where the terms cannot be distinguished.
 std::optional<Eigen::VectorXd> solve(const Eigen::MatrixXd& xx, const Eigen::VectorXd& xy) {
   const Eigen::VectorXd unit = xx.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::LDLT<Eigen::MatrixXd> factor(unit.asDiagonal() * xx * unit.asDiagonal());

@@ -55,7 +55,7 @@ struct BlockFit {
 
 // quantity[y] on quantity[x...]. Blocks that fit far worse than the others count less (Huber); the covariance
 // is the sandwich over blocks (Liang and Zeger 1986). A quantity that is 0 throughout leaves its own
-// coefficient unknown; others that cannot be told apart, or too few blocks, leave all of them unknown.
+// coefficient unknown; others that cannot be distinguished, or too few blocks, leave all of them unknown.
 BlockFit fit_blocks(std::span<const Products::Block> blocks, std::size_t y, std::span<const std::size_t> x);
 
 // A number with its standard deviation.

@@ -58,8 +58,8 @@ std::vector<Check> check_signs_and_units(const CheckContext& c) {
     if (measured.evidence == nullptr) continue;
     const Evidence& e = *measured.evidence;
     Check check{fault.id, fault.channel, measured.factor, measured.interval, {}, true};
-    check.says = fmt::format("{} looks {}: {} {} times {}; joulecast wants {}{}.", fault.channel, fault.cause,
-                             e.says, with_interval(e.ratio.value, e.ratio.interval()), e.against,
+    check.says = fmt::format("{} looks {}: {} {} times {}; joulecast expects {}{}.", fault.channel,
+                             fault.cause, e.says, with_interval(e.ratio.value, e.ratio.interval()), e.against,
                              contract_of(fault.channel), also(explanation.alternatives[k]));
     checks.push_back(std::move(check));
   }
@@ -87,7 +87,7 @@ std::vector<Check> check_limits(const CheckContext& c) {
          ratio,
          {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()},
          fmt::format(
-             "{} reaches {:.3g} times the file's {} in the usual mission: is it {}? joulecast wants {}.",
+             "{} reaches {:.3g} times the file's {} in the usual mission: is it {}? joulecast expects {}.",
              channel, ratio, what, at == reading::yaw_rate ? "in degrees" : "in rpm, or of the motor",
              contract_of(channel)),
          false});

@@ -62,7 +62,7 @@ Check dead_check(const std::vector<std::string>& dead) {
       no_interval,
       fmt::format(
           "{} {} exactly 0 all the time while the robot moves: a sensor that is dead or was never filled in; "
-          "joulecast wants NaN for what is not measured.",
+          "joulecast expects NaN for what is not measured.",
           joined(dead), dead.size() == 1 ? "is" : "are"),
       true};
 }
@@ -80,7 +80,7 @@ Check constant_check(const CheckContext& c, const std::string& channel, double v
   if (channel != "battery_voltage") {
     check.says = fmt::format(
         "{} is {:.5g} all the time while the robot moves: a constant written in, no measurement; "
-        "joulecast wants NaN for what is not measured.",
+        "joulecast expects NaN for what is not measured.",
         channel, value);
     return check;
   }
@@ -105,7 +105,7 @@ bool check_supply(const CheckContext& c, std::vector<Check>& checks) {
   checks.push_back(
       {"supply_for_motor_voltage", "motor_voltage", volts, no_interval,
        fmt::format("motor_voltage stays near {:.3g} V however the wheels turn: it looks read at the supply; "
-                   "joulecast wants V at the armature, positive driving forward.",
+                   "joulecast expects V at the armature, positive driving forward.",
                    volts),
        true});
   return true;
@@ -129,11 +129,11 @@ void check_unsigned(const CheckContext& c, std::size_t first, std::vector<Check>
   if (sides.empty()) return;
   const std::string field = first == reading::motor_current ? "motor_current" : "motor_voltage";
   const std::string channel = sides.size() == 2 ? field : sides.front();
-  checks.push_back(
-      make_check(field + "_unsigned", channel, backward,
-                 fmt::format("{} is positive whichever way the wheel turns, {} on the average while it "
-                             "turns backward: its sign is lost; joulecast wants it positive driving forward.",
-                             channel, with_interval(backward.value, backward.interval()))));
+  checks.push_back(make_check(
+      field + "_unsigned", channel, backward,
+      fmt::format("{} is positive whichever way the wheel turns, {} on the average while it "
+                  "turns backward: its sign is lost; joulecast expects it positive driving forward.",
+                  channel, with_interval(backward.value, backward.interval()))));
   checks.back().contradicted = true;
 }
 

@@ -266,7 +266,8 @@ void RunDiagnoser::add_limits() {
   }
   if (const double range = *speeds.rbegin() / *speeds.begin(); range < 3) {
     limits.push_back(fmt::format(
-        "Speeds within a factor of {:.1f}: dry and viscous friction and drag are hardly told apart.", range));
+        "Speeds within a factor of {:.1f}: dry and viscous friction and drag are hardly distinguishable.",
+        range));
   }
   if (r_.model_given && std::fabs(r_.model_ratio - 1) > 0.1) {
     limits.push_back(

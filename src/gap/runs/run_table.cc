@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 
+#include "base/bounds.h"
 #include "signals/covariates.h"
 #include "telemetry/csv_table.h"
 
@@ -87,14 +88,15 @@ class Row {
   }
 
   // NaN where the cell is empty or the column missing.
-  Result<double> number(Place place, double low, double high, const std::string& constraint) const {
+  Result<double> number(Place place, const Bounds& bounds, std::string_view unit) const {
     const Result<double> value = parsed(trimmed(text(place)));
-    if (!value || *value < low || *value > high) return wrong(place, constraint);
+    if (!value || !(std::isnan(*value) || bounds.contain(*value)))
+      return wrong(place, requirement(bounds, unit));
     return value;
   }
-  Result<double> required(Place place, double low, double high, const std::string& constraint) const {
-    Result<double> value = number(place, low, high, constraint);
-    if (value && std::isnan(*value)) return wrong(place, "is required and " + constraint);
+  Result<double> required(Place place, const Bounds& bounds, std::string_view unit) const {
+    Result<double> value = number(place, bounds, unit);
+    if (value && std::isnan(*value)) return wrong(place, "is required and " + requirement(bounds, unit));
     return value;
   }
 
@@ -121,9 +123,9 @@ class Row {
 };
 
 Result<void> read_turn(const Row& row, RunConditions& at) {
-  const auto radius = row.number(turn_radius, 0.01, 1e6, "must be from 0.01 to 1e6 m");
+  const auto radius = row.number(turn_radius, {0.01, 1e6}, "m");
   if (!radius) return tl::unexpected(radius.error());
-  const auto angle = row.number(turn_angle, 0, 36000, "must be from 0 to 36000 degrees");
+  const auto angle = row.number(turn_angle, {0, 36000}, "degrees");
   if (!angle) return tl::unexpected(angle.error());
   const std::string_view side = row.text(turn_side);
   if (std::isnan(*radius)) {
@@ -140,8 +142,7 @@ Result<void> read_turn(const Row& row, RunConditions& at) {
 }
 
 Result<void> read_energies(const Row& row, MissionRun& run) {
-  const std::string bound = "must be above 0 and below 1e12 J";
-  constexpr double least = 1e-9, most = 1e12;
+  constexpr Bounds bounds{1e-9, 1e12};
   const std::array<std::pair<Place, double*>, 6> cells{{{energy, &run.energy_j},
                                                         {right_energy, &run.motor_j[0]},
                                                         {left_energy, &run.motor_j[1]},
@@ -149,7 +150,7 @@ Result<void> read_energies(const Row& row, MissionRun& run) {
                                                         {model_right, &run.model_motor_j[0]},
                                                         {model_left, &run.model_motor_j[1]}}};
   for (const auto& [place, value] : cells) {
-    const auto read = row.number(place, least, most, bound);
+    const auto read = row.number(place, bounds, "J");
     if (!read) return tl::unexpected(read.error());
     *value = *read;
   }
@@ -177,22 +178,22 @@ Result<MissionRun> read_run(const Row& row, std::size_t line, const robot::Robot
   struct Cell {
     Place place;
     double* value;
-    double low, high, fallback;
-    const char* constraint;
+    Bounds bounds;
+    std::string_view unit;
+    double fallback;
   };
   RunConditions& at = run.at;
   const std::array<Cell, 6> cells{
-      {{distance, &at.distance_m, 1e-3, 1e7, MissionRun::absent, "must be from 0.001 to 1e7 m"},
-       {speed, &at.speed_m_s, 1e-3, 100, MissionRun::absent, "must be from 0.001 to 100 m/s"},
-       {acceleration, &at.acceleration_m_s2, 1e-4, 100, robot.limits.acceleration_m_s2,
-        "must be from 0.0001 to 100 m/s^2"},
-       {payload, &at.payload_kg, 0, 1e5, 0, "must be from 0 to 1e5 kg"},
-       {standstill, &at.standstill_s, 0, 1e7, 0, "must be from 0 to 1e7 s"},
-       {climb, &at.climb_m, -1e5, 1e5, MissionRun::absent, "must be from -1e5 to 1e5 m"}}};
+      {{distance, &at.distance_m, {1e-3, 1e7}, "m", MissionRun::absent},
+       {speed, &at.speed_m_s, {1e-3, 100}, "m/s", MissionRun::absent},
+       {acceleration, &at.acceleration_m_s2, {1e-4, 100}, "m/s^2", robot.limits.acceleration_m_s2},
+       {payload, &at.payload_kg, {0, 1e5}, "kg", 0},
+       {standstill, &at.standstill_s, {0, 1e7}, "s", 0},
+       {climb, &at.climb_m, {-1e5, 1e5}, "m", MissionRun::absent}}};
   for (const Cell& cell : cells) {
     auto value = std::isnan(cell.fallback) && cell.place != climb
-                     ? row.required(cell.place, cell.low, cell.high, cell.constraint)
-                     : row.number(cell.place, cell.low, cell.high, cell.constraint);
+                     ? row.required(cell.place, cell.bounds, cell.unit)
+                     : row.number(cell.place, cell.bounds, cell.unit);
     if (!value) return tl::unexpected(value.error());
     *cell.value = std::isnan(*value) ? cell.fallback : *value;
   }

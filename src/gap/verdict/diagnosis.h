@@ -36,9 +36,9 @@ struct Controls {
 
 // How the answer that names an effect stands.
 enum class Standing {
-  alone,         // nothing speaks against it, and nothing else would do in its place
-  grouped,       // the same, with others that the data cannot tell from it
-  inconclusive,  // something speaks against the answer as a whole
+  alone,         // there is no evidence against it, and nothing else would do in its place
+  grouped,       // the same, with others that the data cannot distinguish from it
+  inconclusive,  // there is evidence against the answer as a whole
   outside        // named beside something that the catalogue does not know
 };
 std::string_view name_of(Standing standing);

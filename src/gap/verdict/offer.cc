@@ -66,7 +66,7 @@ Offer offer_derived(const json& diagnosis) {
   } else if (verdict != name_of(Verdict::effects)) {
     offer.refusal = "the verdict is " + verdict;
   } else if (alternatives) {
-    offer.refusal = "some effects are not told from others: name the ones to adopt";
+    offer.refusal = "some effects are not distinguished from others: name the ones to adopt";
     offer.choice_settles = true;
   }
   return offer;
@@ -93,7 +93,7 @@ Result<std::vector<AdoptedEffect>> choose(const Offer& offer, const std::vector<
       return invalid("effect", fmt::format("{} stand for one thing: name one of them", enumerate(named)));
     if (named.empty() && !offered.instead.empty()) {
       return fail(Fault::conflict, "effect",
-                  fmt::format("{} is not told from {}: name the one to adopt", ids.front(),
+                  fmt::format("{} is not distinguished from {}: name the one to adopt", ids.front(),
                               enumerate(std::span(ids).subspan(1))));
     }
     const auto other =

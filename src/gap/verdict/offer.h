@@ -22,7 +22,7 @@ struct Offer {
   std::vector<OfferedEffect> effects;
   bool corrects_file = false;   // effects that say that a parameter of the file is another one correct it
   std::string refusal;          // why it is not to be taken; empty: it may be
-  bool choice_settles = false;  // choosing among effects that are not told apart is all that it takes
+  bool choice_settles = false;  // choosing among effects that are not distinguished is all that it takes
 };
 
 // What a person asks for.

@@ -165,7 +165,11 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse, bool unexpl
         probability_text(d.outside.probability))));
   }
   if (d.effects.empty() && d.verdict == Verdict::inconclusive) {
-    if (d.power_absolute_relative - d.noise_floor > 0.012) {
+    if (!std::isfinite(d.noise_floor)) {
+      reasons.emplace_back(
+          "Power was measured, but the motion that asks for it is not known: see the checks of the "
+          "recordings.");
+    } else if (d.power_absolute_relative - d.noise_floor > 0.012) {
       reasons.push_back(sentence(fmt::format(
           "{} of the power is missed where nothing could remove {}, and no effect of the catalogue "
           "accounts for it well enough to be named",
@@ -200,7 +204,8 @@ std::string refusal_of(const Diagnosis& d, bool worse, bool against) {
   if (d.verdict == Verdict::inconclusive || against) return "the verdict is inconclusive";
   for (const DiagnosedEffect& e : d.effects) {
     if (e.alternatives.empty()) continue;
-    return fmt::format("{} is not told from {}: name the one to adopt", e.id, enumerate(e.alternatives));
+    return fmt::format("{} is not distinguished from {}: name the one to adopt", e.id,
+                       enumerate(e.alternatives));
   }
   return {};
 }

@@ -55,7 +55,7 @@ TEST(RunTable, ErrorsNameRowAndColumn) {
             "would make it a "
             "possible cause");
   EXPECT_EQ(error_of("distance_m,speed_m_s,energy_j\n10,1,100\n10,fast,100\n"),
-            "runs.csv: line 3: column speed_m_s: 'fast' must be from 0.001 to 100 m/s");
+            "runs.csv: line 3: column speed_m_s: 'fast' must be at least 0.001 m/s and at most 100 m/s");
   EXPECT_EQ(error_of("distance_m,speed_m_s,energy_j\n10,1,\n"),
             "runs.csv: line 2: column energy_j: '' is required unless right_j and left_j are given");
   EXPECT_EQ(error_of("distance_m,speed_m_s,right_j\n10,1,5\n"),

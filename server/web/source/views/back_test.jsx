@@ -63,6 +63,8 @@ const reasons = {
   fitted_on: 'used for the fit',
   open: 'still running',
   no_telemetry: 'without telemetry',
+  contradicted: 'that contradict themselves',
+  annulled: 'annulled',
   beyond_limits: 'beyond the limits',
 };
 

@@ -42,6 +42,8 @@ const kinds = {
     'Undeclared payload',
     (d) => `${format.withDeviation(d.undeclared_kg, d.undeclared_sd_kg)} kg beyond the declared`,
   ],
+  contradiction: ['Telemetry contradicted', (d) => d.says],
+  mission_annulled: ['Mission annulled', (d) => d.reason],
   mission_id_reused: ['Mission name used again', (d) => d.mission_id],
   charged: [
     'Charged',

@@ -73,6 +73,11 @@ function GapBadges({ gap }) {
             drift {format.signed(format.text(format.percent(gap.drift, 1)))}
           </span>
         )}
+        {gap.proposed && (
+          <span class="flag" title="A better model is proposed; the robot's page shows what it changes">
+            proposal
+          </span>
+        )}
         {gap.standsOut && (
           <span class="flag" title="Differs from the other robots of its kind">
             stands out

@@ -8,7 +8,6 @@ import { robotLink } from '../route.js';
 import { Waterfall } from '../waterfall.jsx';
 import { Answer, Empty, MissionState, Panel, Readout, useTitleOf } from '../widgets.jsx';
 import { LeastEnergy } from './least_energy.jsx';
-import { ratioOf } from './mission_rows.jsx';
 import { Conditions, Facts, Findings } from './record.jsx';
 import { TracePanels } from './trace.jsx';
 
@@ -34,7 +33,7 @@ function Heading({ mission: m }) {
 
 function Figures({ mission: m, model }) {
   const e = m.energy;
-  const ratio = ratioOf(e);
+  const { ratio } = m;
   const share = chargeShare(e.charge_ah, model);
   const unexplained = energy(e.unexplained_j);
   return (

@@ -6,10 +6,8 @@ import { missionLink, robotLink } from '../route.js';
 import { Table } from '../table.jsx';
 import { MissionState, Quantity, Ratio } from '../widgets.jsx';
 
-export const ratioOf = ({ measured_j: measured, modelled_j: modelled }) =>
-  measured !== null && modelled !== 0 ? measured / modelled : null;
-
-const perMetre = (m) => (m.energy.distance_m > 0.1 ? m.energy.battery_j / m.energy.distance_m : null);
+// The service's names of what missions are listed by, where they are not the column's.
+export const sortNames = { consumption: 'wh_per_km' };
 
 function StateCell({ mission: m }) {
   const payload = m.findings?.payload;
@@ -21,6 +19,16 @@ function StateCell({ mission: m }) {
           incomplete
         </span>
       )}
+      {m.annulled && (
+        <span class="flag" title={m.annulled.reason}>
+          annulled
+        </span>
+      )}
+      {m.contradictions.length > 0 && (
+        <span class="flag" title={m.contradictions.map((c) => c.says).join(' ')}>
+          contradicted
+        </span>
+      )}
       {payload?.verdict === 'undeclared' && (
         <span class="flag" title="Undeclared payload, estimated from the motion">
           {format.signed(format.digits(payload.undeclared_kg, 2))} kg undeclared
@@ -30,7 +38,7 @@ function StateCell({ mission: m }) {
   );
 }
 
-// The columns for `missions`, each energy column in one unit.
+// The columns for `missions`, each energy column in one unit. The service sorts.
 export function missionColumns(missions, models, withRobot) {
   const scale = energyScale(missions.flatMap((m) => [m.energy.battery_j, m.energy.modelled_j]));
   const share = (m) => chargeShare(m.energy.charge_ah, models.get(m.robot_id));
@@ -39,55 +47,55 @@ export function missionColumns(missions, models, withRobot) {
       key: 'start',
       title: 'Started',
       class: 'when',
-      sort: (m) => m.start_utime_us,
+      sort: true,
       cell: (m) => format.time(m.start_utime_us),
     },
     {
       key: 'robot',
       title: 'Robot',
-      sort: (m) => m.robot_id,
+      sort: true,
       cell: (m) => <a href={robotLink(m.robot_id)}>{m.robot_id}</a>,
     },
     {
       key: 'mission',
       title: 'Mission',
       head: true,
-      sort: (m) => m.mission_id,
+      sort: true,
       cell: (m) => <a href={missionLink(m.id)}>{m.mission_id}</a>,
     },
     {
       key: 'state',
       title: 'State',
       class: 'states',
-      sort: (m) => m.state,
+      sort: true,
       cell: (m) => <StateCell mission={m} />,
     },
     {
       key: 'duration',
       title: 'Duration',
       class: 'figure',
-      sort: (m) => m.energy.duration_s,
+      sort: true,
       cell: (m) => format.span(m.energy.duration_s),
     },
     {
       key: 'distance',
       title: 'Distance',
       class: 'figure',
-      sort: (m) => m.energy.distance_m,
+      sort: true,
       cell: (m) => <Quantity of={format.length(m.energy.distance_m)} />,
     },
     {
       key: 'payload',
       title: 'Payload',
       class: 'figure wide',
-      sort: (m) => m.payload_kg,
+      sort: true,
       cell: (m) => <Quantity of={format.unit(m.payload_kg, 'kg')} />,
     },
     {
       key: 'energy',
       title: 'Energy',
       class: 'figure',
-      sort: (m) => m.energy.battery_j,
+      sort: true,
       cell: (m) => <Quantity of={energyIn(scale, m.energy.battery_j)} />,
     },
     {
@@ -95,14 +103,13 @@ export function missionColumns(missions, models, withRobot) {
       title: 'Of charge',
       class: 'figure',
       hint: 'part of the full battery, where its capacity is known',
-      sort: share,
       cell: (m) => <Quantity of={format.percent(share(m), 2)} />,
     },
     {
       key: 'modelled',
       title: 'Modelled',
       class: 'figure wide',
-      sort: (m) => m.energy.modelled_j,
+      sort: true,
       cell: (m) => <Quantity of={energyIn(scale, m.energy.modelled_j)} />,
     },
     {
@@ -110,16 +117,16 @@ export function missionColumns(missions, models, withRobot) {
       title: 'Ratio',
       class: 'figure',
       hint: 'measured energy over modelled energy',
-      sort: (m) => ratioOf(m.energy),
-      cell: (m) => <Ratio value={ratioOf(m.energy)} />,
+      sort: true,
+      cell: (m) => <Ratio value={m.ratio} />,
     },
     {
       key: 'consumption',
       title: 'Consumption',
       class: 'figure',
       hint: 'energy over distance',
-      sort: perMetre,
-      cell: (m) => <Quantity of={consumption(perMetre(m))} />,
+      sort: true,
+      cell: (m) => <Quantity of={consumption(m.wh_per_km === null ? null : 3.6 * m.wh_per_km)} />,
     },
   ];
   return withRobot ? columns : columns.filter((c) => c.key !== 'robot');

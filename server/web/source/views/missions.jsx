@@ -3,30 +3,14 @@ import { get, query, useGet } from '../api.js';
 import { consumption, energy } from '../energy.js';
 import { exportMissions } from '../export.js';
 import * as format from '../format.js';
-import { useLive } from '../live.js';
 import { useModels } from '../models.js';
 import { keepInAddress } from '../route.js';
-import { SortChoice, sorted, turned } from '../table.jsx';
-import {
-  Answer,
-  Choice,
-  Empty,
-  Failure,
-  Loading,
-  Readout,
-  stateNotes,
-  useOptions,
-  useTitleOf,
-} from '../widgets.jsx';
-import { MissionTable, missionColumns } from './mission_rows.jsx';
-import { Trends } from './trends.jsx';
+import { SortChoice, turned } from '../table.jsx';
+import { Answer, Empty, Failure, Loading, Readout, stateNotes, useTitleOf } from '../widgets.jsx';
+import { Field, RobotsField, utimeUs } from './choosing.jsx';
+import { MissionTable, missionColumns, sortNames } from './mission_rows.jsx';
 
 const pageRows = 50;
-const periods = { day: 'By day', week: 'By week' };
-const searchRows = 1000; // a search by a part of the name looks at this many at a time
-
-// "2026-11-21T06:10" in local time, as the inputs of the browser give it, to microseconds.
-const utimeUs = (local) => (local ? new Date(local).getTime() * 1000 : undefined);
 
 // The filter as the service takes it, from the filter as the address keeps it.
 function filterOf(given) {
@@ -38,57 +22,38 @@ function filterOf(given) {
     to_utime_us: utimeUs(given.to),
     payload_min_kg: given.payload_min,
     payload_max_kg: given.payload_max,
+    ratio_min: given.ratio_min,
+    ratio_max: given.ratio_max,
+    name_contains: given.name,
   };
 }
 
-const views = ['sort', 'down', 'trend']; // how missions are shown, not which
+const views = ['sort', 'down']; // how missions are shown, not which
 
 // Whether the address chooses among the missions.
 const choosing = (given) => Object.entries(given).some(([key, value]) => value && !views.includes(key));
 
-const Field = ({ label, children }) => (
-  <label class="field">
-    <span>{label}</span>
-    {children}
-  </label>
-);
-
-function PayloadFields({ given, set }) {
-  const input = (key, word) => (
+function BoundFields({ label, name, given, set, ...more }) {
+  const input = (end, word) => (
     <input
       class="short"
       type="number"
-      min="0"
       step="any"
-      aria-label={`Payload, ${word} kg`}
+      aria-label={`${label}, ${word}`}
       placeholder={word}
-      value={given[key] ?? ''}
-      onChange={set(key)}
+      value={given[`${name}_${end}`] ?? ''}
+      onChange={set(`${name}_${end}`)}
+      {...more}
     />
   );
   return (
     <fieldset class="field">
-      <legend>Payload, kg</legend>
+      <legend>{label}</legend>
       <span class="with-unit">
-        {input('payload_min', 'from')}
-        {input('payload_max', 'to')}
+        {input('min', 'from')}
+        {input('max', 'to')}
       </span>
     </fieldset>
-  );
-}
-
-function RobotField({ given, set }) {
-  const live = useLive();
-  const known = [...live.robots.keys()].sort();
-  const options = useOptions(known);
-  return (
-    <Field label="Robot">
-      <select value={given.robot ?? ''} onChange={set('robot')}>
-        <option value="">all</option>
-        {given.robot && !known.includes(given.robot) && <option value={given.robot}>{given.robot}</option>}
-        {options}
-      </select>
-    </Field>
   );
 }
 
@@ -101,10 +66,11 @@ function Filters({ given, change }) {
   );
   return (
     <form class="filters" aria-label="Filter missions" onSubmit={(e) => e.preventDefault()}>
-      <RobotField given={given} set={set} />
+      <RobotsField value={given.robot} onChange={(robot) => change({ ...given, robot })} none="all" />
       {date('From', 'from')}
       {date('To', 'to')}
-      <PayloadFields given={given} set={set} />
+      <BoundFields label="Payload, kg" name="payload" given={given} set={set} min="0" />
+      <BoundFields label="Ratio" name="ratio" given={given} set={set} />
       <Field label="State">
         <select value={given.state ?? ''} onChange={set('state')}>
           <option value="">all</option>
@@ -212,7 +178,7 @@ function Export({ filter, total }) {
   );
 }
 
-// Missions of `filter`, newest first, page by page into one list: {rows, next, error, loading, more, reload}.
+// Missions of `filter` in its order, page by page into one list: {rows, next, error, loading, more, reload}.
 function useList(filter, limit) {
   const empty = { rows: null, next: null, error: null, loading: true };
   const [list, setList] = useState(empty);
@@ -236,20 +202,17 @@ function useList(filter, limit) {
   return { ...list, more: () => read(list.rows, list.next), reload };
 }
 
-function Loaded({ list, shown, total, searching }) {
+function Loaded({ list, total }) {
   const of = total === null ? '' : ` of ${format.fixed(total)}`;
-  const found = searching ? `${format.fixed(shown)} found in ` : '';
   return (
     <nav class="pages" aria-label="More missions">
       <span role="status">
-        {found}
-        {searching ? 'the newest ' : ''}
         {format.fixed(list.rows.length)}
         {of} loaded
       </span>
       {list.next !== null && (
         <button type="button" disabled={list.loading} onClick={list.more}>
-          {list.loading ? 'Loading …' : 'Load older'}
+          {list.loading ? 'Loading …' : 'Load more'}
         </button>
       )}
     </nav>
@@ -258,24 +221,21 @@ function Loaded({ list, shown, total, searching }) {
 
 function List({ given, list, total, onSort }) {
   const { rows } = list;
-  const part = (given.name ?? '').toLowerCase();
-  const models = useModels(given.sort === 'charge' ? rows.map((m) => m.robot_id) : []);
-  const named = part === '' ? rows : rows.filter((m) => m.mission_id.toLowerCase().includes(part));
-  const sort = given.sort ? { key: given.sort, down: given.down === '1' } : null;
-  const columns = missionColumns(named, models, true);
+  const models = useModels([]);
+  const sort = given.sort ? { key: given.sort, down: given.down === '1' } : { key: 'start', down: true };
   const title = choosing(given) ? 'No mission matches' : 'No mission yet';
   return (
     <>
       {list.error && <Failure error={list.error} retry={list.reload} />}
-      <SortChoice columns={columns} sort={sort} onSort={onSort} />
+      <SortChoice columns={missionColumns(rows, models, true)} sort={sort} onSort={onSort} />
       <div class={list.loading ? 'stale' : ''} aria-busy={String(list.loading)}>
-        {named.length === 0 ? (
+        {rows.length === 0 ? (
           <Empty title={title}>Missions appear when a robot announces one or sends telemetry.</Empty>
         ) : (
-          <MissionTable missions={sorted(named, columns, sort)} sort={sort} onSort={onSort} />
+          <MissionTable missions={rows} sort={sort} onSort={onSort} />
         )}
       </div>
-      {rows.length > 0 && <Loaded list={list} shown={named.length} total={total} searching={part !== ''} />}
+      {rows.length > 0 && <Loaded list={list} total={total} />}
     </>
   );
 }
@@ -289,14 +249,17 @@ export function Missions({ given: asked }) {
     keepInAddress(kept);
   };
   const filter = useMemo(() => filterOf(given), [given]);
-  const list = useList(filter, given.name ? searchRows : pageRows);
+  const order = given.sort
+    ? { sort: sortNames[given.sort] ?? given.sort, order: given.down === '1' ? 'desc' : 'asc' }
+    : {};
+  const list = useList({ ...filter, ...order }, pageRows);
   const totals = useGet(`/v1/mission-totals${query(filter)}`);
   const refresh = () => {
     list.reload();
     totals.reload();
   };
   const onSort = (key) => {
-    const sort = given.sort ? { key: given.sort, down: given.down === '1' } : null;
+    const sort = given.sort ? { key: given.sort, down: given.down === '1' } : { key: 'start', down: true };
     const next = turned(sort, key, true);
     change({ ...given, sort: next.key, down: next.down ? '1' : '' });
   };
@@ -306,29 +269,22 @@ export function Missions({ given: asked }) {
       <h1 class="hidden">Missions</h1>
       <Filters given={given} change={change} />
       <Totals of={totals} />
-      {given.name && <p class="note">The sums are of all missions that the other filters choose.</p>}
       <div class="tools">
         <button type="button" onClick={refresh}>
           Refresh
         </button>
-        <span class="note">
-          Local times ({Intl.DateTimeFormat().resolvedOptions().timeZone}).
-          {given.sort && list.next !== null && ' Sorted among the missions that are loaded.'}
-        </span>
-        <Choice
-          label="List or sums"
-          value={given.trend ?? ''}
-          onChange={(trend) => change({ ...given, trend })}
-          options={[['', 'List'], ...Object.entries(periods)]}
-        />
-        <Export filter={filter} total={total ?? 0} />
+        <a class="button" href={`#/trends${query({ robot: given.robot })}`}>
+          Trends
+        </a>
+        <a class="button" href="#/compare">
+          Compare
+        </a>
+        <span class="note">Local times ({Intl.DateTimeFormat().resolvedOptions().timeZone}).</span>
+        <Export filter={{ ...filter, ...order }} total={total ?? 0} />
       </div>
-      {given.trend in periods && <Trends kind={given.trend} filter={filter} />}
       {list.rows === null && list.error && <Failure error={list.error} retry={list.reload} />}
       {list.rows === null && !list.error && <Loading what="missions" />}
-      {list.rows !== null && !(given.trend in periods) && (
-        <List given={given} list={list} total={total} onSort={onSort} />
-      )}
+      {list.rows !== null && <List given={given} list={list} total={total} onSort={onSort} />}
     </>
   );
 }

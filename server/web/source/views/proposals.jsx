@@ -9,17 +9,6 @@ import { Changes, changesOf } from './changes.jsx';
 
 const kinds = { calibration: 'Calibration from recent missions', diagnosis: 'From a diagnosis' };
 
-// Why a proposal is no longer one to adopt, or null.
-function closedReason(p, versionInForce) {
-  if (p.state === 'adopted')
-    return p.adopted_version === null ? 'adopted' : `adopted as version ${p.adopted_version}`;
-  if (p.state === 'superseded') return 'replaced by a later proposal';
-  if (p.state === 'dismissed') return 'dismissed';
-  if (p.base_version !== null && p.base_version !== versionInForce)
-    return `out of date: it was made for version ${p.base_version}, and version ${versionInForce} is in force`;
-  return null;
-}
-
 function parameterChanges(p, inForce) {
   const parameters = p.detail?.parameters;
   if (!Array.isArray(parameters)) return changesOf(p.model, inForce.model);
@@ -86,14 +75,13 @@ export function Proposals({ id, inForce, turn, onChange }) {
     if (turn > 0) list.reload();
   }, [turn]);
   if (inForce === null || !list.value?.proposals.length) return null;
-  const sorted = list.value.proposals.map((p) => [p, closedReason(p, inForce.model_version)]);
-  const open = sorted.filter(([, reason]) => reason === null);
-  const closed = sorted.filter(([, reason]) => reason !== null);
+  const open = list.value.proposals.filter((p) => p.closed_reason === null);
+  const closed = list.value.proposals.filter((p) => p.closed_reason !== null);
   return (
     <Panel title={open.length === 1 ? 'A better model is proposed' : 'Proposed models'}>
       {open.length === 0 && <p class="note">No proposal is open.</p>}
       <ol class="versions">
-        {open.map(([p]) => (
+        {open.map((p) => (
           <Proposal key={p.id} of={p} robot={id} inForce={inForce} onChange={onChange} />
         ))}
       </ol>
@@ -103,10 +91,10 @@ export function Proposals({ id, inForce, turn, onChange }) {
             {closed.length} closed {closed.length === 1 ? 'proposal' : 'proposals'}
           </summary>
           <ol class="versions">
-            {closed.map(([p, reason]) => (
+            {closed.map((p) => (
               <li key={p.id}>
                 <b>{kinds[p.kind] ?? format.words(p.kind)}</b>{' '}
-                <span class="note">{format.time(p.created_utime_us)}</span> – {reason}
+                <span class="note">{format.time(p.created_utime_us)}</span> – {p.closed_reason}
               </li>
             ))}
           </ol>

@@ -55,6 +55,10 @@ export function Facts({ mission, model }) {
         </Row>
         <Row name="Motors measured">{sides(e.measured_motor_j)}</Row>
         <Row name="Motors modelled">{sides(e.modelled_motor_j)}</Row>
+        {mission.annulled && <Row name="Annulled">{mission.annulled.reason}</Row>}
+        {mission.contradictions.length > 0 && (
+          <Row name="Contradicted">{mission.contradictions.map((c) => c.says).join(' ')}</Row>
+        )}
         {mission.note && <Row name="Note">{mission.note}</Row>}
       </tbody>
     </table>

@@ -3,7 +3,7 @@ import { idPath, query, useGet } from '../api.js';
 import { energy } from '../energy.js';
 import { FloorPath } from '../floor.jsx';
 import * as format from '../format.js';
-import { Health, between, chargeNote, now, since, unheard } from '../health.jsx';
+import { Contradictions, Health, between, chargeNote, now, since, unheard } from '../health.jsx';
 import { useLive } from '../live.js';
 import { missionLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
@@ -258,6 +258,7 @@ export function Robot({ id }) {
     <>
       <Heading id={id} state={s} />
       {s && <SilenceNote state={s} />}
+      {s && <Contradictions of={s.contradictions} />}
       {s && !unheard(s) && <Now entry={entry} />}
       {(s || detail.value) && <WithModel id={id} detail={detail} />}
       <RecentMissions id={id} running={s?.mission?.id} />

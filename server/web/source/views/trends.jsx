@@ -1,96 +1,238 @@
-// Missions by day or week: energy, consumption and ratio of what the filter of the view chooses.
-import { useEffect, useState } from 'preact/hooks';
+// Energy a day or week, consumption and ratio: of the fleet, or of some robots side by side.
+import { useEffect, useMemo, useState } from 'preact/hooks';
 import { get, query } from '../api.js';
+import { Chart, axis, clockAxis } from '../chart.jsx';
 import { consumption, energyIn, energyScale } from '../energy.js';
+import { saveText } from '../export.js';
 import * as format from '../format.js';
+import { keepInAddress } from '../route.js';
 import { Table } from '../table.jsx';
-import { Answer, Quantity, Ratio } from '../widgets.jsx';
+import { palette } from '../theme.js';
+import { Answer, Choice, Panel, Quantity, Ratio, useTitleOf } from '../widgets.jsx';
+import { RobotsField, dayField, offsetMin, robotsOf, utimeUs } from './choosing.jsx';
 
-const counts = { day: 14, week: 12 };
-const days = { day: 1, week: 7 };
+const defaultDays = { day: 30, week: 182 };
+const dayMs = 86_400_000;
+const dashes = [[], [6, 4], [2, 3], [9, 3, 2, 3], [12, 4], [1, 2]];
 
-// {from, to} in local days, newest first; a week ends today.
-function periodsOf(kind, end) {
-  const last = new Date(end);
-  last.setHours(24, 0, 0, 0);
-  const at = (back) => new Date(last.getFullYear(), last.getMonth(), last.getDate() - back).getTime() * 1000;
-  return Array.from({ length: counts[kind] }, (_, k) => ({
-    from: at((k + 1) * days[kind]),
-    to: at(k * days[kind]),
-  }));
+const dayOf = (utime) => format.time(utime).slice(0, 10);
+export const totalsPath = (filter) => `/v1/mission-totals${query(filter)}`;
+
+function filterOf(given, kind, robot) {
+  const from = given.from ? utimeUs(given.from) : (Date.now() - defaultDays[kind] * dayMs) * 1000;
+  return {
+    robot_id: robot,
+    from_utime_us: Math.round(from),
+    to_utime_us: utimeUs(given.to),
+    group_by: kind,
+    utc_offset_min: offsetMin(),
+  };
 }
 
-function useTotals(kind, filter) {
+// One series a robot, or one of the fleet: [{name, groups}].
+function useSeries(given, kind) {
   const [state, setState] = useState({ value: null, error: null });
   const [turn, setTurn] = useState(0);
-  const key = JSON.stringify([kind, filter]);
+  const robots = robotsOf(given);
   useEffect(() => {
     const abort = new AbortController();
-    const { from_utime_us: from = 0, to_utime_us: to = Infinity } = filter;
-    const ask = async (p) => {
-      const chosen = { ...filter, from_utime_us: Math.max(p.from, from), to_utime_us: Math.min(p.to, to) };
-      return { ...p, ...(await get(`/v1/mission-totals${query(chosen)}`, abort.signal)) };
-    };
-    const periods = periodsOf(kind, Math.min(to / 1000, Date.now())).filter((p) => p.to > from);
-    Promise.all(periods.map(ask)).then(
+    const ask = async (robot) => ({
+      name: robot ?? 'Fleet',
+      groups: (await get(totalsPath(filterOf(given, kind, robot)), abort.signal)).groups,
+    });
+    Promise.all(robots.length > 0 ? robots.map(ask) : [ask()]).then(
       (value) => setState({ value, error: null }),
       (error) => error.name !== 'AbortError' && setState({ value: null, error }),
     );
     return () => abort.abort();
-  }, [key, turn]);
+  }, [JSON.stringify(given), kind, turn]);
   return { ...state, reload: () => setTurn((n) => n + 1) };
 }
 
-// Measured over modelled, where measured.
-const ratioOf = ({ measured_j: measured, unexplained_j: unexplained }) =>
-  measured !== null && unexplained !== null && measured !== unexplained
-    ? measured / (measured - unexplained)
-    : null;
+// {x: seconds of each period that any series has, column(series, value)}. Where periods are missing stands
+// one that no series has, so that no line spans the gap.
+function aligned(series, kind) {
+  const all = new Set(series.flatMap((s) => s.groups.map((g) => g.from_utime_us)));
+  const longest = (kind === 'week' ? 7.5 : 1.5) * dayMs * 1000;
+  const x = [...all]
+    .sort((a, b) => a - b)
+    .flatMap((at, k, sorted) => (k > 0 && at - sorted[k - 1] > longest ? [at - 1, at] : [at]));
+  const rows = series.map((s) => new Map(s.groups.map((g) => [g.from_utime_us, g])));
+  return {
+    x: x.map((v) => v / 1e6),
+    column: (k, value) => x.map((at) => (rows[k].has(at) ? value(rows[k].get(at)) : null)),
+  };
+}
 
-const dayOf = (utimeUs) => format.time(utimeUs).slice(0, 10);
+const dates = { ...clockAxis, values: (_, splits) => splits.map((second) => dayOf(second * 1e6)), space: 90 };
 
-function Periods({ periods, kind }) {
-  const some = periods.filter((p) => p.missions > 0);
-  const scale = energyScale(some.map((p) => p.energy.battery_j));
-  const most = Math.max(...some.map((p) => Math.abs(p.energy.battery_j)), 1e-9);
-  const width = (p) => `${(100 * Math.abs(p.energy.battery_j)) / most}%`;
+function TrendChart({ series, kind, label, value, unit, zero }) {
+  const data = useMemo(() => {
+    const { x, column } = aligned(series, kind);
+    return [x, ...series.map((_, k) => column(k, value))];
+  }, [series, unit]);
+  const make = () => {
+    const p = palette();
+    const colours = [p.measured, p.modelled, p.gap, p.ink, p.muted];
+    return {
+      padding: [8, 30, 0, 0],
+      scales: { y: zero ? { range: (_, low, high) => [Math.min(0, low), high > 0 ? 1.08 * high : 1] } : {} },
+      axes: [axis('', dates), axis(unit)],
+      series: [
+        {},
+        ...series.map((s, k) => ({
+          label: s.name,
+          stroke: colours[k % colours.length],
+          dash: dashes[k % dashes.length],
+          width: 1.5,
+          points: { show: true, size: 6 },
+        })),
+      ],
+    };
+  };
+  return <Chart make={make} data={data} label={label} height={200} changes={[series, unit]} />;
+}
+
+function Key({ series }) {
+  const p = palette();
+  const colours = [p.measured, p.modelled, p.gap, p.ink, p.muted];
+  if (series.length < 2) return null;
+  return (
+    <p class="key trend-key">
+      {series.map((s, k) => (
+        <span key={s.name}>
+          <svg width="34" height="8" aria-hidden="true">
+            <line
+              x1="0"
+              x2="34"
+              y1="4"
+              y2="4"
+              stroke={colours[k % colours.length]}
+              stroke-width="2"
+              stroke-dasharray={dashes[k % dashes.length].join(' ')}
+            />
+          </svg>{' '}
+          {s.name}
+        </span>
+      ))}
+    </p>
+  );
+}
+
+function Periods({ series, kind }) {
+  const rows = series.flatMap((s) => s.groups.map((g) => ({ ...g, name: s.name })));
+  rows.sort((a, b) => b.from_utime_us - a.from_utime_us);
+  const scale = energyScale(rows.map((g) => g.energy.battery_j));
   const figure = (key, title, cell) => ({ key, title, class: 'figure', cell });
   const columns = [
     {
       key: 'period',
       title: kind === 'day' ? 'Day' : 'Week from',
       head: true,
-      cell: (p) => dayOf(p.from),
+      cell: (g) => dayOf(g.from_utime_us),
     },
-    figure('missions', 'Missions', (p) => format.fixed(p.missions)),
-    figure('energy', 'Energy', (p) => <Quantity of={energyIn(scale, p.energy.battery_j)} />),
-    {
-      key: 'bar',
-      title: '',
-      class: 'bar-cell trend-bar',
-      cell: (p) => (
-        <svg width="100%" height="12" aria-hidden="true">
-          <rect height="8" y="2" width={width(p)} class="account measured" />
-        </svg>
-      ),
-    },
-    figure('distance', 'Distance', (p) => <Quantity of={format.kilometres(p.energy.distance_m)} />),
-    figure('consumption', 'Consumption', (p) => (
-      <Quantity
-        of={consumption(p.energy.distance_m > 0.1 ? p.energy.battery_j / p.energy.distance_m : null)}
-      />
+    ...(series.length > 1 ? [{ key: 'robot', title: 'Robot', cell: (g) => g.name }] : []),
+    figure('missions', 'Missions', (g) => format.fixed(g.missions)),
+    figure('energy', 'Energy', (g) => <Quantity of={energyIn(scale, g.energy.battery_j)} />),
+    figure('distance', 'Distance', (g) => <Quantity of={format.kilometres(g.energy.distance_m)} />),
+    figure('consumption', 'Consumption', (g) => (
+      <Quantity of={consumption(g.wh_per_km === null ? null : 3.6 * g.wh_per_km)} />
     )),
-    figure('ratio', 'Ratio', (p) => <Ratio value={ratioOf(p.energy)} />),
+    figure('ratio', 'Ratio', (g) => <Ratio value={g.ratio} />),
   ];
-  if (some.length === 0) return <p class="note">No mission in this time.</p>;
-  return <Table class="trends" columns={columns} rows={some} keyOf={(p) => p.from} />;
+  return <Table class="trends" columns={columns} rows={rows} keyOf={(g) => `${g.from_utime_us} ${g.name}`} />;
 }
 
-export function Trends({ kind, filter }) {
-  const totals = useTotals(kind, filter);
+function Shown({ series, kind }) {
+  if (series.every((s) => s.groups.length === 0)) return <p class="note">No mission in this time.</p>;
+  const scale = energyScale(series.flatMap((s) => s.groups.map((g) => g.energy.battery_j)));
+  const inUnit = consumption(1);
+  const period = kind === 'day' ? 'day' : 'week';
   return (
-    <Answer of={totals} what="trends">
-      {(periods) => <Periods periods={periods} kind={kind} />}
-    </Answer>
+    <>
+      <Key series={series} />
+      <div class="trend-charts">
+        <Panel title={`Energy a ${period}`}>
+          <TrendChart
+            series={series}
+            kind={kind}
+            label={`Energy a ${period}`}
+            unit={scale.u}
+            value={(g) => g.energy.battery_j / scale.joule}
+            zero
+          />
+        </Panel>
+        <Panel title="Consumption">
+          <TrendChart
+            series={series}
+            kind={kind}
+            label="Energy over distance"
+            unit={inUnit.u}
+            value={(g) =>
+              g.wh_per_km === null ? null : inUnit.u === 'J/m' ? 3.6 * g.wh_per_km : g.wh_per_km
+            }
+            zero
+          />
+        </Panel>
+        <Panel title="Measured over modelled">
+          <TrendChart
+            series={series}
+            kind={kind}
+            label="Measured over modelled energy"
+            unit="ratio"
+            value={(g) => g.ratio}
+          />
+        </Panel>
+      </div>
+      <Periods series={series} kind={kind} />
+    </>
+  );
+}
+
+export function Trends({ given: asked }) {
+  useTitleOf('Trends');
+  const [given, setGiven] = useState(asked);
+  const change = (part) => {
+    const next = Object.fromEntries(Object.entries({ ...given, ...part }).filter(([, value]) => value));
+    setGiven(next);
+    keepInAddress(next);
+  };
+  const kind = given.by === 'week' ? 'week' : 'day';
+  const series = useSeries(given, kind);
+  const robots = robotsOf(given);
+  return (
+    <>
+      <h1 class="hidden">Trends</h1>
+      <form class="filters" aria-label="Choose trends" onSubmit={(e) => e.preventDefault()}>
+        <RobotsField value={given.robot} onChange={(robot) => change({ robot })} none="the fleet" />
+        {dayField('From', given.from, (from) => change({ from }))}
+        {dayField('To', given.to, (to) => change({ to }))}
+        <Choice
+          label="Sums by"
+          value={kind}
+          onChange={(by) => change({ by })}
+          options={[
+            ['day', 'By day'],
+            ['week', 'By week'],
+          ]}
+        />
+        <a class="button" href="#/compare">
+          Compare
+        </a>
+        <span class="export">
+          <button
+            type="button"
+            onClick={() =>
+              saveText(totalsPath(filterOf(given, kind, robots.join(',') || undefined)), 'trends')
+            }
+          >
+            Export CSV
+          </button>
+        </span>
+      </form>
+      <Answer of={series} what="trends">
+        {(value) => <Shown series={value} kind={kind} />}
+      </Answer>
+    </>
   );
 }

@@ -1,0 +1,66 @@
+#include "history/audit.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "base/utc_time.h"
+#include "client/commands/table.h"
+
+namespace joulecast::client {
+namespace {
+
+struct Options {
+  std::string store, head;
+};
+
+void print_entry(const history::AuditEntry& entry) {
+  const nlohmann::ordered_json line{
+      {"id", entry.id},
+      {"time", utc_text(entry.utime_us)},
+      {"actor", entry.actor},
+      {"address", entry.address},
+      {"request_id", entry.request_id},
+      {"action", entry.action},
+      {"detail", nlohmann::ordered_json::parse(entry.detail_json, nullptr, false)},
+      {"hash", entry.hash}};
+  fmt::print("{}\n", line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+}
+
+Exit list(const Options& options) {
+  const auto state = history::verify_audit(options.store, {}, print_entry);
+  return state ? Exit::ok : report(state.error());
+}
+
+Exit verify(const Options& options) {
+  const auto state = history::verify_audit(options.store, options.head);
+  if (!state) return report(state.error());
+  fmt::print("{} entries, every link holds\n", state->entries);
+  if (state->entries > 0) fmt::print("head {}\n", state->head);
+  return Exit::ok;
+}
+
+}  // namespace
+
+void add_audit(CLI::App& program, Exit& exit) {
+  auto* group = program.add_subcommand("audit", "Who changed what, and who was refused, by a store's audit");
+  group->require_subcommand(1);
+  auto options = std::make_shared<Options>();
+  const auto add = [&](const char* name, const char* what, Exit (*run)(const Options&)) {
+    auto* command = group->add_subcommand(name, what);
+    command->add_option("--store", options->store, "the file that the daemon's store.path names")->required();
+    command->callback([options, run, &exit] { exit = run(*options); });
+    return command;
+  };
+  add("list", "Print every entry, one JSON object a line, as far as the chain holds", list);
+  add("verify", "Find the first entry that was changed, removed or put in", verify)
+      ->add_option(
+          "--head", options->head,
+          "hash that an earlier verify said: fail also where no entry has it any more, so that an end "
+          "which was cut off is found");
+}
+
+}  // namespace joulecast::client

@@ -1,0 +1,154 @@
+#include "client/commands/check_findings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "client/wrapped.h"
+
+namespace joulecast::client {
+namespace {
+
+// What lcmtypes/robot_telemetry_t.lcm asks of a robot.
+constexpr double least_rate_hz = 10, greatest_rate_hz = 200;
+// The daemon integrates no longer silence (meter.gap_bridge_s) and takes no later stamp by default.
+constexpr double longest_bridged_s = 1;
+constexpr double clock_tolerance_s = 1;
+
+}  // namespace
+
+void judge(const std::string& channel, const telemetry::ChannelTally& tally, bool live, Findings& findings) {
+  const auto add = [&](bool fault, const char* field, std::string says, std::optional<double> value = {}) {
+    findings.push_back({fault, channel, field, std::move(says), value});
+  };
+  for (const auto& [reason, fault] : tally.faults)
+    add(true, "",
+        fmt::format("{} of {} messages {}; the last: {}", fault.first, tally.messages, reason, fault.second),
+        static_cast<double>(fault.first));
+  if (tally.senders.size() > 1)
+    add(true, "",
+        fmt::format("{} senders, {} and {}{}: one robot_id is one robot's", tally.senders.size(),
+                    to_string(tally.senders[0]), to_string(tally.senders[1]),
+                    tally.senders.size() > 2 ? ", ..." : ""),
+        static_cast<double>(tally.senders.size()));
+  const double ahead_s = 1e-6 * static_cast<double>(tally.clock_ahead_us);
+  if (live && std::abs(ahead_s) > clock_tolerance_s)
+    add(std::abs(ahead_s) > 3600, "utime",
+        fmt::format("stamps are {:.6g} s {} this computer's clock", std::abs(ahead_s),
+                    ahead_s > 0 ? "ahead of" : "behind"),
+        ahead_s);
+  if (tally.subject != telemetry::Subject::telemetry) return;
+  const double rate_hz = tally.rate_hz();
+  if (tally.messages > 1 && (rate_hz < 0.9 * least_rate_hz || rate_hz > 1.1 * greatest_rate_hz))
+    add(false, "",
+        fmt::format("{:.4g} messages a second; {} to {} are expected", rate_hz, least_rate_hz,
+                    greatest_rate_hz),
+        rate_hz);
+  const telemetry::SequenceCounters& s = tally.sequence;
+  const auto counted = [&](std::uint64_t count, bool fault, const char* field, const char* says) {
+    if (count > 0) add(fault, field, fmt::format("{} {}", count, says), static_cast<double>(count));
+  };
+  // A publisher that never counts looks like one that boots at every message.
+  if (s.restarts > 1 && 2 * s.restarts > s.received)
+    add(true, "sequence", "does not count up: +1 a message is expected", static_cast<double>(s.restarts));
+  else
+    counted(s.restarts, false, "sequence", "restarts: the robot booted, or two programs publish");
+  counted(s.missing - std::min(s.missing, s.late), false, "sequence",
+          "messages are missing by their sequence numbers");
+  counted(s.duplicate, false, "sequence", "messages came twice");
+  counted(s.gaps, false, "utime", "silences of more than a second, which are not accounted for");
+  counted(s.clock_backward, true, "utime", "times the robot's clock did not advance or was set back");
+  counted(s.clock_forward, false, "utime", "times the robot's clock leapt forward");
+  const double silence_s = 1e-6 * static_cast<double>(tally.longest_silence_us);
+  if (live && silence_s > longest_bridged_s)
+    add(false, "", fmt::format("was silent for {:.3g} s", silence_s), silence_s);
+}
+
+void judge(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot, Findings& findings) {
+  for (const gap::Check& check : gap::check_recordings(recordings, robot))
+    findings.push_back({check.contradicted, recordings.robot_id, check.channel, check.id + ": " + check.says,
+                        std::isfinite(check.value) ? std::optional(check.value) : std::nullopt});
+  for (const std::string& note : recordings.notes) findings.push_back({false, recordings.robot_id, "", note});
+}
+
+void judge_fields(const std::string& channel, const telemetry::ChannelTally& tally, Findings& findings) {
+  if (tally.subject != telemetry::Subject::telemetry || tally.messages < 20) return;
+  const auto turns = [&](const telemetry::FieldTally& field) {
+    return field.name.starts_with("wheel_velocity") && field.changes > 0;
+  };
+  if (std::ranges::none_of(tally.fields, turns)) {
+    findings.push_back({false, channel, "wheel_velocity", "no wheel turned: nothing else can be judged"});
+    return;
+  }
+  for (const telemetry::FieldTally& field : tally.fields) {
+    const bool is_stated = field.name.starts_with("velocity_command") || field.name.starts_with("payload");
+    if (is_stated || field.measured < 20 || field.changes > 0) continue;
+    findings.push_back(
+        {field.last == 0, channel, field.name,
+         fmt::format("reads {:.6g} in all {} messages though the robot moves; NaN says that a robot does not "
+                     "measure it",
+                     field.last, field.measured),
+         field.last});
+  }
+}
+
+void judge(const telemetry::Import& import, const std::string& table, Findings& findings) {
+  const telemetry::ImportReport& report = import.report;
+  const auto counted = [&](std::size_t count, const std::string& field, const std::string& says) {
+    if (count > 0)
+      findings.push_back(
+          {false, table, field, fmt::format("{} {}", count, says), static_cast<double>(count)});
+  };
+  counted(report.rows_without_motion, "", "rows without both wheel speeds give no sample");
+  counted(report.rows_out_of_time, "", "rows are not after the row before and give no sample");
+  counted(report.rows_glitched, "", "rows are dropped for a value out of its limits");
+  counted(report.glitches.size(), "", "values are out of their limits; the import's report lists them");
+  for (const telemetry::JoinReport& join : report.joins) {
+    counted(join.rows_unsorted, join.table, "rows are not after the row before; put in order");
+    counted(join.beyond_tolerance, join.table,
+            fmt::format(
+                "rows of the main table find no reading within the tolerance, {} do, {:.3f} s late at the "
+                "median",
+                join.matched, join.median_lag_s));
+    if (join.matched == 0)
+      findings.push_back(
+          {true, table, join.table, "no row meets one of the main table: are the clocks the same?"});
+  }
+}
+
+nlohmann::json to_json(const Findings& findings) {
+  nlohmann::json out = nlohmann::json::array();
+  for (const Finding& f : findings)
+    out.push_back({{"severity", f.fault ? "fault" : "warning"},
+                   {"about", f.about},
+                   {"field", f.field},
+                   {"value", f.value ? nlohmann::json(*f.value) : nlohmann::json()},
+                   {"says", f.says}});
+  return out;
+}
+
+void print(const Findings& findings) {
+  for (const Finding& f : findings) {
+    const std::string where = f.about +
+                              (f.field.empty()            ? ""
+                               : f.field.starts_with('/') ? "#"
+                                                          : " ") +
+                              f.field;
+    fmt::print("{}\n", wrapped(fmt::format("{} {}: {}", f.fault ? "fault  " : "warning", where, f.says),
+                               help_width(), 8));
+  }
+  const auto faults = std::ranges::count_if(findings, &Finding::fault);
+  if (findings.empty())
+    fmt::print("nothing found\n");
+  else
+    fmt::print("{} faults, {} warnings\n", faults, static_cast<std::ptrdiff_t>(findings.size()) - faults);
+}
+
+Exit exit_of(const Findings& findings) {
+  if (findings.empty()) return Exit::ok;
+  return std::ranges::any_of(findings, &Finding::fault) ? Exit::fault : Exit::warned;
+}
+
+}  // namespace joulecast::client

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "base/error.h"
+#include "telemetry/channel_watch.h"
+#include "telemetry/datagram.h"
+#include "telemetry/recording.h"
+
+namespace joulecast::client {
+
+struct ListenOptions {
+  std::string lcm_url;
+  std::string robot_id;  // empty: all
+  double seconds = 10;   // 0: until interrupted
+};
+
+struct Listened {
+  telemetry::ChannelWatch watch;
+  telemetry::DatagramCounters datagrams;
+};
+
+// Host clock, microseconds since 1970.
+[[nodiscard]] std::int64_t host_utime_us();
+
+// Listens to robots over LCM until the time is over or ctrl-C. `tick` is called about once a second, `take`
+// with every telemetry sample that decodes. Errors are those of opening and receiving.
+[[nodiscard]] Result<void> listen(
+    const ListenOptions& options, Listened& listened, const std::function<void(const Listened&)>& tick = {},
+    const std::function<void(const std::string& robot_id, const signals::Sample&)>& take = {});
+
+// "3 malformed, 1 foreign_sender"; what belongs to other programs of the group is left out.
+[[nodiscard]] std::string dropped_datagrams(const Listened& listened);
+
+}  // namespace joulecast::client

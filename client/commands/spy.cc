@@ -1,0 +1,128 @@
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "client/commands/listen.h"
+#include "client/commands/table.h"
+#include "client/commands/tally_json.h"
+#include "client/interrupt.h"
+#include "client/lcm_url.h"
+
+namespace joulecast::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct Options {
+  std::string lcm_url = usual_lcm_url(), robot_id;
+  double seconds = 0;
+  bool json = false;
+};
+
+// As far as the terminal is wide, in whole characters of UTF-8.
+std::string cut(const std::string& line, std::size_t width) {
+  std::size_t shown = 0, at = 0;
+  for (; at < line.size(); ++at)
+    if ((static_cast<unsigned char>(line[at]) & 0xC0) != 0x80 && ++shown > width) break;
+  return line.substr(0, at);
+}
+
+std::string values_of(const telemetry::ChannelTally& tally) {
+  std::string text = tally.last_text;
+  for (const telemetry::FieldTally& field : tally.fields)
+    if (field.measured > 0)
+      text += fmt::format("{}{} {:.4g}", text.empty() ? "" : "  ", field.name, field.last);
+  return text;
+}
+
+std::string faults_of(const telemetry::ChannelTally& tally) {
+  std::string text;
+  const auto add = [&](const std::string& name, std::uint64_t count, const std::string& says) {
+    if (count == 0) return;
+    text += fmt::format("{}{} {}{}", text.empty() ? "" : "; ", count, name, says.empty() ? "" : ": " + says);
+  };
+  for (const auto& [reason, fault] : tally.faults) add(reason, fault.first, fault.second);
+  const telemetry::SequenceCounters& s = tally.sequence;
+  add("missing", s.missing - std::min(s.missing, s.late), "");
+  add("duplicate", s.duplicate, "");
+  add("late", s.late, "");
+  add("restarts", s.restarts, "");
+  add("clock set back", s.clock_backward, "");
+  add("clock set forward", s.clock_forward, "");
+  return text;
+}
+
+std::string page(const Listened& listened, std::int64_t now_utime_us, std::size_t width) {
+  std::string text =
+      cut(fmt::format("{:<32} {:>9} {:>8} {:>7} {:>9}", "channel", "messages", "Hz", "silent", "clock"),
+          width) +
+      '\n';
+  for (const auto& [channel, tally] : listened.watch.channels()) {
+    const double silent_s = 1e-6 * static_cast<double>(now_utime_us - tally.last_utime_us);
+    text += cut(fmt::format("{:<32} {:>9} {:>8.1f} {:>5.0f} s {:>+7.2f} s", channel, tally.messages,
+                            tally.rate_hz(), silent_s, 1e-6 * static_cast<double>(tally.clock_ahead_us)),
+                width) +
+            '\n';
+    if (const std::string values = values_of(tally); !values.empty())
+      text += cut("    " + values, width) + '\n';
+    if (const std::string faults = faults_of(tally); !faults.empty())
+      text += cut("    faults: " + faults, width) + '\n';
+  }
+  if (listened.watch.channels().empty()) text += "no robot has been heard\n";
+  if (const std::string dropped = dropped_datagrams(listened); !dropped.empty())
+    text += cut("datagrams not taken: " + dropped, width) + '\n';
+  return text;
+}
+
+std::size_t terminal_width() {
+  winsize size{};
+  return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 10'000;
+}
+
+Exit run(const Options& options) {
+  const bool terminal = isatty(STDOUT_FILENO) == 1 && !options.json;
+  // Without a terminal nobody sees it change; ten seconds tell what there is.
+  const double seconds = options.seconds > 0 ? options.seconds : terminal ? 0 : 10;
+  auto redraw = [&](const Listened& listened) {
+    if (!terminal) return;
+    std::fputs(("\033[H\033[J" + page(listened, host_utime_us(), terminal_width()) + "ctrl-C ends\n").c_str(),
+               stdout);
+    std::fflush(stdout);
+  };
+  Listened listened;
+  if (auto heard = listen({options.lcm_url, options.robot_id, seconds}, listened, redraw); !heard)
+    return report(heard.error());
+  if (options.json)
+    std::puts(to_json(listened).dump(2).c_str());
+  else if (!terminal)
+    std::fputs(page(listened, host_utime_us(), terminal_width()).c_str(), stdout);
+  return Exit::ok;
+}
+
+}  // namespace
+
+void add_spy(CLI::App& program, Exit& exit) {
+  auto options = std::make_shared<Options>();
+  auto* command = program.add_subcommand(
+      "spy", "Show what robots publish over LCM: channels, rates, last values and faults");
+  command->add_option("--lcm-url", options->lcm_url, "where to listen")->capture_default_str();
+  command->add_option("--robot-id", options->robot_id, "this robot's channels alone");
+  command
+      ->add_option("--seconds", options->seconds,
+                   "listen so long and leave; 0: until ctrl-C on a terminal, else 10 s")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "print the channels as JSON at the end");
+  command->callback([options, &exit] { exit = run(*options); });
+}
+
+}  // namespace joulecast::client

@@ -1,0 +1,97 @@
+#include "server/api/csv.h"
+
+#include <cmath>
+#include <utility>
+
+#include "base/resolution.h"
+#include "server/http/text.h"
+
+namespace joulecast::api {
+namespace {
+
+std::string percent_encoded(std::string_view text) {
+  constexpr std::string_view digits = "0123456789ABCDEF";
+  constexpr std::string_view plain = "-._~";
+  std::string encoded;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    if (letter || plain.find(c) != std::string_view::npos) {
+      encoded += c;
+    } else {
+      encoded += {'%', digits[byte >> 4], digits[byte & 15]};
+    }
+  }
+  return encoded;
+}
+
+}  // namespace
+
+Csv::Csv(const std::vector<std::string>& titles) {
+  for (const std::string& title : titles) field(title);
+  end_row();
+}
+
+void Csv::separate() {
+  if (std::exchange(comma_, true)) text_ += ',';
+}
+
+Csv& Csv::field(std::string_view text) {
+  separate();
+  constexpr std::string_view formula = "=+-@\t\r";
+  const bool guarded = !text.empty() && formula.find(text.front()) != std::string_view::npos;
+  const bool quoted = text.find_first_of("\",\r\n") != std::string_view::npos;
+  if (quoted) text_ += '"';
+  if (guarded) text_ += '\'';
+  for (const char c : text) text_ += c == '"' ? std::string("\"\"") : std::string(1, c);
+  if (quoted) text_ += '"';
+  return *this;
+}
+
+Csv& Csv::exact(double number) {
+  separate();
+  if (std::isfinite(number)) text_ += http::number_text(number);
+  return *this;
+}
+
+Csv& Csv::field(double number) {
+  return exact(resolved(number));
+}
+
+Csv& Csv::field(std::int64_t number) {
+  separate();
+  text_ += std::to_string(number);
+  return *this;
+}
+
+Csv& Csv::field(bool truth) {
+  return field(truth ? "true" : "false");
+}
+
+void Csv::end_row() {
+  text_ += "\r\n";
+  comma_ = false;
+}
+
+http::Response Csv::response(const std::string& name) {
+  http::Response response;
+  response.content_type = "text/csv; charset=utf-8; header=present";
+  response.headers.emplace_back("Content-Disposition", "attachment; filename=\"joulecast-" + name + ".csv\"");
+  response.headers.emplace_back("Vary", "Accept");
+  response.body = std::move(text_);
+  return response;
+}
+
+http::Response Csv::response(const std::string& name, const http::Request& request,
+                             std::string_view next_cursor) {
+  http::Response made = response(name);
+  if (next_cursor.empty()) return made;
+  std::string link = "<" + std::string(request.target.substr(0, request.target.find('?'))) + "?";
+  for (const auto& [key, value] : request.query)
+    if (key != "cursor") link += percent_encoded(key) + "=" + percent_encoded(value) + "&";
+  link += "cursor=" + percent_encoded(next_cursor) + ">; rel=\"next\"";
+  made.headers.emplace_back("Link", std::move(link));
+  return made;
+}
+
+}  // namespace joulecast::api

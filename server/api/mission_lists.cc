@@ -1,0 +1,334 @@
+// Lists and sums of missions that filters choose.
+#include <array>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "answers/json/ledger_json.h"
+#include "answers/json/mission_json.h"
+#include "base/utc_time.h"
+#include "robot/kind.h"
+#include "server/api/common_parameters.h"
+#include "server/api/csv.h"
+#include "server/api/services.h"
+#include "signals/account_ratios.h"
+
+namespace joulecast::api {
+namespace {
+
+using history::MissionOrder;
+using http::Method;
+using http::Parameter;
+using http::Request;
+using http::Response;
+using Type = Parameter::Type;
+
+constexpr std::array<std::pair<std::string_view, MissionOrder>, 12> orders{{
+    {"start", MissionOrder::start},
+    {"robot", MissionOrder::robot},
+    {"mission", MissionOrder::mission},
+    {"state", MissionOrder::state},
+    {"duration", MissionOrder::duration},
+    {"distance", MissionOrder::distance},
+    {"payload", MissionOrder::payload},
+    {"energy", MissionOrder::energy},
+    {"modelled", MissionOrder::modelled},
+    {"ratio", MissionOrder::ratio},
+    {"wh_per_km", MissionOrder::wh_per_km},
+    {"charge", MissionOrder::charge},
+}};
+
+std::vector<std::string> listed(std::string_view text) {
+  std::vector<std::string> items;
+  while (true) {
+    const auto comma = text.find(',');
+    if (const auto item = text.substr(0, comma); !item.empty()) items.emplace_back(item);
+    if (comma == std::string_view::npos) return items;
+    text.remove_prefix(comma + 1);
+  }
+}
+
+Result<history::MissionFilter> filter_of(const Request& request) {
+  history::MissionFilter filter;
+  if (const auto robots = request.query_value("robot_id")) {
+    filter.robot_ids = listed(*robots);
+    if (filter.robot_ids.empty()) return invalid("robot_id", "must name a robot");
+  }
+  if (const auto mission = request.query_value("mission_id")) filter.mission_id = std::string(*mission);
+  if (const auto part = request.query_value("name_contains")) filter.name_contains = std::string(*part);
+  const auto from = time_of(request, "from"), to = time_of(request, "to");
+  if (!from) return tl::unexpected(from.error());
+  if (!to) return tl::unexpected(to.error());
+  filter.start_from_utime_us = *from;
+  filter.start_to_utime_us = *to;
+  filter.incomplete = request.query_boolean("incomplete");
+  filter.payload_min_kg = request.query_number("payload_min_kg");
+  filter.payload_max_kg = request.query_number("payload_max_kg");
+  filter.ratio_min = request.query_number("ratio_min");
+  filter.ratio_max = request.query_number("ratio_max");
+  if (const auto state = request.query_value("state"))
+    filter.states.push_back(*history::mission_state_from(*state));
+  return filter;
+}
+
+std::vector<Parameter> filter_parameters() {
+  const auto bound = [](std::string name, std::string what, std::optional<double> minimum) {
+    return Parameter{.name = std::move(name),
+                     .type = Type::number,
+                     .description = "only missions with " + std::move(what),
+                     .minimum = minimum};
+  };
+  const std::vector<Parameter> times =
+      with(time_parameters("from", "only missions that started at or after this time"),
+           time_parameters("to", "only missions that started before this time"));
+  return with(
+      times,
+      {
+          {.name = "robot_id",
+           .type = Type::text,
+           .description = "only missions of this robot, or of these, separated by commas"},
+          {.name = "mission_id", .type = Type::text, .description = "only missions that the robot called so"},
+          {.name = "name_contains",
+           .type = Type::text,
+           .description = "only missions with this text within mission_id; ASCII letters in any case"},
+          {.name = "state",
+           .type = Type::text,
+           .description = "only missions in this state",
+           .choices = {"open", "finished", "aborted", "unfinished", "superseded", "interrupted"}},
+          {.name = "incomplete",
+           .type = Type::boolean,
+           .description = "only missions with (true) or without (false) unmeasured parts"},
+          bound("payload_min_kg", "at least this payload", 0),
+          bound("payload_max_kg", "at most this payload", 0),
+          bound("ratio_min", "at least this ratio of measured to modelled energy", std::nullopt),
+          bound("ratio_max", "at most this ratio of measured to modelled energy", std::nullopt),
+      });
+}
+
+std::vector<Parameter> sort_parameters() {
+  std::vector<std::string> names;
+  for (const auto& [name, order] : orders) names.emplace_back(name);
+  return {{.name = "sort",
+           .type = Type::text,
+           .description = "what the missions are listed by, start if absent; those without a value come last",
+           .choices = std::move(names)},
+          {.name = "order",
+           .type = Type::text,
+           .description = "asc: least, oldest or first in the alphabet first; desc if absent",
+           .choices = {"asc", "desc"}}};
+}
+
+history::MissionSort sort_of(const Request& request) {
+  history::MissionSort sort;
+  sort.ascending = request.query_value("order") == "asc";
+  for (const auto& [name, order] : orders)
+    if (request.query_value("sort") == name) sort.by = order;
+  return sort;
+}
+
+const std::vector<std::string>& accounts_titles() {
+  static const std::vector<std::string> titles{"ratio",      "wh_per_km",  "battery_j",     "measured_j",
+                                               "measured_s", "modelled_j", "unexplained_j", "drawn_j",
+                                               "returned_j", "charge_ah",  "distance_m",    "turned_rad",
+                                               "duration_s", "samples",    "gap_count",     "gap_s"};
+  return titles;
+}
+
+template <class Summed>
+void add_accounts(Csv& csv, const Summed& of) {
+  const signals::Accounts& a = of.accounts;
+  const bool measured = a.measured_s > 0;
+  csv.field(signals::energy_ratio(a)).field(signals::energy_per_distance_wh_km(a)).field(a.battery_j);
+  csv.field(measured ? a.measured_j : signals::unmeasured).field(a.measured_s).field(a.modelled_j);
+  csv.field(measured ? a.ledger[signals::Term::unexplained] : signals::unmeasured);
+  csv.field(a.drawn_j).field(a.returned_j).field(a.charge_ah).field(a.distance_m).field(a.turned_rad);
+  csv.field(a.duration_s).field(of.samples).field(of.gap_count).field(of.gap_s);
+}
+
+std::vector<std::string> titled(std::vector<std::string> first, std::vector<std::string> last = {}) {
+  first.insert(first.end(), accounts_titles().begin(), accounts_titles().end());
+  first.insert(first.end(), last.begin(), last.end());
+  return first;
+}
+
+Response list_csv(const Request& request, const history::MissionPage& page) {
+  Csv csv(titled({"id", "robot_id", "mission_id", "state", "incomplete", "incomplete_reason", "start", "end",
+                  "start_utime_us", "end_utime_us", "payload_kg", "model_version"},
+                 {"note"}));
+  for (const history::Mission& m : page.missions) {
+    csv.field(m.key).field(m.robot_id).field(m.mission_id).field(history::name(m.state)).field(m.incomplete);
+    csv.field(m.incomplete_reason).field(utc_text(m.start_utime_us)).field(utc_text(m.end_utime_us));
+    csv.field(m.start_utime_us).field(m.end_utime_us).field(m.payload_kg).field(m.model_version);
+    add_accounts(csv, m);
+    csv.field(m.note).end_row();
+  }
+  return csv.response("missions", request, page.next_cursor);
+}
+
+Result<Response> list(const Services& services, const Request& request) {
+  const Result<history::MissionFilter> filter = filter_of(request);
+  if (!filter) return tl::unexpected(filter.error());
+  Result<history::MissionPage> found =
+      services.store.missions(*filter, page_of(request, 50), sort_of(request));
+  if (!found) return tl::unexpected(std::move(found.error()));
+  if (request.csv) return list_csv(request, *found);
+  JsonWriter json;
+  json.begin_object().key("missions").begin_array();
+  for (const history::Mission& mission : found->missions) answers::write_mission(json, mission);
+  json.end_array();
+  write_cursor(json, found->next_cursor);
+  json.end_object();
+  return http::json_response(json.take());
+}
+
+// Missions that are summed together.
+struct Group {
+  std::vector<std::string> robot_ids;                      // by robot or kind
+  std::optional<std::int64_t> from_utime_us, to_utime_us;  // by day or week
+  history::Totals totals;
+};
+
+// Robots of one kind together; those without a model are one more kind.
+Result<std::vector<Group>> groups_by_kind(const Services& services, history::MissionFilter filter) {
+  const auto robots = services.store.grouped_totals(filter, history::Grouping::robot, 0);
+  if (!robots) return tl::unexpected(robots.error());
+  std::map<std::string, std::vector<std::string>> kinds;
+  for (const history::TotalsGroup& each : *robots) {
+    const auto model = services.models.find(each.robot_id);
+    kinds[model != nullptr ? robot::kind_of(model->robot) : ""].push_back(each.robot_id);
+  }
+  std::vector<Group> groups;
+  for (auto& [kind, ids] : kinds) {
+    filter.robot_ids = ids;
+    const Result<history::Totals> totals = services.store.totals(filter);
+    if (!totals) return tl::unexpected(totals.error());
+    groups.push_back({std::move(ids), std::nullopt, std::nullopt, *totals});
+  }
+  return groups;
+}
+
+Result<std::vector<Group>> groups_of(const Services& services, const Request& request,
+                                     const history::MissionFilter& filter) {
+  const auto by = request.query_value("group_by");
+  if (!by) return std::vector<Group>{};
+  if (*by == "kind") return groups_by_kind(services, filter);
+  const bool robot = *by == "robot";
+  const std::int64_t days = *by == "week" ? 7 : 1;
+  const auto grouping = robot       ? history::Grouping::robot
+                        : days == 7 ? history::Grouping::week
+                                    : history::Grouping::day;
+  const auto found = services.store.grouped_totals(filter, grouping,
+                                                   60 * request.query_integer("utc_offset_min").value_or(0));
+  if (!found) return tl::unexpected(found.error());
+  std::vector<Group> groups;
+  for (const history::TotalsGroup& each : *found) {
+    Group& group = groups.emplace_back();
+    group.totals = each.totals;
+    if (robot) {
+      group.robot_ids = {each.robot_id};
+    } else {
+      group.from_utime_us = each.from_utime_us;
+      group.to_utime_us = each.from_utime_us + days * 86'400'000'000;
+    }
+  }
+  return groups;
+}
+
+void write_totals(JsonWriter& json, const history::Totals& t) {
+  json.field("missions", t.missions);
+  json.field("measured_missions", t.measured_missions);
+  json.field("incomplete_missions", t.incomplete_missions);
+  json.field("samples", t.samples);
+  json.field("gap_count", t.gap_count);
+  json.field("gap_s", t.gap_s);
+  json.field("ratio", signals::energy_ratio(t.accounts));
+  json.field("wh_per_km", signals::energy_per_distance_wh_km(t.accounts));
+  json.key("energy");
+  answers::write_accounts(json, t.accounts);
+  json.key("ledger");
+  answers::write_ledger(json, t.accounts);
+}
+
+Response totals_csv(const std::vector<Group>& groups) {
+  Csv csv(titled({"robots", "from", "to", "missions", "measured_missions", "incomplete_missions"}));
+  for (const Group& group : groups) {
+    std::string robots;
+    for (const std::string& id : group.robot_ids) robots += (robots.empty() ? "" : " ") + id;
+    csv.field(robots);
+    for (const auto time : {group.from_utime_us, group.to_utime_us}) csv.field(time ? utc_text(*time) : "");
+    csv.field(group.totals.missions).field(group.totals.measured_missions);
+    csv.field(group.totals.incomplete_missions);
+    add_accounts(csv, group.totals);
+    csv.end_row();
+  }
+  return csv.response("mission-totals");
+}
+
+Result<Response> totals(const Services& services, const Request& request) {
+  const Result<history::MissionFilter> filter = filter_of(request);
+  if (!filter) return tl::unexpected(filter.error());
+  Result<history::Totals> all = services.store.totals(*filter);
+  if (!all) return tl::unexpected(std::move(all.error()));
+  const Result<std::vector<Group>> groups = groups_of(services, request, *filter);
+  if (!groups) return tl::unexpected(groups.error());
+  const bool grouped = request.query_value("group_by").has_value();
+  if (request.csv) return totals_csv(grouped ? *groups : std::vector<Group>{{{}, {}, {}, *all}});
+  JsonWriter json;
+  json.begin_object();
+  write_totals(json, *all);
+  json.key("groups");
+  if (!grouped) {
+    json.null();
+  } else {
+    json.begin_array();
+    for (const Group& group : *groups) {
+      json.begin_object().array("robots", group.robot_ids);
+      json.time("from", group.from_utime_us).time("to", group.to_utime_us);
+      write_totals(json, group.totals);
+      json.end_object();
+    }
+    json.end_array();
+  }
+  json.end_object();
+  return http::json_response(json.take());
+}
+
+}  // namespace
+
+std::vector<TableRow> mission_list_rows() {
+  std::vector<TableRow> rows;
+  rows.push_back(
+      {{.method = Method::get,
+        .path = "/v1/missions",
+        .operation_id = "listMissions",
+        .role = http::Role::read,
+        .summary = "Missions, newest first or sorted, in pages that stay stable while missions come",
+        .parameters = with(with(filter_parameters(), sort_parameters()),
+                           {limit_parameter("missions a page", history::max_page_size), cursor_parameter()}),
+        .response_schema = "mission-page",
+        .csv = true},
+       answered_by(list)});
+  rows.push_back(
+      {{.method = Method::get,
+        .path = "/v1/mission-totals",
+        .operation_id = "totalMissions",
+        .role = http::Role::read,
+        .summary = "Sums of energy and ledger over the missions that the filters choose, in groups if asked",
+        .parameters = with(filter_parameters(),
+                           {{.name = "group_by",
+                             .type = Type::text,
+                             .description = "also the sums of each robot, day, week or kind of robot",
+                             .choices = {"robot", "day", "week", "kind"}},
+                            {.name = "utc_offset_min",
+                             .type = Type::integer,
+                             .description = "days begin at midnight, weeks on Monday, of a clock so many "
+                                            "minutes ahead of UTC; 0 if absent",
+                             .minimum = -1440,
+                             .maximum = 1440}}),
+        .response_schema = "mission-totals",
+        .csv = true},
+       answered_by(totals)});
+  return rows;
+}
+
+}  // namespace joulecast::api

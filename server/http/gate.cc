@@ -1,0 +1,319 @@
+#include "server/http/gate.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "access/sha256.h"
+#include "base/json_fields.h"
+#include "base/utc_time.h"
+#include "server/http/problem.h"
+#include "server/http/text.h"
+
+namespace joulecast::http {
+namespace {
+
+using access::Token;
+using nlohmann::ordered_json;
+
+constexpr std::int64_t microseconds_per_s = 1'000'000;
+constexpr std::int64_t session_s = 12 * 3600;
+constexpr std::size_t most_sessions = 10'000;
+constexpr std::int64_t refusals_kept_per_minute = 60;
+constexpr std::size_t longest_secret = 256;
+constexpr std::string_view robot_path = "/v1/robots/{id}";
+
+// The value of a cookie of that name, or empty.
+std::string_view cookie_value(std::string_view header, std::string_view name) {
+  while (!header.empty()) {
+    const auto semicolon = header.find(';');
+    const std::string_view pair = trim(header.substr(0, semicolon));
+    header.remove_prefix(semicolon == std::string_view::npos ? header.size() : semicolon + 1);
+    const auto equals = pair.find('=');
+    if (equals != std::string_view::npos && pair.substr(0, equals) == name) return pair.substr(equals + 1);
+  }
+  return {};
+}
+
+// The one robot that a request is about by its path or query.
+std::optional<std::string> robot_of(const Endpoint& endpoint, const Request& request) {
+  const std::string_view path = endpoint.path;
+  if (path.starts_with(robot_path) && (path.size() == robot_path.size() || path[robot_path.size()] == '/'))
+    return request.param("id");
+  if (const auto named = request.query_value("robot_id")) return std::string(*named);
+  return std::nullopt;
+}
+
+ordered_json description_of(const Token& token) {
+  ordered_json text{{"name", token.name}, {"role", access::name(token.role)}};
+  text["robots"] = token.robots.empty() ? ordered_json(nullptr) : ordered_json(token.robots);
+  text["expires"] =
+      token.expires_utime_us == 0 ? ordered_json(nullptr) : ordered_json(utc_text(token.expires_utime_us));
+  return text;
+}
+
+AccessEvent token_event(std::string action, const Token& token) {
+  ordered_json detail = description_of(token);
+  // Enough to tell two tokens of one name apart.
+  detail["sha256_begins"] = token.sha256.substr(0, 16);
+  return {.action = std::move(action), .detail_json = detail.dump()};
+}
+
+// What a request wanted; never what it carried in its headers.
+ordered_json wanted(const Request& request) {
+  return {{"method", to_string(request.method)}, {"path", request.path}};
+}
+
+std::string text_of(const ordered_json& detail) {
+  // A path may hold what is not UTF-8 only by our fault; the audit must not fail on it.
+  return detail.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Gate>> Gate::open(Options options) {
+  auto gate = std::unique_ptr<Gate>(new Gate(std::move(options)));
+  if (!gate->enabled()) return gate;
+  gate->stamp_ = gate->stamp();
+  if (Result<void> loaded = gate->load(); !loaded)
+    return fail(loaded.error().fault, "auth.token_file",
+                describe(loaded.error()) + "; joulecast token create makes it");
+  return gate;
+}
+
+Gate::Stamp Gate::stamp() const {
+  struct stat now {};
+  if (stat(options_.token_file.c_str(), &now) != 0) return {};
+  return {std::int64_t{now.st_mtim.tv_sec} * 1'000'000'000 + now.st_mtim.tv_nsec, std::int64_t{now.st_size},
+          now.st_ino};
+}
+
+// With the mutex held, or before there is anybody else.
+Result<void> Gate::load() {
+  Result<std::vector<Token>> read = access::read_tokens(options_.token_file);
+  if (!read) return tl::unexpected(read.error());
+  const auto holds = [](const std::vector<Token>& list, const Token& token) {
+    return std::ranges::find(list, token) != list.end();
+  };
+  for (const Token& token : tokens_)
+    if (!holds(*read, token)) tell(token_event("token_removed", token));
+  for (const Token& token : *read)
+    if (!holds(tokens_, token)) tell(token_event("token_in_force", token));
+  tokens_ = std::move(*read);
+  return {};
+}
+
+void Gate::refresh() {
+  if (!enabled()) return;
+  const std::lock_guard lock(mutex_);
+  const Stamp now = stamp();
+  if (now == stamp_) return;
+  stamp_ = now;
+  file_ = load();
+}
+
+Result<void> Gate::check() const {
+  const std::lock_guard lock(mutex_);
+  if (!file_)
+    return fail(Fault::unavailable, "auth.token_file",
+                "cannot be read, the tokens from before are in force: " + describe(file_.error()));
+  return {};
+}
+
+void Gate::tell(AccessEvent event) {
+  if (options_.audit) (void)options_.audit(std::move(event));
+}
+
+// Whoever is refused may ask as often as he likes: a minute's further refusals are counted, not listed.
+void Gate::tell_refusal(const Endpoint& endpoint, const Request& request, unsigned status) {
+  const std::int64_t minute = options_.now_utime_us() / (60 * microseconds_per_s);
+  if (minute != refusals_minute_) {
+    if (const std::int64_t omitted = refusals_ - refusals_kept_per_minute; omitted > 0)
+      tell({.action = "refusals_omitted", .detail_json = text_of({{"count", omitted}})});
+    refusals_minute_ = minute;
+    refusals_ = 0;
+  }
+  if (++refusals_ > refusals_kept_per_minute) return;
+  ordered_json detail = wanted(request);
+  detail["status"] = status;
+  tell({request.actor, request.address, request.id, endpoint.operation_id, text_of(detail)});
+}
+
+// The token that a request proves to have; null: none that is valid. With the mutex held.
+const Token* Gate::token_of(const Request& request, bool& presented) {
+  const std::int64_t now = options_.now_utime_us();
+  const std::string_view authorization = trim(request.header("authorization"));
+  const Token* token = nullptr;
+  if (!authorization.empty()) {
+    presented = true;
+    constexpr std::string_view scheme = "bearer ";
+    if (authorization.size() <= scheme.size() || authorization.size() > longest_secret ||
+        !equals_ignoring_case(authorization.substr(0, scheme.size()), scheme))
+      return nullptr;
+    token = access::find_token(tokens_, trim(authorization.substr(scheme.size())));
+  } else if (const auto value = cookie_value(request.header("cookie"), session_cookie); !value.empty()) {
+    presented = true;
+    const auto session = sessions_.find(access::sha256_hex(value));
+    if (session == sessions_.end()) return nullptr;
+    const auto begun = std::ranges::find(tokens_, session->second.token_sha256, &Token::sha256);
+    if (begun == tokens_.end() || now >= session->second.expires_utime_us) {
+      sessions_.erase(session);
+      return nullptr;
+    }
+    token = &*begun;
+  }
+  return token != nullptr && !access::has_expired(*token, now) ? token : nullptr;
+}
+
+std::optional<std::string> Gate::why_not(const Token& token, const Endpoint& endpoint,
+                                         const Request& request) const {
+  if (token.role < endpoint.role)
+    return "This needs a token of role " + std::string(access::name(endpoint.role)) + "; " + token.name +
+           " has role " + std::string(access::name(token.role));
+  if (token.robots.empty()) return std::nullopt;
+  const std::optional<std::string> robot = robot_of(endpoint, request);
+  if (!robot) return "This needs a token for all robots; " + token.name + " is for " + token.robots;
+  if (!access::is_for_robot(token, *robot))
+    return token.name + " is for the robots " + token.robots + " alone";
+  return std::nullopt;
+}
+
+std::optional<Response> Gate::refuse(const Endpoint& endpoint, Request& request) {
+  if (!enabled() || endpoint.role == Role::open) return std::nullopt;
+  refresh();
+  const std::lock_guard lock(mutex_);
+  bool presented = false;
+  const Token* token = token_of(request, presented);
+  if (token == nullptr) {
+    Response response = problem(
+        401, "unauthorized",
+        presented ? "The token or session is unknown, expired or revoked"
+                  : "This needs a token: Authorization: Bearer TOKEN, or a session of POST /v1/session",
+        request.id, "Authorization", "must be a bearer token that is in force");
+    response.headers.emplace_back(
+        "WWW-Authenticate",
+        presented ? R"(Bearer realm="joulecast", error="invalid_token")" : R"(Bearer realm="joulecast")");
+    tell_refusal(endpoint, request, 401);
+    return response;
+  }
+  request.actor = token->name;
+  if (const auto why = why_not(*token, endpoint, request)) {
+    tell_refusal(endpoint, request, 403);
+    return problem(403, "forbidden", *why, request.id, "Authorization",
+                   "must be a token of role " + std::string(access::name(endpoint.role)) + " for this");
+  }
+  return std::nullopt;
+}
+
+Endpoint Gate::audited(Endpoint endpoint) {
+  if (endpoint.role != Role::operate && endpoint.role != Role::admin) return endpoint;
+  endpoint.handler = [this, inner = std::move(endpoint.handler),
+                      action = endpoint.operation_id](const Request& request) -> Result<Response> {
+    const auto keep = [&](const ordered_json& detail) -> Result<void> {
+      if (!options_.audit) return {};
+      return options_.audit({request.actor, request.address, request.id, action, text_of(detail)});
+    };
+    ordered_json asked = wanted(request);
+    if (!request.body.empty()) asked["body_sha256"] = access::sha256_hex(request.body);
+    // What is kept is committed in its order: this before the change.
+    if (Result<void> kept = keep(asked); !kept)
+      return fail(Fault::unavailable, "", "the audit takes nothing: " + describe(kept.error()));
+    try {
+      Result<Response> response = inner(request);
+      (void)keep({{"status", response ? response->status : status_of(response.error().fault)}});
+      return response;
+    } catch (...) {
+      (void)keep({{"status", 500}});
+      throw;
+    }
+  };
+  return endpoint;
+}
+
+std::string Gate::cookie(std::string_view value, std::int64_t max_age_s) const {
+  return std::string(session_cookie) + "=" + std::string(value) +
+         "; Path=/; Max-Age=" + std::to_string(max_age_s) + "; HttpOnly; SameSite=Strict" +
+         (options_.secure ? "; Secure" : "");
+}
+
+Result<Response> Gate::sign_in(const Request& request) {
+  Fields fields(*request.json);
+  const std::string secret = fields.text("token", longest_secret);
+  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  if (!enabled())
+    return fail(Fault::conflict, "/token", "this service has no tokens: nobody needs to sign in");
+  refresh();
+  const std::lock_guard lock(mutex_);
+  const std::int64_t now = options_.now_utime_us();
+  const Token* token = access::find_token(tokens_, secret);
+  Endpoint here;
+  here.operation_id = "createSession";
+  if (token == nullptr || access::has_expired(*token, now)) {
+    tell_refusal(here, request, 401);
+    Response refused = problem(401, "unauthorized", "The token is unknown, expired or revoked", request.id,
+                               "/token", "must be a token that is in force");
+    refused.headers.emplace_back("WWW-Authenticate", R"(Bearer realm="joulecast", error="invalid_token")");
+    return refused;
+  }
+  std::erase_if(sessions_, [now](const auto& each) { return each.second.expires_utime_us <= now; });
+  if (sessions_.size() >= most_sessions) {
+    const auto sooner = [](const auto& a, const auto& b) {
+      return a.second.expires_utime_us < b.second.expires_utime_us;
+    };
+    sessions_.erase(std::min_element(sessions_.begin(), sessions_.end(), sooner));
+  }
+  const std::string value = access::random_hex(32);
+  sessions_[access::sha256_hex(value)] = {token->sha256, now + session_s * microseconds_per_s};
+  tell({token->name, request.address, request.id, here.operation_id, text_of({{"status", 200}})});
+  Response response = json_response(description_of(*token).dump());
+  response.headers.emplace_back("Set-Cookie", cookie(value, session_s));
+  return response;
+}
+
+Result<Response> Gate::sign_out(const Request& request) {
+  {
+    const std::lock_guard lock(mutex_);
+    bool presented = false;
+    if (const Token* token = token_of(request, presented))
+      tell({token->name, request.address, request.id, "deleteSession", text_of({{"status", 204}})});
+    sessions_.erase(access::sha256_hex(cookie_value(request.header("cookie"), session_cookie)));
+  }
+  Response response;
+  response.status = 204;
+  response.content_type.clear();
+  response.headers.emplace_back("Set-Cookie", cookie("", 0));
+  return response;
+}
+
+std::vector<Endpoint> described_session_endpoints() {
+  std::vector<Endpoint> rows;
+  rows.push_back(
+      {.method = Method::post,
+       .path = "/v1/session",
+       .operation_id = "createSession",
+       .role = Role::open,
+       .summary = "Signs a browser in: a session cookie for a token, for 12 h or until it is revoked",
+       .request_schema = "session-request",
+       .response_schema = "session",
+       .error_statuses = {401, 409},
+       .run = Run::io});
+  rows.push_back({.method = Method::del,
+                  .path = "/v1/session",
+                  .operation_id = "deleteSession",
+                  .role = Role::open,
+                  .summary = "Signs the browser out, where it is signed in",
+                  .success_status = 204,
+                  .run = Run::io});
+  return rows;
+}
+
+std::vector<Endpoint> Gate::session_endpoints() {
+  std::vector<Endpoint> rows = described_session_endpoints();
+  rows[0].handler = [this](const Request& request) { return sign_in(request); };
+  rows[1].handler = [this](const Request& request) { return sign_out(request); };
+  return rows;
+}
+
+}  // namespace joulecast::http

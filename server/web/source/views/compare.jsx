@@ -1,0 +1,245 @@
+// Two robots, two periods or two missions side by side.
+import { useState } from 'preact/hooks';
+import { useGet } from '../api.js';
+import { consumption, energyIn, energyScale } from '../energy.js';
+import * as format from '../format.js';
+import { useLive } from '../live.js';
+import { keepInAddress, missionLink, robotLink } from '../route.js';
+import { Table } from '../table.jsx';
+import { Choice, Failure, Loading, Quantity, Ratio, useOptions, useTitleOf } from '../widgets.jsx';
+import { Field, dayField, utimeUs } from './choosing.jsx';
+import { totalsPath } from './trends.jsx';
+
+const sides = ['a', 'b'];
+const kinds = { robots: 'Robots', periods: 'Periods', missions: 'Missions' };
+
+const dayAgo = (days) => {
+  const d = new Date(Date.now() - days * 86_400_000);
+  const two = (v) => String(v).padStart(2, '0');
+  return `${d.getFullYear()}-${two(d.getMonth() + 1)}-${two(d.getDate())}`;
+};
+
+// What one side asks the service: {path, name, link}; path null while something is not chosen.
+function sideOf(given, side, kind, robots) {
+  const at = (key) => given[`${side}_${key}`];
+  if (kind === 'missions') {
+    const id = at('mission');
+    return {
+      path: id ? `/v1/missions/${encodeURIComponent(id)}` : null,
+      name: `Mission ${id}`,
+      link: missionLink(id),
+    };
+  }
+  const robot = kind === 'robots' ? (at('robot') ?? robots[side === 'a' ? 0 : 1]) : given.robot;
+  const from = at('from') ?? (kind === 'periods' ? dayAgo(side === 'a' ? 14 : 7) : undefined);
+  const to = at('to') ?? (kind === 'periods' && side === 'a' ? dayAgo(7) : undefined);
+  const span = kind === 'robots' ? [given.from, given.to] : [from, to];
+  return {
+    path: totalsPath({ robot_id: robot, from_utime_us: utimeUs(span[0]), to_utime_us: utimeUs(span[1]) }),
+    robot,
+    from,
+    to,
+    name: kind === 'robots' ? robot : `${from} to ${to ?? 'now'}`,
+    link: kind === 'robots' && robot ? robotLink(robot) : null,
+  };
+}
+
+function RobotChoice({ label, value, onChange, all }) {
+  const live = useLive();
+  const options = useOptions([...live.robots.keys()].sort());
+  return (
+    <Field label={label}>
+      <select value={value ?? ''} onChange={(event) => onChange(event.currentTarget.value)}>
+        {all && <option value="">the fleet</option>}
+        {options}
+      </select>
+    </Field>
+  );
+}
+
+function MissionChoice({ label, value, onChange, recent }) {
+  const known = recent.some((m) => String(m.id) === value);
+  return (
+    <Field label={label}>
+      <select value={value ?? ''} onChange={(event) => onChange(event.currentTarget.value)}>
+        {!known && <option value={value ?? ''}>{value ? `Mission ${value}` : 'choose …'}</option>}
+        {recent.map((m) => (
+          <option key={m.id} value={m.id}>
+            {m.robot_id} {m.mission_id} {format.time(m.start_utime_us).slice(0, 16)}
+          </option>
+        ))}
+      </select>
+    </Field>
+  );
+}
+
+function Fields({ given, kind, change, shown }) {
+  const recent = useGet(kind === 'missions' ? '/v1/missions?limit=200' : null);
+  const set = (key) => (value) => change({ [key]: value });
+  if (kind === 'missions')
+    return sides.map((side) => (
+      <MissionChoice
+        key={side}
+        label={side === 'a' ? 'First' : 'Second'}
+        value={given[`${side}_mission`]}
+        onChange={set(`${side}_mission`)}
+        recent={recent.value?.missions ?? []}
+      />
+    ));
+  if (kind === 'robots')
+    return (
+      <>
+        <RobotChoice label="First" value={shown[0].robot} onChange={set('a_robot')} />
+        <RobotChoice label="Second" value={shown[1].robot} onChange={set('b_robot')} />
+        {dayField('From', given.from, set('from'))}
+        {dayField('To', given.to, set('to'))}
+      </>
+    );
+  return (
+    <>
+      <RobotChoice label="Robot" value={given.robot} onChange={set('robot')} all />
+      {sides.map((side, k) => (
+        <fieldset class="field" key={side}>
+          <legend>{k === 0 ? 'First period' : 'Second period'}</legend>
+          <span class="with-unit">
+            {dayField('From', shown[k].from, set(`${side}_from`))}
+            {dayField('To', shown[k].to, set(`${side}_to`))}
+          </span>
+        </fieldset>
+      ))}
+    </>
+  );
+}
+
+// Rows of figures: {name, values, cell(value)}; both energies of a row in one unit.
+function rowsOf(one, other, ledgers) {
+  const row = (name, value, cell) => ({ name, values: [value(one), value(other)], cell });
+  const plain = (of) => (v) => <Quantity of={of(v)} />;
+  const joules = (name, value) => {
+    const values = [value(one, ledgers?.[0]), value(other, ledgers?.[1])];
+    const scale = energyScale(values);
+    return { name, values, cell: plain((v) => energyIn(scale, v)) };
+  };
+  const terms = Object.keys(ledgers?.[0]?.terms_j ?? {}).filter((term) =>
+    ledgers.some((ledger) => Math.abs(ledger.terms_j[term] ?? 0) > 0),
+  );
+  const perMetre = (totals, joule) =>
+    totals.energy.distance_m > 0.1 && joule !== null ? joule / totals.energy.distance_m : null;
+  return [
+    ...(one.missions === undefined
+      ? []
+      : [
+          row(
+            'Missions',
+            (t) => t.missions,
+            (v) => format.fixed(v),
+          ),
+        ]),
+    joules('Battery energy', (t) => t.energy.battery_j),
+    joules('Modelled', (t) => t.energy.modelled_j),
+    row(
+      'Ratio',
+      (t) => t.ratio,
+      (v) => <Ratio value={v} />,
+    ),
+    row('Distance', (t) => t.energy.distance_m, plain(format.length)),
+    row('Duration', (t) => t.energy.duration_s, format.span),
+    row(
+      'Mean power',
+      (t) => (t.energy.duration_s > 0 ? t.energy.battery_j / t.energy.duration_s : null),
+      plain(format.power),
+    ),
+    row('Consumption', (t) => (t.wh_per_km === null ? null : 3.6 * t.wh_per_km), plain(consumption)),
+    ...terms.map((term) => ({
+      name: `of it ${format.words(term)}`,
+      values: [one, other].map((t, k) => perMetre(t, ledgers[k].terms_j[term])),
+      least: Math.abs(perMetre(one, one.energy.battery_j) ?? 0) / 100,
+      cell: plain(consumption),
+    })),
+  ];
+}
+
+// Nothing of what is next to nothing itself: its relative change says nothing.
+const change = ([a, b], least = 0) =>
+  format.known(a) && format.known(b) && Math.abs(a) > least ? (b - a) / Math.abs(a) : null;
+
+function Figures({ shown, values, ledgers }) {
+  const columns = [
+    { key: 'name', title: '', head: true, cell: (r) => r.name },
+    ...shown.map((side, k) => ({
+      key: k,
+      title: side.name,
+      class: 'figure',
+      cell: (r) => r.cell(r.values[k]),
+    })),
+    {
+      key: 'change',
+      title: 'Second to first',
+      class: 'figure',
+      cell: (r) => <Quantity of={format.percent(change(r.values, r.least), 1)} sign />,
+    },
+  ];
+  return (
+    <>
+      <p class="note">
+        {shown.map((side, k) => (
+          <span key={k}>
+            {k > 0 && ' · '}
+            {side.link ? <a href={side.link}>{side.name}</a> : side.name}
+            {values[k].mission_id && ` ${values[k].robot_id} ${values[k].mission_id}`}
+          </span>
+        ))}
+      </p>
+      <Table class="compare" columns={columns} rows={rowsOf(...values, ledgers)} keyOf={(r) => r.name} />
+      <p class="note foot">
+        Terms of the ledger are shown over the distance, which makes unequal sides compare.
+      </p>
+    </>
+  );
+}
+
+export function Compare({ given: asked }) {
+  useTitleOf('Compare');
+  const live = useLive();
+  const [given, setGiven] = useState(asked);
+  const kind = given.kind in kinds ? given.kind : 'robots';
+  const change = (part) => {
+    const next = Object.fromEntries(Object.entries({ ...given, ...part }).filter(([, value]) => value));
+    setGiven(next);
+    keepInAddress(next);
+  };
+  const robots = [...live.robots.keys()].sort();
+  const shown = sides.map((side) => sideOf(given, side, kind, robots));
+  const [one, other] = [useGet(shown[0].path), useGet(shown[1].path)];
+  const ledgerPath = (k) => (kind === 'missions' && shown[k].path ? `${shown[k].path}/ledger` : null);
+  const [first, second] = [useGet(ledgerPath(0)), useGet(ledgerPath(1))];
+  const ready = one.path === shown[0].path && other.path === shown[1].path && one.value && other.value;
+  const ledgers =
+    kind === 'missions'
+      ? first.value && second.value && [first.value.ledger, second.value.ledger]
+      : ready && [one.value.ledger, other.value.ledger];
+  const error = one.error ?? other.error;
+  return (
+    <>
+      <h1 class="hidden">Compare</h1>
+      <form class="filters" aria-label="Choose what is compared" onSubmit={(e) => e.preventDefault()}>
+        <Choice
+          label="Compare"
+          value={kind}
+          onChange={(next) => change({ kind: next })}
+          options={Object.entries(kinds)}
+        />
+        <Fields given={given} kind={kind} change={change} shown={shown} />
+        <a class="button" href="#/trends">
+          Trends
+        </a>
+      </form>
+      {error && <Failure error={error} retry={() => [one, other].forEach((each) => each.reload())} />}
+      {!error && shown.some((side) => side.path === null) && <p class="note">Choose two missions.</p>}
+      {!error && !ready && shown.every((side) => side.path !== null) && <Loading what="the comparison" />}
+      {!error && ready && (
+        <Figures shown={shown} values={[one.value, other.value]} ledgers={ledgers || null} />
+      )}
+    </>
+  );
+}

@@ -1,0 +1,161 @@
+#include "access/token.h"
+
+#include <fcntl.h>
+#include <fnmatch.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "access/sha256.h"
+#include "base/json_fields.h"
+#include "base/json_text.h"
+#include "base/text_file.h"
+#include "base/utc_time.h"
+
+namespace joulecast::access {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t longest_name = 64;
+constexpr std::size_t longest_pattern = 128;
+constexpr std::size_t hash_digits = 64;
+
+Result<Token> read_token(const json& object, const std::string& at) {
+  if (!object.is_object()) return invalid(at, "must be an object");
+  Fields fields(object, at);
+  Token token;
+  token.name = fields.text("name", longest_name);
+  token.role = role_of(fields.choice("role", {"read", "plan", "operate", "admin"})).value_or(Role::read);
+  token.robots = fields.text("robots", longest_pattern, "");
+  token.created_utime_us = fields.time("created").value_or(0);
+  token.expires_utime_us = fields.time("expires").value_or(0);
+  token.sha256 = fields.text("sha256", hash_digits);
+  if (fields.ok() && (token.sha256.size() != hash_digits ||
+                      token.sha256.find_first_not_of("0123456789abcdef") != std::string::npos))
+    fields.fault("sha256", "must be 64 hexadecimal digits");
+  if (fields.ok())
+    if (Result<void> sound = check_token_name(token.name); !sound)
+      fields.fault("name", sound.error().message);
+  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  return token;
+}
+
+}  // namespace
+
+std::string new_secret() {
+  return "jc_" + random_hex(32);
+}
+
+const Token* find_token(const std::vector<Token>& tokens, std::string_view secret) {
+  const std::string hash = sha256_hex(secret);
+  const Token* found = nullptr;
+  for (const Token& token : tokens)
+    if (equal_in_constant_time(token.sha256, hash)) found = &token;
+  return found;
+}
+
+bool has_expired(const Token& token, std::int64_t now_utime_us) {
+  return token.expires_utime_us != 0 && now_utime_us >= token.expires_utime_us;
+}
+
+bool is_for_robot(const Token& token, const std::string& robot_id) {
+  return token.robots.empty() || fnmatch(token.robots.c_str(), robot_id.c_str(), 0) == 0;
+}
+
+Result<void> check_token_name(std::string_view name) {
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+           std::string_view("._-@").find(c) != std::string_view::npos;
+  };
+  if (name.empty() || name.size() > longest_name || !std::ranges::all_of(name, allowed))
+    return invalid("name", "must be 1 to 64 of the letters, digits and ._-@");
+  return {};
+}
+
+Result<std::vector<Token>> parse_tokens(std::string_view json_text) {
+  const auto document = parse_json(json_text);
+  if (!document) return tl::unexpected(document.error());
+  if (!document->is_object()) return invalid("", "must be an object with the member tokens");
+  Fields fields(*document);
+  const json* list = fields.required("tokens");
+  if (list != nullptr && !list->is_array()) fields.fault("tokens", "must be an array");
+  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  std::vector<Token> tokens;
+  for (const json& each : *list) {
+    const std::string at = "/tokens/" + std::to_string(tokens.size());
+    Result<Token> token = read_token(each, at);
+    if (!token) return tl::unexpected(std::move(token.error()));
+    if (std::ranges::find(tokens, token->name, &Token::name) != tokens.end())
+      return invalid(at + "/name", "is " + token->name + ", which another token has");
+    tokens.push_back(std::move(*token));
+  }
+  return tokens;
+}
+
+std::string to_json_text(const std::vector<Token>& tokens) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const Token& token : tokens) {
+    nlohmann::ordered_json object{{"name", token.name}, {"role", name(token.role)}};
+    if (!token.robots.empty()) object["robots"] = token.robots;
+    object["created"] = utc_text(token.created_utime_us);
+    if (token.expires_utime_us != 0) object["expires"] = utc_text(token.expires_utime_us);
+    object["sha256"] = token.sha256;
+    list.push_back(std::move(object));
+  }
+  return nlohmann::ordered_json{{"tokens", std::move(list)}}.dump(2) + "\n";
+}
+
+Result<std::vector<Token>> read_tokens(const std::string& path) {
+  const Result<std::string> text = read_text_file(path);
+  if (!text) return tl::unexpected(text.error());
+  Result<std::vector<Token>> tokens = parse_tokens(*text);
+  if (!tokens) return invalid(path, describe(tokens.error()));
+  return tokens;
+}
+
+namespace detail {
+
+Replacement::Replacement(std::string path) : path_(std::move(path)) {}
+
+Replacement::~Replacement() {
+  if (descriptor_ < 0) return;
+  close(descriptor_);
+  unlink((path_ + ".new").c_str());
+}
+
+Result<std::vector<Token>> Replacement::begin() {
+  const std::string beside = path_ + ".new";
+  struct stat old {};
+  const bool exists = stat(path_.c_str(), &old) == 0;
+  descriptor_ = open(beside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (descriptor_ < 0 && errno == EEXIST)
+    return fail(Fault::conflict, beside,
+                "exists: another program changes the tokens, or one died doing so; then delete it");
+  if (descriptor_ < 0) return fail(Fault::unavailable, beside, std::strerror(errno));
+  if (fchmod(descriptor_, exists ? old.st_mode & 07777 : 0640) != 0)
+    return fail(Fault::unavailable, beside, std::strerror(errno));
+  // Whose file it was, so that the daemon goes on reading it; only root may give it away.
+  if (exists && fchown(descriptor_, old.st_uid, old.st_gid) != 0 && geteuid() == 0)
+    return fail(Fault::unavailable, beside, std::strerror(errno));
+  return exists ? read_tokens(path_) : std::vector<Token>();
+}
+
+Result<void> Replacement::commit(const std::vector<Token>& tokens) {
+  const std::string text = to_json_text(tokens);
+  const std::string beside = path_ + ".new";
+  const bool written = write(descriptor_, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
+                       fsync(descriptor_) == 0 && std::rename(beside.c_str(), path_.c_str()) == 0;
+  if (!written) return fail(Fault::unavailable, path_, std::strerror(errno));
+  close(descriptor_);
+  descriptor_ = -1;
+  return {};
+}
+
+}  // namespace detail
+}  // namespace joulecast::access

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "access/role.h"
+#include "base/error.h"
+
+namespace joulecast::access {
+
+// A bearer token as it is kept: of the secret only its hash.
+struct Token {
+  std::string name;  // whom the audit names; unique in its file
+  Role role = Role::read;
+  std::string robots;                 // shell pattern of the robot ids that it is for; empty: all
+  std::int64_t created_utime_us = 0;  // since 1970
+  std::int64_t expires_utime_us = 0;  // since 1970; 0: never
+  std::string sha256;                 // of the secret
+
+  friend bool operator==(const Token&, const Token&) = default;
+};
+
+// A new secret, "jc_" and 64 hexadecimal digits: 256 random bits.
+std::string new_secret();
+
+// The token of that secret, compared with every one in constant time; null when none is. Expired ones are
+// found too.
+const Token* find_token(const std::vector<Token>& tokens, std::string_view secret);
+
+bool has_expired(const Token& token, std::int64_t now_utime_us);
+bool is_for_robot(const Token& token, const std::string& robot_id);
+
+// 1 to 64 of the letters, digits and "._-@".
+Result<void> check_token_name(std::string_view name);
+
+// The file of tokens: {"tokens": [{"name", "role", "robots", "created", "expires", "sha256"}]}. Errors name
+// the member.
+Result<std::vector<Token>> parse_tokens(std::string_view json_text);
+std::string to_json_text(const std::vector<Token>& tokens);
+
+// Fault::not_found where there is no such file.
+Result<std::vector<Token>> read_tokens(const std::string& path);
+
+// Replaces the file as a whole, keeping its mode (a new one: 0640), and never from two programs at once:
+// Fault::conflict while another one writes it. `change` gets what the file holds now; where there is none,
+// nothing.
+template <class Change>
+Result<void> change_tokens(const std::string& path, Change change);
+
+namespace detail {
+// The new file beside the old one, which exists only while somebody writes it.
+class Replacement {
+ public:
+  explicit Replacement(std::string path);
+  ~Replacement();
+  Replacement(const Replacement&) = delete;
+  Replacement& operator=(const Replacement&) = delete;
+  Result<std::vector<Token>> begin();
+  Result<void> commit(const std::vector<Token>& tokens);
+
+ private:
+  std::string path_;
+  int descriptor_ = -1;
+};
+}  // namespace detail
+
+template <class Change>
+Result<void> change_tokens(const std::string& path, Change change) {
+  detail::Replacement replacement(path);
+  Result<std::vector<Token>> tokens = replacement.begin();
+  if (!tokens) return tl::unexpected(tokens.error());
+  if (Result<void> changed = change(*tokens); !changed) return changed;
+  return replacement.commit(*tokens);
+}
+
+}  // namespace joulecast::access

@@ -1,0 +1,337 @@
+// Queries of missions: filters, orders, pages and sums.
+#include <bit>
+#include <cmath>
+#include <utility>
+
+#include "history/cursor.h"
+#include "history/sqlite_queries.h"
+#include "history/sqlite_rows.h"
+#include "signals/account_ratios.h"
+#include "signals/ids.h"
+
+namespace joulecast::history::queries {
+namespace {
+
+// signals::energy_ratio() and signals::energy_per_distance_wh_km().
+const std::string& ratio_sql() {
+  static const std::string sql =
+      "(CASE WHEN measured_s > 0 AND measured_j - ledger_unexplained_j > 0 THEN measured_j / (measured_j - "
+      "ledger_unexplained_j) END)";
+  return sql;
+}
+
+const std::string& wh_per_km_sql() {
+  static const std::string sql = "(CASE WHEN distance_m > " +
+                                 std::to_string(signals::least_compared_distance_m) +
+                                 " THEN battery_j / distance_m / 3.6 END)";
+  return sql;
+}
+
+const std::string& state_sql() {
+  static const std::string sql = [] {
+    std::string text = "(CASE state";
+    for (std::size_t k = 0; k < mission_state_count; ++k)
+      text += " WHEN '" + std::string(name(static_cast<MissionState>(k))) + "' THEN " + std::to_string(k);
+    return text + " END)";
+  }();
+  return sql;
+}
+
+// Visits the conditions of a filter that are set, each with what it binds.
+template <class Visit>
+void visit_filter(const MissionFilter& f, const std::string& robots_json, Visit visit) {
+  // One robot by itself lets the index by robot and start give the order, too.
+  if (f.robot_ids.size() == 1) visit("robot_id = ?", f.robot_ids.front());
+  if (f.robot_ids.size() > 1) visit("robot_id IN (SELECT value FROM json_each(?))", robots_json);
+  if (f.mission_id) visit("mission_id = ?", *f.mission_id);
+  if (f.name_contains) visit("instr(lower(mission_id), lower(?)) > 0", *f.name_contains);
+  if (f.start_from_utime_us) visit("start_utime_us >= ?", *f.start_from_utime_us);
+  if (f.start_to_utime_us) visit("start_utime_us < ?", *f.start_to_utime_us);
+  if (!f.states.empty()) {
+    std::int64_t among = 0;
+    for (const MissionState state : f.states) among |= std::int64_t{1} << static_cast<unsigned>(state);
+    visit("(? >> " + state_sql() + ") & 1", among);
+  }
+  if (f.incomplete) visit("incomplete = ?", std::int64_t{*f.incomplete});
+  if (f.payload_min_kg) visit("payload_kg >= ?", *f.payload_min_kg);
+  if (f.payload_max_kg) visit("payload_kg <= ?", *f.payload_max_kg);
+  if (f.ratio_min) visit(ratio_sql() + " >= ?", *f.ratio_min);
+  if (f.ratio_max) visit(ratio_sql() + " <= ?", *f.ratio_max);
+}
+
+// Robots whose names JSON would have to escape have no missions: ids are of letters, digits and ". _ -".
+std::string robots_json_of(const MissionFilter& f) {
+  std::string text = "[";
+  for (const std::string& id : f.robot_ids)
+    if (signals::is_valid_robot_id(id)) text += (text.size() > 1 ? ",\"" : "\"") + id + '"';
+  return text + "]";
+}
+
+// A filter as SQL. Outlives the rows that it is bound to.
+class Where {
+ public:
+  explicit Where(const MissionFilter& filter) : filter_(filter), robots_json_(robots_json_of(filter)) {
+    visit_filter(filter_, robots_json_,
+                 [&](const std::string& condition, const auto&) { sql_ += " AND " + condition; });
+  }
+
+  const std::string& sql() const { return sql_; }
+
+  void bind(Rows& rows) const {
+    visit_filter(filter_, robots_json_, [&](const std::string&, const auto& value) { rows.bind(value); });
+  }
+
+  // Tells filters apart for cursors. Text values carry their length, so that no two read alike.
+  std::string identity() const {
+    std::string text = sql_;
+    visit_filter(filter_, robots_json_, [&](const std::string&, const auto& value) {
+      using Value = std::decay_t<decltype(value)>;
+      if constexpr (std::is_same_v<Value, std::string>) {
+        text += '|' + std::to_string(value.size()) + ':' + value;
+      } else {
+        text += '|' + std::to_string(std::bit_cast<std::int64_t>(value));
+      }
+    });
+    return text;
+  }
+
+ private:
+  const MissionFilter& filter_;
+  std::string robots_json_;
+  std::string sql_ = " WHERE 1";
+};
+
+Result<void> check_bounds(const std::string& field, const std::string& other, std::optional<double> min,
+                          std::optional<double> max) {
+  if ((min && std::isnan(*min)) || (max && std::isnan(*max)))
+    return invalid(field, "must be a number, like " + other);
+  if (min && max && *min > *max) return invalid(field, "must not be greater than " + other);
+  return {};
+}
+
+Result<void> check_filter(const MissionFilter& f) {
+  if (f.robot_ids.size() > max_filter_robots)
+    return invalid("robot_id", "must name at most " + std::to_string(max_filter_robots) + " robots");
+  if (f.states.size() > mission_state_count) return invalid("state", "names a state more than once");
+  if (f.start_from_utime_us && f.start_to_utime_us && *f.start_from_utime_us > *f.start_to_utime_us)
+    return invalid("from_utime_us", "must not be later than to_utime_us");
+  if (auto ok = check_bounds("payload_min_kg", "payload_max_kg", f.payload_min_kg, f.payload_max_kg); !ok)
+    return ok;
+  return check_bounds("ratio_min", "ratio_max", f.ratio_min, f.ratio_max);
+}
+
+enum class Kind { integer, real, text };
+
+struct Column {
+  std::string sql;
+  Kind kind = Kind::real;
+};
+
+Column column_of(MissionOrder order) {
+  switch (order) {
+    case MissionOrder::start:
+      return {"start_utime_us", Kind::integer};
+    case MissionOrder::robot:
+      return {"robot_id", Kind::text};
+    case MissionOrder::mission:
+      return {"mission_id", Kind::text};
+    case MissionOrder::state:
+      return {state_sql(), Kind::integer};
+    case MissionOrder::duration:
+      return {"duration_s"};
+    case MissionOrder::distance:
+      return {"distance_m"};
+    case MissionOrder::payload:
+      return {"payload_kg"};
+    case MissionOrder::energy:
+      return {"battery_j"};
+    case MissionOrder::modelled:
+      return {"modelled_j"};
+    case MissionOrder::ratio:
+      return {ratio_sql()};
+    case MissionOrder::wh_per_km:
+      return {wh_per_km_sql()};
+    case MissionOrder::charge:
+      return {"charge_ah"};
+  }
+  return {"start_utime_us", Kind::integer};
+}
+
+// The place of the last mission of a page: its value as a number, 0 for a text, which never changes and is
+// read again by the key; and its key.
+CursorPlace place_of(Rows& rows, Kind kind, MissionKey key) {
+  if (kind == Kind::integer) return {rows.integer(), key};
+  if (kind == Kind::real) return {std::bit_cast<std::int64_t>(rows.real()), key};
+  return {0, key};
+}
+
+// Missions behind a place in an order, as a condition with its values.
+class Behind {
+ public:
+  Behind(const Column& column, bool ascending, CursorPlace place)
+      : place_(place), kind_(column.kind), real_(std::bit_cast<double>(place[0])) {
+    const std::string beyond = ascending ? " > " : " < ";
+    const std::string& c = column.sql;
+    if (kind_ == Kind::integer) {
+      sql_ = " AND (" + c + ", mission_key)" + beyond + "(?, ?)";
+    } else if (kind_ == Kind::text) {
+      sql_ = " AND (" + c + ", mission_key)" + beyond + "((SELECT " + c +
+             " FROM mission WHERE mission_key = ?), ?)";
+    } else if (std::isnan(real_)) {
+      sql_ = " AND " + c + " IS NULL AND mission_key" + beyond + "?";
+    } else {
+      sql_ = " AND ((" + c + ", mission_key)" + beyond + "(?, ?) OR " + c + " IS NULL)";
+    }
+  }
+
+  const std::string& sql() const { return sql_; }
+
+  void bind(Rows& rows) const {
+    if (kind_ == Kind::integer) rows.bind(place_[0]);
+    if (kind_ == Kind::text) rows.bind(place_[1]);
+    if (kind_ == Kind::real && !std::isnan(real_)) rows.bind(real_);
+    rows.bind(place_[1]);
+  }
+
+ private:
+  CursorPlace place_;
+  Kind kind_;
+  double real_;
+  std::string sql_;
+};
+
+std::string select_missions() {
+  return "SELECT " + std::string(mission_identity_columns) + ", " + mission_content_columns();
+}
+
+bool has_mission(Database& database, MissionKey key) {
+  Rows rows(database.statement("SELECT 1 FROM mission WHERE mission_key = ?"));
+  return rows.bind(key).next();
+}
+
+// Annulled missions are in no sum.
+constexpr std::string_view not_annulled =
+    " AND (findings_json IS NULL OR json_type(findings_json, '$.annulled') IS NULL)";
+
+const std::string& select_totals() {
+  static const std::string sql = [] {
+    std::string sums = "sum(";
+    for (const char c : accounts_columns()) sums += c == ',' ? std::string("), sum(") : std::string(1, c);
+    return "count(*), coalesce(sum(measured_s > 0), 0), coalesce(sum(incomplete), 0), coalesce(sum(samples), "
+           "0), coalesce(sum(gap_count), 0), coalesce(sum(gap_s), 0.0), " +
+           sums + ") FROM mission";
+  }();
+  return sql;
+}
+
+Totals read_totals(Rows& rows) {
+  Totals t;
+  t.missions = rows.integer();
+  t.measured_missions = rows.integer();
+  t.incomplete_missions = rows.integer();
+  t.samples = rows.integer();
+  t.gap_count = rows.integer();
+  t.gap_s = rows.real();
+  t.accounts = read_accounts(rows);
+  return t;
+}
+
+}  // namespace
+
+Result<Mission> mission(Database& database, MissionKey key) {
+  static const std::string sql = select_missions() + " FROM mission WHERE mission_key = ?";
+  Rows rows(database.statement(sql));
+  if (!rows.bind(key).next()) return no_mission(key);
+  return read_mission(rows);
+}
+
+Result<MissionPage> missions(Database& database, const MissionFilter& filter, const PageRequest& page,
+                             MissionSort sort) {
+  if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_limit("limit", page.limit, max_page_size); !ok) return tl::unexpected(ok.error());
+  const Where where(filter);
+  const Column column = column_of(sort.by);
+  const std::string direction = sort.ascending ? " ASC" : " DESC";
+  const std::string query = "missions by " + column.sql + direction + where.identity();
+  std::optional<Behind> behind;
+  if (!page.cursor.empty()) {
+    const auto place = decode_cursor(query, page.cursor);
+    if (!place) return tl::unexpected(place.error());
+    if (column.kind == Kind::text && !has_mission(database, (*place)[1]))
+      return invalid("cursor", "the mission at which the page before ended is gone: begin again");
+    behind.emplace(column, sort.ascending, *place);
+  }
+  const std::string sql = select_missions() + ", " + column.sql + " FROM mission" + where.sql() +
+                          (behind ? behind->sql() : "") + " ORDER BY " +
+                          (column.kind == Kind::real ? column.sql + " IS NULL, " : "") + column.sql +
+                          direction + ", mission_key" + direction + " LIMIT ?";
+  Statement statement = database.prepare(sql);
+  Rows rows(statement);
+  where.bind(rows);
+  if (behind) behind->bind(rows);
+  // One more than asked for tells whether a page follows.
+  rows.bind(page.limit + 1);
+  MissionPage result;
+  CursorPlace last{};
+  while (rows.next()) {
+    if (static_cast<std::int64_t>(result.missions.size()) == page.limit) {
+      result.next_cursor = encode_cursor(query, last);
+      break;
+    }
+    Result<Mission> read = read_mission(rows);
+    if (!read) return tl::unexpected(std::move(read.error()));
+    last = place_of(rows, column.kind, read->key);
+    result.missions.push_back(std::move(*read));
+  }
+  return result;
+}
+
+Result<Totals> totals(Database& database, const MissionFilter& filter) {
+  if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
+  const Where where(filter);
+  const std::string sql = "SELECT " + select_totals() + where.sql() + std::string(not_annulled);
+  Statement statement = database.prepare(sql);
+  Rows rows(statement);
+  where.bind(rows);
+  rows.next();
+  return read_totals(rows);
+}
+
+Result<std::vector<TotalsGroup>> grouped_totals(Database& database, const MissionFilter& filter, Grouping by,
+                                                std::int64_t utc_offset_s) {
+  if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
+  constexpr std::int64_t day_us = 86'400'000'000;
+  const Where where(filter);
+  const std::string period = std::to_string(by == Grouping::week ? 7 * day_us : day_us);
+  const std::string group = by == Grouping::robot ? "robot_id"
+                                                  : "start_utime_us - ((start_utime_us + ?) % " + period +
+                                                        " + " + period + ") % " + period;
+  const std::string sql = "SELECT " + group + ", " + select_totals() + where.sql() +
+                          std::string(not_annulled) + " GROUP BY 1 ORDER BY 1 LIMIT " +
+                          std::to_string(max_groups + 1);
+  Statement statement = database.prepare(sql);
+  Rows rows(statement);
+  // 1970 began on a Thursday, three days after a Monday.
+  if (by != Grouping::robot)
+    rows.bind(utc_offset_s * 1'000'000 + (by == Grouping::week ? 3 * day_us : std::int64_t{0}));
+  where.bind(rows);
+  std::vector<TotalsGroup> groups;
+  while (rows.next()) {
+    if (groups.size() == max_groups)
+      return invalid("group_by", "gives more than " + std::to_string(max_groups) +
+                                     " groups: choose a shorter time or fewer robots");
+    TotalsGroup& next = groups.emplace_back();
+    by == Grouping::robot ? void(next.robot_id = rows.text()) : void(next.from_utime_us = rows.integer());
+    next.totals = read_totals(rows);
+  }
+  return groups;
+}
+
+Result<std::vector<Mission>> open_missions(Database& database) {
+  static const std::string sql =
+      select_missions() + " FROM mission WHERE state = 'open' ORDER BY start_utime_us, mission_key";
+  Rows rows(database.statement(sql));
+  return read_all<Mission>(rows, read_mission);
+}
+
+}  // namespace joulecast::history::queries

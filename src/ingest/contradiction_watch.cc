@@ -1,0 +1,204 @@
+#include "ingest/contradiction_watch.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "gap/checks/check.h"
+
+namespace joulecast::ingest {
+namespace {
+
+// Of so many messages this share must be wrong: a tenth of a second of a fast robot is no habit, and reboots,
+// losses and late packets stay far below.
+constexpr std::uint64_t window_messages = 50;
+constexpr double wrong_share = 0.2;
+constexpr std::uint64_t first_samples = 300;  // of a mission, before its channels are compared
+constexpr double constant_s =
+    10;  // of motion: coarse readings of a steady drive may stay the same for some seconds
+constexpr double says_enough_s = 60;  // of motion, from which on what is not seen any more is gone
+// Of the speed or yaw rate limit: beyond what any robot overshoots, the readings are not its motion.
+constexpr double absurd_limit = 3;
+
+ContradictionKind kind_of(std::string_view id) {
+  if (id.starts_with("utime")) return ContradictionKind::clock;
+  if (id == "two_senders") return ContradictionKind::sender;
+  if (id == "dead_channel") return ContradictionKind::dead;
+  if (id == "thrown_readings") return ContradictionKind::corrupt;
+  if (id.ends_with("_over_limit")) return ContradictionKind::limit;
+  if (id.ends_with("swapped")) return ContradictionKind::sides;
+  if (id.ends_with("_scale")) return ContradictionKind::scale;
+  if (id.ends_with("_reversed") || id.ends_with("_unsigned")) return ContradictionKind::sign;
+  return ContradictionKind::constant;
+}
+
+// Whether any of the channels enters a mission's accounts or what is learnt from them: commands and gyros do
+// not.
+bool enters_accounts(std::string_view channels) {
+  for (std::size_t from = 0; from < channels.size();) {
+    const std::size_t end = std::min(channels.find(", ", from), channels.size());
+    const std::string_view one = channels.substr(from, end - from);
+    if (!one.starts_with("velocity_command") && !one.starts_with("yaw_rate")) return true;
+    from = end + 2;
+  }
+  return false;
+}
+
+std::vector<Contradiction> contradictions_of(const gap::Observation& seen, const robot::RobotModel& robot) {
+  std::vector<Contradiction> found;
+  for (gap::Check& check : gap::check_contradictions({&seen, 1}, robot)) {
+    const ContradictionKind kind = kind_of(check.id);
+    if (kind == ContradictionKind::constant && seen.moving_s < constant_s) continue;
+    Contradiction& c = found.emplace_back();
+    c.kind = kind;
+    c.untrue = (check.contradicted || (c.kind == ContradictionKind::limit && check.value > absurd_limit)) &&
+               enters_accounts(check.channel);
+    c.id = std::move(check.id);
+    c.channel = std::move(check.channel);
+    c.value = check.value;
+    c.says = std::move(check.says);
+  }
+  return found;
+}
+
+// Faults of messages that tell of a mistake where they make up a good part of them.
+struct Telling {
+  IngestFault fault;
+  ContradictionKind kind;
+  const char* id;
+  const char* channel;
+  bool untrue;
+  const char* says;  // after "49 of 50 messages"
+};
+constexpr Telling tellings[] = {
+    {IngestFault::implausible, ContradictionKind::implausible, "implausible", "", true,
+     "are turned away for a value that no robot sends"},
+    {IngestFault::undecodable, ContradictionKind::implausible, "undecodable", "", false,
+     "cannot be decoded: are the publisher's message types those of joulecast?"},
+    {IngestFault::wrong_channel, ContradictionKind::identity, "wrong_channel", "robot_id", false,
+     "name another robot_id than the channel that they come on, and are turned away"},
+    {IngestFault::second_sender, ContradictionKind::sender, "second_sender", "", false,
+     "come from a second sender under this robot's id, and are turned away: each robot needs its own id"},
+    {IngestFault::too_far_ahead, ContradictionKind::clock, "clock_far_ahead", "utime", false,
+     "are stamped too far ahead of the service's clock and turned away: is the robot's clock set (NTP), and "
+     "utime "
+     "in microseconds?"},
+    {IngestFault::clock_ahead, ContradictionKind::clock, "clock_ahead", "utime", false,
+     "are stamped more than 10 s ahead of the service's clock: is the robot's clock set (NTP)?"},
+    {IngestFault::clock_backward, ContradictionKind::clock, "clock_standing", "utime", true,
+     "are stamped no later than the one before: utime stands or goes back; joulecast expects the instant of "
+     "sampling"},
+    {IngestFault::clock_forward, ContradictionKind::clock, "clock_leaping", "utime", true,
+     "are stamped more than an hour after the one before: utime must be the instant of sampling, in "
+     "microseconds"},
+    {IngestFault::restart, ContradictionKind::sequence, "sequence_standing", "sequence", false,
+     "do not count on: sequence stands or begins anew, so that lost messages cannot be told; joulecast "
+     "expects "
+     "it "
+     "one higher with each message"},
+};
+
+bool told_in(const std::vector<Contradiction>& list, const Contradiction& one) {
+  return std::ranges::any_of(list, [&](const Contradiction& c) { return c.same(one); });
+}
+
+}  // namespace
+
+ContradictionWatch::ContradictionWatch(const robot::RobotModel& robot)
+    : robot_(robot), observer_(robot, false) {}
+
+void ContradictionWatch::hear(std::uint64_t messages) {
+  messages_ += messages;
+  if (messages_ >= window_messages) judge_messages();
+}
+
+void ContradictionWatch::hear(IngestFault fault, std::uint64_t count, const std::string& why) {
+  const auto k = static_cast<std::size_t>(fault);
+  faults_[k] += count;
+  if (!why.empty()) why_[k] = why;
+}
+
+void ContradictionWatch::judge_messages() {
+  std::vector<Contradiction> found;
+  for (const Telling& t : tellings) {
+    const auto k = static_cast<std::size_t>(t.fault);
+    const double share = static_cast<double>(faults_[k]) / static_cast<double>(messages_);
+    if (share < wrong_share) continue;
+    Contradiction& c = found.emplace_back();
+    c.kind = t.kind;
+    c.id = t.id;
+    c.channel = t.channel;
+    c.value = share;
+    c.untrue = t.untrue;
+    c.says = fmt::format("{} of {} messages {}{}.", faults_[k], messages_, t.says,
+                         why_[k].empty() ? "" : " (" + why_[k] + ")");
+    if (t.untrue && in_mission_ && !told_in(untrue_messages_, c)) untrue_messages_.push_back(c);
+  }
+  const auto same = [](const Contradiction& a, const Contradiction& b) { return a.same(b); };
+  if (!std::ranges::equal(found, of_messages_, same)) changed_ = true;
+  of_messages_ = std::move(found);
+  faults_ = {};
+  messages_ = 0;
+}
+
+void ContradictionWatch::begin_mission(const std::string& mission_id, double payload_kg) {
+  observer_.begin(mission_id, payload_kg);
+  samples_ = 0;
+  next_ = first_samples;
+  in_mission_ = true;
+  untrue_messages_.clear();
+  for (const Contradiction& c : of_messages_) {
+    if (c.untrue) untrue_messages_.push_back(c);
+  }
+}
+
+void ContradictionWatch::add(const signals::Sample& sample) {
+  if (!in_mission_) return;
+  observer_.add(sample);
+  if (++samples_ < next_) return;
+  next_ *= 2;
+  const gap::Observation seen = observer_.so_far();
+  judge_channels(contradictions_of(seen, robot_), seen.moving_s >= says_enough_s);
+}
+
+std::vector<Contradiction> ContradictionWatch::end_mission() {
+  if (!in_mission_) return {};
+  in_mission_ = false;
+  // A short mission ends before its window.
+  if (2 * messages_ >= window_messages) judge_messages();
+  const gap::Observation seen = observer_.finish();
+  std::vector<Contradiction> found = contradictions_of(seen, robot_);
+  judge_channels(found, seen.moving_s > 0);
+  std::ranges::copy(untrue_messages_, std::back_inserter(found));
+  return found;
+}
+
+void ContradictionWatch::judge_channels(std::vector<Contradiction> found, bool replace) {
+  if (!replace) {
+    for (const Contradiction& c : of_channels_) {
+      if (!told_in(found, c)) found.push_back(c);
+    }
+  }
+  const auto in = [&](const std::vector<Contradiction>& list) {
+    return [&list](const Contradiction& c) { return told_in(list, c); };
+  };
+  if (found.size() != of_channels_.size() || !std::ranges::all_of(found, in(of_channels_))) changed_ = true;
+  of_channels_ = std::move(found);
+  doubts_battery_ = std::ranges::any_of(of_channels_, [](const Contradiction& c) {
+    return c.untrue && c.channel.find("battery_") != std::string::npos;
+  });
+}
+
+std::vector<Contradiction> ContradictionWatch::all() const {
+  std::vector<Contradiction> list = of_messages_;
+  std::ranges::copy(of_channels_, std::back_inserter(list));
+  return list;
+}
+
+bool ContradictionWatch::take_changed() {
+  return std::exchange(changed_, false);
+}
+
+}  // namespace joulecast::ingest

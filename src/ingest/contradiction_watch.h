@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "gap/checks/observation.h"
+#include "ingest/contradiction.h"
+#include "ingest/counters.h"
+#include "robot/robot_model.h"
+#include "signals/sample.h"
+
+namespace joulecast::ingest {
+
+// Holds one robot's channels against each other and against its file while its missions run (gap/checks), and
+// counts what is wrong with its messages. Work and memory a sample do not grow; the channels are compared
+// after some hundred samples of a mission, then whenever it has become twice as long, and at its end.
+class ContradictionWatch {
+ public:
+  explicit ContradictionWatch(const robot::RobotModel& robot);
+
+  // A message of the robot, before anything is known of it.
+  void hear(std::uint64_t messages = 1);
+  // That something was wrong with messages among them, and what.
+  void hear(IngestFault fault, std::uint64_t count, const std::string& why);
+
+  void begin_mission(const std::string& mission_id, double payload_kg);
+  void add(const signals::Sample& sample);  // accounted for, in order
+  // The contradictions of the mission as a whole.
+  std::vector<Contradiction> end_mission();
+
+  // Those of the newest messages and of the mission, or until it says enough, of the last one.
+  std::vector<Contradiction> all() const;
+  // Whether that has changed since it was last asked.
+  bool take_changed();
+  // What the battery's channels say is contradicted.
+  bool doubts_battery() const { return doubts_battery_; }
+
+ private:
+  void judge_messages();
+  void judge_channels(std::vector<Contradiction> found, bool replace);
+
+  robot::RobotModel robot_;
+  gap::Observer observer_;
+  std::vector<Contradiction> of_messages_, of_channels_;
+  std::vector<Contradiction> untrue_messages_;  // since the mission began
+  std::array<std::uint64_t, ingest_fault_count> faults_{};
+  std::array<std::string, ingest_fault_count> why_;
+  std::uint64_t messages_ = 0;  // of the window that faults_ count
+  std::uint64_t samples_ = 0, next_ = 0;
+  bool in_mission_ = false, changed_ = false, doubts_battery_ = false;
+};
+
+}  // namespace joulecast::ingest

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "signals/sample.h"
+#include "telemetry/import_mapping.h"
+
+// What becomes of a mission's samples when all its rows are read. Only the import's own sources use this.
+namespace joulecast::telemetry {
+
+// Puts the rate of a number in its place. Two samples at least; where fewer than two are measured within the
+// window there is no rate.
+void differentiate(std::vector<signals::Sample>& samples, std::size_t number, const RateOf& rate);
+
+// Between samples everything is taken to run straight. A reading that holds until the next one steps: a
+// sample just before each change of these numbers says so, all else as in the sample at the change. Returns
+// how many were added. Where readings of voltage and current hold, energy then is the integral of their
+// steps.
+std::size_t add_steps(std::vector<signals::Sample>& samples, const std::vector<std::size_t>& numbers);
+
+}  // namespace joulecast::telemetry

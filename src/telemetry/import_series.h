@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "telemetry/csv_import.h"
+#include "telemetry/import_mapping.h"
+
+// A table's columns as functions of time, to be read at the times of another. Only the import's own sources
+// use this.
+namespace joulecast::telemetry {
+
+struct SeriesColumn {
+  std::string name;                     // in its table
+  const ValueLimits* limits = nullptr;  // null: finite values
+  Interpolation interpolation = Interpolation::hold;
+};
+
+class TableSeries {
+ public:
+  // Reads every row; empty cells and values outside the limits, which join `glitches`, give no reading.
+  // `shown` stands before column names in messages ("battery:"). Errors name `source` and line.
+  static Result<TableSeries> read(std::string_view csv, const TableLayout& layout,
+                                  std::vector<SeriesColumn> columns, const std::string& source,
+                                  const std::string& shown, std::vector<Glitch>& glitches);
+
+  // The reading of a column that holds then, or on the straight line between its neighbours; no reading
+  // older than the tolerance, no line over a wider gap. lag_us: from the reading used.
+  struct Reading {
+    double value = signals::unmeasured;
+    std::int64_t lag_us = 0;
+    bool beyond = false;  // there is one, but too far
+  };
+  [[nodiscard]] Reading at(std::size_t column, std::int64_t utime_us, std::int64_t tolerance_us) const;
+
+  [[nodiscard]] std::size_t rows() const noexcept { return rows_; }
+  [[nodiscard]] std::size_t rows_unsorted() const noexcept { return rows_unsorted_; }
+  void shift(std::int64_t by_us);
+
+ private:
+  struct Point {
+    std::int64_t utime_us = 0;
+    double value = 0;
+  };
+  struct Column {
+    Interpolation interpolation = Interpolation::hold;
+    std::vector<Point> points;  // of one time the last
+  };
+
+  std::vector<Column> columns_;
+  std::size_t rows_ = 0, rows_unsorted_ = 0;
+};
+
+// Where a column of the mapping is in a table: by its name as written, then with the prefix before it.
+[[nodiscard]] Result<std::size_t> place_of(const CsvTable& table, const TableLayout& layout,
+                                           const std::string& column, const std::string& source);
+[[nodiscard]] std::string_view name_of(OutsidePolicy policy) noexcept;
+
+}  // namespace joulecast::telemetry

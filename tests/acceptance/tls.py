@@ -1,0 +1,136 @@
+#!/usr/bin/env python3
+"""HTTPS with a certificate of the test's own: what is spoken, what is not, a new certificate at SIGHUP, a secure cookie."""
+import json
+import pathlib
+import shutil
+import signal
+import socket
+import ssl
+import subprocess
+import tempfile
+import time
+import urllib.error
+import urllib.request
+
+from harness import arguments, check, skip
+
+
+def certificate(folder, name):
+    """A self-signed certificate for 127.0.0.1, in tls.crt and tls.key."""
+    subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes",
+                    "-days", "2", "-subj", f"/CN={name}", "-addext", "subjectAltName=IP:127.0.0.1",
+                    "-keyout", folder / "tls.key", "-out", folder / "tls.crt"], check=True, capture_output=True)
+
+
+def until(what, ask, seconds=30):
+    end = time.monotonic() + seconds
+    while not (found := ask()):
+        check(time.monotonic() < end, f"waited {seconds} s for {what}")
+        time.sleep(0.05)
+    return found
+
+
+class Service:
+    def __init__(self, options, folder):
+        self.folder = folder
+        self.log = open(folder / "log.txt", "w+")
+        self.process = subprocess.Popen(
+            [options.daemon, "--http-port", "0", "--store-path", folder / "history.db", "--lcm-url", "memq://", "--log-format",
+             "json", "--http-tls-certificate", folder / "tls.crt", "--http-tls-key", folder / "tls.key", "--auth-token-file",
+             folder / "tokens.json"], stderr=self.log)
+        ready = until("the daemon", lambda: next((e for e in self.events() if e["message"] == "ready"), None))
+        self.url = ready["http"]
+        self.port = int(self.url.rsplit(":", 1)[1])
+
+    def events(self):
+        check(self.process.poll() is None, "the daemon ended:\n" + (self.folder / "log.txt").read_text())
+        return [json.loads(line) for line in (self.folder / "log.txt").read_text().splitlines() if line.endswith("}")]
+
+    def trust(self):
+        return ssl.create_default_context(cafile=self.folder / "tls.crt")
+
+    def ask(self, path, token=None, method="GET", body=None):
+        request = urllib.request.Request(self.url + path, method=method, data=body)
+        if body is not None:
+            request.add_header("Content-Type", "application/json")
+        if token:
+            request.add_header("Authorization", "Bearer " + token)
+        try:
+            reply = urllib.request.urlopen(request, timeout=20, context=self.trust())
+        except urllib.error.HTTPError as error:
+            reply = error
+        with reply:
+            return reply.status, reply.read(), reply.headers
+
+    def subject(self):
+        with socket.create_connection(("127.0.0.1", self.port), timeout=20) as plain:
+            unchecked = ssl._create_unverified_context()
+            with unchecked.wrap_socket(plain) as secure:
+                return secure.getpeercert(binary_form=True), secure.version()
+
+
+def main():
+    options = arguments()
+    if shutil.which("openssl") is None:
+        skip("the command openssl is missing")
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        certificate(folder, "first")
+        token = subprocess.run([options.client, "token", "create", "--file", folder / "tokens.json", "--name", "t", "--role", "admin"],
+                               check=True, capture_output=True, text=True).stdout.strip()
+        service = Service(options, folder)
+        check(service.url.startswith("https://"), service.url)
+        check(service.ask("/healthz")[0] == 200, "no answer over TLS")
+        check(service.ask("/v1/robots")[0] == 401, "no token is needed")
+        status, document, _ = service.ask("/openapi.json", token)
+        check(status == 200 and json.loads(document)["openapi"] == "3.1.0", f"a long answer: {status}")
+        status, answer, _ = service.ask("/v1/robots/amr/profile", token, "POST", b'{"path": ["' + b"x" * 1_000_000 + b'"]}')
+        check(status in (404, 422), f"a long body: {status} {answer[:200]}")
+        status, _, headers = service.ask("/v1/session", None, "POST", json.dumps({"token": token}).encode())
+        check(status == 200 and "; Secure" in headers["Set-Cookie"], f"{status} {headers['Set-Cookie']}")
+
+        first, version = service.subject()
+        check(version in ("TLSv1.2", "TLSv1.3"), version)
+        old = ssl._create_unverified_context()
+        old.minimum_version = ssl.TLSVersion.TLSv1
+        old.maximum_version = ssl.TLSVersion.TLSv1_1
+        old.set_ciphers("ALL:@SECLEVEL=0")
+        try:
+            with socket.create_connection(("127.0.0.1", service.port), timeout=20) as plain, old.wrap_socket(plain) as secure:
+                check(False, f"{secure.version()} is spoken")
+        except (ssl.SSLError, ConnectionError):
+            pass
+        with socket.create_connection(("127.0.0.1", service.port), timeout=20) as plain:
+            plain.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            said = b""
+            try:
+                while piece := plain.recv(4096):
+                    said += piece
+            except ConnectionError:
+                pass
+            check(b"HTTP/1.1" not in said, f"plain HTTP is answered: {said}")
+
+        certificate(folder, "second")
+        check(service.subject()[0] == first, "the certificate changes by itself")
+        service.process.send_signal(signal.SIGHUP)
+        until("the new certificate", lambda: service.subject()[0] != first)
+        check(service.ask("/healthz")[0] == 200, "no answer with the new certificate")
+        second, _ = service.subject()
+        (folder / "good.crt").write_bytes((folder / "tls.crt").read_bytes())
+        (folder / "tls.crt").write_text("no certificate\n")
+        service.process.send_signal(signal.SIGHUP)
+        until("the refusal of a broken certificate",
+              lambda: any("certificate from before stays" in e["message"] for e in service.events()))
+        check(service.subject()[0] == second, "a broken certificate is taken")
+
+        service.process.terminate()
+        check(service.process.wait(timeout=20) == 0, "the daemon did not stop in order")
+        broken = subprocess.run([options.daemon, "--http-port", "0", "--store-path", folder / "other.db", "--lcm-url", "memq://",
+                                 "--http-tls-certificate", folder / "tls.crt", "--http-tls-key", folder / "tls.key"],
+                                capture_output=True, text=True, timeout=30)
+        check(broken.returncode == 1 and "http.tls_certificate" in broken.stderr, broken.stderr)
+    print("TLS 1.2 or newer, a new certificate at SIGHUP, none that is broken")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,101 @@
+// What `joulecast check` finds in files, and the exit codes that scripts rely on.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "client/commands/table.h"
+
+namespace joulecast::client {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+
+class CheckCommand : public testing::Test {
+ protected:
+  CheckCommand() {
+    std::string name = (fs::temp_directory_path() / "joulecast-check-XXXXXX").string();
+    folder_ = mkdtemp(name.data());
+  }
+  ~CheckCommand() override { fs::remove_all(folder_); }
+
+  std::string file(const std::string& name, const std::string& text) {
+    std::ofstream{folder_ / name} << text;
+    return (folder_ / name).string();
+  }
+  // The exit code; what it prints is in printed_.
+  Exit check(std::vector<std::string> words) {
+    CLI::App program("joulecast");
+    Exit exit = Exit::internal;
+    add_check(program, exit);
+    words.insert(words.begin(), "check");
+    std::reverse(words.begin(), words.end());
+    testing::internal::CaptureStdout();
+    program.parse(words);
+    printed_ = testing::internal::GetCapturedStdout();
+    return exit;
+  }
+
+  fs::path folder_;
+  std::string printed_;
+  json amr_ = json::parse(std::ifstream(JOULECAST_SOURCE_DIR "/deploy/robots/amr.json"));
+};
+
+TEST_F(CheckCommand, ARobotFileIsSoundSuspiciousOrFaulty) {
+  EXPECT_EQ(check({file("a.json", amr_.dump())}), Exit::ok);
+  EXPECT_THAT(printed_, HasSubstr("reach 1.74 m/s"));
+
+  json direct = amr_;
+  direct["motor"].erase("gear_ratio");
+  EXPECT_EQ(check({file("b.json", direct.dump())}), Exit::warned);
+  EXPECT_THAT(printed_, HasSubstr("/motor/gear_ratio: is 1, the default"));
+
+  json faulty = amr_;
+  faulty["mass"]["wheel_kg"] = "heavy";
+  faulty["battery"]["capacity_ah"] = -2;
+  EXPECT_EQ(check({file("c.json", faulty.dump()), "--json"}), Exit::fault);
+  const json told = json::parse(printed_)["findings"];
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_EQ(told[0]["severity"], "fault");
+  EXPECT_THAT(printed_, HasSubstr("/mass/wheel_kg"));
+  EXPECT_THAT(printed_, HasSubstr("/battery/capacity_ah"));
+  EXPECT_EQ(check({file("d.json", "{")}), Exit::fault);
+}
+
+TEST_F(CheckCommand, ATableIsReadThroughItsMapping) {
+  std::string csv = "t,r,l,v,i\n";
+  for (int k = 0; k < 200; ++k)
+    csv += std::to_string(0.05 * k) + "," + std::to_string(0.1 * k) + ",1.5," +
+           std::to_string(24 - 0.01 * k) + ",0\n";
+  const std::string table = file("run.csv", csv);
+  const json mapping = {{"robot_id", "amr"},
+                        {"time", {{"column", "t"}, {"unit", "s"}}},
+                        {"fields",
+                         {{"wheel_velocity", {{{"column", "r"}}, {{"column", "l"}}}},
+                          {"battery_voltage", {{"column", "v"}}},
+                          {"battery_current", {{"column", "i"}}}}}};
+  const std::string how = file("m.json", mapping.dump());
+  EXPECT_EQ(check({how}), Exit::ok);
+  // A current of 0 while the robot drives is no measurement.
+  EXPECT_EQ(check({table, "--mapping", how}), Exit::fault);
+  EXPECT_THAT(printed_, HasSubstr("battery_current: reads 0 in all 200 messages"));
+  EXPECT_THAT(printed_, HasSubstr("20 a second"));
+  EXPECT_EQ(check({table}), Exit::usage);
+
+  json wrong = mapping;
+  wrong["time"]["unit"] = "minutes";
+  EXPECT_EQ(check({file("w.json", wrong.dump())}), Exit::fault);
+  EXPECT_THAT(printed_, HasSubstr("/time/unit"));
+}
+
+}  // namespace
+}  // namespace joulecast::client

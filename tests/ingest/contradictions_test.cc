@@ -1,0 +1,414 @@
+// The usual mistakes of an integration, made with telemetry of the virtual robots, are told within one
+// mission; what sound robots send is not contradicted.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
+
+#include "base/text_file.h"
+#include "ingest/contradiction_watch.h"
+#include "ingest/forecasts.h"
+#include "ingest/pipeline.h"
+#include "telemetry/csv_import.h"
+#include "tests/gap/checks/made_recordings.h"
+#include "tests/ingest/harness.h"
+#include "tests/support/shared_folder.h"
+
+namespace joulecast::ingest {
+namespace {
+
+namespace made = gap::made;
+using signals::MissionEvent;
+using signals::MissionPhase;
+using signals::Sample;
+using testing::PipelineHarness;
+
+constexpr double rpm = 30 / std::numbers::pi, degrees = 180 / std::numbers::pi;
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr std::int64_t hour_us = 3'600'000'000;
+
+// One mission of a robot of this kind, with or without the channels of its motors.
+made::Robot drive(std::string_view kind, bool motors, std::uint64_t seed, double length_s = 40) {
+  return made::virtual_robot(kind, seed, [&](virtual_robot::SimulationSpec& spec) {
+    spec.missions = 1;
+    spec.rate_hz = 50;
+    spec.script.duration_s = length_s;
+    spec.sensors.motor_channels = motors;
+  });
+}
+
+struct Sent {
+  std::vector<Contradiction> live;  // at the mission's end
+  std::vector<history::Mission> missions;
+  std::vector<history::Event> events;
+  std::vector<std::string> warnings;
+  std::uint64_t counted = 0;
+
+  const Contradiction* find(ContradictionKind kind, std::string_view channel) const {
+    const auto found = std::ranges::find_if(live, [&](const Contradiction& c) {
+      return c.kind == kind && c.channel.find(channel) != std::string::npos;
+    });
+    return found == live.end() ? nullptr : &*found;
+  }
+  std::string told() const {
+    std::string text;
+    for (const Contradiction& c : live) text += (c.untrue ? "X " : "  ") + c.id + ": " + c.says + "\n";
+    return text;
+  }
+};
+
+// `alter` makes the mistake with each sample on its way.
+class Robot {
+ public:
+  explicit Robot(made::Robot robot) : made_(std::move(robot)) {
+    SessionSettings settings;
+    settings.max_ahead_us = 600'000'000;
+    harness = std::make_unique<PipelineHarness>(settings);
+    harness->add_robot(made_.model);
+  }
+
+  using Alter = std::function<void(InboundMessage&, Sample&)>;
+  Sent send(const Alter& alter = {}, std::optional<std::uint32_t> second_sender = {}) {
+    const std::string& id = made_.model.robot_id;
+    const telemetry::Recording& mission = made_.recordings.missions.front();
+    const telemetry::Sender own{0x0a000005, 40'000};
+    const std::int64_t begin_us = mission.samples.front().utime_us, end_us = mission.samples.back().utime_us;
+    const auto event = [&](MissionPhase phase, std::int64_t at_us) {
+      InboundMessage message{id, Sample{}, at_us, own};
+      Sample clock;
+      clock.utime_us = at_us;
+      if (alter) alter(message, clock);
+      message.content = MissionEvent{clock.utime_us, mission.mission_id, phase, mission.payload_kg, ""};
+      harness->pipeline->handle(message);
+    };
+    event(MissionPhase::started, begin_us - 1000);
+    for (const Sample& s : mission.samples) {
+      InboundMessage message{id, s, s.utime_us, own};
+      Sample altered = s;
+      if (alter) alter(message, altered);
+      if (!std::holds_alternative<RefusedMessage>(message.content)) message.content = altered;
+      harness->pipeline->handle(message);
+      if (!second_sender) continue;
+      Sample other = s;
+      other.sequence += 70'000;
+      other.utime_us += 3'000;
+      harness->pipeline->handle({id, other, s.utime_us + 3'000, {*second_sender, 41'000}});
+    }
+    event(MissionPhase::finished, end_us + 1000);
+    harness->pipeline->tick(end_us + 1'000'000);
+    harness->pipeline->publish();
+    Sent sent;
+    sent.live = harness->fleet.find(id)->contradictions;
+    sent.missions = harness->missions();
+    sent.events = *harness->store->events(0, 1000);
+    sent.warnings = harness->warnings;
+    for (const auto& count : harness->counters.contradictions) sent.counted += count;
+    return sent;
+  }
+
+  const robot::RobotModel& model() const { return made_.model; }
+  std::unique_ptr<PipelineHarness> harness;
+
+ private:
+  made::Robot made_;
+};
+
+struct Mistake {
+  const char* name;
+  ContradictionKind kind;
+  const char* channel;
+  bool untrue;        // nothing is learnt from the mission
+  const char* cause;  // in the sentence
+  std::function<void(InboundMessage&, Sample&, const robot::RobotModel&)> make;
+};
+
+void zero(double& value) {
+  if (std::isnan(value)) value = 0;
+}
+
+std::vector<Mistake> usual_mistakes() {
+  using M = InboundMessage;
+  using R = robot::RobotModel;
+  using K = ContradictionKind;
+  const auto wheels = [](auto factor) {
+    return [factor](M&, Sample& s, const R& r) {
+      for (double& w : s.wheel_velocity_rad_s) w *= factor(r);
+    };
+  };
+  return {
+      {"battery current negated", K::sign, "battery_current", true, "reversed",
+       [](M&, Sample& s, const R&) { s.battery_current_a *= -1; }},
+      {"wheels in rpm", K::scale, "wheel_velocity", true, "rpm", wheels([](const R&) { return rpm; })},
+      {"motor shaft for wheels", K::scale, "wheel_velocity", true, "motor shaft",
+       wheels([](const R& r) { return r.motor.gear_ratio; })},
+      {"wheels in m per s", K::scale, "wheel_velocity", true, "m/s",
+       wheels([](const R& r) { return r.kinematics.wheel_radius_m; })},
+      {"left wheel negated", K::sign, "wheel_velocity.left", true, "reversed",
+       [](M&, Sample& s, const R&) { s.wheel_velocity_rad_s[1] *= -1; }},
+      {"utime in ms", K::clock, "utime", true, "ms", [](M&, Sample& s, const R&) { s.utime_us /= 1000; }},
+      {"unmeasured is 0", K::dead, "battery_voltage", true, "NaN for what is not measured",
+       [](M&, Sample& s, const R&) {
+         s.motor_voltage_v = s.motor_current_a = {0, 0};
+         s.battery_voltage_v = s.battery_current_a = 0;
+         for (double* value : signals::numbers_of(s)) zero(*value);
+       }},
+      {"gyro in degrees", K::scale, "yaw_rate", false, "degrees",
+       [](M&, Sample& s, const R&) { s.yaw_rate_rad_s *= degrees; }},
+      {"battery current in mA", K::scale, "battery_current", true, "mA",
+       [](M&, Sample& s, const R&) { s.battery_current_a *= 1000; }},
+      {"battery voltage in mV", K::implausible, "", true, "is it in mV?",
+       [](M&, Sample& s, const R&) { s.battery_voltage_v *= 1000; }},
+      {"wheels NaN", K::implausible, "", true, "wheel_velocity[0] must be measured",
+       [](M&, Sample& s, const R&) {
+         s.wheel_velocity_rad_s = {nan, nan};
+       }},
+      {"another id than the channel's", K::identity, "robot_id", false, "another robot_id",
+       [](M& message, Sample&, const R&) {
+         message.content = RefusedMessage{IngestFault::wrong_channel, "carries messages of robot_id other"};
+       }},
+      {"sequence stands", K::sequence, "sequence", false, "one higher with each message",
+       [](M&, Sample& s, const R&) { s.sequence = 0; }},
+      {"clock an hour ahead", K::clock, "utime", false, "ahead of the service's clock",
+       [](M&, Sample& s, const R&) { s.utime_us += hour_us; }},
+      {"clock stands", K::clock, "utime", true, "instant of sampling",
+       [](M&, Sample& s, const R&) { s.utime_us = 1'700'000'000'000'000; }},
+      {"battery current in mA and negated", K::scale, "battery_current", true, "mA",
+       [](M&, Sample& s, const R&) { s.battery_current_a *= -1000; }},
+      {"wheels swapped", K::sides, "wheel_velocity", true, "swapped",
+       [](M&, Sample& s, const R&) { std::swap(s.wheel_velocity_rad_s[0], s.wheel_velocity_rad_s[1]); }},
+      {"gyro negated", K::sign, "yaw_rate", false, "reversed",
+       [](M&, Sample& s, const R&) { s.yaw_rate_rad_s *= -1; }},
+      {"battery current constant", K::constant, "battery_current", true, "constant",
+       [](M&, Sample& s, const R&) { s.battery_current_a = 3; }},
+      {"left wheel dead", K::dead, "wheel_velocity.left", true, "0 all the time",
+       [](M&, Sample& s, const R&) { s.wheel_velocity_rad_s[1] = 0; }},
+      {"wheels fall to 0 for a sample", K::corrupt, "wheel_velocity", false, "jumps away and back",
+       [](M&, Sample& s, const R&) {
+         if (s.sequence % 41 == 40) s.wheel_velocity_rad_s = {0, 0};
+       }},
+  };
+}
+
+struct Case {
+  const char* kind;
+  bool motors;
+  double length_s;
+};
+
+class UsualMistakes : public ::testing::TestWithParam<std::tuple<Mistake, Case>> {};
+
+TEST_P(UsualMistakes, AreToldWithinOneMissionAndNothingIsLearntFromIt) {
+  const auto& [mistake, of] = GetParam();
+  Robot robot(drive(of.kind, of.motors, 31, of.length_s));
+  const Sent sent = robot.send([&](InboundMessage& m, Sample& s) { mistake.make(m, s, robot.model()); });
+  const Contradiction* told = sent.find(mistake.kind, mistake.channel);
+  ASSERT_NE(told, nullptr) << sent.told();
+  EXPECT_NE(told->says.find(mistake.cause), std::string::npos) << told->says;
+  EXPECT_TRUE(std::ranges::any_of(told->says, [](unsigned char c) { return std::isdigit(c) != 0; }))
+      << told->says;
+  EXPECT_EQ(told->untrue, mistake.untrue);
+  for (const Contradiction& c : sent.live) EXPECT_TRUE(c.kind == mistake.kind || !c.untrue) << sent.told();
+  EXPECT_EQ(std::ranges::count(sent.events, "contradiction", &history::Event::kind),
+            static_cast<std::ptrdiff_t>(sent.counted));
+  EXPECT_GE(sent.counted, 1u);
+  EXPECT_TRUE(std::ranges::any_of(sent.warnings,
+                                  [&](const std::string& w) { return w.starts_with("contradiction: "); }));
+  for (const history::Mission& mission : sent.missions) {
+    EXPECT_EQ(history::findings_of(mission).teaches(), !mistake.untrue)
+        << mission.findings_json << sent.told();
+  }
+}
+
+std::string name_of(const ::testing::TestParamInfo<std::tuple<Mistake, Case>>& info) {
+  const auto& [mistake, of] = info.param;
+  std::string name = std::string(mistake.name) + " " + of.kind + (of.motors ? "" : " without motors");
+  std::erase_if(name, [](unsigned char c) { return std::isalnum(c) == 0 && c != ' '; });
+  std::ranges::replace(name, ' ', '_');
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Robots, UsualMistakes,
+                         ::testing::Combine(::testing::ValuesIn(usual_mistakes()),
+                                            ::testing::Values(Case{"amr", true, 40}, Case{"amr", false, 40},
+                                                              Case{"nomad", true, 40},
+                                                              Case{"tug", false, 60})),
+                         name_of);
+
+TEST(Contradictions, OfTwoSendersOneIsTurnedAwayAndNothingIsBookedTwice) {
+  Robot robot(drive("amr", true, 32));
+  Robot alone(drive("amr", true, 32));
+  const Sent sent = robot.send({}, 0x0a000006), own = alone.send();
+  const Contradiction* told = sent.find(ContradictionKind::sender, "");
+  ASSERT_NE(told, nullptr) << sent.told();
+  EXPECT_NE(told->says.find("10.0.0.6"), std::string::npos) << told->says;
+  ASSERT_EQ(sent.missions.size(), 1u);
+  EXPECT_DOUBLE_EQ(sent.missions[0].accounts.measured_j, own.missions.at(0).accounts.measured_j);
+  EXPECT_TRUE(history::findings_of(sent.missions[0]).teaches());
+}
+
+TEST(Contradictions, SoundRobotsHaveNone) {
+  struct Sound {
+    const char* kind;
+    bool motors;
+    std::vector<virtual_robot::EffectStrength> effects;
+  };
+  for (const Sound& of :
+       {Sound{"amr", true, {}}, Sound{"nomad", true, {}}, Sound{"p3dx", true, {}}, Sound{"tug", true, {}},
+        Sound{"amr", false, {}}, Sound{"nomad", false, {}}, Sound{"p3dx", false, {}}, Sound{"tug", false, {}},
+        Sound{"amr", true, {{"coulomb_friction", 1.5}}}, Sound{"tug", false, {{"current_sensor_gain", 0.2}}},
+        Sound{"nomad", false, {{"turning_scrub", 0.5}}}, Sound{"amr", false, {{"slope", 0.05}}},
+        Sound{"p3dx", true, {{"torque_constant_loss", 0.3}}}}) {
+    for (const double length_s : {8.0, 20.0, 110.0}) {
+      for (const std::uint64_t seed : {41u, 42u, 43u}) {
+        Robot robot(made::virtual_robot(of.kind, seed, [&](virtual_robot::SimulationSpec& spec) {
+          spec.missions = 1;
+          spec.rate_hz = 50;
+          spec.script.duration_s = length_s;
+          spec.sensors.motor_channels = of.motors;
+          spec.imperfections = *virtual_robot::make_imperfections(of.effects);
+        }));
+        const Sent sent = robot.send();
+        EXPECT_TRUE(sent.live.empty()) << of.kind << " " << length_s << " s, seed " << seed << "\n"
+                                       << sent.told();
+        EXPECT_EQ(sent.counted, 0u) << of.kind << " " << length_s << " s, seed " << seed;
+        EXPECT_TRUE(history::findings_of(sent.missions.at(0)).teaches());
+      }
+    }
+  }
+}
+
+TEST(Contradictions, UnmeasuredChannelsAreNone) {
+  for (const bool battery : {true, false}) {
+    Robot robot(drive("amr", true, 33));
+    const Sent sent = robot.send([&](InboundMessage&, Sample& s) {
+      if (battery) {
+        s.battery_voltage_v = s.battery_current_a = nan;
+      } else {
+        s.motor_voltage_v = s.motor_current_a = {nan, nan};
+      }
+    });
+    EXPECT_TRUE(sent.live.empty()) << sent.told();
+  }
+}
+
+TEST(Contradictions, AreToldOnceAndGoWhenTheMistakeIsMended) {
+  Robot robot(drive("amr", true, 34));
+  const auto negate = [](InboundMessage& m, Sample& s) {
+    s.battery_current_a *= -1;
+    (void)m;
+  };
+  const auto later = [&](std::int64_t shift_us, bool wrong) {
+    return [=](InboundMessage& m, Sample& s) {
+      s.utime_us += shift_us;
+      s.sequence += shift_us / 20'000;
+      m.host_utime_us += shift_us;
+      if (wrong) s.battery_current_a *= -1;
+    };
+  };
+  EXPECT_EQ(robot.send(negate).counted, 1u);
+  EXPECT_EQ(robot.send(later(100'000'000, true)).counted, 1u);
+  const Sent mended = robot.send(later(200'000'000, false));
+  EXPECT_TRUE(mended.live.empty()) << mended.told();
+  ASSERT_EQ(mended.missions.size(), 3u);
+  EXPECT_TRUE(history::findings_of(mended.missions[2]).teaches());
+  EXPECT_EQ(robot.harness->fleet.find(robot.model().robot_id)->missions_left_out.at("contradicted"), 2u);
+}
+
+// A battery of 0 V would be empty; what was known of it before the mission stays known.
+TEST(Contradictions, TheChargeIsThatOfBeforeTheContradictedMission) {
+  Robot robot(drive("amr", true, 35));
+  (void)robot.send();
+  const double before = robot.harness->fleet.find(robot.model().robot_id)->state_of_charge;
+  ASSERT_GT(before, 0.3);
+  (void)robot.send([](InboundMessage& m, Sample& s) {
+    s.utime_us += 100'000'000;
+    s.sequence += 5'000;
+    m.host_utime_us += 100'000'000;
+    s.battery_voltage_v = s.battery_current_a = 0;
+  });
+  EXPECT_NEAR(robot.harness->fleet.find(robot.model().robot_id)->state_of_charge, before, 0.02);
+}
+
+// Recordings that nobody made for these checks, mission by mission.
+// Two are told, and both are true: the Warthog was driven by hand, with commands of 0 written in, and the
+// wheel speeds of one drive of the Husky fall to 0 for single rows.
+TEST(Contradictions, OfRealRecordingsNoneIsUntrue) {
+  struct Source {
+    const char *folder, *ending, *mapping, *robot;
+  };
+  const std::string shared = JOULECAST_SHARED "/data/real/", source = JOULECAST_SOURCE_DIR "/deploy/";
+  JOULECAST_NEED_SHARED(std::filesystem::exists(shared), "real recordings");
+  std::size_t missions = 0;
+  for (const Source& of : {Source{"warthog_grass", ".csv", "warthog_grass", "warthog-grass"},
+                           Source{"borealtc_husky", ".csv", "borealtc_husky", "borealtc-husky"},
+                           Source{"frc3314_drivetrain", "_low.csv", "frc3314_low", "frc3314-low"},
+                           Source{"frc3314_drivetrain", "_high.csv", "frc3314_high", "frc3314-high"}}) {
+    const auto robot = robot::load_robot(source + "robots/" + of.robot + ".json");
+    const auto mapping_text = read_text_file(source + "import/" + of.mapping + ".json");
+    ASSERT_TRUE(robot && mapping_text);
+    const auto mapping = telemetry::ImportMapping::parse(*mapping_text);
+    ASSERT_TRUE(mapping);
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(shared + of.folder)) {
+      if (!entry.path().string().ends_with(of.ending)) continue;
+      const auto text = read_text_file(entry.path().string());
+      const auto import = telemetry::import_csv(*text, *mapping,
+                                                {.source_name = entry.path().string(),
+                                                 .robot_id = {},
+                                                 .mission_id = {},
+                                                 .start_utime_us = 1'700'000'000'000'000});
+      if (!import) continue;
+      ++missions;
+      ContradictionWatch watch(*robot);
+      watch.begin_mission("m", import->recording.payload_kg);
+      std::string told;
+      const auto note = [&] {
+        for (const Contradiction& c : watch.all()) {
+          const bool known = c.channel == "velocity_command" || c.id == "thrown_readings";
+          if (c.untrue || !known) told += c.says + "\n";
+        }
+      };
+      for (const Sample& sample : import->recording.samples) {
+        watch.add(sample);
+        if (watch.take_changed()) note();
+      }
+      (void)watch.end_mission();
+      note();
+      EXPECT_EQ(told, "") << entry.path();
+    }
+  }
+  EXPECT_GT(missions, 10u);
+}
+
+TEST(Forecasts, ForgetAMissionAsIfItHadNotBeen) {
+  const auto made_model = model_in_force(drive("amr", true, 36, 8).model, 1);
+  ASSERT_TRUE(made_model);
+  const std::shared_ptr<const ModelInForce>& model = *made_model;
+  const auto mission = [](std::int64_t start_utime_us, double battery_j) {
+    forecast::PastMission made{start_utime_us, {}};
+    for (int k = 0; k < 5; ++k) made.legs.push_back({forecast::Motion::drive, 10, 8, 0.8, 0, 0, battery_j});
+    return made;
+  };
+  PipelineHarness harness, other;
+  Forecasts both(*harness.store), right(*other.store);
+  (void)both.learn(model, mission(1, 400));
+  (void)both.learn(model, mission(2, 9000));
+  (void)right.learn(model, mission(1, 400));
+  const auto learned = both.forget(model, 2);
+  ASSERT_TRUE(learned);
+  EXPECT_EQ(legs_from_json(learned->body_json)->size(), 1u);
+  EXPECT_FALSE(both.forget(model, 2));
+  const auto a = both.of(model).forecaster, b = right.of(model).forecaster;
+  EXPECT_EQ(a->missions, 1);
+  EXPECT_EQ(a->standing_w, b->standing_w);
+  EXPECT_EQ(a->tracks[0].common, b->tracks[0].common);
+  EXPECT_EQ(a->tracks[0].inflation, b->tracks[0].inflation);
+}
+
+}  // namespace
+}  // namespace joulecast::ingest

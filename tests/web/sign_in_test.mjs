@@ -1,0 +1,57 @@
+// The page of a daemon with tokens in headless Chromium: it asks for a token, keeps it from scripts,
+// and works then.
+// node sign_in_test.mjs --daemon joulecastd --client joulecast --out directory [--chromium /usr/bin/chromium]
+import assert from 'node:assert/strict';
+import { mkdir, rm } from 'node:fs/promises';
+import path from 'node:path';
+import { parseArgs } from 'node:util';
+import { chromium } from 'playwright-core';
+import { freePort, run, startUntil, stop } from './daemon.mjs';
+
+const { values: given } = parseArgs({
+  options: {
+    daemon: { type: 'string' },
+    client: { type: 'string' },
+    out: { type: 'string' },
+    chromium: { type: 'string', default: '/usr/bin/chromium' },
+  },
+});
+await rm(given.out, { recursive: true, force: true });
+await mkdir(given.out, { recursive: true });
+const tokens = path.join(given.out, 'tokens.json');
+const make = ['token', 'create', '--file', tokens, '--name', 'carol', '--role', 'read'];
+const token = /jc_[0-9a-f]{64}/.exec(await run(given.client, make))[0];
+const base = `http://127.0.0.1:${await freePort()}`;
+const options = { '--http-port': new URL(base).port, '--store-path': path.join(given.out, 'history.db') };
+Object.assign(options, { '--lcm-url': 'memq://', '--auth-token-file': tokens });
+const answers = async () => (await fetch(`${base}/healthz`).catch(() => ({ ok: false }))).ok;
+const daemon = await startUntil(given.daemon, Object.entries(options).flat(), answers);
+const browser = await chromium.launch({ executablePath: given.chromium, args: ['--no-sandbox'] });
+try {
+  const page = await browser.newPage();
+  await page.goto(base);
+  const dialog = page.locator('dialog.sign-in');
+  await dialog.waitFor({ state: 'visible' });
+  await dialog.locator('input').fill('jc_wrong');
+  await dialog.locator('button[type=submit]').click();
+  await page.waitForFunction(() => /unknown, expired or revoked/.test(document.body.innerText));
+  await dialog.locator('input').fill(token);
+  await dialog.locator('button[type=submit]').click();
+  await page.waitForFunction(() => document.querySelector('.link.live') !== null);
+  assert.equal(await dialog.isVisible(), false);
+  assert.equal(await page.evaluate(() => document.cookie), '', 'a script reads the session');
+  const [cookie] = await page.context().cookies();
+  assert.deepEqual([cookie.httpOnly, cookie.sameSite, cookie.value.includes(token)], [true, 'Strict', false]);
+  const asked = (method, at) =>
+    page.evaluate(([m, a]) => fetch(a, { method: m }).then((r) => r.status), [method, at]);
+  assert.equal(await asked('GET', '/v1/robots'), 200);
+  assert.equal(await asked('PUT', '/v1/robots/amr'), 403);
+  await run(given.client, ['token', 'revoke', '--file', tokens, '--name', 'carol']);
+  assert.equal(await asked('GET', '/v1/robots'), 401);
+  await page.reload();
+  await dialog.waitFor({ state: 'visible' });
+  console.log('the page signs in, and out when its token is revoked');
+} finally {
+  await browser.close();
+  await stop(daemon);
+}
