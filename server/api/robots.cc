@@ -229,6 +229,7 @@ std::vector<TableRow> robot_rows() {
       {{.method = Method::del,
         .path = "/v1/robots/{id}",
         .operation_id = "removeRobot",
+        .role = http::Role::admin,
         .summary = "Takes a robot's model out of force and ends its mission; with history=purge deletes "
                    "all that is stored of it, but for the audit log",
         .parameters = {{.name = "history",
