@@ -272,6 +272,28 @@ await check('the fleet is live', async () => {
   await page.getByText('Live', { exact: true }).first().waitFor();
 });
 
+await check('a robot without telemetry is folded away, and a removed one is gone', async () => {
+  const rows = page.locator('.fleet tbody tr:not(.spacer)');
+  const spare = { ...JSON.parse(await readFile(hourRobot, 'utf8')), robot_id: 'spare-01' };
+  const change = (method, suffix, body) =>
+    fetch(`${base}/v1/robots/spare-01${suffix}`, {
+      method,
+      headers: { 'Content-Type': 'application/json' },
+      body,
+    });
+  equal((await change('PUT', '', JSON.stringify(spare))).status, 200, 'the status of PUT');
+  await page.reload();
+  await page.getByRole('button', { name: 'Show 1 robot without telemetry yet' }).click();
+  await until('rows of all robots', async () => (await rows.count()) === 8);
+  await page.getByRole('button', { name: 'Hide 1 robot without telemetry yet' }).click();
+  await until('rows of robots that were heard', async () => (await rows.count()) === 7);
+  equal((await change('DELETE', '?history=purge')).status, 200, 'the status of DELETE');
+  await page.reload();
+  await page.waitForSelector('.fleet tbody th a');
+  equal(await rows.count(), 7, 'rows after the removal');
+  equal(await page.getByText('without telemetry yet').count(), 0, 'folds after the removal');
+});
+
 await check('the fleet is found, chosen and ordered', async () => {
   const names = () => page.locator('.fleet tbody th a').allTextContents();
   await page.getByPlaceholder('Find a robot or mission').fill(robot);
