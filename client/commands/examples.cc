@@ -73,7 +73,7 @@ constexpr Examples table[] = {
     {"calibrate drive", "joulecast calibrate drive amr.lcmlog --robot amr.json --out amr-calibrated.json"},
     {"calibrate battery",
      "joulecast calibrate battery cell --capacity-ah 2.6 --out cell.json\n"
-     "joulecast calibrate battery cell_c20_data.csv cell_1c_data.csv --out cell.json"},
+     "joulecast calibrate battery cell_c20_data.csv cell_1c_data.csv --out cell.json --force"},
     {"battery predict",
      "joulecast battery predict cell_rw.csv --battery cell.json\n"
      "joulecast battery predict cell --battery cell.json --from power --json"},

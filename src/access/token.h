@@ -12,12 +12,12 @@ namespace joulecast::access {
 
 // A bearer token as it is kept: of the secret only its hash.
 struct Token {
-  std::string name;  // whom the audit names; unique in its file
+  std::string name = {};  // whom the audit names; unique in its file
   Role role = Role::read;
-  std::string robots;                 // shell pattern of the robot ids that it is for; empty: all
+  std::string robots = {};            // shell pattern of the robot ids that it is for; empty: all
   std::int64_t created_utime_us = 0;  // since 1970
   std::int64_t expires_utime_us = 0;  // since 1970; 0: never
-  std::string sha256;                 // of the secret
+  std::string sha256 = {};            // of the secret
 
   friend bool operator==(const Token&, const Token&) = default;
 };

@@ -201,7 +201,7 @@ bool Importer::is_held(const FieldExpression& expression) const {
 
 Result<void> Importer::bind() {
   for (const JoinedTable& table : mapping_.joined) {
-    joined_.push_back({.table = &table});
+    joined_.emplace_back().table = &table;
     joined_.back().tolerance_us = std::llround(1e6 * table.tolerance_s);
     joined_.back().report.table = table.name;
   }
