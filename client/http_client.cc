@@ -8,18 +8,18 @@
 namespace joulecast::client {
 
 Result<ServerAddress> parse_server_url(std::string_view url) {
-  constexpr std::string_view scheme = "http://";
   const std::string given(url);
-  if (url.starts_with(scheme)) {
-    url.remove_prefix(scheme.size());
+  const bool tls = url.starts_with("https://");
+  if (tls || url.starts_with("http://")) {
+    url.remove_prefix(tls ? 8 : 7);
   } else if (url.find("://") != std::string_view::npos) {
-    return invalid("--server", given + " must begin with http://");
+    return invalid("--server", given + " must begin with http:// or https://");
   }
   const std::size_t slash = std::min(url.find('/'), url.size());
   std::string_view authority = url.substr(0, slash);
   std::string_view path = url.substr(slash);
   while (path.ends_with('/')) path.remove_suffix(1);
-  ServerAddress address{{}, "80", std::string(path)};
+  ServerAddress address{{}, tls ? "443" : "80", std::string(path), tls};
   // A colon inside brackets belongs to an IPv6 address.
   const std::size_t bracket = authority.rfind(']');
   const std::size_t colon = authority.rfind(':');

@@ -12,9 +12,11 @@ struct ServerAddress {
   std::string host;
   std::string port;
   std::string base_path;  // without a slash at the end; empty for the root
+  bool tls = false;       // https
 };
 
-// "[http://]host[:port][/path]"; the port defaults to 80. Fault::invalid for anything else.
+// "[http[s]://]host[:port][/path]"; the port defaults to 80, for https to 443. Fault::invalid for anything
+// else.
 [[nodiscard]] Result<ServerAddress> parse_server_url(std::string_view url);
 
 struct HttpReply {
@@ -28,9 +30,10 @@ struct HttpReply {
 enum class HttpMethod { get, post, put, del };
 
 // One request on its own connection. `target` begins with a slash; `json_body` is sent with GET and DELETE
-// not at all. The token of the environment's JOULECAST_TOKEN goes with it. Fault::unavailable when the server
-// cannot be reached or does not answer within `timeout` (for the whole exchange); a reply of any status is a
-// success here.
+// not at all. The token of the environment's JOULECAST_TOKEN goes with it. With https the server's
+// certificate must be of that host and of an authority that the system or SSL_CERT_FILE trusts.
+// Fault::unavailable when the server cannot be reached or does not answer within `timeout` (for the whole
+// exchange); a reply of any status is a success here.
 [[nodiscard]] Result<HttpReply> http_request(const ServerAddress& server, HttpMethod method,
                                              std::string_view target, std::string json_body,
                                              std::chrono::milliseconds timeout);

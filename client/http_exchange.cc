@@ -1,13 +1,20 @@
 // http_request() of http_client.h on Beast, which appears in no other file of the client.
-#include "client/http_client.h"
-#include "server/http/asio.h"
-// asio.h stays first of Boost.
+// <utility> comes first: Boost 1.74's awaitable.hpp uses std::exchange without including it.
+#include <utility>
+// clang-format off
+#include <boost/asio/connect.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ssl.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http.hpp>
+// clang-format on
 #include <cstdlib>
 #include <memory>
 #include <optional>
-#include <utility>
+
+#include "client/http_client.h"
 
 namespace joulecast::client {
 namespace {
@@ -30,10 +37,12 @@ class Exchange {
   }
 
   Result<HttpReply> run() {
+    if (server_.tls && !prepare_tls()) return std::move(*outcome_);
     resolver_.async_resolve(server_.host, server_.port, [this](beast::error_code error, const auto& found) {
       if (settle(error, "find the host")) return;
       stream_.expires_after(timeout_);
-      stream_.async_connect(found, [this](beast::error_code failed, const tcp::endpoint&) { send(failed); });
+      stream_.async_connect(found,
+                            [this](beast::error_code failed, const tcp::endpoint&) { shake_hands(failed); });
     });
     loop_.run_for(timeout_ + std::chrono::milliseconds(200));
     if (!outcome_) return failure("no answer within the timeout");
@@ -42,7 +51,8 @@ class Exchange {
 
  private:
   tl::unexpected<Error> failure(const std::string& why) const {
-    return fail(Fault::unavailable, "http://" + server_.host + ":" + server_.port, why);
+    return fail(Fault::unavailable,
+                (server_.tls ? "https://" : "http://") + server_.host + ":" + server_.port, why);
   }
 
   bool settle(beast::error_code error, const char* step, const char* hint = "") {
@@ -51,31 +61,71 @@ class Exchange {
     return true;
   }
 
-  void send(beast::error_code error) {
-    if (settle(error, "connect", "; is joulecastd running there?")) return;
-    http::async_write(stream_, request_, [this](beast::error_code failed, std::size_t) { receive(failed); });
+  // Trusts the system's authorities, or those that SSL_CERT_FILE or SSL_CERT_DIR name.
+  bool prepare_tls() {
+    beast::error_code error;
+    trust_.set_default_verify_paths(error);
+    if (settle(error, "read the trusted certificates")) return false;
+    tls_.emplace(stream_, trust_);
+    tls_->set_verify_mode(asio::ssl::verify_peer);
+    tls_->set_verify_callback(asio::ssl::host_name_verification(server_.host));
+    beast::error_code no_address;
+    asio::ip::make_address(server_.host, no_address);
+    if (no_address && SSL_set_tlsext_host_name(tls_->native_handle(), server_.host.c_str()) != 1) {
+      outcome_ = failure("is no name of a host");
+      return false;
+    }
+    return true;
   }
 
-  void receive(beast::error_code error) {
-    if (settle(error, "send")) return;
-    http::async_read(stream_, buffer_, parser_, [this](beast::error_code failed, std::size_t) {
-      if (settle(failed, "receive")) return;
-      auto message = parser_.release();
-      HttpReply reply;
-      reply.status = message.result_int();
-      reply.content_type = std::string(message[http::field::content_type]);
-      reply.body = std::move(message.body());
-      outcome_ = std::move(reply);
-      beast::error_code ignored;
-      stream_.socket().shutdown(tcp::socket::shutdown_both, ignored);
+  void shake_hands(beast::error_code error) {
+    if (settle(error, "connect", "; is joulecastd running there?")) return;
+    if (!tls_) return send();
+    tls_->async_handshake(asio::ssl::stream_base::client, [this](beast::error_code failed) {
+      if (!settle(failed, "agree on TLS", "; SSL_CERT_FILE names the certificates to trust")) send();
     });
+  }
+
+  template <class Use>
+  void with_stream(Use use) {
+    if (tls_) return use(*tls_);
+    use(stream_);
+  }
+
+  void send() {
+    with_stream([this](auto& stream) {
+      http::async_write(stream, request_, [this](beast::error_code failed, std::size_t) {
+        if (!settle(failed, "send")) receive();
+      });
+    });
+  }
+
+  void receive() {
+    with_stream([this](auto& stream) {
+      http::async_read(stream, buffer_, parser_, [this](beast::error_code failed, std::size_t) {
+        if (!settle(failed, "receive")) finish();
+      });
+    });
+  }
+
+  void finish() {
+    auto message = parser_.release();
+    HttpReply reply;
+    reply.status = message.result_int();
+    reply.content_type = std::string(message[http::field::content_type]);
+    reply.body = std::move(message.body());
+    outcome_ = std::move(reply);
+    beast::error_code ignored;
+    stream_.socket().shutdown(tcp::socket::shutdown_both, ignored);
   }
 
   ServerAddress server_;
   http::request<http::string_body> request_;
   asio::io_context loop_{1};
   tcp::resolver resolver_;
+  asio::ssl::context trust_{asio::ssl::context::tls_client};
   beast::tcp_stream stream_;
+  std::optional<asio::ssl::stream<beast::tcp_stream&>> tls_;  // over stream_, for https
   beast::flat_buffer buffer_;
   http::response_parser<http::string_body> parser_;
   std::chrono::milliseconds timeout_;

@@ -1,8 +1,8 @@
 #pragma once
 
 // The one door to Asio and Beast. <utility> comes first: Boost 1.74's awaitable.hpp uses std::exchange
-// without including it. Only the .cc files of server/http and client/http_exchange.cc include this header; no
-// other header of the project does, but for session.h, which is private to this folder.
+// without including it. Only the .cc files of server/http include this header; no other header of the project
+// does, but for admission.h and session.h, which are private to this folder.
 #include <utility>
 // clang-format off
 #include <boost/asio/awaitable.hpp>

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """HTTPS with a certificate of the test's own: what is spoken, what is not, a new certificate at SIGHUP, a secure cookie."""
 import json
+import os
 import pathlib
 import shutil
 import signal
@@ -82,6 +83,12 @@ def main():
         check(service.url.startswith("https://"), service.url)
         check(service.ask("/healthz")[0] == 200, "no answer over TLS")
         check(service.ask("/v1/robots")[0] == 401, "no token is needed")
+        asked = [options.client, "missions", "--server", service.url]
+        known = subprocess.run(asked, env={**os.environ, "SSL_CERT_FILE": folder / "tls.crt", "JOULECAST_TOKEN": token},
+                               capture_output=True, text=True, timeout=30)
+        check(known.returncode == 0, f"the command line over TLS: {known.stderr}")
+        unknown = subprocess.run(asked, env={**os.environ, "JOULECAST_TOKEN": token}, capture_output=True, text=True, timeout=30)
+        check(unknown.returncode != 0 and "TLS" in unknown.stderr, f"a certificate of nobody is trusted: {unknown.stderr}")
         status, document, _ = service.ask("/openapi.json", token)
         check(status == 200 and json.loads(document)["openapi"] == "3.1.0", f"a long answer: {status}")
         status, answer, _ = service.ask("/v1/robots/amr/profile", token, "POST", b'{"path": ["' + b"x" * 1_000_000 + b'"]}')

@@ -93,8 +93,13 @@ TEST(ServerUrl, TakesHostPortAndPathApart) {
   ASSERT_TRUE(six);
   EXPECT_EQ(six->host, "::1");
   EXPECT_EQ(six->port, "99");
+  EXPECT_FALSE(six->tls);
+  const auto secure = parse_server_url("https://fleet.example/joulecast");
+  ASSERT_TRUE(secure);
+  EXPECT_TRUE(secure->tls);
+  EXPECT_EQ(secure->host + '|' + secure->port, "fleet.example|443");
   for (const char* wrong :
-       {"https://x", "ftp://x", "http://", "http://:80", "http://h:", "http://h:99999", "http://h:8o"}) {
+       {"https://", "ftp://x", "http://", "http://:80", "http://h:", "http://h:99999", "http://h:8o"}) {
     EXPECT_FALSE(parse_server_url(wrong)) << wrong;
   }
 }

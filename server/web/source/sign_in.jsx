@@ -1,11 +1,12 @@
 // Asks for a token when the service refuses a request for want of one.
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useLayoutEffect, useRef, useState } from 'preact/hooks';
 import { onUnauthorized, post } from './api.js';
 
 export function SignIn() {
   const dialog = useRef(null);
   const [said, setSaid] = useState('');
-  useEffect(() => onUnauthorized(() => dialog.current.open || dialog.current.showModal()), []);
+  // Before the first answer comes.
+  useLayoutEffect(() => onUnauthorized(() => dialog.current.open || dialog.current.showModal()), []);
   const submit = async (event) => {
     event.preventDefault();
     const token = new FormData(event.target).get('token').trim();
