@@ -236,7 +236,7 @@ TEST_F(WriterTest, TriesAgainUntilTheDiskIsWellAndLosesNothing) {
 }
 
 TEST_F(WriterTest, WaitsOutALockOfAnotherProcess) {
-  Database other(folder_.file("store.db"), OpenMode::read_write_create, 100);
+  SqliteDatabase other(folder_.file("store.db"), OpenMode::read_write_create, 100);
   WriterOptions o = options();
   {
     Writer writer(store_, o);
