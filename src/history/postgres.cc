@@ -224,17 +224,19 @@ PostgresDatabase::~PostgresDatabase() {
   PQfinish(handle_);
 }
 
-void PostgresDatabase::raise(const pg_result* result) const {
+void PostgresDatabase::raise(const pg_result* result) {
   const char* state = result ? PQresultErrorField(result, PG_DIAG_SQLSTATE) : nullptr;
   std::string message = trimmed(result ? PQresultErrorMessage(result) : PQerrorMessage(handle_));
-  // 57P: the server shuts down or was told to end this connection, which it closes next.
-  if (PQstatus(handle_) != CONNECTION_OK || (state && std::string_view(state).starts_with("57P")))
+  // What has no SQLSTATE is libpq's own, which has lost the server. 57P: the server shuts down or was told to end
+  // this connection, which it closes next.
+  is_lost_ = is_lost_ || PQstatus(handle_) != CONNECTION_OK || !state || std::string_view(state).starts_with("57P");
+  if (is_lost_)
     throw SqlError(SqlError::Kind::connection_lost,
                    message.empty() ? "the connection to PostgreSQL was lost" : message);
-  throw SqlError(state ? kind_of(state) : SqlError::Kind::internal, message);
+  throw SqlError(kind_of(state), message);
 }
 
-PostgresResult PostgresDatabase::checked(pg_result* result) const {
+PostgresResult PostgresDatabase::checked(pg_result* result) {
   PostgresResult held(result);
   const ExecStatusType status = PQresultStatus(result);
   if (status != PGRES_COMMAND_OK && status != PGRES_TUPLES_OK) {
@@ -297,12 +299,12 @@ PostgresResult PostgresDatabase::read_sent() {
 }
 
 bool PostgresDatabase::is_usable() const {
-  return PQstatus(handle_) == CONNECTION_OK && PQpipelineStatus(handle_) == PQ_PIPELINE_OFF;
+  return !is_lost_ && PQstatus(handle_) == CONNECTION_OK && PQpipelineStatus(handle_) == PQ_PIPELINE_OFF;
 }
 
 bool PostgresDatabase::in_transaction() const {
-  return sent_ > 0 || PQtransactionStatus(handle_) == PQTRANS_INTRANS ||
-         PQtransactionStatus(handle_) == PQTRANS_INERROR;
+  return !is_lost_ && (sent_ > 0 || PQtransactionStatus(handle_) == PQTRANS_INTRANS ||
+                       PQtransactionStatus(handle_) == PQTRANS_INERROR);
 }
 
 void PostgresDatabase::begin(Access access) {

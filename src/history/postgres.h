@@ -44,11 +44,12 @@ class PostgresDatabase final : public Database {
   // Results of all that was sent; answers the last one. Throws the first error.
   PostgresResult read_sent();
   // The result, or its error thrown.
-  PostgresResult checked(pg_result* result) const;
-  [[noreturn]] void raise(const pg_result* result) const;
+  PostgresResult checked(pg_result* result);
+  [[noreturn]] void raise(const pg_result* result);
 
  private:
   pg_conn* handle_ = nullptr;
+  bool is_lost_ = false;
   int sent_ = 0;
   std::int64_t names_ = 0;
 };

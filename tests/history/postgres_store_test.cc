@@ -37,6 +37,7 @@ class PostgresStoreTest : public testing::Test {
   void end_connections() const {
     administer("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name LIKE 'joulecast-%'");
   }
+  void TearDown() override { start_postgres(); }
   std::int64_t stored_events() const { return std::stoll(administer("SELECT count(*)::text FROM event")); }
 
   TemporaryFolder folder_;

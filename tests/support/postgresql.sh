@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # A PostgreSQL server of a test's own, on a Unix socket in its folder.
 #
-#   postgresql.sh start FOLDER     a new one, or the one that was stopped there; ready when this returns
+#   postgresql.sh start FOLDER     a new one, or the one that is or was there; ready when this returns
 #   postgresql.sh stop FOLDER      at once, as after a power cut (immediate)
 #
 # Connect with postgresql://joulecast@/postgres?host=FOLDER. Ends with 77 where PostgreSQL is not installed.
@@ -27,6 +27,7 @@ fsync = off
 shared_buffers = 16MB
 SETTINGS
   fi
+  "${as_user[@]}" "$programs/pg_ctl" -D "$folder/data" status >"$folder/status.log" && exit 0
   "${as_user[@]}" "$programs/pg_ctl" -D "$folder/data" -l "$folder/server.log" -w -t 120 start >"$folder/start.log" ||
     { cat "$folder/start.log" "$folder/server.log" >&2; exit 1; }
   ;;
