@@ -59,7 +59,7 @@ int serve(const joulecast::Settings& settings) {
   joulecast::log_info("ready", {{"http", "http://" + settings.text("http.address") + ":" +
                                              std::to_string((*application)->http_port())},
                                 {"lcm", settings.text("lcm.url")},
-                                {"store", settings.text("store.path")}});
+                                {"store", (*application)->store_name()}});
   sd_notify(0, "READY=1");
   run(**application);
   sd_notify(0, "STOPPING=1");

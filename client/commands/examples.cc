@@ -55,6 +55,9 @@ constexpr Examples table[] = {
      "joulecast explore --case 1 --plot case1.svg\n"
      "joulecast explore --map yard.json --robot amr.json --payload 0 --payload 20"},
     {"thesis", "joulecast thesis\njoulecast thesis --table 4-1 --json\njoulecast thesis --figure 4-2a --csv"},
+    {"store copy", "joulecast store copy --from history.db --to copy.db"},
+    {"store verify", "joulecast store verify --store history.db"},
+    {"store stats", "joulecast store stats --store history.db --json"},
     {"completion",
      "source <(joulecast completion bash)\n"
      "joulecast completion zsh > _joulecast.zsh\n"

@@ -129,7 +129,7 @@ void add_replay(CLI::App& program, Exit& exit) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   auto* into = command->add_option("--into", options->into,
-                                   "no LCM: account for the logs at once, into this history (SQLite file)");
+                                   "no LCM: account for the logs at once, into this history (SQLite file, or postgresql://...)");
   command
       ->add_option("--robot", options->robots,
                    "with --into: robot file of a robot that the history does not know; may be repeated")

@@ -31,6 +31,7 @@ void add_missions(CLI::App& program, Exit& exit);
 void add_profile(CLI::App& program, Exit& exit);
 void add_replay(CLI::App& program, Exit& exit);
 void add_simulate(CLI::App& program, Exit& exit);
+void add_store(CLI::App& program, Exit& exit);
 void add_thesis(CLI::App& program, Exit& exit);
 
 // Subcommands of calibrate.

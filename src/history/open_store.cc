@@ -1,6 +1,7 @@
 #include "history/open_store.h"
 
 #include <filesystem>
+#include <regex>
 
 #include "history/postgres_store.h"
 #include "history/sqlite_store.h"
@@ -33,6 +34,12 @@ SqliteOptions sqlite_options(const std::string& url) {
 
 bool is_postgres_url(std::string_view url) {
   return url.starts_with("postgresql://") || url.starts_with("postgres://");
+}
+
+std::string shown_url(const std::string& url) {
+  if (!is_postgres_url(url)) return url;
+  static const std::regex of_user("(://[^/@:]*):[^/@]*@"), as_option("([?&]password=)[^&]*");
+  return std::regex_replace(std::regex_replace(url, of_user, "$1@"), as_option, "$1...");
 }
 
 std::string sqlite_path(const std::string& url) {

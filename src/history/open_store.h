@@ -22,6 +22,9 @@ Result<std::unique_ptr<Store>> open_store(const std::string& url);
 // that is absent is Fault::not_found instead of being made.
 Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_exist);
 
+// The URL without its password, to be shown.
+std::string shown_url(const std::string& url);
+
 // The file that an sqlite URL or a path names.
 std::string sqlite_path(const std::string& url);
 
