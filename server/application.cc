@@ -17,6 +17,8 @@
 #include "history/open_store.h"
 #include "history/spool.h"
 #include "history/writer.h"
+#include "ingest/ingest_service.h"
+#include "ingest/model_loading.h"
 #include "server/api/services.h"
 #include "server/daemon_metrics.h"
 #include "server/diagnosis/proposal_acceptor.h"
@@ -29,8 +31,6 @@
 #include "server/http/openapi.h"
 #include "server/http/operations.h"
 #include "server/http/static_files.h"
-#include "ingest/ingest_service.h"
-#include "ingest/model_loading.h"
 #include "server/logging.h"
 #include "server/metrics.h"
 

@@ -125,7 +125,8 @@ Exit stats(const Options& options) {
 }  // namespace
 
 void add_store(CLI::App& program, Exit& exit) {
-  auto* store = program.add_subcommand("store", "Copy, verify and count whole histories that no daemon has open");
+  auto* store =
+      program.add_subcommand("store", "Copy, verify and count whole histories that no daemon has open");
   store->require_subcommand(1);
   constexpr const char* which = "SQLite file, sqlite:PATH or postgresql://...";
   const auto add = [&](const char* name, const char* help, Exit (*run)(const Options&)) {

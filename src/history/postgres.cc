@@ -13,12 +13,13 @@
 namespace joulecast::history {
 namespace {
 
-// Statements sent before their results are read: these fit the socket's buffer, so that neither side waits for
-// the other to read.
+// Statements sent before their results are read: these fit the socket's buffer, so that neither side waits
+// for the other to read.
 constexpr int max_sent = 256;
 
 // Of the types' OIDs, which never change (pg_type.dat), those that results come in.
-constexpr unsigned bool_oid = 16, bytea_oid = 17, int8_oid = 20, int2_oid = 21, int4_oid = 23, float8_oid = 701;
+constexpr unsigned bool_oid = 16, bytea_oid = 17, int8_oid = 20, int2_oid = 21, int4_oid = 23,
+                   float8_oid = 701;
 
 // By SQLSTATE's class; PostgreSQL's manual, appendix A.
 SqlError::Kind kind_of(std::string_view state) {
@@ -52,7 +53,8 @@ std::string numbered(std::string_view sql, int& parameters) {
       continue;
     }
     int number = 0;
-    while (at + 1 < sql.size() && sql[at + 1] >= '0' && sql[at + 1] <= '9') number = 10 * number + sql[++at] - '0';
+    while (at + 1 < sql.size() && sql[at + 1] >= '0' && sql[at + 1] <= '9')
+      number = 10 * number + sql[++at] - '0';
     if (number == 0) number = parameters + 1;
     parameters = std::max(parameters, number);
     text += '$' + std::to_string(number);
@@ -202,13 +204,20 @@ void PostgresResultDeleter::operator()(pg_result* result) const {
 }
 
 PostgresDatabase::PostgresDatabase(const std::string& url, const std::string& application_name) {
-  // What the URL says comes later and prevails, but for the name. A peer that vanished is noticed within half a
-  // minute.
-  const std::array<const char*, 10> keywords = {
-      "connect_timeout", "target_session_attrs", "tcp_user_timeout", "keepalives_idle", "keepalives_interval",
-      "keepalives_count", "dbname", "application_name", "client_encoding", nullptr};
-  const std::array<const char*, 10> values = {"5", "read-write", "15000", "10", "5", "3",
-                                              url.c_str(), application_name.c_str(), "UTF8", nullptr};
+  // What the URL says comes later and prevails, but for the name. A peer that vanished is noticed within half
+  // a minute.
+  const std::array<const char*, 10> keywords = {"connect_timeout",
+                                                "target_session_attrs",
+                                                "tcp_user_timeout",
+                                                "keepalives_idle",
+                                                "keepalives_interval",
+                                                "keepalives_count",
+                                                "dbname",
+                                                "application_name",
+                                                "client_encoding",
+                                                nullptr};
+  const std::array<const char*, 10> values = {
+      "5", "read-write", "15000", "10", "5", "3", url.c_str(), application_name.c_str(), "UTF8", nullptr};
   handle_ = PQconnectdbParams(keywords.data(), values.data(), 1);
   if (PQstatus(handle_) != CONNECTION_OK) {
     const std::string message = trimmed(PQerrorMessage(handle_));
@@ -227,9 +236,10 @@ PostgresDatabase::~PostgresDatabase() {
 void PostgresDatabase::raise(const pg_result* result) {
   const char* state = result ? PQresultErrorField(result, PG_DIAG_SQLSTATE) : nullptr;
   std::string message = trimmed(result ? PQresultErrorMessage(result) : PQerrorMessage(handle_));
-  // What has no SQLSTATE is libpq's own, which has lost the server. 57P: the server shuts down or was told to end
-  // this connection, which it closes next.
-  is_lost_ = is_lost_ || PQstatus(handle_) != CONNECTION_OK || !state || std::string_view(state).starts_with("57P");
+  // What has no SQLSTATE is libpq's own, which has lost the server. 57P: the server shuts down or was told to
+  // end this connection, which it closes next.
+  is_lost_ =
+      is_lost_ || PQstatus(handle_) != CONNECTION_OK || !state || std::string_view(state).starts_with("57P");
   if (is_lost_)
     throw SqlError(SqlError::Kind::connection_lost,
                    message.empty() ? "the connection to PostgreSQL was lost" : message);

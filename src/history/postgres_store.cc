@@ -27,8 +27,8 @@ std::string new_writer_name() {
   return name;
 }
 
-// The lock is the connection's: it ends when the connection's transaction is decided and the connection closed.
-// Others in the same database have another schema; "JLCT" sets the lock apart from other programs'.
+// The lock is the connection's: it ends when the connection's transaction is decided and the connection
+// closed. Others in the same database have another schema; "JLCT" sets the lock apart from other programs'.
 bool try_lock(Database& database) {
   return database.integer("SELECT pg_try_advisory_lock(1246512980, hashtext(current_schema()))::int") == 1;
 }
@@ -51,21 +51,24 @@ Result<std::unique_ptr<PostgresDatabase>> open_writer(const PostgresOptions& opt
 
 // Rows that were copied in carry their own numbers; the next ones are greater.
 void advance_identities(Database& database) {
-  for (const auto& [table, column] : {std::pair("telemetry_chunk", "chunk_key"), {"covariate_chunk", "chunk_key"},
-                                      {"event", "event_id"}, {"diagnosis", "diagnosis_id"},
+  for (const auto& [table, column] : {std::pair("telemetry_chunk", "chunk_key"),
+                                      {"covariate_chunk", "chunk_key"},
+                                      {"event", "event_id"},
+                                      {"diagnosis", "diagnosis_id"},
                                       {"proposal", "proposal_id"}}) {
     const std::string sequence = std::string("pg_get_serial_sequence('") + table + "', '" + column + "')";
     const std::string greatest = std::string("(SELECT max(") + column + ") FROM " + table + ")";
-    database.execute("SELECT setval(" + sequence + ", greatest(nextval(" + sequence + "), " + greatest + "))");
+    database.execute("SELECT setval(" + sequence + ", greatest(nextval(" + sequence + "), " + greatest +
+                     "))");
   }
 }
 
 class PostgresStore final : public SqlStore {
  public:
   PostgresStore(const PostgresOptions& options, std::string name, std::unique_ptr<PostgresDatabase> writer)
-      : SqlStore([url = options.url,
-                  name] { return std::make_unique<PostgresDatabase>(url, name + "-reader"); },
-                 options.readers, queries::greatest_key(*writer)),
+      : SqlStore(
+            [url = options.url, name] { return std::make_unique<PostgresDatabase>(url, name + "-reader"); },
+            options.readers, queries::greatest_key(*writer)),
         url_(options.url),
         name_(std::move(name)),
         now_utime_us_(options.now_utime_us ? options.now_utime_us : host_utime_us) {
@@ -79,12 +82,14 @@ class PostgresStore final : public SqlStore {
       if (in_doubt_) {
         const bool committed = was_committed();
         InDoubt before = *std::exchange(in_doubt_, std::nullopt);
-        if (committed && before.commands == bytes_of(commands)) return done(commands, std::move(before.outcomes));
+        if (committed && before.commands == bytes_of(commands))
+          return done(commands, std::move(before.outcomes));
       }
       std::vector<Outcome> outcomes;
       ++batch_;
       try {
-        changes_->apply(commands, [this] { mark_batch(); }, outcomes);
+        changes_->apply(
+            commands, [this] { mark_batch(); }, outcomes);
       } catch (const SqlError& error) {
         if (error.kind() != SqlError::Kind::commit_unknown) throw;
         in_doubt_ = InDoubt{bytes_of(commands), std::move(outcomes)};
@@ -138,15 +143,16 @@ class PostgresStore final : public SqlStore {
     changes_.emplace(*writer_, now_utime_us_);
   }
 
-  // Connects anew where the connection was lost, and takes the lock again. That the lock is free says that the
-  // lost connection's last transaction is decided.
+  // Connects anew where the connection was lost, and takes the lock again. That the lock is free says that
+  // the lost connection's last transaction is decided.
   Result<void> make_ready() {
     if (!taken_over_.empty()) return fail(Fault::unavailable, "database", taken_over_);
     if (writer_->is_usable()) return {};
     auto database = std::make_unique<PostgresDatabase>(url_, name_);
     if (!try_lock(*database)) {
-      Rows(database->statement("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = ? "
-                               "AND pid <> pg_backend_pid()"))
+      Rows(database->statement(
+               "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = ? "
+               "AND pid <> pg_backend_pid()"))
           .bind(name_)
           .run();
       return fail(Fault::unavailable, "database", "the store is still held by a connection that was lost");
@@ -163,9 +169,7 @@ class PostgresStore final : public SqlStore {
   }
 
   // Held until the transaction ends, for the outcome of its COMMIT to be known by.
-  void mark_batch() {
-    Rows(writer_->statement("UPDATE joulecast_store SET batch = ?")).bind(batch_).run();
-  }
+  void mark_batch() { Rows(writer_->statement("UPDATE joulecast_store SET batch = ?")).bind(batch_).run(); }
 
   bool was_committed() { return writer_->integer("SELECT batch FROM joulecast_store") == batch_; }
 

@@ -13,9 +13,9 @@
 #include "base/error.h"
 
 // A database that speaks SQL, in four types: Database, Statement, Rows (a statement being run) and
-// Transaction. sqlite.h and postgres.h implement the first two; the statements of this room are written in the
-// SQL that both understand. They throw SqlError, which never leaves this room: the store turns it into an Error
-// at its border.
+// Transaction. sqlite.h and postgres.h implement the first two; the statements of this room are written in
+// the SQL that both understand. They throw SqlError, which never leaves this room: the store turns it into an
+// Error at its border.
 namespace joulecast::history {
 
 class SqlError : public std::runtime_error {

@@ -17,8 +17,8 @@ class SqlChanges {
  public:
   SqlChanges(Database& database, std::function<std::int64_t()> now_utime_us);
 
-  // As Store::apply. `before_commit` is called in the transaction. Throws SqlError when nothing was applied, or
-  // when the COMMIT's outcome is not known; then `outcomes` are what they are if it was done.
+  // As Store::apply. `before_commit` is called in the transaction. Throws SqlError when nothing was applied,
+  // or when the COMMIT's outcome is not known; then `outcomes` are what they are if it was done.
   void apply(std::span<const Command> commands, const std::function<void()>& before_commit,
              std::vector<Outcome>& outcomes);
 

@@ -154,10 +154,7 @@ Outcome SqlChanges::run(const UpdateDiagnosis& c) {
   if (changed == 0) return no_diagnosis(d.id);
   if (!c.report_html.empty()) {
     static const std::string replace = insert_or_replace("diagnosis_report", "diagnosis_id", "html");
-    Rows(database_.statement(replace))
-        .bind(d.id)
-        .bind(c.report_html)
-        .run();
+    Rows(database_.statement(replace)).bind(d.id).bind(c.report_html).run();
   }
   return d.id;
 }

@@ -32,7 +32,8 @@ bool has_robot(Database& database, std::string_view robot_id) {
 
 constexpr std::string_view select_model =
     "SELECT model.robot_id, version, model.created_utime_us, origin, note, parent_version, "
-    "coalesce(version = active_version, FALSE), model_json, coalesce(evidence_json, '') FROM model JOIN robot USING "
+    "coalesce(version = active_version, FALSE), model_json, coalesce(evidence_json, '') FROM model JOIN "
+    "robot USING "
     "(robot_id) WHERE model.robot_id = ?";
 
 Result<ModelVersion> read_model(Rows& rows) {

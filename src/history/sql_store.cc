@@ -57,7 +57,7 @@ SqlStore::SqlStore(ReaderPool::Connect connect, std::size_t readers, MissionKey 
     : readers_(std::move(connect), readers), last_key_(last_key) {}
 
 Result<MissionKey> SqlStore::mission_key(std::string_view robot_id, std::string_view mission_id,
-                               std::int64_t start_utime_us) {
+                                         std::int64_t start_utime_us) {
   std::lock_guard lock(keys_mutex_);
   const MissionName mission(robot_id, mission_id, start_utime_us);
   if (const auto found = reserved_.find(mission); found != reserved_.end()) return found->second;
@@ -69,8 +69,9 @@ Result<MissionKey> SqlStore::mission_key(std::string_view robot_id, std::string_
   return reserved_[mission] = ++last_key_;
 }
 
-Result<std::optional<MissionKey>> SqlStore::earlier_mission(std::string_view robot_id, std::string_view mission_id,
-                                                  std::int64_t before_utime_us) {
+Result<std::optional<MissionKey>> SqlStore::earlier_mission(std::string_view robot_id,
+                                                            std::string_view mission_id,
+                                                            std::int64_t before_utime_us) {
   std::lock_guard lock(keys_mutex_);
   const auto stored = read([&](Database& database) -> Result<std::optional<queries::MissionStart>> {
     return queries::last_called(database, robot_id, mission_id, before_utime_us);
@@ -88,7 +89,9 @@ Result<std::optional<MissionKey>> SqlStore::earlier_mission(std::string_view rob
   return last ? std::optional(last->key) : std::nullopt;
 }
 
-Result<std::vector<RobotRecord>> SqlStore::robots() const { return read(queries::robots); }
+Result<std::vector<RobotRecord>> SqlStore::robots() const {
+  return read(queries::robots);
+}
 
 Result<ModelVersion> SqlStore::model(std::string_view robot_id, std::optional<std::int64_t> version) const {
   return read([&](Database& database) { return queries::model(database, robot_id, version); });
@@ -123,7 +126,7 @@ Result<CovariatePage> SqlStore::covariates(MissionKey key, TimeRange range, cons
 }
 
 Result<std::vector<Event>> SqlStore::events(std::int64_t after_id, std::int64_t limit,
-                                  std::optional<std::string> robot_id) const {
+                                            std::optional<std::string> robot_id) const {
   return read([&](Database& database) { return queries::events(database, after_id, limit, robot_id); });
 }
 
@@ -138,8 +141,8 @@ Result<DiagnosisRecord> SqlStore::diagnosis(std::int64_t id) const {
   return read([&](Database& database) { return queries::diagnosis(database, id); });
 }
 
-Result<std::vector<DiagnosisRecord>> SqlStore::diagnoses(std::optional<std::string> robot_id, std::int64_t before_id,
-                                               std::int64_t limit) const {
+Result<std::vector<DiagnosisRecord>> SqlStore::diagnoses(std::optional<std::string> robot_id,
+                                                         std::int64_t before_id, std::int64_t limit) const {
   return read([&](Database& database) { return queries::diagnoses(database, robot_id, before_id, limit); });
 }
 
@@ -152,11 +155,13 @@ Result<Proposal> SqlStore::proposal(std::int64_t id) const {
 }
 
 Result<std::vector<Proposal>> SqlStore::proposals(std::optional<std::string> robot_id, std::int64_t before_id,
-                                        std::int64_t limit) const {
+                                                  std::int64_t limit) const {
   return read([&](Database& database) { return queries::proposals(database, robot_id, before_id, limit); });
 }
 
-Result<std::vector<Mission>> SqlStore::recover() const { return read(queries::open_missions); }
+Result<std::vector<Mission>> SqlStore::recover() const {
+  return read(queries::open_missions);
+}
 
 void SqlStore::forget_reservations(std::span<const Command> commands, const std::vector<Outcome>& outcomes) {
   std::lock_guard lock(keys_mutex_);

@@ -102,7 +102,8 @@ class SqlStore : public Store {
   // `last_key`: the greatest key of a stored mission.
   SqlStore(ReaderPool::Connect connect, std::size_t readers, MissionKey last_key);
 
-  // One snapshot for all statements of the query, which is asked again on another connection when it lost its.
+  // One snapshot for all statements of the query, which is asked again on another connection when it lost
+  // its.
   template <class Query>
   auto read(Query query) const -> decltype(query(std::declval<Database&>())) {
     return guarded([&] {

@@ -14,11 +14,11 @@
 
 #include "base/host_clock.h"
 #include "history/schema.h"
-#include "history/sqlite.h"
 #include "history/sql_changes.h"
 #include "history/sql_chunks.h"
 #include "history/sql_queries.h"
 #include "history/sql_store.h"
+#include "history/sqlite.h"
 
 namespace joulecast::history {
 namespace {
@@ -92,7 +92,8 @@ void configure_writer(Database& database) {
   database.execute("PRAGMA journal_size_limit = 67108864");
 }
 
-// What must outlive the reading connections: the last connection closed is the one that can fold the journal in.
+// What must outlive the reading connections: the last connection closed is the one that can fold the journal
+// in.
 struct OpenedDatabase {
   std::vector<std::unique_ptr<FileLock>> locks;  // of the lock file and of the database itself
   std::unique_ptr<Database> writer;

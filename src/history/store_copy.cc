@@ -52,7 +52,8 @@ std::vector<std::string> columns_of(Database& database, const Table& table) {
     if (std::find(columns.begin(), columns.end(), name) == columns.end()) others.push_back(std::move(name));
   }
   std::sort(others.begin(), others.end());
-  columns.insert(columns.end(), std::make_move_iterator(others.begin()), std::make_move_iterator(others.end()));
+  columns.insert(columns.end(), std::make_move_iterator(others.begin()),
+                 std::make_move_iterator(others.end()));
   return columns;
 }
 
@@ -141,8 +142,8 @@ int index_of(const std::vector<std::string>& columns, std::string_view name) {
 }
 
 // Of the first `rows` rows; `after` becomes the last one's key.
-TableSummary summarize(Database& database, const Table& table, std::int64_t rows, int skipped_column, Key& after,
-                       const TableProgress& progress) {
+TableSummary summarize(Database& database, const Table& table, std::int64_t rows, int skipped_column,
+                       Key& after, const TableProgress& progress) {
   const std::vector<std::string> columns = columns_of(database, table);
   Summary summary(table.name);
   std::int64_t done = 0;
@@ -183,7 +184,8 @@ void bind_column(Rows& to, const Statement& from, int column) {
 }
 
 // Robots before their models: which one is active comes when both are there. Answers the rows found.
-Result<std::int64_t> copy_table(Database& from, Database& to, const Table& table, const TableProgress& progress) {
+Result<std::int64_t> copy_table(Database& from, Database& to, const Table& table,
+                                const TableProgress& progress) {
   const std::vector<std::string> columns = columns_of(from, table);
   if (columns != columns_of(to, table))
     return fail(Fault::conflict, "to", "table " + std::string(table.name) + " has other columns");
@@ -193,16 +195,17 @@ Result<std::int64_t> copy_table(Database& from, Database& to, const Table& table
   Key after, same;
   if (found > rows || summarize(from, table, found, later, after, quietly) !=
                           summarize(to, table, found, later, same, quietly))
-    return fail(Fault::conflict, "to",
-                "table " + std::string(table.name) + " holds rows that are not the beginning of what is copied");
-  const std::string insert =
-      "INSERT INTO " + std::string(table.name) + " (" + joined(columns) + ") VALUES (" +
-      placeholders(joined(columns)) + ")";
+    return fail(
+        Fault::conflict, "to",
+        "table " + std::string(table.name) + " holds rows that are not the beginning of what is copied");
+  const std::string insert = "INSERT INTO " + std::string(table.name) + " (" + joined(columns) +
+                             ") VALUES (" + placeholders(joined(columns)) + ")";
   for (std::int64_t done = found; done < rows;) {
     Transaction transaction(to, Database::Access::write);
     const std::int64_t got = scan(from, table, columns, after, table.batch_rows, [&](const Statement& row) {
       Rows target(to.statement(insert));
-      for (int k = 0; k < row.columns(); ++k) k == later ? (void)target.bind_null() : bind_column(target, row, k);
+      for (int k = 0; k < row.columns(); ++k)
+        k == later ? (void)target.bind_null() : bind_column(target, row, k);
       target.run_later();
     });
     transaction.commit();
@@ -285,8 +288,8 @@ class Verifier {
 
   template <class Decode>
   void verify_chunks(const std::string& table, const std::string& items, Decode decode) {
-    const std::string sql = "SELECT chunk_key, " + items + ", start_utime_us, end_utime_us, body FROM " + table +
-                            " WHERE chunk_key > ? ORDER BY chunk_key LIMIT 200";
+    const std::string sql = "SELECT chunk_key, " + items + ", start_utime_us, end_utime_us, body FROM " +
+                            table + " WHERE chunk_key > ? ORDER BY chunk_key LIMIT 200";
     std::int64_t after = 0;
     for (bool more = true; more;) {
       more = false;

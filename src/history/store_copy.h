@@ -9,11 +9,12 @@
 #include "base/error.h"
 #include "history/sql.h"
 
-// Whole stores, table by table: copied into another database, counted, examined. On databases of open_tables().
+// Whole stores, table by table: copied into another database, counted, examined. On databases of
+// open_tables().
 namespace joulecast::history {
 
-// What a table holds. Equal rows have equal checksums, whatever database they are in: FNV-1a over the values in
-// the order of the key.
+// What a table holds. Equal rows have equal checksums, whatever database they are in: FNV-1a over the values
+// in the order of the key.
 struct TableSummary {
   std::string table;
   std::int64_t rows = 0;
@@ -31,9 +32,9 @@ struct CopyReport {
   std::int64_t rows_found = 0;  // that an earlier copy had brought
 };
 
-// Copies every row. Goes on where an earlier copy of the same store was cut off: what the destination holds must
-// be the beginning of what is copied, or it is a Fault::conflict. Counts and checksums of every table are read back
-// from both and compared: Fault::corrupt when they differ.
+// Copies every row. Goes on where an earlier copy of the same store was cut off: what the destination holds
+// must be the beginning of what is copied, or it is a Fault::conflict. Counts and checksums of every table
+// are read back from both and compared: Fault::corrupt when they differ.
 Result<CopyReport> copy_tables(Database& from, Database& to, const TableProgress& progress);
 
 Result<std::vector<TableSummary>> summarize_tables(Database& database, const TableProgress& progress);
@@ -53,7 +54,8 @@ inline constexpr std::size_t max_faults = 100;
 // against its row.
 Result<VerifyReport> verify_tables(Database& database, const TableProgress& progress);
 
-// Of every store, in an order in which no row comes before one that it refers to, but for a robot's active version.
+// Of every store, in an order in which no row comes before one that it refers to, but for a robot's active
+// version.
 std::vector<std::string> table_names();
 
 }  // namespace joulecast::history

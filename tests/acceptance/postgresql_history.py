@@ -91,7 +91,7 @@ def main():
             print(f"{robot}: {mission['state']}, {mission['samples']} samples in {span_s:.1f} s, {mission['gap_count']} gaps")
             check(mission["state"] == "finished", f"{robot}: the mission ended {mission['state']}")
             check(mission["gap_count"] == 0, f"{robot}: {mission['gap_s']} s without samples")
-            telemetry = programs.get(f"/v1/missions/{mission['mission']}/telemetry?limit=10000")
+            telemetry = programs.get(f"/v1/missions/{mission['id']}/telemetry?limit=10000")
             stored = telemetry["sequence"]
             check(len(stored) == mission["samples"], f"{robot}: {len(stored)} of {mission['samples']} samples are stored")
             check(stored == list(range(stored[0], stored[0] + len(stored))), f"{robot}: samples are missing or twice")

@@ -35,7 +35,8 @@ class PostgresStoreTest : public testing::Test {
   }
   std::string administer(const std::string& sql) const { return as_administrator(folder_, sql); }
   void end_connections() const {
-    administer("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name LIKE 'joulecast-%'");
+    administer(
+        "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name LIKE 'joulecast-%'");
   }
   void TearDown() override { start_postgres(); }
   std::int64_t stored_events() const { return std::stoll(administer("SELECT count(*)::text FROM event")); }
@@ -78,7 +79,8 @@ TEST_F(PostgresStoreTest, RefusesANewerSchema) {
 }
 
 TEST_F(PostgresStoreTest, ReportsAServerThatIsNot) {
-  for (const char* url : {"postgresql://nobody@/nothing?host=/nonexistent", "postgresql://nobody@127.0.0.1:1/x"}) {
+  for (const char* url :
+       {"postgresql://nobody@/nothing?host=/nonexistent", "postgresql://nobody@127.0.0.1:1/x"}) {
     const auto store = open_store(url);
     ASSERT_FALSE(store);
     EXPECT_EQ(store.error().fault, Fault::unavailable);
@@ -136,7 +138,8 @@ class SlowCommit {
         "CREATE FUNCTION wait_at_commit() RETURNS trigger LANGUAGE plpgsql AS $$BEGIN PERFORM "
         "pg_advisory_lock_shared(42); RETURN NULL; END$$");
     holder_.execute(
-        "CREATE CONSTRAINT TRIGGER wait_at_commit AFTER INSERT ON event DEFERRABLE INITIALLY DEFERRED FOR EACH ROW "
+        "CREATE CONSTRAINT TRIGGER wait_at_commit AFTER INSERT ON event DEFERRABLE INITIALLY DEFERRED FOR "
+        "EACH ROW "
         "EXECUTE FUNCTION wait_at_commit()");
   }
   void let_go() { holder_.execute("SELECT pg_advisory_unlock(42)"); }
@@ -157,7 +160,8 @@ TEST_F(PostgresStoreTest, ABatchCutOffDuringItsCommitIsAppliedOnce) {
   });
   // The COMMIT waits: its connection is ended there, so it is rolled back and tried again.
   const std::string waiting =
-      "SELECT count(*)::text FROM pg_stat_activity WHERE query = 'COMMIT' AND state = 'active' AND wait_event = "
+      "SELECT count(*)::text FROM pg_stat_activity WHERE query = 'COMMIT' AND state = 'active' AND "
+      "wait_event = "
       "'advisory'";
   for (int ended = 0; ended < 3;) {
     ASSERT_FALSE(done);
@@ -228,7 +232,8 @@ class Relay {
         if (ends[k].revents == 0) continue;
         const ssize_t size = read(ends[k].fd, bytes.data(), bytes.size());
         const std::string_view text(bytes.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
-        if (k == 0 && text.find("COMMIT") != std::string_view::npos) swallow = swallows_commit.exchange(false);
+        if (k == 0 && text.find("COMMIT") != std::string_view::npos)
+          swallow = swallows_commit.exchange(false);
         open = size > 0 && !(k == 1 && swallow) && write(ends[1 - k].fd, text.data(), text.size()) == size;
       }
     }
@@ -249,7 +254,8 @@ class PostgresCommitTest : public PostgresStoreTest {
     PostgresOptions options;
     const std::string url = postgres_url(folder_);
     const std::size_t host = url.find("host=") + 5;
-    options.url = url.substr(0, host) + "127.0.0.1&port=" + std::to_string(relay.port()) + url.substr(url.find('&'));
+    options.url =
+        url.substr(0, host) + "127.0.0.1&port=" + std::to_string(relay.port()) + url.substr(url.find('&'));
     return open_postgres_store(options);
   }
   Relay relay_{postgres_socket()};

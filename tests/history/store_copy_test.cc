@@ -19,7 +19,8 @@ class StoreCopyTest : public testing::Test {
   // Something in every table, and every kind of value.
   void SetUp() override {
     auto store = need(open_store("sqlite:" + source_));
-    need(apply_one(*store, AddModel{"amr-1", 1, ModelOrigin::file, "größer", R"({"a": 1})", {}, R"({"why": 2})"}));
+    need(apply_one(*store,
+                   AddModel{"amr-1", 1, ModelOrigin::file, "größer", R"({"a": 1})", {}, R"({"why": 2})"}));
     need(apply_one(*store, AddModel{"amr-1", 2, ModelOrigin::http, "", R"({"a": 2})", {}}));
     need(apply_one(*store, AddModel{"Amr-0", 3, ModelOrigin::http, "", R"({"a": 3})", {}}));
     need(apply_one(*store, ActivateModel{"amr-1", 1}));
@@ -38,11 +39,15 @@ class StoreCopyTest : public testing::Test {
         trace[i].start_utime_us = static_cast<std::int64_t>(i) * trace_bucket_us;
         trace[i].covered_s = 1e-300;
       }
-      need(apply_one(*store, CheckpointMission{m, trace, some_samples(0, 0, 3000), ResumeState{"amr-1", 1, 2, 0.5, {}},
+      need(apply_one(*store, CheckpointMission{m,
+                                               trace,
+                                               some_samples(0, 0, 3000),
+                                               ResumeState{"amr-1", 1, 2, 0.5, {}},
                                                {{5, "cpu_load", 0.25}}}));
     }
     need(apply_one(*store, PutLearned{{"amr-1", "charge", 5, R"({"a":1})"}}));
-    for (int k = 0; k < 5; ++k) need(apply_one(*store, AppendEvent{{0, k, k % 2 ? "amr-1" : "", "kind", "{}"}}));
+    for (int k = 0; k < 5; ++k)
+      need(apply_one(*store, AppendEvent{{0, k, k % 2 ? "amr-1" : "", "kind", "{}"}}));
     DiagnosisRecord d;
     d.robot_id = "amr-1";
     d.request_json = "{}";
@@ -68,7 +73,8 @@ class StoreCopyTest : public testing::Test {
 TEST_F(StoreCopyTest, KnowsEveryTable) {
   SqliteDatabase database(source_, OpenMode::read_only, 100);
   std::vector<std::string> stored;
-  Rows rows(database.statement("SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite_%'"));
+  Rows rows(
+      database.statement("SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite_%'"));
   while (rows.next()) stored.push_back(rows.text());
   EXPECT_THAT(table_names(), testing::UnorderedElementsAreArray(stored));
 }
@@ -98,10 +104,10 @@ TEST_F(StoreCopyTest, GoesOnWhereItWasCutOff) {
   for (const std::string_view where : {"robot", "mission", "trace", "telemetry_chunk", "proposal"}) {
     const TemporaryFolder folder;
     const std::string to = where == "trace" ? postgres_ : folder.file("to.db");
-    const auto cut = copy_tables(*tables(source_), *tables(to),
-                                 [&](std::string_view table, std::int64_t, std::int64_t) {
-                                   if (table == where) throw std::runtime_error("cut off");
-                                 });
+    const auto cut =
+        copy_tables(*tables(source_), *tables(to), [&](std::string_view table, std::int64_t, std::int64_t) {
+          if (table == where) throw std::runtime_error("cut off");
+        });
     ASSERT_FALSE(cut);
     const CopyReport whole = copy(source_, to);
     EXPECT_GT(whole.rows_found, 0);
