@@ -241,7 +241,7 @@ TEST_F(WriterTest, WaitsOutALockOfAnotherProcess) {
   {
     Writer writer(store_, o);
     {
-      const Transaction lock(other, Transaction::Kind::write);
+      const Transaction lock(other, Database::Access::write);
       ASSERT_TRUE(writer.post(event(0)));
       // SQLite's own patience (2 s) runs out first.
       ASSERT_TRUE(eventually([&] { return writer.status().failed_commits >= 1; }));
