@@ -7,11 +7,10 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
-#include <functional>
-#include <ostream>
 #include <set>
 #include <thread>
 
+#include "store_kind.h"
 #include "temporary_store.h"
 
 namespace joulecast::history {
@@ -19,23 +18,6 @@ namespace {
 
 using signals::CovariateChange;
 using signals::Sample;
-
-struct StoreKind {
-  std::string name;
-  // Opens the store kept in the folder, with a clock for retention.
-  std::function<std::unique_ptr<Store>(const TemporaryFolder&, std::function<std::int64_t()>)> open;
-};
-
-std::ostream& operator<<(std::ostream& out, const StoreKind& kind) {
-  return out << kind.name;
-}
-
-const StoreKind sqlite{"Sqlite", [](const TemporaryFolder& folder, std::function<std::int64_t()> clock) {
-                         SqliteOptions options;
-                         options.path = folder.file("store.db");
-                         options.now_utime_us = std::move(clock);
-                         return need(open_sqlite_store(options));
-                       }};
 
 class StoreConformance : public testing::TestWithParam<StoreKind> {
  protected:
@@ -909,7 +891,7 @@ TEST_P(StoreConformance, ReadersSeeWholeTransactionsWhileOneWrites) {
   EXPECT_GE(reads, 6);
 }
 
-INSTANTIATE_TEST_SUITE_P(Stores, StoreConformance, testing::Values(sqlite),
+INSTANTIATE_TEST_SUITE_P(Stores, StoreConformance, testing::Values(store_kind()),
                          [](const auto& kind) { return kind.param.name; });
 
 }  // namespace

@@ -1,12 +1,12 @@
-#include "history/sqlite_queries.h"
+#include "history/sql_queries.h"
 
 #include <bit>
 #include <cmath>
 #include <utility>
 
 #include "history/cursor.h"
-#include "history/sqlite_chunks.h"
-#include "history/sqlite_rows.h"
+#include "history/sql_chunks.h"
+#include "history/sql_rows.h"
 #include "history/trace_merge.h"
 
 namespace joulecast::history::queries {
@@ -32,7 +32,8 @@ bool has_robot(Database& database, std::string_view robot_id) {
 
 constexpr std::string_view select_model =
     "SELECT model.robot_id, version, model.created_utime_us, origin, note, parent_version, "
-    "version IS active_version, model_json, coalesce(evidence_json, '') FROM model JOIN robot USING "
+    "coalesce(version = active_version, FALSE), model_json, coalesce(evidence_json, '') FROM model JOIN "
+    "robot USING "
     "(robot_id) WHERE model.robot_id = ?";
 
 Result<ModelVersion> read_model(Rows& rows) {
@@ -54,7 +55,7 @@ Result<ModelVersion> read_model(Rows& rows) {
 
 // The WHERE clause of a filter, which also tells filters apart for cursors when its values are added.
 std::string where(const MissionFilter& f) {
-  std::string sql = " WHERE 1";
+  std::string sql = " WHERE TRUE";
   if (f.robot_id) sql += " AND robot_id = ?";
   if (f.mission_id) sql += " AND mission_id = ?";
   if (f.start_from_utime_us) sql += " AND start_utime_us >= ?";
@@ -206,9 +207,10 @@ Result<Totals> totals(Database& database, const MissionFilter& filter) {
     return text + ")";
   }();
   Rows rows(
-      database.statement("SELECT count(*), coalesce(sum(measured_s > 0), 0), coalesce(sum(incomplete), 0), "
-                         "coalesce(sum(samples), 0), "
-                         "coalesce(sum(gap_count), 0), coalesce(sum(gap_s), 0.0), " +
+      database.statement("SELECT count(*), count(*) FILTER (WHERE measured_s > 0), "
+                         "count(*) FILTER (WHERE incomplete = 1), "
+                         "CAST(coalesce(sum(samples), 0) AS BIGINT), "
+                         "CAST(coalesce(sum(gap_count), 0) AS BIGINT), coalesce(sum(gap_s), 0.0), " +
                          sums + " FROM mission" + where(filter)));
   bind_filter(rows, filter);
   rows.next();
@@ -271,7 +273,7 @@ Result<Trace> trace(Database& database, MissionKey key, TimeRange range, std::in
   }
   if (!first || !last) return Trace{};
   TraceMerger merger(*first, merged_width_us(*first, *last + 1, max_points));
-  static const std::string sql = "SELECT " + std::string(trace_columns) +
+  static const std::string sql = "SELECT start_utime_us, " + std::string(trace_columns) +
                                  " FROM trace WHERE mission_key = ? AND start_utime_us >= ? AND "
                                  "start_utime_us < ? ORDER BY start_utime_us";
   Rows rows(database.statement(sql));
@@ -322,7 +324,7 @@ Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std
 
 Result<std::optional<ResumeState>> resume_state(Database& database, std::string_view robot_id) {
   static const std::string sql =
-      "SELECT " + std::string(resume_state_columns) + " FROM energy_state WHERE robot_id = ?";
+      "SELECT robot_id, " + std::string(resume_state_columns) + " FROM energy_state WHERE robot_id = ?";
   Rows rows(database.statement(sql));
   rows.bind(robot_id);
   if (!rows.next()) return std::nullopt;
