@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "base/error.h"
@@ -20,6 +21,8 @@ class Application {
 
   // The port really bound.
   std::uint16_t http_port() const;
+  // The file or, without its password, the URL of the history.
+  std::string store_name() const;
 
   // True while every loop turns: receiving, accounting, writing, HTTP. What the watchdog asks.
   bool alive();

@@ -67,7 +67,7 @@ int serve(const joulecast::Settings& settings) {
       {{"http", (settings.text("http.tls_certificate").empty() ? "http://" : "https://") +
                     settings.text("http.address") + ":" + std::to_string((*application)->http_port())},
        {"lcm", settings.text("lcm.url")},
-       {"store", settings.text("store.path")}});
+       {"store", (*application)->store_name()}});
   sd_notify(0, "READY=1");
   run(**application);
   sd_notify(0, "STOPPING=1");

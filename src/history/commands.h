@@ -132,10 +132,10 @@ struct RemoveRobot {
   bool purge = false;
 };
 
-using Command = std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutResumeState,
-                             PutLearned, AppendEvent, Prune, AddDiagnosis, UpdateDiagnosis,
-                             InterruptDiagnoses, AddProposal, CloseProposal, AppendAudit, PruneMissions,
-                             RemoveRobot>;
+using Command =
+    std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutResumeState, PutLearned,
+                 AppendEvent, Prune, AddDiagnosis, UpdateDiagnosis, InterruptDiagnoses, AddProposal,
+                 CloseProposal, AppendAudit, PruneMissions, RemoveRobot>;
 
 // Approximate memory that a queued command holds, in bytes.
 std::size_t weight_bytes(const Command& command);

@@ -30,7 +30,8 @@ TEST(Confined, AnswersWhatTheWorkAnswers) {
 
 TEST(Confined, AnswersAnErrorOfTheWork) {
   const auto answer = run_confined(
-      {}, [](const Report&) -> Result<std::string> { return fail(Fault::conflict, "robot", "drove nowhere"); },
+      {},
+      [](const Report&) -> Result<std::string> { return fail(Fault::conflict, "robot", "drove nowhere"); },
       never_ends);
   ASSERT_FALSE(answer);
   EXPECT_NE(answer.error().message.find("drove nowhere"), std::string::npos);

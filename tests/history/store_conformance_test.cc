@@ -7,12 +7,12 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
-#include <functional>
-#include <ostream>
 #include <set>
 #include <thread>
 #include <tuple>
 
+#include "history/audit.h"
+#include "store_kind.h"
 #include "temporary_store.h"
 
 namespace joulecast::history {
@@ -20,23 +20,6 @@ namespace {
 
 using signals::CovariateChange;
 using signals::Sample;
-
-struct StoreKind {
-  std::string name;
-  // Opens the store kept in the folder, with a clock for retention.
-  std::function<std::unique_ptr<Store>(const TemporaryFolder&, std::function<std::int64_t()>)> open;
-};
-
-std::ostream& operator<<(std::ostream& out, const StoreKind& kind) {
-  return out << kind.name;
-}
-
-const StoreKind sqlite{"Sqlite", [](const TemporaryFolder& folder, std::function<std::int64_t()> clock) {
-                         SqliteOptions options;
-                         options.path = folder.file("store.db");
-                         options.now_utime_us = std::move(clock);
-                         return need(open_sqlite_store(options));
-                       }};
 
 class StoreConformance : public testing::TestWithParam<StoreKind> {
  protected:
@@ -972,6 +955,28 @@ TEST_P(StoreConformance, KeepsEventsInOrder) {
 
 // ---- threads
 
+TEST_P(StoreConformance, TheAuditIsAChainWhileTheStoreIsOpenAndAfter) {
+  EXPECT_EQ(need(verify_audit(GetParam().url(folder_))).entries, 0);
+  const auto append = [&](const std::string& actor) {
+    return apply(AppendAudit{{0, ++now_utime_us_, actor, "192.0.2.7", "r-1", "putRobot", R"({"a": 1})", ""}});
+  };
+  for (int k = 1; k <= 3; ++k) EXPECT_EQ(append("größer-" + std::to_string(k)), k);
+  std::vector<AuditEntry> entries;
+  const AuditState state = need(
+      verify_audit(GetParam().url(folder_), {}, [&](const AuditEntry& entry) { entries.push_back(entry); }));
+  EXPECT_EQ(state.entries, 3);
+  ASSERT_EQ(entries.size(), 3U);
+  EXPECT_EQ(entries[1].actor, "größer-2");
+  EXPECT_EQ(entries[1].detail_json, R"({"a": 1})");
+  EXPECT_EQ(entries[2].hash, state.head);
+  // A refused entry is no link.
+  EXPECT_EQ(apply(AppendAudit{{0, 1, "", "", "", "", "{}", ""}}).error().fault, Fault::invalid);
+  reopen();
+  EXPECT_EQ(append("dave"), 4);
+  EXPECT_EQ(need(verify_audit(GetParam().url(folder_), state.head)).entries, 4);
+  EXPECT_EQ(verify_audit(GetParam().url(folder_), std::string(64, '1')).error().fault, Fault::corrupt);
+}
+
 TEST_P(StoreConformance, ReadersSeeWholeTransactionsWhileOneWrites) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   std::atomic<bool> done{false};
@@ -1061,7 +1066,7 @@ TEST_P(StoreConformance, OldMissionsAreDroppedOldestFirst) {
   EXPECT_EQ(walk({}, 10), (std::vector<MissionKey>{missions[4].key, open.key}));
 }
 
-INSTANTIATE_TEST_SUITE_P(Stores, StoreConformance, testing::Values(sqlite),
+INSTANTIATE_TEST_SUITE_P(Stores, StoreConformance, testing::Values(store_kind()),
                          [](const auto& kind) { return kind.param.name; });
 
 }  // namespace
