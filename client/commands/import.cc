@@ -14,6 +14,7 @@
 #include "client/commands/import_tables.h"
 #include "client/commands/parse_time.h"
 #include "client/commands/table.h"
+#include "client/files.h"
 #include "client/progress.h"
 #include "telemetry/csv_import.h"
 #include "telemetry/event_log.h"

@@ -143,7 +143,7 @@ TEST(VerdictText, SaysWhyNothingIsAdopted) {
   EXPECT_THAT(refusal_of(d, true, false),
               AllOf(HasSubstr("misses 15\u00a0%"), HasSubstr("regression 10\u00a0%")));
   d.effects[0].alternatives = {"viscous_friction"};
-  EXPECT_THAT(refusal_of(d, false, false), HasSubstr("not told from viscous_friction"));
+  EXPECT_THAT(refusal_of(d, false, false), HasSubstr("not distinguished from viscous_friction"));
   d.verdict = Verdict::outside;
   EXPECT_THAT(refusal_of(d, false, false), HasSubstr("outside"));
 }

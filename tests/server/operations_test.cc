@@ -136,6 +136,7 @@ TEST(OpenApi, TakesInWhatSchemasReferTo) {
   endpoint.method = Method::post;
   endpoint.path = "/v1/{id}/x";
   endpoint.operation_id = "x";
+  endpoint.role = Role::read;
   endpoint.request_schema = "a";
   endpoint.response_schema = "b";
   endpoint.error_statuses = {404};

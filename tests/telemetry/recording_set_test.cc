@@ -112,7 +112,9 @@ TEST(RecordingSet, CountsWhatCannotBeRead) {
   EXPECT_THAT(names_of(*set), ElementsAre("m1"));
   EXPECT_EQ(set->missions[0].samples.size(), good.samples.size());
   EXPECT_EQ(set->unreadable, 4u);
-  EXPECT_THAT(set->notes, ElementsAre(HasSubstr("4 messages or values"), HasSubstr("1 samples lie before")));
+  EXPECT_THAT(set->notes,
+              ElementsAre(HasSubstr("4 messages or values"), HasSubstr("wheel_velocity that no robot reads"),
+                          HasSubstr("1 samples lie before")));
 }
 
 TEST(RecordingSet, PutsSamplesInOrder) {

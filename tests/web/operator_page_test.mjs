@@ -252,24 +252,37 @@ const page = await openPage();
 await check('the fleet is live', async () => {
   await go(page, '#/fleet');
   await page.waitForSelector('.fleet tbody th a');
-  equal(await page.locator('.fleet tbody tr:not(.spacer)').count(), 4, 'rows of robots that were heard');
-  await page
-    .getByRole('button', { name: 'Show 3 robots without telemetry since the service started' })
-    .click();
-  await until(
-    'rows of all robots',
-    async () => (await page.locator('.fleet tbody tr:not(.spacer)').count()) === 7,
-  );
-  equal(
-    JSON.stringify((await page.locator('.fleet tbody th a').allTextContents()).slice(4)),
-    '["hour-01","oval-01","worn-01"]',
-    'the last rows',
-  );
-  await page.getByRole('button', { name: 'Hide 3 robots' }).click();
+  equal(await page.locator('.fleet tbody tr:not(.spacer)').count(), 7, 'rows of robots');
+  for (const id of ['hour-01', 'oval-01', 'worn-01']) {
+    const last = await page.locator('.fleet tbody tr', { hasText: id }).locator('td.health').textContent();
+    expect(last.startsWith('silent since'), `what was heard of ${id} before the restart: ${last}`);
+  }
   const row = page.locator('.fleet tbody tr', { hasText: robot });
   const before = await row.locator('td.power .number').textContent();
   await until('another power', async () => (await row.locator('td.power .number').textContent()) !== before);
   await page.getByText('Live', { exact: true }).first().waitFor();
+});
+
+await check('a robot without telemetry is folded away, and a removed one is gone', async () => {
+  const rows = page.locator('.fleet tbody tr:not(.spacer)');
+  const spare = { ...JSON.parse(await readFile(hourRobot, 'utf8')), robot_id: 'spare-01' };
+  const change = (method, suffix, body) =>
+    fetch(`${base}/v1/robots/spare-01${suffix}`, {
+      method,
+      headers: { 'Content-Type': 'application/json' },
+      body,
+    });
+  equal((await change('PUT', '', JSON.stringify(spare))).status, 200, 'the status of PUT');
+  await page.reload();
+  await page.getByRole('button', { name: 'Show 1 robot without telemetry yet' }).click();
+  await until('rows of all robots', async () => (await rows.count()) === 8);
+  await page.getByRole('button', { name: 'Hide 1 robot without telemetry yet' }).click();
+  await until('rows of robots that were heard', async () => (await rows.count()) === 7);
+  equal((await change('DELETE', '?history=purge')).status, 200, 'the status of DELETE');
+  await page.reload();
+  await page.waitForSelector('.fleet tbody th a');
+  equal(await rows.count(), 7, 'rows after the removal');
+  equal(await page.getByText('without telemetry yet').count(), 0, 'folds after the removal');
 });
 
 await check('the fleet is found, chosen and ordered', async () => {
@@ -285,7 +298,7 @@ await check('the fleet is found, chosen and ordered', async () => {
   await page.getByRole('button', { name: 'Low charge' }).click();
   await page.getByText('No robot matches').waitFor();
   await page.getByRole('button', { name: 'All', exact: true }).click();
-  await until('all rows', async () => (await names()).length === 4);
+  await until('all rows', async () => (await names()).length === 7);
   const rising = await names();
   await page.getByRole('button', { name: 'Robot', exact: true }).click();
   await until(
@@ -1515,7 +1528,7 @@ await check('500 live robots stay live on the page', async () => {
   );
   await watched.screenshot({ path: path.join(given.out, 'screenshots', 'fleet-500-service-laptop.png') });
   await watched.goto(`${base}/#/missions`);
-  await watched.getByRole('button', { name: 'Load older' }).click();
+  await watched.getByRole('button', { name: 'Load more' }).click();
   await watched.getByText('100 of').waitFor();
   await watched.screenshot({ path: path.join(given.out, 'screenshots', 'missions-100000-laptop.png') });
   await watched.context().close();

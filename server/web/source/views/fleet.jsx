@@ -295,8 +295,7 @@ function QuietFold({ count, whole, onToggle }) {
   return (
     <p class="fold">
       <button type="button" class="plain" aria-expanded={String(whole)} onClick={onToggle}>
-        {whole ? 'Hide' : 'Show'} {count} {count === 1 ? 'robot' : 'robots'} without telemetry since the
-        service started
+        {whole ? 'Hide' : 'Show'} {count} {count === 1 ? 'robot' : 'robots'} without telemetry yet
       </button>
     </p>
   );
