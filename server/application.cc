@@ -579,6 +579,15 @@ bool Application::stop() {
   return parts_->stop() && parts_->http->ended();
 }
 
+Result<std::string> store_file(const Settings& settings) {
+  const std::string url = store_url(settings);
+  if (history::is_postgres_url(url))
+    return invalid("store.url",
+                   "the history is in PostgreSQL: pg_dump and pg_restore copy it, joulecast store verify "
+                   "reads all of it");
+  return history::sqlite_path(url);
+}
+
 Result<std::string> openapi_document() {
   Metrics metrics;
   http::EventHub events;

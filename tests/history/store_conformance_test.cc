@@ -540,6 +540,45 @@ TEST_P(StoreConformance, FiltersMissions) {
   EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[1].key));
 }
 
+TEST_P(StoreConformance, FindsPartsOfMissionNamesAsTheyAreWritten) {
+  const std::vector<std::string> names{"100%",        "a_b",   "axb",    "Tour!7",
+                                       "back\\slash", "Größe", "GRÖSSE", "tour"};
+  for (std::size_t k = 0; k < names.size(); ++k)
+    start_mission(*store_, "amr-1", names[k], static_cast<std::int64_t>(k));
+  const auto found = [&](const std::string& part) {
+    MissionFilter f;
+    f.name_contains = part;
+    std::vector<std::string> all;
+    for (const Mission& m :
+         need(store_->missions(f, {.limit = 100, .cursor = {}}, {MissionOrder::start, true})).missions)
+      all.push_back(m.mission_id);
+    return all;
+  };
+  EXPECT_THAT(found("%"), testing::ElementsAre("100%"));
+  EXPECT_THAT(found("_"), testing::ElementsAre("a_b"));
+  EXPECT_THAT(found("A_B"), testing::ElementsAre("a_b"));
+  EXPECT_THAT(found("!"), testing::ElementsAre("Tour!7"));
+  EXPECT_THAT(found("\\"), testing::ElementsAre("back\\slash"));
+  EXPECT_THAT(found("TOUR"), testing::ElementsAre("Tour!7", "tour"));
+  EXPECT_THAT(found("gr"), testing::ElementsAre("Größe", "GRÖSSE"));
+  // Only letters of ASCII are found in any case.
+  EXPECT_THAT(found("grö"), testing::ElementsAre("Größe"));
+  EXPECT_EQ(found("").size(), names.size());
+  EXPECT_TRUE(found(std::string(10'000, 'x')).empty());
+}
+
+TEST_P(StoreConformance, FiltersByAsManyRobotsAsAllowed) {
+  const auto missions = add_missions("amr-7", 2);
+  add_missions("amr-x", 1);
+  MissionFilter f;
+  for (std::size_t k = 0; k < max_filter_robots; ++k) f.robot_ids.push_back("amr-" + std::to_string(k));
+  f.states = {MissionState::open, MissionState::finished, MissionState::open};
+  EXPECT_THAT(walk(f, 1), testing::ElementsAre(missions[1].key, missions[0].key));
+  EXPECT_EQ(need(store_->totals(f)).missions, 2);
+  f.robot_ids.push_back("amr-x");
+  EXPECT_EQ(store_->totals(f).error().field, "robot_id");
+}
+
 TEST_P(StoreConformance, SortsMissionsInStablePages) {
   auto missions = add_missions("amr-1", 9);
   // Ratios 1.5, 0.5, 1.5, 0.5 ..., none of the last two.
@@ -683,6 +722,16 @@ TEST_P(StoreConformance, SumsOverMissions) {
   EXPECT_EQ(need(store_->totals({})).missions, 3);
   EXPECT_EQ(need(store_->totals({})).accounts.measured_j, 20);
   EXPECT_EQ(need(store_->missions({}, {.limit = 10, .cursor = {}})).missions.size(), 4U);
+  // Whatever the findings say: only a member of that name annuls.
+  missions[0].findings_json = R"({"contradictions":["\"annulled\":1, annulled"]})";
+  need(apply(CheckpointMission{missions[0], {}, {}, {}}));
+  EXPECT_EQ(need(store_->totals({})).missions, 3);
+  missions[0].findings_json =
+      annulled_findings(missions[0], 17, std::string("nul \0 \\u0000 \"annulled\":", 24));
+  need(apply(CheckpointMission{missions[0], {}, {}, {}}));
+  EXPECT_EQ(need(store_->totals({})).missions, 2);
+  EXPECT_EQ(need(store_->grouped_totals({}, Grouping::robot, 0)).front().totals.missions, 2);
+  EXPECT_EQ(findings_of(need(store_->mission(missions[0].key))).annulled, findings_of(missions[0]).annulled);
   MissionFilter nobody;
   nobody.robot_ids = {"nobody"};
   EXPECT_EQ(need(store_->totals(nobody)).missions, 0);
