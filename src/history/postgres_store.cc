@@ -56,10 +56,11 @@ void advance_identities(Database& database) {
                                       {"event", "event_id"},
                                       {"diagnosis", "diagnosis_id"},
                                       {"proposal", "proposal_id"}}) {
-    const std::string sequence = std::string("pg_get_serial_sequence('") + table + "', '" + column + "')";
-    const std::string greatest = std::string("(SELECT max(") + column + ") FROM " + table + ")";
-    database.execute("SELECT setval(" + sequence + ", greatest(nextval(" + sequence + "), " + greatest +
-                     "))");
+    const std::string sequence =
+        std::string("pg_get_serial_sequence('") + table + "', '" + column + "')::regclass";
+    database.execute("SELECT setval(" + sequence + ", last) FROM (SELECT max(" + column + ") AS last FROM " +
+                     table + ") AS stored WHERE last > coalesce(pg_sequence_last_value(" + sequence +
+                     "), 0)");
   }
 }
 
