@@ -3,7 +3,8 @@
 set -euo pipefail
 packages=(
   g++ cmake ninja-build ccache pkg-config git ca-certificates
-  liblcm-dev liblcm-bin libglib2.0-dev libeigen3-dev libsundials-dev libsqlite3-dev nlohmann-json3-dev
+  liblcm-dev liblcm-bin libglib2.0-dev libeigen3-dev libsundials-dev libsqlite3-dev libpq-dev postgresql
+  nlohmann-json3-dev
   libboost-dev libceres-dev libcli11-dev libspdlog-dev libfmt-dev prometheus-cpp-dev libexpected-dev
   libssl-dev libsystemd-dev libzstd-dev zlib1g-dev
   libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev

@@ -16,8 +16,8 @@
 #include "answers/json/autonomy_json.h"
 #include "base/fault_boundary.h"
 #include "base/host_clock.h"
+#include "history/open_store.h"
 #include "history/spool.h"
-#include "history/sqlite_store.h"
 #include "history/writer.h"
 #include "ingest/ingest_service.h"
 #include "ingest/model_loading.h"
@@ -53,8 +53,15 @@ std::int64_t microseconds(double s) {
   return static_cast<std::int64_t>(s * 1e6);
 }
 
+std::string store_url(const Settings& settings) {
+  const std::string& url = settings.text("store.url");
+  return url.empty() ? "sqlite:" + settings.text("store.path") : url;
+}
+
+// Beside the SQLite file; a file of this machine also where the history is kept elsewhere.
 std::string spool_path(const Settings& settings) {
-  return settings.text("store.path") + ".spool";
+  const std::string url = store_url(settings);
+  return (history::is_postgres_url(url) ? settings.text("store.path") : history::sqlite_path(url)) + ".spool";
 }
 
 // What the last daemon could not store. A spool that cannot be read is put aside: it must not stand in the
@@ -411,10 +418,10 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   Parts& p = *parts;
 
   if (const Result<void> safe = check_exposure(settings); !safe) return tl::unexpected(safe.error());
-  history::SqliteOptions sqlite;
-  sqlite.path = settings.text("store.path");
-  Result<std::unique_ptr<history::Store>> store = history::open_sqlite_store(sqlite);
-  if (!store) return fail(store.error().fault, "store.path", std::move(store.error().message));
+  const bool by_path = settings.text("store.url").empty();
+  Result<std::unique_ptr<history::Store>> store = history::open_store(store_url(settings));
+  if (!store)
+    return fail(store.error().fault, by_path ? "store.path" : "store.url", std::move(store.error().message));
   p.store = std::move(*store);
   take_in_spool(settings, *p.store);
   p.writer = std::make_unique<history::Writer>(*p.store, writer_options(settings));
@@ -518,6 +525,11 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   return std::unique_ptr<Application>(new Application(std::move(parts)));
 }
 
+std::string Application::store_name() const {
+  const std::string& url = parts_->settings.text("store.url");
+  return url.empty() ? parts_->settings.text("store.path") : history::shown_url(url);
+}
+
 std::uint16_t Application::http_port() const {
   return parts_->http->port();
 }
@@ -565,6 +577,15 @@ std::vector<Error> faulty_robot_files(const Settings& settings) {
 
 bool Application::stop() {
   return parts_->stop() && parts_->http->ended();
+}
+
+Result<std::string> store_file(const Settings& settings) {
+  const std::string url = store_url(settings);
+  if (history::is_postgres_url(url))
+    return invalid("store.url",
+                   "the history is in PostgreSQL: pg_dump and pg_restore copy it, joulecast store verify "
+                   "reads all of it");
+  return history::sqlite_path(url);
 }
 
 Result<std::string> openapi_document() {

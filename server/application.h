@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "base/error.h"
@@ -20,6 +21,8 @@ class Application {
 
   // The port really bound.
   std::uint16_t http_port() const;
+  // The file or, without its password, the URL of the history.
+  std::string store_name() const;
 
   // True while every loop turns: receiving, accounting, writing, HTTP. What the watchdog asks.
   bool alive();
@@ -44,6 +47,10 @@ std::vector<Error> faults_of_access(const Settings& settings);
 
 // What is wrong with the robot files that the settings name, one a file; or with their directory.
 std::vector<Error> faulty_robot_files(const Settings& settings);
+
+// The SQLite file of the history. Fault::invalid on "store.url" where the history is in PostgreSQL, whose own
+// programs check it, back it up and restore it.
+Result<std::string> store_file(const Settings& settings);
 
 // The OpenAPI document of the table that start() would serve.
 Result<std::string> openapi_document();

@@ -67,7 +67,7 @@ int serve(const joulecast::Settings& settings) {
       {{"http", (settings.text("http.tls_certificate").empty() ? "http://" : "https://") +
                     settings.text("http.address") + ":" + std::to_string((*application)->http_port())},
        {"lcm", settings.text("lcm.url")},
-       {"store", settings.text("store.path")}});
+       {"store", (*application)->store_name()}});
   sd_notify(0, "READY=1");
   run(**application);
   sd_notify(0, "STOPPING=1");
@@ -133,6 +133,24 @@ int restore(const std::string& file, const std::string& path) {
   }));
 }
 
+int care_for_store(const Invocation& invocation) {
+  const auto path = joulecast::store_file(invocation.settings);
+  if (!path) {
+    complain(path.error());
+    return 2;
+  }
+  switch (invocation.action) {
+    case Invocation::Action::backup:
+      return back_up(*path, invocation.file);
+    case Invocation::Action::restore:
+      return restore(invocation.file, *path);
+    case Invocation::Action::salvage:
+      return salvage(*path, invocation.file);
+    default:
+      return check_store(*path);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -155,13 +173,10 @@ int main(int argc, char** argv) {
     case Invocation::Action::print_config_schema:
       return print(joulecast::settings_schema());
     case Invocation::Action::check_store:
-      return check_store(invocation->settings.text("store.path"));
     case Invocation::Action::backup:
-      return back_up(invocation->settings.text("store.path"), invocation->file);
     case Invocation::Action::restore:
-      return restore(invocation->file, invocation->settings.text("store.path"));
     case Invocation::Action::salvage:
-      return salvage(invocation->settings.text("store.path"), invocation->file);
+      return care_for_store(*invocation);
     case Invocation::Action::run:
       return serve(invocation->settings);
   }

@@ -72,7 +72,11 @@ constexpr Setting table[] = {
      "file of the tokens that requests need, made by joulecast token create and read again when it changes; "
      "empty: none is needed"},
 
-    {"store.path", Type::text, "joulecast.db", 0, 0, "", "SQLite file of the history"},
+    {"store.path", Type::text, "joulecast.db", 0, 0, "",
+     "SQLite file of the history; beside it, PATH.spool keeps what was not committed at a stop"},
+    {"store.url", Type::text, "", 0, 0, "",
+     "database of the history: sqlite:PATH or postgresql://user@host1,host2/database; empty: sqlite: and "
+     "store.path"},
     {"store.retention_days", Type::number, "30", 0, 36500, "d",
      "age at which raw telemetry is deleted, at most 5 % of it an hour; 0: never"},
     {"store.retention_bytes", Type::integer, "10737418240", 0, 1e15, "B",

@@ -51,7 +51,8 @@ void add_audit(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
   const auto add = [&](const char* name, const char* what, Exit (*run)(const Options&)) {
     auto* command = group->add_subcommand(name, what);
-    command->add_option("--store", options->store, "the file that the daemon's store.path names")->required();
+    command->add_option("--store", options->store, "SQLite file, sqlite:PATH or postgresql://...")
+        ->required();
     command->callback([options, run, &exit] { exit = run(*options); });
     return command;
   };

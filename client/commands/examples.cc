@@ -66,6 +66,9 @@ constexpr Examples table[] = {
     {"audit list", "joulecast audit list --store history.db"},
     {"audit verify", "joulecast audit verify --store history.db"},
     {"thesis", "joulecast thesis\njoulecast thesis --table 4-1 --json\njoulecast thesis --figure 4-2a --csv"},
+    {"store copy", "joulecast store copy --from history.db --to copy.db"},
+    {"store verify", "joulecast store verify --store history.db"},
+    {"store stats", "joulecast store stats --store history.db --json"},
     {"completion",
      "source <(joulecast completion bash)\n"
      "joulecast completion zsh > _joulecast.zsh\n"

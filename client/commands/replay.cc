@@ -128,8 +128,9 @@ void add_replay(CLI::App& program, Exit& exit) {
   command->add_option("--max-rate", options->max_rate_hz, "messages a second that the receivers can take")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  auto* into = command->add_option("--into", options->into,
-                                   "no LCM: account for the logs at once, into this history (SQLite file)");
+  auto* into = command->add_option(
+      "--into", options->into,
+      "no LCM: account for the logs at once, into this history (SQLite file, or postgresql://...)");
   command
       ->add_option("--robot", options->robots,
                    "with --into: robot file of a robot that the history does not know; may be repeated")

@@ -11,7 +11,7 @@
 #include "answers/json/mission_json.h"
 #include "base/host_clock.h"
 #include "client/log_progress.h"
-#include "history/sqlite_store.h"
+#include "history/open_store.h"
 #include "history/writer.h"
 #include "ingest/forecasts.h"
 #include "ingest/model_loading.h"
@@ -74,9 +74,7 @@ void tell_damage(const std::string& path, const telemetry::LogRead& place) {
 }
 
 Exit replay_into(const ReplayInto& options) {
-  history::SqliteOptions sqlite;
-  sqlite.path = options.store_path;
-  auto store = history::open_sqlite_store(sqlite);
+  auto store = history::open_store(options.store_path);
   if (!store) return report(store.error());
   history::Writer writer(**store, {});
   ingest::ModelRegistry models;

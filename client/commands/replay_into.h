@@ -10,7 +10,7 @@ namespace joulecast::client {
 
 struct ReplayInto {
   std::vector<std::string> logs;
-  std::string store_path;                // history that the missions go into; created when absent
+  std::string store_path;  // a file or URL: the history that the missions go into; created when absent
   std::vector<std::string> robot_files;  // models of the robots that the history does not know yet
   bool json = false;
 };

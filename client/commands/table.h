@@ -34,6 +34,7 @@ void add_profile(CLI::App& program, Exit& exit);
 void add_replay(CLI::App& program, Exit& exit);
 void add_simulate(CLI::App& program, Exit& exit);
 void add_spy(CLI::App& program, Exit& exit);
+void add_store(CLI::App& program, Exit& exit);
 void add_thesis(CLI::App& program, Exit& exit);
 void add_token(CLI::App& program, Exit& exit);
 

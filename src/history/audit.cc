@@ -1,15 +1,14 @@
 #include "history/audit.h"
 
-#include <filesystem>
+#include <limits>
 
 #include "access/sha256.h"
 #include "base/utc_time.h"
-#include "history/schema.h"
+#include "history/open_store.h"
 
 namespace joulecast::history {
 namespace {
 
-constexpr std::int64_t busy_timeout_ms = 2000;
 constexpr std::string_view columns =
     "audit_id, utime_us, actor, address, request_id, action, detail_json, hash";
 const std::string before_the_first(64, '0');
@@ -22,38 +21,6 @@ AuditEntry read_entry(Rows& rows) {
        {&entry.actor, &entry.address, &entry.request_id, &entry.action, &entry.detail_json, &entry.hash})
     *text = rows.text();
   return entry;
-}
-
-Result<AuditState> follow(Database& database, const std::string& path, std::string_view seen_head,
-                          const std::function<void(const AuditEntry&)>& each) {
-  if (database.integer("PRAGMA application_id") != store_application_id)
-    return fail(Fault::corrupt, path, "is not a joulecast store");
-  if (database.integer("SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name = 'audit'") != 1)
-    return fail(Fault::corrupt, path,
-                "has no audit; a store made by an earlier version gets one when it is next opened");
-  AuditState state;
-  bool seen = seen_head.empty();
-  std::string previous = before_the_first;
-  Rows rows(database.statement("SELECT " + std::string(columns) + " FROM audit ORDER BY audit_id"));
-  while (rows.next()) {
-    AuditEntry entry = read_entry(rows);
-    const std::int64_t expected = state.entries + 1;
-    if (entry.id != expected || entry.hash != audit_hash(previous, entry))
-      return fail(
-          Fault::corrupt, path,
-          "the audit is broken at entry " + std::to_string(expected) +
-              (entry.id != expected ? ", which is missing"
-                                    : " of " + utc_text(entry.utime_us) + ": it or its hash was changed"));
-    previous = entry.hash;
-    seen = seen || entry.hash == seen_head;
-    ++state.entries;
-    if (each) each(entry);
-  }
-  if (state.entries > 0) state.head = previous;
-  if (!seen)
-    return fail(Fault::corrupt, path,
-                "no entry has the hash " + std::string(seen_head) + ": the audit was cut off or made anew");
-  return state;
 }
 
 }  // namespace
@@ -96,16 +63,54 @@ std::int64_t append_audit(Database& database, AuditEntry entry) {
   return entry.id;
 }
 
-Result<AuditState> verify_audit(const std::string& store_path, std::string_view seen_head,
+Result<AuditState> verify_audit(Database& database, const std::string& where, std::string_view seen_head,
                                 const std::function<void(const AuditEntry&)>& each) {
-  if (std::error_code error; !std::filesystem::exists(store_path, error))
-    return fail(Fault::not_found, store_path, "does not exist");
+  if (!database.has_table("audit"))
+    return fail(Fault::corrupt, where,
+                "has no audit; a store made by an earlier version gets one when it is next opened");
+  AuditState state;
+  bool seen = seen_head.empty();
+  std::string previous = before_the_first;
+  // Some at a time: a database may hold what it answers in memory.
+  constexpr std::int64_t at_once = 1000;
+  std::int64_t after = std::numeric_limits<std::int64_t>::min();
+  for (std::int64_t got = at_once; got == at_once;) {
+    Rows rows(database.statement("SELECT " + std::string(columns) +
+                                 " FROM audit WHERE audit_id > ? ORDER BY audit_id LIMIT ?"));
+    rows.bind(after).bind(at_once);
+    for (got = 0; rows.next(); ++got) {
+      const AuditEntry entry = read_entry(rows);
+      const std::int64_t expected = state.entries + 1;
+      if (entry.id != expected || entry.hash != audit_hash(previous, entry))
+        return fail(
+            Fault::corrupt, where,
+            "the audit is broken at entry " + std::to_string(expected) +
+                (entry.id != expected ? ", which is missing"
+                                      : " of " + utc_text(entry.utime_us) + ": it or its hash was changed"));
+      previous = entry.hash;
+      after = entry.id;
+      seen = seen || entry.hash == seen_head;
+      ++state.entries;
+      if (each) each(entry);
+    }
+  }
+  if (state.entries > 0) state.head = previous;
+  if (!seen)
+    return fail(Fault::corrupt, where,
+                "no entry has the hash " + std::string(seen_head) + ": the audit was cut off or made anew");
+  return state;
+}
+
+Result<AuditState> verify_audit(const std::string& store_url, std::string_view seen_head,
+                                const std::function<void(const AuditEntry&)>& each) {
+  const std::string shown = shown_url(store_url);
+  const auto database = open_to_read(store_url);
+  if (!database) return fail(database.error().fault, shown, database.error().message);
   try {
-    Database database(store_path, OpenMode::read_only, busy_timeout_ms);
-    Transaction snapshot(database, Transaction::Kind::read);
-    return follow(database, store_path, seen_head, each);
-  } catch (const SqliteError& error) {
-    return fail(error.fault(), store_path, error.what());
+    Transaction snapshot(**database, Database::Access::read);
+    return verify_audit(**database, shown, seen_head, each);
+  } catch (const SqlError& error) {
+    return fail(error.fault(), shown, error.what());
   }
 }
 

@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "history/records.h"
-#include "history/sqlite.h"
+#include "history/sql.h"
 
 // The audit of a store: entries chained by SHA-256, so that a change of one is a break of the chain.
 namespace joulecast::history {
@@ -16,7 +16,7 @@ namespace joulecast::history {
 // the entry's members in the order of AuditEntry but for its own hash, each as "<bytes>:<text>,".
 std::string audit_hash(std::string_view previous_hash, const AuditEntry& entry);
 
-// Adds the entry behind the last one; its id and hash are made here. Answers the id. Throws SqliteError.
+// Adds the entry behind the last one; its id and hash are made here. Answers the id. Throws SqlError.
 std::int64_t append_audit(Database& database, AuditEntry entry);
 
 struct AuditState {
@@ -24,11 +24,14 @@ struct AuditState {
   std::string head;  // the last entry's hash; empty without entries
 };
 
-// Reads the audit of a store's file, also while a daemon writes it, and holds every link of the chain;
-// `each`, when set, is given the entries that hold, in order. Fault::corrupt names the first entry that does
-// not hold. With `seen_head` also Fault::corrupt when no entry has that hash: the audit was cut off or made
-// anew since it was noted.
-Result<AuditState> verify_audit(const std::string& store_path, std::string_view seen_head = {},
+// Reads the audit of the store of a URL or path, also while a daemon writes it, and holds every link of the
+// chain; `each`, when set, is given the entries that hold, in order. Fault::corrupt names the first entry
+// that does not hold. With `seen_head` also Fault::corrupt when no entry has that hash: the audit was cut off
+// or made anew since it was noted.
+Result<AuditState> verify_audit(const std::string& store_url, std::string_view seen_head = {},
+                                const std::function<void(const AuditEntry&)>& each = {});
+// The same of an opened store, which errors call `where`. Throws SqlError.
+Result<AuditState> verify_audit(Database& database, const std::string& where, std::string_view seen_head = {},
                                 const std::function<void(const AuditEntry&)>& each = {});
 
 }  // namespace joulecast::history

@@ -139,7 +139,7 @@ const Schema& store_schema() {
 }
 
 Result<void> bring_to_schema(Database& database, const Schema& schema) {
-  Transaction transaction(database, Transaction::Kind::write);
+  Transaction transaction(database, Database::Access::write);
   const std::int64_t version = database.integer("PRAGMA user_version");
   const std::int64_t application = database.integer("PRAGMA application_id");
   const bool empty = database.integer("SELECT count(*) FROM sqlite_schema") == 0;

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "base/error.h"
-#include "history/sqlite.h"
+#include "history/sql.h"
 
 namespace joulecast::history {
 
@@ -29,7 +29,7 @@ inline constexpr std::int64_t store_application_id = 0x4a4c4354;
 
 // Brings the database to the schema, all in one transaction: creates it in an empty file, migrates an older
 // one, leaves the same one as it is. Fault::conflict: the file is newer, or too old for the list.
-// Fault::corrupt: it holds something else than a store. Throws SqliteError.
+// Fault::corrupt: it holds something else than a store. Throws SqlError.
 Result<void> bring_to_schema(Database& database, const Schema& schema);
 
 }  // namespace joulecast::history

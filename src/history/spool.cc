@@ -287,7 +287,7 @@ Result<void> write_whole(const std::string& path, const Bytes& bytes) {
 
 }  // namespace
 
-Result<void> write_spool(const std::string& path, std::span<const Command* const> commands) {
+Bytes command_bytes(std::span<const Command* const> commands) {
   Bytes plain;
   Saver save(plain);
   std::size_t count = commands.size();
@@ -298,6 +298,11 @@ Result<void> write_spool(const std::string& path, std::span<const Command* const
     Command copy = *command;
     std::visit([&](auto& c) { save(c); }, copy);
   }
+  return plain;
+}
+
+Result<void> write_spool(const std::string& path, std::span<const Command* const> commands) {
+  const Bytes plain = command_bytes(commands);
   Bytes file;
   for (const char c : layout()) file.push_back(static_cast<std::byte>(c));
   append_compressed(file, plain, 1);

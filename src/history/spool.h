@@ -13,6 +13,9 @@
 // that of the program that wrote it; another one refuses it and leaves it as it is.
 namespace joulecast::history {
 
+// The commands as the bytes of a spool: equal for equal commands.
+std::vector<std::byte> command_bytes(std::span<const Command* const> commands);
+
 // Replaces the file whole; it is on the disk when this returns.
 Result<void> write_spool(const std::string& path, std::span<const Command* const> commands);
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "history/sql.h"
 #include "history/store.h"
 
 namespace joulecast::history {
@@ -22,5 +23,8 @@ struct SqliteOptions {
 // program. Fault::corrupt: the file is no database, or damaged. Fault::unavailable: it cannot be opened or
 // written.
 Result<std::unique_ptr<Store>> open_sqlite_store(const SqliteOptions& options);
+
+// The same as tables, held against every other program until it is let go.
+Result<std::shared_ptr<Database>> open_sqlite_tables(const SqliteOptions& options);
 
 }  // namespace joulecast::history

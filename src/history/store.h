@@ -144,13 +144,18 @@ class Store {
   // applied.
   virtual Result<std::vector<Outcome>> apply(std::span<const Command> commands) = 0;
 
+  // After apply() failed with Fault::unavailable: whether it may have been committed all the same, which is
+  // found out when the same commands are applied again; they are then not applied twice.
+  virtual bool is_in_doubt() const { return false; }
+
   // Whether the store still is what was opened; apply() asks it too. Fault::unavailable when its files were
   // deleted or replaced, which lasts until the program is started again, or when they cannot be written for
   // now. To be called from apply()'s thread.
   virtual Result<void> check() { return {}; }
 
   // The key of the mission of that robot, name and start: the stored one's, or else a new one which
-  // StartMission then uses. Asked again before that, it answers the same.
+  // StartMission then uses. Asked again before that, it answers the same. While the store cannot be read, a
+  // new one, which StartMission refuses if the mission is stored under another.
   virtual Result<MissionKey> mission_key(std::string_view robot_id, std::string_view mission_id,
                                          std::int64_t start_utime_us) = 0;
 

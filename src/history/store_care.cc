@@ -35,7 +35,7 @@ template <class Work>
 auto guarded(const std::string& path, Work work) -> decltype(work()) {
   try {
     return work();
-  } catch (const SqliteError& error) {
+  } catch (const SqlError& error) {
     return fail(error.fault(), path, error.what());
   } catch (const std::exception& error) {
     return fail(Fault::unavailable, path, error.what());
@@ -43,11 +43,11 @@ auto guarded(const std::string& path, Work work) -> decltype(work()) {
 }
 
 // SQLite copies only what it might write.
-Result<std::unique_ptr<Database>> open_existing(const std::string& path,
-                                                OpenMode mode = OpenMode::read_only) {
+Result<std::unique_ptr<SqliteDatabase>> open_existing(const std::string& path,
+                                                      OpenMode mode = OpenMode::read_only) {
   if (!fs::is_regular_file(path)) return fail(Fault::not_found, path, "there is no such file");
-  return guarded(path, [&]() -> Result<std::unique_ptr<Database>> {
-    auto database = std::make_unique<Database>(path, mode, busy_timeout_ms);
+  return guarded(path, [&]() -> Result<std::unique_ptr<SqliteDatabase>> {
+    auto database = std::make_unique<SqliteDatabase>(path, mode, busy_timeout_ms);
     if (database->integer("PRAGMA application_id") != store_application_id)
       return fail(Fault::corrupt, path, "is not a joulecast store");
     const std::int64_t version = database->integer("PRAGMA user_version");
@@ -102,7 +102,7 @@ class Inspection {
     try {
       Rows rows(database_.statement(sql));
       while (rows.next()) add(look(rows));
-    } catch (const SqliteError& error) {
+    } catch (const SqlError& error) {
       add(error.what());
     }
   }
@@ -204,7 +204,7 @@ void salvage_range(Database& database, const std::string& table, const std::stri
             .bind(from)
             .bind(to)
             .run();
-  } catch (const SqliteError& error) {
+  } catch (const SqlError& error) {
     if (error.fault() != Fault::corrupt) throw;
     if (from == to || ++failures > most_failures) {
       if (salvage.losses.size() < most_faults)
@@ -221,7 +221,7 @@ void salvage_range(Database& database, const std::string& table, const std::stri
 std::int64_t greatest(Database& database, const std::string& table, const std::string& key) {
   try {
     return database.integer("SELECT coalesce(max(" + key + "), 0) FROM damaged." + table);
-  } catch (const SqliteError&) {
+  } catch (const SqlError&) {
     return std::int64_t{1} << 24;  // the path to the last row is damaged
   }
 }
@@ -311,7 +311,7 @@ Result<Salvage> salvage_store(const std::string& damaged, const std::string& int
   NewFile file(into);
   Salvage salvage;
   auto done = guarded(damaged, [&]() -> Result<void> {
-    Database database(file.part(), OpenMode::read_write_create, busy_timeout_ms);
+    SqliteDatabase database(file.part(), OpenMode::read_write_create, busy_timeout_ms);
     database.execute("PRAGMA auto_vacuum = INCREMENTAL");
     if (auto made = bring_to_schema(database, store_schema()); !made) return made;
     database.execute("PRAGMA synchronous = OFF");

@@ -316,7 +316,8 @@ class Writer::Impl {
       queued_bytes_ -= item.bytes;
     };
     std::size_t k = 0;
-    for (auto item = batch_.items.begin(); item != batch_.items.end();) {
+    const bool may_be_done = store_.is_in_doubt();  // then the batch is tried again as it is
+    for (auto item = batch_.items.begin(); item != batch_.items.end() && !may_be_done;) {
       if (!item->waiter) {
         ++item, ++k;
         continue;

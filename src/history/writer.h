@@ -76,8 +76,8 @@ class Writer {
   Result<void> offer(Command command);
   // Queues a command and waits for its commit. Fault::unavailable means that it was not done and will not be:
   // at once while the store takes no data; when an attempt to commit it fails; when the timeout passes before
-  // one began. Only a commit that does not return within 4 s after the timeout is answered without being
-  // known.
+  // one began. Only a commit that does not return within 4 s after the timeout, or whose answer was cut off,
+  // is answered without being known.
   Outcome execute(Command command, std::chrono::milliseconds timeout = std::chrono::milliseconds{10'000});
   // Waits until everything posted before the call is committed.
   Result<void> flush(std::chrono::milliseconds timeout = std::chrono::milliseconds{30'000});

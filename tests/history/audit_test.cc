@@ -34,7 +34,9 @@ class AuditTest : public testing::Test {
     return {std::istreambuf_iterator<char>(file), {}};
   }
   void write(const std::string& bytes) const { std::ofstream(path_, std::ios::binary) << bytes; }
-  void run(const std::string& sql) const { Database(path_, OpenMode::read_write_create, 1000).execute(sql); }
+  void run(const std::string& sql) const {
+    SqliteDatabase(path_, OpenMode::read_write_create, 1000).execute(sql);
+  }
 
   TemporaryFolder folder_;
   std::string path_ = folder_.file("history.db");
@@ -75,8 +77,8 @@ TEST_F(AuditTest, FindsOneByteChangedInTheFile) {
 
 TEST_F(AuditTest, IsOnlyAppendedTo) {
   close();
-  EXPECT_THROW(run("UPDATE audit SET actor = 'mallory' WHERE audit_id = 3"), SqliteError);
-  EXPECT_THROW(run("DELETE FROM audit WHERE audit_id = 3"), SqliteError);
+  EXPECT_THROW(run("UPDATE audit SET actor = 'mallory' WHERE audit_id = 3"), SqlError);
+  EXPECT_THROW(run("DELETE FROM audit WHERE audit_id = 3"), SqlError);
   EXPECT_TRUE(verify_audit(path_));
 }
 
@@ -103,7 +105,8 @@ TEST_F(AuditTest, RefusesWhatIsNoStore) {
   const std::string other = folder_.file("other.db");
   std::ofstream(other) << "not a database, but long enough to be looked at";
   EXPECT_FALSE(verify_audit(other));
-  Database(folder_.file("foreign.db"), OpenMode::read_write_create, 100).execute("CREATE TABLE audit (x)");
+  SqliteDatabase(folder_.file("foreign.db"), OpenMode::read_write_create, 100)
+      .execute("CREATE TABLE audit (x)");
   EXPECT_EQ(verify_audit(folder_.file("foreign.db")).error().fault, Fault::corrupt);
 }
 

@@ -95,7 +95,7 @@ std::vector<Progress> run_and_kill(const std::string& path, Tells tells, std::ch
 // The samples of the one mission, all of whose parts must agree.
 std::int64_t stored_samples(const std::string& path) {
   {
-    Database database(path, OpenMode::read_write_create, 1000);
+    SqliteDatabase database(path, OpenMode::read_write_create, 1000);
     EXPECT_EQ(database.text("PRAGMA integrity_check"), "ok");
     EXPECT_EQ(database.integer("SELECT count(*) FROM pragma_foreign_key_check"), 0);
   }

@@ -21,7 +21,7 @@ const Schema third{3, "CREATE TABLE colour (name TEXT NOT NULL, hue_deg REAL) ST
 
 class SchemaTest : public testing::Test {
  protected:
-  Database open() const { return {folder_.file("test.db"), OpenMode::read_write_create, 100}; }
+  SqliteDatabase open() const { return {folder_.file("test.db"), OpenMode::read_write_create, 100}; }
 
   TemporaryFolder folder_;
 };
@@ -34,7 +34,7 @@ void make_old(Database& database, std::int64_t version) {
 }
 
 TEST_F(SchemaTest, CreatesAnEmptyFileAtTheNewestVersion) {
-  Database database = open();
+  SqliteDatabase database = open();
   ASSERT_TRUE(bring_to_schema(database, third));
   EXPECT_EQ(database.integer("PRAGMA user_version"), 3);
   EXPECT_EQ(database.integer("PRAGMA application_id"), store_application_id);
@@ -45,7 +45,7 @@ TEST_F(SchemaTest, CreatesAnEmptyFileAtTheNewestVersion) {
 TEST_F(SchemaTest, MigratesFromEveryOlderVersion) {
   for (std::int64_t version = 0; version < 3; ++version) {
     const TemporaryFolder folder;
-    Database database(folder.file("old.db"), OpenMode::read_write_create, 100);
+    SqliteDatabase database(folder.file("old.db"), OpenMode::read_write_create, 100);
     make_old(database, version);
     const auto brought = bring_to_schema(database, third);
     ASSERT_TRUE(brought) << version << describe(brought.error());
@@ -56,9 +56,9 @@ TEST_F(SchemaTest, MigratesFromEveryOlderVersion) {
 
 TEST_F(SchemaTest, AFailingMigrationChangesNothing) {
   const Migration broken[] = {steps[0], steps[1], {2, "DELETE FROM colour; UPDATE nowhere SET x = 1;"}};
-  Database database = open();
+  SqliteDatabase database = open();
   make_old(database, 1);
-  EXPECT_THROW((void)bring_to_schema(database, Schema{3, third.sql, broken}), SqliteError);
+  EXPECT_THROW((void)bring_to_schema(database, Schema{3, third.sql, broken}), SqlError);
   EXPECT_FALSE(database.in_transaction());
   EXPECT_EQ(database.integer("PRAGMA user_version"), 1);
   EXPECT_EQ(database.integer("SELECT count(*) FROM colour"), 1);
@@ -67,7 +67,7 @@ TEST_F(SchemaTest, AFailingMigrationChangesNothing) {
 }
 
 TEST_F(SchemaTest, RefusesANewerFileAndNamesBothVersions) {
-  Database database = open();
+  SqliteDatabase database = open();
   make_old(database, 1);
   database.execute("PRAGMA user_version = 4");
   const auto brought = bring_to_schema(database, third);
@@ -78,7 +78,7 @@ TEST_F(SchemaTest, RefusesANewerFileAndNamesBothVersions) {
 }
 
 TEST_F(SchemaTest, RefusesAFileTooOldForTheList) {
-  Database database = open();
+  SqliteDatabase database = open();
   make_old(database, 1);
   const auto brought = bring_to_schema(database, Schema{3, third.sql, std::span(steps).subspan(2)});
   ASSERT_FALSE(brought);
@@ -87,7 +87,7 @@ TEST_F(SchemaTest, RefusesAFileTooOldForTheList) {
 }
 
 TEST_F(SchemaTest, RefusesADatabaseOfAnotherProgram) {
-  Database database = open();
+  SqliteDatabase database = open();
   database.execute("CREATE TABLE something (x)");
   const auto brought = bring_to_schema(database, third);
   ASSERT_FALSE(brought);
@@ -113,7 +113,7 @@ TEST_F(SchemaTest, AStoreOfVersionOneBecomesWhatAFreshOneIs) {
   std::ifstream file(JOULECAST_SOURCE_DIR "/tests/history/store_v1.sql");
   std::stringstream text;
   text << file.rdbuf();
-  Database old = open();
+  SqliteDatabase old = open();
   old.execute(text.str());
   old.execute(
       "INSERT INTO robot VALUES ('amr-1', 1, NULL); INSERT INTO model VALUES ('amr-1', 1, 1, 'file', '', "
@@ -122,7 +122,7 @@ TEST_F(SchemaTest, AStoreOfVersionOneBecomesWhatAFreshOneIs) {
   old.execute("PRAGMA user_version = 1");
   const auto brought = bring_to_schema(old, store_schema());
   ASSERT_TRUE(brought) << describe(brought.error());
-  Database fresh(folder_.file("fresh.db"), OpenMode::read_write_create, 100);
+  SqliteDatabase fresh(folder_.file("fresh.db"), OpenMode::read_write_create, 100);
   ASSERT_TRUE(bring_to_schema(fresh, store_schema()));
   EXPECT_EQ(column_list(old), column_list(fresh));
   EXPECT_EQ(old.text("SELECT group_concat(name) FROM (SELECT name FROM sqlite_schema WHERE type <> 'table' "
@@ -136,7 +136,7 @@ TEST_F(SchemaTest, DiagnosesOfVersionFourGetTheirSummaries) {
   std::ifstream file(JOULECAST_SOURCE_DIR "/tests/history/store_v1.sql");
   std::stringstream text;
   text << file.rdbuf();
-  Database database = open();
+  SqliteDatabase database = open();
   database.execute(text.str());
   database.execute("PRAGMA application_id = " + std::to_string(store_application_id));
   database.execute("PRAGMA user_version = 1");
@@ -164,7 +164,7 @@ TEST_F(SchemaTest, MissionsOfVersionFiveHaveNoCovariates) {
   std::ifstream file(JOULECAST_SOURCE_DIR "/tests/history/store_v1.sql");
   std::stringstream text;
   text << file.rdbuf();
-  Database database = open();
+  SqliteDatabase database = open();
   database.execute(text.str());
   database.execute("PRAGMA application_id = " + std::to_string(store_application_id));
   database.execute("PRAGMA user_version = 1");
@@ -192,7 +192,7 @@ TEST_F(SchemaTest, EmbedsTheSchemaFile) {
 }
 
 TEST_F(SchemaTest, EveryTableIsStrict) {
-  Database database = open();
+  SqliteDatabase database = open();
   ASSERT_TRUE(bring_to_schema(database, store_schema()));
   EXPECT_GT(database.integer("SELECT count(*) FROM pragma_table_list WHERE schema = 'main'"), 5);
   EXPECT_EQ(database.text("SELECT group_concat(name) FROM pragma_table_list WHERE schema = 'main' AND "

@@ -33,7 +33,7 @@ class SqliteStoreTest : public testing::Test {
 
 TEST_F(SqliteStoreTest, WritesAheadWithForeignKeys) {
   auto store = need(open());
-  Database other(path_, OpenMode::read_only, 50);
+  SqliteDatabase other(path_, OpenMode::read_only, 50);
   EXPECT_EQ(other.text("PRAGMA journal_mode"), "wal");
   // The foreign key is what refuses this.
   Mission m = new_mission(*store, "amr-1", "m", 0);
@@ -45,7 +45,7 @@ TEST_F(SqliteStoreTest, WritesAheadWithForeignKeys) {
 
 TEST_F(SqliteStoreTest, RefusesANewerSchemaAndLeavesTheFileAlone) {
   {
-    Database database(path_, OpenMode::read_write_create, 50);
+    SqliteDatabase database(path_, OpenMode::read_write_create, 50);
     ASSERT_TRUE(bring_to_schema(database, store_schema()));
     database.execute("PRAGMA user_version = 1000");
   }
@@ -176,7 +176,7 @@ TEST_F(SqliteStoreTest, AFullDiskFailsTheWholeBatchAndLaterTakesIt) {
   }
   for (const Outcome& outcome : need(store->apply(batch))) EXPECT_TRUE(outcome);
   EXPECT_EQ(need(store->telemetry(m.key, {}, {max_telemetry_samples, {}})).samples.size(), 50U * 1024);
-  EXPECT_EQ(Database(path_, OpenMode::read_only, 50).text("PRAGMA integrity_check"), "ok");
+  EXPECT_EQ(SqliteDatabase(path_, OpenMode::read_only, 50).text("PRAGMA integrity_check"), "ok");
 }
 
 TEST_F(SqliteStoreTest, ADamagedTailDoesNotStopWhatStillComes) {
@@ -188,7 +188,7 @@ TEST_F(SqliteStoreTest, ADamagedTailDoesNotStopWhatStillComes) {
     need(apply_one(*store, CheckpointMission{m, {}, some_samples(0, 0, 10), {}}));
   }
   {
-    Database database(path_, OpenMode::read_write_create, 50);
+    SqliteDatabase database(path_, OpenMode::read_write_create, 50);
     database.execute("UPDATE telemetry_chunk SET body = zeroblob(5), bytes = 5");
   }
   auto store = need(open());
@@ -205,7 +205,7 @@ TEST_F(SqliteStoreTest, ADamagedTailDoesNotStopWhatStillComes) {
 TEST_F(SqliteStoreTest, MergesSmallChunks) {
   auto store = need(open());
   Mission m = start_mission(*store, "amr-1", "m", 0);
-  Database other(path_, OpenMode::read_only, 50);
+  SqliteDatabase other(path_, OpenMode::read_only, 50);
   for (int i = 0; i < 250; ++i)
     need(apply_one(*store, CheckpointMission{m, {}, some_samples(100'000 * i, 10 * i, 10), {}}));
   // 2500 samples: two full chunks, and the tail of small ones.
@@ -219,7 +219,7 @@ TEST_F(SqliteStoreTest, MergesSmallChunks) {
 
 TEST_F(SqliteStoreTest, PagesOfMissionsComeFromAnIndex) {
   auto store = need(open());
-  Database other(path_, OpenMode::read_only, 50);
+  SqliteDatabase other(path_, OpenMode::read_only, 50);
   const auto plan = [&](const std::string& sql) {
     Rows rows(other.statement("EXPLAIN QUERY PLAN " + sql));
     std::string text;

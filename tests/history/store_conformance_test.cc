@@ -7,12 +7,12 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
-#include <functional>
-#include <ostream>
 #include <set>
 #include <thread>
 #include <tuple>
 
+#include "history/audit.h"
+#include "store_kind.h"
 #include "temporary_store.h"
 
 namespace joulecast::history {
@@ -20,23 +20,6 @@ namespace {
 
 using signals::CovariateChange;
 using signals::Sample;
-
-struct StoreKind {
-  std::string name;
-  // Opens the store kept in the folder, with a clock for retention.
-  std::function<std::unique_ptr<Store>(const TemporaryFolder&, std::function<std::int64_t()>)> open;
-};
-
-std::ostream& operator<<(std::ostream& out, const StoreKind& kind) {
-  return out << kind.name;
-}
-
-const StoreKind sqlite{"Sqlite", [](const TemporaryFolder& folder, std::function<std::int64_t()> clock) {
-                         SqliteOptions options;
-                         options.path = folder.file("store.db");
-                         options.now_utime_us = std::move(clock);
-                         return need(open_sqlite_store(options));
-                       }};
 
 class StoreConformance : public testing::TestWithParam<StoreKind> {
  protected:
@@ -557,6 +540,45 @@ TEST_P(StoreConformance, FiltersMissions) {
   EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[1].key));
 }
 
+TEST_P(StoreConformance, FindsPartsOfMissionNamesAsTheyAreWritten) {
+  const std::vector<std::string> names{"100%",        "a_b",   "axb",    "Tour!7",
+                                       "back\\slash", "Größe", "GRÖSSE", "tour"};
+  for (std::size_t k = 0; k < names.size(); ++k)
+    start_mission(*store_, "amr-1", names[k], static_cast<std::int64_t>(k));
+  const auto found = [&](const std::string& part) {
+    MissionFilter f;
+    f.name_contains = part;
+    std::vector<std::string> all;
+    for (const Mission& m :
+         need(store_->missions(f, {.limit = 100, .cursor = {}}, {MissionOrder::start, true})).missions)
+      all.push_back(m.mission_id);
+    return all;
+  };
+  EXPECT_THAT(found("%"), testing::ElementsAre("100%"));
+  EXPECT_THAT(found("_"), testing::ElementsAre("a_b"));
+  EXPECT_THAT(found("A_B"), testing::ElementsAre("a_b"));
+  EXPECT_THAT(found("!"), testing::ElementsAre("Tour!7"));
+  EXPECT_THAT(found("\\"), testing::ElementsAre("back\\slash"));
+  EXPECT_THAT(found("TOUR"), testing::ElementsAre("Tour!7", "tour"));
+  EXPECT_THAT(found("gr"), testing::ElementsAre("Größe", "GRÖSSE"));
+  // Only letters of ASCII are found in any case.
+  EXPECT_THAT(found("grö"), testing::ElementsAre("Größe"));
+  EXPECT_EQ(found("").size(), names.size());
+  EXPECT_TRUE(found(std::string(10'000, 'x')).empty());
+}
+
+TEST_P(StoreConformance, FiltersByAsManyRobotsAsAllowed) {
+  const auto missions = add_missions("amr-7", 2);
+  add_missions("amr-x", 1);
+  MissionFilter f;
+  for (std::size_t k = 0; k < max_filter_robots; ++k) f.robot_ids.push_back("amr-" + std::to_string(k));
+  f.states = {MissionState::open, MissionState::finished, MissionState::open};
+  EXPECT_THAT(walk(f, 1), testing::ElementsAre(missions[1].key, missions[0].key));
+  EXPECT_EQ(need(store_->totals(f)).missions, 2);
+  f.robot_ids.push_back("amr-x");
+  EXPECT_EQ(store_->totals(f).error().field, "robot_id");
+}
+
 TEST_P(StoreConformance, SortsMissionsInStablePages) {
   auto missions = add_missions("amr-1", 9);
   // Ratios 1.5, 0.5, 1.5, 0.5 ..., none of the last two.
@@ -700,6 +722,16 @@ TEST_P(StoreConformance, SumsOverMissions) {
   EXPECT_EQ(need(store_->totals({})).missions, 3);
   EXPECT_EQ(need(store_->totals({})).accounts.measured_j, 20);
   EXPECT_EQ(need(store_->missions({}, {.limit = 10, .cursor = {}})).missions.size(), 4U);
+  // Whatever the findings say: only a member of that name annuls.
+  missions[0].findings_json = R"({"contradictions":["\"annulled\":1, annulled"]})";
+  need(apply(CheckpointMission{missions[0], {}, {}, {}}));
+  EXPECT_EQ(need(store_->totals({})).missions, 3);
+  missions[0].findings_json =
+      annulled_findings(missions[0], 17, std::string("nul \0 \\u0000 \"annulled\":", 24));
+  need(apply(CheckpointMission{missions[0], {}, {}, {}}));
+  EXPECT_EQ(need(store_->totals({})).missions, 2);
+  EXPECT_EQ(need(store_->grouped_totals({}, Grouping::robot, 0)).front().totals.missions, 2);
+  EXPECT_EQ(findings_of(need(store_->mission(missions[0].key))).annulled, findings_of(missions[0]).annulled);
   MissionFilter nobody;
   nobody.robot_ids = {"nobody"};
   EXPECT_EQ(need(store_->totals(nobody)).missions, 0);
@@ -955,7 +987,9 @@ TEST_P(StoreConformance, KeepsEventsInOrder) {
   const Outcome first = apply(AppendEvent{{99, 10, "amr-1", "robot_seen", R"({"n": 1})"}});
   const Outcome second = apply(AppendEvent{{0, 5, "", "started", "{}"}});
   ASSERT_TRUE(first && second);
-  EXPECT_LT(*first, *second);
+  // Numbered without a hole, from 1 on.
+  EXPECT_EQ(*first, 1);
+  EXPECT_EQ(*second, 2);
   const auto all = need(store_->events(0, 10));
   ASSERT_EQ(all.size(), 2U);
   EXPECT_EQ(all[0].id, *first);
@@ -967,10 +1001,34 @@ TEST_P(StoreConformance, KeepsEventsInOrder) {
   EXPECT_EQ(need(store_->events(*first, 10)).size(), 1U);
   EXPECT_EQ(need(store_->events(0, 1)).size(), 1U);
   EXPECT_EQ(need(store_->events(0, 10, "amr-1")).size(), 1U);
+  reopen();
+  EXPECT_EQ(apply(AppendEvent{{0, 6, "", "started", "{}"}}), 3);
   EXPECT_EQ(apply(AppendEvent{{0, 5, "", "bad", "{"}}).error().fault, Fault::invalid);
 }
 
 // ---- threads
+
+TEST_P(StoreConformance, TheAuditIsAChainWhileTheStoreIsOpenAndAfter) {
+  EXPECT_EQ(need(verify_audit(GetParam().url(folder_))).entries, 0);
+  const auto append = [&](const std::string& actor) {
+    return apply(AppendAudit{{0, ++now_utime_us_, actor, "192.0.2.7", "r-1", "putRobot", R"({"a": 1})", ""}});
+  };
+  for (int k = 1; k <= 3; ++k) EXPECT_EQ(append("größer-" + std::to_string(k)), k);
+  std::vector<AuditEntry> entries;
+  const AuditState state = need(
+      verify_audit(GetParam().url(folder_), {}, [&](const AuditEntry& entry) { entries.push_back(entry); }));
+  EXPECT_EQ(state.entries, 3);
+  ASSERT_EQ(entries.size(), 3U);
+  EXPECT_EQ(entries[1].actor, "größer-2");
+  EXPECT_EQ(entries[1].detail_json, R"({"a": 1})");
+  EXPECT_EQ(entries[2].hash, state.head);
+  // A refused entry is no link.
+  EXPECT_EQ(apply(AppendAudit{{0, 1, "", "", "", "", "{}", ""}}).error().fault, Fault::invalid);
+  reopen();
+  EXPECT_EQ(append("dave"), 4);
+  EXPECT_EQ(need(verify_audit(GetParam().url(folder_), state.head)).entries, 4);
+  EXPECT_EQ(verify_audit(GetParam().url(folder_), std::string(64, '1')).error().fault, Fault::corrupt);
+}
 
 TEST_P(StoreConformance, ReadersSeeWholeTransactionsWhileOneWrites) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
@@ -1061,7 +1119,7 @@ TEST_P(StoreConformance, OldMissionsAreDroppedOldestFirst) {
   EXPECT_EQ(walk({}, 10), (std::vector<MissionKey>{missions[4].key, open.key}));
 }
 
-INSTANTIATE_TEST_SUITE_P(Stores, StoreConformance, testing::Values(sqlite),
+INSTANTIATE_TEST_SUITE_P(Stores, StoreConformance, testing::Values(store_kind()),
                          [](const auto& kind) { return kind.param.name; });
 
 }  // namespace

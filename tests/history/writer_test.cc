@@ -240,12 +240,12 @@ TEST_F(WriterTest, TriesAgainUntilTheDiskIsWellAndLosesNothing) {
 }
 
 TEST_F(WriterTest, WaitsOutALockOfAnotherProcess) {
-  Database other(folder_.file("store.db"), OpenMode::read_write_create, 100);
+  SqliteDatabase other(folder_.file("store.db"), OpenMode::read_write_create, 100);
   WriterOptions o = options();
   {
     Writer writer(store_, o);
     {
-      const Transaction lock(other, Transaction::Kind::write);
+      const Transaction lock(other, Database::Access::write);
       ASSERT_TRUE(writer.post(event(0)));
       // SQLite's own patience (2 s) runs out first.
       ASSERT_TRUE(eventually([&] { return writer.status().failed_commits >= 1; }));

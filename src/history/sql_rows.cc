@@ -1,6 +1,5 @@
-#include "history/sqlite_rows.h"
+#include "history/sql_rows.h"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 namespace joulecast::history {
@@ -187,12 +186,6 @@ ResumeState read_resume_state(Rows& rows) {
   s.state_of_charge = rows.real();
   for (double& celsius : s.winding_temperature_c) celsius = rows.real();
   return s;
-}
-
-std::string placeholders(std::string_view columns) {
-  std::string marks = "?";
-  for (auto commas = std::count(columns.begin(), columns.end(), ','); commas > 0; --commas) marks += ", ?";
-  return marks;
 }
 
 }  // namespace joulecast::history

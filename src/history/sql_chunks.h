@@ -5,10 +5,10 @@
 
 #include "base/error.h"
 #include "history/commands.h"
-#include "history/sqlite.h"
+#include "history/sql.h"
 #include "history/store.h"
 
-// Raw telemetry and covariates as SQL: two tables of one shape (schemas/store.sql). They throw SqliteError.
+// Raw telemetry and covariates as SQL: two tables of one shape (schemas/store.sql). They throw SqlError.
 namespace joulecast::history::chunks {
 
 // Samples or changes of a sealed chunk: large enough to compress well, small enough to decode in a fraction

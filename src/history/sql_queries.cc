@@ -1,9 +1,9 @@
-#include "history/sqlite_queries.h"
+#include "history/sql_queries.h"
 
 #include <utility>
 
-#include "history/sqlite_chunks.h"
-#include "history/sqlite_rows.h"
+#include "history/sql_chunks.h"
+#include "history/sql_rows.h"
 #include "history/trace_merge.h"
 
 namespace joulecast::history::queries {
@@ -25,7 +25,8 @@ bool has_robot(Database& database, std::string_view robot_id) {
 
 constexpr std::string_view select_model =
     "SELECT model.robot_id, version, model.created_utime_us, origin, note, parent_version, "
-    "version IS active_version, model_json, coalesce(evidence_json, '') FROM model JOIN robot USING "
+    "coalesce(version = active_version, FALSE), model_json, coalesce(evidence_json, '') FROM model JOIN "
+    "robot USING "
     "(robot_id) WHERE model.robot_id = ?";
 
 Result<ModelVersion> read_model(Rows& rows) {
@@ -136,7 +137,7 @@ Result<Trace> trace(Database& database, MissionKey key, TimeRange range, std::in
   }
   if (!first || !last) return Trace{};
   TraceMerger merger(*first, merged_width_us(*first, *last + 1, max_points));
-  static const std::string sql = "SELECT " + std::string(trace_columns) +
+  static const std::string sql = "SELECT start_utime_us, " + std::string(trace_columns) +
                                  " FROM trace WHERE mission_key = ? AND start_utime_us >= ? AND "
                                  "start_utime_us < ? ORDER BY start_utime_us";
   Rows rows(database.statement(sql));
@@ -187,7 +188,7 @@ Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std
 
 Result<std::optional<ResumeState>> resume_state(Database& database, std::string_view robot_id) {
   static const std::string sql =
-      "SELECT " + std::string(resume_state_columns) + " FROM energy_state WHERE robot_id = ?";
+      "SELECT robot_id, " + std::string(resume_state_columns) + " FROM energy_state WHERE robot_id = ?";
   Rows rows(database.statement(sql));
   rows.bind(robot_id);
   if (!rows.next()) return std::nullopt;

@@ -1,13 +1,14 @@
 // Queries of missions: filters, orders, pages and sums.
+#include <algorithm>
 #include <bit>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 #include "history/cursor.h"
-#include "history/sqlite_queries.h"
-#include "history/sqlite_rows.h"
+#include "history/sql_queries.h"
+#include "history/sql_rows.h"
 #include "signals/account_ratios.h"
-#include "signals/ids.h"
 
 namespace joulecast::history::queries {
 namespace {
@@ -37,57 +38,60 @@ const std::string& state_sql() {
   return sql;
 }
 
-// Visits the conditions of a filter that are set, each with what it binds.
-template <class Visit>
-void visit_filter(const MissionFilter& f, const std::string& robots_json, Visit visit) {
-  // One robot by itself lets the index by robot and start give the order, too.
-  if (f.robot_ids.size() == 1) visit("robot_id = ?", f.robot_ids.front());
-  if (f.robot_ids.size() > 1) visit("robot_id IN (SELECT value FROM json_each(?))", robots_json);
-  if (f.mission_id) visit("mission_id = ?", *f.mission_id);
-  if (f.name_contains) visit("instr(lower(mission_id), lower(?)) > 0", *f.name_contains);
-  if (f.start_from_utime_us) visit("start_utime_us >= ?", *f.start_from_utime_us);
-  if (f.start_to_utime_us) visit("start_utime_us < ?", *f.start_to_utime_us);
-  if (!f.states.empty()) {
-    std::int64_t among = 0;
-    for (const MissionState state : f.states) among |= std::int64_t{1} << static_cast<unsigned>(state);
-    visit("(? >> " + state_sql() + ") & 1", among);
-  }
-  if (f.incomplete) visit("incomplete = ?", std::int64_t{*f.incomplete});
-  if (f.payload_min_kg) visit("payload_kg >= ?", *f.payload_min_kg);
-  if (f.payload_max_kg) visit("payload_kg <= ?", *f.payload_max_kg);
-  if (f.ratio_min) visit(ratio_sql() + " >= ?", *f.ratio_min);
-  if (f.ratio_max) visit(ratio_sql() + " <= ?", *f.ratio_max);
+std::string among(const std::string& column, std::size_t values) {
+  std::string sql = column + " IN (?";
+  for (std::size_t k = 1; k < values; ++k) sql += ", ?";
+  return sql + ")";
 }
 
-// Robots whose names JSON would have to escape have no missions: ids are of letters, digits and ". _ -".
-std::string robots_json_of(const MissionFilter& f) {
-  std::string text = "[";
-  for (const std::string& id : f.robot_ids)
-    if (signals::is_valid_robot_id(id)) text += (text.size() > 1 ? ",\"" : "\"") + id + '"';
-  return text + "]";
+// A pattern of LIKE, whose escape is '!', for texts in lower case that contain the part. Like SQL's lower(),
+// it knows the letters of ASCII.
+std::string pattern_of(const std::string& part) {
+  std::string pattern = "%";
+  for (const char c : part) {
+    if (c == '%' || c == '_' || c == '!') pattern += '!';
+    pattern += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  }
+  return pattern + "%";
 }
 
 // A filter as SQL. Outlives the rows that it is bound to.
 class Where {
  public:
-  explicit Where(const MissionFilter& filter) : filter_(filter), robots_json_(robots_json_of(filter)) {
-    visit_filter(filter_, robots_json_,
-                 [&](const std::string& condition, const auto&) { sql_ += " AND " + condition; });
+  explicit Where(const MissionFilter& filter) : filter_(filter) {
+    if (filter.name_contains) pattern_ = pattern_of(*filter.name_contains);
+    // In an order of their own and once each.
+    for (std::size_t k = 0; k < mission_state_count; ++k) {
+      const auto state = static_cast<MissionState>(k);
+      if (std::ranges::find(filter.states, state) != filter.states.end()) states_.emplace_back(name(state));
+    }
+    visit([this](const std::string& condition, const auto&) { sql_ += " AND " + condition; });
   }
 
   const std::string& sql() const { return sql_; }
 
   void bind(Rows& rows) const {
-    visit_filter(filter_, robots_json_, [&](const std::string&, const auto& value) { rows.bind(value); });
+    visit([&rows](const std::string&, const auto& value) {
+      if constexpr (std::is_same_v<std::decay_t<decltype(value)>, std::vector<std::string>>) {
+        for (const std::string& one : value) rows.bind(one);
+      } else {
+        rows.bind(value);
+      }
+    });
   }
 
   // Tells filters apart for cursors. Text values carry their length, so that no two read alike.
   std::string identity() const {
     std::string text = sql_;
-    visit_filter(filter_, robots_json_, [&](const std::string&, const auto& value) {
+    const auto add = [&text](const std::string& value) {
+      text += '|' + std::to_string(value.size()) + ':' + value;
+    };
+    visit([&](const std::string&, const auto& value) {
       using Value = std::decay_t<decltype(value)>;
       if constexpr (std::is_same_v<Value, std::string>) {
-        text += '|' + std::to_string(value.size()) + ':' + value;
+        add(value);
+      } else if constexpr (std::is_same_v<Value, std::vector<std::string>>) {
+        for (const std::string& one : value) add(one);
       } else {
         text += '|' + std::to_string(std::bit_cast<std::int64_t>(value));
       }
@@ -96,9 +100,29 @@ class Where {
   }
 
  private:
+  // Visits the conditions that are set, each with what it binds.
+  template <class Visit>
+  void visit(Visit visit) const {
+    const MissionFilter& f = filter_;
+    // One robot by itself lets the index by robot and start give the order, too.
+    if (f.robot_ids.size() == 1) visit("robot_id = ?", f.robot_ids.front());
+    if (f.robot_ids.size() > 1) visit(among("robot_id", f.robot_ids.size()), f.robot_ids);
+    if (f.mission_id) visit("mission_id = ?", *f.mission_id);
+    if (f.name_contains) visit("lower(mission_id) LIKE ? ESCAPE '!'", pattern_);
+    if (f.start_from_utime_us) visit("start_utime_us >= ?", *f.start_from_utime_us);
+    if (f.start_to_utime_us) visit("start_utime_us < ?", *f.start_to_utime_us);
+    if (!states_.empty()) visit(among("state", states_.size()), states_);
+    if (f.incomplete) visit("incomplete = ?", std::int64_t{*f.incomplete});
+    if (f.payload_min_kg) visit("payload_kg >= ?", *f.payload_min_kg);
+    if (f.payload_max_kg) visit("payload_kg <= ?", *f.payload_max_kg);
+    if (f.ratio_min) visit(ratio_sql() + " >= ?", *f.ratio_min);
+    if (f.ratio_max) visit(ratio_sql() + " <= ?", *f.ratio_max);
+  }
+
   const MissionFilter& filter_;
-  std::string robots_json_;
-  std::string sql_ = " WHERE 1";
+  std::string pattern_;
+  std::vector<std::string> states_;
+  std::string sql_ = " WHERE TRUE";
 };
 
 Result<void> check_bounds(const std::string& field, const std::string& other, std::optional<double> min,
@@ -209,16 +233,18 @@ bool has_mission(Database& database, MissionKey key) {
   return rows.bind(key).next();
 }
 
-// Annulled missions are in no sum.
+// Annulled missions are in no sum. Of the findings, whose text is as annulled_findings() writes it, only the
+// name of a member has its quotes without a backslash.
 constexpr std::string_view not_annulled =
-    " AND (findings_json IS NULL OR json_type(findings_json, '$.annulled') IS NULL)";
+    " AND (findings_json IS NULL OR findings_json NOT LIKE '%\"annulled\":%')";
 
 const std::string& select_totals() {
   static const std::string sql = [] {
     std::string sums = "sum(";
     for (const char c : accounts_columns()) sums += c == ',' ? std::string("), sum(") : std::string(1, c);
-    return "count(*), coalesce(sum(measured_s > 0), 0), coalesce(sum(incomplete), 0), coalesce(sum(samples), "
-           "0), coalesce(sum(gap_count), 0), coalesce(sum(gap_s), 0.0), " +
+    return "count(*), count(*) FILTER (WHERE measured_s > 0), count(*) FILTER (WHERE incomplete = 1), "
+           "CAST(coalesce(sum(samples), 0) AS BIGINT), CAST(coalesce(sum(gap_count), 0) AS BIGINT), "
+           "coalesce(sum(gap_s), 0.0), " +
            sums + ") FROM mission";
   }();
   return sql;
@@ -265,8 +291,8 @@ Result<MissionPage> missions(Database& database, const MissionFilter& filter, co
                           (behind ? behind->sql() : "") + " ORDER BY " +
                           (column.kind == Kind::real ? column.sql + " IS NULL, " : "") + column.sql +
                           direction + ", mission_key" + direction + " LIMIT ?";
-  Statement statement = database.prepare(sql);
-  Rows rows(statement);
+  const auto statement = database.prepare(sql);
+  Rows rows(*statement);
   where.bind(rows);
   if (behind) behind->bind(rows);
   // One more than asked for tells whether a page follows.
@@ -290,8 +316,8 @@ Result<Totals> totals(Database& database, const MissionFilter& filter) {
   if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
   const Where where(filter);
   const std::string sql = "SELECT " + select_totals() + where.sql() + std::string(not_annulled);
-  Statement statement = database.prepare(sql);
-  Rows rows(statement);
+  const auto statement = database.prepare(sql);
+  Rows rows(*statement);
   where.bind(rows);
   rows.next();
   return read_totals(rows);
@@ -309,8 +335,8 @@ Result<std::vector<TotalsGroup>> grouped_totals(Database& database, const Missio
   const std::string sql = "SELECT " + group + ", " + select_totals() + where.sql() +
                           std::string(not_annulled) + " GROUP BY 1 ORDER BY 1 LIMIT " +
                           std::to_string(max_groups + 1);
-  Statement statement = database.prepare(sql);
-  Rows rows(statement);
+  const auto statement = database.prepare(sql);
+  Rows rows(*statement);
   // 1970 began on a Thursday, three days after a Monday.
   if (by != Grouping::robot)
     rows.bind(utc_offset_s * 1'000'000 + (by == Grouping::week ? 3 * day_us : std::int64_t{0}));

@@ -1,12 +1,11 @@
-#include "history/sqlite_changes.h"
+#include "history/sql_changes.h"
 
-#include <algorithm>
 #include <string>
 #include <utility>
 
 #include "history/audit.h"
-#include "history/sqlite_chunks.h"
-#include "history/sqlite_rows.h"
+#include "history/sql_chunks.h"
+#include "history/sql_rows.h"
 
 namespace joulecast::history {
 namespace {
@@ -38,41 +37,52 @@ Result<void> check_covariates(const std::vector<signals::CovariateChange>& chang
 
 }  // namespace
 
-SqliteChanges::SqliteChanges(Database& database, std::function<std::int64_t()> now_utime_us)
+SqlChanges::SqlChanges(Database& database, std::function<std::int64_t()> now_utime_us)
     : database_(database), now_utime_us_(std::move(now_utime_us)) {}
 
-std::vector<Outcome> SqliteChanges::apply(std::span<const Command> commands) {
-  std::vector<Outcome> outcomes;
-  outcomes.reserve(commands.size());
-  Transaction transaction(database_, Transaction::Kind::write);
-  for (const Command& command : commands) outcomes.push_back(apply_whole(command));
-  transaction.commit();
-  const auto deletes = [](const Command& c) {
-    return std::holds_alternative<Prune>(c) || std::holds_alternative<PruneMissions>(c) ||
-           std::holds_alternative<RemoveRobot>(c);
-  };
-  if (std::ranges::any_of(commands, deletes)) give_back();
-  return outcomes;
-}
-
-void SqliteChanges::give_back() {
-  // Free pages are used again; only a store that has shrunk gives them back, 16 MB at a time. A store of
-  // before incremental vacuum has none to give until it is restored from a backup.
-  constexpr std::int64_t most_free_share = 8, pages = 4096;
-  try {
-    if (database_.integer("PRAGMA freelist_count") * most_free_share > database_.integer("PRAGMA page_count"))
-      database_.execute("PRAGMA incremental_vacuum(" + std::to_string(pages) + ")");
-  } catch (const SqliteError&) {
-    // The changes are committed; the next ones try again.
+void SqlChanges::apply(std::span<const Command> commands, const std::function<void()>& before_commit,
+                       std::vector<Outcome>& outcomes) {
+  // Nearly always no command is refused, and then none needs a savepoint of its own.
+  {
+    Transaction transaction(database_, Database::Access::write);
+    if (apply_unguarded(commands, outcomes)) {
+      if (before_commit) before_commit();
+      return transaction.commit();
+    }
   }
+  outcomes.clear();
+  Transaction transaction(database_, Database::Access::write);
+  for (const Command& command : commands) outcomes.push_back(apply_guarded(command));
+  if (before_commit) before_commit();
+  transaction.commit();
 }
 
-Outcome SqliteChanges::apply_whole(const Command& command) {
+bool SqlChanges::apply_unguarded(std::span<const Command> commands, std::vector<Outcome>& outcomes) {
+  try {
+    for (const Command& command : commands) {
+      outcomes.push_back(run_one(command));
+      if (!outcomes.back()) return false;
+    }
+    database_.finish_later();
+  } catch (const SqlError& error) {
+    if (!error.is_about_values()) throw;
+    return false;
+  }
+  return true;
+}
+
+Outcome SqlChanges::run_one(const Command& command) {
+  return std::visit([this](const auto& c) { return run(c); }, command);
+}
+
+Outcome SqlChanges::apply_guarded(const Command& command) {
   Rows(database_.statement("SAVEPOINT command")).run();
   Outcome outcome = [&]() -> Outcome {
     try {
-      return std::visit([this](const auto& c) { return run(c); }, command);
-    } catch (const SqliteError& error) {
+      Outcome done = run_one(command);
+      database_.finish_later();
+      return done;
+    } catch (const SqlError& error) {
       if (!error.is_about_values()) throw;
       return invalid("", error.what());
     }
@@ -82,15 +92,15 @@ Outcome SqliteChanges::apply_whole(const Command& command) {
   return outcome;
 }
 
-void SqliteChanges::make_robot(const std::string& robot_id) {
+void SqlChanges::make_robot(const std::string& robot_id) {
   Rows(database_.statement(
            "INSERT INTO robot (robot_id, created_utime_us) VALUES (?, ?) ON CONFLICT DO NOTHING"))
       .bind(robot_id)
       .bind(now_utime_us_())
-      .run();
+      .run_later();
 }
 
-Outcome SqliteChanges::run(const AddModel& c) {
+Outcome SqlChanges::run(const AddModel& c) {
   if (auto ok = check_robot_id(c.robot_id); !ok) return tl::unexpected(ok.error());
   make_robot(c.robot_id);
   std::optional<std::int64_t> active;
@@ -129,7 +139,7 @@ Outcome SqliteChanges::run(const AddModel& c) {
   return run(ActivateModel{c.robot_id, version});
 }
 
-Outcome SqliteChanges::run(const ActivateModel& c) {
+Outcome SqlChanges::run(const ActivateModel& c) {
   const std::int64_t changed =
       Rows(database_.statement("UPDATE robot SET active_version = ?1 WHERE robot_id = ?2 AND EXISTS "
                                "(SELECT 1 FROM model WHERE robot_id = ?2 AND version = ?1)"))
@@ -142,7 +152,7 @@ Outcome SqliteChanges::run(const ActivateModel& c) {
   return c.version;
 }
 
-Outcome SqliteChanges::run(const StartMission& c) {
+Outcome SqlChanges::run(const StartMission& c) {
   const Mission& m = c.mission;
   if (auto ok = check_robot_id(m.robot_id); !ok) return tl::unexpected(ok.error());
   if (m.key <= 0) return invalid("key", "must be one that mission_key() gave");
@@ -159,7 +169,7 @@ Outcome SqliteChanges::run(const StartMission& c) {
                   "key " + std::to_string(m.key) + " and mission '" + m.mission_id + "' of robot '" +
                       m.robot_id + "' do not belong together");
   }
-  Rows(database_.statement("DELETE FROM mission WHERE mission_key = ?")).bind(m.key).run();
+  Rows(database_.statement("DELETE FROM mission WHERE mission_key = ?")).bind(m.key).run_later();
   static const std::string insert = "INSERT INTO mission (" + std::string(mission_identity_columns) + ", " +
                                     mission_content_columns() + ") VALUES (" +
                                     placeholders(mission_identity_columns) + ", " +
@@ -168,11 +178,11 @@ Outcome SqliteChanges::run(const StartMission& c) {
   Rows rows(database_.statement(insert));
   bind_mission_identity(rows, m);
   bind_mission_content(rows, m, faults, covariates);
-  rows.run();
+  rows.run_later();
   return m.key;
 }
 
-Outcome SqliteChanges::run(const CheckpointMission& c) {
+Outcome SqlChanges::run(const CheckpointMission& c) {
   const Mission& m = c.mission;
   if (auto ok = check_trace(c.trace); !ok) return tl::unexpected(ok.error());
   if (auto ok = check_covariates(c.covariates); !ok) return tl::unexpected(ok.error());
@@ -184,14 +194,12 @@ Outcome SqliteChanges::run(const CheckpointMission& c) {
     bind_mission_content(rows, m, faults, covariates);
     if (rows.bind(m.key).run() == 0) return no_mission(m.key);
   }
-  static const std::string replace = "INSERT OR REPLACE INTO trace (mission_key, " +
-                                     std::string(trace_columns) + ") VALUES (?, " +
-                                     placeholders(trace_columns) + ")";
+  static const std::string replace = insert_or_replace("trace", "mission_key, start_utime_us", trace_columns);
   for (const TraceBucket& bucket : c.trace) {
     Rows rows(database_.statement(replace));
     rows.bind(m.key);
     bind_bucket(rows, bucket);
-    rows.run();
+    rows.run_later();
   }
   const bool ended = m.state != MissionState::open;
   chunks::append(database_, m.key, c.samples, ended, now_utime_us_());
@@ -200,34 +208,31 @@ Outcome SqliteChanges::run(const CheckpointMission& c) {
   return m.key;
 }
 
-void SqliteChanges::put(const ResumeState& state) {
+void SqlChanges::put(const ResumeState& state) {
   make_robot(state.robot_id);
-  static const std::string replace = "INSERT OR REPLACE INTO energy_state (" +
-                                     std::string(resume_state_columns) + ") VALUES (" +
-                                     placeholders(resume_state_columns) + ")";
+  static const std::string replace = insert_or_replace("energy_state", "robot_id", resume_state_columns);
   Rows rows(database_.statement(replace));
   bind_resume_state(rows, state);
-  rows.run();
+  rows.run_later();
 }
 
-Outcome SqliteChanges::run(const PutResumeState& c) {
+Outcome SqlChanges::run(const PutResumeState& c) {
   if (auto ok = check_robot_id(c.state.robot_id); !ok) return tl::unexpected(ok.error());
   put(c.state);
   return 0;
 }
 
-Outcome SqliteChanges::run(const PutLearned& c) {
+Outcome SqlChanges::run(const PutLearned& c) {
   if (auto ok = check_robot_id(c.learned.robot_id); !ok) return tl::unexpected(ok.error());
   make_robot(c.learned.robot_id);
-  Rows rows(
-      database_.statement("INSERT OR REPLACE INTO learned (robot_id, topic, utime_us, body_json) "
-                          "VALUES (?, ?, ?, ?)"));
+  static const std::string replace = insert_or_replace("learned", "robot_id, topic", "utime_us, body_json");
+  Rows rows(database_.statement(replace));
   rows.bind(c.learned.robot_id).bind(c.learned.topic).bind(c.learned.utime_us).bind(c.learned.body_json);
-  rows.run();
+  rows.run_later();
   return 0;
 }
 
-Outcome SqliteChanges::run(const AppendEvent& c) {
+Outcome SqlChanges::run(const AppendEvent& c) {
   Rows rows(
       database_.statement("INSERT INTO event (utime_us, robot_id, kind, detail_json) VALUES (?, nullif(?, "
                           "''), ?, ?) RETURNING event_id"));
@@ -238,17 +243,17 @@ Outcome SqliteChanges::run(const AppendEvent& c) {
   return id;
 }
 
-Outcome SqliteChanges::run(const AppendAudit& c) {
+Outcome SqlChanges::run(const AppendAudit& c) {
   return append_audit(database_, c.entry);
 }
 
-Outcome SqliteChanges::run(const Prune& c) {
+Outcome SqlChanges::run(const Prune& c) {
   const Retention& keep = c.retention;
   if (c.max_chunks < 1) return invalid("max_chunks", "must be at least 1");
   return chunks::prune(database_, keep, c.max_chunks, now_utime_us_());
 }
 
-Outcome SqliteChanges::run(const PruneMissions& c) {
+Outcome SqlChanges::run(const PruneMissions& c) {
   if (c.max_missions < 1) return invalid("max_missions", "must be at least 1");
   return Rows(database_.statement("DELETE FROM mission WHERE mission_key IN (SELECT mission_key FROM mission "
                                   "WHERE state <> 'open' "
@@ -258,7 +263,7 @@ Outcome SqliteChanges::run(const PruneMissions& c) {
       .run();
 }
 
-Outcome SqliteChanges::run(const RemoveRobot& c) {
+Outcome SqlChanges::run(const RemoveRobot& c) {
   const auto change = [&](std::string_view sql) {
     return Rows(database_.statement(sql)).bind(c.robot_id).run();
   };

@@ -1,4 +1,4 @@
-#include "history/sqlite_chunks.h"
+#include "history/sql_chunks.h"
 
 #include <algorithm>
 #include <string>
@@ -14,6 +14,9 @@ namespace {
 
 using signals::CovariateChange;
 using signals::Sample;
+
+// Chunks read by one query, so that a page of a long mission does not bring all of it; more than one.
+constexpr std::int64_t chunks_at_once = 64;
 
 // zstd levels: a tail chunk is soon written again, a sealed one is kept.
 constexpr int tail_level = 1;
@@ -74,7 +77,7 @@ void insert_chunk(Database& database, MissionKey key, std::int64_t first_ordinal
       .bind(sealed)
       .bind(static_cast<std::int64_t>(body.size()))
       .bind(std::span<const std::byte>(body))
-      .run();
+      .run_later();
 }
 
 template <class Item>
@@ -96,7 +99,7 @@ std::vector<Item> take_tail(Database& database, MissionKey key) {
     }
   }
   // Damaged on disk: left as it is for the reader to report, and out of the way of what still comes.
-  Rows(database.statement(readable ? drop : seal)).bind(key).run();
+  Rows(database.statement(readable ? drop : seal)).bind(key).run_later();
   if (!readable) all.clear();
   return all;
 }
@@ -106,7 +109,8 @@ void append_items(Database& database, MissionKey key, std::span<const Item> item
                   std::int64_t now_utime_us) {
   if (items.empty() && !ended) return;
   static const std::string count = sql_of<Item>(
-      "SELECT $counter, (SELECT coalesce(sum($items), 0) FROM $table WHERE mission_key = ?1 AND sealed = 0) "
+      "SELECT $counter, (SELECT CAST(coalesce(sum($items), 0) AS BIGINT) FROM $table WHERE mission_key = ?1 "
+      "AND sealed = 0) "
       "FROM mission WHERE mission_key = ?1");
   std::int64_t next_ordinal = 0, in_tail = 0;
   {
@@ -135,7 +139,7 @@ void append_items(Database& database, MissionKey key, std::span<const Item> item
   Rows(database.statement(advance))
       .bind(next_ordinal + static_cast<std::int64_t>(items.size()))
       .bind(key)
-      .run();
+      .run_later();
 }
 
 // A page of items of the range in order of arrival, into `out`; answers the cursor of the next page.
@@ -153,22 +157,26 @@ Result<std::string> read_page(Database& database, MissionKey key, TimeRange rang
   static const std::string select = sql_of<Item>(
       "SELECT first_ordinal, body FROM $table WHERE mission_key = ?1 AND first_ordinal >= "
       "coalesce((SELECT max(first_ordinal) FROM $table WHERE mission_key = ?1 AND first_ordinal <= ?2), 0) "
-      "AND end_utime_us >= ?3 AND start_utime_us < ?4 ORDER BY first_ordinal");
-  Rows rows(database.statement(select));
-  rows.bind(key).bind(from_ordinal).bind(range.from_utime_us).bind(range.to_utime_us);
-  while (rows.next()) {
-    std::int64_t ordinal = rows.integer();
-    const auto items = Table<Item>::decode(rows.blob());
-    if (!items) return tl::unexpected(items.error());
-    for (const Item& item : *items) {
-      const std::int64_t at = ordinal++;
-      if (at < from_ordinal || item.utime_us < range.from_utime_us || item.utime_us >= range.to_utime_us)
-        continue;
-      if (static_cast<std::int64_t>(out.size()) == page.limit) return encode_cursor(query, {at, 0});
-      out.push_back(item);
+      "AND end_utime_us >= ?3 AND start_utime_us < ?4 ORDER BY first_ordinal LIMIT ?5");
+  for (;;) {
+    Rows rows(database.statement(select));
+    rows.bind(key).bind(from_ordinal).bind(range.from_utime_us).bind(range.to_utime_us).bind(chunks_at_once);
+    std::int64_t chunks = 0, ordinal = from_ordinal;
+    for (; rows.next(); ++chunks) {
+      ordinal = rows.integer();
+      const auto items = Table<Item>::decode(rows.blob());
+      if (!items) return tl::unexpected(items.error());
+      for (const Item& item : *items) {
+        const std::int64_t at = ordinal++;
+        if (at < from_ordinal || item.utime_us < range.from_utime_us || item.utime_us >= range.to_utime_us)
+          continue;
+        if (static_cast<std::int64_t>(out.size()) == page.limit) return encode_cursor(query, {at, 0});
+        out.push_back(item);
+      }
     }
+    if (chunks < chunks_at_once) return std::string();
+    from_ordinal = ordinal;
   }
-  return std::string();
 }
 
 }  // namespace
@@ -203,8 +211,8 @@ Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange r
 
 std::int64_t encoded_bytes(Database& database) {
   return database.integer(
-      "SELECT (SELECT coalesce(sum(bytes), 0) FROM telemetry_chunk) + "
-      "(SELECT coalesce(sum(bytes), 0) FROM covariate_chunk)");
+      "SELECT CAST((SELECT coalesce(sum(bytes), 0) FROM telemetry_chunk) + "
+      "(SELECT coalesce(sum(bytes), 0) FROM covariate_chunk) AS BIGINT)");
 }
 
 std::int64_t count(Database& database) {

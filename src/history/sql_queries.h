@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "base/error.h"
-#include "history/sqlite.h"
+#include "history/sql.h"
 #include "history/store.h"
 
-// Store's queries as SQL, each on a connection within a read transaction. They throw SqliteError.
+// Store's queries as SQL, each on a connection within a read transaction. They throw SqlError.
 namespace joulecast::history::queries {
 
 // All rows, each through `read`, up to the first error.

@@ -2,8 +2,8 @@
 #include <string>
 #include <utility>
 
-#include "history/sqlite_changes.h"
-#include "history/sqlite_queries.h"
+#include "history/sql_changes.h"
+#include "history/sql_queries.h"
 
 // Diagnoses and proposals as rows: the commands that change them and the queries that read them.
 namespace joulecast::history {
@@ -108,7 +108,7 @@ Result<std::vector<T>> page(Database& database, const std::string& select, std::
 
 }  // namespace
 
-Outcome SqliteChanges::run(const AddDiagnosis& c) {
+Outcome SqlChanges::run(const AddDiagnosis& c) {
   const DiagnosisRecord& d = c.diagnosis;
   Rows(database_.statement(
            "DELETE FROM diagnosis WHERE robot_id = ?1 AND state NOT IN ('queued', 'running') AND "
@@ -130,7 +130,7 @@ Outcome SqliteChanges::run(const AddDiagnosis& c) {
   return id;
 }
 
-Outcome SqliteChanges::run(const UpdateDiagnosis& c) {
+Outcome SqlChanges::run(const UpdateDiagnosis& c) {
   const DiagnosisRecord& d = c.diagnosis;
   const std::string fitted_on = keys_json(d.fitted_on), held_back = keys_json(d.held_back);
   const auto changed =
@@ -153,15 +153,13 @@ Outcome SqliteChanges::run(const UpdateDiagnosis& c) {
           .run();
   if (changed == 0) return no_diagnosis(d.id);
   if (!c.report_html.empty()) {
-    Rows(database_.statement("INSERT OR REPLACE INTO diagnosis_report (diagnosis_id, html) VALUES (?, ?)"))
-        .bind(d.id)
-        .bind(c.report_html)
-        .run();
+    static const std::string replace = insert_or_replace("diagnosis_report", "diagnosis_id", "html");
+    Rows(database_.statement(replace)).bind(d.id).bind(c.report_html).run();
   }
   return d.id;
 }
 
-Outcome SqliteChanges::run(const InterruptDiagnoses& c) {
+Outcome SqlChanges::run(const InterruptDiagnoses& c) {
   return Rows(database_.statement(
                   "UPDATE diagnosis SET state = 'interrupted', finished_utime_us = ?, error = 'the "
                   "service stopped before it was done' WHERE state IN ('queued', 'running')"))
@@ -169,7 +167,7 @@ Outcome SqliteChanges::run(const InterruptDiagnoses& c) {
       .run();
 }
 
-Outcome SqliteChanges::run(const AddProposal& c) {
+Outcome SqlChanges::run(const AddProposal& c) {
   const Proposal& p = c.proposal;
   Rows(database_.statement(
            "UPDATE proposal SET state = 'superseded' WHERE robot_id = ? AND kind = ? AND state = 'open'"))
@@ -189,7 +187,7 @@ Outcome SqliteChanges::run(const AddProposal& c) {
   return id;
 }
 
-Outcome SqliteChanges::run(const CloseProposal& c) {
+Outcome SqlChanges::run(const CloseProposal& c) {
   const auto changed = Rows(database_.statement("UPDATE proposal SET state = ?, adopted_version = ? WHERE "
                                                 "proposal_id = ? AND state = 'open'"))
                            .bind(name(c.state))

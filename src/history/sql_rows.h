@@ -5,7 +5,7 @@
 
 #include "base/error.h"
 #include "history/records.h"
-#include "history/sqlite.h"
+#include "history/sql.h"
 
 // Records to and from rows: for each, its columns and the two functions that follow their order.
 namespace joulecast::history {
@@ -27,19 +27,18 @@ Result<Mission> read_mission(Rows& rows);
 const std::string& accounts_columns();
 signals::Accounts read_accounts(Rows& rows);
 
+// Without the start_utime_us, which comes first.
 inline constexpr std::string_view trace_columns =
-    "start_utime_us, covered_s, measured_power_min_w, measured_power_mean_w, measured_power_max_w, "
+    "covered_s, measured_power_min_w, measured_power_mean_w, measured_power_max_w, "
     "modelled_power_min_w, modelled_power_mean_w, modelled_power_max_w, speed_min_m_s, speed_mean_m_s, "
     "speed_max_m_s, state_of_charge, measured_j, modelled_j, x_m, y_m";
 void bind_bucket(Rows& rows, const TraceBucket& bucket);
 TraceBucket read_bucket(Rows& rows);
 
+// Without the robot_id, which comes first.
 inline constexpr std::string_view resume_state_columns =
-    "robot_id, utime_us, sequence, state_of_charge, winding_temperature_right_c, winding_temperature_left_c";
+    "utime_us, sequence, state_of_charge, winding_temperature_right_c, winding_temperature_left_c";
 void bind_resume_state(Rows& rows, const ResumeState& state);
 ResumeState read_resume_state(Rows& rows);
-
-// "?, ?, ?" for as many as the comma-separated columns.
-std::string placeholders(std::string_view columns);
 
 }  // namespace joulecast::history

@@ -7,21 +7,26 @@
 
 #include "base/error.h"
 #include "history/commands.h"
-#include "history/sqlite.h"
+#include "history/sql.h"
 #include "history/store.h"
 
 namespace joulecast::history {
 
 // The commands as SQL, on the one writing connection.
-class SqliteChanges {
+class SqlChanges {
  public:
-  SqliteChanges(Database& database, std::function<std::int64_t()> now_utime_us);
+  SqlChanges(Database& database, std::function<std::int64_t()> now_utime_us);
 
-  // As Store::apply. Throws SqliteError when nothing was applied.
-  std::vector<Outcome> apply(std::span<const Command> commands);
+  // As Store::apply. `before_commit` is called in the transaction. Throws SqlError when nothing was applied,
+  // or when the COMMIT's outcome is not known; then `outcomes` are what they are if it was done.
+  void apply(std::span<const Command> commands, const std::function<void()>& before_commit,
+             std::vector<Outcome>& outcomes);
 
  private:
-  Outcome apply_whole(const Command& command);
+  // False when a command was refused.
+  bool apply_unguarded(std::span<const Command> commands, std::vector<Outcome>& outcomes);
+  Outcome apply_guarded(const Command& command);
+  Outcome run_one(const Command& command);
 
   Outcome run(const AddModel& command);
   Outcome run(const ActivateModel& command);
@@ -40,8 +45,6 @@ class SqliteChanges {
   Outcome run(const PruneMissions& command);
   Outcome run(const RemoveRobot& command);
 
-  // Gives free pages back to the disk, some at a time, where they are many.
-  void give_back();
   void make_robot(const std::string& robot_id);
   void put(const ResumeState& state);
 

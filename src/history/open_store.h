@@ -1,0 +1,35 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "base/error.h"
+#include "history/store.h"
+
+namespace joulecast::history {
+
+class Database;
+
+// Whether the URL names a database of PostgreSQL, which libpq reads: postgresql://... or postgres://...
+bool is_postgres_url(std::string_view url);
+
+// Opens the store of a URL: sqlite:PATH, a PATH, or postgresql://... The errors are open_sqlite_store()'s and
+// open_postgres_store()'s; Fault::invalid on "url" for any other scheme.
+Result<std::unique_ptr<Store>> open_store(const std::string& url);
+
+// The same as tables, held against every other program until it is let go. When `must_exist`, an SQLite file
+// that is absent is Fault::not_found instead of being made.
+Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_exist);
+
+// A connection to the tables of a URL that reads beside whoever holds them, and migrates nothing.
+// Fault::not_found when there is no such file, ::corrupt when it is no store.
+Result<std::unique_ptr<Database>> open_to_read(const std::string& url);
+
+// The URL without its password, to be shown.
+std::string shown_url(const std::string& url);
+
+// The file that an sqlite URL or a path names.
+std::string sqlite_path(const std::string& url);
+
+}  // namespace joulecast::history

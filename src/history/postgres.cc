@@ -1,0 +1,361 @@
+#include "history/postgres.h"
+
+#include <libpq-fe.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cstring>
+#include <utility>
+#include <vector>
+
+namespace joulecast::history {
+namespace {
+
+// Statements sent before their results are read: these fit the socket's buffer, so that neither side waits
+// for the other to read.
+constexpr int max_sent = 256;
+
+// Of the types' OIDs, which never change (pg_type.dat), those that results come in.
+constexpr unsigned bool_oid = 16, bytea_oid = 17, int8_oid = 20, int2_oid = 21, int4_oid = 23,
+                   float8_oid = 701;
+
+// By SQLSTATE's class; PostgreSQL's manual, appendix A.
+SqlError::Kind kind_of(std::string_view state) {
+  const std::string_view of = state.substr(0, 2);
+  if (of == "22" || of == "23" || of == "54" || of == "P0") return SqlError::Kind::values;
+  for (const std::string_view soon : {"08", "25", "28", "40", "53", "55", "57", "58", "3D"})
+    if (of == soon) return SqlError::Kind::unavailable;
+  if (state == "XX001" || state == "XX002") return SqlError::Kind::corrupt;
+  return SqlError::Kind::internal;
+}
+
+std::string trimmed(const char* message) {
+  std::string text = message ? message : "";
+  while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
+  return text;
+}
+
+std::uint64_t big_endian(const char* bytes, std::size_t size) {
+  std::uint64_t value = 0;
+  for (std::size_t k = 0; k < size; ++k) value = value << 8 | static_cast<unsigned char>(bytes[k]);
+  return value;
+}
+
+// ? and ?1 become $1.
+std::string numbered(std::string_view sql, int& parameters) {
+  std::string text;
+  parameters = 0;
+  for (std::size_t at = 0; at < sql.size(); ++at) {
+    if (sql[at] != '?') {
+      text += sql[at];
+      continue;
+    }
+    int number = 0;
+    while (at + 1 < sql.size() && sql[at + 1] >= '0' && sql[at + 1] <= '9')
+      number = 10 * number + sql[++at] - '0';
+    if (number == 0) number = parameters + 1;
+    parameters = std::max(parameters, number);
+    text += '$' + std::to_string(number);
+  }
+  return text;
+}
+
+// Numbers go as text, which the server reads as whatever type the column has; text and bytes as they are.
+class PostgresStatement final : public Statement {
+ public:
+  // One that is not kept has no name at the server, which would keep it as long as the connection.
+  PostgresStatement(PostgresDatabase& database, std::string_view sql, bool kept)
+      : database_(database), kept_(kept), sql_(numbered(sql, parameters_)) {
+    values_.resize(static_cast<std::size_t>(parameters_));
+  }
+
+  void bind_null(int parameter) override { at(parameter) = {}; }
+  void bind(int parameter, std::int64_t value) override { bind_number(parameter, value); }
+  void bind(int parameter, double value) override { bind_number(parameter, value); }
+  void bind(int parameter, std::string_view value) override {
+    // libpq takes a null pointer for NULL.
+    at(parameter) = {value.data() ? value.data() : "", static_cast<int>(value.size()), 1, {}};
+  }
+  void bind(int parameter, std::span<const std::byte> value) override {
+    bind(parameter, std::string_view(reinterpret_cast<const char*>(value.data()), value.size()));
+  }
+
+  bool step() override {
+    if (!result_) run();
+    return ++row_ < PQntuples(result_.get());
+  }
+
+  void step_later() override {
+    prepare();
+    database_.enter_pipeline();
+    send();
+    database_.sent_later();
+  }
+
+  std::int64_t changed() const override {
+    const std::string_view text = result_ ? PQcmdTuples(result_.get()) : "";
+    std::int64_t count = 0;
+    std::from_chars(text.data(), text.data() + text.size(), count);
+    return count;
+  }
+
+  void reset() override {
+    result_.reset();
+    row_ = -1;
+    for (Value& value : values_) value = {};
+  }
+
+  int columns() const override { return PQnfields(result_.get()); }
+  std::string name(int column) const override { return PQfname(result_.get(), column); }
+  Type type(int column) const override {
+    if (PQgetisnull(result_.get(), row_, column)) return Type::null;
+    switch (PQftype(result_.get(), column)) {
+      case bool_oid:
+      case int2_oid:
+      case int4_oid:
+      case int8_oid:
+        return Type::integer;
+      case float8_oid:
+        return Type::real;
+      case bytea_oid:
+        return Type::blob;
+      default:
+        return Type::text;
+    }
+  }
+  std::int64_t integer(int column) const override {
+    if (type(column) == Type::real) return static_cast<std::int64_t>(real(column));
+    if (type(column) != Type::integer) return 0;
+    const std::string_view raw = bytes(column);
+    const std::uint64_t bits = big_endian(raw.data(), raw.size());
+    const auto unused = static_cast<unsigned>(64 - 8 * raw.size());
+    return static_cast<std::int64_t>(bits << unused) >> unused;  // keeps the sign of a shorter one
+  }
+  double real(int column) const override {
+    if (type(column) == Type::real) return std::bit_cast<double>(big_endian(bytes(column).data(), 8));
+    return static_cast<double>(integer(column));
+  }
+  std::string_view bytes(int column) const override {
+    return {PQgetvalue(result_.get(), row_, column),
+            static_cast<std::size_t>(PQgetlength(result_.get(), row_, column))};
+  }
+
+ private:
+  struct Value {
+    const char* data = nullptr;
+    int size = 0;
+    int format = 0;  // 0: text, 1: binary
+    std::array<char, 32> digits{};
+  };
+
+  Value& at(int parameter) { return values_.at(static_cast<std::size_t>(parameter)); }
+
+  template <class Number>
+  void bind_number(int parameter, Number number) {
+    Value& value = at(parameter);
+    *std::to_chars(value.digits.data(), value.digits.data() + value.digits.size() - 1, number).ptr = '\0';
+    value.data = value.digits.data();
+    value.format = 0;
+  }
+
+  void prepare() {
+    if (!kept_ || !name_.empty()) return;
+    database_.finish_later();
+    name_ = database_.prepare_as_name(sql_);
+  }
+
+  void run() {
+    prepare();
+    send();
+    if (database_.has_sent()) {
+      result_ = database_.read_sent();
+      return;
+    }
+    result_ = database_.checked(PQgetResult(database_.handle()));
+    while (PGresult* more = PQgetResult(database_.handle())) PQclear(more);
+  }
+
+  void send() {
+    std::vector<const char*> data;
+    std::vector<int> sizes, formats;
+    for (const Value& value : values_) {
+      data.push_back(value.data);
+      sizes.push_back(value.size);
+      formats.push_back(value.format);
+    }
+    const int sent = kept_ ? PQsendQueryPrepared(database_.handle(), name_.c_str(), parameters_, data.data(),
+                                                 sizes.data(), formats.data(), 1)
+                           : PQsendQueryParams(database_.handle(), sql_.c_str(), parameters_, nullptr,
+                                               data.data(), sizes.data(), formats.data(), 1);
+    if (sent == 0) database_.raise(nullptr);
+  }
+
+  PostgresDatabase& database_;
+  const bool kept_;
+  int parameters_ = 0;
+  std::string sql_, name_;
+  std::vector<Value> values_;
+  PostgresResult result_;
+  int row_ = -1;
+};
+
+}  // namespace
+
+void PostgresResultDeleter::operator()(pg_result* result) const {
+  PQclear(result);
+}
+
+PostgresDatabase::PostgresDatabase(const std::string& url, const std::string& application_name) {
+  // What the URL says comes later and prevails, but for the name. A peer that vanished is noticed within half
+  // a minute.
+  const std::array<const char*, 10> keywords = {"connect_timeout",
+                                                "target_session_attrs",
+                                                "tcp_user_timeout",
+                                                "keepalives_idle",
+                                                "keepalives_interval",
+                                                "keepalives_count",
+                                                "dbname",
+                                                "application_name",
+                                                "client_encoding",
+                                                nullptr};
+  const std::array<const char*, 10> values = {
+      "5", "read-write", "15000", "10", "5", "3", url.c_str(), application_name.c_str(), "UTF8", nullptr};
+  handle_ = PQconnectdbParams(keywords.data(), values.data(), 1);
+  if (PQstatus(handle_) != CONNECTION_OK) {
+    const std::string message = trimmed(PQerrorMessage(handle_));
+    PQfinish(std::exchange(handle_, nullptr));
+    throw SqlError(SqlError::Kind::unavailable, message);
+  }
+  PQsetNoticeProcessor(
+      handle_, [](void*, const char*) {}, nullptr);
+}
+
+PostgresDatabase::~PostgresDatabase() {
+  forget_statements();
+  PQfinish(handle_);
+}
+
+void PostgresDatabase::raise(const pg_result* result) {
+  const char* state = result ? PQresultErrorField(result, PG_DIAG_SQLSTATE) : nullptr;
+  std::string message = trimmed(result ? PQresultErrorMessage(result) : PQerrorMessage(handle_));
+  // What has no SQLSTATE is libpq's own, which has lost the server. 57P: the server shuts down or was told to
+  // end this connection, which it closes next.
+  is_lost_ =
+      is_lost_ || PQstatus(handle_) != CONNECTION_OK || !state || std::string_view(state).starts_with("57P");
+  if (is_lost_)
+    throw SqlError(SqlError::Kind::connection_lost,
+                   message.empty() ? "the connection to PostgreSQL was lost" : message);
+  throw SqlError(kind_of(state), message);
+}
+
+PostgresResult PostgresDatabase::checked(pg_result* result) {
+  PostgresResult held(result);
+  const ExecStatusType status = PQresultStatus(result);
+  if (status != PGRES_COMMAND_OK && status != PGRES_TUPLES_OK) {
+    // After a fatal error the server closes the connection, which libpq sees when it reads again.
+    while (PGresult* more = PQgetResult(handle_)) PQclear(more);
+    raise(result);
+  }
+  return held;
+}
+
+void PostgresDatabase::execute(const std::string& sql) {
+  finish_later();
+  (void)checked(PQexec(handle_, sql.c_str()));
+}
+
+std::unique_ptr<Statement> PostgresDatabase::prepare(std::string_view sql) {
+  return std::make_unique<PostgresStatement>(*this, sql, false);
+}
+
+std::unique_ptr<Statement> PostgresDatabase::prepare_to_keep(std::string_view sql) {
+  return std::make_unique<PostgresStatement>(*this, sql, true);
+}
+
+bool PostgresDatabase::has_table(std::string_view name) {
+  Rows rows(statement("SELECT to_regclass(?) IS NOT NULL"));
+  return rows.bind(name).next() && rows.boolean();
+}
+
+std::string PostgresDatabase::prepare_as_name(const std::string& sql) {
+  const std::string name = "s" + std::to_string(++names_);
+  (void)checked(PQprepare(handle_, name.c_str(), sql.c_str(), 0, nullptr));
+  return name;
+}
+
+void PostgresDatabase::enter_pipeline() {
+  if (sent_ == 0 && PQenterPipelineMode(handle_) == 0) raise(nullptr);
+}
+
+void PostgresDatabase::sent_later() {
+  if (++sent_ >= max_sent) finish_later();
+}
+
+void PostgresDatabase::finish_later() {
+  if (sent_ > 0) (void)read_sent();
+}
+
+PostgresResult PostgresDatabase::read_sent() {
+  sent_ = 0;
+  if (PQpipelineSync(handle_) == 0) raise(nullptr);
+  PostgresResult last, failed;
+  for (int ends = 0;;) {  // a null result ends each statement's; two in a row: the connection is lost
+    PostgresResult result(PQgetResult(handle_));
+    if (!result) {
+      if (++ends == 2) break;
+      continue;
+    }
+    ends = 0;
+    const ExecStatusType status = PQresultStatus(result.get());
+    if (status == PGRES_PIPELINE_SYNC) break;
+    if (status == PGRES_COMMAND_OK || status == PGRES_TUPLES_OK)
+      last = std::move(result);
+    else if (status != PGRES_PIPELINE_ABORTED && !failed)
+      failed = std::move(result);
+  }
+  const bool left = PQexitPipelineMode(handle_) == 1;
+  if (failed) raise(failed.get());
+  if (!left || PQstatus(handle_) != CONNECTION_OK) raise(nullptr);
+  return last;
+}
+
+bool PostgresDatabase::is_usable() const {
+  return !is_lost_ && PQstatus(handle_) == CONNECTION_OK && PQpipelineStatus(handle_) == PQ_PIPELINE_OFF;
+}
+
+bool PostgresDatabase::in_transaction() const {
+  return !is_lost_ && (sent_ > 0 || PQtransactionStatus(handle_) == PQTRANS_INTRANS ||
+                       PQtransactionStatus(handle_) == PQTRANS_INERROR);
+}
+
+void PostgresDatabase::begin(Access access) {
+  execute(access == Access::write ? "BEGIN" : "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY");
+}
+
+void PostgresDatabase::commit() {
+  finish_later();
+  try {
+    const PostgresResult result = checked(PQexec(handle_, "COMMIT"));
+    if (std::strcmp(PQcmdStatus(result.get()), "COMMIT") != 0)
+      throw SqlError(SqlError::Kind::internal, "the transaction was rolled back at COMMIT");
+  } catch (const SqlError& error) {
+    if (error.kind() != SqlError::Kind::connection_lost) throw;
+    throw SqlError(SqlError::Kind::commit_unknown,
+                   std::string("the connection was lost during COMMIT: ") + error.what());
+  }
+}
+
+void PostgresDatabase::roll_back() {
+  if (sent_ > 0) {
+    try {
+      finish_later();
+    } catch (const SqlError&) {
+      // What is rolled back need not have succeeded.
+    }
+  }
+  execute("ROLLBACK");
+}
+
+}  // namespace joulecast::history

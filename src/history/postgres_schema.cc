@@ -1,0 +1,46 @@
+#include "history/postgres_schema.h"
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "history/schema.h"
+
+namespace joulecast::history {
+
+extern const std::string_view postgres_store_sql;  // schemas/store.postgresql.sql, embedded at build
+
+namespace {
+
+// None yet: the first release of this schema.
+constexpr std::span<const Migration> postgres_migrations;
+
+}  // namespace
+
+Result<void> bring_to_postgres_schema(Database& database) {
+  Transaction transaction(database, Database::Access::write);
+  if (!database.has_table("joulecast_store")) {
+    database.execute(std::string(postgres_store_sql));
+    database.execute("INSERT INTO joulecast_store VALUES (1, " + std::to_string(postgres_schema_version) +
+                     ", '', 0)");
+    transaction.commit();
+    return {};
+  }
+  std::int64_t version = database.integer("SELECT schema_version FROM joulecast_store");
+  if (version > postgres_schema_version)
+    return fail(Fault::conflict, "database",
+                "schema version " + std::to_string(version) + " is newer than version " +
+                    std::to_string(postgres_schema_version) + ", the newest that this program knows");
+  for (const Migration& migration : postgres_migrations) {
+    if (migration.from != version) continue;
+    database.execute(std::string(migration.sql));
+    ++version;
+  }
+  if (version != postgres_schema_version)
+    return fail(Fault::conflict, "database", "schema version " + std::to_string(version) + " is unknown");
+  database.execute("UPDATE joulecast_store SET schema_version = " + std::to_string(version));
+  transaction.commit();
+  return {};
+}
+
+}  // namespace joulecast::history

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "base/error.h"
+#include "history/sql.h"
+#include "history/store.h"
+
+namespace joulecast::history {
+
+struct PostgresOptions {
+  std::string url;          // libpq's: postgresql://user@host1,host2/database?option=value
+  std::size_t readers = 4;  // connections for queries; a query beyond that many waits for one
+  std::chrono::milliseconds lock_wait{3000};   // for another program's hold on the store to end
+  std::function<std::int64_t()> now_utime_us;  // the clock that retention goes by; empty: the system's
+};
+
+// Opens the store, creating or migrating its tables in the first schema of the connection's search_path. One
+// program at a time holds it, by an advisory lock of its writing connection. Fault::conflict: another program
+// holds it, or its schema is newer than this program. Fault::unavailable: no server that takes writes is
+// reached.
+Result<std::unique_ptr<Store>> open_postgres_store(const PostgresOptions& options);
+
+// The same as tables, held against every other program until it is let go.
+Result<std::shared_ptr<Database>> open_postgres_tables(const PostgresOptions& options);
+
+}  // namespace joulecast::history

@@ -1,0 +1,184 @@
+#include "history/sql_store.h"
+
+#include <algorithm>
+#include <iterator>
+#include <optional>
+
+#include "history/sql_queries.h"
+
+namespace joulecast::history {
+
+// After a connection could not be made: many ask, and each attempt may take its time.
+constexpr std::chrono::seconds connect_pause{1};
+
+ReaderPool::ReaderPool(Connect connect, std::size_t count)
+    : connect_(std::move(connect)), size_(std::max<std::size_t>(count, 1)) {
+  while (idle_.size() < size_) idle_.push_back(connect_());
+}
+
+Database& ReaderPool::Lease::operator*() {
+  if (!database_) database_ = pool_.connect();
+  return *database_;
+}
+
+std::unique_ptr<Database> ReaderPool::connect() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (Clock::now() < retry_at_) throw SqlError(SqlError::Kind::unavailable, why_);
+  }
+  try {
+    return connect_();
+  } catch (const SqlError& error) {
+    const std::lock_guard lock(mutex_);
+    why_ = error.what();
+    retry_at_ = Clock::now() + connect_pause;
+    throw;
+  }
+}
+
+ReaderPool::Lease ReaderPool::lend() {
+  std::unique_lock lock(mutex_);
+  returned_.wait(lock, [this] { return !idle_.empty(); });
+  std::unique_ptr<Database> database = std::move(idle_.back());
+  idle_.pop_back();
+  return Lease(*this, std::move(database));
+}
+
+void ReaderPool::give_back(std::unique_ptr<Database> database) {
+  if (database && !database->is_usable()) database.reset();
+  {
+    std::lock_guard lock(mutex_);
+    idle_.push_back(std::move(database));
+  }
+  returned_.notify_one();
+}
+
+SqlStore::SqlStore(ReaderPool::Connect connect, std::size_t readers, MissionKey last_key)
+    : readers_(std::move(connect), readers), last_key_(last_key) {}
+
+Result<MissionKey> SqlStore::mission_key(std::string_view robot_id, std::string_view mission_id,
+                                         std::int64_t start_utime_us) {
+  std::lock_guard lock(keys_mutex_);
+  const MissionName mission(robot_id, mission_id, start_utime_us);
+  if (const auto found = reserved_.find(mission); found != reserved_.end()) return found->second;
+  auto stored = read([&](Database& database) -> Result<std::optional<MissionKey>> {
+    return queries::key_of(database, robot_id, mission_id, start_utime_us);
+  });
+  if (!stored && stored.error().fault != Fault::unavailable) return tl::unexpected(stored.error());
+  if (stored && *stored) return **stored;
+  return reserved_[mission] = ++last_key_;
+}
+
+Result<std::optional<MissionKey>> SqlStore::earlier_mission(std::string_view robot_id,
+                                                            std::string_view mission_id,
+                                                            std::int64_t before_utime_us) {
+  std::lock_guard lock(keys_mutex_);
+  const auto stored = read([&](Database& database) -> Result<std::optional<queries::MissionStart>> {
+    return queries::last_called(database, robot_id, mission_id, before_utime_us);
+  });
+  if (!stored) return tl::unexpected(stored.error());
+  std::optional<queries::MissionStart> last = *stored;
+  // What is reserved sorts by start within a robot and name.
+  const auto after = reserved_.lower_bound(MissionName(robot_id, mission_id, before_utime_us));
+  if (after != reserved_.begin()) {
+    const auto& [mission, key] = *std::prev(after);
+    const auto& [robot, name, start_utime_us] = mission;
+    if (robot == robot_id && name == mission_id && (!last || last->start_utime_us < start_utime_us))
+      last = {start_utime_us, key};
+  }
+  return last ? std::optional(last->key) : std::nullopt;
+}
+
+Result<std::vector<RobotRecord>> SqlStore::robots() const {
+  return read(queries::robots);
+}
+
+Result<ModelVersion> SqlStore::model(std::string_view robot_id, std::optional<std::int64_t> version) const {
+  return read([&](Database& database) { return queries::model(database, robot_id, version); });
+}
+
+Result<std::vector<ModelVersion>> SqlStore::model_versions(std::string_view robot_id) const {
+  return read([&](Database& database) { return queries::model_versions(database, robot_id); });
+}
+
+Result<Mission> SqlStore::mission(MissionKey key) const {
+  return read([&](Database& database) { return queries::mission(database, key); });
+}
+
+Result<MissionPage> SqlStore::missions(const MissionFilter& filter, const PageRequest& page,
+                                       MissionSort sort) const {
+  return read([&](Database& database) { return queries::missions(database, filter, page, sort); });
+}
+
+Result<Totals> SqlStore::totals(const MissionFilter& filter) const {
+  return read([&](Database& database) { return queries::totals(database, filter); });
+}
+
+Result<std::vector<TotalsGroup>> SqlStore::grouped_totals(const MissionFilter& filter, Grouping by,
+                                                          std::int64_t utc_offset_s) const {
+  return read(
+      [&](Database& database) { return queries::grouped_totals(database, filter, by, utc_offset_s); });
+}
+
+Result<Trace> SqlStore::trace(MissionKey key, TimeRange range, std::int64_t max_points) const {
+  return read([&](Database& database) { return queries::trace(database, key, range, max_points); });
+}
+
+Result<TelemetryPage> SqlStore::telemetry(MissionKey key, TimeRange range, const PageRequest& page) const {
+  return read([&](Database& database) { return queries::telemetry(database, key, range, page); });
+}
+
+Result<CovariatePage> SqlStore::covariates(MissionKey key, TimeRange range, const PageRequest& page) const {
+  return read([&](Database& database) { return queries::covariates(database, key, range, page); });
+}
+
+Result<std::vector<Event>> SqlStore::events(std::int64_t after_id, std::int64_t limit,
+                                            std::optional<std::string> robot_id) const {
+  return read([&](Database& database) { return queries::events(database, after_id, limit, robot_id); });
+}
+
+Result<std::optional<Learned>> SqlStore::learned(std::string_view robot_id, std::string_view topic) const {
+  return read([&](Database& database) { return queries::learned(database, robot_id, topic); });
+}
+Result<std::optional<ResumeState>> SqlStore::resume_state(std::string_view robot_id) const {
+  return read([&](Database& database) { return queries::resume_state(database, robot_id); });
+}
+
+Result<DiagnosisRecord> SqlStore::diagnosis(std::int64_t id) const {
+  return read([&](Database& database) { return queries::diagnosis(database, id); });
+}
+
+Result<std::vector<DiagnosisRecord>> SqlStore::diagnoses(std::optional<std::string> robot_id,
+                                                         std::int64_t before_id, std::int64_t limit) const {
+  return read([&](Database& database) { return queries::diagnoses(database, robot_id, before_id, limit); });
+}
+
+Result<std::string> SqlStore::diagnosis_report(std::int64_t id) const {
+  return read([&](Database& database) { return queries::diagnosis_report(database, id); });
+}
+
+Result<Proposal> SqlStore::proposal(std::int64_t id) const {
+  return read([&](Database& database) { return queries::proposal(database, id); });
+}
+
+Result<std::vector<Proposal>> SqlStore::proposals(std::optional<std::string> robot_id, std::int64_t before_id,
+                                                  std::int64_t limit) const {
+  return read([&](Database& database) { return queries::proposals(database, robot_id, before_id, limit); });
+}
+
+Result<std::vector<Mission>> SqlStore::recover() const {
+  return read(queries::open_missions);
+}
+
+void SqlStore::forget_reservations(std::span<const Command> commands, const std::vector<Outcome>& outcomes) {
+  std::lock_guard lock(keys_mutex_);
+  for (std::size_t k = 0; k < commands.size(); ++k) {
+    const auto* start = std::get_if<StartMission>(&commands[k]);
+    if (!start || !outcomes[k]) continue;
+    const Mission& mission = start->mission;
+    reserved_.erase({mission.robot_id, mission.mission_id, mission.start_utime_us});
+    last_key_ = std::max(last_key_, mission.key);
+  }
+}
+
+}  // namespace joulecast::history

@@ -1,0 +1,365 @@
+#include "history/store_copy.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <iterator>
+#include <span>
+#include <variant>
+
+#include "history/audit.h"
+#include "history/covariate_chunk.h"
+#include "history/sql_rows.h"
+#include "history/sql_store.h"
+#include "history/telemetry_chunk.h"
+
+namespace joulecast::history {
+namespace {
+
+struct Table {
+  std::string_view name;
+  std::vector<std::string> key;  // its columns
+  std::int64_t batch_rows;       // read at once and written in one transaction
+};
+
+const std::vector<Table>& all_tables() {
+  static const std::vector<Table> tables = {
+      {"robot", {"robot_id"}, 1000},
+      {"model", {"robot_id", "version"}, 100},
+      {"mission", {"mission_key"}, 500},
+      {"trace", {"mission_key", "start_utime_us"}, 2000},
+      {"telemetry_chunk", {"chunk_key"}, 200},
+      {"covariate_chunk", {"chunk_key"}, 200},
+      {"event", {"event_id"}, 1000},
+      {"energy_state", {"robot_id"}, 1000},
+      {"learned", {"robot_id", "topic"}, 100},
+      {"diagnosis", {"diagnosis_id"}, 50},
+      {"diagnosis_report", {"diagnosis_id"}, 50},
+      {"proposal", {"proposal_id"}, 50},
+      {"audit", {"audit_id"}, 1000},
+  };
+  return tables;
+}
+
+using Key = std::vector<std::variant<std::int64_t, std::string>>;
+
+// The key's columns first, then the others by name: the same in every database.
+std::vector<std::string> columns_of(Database& database, const Table& table) {
+  const auto all = database.prepare("SELECT * FROM " + std::string(table.name) + " LIMIT 0");
+  Rows rows(*all);
+  rows.next();
+  std::vector<std::string> columns = table.key, others;
+  for (int k = 0; k < rows.columns(); ++k) {
+    std::string name = all->name(k);
+    if (std::find(columns.begin(), columns.end(), name) == columns.end()) others.push_back(std::move(name));
+  }
+  std::sort(others.begin(), others.end());
+  columns.insert(columns.end(), std::make_move_iterator(others.begin()),
+                 std::make_move_iterator(others.end()));
+  return columns;
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+std::int64_t rows_of(Database& database, const Table& table) {
+  return database.integer("SELECT count(*) FROM " + std::string(table.name));
+}
+
+// Visits the next rows by key, at most `limit`, and moves the key on; answers how many they were.
+template <class Visit>
+std::int64_t scan(Database& database, const Table& table, const std::vector<std::string>& columns, Key& after,
+                  std::int64_t limit, Visit visit) {
+  const std::string key = joined(table.key);
+  const std::string beyond = " WHERE (" + key + ") > (" + placeholders(key) + ")";
+  Statement& select = database.statement("SELECT " + joined(columns) + " FROM " + std::string(table.name) +
+                                         (after.empty() ? "" : beyond) + " ORDER BY " + key + " LIMIT ?");
+  Rows rows(select);
+  for (const auto& part : after) std::visit([&](const auto& value) { rows.bind(value); }, part);
+  rows.bind(limit);
+  std::int64_t count = 0;
+  Key last;
+  for (; rows.next(); ++count) {
+    visit(select);
+    last.clear();
+    for (int k = 0; k < static_cast<int>(table.key.size()); ++k) {
+      if (select.type(k) == Statement::Type::integer)
+        last.emplace_back(select.integer(k));
+      else
+        last.emplace_back(std::string(select.bytes(k)));
+    }
+  }
+  if (count > 0) after = last;
+  return count;
+}
+
+// Adds rows up to a TableSummary.
+class Summary {
+ public:
+  explicit Summary(std::string_view table) { sum_.table = table; }
+
+  void add(const Statement& row, int skipped_column) {
+    for (int k = 0; k < row.columns(); ++k)
+      if (k != skipped_column) add_value(row, k);
+    ++sum_.rows;
+  }
+  TableSummary get() const {
+    TableSummary sum = sum_;
+    sum.checksum = hash_;
+    return sum;
+  }
+
+ private:
+  void add_value(const Statement& row, int column) {
+    const Statement::Type type = row.type(column);
+    mix(static_cast<std::uint64_t>(type), 1);
+    if (type == Statement::Type::integer) {
+      mix(static_cast<std::uint64_t>(row.integer(column)), 8);
+    } else if (type == Statement::Type::real) {
+      const double value = row.real(column);
+      mix(std::bit_cast<std::uint64_t>(value == 0 ? 0.0 : value), 8);  // SQLite keeps no sign of a zero
+    } else if (type != Statement::Type::null) {
+      const std::string_view bytes = row.bytes(column);
+      mix(bytes.size(), 8);
+      for (const char c : bytes) mix(static_cast<unsigned char>(c), 1);
+      sum_.value_bytes += static_cast<std::int64_t>(bytes.size());
+      return;
+    }
+    if (type != Statement::Type::null) sum_.value_bytes += 8;
+  }
+  void mix(std::uint64_t value, unsigned bytes) {
+    for (unsigned k = 0; k < bytes; ++k) hash_ = (hash_ ^ ((value >> (8 * k)) & 0xff)) * 0x100000001b3;
+  }
+
+  TableSummary sum_;
+  std::uint64_t hash_ = 0xcbf29ce484222325;
+};
+
+int index_of(const std::vector<std::string>& columns, std::string_view name) {
+  const auto found = std::find(columns.begin(), columns.end(), name);
+  return found == columns.end() ? -1 : static_cast<int>(found - columns.begin());
+}
+
+// Of the first `rows` rows; `after` becomes the last one's key.
+TableSummary summarize(Database& database, const Table& table, std::int64_t rows, int skipped_column,
+                       Key& after, const TableProgress& progress) {
+  const std::vector<std::string> columns = columns_of(database, table);
+  Summary summary(table.name);
+  std::int64_t done = 0;
+  while (done < rows) {
+    const std::int64_t limit = std::min(table.batch_rows, rows - done);
+    const std::int64_t got = scan(database, table, columns, after, limit,
+                                  [&](const Statement& row) { summary.add(row, skipped_column); });
+    if (got == 0) break;
+    done += got;
+    progress(table.name, done, rows);
+  }
+  return summary.get();
+}
+
+TableSummary summarize(Database& database, const Table& table, const TableProgress& progress) {
+  Key after;
+  return summarize(database, table, rows_of(database, table), -1, after, progress);
+}
+
+void bind_column(Rows& to, const Statement& from, int column) {
+  switch (from.type(column)) {
+    case Statement::Type::null:
+      to.bind_null();
+      return;
+    case Statement::Type::integer:
+      to.bind(from.integer(column));
+      return;
+    case Statement::Type::real:
+      to.bind(from.real(column));
+      return;
+    case Statement::Type::text:
+      to.bind(from.bytes(column));
+      return;
+    case Statement::Type::blob:
+      to.bind(std::as_bytes(std::span(from.bytes(column))));
+      return;
+  }
+}
+
+// Robots before their models: which one is active comes when both are there. Answers the rows found.
+Result<std::int64_t> copy_table(Database& from, Database& to, const Table& table,
+                                const TableProgress& progress) {
+  const std::vector<std::string> columns = columns_of(from, table);
+  if (columns != columns_of(to, table))
+    return fail(Fault::conflict, "to", "table " + std::string(table.name) + " has other columns");
+  const int later = table.name == "robot" ? index_of(columns, "active_version") : -1;
+  const std::int64_t rows = rows_of(from, table), found = rows_of(to, table);
+  const auto quietly = [](std::string_view, std::int64_t, std::int64_t) {};
+  Key after, same;
+  if (found > rows || summarize(from, table, found, later, after, quietly) !=
+                          summarize(to, table, found, later, same, quietly))
+    return fail(
+        Fault::conflict, "to",
+        "table " + std::string(table.name) + " holds rows that are not the beginning of what is copied");
+  const std::string insert = "INSERT INTO " + std::string(table.name) + " (" + joined(columns) +
+                             ") VALUES (" + placeholders(joined(columns)) + ")";
+  for (std::int64_t done = found; done < rows;) {
+    Transaction transaction(to, Database::Access::write);
+    const std::int64_t got = scan(from, table, columns, after, table.batch_rows, [&](const Statement& row) {
+      Rows target(to.statement(insert));
+      for (int k = 0; k < row.columns(); ++k)
+        k == later ? (void)target.bind_null() : bind_column(target, row, k);
+      target.run_later();
+    });
+    transaction.commit();
+    if (got == 0) break;
+    done += got;
+    progress(table.name, done, rows);
+  }
+  return found;
+}
+
+void copy_active_versions(Database& from, Database& to) {
+  const auto select = from.prepare("SELECT robot_id, active_version FROM robot ORDER BY robot_id");
+  Transaction transaction(to, Database::Access::write);
+  Rows rows(*select);
+  while (rows.next()) {
+    const std::string robot_id = rows.text();
+    Rows(to.statement("UPDATE robot SET active_version = ? WHERE robot_id = ?"))
+        .bind(rows.optional_integer())
+        .bind(robot_id)
+        .run_later();
+  }
+  transaction.commit();
+}
+
+class Verifier {
+ public:
+  Verifier(Database& database, const TableProgress& progress) : database_(database), progress_(progress) {}
+
+  VerifyReport run() {
+    for (const Table& table : all_tables()) report_.tables.push_back(summarize(database_, table, progress_));
+    verify_missions();
+    verify_chunks("telemetry_chunk", "samples", decode_chunk);
+    verify_chunks("covariate_chunk", "changes", decode_covariates);
+    if (const auto audit = verify_audit(database_, "audit"); !audit) fault(audit.error().message);
+    return std::move(report_);
+  }
+
+ private:
+  void fault(const std::string& text) {
+    if (report_.faults.size() < max_faults) report_.faults.push_back(text);
+    ++report_.fault_count;
+  }
+
+  void verify_missions() {
+    static const std::string sql = "SELECT " + std::string(mission_identity_columns) + ", " +
+                                   mission_content_columns() +
+                                   " FROM mission WHERE mission_key > ? ORDER BY mission_key LIMIT 500";
+    MissionKey after = 0;
+    for (bool more = true; more;) {
+      more = false;
+      Rows rows(database_.statement(sql));
+      rows.bind(after);
+      while (rows.next()) {
+        more = true;
+        ++report_.missions;
+        const auto mission = read_mission(rows);
+        if (!mission) {
+          fault("a mission after " + std::to_string(after) + ": " + describe(mission.error()));
+          ++after;
+          break;
+        }
+        after = mission->key;
+        add_ledger(*mission);
+      }
+    }
+  }
+
+  void add_ledger(const Mission& mission) {
+    const double residual_j = std::abs(mission.accounts.ledger.total() - mission.accounts.battery_j);
+    if (std::isnan(residual_j)) return;  // not known
+    ++report_.ledgers;
+    report_.worst_residual_j = std::max(report_.worst_residual_j, residual_j);
+    double scale_j = 1;
+    for (const double term_j : mission.accounts.ledger.value) scale_j += std::abs(term_j);
+    constexpr double closes = 1e-6;  // of the sum of magnitudes: rounding over many additions
+    if (residual_j > closes * scale_j)
+      fault("mission " + std::to_string(mission.key) + ": its ledger adds up to " +
+            std::to_string(mission.accounts.ledger.total()) + " J, and " +
+            std::to_string(mission.accounts.battery_j) + " J left the battery");
+  }
+
+  template <class Decode>
+  void verify_chunks(const std::string& table, const std::string& items, Decode decode) {
+    const std::string sql = "SELECT chunk_key, " + items + ", start_utime_us, end_utime_us, body FROM " +
+                            table + " WHERE chunk_key > ? ORDER BY chunk_key LIMIT 200";
+    std::int64_t after = 0;
+    for (bool more = true; more;) {
+      more = false;
+      Rows rows(database_.statement(sql));
+      rows.bind(after);
+      while (rows.next()) {
+        more = true;
+        after = rows.integer();
+        const std::int64_t count = rows.integer(), start = rows.integer(), end = rows.integer();
+        const auto decoded = decode(rows.blob());
+        const std::string which = table + " " + std::to_string(after);
+        ++report_.chunks;
+        if (!decoded) {
+          fault(which + ": " + describe(decoded.error()));
+        } else if (const auto [first, last] = std::minmax_element(
+                       decoded->begin(), decoded->end(),
+                       [](const auto& a, const auto& b) { return a.utime_us < b.utime_us; });
+                   static_cast<std::int64_t>(decoded->size()) != count || first->utime_us != start ||
+                   last->utime_us != end) {
+          fault(which + ": holds other items than its row says");
+        }
+      }
+    }
+  }
+
+  Database& database_;
+  const TableProgress& progress_;
+  VerifyReport report_;
+};
+
+}  // namespace
+
+std::vector<std::string> table_names() {
+  std::vector<std::string> names;
+  for (const Table& table : all_tables()) names.emplace_back(table.name);
+  return names;
+}
+
+Result<std::vector<TableSummary>> summarize_tables(Database& database, const TableProgress& progress) {
+  return guarded([&]() -> Result<std::vector<TableSummary>> {
+    std::vector<TableSummary> all;
+    for (const Table& table : all_tables()) all.push_back(summarize(database, table, progress));
+    return all;
+  });
+}
+
+Result<CopyReport> copy_tables(Database& from, Database& to, const TableProgress& progress) {
+  return guarded([&]() -> Result<CopyReport> {
+    CopyReport report;
+    for (const Table& table : all_tables()) {
+      const auto found = copy_table(from, to, table, progress);
+      if (!found) return tl::unexpected(found.error());
+      report.rows_found += *found;
+    }
+    copy_active_versions(from, to);
+    for (const Table& table : all_tables()) {
+      const TableSummary before = summarize(from, table, progress);
+      report.tables.push_back(summarize(to, table, progress));
+      if (report.tables.back() != before)
+        return fail(Fault::corrupt, "to", "table " + before.table + " reads back differently");
+    }
+    return report;
+  });
+}
+
+Result<VerifyReport> verify_tables(Database& database, const TableProgress& progress) {
+  return guarded([&]() -> Result<VerifyReport> { return Verifier(database, progress).run(); });
+}
+
+}  // namespace joulecast::history

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "history/sql.h"
+
+// Whole stores, table by table: copied into another database, counted, examined. On databases of
+// open_tables().
+namespace joulecast::history {
+
+// What a table holds. Equal rows have equal checksums, whatever database they are in: FNV-1a over the values
+// in the order of the key.
+struct TableSummary {
+  std::string table;
+  std::int64_t rows = 0;
+  std::int64_t value_bytes = 0;  // of numbers 8 each, of texts and blobs their lengths
+  std::uint64_t checksum = 0;
+
+  bool operator==(const TableSummary&) const = default;
+};
+
+// Told now and then: the table, its rows done and its rows in all.
+using TableProgress = std::function<void(std::string_view table, std::int64_t done, std::int64_t rows)>;
+
+struct CopyReport {
+  std::vector<TableSummary> tables;
+  std::int64_t rows_found = 0;  // that an earlier copy had brought
+};
+
+// Copies every row. Goes on where an earlier copy of the same store was cut off: what the destination holds
+// must be the beginning of what is copied, or it is a Fault::conflict. Counts and checksums of every table
+// are read back from both and compared: Fault::corrupt when they differ.
+Result<CopyReport> copy_tables(Database& from, Database& to, const TableProgress& progress);
+
+Result<std::vector<TableSummary>> summarize_tables(Database& database, const TableProgress& progress);
+
+struct VerifyReport {
+  std::vector<TableSummary> tables;
+  std::int64_t missions = 0;
+  std::int64_t ledgers = 0;         // added up
+  double worst_residual_j = 0;      // of a ledger: its sum less what left the battery
+  std::int64_t chunks = 0;          // decoded
+  std::vector<std::string> faults;  // what is wrong, a line each, at most max_faults
+  std::int64_t fault_count = 0;
+};
+inline constexpr std::size_t max_faults = 100;
+
+// Reads everything: every mission's record, the sum of its ledger, every chunk of telemetry and covariates
+// against its row, every link of the audit.
+Result<VerifyReport> verify_tables(Database& database, const TableProgress& progress);
+
+// Of every store, in an order in which no row comes before one that it refers to, but for a robot's active
+// version.
+std::vector<std::string> table_names();
+
+}  // namespace joulecast::history

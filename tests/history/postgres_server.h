@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+
+#include "temporary_store.h"
+
+// The test program's own PostgreSQL server; see tests/support/postgresql.sh.
+namespace joulecast::history {
+
+// Of a schema that belongs to the folder, made when it is not there.
+std::string postgres_url(const TemporaryFolder& folder);
+
+// What an administrator does, on a connection of its own; answers the first column of the first row.
+std::string as_administrator(const TemporaryFolder& folder, const std::string& sql);
+
+// The path of the server's socket.
+std::string postgres_socket();
+
+void start_postgres();
+void stop_postgres();  // at once, as after a power cut
+
+}  // namespace joulecast::history
