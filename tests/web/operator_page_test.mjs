@@ -328,7 +328,9 @@ await check('a robot that stands, is silent or was restarted is shown as that', 
     {
       ...heard,
       robot_id: 'negated',
-      contradictions: [{ kind: 'sign', id: 'x', channel: 'battery_current', says: 'It is -1.', untrue: true }],
+      contradictions: [
+        { kind: 'sign', id: 'x', channel: 'battery_current', says: 'It is -1.', untrue: true },
+      ],
     },
     { ...heard, robot_id: 'quiet', live: false, silent_s: 7200 },
     { ...heard, robot_id: 'standing', speed_m_s: 0, measured_power_w: 20 },
