@@ -119,6 +119,8 @@ ingest::IngestOptions ingest_options(const Settings& settings) {
   options.queue_messages = static_cast<std::size_t>(settings.integer("ingest.queue_messages"));
   options.energy_state_period = seconds(settings.number("energy_state.period_s"));
   options.max_unknown_robots = static_cast<std::size_t>(settings.integer("ingest.max_unknown_robots"));
+  options.signatures = {settings.text("ingest.key_file"), settings.boolean("ingest.require_signed"),
+                        microseconds(settings.number("ingest.signature_age_s"))};
   options.session.meter.tolerance = settings.number("meter.tolerance");
   options.session.meter.gap_bridge_s = settings.number("ingest.gap_bridge_s");
   options.session.sequence.gap_us = microseconds(settings.number("ingest.gap_bridge_s"));

@@ -88,6 +88,12 @@ constexpr Setting table[] = {
     {"store.queue_bytes", Type::integer, "67108864", 1048576, 1e12, "B",
      "memory for what waits while the store takes no data; beyond: raw samples are left out and counted"},
 
+    {"ingest.key_file", Type::text, "", 0, 0, "",
+     "file of the keys by which robots sign, made by joulecast key create and read again when it changes; a "
+     "robot that has a key is heard by signed messages alone; empty: none has"},
+    {"ingest.require_signed", Type::boolean, "false", 0, 0, "", "refuse robots that have no key, too"},
+    {"ingest.signature_age_s", Type::number, "30", 0.1, 86400, "s",
+     "how far the time of a signed message may be from the host's clock; others are refused as replayed"},
     {"ingest.queue_messages", Type::integer, "200000", 1000, 1e8, "",
      "received messages that may wait to be accounted; beyond: dropped and counted"},
     {"ingest.gap_bridge_s", Type::number, "2", 0, 3600, "s",

@@ -58,6 +58,9 @@ constexpr Examples table[] = {
     {"explore",
      "joulecast explore --case 1 --plot case1.svg\n"
      "joulecast explore --map yard.json --robot amr.json --payload 0 --payload 20"},
+    {"key create", "joulecast key create --file keys.json --robot-id amr-07"},
+    {"key list", "joulecast key list --file keys.json"},
+    {"key revoke", "joulecast key revoke --file keys.json --robot-id amr-07"},
     {"token create",
      "joulecast token create --file tokens.json --name dispatcher --role plan\n"
      "joulecast token create --file tokens.json --name yard --role operate --robots 'amr-*' --days 30"},

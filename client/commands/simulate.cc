@@ -7,14 +7,17 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include "access/robot_keys.h"
 #include "base/host_clock.h"
 #include "base/text_file.h"
 #include "base/utc_time.h"
@@ -30,6 +33,7 @@
 #include "telemetry/codec.h"
 #include "telemetry/event_log.h"
 #include "telemetry/lcm_link.h"
+#include "telemetry/signature.h"
 
 namespace joulecast::client {
 namespace {
@@ -51,6 +55,7 @@ struct Options {
   std::vector<std::string> robot_files;
   std::string log;
   std::string truth;
+  std::string key_file;
   std::string server;
   std::vector<std::string> effects;
   double scatter = 1;
@@ -198,6 +203,8 @@ Encoded encoded(const std::string& robot_id, const signals::CovariateMessage& co
 }
 
 struct Outlets {
+  access::RobotKeys keys;
+  std::map<std::string, std::int64_t> sequences;  // of each channel, the last
   std::optional<telemetry::LcmLink> link;
   std::optional<telemetry::EventLogWriter> log;
   std::optional<OutputFile> log_file;
@@ -210,12 +217,25 @@ struct Outlets {
                                                telemetry::Subject::telemetry, telemetry::Subject::covariates};
     const std::string channel = telemetry::channel_of(subjects[emission.message.index()], robot_id);
     if (link) {
-      if (auto sent = link->publish(channel, *bytes); !sent) return sent;
+      const auto key = keys.find(robot_id);
+      const auto sent =
+          key == keys.end() ? link->publish(channel, *bytes) : publish_signed(channel, *bytes, key->second);
+      if (!sent) return sent;
     }
     if (log) {
       if (auto written = log->write(emission.utime_us, channel, *bytes); !written) return written;
     }
     return {};
+  }
+
+  Result<void> publish_signed(const std::string& channel, std::span<const std::uint8_t> bytes,
+                              std::string_view key) {
+    std::int64_t& sequence = sequences[channel];
+    const std::int64_t now = host_utime_us();
+    sequence = std::max(sequence + 1, now);
+    const auto proven = telemetry::sign(channel, {now, sequence, bytes, {}}, key);
+    if (!proven) return tl::unexpected(proven.error());
+    return link->publish(channel, *proven);
   }
 };
 
@@ -281,6 +301,11 @@ Result<Outlets> open_outlets(const Options& options, bool over_lcm) {
     auto link = telemetry::LcmLink::open(options.lcm_url);
     if (!link) return tl::unexpected(link.error());
     outlets.link = std::move(*link);
+  }
+  if (!options.key_file.empty()) {
+    auto keys = access::read_robot_keys(options.key_file);
+    if (!keys) return tl::unexpected(keys.error());
+    outlets.keys = std::move(*keys);
   }
   return outlets;
 }
@@ -451,6 +476,8 @@ void add_simulate(CLI::App& program, Exit& exit) {
                   ->capture_default_str();
   command->add_option("--log", options->log,
                       "write an LCM event log; without --lcm-url nothing is published");
+  command->add_option("--key-file", options->key_file,
+                      "sign what is published for robots that have keys in this file of joulecast key");
   command->add_option("--truth", options->truth,
                       "write what was put into the robots and their true energies, JSON");
   command->add_flag("--force", options->force, "overwrite existing files of --log and --truth");

@@ -36,6 +36,7 @@ void add_simulate(CLI::App& program, Exit& exit);
 void add_spy(CLI::App& program, Exit& exit);
 void add_store(CLI::App& program, Exit& exit);
 void add_thesis(CLI::App& program, Exit& exit);
+void add_key(CLI::App& program, Exit& exit);
 void add_token(CLI::App& program, Exit& exit);
 
 // Subcommands of calibrate.

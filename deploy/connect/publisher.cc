@@ -1,8 +1,12 @@
 // A robot's side of joulecast in C++: publishes its telemetry and announces one mission.
 //   lcm-gen -x --cpp-hpath generated lcmtypes/*.lcm
-//   g++ -std=c++20 -Igenerated deploy/connect/publisher.cc -o publisher -llcm
+//   g++ -std=c++20 -Igenerated deploy/connect/publisher.cc -o publisher -llcm -lcrypto
 //   ./publisher amr 5          (robot_id, seconds)
-// The drive below is made up; put your own readings in its place.
+// With the robot's key in the environment's ROBOT_KEY, as `joulecast key create` printed it, messages are
+// signed. The drive below is made up; put your own readings in its place.
+#include <openssl/evp.h>
+#include <openssl/hmac.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -17,6 +21,7 @@
 #include "joulecast/mission_event_t.hpp"
 #include "joulecast/robot_covariates_t.hpp"
 #include "joulecast/robot_telemetry_t.hpp"
+#include "joulecast/signed_message_t.hpp"
 
 namespace {
 
@@ -27,6 +32,43 @@ std::int64_t now_us() {
   using namespace std::chrono;
   return duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
 }
+
+// Publishes messages with proof of who sent them; without a key as they are.
+class Signer {
+ public:
+  Signer(lcm::LCM& lcm, const std::string& key_hex) : lcm_(lcm), sequence_(now_us()) {
+    for (std::size_t k = 0; k + 1 < key_hex.size(); k += 2)
+      key_.push_back(static_cast<std::uint8_t>(std::stoi(key_hex.substr(k, 2), nullptr, 16)));
+  }
+
+  template <class Message>
+  void publish(const std::string& channel, const Message& message) {
+    if (key_.empty()) {
+      lcm_.publish(channel, &message);
+      return;
+    }
+    joulecast::signed_message_t proven{};
+    proven.utime = now_us();
+    proven.sequence = ++sequence_;  // goes on rising when the program is started again
+    proven.size = message.getEncodedSize();
+    proven.content.resize(static_cast<std::size_t>(proven.size));
+    message.encode(proven.content.data(), 0, proven.size);
+    std::vector<std::uint8_t> text(channel.begin(), channel.end());
+    text.push_back(0);
+    for (const std::int64_t number : {proven.utime, proven.sequence})
+      for (int shift = 56; shift >= 0; shift -= 8)
+        text.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(number) >> shift));
+    text.insert(text.end(), proven.content.begin(), proven.content.end());
+    HMAC(EVP_sha256(), key_.data(), static_cast<int>(key_.size()), text.data(), text.size(), proven.mac,
+         nullptr);
+    lcm_.publish(channel, &proven);
+  }
+
+ private:
+  lcm::LCM& lcm_;
+  std::vector<std::uint8_t> key_;
+  std::int64_t sequence_;
+};
 
 joulecast::mission_event_t mission_event(const std::string& robot_id, const std::string& mission_id,
                                          std::int8_t event) {
@@ -94,23 +136,25 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "LCM is not reachable; set LCM_DEFAULT_URL\n");
     return 1;
   }
+  const char* key = std::getenv("ROBOT_KEY");
+  Signer signer(lcm, key != nullptr ? key : "");
   using joulecast::mission_event_t;
   const std::string mission_id = "tour-" + std::to_string(now_us());
   const auto started = mission_event(robot_id, mission_id, mission_event_t::STARTED);
-  lcm.publish("MISSION_EVENT." + robot_id, &started);
+  signer.publish("MISSION_EVENT." + robot_id, started);
   const auto around = covariates(robot_id, {{"surface=concrete", 1}, {"heater_w", 0}});
-  lcm.publish("ROBOT_COVARIATES." + robot_id, &around);
+  signer.publish("ROBOT_COVARIATES." + robot_id, around);
   auto next = std::chrono::steady_clock::now();
   for (std::int64_t sequence = 0; sequence < std::int64_t{rate_hz} * duration_s; ++sequence) {
     if (sequence % rate_hz == 0) {
       const auto load = covariates(robot_id, {{"cpu_load", cpu_load()}});
-      lcm.publish("ROBOT_COVARIATES." + robot_id, &load);
+      signer.publish("ROBOT_COVARIATES." + robot_id, load);
     }
     const auto sample = read_sensors(robot_id, sequence);
-    lcm.publish("ROBOT_TELEMETRY." + robot_id, &sample);
+    signer.publish("ROBOT_TELEMETRY." + robot_id, sample);
     std::this_thread::sleep_until(next += std::chrono::milliseconds(1000 / rate_hz));
   }
   const auto finished = mission_event(robot_id, mission_id, mission_event_t::FINISHED);
-  lcm.publish("MISSION_EVENT." + robot_id, &finished);
+  signer.publish("MISSION_EVENT." + robot_id, finished);
   std::printf("%s drove mission %s\n", robot_id.c_str(), mission_id.c_str());
 }

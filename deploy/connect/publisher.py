@@ -3,15 +3,19 @@
     lcm-gen -p --ppath generated lcmtypes/*.lcm
     PYTHONPATH=generated python3 deploy/connect/publisher.py amr 5      (robot_id, seconds)
 
+With the robot's key in the environment's ROBOT_KEY, as `joulecast key create` printed it, the messages are signed.
 The drive below is made up; put your own readings in its place.
 """
 
+import hashlib
+import hmac
 import math
 import os
+import struct
 import sys
 import time
 
-from joulecast import mission_event_t, robot_covariates_t, robot_telemetry_t
+from joulecast import mission_event_t, robot_covariates_t, robot_telemetry_t, signed_message_t
 from lcm_udp import Publisher
 
 NOT_MEASURED = math.nan
@@ -20,6 +24,28 @@ RATE_HZ = 50
 
 def now_us():
     return time.time_ns() // 1000
+
+
+class Signer:
+    """Publishes messages with proof of who sent them; without a key as they are."""
+
+    def __init__(self, lcm, key_hex):
+        self.lcm = lcm
+        self.key = bytes.fromhex(key_hex)
+        self.sequence = now_us()  # goes on rising when the program is started again
+
+    def publish(self, channel, content):
+        if self.key:
+            self.sequence += 1
+            message = signed_message_t()
+            message.utime = now_us()
+            message.sequence = self.sequence
+            message.size = len(content)
+            message.content = content
+            text = channel.encode() + b"\0" + struct.pack(">qq", message.utime, message.sequence) + content
+            message.mac = hmac.digest(self.key, text, hashlib.sha256)
+            content = message.encode()
+        self.lcm.publish(channel, content)
 
 
 def mission_event(robot_id, mission_id, event):
@@ -68,7 +94,7 @@ def covariates(robot_id, values):
 def main():
     robot_id = sys.argv[1] if len(sys.argv) > 1 else "amr"
     duration_s = int(sys.argv[2]) if len(sys.argv) > 2 else 5
-    lcm = Publisher()
+    lcm = Signer(Publisher(), os.environ.get("ROBOT_KEY", ""))
     mission_id = f"tour-{now_us()}"
     lcm.publish(f"MISSION_EVENT.{robot_id}", mission_event(robot_id, mission_id, mission_event_t.STARTED))
     lcm.publish(f"ROBOT_COVARIATES.{robot_id}", covariates(robot_id, {"surface=concrete": 1, "heater_w": 0}))

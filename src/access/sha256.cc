@@ -2,9 +2,10 @@
 
 #include <openssl/crypto.h>
 #include <openssl/evp.h>
+#include <openssl/hmac.h>
 #include <openssl/rand.h>
 
-#include <array>
+#include <charconv>
 #include <cstdlib>
 #include <span>
 #include <vector>
@@ -12,18 +13,36 @@
 namespace joulecast::access {
 namespace {
 
-std::string hexadecimal(std::span<const unsigned char> bytes) {
+std::string_view as_text(std::span<const unsigned char> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+}  // namespace
+
+std::string hexadecimal(std::string_view bytes) {
   static constexpr char digits[] = "0123456789abcdef";
   std::string text;
   text.reserve(2 * bytes.size());
-  for (const unsigned char byte : bytes) {
+  for (const char c : bytes) {
+    const auto byte = static_cast<unsigned char>(c);
     text.push_back(digits[byte >> 4]);
     text.push_back(digits[byte & 15]);
   }
   return text;
 }
 
-}  // namespace
+std::optional<std::string> from_hexadecimal(std::string_view text) {
+  if (text.size() % 2 != 0) return std::nullopt;
+  std::string bytes;
+  for (std::size_t k = 0; k < text.size(); k += 2) {
+    unsigned char byte = 0;
+    const char* end = text.data() + k + 2;
+    if (std::from_chars(text.data() + k, end, byte, 16) != std::from_chars_result{end, std::errc{}})
+      return std::nullopt;
+    bytes.push_back(static_cast<char>(byte));
+  }
+  return bytes;
+}
 
 std::string sha256_hex(std::string_view bytes) {
   std::array<unsigned char, 32> digest{};
@@ -32,7 +51,17 @@ std::string sha256_hex(std::string_view bytes) {
   if (EVP_Digest(bytes.data(), bytes.size(), digest.data(), &length, EVP_sha256(), nullptr) != 1 ||
       length != digest.size())
     std::abort();
-  return hexadecimal(digest);
+  return hexadecimal(as_text(digest));
+}
+
+std::array<std::uint8_t, 32> hmac_sha256(std::string_view key, std::string_view bytes) {
+  std::array<std::uint8_t, 32> mac{};
+  unsigned length = 0;
+  const auto* at = reinterpret_cast<const unsigned char*>(bytes.data());
+  const void* made =
+      HMAC(EVP_sha256(), key.data(), static_cast<int>(key.size()), at, bytes.size(), mac.data(), &length);
+  if (made == nullptr || length != mac.size()) std::abort();
+  return mac;
 }
 
 bool equal_in_constant_time(std::string_view a, std::string_view b) {
@@ -42,7 +71,7 @@ bool equal_in_constant_time(std::string_view a, std::string_view b) {
 std::string random_hex(int bytes) {
   std::vector<unsigned char> drawn(static_cast<std::size_t>(bytes));
   if (RAND_bytes(drawn.data(), bytes) != 1) std::abort();
-  return hexadecimal(drawn);
+  return hexadecimal(as_text(drawn));
 }
 
 }  // namespace joulecast::access

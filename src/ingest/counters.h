@@ -29,6 +29,9 @@ enum class IngestFault : std::size_t {
   clock_ahead,        // stamped well after the daemon's time; accounted for all the same
   too_far_ahead,      // stamped further after the daemon's time than the setting allows; not accounted for
   too_fast,           // after its clock was set, more time than has passed by the daemon's; not accounted for
+  unsigned_message,   // not signed, where the robot or all robots have to
+  bad_signature,      // the signature is not that of the robot's key
+  replayed,           // signed properly, but sent before, or at another time
   second_sender,      // another sender under the robot's id; not accounted for
   gap,                // a silence too long to be bridged
   zero_payload,       // said 0 where the mission's start declared a load: accounted with that
@@ -40,16 +43,15 @@ enum class IngestFault : std::size_t {
   too_many_covariates,  // a value of a name beyond those that a mission may have
   solver                // CVODE failed on an interval; its chord stood in
 };
-inline constexpr std::size_t ingest_fault_count = 25;
+inline constexpr std::size_t ingest_fault_count = 28;
 
 inline constexpr std::array<std::string_view, ingest_fault_count> ingest_fault_names = {
-    "undecodable",   "wrong_channel", "queue_full",        "too_many_robots",
-    "unknown_robot", "implausible",   "duplicate",         "late",
-    "missing",       "restart",       "clock_backward",    "clock_forward",
-    "clock_ahead",   "too_far_ahead", "too_fast",          "second_sender",
-    "gap",           "zero_payload",  "outside_mission",   "bad_event",
-    "event_flood",   "empty_mission", "reused_mission_id", "too_many_covariates",
-    "solver"};
+    "undecodable",       "wrong_channel",       "queue_full",  "too_many_robots", "unknown_robot",
+    "implausible",       "duplicate",           "late",        "missing",         "restart",
+    "clock_backward",    "clock_forward",       "clock_ahead", "too_far_ahead",   "too_fast",
+    "unsigned",          "bad_signature",       "replayed",    "second_sender",   "gap",
+    "zero_payload",      "outside_mission",     "bad_event",   "event_flood",     "empty_mission",
+    "reused_mission_id", "too_many_covariates", "solver"};
 
 // Why nothing is learnt from a mission that ended.
 enum class LeftOut : std::size_t {

@@ -2,11 +2,13 @@
 
 #include <utility>
 
+#include "ingest/signature_gate.h"
+
 namespace joulecast::ingest {
 
 std::optional<InboundMessage> decode_message(std::string_view channel, std::span<const std::uint8_t> data,
                                              std::int64_t host_utime_us, IngestCounters& counters,
-                                             const telemetry::Sender& sender) {
+                                             const telemetry::Sender& sender, SignatureGate* signatures) {
   const std::optional<telemetry::ChannelName> name = telemetry::parse_channel(channel);
   if (!name || name->subject == telemetry::Subject::energy_state) return std::nullopt;
   counters.messages.fetch_add(1, std::memory_order_relaxed);
@@ -15,6 +17,12 @@ std::optional<InboundMessage> decode_message(std::string_view channel, std::span
     counters.add(fault);
     message.content = RefusedMessage{fault, std::string(channel) + ": " + std::move(why)};
   };
+  if (signatures != nullptr) {
+    if (auto refusal = signatures->check(channel, name->robot_id, data, host_utime_us)) {
+      refuse(refusal->fault, std::move(refusal->why));
+      return message;
+    }
+  }
   const auto take = [&](auto decoded, auto part) {
     if (!decoded) {
       refuse(IngestFault::undecodable, describe(decoded.error()));

@@ -27,9 +27,13 @@ struct InboundMessage {
   telemetry::Sender sender = {};
 };
 
-// Guards and decodes one message. Empty when its channel is none that robots publish on.
+class SignatureGate;
+
+// Guards and decodes one message. Empty when its channel is none that robots publish on. Without `signatures`
+// signed messages are taken unchecked, as from a log.
 std::optional<InboundMessage> decode_message(std::string_view channel, std::span<const std::uint8_t> data,
                                              std::int64_t host_utime_us, IngestCounters& counters,
-                                             const telemetry::Sender& sender = {});
+                                             const telemetry::Sender& sender = {},
+                                             SignatureGate* signatures = nullptr);
 
 }  // namespace joulecast::ingest

@@ -28,19 +28,22 @@ class IngestService::Impl {
         models_(models),
         forecasts_(forecasts),
         outputs_(outputs),
+        signatures_(options_.signatures),
         pipeline_(options_.session, options_.max_unknown_robots, models, std::move(outputs)) {}
 
   ~Impl() { stop(); }
 
   Result<void> start() {
+    if (Result<void> keys = signatures_.read_keys(); !keys) return keys;
     if (Result<void> recovered = pipeline_.recover(); !recovered) return recovered;
     Result<telemetry::LcmLink> link = telemetry::LcmLink::open(options_.lcm_url);
     if (!link) return tl::unexpected(std::move(link.error()));
     link_ = std::make_unique<telemetry::LcmLink>(std::move(*link));
     const auto handler = [this](const telemetry::Received& received) {
       survive("receiving", [&] {
-        std::optional<InboundMessage> message = decode_message(
-            received.channel, received.data, host_utime_us(), outputs_.counters, received.sender);
+        std::optional<InboundMessage> message =
+            decode_message(received.channel, received.data, host_utime_us(), outputs_.counters,
+                           received.sender, &signatures_);
         if (message) batch_.push_back(std::move(*message));
       });
     };
@@ -82,6 +85,8 @@ class IngestService::Impl {
   void receive() {
     while (running_) {
       ++receive_ticks_;
+      if (Result<void> keys = signatures_.refresh(); !keys)
+        outputs_.warn("", "the robots' keys stay as they were: " + describe(keys.error()));
       const Result<int> handled = link_->poll(std::chrono::milliseconds(100));
       if (!handled) {
         receiving_ = false;
@@ -196,6 +201,7 @@ class IngestService::Impl {
   const ModelRegistry& models_;
   Forecasts& forecasts_;
   SessionOutputs outputs_;
+  SignatureGate signatures_;  // the receiver's
   Pipeline pipeline_;
   ClockSteps clock_steps_;  // the accountant's
   std::unique_ptr<telemetry::LcmLink> link_;

@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "ingest/forecasts.h"
 #include "ingest/pipeline.h"
+#include "ingest/signature_gate.h"
 #include "telemetry/lcm_link.h"
 
 namespace joulecast::ingest {
@@ -18,6 +19,7 @@ struct IngestOptions {
   std::size_t queue_messages = 200'000;          // bound between receiving and accounting
   std::chrono::milliseconds publish_period{50};  // snapshots are no older than this
   std::chrono::milliseconds energy_state_period{1000};
+  SignatureOptions signatures;
   SessionSettings session;
   std::size_t max_unknown_robots = 100;
 };

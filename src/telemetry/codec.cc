@@ -7,6 +7,7 @@
 #include <joulecast/mission_event_t.hpp>
 #include <joulecast/robot_covariates_t.hpp>
 #include <joulecast/robot_telemetry_t.hpp>
+#include <joulecast/signed_message_t.hpp>
 #include <limits>
 #include <utility>
 
@@ -140,6 +141,13 @@ class Guard {
   std::optional<Error> error_;
 };
 
+// What a signed message holds; other bytes as they are, and those of a damaged one, which the guard refuses.
+std::span<const std::uint8_t> content_of(std::span<const std::uint8_t> bytes) {
+  if (!is_signed(bytes)) return bytes;
+  const auto message = decode_signed(bytes);
+  return message ? message->content : bytes;
+}
+
 template <class Message>
 Result<Message> decode_guarded(std::span<const std::uint8_t> bytes, Guard& guard) {
   if (auto sound = guard.finish(); !sound) return tl::unexpected(std::move(sound.error()));
@@ -197,7 +205,41 @@ constexpr std::size_t max_covariate_text = 2 * signals::max_covariate_name_lengt
 
 }  // namespace
 
+bool is_signed(std::span<const std::uint8_t> bytes) {
+  static const auto fingerprint = static_cast<std::uint64_t>(signed_message_t::getHash());
+  return bytes.size() >= 8 && read_big_endian(bytes.data(), 8) == fingerprint;
+}
+
+Result<SignedMessage> decode_signed(std::span<const std::uint8_t> bytes) {
+  static const std::int64_t fingerprint = signed_message_t::getHash();
+  constexpr std::size_t head = 8 + 8 + 8 + 4;
+  SignedMessage message;
+  Guard guard(bytes, fingerprint);
+  guard.fixed(8, "utime");
+  guard.fixed(8, "sequence");
+  const std::size_t size = guard.count("size", max_message_bytes);
+  guard.fixed(size, "content");
+  guard.fixed(message.mac.size(), "mac");
+  if (auto sound = guard.finish(); !sound) return tl::unexpected(std::move(sound.error()));
+  message.utime_us = static_cast<std::int64_t>(read_big_endian(bytes.data() + 8, 8));
+  message.sequence = static_cast<std::int64_t>(read_big_endian(bytes.data() + 16, 8));
+  message.content = bytes.subspan(head, size);
+  std::ranges::copy(bytes.subspan(head + size), message.mac.begin());
+  return message;
+}
+
+Result<std::vector<std::uint8_t>> encode_signed(const SignedMessage& message) {
+  signed_message_t out;
+  out.utime = message.utime_us;
+  out.sequence = message.sequence;
+  out.size = static_cast<std::int32_t>(message.content.size());
+  out.content.assign(message.content.begin(), message.content.end());
+  std::ranges::copy(message.mac, out.mac);
+  return encode(out);
+}
+
 Result<DecodedTelemetry> decode_telemetry(std::span<const std::uint8_t> bytes) {
+  bytes = content_of(bytes);
   static const std::int64_t fingerprint = robot_telemetry_t::getHash();
   Guard guard(bytes, fingerprint);
   guard.fixed(8, "utime");
@@ -225,6 +267,7 @@ Result<DecodedTelemetry> decode_telemetry(std::span<const std::uint8_t> bytes) {
 }
 
 Result<DecodedMissionEvent> decode_mission_event(std::span<const std::uint8_t> bytes) {
+  bytes = content_of(bytes);
   static const std::int64_t fingerprint = mission_event_t::getHash();
   Guard guard(bytes, fingerprint);
   guard.fixed(8, "utime");
@@ -247,6 +290,7 @@ Result<DecodedMissionEvent> decode_mission_event(std::span<const std::uint8_t> b
 }
 
 Result<DecodedCovariates> decode_covariates(std::span<const std::uint8_t> bytes) {
+  bytes = content_of(bytes);
   static const std::int64_t fingerprint = robot_covariates_t::getHash();
   Guard guard(bytes, fingerprint);
   guard.fixed(8, "utime");

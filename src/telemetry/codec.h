@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -52,6 +53,20 @@ struct DecodedCovariates {
 [[nodiscard]] Result<std::vector<std::uint8_t>> encode_covariates(std::string_view robot_id,
                                                                   const signals::CovariateMessage& message);
 [[nodiscard]] Result<std::vector<std::uint8_t>> encode_energy_state(const signals::EnergyState& state);
+
+// A message with proof of who sent it; `content` are the bytes of the message itself.
+struct SignedMessage {
+  std::int64_t utime_us = 0;
+  std::int64_t sequence = 0;
+  std::span<const std::uint8_t> content;
+  std::array<std::uint8_t, 32> mac{};
+};
+
+[[nodiscard]] bool is_signed(std::span<const std::uint8_t> bytes);
+// Points into `bytes`. The decoders above take signed messages for what they hold; whether the signature is
+// right is signature.h's question.
+[[nodiscard]] Result<SignedMessage> decode_signed(std::span<const std::uint8_t> bytes);
+[[nodiscard]] Result<std::vector<std::uint8_t>> encode_signed(const SignedMessage& message);
 
 // What a channel of the contract carries, and whose it is.
 enum class Subject { telemetry, mission_event, covariates, energy_state };

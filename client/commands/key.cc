@@ -1,0 +1,80 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "access/robot_keys.h"
+#include "access/sha256.h"
+#include "client/commands/table.h"
+#include "signals/ids.h"
+
+// The keys by which robots sign their telemetry, in the file of joulecastd's ingest.key_file.
+namespace joulecast::client {
+namespace {
+
+struct Options {
+  std::string file, robot_id;
+};
+
+Exit create(const Options& options) {
+  if (!signals::is_valid_robot_id(options.robot_id))
+    return report({Fault::invalid, "--robot-id", "\"" + options.robot_id + "\" is no robot id"});
+  access::RobotKeys keys;
+  if (std::filesystem::exists(options.file)) {
+    auto read = access::read_robot_keys(options.file);
+    if (!read) return report(read.error());
+    keys = std::move(*read);
+  }
+  const std::string key = access::random_hex(access::robot_key_bytes);
+  if (!keys.emplace(options.robot_id, access::from_hexadecimal(key).value()).second)
+    return report({Fault::conflict, "--robot-id", "has a key already; revoke it first"});
+  if (const auto done = access::write_robot_keys(options.file, keys); !done) return report(done.error());
+  std::puts(key.c_str());
+  return Exit::ok;
+}
+
+Exit list(const Options& options) {
+  const auto keys = access::read_robot_keys(options.file);
+  if (!keys) return report(keys.error());
+  for (const auto& [robot_id, key] : *keys) fmt::print("{}\n", robot_id);
+  return Exit::ok;
+}
+
+Exit revoke(const Options& options) {
+  auto keys = access::read_robot_keys(options.file);
+  if (!keys) return report(keys.error());
+  if (keys->erase(options.robot_id) == 0)
+    return report({Fault::not_found, "--robot-id", options.robot_id + " has no key"});
+  if (const auto done = access::write_robot_keys(options.file, *keys); !done) return report(done.error());
+  return Exit::ok;
+}
+
+}  // namespace
+
+void add_key(CLI::App& program, Exit& exit) {
+  auto* group =
+      program.add_subcommand("key", "Make and revoke the keys by which robots sign their telemetry");
+  group->require_subcommand(1);
+  auto options = std::make_shared<Options>();
+  const auto add = [&](const char* name, const char* what, Exit (*run)(const Options&)) {
+    auto* command = group->add_subcommand(name, what);
+    command->add_option("--file", options->file, "the file that the daemon's ingest.key_file names")
+        ->required();
+    command->callback([options, run, &exit] { exit = run(*options); });
+    return command;
+  };
+  add("create", "Add a robot's key, and print it for its publisher: from now on it is heard signed alone",
+      create)
+      ->add_option("--robot-id", options->robot_id, "whose")
+      ->required();
+  add("list", "List the robots that have keys", list);
+  add("revoke", "Remove a robot's key: from now on it is heard as robots without a key are", revoke)
+      ->add_option("--robot-id", options->robot_id, "whose")
+      ->required();
+}
+
+}  // namespace joulecast::client

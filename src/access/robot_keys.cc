@@ -1,0 +1,79 @@
+#include "access/robot_keys.h"
+
+#include <sys/stat.h>
+
+#include <cerrno>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "access/sha256.h"
+#include "base/json_fields.h"
+#include "base/json_text.h"
+#include "base/output_file.h"
+#include "base/text_file.h"
+
+namespace joulecast::access {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t longest_robot_id = 47;
+
+}  // namespace
+
+Result<RobotKeys> parse_robot_keys(std::string_view json_text) {
+  const auto document = parse_json(json_text);
+  if (!document) return tl::unexpected(document.error());
+  if (!document->is_object()) return invalid("", "must be an object with the member keys");
+  Fields fields(*document);
+  const json* list = fields.required("keys");
+  if (list != nullptr && !list->is_array()) fields.fault("keys", "must be an array");
+  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  RobotKeys keys;
+  for (std::size_t k = 0; k < list->size(); ++k) {
+    const std::string at = "/keys/" + std::to_string(k);
+    Fields each((*list)[k], at);
+    const std::string robot_id = each.text("robot_id", longest_robot_id);
+    const std::optional<std::string> key = from_hexadecimal(each.text("key", 2 * robot_key_bytes));
+    if (each.ok() && (!key || key->size() != robot_key_bytes))
+      each.fault("key", "must be 64 hexadecimal digits");
+    if (Result<void> done = each.finish(); !done) return tl::unexpected(std::move(done.error()));
+    if (!keys.emplace(robot_id, *key).second)
+      return invalid(at + "/robot_id", "is " + robot_id + ", which has a key already");
+  }
+  return keys;
+}
+
+std::string to_json_text(const RobotKeys& keys) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const auto& [robot_id, key] : keys)
+    list.push_back({{"robot_id", robot_id}, {"key", hexadecimal(key)}});
+  return nlohmann::ordered_json{{"keys", std::move(list)}}.dump(2) + "\n";
+}
+
+Result<RobotKeys> read_robot_keys(const std::string& path) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) != 0) return fail(Fault::unavailable, path, std::strerror(errno));
+  if ((status.st_mode & S_IROTH) != 0)
+    return invalid(path, "may be read by every user of this machine: chmod o-r");
+  const Result<std::string> text = read_text_file(path);
+  if (!text) return tl::unexpected(text.error());
+  Result<RobotKeys> keys = parse_robot_keys(*text);
+  if (!keys) return invalid(path, describe(keys.error()));
+  return keys;
+}
+
+Result<void> write_robot_keys(const std::string& path, const RobotKeys& keys) {
+  struct stat status {};
+  const bool exists = stat(path.c_str(), &status) == 0;
+  auto file = OutputFile::create(path, Existing::replace);
+  if (!file) return tl::unexpected(file.error());
+  if (!exists && chmod(file->written_to().c_str(), 0640) != 0)
+    return fail(Fault::unavailable, path, std::strerror(errno));
+  if (Result<void> written = file->write(to_json_text(keys)); !written) return written;
+  return file->commit();
+}
+
+}  // namespace joulecast::access

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "access/robot_keys.h"
+#include "base/error.h"
+#include "ingest/inbound_message.h"
+
+namespace joulecast::ingest {
+
+struct SignatureOptions {
+  std::string key_file;                  // empty: no robot has a key
+  bool required = false;                 // of robots without a key, too
+  std::int64_t max_age_us = 30'000'000;  // between the time of a signed message and the host's
+};
+
+// Lets messages pass of which it is proven who sent them, each once. A robot that has a key is heard by
+// signed messages alone. Replays are refused by their sequence number, with a window for messages that
+// overtake each other (RFC 4303, 3.4.3), and by their time. After a start the sequence begins with the first
+// message, so that only the time refuses what was sent before.
+class SignatureGate {
+ public:
+  explicit SignatureGate(SignatureOptions options) : options_(std::move(options)) {}
+
+  // Fault::invalid where the file holds no keys, or keys are required and there is no file.
+  Result<void> read_keys();
+  // Reads a file that has changed, at most once a second; on an error the keys stay as they were.
+  Result<void> refresh();
+
+  // Why the message must not pass.
+  std::optional<RefusedMessage> check(std::string_view channel, std::string_view robot_id,
+                                      std::span<const std::uint8_t> bytes, std::int64_t host_utime_us);
+
+ private:
+  class Window {
+   public:
+    bool take(std::int64_t sequence);  // false: not new, or too old to tell
+
+   private:
+    std::int64_t highest_ = INT64_MIN;
+    std::uint64_t taken_ = 0;  // bit k: highest_ - k
+  };
+
+  SignatureOptions options_;
+  access::RobotKeys keys_;
+  std::filesystem::file_time_type changed_;
+  std::chrono::steady_clock::time_point looked_;
+  std::map<std::string, Window, std::less<>> windows_;  // of channels
+};
+
+}  // namespace joulecast::ingest

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "telemetry/codec.h"
+
+// Proof of who sent a message: HMAC-SHA-256 under the robot's key, as signed_message_t.lcm says.
+namespace joulecast::telemetry {
+
+// The bytes of the message signed for that channel; what its `mac` was does not matter.
+[[nodiscard]] Result<std::vector<std::uint8_t>> sign(std::string_view channel, SignedMessage message,
+                                                     std::string_view key);
+
+// Whether the message was signed for that channel with that key.
+[[nodiscard]] bool is_authentic(std::string_view channel, const SignedMessage& message, std::string_view key);
+
+}  // namespace joulecast::telemetry
