@@ -1,0 +1,10 @@
+#include "battery/recording.h"
+#include "text_input.h"
+
+using namespace joulecast;
+
+// Recordings are rising in time and of one length.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  (void)battery::parse_recordings(testing::as_text(data, size), "input");
+  return 0;
+}

@@ -1,0 +1,20 @@
+#include "history/cursor.h"
+#include "text_input.h"
+
+using namespace joulecast;
+
+// A cursor that is taken is the one that was given.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string_view text = testing::as_text(data, size);
+  if (const auto place = history::decode_cursor("q", text))
+    testing::require(history::encode_cursor("q", *place) == text);
+  const auto number = [&](std::size_t from) {
+    std::uint64_t value = 0;
+    for (std::size_t k = from; k < from + 8 && k < size; ++k) value = value << 8 | data[k];
+    return static_cast<std::int64_t>(value);
+  };
+  const history::CursorPlace place{number(0), number(8)};
+  const auto again = history::decode_cursor(text, history::encode_cursor(text, place));
+  testing::require(again && *again == place);
+  return 0;
+}

@@ -1,0 +1,20 @@
+#include "ingest/charge_watch.h"
+#include "ingest/refinement_watch.h"
+#include "robot/robot_file.h"
+#include "text_input.h"
+
+using namespace joulecast;
+
+// What was learnt is stored as JSON text; a damaged one changes nothing or leaves a state that can be stored.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const robot::RobotModel robot = robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/amr.json").value();
+  const std::string text(testing::as_text(data, size));
+  ingest::ChargeWatch charge(robot);
+  charge.recall(text);
+  ingest::ChargeWatch again(robot);
+  again.recall(charge.memory_json());
+  ingest::RefinementWatch refinement(robot, 1);
+  refinement.recall(text);
+  (void)refinement.memory_json();
+  return 0;
+}

@@ -1,0 +1,20 @@
+#include <nlohmann/json.hpp>
+
+#include "answers/json/estimate_json.h"
+#include "answers/json/matrix_json.h"
+#include "answers/json/profile_json.h"
+#include "base/json_text.h"
+#include "robot/robot_file.h"
+#include "text_input.h"
+
+using namespace joulecast;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const robot::RobotModel robot = robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/amr.json").value();
+  const auto request = parse_json(testing::as_text(data, size));
+  if (!request) return 0;
+  (void)answers::read_profile(*request, robot);
+  (void)answers::read_estimate(*request, robot);
+  (void)answers::read_matrix(*request);
+  return 0;
+}

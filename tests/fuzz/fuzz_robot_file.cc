@@ -1,0 +1,14 @@
+#include "robot/robot_file.h"
+#include "text_input.h"
+
+using namespace joulecast;
+
+// What is read is written, and read again as the same.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const auto robot = robot::parse_robot(testing::as_text(data, size));
+  if (!robot) return 0;
+  const std::string text = robot::to_json_text(*robot);
+  const auto again = robot::parse_robot(text);
+  testing::require(again && robot::to_json_text(*again) == text);
+  return 0;
+}
