@@ -43,6 +43,8 @@ constexpr auto table = std::to_array<Named>({
     {"replay", "--into", "FILE", "*.db"},
     {"", "--file", "FILE", "*.json"},
     {"", "--store", "FILE", "*.db"},
+    {"store copy", "--from", "FILE", "*.db"},
+    {"store copy", "--to", "FILE", "*.db"},
     {"", "--name", "NAME", ""},
     {"token create", "--robots", "PATTERN", ""},
     {"audit verify", "--head", "HASH", ""},

@@ -89,7 +89,7 @@ def main():
                 fit = json.loads(programs.run(
                     "calibrate", "drive", programs.path(gear + ".lcmlog"), "--method", method, "--json", "--robot",
                     f"{options.source}/deploy/robots/frc3314-{gear}.json", "--train",
-                    ",".join(n for n in names if chosen(n)), "--out", programs.path("fitted.json")))
+                    ",".join(n for n in names if chosen(n)), "--out", programs.path("fitted.json"), "--force"))
                 unused = [m for m in fit["missions"] if not m["trained_on"]]
                 check(len(unused) == 2, f"{len(unused)} runs are left to test on")
                 missed = sum(abs(m["calibrated_j"] - m["measured_j"]) for m in unused)
