@@ -48,6 +48,7 @@ constexpr auto table = std::to_array<Named>({
     {"", "--name", "NAME", ""},
     {"token create", "--robots", "PATTERN", ""},
     {"audit verify", "--head", "HASH", ""},
+    {"simulate", "--key-file", "FILE", "*.json"},
     {"simulate", "--log", "FILE", "*.lcmlog"},
     {"simulate", "--truth", "FILE", "*.json"},
     {"gap", "--missions", "FILE", "*.csv"},
