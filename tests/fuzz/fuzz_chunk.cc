@@ -6,7 +6,8 @@
 
 using namespace joulecast;
 
-// Bytes of the input are samples, which come back as they were; and the input is a chunk, which is mostly none.
+// Bytes of the input are samples, which come back as they were; and the input is a chunk, which is mostly
+// none.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto bytes = std::as_bytes(std::span(data, size));
   (void)history::decode_chunk(bytes);
@@ -21,7 +22,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto again = history::decode_chunk(chunk);
   testing::require(again && again->size() == samples.size());
   for (std::size_t k = 0; k < samples.size(); ++k)
-    testing::require((*again)[k].utime_us == samples[k].utime_us && (*again)[k].sequence == samples[k].sequence &&
+    testing::require((*again)[k].utime_us == samples[k].utime_us &&
+                     (*again)[k].sequence == samples[k].sequence &&
                      (*again)[k].battery_voltage_v == samples[k].battery_voltage_v);
   for (std::size_t k = 0; k < size; ++k) chunk[(k * 7919 + data[k]) % chunk.size()] ^= std::byte{data[k]};
   (void)history::decode_chunk(chunk);

@@ -7,7 +7,8 @@ using namespace joulecast;
 
 // What was learnt is stored as JSON text; a damaged one changes nothing or leaves a state that can be stored.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const robot::RobotModel robot = robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/amr.json").value();
+  static const robot::RobotModel robot =
+      robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/amr.json").value();
   const std::string text(testing::as_text(data, size));
   ingest::ChargeWatch charge(robot);
   charge.recall(text);

@@ -7,8 +7,8 @@
 
 using namespace joulecast;
 
-// Nine bytes a step: what comes, and a number. Opened and closed missions take turns, and what is current says
-// which of them is open.
+// Nine bytes a step: what comes, and a number. Opened and closed missions take turns, and what is current
+// says which of them is open.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   telemetry::MissionTracker missions;
   telemetry::SequenceTracker sequence;

@@ -10,7 +10,8 @@
 using namespace joulecast;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const robot::RobotModel robot = robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/amr.json").value();
+  static const robot::RobotModel robot =
+      robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/amr.json").value();
   const auto request = parse_json(testing::as_text(data, size));
   if (!request) return 0;
   (void)answers::read_profile(*request, robot);

@@ -31,7 +31,8 @@ const std::string* running = nullptr;
 void on_fault(int signal_number) {
   std::array<char, 64> name{};
   std::snprintf(name.data(), name.size(), "crash-%d", static_cast<int>(getpid()));
-  if (const int file = open(name.data(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644); file >= 0 && running)
+  if (const int file = open(name.data(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+      file >= 0 && running)
     (void)!write(file, running->data(), running->size());
   const std::string_view text = signal_number == SIGALRM ? "an input hangs; it is in crash-<pid>\n"
                                                          : "an input crashes; it is in crash-<pid>\n";
@@ -76,10 +77,26 @@ class Mutator {
   const std::string& any_seed() { return seeds_[below(seeds_.size())]; }
 
   void mutate(std::string& text) {
-    static constexpr std::array<std::string_view, 20> words = {
-        "0",    "-1",   "1e308", "1e-320", "NaN", "18446744073709551616", "-9223372036854775808", "null",
-        "true", "[]",   "{}",    "\"\"",   ",",   "\n",                   "\xff\xff\xff\xff",       "\xc3",
-        "%00",  "[[[[", "\\u0000", "1e999"};
+    static constexpr std::array<std::string_view, 20> words = {"0",
+                                                               "-1",
+                                                               "1e308",
+                                                               "1e-320",
+                                                               "NaN",
+                                                               "18446744073709551616",
+                                                               "-9223372036854775808",
+                                                               "null",
+                                                               "true",
+                                                               "[]",
+                                                               "{}",
+                                                               "\"\"",
+                                                               ",",
+                                                               "\n",
+                                                               "\xff\xff\xff\xff",
+                                                               "\xc3",
+                                                               "%00",
+                                                               "[[[[",
+                                                               "\\u0000",
+                                                               "1e999"};
     const std::size_t at = below(text.size() + 1);
     const std::size_t length = below(std::min<std::size_t>(text.size() - at, 64) + 1);
     switch (below(7)) {

@@ -234,7 +234,8 @@ class Relay {
         const std::string_view text(bytes.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
         if (k == 0 && text.find("COMMIT") != std::string_view::npos)
           swallow = swallows_commit.exchange(false);
-        open = size > 0 && !(k == 1 && swallow) && write(ends[1 - k].fd, text.data(), text.size()) == size;
+        open = size > 0 && !(k == 1 && swallow) &&
+               send(ends[1 - k].fd, text.data(), text.size(), MSG_NOSIGNAL) == size;
       }
     }
     close(server);
