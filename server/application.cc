@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <cstdio>
 #include <functional>
 #include <future>
 #include <mutex>
-#include <sstream>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -21,6 +21,7 @@
 #include "history/writer.h"
 #include "ingest/ingest_service.h"
 #include "ingest/model_loading.h"
+#include "ingest/signature_gate.h"
 #include "server/api/services.h"
 #include "server/daemon_metrics.h"
 #include "server/diagnosis/proposal_acceptor.h"
@@ -36,33 +37,15 @@
 #include "server/http/static_files.h"
 #include "server/logging.h"
 #include "server/metrics.h"
+#include "server/options_of_settings.h"
 #include "server/process_metrics.h"
 #include "server/robot_metrics.h"
+#include "telemetry/datagram_socket.h"
 
 namespace joulecast {
 namespace {
 
 using std::chrono::milliseconds;
-
-constexpr double seconds_per_day = 86400;
-
-milliseconds seconds(double s) {
-  return milliseconds(static_cast<std::int64_t>(s * 1000));
-}
-std::int64_t microseconds(double s) {
-  return static_cast<std::int64_t>(s * 1e6);
-}
-
-std::string store_url(const Settings& settings) {
-  const std::string& url = settings.text("store.url");
-  return url.empty() ? "sqlite:" + settings.text("store.path") : url;
-}
-
-// Beside the SQLite file; a file of this machine also where the history is kept elsewhere.
-std::string spool_path(const Settings& settings) {
-  const std::string url = store_url(settings);
-  return (history::is_postgres_url(url) ? settings.text("store.path") : history::sqlite_path(url)) + ".spool";
-}
 
 // What the last daemon could not store. A spool that cannot be read is put aside: it must not stand in the
 // way.
@@ -86,118 +69,6 @@ bool within(milliseconds limit, std::function<void()> work) {
     done->set_value();
   }).detach();
   return ended.wait_for(limit) == std::future_status::ready;
-}
-
-// The entries of a list separated by commas.
-std::vector<std::string> listed(const std::string& text) {
-  std::vector<std::string> entries;
-  std::istringstream rest(text);
-  for (std::string entry; std::getline(rest, entry, ',');)
-    if (!entry.empty()) entries.push_back(entry);
-  return entries;
-}
-
-history::WriterOptions writer_options(const Settings& settings) {
-  history::WriterOptions options;
-  if (const double days = settings.number("store.retention_days"); days > 0) {
-    options.retention.telemetry_max_age_us = microseconds(days * seconds_per_day);
-  }
-  if (const auto bytes = settings.integer("store.retention_bytes"); bytes > 0)
-    options.retention.telemetry_max_bytes = bytes;
-  if (const double days = settings.number("store.retention_missions_days"); days > 0)
-    options.missions_max_age_us = microseconds(days * seconds_per_day);
-  options.queue_bytes = static_cast<std::size_t>(settings.integer("store.queue_bytes"));
-  options.spool_path = spool_path(settings);
-  options.on_error = [](const Error& error) { log_error("store", error); };
-  return options;
-}
-
-ingest::IngestOptions ingest_options(const Settings& settings) {
-  ingest::IngestOptions options;
-  options.lcm_url = settings.text("lcm.url");
-  options.listen = {settings.text("lcm.bind_address"), settings.text("lcm.accept_from")};
-  options.queue_messages = static_cast<std::size_t>(settings.integer("ingest.queue_messages"));
-  options.energy_state_period = seconds(settings.number("energy_state.period_s"));
-  options.max_unknown_robots = static_cast<std::size_t>(settings.integer("ingest.max_unknown_robots"));
-  options.signatures = {settings.text("ingest.key_file"), settings.boolean("ingest.require_signed"),
-                        microseconds(settings.number("ingest.signature_age_s"))};
-  options.session.meter.tolerance = settings.number("meter.tolerance");
-  options.session.meter.gap_bridge_s = settings.number("ingest.gap_bridge_s");
-  options.session.sequence.gap_us = microseconds(settings.number("ingest.gap_bridge_s"));
-  options.session.mission.explicit_silence_us =
-      microseconds(settings.number("ingest.mission_idle_timeout_s"));
-  options.session.implicit_missions = settings.boolean("ingest.implicit_missions");
-  options.session.reorder_us = microseconds(settings.number("ingest.reorder_s"));
-  options.session.sender_takeover_us = microseconds(settings.number("ingest.sender_takeover_s"));
-  options.session.max_ahead_us = microseconds(settings.number("ingest.max_clock_ahead_s"));
-  options.session.booked_margin_us = microseconds(settings.number("ingest.booked_time_margin_s"));
-  options.session.event_rate_hz = settings.number("ingest.event_rate_hz");
-  return options;
-}
-
-server::AdoptionOptions adoption_options(const Settings& settings) {
-  server::AdoptionOptions options;
-  options.max_missions = static_cast<std::size_t>(settings.integer("adoption.max_missions"));
-  options.max_samples = static_cast<std::size_t>(settings.integer("adoption.max_samples"));
-  options.meter.tolerance = settings.number("meter.tolerance");
-  options.meter.gap_bridge_s = settings.number("ingest.gap_bridge_s");
-  return options;
-}
-
-server::DiagnosisOptions diagnosis_options(const Settings& settings) {
-  server::DiagnosisOptions options;
-  options.queue = static_cast<std::size_t>(settings.integer("diagnosis.queue"));
-  options.max_missions = static_cast<std::size_t>(settings.integer("diagnosis.max_missions"));
-  options.max_samples = static_cast<std::size_t>(settings.integer("diagnosis.max_samples"));
-  options.controls = static_cast<std::size_t>(settings.integer("diagnosis.controls"));
-  options.threads = static_cast<std::size_t>(settings.integer("diagnosis.threads"));
-  options.max_memory_bytes = static_cast<std::uint64_t>(settings.integer("diagnosis.max_memory_bytes"));
-  options.deadline = seconds(settings.number("diagnosis.deadline_s"));
-  return options;
-}
-
-server::DriftOptions drift_options(const Settings& settings) {
-  server::DriftOptions options;
-  options.settings.least_change = settings.number("watch.least_change");
-  return options;
-}
-
-server::WatchOptions watch_options(const Settings& settings) {
-  server::WatchOptions options;
-  options.period_s = settings.number("watch.period_s");
-  options.diagnose = settings.boolean("watch.diagnose");
-  for (std::string& id : listed(settings.text("watch.robots"))) options.robots.insert(std::move(id));
-  return options;
-}
-
-http::ServerOptions http_options(const Settings& settings) {
-  http::ServerOptions options;
-  options.address = settings.text("http.address");
-  options.port = static_cast<std::uint16_t>(settings.integer("http.port"));
-  options.allowed_hosts = listed(settings.text("http.allowed_hosts"));
-  options.tls_certificate = settings.text("http.tls_certificate");
-  options.tls_key = settings.text("http.tls_key");
-  options.worker_threads = static_cast<unsigned>(settings.integer("http.worker_threads"));
-  options.compute_threads = static_cast<unsigned>(settings.integer("http.compute_threads"));
-  options.worker_queue = static_cast<std::size_t>(settings.integer("http.worker_queue"));
-  options.client_requests = static_cast<std::size_t>(settings.integer("http.client_requests"));
-  options.max_connections = static_cast<std::size_t>(settings.integer("http.max_connections"));
-  options.client_connections = static_cast<std::size_t>(settings.integer("http.client_connections"));
-  options.max_header_bytes = static_cast<std::uint32_t>(settings.integer("http.max_header_bytes"));
-  options.max_body_bytes = static_cast<std::uint64_t>(settings.integer("http.max_body_bytes"));
-  options.max_bodies_bytes = static_cast<std::uint64_t>(settings.integer("http.max_bodies_bytes"));
-  options.read_timeout = seconds(settings.number("http.read_timeout_s"));
-  options.write_timeout = seconds(settings.number("http.write_timeout_s"));
-  options.idle_timeout = seconds(settings.number("http.idle_timeout_s"));
-  options.request_deadline = seconds(settings.number("http.request_deadline_s"));
-  return options;
-}
-
-http::EventHub::Options event_options(const Settings& settings) {
-  http::EventHub::Options options;
-  options.queue_bytes = static_cast<std::size_t>(settings.integer("http.event_queue_bytes"));
-  options.max_subscribers = static_cast<std::size_t>(settings.integer("http.event_streams"));
-  return options;
 }
 
 // Without tokens only this machine is served, unless the settings say otherwise.
@@ -230,6 +101,11 @@ std::function<Result<void>(http::AccessEvent)> audit_into(history::Writer& write
                                               std::move(event.address), std::move(event.request_id),
                                               std::move(event.action), std::move(event.detail_json), ""}});
   };
+}
+
+void log_failed_request(const http::Endpoint& endpoint, const http::Request& request, const Error& error) {
+  log_error("request failed",
+            {{"operation", endpoint.operation_id}, {"request_id", request.id}, {"cause", describe(error)}});
 }
 
 // Every documented endpoint and the page.
@@ -267,6 +143,122 @@ struct Application::Parts {
     observe_faults({});
   }
 
+  Result<void> open_history() {
+    const bool by_path = settings.text("store.url").empty();
+    Result<std::unique_ptr<history::Store>> opened = history::open_store(store_url(settings));
+    if (!opened)
+      return fail(opened.error().fault, by_path ? "store.path" : "store.url",
+                  std::move(opened.error().message));
+    store = std::move(*opened);
+    take_in_spool(settings, *store);
+    writer = std::make_unique<history::Writer>(*store, writer_options(settings));
+    tell_of_faults();
+
+    const std::string& directory = settings.text("robots.directory");
+    Result<void> loaded = directory.empty() ? Result<void>() : load_robot_files(directory);
+    if (loaded) loaded = ingest::load_stored_models(*store, models);
+    return loaded ? recall_states() : loaded;
+  }
+
+  Result<void> start_ingest() {
+    forecasts = std::make_unique<ingest::Forecasts>(*store);
+    const auto post = [this](history::Command command) {
+      if (const Result<void> posted = writer->offer(std::move(command)); !posted)
+        warn("", describe(posted.error()));
+    };
+    ingest::SessionOutputs outputs{*store, post, fleet, counters, warn};
+    outputs.mission_ended = [this, post](const std::shared_ptr<const ingest::ModelInForce>& model,
+                                         forecast::PastMission mission) {
+      // A mission that ran into a new version is learnt against the one in force now.
+      const auto in_force = models.find(model->robot.robot_id);
+      ingest::Forecasts::Learnt learnt =
+          forecasts->learn(in_force != nullptr ? in_force : model, std::move(mission));
+      post(history::PutLearned{std::move(learnt.document)});
+      if (learnt.drift) report_drift(model->robot.robot_id, *learnt.drift, post);
+    };
+    ingest = std::make_unique<ingest::IngestService>(ingest_options(settings), models, *forecasts, outputs);
+    return ingest->start();
+  }
+
+  Result<void> start_diagnosis() {
+    drift_view = std::make_unique<server::DriftView>(*store, models, drift_options(settings));
+    adoption = std::make_unique<server::ModelAdoption>(*store, *writer, models, *drift_view, host_utime_us,
+                                                       adoption_options(settings));
+    if (settings.boolean("adoption.automatic")) {
+      acceptor = std::make_unique<server::ProposalAcceptor>(*store, *adoption, warn);
+      acceptor->start(milliseconds(10'000));
+    }
+    const auto warn_of = [](const Error& error) { log_error("diagnosis", error); };
+    diagnoses = std::make_unique<server::DiagnosisService>(
+        *store, *writer, models, *drift_view, host_utime_us, diagnosis_options(settings), warn_of,
+        [this](const history::DiagnosisRecord& diagnosis) { watch->on_diagnosis(diagnosis); });
+    watch = std::make_unique<server::GapWatch>(*store, *writer, models, *drift_view, *diagnoses,
+                                               host_utime_us, watch_options(settings), warn_of);
+    Result<void> started = diagnoses->start();
+    if (started) watch->start();
+    return started;
+  }
+
+  std::vector<http::ReadinessCheck> readiness_checks() {
+    std::vector<http::ReadinessCheck> checks;
+    checks.push_back({"ingest", [this]() -> Result<void> {
+                        const ingest::IngestStatus status = ingest->status();
+                        if (!status.receiving)
+                          return fail(Fault::unavailable, "ingest",
+                                      "LCM is not being received: " + status.error);
+                        return {};
+                      }});
+    checks.push_back({"store", [this]() -> Result<void> {
+                        const history::WriterStatus status = writer->status();
+                        if (!status.healthy) return fail(Fault::unavailable, "store", status.error);
+                        return {};
+                      }});
+    if (!settings.text("ingest.key_file").empty())
+      checks.push_back({"robot_keys", [this]() -> Result<void> {
+                          const std::string why = ingest->status().key_error;
+                          if (!why.empty()) return fail(Fault::unavailable, "ingest.key_file", why);
+                          return {};
+                        }});
+    if (!settings.text("auth.token_file").empty())
+      checks.push_back({"tokens", [this] { return gate->check(); }});
+    return checks;
+  }
+
+  void export_all_metrics() {
+    server::export_metrics(metrics, counters, *ingest, fleet, *writer, *store, events, host_utime_us);
+    server::export_gap_metrics(metrics, *diagnoses, *watch, *adoption);
+    server::export_process_metrics(metrics);
+    server::export_robot_metrics(metrics, fleet, *watch, host_utime_us,
+                                 static_cast<std::size_t>(settings.integer("metrics.robots")));
+  }
+
+  Result<void> start_http() {
+    services =
+        std::make_unique<api::Services>(api::Services{*store, *writer, models, fleet, *forecasts, cost_tables,
+                                                      *drift_view, *adoption, *diagnoses, host_utime_us});
+    Result<std::unique_ptr<http::Gate>> opened =
+        http::Gate::open({.token_file = settings.text("auth.token_file"),
+                          .secure = !settings.text("http.tls_certificate").empty(),
+                          .now_utime_us = host_utime_us,
+                          .audit = audit_into(*writer)});
+    if (!opened) return tl::unexpected(std::move(opened.error()));
+    gate = std::move(*opened);
+    Result<std::vector<http::Endpoint>> table = endpoint_table(
+        *services, metrics, events, *gate, readiness_checks(), settings.text("http.web_directory"));
+    if (!table) return tl::unexpected(std::move(table.error()));
+    router = std::make_unique<http::Router>(std::move(*table), log_failed_request,
+                                            [this](const http::Endpoint& endpoint, http::Request& request) {
+                                              return gate->refuse(endpoint, request);
+                                            });
+    http_metrics = std::make_unique<http::HttpMetrics>(metrics);
+    export_all_metrics();
+    Result<std::unique_ptr<http::HttpServer>> started =
+        http::HttpServer::start(http_options(settings), *router, http_metrics.get());
+    if (!started) return tl::unexpected(std::move(started.error()));
+    http = std::move(*started);
+    return {};
+  }
+
   // What a thread survived becomes a log line, a count and an entry of the audit log.
   void tell_of_faults() {
     const Counter survived =
@@ -284,7 +276,7 @@ struct Application::Parts {
   // Whatever does not end is left behind, so that the store is always brought to its end.
   bool stop() {
     if (stopped.exchange(true)) return true;
-    const milliseconds patience = seconds(settings.number("http.stop_deadline_s"));
+    const milliseconds patience(std::llround(1e3 * settings.number("http.stop_deadline_s")));
     std::future<bool> http_ended = std::async(std::launch::async, [this, patience] {
       return within(patience + milliseconds(500), [this, patience] {
         if (http && !http->stop(patience)) log_warning("requests were cut off at the stop deadline");
@@ -417,113 +409,14 @@ Application::~Application() = default;
 
 Result<std::unique_ptr<Application>> Application::start(const Settings& settings) {
   auto parts = std::make_unique<Parts>(settings);
-  Parts& p = *parts;
-
-  if (const Result<void> safe = check_exposure(settings); !safe) return tl::unexpected(safe.error());
-  const bool by_path = settings.text("store.url").empty();
-  Result<std::unique_ptr<history::Store>> store = history::open_store(store_url(settings));
-  if (!store)
-    return fail(store.error().fault, by_path ? "store.path" : "store.url", std::move(store.error().message));
-  p.store = std::move(*store);
-  take_in_spool(settings, *p.store);
-  p.writer = std::make_unique<history::Writer>(*p.store, writer_options(settings));
-  p.tell_of_faults();
-
-  if (const std::string& directory = settings.text("robots.directory"); !directory.empty()) {
-    if (Result<void> loaded = p.load_robot_files(directory); !loaded) return tl::unexpected(loaded.error());
-  }
-  if (Result<void> models = ingest::load_stored_models(*p.store, p.models); !models)
-    return tl::unexpected(std::move(models.error()));
-
-  if (Result<void> recalled = p.recall_states(); !recalled)
-    return tl::unexpected(std::move(recalled.error()));
-
-  p.forecasts = std::make_unique<ingest::Forecasts>(*p.store);
-  history::Writer& writer = *p.writer;
-  const auto post = [&writer, warn = p.warn](history::Command command) {
-    if (const Result<void> posted = writer.offer(std::move(command)); !posted)
-      warn("", describe(posted.error()));
-  };
-  ingest::SessionOutputs outputs{*p.store, post, p.fleet, p.counters, p.warn};
-  outputs.mission_ended = [&p, post](const std::shared_ptr<const ingest::ModelInForce>& model,
-                                     forecast::PastMission mission) {
-    // A mission that ran into a new version is learnt against the one in force now.
-    const auto in_force = p.models.find(model->robot.robot_id);
-    ingest::Forecasts::Learnt learnt =
-        p.forecasts->learn(in_force != nullptr ? in_force : model, std::move(mission));
-    post(history::PutLearned{std::move(learnt.document)});
-    if (learnt.drift) p.report_drift(model->robot.robot_id, *learnt.drift, post);
-  };
-  p.ingest =
-      std::make_unique<ingest::IngestService>(ingest_options(settings), p.models, *p.forecasts, outputs);
-  if (Result<void> started = p.ingest->start(); !started) return tl::unexpected(std::move(started.error()));
-
-  p.drift_view = std::make_unique<server::DriftView>(*p.store, p.models, drift_options(settings));
-  p.adoption = std::make_unique<server::ModelAdoption>(*p.store, *p.writer, p.models, *p.drift_view,
-                                                       host_utime_us, adoption_options(settings));
-  if (settings.boolean("adoption.automatic")) {
-    p.acceptor = std::make_unique<server::ProposalAcceptor>(*p.store, *p.adoption, p.warn);
-    p.acceptor->start(milliseconds(10'000));
-  }
-  const auto warn_of = [](const Error& error) { log_error("diagnosis", error); };
-  p.diagnoses = std::make_unique<server::DiagnosisService>(
-      *p.store, *p.writer, p.models, *p.drift_view, host_utime_us, diagnosis_options(settings), warn_of,
-      [&p](const history::DiagnosisRecord& diagnosis) { p.watch->on_diagnosis(diagnosis); });
-  p.watch = std::make_unique<server::GapWatch>(*p.store, *p.writer, p.models, *p.drift_view, *p.diagnoses,
-                                               host_utime_us, watch_options(settings), warn_of);
-  if (Result<void> started = p.diagnoses->start(); !started)
-    return tl::unexpected(std::move(started.error()));
-  p.watch->start();
-  p.services = std::make_unique<api::Services>(api::Services{*p.store, *p.writer, p.models, p.fleet,
-                                                             *p.forecasts, p.cost_tables, *p.drift_view,
-                                                             *p.adoption, *p.diagnoses, host_utime_us});
-  Result<std::unique_ptr<http::Gate>> gate =
-      http::Gate::open({.token_file = settings.text("auth.token_file"),
-                        .secure = !settings.text("http.tls_certificate").empty(),
-                        .now_utime_us = host_utime_us,
-                        .audit = audit_into(*p.writer)});
-  if (!gate) return tl::unexpected(std::move(gate.error()));
-  p.gate = std::move(*gate);
-  std::vector<http::ReadinessCheck> checks;
-  checks.push_back({"ingest", [&p]() -> Result<void> {
-                      const ingest::IngestStatus status = p.ingest->status();
-                      if (!status.receiving)
-                        return fail(Fault::unavailable, "ingest",
-                                    "LCM is not being received: " + status.error);
-                      return {};
-                    }});
-  checks.push_back({"store", [&p]() -> Result<void> {
-                      const history::WriterStatus status = p.writer->status();
-                      if (!status.healthy) return fail(Fault::unavailable, "store", status.error);
-                      return {};
-                    }});
-  if (!settings.text("auth.token_file").empty())
-    checks.push_back({"tokens", [&p] { return p.gate->check(); }});
-  Result<std::vector<http::Endpoint>> table = endpoint_table(
-      *p.services, p.metrics, p.events, *p.gate, std::move(checks), settings.text("http.web_directory"));
-  if (!table) return tl::unexpected(std::move(table.error()));
-  const auto log_fault = [](const http::Endpoint& endpoint, const http::Request& request,
-                            const Error& error) {
-    log_error("request failed",
-              {{"operation", endpoint.operation_id}, {"request_id", request.id}, {"cause", describe(error)}});
-  };
-  p.router = std::make_unique<http::Router>(std::move(*table), log_fault,
-                                            [&p](const http::Endpoint& endpoint, http::Request& request) {
-                                              return p.gate->refuse(endpoint, request);
-                                            });
-  p.http_metrics = std::make_unique<http::HttpMetrics>(p.metrics);
-  server::export_metrics(p.metrics, p.counters, *p.ingest, p.fleet, *p.writer, *p.store, p.events,
-                         host_utime_us);
-  server::export_gap_metrics(p.metrics, *p.diagnoses, *p.watch, *p.adoption);
-  server::export_process_metrics(p.metrics);
-  server::export_robot_metrics(p.metrics, p.fleet, *p.watch, host_utime_us,
-                               static_cast<std::size_t>(settings.integer("metrics.robots")));
-  Result<std::unique_ptr<http::HttpServer>> http =
-      http::HttpServer::start(http_options(settings), *p.router, p.http_metrics.get());
-  if (!http) return tl::unexpected(std::move(http.error()));
-  p.http = std::move(*http);
-  p.beat = std::thread([&p] { p.run_beat(); });
-  p.warming = std::thread([&p] { p.warm_forecasts(); });
+  Result<void> done = check_exposure(settings);
+  if (done) done = parts->open_history();
+  if (done) done = parts->start_ingest();
+  if (done) done = parts->start_diagnosis();
+  if (done) done = parts->start_http();
+  if (!done) return tl::unexpected(std::move(done.error()));
+  parts->beat = std::thread([&p = *parts] { p.run_beat(); });
+  parts->warming = std::thread([&p = *parts] { p.warm_forecasts(); });
   return std::unique_ptr<Application>(new Application(std::move(parts)));
 }
 
@@ -567,6 +460,21 @@ std::vector<Error> faults_of_access(const Settings& settings) {
           http::Gate::open({.token_file = settings.text("auth.token_file")});
       !gate)
     faults.push_back(gate.error());
+  const std::string &certificate = settings.text("http.tls_certificate"),
+                    &key = settings.text("http.tls_key");
+  if (!certificate.empty() || !key.empty()) {
+    if (const Result<void> sound = http::check_tls(certificate, key); !sound) faults.push_back(sound.error());
+  }
+  return faults;
+}
+
+std::vector<Error> faults_of_telemetry(const Settings& settings) {
+  std::vector<Error> faults;
+  const ingest::IngestOptions options = ingest_options(settings);
+  if (Result<void> keys = ingest::SignatureGate(options.signatures).read_keys(); !keys)
+    faults.push_back(keys.error());
+  if (const auto senders = telemetry::AcceptedSenders::parse(options.listen.accept_from); !senders)
+    faults.push_back(senders.error());
   return faults;
 }
 

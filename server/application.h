@@ -42,8 +42,12 @@ class Application {
   std::unique_ptr<Parts> parts_;
 };
 
-// What is wrong with who may use the service: an address open to all, a token file that cannot be read.
+// What is wrong with who may use the service: an address open to all, a token file or a
+// certificate that cannot be used.
 std::vector<Error> faults_of_access(const Settings& settings);
+
+// What is wrong with whose telemetry is taken: the robots' keys, the list of senders.
+std::vector<Error> faults_of_telemetry(const Settings& settings);
 
 // What is wrong with the robot files that the settings name, one a file; or with their directory.
 std::vector<Error> faulty_robot_files(const Settings& settings);

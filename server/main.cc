@@ -95,6 +95,7 @@ int print(const joulecast::Result<std::string>& text) {
 
 int check(const joulecast::Settings& settings) {
   auto faulty = joulecast::faults_of_access(settings);
+  for (joulecast::Error& error : joulecast::faults_of_telemetry(settings)) faulty.push_back(std::move(error));
   for (joulecast::Error& error : joulecast::faulty_robot_files(settings)) faulty.push_back(std::move(error));
   for (const joulecast::Error& error : faulty) complain(error);
   return faulty.empty() ? print(std::string("the settings are valid\n")) : 2;
@@ -118,7 +119,7 @@ int salvage(const std::string& path, const std::string& into) {
   if (!salvaged) return print(tl::unexpected(salvaged.error()));
   for (const std::string& loss : salvaged->losses) std::printf("lost: %s\n", loss.c_str());
   std::printf("%lld rows kept in %s\n", static_cast<long long>(salvaged->rows), into.c_str());
-  return 0;
+  return salvaged->losses.empty() ? 0 : 3;
 }
 
 int back_up(const std::string& path, const std::string& file) {

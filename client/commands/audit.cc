@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "base/utc_time.h"
@@ -13,8 +14,11 @@
 namespace joulecast::client {
 namespace {
 
+constexpr std::size_t hash_digits = 64;
+
 struct Options {
-  std::string store, head;
+  std::string store;
+  std::optional<std::string> head;
 };
 
 void print_entry(const history::AuditEntry& entry) {
@@ -36,7 +40,10 @@ Exit list(const Options& options) {
 }
 
 Exit verify(const Options& options) {
-  const auto state = history::verify_audit(options.store, options.head);
+  if (options.head && options.head->size() != hash_digits)
+    return report(
+        {Fault::invalid, "--head", "must be the 64 hexadecimal digits that an earlier verify printed"});
+  const auto state = history::verify_audit(options.store, options.head.value_or(""));
   if (!state) return report(state.error());
   fmt::print("{} entries, every link holds\n", state->entries);
   if (state->entries > 0) fmt::print("head {}\n", state->head);

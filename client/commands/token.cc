@@ -4,8 +4,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,7 +26,8 @@ namespace {
 using access::Token;
 
 struct Options {
-  std::string file, name, robots;
+  std::string file, name;
+  std::optional<std::string> robots;
   std::string role = "read";
   double days = 365;
 };
@@ -33,11 +36,14 @@ Exit create(const Options& options) {
   constexpr double microseconds_per_day = 86400e6;
   if (const Result<void> sound = access::check_token_name(options.name); !sound)
     return report({sound.error().fault, "--name", sound.error().message});
+  if (options.robots && options.robots->empty())
+    return report({Fault::invalid, "--robots", "must not be empty; without it the token is for all robots"});
+  if (!std::isfinite(options.days)) return report({Fault::invalid, "--days", "must be a number"});
   const std::string secret = access::new_secret();
   Token token;
   token.name = options.name;
   token.role = access::role_of(options.role).value_or(access::Role::read);
-  token.robots = options.robots;
+  token.robots = options.robots.value_or("");
   token.created_utime_us = host_utime_us();
   if (options.days > 0)
     token.expires_utime_us =

@@ -63,7 +63,9 @@ AccessEvent token_event(std::string action, const Token& token) {
 
 // What a request wanted; never what it carried in its headers.
 ordered_json wanted(const Request& request) {
-  return {{"method", to_string(request.method)}, {"path", request.path}};
+  ordered_json detail{{"method", to_string(request.method)}, {"path", request.path}};
+  for (const auto& [key, value] : request.query) detail["query"][key] = value;
+  return detail;
 }
 
 std::string text_of(const ordered_json& detail) {
@@ -201,8 +203,11 @@ std::optional<Response> Gate::refuse(const Endpoint& endpoint, Request& request)
   request.actor = token->name;
   if (const auto why = why_not(*token, endpoint, request)) {
     tell_refusal(endpoint, request, 403);
+    const bool lacks_role = token->role < endpoint.role;
     return problem(403, "forbidden", *why, request.id, "Authorization",
-                   "must be a token of role " + std::string(access::name(endpoint.role)) + " for this");
+                   lacks_role
+                       ? "must be a token of role " + std::string(access::name(endpoint.role)) + " for this"
+                       : "must be a token for the robots that this is about");
   }
   return std::nullopt;
 }

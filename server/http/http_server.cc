@@ -283,6 +283,11 @@ std::uint16_t HttpServer::port() const {
   return impl_->port;
 }
 
+Result<void> check_tls(const std::string& certificate, const std::string& key) {
+  if (const auto tls = make_tls(certificate, key); !tls) return tl::unexpected<Error>(tls.error());
+  return {};
+}
+
 Result<void> HttpServer::reload_tls() {
   const ServerOptions& options = impl_->core->options;
   if (options.tls_certificate.empty()) return {};

@@ -88,6 +88,9 @@ bool is_loopback(std::string_view address);
 // HTTP/1.1 server: one I/O thread, small worker pools, keep-alive, pipelining answered in order. A client, or
 // peer, is an IPv4 address or the /64 network of an IPv6 address.
 // Thread-safe where stated; router and observer must outlive it.
+// Whether the files are a certificate and its key.
+Result<void> check_tls(const std::string& certificate, const std::string& key);
+
 class HttpServer {
  public:
   // Binds, listens and starts its threads. Fails with Fault::unavailable when the address cannot be bound and

@@ -129,6 +129,8 @@ std::string Fields::text(std::string_view name, std::size_t max_length, std::opt
   std::string value = found->get<std::string>();
   if (value.size() > max_length)
     fault(name, fmt::format("has {} bytes, must have at most {}", value.size(), max_length));
+  else if (value.find('\0') != std::string::npos)
+    fault(name, "must not contain a NUL character");
   return value;
 }
 

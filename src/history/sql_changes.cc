@@ -11,7 +11,7 @@ namespace joulecast::history {
 namespace {
 
 tl::unexpected<Error> no_mission(MissionKey key) {
-  return fail(Fault::not_found, "mission", "no mission has key " + std::to_string(key));
+  return fail(Fault::not_found, "id", "no mission has key " + std::to_string(key));
 }
 
 Result<void> check_robot_id(std::string_view robot_id) {

@@ -193,28 +193,51 @@ std::vector<std::pair<std::string, std::string>> tables_and_keys(Database& datab
   return tables;
 }
 
+// Ranges of keys that could not be read, those that touch as one.
+class LostKeys {
+ public:
+  LostKeys(std::string table, std::string key) : table_(std::move(table)), key_(std::move(key)) {}
+
+  void add(std::int64_t from, std::int64_t to, const std::string& why) {
+    if (!ranges_.empty() && ranges_.back().to + 1 == from)
+      ranges_.back().to = to;
+    else
+      ranges_.push_back({from, to, why});
+  }
+
+  void tell(std::vector<std::string>& losses) const {
+    for (const Range& range : ranges_) {
+      if (losses.size() >= most_faults) return;
+      losses.push_back(table_ + ", what it had with " + key_ + " " + std::to_string(range.from) +
+                       (range.from == range.to ? "" : " to " + std::to_string(range.to)) + ": " + range.why);
+    }
+  }
+
+ private:
+  struct Range {
+    std::int64_t from, to;
+    std::string why;
+  };
+  std::string table_, key_;
+  std::vector<Range> ranges_;
+};
+
 // Copies the rows of keys from..to; where they cannot be read, those of either half, down to single keys, as
 // long as that promises something.
 void salvage_range(Database& database, const std::string& table, const std::string& key, std::int64_t from,
-                   std::int64_t to, int& failures, Salvage& salvage) {
+                   std::int64_t to, int& failures, LostKeys& losses) {
   try {
-    salvage.rows +=
-        Rows(database.statement("INSERT OR IGNORE INTO main." + table + " SELECT * FROM damaged." + table +
-                                " WHERE " + key + " BETWEEN ? AND ?"))
-            .bind(from)
-            .bind(to)
-            .run();
+    Rows(database.statement("INSERT OR IGNORE INTO main." + table + " SELECT * FROM damaged." + table +
+                            " WHERE " + key + " BETWEEN ? AND ?"))
+        .bind(from)
+        .bind(to)
+        .run();
   } catch (const SqlError& error) {
     if (error.fault() != Fault::corrupt) throw;
-    if (from == to || ++failures > most_failures) {
-      if (salvage.losses.size() < most_faults)
-        salvage.losses.push_back(table + ", " + key + " " + std::to_string(from) +
-                                 (from == to ? "" : " to " + std::to_string(to)) + ": " + error.what());
-      return;
-    }
+    if (from == to || ++failures > most_failures) return losses.add(from, to, error.what());
     const std::int64_t middle = from + (to - from) / 2;
-    salvage_range(database, table, key, from, middle, failures, salvage);
-    salvage_range(database, table, key, middle + 1, to, failures, salvage);
+    salvage_range(database, table, key, from, middle, failures, losses);
+    salvage_range(database, table, key, middle + 1, to, failures, losses);
   }
 }
 
@@ -226,7 +249,16 @@ std::int64_t greatest(Database& database, const std::string& table, const std::s
   }
 }
 
-void drop_loose_ends(Database& database) {
+// Names what is dropped, because what it belongs to was not read.
+void drop(Database& database, const std::string& table, const std::string& of, const std::string& condition,
+          Salvage& salvage) {
+  const std::int64_t dropped = Rows(database.statement("DELETE FROM " + table + " WHERE " + condition)).run();
+  if (dropped > 0)
+    salvage.losses.push_back(table + ": " + std::to_string(dropped) + " readable rows, whose " + of +
+                             " could not be read");
+}
+
+void drop_loose_ends(Database& database, Salvage& salvage) {
   for (const char* table : {"model", "mission", "energy_state", "learned", "diagnosis", "proposal"})
     database.execute(
         "INSERT OR IGNORE INTO robot (robot_id, created_utime_us) SELECT DISTINCT robot_id, 0 FROM " +
@@ -247,10 +279,9 @@ void drop_loose_ends(Database& database) {
   clear("proposal", "adopted_version", "NULL");
   database.execute(trigger);
   for (const char* table : {"trace", "telemetry_chunk", "covariate_chunk"})
-    database.execute("DELETE FROM " + std::string(table) +
-                     " WHERE mission_key NOT IN (SELECT mission_key FROM mission)");
-  database.execute(
-      "DELETE FROM diagnosis_report WHERE diagnosis_id NOT IN (SELECT diagnosis_id FROM diagnosis)");
+    drop(database, table, "missions", "mission_key NOT IN (SELECT mission_key FROM mission)", salvage);
+  drop(database, "diagnosis_report", "diagnoses", "diagnosis_id NOT IN (SELECT diagnosis_id FROM diagnosis)",
+       salvage);
 }
 
 }  // namespace
@@ -318,9 +349,19 @@ Result<Salvage> salvage_store(const std::string& damaged, const std::string& int
     database.execute("ATTACH " + quoted(damaged) + " AS damaged");
     for (const auto& [table, key] : tables_and_keys(database)) {
       int failures = 0;
-      salvage_range(database, table, key, 0, greatest(database, table, key), failures, salvage);
+      LostKeys losses(table, key);
+      salvage_range(database, table, key, 0, greatest(database, table, key), failures, losses);
+      losses.tell(salvage.losses);
     }
-    drop_loose_ends(database);
+    drop_loose_ends(database, salvage);
+    // A page whose content reads as nothing hides its rows without an error.
+    Rows damage(database.statement("PRAGMA damaged.integrity_check(3)"));
+    while (damage.next())
+      if (const std::string text = damage.text(); text != "ok")
+        salvage.losses.push_back("the damaged file, of which rows may be gone that nothing else names: " +
+                                 text);
+    for (const auto& [table, key] : tables_and_keys(database))
+      salvage.rows += database.integer("SELECT count(*) FROM main." + table);
     return {};
   });
   if (!done) return tl::unexpected(done.error());

@@ -32,8 +32,9 @@ Result<StoreCheck> back_up_store(const std::string& path, const std::string& cop
 Result<std::string> restore_store(const std::string& from, const std::string& path);
 
 struct Salvage {
-  std::int64_t rows = 0;            // kept
-  std::vector<std::string> losses;  // what could not be read, one range of a table each
+  std::int64_t rows = 0;  // in the new store
+  std::vector<std::string>
+      losses;  // what could not be read or is kept no more, and what the file is damaged in
 };
 
 // Reads what can be read of a damaged store, table by table, into a new one, and drops what then refers to

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <condition_variable>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -74,6 +75,7 @@ class IngestService::Impl {
       const std::lock_guard lock(mutex_);
       s.queue_messages = queue_.size();
       s.error = error_;
+      s.key_error = key_error_;
     }
     s.receive_ticks = receive_ticks_;
     s.account_ticks = account_ticks_;
@@ -85,8 +87,7 @@ class IngestService::Impl {
   void receive() {
     while (running_) {
       ++receive_ticks_;
-      if (Result<void> keys = signatures_.refresh(); !keys)
-        outputs_.warn("", "the robots' keys stay as they were: " + describe(keys.error()));
+      refresh_keys();
       const Result<int> handled = link_->poll(std::chrono::milliseconds(100));
       if (!handled) {
         receiving_ = false;
@@ -118,6 +119,14 @@ class IngestService::Impl {
       if (dropped > 0) outputs_.counters.add(IngestFault::queue_full, dropped);
       ready_.notify_one();
     }
+  }
+
+  void refresh_keys() {
+    const std::optional<Result<void>> read = signatures_.refresh();
+    if (!read) return;
+    if (!*read) outputs_.warn("", "the robots' keys stay as they were: " + describe(read->error()));
+    const std::lock_guard lock(mutex_);
+    key_error_ = *read ? "" : describe(read->error());
   }
 
   void account() {
@@ -209,7 +218,7 @@ class IngestService::Impl {
   mutable std::mutex mutex_;
   std::condition_variable ready_;
   std::vector<InboundMessage> queue_;
-  std::string error_;
+  std::string error_, key_error_;
   bool draining_ = false;
   std::atomic<bool> running_ = false, receiving_ = false;
   std::atomic<std::uint64_t> receive_ticks_ = 0, account_ticks_ = 0;

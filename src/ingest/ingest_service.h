@@ -29,7 +29,8 @@ struct IngestStatus {
   std::uint64_t receive_ticks = 0;  // turns of each loop, several a second: for the watchdog
   std::uint64_t account_ticks = 0;
   bool receiving = false;
-  std::string error;  // why not receiving
+  std::string error;      // why not receiving
+  std::string key_error;  // why the robots' keys are not those of the file; empty: they are
 };
 
 // The two ingest threads: one receives from LCM, guards, decodes and queues; the other runs the pipeline,

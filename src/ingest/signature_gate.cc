@@ -39,13 +39,13 @@ Result<void> SignatureGate::read_keys() {
   return {};
 }
 
-Result<void> SignatureGate::refresh() {
-  if (options_.key_file.empty()) return {};
+std::optional<Result<void>> SignatureGate::refresh() {
+  if (options_.key_file.empty()) return std::nullopt;
   const auto now = std::chrono::steady_clock::now();
-  if (now - looked_ < std::chrono::seconds(1)) return {};
+  if (now - looked_ < std::chrono::seconds(1)) return std::nullopt;
   looked_ = now;
   std::error_code ignored;
-  if (std::filesystem::last_write_time(options_.key_file, ignored) == changed_) return {};
+  if (std::filesystem::last_write_time(options_.key_file, ignored) == changed_) return std::nullopt;
   return read_keys();
 }
 

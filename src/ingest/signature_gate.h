@@ -33,8 +33,9 @@ class SignatureGate {
 
   // Fault::invalid where the file holds no keys, or keys are required and there is no file.
   Result<void> read_keys();
-  // Reads a file that has changed, at most once a second; on an error the keys stay as they were.
-  Result<void> refresh();
+  // Reads a file that has changed, looking at most once a second; nothing when it has not. On an error the
+  // keys stay as they were.
+  std::optional<Result<void>> refresh();
 
   // Why the message must not pass.
   std::optional<RefusedMessage> check(std::string_view channel, std::string_view robot_id,

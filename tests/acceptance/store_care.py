@@ -85,7 +85,7 @@ def removed(programs):
     damaged = care(programs, "--check-store", code=3)
     care(programs, "--restore", programs.store + ".absent", code=1)
     whole = programs.path("whole.db")
-    print(damaged.splitlines()[0], "/", care(programs, "--salvage", whole).splitlines()[-1])
+    print(damaged.splitlines()[0], "/", care(programs, "--salvage", whole, code=3).splitlines()[-1])
     care(programs, "--restore", whole)
     care(programs, "--check-store")
 

@@ -1,5 +1,6 @@
 #include "history/store_care.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
@@ -52,6 +53,17 @@ class StoreCare : public testing::Test {
     EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK)
         << sqlite3_errmsg(database);
     sqlite3_close(database);
+  }
+
+  static std::int64_t integer(const std::string& path, const std::string& sql) {
+    sqlite3* database = nullptr;
+    sqlite3_stmt* row = nullptr;
+    sqlite3_open(path.c_str(), &database);
+    sqlite3_prepare_v2(database, sql.c_str(), -1, &row, nullptr);
+    const std::int64_t value = sqlite3_step(row) == SQLITE_ROW ? sqlite3_column_int64(row, 0) : -1;
+    sqlite3_finalize(row);
+    sqlite3_close(database);
+    return value;
   }
 
   // As much of it as is surely on one page.
@@ -159,6 +171,7 @@ TEST_F(StoreCare, ADamagedPageIsFoundAndTheRestIsSalvaged) {
 
   const Salvage salvage = need(salvage_store(path_, whole));
   EXPECT_GT(salvage.rows, 100);
+  EXPECT_FALSE(salvage.losses.empty());
   EXPECT_EQ(missions_of(whole), 62);
   const auto sound = need(check_store(whole));
   EXPECT_LT(sound.chunks, 62);
@@ -167,6 +180,28 @@ TEST_F(StoreCare, ADamagedPageIsFoundAndTheRestIsSalvaged) {
   EXPECT_NE(need(restore_store(whole, path_)), "");
   open();
   EXPECT_EQ(need(store_->robots()).size(), 2u);
+}
+
+// A page of missions that reads as empty: nothing fails, and the recordings of those missions are readable.
+TEST_F(StoreCare, SalvageNamesWhatItDropsAndCountsWhatIsThere) {
+  fill(3);
+  store_.reset();
+  const std::int64_t page = integer(path_, "SELECT rootpage FROM sqlite_schema WHERE name = 'mission'");
+  {
+    std::fstream file(path_, std::ios::binary | std::ios::in | std::ios::out);
+    file.seekp(static_cast<std::streamoff>((page - 1) * 4096 + 3));
+    file.write("\0\0", 2);  // cells
+  }
+  const std::string whole = folder_.file("whole.db");
+  const Salvage salvage = need(salvage_store(path_, whole));
+  EXPECT_THAT(salvage.losses, testing::Contains(testing::HasSubstr("telemetry_chunk: ")));
+  EXPECT_EQ(missions_of(whole), 0);
+  std::int64_t rows = 0;
+  for (const char* table :
+       {"robot", "model", "mission", "trace", "telemetry_chunk", "covariate_chunk", "event", "energy_state",
+        "learned", "audit", "diagnosis", "diagnosis_report", "proposal"})
+    rows += integer(whole, "SELECT count(*) FROM " + std::string(table));
+  EXPECT_EQ(salvage.rows, rows);
 }
 
 TEST_F(StoreCare, TheFileShrinksWhenARobotIsPurged) {

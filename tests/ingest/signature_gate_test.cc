@@ -94,10 +94,10 @@ TEST_F(SignatureGateTest, AChangedFileIsReadAndABrokenOneIsNotTaken) {
     usleep(1'100'000);
   };
   change("no keys");
-  EXPECT_FALSE(g.refresh());
+  EXPECT_FALSE(*g.refresh());
   EXPECT_EQ(fate(g, signed_with(key, 1)), "passes");
   change(access::to_json_text({{"nomad", std::string(32, 'n')}}));
-  EXPECT_TRUE(g.refresh());
+  EXPECT_TRUE(*g.refresh());
   EXPECT_EQ(fate(g, signed_with(key, 2)), "bad_signature");
   EXPECT_EQ(fate(g, signed_with(std::string(32, 'n'), 3)), "passes");
 }

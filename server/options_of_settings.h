@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+
+#include "history/writer.h"
+#include "ingest/ingest_service.h"
+#include "server/diagnosis/diagnosis_service.h"
+#include "server/diagnosis/drift_view.h"
+#include "server/diagnosis/gap_watch.h"
+#include "server/diagnosis/model_adoption.h"
+#include "server/http/event_hub.h"
+#include "server/http/http_server.h"
+#include "server/settings.h"
+
+// What the settings mean to each part of the daemon.
+namespace joulecast {
+
+std::string store_url(const Settings& settings);
+// Beside the SQLite file; a file of this machine also where the history is kept elsewhere.
+std::string spool_path(const Settings& settings);
+
+history::WriterOptions writer_options(const Settings& settings);
+ingest::IngestOptions ingest_options(const Settings& settings);
+server::AdoptionOptions adoption_options(const Settings& settings);
+server::DiagnosisOptions diagnosis_options(const Settings& settings);
+server::DriftOptions drift_options(const Settings& settings);
+server::WatchOptions watch_options(const Settings& settings);
+http::ServerOptions http_options(const Settings& settings);
+http::EventHub::Options event_options(const Settings& settings);
+
+}  // namespace joulecast
