@@ -249,6 +249,21 @@ std::int64_t greatest(Database& database, const std::string& table, const std::s
   }
 }
 
+// A page whose content reads as nothing hides its rows without an error.
+void tell_damage(Database& database, Salvage& salvage) {
+  const auto tell = [&](const std::string& what) {
+    if (what != "ok")
+      salvage.losses.push_back("the damaged file, of which rows may be gone that nothing else names: " +
+                               what);
+  };
+  try {
+    Rows damage(database.statement("PRAGMA damaged.integrity_check(3)"));
+    while (damage.next()) tell(damage.text());
+  } catch (const SqlError& error) {
+    tell(error.what());
+  }
+}
+
 // Names what is dropped, because what it belongs to was not read.
 void drop(Database& database, const std::string& table, const std::string& of, const std::string& condition,
           Salvage& salvage) {
@@ -354,12 +369,7 @@ Result<Salvage> salvage_store(const std::string& damaged, const std::string& int
       losses.tell(salvage.losses);
     }
     drop_loose_ends(database, salvage);
-    // A page whose content reads as nothing hides its rows without an error.
-    Rows damage(database.statement("PRAGMA damaged.integrity_check(3)"));
-    while (damage.next())
-      if (const std::string text = damage.text(); text != "ok")
-        salvage.losses.push_back("the damaged file, of which rows may be gone that nothing else names: " +
-                                 text);
+    tell_damage(database, salvage);
     for (const auto& [table, key] : tables_and_keys(database))
       salvage.rows += database.integer("SELECT count(*) FROM main." + table);
     return {};
