@@ -31,9 +31,10 @@ enum class HttpMethod { get, post, put, del };
 
 // One request on its own connection. `target` begins with a slash; `json_body` is sent with GET and DELETE
 // not at all. The token of the environment's JOULECAST_TOKEN goes with it. With https the server's
-// certificate must be of that host and of an authority that the system or SSL_CERT_FILE trusts.
-// Fault::unavailable when the server cannot be reached or does not answer within `timeout` (for the whole
-// exchange); a reply of any status is a success here.
+// certificate must be of that host and of an authority that the system or SSL_CERT_FILE trusts, and this
+// client shows the certificate of the PEM file JOULECAST_CLIENT_CERTIFICATE, of the key in
+// JOULECAST_CLIENT_KEY. Fault::unavailable when the server cannot be reached or does not answer within
+// `timeout` (for the whole exchange); a reply of any status is a success here.
 [[nodiscard]] Result<HttpReply> http_request(const ServerAddress& server, HttpMethod method,
                                              std::string_view target, std::string json_body,
                                              std::chrono::milliseconds timeout);

@@ -26,6 +26,12 @@ using asio::ip::tcp;
 
 constexpr std::uint64_t body_limit_bytes = 256u << 20;
 
+// Null where it is not set or empty.
+const char* environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value != nullptr && *value != '\0' ? value : nullptr;
+}
+
 // Beast has no timeouts for blocking calls, so the exchange runs as a chain of asynchronous steps on a loop
 // of its own under one deadline.
 class Exchange {
@@ -66,6 +72,12 @@ class Exchange {
     beast::error_code error;
     trust_.set_default_verify_paths(error);
     if (settle(error, "read the trusted certificates")) return false;
+    if (const char* file = environment("JOULECAST_CLIENT_CERTIFICATE"))
+      trust_.use_certificate_chain_file(file, error);
+    if (settle(error, "use JOULECAST_CLIENT_CERTIFICATE")) return false;
+    if (const char* file = environment("JOULECAST_CLIENT_KEY"))
+      trust_.use_private_key_file(file, asio::ssl::context::pem, error);
+    if (settle(error, "use JOULECAST_CLIENT_KEY")) return false;
     tls_.emplace(stream_, trust_);
     tls_->set_verify_mode(asio::ssl::verify_peer);
     tls_->set_verify_callback(asio::ssl::host_name_verification(server_.host));
@@ -145,7 +157,7 @@ Result<HttpReply> http_request(const ServerAddress& server, HttpMethod method, s
   request.set(http::field::host, (bracketed ? "[" + server.host + "]" : server.host) + ":" + server.port);
   request.set(http::field::user_agent, "joulecast/" JOULECAST_VERSION);
   request.set(http::field::accept, "application/json, application/problem+json, text/html;q=0.5");
-  if (const char* token = std::getenv("JOULECAST_TOKEN"); token != nullptr && *token != '\0')
+  if (const char* token = environment("JOULECAST_TOKEN"))
     request.set(http::field::authorization, std::string("Bearer ") + token);
   request.keep_alive(false);
   if (method != HttpMethod::get && method != HttpMethod::del) {

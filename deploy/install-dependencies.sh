@@ -1,17 +1,23 @@
 #!/usr/bin/env bash
-# Installs what joulecast builds with and runs on, from Debian 12's own packages. Run as root or with sudo available.
+# Installs what joulecast builds with and runs on, from Debian 12's own packages; with --tests also what only the tests
+# need. Run as root or with sudo available.
 set -euo pipefail
 packages=(
   g++ cmake ninja-build ccache pkg-config git ca-certificates
-  liblcm-dev liblcm-bin libglib2.0-dev libeigen3-dev libsundials-dev libsqlite3-dev libpq-dev postgresql
+  liblcm-dev liblcm-bin libglib2.0-dev libeigen3-dev libsundials-dev libsqlite3-dev libpq-dev
   nlohmann-json3-dev
   libboost-dev libceres-dev libcli11-dev libspdlog-dev libfmt-dev prometheus-cpp-dev libexpected-dev
   libssl-dev libsystemd-dev libzstd-dev zlib1g-dev
-  libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev
-  lintian clang-format clang-tidy cppcheck iproute2 curl python3 python3-jsonschema chromium
+  iproute2 curl python3
 )
-# The page's tests run on whatever node there is.
-command -v node >/dev/null && command -v npm >/dev/null || packages+=(nodejs npm)
+if [ "${1:-}" = --tests ]; then
+  packages+=(
+    libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev
+    clang-format clang-tidy cppcheck lintian openssl postgresql python3-jsonschema chromium nginx-light caddy prometheus
+  )
+  # The page's tests run on whatever node there is.
+  command -v node >/dev/null && command -v npm >/dev/null || packages+=(nodejs npm)
+fi
 missing=()
 for package in "${packages[@]}"; do
   [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null)" = installed ] || missing+=("$package")

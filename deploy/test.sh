@@ -9,7 +9,7 @@ sanitize=false
 threads=false
 [ "${1:-} ${2:-}" = "--sanitize thread" ] && threads=true
 
-deploy/install-dependencies.sh
+deploy/install-dependencies.sh --tests
 deploy/check-format.sh
 deploy/check-lint.sh
 

@@ -238,7 +238,6 @@ struct Application::Parts {
                                                       *drift_view, *adoption, *diagnoses, host_utime_us});
     Result<std::unique_ptr<http::Gate>> opened =
         http::Gate::open({.token_file = settings.text("auth.token_file"),
-                          .secure = !settings.text("http.tls_certificate").empty(),
                           .now_utime_us = host_utime_us,
                           .audit = audit_into(*writer)});
     if (!opened) return tl::unexpected(std::move(opened.error()));
@@ -460,10 +459,8 @@ std::vector<Error> faults_of_access(const Settings& settings) {
           http::Gate::open({.token_file = settings.text("auth.token_file")});
       !gate)
     faults.push_back(gate.error());
-  const std::string &certificate = settings.text("http.tls_certificate"),
-                    &key = settings.text("http.tls_key");
-  if (!certificate.empty() || !key.empty()) {
-    if (const Result<void> sound = http::check_tls(certificate, key); !sound) faults.push_back(sound.error());
+  if (const http::TlsFiles tls = tls_files(settings); tls.given()) {
+    if (const Result<void> sound = http::check_tls(tls); !sound) faults.push_back(sound.error());
   }
   return faults;
 }

@@ -116,13 +116,19 @@ server::WatchOptions watch_options(const Settings& settings) {
   return options;
 }
 
+http::TlsFiles tls_files(const Settings& settings) {
+  return {.certificate = settings.text("http.tls_certificate"),
+          .key = settings.text("http.tls_key"),
+          .client_authorities = settings.text("http.tls_client_authorities")};
+}
+
 http::ServerOptions http_options(const Settings& settings) {
   http::ServerOptions options;
   options.address = settings.text("http.address");
   options.port = static_cast<std::uint16_t>(settings.integer("http.port"));
   options.allowed_hosts = listed(settings.text("http.allowed_hosts"));
-  options.tls_certificate = settings.text("http.tls_certificate");
-  options.tls_key = settings.text("http.tls_key");
+  options.trusted_proxies = listed(settings.text("http.trusted_proxies"));
+  options.tls = tls_files(settings);
   options.worker_threads = static_cast<unsigned>(settings.integer("http.worker_threads"));
   options.compute_threads = static_cast<unsigned>(settings.integer("http.compute_threads"));
   options.worker_queue = static_cast<std::size_t>(settings.integer("http.worker_queue"));

@@ -25,6 +25,7 @@ server::AdoptionOptions adoption_options(const Settings& settings);
 server::DiagnosisOptions diagnosis_options(const Settings& settings);
 server::DriftOptions drift_options(const Settings& settings);
 server::WatchOptions watch_options(const Settings& settings);
+http::TlsFiles tls_files(const Settings& settings);
 http::ServerOptions http_options(const Settings& settings);
 http::EventHub::Options event_options(const Settings& settings);
 

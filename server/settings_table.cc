@@ -30,6 +30,8 @@ constexpr Setting table[] = {
      "HTTPS "
      "alone, TLS 1.2 or newer"},
     {"http.tls_key", Type::text, "", 0, 0, "", "PEM file of the certificate's private key"},
+    {"http.tls_client_authorities", Type::text, "", 0, 0, "",
+     "PEM file of certificate authorities: only clients with a certificate of one of them are spoken to"},
     {"http.insecure", Type::boolean, "false", 0, 0, "",
      "let everybody who reaches http.address do everything, though there are no tokens"},
     {"http.port", Type::integer, "8080", 0, 65535, "", "port to listen on; 0 lets the system choose"},
@@ -37,6 +39,10 @@ constexpr Setting table[] = {
      "names under which clients may address the service besides IP addresses, localhost and this host's "
      "name, "
      "separated by commas; *: any; others: 421"},
+    {"http.trusted_proxies", Type::text, "", 0, 0, "",
+     "IP addresses of reverse proxies, separated by commas: their X-Forwarded-For says who a request is "
+     "from, in "
+     "the audit and for the limits of each client, and their X-Forwarded-Proto whether it came by HTTPS"},
     {"http.worker_threads", Type::integer, "2", 1, 64, "", "threads for requests that read the store"},
     {"http.compute_threads", Type::integer, "2", 1, 64, "", "threads for requests that compute"},
     {"http.worker_queue", Type::integer, "256", 1, 65536, "",

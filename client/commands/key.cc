@@ -2,10 +2,8 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <string>
-#include <utility>
 
 #include "access/robot_keys.h"
 #include "access/sha256.h"
@@ -23,16 +21,13 @@ struct Options {
 Exit create(const Options& options) {
   if (!signals::is_valid_robot_id(options.robot_id))
     return report({Fault::invalid, "--robot-id", "\"" + options.robot_id + "\" is no robot id"});
-  access::RobotKeys keys;
-  if (std::filesystem::exists(options.file)) {
-    auto read = access::read_robot_keys(options.file);
-    if (!read) return report(read.error());
-    keys = std::move(*read);
-  }
   const std::string key = access::random_hex(access::robot_key_bytes);
-  if (!keys.emplace(options.robot_id, access::from_hexadecimal(key).value()).second)
-    return report({Fault::conflict, "--robot-id", "has a key already; revoke it first"});
-  if (const auto done = access::write_robot_keys(options.file, keys); !done) return report(done.error());
+  const auto add = [&](access::RobotKeys& keys) -> Result<void> {
+    if (!keys.emplace(options.robot_id, access::from_hexadecimal(key).value()).second)
+      return fail(Fault::conflict, "--robot-id", "has a key already; revoke it first");
+    return {};
+  };
+  if (const auto done = access::change_robot_keys(options.file, add); !done) return report(done.error());
   std::puts(key.c_str());
   return Exit::ok;
 }
@@ -45,11 +40,12 @@ Exit list(const Options& options) {
 }
 
 Exit revoke(const Options& options) {
-  auto keys = access::read_robot_keys(options.file);
-  if (!keys) return report(keys.error());
-  if (keys->erase(options.robot_id) == 0)
-    return report({Fault::not_found, "--robot-id", options.robot_id + " has no key"});
-  if (const auto done = access::write_robot_keys(options.file, *keys); !done) return report(done.error());
+  const auto remove = [&](access::RobotKeys& keys) -> Result<void> {
+    if (keys.erase(options.robot_id) == 0)
+      return fail(Fault::not_found, "--robot-id", options.robot_id + " has no key");
+    return {};
+  };
+  if (const auto done = access::change_robot_keys(options.file, remove); !done) return report(done.error());
   return Exit::ok;
 }
 

@@ -9,8 +9,8 @@ namespace {
 
 std::vector<TableRow> table() {
   std::vector<TableRow> all;
-  for (const auto part : {robot_rows, model_rows, diagnosis_rows, gap_history_rows, mission_list_rows,
-                          mission_rows, planning_rows}) {
+  for (const auto part : {robot_rows, model_rows, diagnosis_rows, gap_history_rows, audit_rows,
+                          mission_list_rows, mission_rows, planning_rows}) {
     std::vector<TableRow> rows = part();
     all.insert(all.end(), std::make_move_iterator(rows.begin()), std::make_move_iterator(rows.end()));
   }

@@ -237,10 +237,10 @@ Endpoint Gate::audited(Endpoint endpoint) {
   return endpoint;
 }
 
-std::string Gate::cookie(std::string_view value, std::int64_t max_age_s) const {
+std::string Gate::cookie(std::string_view value, std::int64_t max_age_s, bool secure) {
   return std::string(session_cookie) + "=" + std::string(value) +
          "; Path=/; Max-Age=" + std::to_string(max_age_s) + "; HttpOnly; SameSite=Strict" +
-         (options_.secure ? "; Secure" : "");
+         (secure ? "; Secure" : "");
 }
 
 Result<Response> Gate::sign_in(const Request& request) {
@@ -273,7 +273,7 @@ Result<Response> Gate::sign_in(const Request& request) {
   sessions_[access::sha256_hex(value)] = {token->sha256, now + session_s * microseconds_per_s};
   tell({token->name, request.address, request.id, here.operation_id, text_of({{"status", 200}})});
   Response response = json_response(description_of(*token).dump());
-  response.headers.emplace_back("Set-Cookie", cookie(value, session_s));
+  response.headers.emplace_back("Set-Cookie", cookie(value, session_s, request.secure));
   return response;
 }
 
@@ -288,7 +288,7 @@ Result<Response> Gate::sign_out(const Request& request) {
   Response response;
   response.status = 204;
   response.content_type.clear();
-  response.headers.emplace_back("Set-Cookie", cookie("", 0));
+  response.headers.emplace_back("Set-Cookie", cookie("", 0, request.secure));
   return response;
 }
 

@@ -33,7 +33,6 @@ class Gate {
  public:
   struct Options {
     std::string token_file = {};  // empty: no tokens
-    bool secure = false;          // HTTPS alone: cookies are not sent over anything else
     std::function<std::int64_t()> now_utime_us = {};
     // Keeps an event; an error means that it is not and will not be kept. Must not block.
     std::function<Result<void>(AccessEvent)> audit = {};
@@ -79,7 +78,8 @@ class Gate {
   void tell_refusal(const Endpoint& endpoint, const Request& request, unsigned status);
   Result<Response> sign_in(const Request& request);
   Result<Response> sign_out(const Request& request);
-  std::string cookie(std::string_view value, std::int64_t max_age_s) const;
+  // One of `secure` is sent over HTTPS alone.
+  static std::string cookie(std::string_view value, std::int64_t max_age_s, bool secure);
 
   const Options options_;
   mutable std::mutex mutex_;

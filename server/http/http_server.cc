@@ -47,17 +47,6 @@ std::int64_t milliseconds_now() {
   return std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now().time_since_epoch()).count();
 }
 
-// Whom the limits for one client are for: who has one IPv6 address commonly has its whole /64.
-net::ip::address peer_of(const Socket& socket) {
-  boost::system::error_code error;
-  const net::ip::address address = socket.remote_endpoint(error).address();
-  if (!address.is_v6()) return address;
-  if (address.to_v6().is_v4_mapped()) return net::ip::make_address_v4(net::ip::v4_mapped, address.to_v6());
-  auto bytes = address.to_v6().to_bytes();
-  std::fill(bytes.begin() + 8, bytes.end(), static_cast<unsigned char>(0));
-  return net::ip::address_v6(bytes);
-}
-
 ServerObserver& nobody() {
   static ServerObserver observer;
   return observer;
@@ -142,8 +131,12 @@ Result<void> HttpServer::Impl::open() {
   boost::system::error_code error;
   const auto address = net::ip::make_address(core->options.address, error);
   if (error) return invalid("http.address", "must be an IPv4 or IPv6 address, is " + core->options.address);
-  if (!core->options.tls_certificate.empty() || !core->options.tls_key.empty()) {
-    auto tls = make_tls(core->options.tls_certificate, core->options.tls_key);
+  if (auto proxies = TrustedProxies::parse(core->options.trusted_proxies); proxies)
+    core->proxies = std::move(*proxies);
+  else
+    return tl::unexpected<Error>(proxies.error());
+  if (core->options.tls.given()) {
+    auto tls = make_tls(core->options.tls);
     if (!tls) return tl::unexpected<Error>(tls.error());
     core->tls = std::move(*tls);
   }
@@ -205,14 +198,14 @@ Task<void> HttpServer::Impl::accept() {
 void HttpServer::Impl::admit(Socket socket) {
   boost::system::error_code ignored;
   socket.set_option(Tcp::no_delay(true), ignored);
-  const net::ip::address address = peer_of(socket);
-  const auto known = core->peers.find(address);
-  const Peer* peer = known != core->peers.end() ? known->second.get() : nullptr;
-  const bool crowded = peer != nullptr && peer->connections >= core->options.client_connections;
+  const net::ip::address address = unmapped(socket.remote_endpoint(ignored).address());
+  const auto peer = core->peer_of(address);
+  const bool crowded =
+      peer->connections >= core->options.client_connections && !core->proxies.contains(address);
   const bool full = core->connections >= core->options.max_connections;
-  const bool guest = (crowded || full) && !make_room(crowded ? peer : nullptr, false);
+  const bool guest = (crowded || full) && !make_room(crowded ? peer.get() : nullptr, false);
   if (guest && core->guests >= guest_places) make_room(nullptr, true);
-  make_session(core, std::move(socket), address, guest)->start();
+  make_session(core, std::move(socket), address, peer, guest)->start();
 }
 
 // Closes the longest idle connection, of one peer if given; of guests the oldest, idle or not.
@@ -234,6 +227,7 @@ Task<void> HttpServer::Impl::tick() {
     ticked_ms = milliseconds_now();
     core->date = http_date();
     for (Session* session : core->sessions) session->tick(Clock::now());
+    core->forget_peers();
     if (core->stopping && settled()) co_return;
     ticking.expires_after(core->stopping ? stop_poll_period : tick_period);
     boost::system::error_code ignored;
@@ -283,15 +277,15 @@ std::uint16_t HttpServer::port() const {
   return impl_->port;
 }
 
-Result<void> check_tls(const std::string& certificate, const std::string& key) {
-  if (const auto tls = make_tls(certificate, key); !tls) return tl::unexpected<Error>(tls.error());
+Result<void> check_tls(const TlsFiles& files) {
+  if (const auto tls = make_tls(files); !tls) return tl::unexpected<Error>(tls.error());
   return {};
 }
 
 Result<void> HttpServer::reload_tls() {
-  const ServerOptions& options = impl_->core->options;
-  if (options.tls_certificate.empty()) return {};
-  auto tls = make_tls(options.tls_certificate, options.tls_key);
+  const TlsFiles& files = impl_->core->options.tls;
+  if (!files.given()) return {};
+  auto tls = make_tls(files);
   if (!tls) return tl::unexpected<Error>(tls.error());
   net::post(impl_->core->io, [core = impl_->core, fresh = std::move(*tls)] { core->tls = fresh; });
   return {};

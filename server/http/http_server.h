@@ -13,21 +13,30 @@
 
 namespace joulecast::http {
 
+// PEM files.
+struct TlsFiles {
+  std::string certificate;  // with those that it builds on
+  std::string key;
+  std::string client_authorities;  // of whom every client must show a certificate; empty: of nobody
+
+  bool given() const { return !certificate.empty() || !key.empty() || !client_authorities.empty(); }
+};
+
 // Limits that keep one client from starving the others.
 struct ServerOptions {
   std::string address = "127.0.0.1";
   std::uint16_t port = 0;  // 0: the system chooses, see HttpServer::port()
   // Names of this service for its clients besides IP addresses, localhost and the host's name; "*": any.
   std::vector<std::string> allowed_hosts = {};
-  // PEM files of a certificate chain and its key; both empty: plain HTTP.
-  std::string tls_certificate = {};
-  std::string tls_key = {};
-  unsigned worker_threads = 2;         // of Run::worker endpoints
-  unsigned compute_threads = 2;        // of Run::compute endpoints
-  std::size_t worker_queue = 256;      // requests waiting for one kind of threads; beyond: 503
-  std::size_t client_requests = 64;    // waiting or computing for one client address; beyond: 429
-  std::size_t max_connections = 1024;  // beyond: the longest idle one is closed, or else 503
-  std::size_t client_connections = 512;
+  // IP addresses of proxies whose X-Forwarded-For says who a request is from.
+  std::vector<std::string> trusted_proxies = {};
+  TlsFiles tls = {};                     // none given: plain HTTP
+  unsigned worker_threads = 2;           // of Run::worker endpoints
+  unsigned compute_threads = 2;          // of Run::compute endpoints
+  std::size_t worker_queue = 256;        // requests waiting for one kind of threads; beyond: 503
+  std::size_t client_requests = 64;      // waiting or computing for one client; beyond: 429
+  std::size_t max_connections = 1024;    // beyond: the longest idle one is closed, or else 503
+  std::size_t client_connections = 512;  // of one that is no trusted proxy
   std::uint32_t max_header_bytes = 16 * 1024;
   std::uint64_t max_body_bytes = 4 * 1024 * 1024;
   std::uint64_t max_bodies_bytes = 64 * 1024 * 1024;  // of all bodies being received; beyond: 503
@@ -85,12 +94,12 @@ class ServerObserver {
 // Whether only this machine reaches that IP address; false for what is none.
 bool is_loopback(std::string_view address);
 
+// Whether the files can be used; errors name the setting.
+Result<void> check_tls(const TlsFiles& files);
+
 // HTTP/1.1 server: one I/O thread, small worker pools, keep-alive, pipelining answered in order. A client, or
 // peer, is an IPv4 address or the /64 network of an IPv6 address.
 // Thread-safe where stated; router and observer must outlive it.
-// Whether the files are a certificate and its key.
-Result<void> check_tls(const std::string& certificate, const std::string& key);
-
 class HttpServer {
  public:
   // Binds, listens and starts its threads. Fails with Fault::unavailable when the address cannot be bound and

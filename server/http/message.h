@@ -34,7 +34,8 @@ struct Request {
   std::string body;
   std::shared_ptr<const nlohmann::json> json;  // the parsed body where the endpoint declares a request schema
   std::any input;                              // what an endpoint's `brief` read of it, for its `handler`
-  std::string address;                         // of the client's end of the connection
+  std::string address;                         // the client's, also where a trusted proxy passed it on
+  bool secure = false;                         // came by HTTPS, all the way
   std::string actor;                           // name of the token that it came with; empty: none
   bool csv = false;                            // Accept asks for text/csv of an endpoint that has it
   std::string id;                              // request id: the client's X-Request-Id when sane, else ours

@@ -37,20 +37,37 @@ bool is_sane_id(std::string_view id) {
 
 }  // namespace
 
-std::shared_ptr<Session> make_session(std::shared_ptr<Core> core, Socket socket, const net::ip::address& peer,
-                                      bool guest) {
-  if (core->tls) return make_tls_session(std::move(core), std::move(socket), peer, guest);
-  return std::make_shared<StreamSession<Socket>>(std::move(core), std::move(socket), peer, guest);
+std::shared_ptr<Peer> Core::peer_of(const net::ip::address& address) {
+  net::ip::address limited = address;
+  if (address.is_v6()) {
+    auto bytes = address.to_v6().to_bytes();
+    std::fill(bytes.begin() + 8, bytes.end(), static_cast<unsigned char>(0));
+    limited = net::ip::address_v6(bytes);
+  }
+  auto& known = peers[limited];
+  if (!known) known = std::make_shared<Peer>();
+  return known;
 }
 
-Session::Session(std::shared_ptr<Core> core, const net::ip::address& peer, bool guest)
+void Core::forget_peers() {
+  std::erase_if(peers, [](const auto& each) { return each.second.use_count() == 1; });
+}
+
+std::shared_ptr<Session> make_session(std::shared_ptr<Core> core, Socket socket,
+                                      const net::ip::address& address, std::shared_ptr<Peer> peer,
+                                      bool guest) {
+  if (core->tls) return make_tls_session(std::move(core), std::move(socket), address, std::move(peer), guest);
+  return std::make_shared<StreamSession<Socket>>(std::move(core), std::move(socket), address, std::move(peer),
+                                                 guest);
+}
+
+Session::Session(std::shared_ptr<Core> core, const net::ip::address& address, std::shared_ptr<Peer> peer,
+                 bool guest)
     : core_(std::move(core)),
-      address_(peer),
+      peer_(std::move(peer)),
+      address_(address),
       guest_(guest),
       buffer_(core_->options.max_header_bytes + 2 * body_read_size) {
-  auto& known = core_->peers[address_];
-  if (!known) known = std::make_shared<Peer>();
-  peer_ = known;
   ++peer_->connections;
   ++(guest_ ? core_->guests : core_->connections);
   core_->observer.connections(core_->connections + core_->guests);
@@ -65,8 +82,7 @@ void Session::start() {
         self->release_body();
         self->core_->sessions.erase(self.get());
         self->peer_.reset();
-        const auto known = self->core_->peers.find(self->address_);
-        if (known->second.use_count() == 1) self->core_->peers.erase(known);
+        self->client_.reset();
       });
 }
 
@@ -195,8 +211,11 @@ void Session::fill_request() {
   for (const auto& field : message)
     request_.headers.emplace_back(view(field.name_string()), view(field.value()));
   request_.body = std::move(parser_->get().body());
-  error_code gone;
-  request_.address = socket().remote_endpoint(gone).address().to_string();
+  const net::ip::address client = core_->proxies.client_of(address_, request_);
+  request_.address = client.to_string();
+  request_.secure = core_->tls != nullptr ||
+                    (core_->proxies.contains(address_) && request_.header("x-forwarded-proto") == "https");
+  client_ = client == address_ ? peer_ : core_->peer_of(client);
   keep_alive_ = parser_->keep_alive() && !guest_;
   const auto id = request_.header("x-request-id");
   request_.id = is_sane_id(id) ? std::string(id) : core_->id_prefix + std::to_string(core_->next_id++);
@@ -254,14 +273,14 @@ Task<Session::Outcome> Session::work() {
     if (!self->claimed_.exchange(true)) self->do_work();
     net::post(self->core_->io, [self] {
       self->working_ = false;
-      if (self->peer_) --self->peer_->requests;
+      if (self->client_) --self->client_->requests;
       if (auto waiter = std::exchange(self->waiter_, std::nullopt)) std::move (*waiter)();
     });
   };
   claimed_ = false;
   if (!core_->pool_of(endpoint_->run).submit(job, streaming_)) co_return Outcome::full;
   working_ = true;
-  ++peer_->requests;
+  ++client_->requests;
   const auto begun = Clock::now();
   arm(patience_);
   while (working_ && !cut_) {

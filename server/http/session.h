@@ -16,6 +16,7 @@
 
 #include "server/http/admission.h"
 #include "server/http/http_server.h"
+#include "server/http/proxies.h"
 #include "server/http/worker_pool.h"
 
 namespace boost::asio::ssl {
@@ -38,7 +39,7 @@ inline constexpr Clock::time_point never = Clock::time_point::max();
 
 class Session;
 
-// A client address, with what it holds of the server.
+// A client, with what it holds of the server.
 struct Peer {
   std::size_t connections = 0;
   std::size_t requests = 0;  // waiting or computing
@@ -51,10 +52,16 @@ struct Core {
   // An `io` endpoint's stream that pulls on a worker does so on those of the store.
   WorkerPool& pool_of(Run run) { return *pools.at(run == Run::io ? Run::worker : run); }
 
+  // Whom the limits for one client are for: who has one IPv6 address commonly has its whole /64.
+  std::shared_ptr<Peer> peer_of(const net::ip::address& address);
+  // Those that nobody holds any more.
+  void forget_peers();
+
   const ServerOptions options;
   const Router& router;
   ServerObserver& observer;
   const Admission admission;
+  TrustedProxies proxies;
   std::shared_ptr<net::ssl::context> tls;  // of connections from now on; null: plain HTTP
   net::io_context io{1};
   std::map<Run, std::unique_ptr<WorkerPool>> pools;
@@ -73,7 +80,8 @@ struct Core {
 // places were taken: it is answered one request, and only of a `reserved` endpoint.
 class Session : public std::enable_shared_from_this<Session> {
  public:
-  Session(std::shared_ptr<Core> core, const net::ip::address& peer, bool guest);
+  Session(std::shared_ptr<Core> core, const net::ip::address& address, std::shared_ptr<Peer> peer,
+          bool guest);
   virtual ~Session() = default;
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -116,7 +124,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void release_body();
 
   const std::shared_ptr<Core> core_;  // first: everything else needs the io_context in it
-  std::shared_ptr<Peer> peer_;
+  std::shared_ptr<Peer> peer_;        // of the connection's other end
+  std::shared_ptr<Peer> client_;      // of the request: the same, or whom a proxy names
   const net::ip::address address_;
   const bool guest_;
   bool placed_ = true;
@@ -157,7 +166,8 @@ class Session : public std::enable_shared_from_this<Session> {
 };
 
 // A session on an accepted connection, over TLS where the core has a certificate.
-std::shared_ptr<Session> make_session(std::shared_ptr<Core> core, Socket socket, const net::ip::address& peer,
+std::shared_ptr<Session> make_session(std::shared_ptr<Core> core, Socket socket,
+                                      const net::ip::address& address, std::shared_ptr<Peer> peer,
                                       bool guest);
 
 }  // namespace joulecast::http

@@ -34,8 +34,9 @@ inline Task<void> end_stream(Socket& socket) {
 template <class Stream>
 class StreamSession final : public Session {
  public:
-  StreamSession(std::shared_ptr<Core> core, Stream stream, const net::ip::address& peer, bool guest)
-      : Session(std::move(core), peer, guest), stream_(std::move(stream)) {}
+  StreamSession(std::shared_ptr<Core> core, Stream stream, const net::ip::address& address,
+                std::shared_ptr<Peer> peer, bool guest)
+      : Session(std::move(core), address, std::move(peer), guest), stream_(std::move(stream)) {}
 
  private:
   Socket& socket() override { return beast::get_lowest_layer(stream_); }
@@ -139,11 +140,11 @@ class StreamSession final : public Session {
       response_ = std::move(*brief);
       co_return;
     }
-    if (peer_->requests >= core_->options.client_requests) {
+    if (client_->requests >= core_->options.client_requests) {
       core_->observer.refused(Refusal::client_requests);
       response_ = problem(
           429, "too-many-requests",
-          "This client already has " + std::to_string(peer_->requests) + " requests waiting or computing",
+          "This client already has " + std::to_string(client_->requests) + " requests waiting or computing",
           request_.id);
       co_return;
     }

@@ -8,26 +8,39 @@
 
 namespace joulecast::http {
 
-Result<std::shared_ptr<net::ssl::context>> make_tls(const std::string& certificate, const std::string& key) {
-  if (certificate.empty() || key.empty())
-    return invalid(certificate.empty() ? "http.tls_certificate" : "http.tls_key",
-                   "is needed where the other of the two is given");
+Result<std::shared_ptr<net::ssl::context>> make_tls(const TlsFiles& files) {
+  if (files.certificate.empty())
+    return invalid("http.tls_certificate", "is needed where another file of TLS is given");
+  if (files.key.empty()) return invalid("http.tls_key", "is needed where http.tls_certificate is given");
   auto context = std::make_shared<net::ssl::context>(net::ssl::context::tls_server);
   SSL_CTX* native = context->native_handle();
   SSL_CTX_set_min_proto_version(native, TLS1_2_VERSION);
   SSL_CTX_set_options(native, SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_COMPRESSION);
   boost::system::error_code error;
-  context->use_certificate_chain_file(certificate, error);
-  if (error) return invalid("http.tls_certificate", "cannot use " + certificate + ": " + error.message());
-  context->use_private_key_file(key, net::ssl::context::pem, error);
-  if (error) return invalid("http.tls_key", "cannot use " + key + ": " + error.message());
+  const auto unusable = [&](const char* setting, const std::string& file) {
+    return invalid(setting, "cannot use " + file + ": " + error.message());
+  };
+  context->use_certificate_chain_file(files.certificate, error);
+  if (error) return unusable("http.tls_certificate", files.certificate);
+  context->use_private_key_file(files.key, net::ssl::context::pem, error);
+  if (error) return unusable("http.tls_key", files.key);
+  if (files.client_authorities.empty()) return context;
+  context->load_verify_file(files.client_authorities, error);
+  if (error) return unusable("http.tls_client_authorities", files.client_authorities);
+  context->set_verify_mode(net::ssl::verify_peer | net::ssl::verify_fail_if_no_peer_cert);
+  // Without a name of their own OpenSSL refuses to resume sessions of clients that it has verified.
+  constexpr unsigned char sessions[] = "joulecastd";
+  SSL_CTX_set_session_id_context(native, sessions, sizeof sessions - 1);
+  SSL_CTX_set_client_CA_list(native, SSL_load_client_CA_file(files.client_authorities.c_str()));
   return context;
 }
 
 std::shared_ptr<Session> make_tls_session(std::shared_ptr<Core> core, Socket socket,
-                                          const net::ip::address& peer, bool guest) {
+                                          const net::ip::address& address, std::shared_ptr<Peer> peer,
+                                          bool guest) {
   TlsStream stream(std::move(socket), *core->tls);
-  return std::make_shared<StreamSession<TlsStream>>(std::move(core), std::move(stream), peer, guest);
+  return std::make_shared<StreamSession<TlsStream>>(std::move(core), std::move(stream), address,
+                                                    std::move(peer), guest);
 }
 
 }  // namespace joulecast::http

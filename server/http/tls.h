@@ -12,12 +12,13 @@ namespace joulecast::http {
 
 using TlsStream = net::ssl::stream<Socket>;
 
-// TLS 1.2 or newer with the certificate chain and key of two PEM files. Errors name the setting.
-Result<std::shared_ptr<net::ssl::context>> make_tls(const std::string& certificate, const std::string& key);
+// TLS 1.2 or newer. Errors name the setting.
+Result<std::shared_ptr<net::ssl::context>> make_tls(const TlsFiles& files);
 
 // As make_session, with the core's certificate.
 std::shared_ptr<Session> make_tls_session(std::shared_ptr<Core> core, Socket socket,
-                                          const net::ip::address& peer, bool guest);
+                                          const net::ip::address& address, std::shared_ptr<Peer> peer,
+                                          bool guest);
 
 // Declared before stream_session.h, whose template calls them.
 inline Task<bool> open_stream(TlsStream& stream) {

@@ -8,10 +8,10 @@
 #include <optional>
 #include <utility>
 
+#include "access/secret_file.h"
 #include "access/sha256.h"
 #include "base/json_fields.h"
 #include "base/json_text.h"
-#include "base/output_file.h"
 #include "base/text_file.h"
 
 namespace joulecast::access {
@@ -65,15 +65,9 @@ Result<RobotKeys> read_robot_keys(const std::string& path) {
   return keys;
 }
 
-Result<void> write_robot_keys(const std::string& path, const RobotKeys& keys) {
-  struct stat status {};
-  const bool exists = stat(path.c_str(), &status) == 0;
-  auto file = OutputFile::create(path, Existing::replace);
-  if (!file) return tl::unexpected(file.error());
-  if (!exists && chmod(file->written_to().c_str(), 0640) != 0)
-    return fail(Fault::unavailable, path, std::strerror(errno));
-  if (Result<void> written = file->write(to_json_text(keys)); !written) return written;
-  return file->commit();
+Result<void> change_robot_keys(const std::string& path,
+                               const std::function<Result<void>(RobotKeys&)>& change) {
+  return change_secret_file<RobotKeys>(path, read_robot_keys, to_json_text, change);
 }
 
 }  // namespace joulecast::access

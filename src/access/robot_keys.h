@@ -21,7 +21,8 @@ std::string to_json_text(const RobotKeys& keys);
 
 // Fault::invalid also where users other than the file's owner and group may read it.
 Result<RobotKeys> read_robot_keys(const std::string& path);
-// In one step; a new file is the owner's and the group's alone.
-Result<void> write_robot_keys(const std::string& path, const RobotKeys& keys);
+// As change_tokens.
+Result<void> change_robot_keys(const std::string& path,
+                               const std::function<Result<void>(RobotKeys&)>& change);
 
 }  // namespace joulecast::access

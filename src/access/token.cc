@@ -1,16 +1,11 @@
 #include "access/token.h"
 
-#include <fcntl.h>
 #include <fnmatch.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "access/secret_file.h"
 #include "access/sha256.h"
 #include "base/json_fields.h"
 #include "base/json_text.h"
@@ -119,43 +114,9 @@ Result<std::vector<Token>> read_tokens(const std::string& path) {
   return tokens;
 }
 
-namespace detail {
-
-Replacement::Replacement(std::string path) : path_(std::move(path)) {}
-
-Replacement::~Replacement() {
-  if (descriptor_ < 0) return;
-  close(descriptor_);
-  unlink((path_ + ".new").c_str());
+Result<void> change_tokens(const std::string& path,
+                           const std::function<Result<void>(std::vector<Token>&)>& change) {
+  return change_secret_file<std::vector<Token>>(path, read_tokens, to_json_text, change);
 }
 
-Result<std::vector<Token>> Replacement::begin() {
-  const std::string beside = path_ + ".new";
-  struct stat old {};
-  const bool exists = stat(path_.c_str(), &old) == 0;
-  descriptor_ = open(beside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-  if (descriptor_ < 0 && errno == EEXIST)
-    return fail(Fault::conflict, beside,
-                "exists: another program changes the tokens, or one died doing so; then delete it");
-  if (descriptor_ < 0) return fail(Fault::unavailable, beside, std::strerror(errno));
-  if (fchmod(descriptor_, exists ? old.st_mode & 07777 : 0640) != 0)
-    return fail(Fault::unavailable, beside, std::strerror(errno));
-  // Whose file it was, so that the daemon goes on reading it; only root may give it away.
-  if (exists && fchown(descriptor_, old.st_uid, old.st_gid) != 0 && geteuid() == 0)
-    return fail(Fault::unavailable, beside, std::strerror(errno));
-  return exists ? read_tokens(path_) : std::vector<Token>();
-}
-
-Result<void> Replacement::commit(const std::vector<Token>& tokens) {
-  const std::string text = to_json_text(tokens);
-  const std::string beside = path_ + ".new";
-  const bool written = write(descriptor_, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
-                       fsync(descriptor_) == 0 && std::rename(beside.c_str(), path_.c_str()) == 0;
-  if (!written) return fail(Fault::unavailable, path_, std::strerror(errno));
-  close(descriptor_);
-  descriptor_ = -1;
-  return {};
-}
-
-}  // namespace detail
 }  // namespace joulecast::access

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -46,33 +47,7 @@ Result<std::vector<Token>> read_tokens(const std::string& path);
 // Replaces the file as a whole, keeping its mode (a new one: 0640), and never from two programs at once:
 // Fault::conflict while another one writes it. `change` gets what the file holds now; where there is none,
 // nothing.
-template <class Change>
-Result<void> change_tokens(const std::string& path, Change change);
-
-namespace detail {
-// The new file beside the old one, which exists only while somebody writes it.
-class Replacement {
- public:
-  explicit Replacement(std::string path);
-  ~Replacement();
-  Replacement(const Replacement&) = delete;
-  Replacement& operator=(const Replacement&) = delete;
-  Result<std::vector<Token>> begin();
-  Result<void> commit(const std::vector<Token>& tokens);
-
- private:
-  std::string path_;
-  int descriptor_ = -1;
-};
-}  // namespace detail
-
-template <class Change>
-Result<void> change_tokens(const std::string& path, Change change) {
-  detail::Replacement replacement(path);
-  Result<std::vector<Token>> tokens = replacement.begin();
-  if (!tokens) return tl::unexpected(tokens.error());
-  if (Result<void> changed = change(*tokens); !changed) return changed;
-  return replacement.commit(*tokens);
-}
+Result<void> change_tokens(const std::string& path,
+                           const std::function<Result<void>(std::vector<Token>&)>& change);
 
 }  // namespace joulecast::access

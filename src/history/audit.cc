@@ -5,6 +5,8 @@
 #include "access/sha256.h"
 #include "base/utc_time.h"
 #include "history/open_store.h"
+#include "history/sql_queries.h"
+#include "history/store.h"
 
 namespace joulecast::history {
 namespace {
@@ -61,6 +63,16 @@ std::int64_t append_audit(Database& database, AuditEntry entry) {
       .bind(entry.hash)
       .run();
   return entry.id;
+}
+
+Result<std::vector<AuditEntry>> read_audit(Database& database, std::int64_t before_id, std::int64_t limit) {
+  if (auto ok = queries::check_limit("limit", limit, max_page_size); !ok) return tl::unexpected(ok.error());
+  std::vector<AuditEntry> entries;
+  Rows rows(database.statement("SELECT " + std::string(columns) +
+                               " FROM audit WHERE audit_id < ? ORDER BY audit_id DESC LIMIT ?"));
+  rows.bind(before_id).bind(limit);
+  while (rows.next()) entries.push_back(read_entry(rows));
+  return entries;
 }
 
 Result<AuditState> verify_audit(Database& database, const std::string& where, std::string_view seen_head,

@@ -4,6 +4,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/error.h"
 #include "history/records.h"
@@ -18,6 +19,9 @@ std::string audit_hash(std::string_view previous_hash, const AuditEntry& entry);
 
 // Adds the entry behind the last one; its id and hash are made here. Answers the id. Throws SqlError.
 std::int64_t append_audit(Database& database, AuditEntry entry);
+
+// As Store::audit. Throws SqlError.
+Result<std::vector<AuditEntry>> read_audit(Database& database, std::int64_t before_id, std::int64_t limit);
 
 struct AuditState {
   std::int64_t entries = 0;

@@ -58,9 +58,9 @@ Result<std::unique_ptr<Store>> open_store(const std::string& url) {
 
 Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_exist) {
   if (auto ok = check_scheme(url); !ok) return tl::unexpected(ok.error());
+  if (must_exist)
+    if (const auto there = open_to_read(url); !there) return tl::unexpected(there.error());
   if (is_postgres_url(url)) return open_postgres_tables(postgres_options(url));
-  if (must_exist && !std::filesystem::exists(sqlite_path(url)))
-    return fail(Fault::not_found, "url", "there is no file " + sqlite_path(url));
   return open_sqlite_tables(sqlite_options(url));
 }
 
@@ -74,7 +74,8 @@ Result<std::unique_ptr<Database>> open_to_read(const std::string& url) {
       is_store = database->has_table("joulecast_store");
     } else {
       const SqliteOptions options = sqlite_options(url);
-      if (!std::filesystem::exists(options.path)) return fail(Fault::not_found, "url", "does not exist");
+      if (!std::filesystem::exists(options.path))
+        return fail(Fault::not_found, "url", "there is no file " + options.path);
       database = std::make_unique<SqliteDatabase>(options.path, OpenMode::read_only, options.busy_timeout_ms);
       is_store = database->integer("PRAGMA application_id") == store_application_id;
     }

@@ -18,8 +18,8 @@ bool is_postgres_url(std::string_view url);
 // open_postgres_store()'s; Fault::invalid on "url" for any other scheme.
 Result<std::unique_ptr<Store>> open_store(const std::string& url);
 
-// The same as tables, held against every other program until it is let go. When `must_exist`, an SQLite file
-// that is absent is Fault::not_found instead of being made.
+// The same as tables, held against every other program until it is let go. When `must_exist`, nothing is
+// made: the errors are then also open_to_read()'s.
 Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_exist);
 
 // A connection to the tables of a URL that reads beside whoever holds them, and migrates nothing.

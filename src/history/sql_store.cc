@@ -4,6 +4,7 @@
 #include <iterator>
 #include <optional>
 
+#include "history/audit.h"
 #include "history/sql_queries.h"
 
 namespace joulecast::history {
@@ -130,6 +131,10 @@ Result<TelemetryPage> SqlStore::telemetry(MissionKey key, TimeRange range, const
 
 Result<CovariatePage> SqlStore::covariates(MissionKey key, TimeRange range, const PageRequest& page) const {
   return read([&](Database& database) { return queries::covariates(database, key, range, page); });
+}
+
+Result<std::vector<AuditEntry>> SqlStore::audit(std::int64_t before_id, std::int64_t limit) const {
+  return read([&](Database& database) { return read_audit(database, before_id, limit); });
 }
 
 Result<std::vector<Event>> SqlStore::events(std::int64_t after_id, std::int64_t limit,

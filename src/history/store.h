@@ -199,6 +199,9 @@ class Store {
   virtual Result<std::vector<Event>> events(std::int64_t after_id, std::int64_t limit,
                                             std::optional<std::string> robot_id = std::nullopt) const = 0;
 
+  // Entries of the audit, newest first, with id < before_id, at most `limit` (1 to max_page_size).
+  virtual Result<std::vector<AuditEntry>> audit(std::int64_t before_id, std::int64_t limit) const = 0;
+
   // Absent when none was ever put.
   virtual Result<std::optional<ResumeState>> resume_state(std::string_view robot_id) const = 0;
 

@@ -1,26 +1,17 @@
 #include "history/store_care.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <utility>
 
 #include "base/host_clock.h"
 #include "base/output_file.h"
 #include "base/utc_time.h"
-#include "history/covariate_chunk.h"
 #include "history/file_lock.h"
 #include "history/schema.h"
 #include "history/sqlite.h"
-#include "history/telemetry_chunk.h"
-#include "signals/ledger.h"
 
 namespace joulecast::history {
 namespace {
@@ -28,7 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::int64_t busy_timeout_ms = 10'000;
-constexpr std::size_t most_faults = 100;
 constexpr int most_failures = 10'000;  // of reads of one table
 
 template <class Work>
@@ -60,115 +50,20 @@ Result<std::unique_ptr<SqliteDatabase>> open_existing(const std::string& path,
   });
 }
 
-// SQL for the signed sum of a mission's ledger, and for the sum of its terms' sizes.
-std::pair<std::string, std::string> ledger_sums() {
-  std::string total = "0", size = "1";
-  for (std::size_t k = 0; k < signals::term_count; ++k) {
-    const std::string column = "coalesce(ledger_" + std::string(signals::term_names[k]) + "_j, 0)";
-    total += (signals::sign(static_cast<signals::Term>(k)) < 0 ? " - " : " + ") + column;
-    size += " + abs(" + column + ")";
-  }
-  return {total, size};
+void add_texts(StoreCheck& check, Database& database, const std::string& sql) {
+  Rows rows(database.statement(sql));
+  while (rows.next()) check.add_fault(rows.text());
 }
-
-class Inspection {
- public:
-  explicit Inspection(Database& database) : database_(database) {}
-
-  StoreCheck run() {
-    each("PRAGMA integrity_check(100)", [](Rows& row) {
-      std::string text = row.text();
-      return text == "ok" ? std::string() : text;
-    });
-    each("SELECT \"table\", coalesce(rowid, 0), parent FROM pragma_foreign_key_check", [](Rows& row) {
-      const std::string table = row.text();
-      const std::int64_t id = row.integer();
-      return table + ", row " + std::to_string(id) + ": refers to nothing in " + row.text();
-    });
-    ledgers();
-    chunks("telemetry_chunk", "samples", [](std::span<const std::byte> body) { return decode_chunk(body); });
-    chunks("covariate_chunk", "changes",
-           [](std::span<const std::byte> body) { return decode_covariates(body); });
-    return std::move(check_);
-  }
-
- private:
-  void add(std::string fault) {
-    if (!fault.empty() && check_.faults.size() < most_faults) check_.faults.push_back(std::move(fault));
-  }
-
-  // A fault, or none, of each row.
-  void each(const std::string& sql, const std::function<std::string(Rows&)>& look) {
-    try {
-      Rows rows(database_.statement(sql));
-      while (rows.next()) add(look(rows));
-    } catch (const SqlError& error) {
-      add(error.what());
-    }
-  }
-
-  // Ledgers are sums of many rounded steps, so they close to a part of what they hold.
-  void ledgers() {
-    const auto [total, size] = ledger_sums();
-    each("SELECT mission_key, battery_j - (" + total + "), battery_j IS NOT NULL AND abs(battery_j - (" +
-             total + ")) > 1e-6 * (" + size + ") FROM mission",
-         [this](Rows& row) {
-           ++check_.missions;
-           const std::int64_t key = row.integer();
-           const double rest = row.real();
-           return row.boolean() ? "mission " + std::to_string(key) + ": its ledger is " +
-                                      std::to_string(rest) + " J short"
-                                : std::string();
-         });
-  }
-
-  template <class Decode>
-  void chunks(const std::string& table, const std::string& count, const Decode& decode) {
-    each("SELECT chunk_key, mission_key, " + count + ", body FROM " + table, [&](Rows& row) {
-      ++check_.chunks;
-      const std::int64_t key = row.integer(), mission = row.integer(), declared = row.integer();
-      const auto content = decode(row.blob());
-      const std::string name = table + " " + std::to_string(key) + " of mission " + std::to_string(mission);
-      if (!content) return name + ": " + content.error().message;
-      return std::cmp_equal(content->size(), declared) ? std::string()
-                                                       : name + ": holds another number of " + count;
-    });
-  }
-
-  Database& database_;
-  StoreCheck check_;
-};
-
-// A new file that takes its name when it is whole.
-class NewFile {
- public:
-  explicit NewFile(std::string path) : path_(std::move(path)), part_(path_ + ".part") { remove(); }
-  ~NewFile() { remove(); }
-  NewFile(const NewFile&) = delete;
-  NewFile& operator=(const NewFile&) = delete;
-  const std::string& part() const { return part_; }
-
-  Result<void> commit() {
-    const int file = open(part_.c_str(), O_RDONLY | O_CLOEXEC);
-    const bool synced = file >= 0 && fsync(file) == 0;
-    if (file >= 0) close(file);
-    if (!synced || std::rename(part_.c_str(), path_.c_str()) != 0)
-      return fail(Fault::unavailable, path_, std::string("cannot be written: ") + std::strerror(errno));
-    return {};
-  }
-
- private:
-  void remove() {
-    std::error_code ignored;
-    for (const char* suffix : {"", "-wal", "-shm", "-journal"}) fs::remove(part_ + suffix, ignored);
-  }
-  std::string path_, part_;
-};
 
 std::string quoted(const std::string& text) {
   std::string sql = "'";
   for (const char c : text) sql += c == '\'' ? std::string("''") : std::string(1, c);
   return sql + "'";
+}
+
+Result<OutputFile> new_file(const std::string& path) {
+  if (!may_write(path, path, Existing::refuse)) return fail(Fault::conflict, path, "is there already");
+  return OutputFile::create(path, Existing::refuse);
 }
 
 // A compact copy, which gives free pages back from now on.
@@ -207,7 +102,7 @@ class LostKeys {
 
   void tell(std::vector<std::string>& losses) const {
     for (const Range& range : ranges_) {
-      if (losses.size() >= most_faults) return;
+      if (losses.size() >= max_faults) return;
       losses.push_back(table_ + ", what it had with " + key_ + " " + std::to_string(range.from) +
                        (range.from == range.to ? "" : " to " + std::to_string(range.to)) + ": " + range.why);
     }
@@ -304,20 +199,31 @@ void drop_loose_ends(Database& database, Salvage& salvage) {
 Result<StoreCheck> check_store(const std::string& path) {
   auto database = open_existing(path);
   if (!database) return tl::unexpected(database.error());
-  return guarded(path, [&]() -> Result<StoreCheck> { return Inspection(**database).run(); });
+  return guarded(path, [&]() -> Result<StoreCheck> {
+    StoreCheck check = check_content(**database);
+    try {
+      add_texts(check, **database,
+                "SELECT integrity_check FROM pragma_integrity_check(100) WHERE integrity_check <> 'ok'");
+      add_texts(check, **database,
+                "SELECT \"table\" || ', row ' || coalesce(rowid, 0) || ': refers to nothing in ' || parent "
+                "FROM pragma_foreign_key_check");
+    } catch (const SqlError& error) {
+      check.add_fault(error.what());
+    }
+    return check;
+  });
 }
 
 Result<StoreCheck> back_up_store(const std::string& path, const std::string& copy) {
-  if (auto may = may_write(copy, copy, Existing::refuse); !may)
-    return fail(Fault::conflict, copy, "is there already");
+  auto file = new_file(copy);
+  if (!file) return tl::unexpected(file.error());
   auto database = open_existing(path, OpenMode::read_write_create);
   if (!database) return tl::unexpected(database.error());
-  NewFile file(copy);
-  if (auto copied = copy_into(**database, file.part()); !copied) return tl::unexpected(copied.error());
-  auto check = check_store(file.part());
+  if (auto copied = copy_into(**database, file->written_to()); !copied) return tl::unexpected(copied.error());
+  auto check = check_store(file->written_to());
   if (!check) return check;
   if (!check->faults.empty()) return fail(Fault::corrupt, path, "is damaged: " + check->faults.front());
-  if (auto done = file.commit(); !done) return tl::unexpected(done.error());
+  if (auto done = file->commit(); !done) return tl::unexpected(done.error());
   return check;
 }
 
@@ -328,14 +234,15 @@ Result<std::string> restore_store(const std::string& from, const std::string& pa
   auto locks = lock_store(path);
   if (!locks) return tl::unexpected(locks.error());
   if (!replaces) fs::remove(path, unknown);  // the lock has made an empty one
-  NewFile file(path);
+  auto file = OutputFile::create(path, Existing::replace);
+  if (!file) return tl::unexpected(file.error());
   {
     auto check = check_store(from);
     if (!check) return tl::unexpected(check.error());
     if (!check->faults.empty()) return fail(Fault::corrupt, from, "is damaged: " + check->faults.front());
     auto source = open_existing(from, OpenMode::read_write_create);
     if (!source) return tl::unexpected(source.error());
-    if (auto copied = copy_into(**source, file.part()); !copied) return tl::unexpected(copied.error());
+    if (auto copied = copy_into(**source, file->written_to()); !copied) return tl::unexpected(copied.error());
   }
   std::string before;
   if (replaces) {
@@ -346,18 +253,17 @@ Result<std::string> restore_store(const std::string& from, const std::string& pa
         return fail(Fault::unavailable, path + suffix, "cannot be put aside: " + unknown.message());
     }
   }
-  if (auto done = file.commit(); !done) return tl::unexpected(done.error());
+  if (auto done = file->commit(); !done) return tl::unexpected(done.error());
   return before;
 }
 
 Result<Salvage> salvage_store(const std::string& damaged, const std::string& into) {
-  if (auto may = may_write(into, into, Existing::refuse); !may)
-    return fail(Fault::conflict, into, "is there already");
   if (auto readable = open_existing(damaged); !readable) return tl::unexpected(readable.error());
-  NewFile file(into);
+  auto file = new_file(into);
+  if (!file) return tl::unexpected(file.error());
   Salvage salvage;
   auto done = guarded(damaged, [&]() -> Result<void> {
-    SqliteDatabase database(file.part(), OpenMode::read_write_create, busy_timeout_ms);
+    SqliteDatabase database(file->written_to(), OpenMode::read_write_create, busy_timeout_ms);
     database.execute("PRAGMA auto_vacuum = INCREMENTAL");
     if (auto made = bring_to_schema(database, store_schema()); !made) return made;
     database.execute("PRAGMA synchronous = OFF");
@@ -375,7 +281,7 @@ Result<Salvage> salvage_store(const std::string& damaged, const std::string& int
     return {};
   });
   if (!done) return tl::unexpected(done.error());
-  if (auto named = file.commit(); !named) return tl::unexpected(named.error());
+  if (auto named = file->commit(); !named) return tl::unexpected(named.error());
   return salvage;
 }
 

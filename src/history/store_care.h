@@ -5,19 +5,16 @@
 #include <vector>
 
 #include "base/error.h"
+#include "history/store_content.h"
 
 // The care of a store's file: is it sound, a copy of it, a copy put in its place, and what can still be read
 // of a damaged one. None of it opens the store as Store does, and nothing is migrated.
 namespace joulecast::history {
 
-struct StoreCheck {
-  std::int64_t missions = 0;
-  std::int64_t chunks = 0;          // of telemetry and covariates, each decoded and its checksum tried
-  std::vector<std::string> faults;  // the first of each kind of check, a hundred at most; empty: sound
-};
+using StoreCheck = ContentReport;
 
-// Looks at pages and indexes, references, the sum of every ledger, and every chunk of recordings. May run
-// beside a daemon. Fault::not_found when there is no such file, ::corrupt when it is no store at all,
+// Looks at the content, at pages, indexes and references. May run beside a daemon. Fault::not_found when
+// there is no such file, ::corrupt when it is no store at all,
 // ::conflict when it is of another version.
 Result<StoreCheck> check_store(const std::string& path);
 

@@ -7,11 +7,7 @@
 #include <span>
 #include <variant>
 
-#include "history/audit.h"
-#include "history/covariate_chunk.h"
-#include "history/sql_rows.h"
 #include "history/sql_store.h"
-#include "history/telemetry_chunk.h"
 
 namespace joulecast::history {
 namespace {
@@ -232,97 +228,6 @@ void copy_active_versions(Database& from, Database& to) {
   transaction.commit();
 }
 
-class Verifier {
- public:
-  Verifier(Database& database, const TableProgress& progress) : database_(database), progress_(progress) {}
-
-  VerifyReport run() {
-    for (const Table& table : all_tables()) report_.tables.push_back(summarize(database_, table, progress_));
-    verify_missions();
-    verify_chunks("telemetry_chunk", "samples", decode_chunk);
-    verify_chunks("covariate_chunk", "changes", decode_covariates);
-    if (const auto audit = verify_audit(database_, "audit"); !audit) fault(audit.error().message);
-    return std::move(report_);
-  }
-
- private:
-  void fault(const std::string& text) {
-    if (report_.faults.size() < max_faults) report_.faults.push_back(text);
-    ++report_.fault_count;
-  }
-
-  void verify_missions() {
-    static const std::string sql = "SELECT " + std::string(mission_identity_columns) + ", " +
-                                   mission_content_columns() +
-                                   " FROM mission WHERE mission_key > ? ORDER BY mission_key LIMIT 500";
-    MissionKey after = 0;
-    for (bool more = true; more;) {
-      more = false;
-      Rows rows(database_.statement(sql));
-      rows.bind(after);
-      while (rows.next()) {
-        more = true;
-        ++report_.missions;
-        const auto mission = read_mission(rows);
-        if (!mission) {
-          fault("a mission after " + std::to_string(after) + ": " + describe(mission.error()));
-          ++after;
-          break;
-        }
-        after = mission->key;
-        add_ledger(*mission);
-      }
-    }
-  }
-
-  void add_ledger(const Mission& mission) {
-    const double residual_j = std::abs(mission.accounts.ledger.total() - mission.accounts.battery_j);
-    if (std::isnan(residual_j)) return;  // not known
-    ++report_.ledgers;
-    report_.worst_residual_j = std::max(report_.worst_residual_j, residual_j);
-    double scale_j = 1;
-    for (const double term_j : mission.accounts.ledger.value) scale_j += std::abs(term_j);
-    constexpr double closes = 1e-6;  // of the sum of magnitudes: rounding over many additions
-    if (residual_j > closes * scale_j)
-      fault("mission " + std::to_string(mission.key) + ": its ledger adds up to " +
-            std::to_string(mission.accounts.ledger.total()) + " J, and " +
-            std::to_string(mission.accounts.battery_j) + " J left the battery");
-  }
-
-  template <class Decode>
-  void verify_chunks(const std::string& table, const std::string& items, Decode decode) {
-    const std::string sql = "SELECT chunk_key, " + items + ", start_utime_us, end_utime_us, body FROM " +
-                            table + " WHERE chunk_key > ? ORDER BY chunk_key LIMIT 200";
-    std::int64_t after = 0;
-    for (bool more = true; more;) {
-      more = false;
-      Rows rows(database_.statement(sql));
-      rows.bind(after);
-      while (rows.next()) {
-        more = true;
-        after = rows.integer();
-        const std::int64_t count = rows.integer(), start = rows.integer(), end = rows.integer();
-        const auto decoded = decode(rows.blob());
-        const std::string which = table + " " + std::to_string(after);
-        ++report_.chunks;
-        if (!decoded) {
-          fault(which + ": " + describe(decoded.error()));
-        } else if (const auto [first, last] = std::minmax_element(
-                       decoded->begin(), decoded->end(),
-                       [](const auto& a, const auto& b) { return a.utime_us < b.utime_us; });
-                   static_cast<std::int64_t>(decoded->size()) != count || first->utime_us != start ||
-                   last->utime_us != end) {
-          fault(which + ": holds other items than its row says");
-        }
-      }
-    }
-  }
-
-  Database& database_;
-  const TableProgress& progress_;
-  VerifyReport report_;
-};
-
 }  // namespace
 
 std::vector<std::string> table_names() {
@@ -359,7 +264,11 @@ Result<CopyReport> copy_tables(Database& from, Database& to, const TableProgress
 }
 
 Result<VerifyReport> verify_tables(Database& database, const TableProgress& progress) {
-  return guarded([&]() -> Result<VerifyReport> { return Verifier(database, progress).run(); });
+  return guarded([&]() -> Result<VerifyReport> {
+    auto tables = summarize_tables(database, progress);
+    if (!tables) return tl::unexpected(tables.error());
+    return VerifyReport{check_content(database), std::move(*tables)};
+  });
 }
 
 }  // namespace joulecast::history

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "history/sql.h"
+#include "history/store_content.h"
 
 // Whole stores, table by table: copied into another database, counted, examined. On databases of
 // open_tables().
@@ -39,19 +40,11 @@ Result<CopyReport> copy_tables(Database& from, Database& to, const TableProgress
 
 Result<std::vector<TableSummary>> summarize_tables(Database& database, const TableProgress& progress);
 
-struct VerifyReport {
+struct VerifyReport : ContentReport {
   std::vector<TableSummary> tables;
-  std::int64_t missions = 0;
-  std::int64_t ledgers = 0;         // added up
-  double worst_residual_j = 0;      // of a ledger: its sum less what left the battery
-  std::int64_t chunks = 0;          // decoded
-  std::vector<std::string> faults;  // what is wrong, a line each, at most max_faults
-  std::int64_t fault_count = 0;
 };
-inline constexpr std::size_t max_faults = 100;
 
-// Reads everything: every mission's record, the sum of its ledger, every chunk of telemetry and covariates
-// against its row, every link of the audit.
+// Reads everything: every row of every table, and what their content says.
 Result<VerifyReport> verify_tables(Database& database, const TableProgress& progress);
 
 // Of every store, in an order in which no row comes before one that it refers to, but for a robot's active

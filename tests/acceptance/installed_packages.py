@@ -138,13 +138,35 @@ def check_library(root):
     check(re.fullmatch(r"[1-9]\d+ J in \d+\.\d s\n", answer), answer)
 
 
+def check_bill_of_materials(root):
+    """It names the package of every library that the program says it needs, in its installed version, and what the page holds."""
+    bill = json.loads((root / "usr/share/doc/joulecastd/joulecast.spdx.json").read_text())
+    check(bill["spdxVersion"] == "SPDX-2.3" and bill["dataLicense"] == "CC0-1.0", str(bill)[:300])
+    by_id = {each["SPDXID"]: each for each in bill["packages"]}
+    for relation in bill["relationships"]:
+        known = {*by_id, "SPDXRef-DOCUMENT"}
+        check({relation["spdxElementId"], relation["relatedSpdxElement"]} <= known, f"{relation} is of nothing")
+    versions = {each["name"]: each["versionInfo"] for each in by_id.values()}
+    for program in ("joulecastd", "joulecast"):
+        check(program in versions, f"{program} is not in the bill")
+        for library in re.findall(r"NEEDED.*\[(.*)\]", run("readelf", "-d", root / "usr/bin" / program)):
+            holders = {line.split(":")[0] for line in run("dpkg", "-S", f"*/{library}").splitlines()}
+            mine = holders & set(versions)
+            check(mine, f"{library} of {program}: none of {holders} is in the bill")
+            for name in mine:
+                installed = run("dpkg-query", "-W", "-f=${Version}", name)
+                check(versions[name] in installed, f"{name}: {versions[name]}, installed is {installed}")
+    check({"preact", "uplot", "libboost-dev"} <= set(versions), f"{sorted(versions)}")
+    print(f"bill of materials: {len(by_id)} packages")
+
+
 def install_and_use(root, packages):
     for package in packages:
         shutil.copy(package, root / "run")
     run("chroot", root, "dpkg", "--install", *[f"/run/{p.name}" for p in packages])
     check_programs(root)
-
     check_library(root)
+    check_bill_of_materials(root)
     path, unit = unit_of(root)
     check_with_systemd(root, path)
     program, flag, settings = shlex.split(unit["ExecStart"])

@@ -23,6 +23,49 @@ def certificate(folder, name):
                     "-keyout", folder / "tls.key", "-out", folder / "tls.crt"], check=True, capture_output=True)
 
 
+def client_certificate(folder):
+    """An authority in ca.crt, and what it signed for a client, in client.crt and client.key."""
+    def openssl(*words):
+        subprocess.run(["openssl", *words], check=True, capture_output=True, cwd=folder)
+    kind = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes"]
+    openssl("req", "-x509", *kind, "-days", "2", "-subj", "/CN=site", "-keyout", "ca.key", "-out", "ca.crt")
+    openssl("req", *kind, "-subj", "/CN=dispatcher", "-keyout", "client.key", "-out", "client.csr")
+    openssl("x509", "-req", "-in", "client.csr", "-CA", "ca.crt", "-CAkey", "ca.key", "-CAcreateserial", "-days", "2",
+            "-out", "client.crt")
+
+
+def ask_only_certified(options, folder, token):
+    """With http.tls_client_authorities nobody without one of their certificates is answered."""
+    client_certificate(folder)
+    service = Service(options, folder, "--http-tls-client-authorities", folder / "ca.crt")
+    other = folder / "other"
+    other.mkdir()
+    certificate(other, "stranger")
+
+    def status(certified_by=None):
+        trust = service.trust()
+        if certified_by:
+            trust.load_cert_chain(*certified_by)
+        try:
+            with urllib.request.urlopen(service.url + "/healthz", timeout=20, context=trust) as reply:
+                return reply.status
+        except (urllib.error.URLError, ssl.SSLError, ConnectionError):
+            return None
+    mine = (folder / "client.crt", folder / "client.key")
+    check(status(mine) == 200, "a certified client is refused")
+    check(status() is None, "a client without a certificate is answered")
+    check(status((other / "tls.crt", other / "tls.key")) is None, "a certificate of nobody is taken")
+    asked = [options.client, "missions", "--server", service.url]
+    env = {**os.environ, "SSL_CERT_FILE": folder / "tls.crt", "JOULECAST_TOKEN": token}
+    known = subprocess.run(asked, env={**env, "JOULECAST_CLIENT_CERTIFICATE": mine[0], "JOULECAST_CLIENT_KEY": mine[1]},
+                           capture_output=True, text=True, timeout=30)
+    check(known.returncode == 0, f"the command line with a certificate: {known.stderr}")
+    unknown = subprocess.run(asked, env=env, capture_output=True, text=True, timeout=30)
+    check(unknown.returncode != 0, "the command line without a certificate is answered")
+    service.process.terminate()
+    check(service.process.wait(timeout=20) == 0, "the daemon did not stop in order")
+
+
 def until(what, ask, seconds=30):
     end = time.monotonic() + seconds
     while not (found := ask()):
@@ -32,13 +75,13 @@ def until(what, ask, seconds=30):
 
 
 class Service:
-    def __init__(self, options, folder):
+    def __init__(self, options, folder, *more):
         self.folder = folder
         self.log = open(folder / "log.txt", "w+")
         self.process = subprocess.Popen(
             [options.daemon, "--http-port", "0", "--store-path", folder / "history.db", "--lcm-url", "memq://", "--log-format",
              "json", "--http-tls-certificate", folder / "tls.crt", "--http-tls-key", folder / "tls.key", "--auth-token-file",
-             folder / "tokens.json"], stderr=self.log)
+             folder / "tokens.json", *more], stderr=self.log)
         ready = until("the daemon", lambda: next((e for e in self.events() if e["message"] == "ready"), None))
         self.url = ready["http"]
         self.port = int(self.url.rsplit(":", 1)[1])
@@ -123,7 +166,7 @@ def main():
         until("the new certificate", lambda: service.subject()[0] != first)
         check(service.ask("/healthz")[0] == 200, "no answer with the new certificate")
         second, _ = service.subject()
-        (folder / "good.crt").write_bytes((folder / "tls.crt").read_bytes())
+        good = (folder / "tls.crt").read_bytes()
         (folder / "tls.crt").write_text("no certificate\n")
         service.process.send_signal(signal.SIGHUP)
         until("the refusal of a broken certificate",
@@ -136,6 +179,8 @@ def main():
                                  "--http-tls-certificate", folder / "tls.crt", "--http-tls-key", folder / "tls.key"],
                                 capture_output=True, text=True, timeout=30)
         check(broken.returncode == 1 and "http.tls_certificate" in broken.stderr, broken.stderr)
+        (folder / "tls.crt").write_bytes(good)
+        ask_only_certified(options, folder, token)
     print("TLS 1.2 or newer, a new certificate at SIGHUP, none that is broken")
 
 

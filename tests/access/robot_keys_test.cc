@@ -27,7 +27,11 @@ TEST(Hmac, IsThatOfTheStandard) {
 TEST(RobotKeys, AreReadAsTheyWereWritten) {
   const std::string path = testing::TempDir() + "robot_keys_" + std::to_string(getpid()) + ".json";
   const RobotKeys keys{{"amr-07", std::string(32, 'k')}, {"tug", std::string(31, '\0') + '\xff'}};
-  ASSERT_TRUE(write_robot_keys(path, keys));
+  ASSERT_TRUE(change_robot_keys(path, [&](RobotKeys& held) -> Result<void> {
+    held = keys;
+    return change_robot_keys(path, [](RobotKeys&) -> Result<void> { return {}; }) ? invalid("", "two at once")
+                                                                                  : Result<void>();
+  }));
   const auto read = read_robot_keys(path);
   ASSERT_TRUE(read) << describe(read.error());
   EXPECT_EQ(*read, keys);

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <thread>
 #include <tuple>
@@ -1022,6 +1023,12 @@ TEST_P(StoreConformance, TheAuditIsAChainWhileTheStoreIsOpenAndAfter) {
   EXPECT_EQ(entries[1].actor, "größer-2");
   EXPECT_EQ(entries[1].detail_json, R"({"a": 1})");
   EXPECT_EQ(entries[2].hash, state.head);
+  const auto newest = need(store_->audit(std::numeric_limits<std::int64_t>::max(), 2));
+  ASSERT_EQ(newest.size(), 2U);
+  EXPECT_EQ(newest[0].hash, state.head);
+  EXPECT_EQ(newest[1].id, 2);
+  EXPECT_EQ(need(store_->audit(2, 10)).size(), 1U);
+  EXPECT_EQ(store_->audit(2, 0).error().fault, Fault::invalid);
   // A refused entry is no link.
   EXPECT_EQ(apply(AppendAudit{{0, 1, "", "", "", "", "{}", ""}}).error().fault, Fault::invalid);
   reopen();

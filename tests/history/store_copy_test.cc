@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <stdexcept>
 
 #include "history/audit.h"
@@ -127,7 +128,13 @@ TEST_F(StoreCopyTest, RefusesADestinationOfOtherRows) {
   const auto refused = copy_tables(*tables(source_), *tables(back_), quietly);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().fault, Fault::conflict);
+}
+
+TEST_F(StoreCopyTest, ReadsNoStoreThatIsNotThere) {
   EXPECT_EQ(open_tables(folder_.file("absent.db"), true).error().fault, Fault::not_found);
+  std::ofstream(folder_.file("empty.db")).close();
+  EXPECT_EQ(open_tables(folder_.file("empty.db"), true).error().fault, Fault::corrupt);
+  EXPECT_EQ(open_tables(postgres_, true).error().fault, Fault::corrupt);
 }
 
 TEST_F(StoreCopyTest, VerifiesLedgersAndChunks) {

@@ -76,6 +76,9 @@ class FailingStore final : public Store {
   Result<TelemetryPage> telemetry(MissionKey k, TimeRange r, const PageRequest& p) const override {
     return store_->telemetry(k, r, p);
   }
+  Result<std::vector<AuditEntry>> audit(std::int64_t before, std::int64_t n) const override {
+    return store_->audit(before, n);
+  }
   Result<std::vector<Event>> events(std::int64_t a, std::int64_t n,
                                     std::optional<std::string> r) const override {
     return store_->events(a, n, r);

@@ -19,7 +19,12 @@ const std::string key(32, 'k');
 
 class SignatureGateTest : public testing::Test {
  protected:
-  SignatureGateTest() { EXPECT_TRUE(access::write_robot_keys(path_, {{"nomad", key}})); }
+  SignatureGateTest() {
+    EXPECT_TRUE(access::change_robot_keys(path_, [](access::RobotKeys& keys) -> Result<void> {
+      keys = {{"nomad", key}};
+      return {};
+    }));
+  }
   ~SignatureGateTest() override { std::filesystem::remove(path_); }
 
   SignatureGate gate(bool required = false) {

@@ -86,9 +86,8 @@ class AccessTest : public testing::Test {
     }));
   }
 
-  void open(bool secure = false) {
+  void open() {
     gate_ = *Gate::open({.token_file = file(),
-                         .secure = secure,
                          .now_utime_us = [this] { return now_us_; },
                          .audit = [this](AccessEvent event) -> Result<void> {
                            if (!audit_open_) return fail(Fault::unavailable, "", "stopping");
@@ -110,6 +109,7 @@ class AccessTest : public testing::Test {
     request.target = target;
     request.id = "r-1";
     request.address = "192.0.2.7";
+    request.secure = secure_;
     request.body = std::move(body);
     if (!authorization.empty()) request.headers.emplace_back("Authorization", authorization);
     if (!cookie.empty()) request.headers.emplace_back("Cookie", cookie);
@@ -122,7 +122,7 @@ class AccessTest : public testing::Test {
 
   std::filesystem::path folder_;
   std::int64_t now_us_ = 1'790'000'000'000'000;
-  bool audit_open_ = true;
+  bool audit_open_ = true, secure_ = false;
   std::vector<AccessEvent> events_;
   Metrics metrics_;
   EventHub hub_;
@@ -279,8 +279,8 @@ TEST_F(AccessTest, ASessionEndsWithItsTokenAndAfterTwelveHours) {
   EXPECT_EQ(ask(Method::get, "/v1/robots", "", second).status, 401U);
 }
 
-TEST_F(AccessTest, UnderTlsTheCookieIsSecure) {
-  open(true);
+TEST_F(AccessTest, OverHttpsTheCookieIsSecure) {
+  secure_ = true;
   EXPECT_NE(header(ask(Method::post, "/v1/session", "", "", R"({"token": "s-plan"})"), "Set-Cookie")
                 .find("; Secure"),
             std::string::npos);

@@ -238,7 +238,8 @@ def hold_pages(checker, name):
     for k in range(3):
         checker.check("PUT", "/v1/robots/{id}", f"/v1/robots/page-{k}", {**robot, "robot_id": f"page-{k}"}, expect=200)
         checker.check("PUT", "/v1/robots/{id}", f"/v1/robots/page-0", {**robot, "robot_id": "page-0", "idle_power_w": 10 + k}, expect=200)
-    for template, member, key in (("/v1/robots", "robots", "robot_id"), ("/v1/robots/{id}/versions", "versions", "model_version")):
+    for template, member, key in (("/v1/robots", "robots", "robot_id"), ("/v1/robots/{id}/versions", "versions", "model_version"),
+                                  ("/v1/audit", "entries", "id")):
         path = template.replace("{id}", "page-0")
         whole = [row[key] for row in checker.check("GET", template, path, expect=200)[member]]
         seen, cursor = [], ""
@@ -250,7 +251,7 @@ def hold_pages(checker, name):
             cursor = "&cursor=" + page["next_cursor"]
         if len(whole) < 4 or seen != whole:
             checker.fault(f"{template} by pages: {seen}, whole: {whole}")
-    for template in ("/v1/diagnoses", "/v1/audit-log", "/v1/robots/{id}/proposals"):
+    for template in ("/v1/diagnoses", "/v1/audit", "/v1/audit-log", "/v1/robots/{id}/proposals"):
         told = checker.check("GET", template, template.replace("{id}", name) + "?cursor=x", expect=422) or {}
         if told.get("field") != "cursor":
             checker.fault(f"{template}: {told}")

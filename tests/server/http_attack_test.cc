@@ -66,6 +66,9 @@ class HttpAttackTest : public ::testing::Test {
     row(Method::get, "/read", http::Run::worker, fine);
     row(Method::get, "/ready", http::Run::operations, fine);
     rows.back().reserved = true;
+    row(Method::get, "/who", http::Run::io, [](const Request& request) -> Result<Response> {
+      return json_response(request.address + (request.secure ? " secure" : ""));
+    });
     row(Method::post, "/length", http::Run::worker, [](const Request& request) -> Result<Response> {
       return json_response(std::to_string(request.body.size()));
     });
@@ -388,6 +391,44 @@ TEST_F(HttpAttackTest, OneClientHasALimitedShareOfTheWork) {
   for (RawClient& client : clients) EXPECT_EQ(client.reply().status, 200U);
   fourth.send(get_text("/read"));  // on the same connection
   EXPECT_EQ(fourth.reply().status, 200U);
+}
+
+TEST_F(HttpAttackTest, TrustedProxiesAloneSayWhoARequestIsFrom) {
+  start({.trusted_proxies = {"127.0.0.1", "10.0.0.9"}});
+  const auto who = [&](const std::string& lines, const char* source = nullptr) {
+    return ask(get_text("/who", lines), source).body;
+  };
+  EXPECT_EQ(who(""), "127.0.0.1");
+  EXPECT_EQ(who("X-Forwarded-For: 192.0.2.1\r\n", other_peer), "127.0.0.2");
+  EXPECT_EQ(who("X-Forwarded-For: 192.0.2.1\r\n"), "192.0.2.1");
+  EXPECT_EQ(who("X-Forwarded-For: 198.51.100.1, 192.0.2.1\r\n"), "192.0.2.1")
+      << "the first is the client's own word";
+  EXPECT_EQ(who("X-Forwarded-For: 198.51.100.1\r\nx-forwarded-for: 192.0.2.1,10.0.0.9\r\n"), "192.0.2.1");
+  EXPECT_EQ(who("X-Forwarded-For: 192.0.2.1, unknown\r\n"), "127.0.0.1");
+  EXPECT_EQ(who("X-Forwarded-For: ::ffff:192.0.2.1\r\nX-Forwarded-Proto: https\r\n"), "192.0.2.1 secure");
+  EXPECT_EQ(who("X-Forwarded-Proto: https\r\n", other_peer), "127.0.0.2");
+  EXPECT_EQ(HttpServer::start({.trusted_proxies = {"proxy"}}, router_).error().field, "http.trusted_proxies");
+}
+
+TEST_F(HttpAttackTest, ClientsOfOneProxyHaveLimitsOfTheirOwn) {
+  start({.trusted_proxies = {"127.0.0.1"},
+         .compute_threads = 1,
+         .client_requests = 1,
+         .client_connections = 2});
+  const auto from = [](const char* path, const std::string& client) {
+    return get_text(path, "X-Forwarded-For: " + client + "\r\n");
+  };
+  RawClient busy(port()), same(port()), another(port());
+  busy.send(from("/compute", "192.0.2.1"));
+  ASSERT_TRUE(soon([&] { return begun_ == 1; }));
+  same.send(from("/read", "192.0.2.1"));
+  EXPECT_EQ(same.reply().status, 429U);
+  another.send(from("/read", "192.0.2.2"));
+  EXPECT_EQ(another.reply().status, 200U) << "the third connection of the proxy";
+  release();
+  EXPECT_EQ(busy.reply().status, 200U);
+  same.send(from("/read", "192.0.2.1"));
+  EXPECT_EQ(same.reply().status, 200U);
 }
 
 TEST_F(HttpAttackTest, IdleConnectionsOfOnePeerDoNotShutOutAnother) {

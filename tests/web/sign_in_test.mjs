@@ -19,8 +19,12 @@ const { values: given } = parseArgs({
 await rm(given.out, { recursive: true, force: true });
 await mkdir(given.out, { recursive: true });
 const tokens = path.join(given.out, 'tokens.json');
-const make = ['token', 'create', '--file', tokens, '--name', 'carol', '--role', 'read'];
-const token = /jc_[0-9a-f]{64}/.exec(await run(given.client, make))[0];
+const makeToken = async (name, role) => {
+  const made = await run(given.client, ['token', 'create', '--file', tokens, '--name', name, '--role', role]);
+  return /jc_[0-9a-f]{64}/.exec(made)[0];
+};
+const token = await makeToken('carol', 'read');
+const adminToken = await makeToken('root', 'admin');
 const base = `http://127.0.0.1:${await freePort()}`;
 const options = { '--http-port': new URL(base).port, '--store-path': path.join(given.out, 'history.db') };
 Object.assign(options, { '--lcm-url': 'memq://', '--auth-token-file': tokens });
@@ -46,11 +50,19 @@ try {
     page.evaluate(([m, a]) => fetch(a, { method: m }).then((r) => r.status), [method, at]);
   assert.equal(await asked('GET', '/v1/robots'), 200);
   assert.equal(await asked('PUT', '/v1/robots/amr'), 403);
+  await page.goto(`${base}/#/audit?of=requests`);
+  await page.getByText('needs a token of role admin').waitFor();
   await run(given.client, ['token', 'revoke', '--file', tokens, '--name', 'carol']);
   assert.equal(await asked('GET', '/v1/robots'), 401);
   await page.reload();
   await dialog.waitFor({ state: 'visible' });
-  console.log('the page signs in, and out when its token is revoked');
+  await dialog.locator('input').fill(adminToken);
+  await dialog.locator('button[type=submit]').click();
+  await page.getByRole('row', { name: /carol.*127\.0\.0\.1.*putRobot.*403/ }).waitFor();
+  await page.screenshot({ path: path.join(given.out, 'requests.png') });
+  await page.getByRole('button', { name: 'Robots and models' }).click();
+  await page.getByText('Nothing has happened yet').waitFor();
+  console.log('the page signs in, out when its token is revoked, and shows the audit to an admin');
 } finally {
   await browser.close();
   await stop(daemon);

@@ -1,14 +1,18 @@
 import { useState } from 'preact/hooks';
 import { useLive } from '../live.js';
 import { keepInAddress } from '../route.js';
-import { Answer, Empty, useOptions, useTitleOf } from '../widgets.jsx';
+import { Answer, Choice, Empty, useOptions, useTitleOf } from '../widgets.jsx';
 import { Events, useEvents } from './events.jsx';
+import { Requests } from './requests.jsx';
 
 const step = 200;
+const subjects = [
+  ['robots', 'Robots and models'],
+  ['requests', 'Requests'],
+];
 
 // What happened to robots and their models, newest first.
-export function Audit({ given }) {
-  useTitleOf('Log');
+function RobotEvents({ given }) {
   const live = useLive();
   const [robot, setRobot] = useState(given.robot ?? '');
   const [count, setCount] = useState(step);
@@ -20,10 +24,6 @@ export function Audit({ given }) {
   };
   return (
     <>
-      <div class="heading">
-        <h1>Log</h1>
-        <span class="note">adoptions of models, drifts, diagnoses, charges, undeclared payloads</span>
-      </div>
       <div class="filters">
         <label class="field">
           <span>Robot</span>
@@ -54,6 +54,30 @@ export function Audit({ given }) {
           )
         }
       </Answer>
+    </>
+  );
+}
+
+export function Audit({ given }) {
+  useTitleOf('Log');
+  const [subject, setSubject] = useState(given.of === 'requests' ? 'requests' : 'robots');
+  const choose = (value) => {
+    setSubject(value);
+    keepInAddress({ of: value === 'robots' ? '' : value });
+  };
+  return (
+    <>
+      <div class="heading">
+        <h1>Log</h1>
+        <span class="note">
+          {subject === 'requests'
+            ? 'who changed something, signed in or was refused'
+            : 'adoptions of models, drifts, diagnoses, charges, undeclared payloads'}
+        </span>
+        <span class="spring" />
+        <Choice label="Of" options={subjects} value={subject} onChange={choose} />
+      </div>
+      {subject === 'requests' ? <Requests /> : <RobotEvents given={given} />}
     </>
   );
 }

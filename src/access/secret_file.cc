@@ -1,0 +1,46 @@
+#include "access/secret_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+
+namespace joulecast::access {
+
+FileReplacement::~FileReplacement() {
+  if (descriptor_ < 0) return;
+  close(descriptor_);
+  unlink((path_ + ".new").c_str());
+}
+
+Result<bool> FileReplacement::begin() {
+  const std::string beside = path_ + ".new";
+  struct stat old {};
+  const bool exists = stat(path_.c_str(), &old) == 0;
+  descriptor_ = open(beside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (descriptor_ < 0 && errno == EEXIST)
+    return fail(Fault::conflict, beside,
+                "exists: another program changes " + path_ + ", or one died doing so; then delete it");
+  if (descriptor_ < 0) return fail(Fault::unavailable, beside, std::strerror(errno));
+  if (fchmod(descriptor_, exists ? old.st_mode & 07777 : 0640) != 0)
+    return fail(Fault::unavailable, beside, std::strerror(errno));
+  // Whose file it was, so that the daemon goes on reading it; only root may give it away.
+  if (exists && fchown(descriptor_, old.st_uid, old.st_gid) != 0 && geteuid() == 0)
+    return fail(Fault::unavailable, beside, std::strerror(errno));
+  return exists;
+}
+
+Result<void> FileReplacement::commit(std::string_view text) {
+  const std::string beside = path_ + ".new";
+  const bool written = write(descriptor_, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
+                       fsync(descriptor_) == 0 && std::rename(beside.c_str(), path_.c_str()) == 0;
+  if (!written) return fail(Fault::unavailable, path_, std::strerror(errno));
+  close(descriptor_);
+  descriptor_ = -1;
+  return {};
+}
+
+}  // namespace joulecast::access

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "base/error.h"
+
+// Files of secrets, which commands change while a daemon reads them.
+namespace joulecast::access {
+
+// The new file beside the old one, as `<path>.new`, which exists only while somebody writes it.
+class FileReplacement {
+ public:
+  explicit FileReplacement(std::string path) : path_(std::move(path)) {}
+  ~FileReplacement();
+  FileReplacement(const FileReplacement&) = delete;
+  FileReplacement& operator=(const FileReplacement&) = delete;
+
+  // Whether there is an old one, whose mode and owner the new one gets (a new one: 0640). Fault::conflict
+  // while another program changes it.
+  Result<bool> begin();
+  Result<void> commit(std::string_view text);
+
+ private:
+  std::string path_;
+  int descriptor_ = -1;
+};
+
+// Replaces the file as a whole by what `change` makes of its content, of nothing where there is none.
+template <class Content>
+Result<void> change_secret_file(const std::string& path, Result<Content> (*read)(const std::string&),
+                                std::string (*text_of)(const Content&),
+                                const std::function<Result<void>(Content&)>& change) {
+  FileReplacement replacement(path);
+  const Result<bool> exists = replacement.begin();
+  if (!exists) return tl::unexpected(exists.error());
+  Result<Content> content = *exists ? read(path) : Content{};
+  if (!content) return tl::unexpected(content.error());
+  if (Result<void> changed = change(*content); !changed) return changed;
+  return replacement.commit(text_of(*content));
+}
+
+}  // namespace joulecast::access

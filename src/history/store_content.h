@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "history/sql.h"
+
+// What a store's rows must say of each other, whatever database they are in.
+namespace joulecast::history {
+
+inline constexpr std::size_t max_faults = 100;
+
+struct ContentReport {
+  std::int64_t missions = 0;
+  std::int64_t ledgers = 0;         // added up
+  double worst_residual_j = 0;      // of a ledger: its sum less what left the battery
+  std::int64_t chunks = 0;          // of telemetry and covariates, decoded
+  std::vector<std::string> faults;  // what is wrong, a line each, at most max_faults
+  std::int64_t fault_count = 0;
+
+  void add_fault(std::string text);
+};
+
+// Reads every mission's record, the sum of its ledger, every chunk of telemetry and covariates against its
+// row, every link of the audit. What is damaged is a fault of the report, and the rest is read all the same.
+// Throws SqlError when the database cannot be asked.
+ContentReport check_content(Database& database);
+
+}  // namespace joulecast::history
