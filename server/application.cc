@@ -359,13 +359,21 @@ struct Application::Parts {
     }
   }
 
+  void read_tokens() {
+    gate->refresh();
+    const Result<void> read = gate->check();
+    if (!read && tokens_read) log_error("tokens", read.error());
+    if (read && !tokens_read) log_info("the token file is read again");
+    tokens_read = read.has_value();
+  }
+
   void run_beat() {
     server::FleetEvents fleet_events(fleet, models, *forecasts, *store, events);
     std::unique_lock lock(beat_mutex);
     while (beating) {
       lock.unlock();
       survive("fleet events", [&] { fleet_events.publish(host_utime_us()); });
-      survive("tokens", [&] { gate->refresh(); });
+      survive("tokens", [&] { read_tokens(); });
       lock.lock();
       beat_wake.wait_for(lock, milliseconds(1000), [&] { return !beating; });
     }
@@ -398,6 +406,7 @@ struct Application::Parts {
   std::mutex beat_mutex;
   std::condition_variable beat_wake;
   bool beating = true;
+  bool tokens_read = true;  // of the beat alone
   std::thread beat, warming;
   std::atomic<bool> stopped = false;
   std::uint64_t last_receive = 0, last_account = 0, last_write = 0;
@@ -480,6 +489,12 @@ std::vector<Error> faulty_robot_files(const Settings& settings) {
   if (directory.empty()) return {};
   const Result<ingest::RobotFiles> files = ingest::read_robot_files(directory);
   return files ? files->faulty : std::vector<Error>{files.error()};
+}
+
+std::vector<Error> faults_of_store(const Settings& settings) {
+  const Result<void> sound = history::check_store_url(store_url(settings));
+  return sound ? std::vector<Error>{}
+               : std::vector<Error>{{Fault::invalid, "store.url", sound.error().message}};
 }
 
 bool Application::stop() {

@@ -46,6 +46,9 @@ class Application {
 // certificate that cannot be used.
 std::vector<Error> faults_of_access(const Settings& settings);
 
+// What is wrong with the URL of the history; nothing is asked of it.
+std::vector<Error> faults_of_store(const Settings& settings);
+
 // What is wrong with whose telemetry is taken: the robots' keys, the list of senders.
 std::vector<Error> faults_of_telemetry(const Settings& settings);
 

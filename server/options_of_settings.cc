@@ -55,6 +55,7 @@ history::WriterOptions writer_options(const Settings& settings) {
   options.queue_bytes = static_cast<std::size_t>(settings.integer("store.queue_bytes"));
   options.spool_path = spool_path(settings);
   options.on_error = [](const Error& error) { log_error("store", error); };
+  options.on_recovery = [] { log_info("store: commits succeed again"); };
   return options;
 }
 

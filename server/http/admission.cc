@@ -48,7 +48,7 @@ std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>
   const auto malformed = [](std::string detail) {
     return Denial{Refusal::malformed, 400, "malformed-request", std::move(detail)};
   };
-  std::size_t codings = 0, lengths = 0, hosts = 0, origins = 0;
+  std::size_t codings = 0, lengths = 0, hosts = 0, origins = 0, authorizations = 0;
   std::string_view coding, length, host, origin, expect = "100-continue";
   for (const auto& field : head) {
     const std::string_view value = view(field.value());
@@ -61,6 +61,9 @@ std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>
         break;
       case bhttp::field::host:
         ++hosts, host = value;
+        break;
+      case bhttp::field::authorization:
+        ++authorizations;
         break;
       case bhttp::field::origin:
         ++origins, origin = value;
@@ -79,6 +82,7 @@ std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>
     return malformed("Content-Length must be one number");
   if (hosts > 1 || (hosts == 0 && head.version() >= 11))
     return malformed("HTTP/1.1 needs exactly one Host header");
+  if (authorizations > 1) return malformed("Authorization must be there once at most");
   if (head.version() >= 11 && !equals_ignoring_case(expect, "100-continue"))
     return Denial{Refusal::malformed, 417, "expectation-failed",
                   "Only the expectation 100-continue is known here"};

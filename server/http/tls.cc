@@ -1,7 +1,10 @@
 #include "server/http/tls.h"
 // tls.h stays first.
 #include <openssl/ssl.h>
+#include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <utility>
 
 #include "server/http/stream_session.h"
@@ -18,7 +21,9 @@ Result<std::shared_ptr<net::ssl::context>> make_tls(const TlsFiles& files) {
   SSL_CTX_set_options(native, SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_COMPRESSION);
   boost::system::error_code error;
   const auto unusable = [&](const char* setting, const std::string& file) {
-    return invalid(setting, "cannot use " + file + ": " + error.message());
+    const bool readable = ::access(file.c_str(), R_OK) == 0;
+    return invalid(setting,
+                   "cannot use " + file + ": " + (readable ? error.message() : std::strerror(errno)));
   };
   context->use_certificate_chain_file(files.certificate, error);
   if (error) return unusable("http.tls_certificate", files.certificate);

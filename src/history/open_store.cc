@@ -15,13 +15,6 @@ namespace {
 
 constexpr std::string_view sqlite_scheme = "sqlite:";
 
-Result<void> check_scheme(std::string_view url) {
-  if (url.empty()) return invalid("url", "must not be empty");
-  if (is_postgres_url(url) || url.starts_with(sqlite_scheme) || url.find("://") == std::string_view::npos)
-    return {};
-  return invalid("url", "must be sqlite:PATH or postgresql://...");
-}
-
 PostgresOptions postgres_options(const std::string& url) {
   PostgresOptions options;
   options.url = url;
@@ -40,6 +33,13 @@ bool is_postgres_url(std::string_view url) {
   return url.starts_with("postgresql://") || url.starts_with("postgres://");
 }
 
+Result<void> check_store_url(const std::string& url) {
+  if (url.empty()) return invalid("url", "must not be empty");
+  if (is_postgres_url(url)) return check_postgres_url(url);
+  if (url.starts_with(sqlite_scheme) || url.find("://") == std::string_view::npos) return {};
+  return invalid("url", "must be sqlite:PATH or postgresql://...");
+}
+
 std::string shown_url(const std::string& url) {
   if (!is_postgres_url(url)) return url;
   static const std::regex of_user("(://[^/@:]*):[^/@]*@"), as_option("([?&]password=)[^&]*");
@@ -51,13 +51,13 @@ std::string sqlite_path(const std::string& url) {
 }
 
 Result<std::unique_ptr<Store>> open_store(const std::string& url) {
-  if (auto ok = check_scheme(url); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_store_url(url); !ok) return tl::unexpected(ok.error());
   if (is_postgres_url(url)) return open_postgres_store(postgres_options(url));
   return open_sqlite_store(sqlite_options(url));
 }
 
 Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_exist) {
-  if (auto ok = check_scheme(url); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_store_url(url); !ok) return tl::unexpected(ok.error());
   if (must_exist)
     if (const auto there = open_to_read(url); !there) return tl::unexpected(there.error());
   if (is_postgres_url(url)) return open_postgres_tables(postgres_options(url));
@@ -65,7 +65,7 @@ Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_
 }
 
 Result<std::unique_ptr<Database>> open_to_read(const std::string& url) {
-  if (auto ok = check_scheme(url); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_store_url(url); !ok) return tl::unexpected(ok.error());
   return guarded([&]() -> Result<std::unique_ptr<Database>> {
     std::unique_ptr<Database> database;
     bool is_store = false;

@@ -14,6 +14,9 @@ class Database;
 // Whether the URL names a database of PostgreSQL, which libpq reads: postgresql://... or postgres://...
 bool is_postgres_url(std::string_view url);
 
+// Whether it is a URL or path of a store at all; asks nothing of it. Fault::invalid on "url".
+Result<void> check_store_url(const std::string& url);
+
 // Opens the store of a URL: sqlite:PATH, a PATH, or postgresql://... The errors are open_sqlite_store()'s and
 // open_postgres_store()'s; Fault::invalid on "url" for any other scheme.
 Result<std::unique_ptr<Store>> open_store(const std::string& url);

@@ -31,9 +31,11 @@ SqlError::Kind kind_of(std::string_view state) {
   return SqlError::Kind::internal;
 }
 
+// On one line.
 std::string trimmed(const char* message) {
   std::string text = message ? message : "";
   while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
+  std::ranges::replace(text, '\n', ' ');
   return text;
 }
 
@@ -205,6 +207,16 @@ class PostgresStatement final : public Statement {
 
 void PostgresResultDeleter::operator()(pg_result* result) const {
   PQclear(result);
+}
+
+Result<void> check_postgres_url(const std::string& url) {
+  char* why = nullptr;
+  PQconninfoOption* options = PQconninfoParse(url.c_str(), &why);
+  Result<void> sound;
+  if (options == nullptr) sound = invalid("url", why != nullptr ? trimmed(why) : "cannot be read");
+  PQconninfoFree(options);
+  PQfreemem(why);
+  return sound;
 }
 
 PostgresDatabase::PostgresDatabase(const std::string& url, const std::string& application_name) {

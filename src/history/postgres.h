@@ -16,6 +16,9 @@ struct PostgresResultDeleter {
 };
 using PostgresResult = std::unique_ptr<pg_result, PostgresResultDeleter>;
 
+// Whether libpq can read it: its options and hosts. Fault::invalid on "url".
+Result<void> check_postgres_url(const std::string& url);
+
 // A connection through libpq. The URL is libpq's (postgresql://user@host1,host2/database?option=value).
 class PostgresDatabase final : public Database {
  public:

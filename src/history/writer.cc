@@ -375,7 +375,7 @@ class Writer::Impl {
       const std::lock_guard lock(mutex_);
       recovered = !why_.empty() && !ended_;
     }
-    if (recovered) tell(unavailable("commits succeed again"));
+    if (recovered && options_.on_recovery) options_.on_recovery();
     {
       const std::lock_guard lock(mutex_);
       attempt_since_.reset();

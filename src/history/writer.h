@@ -32,6 +32,7 @@ struct WriterOptions {
   // Receives failed commits (the first, then once a minute), refused posted commands and recovery; called on
   // the writer's thread.
   std::function<void(const Error&)> on_error;
+  std::function<void()> on_recovery = {};  // commits succeed again
 };
 
 struct WriterStatus {

@@ -179,9 +179,10 @@ def install_and_use(root, packages):
     (robots / "negative.json").write_text((robots / "amr.json").read_text().replace('"amr"', '"other"')
                                           .replace('"wheel_radius_m": 0', '"wheel_radius_m": -1'))
     (robots / "twin.json").write_text((robots / "amr.json").read_text())
-    told = subprocess.run(["chroot", str(root), program, flag, settings, "--check-config"], capture_output=True, text=True)
-    check(told.returncode == 2 and len(told.stderr.splitlines()) == 3, f"{told.returncode}: {told.stderr}")
-    for fault in ("broken.json", "negative.json", "twin.json"):
+    told = subprocess.run(["chroot", str(root), program, flag, settings, "--store-url", "postgresql://host/?bogus=1", "--check-config"],
+                          capture_output=True, text=True)
+    check(told.returncode == 2 and len(told.stderr.splitlines()) == 4, f"{told.returncode}: {told.stderr}")
+    for fault in ("broken.json", "negative.json", "twin.json", "store.url"):
         check(fault in told.stderr, f"{fault}: {told.stderr}")
 
     service = Service(root, unit)

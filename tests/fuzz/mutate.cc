@@ -1,6 +1,7 @@
 // Runs a fuzz target on mutations of its seeds for so many seconds: fuzz_x SECONDS SEED_FILE_OR_FOLDER...
-// The same seeds give the same inputs. What the target crashed or hung on is in crash-<pid>, which libFuzzer
-// and this program (SECONDS 0: each seed once) run again.
+// Before that, for a fifth of the time each, on its seeds cut short at every byte, and on its seeds with each
+// allocation failing once. The same seeds give the same inputs. What the target crashed or hung on is in
+// crash-<pid>, which libFuzzer and this program (SECONDS 0: each seed once) run again.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -14,10 +15,13 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <new>
 #include <random>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "failing_new.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
@@ -134,6 +138,46 @@ class Mutator {
   std::mt19937_64 random_{20261122};
 };
 
+using Clock = std::chrono::steady_clock;
+
+void run(const std::string& input) {
+  running = &input;
+  alarm(max_input_s);
+  (void)LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(input.data()), input.size());
+  alarm(0);
+}
+
+std::uint64_t cut_short(const std::vector<std::string>& seeds, Clock::time_point until) {
+  std::uint64_t runs = 0;
+  for (std::size_t size = 0; size < max_input_bytes; ++size)
+    for (const std::string& seed : seeds) {
+      if (size >= seed.size()) continue;
+      if (Clock::now() > until) return runs;
+      run(seed.substr(0, size));
+      ++runs;
+    }
+  return runs;
+}
+
+std::uint64_t without_memory(const std::vector<std::string>& seeds, Clock::time_point until) {
+  using namespace joulecast::testing;
+  std::uint64_t runs = 0;
+  for (const std::string& seed : seeds)
+    for (std::int64_t number = 1; Clock::now() < until; ++number, ++runs) {
+      bool ended = false;
+      try {
+        fail_allocation(number);
+        run(seed);
+        ended = !allocation_failed();
+      } catch (const std::bad_alloc&) {
+        fail_allocation(0);
+        alarm(0);
+      }
+      if (ended) break;
+    }
+  return runs;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -144,16 +188,17 @@ int main(int argc, char** argv) {
     return 2;
   }
   for (const int each : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGALRM}) std::signal(each, on_fault);
-  const auto run = [](const std::string& input) {
-    running = &input;
-    alarm(max_input_s);
-    (void)LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(input.data()), input.size());
-    alarm(0);
-  };
   std::ranges::for_each(seeds, run);
+  const auto began = Clock::now();
+  const std::chrono::duration<double> whole(duration_s);
+  const auto at = [&](double share) {
+    return began + std::chrono::duration_cast<Clock::duration>(share * whole);
+  };
+  const std::uint64_t cut = cut_short(seeds, at(0.2)), starved = without_memory(seeds, at(0.4));
   Mutator mutator(seeds);
   std::uint64_t runs = 0;
-  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(duration_s);
-  for (; std::chrono::steady_clock::now() < until; ++runs) run(mutator.next());
-  std::printf("%llu mutations of %zu seeds\n", static_cast<unsigned long long>(runs), seeds.size());
+  for (; Clock::now() < at(1); ++runs) run(mutator.next());
+  std::printf("%llu mutations of %zu seeds, %llu seeds cut short, %llu allocations failed\n",
+              static_cast<unsigned long long>(runs), seeds.size(), static_cast<unsigned long long>(cut),
+              static_cast<unsigned long long>(starved));
 }

@@ -215,6 +215,12 @@ TEST_F(HttpAttackTest, AnswersOnlyUnderItsOwnNames) {
   EXPECT_GE(recorder_.count(Refusal::host), 9);
 }
 
+TEST_F(HttpAttackTest, OneAuthorizationAlone) {
+  start();
+  EXPECT_EQ(ask(get_text("/io", "Authorization: Bearer a\r\n")).status, 200U);
+  EXPECT_EQ(ask(get_text("/io", "Authorization: Bearer a\r\nauthorization: Bearer b\r\n")).status, 400U);
+}
+
 TEST_F(HttpAttackTest, AnyNameMayBeAllowed) {
   start({.allowed_hosts = {"*"}});
   EXPECT_EQ(ask("GET /io HTTP/1.1\r\nHost: whatever.example\r\n\r\n").status, 200U);

@@ -11,9 +11,11 @@ const pageEntries = 200;
 function summaryOf({ method, path, status, ...rest }) {
   const asked = [method, path].filter(Boolean).join(' ');
   const answered = status === undefined ? '' : `answered ${status}`;
-  const others = Object.entries(rest).map(
-    ([key, value]) => `${format.words(key)}: ${typeof value === 'string' ? value : JSON.stringify(value)}`,
-  );
+  const others = Object.entries(rest)
+    .filter(([, value]) => value !== null)
+    .map(
+      ([key, value]) => `${format.words(key)}: ${typeof value === 'string' ? value : JSON.stringify(value)}`,
+    );
   return [asked, answered, ...others].filter(Boolean).join('; ');
 }
 
