@@ -109,6 +109,7 @@ Result<std::unique_ptr<PostgresDatabase>> open_shared_writer(const PostgresOptio
 
 // Mission keys come in blocks of this many: schemas/cluster.postgresql.sql.
 constexpr MissionKey key_block = 1000;
+constexpr std::string_view next_keys = "SELECT nextval('cluster_mission_keys')";
 
 class PostgresStore final : public SqlStore {
  public:
@@ -121,7 +122,10 @@ class PostgresStore final : public SqlStore {
         now_utime_us_(options.now_utime_us ? options.now_utime_us : host_utime_us),
         shared_(!options.shared_writer.empty()),
         on_dropped_(options.on_dropped) {
-    if (!shared_) Rows(writer->statement("UPDATE joulecast_store SET writer = ?, batch = 0")).bind(name_).run();
+    if (!shared_)
+      Rows(writer->statement("UPDATE joulecast_store SET writer = ?, batch = 0")).bind(name_).run();
+    else
+      for (int k = 0; k < 2; ++k) add_keys(writer->integer(next_keys));
     use(std::move(writer));
   }
 
@@ -246,13 +250,14 @@ class PostgresStore final : public SqlStore {
     return rows.next() && rows.integer() == batch_;
   }
 
-  // While the database is away the keys at hand go on; what is left of them would do for half a block of
-  // missions at least.
+  void add_keys(MissionKey first) { keys_.push_back({first, first + key_block}); }
+
+  // While the database is away, the keys at hand do for a block of missions at least.
   Result<MissionKey> new_key() override {
     if (!shared_) return SqlStore::new_key();
     if (keys_.size() < 2) {
-      const Result<std::int64_t> first = ask("SELECT nextval('cluster_mission_keys')");
-      if (first) keys_.push_back({*first, *first + key_block});
+      const Result<std::int64_t> first = ask(std::string(next_keys));
+      if (first) add_keys(*first);
       if (keys_.empty()) return tl::unexpected(first.error());
     }
     const MissionKey key = keys_.front().next++;

@@ -144,10 +144,10 @@ bool Pipeline::take_up(const Keeping::Grant& grant) {
   return true;
 }
 
-void Pipeline::suspend(Robot& robot) {
+void Pipeline::suspend(Robot& robot) const {
   for (const InboundMessage& each : robot.gate.release(std::numeric_limits<std::int64_t>::max()))
     deliver(robot.session, each);
-  robot.session.suspend();
+  keeping_ != nullptr ? robot.session.hand_over() : robot.session.suspend();
 }
 
 void Pipeline::let_go(const Keeping::Withdrawal& withdrawal) {

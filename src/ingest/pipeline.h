@@ -61,7 +61,7 @@ class Pipeline {
   // False when the store cannot be read for now.
   bool take_up(const Keeping::Grant& grant);
   void let_go(const Keeping::Withdrawal& withdrawal);
-  static void suspend(Robot& robot);
+  void suspend(Robot& robot) const;
   SessionOutputs outputs_under(history::Epoch epoch) const;
   static void deliver(RobotSession& session, const InboundMessage& message);
   void count_unknown_robot(const InboundMessage& message);

@@ -783,6 +783,12 @@ void RobotSession::suspend() {
   order_.flush();
   release_held();
   flush_meter();
+  hand_over();
+}
+
+void RobotSession::hand_over() {
+  order_.flush();
+  release_held();
   remember_charge();
   if (open_ != nullptr) checkpoint();
   publish();

@@ -106,6 +106,8 @@ class RobotSession {
   void on_tick(std::int64_t host_utime_us);
   // Checkpoints and publishes at once; for an orderly stop, which leaves an open mission to be resumed.
   void suspend();
+  // The same for another daemon to take_over(), which goes on with the meter's last samples itself.
+  void hand_over();
 
   // Publishes the snapshot if anything changed since the last one.
   void publish();
