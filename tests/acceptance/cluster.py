@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Three daemons share a fleet through one PostgreSQL. One is killed, one is stopped for longer than its lease and goes on, one
-is ended in order and started again; then PostgreSQL itself crashes and comes back. What is stored at the end is compared
+is ended in order and started again; then PostgreSQL itself crashes and comes back, and crashes for good, and its synchronous
+standby takes over. What is stored at the end is compared
 with the log of what the robots published, by sums made here, and with one daemon that reads the log alone: every sample
 is in the same mission, once, and the energies agree.
 
@@ -44,15 +45,22 @@ def wait_until(condition, seconds, text):
 
 
 class Server:
-    """PostgreSQL of the test's own."""
+    """PostgreSQL of the test's own, with a synchronous standby."""
 
     def __init__(self, source):
-        self.folder = tempfile.TemporaryDirectory()
+        self.folder, self.other = tempfile.TemporaryDirectory(), tempfile.TemporaryDirectory()
         self.script = pathlib.Path(source, "tests", "support", "postgresql.sh")
-        self.url = f"postgresql://joulecast@/postgres?host={self.folder.name}"
+        self.primary, self.standby = self.folder.name, self.other.name
+        self.url = f"postgresql://joulecast@/postgres?host={self.primary},{self.standby}&target_session_attrs=read-write"
 
-    def tell(self, what):
-        return subprocess.run([self.script, what, self.folder.name]).returncode
+    def tell(self, what, *folders):
+        return subprocess.run([self.script, what, *(folders or [self.primary])]).returncode
+
+    def fail_over(self):
+        """The primary crashes for good, and the standby takes its place."""
+        check(self.tell("stop") == 0, "the primary did not stop")
+        check(self.tell("promote", self.standby) == 0, "the standby was not promoted")
+        self.primary, self.standby = self.standby, None
 
     def rows(self, text):
         done = subprocess.run(["psql", self.url, "-XqtAF", "\t", "-c", text], capture_output=True, text=True)
@@ -158,13 +166,13 @@ def faults(cluster, robots):
     anna.start()
     wait_until(lambda: cluster.is_spread(robots), 30, "the daemon that came back has robots again")
 
-    bert_had = cluster.of("bert")
+    bert_had, lost = cluster.of("bert"), bert.metric("joulecast_cluster_memberships_lost_total")
     since = time.monotonic()
     bert.send(signal.SIGSTOP)
     cluster.takeover("bert", bert_had, PAUSED_S, "SIGSTOP", since)
     time.sleep(2)
     bert.send(signal.SIGCONT)
-    wait_until(lambda: bert.metric("joulecast_cluster_memberships_lost_total") >= 1, 10, "it sees that it was away")
+    wait_until(lambda: bert.metric("joulecast_cluster_memberships_lost_total") > lost, 10, "it sees that it was away")
     print(f"SIGCONT: {bert.metric('joulecast_cluster_commands_dropped_total'):.0f} late commands dropped")
     wait_until(lambda: cluster.is_spread(robots), 30, "the daemon that went on has robots again")
 
@@ -180,6 +188,13 @@ def faults(cluster, robots):
     check(cluster.server.tell("start") == 0, "PostgreSQL did not start again")
     wait_until(lambda: all(node.is_ready() for node in cluster.nodes.values()), 20, "all daemons reach PostgreSQL again")
     print("PostgreSQL crashed and came back")
+    if cluster.server.standby:
+        cluster.server.fail_over()
+        took = wait_until(lambda: all(node.is_ready() for node in cluster.nodes.values()), 30, "all daemons reach the standby")
+        wait_until(lambda: cluster.is_spread(robots), 30, "all daemons keep robots with the standby")
+        at = cluster.positions()
+        wait_until(lambda: all(us > at[robot] for robot, us in cluster.positions().items()), 15, "all robots are stored again")
+        print(f"the primary was lost: all daemons were ready {took:.2f} s after the standby was promoted")
 
 
 def events_of_log(path):
@@ -300,6 +315,7 @@ def main():
     if started == SKIP:
         skip("PostgreSQL is not installed")
     check(started == 0, "PostgreSQL did not start")
+    check(server.tell("standby", server.primary, server.standby) == 0, "the standby did not start")
     cluster = Cluster(arguments, server)
     anna = cluster.nodes["anna"]
     log = anna.path("published.lcmlog")
@@ -321,6 +337,8 @@ def main():
             if time.monotonic() >= until:
                 break
         live_everywhere(cluster, robots)
+        told = anna.get("/v1/cluster")
+        check({n["node"] for n in told["nodes"]} == set(NODES) and len(told["leases"]) == arguments.robots, f"/v1/cluster: {told}")
         fleet.send_signal(signal.SIGINT)
         fleet.wait(timeout=30)
         fleet = None
@@ -337,7 +355,8 @@ def main():
             if node.process and node.process.poll() is None:
                 node.send(signal.SIGCONT)
             node.end()
-        server.tell("stop")
+        for folder in filter(None, (server.primary, server.standby)):
+            server.tell("stop", folder)
 
 
 main()
