@@ -157,7 +157,7 @@ struct Application::Parts {
         in_cluster ? history::open_shared_store(
                          in_cluster->url, in_cluster->writer,
                          [this](const std::string& robot_id, history::Epoch epoch, std::uint64_t count) {
-                           if (cluster) cluster->on_dropped(robot_id, epoch, count);
+                           if (joined) cluster->on_dropped(robot_id, epoch, count);
                          })
                    : history::open_store(store_url(settings));
     if (!opened)
@@ -166,7 +166,7 @@ struct Application::Parts {
     store = std::move(*opened);
     take_in_spool(settings, *store);
     history::WriterOptions options = writer_options(settings);
-    if (in_cluster) options.prunes = [this] { return cluster && cluster->is_first(); };
+    if (in_cluster) options.prunes = [this] { return joined && cluster->is_first(); };
     writer = std::make_unique<history::Writer>(*store, std::move(options));
     tell_of_faults();
 
@@ -202,19 +202,22 @@ struct Application::Parts {
   // Its threads start when everything else answers.
   void make_cluster() {
     cluster = std::make_unique<server::Cluster>(
-        *in_cluster,
-        server::Cluster::Parts{*store, keeping, fleet, models, *forecasts, host_utime_us,
-                               [](const std::string& text) { log_warning(text, {}); },
-                               [this](std::int64_t id) {
-                                 if (const Result<void> taken = diagnoses->take_over(id); !taken)
-                                   log_error("a diagnosis left by another daemon", taken.error());
-                               }});
+        *in_cluster, server::Cluster::Parts{*store, keeping, fleet, models, *forecasts, host_utime_us,
+                                            [](const std::string& text) { log_warning(text, {}); },
+                                            [this](std::int64_t id) {
+                                              if (const Result<void> taken = diagnoses->take_over(id); !taken)
+                                                log_error("a diagnosis left by another daemon",
+                                                          taken.error());
+                                            }});
   }
 
   Result<void> join_cluster() {
     if (!in_cluster) return {};
     const std::string scheme = settings.text("http.tls_certificate").empty() ? "http://" : "https://";
-    return cluster->start(scheme + settings.text("http.address") + ":" + std::to_string(http->port()));
+    Result<void> done =
+        cluster->start(scheme + settings.text("http.address") + ":" + std::to_string(http->port()));
+    joined = done.has_value();
+    return done;
   }
 
   // Whether this daemon does what one of the cluster's should do about a robot.
@@ -261,8 +264,7 @@ struct Application::Parts {
     if (in_cluster)
       checks.push_back({"cluster", [this]() -> Result<void> {
                           const server::ClusterStatus status = cluster->status();
-                          if (!status.error.empty())
-                            return fail(Fault::unavailable, "cluster", status.error);
+                          if (!status.error.empty()) return fail(Fault::unavailable, "cluster", status.error);
                           return {};
                         }});
     if (!settings.text("ingest.key_file").empty())
@@ -286,9 +288,9 @@ struct Application::Parts {
   }
 
   Result<void> start_http() {
-    services =
-        std::make_unique<api::Services>(api::Services{*store, *writer, models, fleet, *forecasts, cost_tables,
-                                                      *drift_view, *adoption, *diagnoses, cluster.get(), host_utime_us});
+    services = std::make_unique<api::Services>(api::Services{*store, *writer, models, fleet, *forecasts,
+                                                             cost_tables, *drift_view, *adoption, *diagnoses,
+                                                             cluster.get(), host_utime_us});
     Result<std::unique_ptr<http::Gate>> opened =
         http::Gate::open({.token_file = settings.text("auth.token_file"),
                           .secure = !settings.text("http.tls_certificate").empty(),
@@ -444,6 +446,7 @@ struct Application::Parts {
   std::optional<server::ClusterOptions> in_cluster;  // absent: this daemon keeps all robots
   ingest::Keeping keeping;
   std::unique_ptr<server::Cluster> cluster;
+  std::atomic<bool> joined = false;  // the writer's thread may ask the cluster
   std::unique_ptr<ingest::IngestService> ingest;
   std::unique_ptr<server::DriftView> drift_view;
   std::unique_ptr<server::ModelAdoption> adoption;

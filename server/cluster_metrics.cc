@@ -17,8 +17,9 @@ void export_cluster_metrics(Metrics& metrics, const Cluster& cluster) {
                                                "Of these those that gave way for want of room");
   const Counter takeovers = metrics.counter("joulecast_cluster_takeovers_total",
                                             "Robots that this daemon took from daemons that were gone");
-  const Counter handovers = metrics.counter("joulecast_cluster_handovers_total",
-                                            "Robots that this daemon handed to another that joined or hears them");
+  const Counter handovers =
+      metrics.counter("joulecast_cluster_handovers_total",
+                      "Robots that this daemon handed to another that joined or hears them");
   const Counter resumed =
       metrics.counter("joulecast_cluster_missions_resumed_total", "Open missions that this daemon took over");
   const Counter dropped =

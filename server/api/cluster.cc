@@ -29,9 +29,7 @@ void write_member(JsonWriter& out, const history::Member& member, std::size_t ro
 void write_lease(JsonWriter& out, const history::Lease& lease, bool is_held) {
   out.begin_object().field("robot_id", lease.robot_id).key("node");
   is_held ? out.value(lease.node) : out.null();
-  out.field("epoch", lease.epoch)
-      .field("taken_s", lease.taken_s)
-      .field("takeovers", lease.takeovers);
+  out.field("epoch", lease.epoch).field("taken_s", lease.taken_s).field("takeovers", lease.takeovers);
   out.time("stored", lease.position ? std::optional(lease.position->utime_us) : std::nullopt);
   out.field("stored_sequence", lease.position ? std::optional(lease.position->sequence) : std::nullopt);
   out.end_object();
@@ -73,15 +71,16 @@ Result<Response> cluster(const Services& services, const Request&) {
 
 std::vector<TableRow> cluster_rows() {
   std::vector<TableRow> rows;
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/cluster",
-                   .operation_id = "getCluster",
-                   .role = http::Role::read,
-                   .summary = "The daemons that share the fleet, and which of them keeps which robot; 404 where "
-                              "cluster.name is not set",
-                   .response_schema = "cluster",
-                   .error_statuses = {404}},
-                  answered_by(cluster)});
+  rows.push_back(
+      {{.method = Method::get,
+        .path = "/v1/cluster",
+        .operation_id = "getCluster",
+        .role = http::Role::read,
+        .summary = "The daemons that share the fleet, and which of them keeps which robot; 404 where "
+                   "cluster.name is not set",
+        .response_schema = "cluster",
+        .error_statuses = {404}},
+       answered_by(cluster)});
   return rows;
 }
 

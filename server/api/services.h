@@ -29,7 +29,7 @@ struct Services {
   const server::DriftView& drift;
   server::ModelAdoption& adoption;
   server::DiagnosisService& diagnoses;
-  const server::Cluster* cluster;  // null: this daemon is in none
+  const server::Cluster* cluster;              // null: this daemon is in none
   std::function<std::int64_t()> now_utime_us;  // host clock
 };
 

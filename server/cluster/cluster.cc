@@ -27,7 +27,7 @@ constexpr milliseconds turn_period{250};
 constexpr milliseconds exchange_period{250};
 // A connection may be cut and made again; a daemon that was killed makes none.
 constexpr milliseconds gone_patience{1000};
-constexpr std::int64_t heard_us = 5'000'000;  // a robot not received from for longer is not heard
+constexpr std::int64_t heard_us = 5'000'000;       // a robot not received from for longer is not heard
 constexpr std::int64_t own_heard_us = 10'000'000;  // the same of one that is kept, so that others cease first
 constexpr milliseconds job_period{2000};
 constexpr std::chrono::minutes longest_release{2};  // a writer that takes no data for so long has lost it
@@ -54,8 +54,7 @@ class Cluster::Impl {
     // One that was killed a moment ago had this name.
     Result<void> joined = leases_->join();
     for (const auto until = Clock::now() + options_.lifetime + gone_patience;
-         !joined && joined.error().fault == Fault::conflict && Clock::now() < until;
-         joined = leases_->join())
+         !joined && joined.error().fault == Fault::conflict && Clock::now() < until; joined = leases_->join())
       std::this_thread::sleep_for(turn_period);
     if (!joined) return joined;
     {
@@ -140,8 +139,8 @@ class Cluster::Impl {
       const std::string why = done ? std::string() : describe(done.error());
       if (!done) steady_since_.reset();
       if (why.empty() != status_.error.empty())
-        text = done ? "the cluster's leases are renewed again"
-                    : "the cluster's leases are not renewed: " + why;
+        text =
+            done ? "the cluster's leases are renewed again" : "the cluster's leases are not renewed: " + why;
       status_.error = why;
     }
     if (!text.empty()) parts_.note(text);
@@ -178,7 +177,8 @@ class Cluster::Impl {
         ++status_.memberships_lost;
         steady_since_.reset();
       }
-      parts_.note("this daemon was away for too long, and others keep its robots; it joins the cluster again");
+      parts_.note(
+          "this daemon was away for too long, and others keep its robots; it joins the cluster again");
       renewed = leases_->join();
     }
     if (renewed) {
@@ -294,9 +294,9 @@ class Cluster::Impl {
   }
 
   void exchange() {
-    Exchange exchange(options_.node,
-                      history::open_shared_state(options_.url, options_.writer + "-exchange"), parts_.store,
-                      parts_.keeping, parts_.fleet, parts_.models, parts_.forecasts, parts_.now_utime_us);
+    Exchange exchange(options_.node, history::open_shared_state(options_.url, options_.writer + "-exchange"),
+                      parts_.store, parts_.keeping, parts_.fleet, parts_.models, parts_.forecasts,
+                      parts_.now_utime_us);
     bool told = false;
     do {
       survive("cluster exchange", [&] {

@@ -18,10 +18,10 @@
 namespace joulecast::server {
 
 struct WatchOptions {
-  double period_s = 3600;        // 0: no watch
-  std::set<std::string> robots;  // empty: all
+  double period_s = 3600;                                   // 0: no watch
+  std::set<std::string> robots;                             // empty: all
   std::function<bool(const std::string& robot_id)> is_own;  // of the daemons of a cluster; empty: all are
-  bool diagnose = true;          // a drift starts a diagnosis of the missions since
+  bool diagnose = true;  // a drift starts a diagnosis of the missions since
 };
 
 struct WatchCounts {

@@ -74,8 +74,8 @@ class Meter {
   // Goes on with accounts from before a restart of the service; call before the first sample.
   void resume(const signals::Accounts& accounts) { accounts_ = accounts; }
 
-  // The same where the samples of before are at hand: those up to `counted_utime_us` that come next are in the
-  // accounts already and only prepare what follows them. NaN: a winding's temperature is not known.
+  // The same where the samples of before are at hand: those up to `counted_utime_us` that come next are in
+  // the accounts already and only prepare what follows them. NaN: a winding's temperature is not known.
   void resume(const signals::Accounts& accounts, std::int64_t counted_utime_us,
               const std::array<double, 2>& winding_temperature_c);
 

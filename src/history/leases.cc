@@ -69,10 +69,11 @@ class PostgresLeases final : public Leases {
           .bind(options_.cluster)
           .run();
       incarnation_ = database.integer("SELECT nextval('cluster_incarnation')");
-      Rows(database.statement(
-               "INSERT INTO cluster_node VALUES (?, ?, ?, ?, ?, ?, clock_timestamp(), clock_timestamp() + ? * "
-               "interval '1 ms', pg_postmaster_start_time(), pg_backend_pid(), (SELECT backend_start FROM "
-               "pg_stat_activity WHERE pid = pg_backend_pid()))"))
+      Rows(
+          database.statement(
+              "INSERT INTO cluster_node VALUES (?, ?, ?, ?, ?, ?, clock_timestamp(), clock_timestamp() + ? * "
+              "interval '1 ms', pg_postmaster_start_time(), pg_backend_pid(), (SELECT backend_start FROM "
+              "pg_stat_activity WHERE pid = pg_backend_pid()))"))
           .bind(options_.node)
           .bind(options_.cluster)
           .bind(incarnation_)
@@ -94,7 +95,8 @@ class PostgresLeases final : public Leases {
     return work([&](Database& database) -> Result<void> {
       const std::int64_t renewed =
           Rows(database.statement(
-                   "UPDATE cluster_node SET expires = clock_timestamp() + ? * interval '1 ms', server_started = "
+                   "UPDATE cluster_node SET expires = clock_timestamp() + ? * interval '1 ms', "
+                   "server_started = "
                    "pg_postmaster_start_time(), backend_pid = pg_backend_pid(), backend_started = (SELECT "
                    "backend_start FROM pg_stat_activity WHERE pid = pg_backend_pid()) WHERE node = ? AND "
                    "incarnation = ?"))
@@ -133,7 +135,8 @@ class PostgresLeases final : public Leases {
           .run();
       return Rows(database.statement(
                       "DELETE FROM cluster_node WHERE node = ?1 AND incarnation = ?2 AND (expires < "
-                      "clock_timestamp() OR server_started = pg_postmaster_start_time() AND NOT EXISTS (SELECT "
+                      "clock_timestamp() OR server_started = pg_postmaster_start_time() AND NOT EXISTS "
+                      "(SELECT "
                       "1 FROM pg_stat_activity WHERE pid = backend_pid AND coalesce(backend_start, "
                       "backend_started) = backend_started))"))
                  .bind(member.node)
@@ -142,7 +145,8 @@ class PostgresLeases final : public Leases {
     });
   }
 
-  Result<void> hear(const std::vector<std::string>& more, const std::vector<std::string>& no_longer) override {
+  Result<void> hear(const std::vector<std::string>& more,
+                    const std::vector<std::string>& no_longer) override {
     return work([&](Database& database) -> Result<void> {
       const std::string added = nlohmann::json(more).dump(), removed = nlohmann::json(no_longer).dump();
       if (!no_longer.empty())
@@ -173,9 +177,11 @@ class PostgresLeases final : public Leases {
         // It is free when let go, or when its member is gone.
         Rows rows(database.statement(
             "UPDATE cluster_lease SET node = ?1, epoch = epoch + 1, taken = clock_timestamp(), takeovers = "
-            "takeovers + (node IS NOT NULL)::int WHERE robot_id = ?2 AND epoch = ?3 AND (node IS NULL OR node = "
+            "takeovers + (node IS NOT NULL)::int WHERE robot_id = ?2 AND epoch = ?3 AND (node IS NULL OR "
+            "node = "
             "?1 OR NOT EXISTS (SELECT 1 FROM cluster_node WHERE cluster_node.node = cluster_lease.node)) AND "
-            "EXISTS (SELECT 1 FROM cluster_node WHERE node = ?1 AND incarnation = ?4) RETURNING robot_id, node, "
+            "EXISTS (SELECT 1 FROM cluster_node WHERE node = ?1 AND incarnation = ?4) RETURNING robot_id, "
+            "node, "
             "epoch, 0::double precision, takeovers, utime_us, sequence"));
         rows.bind(options_.node).bind(lease.robot_id).bind(lease.epoch).bind(incarnation_);
         if (rows.next()) taken.push_back(read_lease(rows));
@@ -187,7 +193,8 @@ class PostgresLeases final : public Leases {
   Result<void> free(const std::vector<Lease>& seen) override {
     return work([&](Database& database) -> Result<void> {
       for (const Lease& lease : seen)
-        Rows(database.statement("UPDATE cluster_lease SET node = NULL WHERE robot_id = ? AND node = ? AND epoch = ?"))
+        Rows(database.statement(
+                 "UPDATE cluster_lease SET node = NULL WHERE robot_id = ? AND node = ? AND epoch = ?"))
             .bind(lease.robot_id)
             .bind(options_.node)
             .bind(lease.epoch)
@@ -200,7 +207,8 @@ class PostgresLeases final : public Leases {
     return work([&](Database& database) -> Result<std::vector<std::int64_t>> {
       std::vector<std::int64_t> taken;
       Rows rows(database.statement(
-          "UPDATE cluster_job SET writer = ? WHERE diagnosis_id IN (SELECT diagnosis_id FROM cluster_job WHERE "
+          "UPDATE cluster_job SET writer = ? WHERE diagnosis_id IN (SELECT diagnosis_id FROM cluster_job "
+          "WHERE "
           "NOT EXISTS (SELECT 1 FROM cluster_node WHERE cluster_node.writer = cluster_job.writer) FOR UPDATE "
           "SKIP LOCKED) RETURNING diagnosis_id"));
       rows.bind(options_.writer);

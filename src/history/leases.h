@@ -23,9 +23,9 @@ struct Member {
   std::string writer;   // the name under which it writes to the store
   std::string address;  // where it answers
   std::string version;
-  double joined_s = 0;    // ago
+  double joined_s = 0;      // ago
   double expires_in_s = 0;  // negative: it has not renewed
-  bool connected = true;  // its connection is there, or the server is another one than it last renewed at
+  bool connected = true;    // its connection is there, or the server is another one than it last renewed at
 };
 
 struct Lease {
@@ -72,7 +72,8 @@ class Leases {
   // False when it has.
   virtual Result<bool> bury(const Member& member) = 0;
   // Says from which robots telemetry comes, besides those said before.
-  virtual Result<void> hear(const std::vector<std::string>& more, const std::vector<std::string>& no_longer) = 0;
+  virtual Result<void> hear(const std::vector<std::string>& more,
+                            const std::vector<std::string>& no_longer) = 0;
   // Takes leases that nobody holds by now, as they were seen; answers those that it got, with their new
   // epochs. A robot without a lease is seen with epoch 0.
   virtual Result<std::vector<Lease>> take(const std::vector<Lease>& seen) = 0;

@@ -9,7 +9,7 @@
 
 namespace joulecast::history {
 
-extern const std::string_view postgres_store_sql;  // schemas/store.postgresql.sql, embedded at build
+extern const std::string_view postgres_store_sql;    // schemas/store.postgresql.sql, embedded at build
 extern const std::string_view postgres_cluster_sql;  // schemas/cluster.postgresql.sql
 
 namespace {

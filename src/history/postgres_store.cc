@@ -27,11 +27,12 @@ bool try_lock(Database& database) {
 
 // The same lock, which several may hold that all ask for it in this way.
 bool try_shared_lock(Database& database) {
-  return database.integer("SELECT pg_try_advisory_lock_shared(1246512980, hashtext(current_schema()))::int") ==
-         1;
+  return database.integer(
+             "SELECT pg_try_advisory_lock_shared(1246512980, hashtext(current_schema()))::int") == 1;
 }
 
-Result<void> wait_for_lock(Database& database, bool (*try_it)(Database&), std::chrono::milliseconds patience) {
+Result<void> wait_for_lock(Database& database, bool (*try_it)(Database&),
+                           std::chrono::milliseconds patience) {
   const auto give_up = std::chrono::steady_clock::now() + patience;
   while (!try_it(database)) {
     if (std::chrono::steady_clock::now() >= give_up)
@@ -103,7 +104,9 @@ Result<std::unique_ptr<PostgresDatabase>> open_shared_writer(const PostgresOptio
                     " is in use by other daemons; this program needs version " +
                     std::to_string(postgres_schema_version) + " and can migrate once they have stopped");
   database.execute("DELETE FROM cluster_writer WHERE since < now() - interval '30 days'");
-  Rows(database.statement("INSERT INTO cluster_writer VALUES (?, 0, now())")).bind(options.shared_writer).run();
+  Rows(database.statement("INSERT INTO cluster_writer VALUES (?, 0, now())"))
+      .bind(options.shared_writer)
+      .run();
   return opened;
 }
 

@@ -30,8 +30,8 @@ std::string new_writer_name();
 
 // Opens the store, creating or migrating its tables in the first schema of the connection's search_path. One
 // program at a time holds it, by an advisory lock of its writing connection, or several that say so
-// (shared_writer). Fault::conflict: another program holds it, or its schema is newer than this program. Fault::unavailable: no server that takes writes is
-// reached.
+// (shared_writer). Fault::conflict: another program holds it, or its schema is newer than this program.
+// Fault::unavailable: no server that takes writes is reached.
 Result<std::unique_ptr<Store>> open_postgres_store(const PostgresOptions& options);
 
 // The same as tables, held against every other program until it is let go.

@@ -50,8 +50,9 @@ class PostgresSharedState final : public SharedState {
       std::vector<LiveState> news;
       if (!changed.empty()) {
         const std::string names = nlohmann::json(changed).dump();
-        Rows rows(database.statement("SELECT robot_id, node, epoch, body FROM cluster_live WHERE node <> ? AND "
-                                     "robot_id IN (SELECT json_array_elements_text(?::json))"));
+        Rows rows(
+            database.statement("SELECT robot_id, node, epoch, body FROM cluster_live WHERE node <> ? AND "
+                               "robot_id IN (SELECT json_array_elements_text(?::json))"));
         rows.bind(own_node).bind(names);
         while (rows.next()) {
           LiveState& state = news.emplace_back();

@@ -90,8 +90,7 @@ void members(Archive& a, PutLearned& c) {
 }
 template <class Archive>
 void members(Archive& a, AppendEvent& c) {
-  a(c.event.id, c.event.utime_us, c.event.robot_id, c.event.kind, c.event.detail_json,
-    c.epoch);
+  a(c.event.id, c.event.utime_us, c.event.robot_id, c.event.kind, c.event.detail_json, c.epoch);
 }
 template <class Archive>
 void members(Archive& a, AppendAudit& c) {

@@ -52,9 +52,10 @@ void SqlChanges::lock_leases(std::span<const Command> commands) {
     if (const auto fence = fence_of(command)) robots.insert(fence->robot_id);
   if (robots.empty()) return;
   const std::string names = nlohmann::json(robots).dump();
-  Rows rows(database_.statement(
-      "SELECT robot_id, epoch FROM cluster_lease WHERE robot_id IN (SELECT json_array_elements_text(?::json)) "
-      "ORDER BY robot_id FOR NO KEY UPDATE"));
+  Rows rows(
+      database_.statement("SELECT robot_id, epoch FROM cluster_lease WHERE robot_id IN (SELECT "
+                          "json_array_elements_text(?::json)) "
+                          "ORDER BY robot_id FOR NO KEY UPDATE"));
   rows.bind(names);
   while (rows.next()) {
     std::string robot_id = rows.text();

@@ -134,7 +134,8 @@ Outcome SqlChanges::run(const AddDiagnosis& c) {
 
 bool SqlChanges::has_job(std::int64_t diagnosis_id) {
   if (writer_.empty()) return true;
-  Rows rows(database_.statement("SELECT 1 FROM cluster_job WHERE diagnosis_id = ? AND writer = ? FOR UPDATE"));
+  Rows rows(
+      database_.statement("SELECT 1 FROM cluster_job WHERE diagnosis_id = ? AND writer = ? FOR UPDATE"));
   rows.bind(diagnosis_id).bind(writer_);
   return rows.next();
 }

@@ -67,8 +67,8 @@ class ReaderPool {
   std::string why_;                              // the last attempt failed
 };
 
-// What the stores have in common: every query, and the keys of missions. Where its program is the only one that
-// writes, the keys are given out in memory.
+// What the stores have in common: every query, and the keys of missions. Where its program is the only one
+// that writes, the keys are given out in memory.
 class SqlStore : public Store {
  public:
   Result<MissionKey> mission_key(std::string_view robot_id, std::string_view mission_id,

@@ -23,7 +23,7 @@ using answers::RobotOutlook;
 // the topic "legs", from which a restarted daemon learns again. Any thread.
 class Forecasts {
  public:
-  static constexpr std::size_t kept_missions = 40;  // in the store
+  static constexpr std::size_t kept_missions = 40;   // in the store
   static constexpr std::string_view topic = "legs";  // there
 
   explicit Forecasts(const history::Store& store);

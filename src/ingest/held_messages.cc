@@ -9,7 +9,8 @@ std::size_t HeldMessages::add(const InboundMessage& message) {
   if (room_ == 0) return 1;
   std::size_t gave_way = 0;
   if (size_ >= room_) {
-    auto& most = std::ranges::max_element(robots_, {}, [](const auto& each) { return each.second.size(); })->second;
+    auto& most =
+        std::ranges::max_element(robots_, {}, [](const auto& each) { return each.second.size(); })->second;
     // A tenth at a time: finding the robot takes its time.
     gave_way = std::min(most.size(), std::max<std::size_t>(1, most.size() / 10));
     most.erase(most.begin(), most.begin() + static_cast<std::ptrdiff_t>(gave_way));

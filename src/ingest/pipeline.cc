@@ -12,7 +12,7 @@ constexpr std::int64_t stranger_silence_us = 60'000'000, forget_period_us = 1'00
                        tell_period_us = 600'000'000;
 // Of robots that others keep: longer than a daemon that is gone stays unnoticed, with the time to go on.
 constexpr std::int64_t held_us = 30'000'000;
-constexpr std::size_t held_room = 1'000'000;       // some 300 MB
+constexpr std::size_t held_room = 1'000'000;    // some 300 MB
 constexpr std::int64_t recalled_missions = 16;  // that a robot may repeat the events of
 
 }  // namespace
@@ -49,7 +49,8 @@ Result<void> Pipeline::recover() {
   if (!open) return tl::unexpected(std::move(open.error()));
   for (const history::Mission& mission : *open) {
     const auto found = robots_.find(mission.robot_id);
-    RobotSession& session = found != robots_.end() ? found->second->session : add(mission.robot_id, outputs_).session;
+    RobotSession& session =
+        found != robots_.end() ? found->second->session : add(mission.robot_id, outputs_).session;
     session.resume(mission);
     session.publish();
   }
@@ -67,12 +68,17 @@ void Pipeline::refresh_models() {
       (each++)->second->session.set_model(model);
       continue;
     }
-    // A robot that was removed: its mission ends, and it is a stranger from now on.
+    // A robot that was removed: its mission ends, and its messages are counted only.
     for (const InboundMessage& held : each->second->gate.release(std::numeric_limits<std::int64_t>::max()))
       deliver(each->second->session, held);
     each->second->session.on_tick(std::numeric_limits<std::int64_t>::max());
     outputs_.fleet.remove(each->first);
-    each = robots_.erase(each);
+    if (keeping_ == nullptr) {
+      each = robots_.erase(each);
+    } else {  // the lease goes on, and so does the robot when it is given a model again
+      each->second->had_model = false;
+      (each++)->second->session.set_model(nullptr);
+    }
   }
   for (auto stranger = strangers_.begin(); stranger != strangers_.end();) {
     const std::string id = (stranger++)->first;

@@ -218,8 +218,7 @@ void RobotSession::take_over(const Handover& handover) {
 }
 
 void RobotSession::meter_tail(const Handover& handover) {
-  for (const signals::Sample& sample : handover.tail)
-    (void)sequence_.place(sample.sequence, sample.utime_us);
+  for (const signals::Sample& sample : handover.tail) (void)sequence_.place(sample.sequence, sample.utime_us);
   if (meter_ == nullptr) return;
   open_->resumed_silent = false;
   meter_->resume(open_->record.accounts, open_->record.end_utime_us, handover.winding_temperature_c);
@@ -586,10 +585,9 @@ void RobotSession::on_covariates(const signals::CovariateMessage& message, std::
     return on_fault(IngestFault::implausible, 1, "covariates: " + telemetry::describe(*fault));
   if (is_too_far_ahead(message.utime_us, host_utime_us)) return;
   const std::size_t before = covariates_.pending();
-  covariates_.take(message,
-                   [this](IngestFault fault, std::string why) {
-                     if (!repeats_) on_fault(fault, 1, std::move(why));
-                   });
+  covariates_.take(message, [this](IngestFault fault, std::string why) {
+    if (!repeats_) on_fault(fault, 1, std::move(why));
+  });
   outputs_.counters.covariate_changes.fetch_add(covariates_.pending() - before, std::memory_order_relaxed);
   if (open_ == nullptr || covariates_.pending() < settings_.checkpoint_samples) return;
   if (!open_->stored) begin_record();

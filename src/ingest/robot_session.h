@@ -79,8 +79,8 @@ class RobotSession {
   // Goes on where another daemon stopped that kept the robot before. What that one had received and not
   // stored, and what it did store, comes again between begin_repeats() and end_repeats().
   struct Handover {
-    std::vector<history::Mission> missions;          // the latest, newest first; one of them may be open
-    std::vector<signals::Sample> tail;               // the end of the open one's stored samples
+    std::vector<history::Mission> missions;           // the latest, newest first; one of them may be open
+    std::vector<signals::Sample> tail;                // the end of the open one's stored samples
     std::optional<history::StreamPosition> position;  // of the last sample that missions took in
     std::array<double, 2> winding_temperature_c{signals::unmeasured, signals::unmeasured};
   };

@@ -18,6 +18,8 @@ import time
 import urllib.error
 import urllib.request
 
+import jsonschema
+
 from harness import SKIP, Programs, check, need_multicast, skip
 
 RATE_HZ = 50
@@ -307,8 +309,15 @@ def compare(cluster, log, changed):
     alone.stop()
 
 
+def settings_are_checked(arguments):
+    for settings, field in ((["--cluster-name", "x"], "cluster.name"), (["--cluster-node", "x"], "cluster.node")):
+        done = subprocess.run([arguments.daemon, "--check-config", *settings], capture_output=True, text=True)
+        check(done.returncode == 2 and field + ":" in done.stderr, f"{settings}: {done.returncode}, {done.stderr}")
+
+
 def main():
     arguments = options()
+    settings_are_checked(arguments)
     need_multicast()
     server = Server(arguments.source)
     started = server.tell("start")
@@ -338,6 +347,7 @@ def main():
                 break
         live_everywhere(cluster, robots)
         told = anna.get("/v1/cluster")
+        jsonschema.validate(told, json.loads(pathlib.Path(arguments.source, "schemas", "cluster.schema.json").read_text()))
         check({n["node"] for n in told["nodes"]} == set(NODES) and len(told["leases"]) == arguments.robots, f"/v1/cluster: {told}")
         fleet.send_signal(signal.SIGINT)
         fleet.wait(timeout=30)

@@ -63,7 +63,8 @@ TEST(Assignment, ADaemonThatJoinsTakesItsShareAndMovesNoOther) {
   for (const std::string node : {"a", "b", "c", "d"}) {
     const Assignment decided = assign(joined, {node, everybody, all_kept});
     EXPECT_TRUE(decided.take.empty());
-    for (const Lease& each : decided.hand_over) EXPECT_EQ(keeper_of(each.robot_id, {"a", "b", "c", "d"}), "d");
+    for (const Lease& each : decided.hand_over)
+      EXPECT_EQ(keeper_of(each.robot_id, {"a", "b", "c", "d"}), "d");
     moved += decided.hand_over.size();
   }
   EXPECT_NEAR(static_cast<double>(moved), 75, 30);
@@ -123,7 +124,8 @@ TEST(Assignment, WhatAnEarlierRunHeldIsTakenAgainOrFreed) {
 }
 
 TEST(Assignment, ADaemonThatIsNotAliveGetsNothing) {
-  const auto decided = assign(state_of({"a", "b"}, 100), {"a", [](const auto& m) { return m.node == "a"; }, all_kept});
+  const auto decided =
+      assign(state_of({"a", "b"}, 100), {"a", [](const auto& m) { return m.node == "a"; }, all_kept});
   EXPECT_EQ(decided.take.size(), 100u);
 }
 

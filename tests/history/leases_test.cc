@@ -33,9 +33,10 @@ class LeasesTest : public testing::Test {
 
   std::unique_ptr<Daemon> daemon(const std::string& node, milliseconds lifetime = milliseconds(5000)) {
     auto made = std::make_unique<Daemon>();
-    made->store = need(open_shared_store(url(), made->writer,
-                                         [&dropped = made->dropped](const std::string& robot_id, Epoch,
-                                                                    std::uint64_t count) { dropped[robot_id] += count; }));
+    made->store = need(
+        open_shared_store(url(), made->writer,
+                          [&dropped = made->dropped](const std::string& robot_id, Epoch,
+                                                     std::uint64_t count) { dropped[robot_id] += count; }));
     made->leases = open_leases({url(), "test", node, "http://" + node, "1", made->writer, lifetime});
     need_done(made->leases->join());
     return made;
@@ -57,7 +58,8 @@ class LeasesTest : public testing::Test {
     return need(leases.take({lease_of(leases, robot_id)}));
   }
 
-  static Result<std::vector<Outcome>> checkpoint(Store& store, Mission& mission, Epoch epoch, std::int64_t sequence) {
+  static Result<std::vector<Outcome>> checkpoint(Store& store, Mission& mission, Epoch epoch,
+                                                 std::int64_t sequence) {
     CheckpointMission command{mission, {}, some_samples(mission.start_utime_us + sequence, sequence, 1), {}};
     command.position = StreamPosition{mission.start_utime_us + sequence, sequence};
     command.epoch = epoch;
@@ -191,7 +193,8 @@ TEST_F(LeasesTest, KeysOfMissionsAreOneDaemonsAlone) {
   EXPECT_EQ(keys.size(), 5000u);
   // While the database is away, too.
   stop_postgres();
-  for (std::int64_t k = 0; k < 500; ++k) keys.insert(need(a->store->mission_key("three", std::to_string(k), k)));
+  for (std::int64_t k = 0; k < 500; ++k)
+    keys.insert(need(a->store->mission_key("three", std::to_string(k), k)));
   EXPECT_EQ(keys.size(), 5500u);
 }
 
@@ -200,9 +203,11 @@ TEST_F(LeasesTest, DaemonsCommitAtTheSameTime) {
   constexpr int each = 40;
   const auto work = [](Store& store, const std::string& robot_id) {
     for (int k = 0; k < each; ++k) {
-      const Command commands[] = {AppendAudit{{0, k, "somebody", "", "", "test", "{}", ""}},
-                                  AddModel{"shared", k, ModelOrigin::http, "", "{\"of\": \"" + robot_id + std::to_string(k) + "\"}", {}},
-                                  AppendEvent{{0, k, robot_id, "test", "{}"}}};
+      const Command commands[] = {
+          AppendAudit{{0, k, "somebody", "", "", "test", "{}", ""}},
+          AddModel{
+              "shared", k, ModelOrigin::http, "", "{\"of\": \"" + robot_id + std::to_string(k) + "\"}", {}},
+          AppendEvent{{0, k, robot_id, "test", "{}"}}};
       for (int tries = 0;; ++tries) {  // as the writer does: a deadlock ends one of the two
         const auto outcomes = store.apply(commands);
         if (outcomes) {
@@ -289,7 +294,8 @@ TEST_F(LeasesTest, LiveStatesReachTheOthersOnce) {
 
 TEST_F(LeasesTest, AStoreOfVersionOneIsMigrated) {
   (void)need(open_store(url()));
-  administer("DROP TABLE cluster_hears, cluster_node, cluster_lease, cluster_writer, cluster_job, cluster_live");
+  administer(
+      "DROP TABLE cluster_hears, cluster_node, cluster_lease, cluster_writer, cluster_job, cluster_live");
   administer("DROP SEQUENCE cluster_incarnation, cluster_mission_keys");
   administer("UPDATE joulecast_store SET schema_version = 1");
   const auto a = daemon("a");

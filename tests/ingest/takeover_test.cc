@@ -1,5 +1,5 @@
-// Two daemons of a cluster that hear one robot: one keeps it, the other takes over at any moment. What is stored at the end
-// is what one daemon alone stores.
+// Two daemons of a cluster that hear one robot: one keeps it, the other takes over at any moment. What is
+// stored at the end is what one daemon alone stores.
 
 #include <gtest/gtest.h>
 
@@ -55,10 +55,12 @@ std::deque<InboundMessage> drive() {
 struct Daemon {
   Daemon(history::Store& shared, std::optional<history::StreamPosition>& position)
       : store(shared),
-        pipeline({}, 10, models,
-                 SessionOutputs{shared, [this, &position](history::Command command) { apply(std::move(command), position); },
-                                fleet, counters, [](const std::string&, const std::string&) {}},
-                 &keeping) {
+        pipeline(
+            {}, 10, models,
+            SessionOutputs{
+                shared, [this, &position](history::Command command) { apply(std::move(command), position); },
+                fleet, counters, [](const std::string&, const std::string&) {}},
+            &keeping) {
     if (!models.put(testing::nomad(), 1)) throw std::runtime_error("the model");
   }
 
@@ -105,7 +107,8 @@ class TakeoverTest : public ::testing::Test {
   }
 
   static std::vector<history::Mission> missions(const history::Store& store) {
-    auto page = store.missions({}, {.limit = 100, .cursor = {}}, {.by = history::MissionOrder::start, .ascending = true});
+    auto page = store.missions({}, {.limit = 100, .cursor = {}},
+                               {.by = history::MissionOrder::start, .ascending = true});
     EXPECT_TRUE(page);
     return page ? page->missions : std::vector<history::Mission>{};
   }
