@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Three daemons share a fleet through one PostgreSQL. One is killed, one is stopped for longer than its lease and goes on, one
-is ended in order and started again; then PostgreSQL itself crashes and comes back, and crashes for good, and its synchronous
+is cut off from PostgreSQL, ended in order and started again; then PostgreSQL itself crashes and comes back, and crashes for good, and its synchronous
 standby takes over. What is stored at the end is compared
 with the log of what the robots published, by sums made here, and with one daemon that reads the log alone: every sample
 is in the same mission, once, and the energies agree.
@@ -11,9 +11,11 @@ import json
 import os
 import pathlib
 import signal
+import socket
 import struct
 import subprocess
 import tempfile
+import threading
 import time
 import urllib.error
 import urllib.request
@@ -70,13 +72,53 @@ class Server:
         return [line.split("\t") for line in done.stdout.splitlines()]
 
 
+class Relay:
+    """Between one daemon and PostgreSQL; cut, it takes what either says and passes nothing on."""
+
+    def __init__(self, server):
+        self.server, self.open = server, threading.Event()
+        self.open.set()
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.url = f"postgresql://joulecast@127.0.0.1:{self.listener.getsockname()[1]}/postgres"
+        threading.Thread(target=self.accept, daemon=True).start()
+
+    def accept(self):
+        while True:
+            client, _ = self.listener.accept()
+            threading.Thread(target=self.connect, args=(client,), daemon=True).start()
+
+    def connect(self, client):
+        self.open.wait()
+        database = socket.socket(socket.AF_UNIX)
+        try:
+            database.connect(self.server.primary + "/.s.PGSQL.5432")
+        except OSError:
+            client.close()
+            return
+        for one, other in ((client, database), (database, client)):
+            threading.Thread(target=self.carry, args=(one, other), daemon=True).start()
+
+    def carry(self, one, other):
+        try:
+            while data := one.recv(65536):
+                self.open.wait()
+                other.sendall(data)
+        except OSError:
+            pass
+        for end in (one, other):
+            try:
+                end.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass
+
+
 class Node(Programs):
     """A daemon of the cluster."""
 
-    def __init__(self, arguments, name, server, lcm_url):
+    def __init__(self, arguments, name, url, lcm_url):
         super().__init__(arguments)
         self.name, self.lcm_url = name, lcm_url
-        self.settings = ["--store-url", server.url, "--cluster-name", "test", "--cluster-node", name,
+        self.settings = ["--store-url", url, "--cluster-name", "test", "--cluster-node", name,
                          "--cluster-lease-s", str(LEASE_S), "--diagnosis-controls", "2"]
 
     def metric(self, name):
@@ -107,7 +149,9 @@ class Cluster:
     def __init__(self, arguments, server):
         first = Programs(arguments)
         self.server, self.lcm_url = server, first.lcm_url
-        self.nodes = {name: Node(arguments, name, server, first.lcm_url) for name in NODES}
+        self.relay = Relay(server)
+        urls = (server.url, server.url, self.relay.url)
+        self.nodes = {name: Node(arguments, name, url, first.lcm_url) for name, url in zip(NODES, urls)}
 
     def keepers(self):
         """Robot to daemon; only leases of daemons that are members."""
@@ -177,6 +221,16 @@ def faults(cluster, robots):
     wait_until(lambda: bert.metric("joulecast_cluster_memberships_lost_total") > lost, 10, "it sees that it was away")
     print(f"SIGCONT: {bert.metric('joulecast_cluster_commands_dropped_total'):.0f} late commands dropped")
     wait_until(lambda: cluster.is_spread(robots), 30, "the daemon that went on has robots again")
+
+    cleo_had, lost = cluster.of("cleo"), cleo.metric("joulecast_cluster_memberships_lost_total")
+    since = time.monotonic()
+    cluster.relay.open.clear()
+    cluster.takeover("cleo", cleo_had, PAUSED_S, "cut off from PostgreSQL", since)
+    time.sleep(2)
+    cluster.relay.open.set()
+    wait_until(lambda: cleo.metric("joulecast_cluster_memberships_lost_total") > lost, 40, "it sees that it was cut off")
+    print(f"connected again: {cleo.metric('joulecast_cluster_commands_dropped_total'):.0f} late commands dropped")
+    wait_until(lambda: cluster.is_spread(robots), 30, "the daemon that was cut off has robots again")
 
     cleo_had = cluster.of("cleo")
     since = time.monotonic()
@@ -252,7 +306,7 @@ def stored_samples(node, mission):
 def reference(cluster, log):
     """The missions of one daemon that reads the whole log."""
     node = cluster.nodes["anna"]
-    alone = Node(node.options, "alone", cluster.server, cluster.lcm_url)
+    alone = Node(node.options, "alone", "", cluster.lcm_url)
     alone.settings = []
     robots = []
     for robot in node.get("/v1/robots?limit=1000")["robots"]:
