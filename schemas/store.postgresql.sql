@@ -1,4 +1,4 @@
--- The history of a fleet in PostgreSQL, schema version 1 (src/history/postgres_schema.cc lists the migrations to it). The
+-- The history of a fleet in PostgreSQL, schema version 2 (src/history/postgres_schema.cc lists the migrations to it). The
 -- tables and columns are those of store.sql, where what they hold is described.
 -- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a DOUBLE PRECISION column: not measured.
 -- Names compare by their bytes (COLLATE "C"), as SQLite compares them. JSON is kept as text, byte for byte.

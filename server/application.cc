@@ -9,6 +9,7 @@
 #include <functional>
 #include <future>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -20,9 +21,12 @@
 #include "history/spool.h"
 #include "history/writer.h"
 #include "ingest/ingest_service.h"
+#include "ingest/keeping.h"
 #include "ingest/model_loading.h"
 #include "ingest/signature_gate.h"
 #include "server/api/services.h"
+#include "server/cluster/cluster.h"
+#include "server/cluster_metrics.h"
 #include "server/daemon_metrics.h"
 #include "server/diagnosis/proposal_acceptor.h"
 #include "server/embedded.h"
@@ -145,13 +149,25 @@ struct Application::Parts {
 
   Result<void> open_history() {
     const bool by_path = settings.text("store.url").empty();
-    Result<std::unique_ptr<history::Store>> opened = history::open_store(store_url(settings));
+    if (Result<server::ClusterOptions> wanted = cluster_options(settings); !wanted)
+      return tl::unexpected(std::move(wanted.error()));
+    else if (!wanted->name.empty())
+      in_cluster = std::move(*wanted);
+    Result<std::unique_ptr<history::Store>> opened =
+        in_cluster ? history::open_shared_store(
+                         in_cluster->url, in_cluster->writer,
+                         [this](const std::string& robot_id, history::Epoch epoch, std::uint64_t count) {
+                           if (joined) cluster->on_dropped(robot_id, epoch, count);
+                         })
+                   : history::open_store(store_url(settings));
     if (!opened)
       return fail(opened.error().fault, by_path ? "store.path" : "store.url",
                   std::move(opened.error().message));
     store = std::move(*opened);
     take_in_spool(settings, *store);
-    writer = std::make_unique<history::Writer>(*store, writer_options(settings));
+    history::WriterOptions options = writer_options(settings);
+    if (in_cluster) options.prunes = [this] { return joined && cluster->is_first(); };
+    writer = std::make_unique<history::Writer>(*store, std::move(options));
     tell_of_faults();
 
     const std::string& directory = settings.text("robots.directory");
@@ -167,17 +183,47 @@ struct Application::Parts {
         warn("", describe(posted.error()));
     };
     ingest::SessionOutputs outputs{*store, post, fleet, counters, warn};
-    outputs.mission_ended = [this, post](const std::shared_ptr<const ingest::ModelInForce>& model,
-                                         forecast::PastMission mission) {
+    outputs.mission_ended = [this](const ingest::SessionOutputs::Post& store_it,
+                                   const std::shared_ptr<const ingest::ModelInForce>& model,
+                                   forecast::PastMission mission) {
       // A mission that ran into a new version is learnt against the one in force now.
       const auto in_force = models.find(model->robot.robot_id);
       ingest::Forecasts::Learnt learnt =
           forecasts->learn(in_force != nullptr ? in_force : model, std::move(mission));
-      post(history::PutLearned{std::move(learnt.document)});
-      if (learnt.drift) report_drift(model->robot.robot_id, *learnt.drift, post);
+      store_it(history::PutLearned{std::move(learnt.document)});
+      if (learnt.drift) report_drift(model->robot.robot_id, *learnt.drift, store_it);
     };
-    ingest = std::make_unique<ingest::IngestService>(ingest_options(settings), models, *forecasts, outputs);
+    ingest = std::make_unique<ingest::IngestService>(ingest_options(settings), models, *forecasts, outputs,
+                                                     in_cluster ? &keeping : nullptr);
+    if (in_cluster) make_cluster();
     return ingest->start();
+  }
+
+  // Its threads start when everything else answers.
+  void make_cluster() {
+    cluster = std::make_unique<server::Cluster>(
+        *in_cluster, server::Cluster::Parts{*store, keeping, fleet, models, *forecasts, host_utime_us,
+                                            [](const std::string& text) { log_warning(text, {}); },
+                                            [this](std::int64_t id) {
+                                              if (const Result<void> taken = diagnoses->take_over(id); !taken)
+                                                log_error("a diagnosis left by another daemon",
+                                                          taken.error());
+                                            }});
+  }
+
+  Result<void> join_cluster() {
+    if (!in_cluster) return {};
+    const std::string scheme = settings.text("http.tls_certificate").empty() ? "http://" : "https://";
+    Result<void> done =
+        cluster->start(scheme + settings.text("http.address") + ":" + std::to_string(http->port()));
+    joined = done.has_value();
+    return done;
+  }
+
+  // Whether this daemon does what one of the cluster's should do about a robot.
+  std::function<bool(const std::string&)> is_own() {
+    if (!in_cluster) return {};
+    return [this](const std::string& robot_id) { return keeping.epoch_of(robot_id) != 0; };
   }
 
   Result<void> start_diagnosis() {
@@ -185,15 +231,17 @@ struct Application::Parts {
     adoption = std::make_unique<server::ModelAdoption>(*store, *writer, models, *drift_view, host_utime_us,
                                                        adoption_options(settings));
     if (settings.boolean("adoption.automatic")) {
-      acceptor = std::make_unique<server::ProposalAcceptor>(*store, *adoption, warn);
+      acceptor = std::make_unique<server::ProposalAcceptor>(*store, *adoption, warn, is_own());
       acceptor->start(milliseconds(10'000));
     }
     const auto warn_of = [](const Error& error) { log_error("diagnosis", error); };
     diagnoses = std::make_unique<server::DiagnosisService>(
         *store, *writer, models, *drift_view, host_utime_us, diagnosis_options(settings), warn_of,
         [this](const history::DiagnosisRecord& diagnosis) { watch->on_diagnosis(diagnosis); });
+    server::WatchOptions watching = watch_options(settings);
+    watching.is_own = is_own();
     watch = std::make_unique<server::GapWatch>(*store, *writer, models, *drift_view, *diagnoses,
-                                               host_utime_us, watch_options(settings), warn_of);
+                                               host_utime_us, watching, warn_of);
     Result<void> started = diagnoses->start();
     if (started) watch->start();
     return started;
@@ -213,6 +261,12 @@ struct Application::Parts {
                         if (!status.healthy) return fail(Fault::unavailable, "store", status.error);
                         return {};
                       }});
+    if (in_cluster)
+      checks.push_back({"cluster", [this]() -> Result<void> {
+                          const server::ClusterStatus status = cluster->status();
+                          if (!status.error.empty()) return fail(Fault::unavailable, "cluster", status.error);
+                          return {};
+                        }});
     if (!settings.text("ingest.key_file").empty())
       checks.push_back({"robot_keys", [this]() -> Result<void> {
                           const std::string why = ingest->status().key_error;
@@ -227,15 +281,16 @@ struct Application::Parts {
   void export_all_metrics() {
     server::export_metrics(metrics, counters, *ingest, fleet, *writer, *store, events, host_utime_us);
     server::export_gap_metrics(metrics, *diagnoses, *watch, *adoption);
+    if (cluster) server::export_cluster_metrics(metrics, *cluster);
     server::export_process_metrics(metrics);
     server::export_robot_metrics(metrics, fleet, *watch, host_utime_us,
                                  static_cast<std::size_t>(settings.integer("metrics.robots")));
   }
 
   Result<void> start_http() {
-    services =
-        std::make_unique<api::Services>(api::Services{*store, *writer, models, fleet, *forecasts, cost_tables,
-                                                      *drift_view, *adoption, *diagnoses, host_utime_us});
+    services = std::make_unique<api::Services>(api::Services{*store, *writer, models, fleet, *forecasts,
+                                                             cost_tables, *drift_view, *adoption, *diagnoses,
+                                                             cluster.get(), host_utime_us});
     Result<std::unique_ptr<http::Gate>> opened =
         http::Gate::open({.token_file = settings.text("auth.token_file"),
                           .now_utime_us = host_utime_us,
@@ -275,6 +330,7 @@ struct Application::Parts {
   // Whatever does not end is left behind, so that the store is always brought to its end.
   bool stop() {
     if (stopped.exchange(true)) return true;
+    if (cluster) cluster->settle_down();
     const milliseconds patience(std::llround(1e3 * settings.number("http.stop_deadline_s")));
     std::future<bool> http_ended = std::async(std::launch::async, [this, patience] {
       return within(patience + milliseconds(500), [this, patience] {
@@ -303,6 +359,8 @@ struct Application::Parts {
         ended &= writer->status().attempt_s == 0;
       }
     }
+    // What this daemon kept is committed and let go.
+    if (cluster) ended &= within(milliseconds(2000), [this] { cluster->leave(); });
     return ended;
   }
 
@@ -392,6 +450,10 @@ struct Application::Parts {
   std::function<void(const std::string&, const std::string&)> warn;
   std::unique_ptr<history::Store> store;
   std::unique_ptr<history::Writer> writer;
+  std::optional<server::ClusterOptions> in_cluster;  // absent: this daemon keeps all robots
+  ingest::Keeping keeping;
+  std::unique_ptr<server::Cluster> cluster;
+  std::atomic<bool> joined = false;  // the writer's thread may ask the cluster
   std::unique_ptr<ingest::IngestService> ingest;
   std::unique_ptr<server::DriftView> drift_view;
   std::unique_ptr<server::ModelAdoption> adoption;
@@ -422,6 +484,7 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   if (done) done = parts->start_ingest();
   if (done) done = parts->start_diagnosis();
   if (done) done = parts->start_http();
+  if (done) done = parts->join_cluster();
   if (!done) return tl::unexpected(std::move(done.error()));
   parts->beat = std::thread([&p = *parts] { p.run_beat(); });
   parts->warming = std::thread([&p = *parts] { p.warm_forecasts(); });
@@ -482,6 +545,11 @@ std::vector<Error> faults_of_telemetry(const Settings& settings) {
   if (const auto senders = telemetry::AcceptedSenders::parse(options.listen.accept_from); !senders)
     faults.push_back(senders.error());
   return faults;
+}
+
+std::vector<Error> faults_of_cluster(const Settings& settings) {
+  const auto options = cluster_options(settings);
+  return options ? std::vector<Error>{} : std::vector<Error>{options.error()};
 }
 
 std::vector<Error> faulty_robot_files(const Settings& settings) {

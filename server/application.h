@@ -52,6 +52,9 @@ std::vector<Error> faults_of_store(const Settings& settings);
 // What is wrong with whose telemetry is taken: the robots' keys, the list of senders.
 std::vector<Error> faults_of_telemetry(const Settings& settings);
 
+// What is wrong with the part in a cluster that the settings name.
+std::vector<Error> faults_of_cluster(const Settings& settings);
+
 // What is wrong with the robot files that the settings name, one a file; or with their directory.
 std::vector<Error> faulty_robot_files(const Settings& settings);
 

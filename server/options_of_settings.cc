@@ -1,10 +1,14 @@
 #include "server/options_of_settings.h"
 
+#include <unistd.h>
+
+#include <array>
 #include <chrono>
 #include <sstream>
 #include <utility>
 
 #include "history/open_store.h"
+#include "history/postgres_store.h"
 #include "server/logging.h"
 
 namespace joulecast {
@@ -41,6 +45,33 @@ std::string store_url(const Settings& settings) {
 std::string spool_path(const Settings& settings) {
   const std::string url = store_url(settings);
   return (history::is_postgres_url(url) ? settings.text("store.path") : history::sqlite_path(url)) + ".spool";
+}
+
+Result<server::ClusterOptions> cluster_options(const Settings& settings) {
+  constexpr std::size_t longest_name = 64;
+  server::ClusterOptions options;
+  options.name = settings.text("cluster.name");
+  options.node = settings.text("cluster.node");
+  if (options.name.empty()) {
+    if (!options.node.empty())
+      return invalid("cluster.node", "names a daemon of a cluster, and no cluster.name is set");
+    return options;
+  }
+  options.url = store_url(settings);
+  if (!history::is_postgres_url(options.url))
+    return invalid("cluster.name",
+                   "daemons share a fleet through a PostgreSQL: set store.url to postgresql://...");
+  if (options.node.empty()) {
+    std::array<char, 256> host{};
+    if (gethostname(host.data(), host.size() - 1) == 0) options.node = host.data();
+  }
+  for (const auto& [key, text] : {std::pair("cluster.name", options.name), {"cluster.node", options.node}}) {
+    if (text.empty() || text.size() > longest_name)
+      return invalid(key, "must have 1 to " + std::to_string(longest_name) + " bytes");
+  }
+  options.writer = history::new_writer_name();
+  options.lifetime = seconds(settings.number("cluster.lease_s"));
+  return options;
 }
 
 history::WriterOptions writer_options(const Settings& settings) {

@@ -2,8 +2,10 @@
 
 #include <string>
 
+#include "base/error.h"
 #include "history/writer.h"
 #include "ingest/ingest_service.h"
+#include "server/cluster/cluster.h"
 #include "server/diagnosis/diagnosis_service.h"
 #include "server/diagnosis/drift_view.h"
 #include "server/diagnosis/gap_watch.h"
@@ -18,6 +20,9 @@ namespace joulecast {
 std::string store_url(const Settings& settings);
 // Beside the SQLite file; a file of this machine also where the history is kept elsewhere.
 std::string spool_path(const Settings& settings);
+
+// Fault::invalid on "cluster.name" or "cluster.node". An empty name: no cluster.
+Result<server::ClusterOptions> cluster_options(const Settings& settings);
 
 history::WriterOptions writer_options(const Settings& settings);
 ingest::IngestOptions ingest_options(const Settings& settings);

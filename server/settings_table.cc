@@ -94,6 +94,15 @@ constexpr Setting table[] = {
     {"store.queue_bytes", Type::integer, "67108864", 1048576, 1e12, "B",
      "memory for what waits while the store takes no data; beyond: raw samples are left out and counted"},
 
+    {"cluster.name", Type::text, "", 0, 0, "",
+     "name of the cluster of daemons that share the fleet and the PostgreSQL of store.url; empty: this one "
+     "keeps all robots that it hears"},
+    {"cluster.node", Type::text, "", 0, 0, "",
+     "this daemon's name in the cluster, another for each; empty: the host's name"},
+    {"cluster.lease_s", Type::number, "5", 2, 60, "s",
+     "silence towards PostgreSQL after which other daemons of the cluster take this one's robots; one that "
+     "was killed is noticed at once"},
+
     {"ingest.key_file", Type::text, "", 0, 0, "",
      "file of the keys by which robots sign, made by joulecast key create and read again when it changes; a "
      "robot that has a key is heard by signed messages alone; empty: none has"},

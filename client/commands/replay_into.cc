@@ -102,11 +102,10 @@ Exit replay_into(const ReplayInto& options) {
                                    std::fprintf(stderr, "joulecast: %s: %s\n", robot.c_str(), text.c_str());
                                  }};
   ingest::Forecasts forecasts(**store);
-  outputs.mission_ended = [&](const std::shared_ptr<const ingest::ModelInForce>& model,
+  outputs.mission_ended = [&](const ingest::SessionOutputs::Post& post,
+                              const std::shared_ptr<const ingest::ModelInForce>& model,
                               forecast::PastMission mission) {
-    ingest::Forecasts::Learnt learnt = forecasts.learn(model, std::move(mission));
-    if (const Result<void> posted = writer.post(history::PutLearned{std::move(learnt.document)}); !posted)
-      report(posted.error());
+    post(history::PutLearned{forecasts.learn(model, std::move(mission)).document});
   };
   constexpr std::size_t any_number_of_robots = 1'000'000;
   ingest::Pipeline pipeline({}, any_number_of_robots, models, outputs);

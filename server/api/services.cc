@@ -10,7 +10,7 @@ namespace {
 std::vector<TableRow> table() {
   std::vector<TableRow> all;
   for (const auto part : {robot_rows, model_rows, diagnosis_rows, gap_history_rows, audit_rows,
-                          mission_list_rows, mission_rows, planning_rows}) {
+                          mission_list_rows, mission_rows, planning_rows, cluster_rows}) {
     std::vector<TableRow> rows = part();
     all.insert(all.end(), std::make_move_iterator(rows.begin()), std::make_move_iterator(rows.end()));
   }

@@ -10,6 +10,7 @@
 #include "ingest/forecasts.h"
 #include "ingest/model_registry.h"
 #include "planning/cost_table_cache.h"
+#include "server/cluster/cluster.h"
 #include "server/diagnosis/diagnosis_service.h"
 #include "server/diagnosis/drift_view.h"
 #include "server/diagnosis/model_adoption.h"
@@ -28,6 +29,7 @@ struct Services {
   const server::DriftView& drift;
   server::ModelAdoption& adoption;
   server::DiagnosisService& diagnoses;
+  const server::Cluster* cluster;              // null: this daemon is in none
   std::function<std::int64_t()> now_utime_us;  // host clock
 };
 
@@ -62,6 +64,7 @@ std::vector<TableRow> gap_history_rows();
 std::vector<TableRow> mission_list_rows();
 std::vector<TableRow> mission_rows();
 std::vector<TableRow> planning_rows();
+std::vector<TableRow> cluster_rows();
 
 // The model of a robot that `field` of the request names, or the error that says why there is none.
 Result<std::shared_ptr<const ingest::ModelInForce>> model_of(const Services& services,

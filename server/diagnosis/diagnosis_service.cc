@@ -50,6 +50,20 @@ json request_json(const DiagnosisRequest& request) {
   return text;
 }
 
+DiagnosisRequest request_of(const DiagnosisRecord& record) {
+  DiagnosisRequest request;
+  request.robot_id = record.robot_id;
+  request.cause = record.cause;
+  const json text = json::parse(record.request_json, nullptr, false);
+  if (!text.is_object()) return request;
+  request.max_missions = text.value("max_missions", request.max_missions);
+  request.hold_back = text.value("hold_back", request.hold_back);
+  request.missions = text.value("missions", request.missions);
+  if (text.contains("since_utime_us")) request.since_utime_us = text["since_utime_us"].get<std::int64_t>();
+  if (text.contains("controls")) request.controls = text["controls"].get<std::size_t>();
+  return request;
+}
+
 // What lists show of a result: the verdict, the effects and how far the gap shrinks.
 json summary_of(const ordered_json& result) {
   json effects = json::array();
@@ -145,6 +159,24 @@ class DiagnosisService::Impl {
     }
     wake_.notify_all();
     return *id;
+  }
+
+  Result<void> take_over(std::int64_t id) {
+    auto stored = store_.diagnosis(id);
+    if (!stored) return tl::unexpected(std::move(stored.error()));
+    auto job = std::make_shared<Job>();
+    job->request = request_of(*stored);
+    job->record = std::move(*stored);
+    job->record.state = DiagnosisState::queued;
+    job->record.fitted_on.clear();
+    job->record.held_back.clear();
+    {
+      const std::lock_guard lock(mutex_);
+      if (stopping_) return fail(Fault::unavailable, "", "the service is stopping");
+      waiting_.push_back(std::move(job));
+    }
+    wake_.notify_all();
+    return {};
   }
 
   Result<void> cancel(std::int64_t id) {
@@ -420,6 +452,9 @@ void DiagnosisService::stop() {
 }
 Result<std::int64_t> DiagnosisService::submit(const DiagnosisRequest& request) {
   return impl_->submit(request);
+}
+Result<void> DiagnosisService::take_over(std::int64_t id) {
+  return impl_->take_over(id);
 }
 Result<void> DiagnosisService::cancel(std::int64_t id) {
   return impl_->cancel(id);

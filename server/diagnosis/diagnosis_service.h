@@ -77,6 +77,8 @@ class DiagnosisService {
   // Queues a job and answers its id. Fault::not_found: no such robot or mission; ::conflict: the robot has no
   // mission that has ended; ::unavailable: the queue is full.
   Result<std::int64_t> submit(const DiagnosisRequest& request);
+  // Runs a stored job that another daemon of the cluster left behind.
+  Result<void> take_over(std::int64_t id);
   // Fault::not_found, or ::conflict when it has ended.
   Result<void> cancel(std::int64_t id);
 

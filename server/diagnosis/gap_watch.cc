@@ -113,6 +113,10 @@ bool GapWatch::watches(const std::string& robot_id) const {
   return options_.robots.empty() || options_.robots.contains(robot_id);
 }
 
+bool GapWatch::is_own(const std::string& robot_id) const {
+  return !options_.is_own || options_.is_own(robot_id);
+}
+
 void GapWatch::look() {
   const std::lock_guard looking(looking_);
   const auto told = [this](const Result<void>& done) {
@@ -122,7 +126,7 @@ void GapWatch::look() {
   std::vector<double> now;
   for (const auto& model : models_.all()) {
     if (!watches(model->robot.robot_id)) continue;
-    told(look_at(*model, counts));
+    if (is_own(model->robot.robot_id)) told(look_at(*model, counts));
     const auto recent = drift_.recent(*model);
     if (!recent) {
       on_error_(recent.error());
@@ -154,6 +158,7 @@ Result<void> GapWatch::compare_kinds(WatchCounts& counts) {
       if (!watches(s.robot_id)) continue;
       counts.standing_out += s.stands_out;
       counts.ratios[s.robot_id] = s.ratio;
+      if (!is_own(s.robot_id)) continue;
       const Result<Memory> memory = read_memory(store_, s.robot_id);
       if (!memory) return tl::unexpected(memory.error());
       if (memory->stood_out == s.stands_out) continue;

@@ -18,9 +18,10 @@
 namespace joulecast::server {
 
 struct WatchOptions {
-  double period_s = 3600;        // 0: no watch
-  std::set<std::string> robots;  // empty: all
-  bool diagnose = true;          // a drift starts a diagnosis of the missions since
+  double period_s = 3600;                                   // 0: no watch
+  std::set<std::string> robots;                             // empty: all
+  std::function<bool(const std::string& robot_id)> is_own;  // of the daemons of a cluster; empty: all are
+  bool diagnose = true;  // a drift starts a diagnosis of the missions since
 };
 
 struct WatchCounts {
@@ -60,6 +61,7 @@ class GapWatch {
   Result<void> compare_kinds(WatchCounts& counts);
   Result<void> remember(const std::string& robot_id, std::int64_t announced_utime_us, bool stood_out);
   bool watches(const std::string& robot_id) const;
+  bool is_own(const std::string& robot_id) const;
   void record(const std::string& robot_id, const std::string& kind, std::string detail_json);
 
   const history::Store& store_;

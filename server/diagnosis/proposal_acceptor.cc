@@ -16,8 +16,9 @@ constexpr std::int64_t proposals_a_look = 100;  // newest first; older ones are 
 }  // namespace
 
 ProposalAcceptor::ProposalAcceptor(const history::Store& store, ModelAdoption& adoption,
-                                   std::function<void(const std::string&, const std::string&)> tell)
-    : store_(store), adoption_(adoption), tell_(std::move(tell)) {}
+                                   std::function<void(const std::string&, const std::string&)> tell,
+                                   std::function<bool(const std::string&)> is_own)
+    : store_(store), adoption_(adoption), tell_(std::move(tell)), is_own_(std::move(is_own)) {}
 
 ProposalAcceptor::~ProposalAcceptor() {
   stop();
@@ -35,6 +36,7 @@ int ProposalAcceptor::look() {
     if (listed.id <= seen_id_) break;
     newest = std::max(newest, listed.id);
     if (listed.state != history::ProposalState::open || listed.kind != "calibration") continue;
+    if (is_own_ && !is_own_(listed.robot_id)) continue;
     // Lists leave the model out.
     if (const auto whole = store_.proposal(listed.id); whole && try_one(*whole)) ++adopted;
   }

@@ -107,6 +107,17 @@ void Meter::interrupt() {
   next_ = 0;
   usual_interval_s_ = 0;
   last_.reset();
+  counted_utime_us_.reset();
+}
+
+void Meter::resume(const signals::Accounts& accounts, std::int64_t counted_utime_us,
+                   const std::array<double, 2>& winding_temperature_c) {
+  accounts_ = accounts;
+  counted_utime_us_ = counted_utime_us;
+  const double resistance_k_w = model_.parameters().thermal_resistance_k_w;
+  for (std::size_t s : {0u, 1u})
+    if (std::isfinite(winding_temperature_c[s]) && resistance_k_w > 0)
+      copper_heat_w_[s] = (winding_temperature_c[s] - settings_.winding_reference_c) / resistance_k_w;
 }
 
 void Meter::begin() {
@@ -258,6 +269,13 @@ Result<void> Meter::settle(std::size_t index) {
             {std::isfinite(sample.battery_voltage_v) && std::isfinite(sample.battery_current_a),
              std::isfinite(sample.motor_voltage_v[0]) && std::isfinite(sample.motor_voltage_v[1]) &&
                  std::isfinite(sample.motor_current_a[0]) && std::isfinite(sample.motor_current_a[1])}};
+
+  if (counted_utime_us_ && sample.utime_us <= *counted_utime_us_) {
+    last_ = std::make_unique<Node>(node);
+    origin_utime_us_ = sample.utime_us;
+    return {};
+  }
+  counted_utime_us_.reset();
 
   Result<void> outcome;
   if (last_ == nullptr) {

@@ -4,6 +4,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "base/error.h"
@@ -73,6 +74,11 @@ class Meter {
   // Goes on with accounts from before a restart of the service; call before the first sample.
   void resume(const signals::Accounts& accounts) { accounts_ = accounts; }
 
+  // The same where the samples of before are at hand: those up to `counted_utime_us` that come next are in
+  // the accounts already and only prepare what follows them. NaN: a winding's temperature is not known.
+  void resume(const signals::Accounts& accounts, std::int64_t counted_utime_us,
+              const std::array<double, 2>& winding_temperature_c);
+
   // Forgets the previous sample without ending the accounts: what lies between is not integrated. For a
   // robot's clock that was set. flush() first.
   void interrupt();
@@ -115,6 +121,7 @@ class Meter {
   std::array<double, 2> copper_heat_w_{};
   double payload_kg_ = 0;
   std::int64_t origin_utime_us_ = 0;
+  std::optional<std::int64_t> counted_utime_us_;  // samples up to then are in the accounts
   std::size_t gaps_ = 0;
   double gap_seconds_ = 0;
 };

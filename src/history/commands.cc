@@ -75,7 +75,57 @@ std::size_t content_bytes(const RemoveRobot& c) {
   return c.robot_id.size();
 }
 
+std::size_t content_bytes(const ReleaseLease& c) {
+  return c.robot_id.size();
+}
+
+template <class T>
+concept Fenced = requires(T command) {
+  command.epoch;
+};
+
+const std::string& robot_of(const StartMission& c) {
+  return c.mission.robot_id;
+}
+const std::string& robot_of(const CheckpointMission& c) {
+  return c.mission.robot_id;
+}
+const std::string& robot_of(const PutResumeState& c) {
+  return c.state.robot_id;
+}
+const std::string& robot_of(const PutLearned& c) {
+  return c.learned.robot_id;
+}
+const std::string& robot_of(const AppendEvent& c) {
+  return c.event.robot_id;
+}
+const std::string& robot_of(const AddProposal& c) {
+  return c.proposal.robot_id;
+}
+const std::string& robot_of(const ReleaseLease& c) {
+  return c.robot_id;
+}
+
 }  // namespace
+
+std::optional<Fence> fence_of(const Command& command) {
+  return std::visit(
+      []<class T>(const T& c) -> std::optional<Fence> {
+        if constexpr (Fenced<T>) {
+          if (c.epoch != 0) return Fence{robot_of(c), c.epoch};
+        }
+        return std::nullopt;
+      },
+      command);
+}
+
+void put_under(Command& command, Epoch epoch) {
+  std::visit(
+      [epoch]<class T>(T& c) {
+        if constexpr (Fenced<T>) c.epoch = epoch;
+      },
+      command);
+}
 
 std::size_t weight_bytes(const Command& command) {
   return sizeof(Command) + std::visit([](const auto& c) { return content_bytes(c); }, command);

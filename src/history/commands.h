@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -11,6 +12,18 @@
 // Everything that changes the store. A command is applied whole or not at all, and is never split over
 // transactions.
 namespace joulecast::history {
+
+// Commands about what one robot does carry the epoch of the robot's lease where daemons share a fleet
+// (leases.h): when the lease has another epoch by then, the command is dropped. 0: no lease is asked for.
+using Epoch = std::int64_t;
+
+// A sample's place in its robot's stream.
+struct StreamPosition {
+  std::int64_t utime_us = 0;  // robot's clock
+  std::int64_t sequence = 0;
+
+  friend bool operator==(const StreamPosition&, const StreamPosition&) = default;
+};
 
 // Adds the next version of a robot's model and makes it the active one. The robot is created when new.
 // Outcome: the version. A text equal to the active version's adds nothing and answers the active version.
@@ -35,6 +48,7 @@ struct ActivateModel {
 // replaced. The robot is created when new. Outcome: the key.
 struct StartMission {
   Mission mission;
+  Epoch epoch = 0;
 };
 
 // Brings a started mission up to date, ends it (by its state), and appends what came since the last
@@ -47,21 +61,26 @@ struct CheckpointMission {
   std::vector<signals::Sample> samples;
   std::optional<ResumeState> resume_state;
   std::vector<signals::CovariateChange> covariates = {};
+  Epoch epoch = 0;
+  std::optional<StreamPosition> position = {};  // of the last of all samples that missions have taken in
 };
 
 // Replaces a robot's energy state, for robots outside missions. The robot is created when new. Outcome: 0.
 struct PutResumeState {
   ResumeState state;
+  Epoch epoch = 0;
 };
 
 // Replaces what was learned of the robot under the topic. The robot is created when new. Outcome: 0.
 struct PutLearned {
   Learned learned;
+  Epoch epoch = 0;
 };
 
 // Outcome: the event's id; `event.id` is ignored.
 struct AppendEvent {
   Event event;
+  Epoch epoch = 0;
 };
 
 // Adds an entry to the audit. Outcome: the entry's id; `entry.id` and `entry.hash` are ignored.
@@ -107,6 +126,7 @@ struct InterruptDiagnoses {
 // ignored.
 struct AddProposal {
   Proposal proposal;
+  Epoch epoch = 0;
 };
 
 // Fault::conflict unless the proposal is open. Outcome: its id.
@@ -132,10 +152,26 @@ struct RemoveRobot {
   bool purge = false;
 };
 
+// Lets a robot's lease go, after all that was commanded under it. Outcome: 0.
+struct ReleaseLease {
+  std::string robot_id;
+  Epoch epoch = 0;
+};
+
 using Command =
     std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutResumeState, PutLearned,
                  AppendEvent, Prune, AddDiagnosis, UpdateDiagnosis, InterruptDiagnoses, AddProposal,
-                 CloseProposal, AppendAudit, PruneMissions, RemoveRobot>;
+                 CloseProposal, AppendAudit, PruneMissions, RemoveRobot, ReleaseLease>;
+
+// What a command with an epoch stands under.
+struct Fence {
+  std::string_view robot_id;
+  Epoch epoch = 0;
+};
+// Absent: the command carries no epoch.
+std::optional<Fence> fence_of(const Command& command);
+// Gives the epoch to a command that can carry one.
+void put_under(Command& command, Epoch epoch);
 
 // Approximate memory that a queued command holds, in bytes.
 std::size_t weight_bytes(const Command& command);

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <regex>
+#include <utility>
 
 #include "history/postgres.h"
 #include "history/postgres_store.h"
@@ -54,6 +55,16 @@ Result<std::unique_ptr<Store>> open_store(const std::string& url) {
   if (auto ok = check_store_url(url); !ok) return tl::unexpected(ok.error());
   if (is_postgres_url(url)) return open_postgres_store(postgres_options(url));
   return open_sqlite_store(sqlite_options(url));
+}
+
+Result<std::unique_ptr<Store>> open_shared_store(
+    const std::string& url, const std::string& writer,
+    std::function<void(const std::string&, Epoch, std::uint64_t)> on_dropped) {
+  if (!is_postgres_url(url)) return invalid("url", "must be postgresql://...");
+  PostgresOptions options = postgres_options(url);
+  options.shared_writer = writer;
+  options.on_dropped = std::move(on_dropped);
+  return open_postgres_store(options);
 }
 
 Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_exist) {

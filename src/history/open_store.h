@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -20,6 +22,12 @@ Result<void> check_store_url(const std::string& url);
 // Opens the store of a URL: sqlite:PATH, a PATH, or postgresql://... The errors are open_sqlite_store()'s and
 // open_postgres_store()'s; Fault::invalid on "url" for any other scheme.
 Result<std::unique_ptr<Store>> open_store(const std::string& url);
+
+// The store of a PostgreSQL URL, which other programs that name themselves write to as well: see
+// PostgresOptions for `writer` and `on_dropped`.
+Result<std::unique_ptr<Store>> open_shared_store(
+    const std::string& url, const std::string& writer,
+    std::function<void(const std::string& robot_id, Epoch epoch, std::uint64_t count)> on_dropped);
 
 // The same as tables, held against every other program until it is let go. When `must_exist`, nothing is
 // made: the errors are then also open_to_read()'s.

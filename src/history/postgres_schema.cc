@@ -1,5 +1,6 @@
 #include "history/postgres_schema.h"
 
+#include <array>
 #include <span>
 #include <string>
 #include <string_view>
@@ -8,12 +9,15 @@
 
 namespace joulecast::history {
 
-extern const std::string_view postgres_store_sql;  // schemas/store.postgresql.sql, embedded at build
+extern const std::string_view postgres_store_sql;    // schemas/store.postgresql.sql, embedded at build
+extern const std::string_view postgres_cluster_sql;  // schemas/cluster.postgresql.sql
 
 namespace {
 
-// None yet: the first release of this schema.
-constexpr std::span<const Migration> postgres_migrations;
+std::span<const Migration> postgres_migrations() {
+  static const std::array migrations{Migration{1, postgres_cluster_sql}};
+  return migrations;
+}
 
 }  // namespace
 
@@ -21,6 +25,7 @@ Result<void> bring_to_postgres_schema(Database& database) {
   Transaction transaction(database, Database::Access::write);
   if (!database.has_table("joulecast_store")) {
     database.execute(std::string(postgres_store_sql));
+    database.execute(std::string(postgres_cluster_sql));
     database.execute("INSERT INTO joulecast_store VALUES (1, " + std::to_string(postgres_schema_version) +
                      ", '', 0)");
     transaction.commit();
@@ -31,7 +36,7 @@ Result<void> bring_to_postgres_schema(Database& database) {
     return fail(Fault::conflict, "database",
                 "schema version " + std::to_string(version) + " is newer than version " +
                     std::to_string(postgres_schema_version) + ", the newest that this program knows");
-  for (const Migration& migration : postgres_migrations) {
+  for (const Migration& migration : postgres_migrations()) {
     if (migration.from != version) continue;
     database.execute(std::string(migration.sql));
     ++version;

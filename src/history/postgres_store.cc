@@ -1,5 +1,6 @@
 #include "history/postgres_store.h"
 
+#include <deque>
 #include <optional>
 #include <random>
 #include <thread>
@@ -18,34 +19,45 @@
 namespace joulecast::history {
 namespace {
 
-// Names this run of the program among all that ever wrote to the store.
-std::string new_writer_name() {
-  std::random_device random;
-  std::string name = "joulecast-";
-  constexpr std::string_view digits = "0123456789abcdef";
-  for (int k = 0; k < 16; ++k) name += digits[random() % digits.size()];
-  return name;
-}
-
 // The lock is the connection's: it ends when the connection's transaction is decided and the connection
 // closed. Others in the same database have another schema; "JLCT" sets the lock apart from other programs'.
 bool try_lock(Database& database) {
   return database.integer("SELECT pg_try_advisory_lock(1246512980, hashtext(current_schema()))::int") == 1;
 }
 
-Result<std::unique_ptr<PostgresDatabase>> open_writer(const PostgresOptions& options,
-                                                      const std::string& writer_name) {
-  auto database = std::make_unique<PostgresDatabase>(options.url, writer_name);
-  if (database->integer("SELECT (current_schema() IS NOT NULL)::int") == 0)
-    return fail(Fault::not_found, "database", "the search_path names no schema that exists");
-  const auto give_up = std::chrono::steady_clock::now() + options.lock_wait;
-  while (!try_lock(*database)) {
+// The same lock, which several may hold that all ask for it in this way.
+bool try_shared_lock(Database& database) {
+  return database.integer(
+             "SELECT pg_try_advisory_lock_shared(1246512980, hashtext(current_schema()))::int") == 1;
+}
+
+Result<void> wait_for_lock(Database& database, bool (*try_it)(Database&),
+                           std::chrono::milliseconds patience) {
+  const auto give_up = std::chrono::steady_clock::now() + patience;
+  while (!try_it(database)) {
     if (std::chrono::steady_clock::now() >= give_up)
       return fail(Fault::conflict, "database",
                   "is locked: another joulecast program, a daemon perhaps, has this store open");
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
-  if (auto ready = bring_to_postgres_schema(*database); !ready) return tl::unexpected(ready.error());
+  return {};
+}
+
+Result<std::unique_ptr<PostgresDatabase>> connect_writer(const PostgresOptions& options,
+                                                         const std::string& writer_name) {
+  auto database = std::make_unique<PostgresDatabase>(options.url, writer_name);
+  if (database->integer("SELECT (current_schema() IS NOT NULL)::int") == 0)
+    return fail(Fault::not_found, "database", "the search_path names no schema that exists");
+  return database;
+}
+
+Result<std::unique_ptr<PostgresDatabase>> open_writer(const PostgresOptions& options,
+                                                      const std::string& writer_name) {
+  auto database = connect_writer(options, writer_name);
+  if (!database) return database;
+  if (auto held = wait_for_lock(**database, try_lock, options.lock_wait); !held)
+    return tl::unexpected(held.error());
+  if (auto ready = bring_to_postgres_schema(**database); !ready) return tl::unexpected(ready.error());
   return database;
 }
 
@@ -64,6 +76,44 @@ void advance_identities(Database& database) {
   }
 }
 
+// Of several that share the store the first prepares it, while it is alone.
+void prepare_shared(Database& database) {
+  advance_identities(database);
+  database.execute(
+      "SELECT setval('cluster_mission_keys', greatest((SELECT coalesce(max(mission_key), 0) FROM mission), "
+      "(SELECT last_value FROM cluster_mission_keys)) + 1)");
+}
+
+Result<std::unique_ptr<PostgresDatabase>> open_shared_writer(const PostgresOptions& options) {
+  auto opened = connect_writer(options, options.shared_writer);
+  if (!opened) return opened;
+  PostgresDatabase& database = **opened;
+  if (try_lock(database)) {
+    if (auto ready = bring_to_postgres_schema(database); !ready) return tl::unexpected(ready.error());
+    prepare_shared(database);
+    // The own lock is no obstacle to the shared one.
+    if (!try_shared_lock(database)) return fail(Fault::internal, "database", "the lock was not shared");
+    database.execute("SELECT pg_advisory_unlock(1246512980, hashtext(current_schema()))");
+  } else if (auto held = wait_for_lock(database, try_shared_lock, options.lock_wait); !held) {
+    return tl::unexpected(held.error());
+  }
+  const std::int64_t version = database.integer("SELECT schema_version FROM joulecast_store");
+  if (version != postgres_schema_version)
+    return fail(Fault::conflict, "database",
+                "schema version " + std::to_string(version) +
+                    " is in use by other daemons; this program needs version " +
+                    std::to_string(postgres_schema_version) + " and can migrate once they have stopped");
+  database.execute("DELETE FROM cluster_writer WHERE since < now() - interval '30 days'");
+  Rows(database.statement("INSERT INTO cluster_writer VALUES (?, 0, now())"))
+      .bind(options.shared_writer)
+      .run();
+  return opened;
+}
+
+// Mission keys come in blocks of this many: schemas/cluster.postgresql.sql.
+constexpr MissionKey key_block = 1000;
+constexpr std::string_view next_keys = "SELECT nextval('cluster_mission_keys')";
+
 class PostgresStore final : public SqlStore {
  public:
   PostgresStore(const PostgresOptions& options, std::string name, std::unique_ptr<PostgresDatabase> writer)
@@ -72,8 +122,13 @@ class PostgresStore final : public SqlStore {
             options.readers, queries::greatest_key(*writer)),
         url_(options.url),
         name_(std::move(name)),
-        now_utime_us_(options.now_utime_us ? options.now_utime_us : host_utime_us) {
-    Rows(writer->statement("UPDATE joulecast_store SET writer = ?, batch = 0")).bind(name_).run();
+        now_utime_us_(options.now_utime_us ? options.now_utime_us : host_utime_us),
+        shared_(!options.shared_writer.empty()),
+        on_dropped_(options.on_dropped) {
+    if (!shared_)
+      Rows(writer->statement("UPDATE joulecast_store SET writer = ?, batch = 0")).bind(name_).run();
+    else
+      for (int k = 0; k < 2; ++k) add_keys(writer->integer(next_keys));
     use(std::move(writer));
   }
 
@@ -99,6 +154,9 @@ class PostgresStore final : public SqlStore {
         outcomes = std::exchange(in_doubt_, std::nullopt)->outcomes;
         if (!committed) throw;
       }
+      if (on_dropped_)
+        for (const auto& [robot_id, dropped] : changes_->dropped())
+          on_dropped_(robot_id, dropped.epoch, dropped.count);
       return done(commands, std::move(outcomes));
     });
   }
@@ -142,7 +200,7 @@ class PostgresStore final : public SqlStore {
   void use(std::unique_ptr<PostgresDatabase> writer) {
     changes_.reset();
     writer_ = std::move(writer);
-    changes_.emplace(*writer_, now_utime_us_);
+    changes_.emplace(*writer_, now_utime_us_, shared_ ? name_ : std::string());
   }
 
   // Connects anew where the connection was lost, and takes the lock again. That the lock is free says that
@@ -151,7 +209,7 @@ class PostgresStore final : public SqlStore {
     if (!taken_over_.empty()) return fail(Fault::unavailable, "database", taken_over_);
     if (writer_->is_usable()) return {};
     auto database = std::make_unique<PostgresDatabase>(url_, name_);
-    if (!try_lock(*database)) {
+    if (shared_ ? !take_back(*database) : !try_lock(*database)) {
       Rows(database->statement(
                "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = ? "
                "AND pid <> pg_backend_pid()"))
@@ -159,8 +217,7 @@ class PostgresStore final : public SqlStore {
           .run();
       return fail(Fault::unavailable, "database", "the store is still held by a connection that was lost");
     }
-    const std::string owner = database->text("SELECT writer FROM joulecast_store");
-    if (owner != name_) {
+    if (!shared_ && database->text("SELECT writer FROM joulecast_store") != name_) {
       taken_over_ =
           "another joulecast program has written to the store meanwhile; nothing is stored until this one is "
           "started again";
@@ -170,10 +227,46 @@ class PostgresStore final : public SqlStore {
     return {};
   }
 
-  // Held until the transaction ends, for the outcome of its COMMIT to be known by.
-  void mark_batch() { Rows(writer_->statement("UPDATE joulecast_store SET batch = ?")).bind(batch_).run(); }
+  // Of a shared store: the lost connection is gone, and nobody holds the store alone.
+  bool take_back(Database& database) {
+    Rows others(database.statement(
+        "SELECT count(*) FROM pg_stat_activity WHERE application_name = ? AND pid <> pg_backend_pid()"));
+    others.bind(name_);
+    return others.next() && others.integer() == 0 && try_shared_lock(database);
+  }
 
-  bool was_committed() { return writer_->integer("SELECT batch FROM joulecast_store") == batch_; }
+  // Held until the transaction ends, for the outcome of its COMMIT to be known by.
+  void mark_batch() {
+    if (shared_)
+      Rows(writer_->statement("UPDATE cluster_writer SET batch = ?, since = now() WHERE writer = ?"))
+          .bind(batch_)
+          .bind(name_)
+          .run();
+    else
+      Rows(writer_->statement("UPDATE joulecast_store SET batch = ?")).bind(batch_).run();
+  }
+
+  bool was_committed() {
+    Rows rows(writer_->statement(shared_ ? "SELECT batch FROM cluster_writer WHERE writer = ?1"
+                                         : "SELECT batch FROM joulecast_store WHERE writer = ?1"));
+    rows.bind(name_);
+    return rows.next() && rows.integer() == batch_;
+  }
+
+  void add_keys(MissionKey first) { keys_.push_back({first, first + key_block}); }
+
+  // While the database is away, the keys at hand do for a block of missions at least.
+  Result<MissionKey> new_key() override {
+    if (!shared_) return SqlStore::new_key();
+    if (keys_.size() < 2) {
+      const Result<std::int64_t> first = ask(std::string(next_keys));
+      if (first) add_keys(*first);
+      if (keys_.empty()) return tl::unexpected(first.error());
+    }
+    const MissionKey key = keys_.front().next++;
+    if (keys_.front().next == keys_.front().end) keys_.pop_front();
+    return key;
+  }
 
   std::vector<Outcome> done(std::span<const Command> commands, std::vector<Outcome> outcomes) {
     forget_reservations(commands, outcomes);
@@ -182,6 +275,12 @@ class PostgresStore final : public SqlStore {
 
   const std::string url_, name_;
   const std::function<std::int64_t()> now_utime_us_;
+  const bool shared_;
+  const std::function<void(const std::string&, Epoch, std::uint64_t)> on_dropped_;
+  struct KeyBlock {
+    MissionKey next = 0, end = 0;
+  };
+  std::deque<KeyBlock> keys_;  // with the mutex of mission_key()
   std::unique_ptr<PostgresDatabase> writer_;
   std::optional<SqlChanges> changes_;
   std::int64_t batch_ = 0;  // the last one tried
@@ -191,8 +290,21 @@ class PostgresStore final : public SqlStore {
 
 }  // namespace
 
+std::string new_writer_name() {
+  std::random_device random;
+  std::string name = "joulecast-";
+  constexpr std::string_view digits = "0123456789abcdef";
+  for (int k = 0; k < 16; ++k) name += digits[random() % digits.size()];
+  return name;
+}
+
 Result<std::unique_ptr<Store>> open_postgres_store(const PostgresOptions& options) {
   return guarded([&]() -> Result<std::unique_ptr<Store>> {
+    if (!options.shared_writer.empty()) {
+      auto writer = open_shared_writer(options);
+      if (!writer) return tl::unexpected(writer.error());
+      return std::make_unique<PostgresStore>(options, options.shared_writer, std::move(*writer));
+    }
     const std::string name = new_writer_name();
     auto writer = open_writer(options, name);
     if (!writer) return tl::unexpected(writer.error());

@@ -48,7 +48,7 @@ void members(Archive& a, Mission& c) {
 }
 template <class Archive>
 void members(Archive& a, StartMission& c) {
-  a(c.mission);
+  a(c.mission, c.epoch);
 }
 template <class Archive>
 void members(Archive& a, Band& c) {
@@ -73,20 +73,24 @@ void members(Archive& a, ResumeState& c) {
   a(c.robot_id, c.utime_us, c.sequence, c.state_of_charge, c.winding_temperature_c);
 }
 template <class Archive>
+void members(Archive& a, StreamPosition& c) {
+  a(c.utime_us, c.sequence);
+}
+template <class Archive>
 void members(Archive& a, CheckpointMission& c) {
-  a(c.mission, c.trace, c.samples, c.resume_state, c.covariates);
+  a(c.mission, c.trace, c.samples, c.resume_state, c.covariates, c.epoch, c.position);
 }
 template <class Archive>
 void members(Archive& a, PutResumeState& c) {
-  a(c.state);
+  a(c.state, c.epoch);
 }
 template <class Archive>
 void members(Archive& a, PutLearned& c) {
-  a(c.learned.robot_id, c.learned.topic, c.learned.utime_us, c.learned.body_json);
+  a(c.learned.robot_id, c.learned.topic, c.learned.utime_us, c.learned.body_json, c.epoch);
 }
 template <class Archive>
 void members(Archive& a, AppendEvent& c) {
-  a(c.event.id, c.event.utime_us, c.event.robot_id, c.event.kind, c.event.detail_json);
+  a(c.event.id, c.event.utime_us, c.event.robot_id, c.event.kind, c.event.detail_json, c.epoch);
 }
 template <class Archive>
 void members(Archive& a, AppendAudit& c) {
@@ -119,7 +123,7 @@ template <class Archive>
 void members(Archive& a, AddProposal& c) {
   Proposal& p = c.proposal;
   a(p.id, p.robot_id, p.created_utime_us, p.kind, p.state, p.note, p.base_version, p.adopted_version,
-    p.fitted_on, p.model_json, p.detail_json);
+    p.fitted_on, p.model_json, p.detail_json, c.epoch);
 }
 template <class Archive>
 void members(Archive& a, CloseProposal& c) {
@@ -132,6 +136,10 @@ void members(Archive& a, PruneMissions& c) {
 template <class Archive>
 void members(Archive& a, RemoveRobot& c) {
   a(c.robot_id, c.purge);
+}
+template <class Archive>
+void members(Archive& a, ReleaseLease& c) {
+  a(c.robot_id, c.epoch);
 }
 
 template <class T>
@@ -251,7 +259,7 @@ class Loader {
 
 // What a file begins with: another layout has another size of something.
 std::string layout() {
-  std::string text = "joulecast spool 1";
+  std::string text = "joulecast spool 2";
   for (const std::size_t size :
        {sizeof(Mission), sizeof(signals::Accounts), sizeof(CovariateSummary), sizeof(TraceBucket),
         sizeof(signals::Sample), sizeof(ResumeState), sizeof(DiagnosisRecord), sizeof(Proposal),

@@ -1,6 +1,9 @@
 #include "history/sql_changes.h"
 
+#include <nlohmann/json.hpp>
+#include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "history/audit.h"
@@ -37,14 +40,46 @@ Result<void> check_covariates(const std::vector<signals::CovariateChange>& chang
 
 }  // namespace
 
-SqlChanges::SqlChanges(Database& database, std::function<std::int64_t()> now_utime_us)
-    : database_(database), now_utime_us_(std::move(now_utime_us)) {}
+SqlChanges::SqlChanges(Database& database, std::function<std::int64_t()> now_utime_us, std::string writer)
+    : database_(database), now_utime_us_(std::move(now_utime_us)), writer_(std::move(writer)) {}
+
+// In one statement for all robots, in the order of their names, so that no two programs wait for each other.
+void SqlChanges::lock_leases(std::span<const Command> commands) {
+  epochs_.clear();
+  dropped_.clear();
+  std::set<std::string_view> robots;
+  for (const Command& command : commands)
+    if (const auto fence = fence_of(command)) robots.insert(fence->robot_id);
+  if (robots.empty()) return;
+  const std::string names = nlohmann::json(robots).dump();
+  Rows rows(
+      database_.statement("SELECT robot_id, epoch FROM cluster_lease WHERE robot_id IN (SELECT "
+                          "json_array_elements_text(?::json)) "
+                          "ORDER BY robot_id FOR NO KEY UPDATE"));
+  rows.bind(names);
+  while (rows.next()) {
+    std::string robot_id = rows.text();
+    epochs_.emplace(std::move(robot_id), rows.integer());
+  }
+}
+
+bool SqlChanges::stands(const Command& command) {
+  const auto fence = fence_of(command);
+  if (!fence) return true;
+  const auto lease = epochs_.find(fence->robot_id);
+  if (lease != epochs_.end() && lease->second == fence->epoch) return true;
+  DroppedCommands& dropped = dropped_[std::string(fence->robot_id)];
+  dropped.epoch = fence->epoch;
+  ++dropped.count;
+  return false;
+}
 
 void SqlChanges::apply(std::span<const Command> commands, const std::function<void()>& before_commit,
                        std::vector<Outcome>& outcomes) {
   // Nearly always no command is refused, and then none needs a savepoint of its own.
   {
     Transaction transaction(database_, Database::Access::write);
+    lock_leases(commands);
     if (apply_unguarded(commands, outcomes)) {
       if (before_commit) before_commit();
       return transaction.commit();
@@ -52,6 +87,7 @@ void SqlChanges::apply(std::span<const Command> commands, const std::function<vo
   }
   outcomes.clear();
   Transaction transaction(database_, Database::Access::write);
+  lock_leases(commands);
   for (const Command& command : commands) outcomes.push_back(apply_guarded(command));
   if (before_commit) before_commit();
   transaction.commit();
@@ -72,6 +108,7 @@ bool SqlChanges::apply_unguarded(std::span<const Command> commands, std::vector<
 }
 
 Outcome SqlChanges::run_one(const Command& command) {
+  if (!stands(command)) return 0;
   return std::visit([this](const auto& c) { return run(c); }, command);
 }
 
@@ -103,6 +140,11 @@ void SqlChanges::make_robot(const std::string& robot_id) {
 Outcome SqlChanges::run(const AddModel& c) {
   if (auto ok = check_robot_id(c.robot_id); !ok) return tl::unexpected(ok.error());
   make_robot(c.robot_id);
+  // Versions are numbered in turn.
+  if (!writer_.empty())
+    Rows(database_.statement("SELECT 1 FROM robot WHERE robot_id = ? FOR NO KEY UPDATE"))
+        .bind(c.robot_id)
+        .run();
   std::optional<std::int64_t> active;
   {
     Rows rows(database_.statement("SELECT active_version FROM robot WHERE robot_id = ?"));
@@ -205,6 +247,12 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
   chunks::append(database_, m.key, c.samples, ended, now_utime_us_());
   chunks::append(database_, m.key, c.covariates, ended, now_utime_us_());
   if (c.resume_state) put(*c.resume_state);
+  if (c.epoch != 0 && c.position)
+    Rows(database_.statement("UPDATE cluster_lease SET utime_us = ?, sequence = ? WHERE robot_id = ?"))
+        .bind(c.position->utime_us)
+        .bind(c.position->sequence)
+        .bind(m.robot_id)
+        .run_later();
   return m.key;
 }
 
@@ -244,6 +292,9 @@ Outcome SqlChanges::run(const AppendEvent& c) {
 }
 
 Outcome SqlChanges::run(const AppendAudit& c) {
+  // Each entry's hash covers the one before.
+  if (!writer_.empty())
+    Rows(database_.statement("SELECT pg_advisory_xact_lock(1246512981, hashtext(current_schema()))")).run();
   return append_audit(database_, c.entry);
 }
 
@@ -281,6 +332,13 @@ Outcome SqlChanges::run(const RemoveRobot& c) {
   change("DELETE FROM model WHERE robot_id = ?");
   change("DELETE FROM robot WHERE robot_id = ?");
   return missions;
+}
+
+Outcome SqlChanges::run(const ReleaseLease& c) {
+  Rows(database_.statement("UPDATE cluster_lease SET node = NULL WHERE robot_id = ?"))
+      .bind(c.robot_id)
+      .run_later();
+  return 0;
 }
 
 }  // namespace joulecast::history

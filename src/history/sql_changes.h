@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "base/error.h"
@@ -12,17 +14,31 @@
 
 namespace joulecast::history {
 
+struct DroppedCommands {
+  Epoch epoch = 0;  // that they carried
+  std::uint64_t count = 0;
+};
+
 // The commands as SQL, on the one writing connection.
 class SqlChanges {
  public:
-  SqlChanges(Database& database, std::function<std::int64_t()> now_utime_us);
+  // `writer`: this program's name among those that write to the store at the same time; empty: it is the only
+  // one.
+  SqlChanges(Database& database, std::function<std::int64_t()> now_utime_us, std::string writer = {});
 
   // As Store::apply. `before_commit` is called in the transaction. Throws SqlError when nothing was applied,
   // or when the COMMIT's outcome is not known; then `outcomes` are what they are if it was done.
   void apply(std::span<const Command> commands, const std::function<void()>& before_commit,
              std::vector<Outcome>& outcomes);
 
+  // The leases under which the last apply() dropped commands: they have other epochs now.
+  const std::map<std::string, DroppedCommands>& dropped() const { return dropped_; }
+
  private:
+  // Locks the leases that the commands stand under until the transaction ends.
+  void lock_leases(std::span<const Command> commands);
+  // Whether the command's lease holds, or it needs none; counts it if not.
+  bool stands(const Command& command);
   // False when a command was refused.
   bool apply_unguarded(std::span<const Command> commands, std::vector<Outcome>& outcomes);
   Outcome apply_guarded(const Command& command);
@@ -44,12 +60,18 @@ class SqlChanges {
   Outcome run(const CloseProposal& command);
   Outcome run(const PruneMissions& command);
   Outcome run(const RemoveRobot& command);
+  Outcome run(const ReleaseLease& command);
 
+  // Whether this program is the one that runs the diagnosis.
+  bool has_job(std::int64_t diagnosis_id);
   void make_robot(const std::string& robot_id);
   void put(const ResumeState& state);
 
   Database& database_;
   std::function<std::int64_t()> now_utime_us_;
+  const std::string writer_;
+  std::map<std::string, Epoch, std::less<>> epochs_;  // of the leases locked
+  std::map<std::string, DroppedCommands> dropped_;    // by robot
 };
 
 }  // namespace joulecast::history

@@ -127,11 +127,23 @@ Outcome SqlChanges::run(const AddDiagnosis& c) {
   rows.next();
   const std::int64_t id = rows.integer();
   rows.run();
+  if (!writer_.empty())
+    Rows(database_.statement("INSERT INTO cluster_job VALUES (?, ?)")).bind(id).bind(writer_).run();
   return id;
+}
+
+bool SqlChanges::has_job(std::int64_t diagnosis_id) {
+  if (writer_.empty()) return true;
+  Rows rows(
+      database_.statement("SELECT 1 FROM cluster_job WHERE diagnosis_id = ? AND writer = ? FOR UPDATE"));
+  rows.bind(diagnosis_id).bind(writer_);
+  return rows.next();
 }
 
 Outcome SqlChanges::run(const UpdateDiagnosis& c) {
   const DiagnosisRecord& d = c.diagnosis;
+  if (!has_job(d.id))
+    return fail(Fault::conflict, "id", "another daemon has taken diagnosis " + std::to_string(d.id));
   const std::string fitted_on = keys_json(d.fitted_on), held_back = keys_json(d.held_back);
   const auto changed =
       Rows(database_.statement(
@@ -152,6 +164,8 @@ Outcome SqlChanges::run(const UpdateDiagnosis& c) {
           .bind(d.id)
           .run();
   if (changed == 0) return no_diagnosis(d.id);
+  if (!writer_.empty() && d.state != DiagnosisState::queued && d.state != DiagnosisState::running)
+    Rows(database_.statement("DELETE FROM cluster_job WHERE diagnosis_id = ?")).bind(d.id).run();
   if (!c.report_html.empty()) {
     static const std::string replace = insert_or_replace("diagnosis_report", "diagnosis_id", "html");
     Rows(database_.statement(replace)).bind(d.id).bind(c.report_html).run();
@@ -160,6 +174,7 @@ Outcome SqlChanges::run(const UpdateDiagnosis& c) {
 }
 
 Outcome SqlChanges::run(const InterruptDiagnoses& c) {
+  if (!writer_.empty()) return 0;  // another daemon takes what one leaves behind
   return Rows(database_.statement(
                   "UPDATE diagnosis SET state = 'interrupted', finished_utime_us = ?, error = 'the "
                   "service stopped before it was done' WHERE state IN ('queued', 'running')"))

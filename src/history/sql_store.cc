@@ -67,7 +67,16 @@ Result<MissionKey> SqlStore::mission_key(std::string_view robot_id, std::string_
   });
   if (!stored && stored.error().fault != Fault::unavailable) return tl::unexpected(stored.error());
   if (stored && *stored) return **stored;
-  return reserved_[mission] = ++last_key_;
+  const Result<MissionKey> key = new_key();
+  if (key) reserved_[mission] = *key;
+  return key;
+}
+
+Result<std::int64_t> SqlStore::ask(const std::string& sql) const {
+  return guarded([&]() -> Result<std::int64_t> {
+    auto lease = readers_.lend();
+    return (*lease).integer(sql);
+  });
 }
 
 Result<std::optional<MissionKey>> SqlStore::earlier_mission(std::string_view robot_id,

@@ -67,8 +67,8 @@ class ReaderPool {
   std::string why_;                              // the last attempt failed
 };
 
-// What the stores have in common: every query, and the keys of missions. Its program is the only one that
-// writes, so the keys are given out in memory.
+// What the stores have in common: every query, and the keys of missions. Where its program is the only one
+// that writes, the keys are given out in memory.
 class SqlStore : public Store {
  public:
   Result<MissionKey> mission_key(std::string_view robot_id, std::string_view mission_id,
@@ -122,6 +122,12 @@ class SqlStore : public Store {
       }
     });
   }
+
+  // A key that no mission has.
+  virtual Result<MissionKey> new_key() { return ++last_key_; }
+
+  // What a statement that is no query answers, on a reading connection.
+  Result<std::int64_t> ask(const std::string& sql) const;
 
   void forget_reservations(std::span<const Command> commands, const std::vector<Outcome>& outcomes);
 

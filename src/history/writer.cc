@@ -43,6 +43,7 @@ void take_up(CheckpointMission& earlier, CheckpointMission later) {
   append(earlier.samples, later.samples);
   append(earlier.covariates, later.covariates);
   if (later.resume_state) earlier.resume_state = std::move(later.resume_state);
+  if (later.position) earlier.position = later.position;
 }
 
 }  // namespace
@@ -218,6 +219,7 @@ class Writer::Impl {
       const auto found = checkpoints_.find(checkpoint->mission.key);
       if (found == checkpoints_.end()) return false;
       waiting = found->second;
+      if (std::get<CheckpointMission>(waiting->command).epoch != checkpoint->epoch) return false;
       take_up(std::get<CheckpointMission>(waiting->command), std::move(*checkpoint));
     } else if (auto* put = std::get_if<PutLearned>(&command)) {
       const auto found = learned_.find({put->learned.robot_id, put->learned.topic});
@@ -409,6 +411,7 @@ class Writer::Impl {
     if (steps_.take_step_us() != 0) distrust_until_ = now + options_.clock_distrust;
     const Retention& keep = options_.retention;
     if (!keep.telemetry_max_age_us && !keep.telemetry_max_bytes && !options_.missions_max_age_us) return;
+    if (options_.prunes && !options_.prunes()) return;
     if (now - last_prune_ < options_.prune_interval) return;
     bool more_is_due = false;
     if ((keep.telemetry_max_age_us || options_.missions_max_age_us) && now >= distrust_until_) {

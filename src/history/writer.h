@@ -23,6 +23,7 @@ struct WriterOptions {
   Retention retention;                              // enforced every prune_interval
   std::optional<std::int64_t> missions_max_age_us;  // as PruneMissions; absent: missions are kept for ever
   std::chrono::milliseconds prune_interval{60'000};
+  std::function<bool()> prunes;  // whether this program enforces the retention now; empty: always
   // Retention by age goes by the wall clock, so it rests for this long after a step of that clock, and never
   // drops more than this share of the telemetry, or of the missions, in an hour: a wrong clock must not cost
   // the recordings.

@@ -15,7 +15,6 @@ namespace {
 using forecast::subject_count;
 using nlohmann::json;
 
-constexpr std::string_view topic = "legs";
 constexpr std::size_t most_lenders = 20;
 
 // Digits beyond the fifth are noise, and cost space.
@@ -203,6 +202,21 @@ Forecasts::Learnt Forecasts::learn(const std::shared_ptr<const ModelInForce>& mo
   slot.outlook.forecaster = slot.forecast->forecaster();
   learnt.document = document_of(slot);
   return learnt;
+}
+
+void Forecasts::learnt_elsewhere(const std::string& robot_id) {
+  Entry* slot = nullptr;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = entries_.find(robot_id);
+    if (found == entries_.end()) return;
+    slot = found->second.get();
+  }
+  const std::lock_guard lock(slot->mutex);
+  slot->model.reset();
+  slot->forecast.reset();
+  slot->kept.clear();
+  slot->borrowed_at = -1;
 }
 
 history::Learned Forecasts::document_of(const Entry& entry) {

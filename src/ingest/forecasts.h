@@ -23,7 +23,8 @@ using answers::RobotOutlook;
 // the topic "legs", from which a restarted daemon learns again. Any thread.
 class Forecasts {
  public:
-  static constexpr std::size_t kept_missions = 40;  // in the store
+  static constexpr std::size_t kept_missions = 40;   // in the store
+  static constexpr std::string_view topic = "legs";  // there
 
   explicit Forecasts(const history::Store& store);
   ~Forecasts();
@@ -40,6 +41,9 @@ class Forecasts {
     std::optional<forecast::Drift> drift;
   };
   Learnt learn(const std::shared_ptr<const ModelInForce>& model, forecast::PastMission mission);
+
+  // Another daemon has learnt of the robot: what the store has is read again when it is next asked for.
+  void learnt_elsewhere(const std::string& robot_id);
 
   // As if the mission that started then had not been. What is left is learnt anew. Empty: it was not learnt
   // from, or is no longer kept.

@@ -24,13 +24,15 @@ constexpr std::int64_t live_us = 5'000'000;  // a robot not received from for lo
 
 class IngestService::Impl {
  public:
-  Impl(IngestOptions options, const ModelRegistry& models, Forecasts& forecasts, SessionOutputs outputs)
+  Impl(IngestOptions options, const ModelRegistry& models, Forecasts& forecasts, SessionOutputs outputs,
+       Keeping* keeping)
       : options_(std::move(options)),
         models_(models),
         forecasts_(forecasts),
         outputs_(outputs),
         signatures_(options_.signatures),
-        pipeline_(options_.session, options_.max_unknown_robots, models, std::move(outputs)) {}
+        keeping_(keeping),
+        pipeline_(options_.session, options_.max_unknown_robots, models, std::move(outputs), keeping) {}
 
   ~Impl() { stop(); }
 
@@ -140,6 +142,7 @@ class IngestService::Impl {
         work.swap(queue_);
         last = draining_ && work.empty();
       }
+      survive("accounting", [&] { pipeline_.follow_orders(); });
       for (const InboundMessage& message : work) survive("accounting", [&] { pipeline_.handle(message); });
       work.clear();
       if (const std::int64_t step_us = clock_steps_.take_step_us(); step_us != 0)
@@ -172,6 +175,7 @@ class IngestService::Impl {
   void publish_energy_states() {
     const std::int64_t now = host_utime_us();
     for (const auto& snapshot : outputs_.fleet.all()) {
+      if (keeping_ != nullptr && keeping_->epoch_of(snapshot->robot_id) == 0) continue;
       if (!snapshot->has_model || now - snapshot->received_utime_us > live_us ||
           snapshot->sample.utime_us == 0)
         continue;
@@ -211,6 +215,7 @@ class IngestService::Impl {
   Forecasts& forecasts_;
   SessionOutputs outputs_;
   SignatureGate signatures_;  // the receiver's
+  Keeping* keeping_;
   Pipeline pipeline_;
   ClockSteps clock_steps_;  // the accountant's
   std::unique_ptr<telemetry::LcmLink> link_;
@@ -226,8 +231,8 @@ class IngestService::Impl {
 };
 
 IngestService::IngestService(IngestOptions options, const ModelRegistry& models, Forecasts& forecasts,
-                             SessionOutputs outputs)
-    : impl_(std::make_unique<Impl>(std::move(options), models, forecasts, std::move(outputs))) {}
+                             SessionOutputs outputs, Keeping* keeping)
+    : impl_(std::make_unique<Impl>(std::move(options), models, forecasts, std::move(outputs), keeping)) {}
 IngestService::~IngestService() = default;
 Result<void> IngestService::start() {
   return impl_->start();

@@ -37,8 +37,9 @@ struct IngestStatus {
 // ticks it, and publishes each live robot's ENERGY_STATE.
 class IngestService {
  public:
+  // `keeping`: as Pipeline's.
   IngestService(IngestOptions options, const ModelRegistry& models, Forecasts& forecasts,
-                SessionOutputs outputs);
+                SessionOutputs outputs, Keeping* keeping = nullptr);
   ~IngestService();
 
   // Recovers open missions, opens LCM and starts the threads.

@@ -10,21 +10,27 @@ namespace {
 constexpr std::size_t waiting_units = 131'072;  // some 30 MB of messages
 constexpr std::int64_t stranger_silence_us = 60'000'000, forget_period_us = 1'000'000,
                        tell_period_us = 600'000'000;
+// Of robots that others keep: longer than a daemon that is gone stays unnoticed, with the time to go on.
+constexpr std::int64_t held_us = 30'000'000;
+constexpr std::size_t held_room = 1'000'000;    // some 300 MB
+constexpr std::int64_t recalled_missions = 16;  // that a robot may repeat the events of
 
 }  // namespace
 
 Pipeline::Pipeline(const SessionSettings& settings, std::size_t max_unknown_robots,
-                   const ModelRegistry& models, SessionOutputs outputs)
+                   const ModelRegistry& models, SessionOutputs outputs, Keeping* keeping)
     : settings_(settings),
       max_unknown_robots_(max_unknown_robots),
       models_(models),
       outputs_(std::move(outputs)),
-      waiting_room_(waiting_units) {}
+      waiting_room_(waiting_units),
+      keeping_(keeping),
+      held_(held_us, held_room) {}
 
-Pipeline::Robot& Pipeline::add(const std::string& robot_id) {
+Pipeline::Robot& Pipeline::add(const std::string& robot_id, const SessionOutputs& outputs) {
   strangers_.erase(robot_id);
   auto made = std::unique_ptr<Robot>(
-      new Robot{{robot_id, settings_, outputs_}, {settings_.sender_takeover_us, waiting_room_}});
+      new Robot{{robot_id, settings_, outputs}, {settings_.sender_takeover_us, waiting_room_}});
   const auto model = models_.find(robot_id);
   made->had_model = model != nullptr;
   made->session.set_model(model);
@@ -33,15 +39,18 @@ Pipeline::Robot& Pipeline::add(const std::string& robot_id) {
 
 Pipeline::Robot* Pipeline::find(const std::string& robot_id) {
   if (const auto found = robots_.find(robot_id); found != robots_.end()) return found->second.get();
-  return models_.find(robot_id) != nullptr ? &add(robot_id) : nullptr;
+  if (keeping_ != nullptr) return nullptr;
+  return models_.find(robot_id) != nullptr ? &add(robot_id, outputs_) : nullptr;
 }
 
 Result<void> Pipeline::recover() {
+  if (keeping_ != nullptr) return {};
   Result<std::vector<history::Mission>> open = outputs_.store.recover();
   if (!open) return tl::unexpected(std::move(open.error()));
   for (const history::Mission& mission : *open) {
     const auto found = robots_.find(mission.robot_id);
-    RobotSession& session = found != robots_.end() ? found->second->session : add(mission.robot_id).session;
+    RobotSession& session =
+        found != robots_.end() ? found->second->session : add(mission.robot_id, outputs_).session;
     session.resume(mission);
     session.publish();
   }
@@ -59,17 +68,102 @@ void Pipeline::refresh_models() {
       (each++)->second->session.set_model(model);
       continue;
     }
-    // A robot that was removed: its mission ends, and it is a stranger from now on.
+    // A robot that was removed: its mission ends, and its messages are counted only.
     for (const InboundMessage& held : each->second->gate.release(std::numeric_limits<std::int64_t>::max()))
       deliver(each->second->session, held);
     each->second->session.on_tick(std::numeric_limits<std::int64_t>::max());
     outputs_.fleet.remove(each->first);
-    each = robots_.erase(each);
+    if (keeping_ == nullptr) {
+      each = robots_.erase(each);
+    } else {  // the lease goes on, and so does the robot when it is given a model again
+      each->second->had_model = false;
+      (each++)->second->session.set_model(nullptr);
+    }
   }
   for (auto stranger = strangers_.begin(); stranger != strangers_.end();) {
     const std::string id = (stranger++)->first;
-    if (models_.find(id) != nullptr) add(id);
+    if (models_.find(id) == nullptr) continue;
+    if (keeping_ == nullptr)
+      add(id, outputs_);
+    else
+      strangers_.erase(id);
   }
+}
+
+SessionOutputs Pipeline::outputs_under(history::Epoch epoch) const {
+  SessionOutputs outputs = outputs_;
+  outputs.post = [post = outputs_.post, epoch](history::Command command) {
+    put_under(command, epoch);
+    post(std::move(command));
+  };
+  return outputs;
+}
+
+void Pipeline::hold(const InboundMessage& message) {
+  if (std::holds_alternative<RefusedMessage>(message.content)) return;
+  keeping_->hear(message.robot_id, message.host_utime_us);
+  keeping_->held_dropped += held_.add(message);
+}
+
+void Pipeline::follow_orders() {
+  if (keeping_ == nullptr) return;
+  if (keeping_->has_orders()) {
+    Keeping::Orders orders = keeping_->take_orders();
+    for (const Keeping::Withdrawal& each : orders.withdrawals) let_go(each);
+    for (Keeping::Grant& each : orders.grants) granted_.push_back(std::move(each));
+  }
+  if (granted_.empty()) return;
+  refresh_models();
+  std::erase_if(granted_, [this](const Keeping::Grant& grant) { return take_up(grant); });
+}
+
+bool Pipeline::take_up(const Keeping::Grant& grant) {
+  const std::string& id = grant.robot_id;
+  RobotSession::Handover handover;
+  handover.position = grant.position;
+  history::MissionFilter of_robot;
+  of_robot.robot_ids = {id};
+  const auto latest = outputs_.store.missions(of_robot, {.limit = recalled_missions, .cursor = {}}, {});
+  const auto energy = outputs_.store.resume_state(id);
+  if (!latest || !energy) return false;
+  handover.missions = latest->missions;
+  if (*energy) handover.winding_temperature_c = (*energy)->winding_temperature_c;
+  for (const history::Mission& mission : handover.missions) {
+    if (mission.state != history::MissionState::open) continue;
+    const auto tail = outputs_.store.telemetry(
+        mission.key, {mission.end_utime_us - RobotSession::tail_us, history::whole_future},
+        {.limit = history::max_telemetry_samples, .cursor = {}});
+    if (!tail) return false;
+    handover.tail = tail->samples;
+    ++keeping_->resumed_missions;
+    break;
+  }
+  Robot& robot = add(id, outputs_under(grant.epoch));
+  robot.epoch = grant.epoch;
+  robot.session.take_over(handover);
+  const std::deque<InboundMessage> held = held_.take(id);
+  robot.session.begin_repeats();
+  for (const InboundMessage& message : held) deliver(robot, message);
+  robot.session.end_repeats();
+  keeping_->replayed_messages += held.size();
+  robot.session.publish();
+  return true;
+}
+
+void Pipeline::suspend(Robot& robot) const {
+  for (const InboundMessage& each : robot.gate.release(std::numeric_limits<std::int64_t>::max()))
+    deliver(robot.session, each);
+  keeping_ != nullptr ? robot.session.hand_over() : robot.session.suspend();
+}
+
+void Pipeline::let_go(const Keeping::Withdrawal& withdrawal) {
+  std::erase_if(granted_, [&](const Keeping::Grant& grant) { return grant.robot_id == withdrawal.robot_id; });
+  const auto found = robots_.find(withdrawal.robot_id);
+  if (withdrawal.orderly) {
+    if (found != robots_.end()) suspend(*found->second);
+    outputs_.post(history::ReleaseLease{withdrawal.robot_id, withdrawal.epoch});
+  }
+  if (found != robots_.end()) robots_.erase(found);
 }
 
 bool Pipeline::discard_unknown_robot(std::int64_t host_utime_us) {
@@ -122,14 +216,21 @@ void Pipeline::deliver(RobotSession& session, const InboundMessage& message) {
 void Pipeline::handle(const InboundMessage& message) {
   refresh_models();
   Robot* robot = find(message.robot_id);
+  if (robot == nullptr && keeping_ != nullptr && models_.find(message.robot_id) != nullptr)
+    return hold(message);
   if (robot == nullptr) return count_unknown_robot(message);
+  if (keeping_ != nullptr) keeping_->hear(message.robot_id, message.host_utime_us);
+  deliver(*robot, message);
+}
+
+void Pipeline::deliver(Robot& robot, const InboundMessage& message) {
   if (const auto* refused = std::get_if<RefusedMessage>(&message.content))
-    return robot->session.note_fault(refused->fault, 1, refused->why, message.host_utime_us);
-  const SenderGate::Verdict verdict = robot->gate.take(message);
-  for (const InboundMessage& each : verdict.released) deliver(robot->session, each);
+    return robot.session.note_fault(refused->fault, 1, refused->why, message.host_utime_us);
+  const SenderGate::Verdict verdict = robot.gate.take(message);
+  for (const InboundMessage& each : verdict.released) deliver(robot.session, each);
   if (verdict.refused > 0)
-    robot->session.on_fault(IngestFault::second_sender, verdict.refused, robot->gate.describe());
-  if (verdict.pass) deliver(robot->session, message);
+    robot.session.on_fault(IngestFault::second_sender, verdict.refused, robot.gate.describe());
+  if (verdict.pass) deliver(robot.session, message);
 }
 
 void Pipeline::tick(std::int64_t host_utime_us) {
@@ -138,6 +239,9 @@ void Pipeline::tick(std::int64_t host_utime_us) {
     for (const InboundMessage& each : robot->gate.release(host_utime_us)) deliver(robot->session, each);
     robot->session.on_tick(host_utime_us);
   }
+  if (keeping_ == nullptr) return;
+  held_.forget_older(host_utime_us);
+  keeping_->held_messages = held_.size();
 }
 
 void Pipeline::on_host_clock_step(std::int64_t host_utime_us, std::int64_t step_us) {
@@ -158,11 +262,10 @@ void Pipeline::finish() {
 }
 
 void Pipeline::suspend() {
-  for (auto& [id, robot] : robots_) {
-    for (const InboundMessage& each : robot->gate.release(std::numeric_limits<std::int64_t>::max()))
-      deliver(robot->session, each);
-    robot->session.suspend();
-  }
+  for (auto& [id, robot] : robots_) suspend(*robot);
+  if (keeping_ == nullptr) return;
+  follow_orders();
+  for (const auto& [id, epoch] : keeping_->kept()) outputs_.post(history::ReleaseLease{id, epoch});
 }
 
 }  // namespace joulecast::ingest

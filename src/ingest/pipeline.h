@@ -4,9 +4,12 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
+#include "ingest/held_messages.h"
 #include "ingest/inbound_message.h"
+#include "ingest/keeping.h"
 #include "ingest/robot_session.h"
 #include "ingest/sender_gate.h"
 
@@ -16,11 +19,15 @@ namespace joulecast::ingest {
 // messages are counted, of a bounded number of ids. The daemon and the offline replay run this same code.
 class Pipeline {
  public:
+  // `keeping`: which robots this daemon of a cluster keeps; null: all.
   Pipeline(const SessionSettings& settings, std::size_t max_unknown_robots, const ModelRegistry& models,
-           SessionOutputs outputs);
+           SessionOutputs outputs, Keeping* keeping = nullptr);
 
-  // Opens sessions for the missions that were open when the last daemon stopped.
+  // Opens sessions for the missions that were open when the last daemon stopped. In a cluster leases do.
   Result<void> recover();
+
+  // Takes up robots that this daemon of a cluster is to keep from now on, and lets others go. Call often.
+  void follow_orders();
 
   void handle(const InboundMessage& message);
 
@@ -32,7 +39,7 @@ class Pipeline {
   void publish();
   // Ends missions as if the robots had fallen silent for good; for offline replay.
   void finish();
-  // Checkpoints all open missions, to be resumed by the next daemon.
+  // Checkpoints all open missions, to be resumed by the next daemon, and lets the leases go.
   void suspend();
 
  private:
@@ -40,6 +47,7 @@ class Pipeline {
     RobotSession session;
     SenderGate gate;
     bool had_model = false;
+    history::Epoch epoch = 0;  // of its lease, in a cluster
   };
   struct Stranger {
     RobotSnapshot snapshot;
@@ -47,7 +55,14 @@ class Pipeline {
   };
 
   Robot* find(const std::string& robot_id);
-  Robot& add(const std::string& robot_id);
+  Robot& add(const std::string& robot_id, const SessionOutputs& outputs);
+  void deliver(Robot& robot, const InboundMessage& message);
+  void hold(const InboundMessage& message);
+  // False when the store cannot be read for now.
+  bool take_up(const Keeping::Grant& grant);
+  void let_go(const Keeping::Withdrawal& withdrawal);
+  void suspend(Robot& robot) const;
+  SessionOutputs outputs_under(history::Epoch epoch) const;
   static void deliver(RobotSession& session, const InboundMessage& message);
   void count_unknown_robot(const InboundMessage& message);
   // Makes room for another unknown robot by discarding one that has long been silent.
@@ -62,6 +77,9 @@ class Pipeline {
   std::size_t waiting_room_;  // of all gates
   std::map<std::string, std::unique_ptr<Robot>, std::less<>> robots_;
   std::map<std::string, Stranger, std::less<>> strangers_;
+  Keeping* keeping_;
+  HeldMessages held_;
+  std::vector<Keeping::Grant> granted_;  // to be taken up
   std::int64_t forgot_utime_us_ = 0, told_utime_us_ = 0;
 };
 

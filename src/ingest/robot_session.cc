@@ -192,6 +192,45 @@ void RobotSession::resume(const history::Mission& mission) {
   changed_ = true;
 }
 
+void RobotSession::take_over(const Handover& handover) {
+  const history::Mission* open = nullptr;
+  for (auto each = handover.missions.rbegin(); each != handover.missions.rend(); ++each) {
+    if (each->state == history::MissionState::open) {
+      open = &*each;
+      continue;
+    }
+    const bool was_said = !each->implicit && (each->state == history::MissionState::finished ||
+                                              each->state == history::MissionState::aborted);
+    missions_.recall(
+        {each->mission_id, each->start_utime_us, each->end_utime_us, each->payload_kg, each->implicit},
+        was_said);
+  }
+  taken_in_ = handover.position;
+  if (handover.position) {
+    const auto& [utime_us, sequence] = *handover.position;
+    order_.start_after(sequence, utime_us);
+    if (open == nullptr || handover.tail.empty()) (void)sequence_.place(sequence, utime_us);
+    last_sequence_ = sequence;
+  }
+  if (open == nullptr) return;
+  resume(*open);
+  if (!handover.tail.empty()) meter_tail(handover);
+}
+
+void RobotSession::meter_tail(const Handover& handover) {
+  for (const signals::Sample& sample : handover.tail) (void)sequence_.place(sample.sequence, sample.utime_us);
+  if (meter_ == nullptr) return;
+  open_->resumed_silent = false;
+  meter_->resume(open_->record.accounts, open_->record.end_utime_us, handover.winding_temperature_c);
+  for (const signals::Sample& sample : handover.tail) {
+    signals::Sample counted = sample;
+    counted.payload_kg = open_->payload.take(sample.payload_kg);
+    const double climb_rad = covariates_.climb_at(model_->drive.parameters(), counted);
+    if (const Result<void> metered = meter_->add(counted, climb_rad); !metered)
+      outputs_.warn(robot_id_, describe(metered.error()));
+  }
+}
+
 void RobotSession::on_fault(IngestFault fault, std::uint64_t count, std::string why) {
   outputs_.counters.add(fault, count);
   note_fault(fault, count, std::move(why), snapshot_.received_utime_us);
@@ -233,6 +272,9 @@ bool RobotSession::is_too_far_ahead(std::int64_t utime_us, std::int64_t host_uti
 void RobotSession::on_sample(const signals::Sample& sample, std::int64_t host_utime_us) {
   snapshot_.received_utime_us = host_utime_us;
   if (model_ == nullptr) return on_fault(IngestFault::unknown_robot);
+  if (repeats_ && taken_in_ && sample.sequence <= taken_in_->sequence &&
+      sample.utime_us <= taken_in_->utime_us)
+    return;
   contradictions_->hear();
   if (const auto fault = telemetry::check_plausible(sample))
     return on_fault(IngestFault::implausible, 1, telemetry::describe(*fault));
@@ -460,6 +502,7 @@ void RobotSession::keep(const signals::Sample& sample) {
   ++open_->record.samples;
   ++open_->unsaved;
   open_->samples.push_back(sample);
+  taken_in_ = {sample.utime_us, sample.sequence};
   if (open_->samples.size() >= settings_.checkpoint_samples) checkpoint();
 }
 
@@ -533,7 +576,7 @@ void RobotSession::on_event(const signals::MissionEvent& event, std::int64_t hos
   telemetry::MissionActions actions = missions_.on_event(event);
   if (actions.empty()) ++event_allowance_;  // robots may repeat themselves
   carry_out(actions);
-  if (refused() != before) on_fault(IngestFault::bad_event);
+  if (refused() != before && !repeats_) on_fault(IngestFault::bad_event);
   changed_ = true;
 }
 
@@ -542,8 +585,9 @@ void RobotSession::on_covariates(const signals::CovariateMessage& message, std::
     return on_fault(IngestFault::implausible, 1, "covariates: " + telemetry::describe(*fault));
   if (is_too_far_ahead(message.utime_us, host_utime_us)) return;
   const std::size_t before = covariates_.pending();
-  covariates_.take(message,
-                   [this](IngestFault fault, std::string why) { on_fault(fault, 1, std::move(why)); });
+  covariates_.take(message, [this](IngestFault fault, std::string why) {
+    if (!repeats_) on_fault(fault, 1, std::move(why));
+  });
   outputs_.counters.covariate_changes.fetch_add(covariates_.pending() - before, std::memory_order_relaxed);
   if (open_ == nullptr || covariates_.pending() < settings_.checkpoint_samples) return;
   if (!open_->stored) begin_record();
@@ -643,7 +687,7 @@ void RobotSession::close(const telemetry::MissionAction& action) {
     checkpoint();
     remember_charge();
     if (learn && outputs_.mission_ended && model_ != nullptr)
-      outputs_.mission_ended(model_, {record.start_utime_us, legs_->take()});
+      outputs_.mission_ended(outputs_.post, model_, {record.start_utime_us, legs_->take()});
   } else {
     on_fault(IngestFault::empty_mission);
     (void)covariates_.settle(record);
@@ -684,6 +728,7 @@ void RobotSession::checkpoint() {
   command.mission = open_->record;
   command.trace = trace_.take();
   command.samples = std::exchange(open_->samples, {});
+  command.position = taken_in_;
   open_->unsaved = 0;
   if (std::isfinite(snapshot_.state_of_charge)) {
     command.resume_state = history::ResumeState{robot_id_, snapshot_.sample.utime_us, last_sequence_,
@@ -736,6 +781,12 @@ void RobotSession::suspend() {
   order_.flush();
   release_held();
   flush_meter();
+  hand_over();
+}
+
+void RobotSession::hand_over() {
+  order_.flush();
+  release_held();
   remember_charge();
   if (open_ != nullptr) checkpoint();
   publish();

@@ -51,8 +51,11 @@ struct SessionOutputs {
   FleetView& fleet;
   IngestCounters& counters;
   std::function<void(const std::string& robot_id, const std::string& text)> warn;
-  // Told of each mission that ended and may be learnt from, with its legs; may be empty.
-  std::function<void(const std::shared_ptr<const ModelInForce>& model, forecast::PastMission mission)>
+  // Told of each mission that ended and may be learnt from, with its legs, and of how to post what comes of
+  // it; may be empty.
+  using Post = std::function<void(history::Command)>;
+  std::function<void(const Post& post, const std::shared_ptr<const ModelInForce>& model,
+                     forecast::PastMission mission)>
       mission_ended = {};
 };
 
@@ -73,6 +76,20 @@ class RobotSession {
   // Goes on with a mission that was open when the last daemon stopped.
   void resume(const history::Mission& mission);
 
+  // Goes on where another daemon stopped that kept the robot before. What that one had received and not
+  // stored, and what it did store, comes again between begin_repeats() and end_repeats().
+  struct Handover {
+    std::vector<history::Mission> missions;           // the latest, newest first; one of them may be open
+    std::vector<signals::Sample> tail;                // the end of the open one's stored samples
+    std::optional<history::StreamPosition> position;  // of the last sample that missions took in
+    std::array<double, 2> winding_temperature_c{signals::unmeasured, signals::unmeasured};
+  };
+  // What take_over() wants of the tail: from so long before the open mission's end on.
+  static constexpr std::int64_t tail_us = 5'000'000;
+  void take_over(const Handover& handover);
+  void begin_repeats() { repeats_ = true; }
+  void end_repeats() { repeats_ = false; }
+
   void on_sample(const signals::Sample& sample, std::int64_t host_utime_us);
   void on_event(const signals::MissionEvent& event, std::int64_t host_utime_us);
   // Opens no mission and is no sign that the robot's telemetry lives.
@@ -89,6 +106,8 @@ class RobotSession {
   void on_tick(std::int64_t host_utime_us);
   // Checkpoints and publishes at once; for an orderly stop, which leaves an open mission to be resumed.
   void suspend();
+  // The same for another daemon to take_over(), which goes on with the meter's last samples itself.
+  void hand_over();
 
   // Publishes the snapshot if anything changed since the last one.
   void publish();
@@ -130,6 +149,7 @@ class RobotSession {
   void close(const telemetry::MissionAction& action);
   void checkpoint();
   void on_point(const energy::MeterPoint& point);
+  void meter_tail(const Handover& handover);
   void meter_with(std::shared_ptr<const ModelInForce> model);
   void flush_meter();
   void refresh_record();
@@ -160,6 +180,8 @@ class RobotSession {
   std::unique_ptr<OpenMission> open_;
   RobotSnapshot snapshot_;
   std::int64_t last_sequence_ = 0;
+  std::optional<history::StreamPosition> taken_in_;  // the last sample that a mission took in
+  bool repeats_ = false;
   double event_allowance_;
   std::int64_t event_utime_us_ = 0;  // host's, when it was last counted up
   struct Told {

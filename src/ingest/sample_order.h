@@ -20,6 +20,11 @@ class SampleOrder {
   SampleOrder(std::int64_t window_us, std::int64_t backward_jump_us, Sink sink)
       : window_us_(window_us), backward_jump_us_(backward_jump_us), sink_(std::move(sink)) {}
 
+  // Goes on after a sample that was passed on elsewhere; before the first.
+  void start_after(std::int64_t sequence, std::int64_t utime_us) {
+    next_ = sequence + 1;
+    newest_utime_us_ = utime_us;
+  }
   // False: a duplicate of one that waits.
   bool take(const signals::Sample& sample, std::int64_t host_utime_us);
   // Passes on what has waited long enough.

@@ -77,6 +77,13 @@ void MissionTracker::resume(OpenMission mission) {
   current_ = std::move(mission);
 }
 
+void MissionTracker::recall(OpenMission mission, bool was_said) {
+  std::optional<std::int64_t> said_us;
+  if (was_said) explicit_end_us_ = said_us = mission.last_utime_us;
+  remember({std::move(mission.mission_id), mission.start_utime_us, said_us, mission.start_utime_us,
+            mission.last_utime_us});
+}
+
 void MissionTracker::close_if_over(MissionActions& actions, std::int64_t utime_us) {
   const bool implicit = current_->implicit;
   const std::int64_t silent_us = utime_us - current_->last_utime_us;

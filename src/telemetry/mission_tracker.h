@@ -100,6 +100,9 @@ class MissionTracker {
   void on_clock_step(std::int64_t utime_us);
   // Continue a mission that a restarted service finds open in its store.
   void resume(OpenMission mission);
+  // Before that: missions of the past, oldest first, so that what the robot repeats of them is known again.
+  // `was_said`: the robot said that it ended.
+  void recall(OpenMission mission, bool was_said);
 
   // The mission open now.
   [[nodiscard]] const std::optional<OpenMission>& current() const noexcept { return current_; }

@@ -1,0 +1,82 @@
+#include "server/cluster/assignment.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <utility>
+
+namespace joulecast::server {
+namespace {
+
+// FNV-1a of both names, mixed by the finalizer of MurmurHash3: the same in every build and on every machine.
+std::uint64_t weight(std::string_view node, std::string_view robot_id) {
+  std::uint64_t hash = 14695981039346656037ULL;
+  const auto take = [&hash](std::string_view text) {
+    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
+    hash = (hash ^ 0xff) * 1099511628211ULL;
+  };
+  take(node);
+  take(robot_id);
+  hash = (hash ^ hash >> 33) * 0xff51afd7ed558ccdULL;
+  hash = (hash ^ hash >> 33) * 0xc4ceb9fe1a85ec53ULL;
+  return hash ^ hash >> 33;
+}
+
+struct Hearers {
+  std::vector<std::string> all, settled;
+};
+
+}  // namespace
+
+std::string keeper_of(std::string_view robot_id, const std::vector<std::string>& nodes) {
+  const auto most = std::ranges::max_element(nodes, {}, [&](const std::string& node) {
+    return std::pair(weight(node, robot_id), std::string_view(node));
+  });
+  return most == nodes.end() ? std::string() : *most;
+}
+
+Assignment assign(const history::ClusterState& state, const Asker& asker) {
+  std::vector<std::string> alive;
+  std::set<std::string, std::less<>> members;
+  for (const history::Member& member : state.members) {
+    members.insert(member.node);
+    if (asker.is_alive(member)) alive.push_back(member.node);
+  }
+  std::map<std::string, Hearers, std::less<>> hearers;
+  for (const history::Hearing& each : state.hearings) {
+    if (std::ranges::find(alive, each.node) == alive.end()) continue;
+    Hearers& of_robot = hearers[each.robot_id];
+    of_robot.all.push_back(each.node);
+    if (each.since_s >= settled_s) of_robot.settled.push_back(each.node);
+  }
+  std::map<std::string, history::Lease, std::less<>> leases;
+  for (const history::Lease& lease : state.leases) leases.emplace(lease.robot_id, lease);
+  for (const auto& [robot_id, of_robot] : hearers) {
+    history::Lease none;
+    none.robot_id = robot_id;
+    leases.try_emplace(robot_id, std::move(none));
+  }
+
+  Assignment decided;
+  for (const auto& [robot_id, lease] : leases) {
+    const auto found = hearers.find(robot_id);
+    const Hearers of_robot = found == hearers.end() ? Hearers{} : found->second;
+    const bool own = lease.node == asker.node, left_over = own && !asker.keeps(lease);
+    if (left_over || lease.node.empty() || !members.contains(lease.node)) {
+      // A mission that is open must be ended even when its robot is never heard again.
+      const auto& candidates = !of_robot.settled.empty() ? of_robot.settled
+                               : !of_robot.all.empty()   ? of_robot.all
+                                                         : alive;
+      if (keeper_of(robot_id, candidates) == asker.node)
+        decided.take.push_back(lease);
+      else if (left_over)
+        decided.free.push_back(lease);
+    } else if (own && lease.taken_s >= settled_s) {
+      const std::string keeper = keeper_of(robot_id, of_robot.settled);
+      if (!keeper.empty() && keeper != asker.node) decided.hand_over.push_back(lease);
+    }
+  }
+  return decided;
+}
+
+}  // namespace joulecast::server

@@ -1,0 +1,357 @@
+#include "server/cluster/cluster.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <condition_variable>
+#include <limits>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <thread>
+#include <utility>
+
+#include "base/fault_boundary.h"
+#include "history/shared_state.h"
+#include "server/cluster/assignment.h"
+#include "server/cluster/exchange.h"
+
+namespace joulecast::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+constexpr milliseconds turn_period{250};
+constexpr milliseconds exchange_period{250};
+// A connection may be cut and made again; a daemon that was killed makes none.
+constexpr milliseconds gone_patience{1000};
+constexpr std::int64_t heard_us = 5'000'000;       // a robot not received from for longer is not heard
+constexpr std::int64_t own_heard_us = 10'000'000;  // the same of one that is kept, so that others cease first
+constexpr milliseconds job_period{2000};
+constexpr std::chrono::minutes longest_release{2};  // a writer that takes no data for so long has lost it
+
+double seconds_since(const std::optional<Clock::time_point>& then) {
+  if (!then) return std::numeric_limits<double>::quiet_NaN();
+  return std::chrono::duration<double>(Clock::now() - *then).count();
+}
+
+}  // namespace
+
+class Cluster::Impl {
+ public:
+  Impl(ClusterOptions options, Parts parts) : options_(std::move(options)), parts_(std::move(parts)) {
+    status_.name = options_.name;
+    status_.node = options_.node;
+  }
+
+  ~Impl() { leave(); }
+
+  Result<void> start(const std::string& address) {
+    leases_ = history::open_leases({options_.url, options_.name, options_.node, address, JOULECAST_VERSION,
+                                    options_.writer, options_.lifetime});
+    // One that was killed a moment ago had this name.
+    Result<void> joined = leases_->join();
+    for (const auto until = Clock::now() + options_.lifetime + gone_patience;
+         !joined && joined.error().fault == Fault::conflict && Clock::now() < until; joined = leases_->join())
+      std::this_thread::sleep_for(turn_period);
+    if (!joined) return joined;
+    {
+      const std::lock_guard lock(mutex_);
+      renewed_ = steady_since_ = Clock::now();
+      running_ = true;
+    }
+    keeper_ = std::thread([this] { keep(); });
+    exchanger_ = std::thread([this] { exchange(); });
+    return {};
+  }
+
+  void settle_down() {
+    const std::lock_guard lock(mutex_);
+    settling_ = true;
+  }
+
+  void leave() {
+    {
+      const std::lock_guard lock(mutex_);
+      if (!std::exchange(running_, false)) return;
+    }
+    wake_.notify_all();
+    keeper_.join();
+    exchanger_.join();
+    if (const Result<void> left = leases_->leave(); !left)
+      parts_.note("the cluster was not told that this daemon leaves: " + describe(left.error()));
+  }
+
+  ClusterStatus status() const {
+    const std::lock_guard lock(mutex_);
+    ClusterStatus now = status_;
+    now.read_s = seconds_since(read_);
+    now.renewed_s = seconds_since(renewed_);
+    now.kept = parts_.keeping.kept().size();
+    now.resumed_missions = parts_.keeping.resumed_missions;
+    now.replayed_messages = parts_.keeping.replayed_messages;
+    now.held_messages = parts_.keeping.held_messages;
+    now.held_dropped = parts_.keeping.held_dropped;
+    return now;
+  }
+
+  bool is_first() const {
+    const std::lock_guard lock(mutex_);
+    for (const history::Member& member : status_.state.members)
+      if (member.expires_in_s > 0) return member.node == options_.node;
+    return true;
+  }
+
+  void on_dropped(const std::string& robot_id, history::Epoch epoch, std::uint64_t count) {
+    parts_.keeping.withdraw({robot_id, epoch, false});
+    const std::lock_guard lock(mutex_);
+    if (status_.dropped_commands == 0 || Clock::now() - told_dropped_ > std::chrono::minutes(1)) {
+      told_dropped_ = Clock::now();
+      parts_.note("commands for " + robot_id + " were dropped: another daemon keeps it since");
+    }
+    status_.dropped_commands += count;
+  }
+
+ private:
+  bool wait(milliseconds period) {
+    std::unique_lock lock(mutex_);
+    wake_.wait_for(lock, period, [this] { return !running_; });
+    return running_;
+  }
+
+  void keep() {
+    for (bool again = true; again || wait(turn_period);) {
+      again = false;
+      survive("cluster leases", [&] {
+        const Result<bool> turned = turn();
+        note(turned ? Result<void>() : tl::unexpected(turned.error()));
+        again = turned.value_or(false);
+      });
+    }
+  }
+
+  void note(const Result<void>& done) {
+    std::string text;
+    {
+      const std::lock_guard lock(mutex_);
+      const std::string why = done ? std::string() : describe(done.error());
+      if (!done) steady_since_.reset();
+      if (why.empty() != status_.error.empty())
+        text =
+            done ? "the cluster's leases are renewed again" : "the cluster's leases are not renewed: " + why;
+      status_.error = why;
+    }
+    if (!text.empty()) parts_.note(text);
+  }
+
+  // True when there is more to do at once.
+  Result<bool> turn() {
+    if (Result<void> renewed = renew(); !renewed) return tl::unexpected(renewed.error());
+    if (Result<void> told = tell_heard(); !told) return tl::unexpected(told.error());
+    auto state = leases_->state();
+    if (!state) return tl::unexpected(state.error());
+    {
+      const std::lock_guard lock(mutex_);
+      status_.state = *state;
+      read_ = Clock::now();
+      if (!steady_since_) steady_since_ = read_;
+      if (settling_) return false;
+    }
+    const Result<bool> buried = bury(*state);
+    if (!buried || *buried) return buried;
+    if (Result<void> done = reassign(*state); !done) return tl::unexpected(done.error());
+    return take_jobs().map([] { return false; });
+  }
+
+  Result<void> renew() {
+    Result<void> renewed = leases_->renew();
+    if (!renewed && renewed.error().fault == Fault::conflict) {
+      // Away for too long. What was received meanwhile may have holes, so nothing of before counts.
+      parts_.keeping.withdraw_all();
+      parts_.keeping.forget_heard();
+      said_heard_.clear();
+      {
+        const std::lock_guard lock(mutex_);
+        ++status_.memberships_lost;
+        steady_since_.reset();
+      }
+      parts_.note(
+          "this daemon was away for too long, and others keep its robots; it joins the cluster again");
+      renewed = leases_->join();
+    }
+    if (renewed) {
+      const std::lock_guard lock(mutex_);
+      renewed_ = Clock::now();
+    }
+    return renewed;
+  }
+
+  Result<void> tell_heard() {
+    const std::int64_t now = parts_.now_utime_us();
+    std::set<std::string> heard;
+    for (const auto& [robot_id, utime_us] : parts_.keeping.heard()) {
+      const bool kept = parts_.keeping.epoch_of(robot_id) != 0;
+      if (now - utime_us < (kept ? own_heard_us : heard_us)) heard.insert(robot_id);
+    }
+    std::vector<std::string> more, no_longer;
+    for (const std::string& robot_id : heard)
+      if (!said_heard_.contains(robot_id)) more.push_back(robot_id);
+    for (const std::string& robot_id : said_heard_)
+      if (!heard.contains(robot_id)) no_longer.push_back(robot_id);
+    if (more.empty() && no_longer.empty()) return {};
+    Result<void> told = leases_->hear(more, no_longer);
+    if (told) said_heard_ = std::move(heard);
+    return told;
+  }
+
+  // How long this daemon has seen the database without a break.
+  Clock::duration steadily() const {
+    const std::lock_guard lock(mutex_);
+    return steady_since_ ? Clock::now() - *steady_since_ : Clock::duration::zero();
+  }
+
+  bool is_alive(const history::Member& member) const {
+    if (member.node == options_.node) return true;
+    return member.expires_in_s > 0 && !gone_since_.contains(member.incarnation);
+  }
+
+  // Ends the memberships of daemons that are gone. After the database was away all of them may look so until
+  // they have reached it again.
+  Result<bool> bury(const history::ClusterState& state) {
+    std::map<std::int64_t, Clock::time_point> gone;
+    bool any = false;
+    const auto steady = steadily();
+    for (const history::Member& member : state.members) {
+      if (member.node == options_.node) continue;
+      if (!member.connected) {
+        const auto since = gone_since_.find(member.incarnation);
+        gone.emplace(member.incarnation, since != gone_since_.end() ? since->second : Clock::now());
+      }
+      const bool expired = member.expires_in_s <= 0 && steady > options_.lifetime;
+      const bool cut_off = !member.connected && steady > gone_patience &&
+                           Clock::now() - gone.at(member.incarnation) > gone_patience;
+      if (!expired && !cut_off) continue;
+      const Result<bool> buried = leases_->bury(member);
+      if (!buried) return buried;
+      any |= *buried;
+      if (*buried)
+        parts_.note("daemon " + member.node + " of the cluster is gone: " +
+                    (cut_off ? "its connection has ended" : "it does not renew its leases"));
+    }
+    gone_since_ = std::move(gone);
+    return any;
+  }
+
+  Result<void> reassign(const history::ClusterState& state) {
+    const Assignment assigned =
+        assign(state, {options_.node, [this](const history::Member& member) { return is_alive(member); },
+                       [this](const history::Lease& lease) { return keeps(lease); }});
+    if (!assigned.take.empty()) {
+      const auto taken = leases_->take(assigned.take);
+      if (!taken) return tl::unexpected(taken.error());
+      for (const history::Lease& lease : *taken) {
+        parts_.forecasts.learnt_elsewhere(lease.robot_id);
+        parts_.keeping.grant({lease.robot_id, lease.epoch, lease.position});
+      }
+      count_taken(assigned.take, *taken);
+    }
+    for (const history::Lease& lease : assigned.hand_over) {
+      const history::Epoch epoch = parts_.keeping.epoch_of(lease.robot_id);
+      if (epoch != lease.epoch) continue;
+      parts_.keeping.withdraw({lease.robot_id, epoch, true});
+      letting_go_[lease.robot_id] = {epoch, Clock::now()};
+      const std::lock_guard lock(mutex_);
+      ++status_.handovers;
+    }
+    return assigned.free.empty() ? Result<void>() : leases_->free(assigned.free);
+  }
+
+  bool keeps(const history::Lease& lease) {
+    if (parts_.keeping.epoch_of(lease.robot_id) == lease.epoch) return true;
+    const auto found = letting_go_.find(lease.robot_id);
+    return found != letting_go_.end() && found->second.epoch == lease.epoch &&
+           Clock::now() - found->second.since < longest_release;
+  }
+
+  void count_taken(const std::vector<history::Lease>& seen, const std::vector<history::Lease>& taken) {
+    const std::lock_guard lock(mutex_);
+    status_.taken += taken.size();
+    for (const history::Lease& lease : taken) {
+      const auto before = std::ranges::find(seen, lease.robot_id, &history::Lease::robot_id);
+      if (before != seen.end() && !before->node.empty()) ++status_.takeovers;
+    }
+  }
+
+  Result<void> take_jobs() {
+    if (Clock::now() - looked_for_jobs_ < job_period || steadily() < options_.lifetime) return {};
+    looked_for_jobs_ = Clock::now();
+    const auto jobs = leases_->take_jobs();
+    if (!jobs) return tl::unexpected(jobs.error());
+    for (const std::int64_t id : *jobs) parts_.take_job(id);
+    return {};
+  }
+
+  void exchange() {
+    Exchange exchange(options_.node, history::open_shared_state(options_.url, options_.writer + "-exchange"),
+                      parts_.store, parts_.keeping, parts_.fleet, parts_.models, parts_.forecasts,
+                      parts_.now_utime_us);
+    bool told = false;
+    do {
+      survive("cluster exchange", [&] {
+        const Result<void> turned = exchange.turn();
+        if (!turned && !told)
+          parts_.note("live states are not exchanged with the other daemons: " + describe(turned.error()));
+        told = !turned;
+      });
+    } while (wait(exchange_period));
+  }
+
+  const ClusterOptions options_;
+  const Parts parts_;
+  std::unique_ptr<history::Leases> leases_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  bool running_ = false, settling_ = false;
+  ClusterStatus status_;
+  std::optional<Clock::time_point> read_, renewed_, steady_since_;
+  Clock::time_point told_dropped_;
+
+  // The keeper's own.
+  std::set<std::string> said_heard_;
+  std::map<std::int64_t, Clock::time_point> gone_since_;  // by incarnation
+  Clock::time_point looked_for_jobs_{};
+  struct Release {
+    history::Epoch epoch = 0;
+    Clock::time_point since;
+  };
+  std::map<std::string, Release> letting_go_;  // the last of each robot
+
+  std::thread keeper_, exchanger_;
+};
+
+Cluster::Cluster(ClusterOptions options, Parts parts)
+    : impl_(std::make_unique<Impl>(std::move(options), std::move(parts))) {}
+Cluster::~Cluster() = default;
+Result<void> Cluster::start(const std::string& address) {
+  return impl_->start(address);
+}
+void Cluster::settle_down() {
+  impl_->settle_down();
+}
+void Cluster::leave() {
+  impl_->leave();
+}
+ClusterStatus Cluster::status() const {
+  return impl_->status();
+}
+bool Cluster::is_first() const {
+  return impl_->is_first();
+}
+void Cluster::on_dropped(const std::string& robot_id, history::Epoch epoch, std::uint64_t count) {
+  impl_->on_dropped(robot_id, epoch, count);
+}
+
+}  // namespace joulecast::server

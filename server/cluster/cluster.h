@@ -1,0 +1,85 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "history/leases.h"
+#include "history/store.h"
+#include "ingest/fleet_view.h"
+#include "ingest/forecasts.h"
+#include "ingest/keeping.h"
+#include "ingest/model_registry.h"
+
+namespace joulecast::server {
+
+struct ClusterOptions {
+  std::string url;
+  std::string name, node;
+  std::string writer;                        // history::new_writer_name()
+  std::chrono::milliseconds lifetime{5000};  // of a membership that is not renewed
+};
+
+struct ClusterStatus {
+  std::string name, node;
+  history::ClusterState state;         // as last read
+  double read_s = 0;                   // ago; NaN: never
+  double renewed_s = 0;                // ago; NaN: never
+  std::string error;                   // why the database was not reached last; empty: it was
+  std::size_t kept = 0;                // robots
+  std::uint64_t takeovers = 0;         // robots taken from daemons that were gone
+  std::uint64_t handovers = 0;         // robots given to daemons that joined or hear them
+  std::uint64_t taken = 0;             // leases taken in all
+  std::uint64_t dropped_commands = 0;  // for the robot's lease being another's
+  std::uint64_t memberships_lost = 0;  // this daemon was away for longer than its lifetime
+  std::uint64_t resumed_missions = 0, replayed_messages = 0;
+  std::size_t held_messages = 0;
+  std::uint64_t held_dropped = 0;
+};
+
+// This daemon's part in a cluster: two threads with a connection each. One renews the membership and decides
+// which robots this daemon keeps (assignment.h), several times a second; the other exchanges live state
+// (exchange.h).
+class Cluster {
+ public:
+  // What the threads work with; all of it safe to use from any thread.
+  struct Parts {
+    const history::Store& store;
+    ingest::Keeping& keeping;
+    ingest::FleetView& fleet;
+    ingest::ModelRegistry& models;
+    ingest::Forecasts& forecasts;
+    std::function<std::int64_t()> now_utime_us;
+    std::function<void(const std::string& text)> note;  // into the log
+    // Is told of diagnoses that this daemon has to run in the place of one that is gone.
+    std::function<void(std::int64_t diagnosis_id)> take_job;
+  };
+
+  Cluster(ClusterOptions options, Parts parts);
+  ~Cluster();
+  Cluster(const Cluster&) = delete;
+  Cluster& operator=(const Cluster&) = delete;
+
+  // Joins, and starts the threads. Fault::conflict on "cluster.node" or "cluster.name".
+  Result<void> start(const std::string& address);
+  // Takes no more robots; the membership is renewed on.
+  void settle_down();
+  // Ends the membership: other daemons take what this one has let go.
+  void leave();
+
+  ClusterStatus status() const;
+  // Whether it is this daemon that does what one of them should do.
+  bool is_first() const;
+  // From any thread: so many commands were dropped for standing under this epoch.
+  void on_dropped(const std::string& robot_id, history::Epoch epoch, std::uint64_t count);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace joulecast::server

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "base/error.h"
+#include "history/shared_state.h"
+#include "history/store.h"
+#include "ingest/fleet_view.h"
+#include "ingest/forecasts.h"
+#include "ingest/keeping.h"
+#include "ingest/model_registry.h"
+
+namespace joulecast::server {
+
+// What the daemons of a cluster tell each other through the database: the live state of the robots that each
+// keeps, models that were put in force, what was learnt. After a turn, this daemon answers for the others'
+// robots as of then.
+class Exchange {
+ public:
+  Exchange(std::string node, std::unique_ptr<history::SharedState> shared, const history::Store& store,
+           ingest::Keeping& keeping, ingest::FleetView& fleet, ingest::ModelRegistry& models,
+           ingest::Forecasts& forecasts, std::function<std::int64_t()> now_utime_us);
+
+  // Call several times a second; one thread.
+  Result<void> turn();
+
+ private:
+  Result<void> tell();
+  Result<void> hear();
+  Result<void> follow_models();
+  Result<void> follow_learning();
+  Result<void> put_in_force(const std::string& robot_id, std::int64_t version);
+
+  const std::string node_;
+  const std::unique_ptr<history::SharedState> shared_;
+  const history::Store& store_;
+  ingest::Keeping& keeping_;
+  ingest::FleetView& fleet_;
+  ingest::ModelRegistry& models_;
+  ingest::Forecasts& forecasts_;
+  const std::function<std::int64_t()> now_utime_us_;
+  std::map<std::string, std::shared_ptr<const ingest::RobotSnapshot>> told_;
+  std::map<std::string, std::int64_t> learned_;
+  std::uint64_t turns_ = 0;
+};
+
+}  // namespace joulecast::server

@@ -1,0 +1,265 @@
+// Two daemons of a cluster that hear one robot: one keeps it, the other takes over at any moment. What is
+// stored at the end is what one daemon alone stores.
+
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <functional>
+
+#include "ingest/held_messages.h"
+#include "ingest/pipeline.h"
+#include "ingest/snapshot_bytes.h"
+#include "tests/ingest/harness.h"
+#include "tests/support/sample_robots.h"
+
+namespace joulecast::ingest {
+namespace {
+
+using signals::MissionEvent;
+using signals::MissionPhase;
+using signals::Sample;
+
+constexpr std::int64_t start_us = 1'750'000'000'000'000, period_us = 20'000;
+
+InboundMessage sample(std::int64_t sequence) {
+  Sample s;
+  s.utime_us = start_us + sequence * period_us;
+  s.sequence = sequence;
+  const double swing = std::sin(0.05 * static_cast<double>(sequence));
+  s.wheel_velocity_rad_s = {3 + swing, 3 - swing};
+  s.battery_voltage_v = 24 - 0.3 * swing;
+  s.battery_current_a = 2 + swing;
+  s.payload_kg = 2;
+  return {"nomad", s, s.utime_us + 1000};
+}
+
+InboundMessage event(MissionPhase phase, std::int64_t sequence, const std::string& id) {
+  const MissionEvent e{start_us + sequence * period_us - 5'000, id, phase, 2, ""};
+  return {"nomad", e, e.utime_us + 1000};
+}
+
+// Two missions with a moment of rest after each.
+std::deque<InboundMessage> drive() {
+  std::deque<InboundMessage> messages;
+  for (std::int64_t k = 0; k < 1000; ++k) {
+    if (k == 40) messages.push_back(event(MissionPhase::started, k, "one"));
+    if (k == 400) messages.push_back(event(MissionPhase::finished, k, "one"));
+    if (k == 420) messages.push_back(event(MissionPhase::started, k, "two"));
+    if (k == 900) messages.push_back(event(MissionPhase::finished, k, "two"));
+    messages.push_back(sample(k));
+  }
+  return messages;
+}
+
+// A daemon of the cluster: its pipeline, on the store that all share.
+struct Daemon {
+  Daemon(history::Store& shared, std::optional<history::StreamPosition>& position)
+      : store(shared),
+        pipeline(
+            {}, 10, models,
+            SessionOutputs{
+                shared, [this, &position](history::Command command) { apply(std::move(command), position); },
+                fleet, counters, [](const std::string&, const std::string&) {}},
+            &keeping) {
+    if (!models.put(testing::nomad(), 1)) throw std::runtime_error("the model");
+  }
+
+  // What SQL does with a lease is tested in tests/history: here the command is applied if it is of the epoch.
+  void apply(history::Command command, std::optional<history::StreamPosition>& position) {
+    if (std::holds_alternative<history::ReleaseLease>(command)) {
+      ++releases;
+      return;
+    }
+    const auto fence = history::fence_of(command);
+    EXPECT_TRUE(fence) << "a command without an epoch";
+    if (const auto* c = std::get_if<history::CheckpointMission>(&command); c != nullptr && c->position)
+      position = c->position;
+    history::put_under(command, 0);
+    const auto done = store.apply({&command, 1});
+    ASSERT_TRUE(done && done->front()) << describe(done ? done->front().error() : done.error());
+  }
+
+  void handle(const InboundMessage& message) {
+    pipeline.follow_orders();
+    pipeline.handle(message);
+    if (++handled % 25 == 0) pipeline.tick(message.host_utime_us);
+  }
+
+  history::Store& store;
+  ModelRegistry models;
+  FleetView fleet;
+  IngestCounters counters;
+  Keeping keeping;
+  int handled = 0, releases = 0;
+  Pipeline pipeline;
+};
+
+class TakeoverTest : public ::testing::Test {
+ protected:
+  std::unique_ptr<history::Store> store(const std::string& name) {
+    history::SqliteOptions options;
+    options.path = folder_.file(name);
+    auto opened = history::open_sqlite_store(options);
+    if (!opened) throw std::runtime_error(describe(opened.error()));
+    history::Command model = history::AddModel{"nomad", 1, history::ModelOrigin::file, "", "{}", {}};
+    if (!(*opened)->apply({&model, 1})) throw std::runtime_error("the robot");
+    return std::move(*opened);
+  }
+
+  static std::vector<history::Mission> missions(const history::Store& store) {
+    auto page = store.missions({}, {.limit = 100, .cursor = {}},
+                               {.by = history::MissionOrder::start, .ascending = true});
+    EXPECT_TRUE(page);
+    return page ? page->missions : std::vector<history::Mission>{};
+  }
+
+  static std::vector<std::int64_t> sequences(const history::Store& store, history::MissionKey key) {
+    std::vector<std::int64_t> numbers;
+    const auto page = store.telemetry(key, {}, {.limit = 10'000, .cursor = {}});
+    EXPECT_TRUE(page);
+    for (const Sample& s : page->samples) numbers.push_back(s.sequence);
+    return numbers;
+  }
+
+  void expect_same(const history::Store& one, const history::Store& other) {
+    const auto a = missions(one), b = missions(other);
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t k = 0; k < a.size(); ++k) {
+      EXPECT_EQ(a[k].mission_id, b[k].mission_id);
+      EXPECT_EQ(a[k].start_utime_us, b[k].start_utime_us);
+      EXPECT_EQ(a[k].end_utime_us, b[k].end_utime_us);
+      EXPECT_EQ(a[k].state, b[k].state);
+      EXPECT_EQ(a[k].samples, b[k].samples);
+      EXPECT_EQ(a[k].gap_count, 0);
+      EXPECT_EQ(a[k].sample_faults, b[k].sample_faults);
+      EXPECT_EQ(sequences(one, a[k].key), sequences(other, b[k].key));
+      EXPECT_DOUBLE_EQ(a[k].accounts.measured_j, b[k].accounts.measured_j);
+      EXPECT_NEAR(a[k].accounts.modelled_j, b[k].accounts.modelled_j, 1e-6 * b[k].accounts.modelled_j);
+      EXPECT_NEAR(a[k].accounts.duration_s, b[k].accounts.duration_s, 1e-9);
+    }
+  }
+
+  // One daemon that has it all.
+  std::unique_ptr<history::Store> alone() {
+    auto there = store("alone.db");
+    std::optional<history::StreamPosition> position;
+    Daemon daemon(*there, position);
+    daemon.keeping.grant({"nomad", 1, {}});
+    for (const InboundMessage& message : drive()) daemon.handle(message);
+    daemon.pipeline.finish();
+    return there;
+  }
+
+  testing::TemporaryFolder folder_;
+};
+
+TEST_F(TakeoverTest, GoesOnAtAnyMomentAsIfNothingHadHappened) {
+  const auto expected = alone();
+  ASSERT_EQ(missions(*expected).size(), 4u);  // one implicit before each announced one, and one after
+  const auto messages = drive();
+  for (std::size_t at = 1; at < messages.size(); at += 37) {
+    SCOPED_TRACE("taken over after message " + std::to_string(at));
+    const auto shared = store("at-" + std::to_string(at) + ".db");
+    std::optional<history::StreamPosition> position;
+    Daemon first(*shared, position), second(*shared, position);
+    first.keeping.grant({"nomad", 1, {}});
+    // The first is killed; until that is noticed nobody books what the second one hears.
+    for (std::size_t k = 0; k < messages.size(); ++k) {
+      if (k < at) first.handle(messages[k]);
+      if (k == at + 30) second.keeping.grant({"nomad", 2, position});
+      second.handle(messages[k]);
+    }
+    if (at + 30 >= messages.size()) second.keeping.grant({"nomad", 2, position});
+    second.pipeline.follow_orders();
+    second.pipeline.finish();
+    expect_same(*shared, *expected);
+    if (HasFailure()) return;
+  }
+}
+
+TEST_F(TakeoverTest, RobotsAreHandedBackAndForth) {
+  const auto expected = alone();
+  const auto shared = store("shared.db");
+  std::optional<history::StreamPosition> position;
+  Daemon one(*shared, position), other(*shared, position);
+  Daemon* keeper = &one;
+  history::Epoch epoch = 1;
+  keeper->keeping.grant({"nomad", epoch, {}});
+  int count = 0;
+  for (const InboundMessage& message : drive()) {
+    one.handle(message);
+    other.handle(message);
+    if (++count % 90 != 0) continue;
+    keeper->keeping.withdraw({"nomad", epoch, true});
+    keeper->pipeline.follow_orders();
+    EXPECT_EQ(keeper->keeping.epoch_of("nomad"), 0);
+    keeper = keeper == &one ? &other : &one;
+    keeper->keeping.grant({"nomad", ++epoch, position});
+    keeper->pipeline.follow_orders();
+  }
+  EXPECT_GT(one.releases + other.releases, 10);
+  keeper->pipeline.finish();
+  expect_same(*shared, *expected);
+}
+
+TEST_F(TakeoverTest, ADaemonThatLostARobotStoresNothingMoreOfIt) {
+  const auto shared = store("shared.db");
+  std::optional<history::StreamPosition> position;
+  Daemon daemon(*shared, position);
+  daemon.keeping.grant({"nomad", 1, {}});
+  const auto messages = drive();
+  for (std::size_t k = 0; k < 200; ++k) daemon.handle(messages[k]);
+  const auto before = missions(*shared);
+  daemon.keeping.withdraw({"nomad", 1, false});
+  for (std::size_t k = 200; k < 400; ++k) daemon.handle(messages[k]);
+  daemon.pipeline.suspend();
+  const auto after = missions(*shared);
+  ASSERT_EQ(after.size(), before.size());
+  for (std::size_t k = 0; k < after.size(); ++k) EXPECT_EQ(after[k].samples, before[k].samples);
+  EXPECT_EQ(daemon.releases, 0);
+}
+
+TEST(HeldMessages, AreBoundedByAgeAndNumber) {
+  HeldMessages held(1'000'000, 100);
+  for (std::int64_t k = 0; k < 80; ++k) EXPECT_EQ(held.add(sample(k)), 0u);
+  held.forget_older(sample(80).host_utime_us);
+  EXPECT_EQ(held.size(), 50u);  // of one second
+  std::size_t gave_way = 0;
+  for (std::int64_t k = 80; k < 200; ++k) gave_way += held.add(sample(k));
+  EXPECT_LE(held.size(), 100u);
+  EXPECT_EQ(held.size() + gave_way, 170u);
+  const auto last = held.take("nomad");
+  EXPECT_EQ(std::get<Sample>(last.back().content).sequence, 199);
+  EXPECT_EQ(held.size(), 0u);
+}
+
+TEST(SnapshotBytes, KeepEveryMember) {
+  RobotSnapshot snapshot;
+  snapshot.robot_id = "nomad";
+  snapshot.has_model = true;
+  snapshot.model_version = 7;
+  snapshot.received_utime_us = start_us;
+  snapshot.sample = std::get<Sample>(sample(3).content);
+  snapshot.mission_id = "one";
+  snapshot.accounts.measured_j = 12.5;
+  snapshot.accounts.ledger.value[2] = 3.25;
+  snapshot.charge.estimate.charge = 0.5;
+  snapshot.charge.habit.end_current_a.mean = 0.25;
+  snapshot.faults["late"] = 4;
+  snapshot.fault_notes["late"] = "why";
+  snapshot.contradictions.push_back({ContradictionKind::clock, "id", "channel", 1.5, "says", true, 9});
+  const auto bytes = snapshot_bytes(snapshot);
+  const auto back = snapshot_from_bytes(bytes);
+  ASSERT_NE(back, nullptr);
+  EXPECT_EQ(snapshot_bytes(*back), bytes);
+  EXPECT_EQ(back->sample.battery_current_a, snapshot.sample.battery_current_a);
+  EXPECT_EQ(back->accounts.measured_j, 12.5);
+  EXPECT_EQ(back->contradictions.at(0).says, "says");
+  EXPECT_TRUE(back->contradictions.at(0).untrue);
+  EXPECT_EQ(back->faults, snapshot.faults);
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    EXPECT_EQ(snapshot_from_bytes(std::span(bytes).first(size)), nullptr) << size;
+}
+
+}  // namespace
+}  // namespace joulecast::ingest
