@@ -42,7 +42,7 @@ if [ "${1:-}" = stop ]; then
   exit 0
 fi
 
-deploy/install-dependencies.sh
+deploy/install-dependencies.sh postgresql
 cmake --preset release -DJOULECAST_TESTS=OFF -B build/demo-build >/dev/null
 cmake --build build/demo-build --target joulecastd joulecast
 stop

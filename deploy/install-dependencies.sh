@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs what joulecast builds with and runs on, from Debian 12's own packages; with --tests also what only the tests
-# need. Run as root or with sudo available.
+# Installs what joulecast builds with and runs on, from Debian 12's own packages, and packages named as arguments; with
+# --tests also what only the tests need. Run as root or with sudo available.
 set -euo pipefail
 packages=(
   g++ cmake ninja-build ccache pkg-config git ca-certificates
@@ -17,6 +17,8 @@ if [ "${1:-}" = --tests ]; then
   )
   # The page's tests run on whatever node there is.
   command -v node >/dev/null && command -v npm >/dev/null || packages+=(nodejs npm)
+else
+  packages+=("$@")
 fi
 missing=()
 for package in "${packages[@]}"; do
