@@ -28,6 +28,7 @@
 #include "server/embedded.h"
 #include "server/fleet_events.h"
 #include "server/gap_metrics.h"
+#include "server/http/cors.h"
 #include "server/http/event_hub.h"
 #include "server/http/gate.h"
 #include "server/http/http_metrics.h"
@@ -73,6 +74,8 @@ bool within(milliseconds limit, std::function<void()> work) {
 
 // Without tokens only this machine is served, unless the settings say otherwise.
 Result<void> check_exposure(const Settings& settings) {
+  for (const std::string& origin : http_options(settings).allowed_origins)
+    if (Result<void> sound = http::check_origin(origin); !sound) return sound;
   const std::string& address = settings.text("http.address");
   if (http::is_loopback(address)) return {};
   if (!settings.text("auth.token_file").empty()) {
@@ -119,7 +122,8 @@ Result<std::vector<http::Endpoint>> endpoint_table(api::Services& services, Metr
   table.push_back(http::events_endpoint(events));
   for (http::Endpoint& row : http::operations_endpoints(metrics, std::move(checks)))
     table.push_back(std::move(row));
-  Result<std::vector<http::Endpoint>> documented = http::with_openapi(std::move(table), embedded_schemas());
+  Result<std::vector<http::Endpoint>> documented =
+      http::with_openapi(std::move(table), embedded_schemas(), embedded_examples());
   if (!documented) return documented;
   Result<std::vector<http::Endpoint>> page =
       web_directory.empty() ? Result<std::vector<http::Endpoint>>(http::asset_endpoints(embedded_web()))
@@ -313,7 +317,9 @@ struct Application::Parts {
     answers::write_drift(json, drift);
     std::string detail = json.take();
     log_warning("consumption has changed", {{"robot_id", robot_id}, {"drift", detail}});
-    events.publish("drift", detail, robot_id);
+    JsonWriter event;
+    event.begin_object().field("robot_id", robot_id).key("drift").raw(detail).end_object();
+    events.publish("drift", event.text(), robot_id);
     post(history::AppendEvent{{0, host_utime_us(), robot_id, "consumption_drift", std::move(detail)}});
   }
 
@@ -505,7 +511,7 @@ Result<std::string> openapi_document() {
   for (http::Endpoint& row : http::described_session_endpoints()) table.push_back(std::move(row));
   table.push_back(http::events_endpoint(events));
   for (http::Endpoint& row : http::operations_endpoints(metrics, {})) table.push_back(std::move(row));
-  return http::openapi_document(table, embedded_schemas());
+  return http::openapi_document(table, embedded_schemas(), embedded_examples());
 }
 
 }  // namespace joulecast

@@ -121,6 +121,7 @@ http::ServerOptions http_options(const Settings& settings) {
   options.address = settings.text("http.address");
   options.port = static_cast<std::uint16_t>(settings.integer("http.port"));
   options.allowed_hosts = listed(settings.text("http.allowed_hosts"));
+  options.allowed_origins = listed(settings.text("http.allowed_origins"));
   options.tls_certificate = settings.text("http.tls_certificate");
   options.tls_key = settings.text("http.tls_key");
   options.worker_threads = static_cast<unsigned>(settings.integer("http.worker_threads"));

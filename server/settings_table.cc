@@ -37,6 +37,9 @@ constexpr Setting table[] = {
      "names under which clients may address the service besides IP addresses, localhost and this host's "
      "name, "
      "separated by commas; *: any; others: 421"},
+    {"http.allowed_origins", Type::text, "", 0, 0, "",
+     "origins of pages elsewhere that browsers let use the service, such as https://fleet.example, separated "
+     "by commas; empty: none"},
     {"http.worker_threads", Type::integer, "2", 1, 64, "", "threads for requests that read the store"},
     {"http.compute_threads", Type::integer, "2", 1, 64, "", "threads for requests that compute"},
     {"http.worker_queue", Type::integer, "256", 1, 65536, "",

@@ -19,6 +19,7 @@ struct ServerOptions {
   std::uint16_t port = 0;  // 0: the system chooses, see HttpServer::port()
   // Names of this service for its clients besides IP addresses, localhost and the host's name; "*": any.
   std::vector<std::string> allowed_hosts = {};
+  std::vector<std::string> allowed_origins = {};  // of pages elsewhere that may use it; see Cors
   // PEM files of a certificate chain and its key; both empty: plain HTTP.
   std::string tls_certificate = {};
   std::string tls_key = {};
