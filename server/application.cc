@@ -41,6 +41,7 @@
 #include "server/options_of_settings.h"
 #include "server/process_metrics.h"
 #include "server/robot_metrics.h"
+#include "server/webhook_metrics.h"
 #include "telemetry/datagram_socket.h"
 
 namespace joulecast {
@@ -155,13 +156,29 @@ struct Application::Parts {
                   std::move(opened.error().message));
     store = std::move(*opened);
     take_in_spool(settings, *store);
-    writer = std::make_unique<history::Writer>(*store, writer_options(settings));
+    if (Result<void> opened_webhooks = open_webhooks(); !opened_webhooks) return opened_webhooks;
+    history::WriterOptions writing = writer_options(settings);
+    if (webhooks)
+      writing.on_event = [&hooks = *webhooks](const history::Event& event) {
+        hooks.offer(event.kind, event.robot_id, event.utime_us, event.detail_json);
+      };
+    writer = std::make_unique<history::Writer>(*store, std::move(writing));
     tell_of_faults();
 
     const std::string& directory = settings.text("robots.directory");
     Result<void> loaded = directory.empty() ? Result<void>() : load_robot_files(directory);
     if (loaded) loaded = ingest::load_stored_models(*store, models);
     return loaded ? recall_states() : loaded;
+  }
+
+  Result<void> open_webhooks() {
+    const std::string& file = settings.text("webhooks.file");
+    if (file.empty()) return {};
+    Result<std::vector<server::Webhook>> read = server::read_webhooks(file);
+    if (!read) return fail(read.error().fault, "webhooks.file", describe(read.error()));
+    webhooks = std::make_unique<server::Webhooks>(std::move(*read), webhook_options(settings));
+    server::export_webhook_metrics(metrics, *webhooks);
+    return {};
   }
 
   Result<void> start_ingest() {
@@ -308,6 +325,9 @@ struct Application::Parts {
         ended &= writer->status().attempt_s == 0;
       }
     }
+    ended &= within(milliseconds(2000), [this] {
+      if (webhooks) webhooks->stop();
+    });
     return ended;
   }
 
@@ -367,7 +387,12 @@ struct Application::Parts {
   }
 
   void run_beat() {
-    server::FleetEvents fleet_events(fleet, models, *forecasts, *store, events);
+    server::FleetEvents fleet_events(fleet, models, *forecasts, *store, events,
+                                     [this](const history::Mission& mission, const std::string& json) {
+                                       if (webhooks)
+                                         webhooks->offer("mission", mission.robot_id, mission.end_utime_us,
+                                                         json);
+                                     });
     std::unique_lock lock(beat_mutex);
     while (beating) {
       lock.unlock();
@@ -390,6 +415,7 @@ struct Application::Parts {
   ingest::IngestCounters counters;
   std::function<void(const std::string&, const std::string&)> warn;
   std::unique_ptr<history::Store> store;
+  std::unique_ptr<server::Webhooks> webhooks;  // null: nobody listens
   std::unique_ptr<history::Writer> writer;
   std::unique_ptr<ingest::IngestService> ingest;
   std::unique_ptr<server::DriftView> drift_view;
@@ -472,6 +498,13 @@ std::vector<Error> faults_of_access(const Settings& settings) {
     if (const Result<void> sound = http::check_tls(certificate, key); !sound) faults.push_back(sound.error());
   }
   return faults;
+}
+
+std::vector<Error> faults_of_webhooks(const Settings& settings) {
+  const std::string& file = settings.text("webhooks.file");
+  if (file.empty()) return {};
+  const auto webhooks = server::read_webhooks(file);
+  return webhooks ? std::vector<Error>{} : std::vector<Error>{webhooks.error()};
 }
 
 std::vector<Error> faults_of_telemetry(const Settings& settings) {

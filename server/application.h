@@ -49,6 +49,9 @@ std::vector<Error> faults_of_access(const Settings& settings);
 // What is wrong with whose telemetry is taken: the robots' keys, the list of senders.
 std::vector<Error> faults_of_telemetry(const Settings& settings);
 
+// What is wrong with the file of the webhooks and their secrets.
+std::vector<Error> faults_of_webhooks(const Settings& settings);
+
 // What is wrong with the robot files that the settings name, one a file; or with their directory.
 std::vector<Error> faulty_robot_files(const Settings& settings);
 

@@ -38,7 +38,9 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
       if (const auto mission = store_.mission(told.snapshot->mission_key)) {
         JsonWriter json;
         answers::write_mission(json, *mission);
-        hub_.publish("mission", rounded(json), snapshot->robot_id);
+        const std::string text = rounded(json);
+        hub_.publish("mission", text, snapshot->robot_id);
+        mission_ended_(*mission, text);
       }
     }
     if (told.snapshot == snapshot && told.live == live) continue;

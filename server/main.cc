@@ -96,6 +96,7 @@ int print(const joulecast::Result<std::string>& text) {
 int check(const joulecast::Settings& settings) {
   auto faulty = joulecast::faults_of_access(settings);
   for (joulecast::Error& error : joulecast::faults_of_telemetry(settings)) faulty.push_back(std::move(error));
+  for (joulecast::Error& error : joulecast::faults_of_webhooks(settings)) faulty.push_back(std::move(error));
   for (joulecast::Error& error : joulecast::faulty_robot_files(settings)) faulty.push_back(std::move(error));
   for (const joulecast::Error& error : faulty) complain(error);
   return faulty.empty() ? print(std::string("the settings are valid\n")) : 2;

@@ -4,6 +4,7 @@
 #include <sstream>
 #include <utility>
 
+#include "base/host_clock.h"
 #include "history/open_store.h"
 #include "server/logging.h"
 
@@ -113,6 +114,14 @@ server::WatchOptions watch_options(const Settings& settings) {
   options.period_s = settings.number("watch.period_s");
   options.diagnose = settings.boolean("watch.diagnose");
   for (std::string& id : listed(settings.text("watch.robots"))) options.robots.insert(std::move(id));
+  return options;
+}
+
+server::Webhooks::Options webhook_options(const Settings& settings) {
+  server::Webhooks::Options options;
+  options.queue = static_cast<std::size_t>(settings.integer("webhooks.queue"));
+  options.now_utime_us = host_utime_us;
+  options.on_error = [](const Error& error) { log_error("webhook", error); };
   return options;
 }
 

@@ -75,6 +75,11 @@ constexpr Setting table[] = {
      "file of the tokens that requests need, made by joulecast token create and read again when it changes; "
      "empty: none is needed"},
 
+    {"webhooks.file", Type::text, "", 0, 0, "",
+     "file of the URLs that are told of events, see operations.md; empty: none"},
+    {"webhooks.queue", Type::integer, "1000", 1, 1000000, "",
+     "events that may wait for one of these; beyond: the oldest is dropped and counted"},
+
     {"store.path", Type::text, "joulecast.db", 0, 0, "",
      "SQLite file of the history; beside it, PATH.spool keeps what was not committed at a stop"},
     {"store.url", Type::text, "", 0, 0, "",

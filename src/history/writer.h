@@ -32,6 +32,9 @@ struct WriterOptions {
   // Receives failed commits (the first, then once a minute), refused posted commands and recovery; called on
   // the writer's thread.
   std::function<void(const Error&)> on_error;
+  // Told of every event that is accepted, before it is committed, under the queue's lock: it must neither
+  // block nor call the writer.
+  std::function<void(const Event&)> on_event;
 };
 
 struct WriterStatus {

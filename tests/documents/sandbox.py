@@ -25,7 +25,7 @@ def free_port(kind):
 class Sandbox:
     """Commands say the ports that their readers would use; what runs uses ports that were free."""
 
-    USUAL_HTTP = ["8080", "8081", "8082", "8083", "8084", "8085"]
+    USUAL_HTTP = ["8080", "8081", "8082", "8083", "8084", "8085", "8086"]
     USUAL_LCM = ["7667", "7671", "7672", "7673", "7674"]
 
     def __init__(self, daemon, client, source):

@@ -1,4 +1,4 @@
-// http_request() of http_client.h on Beast, which appears in no other file of the client.
+// exchange() of http_client.h on Beast, which appears in no other file of this room.
 // <utility> comes first: Boost 1.74's awaitable.hpp uses std::exchange without including it.
 #include <utility>
 // clang-format off
@@ -10,13 +10,12 @@
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http.hpp>
 // clang-format on
-#include <cstdlib>
 #include <memory>
 #include <optional>
 
-#include "client/http_client.h"
+#include "http_client/http_client.h"
 
-namespace joulecast::client {
+namespace joulecast::http_client {
 namespace {
 
 namespace asio = boost::asio;
@@ -113,6 +112,7 @@ class Exchange {
     HttpReply reply;
     reply.status = message.result_int();
     reply.content_type = std::string(message[http::field::content_type]);
+    reply.link = std::string(message[http::field::link]);
     reply.body = std::move(message.body());
     outcome_ = std::move(reply);
     beast::error_code ignored;
@@ -134,26 +134,25 @@ class Exchange {
 
 }  // namespace
 
-Result<HttpReply> http_request(const ServerAddress& server, HttpMethod method, std::string_view target,
-                               std::string json_body, std::chrono::milliseconds timeout) {
+Result<HttpReply> exchange(const ServerAddress& server, const HttpRequest& wanted,
+                           std::chrono::milliseconds timeout) {
+  const HttpMethod method = wanted.method;
   const http::verb verb = method == HttpMethod::get    ? http::verb::get
                           : method == HttpMethod::post ? http::verb::post
                           : method == HttpMethod::put  ? http::verb::put
                                                        : http::verb::delete_;
-  http::request<http::string_body> request(verb, server.base_path + std::string(target), 11);
+  http::request<http::string_body> request(verb, server.base_path + wanted.target, 11);
   const bool bracketed = server.host.find(':') != std::string::npos;
   request.set(http::field::host, (bracketed ? "[" + server.host + "]" : server.host) + ":" + server.port);
   request.set(http::field::user_agent, "joulecast/" JOULECAST_VERSION);
-  request.set(http::field::accept, "application/json, application/problem+json, text/html;q=0.5");
-  if (const char* token = std::getenv("JOULECAST_TOKEN"); token != nullptr && *token != '\0')
-    request.set(http::field::authorization, std::string("Bearer ") + token);
+  for (const auto& [name, value] : wanted.headers) request.set(name, value);
   request.keep_alive(false);
   if (method != HttpMethod::get && method != HttpMethod::del) {
     request.set(http::field::content_type, "application/json");
-    request.body() = std::move(json_body);
+    request.body() = wanted.json_body;
   }
   request.prepare_payload();
   return Exchange(server, std::move(request), timeout).run();
 }
 
-}  // namespace joulecast::client
+}  // namespace joulecast::http_client
