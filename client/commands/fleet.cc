@@ -24,13 +24,21 @@ std::string mission_of(const json& state) {
   return state["mission"].is_object() ? text_of(state["mission"]["mission_id"]) : "-";
 }
 
+// "40 s", "12 min", "5 h", "3 d"; "never" for what is no number.
+std::string age_of(const json& state) {
+  if (!state["silent_s"].is_number()) return "never";
+  const double s = state["silent_s"].get<double>();
+  if (s < 100) return fmt::format("{:.0f} s", s);
+  if (s < 6000) return fmt::format("{:.0f} min", s / 60);
+  if (s < 360'000) return fmt::format("{:.0f} h", s / 3600);
+  return fmt::format("{:.0f} d", s / 86'400);
+}
+
 void print_fleet(const json& page) {
   fmt::print("{:<20} {:<8} {:>9} {:>9} {:>9} {:>9} {:>6}  {}\n", "robot", "heard", "charge %", "range km",
              "power W", "speed m/s", "model", "mission");
   for (const json& r : page["robots"]) {
-    const std::string heard = r.value("live", false)      ? "now"
-                              : r["silent_s"].is_number() ? number_of(r, "silent_s", 0) + " s"
-                                                          : "never";
+    const std::string heard = r.value("live", false) ? "now" : age_of(r);
     fmt::print("{:<20} {:<8} {:>9} {:>9} {:>9} {:>9} {:>6}  {}\n", text_of(r["robot_id"]), heard,
                number_of(r, "state_of_charge", 1, 100), number_of(r, "range_m", 2, 1e-3),
                number_of(r, "measured_power_w", 1), number_of(r, "speed_m_s", 2), text_of(r["model_version"]),
@@ -41,8 +49,7 @@ void print_fleet(const json& page) {
 
 void print_state(const json& s) {
   fmt::print("{}: {}, model version {}\n", text_of(s["robot_id"]),
-             s.value("live", false) ? "live" : "silent for " + number_of(s, "silent_s", 0) + " s",
-             text_of(s["model_version"]));
+             s.value("live", false) ? "live" : "silent for " + age_of(s), text_of(s["model_version"]));
   const auto line = [](const char* name, const std::string& text) {
     fmt::print("  {:<10} {}\n", name, text);
   };
