@@ -84,7 +84,7 @@ class Examples:
         self.document, self.folder, self.update = document, folder, update
         self.operations = {operation["operationId"]: (method.upper(), path, operation)
                            for path, item in document["paths"].items() for method, operation in item.items()}
-        self.faults, self.asked, self.requests, self.answers = [], set(), 0, 0
+        self.faults, self.asked, self.requests, self.answers, self.events = [], set(), 0, 0, 0
 
     def fault(self, text):
         self.faults.append(text)
@@ -137,6 +137,24 @@ def history_of(given, folder):
         subprocess.run([given.client, *command], check=True, stdout=subprocess.DEVNULL)
 
 
+def hold_events(examples, url, name, thing, kind):
+    """The first event of that kind has the data that the document states."""
+    _, path, operation = examples.operations[name]
+    schema = operation["responses"]["200"]["content"]["text/event-stream"]["schema"]["contentSchema"]["items"]
+    with urllib.request.urlopen(url + path.replace("{id}", thing), timeout=30) as stream:
+        event = {}
+        for line in stream:
+            key, _, value = line.decode().rstrip("\n").partition(": ")
+            if key:
+                event[key] = value
+            elif event.get("event") == kind:
+                break
+    if event.get("event") != kind:
+        return examples.fault(f"{name}: no event {kind}")
+    examples.hold(f"{name}: event {kind}", schema, {"event": kind, "data": json.loads(event["data"])})
+    examples.events += 1
+
+
 def ended(url, diagnosis):
     for _ in range(600):
         if ask(url, "GET", f"/v1/diagnoses/{diagnosis}")[1]["state"] not in ("queued", "running"):
@@ -162,6 +180,9 @@ def main():
                 if name == "getDiagnosis":
                     ended(url, 1)
                 examples.ask(url, name, thing)
+            hold_events(examples, url, "streamDiagnosis", "1", "ended")
+        with daemon(given.daemon, folder) as url:
+            hold_events(examples, url, "streamEvents", "", "state")
         made = subprocess.run([given.client, "token", "create", "--file", f"{folder}/tokens.json", "--name", "example", "--role", "plan"],
                               check=True, capture_output=True, text=True).stdout
         token = re.search(r"\S{30,}", made).group()
@@ -179,7 +200,8 @@ def main():
     undescribed = list(without_description(document))
     for place in undescribed:
         examples.fault(f"{place} has no description")
-    print(f"{examples.requests} example requests answered, {examples.answers} example answers held, {len(examples.faults)} faults")
+    print(f"{examples.requests} example requests answered, {examples.answers} example answers and "
+          f"{examples.events} events held, {len(examples.faults)} faults")
     return 1 if examples.faults else 0
 
 

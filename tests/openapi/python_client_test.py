@@ -29,8 +29,18 @@ with tempfile.TemporaryDirectory() as folder:
     with daemon(given.daemon, folder) as url:
         client = Client(url, validate=True)
         robot = json.loads((given.source / "deploy/robots/amr.json").read_text())
+        # What is stored, and what comes back to the service, keeps every digit, whatever answers are rounded to.
+        exact = {**robot, "idle_power_w": 22.123456789012345}
+        client.putRobot(id="amr", body=exact)
+        assert client.getRobot(id="amr")["model"]["idle_power_w"] == exact["idle_power_w"]
+        assert client.listRobotVersions(id="amr")["versions"][0]["model"]["idle_power_w"] == exact["idle_power_w"]
+        rounded, whole = (client.getMission(id=1, digits=digits)["energy"]["modelled_j"] for digits in (4, 17))
+        assert rounded == float(f"{whole:.4g}") != whole, (rounded, whole)
+        again = Client(url).getMission(id=1, digits=17)["energy"]["modelled_j"]
+        assert again == whole
+        voltages = client.getMissionTelemetry(id=1, limit=500)["motor_voltage_v"][0]
+        assert any(len(repr(value)) > 14 for value in voltages), "raw telemetry was rounded"
         client.putRobot(id="amr", body=robot)
-        assert client.getRobot(id="amr")["model"]["idle_power_w"] == robot["idle_power_w"]
         profile = client.computeProfile(id="amr", body={"path": [{"kind": "straight", "length_m": 10}]}, digits=17)
         assert profile["energy_j"] > 0
         rounded = client.computeProfile(id="amr", body={"path": [{"kind": "straight", "length_m": 10}]})
