@@ -1,42 +1,31 @@
 #include "client/http_client.h"
 
-#include <algorithm>
-#include <cctype>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 namespace joulecast::client {
+namespace {
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value != nullptr ? value : "";
+}
+
+}  // namespace
 
 Result<ServerAddress> parse_server_url(std::string_view url) {
-  const std::string given(url);
-  const bool tls = url.starts_with("https://");
-  if (tls || url.starts_with("http://")) {
-    url.remove_prefix(tls ? 8 : 7);
-  } else if (url.find("://") != std::string_view::npos) {
-    return invalid("--server", given + " must begin with http:// or https://");
-  }
-  const std::size_t slash = std::min(url.find('/'), url.size());
-  std::string_view authority = url.substr(0, slash);
-  std::string_view path = url.substr(slash);
-  while (path.ends_with('/')) path.remove_suffix(1);
-  ServerAddress address{{}, tls ? "443" : "80", std::string(path), tls};
-  // A colon inside brackets belongs to an IPv6 address.
-  const std::size_t bracket = authority.rfind(']');
-  const std::size_t colon = authority.rfind(':');
-  if (colon != std::string_view::npos && (bracket == std::string_view::npos || colon > bracket)) {
-    address.port = std::string(authority.substr(colon + 1));
-    authority = authority.substr(0, colon);
-    const bool digits = std::all_of(address.port.begin(), address.port.end(),
-                                    [](unsigned char c) { return std::isdigit(c) != 0; });
-    if (address.port.empty() || address.port.size() > 5 || !digits || std::stoi(address.port) > 65535) {
-      return invalid("--server", given + " has no valid port");
-    }
-  }
-  if (authority.starts_with('[') && authority.ends_with(']'))
-    authority = authority.substr(1, authority.size() - 2);
-  if (authority.empty()) return invalid("--server", given + " names no host");
-  address.host = std::string(authority);
-  return address;
+  return http_client::parse_url(url, "--server");
+}
+
+Result<HttpReply> http_request(const ServerAddress& server, HttpMethod method, std::string_view target,
+                               std::string json_body, std::chrono::milliseconds timeout,
+                               const std::string& accept) {
+  http_client::HttpRequest request{method, std::string(target), std::move(json_body), {{"Accept", accept}}};
+  if (const std::string token = environment("JOULECAST_TOKEN"); !token.empty())
+    request.headers.emplace_back("Authorization", "Bearer " + token);
+  request.certificate = {environment("JOULECAST_CLIENT_CERTIFICATE"), environment("JOULECAST_CLIENT_KEY")};
+  return http_client::exchange(server, request, timeout);
 }
 
 Error error_of(const HttpReply& reply) {

@@ -32,6 +32,7 @@
 #include "server/embedded.h"
 #include "server/fleet_events.h"
 #include "server/gap_metrics.h"
+#include "server/http/cors.h"
 #include "server/http/event_hub.h"
 #include "server/http/gate.h"
 #include "server/http/http_metrics.h"
@@ -44,6 +45,7 @@
 #include "server/options_of_settings.h"
 #include "server/process_metrics.h"
 #include "server/robot_metrics.h"
+#include "server/webhook_metrics.h"
 #include "telemetry/datagram_socket.h"
 
 namespace joulecast {
@@ -77,6 +79,8 @@ bool within(milliseconds limit, std::function<void()> work) {
 
 // Without tokens only this machine is served, unless the settings say otherwise.
 Result<void> check_exposure(const Settings& settings) {
+  for (const std::string& origin : http_options(settings).allowed_origins)
+    if (Result<void> sound = http::check_origin(origin); !sound) return sound;
   const std::string& address = settings.text("http.address");
   if (http::is_loopback(address)) return {};
   if (!settings.text("auth.token_file").empty()) {
@@ -123,7 +127,8 @@ Result<std::vector<http::Endpoint>> endpoint_table(api::Services& services, Metr
   table.push_back(http::events_endpoint(events));
   for (http::Endpoint& row : http::operations_endpoints(metrics, std::move(checks)))
     table.push_back(std::move(row));
-  Result<std::vector<http::Endpoint>> documented = http::with_openapi(std::move(table), embedded_schemas());
+  Result<std::vector<http::Endpoint>> documented =
+      http::with_openapi(std::move(table), embedded_schemas(), embedded_examples());
   if (!documented) return documented;
   Result<std::vector<http::Endpoint>> page =
       web_directory.empty() ? Result<std::vector<http::Endpoint>>(http::asset_endpoints(embedded_web()))
@@ -165,8 +170,13 @@ struct Application::Parts {
                   std::move(opened.error().message));
     store = std::move(*opened);
     take_in_spool(settings, *store);
+    if (Result<void> opened_webhooks = open_webhooks(); !opened_webhooks) return opened_webhooks;
     history::WriterOptions options = writer_options(settings);
     if (in_cluster) options.prunes = [this] { return joined && cluster->is_first(); };
+    if (webhooks)
+      options.on_event = [&hooks = *webhooks](const history::Event& event) {
+        hooks.offer(event.kind, event.robot_id, event.utime_us, event.detail_json);
+      };
     writer = std::make_unique<history::Writer>(*store, std::move(options));
     tell_of_faults();
 
@@ -174,6 +184,16 @@ struct Application::Parts {
     Result<void> loaded = directory.empty() ? Result<void>() : load_robot_files(directory);
     if (loaded) loaded = ingest::load_stored_models(*store, models);
     return loaded ? recall_states() : loaded;
+  }
+
+  Result<void> open_webhooks() {
+    const std::string& file = settings.text("webhooks.file");
+    if (file.empty()) return {};
+    Result<std::vector<server::Webhook>> read = server::read_webhooks(file);
+    if (!read) return fail(read.error().fault, "webhooks.file", describe(read.error()));
+    webhooks = std::make_unique<server::Webhooks>(std::move(*read), webhook_options(settings));
+    server::export_webhook_metrics(metrics, *webhooks);
+    return {};
   }
 
   Result<void> start_ingest() {
@@ -361,6 +381,9 @@ struct Application::Parts {
     }
     // What this daemon kept is committed and let go.
     if (cluster) ended &= within(milliseconds(2000), [this] { cluster->leave(); });
+    ended &= within(milliseconds(2000), [this] {
+      if (webhooks) webhooks->stop();
+    });
     return ended;
   }
 
@@ -370,7 +393,9 @@ struct Application::Parts {
     answers::write_drift(json, drift);
     std::string detail = json.take();
     log_warning("consumption has changed", {{"robot_id", robot_id}, {"drift", detail}});
-    events.publish("drift", detail, robot_id);
+    JsonWriter event;
+    event.begin_object().field("robot_id", robot_id).key("drift").raw(detail).end_object();
+    events.publish("drift", event.text(), robot_id);
     post(history::AppendEvent{{0, host_utime_us(), robot_id, "consumption_drift", std::move(detail)}});
   }
 
@@ -426,7 +451,12 @@ struct Application::Parts {
   }
 
   void run_beat() {
-    server::FleetEvents fleet_events(fleet, models, *forecasts, *store, events);
+    server::FleetEvents fleet_events(fleet, models, *forecasts, *store, events,
+                                     [this](const history::Mission& mission, const std::string& json) {
+                                       if (webhooks)
+                                         webhooks->offer("mission", mission.robot_id, mission.end_utime_us,
+                                                         json);
+                                     });
     std::unique_lock lock(beat_mutex);
     while (beating) {
       lock.unlock();
@@ -449,6 +479,7 @@ struct Application::Parts {
   ingest::IngestCounters counters;
   std::function<void(const std::string&, const std::string&)> warn;
   std::unique_ptr<history::Store> store;
+  std::unique_ptr<server::Webhooks> webhooks;  // null: nobody listens
   std::unique_ptr<history::Writer> writer;
   std::optional<server::ClusterOptions> in_cluster;  // absent: this daemon keeps all robots
   ingest::Keeping keeping;
@@ -537,6 +568,13 @@ std::vector<Error> faults_of_access(const Settings& settings) {
   return faults;
 }
 
+std::vector<Error> faults_of_webhooks(const Settings& settings) {
+  const std::string& file = settings.text("webhooks.file");
+  if (file.empty()) return {};
+  const auto webhooks = server::read_webhooks(file);
+  return webhooks ? std::vector<Error>{} : std::vector<Error>{webhooks.error()};
+}
+
 std::vector<Error> faults_of_telemetry(const Settings& settings) {
   std::vector<Error> faults;
   const ingest::IngestOptions options = ingest_options(settings);
@@ -585,7 +623,7 @@ Result<std::string> openapi_document() {
   for (http::Endpoint& row : http::described_session_endpoints()) table.push_back(std::move(row));
   table.push_back(http::events_endpoint(events));
   for (http::Endpoint& row : http::operations_endpoints(metrics, {})) table.push_back(std::move(row));
-  return http::openapi_document(table, embedded_schemas());
+  return http::openapi_document(table, embedded_schemas(), embedded_examples());
 }
 
 }  // namespace joulecast

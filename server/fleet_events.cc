@@ -2,8 +2,18 @@
 
 #include "answers/json/mission_json.h"
 #include "server/api/robot_json.h"
+#include "server/http/json_digits.h"
 
 namespace joulecast::server {
+namespace {
+
+std::string rounded(JsonWriter& json) {
+  std::string text = json.take();
+  http::round_numbers(text, http::usual_digits);
+  return text;
+}
+
+}  // namespace
 
 void FleetEvents::tell_contradictions(const ingest::RobotSnapshot& now, Told& told) {
   for (const ingest::Contradiction& c : now.contradictions) {
@@ -14,7 +24,7 @@ void FleetEvents::tell_contradictions(const ingest::RobotSnapshot& now, Told& to
     json.begin_object().field("robot_id", now.robot_id).key("contradiction");
     api::write_contradiction(json, c);
     json.end_object();
-    hub_.publish("contradiction", json.text(), now.robot_id);
+    hub_.publish("contradiction", rounded(json), now.robot_id);
   }
 }
 
@@ -28,7 +38,9 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
       if (const auto mission = store_.mission(told.snapshot->mission_key)) {
         JsonWriter json;
         answers::write_mission(json, *mission);
-        hub_.publish("mission", json.text(), snapshot->robot_id);
+        const std::string text = rounded(json);
+        hub_.publish("mission", text, snapshot->robot_id);
+        mission_ended_(*mission, text);
       }
     }
     if (told.snapshot == snapshot && told.live == live) continue;
@@ -38,7 +50,7 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
     std::optional<forecast::Reach> reach;
     if (model != nullptr) reach = forecasts_.reach(model, *snapshot);
     api::write_state(json, *snapshot, reach, now_utime_us);
-    hub_.publish_newest("state", json.text(), snapshot->robot_id);
+    hub_.publish_newest("state", rounded(json), snapshot->robot_id);
     told.snapshot = snapshot;
     told.live = live;
   }

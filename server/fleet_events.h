@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
+#include <utility>
 
 #include "history/store.h"
 #include "ingest/fleet_view.h"
@@ -17,9 +19,18 @@ namespace joulecast::server {
 // contradiction that is told. One thread.
 class FleetEvents {
  public:
+  // Also told of each mission that ended: the mission, and itself as JSON.
+  using MissionSink = std::function<void(const history::Mission&, const std::string& json)>;
+
   FleetEvents(const ingest::FleetView& fleet, const ingest::ModelRegistry& models,
-              ingest::Forecasts& forecasts, const history::Store& store, http::EventHub& hub)
-      : fleet_(fleet), models_(models), forecasts_(forecasts), store_(store), hub_(hub) {}
+              ingest::Forecasts& forecasts, const history::Store& store, http::EventHub& hub,
+              MissionSink mission_ended)
+      : fleet_(fleet),
+        models_(models),
+        forecasts_(forecasts),
+        store_(store),
+        hub_(hub),
+        mission_ended_(std::move(mission_ended)) {}
 
   void publish(std::int64_t now_utime_us);
 
@@ -36,6 +47,7 @@ class FleetEvents {
   ingest::Forecasts& forecasts_;
   const history::Store& store_;
   http::EventHub& hub_;
+  const MissionSink mission_ended_;
   std::map<std::string, Told> told_;
 };
 

@@ -95,8 +95,9 @@ int print(const joulecast::Result<std::string>& text) {
 
 int check(const joulecast::Settings& settings) {
   auto faulty = joulecast::faults_of_access(settings);
-  for (const auto part : {joulecast::faults_of_store, joulecast::faults_of_cluster,
-                          joulecast::faults_of_telemetry, joulecast::faulty_robot_files})
+  for (const auto part :
+       {joulecast::faults_of_store, joulecast::faults_of_cluster, joulecast::faults_of_telemetry,
+        joulecast::faults_of_webhooks, joulecast::faulty_robot_files})
     for (joulecast::Error& error : part(settings)) faulty.push_back(std::move(error));
   for (const joulecast::Error& error : faulty) complain(error);
   return faulty.empty() ? print(std::string("the settings are valid\n")) : 2;

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <utility>
 
+#include "base/host_clock.h"
 #include "history/open_store.h"
 #include "history/postgres_store.h"
 #include "server/logging.h"
@@ -154,11 +155,20 @@ http::TlsFiles tls_files(const Settings& settings) {
           .client_authorities = settings.text("http.tls_client_authorities")};
 }
 
+server::Webhooks::Options webhook_options(const Settings& settings) {
+  server::Webhooks::Options options;
+  options.queue = static_cast<std::size_t>(settings.integer("webhooks.queue"));
+  options.now_utime_us = host_utime_us;
+  options.on_error = [](const Error& error) { log_error("webhook", error); };
+  return options;
+}
+
 http::ServerOptions http_options(const Settings& settings) {
   http::ServerOptions options;
   options.address = settings.text("http.address");
   options.port = static_cast<std::uint16_t>(settings.integer("http.port"));
   options.allowed_hosts = listed(settings.text("http.allowed_hosts"));
+  options.allowed_origins = listed(settings.text("http.allowed_origins"));
   options.trusted_proxies = listed(settings.text("http.trusted_proxies"));
   options.tls = tls_files(settings);
   options.worker_threads = static_cast<unsigned>(settings.integer("http.worker_threads"));

@@ -13,6 +13,7 @@
 #include "server/http/event_hub.h"
 #include "server/http/http_server.h"
 #include "server/settings.h"
+#include "server/webhooks/webhooks.h"
 
 // What the settings mean to each part of the daemon.
 namespace joulecast {
@@ -31,6 +32,7 @@ server::DiagnosisOptions diagnosis_options(const Settings& settings);
 server::DriftOptions drift_options(const Settings& settings);
 server::WatchOptions watch_options(const Settings& settings);
 http::TlsFiles tls_files(const Settings& settings);
+server::Webhooks::Options webhook_options(const Settings& settings);
 http::ServerOptions http_options(const Settings& settings);
 http::EventHub::Options event_options(const Settings& settings);
 

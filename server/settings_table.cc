@@ -43,6 +43,9 @@ constexpr Setting table[] = {
      "IP addresses of reverse proxies, separated by commas: their X-Forwarded-For says who a request is "
      "from, in "
      "the audit and for the limits of each client, and their X-Forwarded-Proto whether it came by HTTPS"},
+    {"http.allowed_origins", Type::text, "", 0, 0, "",
+     "origins of pages elsewhere that browsers let use the service, such as https://fleet.example, separated "
+     "by commas; empty: none"},
     {"http.worker_threads", Type::integer, "2", 1, 64, "", "threads for requests that read the store"},
     {"http.compute_threads", Type::integer, "2", 1, 64, "", "threads for requests that compute"},
     {"http.worker_queue", Type::integer, "256", 1, 65536, "",
@@ -77,6 +80,11 @@ constexpr Setting table[] = {
     {"auth.token_file", Type::text, "", 0, 0, "",
      "file of the tokens that requests need, made by joulecast token create and read again when it changes; "
      "empty: none is needed"},
+
+    {"webhooks.file", Type::text, "", 0, 0, "",
+     "file of the URLs that are told of events, see operations.md; empty: none"},
+    {"webhooks.queue", Type::integer, "1000", 1, 1000000, "",
+     "events that may wait for one of these; beyond: the oldest is dropped and counted"},
 
     {"store.path", Type::text, "joulecast.db", 0, 0, "",
      "SQLite file of the history; beside it, PATH.spool keeps what was not committed at a stop"},

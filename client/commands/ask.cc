@@ -129,12 +129,12 @@ Result<std::string> ask_server(const Options& options, const Question& question,
   const auto server = parse_server_url(options.server);
   if (!server) return tl::unexpected(server.error());
   const auto timeout = std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * options.timeout_s));
-  // Without a robot's name the whole fleet is asked.
+  // All digits, as an answer from a file has them. Without a robot's name the whole fleet is asked.
   const bool fleet = options.robot_id.empty();
   const std::string path =
       fleet ? std::string("/v1/") + question.name : "/v1/robots/" + options.robot_id + "/" + question.name;
   const json body = fleet ? json{{"request", request}} : request;
-  auto reply = http_request(*server, HttpMethod::post, path, body.dump(), timeout);
+  auto reply = http_request(*server, HttpMethod::post, path + "?digits=17", body.dump(), timeout);
   if (!reply) return tl::unexpected(reply.error());
   if (!reply->ok()) return tl::unexpected(error_of(*reply));
   return std::move(reply->body);

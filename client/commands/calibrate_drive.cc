@@ -15,6 +15,7 @@
 #include "base/json_number.h"
 #include "client/commands/table.h"
 #include "client/files.h"
+#include "client/progress.h"
 #include "dynamics/drive_model.h"
 #include "energy/calibration.h"
 #include "robot/robot_file.h"
@@ -96,7 +97,9 @@ Result<Outcome> calibrate(const Options& options) {
   Outcome outcome{std::move(*calibration), {}};
   energy::MeterSettings meter;
   meter.half_window_s = energy::half_window_for(all);
+  Progress progress("accounting", "missions", all.size());
   for (const energy::DriveRun& run : all) {
+    progress.reach(outcome.missions.size());
     const auto before = energy::metered(*robot, run, meter);
     if (!before) return tl::unexpected(before.error());
     const auto after = energy::metered(outcome.calibration.robot, run, meter);

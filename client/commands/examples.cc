@@ -33,6 +33,19 @@ constexpr Examples table[] = {
     {"missions",
      "joulecast missions --server http://127.0.0.1:8080 --robot-id amr --limit 20\n"
      "joulecast missions --server http://127.0.0.1:8080 --from 2026-11-21 --state finished"},
+    {"robots", "joulecast robots --server http://127.0.0.1:8080"},
+    {"state", "joulecast state --server http://127.0.0.1:8080 --robot-id amr"},
+    {"ledger", "joulecast ledger 1 --server http://127.0.0.1:8080"},
+    {"export missions",
+     "joulecast export missions --server http://127.0.0.1:8080 --from 2026-11-21 --out missions.csv"},
+    {"export telemetry",
+     "joulecast export telemetry --server http://127.0.0.1:8080 --mission 1 --out samples.csv"},
+    {"export trace",
+     "joulecast export trace --server http://127.0.0.1:8080 --mission 1 --points 500 --out trace.csv"},
+    {"proposals", "joulecast proposals --server http://127.0.0.1:8080"},
+    {"adopt",
+     "joulecast adopt --server http://127.0.0.1:8080 --robot-id amr --model amr.json --dry-run\n"
+     "joulecast adopt --server http://127.0.0.1:8080 --robot-id amr --version 1"},
     {"check",
      "joulecast check amr.json mapping.json\n"
      "joulecast check amr.lcmlog --robot amr.json --json"},

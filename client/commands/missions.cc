@@ -1,8 +1,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <chrono>
+#include <array>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -12,8 +11,8 @@
 #include <vector>
 
 #include "client/commands/parse_time.h"
+#include "client/commands/server_answer.h"
 #include "client/commands/table.h"
-#include "client/http_client.h"
 
 namespace joulecast::client {
 namespace {
@@ -30,29 +29,6 @@ struct Options {
   std::vector<Parameter> query;
   bool json = false;
 };
-
-std::string percent_encoded(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
-                       std::string_view("-._~").find(c) != std::string_view::npos;
-    plain ? out.push_back(c) : static_cast<void>(out += fmt::format("%{:02X}", byte));
-  }
-  return out;
-}
-
-std::string text_of(const json& value) {
-  return value.is_string() ? value.get<std::string>() : value.is_null() ? "-" : value.dump();
-}
-
-// "2026-11-22T16:45:00.25Z" -> "2026-11-22 16:45:00"
-std::string to_second(const json& time) {
-  if (!time.is_string()) return "-";
-  std::string text = time.get<std::string>().substr(0, std::string_view("2026-11-22T16:45:00").size());
-  std::ranges::replace(text, 'T', ' ');
-  return text;
-}
 
 std::string joules(const json& energy, const char* name) {
   const auto found = energy.find(name);
@@ -76,10 +52,10 @@ void print_table(const json& page) {
 }
 
 Exit run(const Options& options) {
-  const auto server = parse_server_url(options.server);
-  if (!server) return report(server.error());
-  std::string target = "/v1/missions";
+  Query query;
+  Renamed renamed;
   for (const auto& [flag, name, value] : options.query) {
+    renamed.emplace_back(name, flag);
     if (!value) continue;
     std::string sent = *value;
     if (name.ends_with("_utime_us")) {
@@ -87,16 +63,10 @@ Exit run(const Options& options) {
       if (!utime_us) return report(utime_us.error());
       sent = std::to_string(*utime_us);
     }
-    target += (target.find('?') == std::string::npos ? '?' : '&') + name + '=' + percent_encoded(sent);
+    query.emplace_back(name, std::move(sent));
   }
-  const auto reply = http_request(*server, HttpMethod::get, target, {}, std::chrono::seconds(30));
+  const auto reply = ask(options.server, HttpMethod::get, target_of("/v1/missions", query), {}, renamed);
   if (!reply) return report(reply.error());
-  if (!reply->ok()) {
-    Error error = error_of(*reply);
-    const auto by_name = std::ranges::find(options.query, error.field, &Options::Parameter::name);
-    if (by_name != options.query.end()) error.field = by_name->flag;
-    return report(error);
-  }
   if (options.json) {
     std::puts(reply->body.c_str());
     return Exit::ok;
@@ -113,7 +83,7 @@ Exit run(const Options& options) {
 void add_missions(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
   auto* command = program.add_subcommand("missions", "List missions with their energy, newest first");
-  command->add_option("--server", options->server, "joulecastd to ask, host:port")->required();
+  add_server(*command, options->server);
   constexpr std::array<std::array<const char*, 3>, 10> filters{{
       {"--robot-id", "robot_id", "only this robot's"},
       {"--mission-id", "mission_id", "only those with this mission id"},

@@ -26,6 +26,7 @@
 #include "client/http_client.h"
 #include "client/interrupt.h"
 #include "client/lcm_url.h"
+#include "client/progress.h"
 #include "client/virtual_robot/fleet.h"
 #include "client/virtual_robot/truth_json.h"
 #include "signals/ids.h"
@@ -348,6 +349,7 @@ struct Sent {
 Result<Sent> publish(vr::Fleet& fleet, std::int64_t start_us, const Options& options, Outlets& outlets) {
   InterruptGuard interrupt;
   Sent sent;
+  Progress progress("simulating", "s of robot time", static_cast<std::uint64_t>(options.duration_s));
   const auto began = Clock::now();
   while (auto message = fleet.next()) {
     const double at_s = 1e-6 * static_cast<double>(message->emission.utime_us - start_us);
@@ -362,6 +364,7 @@ Result<Sent> publish(vr::Fleet& fleet, std::int64_t start_us, const Options& opt
     if (auto done = outlets.send(fleet.robot(message->robot).robot_id(), message->emission); !done)
       return tl::unexpected(done.error());
     sent.robot_time_s = at_s;
+    progress.reach(static_cast<std::uint64_t>(at_s));
     ++sent.messages;
   }
   for (const auto& message : fleet.abort()) {

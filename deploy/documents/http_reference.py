@@ -87,11 +87,43 @@ def table(title, rows):
     return [title, "", "| field | type | meaning |", "|---|---|---|", *rows, ""] if rows else []
 
 
+COMMON = """## What holds for all answers
+
+- **Digits.** Where `digits` is among the parameters, numbers with a fraction are rounded to 10 significant digits, finer than any sensor;
+  `?digits=17` gives all that a double has. What is evidence or comes back to the service (raw telemetry, covariates,
+  models, diagnoses) and all that is stored keeps every digit.
+- **Compression.** Answers of more than 1 kB, and long lists while they are made, leave coded as zstd or gzip where `Accept-Encoding`
+  has it. Not coded are event streams, and what is answered at once on the thread that serves all connections: short profiles,
+  single live states, `/version`. Files of the page and `/openapi.json` are kept gzipped.
+- **ETag.** What rarely changes (models and their versions, a mission with its ledger, trace and covariates, diagnoses, `/version`,
+  `/openapi.json`) carries an `ETag`; a request that has it in `If-None-Match` is answered 304, without a body.
+- **CSV.** Where an answer is also served as `text/csv`, `Accept: text/csv` asks for it; a header `Link` with `rel="next"` names the next page.
+- **Other origins.** A page elsewhere may use the service when `http.allowed_origins` has its origin, `https://fleet.example`; it proves
+  itself by a token. All other pages are refused what changes something, and their browsers keep answers from them.""".splitlines()
+
+
+def example(title, content):
+    """A body as the document shows it."""
+    if "example" not in content:
+        return []
+    return [title, "", "```json", *json.dumps(content["example"], indent=2, ensure_ascii=False).splitlines(), "```", ""]
+
+
+def events(document, content):
+    """Rows of a table of the kinds of events of a stream."""
+    kinds = content.get("schema", {}).get("contentSchema", {}).get("items", {}).get("oneOf", ())
+    return [f"| `{kind['properties']['event']['const']}` | {component(kind['properties']['data'])} | {cell(kind['description'])} |" for kind in kinds]
+
+
+def component(schema):
+    return f"`{schema['$ref'].rsplit('/', 1)[-1]}`"
+
+
 def render(document):
     lines = ["# HTTP reference", "", "Made from `schemas/openapi.json` by `http_reference.py`, which a test repeats. "
              "Errors are RFC 9457 problem documents that name the field and the constraint. `field` is a JSON pointer into the "
              "body, which begins with `/`, or else the bare name of a query or path parameter or of a header. Numbers nearer "
-             "to 0 than 1e-18 are told as 0, but for raw telemetry.", ""]
+             "to 0 than 1e-18 are told as 0, but for raw telemetry.", "", *COMMON, ""]
     for path, item in document["paths"].items():
         for method in ("get", "put", "post", "delete"):
             if method not in item:
@@ -108,6 +140,7 @@ def render(document):
             body = resolve(document, operation.get("requestBody", {})).get("content", {})
             for media, content in body.items():
                 lines += table(f"Body, `{media}`:", fields(document, content.get("schema", {})))
+                lines += example("For example:", content)
             problems = [status for status in operation["responses"] if not status.startswith("2")]
             for status, response in operation["responses"].items():
                 if status in problems:
@@ -120,8 +153,13 @@ def render(document):
             for status, response in operation["responses"].items():
                 if not status.startswith("2"):
                     continue
-                content = resolve(document, response).get("content", {}).get("application/json", {})
+                contents = resolve(document, response).get("content", {})
+                content = contents.get("application/json", {})
                 lines += table(f"Fields of {status}:", fields(document, content.get("schema", {})))
+                lines += example("For example, with lists cut short:", content)
+                rows = events(document, contents.get("text/event-stream", {}))
+                if rows:
+                    lines += ["Events:", "", "| event | data, a schema of `schemas/openapi.json` | when |", "|---|---|---|", *rows, ""]
     return "\n".join(lines).rstrip() + "\n"
 
 

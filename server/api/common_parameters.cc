@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/utc_time.h"
+#include "server/http/json_digits.h"
 
 namespace joulecast::api {
 
@@ -18,6 +19,16 @@ Result<std::int64_t> path_id(const http::Request& request, std::string_view thin
     return fail(Fault::not_found, "id",
                 "\"" + text + "\" names no " + std::string(thing) + ": ids are positive integers");
   return id;
+}
+
+Parameter digits_parameter() {
+  return {.name = "digits",
+          .type = Parameter::Type::integer,
+          .description = "significant digits of numbers that are no integers, " +
+                         std::to_string(http::usual_digits) + " if absent; " +
+                         std::to_string(http::all_digits) + ": all",
+          .minimum = 2,
+          .maximum = http::all_digits};
 }
 
 Parameter limit_parameter(std::string things, std::int64_t maximum) {

@@ -18,6 +18,9 @@ namespace joulecast::api {
 // The {id} of a path as the positive integer that names a `thing`. Fault::not_found for any other text.
 Result<std::int64_t> path_id(const http::Request& request, std::string_view thing);
 
+// ?digits=: how many significant ones the numbers of an answer have.
+http::Parameter digits_parameter();
+
 // ?limit=: how many `things`, e.g. "missions a page", are answered at most.
 http::Parameter limit_parameter(std::string things, std::int64_t maximum);
 
@@ -28,10 +31,14 @@ http::Parameter cursor_parameter();
 Result<std::optional<std::int64_t>> id_cursor(const http::Request& request);
 // "next_cursor": null where `cursor` is empty.
 void write_cursor(JsonWriter& json, std::string_view cursor);
-// The same for ids: null where the page is not full.
+// The cursor of a list whose cursors are ids; empty where the page is not full.
+template <class Items, class Id>
+std::string next_id_cursor(const Items& items, std::int64_t limit, Id id_of) {
+  return std::cmp_less(items.size(), limit) ? "" : std::to_string(id_of(items.back()));
+}
 template <class Items, class Id>
 void write_id_cursor(JsonWriter& json, const Items& items, std::int64_t limit, Id id_of) {
-  write_cursor(json, std::cmp_less(items.size(), limit) ? "" : std::to_string(id_of(items.back())));
+  write_cursor(json, next_id_cursor(items, limit, id_of));
 }
 
 // ?limit= and ?cursor= of a list that the store pages.

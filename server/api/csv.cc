@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/resolution.h"
+#include "server/http/json_digits.h"
 #include "server/http/text.h"
 
 namespace joulecast::api {
@@ -27,7 +28,8 @@ std::string percent_encoded(std::string_view text) {
 
 }  // namespace
 
-Csv::Csv(const std::vector<std::string>& titles) {
+Csv::Csv(const http::Request& request, const std::vector<std::string>& titles)
+    : digits_(static_cast<int>(request.query_integer("digits").value_or(http::usual_digits))) {
   for (const std::string& title : titles) field(title);
   end_row();
 }
@@ -55,7 +57,9 @@ Csv& Csv::exact(double number) {
 }
 
 Csv& Csv::field(double number) {
-  return exact(resolved(number));
+  separate();
+  if (std::isfinite(number)) text_ += http::rounded_number(http::number_text(resolved(number)), digits_);
+  return *this;
 }
 
 Csv& Csv::field(std::int64_t number) {
@@ -77,7 +81,6 @@ http::Response Csv::response(const std::string& name) {
   http::Response response;
   response.content_type = "text/csv; charset=utf-8; header=present";
   response.headers.emplace_back("Content-Disposition", "attachment; filename=\"joulecast-" + name + ".csv\"");
-  response.headers.emplace_back("Vary", "Accept");
   response.body = std::move(text_);
   return response;
 }

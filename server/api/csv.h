@@ -14,12 +14,13 @@ namespace joulecast::api {
 // that a spreadsheet would take for a formula gets an apostrophe before it.
 class Csv {
  public:
-  explicit Csv(const std::vector<std::string>& titles);
+  // Numbers are as precise as the request's ?digits= says.
+  Csv(const http::Request& request, const std::vector<std::string>& titles);
 
   Csv& field(std::string_view text);
   Csv& field(const std::string& text) { return field(std::string_view(text)); }
   Csv& field(const char* text) { return field(std::string_view(text)); }
-  Csv& field(double number);  // resolved() (base/resolution.h)
+  Csv& field(double number);  // resolved() (base/resolution.h) and rounded
   Csv& exact(double number);  // as it is, for evidence
   Csv& field(std::int64_t number);
   Csv& field(bool truth);
@@ -35,6 +36,7 @@ class Csv {
  private:
   void separate();
 
+  int digits_;
   std::string text_;
   bool comma_ = false;
 };

@@ -4,7 +4,9 @@
 
 #include "base/json_fields.h"
 #include "base/json_writer.h"
+#include "base/utc_time.h"
 #include "server/api/common_parameters.h"
+#include "server/api/csv.h"
 #include "server/api/services.h"
 #include "server/diagnosis/diagnosis_service.h"
 
@@ -107,6 +109,20 @@ Result<Response> cancel(Services& services, const Request& request) {
   return answer(services, *id, 200);
 }
 
+Response list_csv(const Services& services, const Request& request,
+                  const std::vector<history::DiagnosisRecord>& diagnoses, std::string_view next_cursor) {
+  Csv csv(request, {"id", "robot_id", "state", "cause", "created", "created_utime_us", "started_utime_us",
+                    "finished_utime_us", "model_version", "error"});
+  for (const history::DiagnosisRecord& d : diagnoses) {
+    const auto progress = services.diagnoses.progress(d.id);
+    csv.field(d.id).field(d.robot_id).field(history::name(progress ? progress->state : d.state));
+    csv.field(history::name(d.cause)).field(utc_text(d.created_utime_us)).field(d.created_utime_us);
+    csv.field(progress ? progress->started_utime_us : d.started_utime_us).field(d.finished_utime_us);
+    csv.field(d.model_version).field(d.error).end_row();
+  }
+  return csv.response("diagnoses", request, next_cursor);
+}
+
 Result<Response> list(const Services& services, const Request& request) {
   std::optional<std::string> robot;
   if (const auto id = request.query_value("robot_id")) robot = std::string(*id);
@@ -115,11 +131,13 @@ Result<Response> list(const Services& services, const Request& request) {
   if (!cursor) return tl::unexpected(cursor.error());
   const auto found = services.store.diagnoses(robot, cursor->value_or(history::whole_future), limit);
   if (!found) return tl::unexpected(found.error());
+  const auto id_of = [](const history::DiagnosisRecord& d) { return d.id; };
+  if (request.csv) return list_csv(services, request, *found, next_id_cursor(*found, limit, id_of));
   JsonWriter out;
   out.begin_object().key("diagnoses").begin_array();
   for (const history::DiagnosisRecord& d : *found) write_diagnosis(out, services, d, Detail::list);
   out.end_array();
-  write_id_cursor(out, *found, limit, [](const history::DiagnosisRecord& d) { return d.id; });
+  write_id_cursor(out, *found, limit, id_of);
   out.end_object();
   return http::json_response(out.take());
 }
@@ -216,7 +234,9 @@ std::vector<TableRow> diagnosis_rows() {
         .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},
                        limit_parameter("diagnoses a page", history::max_page_size),
                        cursor_parameter()},
-        .response_schema = "diagnosis-list"},
+        .response_schema = "diagnosis-list",
+        .csv = true,
+        .rounded = true},
        answered_by(list)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/diagnoses/{id}",
@@ -224,6 +244,7 @@ std::vector<TableRow> diagnosis_rows() {
                    .role = http::Role::read,
                    .summary = "A diagnosis: where it stands, and its result",
                    .response_schema = "diagnosis",
+                   .etag = true,
                    .error_statuses = {404}},
                   answered_by(get)});
   rows.push_back({{.method = Method::del,
@@ -241,6 +262,8 @@ std::vector<TableRow> diagnosis_rows() {
                    .role = http::Role::read,
                    .summary = "The progress of a diagnosis as server-sent events, until it has ended",
                    .response_type = "text/event-stream",
+                   .events = {{"progress", "diagnosis-progress", "while it waits or runs, at every step"},
+                              {"ended", "diagnosis-ended", "last of the stream"}},
                    .error_statuses = {404}},
                   answered_by(events)});
   rows.push_back({{.method = Method::get,

@@ -3,7 +3,9 @@
 #include <utility>
 
 #include "base/json_writer.h"
+#include "base/utc_time.h"
 #include "server/api/common_parameters.h"
+#include "server/api/csv.h"
 #include "server/api/services.h"
 
 // How a robot's gap moved over its missions, what was adopted meanwhile, and how robots of its kind do.
@@ -58,6 +60,15 @@ void write_versions(JsonWriter& out, const std::vector<history::ModelVersion>& v
   out.end_array();
 }
 
+Response gap_history_csv(const Request& request, const std::vector<drift::MissionRatio>& missions) {
+  Csv csv(request, {"id", "start", "start_utime_us", "model_version", "measured_j", "modelled_j", "ratio"});
+  for (const drift::MissionRatio& m : missions) {
+    csv.field(m.mission_key).field(utc_text(m.utime_us)).field(m.utime_us).field(m.model_version);
+    csv.field(m.measured_j).field(m.modelled_j).field(m.ratio()).end_row();
+  }
+  return csv.response("robot-" + request.param("id") + "-gap-history");
+}
+
 Result<Response> gap_history(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
   const auto model = model_of(services, id);
@@ -65,6 +76,7 @@ Result<Response> gap_history(const Services& services, const Request& request) {
   const auto missions =
       services.drift.missions(id, static_cast<std::size_t>(request.query_integer("limit").value_or(500)));
   if (!missions) return tl::unexpected(missions.error());
+  if (request.csv) return gap_history_csv(request, *missions);
   const auto marks = services.drift.marks(id);
   if (!marks) return tl::unexpected(marks.error());
   const auto siblings = services.drift.siblings(id);
@@ -88,6 +100,16 @@ Result<Response> gap_history(const Services& services, const Request& request) {
   return http::json_response(out.take());
 }
 
+Response audit_csv(const Request& request, const std::vector<history::Event>& events,
+                   std::string_view next_cursor) {
+  Csv csv(request, {"id", "time", "utime_us", "robot_id", "kind", "detail"});
+  for (const history::Event& e : events) {
+    csv.field(e.id).field(utc_text(e.utime_us)).field(e.utime_us).field(e.robot_id).field(e.kind);
+    csv.field(e.detail_json).end_row();
+  }
+  return csv.response("audit-log", request, next_cursor);
+}
+
 // The audit log: adoptions, drifts, diagnoses, mission ids that were used again.
 Result<Response> audit(const Services& services, const Request& request) {
   std::optional<std::string> robot;
@@ -97,6 +119,8 @@ Result<Response> audit(const Services& services, const Request& request) {
   const std::int64_t limit = request.query_integer("limit").value_or(100);
   const auto found = services.store.events(cursor->value_or(0), limit, robot);
   if (!found) return tl::unexpected(found.error());
+  const auto id_of = [](const history::Event& e) { return e.id; };
+  if (request.csv) return audit_csv(request, *found, next_id_cursor(*found, limit, id_of));
   JsonWriter out;
   out.begin_object().key("events").begin_array();
   for (const history::Event& e : *found) {
@@ -105,7 +129,7 @@ Result<Response> audit(const Services& services, const Request& request) {
     out.field("kind", e.kind).key("detail").raw(e.detail_json).end_object();
   }
   out.end_array();
-  write_id_cursor(out, *found, limit, [](const history::Event& e) { return e.id; });
+  write_id_cursor(out, *found, limit, id_of);
   out.end_object();
   return http::json_response(out.take());
 }
@@ -113,7 +137,6 @@ Result<Response> audit(const Services& services, const Request& request) {
 }  // namespace
 
 std::vector<TableRow> gap_history_rows() {
-  using Type = Parameter::Type;
   std::vector<TableRow> rows;
   rows.push_back(
       {{.method = Method::get,
@@ -124,8 +147,16 @@ std::vector<TableRow> gap_history_rows() {
                    "models adopted, and the robots of its kind",
         .parameters = {limit_parameter("missions, newest first", most_missions)},
         .response_schema = "gap-history",
+        .csv = true,
+        .rounded = true,
         .error_statuses = {404}},
        answered_by(gap_history)});
+  return rows;
+}
+
+std::vector<TableRow> audit_rows() {
+  using Type = Parameter::Type;
+  std::vector<TableRow> rows;
   rows.push_back(
       {{.method = Method::get,
         .path = "/v1/audit-log",
@@ -136,7 +167,8 @@ std::vector<TableRow> gap_history_rows() {
         .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},
                        limit_parameter("entries a page", history::max_page_size),
                        cursor_parameter()},
-        .response_schema = "audit-log"},
+        .response_schema = "audit-log",
+        .csv = true},
        answered_by(audit)});
   return rows;
 }

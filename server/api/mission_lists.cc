@@ -152,9 +152,9 @@ std::vector<std::string> titled(std::vector<std::string> first, std::vector<std:
 }
 
 Response list_csv(const Request& request, const history::MissionPage& page) {
-  Csv csv(titled({"id", "robot_id", "mission_id", "state", "incomplete", "incomplete_reason", "start", "end",
-                  "start_utime_us", "end_utime_us", "payload_kg", "model_version"},
-                 {"note"}));
+  Csv csv(request, titled({"id", "robot_id", "mission_id", "state", "incomplete", "incomplete_reason",
+                           "start", "end", "start_utime_us", "end_utime_us", "payload_kg", "model_version"},
+                          {"note"}));
   for (const history::Mission& m : page.missions) {
     csv.field(m.key).field(m.robot_id).field(m.mission_id).field(history::name(m.state)).field(m.incomplete);
     csv.field(m.incomplete_reason).field(utc_text(m.start_utime_us)).field(utc_text(m.end_utime_us));
@@ -249,8 +249,8 @@ void write_totals(JsonWriter& json, const history::Totals& t) {
   answers::write_ledger(json, t.accounts);
 }
 
-Response totals_csv(const std::vector<Group>& groups) {
-  Csv csv(titled({"robots", "from", "to", "missions", "measured_missions", "incomplete_missions"}));
+Response totals_csv(const Request& request, const std::vector<Group>& groups) {
+  Csv csv(request, titled({"robots", "from", "to", "missions", "measured_missions", "incomplete_missions"}));
   for (const Group& group : groups) {
     std::string robots;
     for (const std::string& id : group.robot_ids) robots += (robots.empty() ? "" : " ") + id;
@@ -272,7 +272,7 @@ Result<Response> totals(const Services& services, const Request& request) {
   const Result<std::vector<Group>> groups = groups_of(services, request, *filter);
   if (!groups) return tl::unexpected(groups.error());
   const bool grouped = request.query_value("group_by").has_value();
-  if (request.csv) return totals_csv(grouped ? *groups : std::vector<Group>{{{}, {}, {}, *all}});
+  if (request.csv) return totals_csv(request, grouped ? *groups : std::vector<Group>{{{}, {}, {}, *all}});
   JsonWriter json;
   json.begin_object();
   write_totals(json, *all);
@@ -306,7 +306,8 @@ std::vector<TableRow> mission_list_rows() {
         .parameters = with(with(filter_parameters(), sort_parameters()),
                            {limit_parameter("missions a page", history::max_page_size), cursor_parameter()}),
         .response_schema = "mission-page",
-        .csv = true},
+        .csv = true,
+        .rounded = true},
        answered_by(list)});
   rows.push_back(
       {{.method = Method::get,
@@ -326,7 +327,8 @@ std::vector<TableRow> mission_list_rows() {
                              .minimum = -1440,
                              .maximum = 1440}}),
         .response_schema = "mission-totals",
-        .csv = true},
+        .csv = true,
+        .rounded = true},
        answered_by(totals)});
   return rows;
 }

@@ -116,9 +116,25 @@ Result<Response> annul(Services& services, const Request& request) {
   return http::json_response(json.take());
 }
 
+Response ledger_csv(const Request& request, const history::Mission& mission) {
+  Csv csv(request, {"term", "energy_j"});
+  for (std::size_t k = 0; k < signals::term_count; ++k)
+    csv.field(signals::term_names[k]).field(mission.accounts.ledger.value[k]).end_row();
+  return csv.response("mission-" + std::to_string(mission.key) + "-ledger");
+}
+
+Response covariates_csv(const Request& request, const history::CovariatePage& page, history::MissionKey key) {
+  Csv csv(request, {"name", "utime_us", "value"});
+  for (const signals::CovariateSeries& series : signals::series_of(page.changes))
+    for (std::size_t k = 0; k < series.value.size(); ++k)
+      csv.field(series.name).field(series.utime_us[k]).exact(series.value[k]).end_row();
+  return csv.response("mission-" + std::to_string(key) + "-covariates", request, page.next_cursor);
+}
+
 Result<Response> ledger(const Services& services, const Request& request) {
   const Result<history::Mission> mission = mission_of(services, request);
   if (!mission) return tl::unexpected(mission.error());
+  if (request.csv) return ledger_csv(request, *mission);
   JsonWriter json;
   json.begin_object();
   json.field("id", mission->key);
@@ -131,11 +147,11 @@ Result<Response> ledger(const Services& services, const Request& request) {
   return http::json_response(json.take());
 }
 
-Response trace_csv(const history::Trace& trace, history::MissionKey key) {
-  Csv csv({"start_utime_us", "covered_s", "measured_power_min_w", "measured_power_mean_w",
-           "measured_power_max_w", "modelled_power_min_w", "modelled_power_mean_w", "modelled_power_max_w",
-           "speed_min_m_s", "speed_mean_m_s", "speed_max_m_s", "state_of_charge", "measured_j", "modelled_j",
-           "x_m", "y_m"});
+Response trace_csv(const Request& request, const history::Trace& trace, history::MissionKey key) {
+  Csv csv(request, {"start_utime_us", "covered_s", "measured_power_min_w", "measured_power_mean_w",
+                    "measured_power_max_w", "modelled_power_min_w", "modelled_power_mean_w",
+                    "modelled_power_max_w", "speed_min_m_s", "speed_mean_m_s", "speed_max_m_s",
+                    "state_of_charge", "measured_j", "modelled_j", "x_m", "y_m"});
   for (const history::TraceBucket& b : trace.buckets) {
     csv.field(b.start_utime_us).field(b.covered_s);
     for (const history::Band& band : {b.measured_power_w, b.modelled_power_w, b.speed_m_s})
@@ -150,7 +166,7 @@ Response telemetry_csv(const Request& request, const history::TelemetryPage& pag
   for (const signals::SampleField& field : signals::sample_fields)
     names.push_back(std::string(field.key) +
                     (field.part == "right" || field.part == "left" ? "." + std::string(field.part) : ""));
-  Csv csv(names);
+  Csv csv(request, names);
   for (const signals::Sample& sample : page.samples) {
     csv.field(sample.utime_us).field(sample.sequence);
     for (const double* number : signals::numbers_of(sample)) csv.exact(*number);
@@ -167,7 +183,7 @@ Result<Response> trace(const Services& services, const Request& request) {
   const Result<history::Trace> found =
       services.store.trace(*key, *range, request.query_integer("points").value_or(1000));
   if (!found) return tl::unexpected(found.error());
-  if (request.csv) return trace_csv(*found, *key);
+  if (request.csv) return trace_csv(request, *found, *key);
   JsonWriter json;
   json.begin_object();
   json.field("id", *key);
@@ -253,6 +269,7 @@ Result<Response> covariates(const Services& services, const Request& request) {
   const Result<history::CovariatePage> found =
       services.store.covariates(*key, *range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
+  if (request.csv) return covariates_csv(request, *found, *key);
   JsonWriter json;
   json.begin_object();
   json.field("id", *key);
@@ -282,6 +299,8 @@ std::vector<TableRow> mission_rows() {
                    .role = http::Role::read,
                    .summary = "One mission: its energy, measured and modelled",
                    .response_schema = "mission",
+                   .rounded = true,
+                   .etag = true,
                    .error_statuses = {404}},
                   [](Services& services, http::Endpoint& endpoint) {
                     const auto summaries = std::make_shared<MissionSummaries>(services);
@@ -299,6 +318,7 @@ std::vector<TableRow> mission_rows() {
                    "lists and the audit log keep",
         .request_schema = "annul-request",
         .response_schema = "mission",
+        .rounded = true,
         .error_statuses = {404, 409, 422},
         .run = http::Run::write},
        answered_by(annul)});
@@ -308,6 +328,9 @@ std::vector<TableRow> mission_rows() {
                    .role = http::Role::read,
                    .summary = "Where the energy of a mission went; the terms add up to the battery's energy",
                    .response_schema = "mission-ledger",
+                   .csv = true,
+                   .rounded = true,
+                   .etag = true,
                    .error_statuses = {404}},
                   answered_by(ledger)});
   rows.push_back(
@@ -324,6 +347,8 @@ std::vector<TableRow> mission_rows() {
                                    .maximum = static_cast<double>(history::max_trace_points)}}),
         .response_schema = "mission-trace",
         .csv = true,
+        .rounded = true,
+        .etag = true,
         .error_statuses = {404}},
        answered_by(trace)});
   rows.push_back(
@@ -347,6 +372,8 @@ std::vector<TableRow> mission_rows() {
         .parameters = with(
             span, {limit_parameter("changes a page", history::max_telemetry_samples), cursor_parameter()}),
         .response_schema = "mission-covariates",
+        .csv = true,
+        .etag = true,
         .error_statuses = {404}},
        answered_by(covariates)});
   return rows;

@@ -4,8 +4,10 @@
 
 #include "base/json_fields.h"
 #include "base/json_writer.h"
+#include "base/utc_time.h"
 #include "robot/robot_file.h"
 #include "server/api/common_parameters.h"
+#include "server/api/csv.h"
 #include "server/api/services.h"
 #include "server/diagnosis/diagnosed_model.h"
 #include "server/diagnosis/model_adoption.h"
@@ -244,15 +246,30 @@ Result<Response> diff(const Services& services, const Request& request) {
   return http::json_response(out.take());
 }
 
+history::ProposalState state_of(const Services& services, const history::Proposal& p) {
+  return moot_of(services, p) ? history::ProposalState::superseded : p.state;
+}
+
 void write_proposal(JsonWriter& out, const Services& services, const history::Proposal& p) {
-  const bool moot = moot_of(services, p).has_value();
-  const auto state = moot ? history::ProposalState::superseded : p.state;
   out.begin_object().field("id", p.id).field("robot_id", p.robot_id).time("created", p.created_utime_us);
-  out.field("kind", p.kind).field("state", history::name(state));
+  out.field("kind", p.kind).field("state", history::name(state_of(services, p)));
   out.field("closed_reason", closed_reason(services, p)).field("note", p.note);
   out.field("base_version", p.base_version).field("adopted_version", p.adopted_version);
   out.array("fitted_on", p.fitted_on);
   out.key("model").raw(p.model_json).key("detail").raw(p.detail_json).end_object();
+}
+
+Response proposals_csv(const Services& services, const Request& request,
+                       const std::vector<history::Proposal>& proposals, std::string_view next_cursor) {
+  Csv csv(request, {"id", "robot_id", "created", "created_utime_us", "kind", "state", "closed_reason", "note",
+                    "base_version", "adopted_version"});
+  for (const history::Proposal& p : proposals) {
+    csv.field(p.id).field(p.robot_id).field(utc_text(p.created_utime_us)).field(p.created_utime_us);
+    csv.field(p.kind).field(history::name(state_of(services, p)));
+    csv.field(closed_reason(services, p).value_or("")).field(p.note).field(p.base_version);
+    csv.field(p.adopted_version).end_row();
+  }
+  return csv.response("proposals", request, next_cursor);
 }
 
 Result<Response> proposals_of(const Services& services, const Request& request,
@@ -262,11 +279,13 @@ Result<Response> proposals_of(const Services& services, const Request& request,
   const std::int64_t limit = request.query_integer("limit").value_or(50);
   const auto found = services.store.proposals(id, cursor->value_or(history::whole_future), limit);
   if (!found) return tl::unexpected(found.error());
+  const auto id_of = [](const history::Proposal& p) { return p.id; };
+  if (request.csv) return proposals_csv(services, request, *found, next_id_cursor(*found, limit, id_of));
   JsonWriter out;
   out.begin_object().field("robot_id", id).key("proposals").begin_array();
   for (const history::Proposal& proposal : *found) write_proposal(out, services, proposal);
   out.end_array();
-  write_id_cursor(out, *found, limit, [](const history::Proposal& p) { return p.id; });
+  write_id_cursor(out, *found, limit, id_of);
   out.end_object();
   return http::json_response(out.take());
 }
@@ -295,6 +314,7 @@ std::vector<TableRow> model_rows() {
                    "back-test on missions that it was not fitted on; or puts an earlier version in force",
         .request_schema = "model-request",
         .response_schema = "model-adoption",
+        .rounded = true,
         .error_statuses = {404, 409, 422},
         .run = http::Run::write},
        answered_by(post_model)});
@@ -312,6 +332,7 @@ std::vector<TableRow> model_rows() {
                                    .description = "version after; default: the one in force",
                                    .minimum = 1}},
                    .response_schema = "version-diff",
+                   .etag = true,
                    .error_statuses = {404}},
                   answered_by(diff)});
   rows.push_back(
@@ -322,6 +343,7 @@ std::vector<TableRow> model_rows() {
         .summary = "Models that were suggested for a robot, newest first",
         .parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
         .response_schema = "proposal-list",
+        .csv = true,
         .error_statuses = {404}},
        answered_by(proposals)});
   rows.push_back(
@@ -331,7 +353,8 @@ std::vector<TableRow> model_rows() {
         .role = http::Role::read,
         .summary = "Models that were suggested for the robots of the fleet, newest first",
         .parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
-        .response_schema = "proposal-list"},
+        .response_schema = "proposal-list",
+        .csv = true},
        answered_by(all_proposals)});
   return rows;
 }

@@ -111,6 +111,7 @@ std::vector<TableRow> planning_rows() {
             "The minimum-energy motion along a path, with its certificate, against trapezoid and triangle",
         .request_schema = "profile-request",
         .response_schema = "profile",
+        .rounded = true,
         .error_statuses = {404, 422},
         .run = http::Run::compute},
        [](Services& services, http::Endpoint& endpoint) {
@@ -126,6 +127,7 @@ std::vector<TableRow> planning_rows() {
                    "the robot) or as the robot usually drives, or of a given motion",
         .request_schema = "estimate-request",
         .response_schema = "estimate",
+        .rounded = true,
         .error_statuses = {404, 422},
         .run = http::Run::compute},
        answered_by(estimate)});
@@ -153,6 +155,7 @@ std::vector<TableRow> planning_rows() {
             "it usually drives (the default: the charge must last for that) or by minimum-energy motions",
         .request_schema = "autonomy-request",
         .response_schema = "autonomy",
+        .rounded = true,
         .error_statuses = {404, 422},
         .run = http::Run::compute},
        answered_by(autonomy)});
@@ -163,6 +166,7 @@ std::vector<TableRow> planning_rows() {
                    .summary = "The autonomy of many robots in one call",
                    .request_schema = "fleet-autonomy-request",
                    .response_schema = "fleet-autonomy",
+                   .rounded = true,
                    .error_statuses = {422},
                    .run = http::Run::compute},
                   answered_by([](Services& services, const Request& r) {

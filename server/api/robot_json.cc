@@ -8,16 +8,16 @@ namespace {
 
 constexpr double live_s = 5;
 
-double silence_s(const ingest::RobotSnapshot& s, std::int64_t now_utime_us) {
-  return s.received_utime_us > 0 ? static_cast<double>(now_utime_us - s.received_utime_us) * 1e-6
-                                 : signals::unmeasured;
-}
-
 void write_sides(JsonWriter& json, std::string_view name, const std::array<double, 2>& sides) {
   json.key(name).begin_array().value(sides[0]).value(sides[1]).end_array();
 }
 
 }  // namespace
+
+double silence_s(const ingest::RobotSnapshot& s, std::int64_t now_utime_us) {
+  return s.received_utime_us > 0 ? static_cast<double>(now_utime_us - s.received_utime_us) * 1e-6
+                                 : signals::unmeasured;
+}
 
 void write_charge(JsonWriter& json, const ingest::ChargeView& charge) {
   const battery::ChargeEstimate& estimate = charge.estimate;

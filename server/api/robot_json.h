@@ -8,6 +8,9 @@
 
 namespace joulecast::api {
 
+// Since the last message, by the host's clock; NaN when none came.
+double silence_s(const ingest::RobotSnapshot& snapshot, std::int64_t now_utime_us);
+
 // Received from within the last seconds.
 bool is_live(const ingest::RobotSnapshot& snapshot, std::int64_t now_utime_us);
 

@@ -5,9 +5,11 @@
 #include <thread>
 #include <utility>
 
+#include "base/utc_time.h"
 #include "robot/review.h"
 #include "robot/robot_file.h"
 #include "server/api/common_parameters.h"
+#include "server/api/csv.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
 
@@ -20,7 +22,13 @@ using http::Response;
 
 constexpr std::int64_t most_robots = 10'000;  // a page
 
-void write_robot_state(JsonWriter& json, const Services& services, const std::string& robot_id) {
+// What is known of a robot now, and how far it still goes.
+struct KnownState {
+  ingest::RobotSnapshot snapshot;
+  std::optional<forecast::Reach> reach;
+};
+
+KnownState known_state(const Services& services, const std::string& robot_id) {
   const auto model = services.models.find(robot_id);
   auto snapshot = services.fleet.find(robot_id);
   ingest::RobotSnapshot silent;
@@ -36,10 +44,57 @@ void write_robot_state(JsonWriter& json, const Services& services, const std::st
     silent.model_version = model != nullptr ? model->version : 0;
     snapshot.reset();
   }
-  const ingest::RobotSnapshot& now = snapshot != nullptr ? *snapshot : silent;
-  std::optional<forecast::Reach> reach;
-  if (model != nullptr) reach = services.forecasts.reach(model, now);
-  write_state(json, now, reach, services.now_utime_us());
+  KnownState known{snapshot != nullptr ? *snapshot : silent, std::nullopt};
+  if (model != nullptr) known.reach = services.forecasts.reach(model, known.snapshot);
+  return known;
+}
+
+void write_robot_state(JsonWriter& json, const Services& services, const std::string& robot_id) {
+  const KnownState known = known_state(services, robot_id);
+  write_state(json, known.snapshot, known.reach, services.now_utime_us());
+}
+
+Csv fleet_csv(const Request& request) {
+  return {request,
+          {"robot_id",
+           "live",
+           "silent_s",
+           "time",
+           "utime_us",
+           "has_model",
+           "model_version",
+           "measured_power_w",
+           "modelled_power_w",
+           "speed_m_s",
+           "yaw_rate_rad_s",
+           "x_m",
+           "y_m",
+           "heading_rad",
+           "payload_kg",
+           "battery_voltage_v",
+           "battery_current_a",
+           "state_of_charge",
+           "state_of_charge_sd",
+           "range_m",
+           "run_time_s",
+           "mission_id",
+           "samples"}};
+}
+
+void add_row(Csv& csv, const KnownState& known, std::int64_t now_utime_us) {
+  const ingest::RobotSnapshot& s = known.snapshot;
+  const std::int64_t heard_us = s.sample.utime_us;
+  csv.field(s.robot_id).field(is_live(s, now_utime_us)).field(silence_s(s, now_utime_us));
+  csv.field(heard_us != 0 ? utc_text(heard_us) : "")
+      .field(heard_us != 0 ? std::optional(heard_us) : std::nullopt);
+  csv.field(s.has_model).field(s.has_model ? std::optional(s.model_version) : std::nullopt);
+  csv.field(s.measured_power_w).field(s.modelled_power_w).field(s.speed_m_s).field(s.yaw_rate_rad_s);
+  for (const double place : s.sample.pose) csv.field(place);
+  csv.field(s.sample.payload_kg).field(s.sample.battery_voltage_v).field(s.sample.battery_current_a);
+  csv.field(s.state_of_charge).field(s.charge.estimate.sd);
+  csv.field(known.reach ? known.reach->range_m[1] : signals::unmeasured);
+  csv.field(known.reach ? known.reach->run_time_s[1] : signals::unmeasured);
+  csv.field(s.mission_id).field(static_cast<std::int64_t>(s.samples)).end_row();
 }
 
 Result<Response> list(const Services& services, const Request& request) {
@@ -49,6 +104,12 @@ Result<Response> list(const Services& services, const Request& request) {
   const std::int64_t limit = request.query_integer("limit").value_or(most_robots);
   auto next = ids.upper_bound(std::string(request.query_value("cursor").value_or("")));
   std::string last;
+  if (request.csv) {
+    Csv csv = fleet_csv(request);
+    for (std::int64_t k = 0; k < limit && next != ids.end(); ++k, ++next)
+      add_row(csv, known_state(services, last = *next), services.now_utime_us());
+    return csv.response("robots", request, next == ids.end() ? "" : last);
+  }
   JsonWriter json;
   json.begin_object().key("robots").begin_array();
   for (std::int64_t k = 0; k < limit && next != ids.end(); ++k, ++next)
@@ -205,7 +266,9 @@ std::vector<TableRow> robot_rows() {
         .summary = "The fleet: every robot that has a model or has sent telemetry, by id, with its live "
                    "state",
         .parameters = {limit_parameter("robots a page", most_robots), cursor_parameter()},
-        .response_schema = "robot-list"},
+        .response_schema = "robot-list",
+        .csv = true,
+        .rounded = true},
        answered_by(list)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/robots/{id}",
@@ -213,6 +276,7 @@ std::vector<TableRow> robot_rows() {
                    .role = http::Role::read,
                    .summary = "A robot's model in force",
                    .response_schema = "robot-detail",
+                   .etag = true,
                    .error_statuses = {404}},
                   answered_by(get)});
   rows.push_back({{.method = Method::put,
@@ -246,6 +310,7 @@ std::vector<TableRow> robot_rows() {
                    .role = http::Role::read,
                    .summary = "A robot's live state: power, charge, mission, health of its telemetry",
                    .response_schema = "robot-state",
+                   .rounded = true,
                    .error_statuses = {404},
                    .run = http::Run::io},
                   answered_by(state)});
@@ -257,6 +322,7 @@ std::vector<TableRow> robot_rows() {
         .summary = "Every version of a robot's model, newest first",
         .parameters = {limit_parameter("versions a page", history::max_page_size), cursor_parameter()},
         .response_schema = "robot-version-list",
+        .etag = true,
         .error_statuses = {404}},
        answered_by(versions)});
   return rows;

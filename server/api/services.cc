@@ -3,15 +3,24 @@
 #include <iterator>
 #include <utility>
 
+#include "server/api/common_parameters.h"
+
 namespace joulecast::api {
 
 namespace {
 
 std::vector<TableRow> table() {
+  constexpr std::pair<const char*, std::vector<TableRow> (*)()> parts[] = {
+      {"robots", robot_rows},          {"models", model_rows},     {"diagnosis", diagnosis_rows},
+      {"diagnosis", gap_history_rows}, {"access", audit_rows},     {"operations", cluster_rows},
+      {"missions", mission_list_rows}, {"missions", mission_rows}, {"planning", planning_rows}};
   std::vector<TableRow> all;
-  for (const auto part : {robot_rows, model_rows, diagnosis_rows, gap_history_rows, audit_rows,
-                          mission_list_rows, mission_rows, planning_rows, cluster_rows}) {
+  for (const auto& [tag, part] : parts) {
     std::vector<TableRow> rows = part();
+    for (TableRow& row : rows) {
+      row.endpoint.tag = tag;
+      if (row.endpoint.rounded) row.endpoint.parameters.push_back(digits_parameter());
+    }
     all.insert(all.end(), std::make_move_iterator(rows.begin()), std::make_move_iterator(rows.end()));
   }
   return all;

@@ -61,6 +61,7 @@ std::vector<TableRow> model_rows();
 std::vector<TableRow> diagnosis_rows();
 std::vector<TableRow> audit_rows();
 std::vector<TableRow> gap_history_rows();
+std::vector<TableRow> audit_rows();
 std::vector<TableRow> mission_list_rows();
 std::vector<TableRow> mission_rows();
 std::vector<TableRow> planning_rows();

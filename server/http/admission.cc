@@ -28,7 +28,8 @@ bool changes_something(bhttp::verb method) {
 
 }  // namespace
 
-Admission::Admission(const std::vector<std::string>& allowed_hosts) : names_(allowed_hosts) {
+Admission::Admission(const std::vector<std::string>& allowed_hosts, const Cors& cors)
+    : cors_(cors), names_(allowed_hosts) {
   any_ = std::ranges::find(names_, "*") != names_.end();
   names_.emplace_back("localhost");
   boost::system::error_code error;
@@ -91,10 +92,12 @@ std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>
                   "Host names no address or name of this service; http.allowed_hosts adds names"};
   if (origins > 0 && changes_something(head.method())) {
     const auto scheme = origin.find("://");
-    if (origins > 1 || scheme == std::string_view::npos ||
-        !equals_ignoring_case(origin.substr(scheme + 3), host))
+    const bool own =
+        scheme != std::string_view::npos && equals_ignoring_case(origin.substr(scheme + 3), host);
+    if (origins > 1 || (!own && !cors_.allows(origin)))
       return Denial{Refusal::origin, 403, "foreign-origin",
-                    "A page may change something only under the host it came from; Origin differs from Host"};
+                    "A page may change something only under the host it came from; Origin differs from Host, "
+                    "and http.allowed_origins does not have it"};
   }
   return std::nullopt;
 }

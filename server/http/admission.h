@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "server/http/cors.h"
 #include "server/http/http_server.h"
 
 namespace joulecast::http {
@@ -24,7 +25,8 @@ struct Denial {
 class Admission {
  public:
   // The names besides IP addresses, localhost and this host's name; "*" lets any name in.
-  explicit Admission(const std::vector<std::string>& allowed_hosts);
+  // `cors`, which must outlive this: origins whose pages may change something too.
+  Admission(const std::vector<std::string>& allowed_hosts, const Cors& cors);
 
   // One Authorization at most. Framing (RFC 9112 section 6.3: one Host, one Content-Length at most; no
   // Transfer-Encoding but exactly "chunked", in HTTP/1.1 only), Expect, the Host that the client believes to
@@ -35,6 +37,7 @@ class Admission {
 
  private:
   bool is_own(std::string_view host) const;
+  const Cors& cors_;
   std::vector<std::string> names_;
   bool any_ = false;
 };

@@ -299,6 +299,7 @@ std::vector<Endpoint> described_session_endpoints() {
        .path = "/v1/session",
        .operation_id = "createSession",
        .role = Role::open,
+       .tag = "access",
        .summary = "Signs a browser in: a session cookie for a token, for 12 h or until it is revoked",
        .request_schema = "session-request",
        .response_schema = "session",
@@ -308,6 +309,7 @@ std::vector<Endpoint> described_session_endpoints() {
                   .path = "/v1/session",
                   .operation_id = "deleteSession",
                   .role = Role::open,
+                  .tag = "access",
                   .summary = "Signs the browser out, where it is signed in",
                   .success_status = 204,
                   .run = Run::io});

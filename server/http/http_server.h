@@ -28,6 +28,7 @@ struct ServerOptions {
   std::uint16_t port = 0;  // 0: the system chooses, see HttpServer::port()
   // Names of this service for its clients besides IP addresses, localhost and the host's name; "*": any.
   std::vector<std::string> allowed_hosts = {};
+  std::vector<std::string> allowed_origins = {};  // of pages elsewhere that may use it; see Cors
   // IP addresses of proxies whose X-Forwarded-For says who a request is from.
   std::vector<std::string> trusted_proxies = {};
   TlsFiles tls = {};                     // none given: plain HTTP

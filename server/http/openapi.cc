@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/json_text.h"
+#include "server/http/asset.h"
 #include "server/http/gate.h"
 #include "server/http/problem.h"
 #include "server/http/uri.h"
@@ -59,11 +60,17 @@ class Components {
     schema.erase("$id");
     schemas_.emplace(name, ordered_json());  // ends recursion between schemas that refer to each other
     if (auto done = rebase(schema, name); !done) return done;
+    // Generators of clients know components, not definitions within them.
+    if (const auto definitions = schema.find("$defs"); definitions != schema.end()) {
+      for (auto& [inner, definition] : definitions->items())
+        schemas_[name + "." + inner] = std::move(definition);
+      schema.erase("$defs");
+    }
     schemas_[name] = std::move(schema);
     return {};
   }
 
-  // "#/$defs/x" -> "#/components/schemas/<name>/$defs/x"; "other.schema.json#/..." likewise under other.
+  // "#/$defs/x" of <name> is the component "<name>.x"; "other.schema.json#/..." likewise under other.
   Result<void> rebase(ordered_json& node, const std::string& name) {
     if (node.is_array()) {
       for (auto& each : node) {
@@ -80,7 +87,9 @@ class Components {
       const std::string reference = value.get<std::string>();
       const auto hash = reference.find('#');
       std::string file = reference.substr(0, hash);
-      const std::string rest = hash == std::string::npos ? "" : reference.substr(hash + 1);
+      std::string rest = hash == std::string::npos ? "" : reference.substr(hash + 1);
+      constexpr std::string_view definitions = "/$defs/";
+      if (rest.starts_with(definitions)) rest.replace(0, definitions.size(), ".");
       if (!file.empty()) {
         if (!file.ends_with(suffix))
           return fail(Fault::internal, name, "cannot follow the reference " + reference);
@@ -148,118 +157,225 @@ ordered_json security_of(Role role) {
 }
 
 // The endpoint that serves the document.
-Endpoint self_endpoint(std::shared_ptr<const std::string> text) {
+Endpoint self_endpoint(std::shared_ptr<const Asset> document) {
   Endpoint self;
   self.path = "/openapi.json";
   self.operation_id = "getOpenApi";
+  self.tag = "operations";
   self.role = Role::read;
   self.summary = "This description of the interface, OpenAPI 3.1";
   self.run = Run::io;
   self.response_schema = "openapi";
-  self.handler = [text = std::move(text)](const Request&) -> Result<Response> {
-    Response response;
-    response.shared_body = text;
-    response.headers.emplace_back("Cache-Control", "no-cache");
-    return response;
+  self.handler = [document = std::move(document)](const Request& request) -> Result<Response> {
+    return document->answer(request);
   };
   return self;
 }
 
-}  // namespace
+// Groups of endpoints, in the order of the document.
+constexpr std::pair<std::string_view, std::string_view> tag_table[] = {
+    {"robots", "The fleet: robots, their models in force and their live states"},
+    {"planning", "What schedulers ask: profiles, estimates, autonomy, energy matrices"},
+    {"missions", "The history: missions, their ledgers, traces and telemetry"},
+    {"models", "Versions of robots' models: compare, propose, adopt, put back"},
+    {"diagnosis", "Why reality departs from a robot's model"},
+    {"events", "What happens: live as server-sent events, and as the audit log"},
+    {"access", "Who one is, where the service has tokens"},
+    {"operations", "Whether and how the service runs"},
+};
 
-Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<const EmbeddedFile> schemas) {
-  std::vector<Endpoint> endpoints(given.begin(), given.end());
-  endpoints.push_back(self_endpoint(nullptr));
-  Components components(schemas);
-  ordered_json paths = ordered_json::object();
-  std::set<unsigned> statuses;
-  for (const Endpoint& endpoint : endpoints) {
-    if (!endpoint.documented) continue;
-    ordered_json operation;
-    operation["operationId"] = endpoint.operation_id;
-    operation["summary"] = endpoint.summary;
+std::string_view description_of_tag(std::string_view tag) {
+  for (const auto& [name, description] : tag_table)
+    if (name == tag) return description;
+  return {};
+}
+
+// What an {id} names, by the list that it is in.
+std::string_view description_of_id(std::string_view path) {
+  if (path.starts_with("/v1/robots/")) return "the robot's id, as in its telemetry";
+  if (path.starts_with("/v1/missions/")) return "number of the mission: `id` in the list of missions";
+  if (path.starts_with("/v1/diagnoses/")) return "number of the diagnosis: `id` in the list of diagnoses";
+  return {};
+}
+
+Result<ordered_json> parameters_of(const Endpoint& endpoint) {
+  ordered_json parameters = ordered_json::array();
+  const auto target = parse_target(endpoint.path);
+  if (!target) return fail(Fault::internal, endpoint.path, "malformed path template");
+  for (const std::string& segment : target->segments) {
+    if (segment.size() < 3 || segment.front() != '{') continue;
+    parameters.push_back({{"name", segment.substr(1, segment.size() - 2)},
+                          {"in", "path"},
+                          {"required", true},
+                          {"description", description_of_id(endpoint.path)},
+                          {"schema", {{"type", "string"}, {"minLength", 1}}}});
+  }
+  for (const Parameter& parameter : endpoint.parameters) parameters.push_back(parameter_of(parameter));
+  return parameters;
+}
+
+ordered_json information() {
+  return {{"title", "joulecastd"},
+          {"description",
+           "What a fleet of differential-drive robots spends, will spend and could save. "
+           "Names carry units; energy leaving a battery is positive; null is not measured."},
+          {"license", {{"name", "MIT"}, {"identifier", "MIT"}}},
+          {"version", JOULECAST_VERSION}};
+}
+
+ordered_json security_schemes() {
+  return {{"bearer",
+           {{"type", "http"},
+            {"scheme", "bearer"},
+            {"description",
+             "A token, where the service has auth.token_file; roles: read < plan < operate < admin"}}},
+          {"session",
+           {{"type", "apiKey"},
+            {"in", "cookie"},
+            {"name", session_cookie},
+            {"description", "What POST /v1/session gives a browser for a token"}}}};
+}
+
+// What a document is made of: the table's rows become paths one by one.
+class Document {
+ public:
+  Document(std::span<const EmbeddedFile> schemas, std::span<const EmbeddedFile> examples)
+      : components_(schemas), examples_(examples) {}
+
+  Result<void> add(const Endpoint& endpoint) {
     if (endpoint.role == Role::unstated)
       return fail(Fault::internal, endpoint.operation_id, "the table states no role for it");
-    operation["security"] = security_of(endpoint.role);
-    ordered_json parameters = ordered_json::array();
-    const auto target = parse_target(endpoint.path);
-    if (!target) return fail(Fault::internal, endpoint.path, "malformed path template");
-    for (const std::string& segment : target->segments) {
-      if (segment.size() < 3 || segment.front() != '{') continue;
-      parameters.push_back({{"name", segment.substr(1, segment.size() - 2)},
-                            {"in", "path"},
-                            {"required", true},
-                            {"schema", {{"type", "string"}, {"minLength", 1}}}});
-    }
-    for (const Parameter& parameter : endpoint.parameters) parameters.push_back(parameter_of(parameter));
-    if (!parameters.empty()) operation["parameters"] = std::move(parameters);
+    if (description_of_tag(endpoint.tag).empty())
+      return fail(Fault::internal, endpoint.operation_id, "has no tag that is described");
+    ordered_json operation{{"operationId", endpoint.operation_id},
+                           {"tags", ordered_json::array({endpoint.tag})},
+                           {"summary", endpoint.summary},
+                           {"security", security_of(endpoint.role)}};
+    Result<ordered_json> parameters = parameters_of(endpoint);
+    if (!parameters) return tl::unexpected(std::move(parameters.error()));
+    if (!parameters->empty()) operation["parameters"] = std::move(*parameters);
     if (!endpoint.request_schema.empty()) {
-      auto schema = components.reference(endpoint.request_schema);
-      if (!schema) return tl::unexpected(schema.error());
+      auto content = content_of(endpoint.request_schema, endpoint.operation_id + ".request.json");
+      if (!content) return tl::unexpected(std::move(content.error()));
       operation["requestBody"] = {{"required", true},
-                                  {"content", {{"application/json", {{"schema", *schema}}}}}};
+                                  {"content", {{"application/json", std::move(*content)}}}};
     }
-    ordered_json success;
-    success["description"] = reason_phrase(endpoint.success_status);
-    if (endpoint.success_status != 204) {
-      ordered_json content;
-      if (endpoint.response_schema.empty()) {
-        content["schema"] = {{"type", "string"}};
-      } else {
-        auto schema = components.reference(endpoint.response_schema);
-        if (!schema) return tl::unexpected(schema.error());
-        content["schema"] = *schema;
-      }
-      success["content"][endpoint.response_type.substr(0, endpoint.response_type.find(';'))] =
-          std::move(content);
-      if (endpoint.csv) success["content"]["text/csv"] = {{"schema", {{"type", "string"}}}};
-    }
-    operation["responses"][std::to_string(endpoint.success_status)] = std::move(success);
+    Result<ordered_json> success = success_of(endpoint);
+    if (!success) return tl::unexpected(std::move(success.error()));
+    operation["responses"][std::to_string(endpoint.success_status)] = std::move(*success);
     for (const unsigned status : errors_of(endpoint)) {
       operation["responses"][std::to_string(status)] = {
           {"$ref", "#/components/responses/problem_" + std::to_string(status)}};
-      statuses.insert(status);
+      statuses_.insert(status);
     }
-    paths[endpoint.path][lower_name(endpoint.method)] = std::move(operation);
+    tags_.insert(endpoint.tag);
+    paths_[endpoint.path][lower_name(endpoint.method)] = std::move(operation);
+    return {};
   }
 
-  auto problem_reference = components.reference("problem");
-  if (!problem_reference) return tl::unexpected(problem_reference.error());
-  ordered_json responses = ordered_json::object();
-  for (const unsigned status : statuses) {
-    responses["problem_" + std::to_string(status)] = {
-        {"description", reason_phrase(status)},
-        {"content", {{"application/problem+json", {{"schema", *problem_reference}}}}}};
+  Result<std::string> text() {
+    auto problem_reference = components_.reference("problem");
+    if (!problem_reference) return tl::unexpected(problem_reference.error());
+    ordered_json responses = ordered_json::object();
+    for (const unsigned status : statuses_) {
+      responses["problem_" + std::to_string(status)] = {
+          {"description", reason_phrase(status)},
+          {"content", {{"application/problem+json", {{"schema", *problem_reference}}}}}};
+    }
+    ordered_json document;
+    document["openapi"] = "3.1.0";
+    document["info"] = information();
+    document["servers"] =
+        ordered_json::array({{{"url", "/"}, {"description", "The service that this document comes from"}}});
+    document["tags"] = ordered_json::array();
+    for (const auto& [name, description] : tag_table)
+      if (tags_.contains(std::string(name)))
+        document["tags"].push_back({{"name", name}, {"description", description}});
+    document["paths"] = std::move(paths_);
+    document["components"] = {{"schemas", components_.take()},
+                              {"responses", std::move(responses)},
+                              {"securitySchemes", security_schemes()}};
+    return document.dump(2) + "\n";
   }
 
-  ordered_json document;
-  document["openapi"] = "3.1.0";
-  document["info"] = {{"title", "joulecastd"},
-                      {"description",
-                       "What a fleet of differential-drive robots spends, will spend and could save. "
-                       "Names carry units; energy leaving a battery is positive; null is not measured."},
-                      {"version", JOULECAST_VERSION}};
-  document["paths"] = std::move(paths);
-  document["components"] = {{"schemas", components.take()}, {"responses", std::move(responses)}};
-  document["components"]["securitySchemes"] = {
-      {"bearer",
-       {{"type", "http"},
-        {"scheme", "bearer"},
-        {"description",
-         "A token, where the service has auth.token_file; roles: read < plan < operate < admin"}}},
-      {"session",
-       {{"type", "apiKey"},
-        {"in", "cookie"},
-        {"name", session_cookie},
-        {"description", "What POST /v1/session gives a browser for a token"}}}};
-  return document.dump(2) + "\n";
+ private:
+  // {"schema": ..., "example": ...}: the example where schemas/examples has that file.
+  Result<ordered_json> content_of(const std::string& schema, const std::string& example) {
+    auto reference = components_.reference(schema);
+    if (!reference) return tl::unexpected(std::move(reference.error()));
+    ordered_json content{{"schema", std::move(*reference)}};
+    const auto file = std::ranges::find(examples_, example, &EmbeddedFile::name);
+    if (file == examples_.end()) return content;
+    if (auto strict = parse_json(file->bytes); !strict)
+      return fail(Fault::internal, example, describe(strict.error()));
+    content["example"] = ordered_json::parse(file->bytes);
+    return content;
+  }
+
+  Result<ordered_json> success_of(const Endpoint& endpoint) {
+    ordered_json success{{"description", reason_phrase(endpoint.success_status)}};
+    if (endpoint.success_status == 204) return success;
+    ordered_json content{{"schema", {{"type", "string"}}}};
+    if (!endpoint.response_schema.empty()) {
+      auto described = content_of(endpoint.response_schema, endpoint.operation_id + ".answer.json");
+      if (!described) return described;
+      content = std::move(*described);
+    }
+    if (!endpoint.events.empty()) {
+      Result<ordered_json> events = events_of(endpoint);
+      if (!events) return events;
+      content["schema"] = std::move(*events);
+    }
+    success["content"][endpoint.response_type.substr(0, endpoint.response_type.find(';'))] =
+        std::move(content);
+    if (endpoint.csv) success["content"]["text/csv"] = {{"schema", {{"type", "string"}}}};
+    return success;
+  }
+
+  // A stream of events as its text decodes: names, and the JSON of their data.
+  Result<ordered_json> events_of(const Endpoint& endpoint) {
+    ordered_json kinds = ordered_json::array();
+    for (const EventKind& event : endpoint.events) {
+      auto data = components_.reference(event.schema);
+      if (!data) return data;
+      kinds.push_back({{"type", "object"},
+                       {"description", event.description},
+                       {"properties", {{"event", {{"const", event.name}}}, {"data", std::move(*data)}}},
+                       {"required", {"event", "data"}}});
+    }
+    return ordered_json{{"type", "string"},
+                        {"contentMediaType", "text/event-stream"},
+                        {"contentSchema", {{"type", "array"}, {"items", {{"oneOf", std::move(kinds)}}}}}};
+  }
+
+  Components components_;
+  std::span<const EmbeddedFile> examples_;
+  ordered_json paths_ = ordered_json::object();
+  std::set<std::string> tags_;
+  std::set<unsigned> statuses_;
+};
+
+}  // namespace
+
+Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<const EmbeddedFile> schemas,
+                                     std::span<const EmbeddedFile> examples) {
+  std::vector<Endpoint> endpoints(given.begin(), given.end());
+  endpoints.push_back(self_endpoint(nullptr));
+  Document document(schemas, examples);
+  for (const Endpoint& endpoint : endpoints) {
+    if (!endpoint.documented) continue;
+    if (Result<void> added = document.add(endpoint); !added) return tl::unexpected(std::move(added.error()));
+  }
+  return document.text();
 }
 
 Result<std::vector<Endpoint>> with_openapi(std::vector<Endpoint> endpoints,
-                                           std::span<const EmbeddedFile> schemas) {
-  auto document = openapi_document(endpoints, schemas);
+                                           std::span<const EmbeddedFile> schemas,
+                                           std::span<const EmbeddedFile> examples) {
+  auto document = openapi_document(endpoints, schemas, examples);
   if (!document) return tl::unexpected(document.error());
-  endpoints.push_back(self_endpoint(std::make_shared<const std::string>(std::move(*document))));
+  endpoints.push_back(
+      self_endpoint(std::make_shared<const Asset>(std::move(*document), "application/json", "no-cache")));
   return endpoints;
 }
 

@@ -16,6 +16,7 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
   health.path = "/healthz";
   health.operation_id = "getHealth";
   health.role = Role::open;
+  health.tag = "operations";
   health.summary = "The process answers";
   health.response_schema = "health";
   health.run = Run::io;
@@ -27,6 +28,7 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
   ready.path = "/readyz";
   ready.operation_id = "getReadiness";
   ready.role = Role::open;
+  ready.tag = "operations";
   ready.summary = "All parts of the service can do their work";
   ready.response_schema = "readiness";
   ready.run = Run::operations;
@@ -50,6 +52,7 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
   scrape.path = "/metrics";
   scrape.operation_id = "getMetrics";
   scrape.role = Role::read;
+  scrape.tag = "operations";
   scrape.summary = "Prometheus metrics";
   scrape.response_type = Metrics::content_type();
   scrape.run = Run::operations;
@@ -66,8 +69,10 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
   version.path = "/version";
   version.operation_id = "getVersion";
   version.role = Role::read;
+  version.tag = "operations";
   version.summary = "What is running";
   version.response_schema = "version";
+  version.etag = true;
   version.run = Run::io;
   version.handler = [](const Request&) -> Result<Response> {
     return json_response(nlohmann::ordered_json{
@@ -83,12 +88,19 @@ Endpoint events_endpoint(EventHub& hub) {
   endpoint.path = "/v1/events";
   endpoint.operation_id = "streamEvents";
   endpoint.role = Role::read;
+  endpoint.tag = "events";
   endpoint.summary =
       "The live fleet as server-sent events. A returning client's Last-Event-ID gets it what it missed, or "
       "an event "
       "\"reset\" when that is no longer known";
   endpoint.parameters = {{.name = "robot_id", .description = "events of this robot only"}};
   endpoint.response_type = "text/event-stream";
+  endpoint.events = {
+      {"state", "robot-state", "a robot's live state, at most once a second where it changed"},
+      {"mission", "mission", "a mission has ended"},
+      {"contradiction", "contradiction-event", "something contradicts a robot's telemetry"},
+      {"drift", "drift-event", "the consumption of a robot has changed for good"},
+      {"reset", "reset-event", "first after a return: what was missed is not kept, read /v1/robots afresh"}};
   endpoint.error_statuses = {503};
   endpoint.run = Run::io;
   endpoint.handler = [&hub](const Request& request) -> Result<Response> {

@@ -9,6 +9,7 @@
 
 #include "base/bounds.h"
 #include "base/json_text.h"
+#include "server/http/delivery.h"
 #include "server/http/problem.h"
 #include "server/http/text.h"
 #include "server/http/uri.h"
@@ -297,6 +298,7 @@ Response Router::run(const Endpoint& endpoint, Request& request) const {
     }
     auto response = endpoint.handler(request);
     if (!response) return fault(endpoint, request, response.error());
+    deliver(endpoint, request, *response, endpoint.run == Run::io);
     return std::move(*response);
   } catch (const std::exception& cause) {
     return fault(endpoint, request, Error{Fault::internal, "", cause.what()});
@@ -311,7 +313,9 @@ std::optional<Response> Router::run_brief(const Endpoint& endpoint, Request& req
       if (!body) return std::nullopt;
       request.json = std::make_shared<const nlohmann::json>(std::move(*body));
     }
-    return endpoint.brief(request);
+    std::optional<Response> response = endpoint.brief(request);
+    if (response) deliver(endpoint, request, *response, true);
+    return response;
   } catch (const std::exception&) {
     return std::nullopt;  // to be met again, and told of, by the handler
   }

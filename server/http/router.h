@@ -36,6 +36,13 @@ struct Parameter {
   std::vector<std::string> choices = {};  // for text: the only values allowed, when not empty
 };
 
+// One kind of event of an event stream, for documents.
+struct EventKind {
+  std::string name;
+  std::string schema;  // name of schemas/<name>.schema.json, of its data
+  std::string description;
+};
+
 // One row of the table of endpoints. Routes, the Allow headers and the OpenAPI document all come from it.
 // GET implies HEAD; OPTIONS is answered by the router.
 struct Endpoint {
@@ -43,12 +50,16 @@ struct Endpoint {
   std::string path = {};          // template, e.g. "/v1/robots/{id}/profile"
   std::string operation_id = {};  // e.g. "computeProfile"; also the label of the request metrics
   Role role = Role::unstated;     // that a request needs where tokens exist; one unstated nobody has
+  std::string tag = {};           // group that documents list it in, one of openapi.cc's
   std::string summary = {};
   std::vector<Parameter> parameters = {};
   std::string request_schema = {};   // name of schemas/<name>.schema.json; empty when there is no body
   std::string response_schema = {};  // likewise; empty when the answer is not JSON
   std::string response_type = "application/json";
-  bool csv = false;  // also served as text/csv: Request::csv says when
+  std::vector<EventKind> events = {};  // of an event stream
+  bool csv = false;                    // also served as text/csv: Request::csv says when
+  bool rounded = false;                // numbers as precise as ?digits= says; false: all their digits
+  bool etag = false;  // of what rarely changes: with an ETag, so that a client need not read it again
   unsigned success_status = 200;
   std::vector<unsigned> error_statuses = {};  // beyond those the frame itself can answer
   Run run = Run::worker;

@@ -15,6 +15,7 @@
 #include <unordered_set>
 
 #include "server/http/admission.h"
+#include "server/http/cors.h"
 #include "server/http/http_server.h"
 #include "server/http/proxies.h"
 #include "server/http/worker_pool.h"
@@ -47,7 +48,11 @@ struct Peer {
 
 struct Core {
   Core(const ServerOptions& options_in, const Router& router_in, ServerObserver& observer_in)
-      : options(options_in), router(router_in), observer(observer_in), admission(options.allowed_hosts) {}
+      : options(options_in),
+        router(router_in),
+        observer(observer_in),
+        cors(options.allowed_origins),
+        admission(options.allowed_hosts, cors) {}
 
   // An `io` endpoint's stream that pulls on a worker does so on those of the store.
   WorkerPool& pool_of(Run run) { return *pools.at(run == Run::io ? Run::worker : run); }
@@ -60,6 +65,7 @@ struct Core {
   const ServerOptions options;
   const Router& router;
   ServerObserver& observer;
+  const Cors cors;
   const Admission admission;
   TrustedProxies proxies;
   std::shared_ptr<net::ssl::context> tls;  // of connections from now on; null: plain HTTP

@@ -20,7 +20,4 @@ std::vector<Endpoint> asset_endpoints(std::span<const EmbeddedFile> files);
 // with a leading dot are left out. Fault::not_found when it cannot be read.
 Result<std::vector<Endpoint>> asset_endpoints_from(const std::string& directory);
 
-// RFC 1952 form of the bytes; empty when zlib fails.
-std::string gzip(std::string_view bytes);
-
 }  // namespace joulecast::http

@@ -172,6 +172,7 @@ class StreamSession final : public Session {
     const bool chunked = response_.stream && !old_client;
     const bool streamed = response_.stream && request_.method != Method::head;
     if (response_.stream && old_client) keep_alive_ = false;
+    core_->cors.tell(request_, response_);
     write_head(head_, response_, {core_->date, request_.id, chunked, keep_alive_, old_client});
     std::string_view body;
     if (request_.method != Method::head && response_.status != 204 && response_.status != 304)

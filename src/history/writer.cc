@@ -188,6 +188,8 @@ class Writer::Impl {
   }
 
   Place push(Command command, std::shared_ptr<Waiter> waiter) {
+    if (const auto* append = std::get_if<AppendEvent>(&command); append != nullptr && options_.on_event)
+      options_.on_event(append->event);
     const std::size_t bytes = weight_bytes(command);
     queued_bytes_ += bytes;
     queue_.push_back({++last_id_, std::move(command), bytes, Clock::now(), std::move(waiter)});

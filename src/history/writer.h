@@ -34,6 +34,9 @@ struct WriterOptions {
   // the writer's thread.
   std::function<void(const Error&)> on_error;
   std::function<void()> on_recovery = {};  // commits succeed again
+  // Told of every event that is accepted, before it is committed, under the queue's lock: it must neither
+  // block nor call the writer.
+  std::function<void(const Event&)> on_event;
 };
 
 struct WriterStatus {

@@ -7,6 +7,55 @@ import xml.etree.ElementTree
 from harness import Programs, arguments, check
 
 
+def read_history(options, programs):
+    """robots, state, ledger, export, proposals and adopt, of a daemon that starts on a stored history."""
+    robot = f"{options.source}/deploy/robots/amr.json"
+    log, store = programs.path("amr.lcmlog"), programs.path("past.db")
+    programs.run("simulate", "--robots", "1", "--robot", robot, "--seed", "7", "--missions", "3", "--mission-duration", "30", "--speed", "0", "--log", log, "--quiet")
+    programs.run("replay", log, "--into", store, "--robot", robot)
+    process = subprocess.Popen([options.daemon, "--http-port", "0", "--store-path", store, "--lcm-url", "memq://", "--log-format", "json"],
+                               stderr=subprocess.PIPE, text=True)
+    url = next(event["http"] for event in map(json.loads, process.stderr) if event["message"] == "ready")
+    server = ["--server", url.removeprefix("http://")]
+    fleet = programs.run("robots", *server)
+    check(fleet.splitlines()[1].startswith("amr ") and "charge %" in fleet, fleet)
+    check(json.loads(programs.run("robots", *server, "--json"))["robots"][0]["robot_id"] == "amr", fleet)
+    state = programs.run("state", *server, "--robot-id", "amr")
+    check(state.startswith("amr: silent for ") and "  charge " in state and "in 19 of 20 cases" in state, state)
+    ledger = programs.run("ledger", "1", *server)
+    parts = [float(line.split()[1]) for line in ledger.splitlines()[1:]]
+    whole = float(ledger.splitlines()[0].split(": ")[1].split()[0])
+    check(len(parts) > 4 and abs(sum(parts) - whole) < 0.05, ledger)
+    for name, least, title in (("missions", 3, "id,robot_id"), ("telemetry", 500, "utime_us,sequence"), ("trace", 10, "start_utime_us,covered_s")):
+        out = programs.path(f"{name}.csv")
+        of = [] if name == "missions" else ["--mission", "1"]
+        programs.run("export", name, *server, *of, "--out", out)
+        rows = open(out, newline="").read().split("\r\n")
+        check(rows[0].startswith(title) and len(rows) > least and rows.count(rows[0]) == 1, f"{name}: {len(rows)} rows, {rows[0]}")
+        check(programs.run("export", name, *server, *of).replace("\r", "").split("\n") == "\n".join(rows).replace("\r", "").split("\n"), f"{name} differs on standard output")
+        done = subprocess.run([options.client, "export", name, *server, *of, "--out", out], capture_output=True, text=True)
+        check(done.returncode == 1 and "--out" in done.stderr, f"{name} was written over: {done}")
+    # Pages follow one another: three missions by pages of the server's own size are three lines.
+    check("no proposal" in programs.run("proposals", *server) and json.loads(programs.run("proposals", *server, "--json"))["proposals"] == [], "proposals")
+    changed = json.load(open(robot))
+    changed["idle_power_w"] += 1
+    with open(programs.path("changed.json"), "w") as file:
+        json.dump(changed, file)
+    adopt = ["adopt", *server, "--robot-id", "amr"]
+    tested = programs.run(*adopt, "--model", programs.path("changed.json"), "--dry-run")
+    check("back-test on " in tested and "nothing changed, version 1 stays in force (a test only)" in tested, tested)
+    check("model version 2 is in force (was 1)" in programs.run(*adopt, "--model", programs.path("changed.json"), "--force", "--note", "a camera"), "adopt")
+    check("model version 1 is in force" in programs.run(*adopt, "--version", "1"), "back to version 1")
+    for command, code, words in (([*adopt, "--version", "9"], 1, "--version"), ([*adopt, "--version", "1", "--proposal", "1"], 2, "what"),
+                                 (["ledger", "99", *server], 1, "mission"), (["state", *server, "--robot-id", "nobody"], 1, "--robot-id"),
+                                 (["export", "missions", *server, "--from", "yesterday"], 2, "--from"), (["robot", *server], 2, "did you mean robots")):
+        done = subprocess.run([options.client, *command], capture_output=True, text=True)
+        check(done.returncode == code and words in done.stderr, f"{command}: {done}")
+    process.terminate()
+    check(process.wait(timeout=20) == 0, "the daemon did not stop in order")
+    process.stderr.close()
+
+
 def main():
     options = arguments()
     programs = Programs(options)
@@ -66,6 +115,7 @@ def main():
         told = programs.run(*drive, "--deadline", f"{deadline_s:.5f}")
         check(words in told and "a second less would cost 0" not in told, told)
 
+    read_history(options, programs)
     page = json.loads(programs.run("missions", "--server", programs.url, "--robot-id", "amr", "--json"))
     check(page == {"missions": [], "next_cursor": None}, f"a fresh daemon knows missions: {page}")
 

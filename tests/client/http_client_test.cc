@@ -130,17 +130,18 @@ TEST(HttpClient, ProblemsKeepTheirFaultAndWords) {
 }
 
 TEST(HttpClient, StatusesBecomeFaults) {
-  EXPECT_EQ(error_of({422, "", ""}).fault, Fault::invalid);
-  EXPECT_EQ(error_of({409, "", ""}).fault, Fault::conflict);
-  EXPECT_EQ(error_of({413, "", ""}).fault, Fault::too_large);
-  EXPECT_EQ(error_of({429, "", ""}).fault, Fault::unavailable);
-  EXPECT_EQ(error_of({503, "", ""}).fault, Fault::unavailable);
-  EXPECT_EQ(error_of({400, "", R"({"title":"bad","detail":"speed"})"}).message,
+  EXPECT_EQ(error_of({422, "", "", ""}).fault, Fault::invalid);
+  EXPECT_EQ(error_of({409, "", "", ""}).fault, Fault::conflict);
+  EXPECT_EQ(error_of({413, "", "", ""}).fault, Fault::too_large);
+  EXPECT_EQ(error_of({429, "", "", ""}).fault, Fault::unavailable);
+  EXPECT_EQ(error_of({503, "", "", ""}).fault, Fault::unavailable);
+  EXPECT_EQ(error_of({400, "", R"({"title":"bad","detail":"speed"})", ""}).message,
             "the server answered 400: bad: speed");
   // A field's fault is told as one found here.
   const Error of_field =
       error_of({422, "", R"({"type":"urn:joulecast:problem:infeasible","title":"Unprocessable",
-      "detail":"/a: must be 1","field":"/a","constraint":"must be 1"})"});
+      "detail":"/a: must be 1","field":"/a","constraint":"must be 1"})",
+                ""});
   EXPECT_EQ(of_field.fault, Fault::infeasible);
   EXPECT_EQ(describe(of_field), "/a: must be 1 (the server answered 422)");
 }

@@ -1,6 +1,7 @@
 """A shell in a folder of its own, with joulecast's programs on its path and the ports of the documents made private."""
 
 import os
+import re
 import shutil
 import signal
 import socket
@@ -22,10 +23,15 @@ def free_port(kind):
         return str(probe.getsockname()[1])
 
 
+def replaced(text, words):
+    """In one pass: what stands for one port may contain another."""
+    return re.sub("|".join(words), lambda found: words[found.group()], text)
+
+
 class Sandbox:
     """Commands say the ports that their readers would use; what runs uses ports that were free."""
 
-    USUAL_HTTP = ["8080", "8081", "8082", "8083", "8084", "8085"]
+    USUAL_HTTP = ["8080", "8081", "8082", "8083", "8084", "8085", "8086"]
     USUAL_LCM = ["7667", "7671", "7672", "7673", "7674"]
 
     def __init__(self, daemon, client, source):
@@ -53,8 +59,7 @@ class Sandbox:
 
     def run(self, command):
         """Its lines of output, as if it had used the usual ports, and its exit code."""
-        for usual, private in self.ports.items():
-            command = command.replace(usual, private)
+        command = replaced(command, self.ports)
         self.shell.stdin.write(f"{command}\nprintf '\\n%s %d\\n' {END} $?\n")
         self.shell.stdin.flush()
         lines = []
@@ -63,7 +68,6 @@ class Sandbox:
                 while lines and not lines[-1].strip():
                     lines.pop()
                 return lines, int(line.split()[1])
-            for usual, private in self.ports.items():
-                line = line.replace(private, usual)
+            line = replaced(line, {private: usual for usual, private in self.ports.items()})
             lines.append(line.replace(str(self.home), "~").rstrip())
         raise SystemExit(f"the shell ended during: {command}")

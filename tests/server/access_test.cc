@@ -45,7 +45,7 @@ std::vector<Endpoint> whole_table(Metrics& metrics, EventHub& events) {
   std::vector<Endpoint> table = api::described_endpoints();
   table.push_back(events_endpoint(events));
   for (Endpoint& row : operations_endpoints(metrics, {})) table.push_back(std::move(row));
-  table = *with_openapi(std::move(table), embedded_schemas());
+  table = *with_openapi(std::move(table), embedded_schemas(), embedded_examples());
   for (Endpoint& row : asset_endpoints(embedded_web())) table.push_back(std::move(row));
   for (Endpoint& row : table) {
     row.brief = nullptr;
@@ -182,14 +182,15 @@ TEST_F(AccessTest, EveryRowRefusesWhoHasNoTokenOrTooSmallARole) {
 
 TEST_F(AccessTest, ARowWithoutARoleIsRefusedToEverybodyAndFailsTheDocument) {
   Endpoint forgotten{.path = "/forgotten", .operation_id = "forgotten"};
-  EXPECT_FALSE(openapi_document(std::vector{forgotten}, embedded_schemas()));
+  EXPECT_FALSE(openapi_document(std::vector{forgotten}, embedded_schemas(), embedded_examples()));
   Request request;
   request.headers.emplace_back("Authorization", "Bearer s-admin");
   EXPECT_EQ(gate_->refuse(forgotten, request)->status, 403U);
 }
 
 TEST_F(AccessTest, TheDocumentStatesTheRoles) {
-  const json document = json::parse(*openapi_document(api::described_endpoints(), embedded_schemas()));
+  const json document =
+      json::parse(*openapi_document(api::described_endpoints(), embedded_schemas(), embedded_examples()));
   for (const Endpoint& row : api::described_endpoints()) {
     std::string method(to_string(row.method));
     for (char& c : method) c = static_cast<char>(c - 'A' + 'a');

@@ -7,6 +7,7 @@
 Ends with 77 where python3-jsonschema is missing.
 """
 import argparse
+import gzip
 import json
 import pathlib
 import re
@@ -287,6 +288,39 @@ def hold_mission_lists(checker):
     checker.check("GET", "/v1/proposals", expect=200)
 
 
+def hold_conveniences(checker, name):
+    """Digits, codings, tags, CSV and other origins, as http.md says."""
+    path = f"/v1/robots/{name}"
+    with urllib.request.urlopen(checker.url + path, timeout=10) as reply:
+        tag = reply.headers["ETag"]
+    status, _, again = ask(checker.url, "GET", path, headers={"If-None-Match": tag})
+    if (status, again) != (304, b""):
+        checker.fault(f"{path} with its ETag: {status} {again!r}")
+    with urllib.request.urlopen(checker.url + "/openapi.json", timeout=10) as reply:
+        plain = reply.read()
+    with urllib.request.urlopen(urllib.request.Request(checker.url + "/openapi.json", headers={"Accept-Encoding": "gzip"}), timeout=10) as reply:
+        packed = reply.read()
+        if reply.headers["Content-Encoding"] != "gzip" or gzip.decompress(packed) != plain:
+            checker.fault("/openapi.json is not served gzipped")
+    drive = ("POST", "/v1/robots/{id}/profile", f"{path}/profile")
+    body = {"path": [{"kind": "straight", "length_m": 7.3}]}
+    whole = checker.check(drive[0], drive[1], drive[2] + "?digits=17", body, expect=200)
+    usual = checker.check(*drive, body, expect=200)
+    few = checker.check(drive[0], drive[1], drive[2] + "?digits=3", body, expect=200)
+    for answer, digits in ((usual, 10), (few, 3)):
+        if answer["energy_j"] != float(f"{whole['energy_j']:.{digits}g}") and answer["energy_j"] < 10**digits:
+            checker.fault(f"{digits} digits of {whole['energy_j']}: {answer['energy_j']}")
+    checker.check(drive[0], drive[1], drive[2] + "?digits=1", body, expect=422)
+    for template, column in (("/v1/robots", b"state_of_charge"), ("/v1/audit-log", b"detail"), ("/v1/diagnoses", b"finished_utime_us"), ("/v1/proposals", b"adopted_version"),
+                             ("/v1/robots/{id}/gap-history", b"ratio"), ("/v1/robots/{id}/proposals", b"kind")):
+        text = checker.check("GET", template, template.replace("{id}", name), expect=200, headers={"Accept": "text/csv"})
+        if not isinstance(text, bytes) or column not in text.split(b"\r\n")[0]:
+            checker.fault(f"{template} as CSV: {text!r}")
+    foreign = {"Origin": "https://elsewhere.example"}
+    if ask(checker.url, "POST", drive[2], body, foreign)[0] != 403:
+        checker.fault("a page from elsewhere may ask for profiles, though http.allowed_origins is empty")
+
+
 def main():
     arguments = argparse.ArgumentParser()
     arguments.add_argument("--source", required=True, type=pathlib.Path)
@@ -412,6 +446,7 @@ def exercise(checker, source):
     hold_driving(checker, name, matrix)
     hold_pages(checker, name)
     hold_mission_lists(checker)
+    hold_conveniences(checker, name)
     status, kind, _ = ask(checker.url, "DELETE", "/v1/robots")
     if (status, kind) != (405, "application/problem+json"):
         checker.fault(f"DELETE /v1/robots: {status} {kind}")

@@ -241,6 +241,23 @@ TEST_F(HttpAttackTest, ForeignPagesChangeNothing) {
   EXPECT_EQ(begun_, 0);
 }
 
+TEST_F(HttpAttackTest, PagesOfAllowedOriginsMayUseTheService) {
+  start({.allowed_origins = {"https://fleet.example"}});
+  const auto preflight =
+      ask("OPTIONS /length HTTP/1.1\r\nHost: test\r\nOrigin: https://fleet.example\r\n"
+          "Access-Control-Request-Method: POST\r\n\r\n");
+  EXPECT_EQ(preflight.status, 204U);
+  EXPECT_EQ(preflight.headers.at("access-control-allow-origin"), "https://fleet.example");
+  EXPECT_NE(preflight.headers.at("access-control-allow-methods").find("POST"), std::string::npos);
+  const auto posted = ask(post_text("/length", "[]", "Origin: https://fleet.example\r\n"));
+  EXPECT_EQ(posted.status, 200U);
+  EXPECT_EQ(posted.headers.at("access-control-allow-origin"), "https://fleet.example");
+  EXPECT_FALSE(posted.headers.contains("access-control-allow-credentials"));
+  EXPECT_EQ(ask(post_text("/length", "[]", "Origin: http://fleet.example\r\n")).status, 403U);
+  EXPECT_FALSE(ask(get_text("/io", "Origin: http://evil.example\r\n"))
+                   .headers.contains("access-control-allow-origin"));
+}
+
 TEST_F(HttpAttackTest, TricklingClientsHoldNobodyUp) {
   start({.max_connections = 64, .client_connections = 32, .read_timeout = 500ms});
   std::deque<RawClient> tricklers;

@@ -45,7 +45,7 @@ class OperationsTest : public ::testing::Test {
     auto rows = operations_endpoints(
         metrics_, {{"store", [this] { return store_; }}, {"lcm", [] { return Result<void>{}; }}});
     rows.push_back(events_endpoint(hub_));
-    auto all = with_openapi(std::move(rows), embedded_schemas());
+    auto all = with_openapi(std::move(rows), embedded_schemas(), embedded_examples());
     EXPECT_TRUE(all.has_value()) << (all ? "" : describe(all.error()));
     router_ = std::make_unique<Router>(std::move(*all));
   }
@@ -137,17 +137,18 @@ TEST(OpenApi, TakesInWhatSchemasReferTo) {
   endpoint.path = "/v1/{id}/x";
   endpoint.operation_id = "x";
   endpoint.role = Role::read;
+  endpoint.tag = "planning";
   endpoint.request_schema = "a";
   endpoint.response_schema = "b";
   endpoint.error_statuses = {404};
   endpoint.parameters = {{.name = "n", .type = Parameter::Type::integer, .minimum = 1}};
-  const auto text = openapi_document(std::vector<Endpoint>{endpoint}, files);
+  const auto text = openapi_document(std::vector<Endpoint>{endpoint}, files, {});
   ASSERT_TRUE(text.has_value()) << describe(text.error());
   const json document = json::parse(*text);
   const json& schemas = document.at("components").at("schemas");
-  EXPECT_EQ(schemas.at("a").at("properties").at("l").at("$ref"), "#/components/schemas/a/$defs/l");
-  EXPECT_EQ(schemas.at("a").at("properties").at("b").at("$ref"), "#/components/schemas/b/$defs/c");
-  EXPECT_EQ(schemas.at("b").at("$defs").at("c").at("$ref"), "#/components/schemas/a");
+  EXPECT_EQ(schemas.at("a").at("properties").at("l").at("$ref"), "#/components/schemas/a.l");
+  EXPECT_EQ(schemas.at("a").at("properties").at("b").at("$ref"), "#/components/schemas/b.c");
+  EXPECT_EQ(schemas.at("b.c").at("$ref"), "#/components/schemas/a");
   EXPECT_FALSE(schemas.contains("unused"));
   EXPECT_FALSE(schemas.at("a").contains("$id"));
   const json& operation = document.at("paths").at("/v1/{id}/x").at("post");
@@ -157,7 +158,7 @@ TEST(OpenApi, TakesInWhatSchemasReferTo) {
     EXPECT_TRUE(operation.at("responses").contains(status)) << status;
   }
   endpoint.response_schema = "missing";
-  EXPECT_FALSE(openapi_document(std::vector<Endpoint>{endpoint}, files).has_value());
+  EXPECT_FALSE(openapi_document(std::vector<Endpoint>{endpoint}, files, {}).has_value());
 }
 
 std::string gunzip(std::string_view packed) {

@@ -1,4 +1,4 @@
-// http_request() of http_client.h on Beast, which appears in no other file of the client.
+// exchange() of http_client.h on Beast, which appears in no other file of this room.
 // <utility> comes first: Boost 1.74's awaitable.hpp uses std::exchange without including it.
 #include <utility>
 // clang-format off
@@ -10,13 +10,12 @@
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http.hpp>
 // clang-format on
-#include <cstdlib>
 #include <memory>
 #include <optional>
 
-#include "client/http_client.h"
+#include "http_client/http_client.h"
 
-namespace joulecast::client {
+namespace joulecast::http_client {
 namespace {
 
 namespace asio = boost::asio;
@@ -26,19 +25,18 @@ using asio::ip::tcp;
 
 constexpr std::uint64_t body_limit_bytes = 256u << 20;
 
-// Null where it is not set or empty.
-const char* environment(const char* name) {
-  const char* value = std::getenv(name);
-  return value != nullptr && *value != '\0' ? value : nullptr;
-}
-
 // Beast has no timeouts for blocking calls, so the exchange runs as a chain of asynchronous steps on a loop
 // of its own under one deadline.
 class Exchange {
  public:
   Exchange(const ServerAddress& server, http::request<http::string_body> request,
-           std::chrono::milliseconds timeout)
-      : server_(server), request_(std::move(request)), resolver_(loop_), stream_(loop_), timeout_(timeout) {
+           ClientCertificate certificate, std::chrono::milliseconds timeout)
+      : server_(server),
+        request_(std::move(request)),
+        certificate_(std::move(certificate)),
+        resolver_(loop_),
+        stream_(loop_),
+        timeout_(timeout) {
     parser_.body_limit(body_limit_bytes);
   }
 
@@ -72,12 +70,11 @@ class Exchange {
     beast::error_code error;
     trust_.set_default_verify_paths(error);
     if (settle(error, "read the trusted certificates")) return false;
-    if (const char* file = environment("JOULECAST_CLIENT_CERTIFICATE"))
-      trust_.use_certificate_chain_file(file, error);
-    if (settle(error, "use JOULECAST_CLIENT_CERTIFICATE")) return false;
-    if (const char* file = environment("JOULECAST_CLIENT_KEY"))
-      trust_.use_private_key_file(file, asio::ssl::context::pem, error);
-    if (settle(error, "use JOULECAST_CLIENT_KEY")) return false;
+    if (!certificate_.file.empty()) trust_.use_certificate_chain_file(certificate_.file, error);
+    if (settle(error, "use the client's certificate")) return false;
+    if (!certificate_.key_file.empty())
+      trust_.use_private_key_file(certificate_.key_file, asio::ssl::context::pem, error);
+    if (settle(error, "use the key of the client's certificate")) return false;
     tls_.emplace(stream_, trust_);
     tls_->set_verify_mode(asio::ssl::verify_peer);
     tls_->set_verify_callback(asio::ssl::host_name_verification(server_.host));
@@ -125,6 +122,7 @@ class Exchange {
     HttpReply reply;
     reply.status = message.result_int();
     reply.content_type = std::string(message[http::field::content_type]);
+    reply.link = std::string(message[http::field::link]);
     reply.body = std::move(message.body());
     outcome_ = std::move(reply);
     beast::error_code ignored;
@@ -133,6 +131,7 @@ class Exchange {
 
   ServerAddress server_;
   http::request<http::string_body> request_;
+  const ClientCertificate certificate_;
   asio::io_context loop_{1};
   tcp::resolver resolver_;
   asio::ssl::context trust_{asio::ssl::context::tls_client};
@@ -146,26 +145,25 @@ class Exchange {
 
 }  // namespace
 
-Result<HttpReply> http_request(const ServerAddress& server, HttpMethod method, std::string_view target,
-                               std::string json_body, std::chrono::milliseconds timeout) {
+Result<HttpReply> exchange(const ServerAddress& server, const HttpRequest& wanted,
+                           std::chrono::milliseconds timeout) {
+  const HttpMethod method = wanted.method;
   const http::verb verb = method == HttpMethod::get    ? http::verb::get
                           : method == HttpMethod::post ? http::verb::post
                           : method == HttpMethod::put  ? http::verb::put
                                                        : http::verb::delete_;
-  http::request<http::string_body> request(verb, server.base_path + std::string(target), 11);
+  http::request<http::string_body> request(verb, server.base_path + wanted.target, 11);
   const bool bracketed = server.host.find(':') != std::string::npos;
   request.set(http::field::host, (bracketed ? "[" + server.host + "]" : server.host) + ":" + server.port);
   request.set(http::field::user_agent, "joulecast/" JOULECAST_VERSION);
-  request.set(http::field::accept, "application/json, application/problem+json, text/html;q=0.5");
-  if (const char* token = environment("JOULECAST_TOKEN"))
-    request.set(http::field::authorization, std::string("Bearer ") + token);
+  for (const auto& [name, value] : wanted.headers) request.set(name, value);
   request.keep_alive(false);
   if (method != HttpMethod::get && method != HttpMethod::del) {
     request.set(http::field::content_type, "application/json");
-    request.body() = std::move(json_body);
+    request.body() = wanted.json_body;
   }
   request.prepare_payload();
-  return Exchange(server, std::move(request), timeout).run();
+  return Exchange(server, std::move(request), wanted.certificate, timeout).run();
 }
 
-}  // namespace joulecast::client
+}  // namespace joulecast::http_client

@@ -1,0 +1,147 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/json_text.h"
+#include "client/commands/server_answer.h"
+#include "client/commands/table.h"
+#include "client/files.h"
+
+// Models that missions suggest, and the one to put in force: proposals, adopt.
+namespace joulecast::client {
+namespace {
+
+using nlohmann::json;
+
+struct Options {
+  std::string server;
+  std::optional<std::string> robot_id;
+  std::optional<std::int64_t> proposal, diagnosis, version;
+  std::optional<std::string> model_file, note;
+  std::vector<std::string> effects;
+  bool force = false, dry_run = false, json = false;
+};
+
+void print_proposals(const json& page) {
+  fmt::print("{:>5} {:<20} {:<19} {:<11} {:>6}  {}\n", "id", "robot", "created (UTC)", "state", "model",
+             "says");
+  for (const json& p : page["proposals"])
+    fmt::print("{:>5} {:<20} {:<19} {:<11} {:>6}  {}\n", text_of(p["id"]), text_of(p["robot_id"]),
+               to_second(p["created"]), text_of(p["state"]), text_of(p["base_version"]), text_of(p["note"]));
+  if (page["proposals"].empty()) fmt::print("no proposal\n");
+}
+
+Exit list(const Options& options) {
+  const std::string path =
+      options.robot_id ? "/v1/robots/" + percent_encoded(*options.robot_id) + "/proposals" : "/v1/proposals";
+  const auto reply = ask(options.server, HttpMethod::get, path, {}, {{"id", "--robot-id"}});
+  if (!reply) return report(reply.error());
+  if (options.json) {
+    std::puts(reply->body.c_str());
+    return Exit::ok;
+  }
+  const auto page = object_of(*reply, options.server);
+  if (!page) return report(page.error());
+  print_proposals(*page);
+  return Exit::ok;
+}
+
+Result<json> request_of(const Options& options) {
+  json request = json::object();
+  if (options.proposal) request["proposal_id"] = *options.proposal;
+  if (options.diagnosis) request["diagnosis_id"] = *options.diagnosis;
+  if (options.version) request["version"] = *options.version;
+  if (options.model_file) {
+    const auto text = read_file(*options.model_file);
+    if (!text) return tl::unexpected(text.error());
+    auto model = parse_json(*text);
+    if (!model) return invalid(*options.model_file, describe(model.error()));
+    request["model"] = std::move(*model);
+  }
+  if (!options.effects.empty()) request["effect"] = options.effects;
+  if (options.note) request["note"] = *options.note;
+  if (options.force) request["force"] = true;
+  if (options.dry_run) request["dry_run"] = true;
+  return request;
+}
+
+std::string percent(const json& test, const char* name) {
+  return number_of(test, name, 2, 100) + " %";
+}
+
+void print_adoption(const json& a, bool dry_run) {
+  const json& test = a["back_test"];
+  if (test.is_object())
+    fmt::print("back-test on {} missions: error {} before, {} after\n", test["missions"].size(),
+               percent(test, "error_before"), percent(test, "error_after"));
+  if (a.value("adopted", false)) {
+    fmt::print("{}: model version {} is in force (was {})\n", text_of(a["robot_id"]),
+               text_of(a["model_version"]), text_of(a["previous_version"]));
+  } else {
+    fmt::print("{}: nothing changed, version {} stays in force{}\n", text_of(a["robot_id"]),
+               text_of(a["model_version"]), dry_run ? " (a test only)" : "");
+  }
+}
+
+Exit adopt(const Options& options) {
+  const auto request = request_of(options);
+  if (!request) return report(request.error());
+  const Renamed renamed{
+      {"id", "--robot-id"},          {"/proposal_id", "--proposal"}, {"/diagnosis_id", "--diagnosis"},
+      {"/version", "--version"},     {"/effect", "--effect"},        {"/note", "--note"},
+      {"/model/robot_id", "--model"}};
+  const auto reply = ask(options.server, HttpMethod::post,
+                         "/v1/robots/" + percent_encoded(options.robot_id.value_or("")) + "/model",
+                         request->dump(), renamed);
+  if (!reply) return report(reply.error());
+  if (options.json) {
+    std::puts(reply->body.c_str());
+    return Exit::ok;
+  }
+  const auto answer = object_of(*reply, options.server);
+  if (!answer) return report(answer.error());
+  print_adoption(*answer, options.dry_run);
+  return Exit::ok;
+}
+
+}  // namespace
+
+void add_proposals(CLI::App& program, Exit& exit) {
+  auto options = std::make_shared<Options>();
+  auto* command = program.add_subcommand("proposals", "List models that missions suggest, newest first");
+  add_server(*command, options->server);
+  command->add_option("--robot-id", options->robot_id, "only of this robot");
+  command->add_flag("--json", options->json, "print the answer as the server sends it");
+  command->callback([options, &exit] { exit = list(*options); });
+}
+
+void add_adopt(CLI::App& program, Exit& exit) {
+  auto options = std::make_shared<Options>();
+  auto* command = program.add_subcommand(
+      "adopt", "Put a model in force, after a back-test on missions that it was not made from");
+  add_server(*command, options->server);
+  command->add_option("--robot-id", options->robot_id, "robot whose model it is to be")->required();
+  auto* what = command->add_option_group("what");
+  what->add_option("--proposal", options->proposal, "a proposal, by its number")->check(CLI::PositiveNumber);
+  what->add_option("--diagnosis", options->diagnosis, "what this diagnosis found")
+      ->check(CLI::PositiveNumber);
+  what->add_option("--version", options->version, "a stored version again, without a back-test")
+      ->check(CLI::PositiveNumber);
+  what->add_option("--model", options->model_file, "a robot file");
+  what->require_option(1);
+  command->add_option("--effect", options->effects,
+                      "with --diagnosis: the one to adopt of effects that it does not tell apart");
+  command->add_option("--note", options->note, "why, for the list of versions");
+  command->add_flag("--force", options->force, "also where the back-test or the diagnosis speaks against it");
+  command->add_flag("--dry-run", options->dry_run, "test only");
+  command->add_flag("--json", options->json, "print the answer as the server sends it");
+  command->callback([options, &exit] { exit = adopt(*options); });
+}
+
+}  // namespace joulecast::client

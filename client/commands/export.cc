@@ -1,0 +1,144 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "base/output_file.h"
+#include "client/commands/parse_time.h"
+#include "client/commands/server_answer.h"
+#include "client/commands/table.h"
+#include "client/files.h"
+#include "client/progress.h"
+
+// Tables of a daemon's history as CSV files.
+namespace joulecast::client {
+namespace {
+
+struct Options {
+  std::string server, out = "-";
+  bool force = false;
+  std::optional<std::string> robot_id, from, to, points;
+  std::int64_t mission = 0;
+};
+
+constexpr const char* accept_csv = "text/csv, application/problem+json;q=0.5";
+
+// The path and query of the page that follows: <...>; rel="next".
+std::string next_of(const std::string& link) {
+  const auto open = link.find('<'), close = link.find('>');
+  if (open == std::string::npos || close == std::string::npos ||
+      link.find("rel=\"next\"") == std::string::npos)
+    return {};
+  return link.substr(open + 1, close - open - 1);
+}
+
+// Every page, with the line of titles once.
+Exit write_pages(const Options& options, std::string target, const Renamed& renamed,
+                 std::uint64_t all_rows = 0) {
+  std::optional<OutputFile> file;
+  if (options.out != "-") {
+    auto made = OutputFile::create(options.out, existing(options.force));
+    if (!made) return report({made.error().fault, "--out", describe(made.error())});
+    file.emplace(std::move(*made));
+  }
+  Progress progress("exporting", "rows", all_rows);
+  std::uint64_t rows = 0;
+  for (bool first = true; !target.empty(); first = false) {
+    const auto reply = ask(options.server, HttpMethod::get, target, {}, renamed, accept_csv);
+    if (!reply) return report(reply.error());
+    std::string_view text = reply->body;
+    const auto titles = text.find('\n');
+    if (!first) text.remove_prefix(titles == std::string_view::npos ? text.size() : titles + 1);
+    rows += static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n'));
+    progress.reach(rows);
+    if (!file) {
+      std::fwrite(text.data(), 1, text.size(), stdout);
+    } else if (const auto written = file->write(text); !written) {
+      return report(written.error());
+    }
+    target = next_of(reply->link);
+  }
+  if (file) {
+    if (const auto done = file->commit(); !done) return report(done.error());
+  }
+  return Exit::ok;
+}
+
+Exit export_missions(const Options& options) {
+  Query query{{"limit", "1000"}, {"robot_id", options.robot_id}};
+  for (const auto& [name, flag, text] : {std::tuple{"from_utime_us", "--from", &options.from},
+                                         std::tuple{"to_utime_us", "--to", &options.to}}) {
+    if (!*text) continue;
+    const auto utime_us = parse_time(**text, flag);
+    if (!utime_us) return report(utime_us.error());
+    query.emplace_back(name, std::to_string(*utime_us));
+  }
+  return write_pages(options, target_of("/v1/missions", query), {{"robot_id", "--robot-id"}});
+}
+
+Exit export_of_mission(const Options& options, const char* what, const Query& query) {
+  const std::string path = "/v1/missions/" + std::to_string(options.mission) + "/" + what;
+  const Renamed renamed{{"id", "--mission"}, {"points", "--points"}};
+  // How many rows there are to come, where that takes a while.
+  std::uint64_t rows = 0;
+  if (std::string_view(what) == "telemetry") {
+    const auto mission =
+        ask(options.server, HttpMethod::get, "/v1/missions/" + std::to_string(options.mission), {}, renamed);
+    if (!mission) return report(mission.error());
+    const auto answer = object_of(*mission, options.server);
+    if (!answer) return report(answer.error());
+    rows = answer->value("samples", std::uint64_t{0});
+  }
+  return write_pages(options, target_of(path, query), renamed, rows);
+}
+
+CLI::App* add(CLI::App& group, const char* name, const char* what, Options& options) {
+  auto* command = group.add_subcommand(name, what);
+  add_server(*command, options.server);
+  command->add_option("--out", options.out, "CSV file to write, - for standard output")
+      ->capture_default_str();
+  command->add_flag("--force", options.force, force_help);
+  return command;
+}
+
+void add_mission(CLI::App& command, Options& options) {
+  command.add_option("--mission", options.mission, "number of the mission, as joulecast missions lists it")
+      ->required()
+      ->check(CLI::PositiveNumber);
+}
+
+}  // namespace
+
+void add_export(CLI::App& program, Exit& exit) {
+  auto options = std::make_shared<Options>();
+  auto* group = program.add_subcommand("export", "Write tables of a daemon's history as CSV files");
+  group->require_subcommand(1);
+  auto* missions = add(*group, "missions", "Missions with their energy and ratio, one a line", *options);
+  missions->add_option("--robot-id", options->robot_id, "only this robot's");
+  missions->add_option("--from", options->from,
+                       "started at or after: 2024-07-18, 2024-07-18T09:10:45Z or microseconds since 1970");
+  missions->add_option("--to", options->to, "started before, the same");
+  missions->callback([options, &exit] { exit = export_missions(*options); });
+  auto* telemetry =
+      add(*group, "telemetry", "Every sample of a mission as received, with all digits", *options);
+  add_mission(*telemetry, *options);
+  telemetry->callback([options, &exit] {
+    exit = export_of_mission(*options, "telemetry", {{"limit", "20000"}});
+  });
+  auto* trace = add(*group, "trace", "Power, speed, charge and position over a mission", *options);
+  add_mission(*trace, *options);
+  trace->add_option("--points", options->points, "spans at most");
+  trace->callback([options, &exit] {
+    exit = export_of_mission(*options, "trace", {{"points", options->points}});
+  });
+}
+
+}  // namespace joulecast::client

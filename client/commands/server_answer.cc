@@ -1,0 +1,77 @@
+#include "client/commands/server_answer.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+namespace joulecast::client {
+namespace {
+
+using nlohmann::json;
+constexpr std::chrono::seconds patience{60};
+
+}  // namespace
+
+void add_server(CLI::App& command, std::string& server) {
+  command.add_option("--server", server, "joulecastd to ask, host:port")->required();
+}
+
+std::string percent_encoded(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                       std::string_view("-._~").find(c) != std::string_view::npos;
+    plain ? out.push_back(c) : static_cast<void>(out += fmt::format("%{:02X}", byte));
+  }
+  return out;
+}
+
+std::string target_of(std::string_view path, const Query& query) {
+  std::string target(path);
+  for (const auto& [name, value] : query)
+    if (value)
+      target += (target.find('?') == std::string::npos ? '?' : '&') + name + '=' + percent_encoded(*value);
+  return target;
+}
+
+Result<HttpReply> ask(const std::string& server, HttpMethod method, const std::string& target,
+                      std::string body, const Renamed& renamed, const std::string& accept) {
+  const auto address = parse_server_url(server);
+  if (!address) return tl::unexpected(address.error());
+  auto reply = http_request(*address, method, target, std::move(body), patience, accept);
+  if (!reply || reply->ok()) return reply;
+  Error error = error_of(*reply);
+  const auto by_name = std::ranges::find(renamed, error.field, &Renamed::value_type::first);
+  if (by_name != renamed.end()) error.field = by_name->second;
+  return tl::unexpected(std::move(error));
+}
+
+Result<json> object_of(const HttpReply& reply, const std::string& server) {
+  json answer = json::parse(reply.body, nullptr, false);
+  if (!answer.is_object()) return fail(Fault::corrupt, server, "did not answer with a JSON object");
+  return answer;
+}
+
+std::string text_of(const json& value) {
+  return value.is_string() ? value.get<std::string>() : value.is_null() ? "-" : value.dump();
+}
+
+std::string number_of(const json& object, const char* name, int decimals, double scale) {
+  if (!object.is_object()) return "-";
+  const auto found = object.find(name);
+  if (found == object.end() || !found->is_number()) return "-";
+  return fmt::format("{:.{}f}", scale * found->get<double>(), decimals);
+}
+
+std::string to_second(const json& time) {
+  if (!time.is_string()) return "-";
+  std::string text = time.get<std::string>().substr(0, std::string_view("2026-11-22T16:45:00").size());
+  std::ranges::replace(text, 'T', ' ');
+  return text;
+}
+
+}  // namespace joulecast::client

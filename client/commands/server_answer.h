@@ -1,0 +1,46 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "client/http_client.h"
+
+namespace CLI {
+class App;
+}
+
+// What the commands that read from a daemon share.
+namespace joulecast::client {
+
+// --server, required.
+void add_server(CLI::App& command, std::string& server);
+
+// Keys and values of a query; those without a value are left out.
+using Query = std::vector<std::pair<std::string, std::optional<std::string>>>;
+
+// "/v1/missions" -> "/v1/missions?robot_id=amr", percent-encoded.
+[[nodiscard]] std::string target_of(std::string_view path, const Query& query);
+[[nodiscard]] std::string percent_encoded(std::string_view text);
+
+// A reply with 2xx; the problem of any other, in which `renamed` fields are called by their flags.
+using Renamed = std::vector<std::pair<std::string, std::string>>;
+[[nodiscard]] Result<HttpReply> ask(const std::string& server, HttpMethod method, const std::string& target,
+                                    std::string body = {}, const Renamed& renamed = {},
+                                    const std::string& accept = accept_json);
+// The same with a JSON object as its body; Fault::corrupt when it is none.
+[[nodiscard]] Result<nlohmann::json> object_of(const HttpReply& reply, const std::string& server);
+
+// "-" for null.
+[[nodiscard]] std::string text_of(const nlohmann::json& value);
+// With so many decimals; "-" for what is no number.
+[[nodiscard]] std::string number_of(const nlohmann::json& object, const char* name, int decimals,
+                                    double scale = 1);
+// "2026-11-22T16:45:00.25Z" -> "2026-11-22 16:45:00"; "-" for null.
+[[nodiscard]] std::string to_second(const nlohmann::json& time);
+
+}  // namespace joulecast::client

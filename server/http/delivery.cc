@@ -1,0 +1,85 @@
+#include "server/http/delivery.h"
+
+#include <algorithm>
+#include <charconv>
+#include <utility>
+
+#include "server/http/content_coding.h"
+#include "server/http/header_list.h"
+#include "server/http/json_digits.h"
+#include "server/http/response_head.h"
+
+namespace joulecast::http {
+namespace {
+
+constexpr std::size_t least_coded_bytes = 1024;
+
+bool is_json(const Response& response) {
+  return response.content_type.starts_with("application/json");
+}
+
+std::string& own_body(Response& response) {
+  if (response.shared_body) response.body = *std::exchange(response.shared_body, nullptr);
+  return response.body;
+}
+
+bool has_header(const Response& response, std::string_view name) {
+  return std::ranges::any_of(response.headers,
+                             [&](const auto& each) { return equals_ignoring_case(each.first, name); });
+}
+
+void round(const Request& request, Response& response) {
+  const auto digits = static_cast<int>(request.query_integer("digits").value_or(usual_digits));
+  if (digits < all_digits) round_numbers(own_body(response), digits);
+}
+
+// True when the client has it.
+bool tag(const Request& request, Response& response) {
+  const std::string made = entity_tag(body_of(response));
+  response.headers.emplace_back("ETag", made);
+  response.headers.emplace_back("Cache-Control", "private, no-cache");
+  if (!lists(request.header("if-none-match"), std::string_view(made).substr(2))) return false;
+  response.status = 304;
+  own_body(response).clear();
+  return true;
+}
+
+void code(const Request& request, Response& response) {
+  const Coding coding = coding_of(request.header("accept-encoding"));
+  if (coding == Coding::identity) return;
+  if (response.stream) {
+    response.stream = coded(coding, std::move(response.stream));
+  } else {
+    std::string smaller = coded(coding, body_of(response));
+    if (smaller.empty() || smaller.size() >= body_of(response).size()) return;
+    own_body(response) = std::move(smaller);
+  }
+  response.headers.emplace_back("Content-Encoding", name(coding));
+}
+
+}  // namespace
+
+std::string entity_tag(std::string_view bytes) {
+  // FNV-1a, 64 bits: tells versions apart; nothing here relies on it against an adversary.
+  std::uint64_t hash = 14695981039346656037ULL;
+  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
+  char text[20];
+  const auto [end, fault] = std::to_chars(text, text + sizeof text, hash, 16);
+  (void)fault;  // 16 hexadecimal digits at most
+  return "W/\"" + std::string(text, end) + "\"";
+}
+
+void deliver(const Endpoint& endpoint, const Request& request, Response& response, bool on_io) {
+  if (response.status != endpoint.success_status || has_header(response, "Content-Encoding")) return;
+  std::string vary = endpoint.csv ? "Accept" : "";
+  if (endpoint.rounded && is_json(response) && !response.stream) round(request, response);
+  const bool known = endpoint.etag && !response.stream && tag(request, response);
+  const bool large = response.stream || body_of(response).size() >= least_coded_bytes;
+  if (!on_io && endpoint.response_type != "text/event-stream" && large) {
+    vary += vary.empty() ? "Accept-Encoding" : ", Accept-Encoding";
+    if (!known) code(request, response);
+  }
+  if (!vary.empty()) response.headers.emplace_back("Vary", std::move(vary));
+}
+
+}  // namespace joulecast::http

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string_view>
+
+#include "server/http/text.h"
+
+namespace joulecast::http {
+
+// Whether a header's list ("gzip, br;q=0") admits an item: it stands there, or "*" does, and not with q=0.
+// Weak validators (W/"x") count as strong ones.
+inline bool lists(std::string_view header, std::string_view wanted) {
+  bool by_star = false;
+  while (!header.empty()) {
+    const auto comma = header.find(',');
+    std::string_view item = trim(header.substr(0, comma));
+    header.remove_prefix(comma == std::string_view::npos ? header.size() : comma + 1);
+    const auto semicolon = item.find(';');
+    const bool refused = semicolon != std::string_view::npos &&
+                         item.substr(semicolon).find("q=0") != std::string_view::npos &&
+                         item.substr(semicolon).find_first_of("123456789") == std::string_view::npos;
+    item = trim(item.substr(0, semicolon));
+    if (item.starts_with("W/")) item.remove_prefix(2);
+    if (equals_ignoring_case(item, wanted)) return !refused;
+    if (item == "*" && !refused) by_star = true;
+  }
+  return by_star;
+}
+
+}  // namespace joulecast::http

@@ -1,0 +1,28 @@
+#include "server/webhook_metrics.h"
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace joulecast::server {
+
+void export_webhook_metrics(Metrics& metrics, const Webhooks& webhooks) {
+  metrics.series([&webhooks] {
+    std::vector<Metrics::Series> all{
+        {"joulecast_webhook_delivered_total", "Events that a webhook took"},
+        {"joulecast_webhook_failed_total", "Attempts to tell an event that failed"},
+        {"joulecast_webhook_dropped_total", "Events left out since too many waited (webhooks.queue)"},
+        {"joulecast_webhook_given_up_total", "Events left out after their last attempt"},
+        {"joulecast_webhook_waiting", "Events that wait for a webhook"}};
+    for (const auto& [url, counts] : webhooks.status()) {
+      const Labels labels{{"url", url}};
+      const double values[] = {static_cast<double>(counts.delivered), static_cast<double>(counts.failed),
+                               static_cast<double>(counts.dropped), static_cast<double>(counts.given_up),
+                               static_cast<double>(counts.waiting)};
+      for (std::size_t k = 0; k < all.size(); ++k) all[k].rows.emplace_back(labels, values[k]);
+    }
+    return all;
+  });
+}
+
+}  // namespace joulecast::server

@@ -1,0 +1,110 @@
+#include "server/webhooks/webhook_file.h"
+
+#include <sys/stat.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "base/json_fields.h"
+#include "base/json_text.h"
+#include "base/text_file.h"
+
+namespace joulecast::server {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t longest_text = 2048;
+constexpr std::size_t shortest_secret = 16;
+constexpr std::size_t most_secret_bytes = 4096;
+
+Result<std::string> read_secret(const std::filesystem::path& path) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) != 0) return fail(Fault::unavailable, path.string(), std::strerror(errno));
+  if ((status.st_mode & S_IROTH) != 0)
+    return invalid(path.string(), "may be read by every user of this machine: chmod o-r");
+  Result<std::string> text = read_text_file(path, most_secret_bytes);
+  if (!text) return text;
+  constexpr const char* space = " \t\r\n";
+  text->erase(0, text->find_first_not_of(space));
+  text->erase(text->find_last_not_of(space) + 1);
+  if (text->size() < shortest_secret)
+    return invalid(path.string(), "must hold " + std::to_string(shortest_secret) + " bytes at least");
+  return text;
+}
+
+std::string all_kinds() {
+  std::string text;
+  for (const std::string& kind : event_kinds()) text += (text.empty() ? "" : ", ") + kind;
+  return text;
+}
+
+void read_events(Fields& fields, std::set<std::string>& events) {
+  const json* list = fields.member("events");
+  if (list == nullptr) {
+    events = event_kinds();
+    return;
+  }
+  if (!list->is_array() || list->empty()) return fields.fault("events", "must be an array of kinds");
+  for (const json& kind : *list) {
+    if (!kind.is_string() || !event_kinds().contains(kind.get<std::string>()))
+      return fields.fault("events", "has " + kind.dump() + "; the kinds are " + all_kinds());
+    events.insert(kind.get<std::string>());
+  }
+}
+
+Result<Webhook> read_webhook(const json& value, const std::string& at, const std::filesystem::path& folder) {
+  Fields fields(value, at);
+  Webhook webhook;
+  webhook.url = fields.text("url", longest_text);
+  const std::string secret_file = fields.text("secret_file", longest_text);
+  read_events(fields, webhook.events);
+  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  auto address = http_client::parse_url(webhook.url, at + "/url");
+  if (!address) return tl::unexpected(std::move(address.error()));
+  webhook.address = std::move(*address);
+  auto secret = read_secret(folder / secret_file);
+  if (!secret) return invalid(at + "/secret_file", describe(secret.error()));
+  webhook.secret = std::move(*secret);
+  return webhook;
+}
+
+Result<std::vector<Webhook>> parse(std::string_view text, const std::filesystem::path& folder) {
+  const auto document = parse_json(text);
+  if (!document) return tl::unexpected(document.error());
+  if (!document->is_object()) return invalid("", "must be an object with the member webhooks");
+  Fields fields(*document);
+  const json* list = fields.required("webhooks");
+  if (list != nullptr && !list->is_array()) fields.fault("webhooks", "must be an array");
+  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  std::vector<Webhook> webhooks;
+  for (std::size_t k = 0; k < list->size(); ++k) {
+    Result<Webhook> webhook = read_webhook((*list)[k], "/webhooks/" + std::to_string(k), folder);
+    if (!webhook) return tl::unexpected(std::move(webhook.error()));
+    webhooks.push_back(std::move(*webhook));
+  }
+  return webhooks;
+}
+
+}  // namespace
+
+Result<std::vector<Webhook>> read_webhooks(const std::string& path) {
+  const Result<std::string> text = read_text_file(path);
+  if (!text) return tl::unexpected(text.error());
+  Result<std::vector<Webhook>> webhooks = parse(*text, std::filesystem::path(path).parent_path());
+  if (!webhooks) return invalid(path, describe(webhooks.error()));
+  return webhooks;
+}
+
+const std::set<std::string>& event_kinds() {
+  static const std::set<std::string> kinds{
+      "charged",           "consumption_drift", "contradiction",  "gap_diagnosed", "gap_drift",
+      "gap_sibling",       "host_clock_step",   "internal_fault", "mission",       "mission_annulled",
+      "mission_id_reused", "model_activated",   "model_adopted",  "robot_removed", "undeclared_payload"};
+  return kinds;
+}
+
+}  // namespace joulecast::server

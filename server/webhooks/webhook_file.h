@@ -1,0 +1,30 @@
+#pragma once
+
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "http_client/http_client.h"
+
+namespace joulecast::server {
+
+// Somebody who wants to be told of events by HTTP.
+struct Webhook {
+  std::string url;
+  http_client::ServerAddress address;  // of that URL, its path included
+  std::string secret;                  // key of the signatures
+  std::set<std::string> events;        // kinds to be told of
+};
+
+// {"webhooks": [{"url": "https://...", "secret_file": "path", "events": ["mission", ...]}]}. A relative
+// secret_file is beside the file; it holds 16 bytes at least, whitespace around them not counted, and is for
+// no other user to read. "events" may be left out: all kinds. Faults are told by JSON pointer.
+Result<std::vector<Webhook>> read_webhooks(const std::string& path);
+
+// Every kind that there is, in order of the alphabet: those of the audit log and "mission", a mission that
+// ended.
+const std::set<std::string>& event_kinds();
+
+}  // namespace joulecast::server

@@ -1,0 +1,174 @@
+#include "server/webhooks/webhooks.h"
+
+#include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "access/sha256.h"
+#include "base/fault_boundary.h"
+#include "base/json_writer.h"
+
+namespace joulecast::server {
+namespace {
+
+constexpr std::int64_t microseconds_per_s = 1'000'000;
+
+struct Delivery {
+  std::string id, kind, body;
+};
+
+}  // namespace
+
+// One webhook with its queue and its thread.
+class Webhooks::Sender {
+ public:
+  Sender(Webhook webhook, const Options& options) : webhook_(std::move(webhook)), options_(options) {
+    thread_ = std::thread([this] { run(); });
+  }
+  ~Sender() { stop(); }
+  Sender(const Sender&) = delete;
+  Sender& operator=(const Sender&) = delete;
+
+  bool wants(std::string_view kind) const { return webhook_.events.contains(std::string(kind)); }
+
+  void offer(const Delivery& delivery) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (queue_.size() >= options_.queue) {
+        queue_.pop_front();
+        ++counts_.dropped;
+      }
+      queue_.push_back(delivery);
+    }
+    wake_.notify_one();
+  }
+
+  void tell_to_stop() {
+    {
+      const std::lock_guard lock(mutex_);
+      stopping_ = true;
+    }
+    wake_.notify_one();
+  }
+  void stop() {
+    tell_to_stop();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  Status status() const {
+    const std::lock_guard lock(mutex_);
+    Status status{webhook_.url, counts_};
+    status.counts.waiting = queue_.size() + (sending_ ? 1 : 0);
+    return status;
+  }
+
+ private:
+  void run() {
+    std::unique_lock lock(mutex_);
+    for (;;) {
+      wake_.wait(lock, [this] { return stopping_ || !queue_.empty(); });
+      if (stopping_) return;
+      const Delivery next = std::move(queue_.front());
+      queue_.pop_front();
+      sending_ = true;
+      deliver(next, lock);
+      sending_ = false;
+    }
+  }
+
+  // Tries until it is answered, given up or the service stops. Called and returns with the lock.
+  void deliver(const Delivery& delivery, std::unique_lock<std::mutex>& lock) {
+    std::chrono::milliseconds pause = options_.first_pause;
+    for (int attempt = 1; !stopping_; ++attempt) {
+      lock.unlock();
+      Result<void> sent = fail(Fault::internal, webhook_.url, "the attempt broke off");
+      survive("webhooks", [&] { sent = post(delivery); });
+      lock.lock();
+      if (sent) {
+        ++counts_.delivered;
+        failing_ = false;
+        return;
+      }
+      ++counts_.failed;
+      if (!std::exchange(failing_, true) && options_.on_error) options_.on_error(sent.error());
+      if (attempt >= options_.attempts) {
+        ++counts_.given_up;
+        return;
+      }
+      wake_.wait_for(lock, pause, [this] { return stopping_; });
+      pause = std::min(2 * pause, options_.last_pause);
+    }
+  }
+
+  Result<void> post(const Delivery& delivery) const {
+    const std::int64_t seconds = options_.now_utime_us() / microseconds_per_s;
+    const http_client::HttpRequest request{
+        http_client::HttpMethod::post,
+        webhook_.address.base_path.empty() ? "/" : "",
+        delivery.body,
+        {{"Joulecast-Event", delivery.kind},
+         {"Joulecast-Delivery", delivery.id},
+         {"Joulecast-Signature", webhook_signature(webhook_.secret, seconds, delivery.body)}}};
+    const auto reply = http_client::exchange(webhook_.address, request, options_.timeout);
+    if (!reply) return tl::unexpected(reply.error());
+    if (!reply->ok())
+      return fail(Fault::unavailable, webhook_.url, "answered " + std::to_string(reply->status));
+    return {};
+  }
+
+  const Webhook webhook_;
+  const Options& options_;
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<Delivery> queue_;
+  Counts counts_;
+  bool sending_ = false, failing_ = false, stopping_ = false;
+  std::thread thread_;
+};
+
+Webhooks::Webhooks(std::vector<Webhook> webhooks, Options options)
+    : options_(std::move(options)), id_prefix_(access::random_hex(8)) {
+  for (Webhook& webhook : webhooks)
+    senders_.push_back(std::make_unique<Sender>(std::move(webhook), options_));
+}
+
+Webhooks::~Webhooks() {
+  stop();
+}
+
+void Webhooks::offer(std::string_view kind, std::string_view robot_id, std::int64_t utime_us,
+                     std::string_view data) {
+  const auto wants = [kind](const auto& sender) { return sender->wants(kind); };
+  if (std::ranges::none_of(senders_, wants)) return;
+  Delivery delivery{id_prefix_ + "-" + std::to_string(next_id_++), std::string(kind), {}};
+  JsonWriter body;
+  body.begin_object().field("id", delivery.id).field("event", kind).time("", utime_us).key("robot_id");
+  robot_id.empty() ? body.null() : body.value(robot_id);
+  body.key("data").raw(data).end_object();
+  delivery.body = body.take();
+  for (const auto& sender : senders_)
+    if (wants(sender)) sender->offer(delivery);
+}
+
+void Webhooks::stop() {
+  for (const auto& sender : senders_) sender->tell_to_stop();
+  for (const auto& sender : senders_) sender->stop();
+}
+
+std::vector<Webhooks::Status> Webhooks::status() const {
+  std::vector<Status> all;
+  for (const auto& sender : senders_) all.push_back(sender->status());
+  return all;
+}
+
+std::string webhook_signature(std::string_view secret, std::int64_t seconds, std::string_view body) {
+  const std::string time = std::to_string(seconds);
+  const auto code = access::hmac_sha256(secret, time + "." + std::string(body));
+  const std::string_view bytes(reinterpret_cast<const char*>(code.data()), code.size());
+  return "t=" + time + ",v1=" + access::hexadecimal(bytes);
+}
+
+}  // namespace joulecast::server

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "server/webhooks/webhook_file.h"
+
+namespace joulecast::server {
+
+// Tells events to webhooks: POST of
+//   {"id", "event", "time", "utime_us", "robot_id", "data"}
+// with the header Joulecast-Signature: t=<seconds since 1970>,v1=<HMAC-SHA-256 of "<t>.<body>" by the
+// webhook's secret, in hexadecimal>. A delivery that is not answered 2xx is tried again with growing pauses,
+// in order; each webhook has a thread and a bounded queue of its own. What waits at a stop is lost.
+class Webhooks {
+ public:
+  struct Options {
+    std::size_t queue = 1000;  // events that wait for one webhook; beyond: the oldest is dropped
+    std::chrono::milliseconds timeout{10'000};
+    std::chrono::milliseconds first_pause{1'000};  // doubled each time
+    std::chrono::milliseconds last_pause{300'000};
+    int attempts = 12;  // about half an hour; then the event is given up
+    std::function<std::int64_t()> now_utime_us = {};
+    std::function<void(const Error&)> on_error = {};  // the first of a row of failures; any thread
+  };
+  struct Counts {
+    std::uint64_t delivered = 0, failed = 0;  // attempts
+    std::uint64_t dropped = 0;                // events that found the queue full
+    std::uint64_t given_up = 0;               // events after their last attempt
+    std::size_t waiting = 0;
+  };
+
+  Webhooks(std::vector<Webhook> webhooks, Options options);
+  ~Webhooks();
+  Webhooks(const Webhooks&) = delete;
+  Webhooks& operator=(const Webhooks&) = delete;
+
+  // Any thread; never waits. `data` is JSON text; an empty robot_id concerns no single robot.
+  void offer(std::string_view kind, std::string_view robot_id, std::int64_t utime_us, std::string_view data);
+
+  // Ends within the time of one attempt.
+  void stop();
+
+  struct Status {
+    std::string url;
+    Counts counts;
+  };
+  std::vector<Status> status() const;
+
+ private:
+  class Sender;
+  const Options options_;
+  std::vector<std::unique_ptr<Sender>> senders_;
+  std::string id_prefix_;
+  std::atomic<std::uint64_t> next_id_{1};
+};
+
+// The value of the header Joulecast-Signature.
+std::string webhook_signature(std::string_view secret, std::int64_t seconds, std::string_view body);
+
+}  // namespace joulecast::server

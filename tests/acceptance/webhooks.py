@@ -1,0 +1,153 @@
+#!/usr/bin/env python3
+"""joulecastd tells events to webhooks: signed, in order, again after failures, over HTTPS, never at accounting's cost.
+
+webhooks.py --daemon PROGRAM --client PROGRAM --source DIR. The receiver is the one of operations.md, with failures on demand.
+"""
+import argparse
+import hashlib
+import hmac
+import http.server
+import json
+import os
+import pathlib
+import ssl
+import subprocess
+import tempfile
+import threading
+import time
+import urllib.request
+
+SECRET = b"a secret of sixteen bytes or more"
+
+
+class Receiver:
+    """Keeps what arrives; `fail` attempts are answered 503 first, and `silent` ones not at all."""
+
+    def __init__(self, fail=0, silent=False, tls=None):
+        self.got, self.attempts, self.fail, self.silent = [], 0, fail, silent
+        outer = self
+
+        class Handler(http.server.BaseHTTPRequestHandler):
+            def do_POST(self):
+                body = self.rfile.read(int(self.headers["Content-Length"]))
+                outer.attempts += 1
+                if outer.silent:
+                    time.sleep(30)
+                    return
+                stated = dict(part.split("=") for part in self.headers["Joulecast-Signature"].split(","))
+                wanted = hmac.new(SECRET, stated["t"].encode() + b"." + body, hashlib.sha256).hexdigest()
+                fresh = abs(time.time() - int(stated["t"])) < 300
+                sound = hmac.compare_digest(wanted, stated["v1"]) and fresh
+                refused = outer.fail > 0
+                outer.fail -= refused
+                if sound and not refused:
+                    outer.got.append((self.headers["Joulecast-Event"], self.headers["Joulecast-Delivery"], json.loads(body), self.path))
+                self.send_response(503 if refused else 204 if sound else 401)
+                self.end_headers()
+
+            def log_message(self, *_):
+                pass
+
+        self.server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self.server.daemon_threads = True
+        if tls:
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            context.load_cert_chain(*tls)
+            self.server.socket = context.wrap_socket(self.server.socket, server_side=True)
+        self.url = f"http{'s' if tls else ''}://127.0.0.1:{self.server.server_port}/hooks/energy"
+        threading.Thread(target=self.server.serve_forever, daemon=True).start()
+
+
+def until(what, holds, seconds=30):
+    end = time.monotonic() + seconds
+    while not holds():
+        if time.monotonic() > end:
+            raise SystemExit(f"not within {seconds} s: {what}")
+        time.sleep(0.05)
+
+
+def metric(url, name, receiver):
+    with urllib.request.urlopen(url + "/metrics", timeout=10) as reply:
+        for line in reply.read().decode().splitlines():
+            if line.startswith(name + "{") and receiver.url in line:
+                return float(line.rsplit(" ", 1)[1])
+    raise SystemExit(f"no metric {name} of {receiver.url}")
+
+
+def put(url, robot):
+    request = urllib.request.Request(f"{url}/v1/robots/{robot['robot_id']}", json.dumps(robot).encode(),
+                                     {"Content-Type": "application/json"}, method="PUT")
+    urllib.request.urlopen(request, timeout=10).close()
+
+
+def remove(url, robot_id):
+    urllib.request.urlopen(urllib.request.Request(f"{url}/v1/robots/{robot_id}", method="DELETE"), timeout=10).close()
+
+
+def refused(given, folder, change, *words):
+    """--check-config names the fault."""
+    file = folder / "faulty.json"
+    file.write_text(json.dumps({"webhooks": [{"url": "http://127.0.0.1:1/", "secret_file": "secret", **change}]}))
+    told = subprocess.run([given.daemon, "--check-config", "--webhooks-file", file], capture_output=True, text=True)
+    assert told.returncode == 2 and all(word in told.stderr for word in words), told
+
+
+def main():
+    arguments = argparse.ArgumentParser()
+    for name in ("daemon", "client", "source", "shared"):
+        arguments.add_argument("--" + name, type=pathlib.Path, required=name != "shared")
+    given = arguments.parse_args()
+    robot = json.loads((given.source / "deploy/robots/amr.json").read_text())
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", folder / "key.pem", "-out", folder / "cert.pem",
+                        "-days", "2", "-subj", "/CN=127.0.0.1", "-addext", "subjectAltName=IP:127.0.0.1"], check=True, capture_output=True)
+        good, failing, silent = Receiver(), Receiver(fail=2), Receiver(silent=True)
+        secure = Receiver(tls=(folder / "cert.pem", folder / "key.pem"))
+        (folder / "secret").write_bytes(SECRET + b"\n")
+        (folder / "secret").chmod(0o640)
+        (folder / "short").write_bytes(b"short")
+        (folder / "short").chmod(0o640)
+        everything = ["robot_removed", "model_activated"]
+        (folder / "webhooks.json").write_text(json.dumps({"webhooks": [
+            {"url": good.url, "secret_file": "secret"},
+            {"url": failing.url, "secret_file": "secret", "events": everything},
+            {"url": silent.url, "secret_file": str(folder / "secret")},
+            {"url": secure.url, "secret_file": "secret", "events": ["robot_removed"]}]}))
+        refused(given, folder, {"events": ["robot_remove"]}, "/webhooks/0/events", "robot_removed")
+        refused(given, folder, {"url": "ftp://x"}, "/webhooks/0/url")
+        refused(given, folder, {"secret_file": "short"}, "/webhooks/0/secret_file", "16 bytes")
+        refused(given, folder, {"secret_file": "none"}, "/webhooks/0/secret_file")
+        (folder / "short").chmod(0o644)
+        refused(given, folder, {"secret_file": "short"}, "chmod o-r")
+        process = subprocess.Popen(
+            [given.daemon, "--http-port", "0", "--store-path", folder / "history.db", "--log-format", "json", "--lcm-url", "memq://",
+             "--webhooks-file", folder / "webhooks.json", "--webhooks-queue", "5"],
+            stderr=subprocess.PIPE, text=True, env={**os.environ, "SSL_CERT_FILE": str(folder / "cert.pem")})
+        url = next(event["http"] for event in map(json.loads, process.stderr) if event["message"] == "ready")
+        names = [f"amr-{k}" for k in range(12)]
+        began = time.monotonic()
+        for robot_id in names:
+            put(url, {**robot, "robot_id": robot_id})
+            remove(url, robot_id)
+        assert time.monotonic() - began < 10, "a receiver that does not answer holds up the service"
+        for receiver in (good, failing):
+            until(f"{receiver.url} hears of all robots", lambda receiver=receiver: len(receiver.got) >= len(names) - 6 and receiver.got[-1][2]["robot_id"] == names[-1])
+        until("HTTPS", lambda: secure.got and secure.got[-1][2]["robot_id"] == names[-1])
+        heard = [body["robot_id"] for event, _, body, _ in good.got if event == "robot_removed"]
+        assert heard == sorted(heard, key=names.index) and good.got[0][3] == "/hooks/energy", good.got
+        event, delivery, body, _ = good.got[0]
+        assert body["event"] == event and body["id"] == delivery and set(body) == {"id", "event", "time", "utime_us", "robot_id", "data"}, body
+        assert len({delivery for _, delivery, _, _ in good.got}) == len(good.got)
+        assert failing.attempts == len(failing.got) + 2 and metric(url, "joulecast_webhook_failed_total", failing) == 2
+        # Five wait and one is under way; the others were dropped, and counted.
+        assert metric(url, "joulecast_webhook_dropped_total", silent) == len(names) - 6, metric(url, "joulecast_webhook_dropped_total", silent)
+        assert metric(url, "joulecast_webhook_waiting", silent) == 6
+        assert metric(url, "joulecast_webhook_delivered_total", good) == len(good.got)
+        process.terminate()
+        assert process.wait(timeout=15) == 0
+        process.stderr.close()
+    print(f"{len(good.got)} events told, {failing.attempts - len(failing.got)} attempts repeated, {len(names) - 6} dropped for one that is silent")
+
+
+main()

@@ -1,0 +1,236 @@
+#!/usr/bin/env python3
+"""Holds the examples of schemas/examples against the document and a daemon.
+
+Every operation with a body has an example request, which a daemon with a history answers with 2xx; every operation
+that answers with JSON has an example answer of its schema. --update writes the answers anew, from what this daemon
+answers, with long lists cut short. Ends with 77 where python3-jsonschema is missing.
+"""
+import argparse
+import contextlib
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.error
+import urllib.request
+
+try:
+    import jsonschema
+except ImportError:
+    print("python3-jsonschema is not installed")
+    sys.exit(77)
+
+LONGEST = 3  # of a list in an example: a pose has three numbers
+# Operations in an order in which each finds what it needs, and what stands for {id}. "spare" is a second robot.
+ORDER = [
+    ("putRobot", "amr"), ("listRobots", ""), ("getRobot", "amr"), ("getRobotState", "amr"), ("computeProfile", "amr"),
+    ("estimateEnergy", "amr"), ("computeAutonomy", "amr"), ("computeFleetAutonomy", ""), ("computeEnergyMatrix", ""),
+    ("listMissions", ""), ("totalMissions", "?group_by=robot"), ("getMission", "1"), ("getMissionLedger", "1"),
+    ("getMissionTrace", "1"), ("getMissionTelemetry", "1"), ("getMissionCovariates", "1"), ("startDiagnosis", ""),
+    ("startDiagnosis", ""), ("cancelDiagnosis", "2"), ("getDiagnosis", "1"), ("listDiagnoses", ""), ("adoptModel", "amr"),
+    ("listRobotVersions", "amr"), ("compareRobotVersions", "amr"), ("listProposals", "amr"), ("listFleetProposals", ""),
+    ("getGapHistory", "amr"), ("annulMission", "1"), ("listAuditLog", ""), ("removeRobot", "spare"), ("getHealth", ""),
+    ("getReadiness", ""), ("getVersion", ""),
+]
+SIGNED_IN = [("createSession", ""), ("deleteSession", "")]
+# Neither JSON nor a fixed answer, or the document itself.
+WITHOUT_EXAMPLE = {"streamEvents", "streamDiagnosis", "getDiagnosisReport", "getMetrics", "getOpenApi", "getOperatorPage"}
+
+
+@contextlib.contextmanager
+def daemon(program, folder, *arguments):
+    process = subprocess.Popen([program, "--http-port", "0", "--log-format", "json", "--lcm-url", "memq://",
+                                "--store-path", f"{folder}/history.db", *arguments], stderr=subprocess.PIPE, text=True)
+    try:
+        for line in process.stderr:
+            event = json.loads(line)
+            if event["message"] == "ready":
+                yield event["http"]
+                return
+        raise SystemExit("the daemon did not become ready")
+    finally:
+        process.terminate()
+        process.wait(timeout=30)
+        process.stderr.close()
+
+
+def ask(url, method, path, body=None, headers=None):
+    request = urllib.request.Request(url + path, method=method, headers=dict(headers or {}))
+    if body is not None:
+        request.data = json.dumps(body).encode()
+        request.add_header("Content-Type", "application/json")
+    try:
+        reply = urllib.request.urlopen(request, timeout=60)
+    except urllib.error.HTTPError as error:
+        reply = error
+    with reply:
+        text = reply.read()
+        return reply.status, json.loads(text) if text and "json" in reply.headers.get_content_type() else text, reply.headers
+
+
+def shortened(value):
+    if isinstance(value, list):
+        return [shortened(each) for each in value[:1 if value and isinstance(value[0], dict) else LONGEST]]
+    if isinstance(value, dict):
+        return {key: shortened(each) for key, each in value.items()}
+    return value
+
+
+class Examples:
+    def __init__(self, document, folder, update):
+        self.document, self.folder, self.update = document, folder, update
+        self.operations = {operation["operationId"]: (method.upper(), path, operation)
+                           for path, item in document["paths"].items() for method, operation in item.items()}
+        self.faults, self.asked, self.requests, self.answers, self.events = [], set(), 0, 0, 0
+
+    def fault(self, text):
+        self.faults.append(text)
+        print("FAULT", text)
+
+    def hold(self, what, schema, value):
+        whole = {"components": self.document["components"], **schema}
+        for error in jsonschema.Draft202012Validator(whole).iter_errors(value):
+            self.fault(f"{what}: {error.json_path}: {error.message[:300]}")
+
+    def ask(self, url, name, thing, replace=None, headers=None):
+        """Asks the example, or an operation without a body, and holds both examples against their schemas."""
+        method, template, operation = self.operations[name]
+        path = template.replace("{id}", thing) if "{id}" in template else template + thing
+        body = None
+        if "requestBody" in operation:
+            content = operation["requestBody"]["content"]["application/json"]
+            if "example" not in content:
+                return self.fault(f"{name}: the document has no example of its request")
+            body = {**content["example"], **(replace or {})}
+            self.hold(f"{name}: request", content["schema"], content["example"])
+            self.requests += name not in self.asked
+        status, answer, headers = ask(url, method, path, body, headers)
+        self.asked.add(name)
+        if str(status) not in operation["responses"] or not 200 <= status < 300:
+            return self.fault(f"{method} {path}: {status}: {answer}")
+        content = operation["responses"][str(status)].get("content", {}).get("application/json")
+        if content is None:
+            return headers
+        self.hold(f"{name}: answer", content["schema"], answer)
+        file = self.folder / f"{name}.answer.json"
+        if self.update:
+            file.write_text(json.dumps(shortened(answer), indent=2) + "\n")
+        elif "example" not in content:
+            self.fault(f"{name}: the document has no example of its answer")
+        else:
+            self.hold(f"{name}: example of its answer", content["schema"], content["example"])
+            self.answers += 1
+            if set(content["example"]) != set(answer):
+                self.fault(f"{name}: the example has {sorted(content['example'])}, the answer {sorted(answer)}")
+        return headers
+
+
+def history_of(given, folder):
+    """A store with missions of a robot that its model misses by a rolling resistance of the load."""
+    robot = given.source / "deploy/robots/amr.json"
+    for command in (["simulate", "--robots", "1", "--robot", robot, "--seed", "7", "--missions", "6", "--mission-duration", "40",
+                     "--speed", "0", "--effect", "load_rolling_resistance=0.02", "--log", f"{folder}/amr.lcmlog", "--quiet"],
+                    ["replay", f"{folder}/amr.lcmlog", "--into", f"{folder}/history.db", "--robot", robot]):
+        subprocess.run([given.client, *command], check=True, stdout=subprocess.DEVNULL)
+
+
+def hold_events(examples, url, name, thing, kind):
+    """The first event of that kind has the data that the document states."""
+    _, path, operation = examples.operations[name]
+    schema = operation["responses"]["200"]["content"]["text/event-stream"]["schema"]["contentSchema"]["items"]
+    with urllib.request.urlopen(url + path.replace("{id}", thing), timeout=30) as stream:
+        event = {}
+        for line in stream:
+            key, _, value = line.decode().rstrip("\n").partition(": ")
+            if key:
+                event[key] = value
+            elif event.get("event") == kind:
+                break
+    if event.get("event") != kind:
+        return examples.fault(f"{name}: no event {kind}")
+    examples.hold(f"{name}: event {kind}", schema, {"event": kind, "data": json.loads(event["data"])})
+    examples.events += 1
+
+
+def ended(url, diagnosis):
+    for _ in range(600):
+        if ask(url, "GET", f"/v1/diagnoses/{diagnosis}")[1]["state"] not in ("queued", "running"):
+            return
+        time.sleep(0.1)
+    raise SystemExit(f"diagnosis {diagnosis} does not end")
+
+
+def main():
+    arguments = argparse.ArgumentParser()
+    for name in ("source", "daemon", "client"):
+        arguments.add_argument("--" + name, required=True, type=pathlib.Path)
+    arguments.add_argument("--update", action="store_true", help="write the examples of answers anew")
+    given = arguments.parse_args()
+    document = json.loads((given.source / "schemas/openapi.json").read_text())
+    examples = Examples(document, given.source / "schemas/examples", given.update)
+    with tempfile.TemporaryDirectory() as folder:
+        history_of(given, folder)
+        with daemon(given.daemon, folder, "--diagnosis-controls", "0") as url:
+            spare = json.loads((given.source / "deploy/robots/nomad.json").read_text())
+            ask(url, "PUT", "/v1/robots/spare", {**spare, "robot_id": "spare"})
+            for name, thing in ORDER:
+                if name == "getDiagnosis":
+                    ended(url, 1)
+                examples.ask(url, name, thing)
+            hold_events(examples, url, "streamDiagnosis", "1", "ended")
+        with daemon(given.daemon, folder) as url:
+            hold_events(examples, url, "streamEvents", "", "state")
+        made = subprocess.run([given.client, "token", "create", "--file", f"{folder}/tokens.json", "--name", "example", "--role", "plan"],
+                              check=True, capture_output=True, text=True).stdout
+        token = re.search(r"\S{30,}", made).group()
+        with daemon(given.daemon, folder, "--auth-token-file", f"{folder}/tokens.json") as url:
+            headers = {}
+            for name, thing in SIGNED_IN:
+                answered = examples.ask(url, name, thing, {"token": token} if name == "createSession" else None, headers)
+                if answered and answered.get("Set-Cookie"):
+                    headers = {"Cookie": answered["Set-Cookie"].split(";")[0]}
+    for name in sorted(set(examples.operations) - examples.asked - WITHOUT_EXAMPLE):
+        examples.fault(f"{name}: nobody asks it here")
+    known = {f"{name}.{kind}.json" for name in examples.operations for kind in ("request", "answer")}
+    for stray in sorted({file.name for file in examples.folder.iterdir()} - known):
+        examples.fault(f"{stray} is of no operation")
+    undescribed = list(without_description(document))
+    for place in undescribed:
+        examples.fault(f"{place} has no description")
+    print(f"{examples.requests} example requests answered, {examples.answers} example answers and "
+          f"{examples.events} events held, {len(examples.faults)} faults")
+    return 1 if examples.faults else 0
+
+
+def without_description(document):
+    """Every property of every schema has a description, its own or that of what it refers to."""
+    def described(schema):
+        while isinstance(schema, dict):
+            if schema.get("description") or schema.get("title"):
+                return True
+            if "$ref" not in schema:
+                return False
+            target = document
+            for part in schema["$ref"].lstrip("#/").split("/"):
+                target = target[int(part)] if isinstance(target, list) else target[part]
+            schema = target
+        return True
+
+    def walk(node, at):
+        if isinstance(node, dict):
+            properties = node.get("properties")
+            if isinstance(properties, dict):
+                yield from (f"{at}/properties/{name}" for name, schema in properties.items() if not described(schema))
+            for key, value in node.items():
+                yield from walk(value, f"{at}/{key}") if key not in ("example", "enum") else ()
+        elif isinstance(node, list):
+            for k, value in enumerate(node):
+                yield from walk(value, f"{at}/{k}")
+    yield from walk(document["components"]["schemas"], "schemas")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

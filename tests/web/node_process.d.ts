@@ -1,0 +1,2 @@
+// All that the client uses of node.
+declare const process: { argv: string[] };
