@@ -55,7 +55,8 @@ bool depends_on_whereabouts(const answers::AutonomyInput& input) {
   return !input.start_pose || !input.payload_kg;
 }
 
-Result<std::string> answer(const Row& row, const Common& common, const Services& services) {
+Result<std::string> answer(const Row& row, const Common& common, const Services& services,
+                           const std::stop_token& stop) {
   const auto model = model_of(services, row.robot_id);
   if (!model) return tl::unexpected(model.error());
   if (row.own && !*row.own) return tl::unexpected(row.own->error());
@@ -73,7 +74,7 @@ Result<std::string> answer(const Row& row, const Common& common, const Services&
   }
   const answers::RobotOutlook robot = services.forecasts.of(*model);
   const auto autonomy =
-      answers::autonomy(request.input, mine ? *mine : common.plan, robot, now, services.cost_tables);
+      answers::autonomy(request.input, mine ? *mine : common.plan, robot, now, services.cost_tables, stop);
   if (!autonomy) return in_request(autonomy.error());
   std::string text = answers::autonomy_json(request, *autonomy, robot, now);
   if (request.dialect == answers::Dialect::joulecast) return text;
@@ -104,7 +105,7 @@ Row read_row(const json& given, const std::string& at, Fields& outer) {
 
 }  // namespace
 
-Result<std::string> fleet_autonomy_answer(const json& body, Services& services) {
+Result<std::string> fleet_autonomy_answer(const json& body, Services& services, const std::stop_token& stop) {
   Fields fields(body);
   const json nothing = json::object();
   const json* shared = fields.member("request");
@@ -132,9 +133,11 @@ Result<std::string> fleet_autonomy_answer(const json& body, Services& services) 
 
   std::vector<std::string> texts(rows.size());
   parallel_for(rows.size(), 2, [&](std::size_t k) {
-    auto text = answer(rows[k], common, services);
+    if (stop.stop_requested()) return;
+    auto text = answer(rows[k], common, services, stop);
     texts[k] = text ? std::move(*text) : problem_row(rows[k].robot_id, text.error());
   });
+  if (stop.stop_requested()) return fail(Fault::stopped, "", "the answer is no longer wanted");
   std::size_t length = 16;
   for (const std::string& text : texts) length += text.size() + 1;
   std::string out;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <stop_token>
 #include <string>
 
 #include "base/error.h"
@@ -9,6 +10,7 @@
 namespace joulecast::api {
 
 // {"robots": [...], "request": {...}}; a row a robot, in the order asked for or by id.
-Result<std::string> fleet_autonomy_answer(const nlohmann::json& body, Services& services);
+Result<std::string> fleet_autonomy_answer(const nlohmann::json& body, Services& services,
+                                          const std::stop_token& stop);
 
 }  // namespace joulecast::api

@@ -79,7 +79,7 @@ Result<Response> autonomy(const Services& services, const Request& r) {
   if (!model) return tl::unexpected(model.error());
   return json_or_error(answers::autonomy_answer(*r.json, services.forecasts.of(*model),
                                                 live_robot(services.fleet.find(id).get()),
-                                                services.cost_tables));
+                                                services.cost_tables, r.stop));
 }
 
 Result<Response> matrix(const Services& services, const Request& r) {
@@ -170,7 +170,7 @@ std::vector<TableRow> planning_rows() {
                    .error_statuses = {422},
                    .run = http::Run::compute},
                   answered_by([](Services& services, const Request& r) {
-                    return json_or_error(fleet_autonomy_answer(*r.json, services));
+                    return json_or_error(fleet_autonomy_answer(*r.json, services, r.stop));
                   })});
   return rows;
 }

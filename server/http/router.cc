@@ -116,7 +116,7 @@ std::optional<std::string> broken_constraint(const Parameter& parameter, std::st
   return std::nullopt;
 }
 
-// The rooms name what they were given by their own words: here it is what the client gave. A name that is no
+// Errors name the field as the code that found them knows it; here it is named as the client sent it. A name that is no
 // parameter is a member of the body, or, where there is none, what the path names.
 std::string field_of(const Endpoint& endpoint, const Request& request, const Error& error) {
   const std::string& field = error.field;

@@ -168,7 +168,8 @@ Result<forecast::Charge> charge_of(const std::optional<double>& given, const std
 }
 
 Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan, const RobotOutlook& robot,
-                                const LiveRobot& now, planning::CostTableCache& tables) {
+                                const LiveRobot& now, planning::CostTableCache& tables,
+                                const std::stop_token& stop) {
   const ModelInForce& model = *robot.model;
   const forecast::Forecaster& forecaster = *robot.forecaster;
   AutonomyOutput out;
@@ -198,7 +199,7 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
   const bool with_plan = moves && (!input.tasks.empty() || !plan.from_here.empty());
   std::optional<LeastEnergy> least;
   if (minimum_energy || (input.compare_minimum_energy && with_plan)) {
-    auto made = LeastEnergy::make(model, tables, input.value_of_time_w);
+    auto made = LeastEnergy::make(model, tables, input.value_of_time_w, stop);
     if (!made) return tl::unexpected(made.error());
     least.emplace(std::move(*made));
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -75,9 +76,10 @@ struct AutonomyOutput {
 };
 
 // How far and how long a robot still goes, and what becomes of the plan. infeasible when the charge is known
-// from nowhere; invalid for a payload beyond the robot's limit.
+// from nowhere; invalid for a payload beyond the robot's limit; unavailable once the token is set.
 Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan, const RobotOutlook& robot,
-                                const LiveRobot& now, planning::CostTableCache& tables);
+                                const LiveRobot& now, planning::CostTableCache& tables,
+                                const std::stop_token& stop = {});
 
 // What is known of the charge: what is given, else what is live. infeasible where neither is.
 Result<forecast::Charge> charge_of(const std::optional<double>& given, const std::optional<double>& given_sd,

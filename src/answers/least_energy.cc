@@ -12,18 +12,19 @@ using forecast::PlannedLeg;
 using forecast::PricedLeg;
 
 LeastEnergy::LeastEnergy(std::shared_ptr<const planning::CostTable> table, const ModelInForce& model,
-                         double value_of_time_w)
+                         double value_of_time_w, std::stop_token stop)
     : table_(std::move(table)),
       model_(&model),
       standing_w_(model.drive.battery_power_for({0, 0})),
-      value_of_time_w_(value_of_time_w) {}
+      value_of_time_w_(value_of_time_w),
+      stop_(std::move(stop)) {}
 
 Result<LeastEnergy> LeastEnergy::make(const ModelInForce& model, planning::CostTableCache& tables,
-                                      double value_of_time_w) {
-  if (value_of_time_w > 0) return LeastEnergy(nullptr, model, value_of_time_w);
-  auto table = tables.get(model.robot, {});
+                                      double value_of_time_w, std::stop_token stop) {
+  if (value_of_time_w > 0) return LeastEnergy(nullptr, model, value_of_time_w, std::move(stop));
+  auto table = tables.get(model.robot, {}, stop);
   if (!table) return tl::unexpected(std::move(table.error()));
-  return LeastEnergy(std::move(*table), model, 0);
+  return LeastEnergy(std::move(*table), model, 0, std::move(stop));
 }
 
 Result<planning::LegCost> LeastEnergy::curve(const PlannedLeg& leg) {
@@ -41,7 +42,7 @@ Result<planning::LegCost> LeastEnergy::curve(const PlannedLeg& leg) {
   planning::Problem problem;
   problem.limits = planning::limits_of(model_->robot);
   problem.value_of_time_w = value_of_time_w_;
-  const Result<planning::PlanCost> best = model_->planner.cost(path, problem);
+  const Result<planning::PlanCost> best = model_->planner.cost(path, problem, stop_);
   if (!best) return tl::unexpected(best.error());
   curves_.push_back({leg, {best->energy_j, best->duration_s}});
   return curves_.back().cost;

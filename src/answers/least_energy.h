@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <stop_token>
 #include <vector>
 
 #include "answers/model.h"
@@ -16,10 +17,10 @@ namespace joulecast::answers {
 class LeastEnergy {
  public:
   static Result<LeastEnergy> make(const ModelInForce& model, planning::CostTableCache& tables,
-                                  double value_of_time_w = 0);
+                                  double value_of_time_w = 0, std::stop_token stop = {});
 
-  // `may_halt`: after each leg the robot stands as it is used to. Error: a leg that cannot be driven within
-  // the limits.
+  // Both end with an error when the token is set. `may_halt`: after each leg the robot stands as it is used
+  // to. Error: a leg that cannot be driven within the limits.
   Result<std::vector<forecast::PricedLeg>> price(const std::vector<forecast::PlannedLeg>& legs,
                                                  bool may_halt);
 
@@ -29,13 +30,14 @@ class LeastEnergy {
     planning::LegCost cost;
   };
   LeastEnergy(std::shared_ptr<const planning::CostTable> table, const ModelInForce& model,
-              double value_of_time_w);
+              double value_of_time_w, std::stop_token stop);
   Result<forecast::LegCost> cost(const forecast::PlannedLeg& leg);
   Result<planning::LegCost> curve(const forecast::PlannedLeg& leg);
 
   std::shared_ptr<const planning::CostTable> table_;  // null where a second has its price
   const ModelInForce* model_;
   double standing_w_, value_of_time_w_;
+  std::stop_token stop_;
   std::vector<Curve> curves_;
 };
 

@@ -187,7 +187,7 @@ const MatrixInput& Matrix::input() const {
   return state_->input;
 }
 
-bool Matrix::prepare(std::chrono::milliseconds time) {
+bool Matrix::prepare(std::chrono::milliseconds time, const std::stop_token& stop) {
   State& s = *state_;
   if (s.tables_done == s.models.size()) {
     if (s.matrix == nullptr && s.input.driving == Driving::minimum_energy) s.assemble();
@@ -199,8 +199,8 @@ bool Matrix::prepare(std::chrono::milliseconds time) {
     do {
       const std::size_t k = next++;
       if (k >= s.models.size()) return;
-      s.tables[k] = s.cache.get(s.models[k]->robot, s.input.options);
-    } while (std::chrono::steady_clock::now() < until);
+      s.tables[k] = s.cache.get(s.models[k]->robot, s.input.options, stop);
+    } while (!stop.stop_requested() && std::chrono::steady_clock::now() < until);
   });
   s.tables_done = std::min(next.load(), s.models.size());
   return true;

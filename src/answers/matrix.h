@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -64,7 +65,7 @@ class Matrix {
   const MatrixInput& input() const;
 
   // Builds cost tables, on two threads, for so long; false when there is none left to build.
-  bool prepare(std::chrono::milliseconds time);
+  bool prepare(std::chrono::milliseconds time, const std::stop_token& stop = {});
   // From any thread; after the last prepare().
   MatrixRow row(std::size_t robot) const;
 

@@ -109,9 +109,12 @@ TEST(MotionEstimate, RefusesHeightsThatNoRobotDrives) {
 
 TEST(MotionEstimate, RefusesTimesThatDoNotIncrease) {
   const dynamics::DriveModel model(testing::nomad(), {});
-  const auto refused = estimate_motion(model, std::vector<MotionPoint>{{0, 0, 0}, {1, 1, 0}, {1, 0, 0}}, 0);
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().field, "time_s/2");
+  for (const double step : {0.0, -1.0, 1e-320}) {
+    const auto refused =
+        estimate_motion(model, std::vector<MotionPoint>{{-1, 0, 0}, {0, 1, 0}, {step, 0, 0}}, 0);
+    ASSERT_FALSE(refused) << step;
+    EXPECT_EQ(refused.error().field, "time_s/2");
+  }
 }
 
 }  // namespace

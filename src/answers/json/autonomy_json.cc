@@ -266,13 +266,14 @@ std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& 
 }
 
 Result<std::string> autonomy_answer(const nlohmann::json& request, const RobotOutlook& robot,
-                                    const LiveRobot& now, planning::CostTableCache& tables) {
+                                    const LiveRobot& now, planning::CostTableCache& tables,
+                                    const std::stop_token& stop) {
   Fields fields(request);
   const AutonomyRequest read = read_autonomy(fields, true);
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
   const auto plan = task_plan(read.input, now);
   if (!plan) return tl::unexpected(plan.error());
-  const auto output = autonomy(read.input, *plan, robot, now, tables);
+  const auto output = autonomy(read.input, *plan, robot, now, tables, stop);
   if (!output) return tl::unexpected(output.error());
   return autonomy_json(read, *output, robot, now);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <stop_token>
 #include <string>
 
 #include "answers/autonomy.h"
@@ -25,7 +26,8 @@ std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& 
 
 // From request to answer, of one robot.
 Result<std::string> autonomy_answer(const nlohmann::json& request, const RobotOutlook& robot,
-                                    const LiveRobot& now, planning::CostTableCache& tables);
+                                    const LiveRobot& now, planning::CostTableCache& tables,
+                                    const std::stop_token& stop = {});
 
 // {"since_utime_us", "detected_utime_us", "ratio", "missions"}
 void write_drift(JsonWriter& json, const forecast::Drift& drift);

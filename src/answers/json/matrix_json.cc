@@ -165,7 +165,9 @@ Result<MatrixInput> read_matrix(const json& request) {
 
 bool MatrixText::next(std::string& out, const std::stop_token& left) {
   if (left.stop_requested()) return false;
-  if (matrix_.prepare(tables_piece)) return true;
+  const bool more = matrix_.prepare(tables_piece, left);
+  if (left.stop_requested()) return false;
+  if (more) return true;
   const MatrixInput& input = matrix_.input();
   if (!begun_) {
     JsonWriter head;
