@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -26,9 +27,9 @@ struct ClusterOptions {
 
 struct ClusterStatus {
   std::string name, node;
-  history::ClusterState state;         // as last read
-  double read_s = 0;                   // ago; NaN: never
-  double renewed_s = 0;                // ago; NaN: never
+  history::ClusterState state;                                  // as last read
+  double read_s = std::numeric_limits<double>::quiet_NaN();     // ago; NaN: never
+  double renewed_s = std::numeric_limits<double>::quiet_NaN();  // ago; NaN: never
   std::string error;                   // why the database was not reached last; empty: it was
   std::size_t kept = 0;                // robots
   std::uint64_t takeovers = 0;         // robots taken from daemons that were gone

@@ -13,8 +13,8 @@
 
 // Which daemon of a cluster keeps which robot, agreed on in PostgreSQL (schemas/cluster.postgresql.sql). A
 // daemon is a member as long as it renews its row; a robot's lease is its member's as long as that is there.
-// Commits carry the lease's epoch (commands.h), which whoever takes the lease raises: one that was away and
-// believes that it still keeps the robot cannot write.
+// Commits carry the lease's epoch (commands.h), which whoever takes the lease raises: a daemon that lost the
+// lease without noticing cannot write.
 namespace joulecast::history {
 
 struct Member {

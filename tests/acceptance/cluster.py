@@ -27,7 +27,7 @@ from harness import SKIP, Programs, check, need_multicast, skip
 RATE_HZ = 50
 LEASE_S = 5
 KILLED_S, PAUSED_S = 3, 10  # within which another daemon goes on
-NODES = ("anna", "bert", "cleo")
+NODES = ("alpha", "beta", "gamma")
 
 
 def options():
@@ -204,39 +204,39 @@ def models_everywhere(cluster, robot):
 
 
 def faults(cluster, robots):
-    anna, bert, cleo = (cluster.nodes[name] for name in NODES)
-    anna_had = cluster.of("anna")
+    alpha, beta, gamma = (cluster.nodes[name] for name in NODES)
+    alpha_had = cluster.of("alpha")
     since = time.monotonic()
-    anna.kill()
-    cluster.takeover("anna", anna_had, KILLED_S, "kill -9", since)
-    anna.start()
+    alpha.kill()
+    cluster.takeover("alpha", alpha_had, KILLED_S, "kill -9", since)
+    alpha.start()
     wait_until(lambda: cluster.is_spread(robots), 30, "the daemon that came back has robots again")
 
-    bert_had, lost = cluster.of("bert"), bert.metric("joulecast_cluster_memberships_lost_total")
+    beta_had, lost = cluster.of("beta"), beta.metric("joulecast_cluster_memberships_lost_total")
     since = time.monotonic()
-    bert.send(signal.SIGSTOP)
-    cluster.takeover("bert", bert_had, PAUSED_S, "SIGSTOP", since)
+    beta.send(signal.SIGSTOP)
+    cluster.takeover("beta", beta_had, PAUSED_S, "SIGSTOP", since)
     time.sleep(2)
-    bert.send(signal.SIGCONT)
-    wait_until(lambda: bert.metric("joulecast_cluster_memberships_lost_total") > lost, 10, "it sees that it was away")
-    print(f"SIGCONT: {bert.metric('joulecast_cluster_commands_dropped_total'):.0f} late commands dropped")
+    beta.send(signal.SIGCONT)
+    wait_until(lambda: beta.metric("joulecast_cluster_memberships_lost_total") > lost, 10, "it sees that it was away")
+    print(f"SIGCONT: {beta.metric('joulecast_cluster_commands_dropped_total'):.0f} late commands dropped")
     wait_until(lambda: cluster.is_spread(robots), 30, "the daemon that went on has robots again")
 
-    cleo_had, lost = cluster.of("cleo"), cleo.metric("joulecast_cluster_memberships_lost_total")
+    gamma_had, lost = cluster.of("gamma"), gamma.metric("joulecast_cluster_memberships_lost_total")
     since = time.monotonic()
     cluster.relay.open.clear()
-    cluster.takeover("cleo", cleo_had, PAUSED_S, "cut off from PostgreSQL", since)
+    cluster.takeover("gamma", gamma_had, PAUSED_S, "cut off from PostgreSQL", since)
     time.sleep(2)
     cluster.relay.open.set()
-    wait_until(lambda: cleo.metric("joulecast_cluster_memberships_lost_total") > lost, 40, "it sees that it was cut off")
-    print(f"connected again: {cleo.metric('joulecast_cluster_commands_dropped_total'):.0f} late commands dropped")
+    wait_until(lambda: gamma.metric("joulecast_cluster_memberships_lost_total") > lost, 40, "it sees that it was cut off")
+    print(f"connected again: {gamma.metric('joulecast_cluster_commands_dropped_total'):.0f} late commands dropped")
     wait_until(lambda: cluster.is_spread(robots), 30, "the daemon that was cut off has robots again")
 
-    cleo_had = cluster.of("cleo")
+    gamma_had = cluster.of("gamma")
     since = time.monotonic()
-    check(cleo.stop() == 0, "the daemon did not stop in order")
-    cluster.takeover("cleo", cleo_had, KILLED_S, "SIGTERM", since)
-    cleo.start()
+    check(gamma.stop() == 0, "the daemon did not stop in order")
+    cluster.takeover("gamma", gamma_had, KILLED_S, "SIGTERM", since)
+    gamma.start()
     wait_until(lambda: cluster.is_spread(robots), 30, "the daemon that was started again has robots")
 
     check(cluster.server.tell("stop") == 0, "PostgreSQL did not stop")
@@ -305,7 +305,7 @@ def stored_samples(node, mission):
 
 def reference(cluster, log):
     """The missions of one daemon that reads the whole log."""
-    node = cluster.nodes["anna"]
+    node = cluster.nodes["alpha"]
     alone = Node(node.options, "alone", "", cluster.lcm_url)
     alone.settings = []
     robots = []
@@ -326,7 +326,7 @@ def by_name(missions):
 
 def compare(cluster, log, changed):
     sent = published(log)
-    node = cluster.nodes["anna"]
+    node = cluster.nodes["alpha"]
     alone = reference(cluster, log)
     ours, theirs = by_name(all_missions(node)), by_name(all_missions(alone))
     for one, other, text in ((ours, theirs, "only the cluster"), (theirs, ours, "only one daemon")):
@@ -380,14 +380,14 @@ def main():
     check(started == 0, "PostgreSQL did not start")
     check(server.tell("standby", server.primary, server.standby) == 0, "the standby did not start")
     cluster = Cluster(arguments, server)
-    anna = cluster.nodes["anna"]
-    log = anna.path("published.lcmlog")
+    alpha = cluster.nodes["alpha"]
+    log = alpha.path("published.lcmlog")
     fleet = None
     try:
         for node in cluster.nodes.values():
             node.start()
         fleet = subprocess.Popen(
-            [arguments.client, "simulate", "--robots", str(arguments.robots), "--lcm-url", cluster.lcm_url, "--server", anna.url,
+            [arguments.client, "simulate", "--robots", str(arguments.robots), "--lcm-url", cluster.lcm_url, "--server", alpha.url,
              "--rate", str(RATE_HZ), "--mission-duration", str(arguments.mission_duration), "--log", log, "--quiet"])
         wait_until(lambda: cluster.is_spread(arguments.robots), 40, "every daemon keeps some of the robots")
         print({name: len(cluster.of(name)) for name in NODES})
@@ -400,7 +400,7 @@ def main():
             if time.monotonic() >= until:
                 break
         live_everywhere(cluster, robots)
-        told = anna.get("/v1/cluster")
+        told = alpha.get("/v1/cluster")
         jsonschema.validate(told, json.loads(pathlib.Path(arguments.source, "schemas", "cluster.schema.json").read_text()))
         check({n["node"] for n in told["nodes"]} == set(NODES) and len(told["leases"]) == arguments.robots, f"/v1/cluster: {told}")
         fleet.send_signal(signal.SIGINT)
@@ -409,7 +409,7 @@ def main():
         time.sleep(3)
         for node in cluster.nodes.values():
             check(node.stop() == 0, f"{node.name} did not stop in order")
-        anna.start()
+        alpha.start()
         compare(cluster, log, robots[0])
     finally:
         if fleet:

@@ -134,6 +134,28 @@ TEST_F(DiagnosisServiceTest, AJobThatAStopCutsOffIsMarkedByTheNextStart) {
   EXPECT_FALSE(d->error.empty());
 }
 
+TEST_F(DiagnosisServiceTest, AJobThatAnotherDaemonLeftIsRunAsItWasAskedFor) {
+  drive(harness_, testing::nomad(), 0);
+  serve();  // not started: as a daemon that is gone before it began
+  DiagnosisRequest wanted = request();
+  wanted.missions = {harness_.missions().front().key};
+  wanted.hold_back = 0;
+  const auto id = service_->submit(wanted);
+  ASSERT_TRUE(id) << describe(id.error());
+  serve();
+  EXPECT_EQ(service_->take_over(*id + 1).error().fault, Fault::not_found);
+  ASSERT_TRUE(service_->start());  // outside a cluster this gives up what was left
+  ASSERT_TRUE(service_->take_over(*id));
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (service_->counts().done + service_->counts().failed == 0 && std::chrono::steady_clock::now() < until)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  const auto d = harness_.store->diagnosis(*id);
+  ASSERT_TRUE(d);
+  EXPECT_TRUE(d->state == DiagnosisState::done || d->state == DiagnosisState::failed);
+  EXPECT_EQ(d->fitted_on, wanted.missions);
+  EXPECT_TRUE(d->held_back.empty());
+}
+
 TEST_F(DiagnosisServiceTest, RefusesAtOnceWhatItCannotDo) {
   serve();
   const auto bare = service_->submit(request());
