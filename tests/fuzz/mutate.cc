@@ -3,6 +3,7 @@
 // allocation failing once. The same seeds give the same inputs. What the target crashed or hung on is in
 // crash-<pid>, which libFuzzer and this program (SECONDS 0: each seed once) run again.
 #include <fcntl.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -38,7 +39,7 @@ void on_fault(int signal_number) {
   if (const int file = open(name.data(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
       file >= 0 && running)
     (void)!write(file, running->data(), running->size());
-  const std::string_view text = signal_number == SIGALRM ? "an input hangs; it is in crash-<pid>\n"
+  const std::string_view text = signal_number == SIGPROF ? "an input hangs; it is in crash-<pid>\n"
                                                          : "an input crashes; it is in crash-<pid>\n";
   (void)!write(STDERR_FILENO, text.data(), text.size());
   std::signal(SIGABRT, SIG_DFL);
@@ -140,11 +141,18 @@ class Mutator {
 
 using Clock = std::chrono::steady_clock;
 
+// Of this program's time, since a busy machine may keep it waiting for as long as it likes.
+void limit_time(unsigned seconds) {
+  itimerval limit{};
+  limit.it_value.tv_sec = seconds;
+  setitimer(ITIMER_PROF, &limit, nullptr);
+}
+
 void run(const std::string& input) {
   running = &input;
-  alarm(max_input_s);
+  limit_time(max_input_s);
   (void)LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(input.data()), input.size());
-  alarm(0);
+  limit_time(0);
 }
 
 std::uint64_t cut_short(const std::vector<std::string>& seeds, Clock::time_point until) {
@@ -171,7 +179,7 @@ std::uint64_t without_memory(const std::vector<std::string>& seeds, Clock::time_
         ended = !allocation_failed();
       } catch (const std::bad_alloc&) {
         fail_allocation(0);
-        alarm(0);
+        limit_time(0);
       }
       if (ended) break;
     }
@@ -187,7 +195,7 @@ int main(int argc, char** argv) {
     std::fputs("no seeds\n", stderr);
     return 2;
   }
-  for (const int each : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGALRM}) std::signal(each, on_fault);
+  for (const int each : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGPROF}) std::signal(each, on_fault);
   std::ranges::for_each(seeds, run);
   const auto began = Clock::now();
   const std::chrono::duration<double> whole(duration_s);
