@@ -90,7 +90,6 @@ class Request {
       if (brief() && run.uniform()) answer->forget_motion();
       answers_.push_back(std::move(*answer));
     }
-    shortest_s_ = least_time_s();
     return {};
   }
 
@@ -115,7 +114,7 @@ class Request {
     } else if (duration_s() <= deadline) {
       return {};
     }
-    return meet(deadline, std::clamp(1e-3 * (deadline - shortest_s_), 1e-6 * deadline, 1e-4 * deadline));
+    return meet(deadline, std::clamp(1e-3 * (deadline - least_time_s()), 1e-6 * deadline, 1e-4 * deadline));
   }
 
   // Whether closed forms answer every run at the value of time, and no deadline asks for more; then solved.
@@ -135,21 +134,21 @@ class Request {
   Result<void> meet(double deadline, double early_s) {
     // The shortest time is known as finely as the grids are, which become finer while solving: a deadline
     // found to be beyond reach on the way is refused as one that was known to be.
-    const auto beyond_reach = [&] { return deadline < shortest_s_ * (1 - 1e-9); };
-    if (beyond_reach()) return too_soon(deadline, shortest_s_);
+    const auto beyond_reach = [&] { return deadline < least_time_s() * (1 - 1e-9); };
+    if (beyond_reach()) return too_soon(deadline, least_time_s());
     deadline_binds_ = true;
-    if (deadline <= shortest_s_ * (1 + 1e-7)) return solve(at_once_w);
+    if (deadline <= least_time_s() * (1 + 1e-7)) return solve(at_once_w);
     // log(T - T_min) falls nearly linearly in log(idle + price): a bracket there, drawn in by the secant
     // through its ends (Illinois) or, where that stalls, by halving. Done a little
     // early.
     const double idle = endless_ ? 0 : std::max(loads_.electric().idle_w, 1e-3 * average_power_w());
     const auto late = [&] {
-      return std::log(std::max(1e-12, duration_s() - shortest_s_) / (deadline - shortest_s_));
+      return std::log(std::max(1e-12, duration_s() - least_time_s()) / (deadline - least_time_s()));
     };
     const auto met = [&] { return duration_s() <= deadline && duration_s() > deadline - early_s; };
     const auto at = [&](double x) -> Result<void> {
       if (auto ok = solve(std::exp(x) - idle); !ok) return ok;
-      if (beyond_reach()) return too_soon(deadline, shortest_s_);
+      if (beyond_reach()) return too_soon(deadline, least_time_s());
       return {};
     };
     constexpr double steepest = 40;  // e^40 W: no price of time is higher
@@ -168,7 +167,7 @@ class Request {
     }
     int side = 0;
     for (int k = 0; k < 60 && late_fast <= 0 && !met(); ++k) {
-      const double aim = 0.5 * early_s / (deadline - shortest_s_);
+      const double aim = 0.5 * early_s / (deadline - least_time_s());
       double x = slow + (fast - slow) * (late_slow + aim) / (late_slow - late_fast);
       if (k % 4 == 3 || !(x > slow && x < fast)) x = 0.5 * (slow + fast);
       if (auto ok = at(x); !ok) return ok;
@@ -202,7 +201,6 @@ class Request {
     return sum;
   }
   double average_power_w() const { return energy_j() / duration_s(); }
-  double shortest_s() const { return shortest_s_; }
   PlanCost cost() const {
     PlanCost cost{energy_j(), duration_s(), price_w_, 0, true};
     for (std::size_t k = 0; k < runs_.size(); ++k) {
@@ -228,7 +226,7 @@ class Request {
   std::stop_token stop_;
   std::vector<RunPlanner> runs_;
   std::vector<RunAnswer> answers_;
-  double dwell_s_ = 0, shortest_s_ = 0, price_w_ = 0;
+  double dwell_s_ = 0, price_w_ = 0;
   bool deadline_binds_ = false;
   bool endless_ = false;  // without a price of time
 };
@@ -545,7 +543,7 @@ Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& p
   for (int attempt = 0; front.size() < count; ++attempt) {
     front.resize(1);
     // The shortest time itself costs an unbounded price; the front ends a hundredth of the way before it.
-    const double shortest = request->shortest_s();
+    const double shortest = request->least_time_s();
     if (free.duration_s < shortest * (1 + 1e-5)) return std::vector<PlanCost>{free};
     const double fastest = std::max(shortest * (1 + 2e-6), shortest + 0.01 * (free.duration_s - shortest));
     for (std::size_t k = 1; k < count; ++k) {

@@ -6,8 +6,6 @@
 #include <string>
 #include <utility>
 
-#include "planning/peaks.h"
-
 namespace joulecast::planning {
 namespace {
 
@@ -91,6 +89,13 @@ bool RunPlanner::motors_break(double v, double q) const {
   return false;
 }
 
+// Whether torque and voltage, linear in speed and acceleration, keep their limits up to a speed and an
+// acceleration: they do where they do at the corners.
+bool RunPlanner::motors_hold(double top, double most) const {
+  return !motors_break(0, -most) && !motors_break(0, most) && !motors_break(top, -most) &&
+         !motors_break(top, most);
+}
+
 // Prepares the closed form where power is quadratic.
 void RunPlanner::find_line() {
   const Electric& e = loads_->electric();
@@ -108,12 +113,10 @@ void RunPlanner::find_line() {
   task.distance = run_->length();
   task.start_speed = start_, task.end_speed = end_;
   line_ = task;
-  // Torque and voltage are linear in speed and acceleration: within the corners' values.
   const Limits& l = problem_->limits;
   const double top = std::sqrt(ceiling_at(0)), most = acceleration_limit();
   motors_never_break_ = (!std::isfinite(l.current_a) && !std::isfinite(l.voltage_v)) ||
-                        (std::isfinite(most) && !motors_break(0, -most) && !motors_break(0, most) &&
-                         !motors_break(top, -most) && !motors_break(top, most));
+                        (std::isfinite(most) && motors_hold(top, most));
   shortest_s_ = std::max(start_, end_) <= top ? shortest_time_within(task, top, most)
                                               : std::numeric_limits<double>::infinity();
   if (std::fabs(start_ * start_ - end_ * end_) > 2 * most * task.distance * (1 + 1e-9))
@@ -172,11 +175,30 @@ void RunPlanner::build(std::vector<double> nodes) {
       const double middle = 0.5 * (nodes_[k] + nodes_[k + 1]);
       grid->loads.push_back(loads_->at(*run_, run_->at(middle), run_->curvature_slope(middle)));
     }
+    add_end_loads(*grid);
   }
   solver_.reset();
   grid_ = std::move(grid);
   envelope_ = std::make_unique<SpeedEnvelope>(speed_envelope(*grid_));
   shortest_s_ = envelope_->shortest_s;
+}
+
+// Only where motors could come near their limits.
+void RunPlanner::add_end_loads(SpeedGrid& grid) const {
+  bool near = false;
+  for (std::size_t k = 0; k < grid.cells() && !near; ++k) {
+    const Reachable may =
+        reachable(grid, grid.load(k), std::sqrt(std::max(grid.ceiling[k], grid.ceiling[k + 1])), 0.8);
+    near = may.torque[0] || may.torque[1] || may.voltage[0] || may.voltage[1];
+  }
+  if (!near) return;
+  grid.end_loads.reserve(grid.cells());
+  for (std::size_t k = 0; k < grid.cells(); ++k) {
+    // The slope of the curvature may jump at a node.
+    const double slope = run_->curvature_slope(nodes_[k] + 0.5 * grid.step[k]);
+    grid.end_loads.push_back(
+        {loads_->at(*run_, run_->at(nodes_[k]), slope), loads_->at(*run_, run_->at(nodes_[k + 1]), slope)});
+  }
 }
 
 Result<void> RunPlanner::check_feasible() const {
@@ -385,14 +407,52 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
     // Without motors to mind, the closed form knows what is feasible; the grid waits until it is needed.
     if (planner.line_ && planner.motors_never_break_ && std::isfinite(planner.shortest_s_)) return planner;
     planner.find_motion();
-    if (planner.motion_ && std::isfinite(planner.motion_->shortest_s())) {
-      planner.shortest_s_ = planner.motion_->shortest_s();
-      return planner;
-    }
+    planner.shortest_s_ = 0;
+    // From rest to rest some motion covers any way.
+    const bool rests = start_speed == 0 && end_speed == 0;
+    if (planner.motion_ && (rests || std::isfinite(planner.shortest_s()))) return planner;
     planner.motion_.reset();
   }
   if (auto ok = planner.build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
   return planner;
+}
+
+double RunPlanner::shortest_s() const {
+  if (shortest_s_ == 0 && motion_) shortest_s_ = motion_->shortest_s();
+  return shortest_s_;
+}
+
+std::optional<double> RunPlanner::cruise_speed(double price_w) {
+  if (!uniform_) return {};
+  if (line_ && motors_never_break_) {
+    LineTask task = *line_;
+    task.value_of_time_w = price_w;
+    return std::min(best_speed_of(task), std::sqrt(ceiling_at(0)));
+  }
+  if (!motion_ && !grid_) find_motion();
+  if (!motion_) return {};
+  return motion_->cruise_speed(price_w);
+}
+
+std::optional<RestMotion> RunPlanner::to_peak(double peak, double price_w) {
+  const Electric& e = loads_->electric();
+  if (line_ && e.up == e.down) {
+    LineTask task = *line_;
+    task.value_of_time_w = price_w;
+    if (peak < best_speed_of(task)) {
+      const LineMotion line = line_to_peak(task, peak, acceleration_limit());
+      if (motors_never_break_ || motors_hold(peak, line.peak_acceleration()))
+        return RestMotion{line.distance(), line.duration_s(), line.energy_j()};
+    }
+  }
+  if (!motion_ && !grid_) find_motion();
+  if (!motion_) return {};
+  return motion_->to_peak(peak, price_w);
+}
+
+double RunPlanner::steady_power_w(double speed) const {
+  const dynamics::Instant at = loads_->instant(*run_, run_->at(0), 0, speed, 0);
+  return loads_->model().flow(at).battery_power_w;
 }
 
 Result<void> RunPlanner::build_grid() {
@@ -418,8 +478,7 @@ std::optional<RunAnswer> RunPlanner::closed_form(double price_w, double length) 
   const double top = line->peak_speed(), most = line->peak_acceleration();
   const bool lossy = e.up != e.down;
   // The corners of the box that the profile stays in decide quickly, its samples where they do not.
-  const bool sure = motors_never_break_ || (!motors_break(0, -most) && !motors_break(0, most) &&
-                                            !motors_break(top, -most) && !motors_break(top, most));
+  const bool sure = motors_never_break_ || motors_hold(top, most);
   if (lossy || !sure) {
     for (const double t : line->times(128)) {
       const auto [way, v, q] = line->state(t);
@@ -438,41 +497,23 @@ std::optional<RunAnswer> RunPlanner::closed_form(double price_w, double length) 
   return answer;
 }
 
-// The solver holds the motors' limits at the middle of each cell. Where they are exceeded towards its ends,
-// the cell gets a smaller share of them; false when none needs it.
-bool RunPlanner::tighten(const std::vector<double>& z) {
-  const std::size_t n = nodes_.size() - 1;
-  bool any = false;
-  for (std::size_t k = 0; k < n; ++k) {
+// Constant acceleration between nodes uses a motor fully at one end of a cell and less at the other. Where it
+// is used to its limit, cells are cut until that difference is small; the same nodes where it is.
+std::vector<double> RunPlanner::split_for_motors(const std::vector<double>& z) const {
+  constexpr double most_parts = 16, full = 0.99;
+  std::vector<double> nodes{0};
+  for (std::size_t k = 0; k < grid_->cells(); ++k) {
     const double q = (z[k + 1] - z[k]) / (2 * grid_->step[k]);
-    const auto use = [&](double f, double acceleration) {
-      const double way = nodes_[k] + f * grid_->step[k], v = std::sqrt(z[k] + f * (z[k + 1] - z[k]));
-      const double slope = run_->turn == 0 ? run_->curvature_slope(way) : 0;
-      const auto at = loads_->instant(*run_, run_->at(way), slope, v, acceleration);
-      if (creeps(at.wheel_speed_rad_s)) return 0.0;
-      const auto flow = loads_->model().flow(at);
-      double most = 0;
-      for (std::size_t s : {0u, 1u}) {
-        most = std::max({most, std::fabs(flow.torque_nm[s]) / grid_->torque_limit_nm,
-                         std::fabs(flow.voltage_v[s]) / grid_->voltage_limit_v});
-      }
-      return most;
-    };
-    const double excess = std::max(use(0.001, q), use(0.999, q)) - 1, holding = use(0.5, 0);
-    if (excess > UniformMotion::motor_tolerance) {
-      if (grid_->motor_share.empty()) grid_->motor_share.assign(n, 1);
-      double& share = grid_->motor_share[k];
-      // A steady speed must stay possible.
-      const double less = std::max(share * (1 - 1e-5) / (1 + excess), std::min(share, 1.001 * holding));
-      any = any || less < share;
-      share = less;
-    }
+    const double from = motor_use(*grid_, grid_->load(k, 0), std::sqrt(z[k]), q),
+                 to = motor_use(*grid_, grid_->load(k, 1), std::sqrt(z[k + 1]), q);
+    const double change = std::fabs(to - from) / UniformMotion::motor_tolerance;
+    const double parts = std::max(from, to) < full || nodes.size() > most_cells
+                             ? 1
+                             : std::clamp(std::ceil(change - 0.5), 1.0, most_parts);
+    for (double i = 1; i <= parts; ++i) nodes.push_back(nodes_[k] + grid_->step[k] * i / parts);
+    nodes.back() = nodes_[k + 1];
   }
-  if (any) {
-    *envelope_ = speed_envelope(*grid_);
-    solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
-  }
-  return any;
+  return nodes;
 }
 
 Result<RunAnswer> RunPlanner::solve(double price_w, const std::stop_token& stop) {
@@ -512,11 +553,18 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     discretisation_j_ = std::fabs(coarse_cost - s.cost_j);
     refined_ = true;
   }
-  const double before_tightening = s.cost_j;
-  for (int round = 0; round < 4 && s.converged && solver_->bounds_motors() && tighten(s.z); ++round) {
+  for (int round = 0; round < 2 && s.converged && solver_->bounds_motors(); ++round) {
+    std::vector<double> nodes = split_for_motors(s.z);
+    if (nodes.size() < nodes_.size() + nodes_.size() / 50 + 1) break;
+    const std::vector<double> z = resampled(nodes_, s.z, nodes);
+    build(std::move(nodes));
     if (auto ok = check_feasible(); !ok) return tl::unexpected(std::move(ok.error()));
+    solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
+    solver_->start_from(z);
+    const double coarse_cost = s.cost_j;
     s = solver_->solve(price_w, fine_tolerance, stop);
     iterations += s.iterations;
+    discretisation_j_ = std::max(discretisation_j_, std::fabs(coarse_cost - s.cost_j));
   }
   if (stop.stop_requested()) return stopped();
   if (!s.converged) {
@@ -524,7 +572,6 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     if (s.z.empty()) return fail(Fault::internal, "path", "the speed profile of a run did not converge");
     return s;
   }
-  discretisation_j_ += std::max(0.0, s.cost_j - before_tightening);
   s.iterations = iterations;
   return s;
 }
@@ -535,7 +582,6 @@ SpeedSolution RunPlanner::best_capped(double price_w) {
   SpeedSolution best;
   best.cost_j = std::numeric_limits<double>::infinity();
   SpeedGrid capped = *grid_;
-  capped.motor_share.clear();
   for (double part = 1; part > 1e-3; part *= 0.95) {
     for (std::size_t k = 1; k + 1 < nodes_.size(); ++k) capped.ceiling[k] = part * part * grid_->ceiling[k];
     const SpeedEnvelope envelope = speed_envelope(capped);
@@ -557,7 +603,7 @@ RunAnswer RunPlanner::answer_of(const SpeedSolution& s, double price_w) const {
   answer.duration_s = s.duration_s;
   answer.energy_j = s.cost_j - price_w * s.duration_s;
   answer.gap_j = s.gap_j;
-  answer.discretisation_j = discretisation_j_;
+  answer.discretisation_j = discretisation_j_ + s.ends_j;
   answer.residual = s.residual;
   answer.convex = s.convex && loads_->electric().idle_w + price_w >= 0;
   answer.iterations = s.iterations;
@@ -586,7 +632,6 @@ Result<RunAnswer> RunPlanner::fastest() {
   if (!grid_) {
     if (auto ok = build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
   }
-  grid_->motor_share.clear();
   const SpeedEnvelope envelope = speed_envelope(*grid_);
   SpeedSolution solution;
   solution.z = envelope.fastest;
