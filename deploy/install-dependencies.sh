@@ -7,7 +7,7 @@ packages=(
   nlohmann-json3-dev
   libboost-dev libceres-dev libcli11-dev libspdlog-dev libfmt-dev prometheus-cpp-dev libexpected-dev
   libssl-dev libsystemd-dev libzstd-dev zlib1g-dev
-  libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev
+  libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev coinor-libipopt-dev
   lintian clang-format clang-tidy cppcheck iproute2 curl python3 python3-jsonschema chromium
 )
 # The page's tests run on whatever node there is.

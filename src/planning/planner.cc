@@ -94,9 +94,9 @@ class Request {
   }
 
   // Of the fastest motion that the limits allow.
-  double least_time_s() const {
+  double least_time_s() {
     double sum = dwell_s_;
-    for (const RunPlanner& run : runs_) sum += run.shortest_s();
+    for (RunPlanner& run : runs_) sum += run.shortest_s();
     return sum;
   }
 
@@ -105,12 +105,14 @@ class Request {
     auto solved = solve(problem_.value_of_time_w);
     if (!problem_.deadline_s) return solved;
     const double deadline = *problem_.deadline_s;
+    if (solved) unhurried_j_ = energy_j();
     if (!solved) {
       // Without idle power, friction and value of time only a deadline ends the motion.
       if (solved.error().fault != Fault::infeasible || solved.error().field != "value_of_time_w")
         return solved;
       endless_ = true;
       if (auto ok = solve(1.0); !ok) return ok;
+      unhurried_j_ = 0;
     } else if (duration_s() <= deadline) {
       return {};
     }
@@ -227,6 +229,7 @@ class Request {
   std::vector<RunPlanner> runs_;
   std::vector<RunAnswer> answers_;
   double dwell_s_ = 0, price_w_ = 0;
+  double unhurried_j_ = 0;  // energy at the value of time, where there is a deadline; no motion takes less
   bool deadline_binds_ = false;
   bool endless_ = false;  // without a price of time
 };
@@ -414,6 +417,12 @@ Result<Plan> Request::written() {
   writer.dwell(path_.dwell_after_s, pose, path_.final_payload_kg);
   c.time_multiplier_w = price_w_;
   c.shortest_time_s = least_time_s();
+  // A motion that ends at the deadline saves at most the price of the time in between; of the fastest motion
+  // only that holds which holds without a deadline.
+  if (deadline_binds_ && problem_.deadline_s) {
+    c.gap_j += std::isfinite(price_w_) ? price_w_ * std::max(0.0, *problem_.deadline_s - duration_s())
+                                       : std::max(0.0, energy_j() - unhurried_j_);
+  }
   binding[static_cast<std::size_t>(Bound::deadline)] = deadline_binds_;
   for (std::size_t b = 0; b < bound_count; ++b) {
     if (binding[b]) c.binding.push_back(static_cast<Bound>(b));
@@ -494,7 +503,7 @@ Result<double> Planner::needed_speed(const Path& path, const Problem& problem, s
   // Seconds late under a speed limit; the end speeds must remain allowed.
   const auto late = [&](double speed) -> Result<double> {
     limited.limits.speed_m_s = speed;
-    const auto request = Request::make(robot_, loads_, path, limited, stop);
+    auto request = Request::make(robot_, loads_, path, limited, stop);
     if (!request) return tl::unexpected(request.error());
     return request->least_time_s() - deadline;
   };

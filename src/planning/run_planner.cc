@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::size_t most_cells = 200'000;
 
+constexpr double motor_tolerance = 7e-4;                          // as UniformTask's, of a grid
 constexpr double coarse_tolerance = 1e-5, fine_tolerance = 1e-6;  // of the cost
 
 std::string number(double x) {
@@ -135,6 +136,7 @@ void RunPlanner::find_motion() {
   task.torque_limit_nm = problem_->limits.current_a * task.electric.torque_constant_nm_a;
   task.voltage_limit_v = problem_->limits.voltage_v;
   task.cells = std::max<std::size_t>(8, problem_->intervals_per_run);
+  if (problem_->deadline_s) task.motor_tolerance = UniformMotion::hurried_tolerance;
   if (auto motion = UniformMotion::make(task)) motion_ = std::make_unique<UniformMotion>(std::move(*motion));
 }
 
@@ -181,6 +183,7 @@ void RunPlanner::build(std::vector<double> nodes) {
   grid_ = std::move(grid);
   envelope_ = std::make_unique<SpeedEnvelope>(speed_envelope(*grid_));
   shortest_s_ = envelope_->shortest_s;
+  fastest_known_ = false;
 }
 
 // Only where motors could come near their limits.
@@ -417,9 +420,29 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
   return planner;
 }
 
-double RunPlanner::shortest_s() const {
+double RunPlanner::shortest_s() {
   if (shortest_s_ == 0 && motion_) shortest_s_ = motion_->shortest_s();
+  if (grid_) find_fastest();
   return shortest_s_;
+}
+
+// Where motors' limits can bind, the profile of the envelope is drivable but not always the fastest: the
+// solver is asked for one at a price of time that makes energy unimportant.
+void RunPlanner::find_fastest() {
+  if (std::exchange(fastest_known_, true)) return;
+  SpeedSolver solver(*grid_, *envelope_);
+  if (!solver.bounds_motors() || !envelope_->feasible) return;
+  constexpr double unimportant = 1e5;  // times the mean power
+  const double mean_w = solver.cost_j(envelope_->fastest, 0) / envelope_->shortest_s;
+  SpeedSolution s = solver.solve(unimportant * std::max(std::fabs(mean_w), 1e-3), fine_tolerance);
+  if (!s.converged || s.duration_s > envelope_->shortest_s) {
+    s.z = envelope_->fastest, s.duration_s = envelope_->shortest_s;
+    s.binding = {};
+  }
+  s.gap_j = s.ends_j = s.residual = 0;
+  s.cost_j = solver.cost_j(s.z, 0);
+  if (!fastest_ || s.duration_s < fastest_->solution.duration_s) fastest_ = FastMotion{nodes_, std::move(s)};
+  shortest_s_ = fastest_->solution.duration_s;
 }
 
 std::optional<double> RunPlanner::cruise_speed(double price_w) {
@@ -506,7 +529,7 @@ std::vector<double> RunPlanner::split_for_motors(const std::vector<double>& z) c
     const double q = (z[k + 1] - z[k]) / (2 * grid_->step[k]);
     const double from = motor_use(*grid_, grid_->load(k, 0), std::sqrt(z[k]), q),
                  to = motor_use(*grid_, grid_->load(k, 1), std::sqrt(z[k + 1]), q);
-    const double change = std::fabs(to - from) / UniformMotion::motor_tolerance;
+    const double change = std::fabs(to - from) / motor_tolerance;
     const double parts = std::max(from, to) < full || nodes.size() > most_cells
                              ? 1
                              : std::clamp(std::ceil(change - 0.5), 1.0, most_parts);
@@ -531,7 +554,7 @@ Result<RunAnswer> RunPlanner::solve(double price_w, const std::stop_token& stop)
   }
   const auto solution = solve_grid(price_w, stop);
   if (!solution) return tl::unexpected(solution.error());
-  return answer_of(*solution, price_w);
+  return answer_of(*solution, nodes_, price_w);
 }
 
 Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_token& stop) {
@@ -556,15 +579,22 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
   for (int round = 0; round < 2 && s.converged && solver_->bounds_motors(); ++round) {
     std::vector<double> nodes = split_for_motors(s.z);
     if (nodes.size() < nodes_.size() + nodes_.size() / 50 + 1) break;
-    const std::vector<double> z = resampled(nodes_, s.z, nodes);
-    build(std::move(nodes));
-    if (auto ok = check_feasible(); !ok) return tl::unexpected(std::move(ok.error()));
-    solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
-    solver_->start_from(z);
-    const double coarse_cost = s.cost_j;
-    s = solver_->solve(price_w, fine_tolerance, stop);
-    iterations += s.iterations;
-    discretisation_j_ = std::max(discretisation_j_, std::fabs(coarse_cost - s.cost_j));
+    const std::vector<double> coarse_nodes = nodes_, z = resampled(nodes_, s.z, nodes);
+    const auto rebuild = [&](std::vector<double> onto, const std::vector<double>& from) {
+      build(std::move(onto));
+      solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
+      solver_->start_from(from);
+    };
+    rebuild(std::move(nodes), z);
+    SpeedSolution finer;
+    if (envelope_->feasible) finer = solver_->solve(price_w, fine_tolerance, stop);
+    if (!finer.converged) {
+      rebuild(coarse_nodes, s.z);
+      break;
+    }
+    iterations += finer.iterations;
+    discretisation_j_ = std::max(discretisation_j_, std::fabs(s.cost_j - finer.cost_j));
+    s = std::move(finer);
   }
   if (stop.stop_requested()) return stopped();
   if (!s.converged) {
@@ -594,10 +624,11 @@ SpeedSolution RunPlanner::best_capped(double price_w) {
   return best;
 }
 
-RunAnswer RunPlanner::answer_of(const SpeedSolution& s, double price_w) const {
+RunAnswer RunPlanner::answer_of(const SpeedSolution& s, const std::vector<double>& nodes,
+                                double price_w) const {
   RunAnswer answer;
   answer.method = Method::interior_point;
-  answer.way = nodes_;
+  answer.way = nodes;
   for (const double z : s.z) answer.speed.push_back(std::sqrt(z));
   answer.peak_speed = *std::max_element(answer.speed.begin(), answer.speed.end());
   answer.duration_s = s.duration_s;
@@ -611,10 +642,9 @@ RunAnswer RunPlanner::answer_of(const SpeedSolution& s, double price_w) const {
   if (s.binding[static_cast<std::size_t>(Bound::speed)]) {
     // Tell which of the limits behind the ceiling it was, where the profile is closest to it.
     answer.binding[static_cast<std::size_t>(Bound::speed)] = false;
-    for (std::size_t k = 1; k + 1 < nodes_.size(); ++k) {
-      if (s.z[k] > (1 - 2e-3) * grid_->ceiling[k]) {
-        answer.binding[static_cast<std::size_t>(ceiling_bound(nodes_[k]))] = true;
-      }
+    for (std::size_t k = 1; k + 1 < nodes.size(); ++k) {
+      if (s.z[k] > (1 - 2e-3) * ceiling_at(nodes[k]))
+        answer.binding[static_cast<std::size_t>(ceiling_bound(nodes[k]))] = true;
     }
   }
   return answer;
@@ -632,12 +662,13 @@ Result<RunAnswer> RunPlanner::fastest() {
   if (!grid_) {
     if (auto ok = build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
   }
-  const SpeedEnvelope envelope = speed_envelope(*grid_);
+  find_fastest();
+  if (fastest_) return answer_of(fastest_->solution, fastest_->nodes, 0);
   SpeedSolution solution;
-  solution.z = envelope.fastest;
-  solution.duration_s = envelope.shortest_s;
-  solution.cost_j = SpeedSolver(*grid_, envelope).cost_j(solution.z, 0);
-  return answer_of(solution, 0);
+  solution.z = envelope_->fastest;
+  solution.duration_s = envelope_->shortest_s;
+  solution.cost_j = SpeedSolver(*grid_, *envelope_).cost_j(solution.z, 0);
+  return answer_of(solution, nodes_, 0);
 }
 
 }  // namespace joulecast::planning

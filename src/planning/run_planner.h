@@ -60,7 +60,7 @@ class RunPlanner {
   const Run& run() const { return *run_; }
   bool uniform() const { return uniform_; }  // loads are the same all along
   // Of a grid: of the finest so far.
-  double shortest_s() const;
+  double shortest_s();
 
   // Of the run's coordinate.
   double acceleration_limit() const;
@@ -77,7 +77,8 @@ class RunPlanner {
   Result<RunAnswer> fastest();
   Result<SpeedSolution> solve_grid(double price_w, const std::stop_token& stop);
   SpeedSolution best_capped(double price_w);
-  RunAnswer answer_of(const SpeedSolution& solution, double price_w) const;
+  RunAnswer answer_of(const SpeedSolution& solution, const std::vector<double>& nodes, double price_w) const;
+  void find_fastest();
   bool motors_break(double speed, double acceleration) const;
   bool motors_hold(double top, double most) const;
   Result<void> build_grid();
@@ -101,7 +102,14 @@ class RunPlanner {
   std::array<dynamics::QuadraticPower, 2> motor_power_{};
   WheelLoads loads_here_{};          // of a uniform run
   bool motors_never_break_ = false;  // at any speed and acceleration within the other limits
-  mutable double shortest_s_ = 0;    // of a quadrature: 0 until asked for
+  double shortest_s_ = 0;            // of a quadrature: 0 until asked for
+  // On a grid on which motors' limits can bind, the fastest motion found so far.
+  struct FastMotion {
+    std::vector<double> nodes;
+    SpeedSolution solution;
+  };
+  std::optional<FastMotion> fastest_;
+  bool fastest_known_ = false;  // of the present grid
   double discretisation_j_ = 0;
   std::unique_ptr<UniformMotion> motion_;  // of a uniform run, where wanted
   std::vector<double> nodes_;

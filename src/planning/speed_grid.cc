@@ -78,6 +78,17 @@ double duration_of(const SpeedGrid& grid, const std::vector<double>& z) {
   return sum;
 }
 
+std::vector<double> fastest_without_motors(const SpeedGrid& grid) {
+  std::vector<double> fastest = grid.ceiling;
+  fastest.front() = grid.start, fastest.back() = grid.end;
+  if (!std::isfinite(grid.acceleration_limit)) return fastest;
+  const auto rise = [&](std::size_t cell) { return 2 * grid.step[cell] * grid.acceleration_limit; };
+  for (std::size_t k = 0; k < grid.cells(); ++k)
+    fastest[k + 1] = std::min(fastest[k + 1], fastest[k] + rise(k));
+  for (std::size_t k = grid.cells(); k-- > 0;) fastest[k] = std::min(fastest[k], fastest[k + 1] + rise(k));
+  return fastest;
+}
+
 SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
   const std::size_t n = grid.cells();
   SpeedEnvelope e;
@@ -86,10 +97,10 @@ SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
   e.fastest.back() = grid.end;
 
   const bool motors = std::isfinite(grid.torque_limit_nm) || std::isfinite(grid.voltage_limit_v);
+  // Between the ends of a cell motors are used between what they are used there.
   const auto allowed = [&](std::size_t cell, double z0, double z1) {
     const double q = (z1 - z0) / (2 * grid.step[cell]);
     return motor_use(grid, grid.load(cell, 0), std::sqrt(z0), q) <= 1 &&
-           motor_use(grid, grid.load(cell), mean_speed(z0, z1), q) <= 1 &&
            motor_use(grid, grid.load(cell, 1), std::sqrt(z1), q) <= 1;
   };
   // Where a steady speed is already too much for the motors, the ceiling is lower.

@@ -48,6 +48,9 @@ struct SpeedEnvelope {
 };
 SpeedEnvelope speed_envelope(const SpeedGrid& grid);
 
+// The fastest that ceilings and the limit of acceleration leave.
+std::vector<double> fastest_without_motors(const SpeedGrid& grid);
+
 // The slowest profile whose acceleration stays within a bound; at rest in between where the way is long
 // enough.
 std::vector<double> slowest_profile(const SpeedGrid& grid, double acceleration);

@@ -69,11 +69,12 @@ SpeedSolver::SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope)
   }
   bounds_.assign(n, 0);
   bound_total_ = 2 * (n - 1);
+  const std::vector<double> fastest = fastest_without_motors(grid);
   for (std::size_t k = 0; k < n; ++k) {
     std::uint32_t mask = 0;
     if (std::isfinite(grid.acceleration_limit)) mask = 3;
     // A bound is left out where no speed and acceleration inside the others can reach it.
-    const double v = std::sqrt(std::max(envelope.fastest[k], envelope.fastest[k + 1]));
+    const double v = std::sqrt(std::max(fastest[k], fastest[k + 1]));
     for (const std::size_t end : {0u, 1u}) {
       const Reachable may = reachable(grid, grid.load(k, end), v, 0.99);
       for (const std::size_t s : {0u, 1u}) {

@@ -15,8 +15,8 @@ struct SpeedSolution {
   std::vector<double> z;
   double cost_j = 0;  // motors, idle power and price of time, of the grid's midpoint rule
   double gap_j = 0;   // see Certificate
-  // What limits of motors cost at most that hold at the ends of cells: along a cell of constant acceleration a
-  // motor is used fully at one end only. Their multipliers times half the difference between the ends.
+  // What limits of motors cost at most that hold at the ends of cells: along a cell of constant acceleration
+  // a motor is used fully at one end only. Their multipliers times half the difference between the ends.
   double ends_j = 0;
   double residual = 0;
   double duration_s = 0;

@@ -182,12 +182,13 @@ void UniformMotion::piece(const End& from, const End& to, double change, const P
   const auto [least, greatest] = std::minmax({from.acceleration, at_middle.acceleration, to.acceleration});
   const bool jumps = greatest > change * least && halvings < most_cuts;
   const End cut{middle, at_middle.acceleration};
+  const double tolerance = price.fastest ? fastest_tolerance : task_.motor_tolerance;
   bool beyond = false;
   if (!price.rough && has_motor_limits()) {
     for (const double end : {from.v, to.v}) {
       const Local there = local(end);
       const Most strict = most(there, direction, 0);
-      beyond = beyond || at_middle.acceleration > most(there, direction, motor_tolerance).acceleration ||
+      beyond = beyond || at_middle.acceleration > most(there, direction, tolerance).acceleration ||
                strict.acceleration < least_share * cut.acceleration;
       if (strict.acceleration < at_middle.acceleration)
         at_middle = {std::max(strict.acceleration, 1e-3 * at_middle.acceleration), strict.bound, true};
@@ -406,7 +407,7 @@ std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
   if ((!bounded && !(task.electric.down > 0)) || task.loads[0].gear != 0 || task.loads[1].gear != 0)
     return std::nullopt;
   // Something must be left to accelerate with at the top speed.
-  double left = 0.2 * motor_tolerance;
+  double left = 0.5 * fastest_tolerance;
   const auto holds = [&](double v) { return motion.most(motion.local(v), 1, -left).acceleration > 0; };
   for (int k = 0; k < 30 && !holds(0); ++k) left *= 0.5;
   if (!holds(0)) return std::nullopt;

@@ -22,6 +22,8 @@ struct UniformTask {
   double acceleration_limit = 0;
   double torque_limit_nm = 0, voltage_limit_v = 0;
   std::size_t cells = 64;  // of the speed range on either side of the cruise
+  // How far below its limit a motor may be used within a cell where that limit binds.
+  double motor_tolerance = 7e-4;
 };
 
 // Speeds at places along the way, the acceleration being constant in between.
@@ -59,11 +61,12 @@ tl::unexpected<Error> endless(double standing_w);
 // it are left likewise.
 //
 // Between nodes of the speed the acceleration is constant, so the answer is a motion that can be driven as it
-// is told: current and voltage limits are kept all along a cell. Cells are as small as it takes for the most
-// that a motor is used to be within motor_tolerance of its limit all along, where that limit binds.
+// is told: current and voltage limits are kept all along a cell. Cells are as small as motor_tolerance asks
+// for.
 class UniformMotion {
  public:
-  static constexpr double motor_tolerance = 7e-4;
+  // motor_tolerance of the fastest motion, and what is to be asked for where time is short.
+  static constexpr double fastest_tolerance = 1e-4, hurried_tolerance = 2e-4;
 
   // Nothing when f has several minima within the speed limit (friction that falls steeply with the speed),
   // the motors cannot hold a steady speed from rest to the end speeds, nothing bounds braking that neither

@@ -34,8 +34,8 @@ struct Question {
   double voltage_v = std::numeric_limits<double>::infinity();
   bool fastest = false;  // minimise the duration alone
   int cells = 150;
-  // Whether the motors' limits hold at the ends of cells too. Else at their middles alone: the cost then comes
-  // near the least as the square of a cell's size, from either side.
+  // Whether the motors' limits hold at the ends of cells too. Else at their middles alone: the cost then
+  // comes near the least as the square of a cell's size, from either side.
   bool strict = true;
 };
 
