@@ -186,7 +186,7 @@ CostTable::Row CostTable::Grid::row_of(const Walk& walk, double per_decade) cons
   // A robot so slow that it cruises on the shortest way already.
   while (members.size() < 4 || members.back().length < 1.5 * shortest_)
     members.push_back(beyond(1.2 * std::max(members.back().length, shortest_)));
-  row.knee = members.back().length;
+  row.knee = members.back().length, row.log_knee = members.back().log_length;
   row.at_knee = members.back().cost;
   row.per_length = walk.per_length;
   const double logs = std::log(row.knee) - log_shortest_;
@@ -232,10 +232,12 @@ void CostTable::Grid::build(Kind& kind, double payload_limit_kg, CostTable& tabl
   double error = 0, per_decade = first_per_decade;
   for (int round = 0; round < rounds && !kind.stop.stop_requested(); ++round) {
     rows_.assign(payloads, Row());
+    knees_within_ = true;
     for (std::size_t p = 0; p < payloads; ++p) {
       const auto walk = kind.walk(payload_of(static_cast<double>(p)), per_decade);
       if (walk) {
         rows_[p] = row_of(*walk, per_decade);
+        knees_within_ = knees_within_ && rows_[p].knee < kind.longest && rows_[p].at_knee.energy_j > 0;
         continue;
       }
       if (!table.obstacle_) table.obstacle_ = walk.error();
@@ -268,6 +270,8 @@ LegCost CostTable::Grid::along(const Row& row, double length, double log_length)
   return {sum.energy_per_length * scale, sum.duration_per_length * scale};
 }
 
+// Rows are read at the same share of their knees, and tell shares of what they cost there: the knee, a kink
+// that moves with the payload, is then no kink in it.
 LegCost CostTable::Grid::at(double length, double payload_kg) const {
   if (!(length > 0)) return {};
   const double log_length = std::log(length);
@@ -275,12 +279,25 @@ LegCost CostTable::Grid::at(double length, double payload_kg) const {
   const auto [first, share] =
       place(payload_kg / payload_limit_kg_ * static_cast<double>(rows_.size() - 1), rows_.size());
   LegCost sum;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const LegCost part = along(rows_[first + i], length, log_length);
-    sum.energy_j += share[i] * part.energy_j;
-    sum.duration_s += share[i] * part.duration_s;
+  if (!knees_within_) {
+    for (std::size_t i = 0; i < 4; ++i) sum += scaled(along(rows_[first + i], length, log_length), share[i]);
+    return sum;
   }
-  return sum;
+  double knee = 0;
+  LegCost at_knee;
+  for (std::size_t i = 0; i < 4; ++i) {
+    knee += share[i] * rows_[first + i].knee;
+    at_knee += scaled(rows_[first + i].at_knee, share[i]);
+  }
+  const double of_knee = length / knee;
+  const double log_of_knee = std::log(of_knee);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Row& row = rows_[first + i];
+    const LegCost part = along(row, of_knee * row.knee, log_of_knee + row.log_knee);
+    sum.energy_j += share[i] * part.energy_j / row.at_knee.energy_j;
+    sum.duration_s += share[i] * part.duration_s / row.at_knee.duration_s;
+  }
+  return {sum.energy_j * at_knee.energy_j, sum.duration_s * at_knee.duration_s};
 }
 
 Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOptions& options,

@@ -72,7 +72,7 @@ class CostTable {
     struct Node {
       double energy_per_length = 0, duration_per_length = 0;
     };
-    double knee = 0, per_log = 1;
+    double knee = 0, log_knee = 0, per_log = 1;
     LegCost at_knee, per_length;  // cost there, and what a unit of length more costs
     std::vector<Node> nodes;      // from the shortest length to the knee
   };
@@ -103,7 +103,8 @@ class CostTable {
     double error_against(Kind& kind, double per_decade) const;
 
     double shortest_ = 1, log_shortest_ = 0, payload_limit_kg_ = 0;
-    std::vector<Row> rows_;  // payloads from none to the limit
+    bool knees_within_ = true;  // every row's, within the lengths asked for
+    std::vector<Row> rows_;     // payloads from none to the limit
   };
 
   Grid straight_, turn_;

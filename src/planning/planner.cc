@@ -293,8 +293,13 @@ class Writer {
       return loads_.model().flow(here_);
     }
     const Run& run = planner.run();
-    const double slope = run.turn == 0 ? run.curvature_slope(s.way) : 0;
+    const double slope = run.turn == 0 ? slope_at(run, s.way) : 0;
     return loads_.model().flow(loads_.instant(run, run.at(s.way), slope, s.speed, s.acceleration));
+  }
+
+  // Just after a place, as rows are told.
+  static double slope_at(const Run& run, double way) {
+    return run.curvature_slope(way + 1e-9 * run.length());
   }
 
   void add(const dynamics::PowerFlow<double>& f, double seconds) {
@@ -324,8 +329,8 @@ class Writer {
            power);
     } else {
       push(time_s, driven_m_ + s.way, knot.pose, s.speed, knot.curvature_1_m * s.speed, s.acceleration,
-           knot.curvature_1_m * s.acceleration + run.curvature_slope(s.way) * s.speed * s.speed,
-           run.payload_kg, power);
+           knot.curvature_1_m * s.acceleration + slope_at(run, s.way) * s.speed * s.speed, run.payload_kg,
+           power);
     }
   }
 
@@ -543,7 +548,9 @@ Result<double> Planner::needed_speed(const Path& path, const Problem& problem, s
 Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& problem, std::size_t count,
                                               std::stop_token stop) const {
   if (count < 2) return invalid("count", "must be at least 2");
-  auto request = Request::make(robot_, loads_, path, problem, stop);
+  Problem hurried = problem;
+  hurried.hurried = true;
+  auto request = Request::make(robot_, loads_, path, hurried, stop);
   if (!request) return tl::unexpected(std::move(request.error()));
   if (auto solved = request->solve(problem.value_of_time_w); !solved)
     return tl::unexpected(std::move(solved.error()));

@@ -136,7 +136,7 @@ void RunPlanner::find_motion() {
   task.torque_limit_nm = problem_->limits.current_a * task.electric.torque_constant_nm_a;
   task.voltage_limit_v = problem_->limits.voltage_v;
   task.cells = std::max<std::size_t>(8, problem_->intervals_per_run);
-  if (problem_->deadline_s) task.motor_tolerance = UniformMotion::hurried_tolerance;
+  if (problem_->deadline_s || problem_->hurried) task.motor_tolerance = UniformMotion::hurried_tolerance;
   if (auto motion = UniformMotion::make(task)) motion_ = std::make_unique<UniformMotion>(std::move(*motion));
 }
 
@@ -333,7 +333,29 @@ std::vector<double> RunPlanner::first_nodes(std::size_t cells) const {
     }
     apart = std::move(smooth);
   }
-  return apart;
+  return with_corners(std::move(apart));
+}
+
+// Where the slope of the curvature jumps, torque does: such places are nodes exactly.
+std::vector<double> RunPlanner::with_corners(std::vector<double> nodes) const {
+  constexpr double jump_1_m2 = 0.05;
+  const auto& knots = run_->knots;
+  const auto slope = [&](std::size_t k) {
+    return (knots[k].curvature_1_m - knots[k - 1].curvature_1_m) / (knots[k].way - knots[k - 1].way);
+  };
+  for (std::size_t k = 1; k + 1 < knots.size(); ++k) {
+    if (std::fabs(slope(k + 1) - slope(k)) < jump_1_m2) continue;
+    const double corner = knots[k].way;
+    const auto after = std::lower_bound(nodes.begin() + 1, nodes.end() - 1, corner);
+    if (*after == corner || nodes.size() < 4) continue;
+    const auto near =
+        after - 1 > nodes.begin() && corner - *(after - 1) < *after - corner ? after - 1 : after;
+    if (near + 1 < nodes.end() && std::fabs(*near - corner) < 0.5 * (*(near + 1) - *(near - 1)))
+      *near = corner;
+    else
+      nodes.insert(after, corner);
+  }
+  return nodes;
 }
 
 // Every second node.
@@ -484,7 +506,7 @@ Result<void> RunPlanner::build_grid() {
     build(first_nodes(cells / 2));
   } else {
     fine_nodes_ = first_nodes(2 * cells);
-    build(thinned(fine_nodes_));
+    build(with_corners(thinned(fine_nodes_)));
   }
   return check_feasible();
 }

@@ -87,6 +87,7 @@ class RunPlanner {
   std::vector<double> split_for_motors(const std::vector<double>& z) const;
   void add_end_loads(SpeedGrid& grid) const;
   std::vector<double> first_nodes(std::size_t cells) const;
+  std::vector<double> with_corners(std::vector<double> nodes) const;
   static std::vector<double> thinned(const std::vector<double>& nodes);
   std::vector<double> refined_nodes(const std::vector<double>& z, std::size_t cells) const;
   std::vector<double> resampled(const std::vector<double>& nodes, const std::vector<double>& z,

@@ -182,7 +182,7 @@ void UniformMotion::piece(const End& from, const End& to, double change, const P
   const auto [least, greatest] = std::minmax({from.acceleration, at_middle.acceleration, to.acceleration});
   const bool jumps = greatest > change * least && halvings < most_cuts;
   const End cut{middle, at_middle.acceleration};
-  const double tolerance = price.fastest ? fastest_tolerance : task_.motor_tolerance;
+  const double tolerance = price.fastest ? hurried_tolerance : task_.motor_tolerance;
   bool beyond = false;
   if (!price.rough && has_motor_limits()) {
     for (const double end : {from.v, to.v}) {
@@ -407,7 +407,7 @@ std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
   if ((!bounded && !(task.electric.down > 0)) || task.loads[0].gear != 0 || task.loads[1].gear != 0)
     return std::nullopt;
   // Something must be left to accelerate with at the top speed.
-  double left = 0.5 * fastest_tolerance;
+  double left = 0.5 * hurried_tolerance;
   const auto holds = [&](double v) { return motion.most(motion.local(v), 1, -left).acceleration > 0; };
   for (int k = 0; k < 30 && !holds(0); ++k) left *= 0.5;
   if (!holds(0)) return std::nullopt;

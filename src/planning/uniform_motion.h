@@ -66,7 +66,7 @@ tl::unexpected<Error> endless(double standing_w);
 class UniformMotion {
  public:
   // motor_tolerance of the fastest motion, and what is to be asked for where time is short.
-  static constexpr double fastest_tolerance = 1e-4, hurried_tolerance = 2e-4;
+  static constexpr double hurried_tolerance = 1e-4;
 
   // Nothing when f has several minima within the speed limit (friction that falls steeply with the speed),
   // the motors cannot hold a steady speed from rest to the end speeds, nothing bounds braking that neither

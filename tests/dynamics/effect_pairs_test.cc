@@ -89,7 +89,7 @@ TEST(EffectPairs, DryFrictionIsAsTheDocumentSays) {
         if ((set & 2u) && s == 1) ratio += asymmetry;
         if (set & 4u) ratio += stribeck * std::exp(-std::pow(w / speed, exponent));
         EXPECT_NEAR(balance.total_nm[s], file_nm * ratio + extra + robot.motor.viscous_friction_nm_s_rad * w,
-                    2e-5)
+                    1e-4)
             << set << " at " << w;
       }
     }
