@@ -556,24 +556,28 @@ Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& p
     return tl::unexpected(std::move(solved.error()));
   const PlanCost free = request->cost();
   std::vector<PlanCost> front{free};
-  for (int attempt = 0; front.size() < count; ++attempt) {
+  for (int attempt = 0;; ++attempt) {
     front.resize(1);
     // The shortest time itself costs an unbounded price; the front ends a hundredth of the way before it.
     const double shortest = request->least_time_s();
     if (free.duration_s < shortest * (1 + 1e-5)) return std::vector<PlanCost>{free};
     const double fastest = std::max(shortest * (1 + 2e-6), shortest + 0.01 * (free.duration_s - shortest));
-    for (std::size_t k = 1; k < count; ++k) {
+    bool moved = false;
+    for (std::size_t k = 1; k < count && !moved; ++k) {
       const double f = static_cast<double>(k) / static_cast<double>(count - 1);
       const double deadline = free.duration_s + f * (fastest - free.duration_s);
       const double spacing = (free.duration_s - fastest) / static_cast<double>(count - 1);
       auto met = request->meet(deadline, std::min(1e-4 * deadline, 0.1 * spacing));
       // Finer grids on the way may have moved the shortest time: again, towards the new one.
-      if (!met && met.error().fault == Fault::infeasible && attempt < 8) break;
-      if (!met) return tl::unexpected(std::move(met.error()));
-      front.push_back(request->cost());
+      moved = !met && met.error().fault == Fault::infeasible && attempt < 8;
+      if (!met && !moved) return tl::unexpected(std::move(met.error()));
+      // Nearer to the shortest time than grids tell apart, motions are the same.
+      if (const PlanCost cost = request->cost();
+          met && cost.duration_s < front.back().duration_s * (1 - 1e-9))
+        front.push_back(cost);
     }
+    if (!moved) return front;
   }
-  return front;
 }
 
 Result<Plan> plan(const robot::RobotModel& robot, const Path& path, const Problem& problem,
