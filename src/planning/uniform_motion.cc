@@ -272,6 +272,13 @@ UniformMotion::Shape UniformMotion::turning(Shape shape, double nearest, double 
     const double next = v - (m + 0.5 * spare) / slope - (k > 5 ? 1e-4 * (v - nearest) : 0);
     v = std::clamp(next, std::min(nearest, farthest), std::max(nearest, farthest));
   }
+  // Cells that are cut where the acceleration jumps make the distance jump a little with the speed.
+  if (missing(v) > spare) {
+    double low = v, step = 1e-4 * (v - nearest);
+    for (int k = 0; k < 20 && missing(low) > spare; ++k, step *= 2)
+      low = nearest + std::max(0.0, low - step - nearest);
+    missing(last_that([&](double speed) { return missing(speed) <= spare; }, low, v, 30));
+  }
   return shape;
 }
 
