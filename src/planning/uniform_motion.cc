@@ -182,7 +182,7 @@ void UniformMotion::piece(const End& from, const End& to, double change, const P
   const auto [least, greatest] = std::minmax({from.acceleration, at_middle.acceleration, to.acceleration});
   const bool jumps = greatest > change * least && halvings < most_cuts;
   const End cut{middle, at_middle.acceleration};
-  const double tolerance = price.fastest ? hurried_tolerance : task_.motor_tolerance;
+  const double tolerance = closeness_ * (price.fastest ? hurried_tolerance : task_.motor_tolerance);
   bool beyond = false;
   if (!price.rough && has_motor_limits()) {
     for (const double end : {from.v, to.v}) {
@@ -413,8 +413,12 @@ std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
   const bool bounded = std::isfinite(task.acceleration_limit) || motion.has_motor_limits();
   if ((!bounded && !(task.electric.down > 0)) || task.loads[0].gear != 0 || task.loads[1].gear != 0)
     return std::nullopt;
+  // Of little that friction leaves, little may be left unused: full tolerance from two fifths on.
+  const double room = last_that(
+      [&](double share) { return motion.most(motion.local(0), 1, -share).acceleration > 0; }, 0, 1, 20);
+  motion.closeness_ = std::clamp(2.5 * room, 0.05, 1.0);
   // Something must be left to accelerate with at the top speed.
-  double left = 0.5 * hurried_tolerance;
+  double left = 0.5 * motion.closeness_ * hurried_tolerance;
   const auto holds = [&](double v) { return motion.most(motion.local(v), 1, -left).acceleration > 0; };
   for (int k = 0; k < 30 && !holds(0); ++k) left *= 0.5;
   if (!holds(0)) return std::nullopt;

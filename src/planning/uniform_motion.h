@@ -162,8 +162,9 @@ class UniformMotion {
                  RestMotion& sum) const;
 
   UniformTask task_;
-  double top_ = 0;       // the speed limit, or what the motors can hold with something left to accelerate
-  double bare_top_ = 0;  // what they can just hold, where that is less than the speed limit
+  double closeness_ = 1;  // share of motor_tolerance that the room above friction allows
+  double top_ = 0;        // the speed limit, or what the motors can hold with something left to accelerate
+  double bare_top_ = 0;   // what they can just hold, where that is less than the speed limit
 };
 
 }  // namespace joulecast::planning
