@@ -12,7 +12,7 @@ packages=(
 )
 if [ "${1:-}" = --tests ]; then
   packages+=(
-    libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev
+    libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev coinor-libipopt-dev
     clang-format clang-tidy cppcheck lintian openssl postgresql python3-jsonschema chromium nginx-light caddy prometheus
   )
   # The page's tests run on whatever node there is.

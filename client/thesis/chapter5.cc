@@ -181,9 +181,18 @@ Result<Robots> shipped_robots() {
 }
 
 std::vector<Table> all_tables(const Robots& robots) {
-  return {table_2_3(robots.p3dx),          table_2_4(robots.p3dx),  table_2_5(robots.p3dx),
-          table_3_3(robots.nomad),         table_4_1(robots.nomad), table_4_2(robots.nomad),
-          table_4_3(robots.nomad),         table_4_4(robots.nomad), table_5_4(robots.nomad),
+  return {table_2_3(robots.p3dx),
+          table_2_4(robots.p3dx),
+          table_2_5(robots.p3dx),
+          table_3_3(robots.nomad),
+          table_3_5(),
+          table_3_6(),
+          table_3_8(),
+          table_4_1(robots.nomad),
+          table_4_2(robots.nomad),
+          table_4_3(robots.nomad),
+          table_4_4(robots.nomad),
+          table_5_4(robots.nomad),
           table_5_4_readings(robots.nomad)};
 }
 

@@ -41,6 +41,9 @@ Table table_2_3(const robot::RobotModel& p3dx);   // straight lines, three speed
 Table table_2_4(const robot::RobotModel& p3dx);   // straight lines, three payloads
 Table table_2_5(const robot::RobotModel& p3dx);   // Gaussian detours (2-48)
 Table table_3_3(const robot::RobotModel& nomad);  // tables 3-3 and 3-4: the model's columns
+Table table_3_5();                                // tables 3-5 to 3-9: why they cannot be computed
+Table table_3_6();                                // tables 3-6 and 3-7
+Table table_3_8();                                // tables 3-8 and 3-9
 Table table_4_1(const robot::RobotModel& nomad);  // optimum and trapezoid
 Table table_4_2(const robot::RobotModel& nomad);  // optimum and triangle
 Table table_4_3(const robot::RobotModel& nomad);  // the same to an end speed

@@ -4,15 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "planning/gauss.h"
+
 namespace joulecast::forecast {
-namespace {
-
-constexpr std::array<double, 4> node{0.06943184420297371, 0.33000947820757187, 0.6699905217924281,
-                                     0.9305681557970263};
-constexpr std::array<double, 4> weight{0.17392742256872692, 0.32607257743127307, 0.32607257743127307,
-                                       0.17392742256872692};
-
-}  // namespace
 
 std::vector<PlannedLeg> planned_legs(const planning::Path& path) {
   std::vector<PlannedLeg> legs;
@@ -170,9 +164,8 @@ LegCost LegPricer::trapezoid(const Power& kind, double way, double speed, double
     const double ramps = q.c1 * a * a + q.c2 * speed * speed / 3 + q.c3 * speed / 2 + q.c0;
     cost.motor_j = 2 * ramp_s * ramps + cruise_s * q.power_w(speed, 0);
   } else {
-    for (std::size_t k = 0; k < node.size(); ++k)
-      cost.motor_j +=
-          weight[k] * ramp_s * (power_w(kind, speed * node[k], a) + power_w(kind, speed * node[k], -a));
+    for (const auto& [at, weight] : planning::gauss4)
+      cost.motor_j += weight * ramp_s * (power_w(kind, speed * at, a) + power_w(kind, speed * at, -a));
     cost.motor_j += cruise_s * power_w(kind, speed, 0);
   }
   cost.speed_fraction = speed / (kind.motion == Motion::turn ? limits_.yaw_rate_rad_s : limits_.speed_m_s);

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "dynamics/drive_model.h"
 #include "planning/planner.h"
+#include "planning/root.h"
 #include "planning/run_planner.h"
 
 namespace joulecast::planning {
@@ -16,11 +18,12 @@ constexpr double shortest_leg_m = 1e-3;
 constexpr double smallest_turn_rad = 1e-3;
 // Tables are refined until their error is below this, or their nodes number the most.
 constexpr double wanted_error = 2e-4;
-constexpr double wanted_of_numerical = 2e-3;  // whose solves cost two hundred times as much
-constexpr double first_lengths_per_decade = 8, most_lengths_per_decade = 32;
-constexpr std::size_t first_payloads = 5, most_payloads = 17;
-// How closely cost must follow its line beyond the knee. The numerical solver's own noise is above the first.
-constexpr double straightness = 1e-5, straightness_of_numerical = 4e-4;
+constexpr double wanted_of_numerical = 2e-3;  // of nodes from the numerical solver
+constexpr int rounds = 3;                     // of refinement; each doubles the nodes both ways
+constexpr double first_per_decade = 10;
+constexpr std::size_t first_payloads = 5;
+// How closely cost must follow its line beyond the knee; the numerical solver's own noise is below it.
+constexpr double straightness = 4e-4;
 
 // Weights of the cubic through four equally spaced points, `x` of a step beyond the second.
 std::array<double, 4> cubic(double x) {
@@ -35,105 +38,218 @@ std::pair<std::size_t, std::array<double, 4>> place(double at, std::size_t count
   return {first, cubic(at - static_cast<double>(first) - 1)};
 }
 
+LegCost scaled(const LegCost& cost, double by) {
+  return {by * cost.energy_j, by * cost.duration_s};
+}
+
+}  // namespace
+
+struct CostTable::Kind {
+  const robot::RobotModel& robot;
+  const Planner& planner;
+  const Problem& problem;
+  const std::stop_token& stop;
+  int turn;
+  double shortest, longest;
+  bool numerical = false;  // the solver had to be asked
+  std::size_t solves = 0;
+
+  Run run(double length, double payload_kg) const {
+    Run run;
+    run.turn = turn;
+    run.payload_kg = payload_kg;
+    run.knots = {{0, 0, {}}, {length, 0, turn == 0 ? Pose{length, 0, 0} : Pose{0, 0, length}}};
+    return run;
+  }
+
+  Result<Walk> walk(double payload_kg, double per_decade) {
+    if (stop.stop_requested()) return stopped();
+    if (!numerical) {
+      const Run unit = run(1, payload_kg);
+      auto made = RunPlanner::make(robot, planner.loads(), unit, problem, 0, 0);
+      if (!made) return tl::unexpected(std::move(made.error()));
+      if (const auto cruise = made->cruise_speed(problem.value_of_time_w))
+        return along_family(*made, *cruise, per_decade);
+    }
+    numerical = true;
+    return by_solver(payload_kg, per_decade);
+  }
+
+ private:
+  // From the slowest peak to nearly the cruising speed, in steps that change the length about evenly:
+  // peak = cruise tanh(w), where the length grows as a power of w at first, and slower than w near the end.
+  Walk along_family(RunPlanner& family, double cruise, double per_decade) {
+    constexpr double last = 7.5;  // 1 - tanh is 6e-7
+    const double step = std::numbers::ln10 / per_decade;
+    Walk walk;
+    const auto member = [&](double w) {
+      const RestMotion m = *family.to_peak(cruise * std::tanh(w), problem.value_of_time_w);
+      ++solves;
+      return Member(m.distance, {m.energy_j, m.duration_s});
+    };
+    double w = last, power = 1.75;
+    Member now = member(w);
+    for (int k = 0; k < 60 && now.length > shortest; ++k)
+      now = member(w *= std::clamp(0.9 * std::pow(shortest / now.length, 1 / power), 1e-3, 0.9));
+    walk.members.push_back(now);
+    while (w < last && now.length < longest) {
+      const double next = std::min(last, w * std::exp(step / std::clamp(power, 0.25, 3.0)));
+      const Member then = member(next);
+      power = (then.log_length - now.log_length) / std::log(next / w);
+      w = next, now = then;
+      walk.members.push_back(now);
+    }
+    const double steady_w = family.steady_power_w(cruise);
+    walk.per_length = {steady_w / cruise, 1 / cruise};
+    return walk;
+  }
+
+  // Finds the knee: beyond it the cost follows the line through two long motions.
+  Result<Walk> by_solver(double payload_kg, double per_decade) {
+    const auto solve = [&](double length) -> Result<LegCost> {
+      Path path;
+      path.runs = {run(length, payload_kg)};
+      path.final_payload_kg = payload_kg;
+      ++solves;
+      const auto cost = planner.cost(path, problem, stop);
+      if (!cost) return tl::unexpected(cost.error());
+      return LegCost{cost->energy_j, cost->duration_s};
+    };
+    const auto far = solve(longest), near = solve(0.5 * longest);
+    if (!far || !near) return tl::unexpected(far ? near.error() : far.error());
+    Walk walk;
+    walk.per_length = {(far->energy_j - near->energy_j) / (0.5 * longest),
+                       (far->duration_s - near->duration_s) / (0.5 * longest)};
+    const auto on_line = [&](double log_length) {
+      const double length = std::exp(log_length), rest = longest - length;
+      const auto cost = solve(length);
+      return cost &&
+             std::fabs(far->energy_j - rest * walk.per_length.energy_j - cost->energy_j) <=
+                 straightness * cost->energy_j &&
+             std::fabs(far->duration_s - rest * walk.per_length.duration_s - cost->duration_s) <=
+                 straightness * cost->duration_s;
+    };
+    double low = std::log(shortest), knee = std::log(longest);
+    if (const double high = std::log(0.25 * longest); on_line(high)) {
+      knee = high;
+      while (knee - low > 0.02) {
+        const double middle = 0.5 * (low + knee);
+        (on_line(middle) ? knee : low) = middle;
+      }
+    }
+    low = std::log(shortest);
+    const double count = std::max(4.0, std::ceil((knee - low) / std::numbers::ln10 * per_decade) + 1);
+    for (double k = 0; k < count; ++k) {
+      const double length = std::exp(low + (knee - low) * k / (count - 1));
+      const auto cost = solve(length);
+      if (!cost) return tl::unexpected(cost.error());
+      walk.members.emplace_back(length, *cost);
+    }
+    return walk;
+  }
+};
+
+namespace {
+
+// Costs of a unit of length: a cubic through the four members about a length, in its logarithm. `near` is
+// where the last one was found.
+template <class Members>
+LegCost interpolated(const Members& members, double log_length, std::size_t& near) {
+  while (near + 2 < members.size() && members[near + 1].log_length < log_length) ++near;
+  const std::size_t first = std::min(near > 0 ? near - 1 : 0, members.size() - 4);
+  LegCost sum;
+  for (std::size_t i = first; i < first + 4; ++i) {
+    double weight = 1 / members[i].length;
+    for (std::size_t j = first; j < first + 4; ++j)
+      if (j != i)
+        weight *= (log_length - members[j].log_length) / (members[i].log_length - members[j].log_length);
+    sum += scaled(members[i].cost, weight);
+  }
+  return sum;
+}
+
 }  // namespace
 
 double CostTable::Grid::payload_of(double row) const {
   return rows_.size() > 1 ? payload_limit_kg_ * row / static_cast<double>(rows_.size() - 1) : 0;
 }
 
-// Finds the knee: beyond it the cost follows the line through two long motions.
-CostTable::Grid::Row CostTable::Grid::row(const Solve& solve, double payload_kg, double longest,
-                                          CostTable& table) const {
+CostTable::Row CostTable::Grid::row_of(const Walk& walk, double per_decade) const {
   Row row;
-  row.knee = longest;
-  const auto far = solve(longest, payload_kg), near = solve(0.5 * longest, payload_kg);
-  table.solves_ += 2;
-  if (!far || !near) {
-    if (!table.obstacle_) table.obstacle_ = far ? near.error() : far.error();
-    row.at_knee = row.per_length = {std::nan(""), std::nan("")};
-    return row;
-  }
-  row.per_length = {(far->energy_j - near->energy_j) / (0.5 * longest),
-                    (far->duration_s - near->duration_s) / (0.5 * longest)};
-  row.at_knee = *far;
-  const auto on_line = [&](double length) {
-    const auto cost = solve(length, payload_kg);
-    ++table.solves_;
-    if (!cost) return false;
-    const double rest = longest - length, bound = table.numerical_ ? straightness_of_numerical : straightness;
-    return std::fabs(far->energy_j - rest * row.per_length.energy_j - cost->energy_j) <=
-               bound * cost->energy_j &&
-           std::fabs(far->duration_s - rest * row.per_length.duration_s - cost->duration_s) <=
-               bound * cost->duration_s;
+  std::vector<Member> members = walk.members;
+  const auto beyond = [&](double length) {
+    const Member& last = walk.members.back();
+    Member m(length, last.cost);
+    m.cost += scaled(walk.per_length, length - last.length);
+    return m;
   };
-  double low = log_shortest_, high = std::log(0.25 * longest);
-  if (!on_line(std::exp(high))) return row;
-  while (high - low > 0.02) {
-    const double middle = 0.5 * (low + high);
-    (on_line(std::exp(middle)) ? high : low) = middle;
+  // A robot so slow that it cruises on the shortest way already.
+  while (members.size() < 4 || members.back().length < 1.5 * shortest_)
+    members.push_back(beyond(1.2 * std::max(members.back().length, shortest_)));
+  row.knee = members.back().length, row.log_knee = members.back().log_length;
+  row.at_knee = members.back().cost;
+  row.per_length = walk.per_length;
+  const double logs = std::log(row.knee) - log_shortest_;
+  const double count = std::max(4.0, std::ceil(logs / std::numbers::ln10 * per_decade) + 1);
+  row.per_log = (count - 1) / logs;
+  std::size_t near = 0;
+  for (double k = 0; k < count; ++k) {
+    const LegCost unit = interpolated(members, log_shortest_ + k / row.per_log, near);
+    row.nodes.push_back({unit.energy_j, unit.duration_s});
   }
-  row.knee = std::exp(high);
-  row.at_knee = *solve(row.knee, payload_kg);
   return row;
 }
 
-void CostTable::Grid::fill(const Solve& solve, Row& row, double payload_kg, std::size_t lengths,
-                           CostTable& table) const {
-  row.per_log = static_cast<double>(lengths - 1) / (std::log(row.knee) - log_shortest_);
-  row.nodes.clear();
-  for (std::size_t k = 0; k < lengths; ++k) {
-    const double length = std::exp(log_shortest_ + static_cast<double>(k) / row.per_log);
-    const auto cost = solve(length, payload_kg);
-    ++table.solves_;
-    if (!cost && !table.obstacle_) table.obstacle_ = cost.error();
-    row.nodes.push_back(cost ? Node{cost->energy_j / length, cost->duration_s / length}
-                             : Node{std::nan(""), std::nan("")});
-  }
-}
-
-double CostTable::Grid::error_against(const Solve& solve, double longest, CostTable& table) const {
+double CostTable::Grid::error_against(Kind& kind, double per_decade) const {
   double worst = 0;
-  const auto compare = [&](double length, double payload) {
-    const auto exact = solve(length, payload);
-    ++table.solves_;
-    const LegCost ours = at(length, payload);
-    if (!exact || !std::isfinite(ours.energy_j)) return;
-    worst = std::max({worst, std::fabs(ours.energy_j / exact->energy_j - 1),
-                      std::fabs(ours.duration_s / exact->duration_s - 1)});
+  const auto compare = [&](double length, double payload_kg, const LegCost& exact) {
+    const LegCost ours = at(length, payload_kg);
+    if (length < shortest_ || length > kind.longest || !std::isfinite(ours.energy_j)) return;
+    worst = std::max({worst, std::fabs(ours.energy_j / exact.energy_j - 1),
+                      std::fabs(ours.duration_s / exact.duration_s - 1)});
   };
   for (std::size_t p = 0; p + 1 < std::max<std::size_t>(rows_.size(), 2); ++p) {
-    const double payload = payload_of(static_cast<double>(p) + 0.5);
-    const Row& row = rows_[p];
-    for (std::size_t k = 0; k + 1 < row.nodes.size(); ++k)
-      compare(std::exp(log_shortest_ + (static_cast<double>(k) + 0.5) / row.per_log), payload);
-    for (const double beyond : {1.1, 1.5, 4.0})
-      if (beyond * row.knee < longest) compare(beyond * row.knee, payload);
+    const double payload_kg = payload_of(static_cast<double>(p) + 0.5);
+    // Of another pace than the nodes', so that its members fall anywhere between them.
+    const auto walk = kind.walk(payload_kg, 0.77 * per_decade);
+    if (!walk) continue;
+    for (const Member& m : walk->members) compare(m.length, payload_kg, m.cost);
+    const Member& last = walk->members.back();
+    for (const double beyond : {0.1, 0.5, 3.0}) {
+      LegCost cost = last.cost;
+      cost += scaled(walk->per_length, beyond * last.length);
+      compare((1 + beyond) * last.length, payload_kg, cost);
+    }
   }
   return worst;
 }
 
-void CostTable::Grid::build(const Solve& solve, double shortest, double longest, double payload_limit_kg,
-                            CostTable& table) {
-  shortest_ = shortest;
-  log_shortest_ = std::log(shortest);
+void CostTable::Grid::build(Kind& kind, double payload_limit_kg, CostTable& table) {
+  shortest_ = kind.shortest;
+  log_shortest_ = std::log(shortest_);
   payload_limit_kg_ = payload_limit_kg;
   std::size_t payloads = payload_limit_kg > 0 ? first_payloads : 1;
-  double error = 0;
-  for (double per_decade = first_lengths_per_decade; per_decade <= most_lengths_per_decade; per_decade *= 2) {
+  double error = 0, per_decade = first_per_decade;
+  for (int round = 0; round < rounds && !kind.stop.stop_requested(); ++round) {
     rows_.assign(payloads, Row());
-    double decades = 0;
+    knees_within_ = true;
     for (std::size_t p = 0; p < payloads; ++p) {
-      rows_[p] = row(solve, payload_of(static_cast<double>(p)), longest, table);
-      decades = std::max(decades, std::log10(rows_[p].knee / shortest));
+      const auto walk = kind.walk(payload_of(static_cast<double>(p)), per_decade);
+      if (walk) {
+        rows_[p] = row_of(*walk, per_decade);
+        knees_within_ = knees_within_ && rows_[p].knee < kind.longest && rows_[p].at_knee.energy_j > 0;
+        continue;
+      }
+      if (!table.obstacle_) table.obstacle_ = walk.error();
+      rows_[p].at_knee = rows_[p].per_length = {std::nan(""), std::nan("")};
     }
-    const auto lengths = static_cast<std::size_t>(std::max(4.0, std::ceil(decades * per_decade) + 1));
-    for (std::size_t p = 0; p < payloads; ++p)
-      fill(solve, rows_[p], payload_of(static_cast<double>(p)), lengths, table);
-    error = error_against(solve, longest, table);
-    if (error <= (table.numerical_ ? wanted_of_numerical : wanted_error)) break;
-    if (payloads > 1 && payloads < most_payloads) payloads = 2 * payloads - 1;
+    error = error_against(kind, per_decade);
+    if (error <= (kind.numerical ? wanted_of_numerical : wanted_error)) break;
+    if (payloads > 1) payloads = 2 * payloads - 1;
+    per_decade *= 2;
   }
   table.interpolation_error_ = std::max(table.interpolation_error_, error);
+  table.solves_ += kind.solves;
 }
 
 LegCost CostTable::Grid::along(const Row& row, double length, double log_length) const {
@@ -144,7 +260,7 @@ LegCost CostTable::Grid::along(const Row& row, double length, double log_length)
   }
   const auto [first, weight] =
       place(std::max(0.0, (log_length - log_shortest_) * row.per_log), row.nodes.size());
-  Node sum;
+  Row::Node sum;
   for (std::size_t i = 0; i < 4; ++i) {
     sum.energy_per_length += weight[i] * row.nodes[first + i].energy_per_length;
     sum.duration_per_length += weight[i] * row.nodes[first + i].duration_per_length;
@@ -154,6 +270,8 @@ LegCost CostTable::Grid::along(const Row& row, double length, double log_length)
   return {sum.energy_per_length * scale, sum.duration_per_length * scale};
 }
 
+// Rows are read at the same share of their knees, and tell shares of what they cost there: the knee, a kink
+// that moves with the payload, is then no kink in it.
 LegCost CostTable::Grid::at(double length, double payload_kg) const {
   if (!(length > 0)) return {};
   const double log_length = std::log(length);
@@ -161,12 +279,25 @@ LegCost CostTable::Grid::at(double length, double payload_kg) const {
   const auto [first, share] =
       place(payload_kg / payload_limit_kg_ * static_cast<double>(rows_.size() - 1), rows_.size());
   LegCost sum;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const LegCost part = along(rows_[first + i], length, log_length);
-    sum.energy_j += share[i] * part.energy_j;
-    sum.duration_s += share[i] * part.duration_s;
+  if (!knees_within_) {
+    for (std::size_t i = 0; i < 4; ++i) sum += scaled(along(rows_[first + i], length, log_length), share[i]);
+    return sum;
   }
-  return sum;
+  double knee = 0;
+  LegCost at_knee;
+  for (std::size_t i = 0; i < 4; ++i) {
+    knee += share[i] * rows_[first + i].knee;
+    at_knee += scaled(rows_[first + i].at_knee, share[i]);
+  }
+  const double of_knee = length / knee;
+  const double log_of_knee = std::log(of_knee);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Row& row = rows_[first + i];
+    const LegCost part = along(row, of_knee * row.knee, log_of_knee + row.log_knee);
+    sum.energy_j += share[i] * part.energy_j / row.at_knee.energy_j;
+    sum.duration_s += share[i] * part.duration_s / row.at_knee.duration_s;
+  }
+  return {sum.energy_j * at_knee.energy_j, sum.duration_s * at_knee.duration_s};
 }
 
 Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOptions& options,
@@ -187,47 +318,15 @@ Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOpti
   problem.limits = limits_of(placeless);
   problem.value_of_time_w = options.value_of_time_w;
   problem.intervals_per_run = 24;  // finer than what the table's own nodes tell
-  const auto solver = [&](int turn) {
-    const auto along = [turn](double length, double payload_kg) {
-      Run run;
-      run.turn = turn;
-      run.payload_kg = payload_kg;
-      run.knots = {{0, 0, {}}, {length, 0, turn == 0 ? Pose{length, 0, 0} : Pose{0, 0, length}}};
-      return run;
-    };
-    // Loads depend on the payload alone: what closed forms need of them is kept for other lengths.
-    auto last = std::make_shared<std::pair<Run, std::optional<RunPlanner>>>();
-    return [&planner, &placeless, &problem, &table, &stop, along, last](
-               double length, double payload_kg) -> Result<LegCost> {
-      auto& [unit, closed] = *last;
-      if (!closed || unit.payload_kg != payload_kg) {
-        unit = along(1, payload_kg);
-        auto made = RunPlanner::make(placeless, planner->loads(), unit, problem, 0, 0);
-        closed = made ? std::optional(std::move(*made)) : std::nullopt;
-      }
-      if (closed && !stop.stop_requested()) {
-        if (const auto answer = closed->closed_form(problem.value_of_time_w, length))
-          return LegCost{answer->energy_j, answer->duration_s};
-      }
-      Path path;
-      path.runs = {along(length, payload_kg)};
-      path.final_payload_kg = payload_kg;
-      const auto cost = planner->cost(path, problem, stop);
-      if (!cost) return tl::unexpected(cost.error());
-      table.numerical_ = true;
-      return LegCost{cost->energy_j, cost->duration_s};
-    };
-  };
   const auto standing = dynamics::drive_model(placeless);
   if (!standing) return tl::unexpected(standing.error());
   table.idle_power_w_ = standing->battery_power_for({0, 0});
   const double payload_limit = std::max(0.0, robot.limits.payload_kg);
-  Grid straight, turn;
-  straight.build(solver(0), shortest_leg_m, longest_leg_m, payload_limit, table);
-  turn.build(solver(1), smallest_turn_rad, widest_turn_rad, payload_limit, table);
+  Kind straights{placeless, *planner, problem, stop, 0, shortest_leg_m, longest_leg_m};
+  Kind turns{placeless, *planner, problem, stop, 1, smallest_turn_rad, widest_turn_rad};
+  table.straight_.build(straights, payload_limit, table);
+  table.turn_.build(turns, payload_limit, table);
   if (stop.stop_requested()) return stopped();
-  table.straight_ = std::move(straight);
-  table.turn_ = std::move(turn);
   return table;
 }
 

@@ -1,9 +1,7 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
-#include <functional>
-#include <limits>
-#include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -37,9 +35,15 @@ struct CostOptions {
 inline constexpr double longest_leg_m = 1e4;
 inline constexpr double widest_turn_rad = 314.16;
 
-// Energy and duration of best motions from rest to rest in free time, over length and payload: solved at
+// Energy and duration of best motions from rest to rest in free time, over length and payload: computed at
 // nodes, interpolated by cubics in between, in the logarithm of the length and in the payload. For
 // schedulers, who ask for millions. Immutable, any thread.
+//
+// Motions in free time are one family, told apart by their peak speed alone; each member's length, duration
+// and energy are integrals over the speed (UniformMotion). So a payload's row is a walk along the family, in
+// which nothing is searched for. Where the planner has neither closed form nor quadrature (losses of gears,
+// friction that falls steeply with the speed) its solver gives the nodes, which takes a thousand times as
+// long.
 class CostTable {
  public:
   // Effects tied to places or headings of the floor are left out, since a leg here has no place; see
@@ -60,36 +64,47 @@ class CostTable {
   const std::vector<std::string>& neglected() const { return neglected_; }
   // Why the planner found no motion at some payload, when it found none.
   const std::optional<Error>& obstacle() const { return obstacle_; }
-  std::size_t solves() const { return solves_; }  // planner calls that it took
+  std::size_t solves() const { return solves_; }  // motions that it took
 
  private:
-  // One kind of motion over a grid of payloads and logarithms of length. Beyond a knee, where a motion
-  // reaches its cruising speed, cost is linear in the length.
-  class Grid {
-   public:
-    using Solve = std::function<Result<LegCost>(double length, double payload_kg)>;
-    void build(const Solve& solve, double shortest, double longest, double payload_limit_kg,
-               CostTable& table);
-    LegCost at(double length, double payload_kg) const;
-
-   private:
+  // One payload. Beyond a knee, where a motion reaches its cruising speed, cost is linear in the length.
+  struct Row {
     struct Node {
       double energy_per_length = 0, duration_per_length = 0;
     };
-    // One payload.
-    struct Row {
-      double knee = 0, per_log = 1;
-      LegCost at_knee, per_length;  // cost there, and what a unit of length more costs
-      std::vector<Node> nodes;      // from the shortest length to the knee
-    };
+    double knee = 0, log_knee = 0, per_log = 1;
+    LegCost at_knee, per_length;  // cost there, and what a unit of length more costs
+    std::vector<Node> nodes;      // from the shortest length to the knee
+  };
+  // One motion of a payload: its length and what it costs.
+  struct Member {
+    Member(double way, const LegCost& costs) : length(way), log_length(std::log(way)), cost(costs) {}
+    double length, log_length;
+    LegCost cost;
+  };
+  // All motions of a payload that a row needs, by ascending length up to the knee, `per_decade` of them to a
+  // factor of ten about.
+  struct Walk {
+    std::vector<Member> members;
+    LegCost per_length;  // beyond the last
+  };
+  struct Kind;  // straights or turns of one robot
+
+  // Rows over a grid of payloads.
+  class Grid {
+   public:
+    void build(Kind& kind, double payload_limit_kg, CostTable& table);
+    LegCost at(double length, double payload_kg) const;
+
+   private:
     double payload_of(double row) const;
-    Row row(const Solve& solve, double payload_kg, double longest, CostTable& table) const;
-    void fill(const Solve& solve, Row& row, double payload_kg, std::size_t lengths, CostTable& table) const;
+    Row row_of(const Walk& walk, double per_decade) const;
     LegCost along(const Row& row, double length, double log_length) const;
-    double error_against(const Solve& solve, double longest, CostTable& table) const;
+    double error_against(Kind& kind, double per_decade) const;
 
     double shortest_ = 1, log_shortest_ = 0, payload_limit_kg_ = 0;
-    std::vector<Row> rows_;  // payloads from none to the limit
+    bool knees_within_ = true;  // every row's, within the lengths asked for
+    std::vector<Row> rows_;     // payloads from none to the limit
   };
 
   Grid straight_, turn_;
@@ -97,7 +112,6 @@ class CostTable {
   std::vector<std::string> neglected_;
   std::optional<Error> obstacle_;
   std::size_t solves_ = 0;
-  bool numerical_ = false;  // some of them by the numerical solver
 };
 
 }  // namespace joulecast::planning

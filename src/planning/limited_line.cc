@@ -237,6 +237,21 @@ std::optional<LineMotion> line_within(const LineTask& task, double speed_limit, 
   return motion;
 }
 
+LineMotion line_to_peak(const LineTask& task, double peak, double acceleration_limit) {
+  LineMotion motion(task.power);
+  const Shape shape(task, acceleration_limit);
+  const Flank flank = shape.flank(0, peak, shape.slope(peak));
+  motion.append_ramp(0, acceleration_limit, flank.ramp_s);
+  motion.append_free(task, flank.free, flank.join, peak, flank.free_s);
+  motion.append_free(task, flank.free, peak, flank.join, flank.free_s);
+  motion.append_ramp(flank.join, -acceleration_limit, flank.ramp_s);
+  return motion;
+}
+
+double best_speed_of(const LineTask& task) {
+  return Shape(task, std::numeric_limits<double>::infinity()).best_speed();
+}
+
 double shortest_time_within(const LineTask& task, double speed_limit, double acceleration_limit) {
   const double v0 = task.start_speed, v1 = task.end_speed, a = acceleration_limit;
   if (!std::isfinite(a)) return std::isfinite(speed_limit) ? task.distance / speed_limit : 0;

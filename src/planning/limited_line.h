@@ -69,6 +69,12 @@ class LineMotion {
 // distance that the profile falls between them, or rises monotonically.
 std::optional<LineMotion> line_within(const LineTask& task, double speed_limit, double acceleration_limit);
 
+// Of all motions from rest to rest in free time, that whose peak is `peak`; below best_speed_of(), where the
+// speed's extremal stands still.
+LineMotion line_to_peak(const LineTask& task, double peak, double acceleration_limit);
+// The speed of least cost a metre; infinite without viscosity.
+double best_speed_of(const LineTask& task);
+
 // The least time within the bounds; infinite where none suffices.
 double shortest_time_within(const LineTask& task, double speed_limit, double acceleration_limit);
 

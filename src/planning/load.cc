@@ -29,7 +29,7 @@ Result<DriveLoads> DriveLoads::make(const robot::RobotModel& robot, std::optiona
     loads.needs_position_ |= effect.effect->info().needs_position;
     loads.needs_heading_ |= effect.effect->info().needs_heading;
     if (effect.effect->info().id == "stribeck_friction") {
-      for (std::size_t s : {0u, 1u}) loads.stribeck_nm_[s] = effect.values[0] * p.friction_torque_nm[s];
+      for (std::size_t s : {0u, 1u}) loads.stribeck_nm_[s] = effect.values[0] * p.file_friction_torque_nm[s];
       loads.stribeck_speed_rad_s_ = effect.values[1];
       loads.stribeck_exponent_ = effect.values[2];
     }
@@ -75,8 +75,10 @@ WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slo
     const auto b = model_.balance(instant(run, knot, curvature_slope, speed, acceleration));
     Torques t;
     for (std::size_t s : {0u, 1u}) {
-      t.through[s] = b.inertial_nm[s];
-      t.inside[s] = b.friction_nm[s];
+      // Of the friction, what the gear passes on with the load.
+      const double passed = model_.parameters().gear_friction_share * b.friction_nm[s];
+      t.through[s] = b.inertial_nm[s] + passed;
+      t.inside[s] = b.friction_nm[s] - passed;
       for (std::size_t k = 0; k < dynamics::load_count; ++k) {
         (k == static_cast<std::size_t>(Load::internal) ? t.inside : t.through)[s] += b.loads.torque[k][s];
       }

@@ -9,7 +9,6 @@ namespace {
 // Of rows that are rounded to 1e-6, and of the motors' limits, which constant acceleration between rows may
 // pass by UniformMotion::motor_tolerance.
 constexpr double rounding = 1e-6, of_slopes = 1.5e-3;
-constexpr double creep_rad_s = 10 * dynamics::friction_width_rad_s;
 
 }  // namespace
 

@@ -90,14 +90,13 @@ class Request {
       if (brief() && run.uniform()) answer->forget_motion();
       answers_.push_back(std::move(*answer));
     }
-    shortest_s_ = least_time_s();
     return {};
   }
 
   // Of the fastest motion that the limits allow.
-  double least_time_s() const {
+  double least_time_s() {
     double sum = dwell_s_;
-    for (const RunPlanner& run : runs_) sum += run.shortest_s();
+    for (RunPlanner& run : runs_) sum += run.shortest_s();
     return sum;
   }
 
@@ -106,16 +105,18 @@ class Request {
     auto solved = solve(problem_.value_of_time_w);
     if (!problem_.deadline_s) return solved;
     const double deadline = *problem_.deadline_s;
+    if (solved) unhurried_j_ = energy_j();
     if (!solved) {
       // Without idle power, friction and value of time only a deadline ends the motion.
       if (solved.error().fault != Fault::infeasible || solved.error().field != "value_of_time_w")
         return solved;
       endless_ = true;
       if (auto ok = solve(1.0); !ok) return ok;
+      unhurried_j_ = 0;
     } else if (duration_s() <= deadline) {
       return {};
     }
-    return meet(deadline, std::clamp(1e-3 * (deadline - shortest_s_), 1e-6 * deadline, 1e-4 * deadline));
+    return meet(deadline, std::clamp(1e-3 * (deadline - least_time_s()), 1e-6 * deadline, 1e-4 * deadline));
   }
 
   // Whether closed forms answer every run at the value of time, and no deadline asks for more; then solved.
@@ -135,21 +136,21 @@ class Request {
   Result<void> meet(double deadline, double early_s) {
     // The shortest time is known as finely as the grids are, which become finer while solving: a deadline
     // found to be beyond reach on the way is refused as one that was known to be.
-    const auto beyond_reach = [&] { return deadline < shortest_s_ * (1 - 1e-9); };
-    if (beyond_reach()) return too_soon(deadline, shortest_s_);
+    const auto beyond_reach = [&] { return deadline < least_time_s() * (1 - 1e-9); };
+    if (beyond_reach()) return too_soon(deadline, least_time_s());
     deadline_binds_ = true;
-    if (deadline <= shortest_s_ * (1 + 1e-7)) return solve(at_once_w);
+    if (deadline <= least_time_s() * (1 + 1e-7)) return solve(at_once_w);
     // log(T - T_min) falls nearly linearly in log(idle + price): a bracket there, drawn in by the secant
     // through its ends (Illinois) or, where that stalls, by halving. Done a little
     // early.
     const double idle = endless_ ? 0 : std::max(loads_.electric().idle_w, 1e-3 * average_power_w());
     const auto late = [&] {
-      return std::log(std::max(1e-12, duration_s() - shortest_s_) / (deadline - shortest_s_));
+      return std::log(std::max(1e-12, duration_s() - least_time_s()) / (deadline - least_time_s()));
     };
     const auto met = [&] { return duration_s() <= deadline && duration_s() > deadline - early_s; };
     const auto at = [&](double x) -> Result<void> {
       if (auto ok = solve(std::exp(x) - idle); !ok) return ok;
-      if (beyond_reach()) return too_soon(deadline, shortest_s_);
+      if (beyond_reach()) return too_soon(deadline, least_time_s());
       return {};
     };
     constexpr double steepest = 40;  // e^40 W: no price of time is higher
@@ -168,7 +169,7 @@ class Request {
     }
     int side = 0;
     for (int k = 0; k < 60 && late_fast <= 0 && !met(); ++k) {
-      const double aim = 0.5 * early_s / (deadline - shortest_s_);
+      const double aim = 0.5 * early_s / (deadline - least_time_s());
       double x = slow + (fast - slow) * (late_slow + aim) / (late_slow - late_fast);
       if (k % 4 == 3 || !(x > slow && x < fast)) x = 0.5 * (slow + fast);
       if (auto ok = at(x); !ok) return ok;
@@ -202,7 +203,6 @@ class Request {
     return sum;
   }
   double average_power_w() const { return energy_j() / duration_s(); }
-  double shortest_s() const { return shortest_s_; }
   PlanCost cost() const {
     PlanCost cost{energy_j(), duration_s(), price_w_, 0, true};
     for (std::size_t k = 0; k < runs_.size(); ++k) {
@@ -228,7 +228,8 @@ class Request {
   std::stop_token stop_;
   std::vector<RunPlanner> runs_;
   std::vector<RunAnswer> answers_;
-  double dwell_s_ = 0, shortest_s_ = 0, price_w_ = 0;
+  double dwell_s_ = 0, price_w_ = 0;
+  double unhurried_j_ = 0;  // energy at the value of time, where there is a deadline; no motion takes less
   bool deadline_binds_ = false;
   bool endless_ = false;  // without a price of time
 };
@@ -292,8 +293,13 @@ class Writer {
       return loads_.model().flow(here_);
     }
     const Run& run = planner.run();
-    const double slope = run.turn == 0 ? run.curvature_slope(s.way) : 0;
+    const double slope = run.turn == 0 ? slope_at(run, s.way) : 0;
     return loads_.model().flow(loads_.instant(run, run.at(s.way), slope, s.speed, s.acceleration));
+  }
+
+  // Just after a place, as rows are told.
+  static double slope_at(const Run& run, double way) {
+    return run.curvature_slope(way + 1e-9 * run.length());
   }
 
   void add(const dynamics::PowerFlow<double>& f, double seconds) {
@@ -323,8 +329,8 @@ class Writer {
            power);
     } else {
       push(time_s, driven_m_ + s.way, knot.pose, s.speed, knot.curvature_1_m * s.speed, s.acceleration,
-           knot.curvature_1_m * s.acceleration + run.curvature_slope(s.way) * s.speed * s.speed,
-           run.payload_kg, power);
+           knot.curvature_1_m * s.acceleration + slope_at(run, s.way) * s.speed * s.speed, run.payload_kg,
+           power);
     }
   }
 
@@ -416,6 +422,12 @@ Result<Plan> Request::written() {
   writer.dwell(path_.dwell_after_s, pose, path_.final_payload_kg);
   c.time_multiplier_w = price_w_;
   c.shortest_time_s = least_time_s();
+  // A motion that ends at the deadline saves at most the price of the time in between; of the fastest motion
+  // only that holds which holds without a deadline.
+  if (deadline_binds_ && problem_.deadline_s) {
+    c.gap_j += std::isfinite(price_w_) ? price_w_ * std::max(0.0, *problem_.deadline_s - duration_s())
+                                       : std::max(0.0, energy_j() - unhurried_j_);
+  }
   binding[static_cast<std::size_t>(Bound::deadline)] = deadline_binds_;
   for (std::size_t b = 0; b < bound_count; ++b) {
     if (binding[b]) c.binding.push_back(static_cast<Bound>(b));
@@ -496,7 +508,7 @@ Result<double> Planner::needed_speed(const Path& path, const Problem& problem, s
   // Seconds late under a speed limit; the end speeds must remain allowed.
   const auto late = [&](double speed) -> Result<double> {
     limited.limits.speed_m_s = speed;
-    const auto request = Request::make(robot_, loads_, path, limited, stop);
+    auto request = Request::make(robot_, loads_, path, limited, stop);
     if (!request) return tl::unexpected(request.error());
     return request->least_time_s() - deadline;
   };
@@ -536,30 +548,36 @@ Result<double> Planner::needed_speed(const Path& path, const Problem& problem, s
 Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& problem, std::size_t count,
                                               std::stop_token stop) const {
   if (count < 2) return invalid("count", "must be at least 2");
-  auto request = Request::make(robot_, loads_, path, problem, stop);
+  Problem hurried = problem;
+  hurried.hurried = true;
+  auto request = Request::make(robot_, loads_, path, hurried, stop);
   if (!request) return tl::unexpected(std::move(request.error()));
   if (auto solved = request->solve(problem.value_of_time_w); !solved)
     return tl::unexpected(std::move(solved.error()));
   const PlanCost free = request->cost();
   std::vector<PlanCost> front{free};
-  for (int attempt = 0; front.size() < count; ++attempt) {
+  for (int attempt = 0;; ++attempt) {
     front.resize(1);
     // The shortest time itself costs an unbounded price; the front ends a hundredth of the way before it.
-    const double shortest = request->shortest_s();
+    const double shortest = request->least_time_s();
     if (free.duration_s < shortest * (1 + 1e-5)) return std::vector<PlanCost>{free};
     const double fastest = std::max(shortest * (1 + 2e-6), shortest + 0.01 * (free.duration_s - shortest));
-    for (std::size_t k = 1; k < count; ++k) {
+    bool moved = false;
+    for (std::size_t k = 1; k < count && !moved; ++k) {
       const double f = static_cast<double>(k) / static_cast<double>(count - 1);
       const double deadline = free.duration_s + f * (fastest - free.duration_s);
       const double spacing = (free.duration_s - fastest) / static_cast<double>(count - 1);
       auto met = request->meet(deadline, std::min(1e-4 * deadline, 0.1 * spacing));
       // Finer grids on the way may have moved the shortest time: again, towards the new one.
-      if (!met && met.error().fault == Fault::infeasible && attempt < 8) break;
-      if (!met) return tl::unexpected(std::move(met.error()));
-      front.push_back(request->cost());
+      moved = !met && met.error().fault == Fault::infeasible && attempt < 8;
+      if (!met && !moved) return tl::unexpected(std::move(met.error()));
+      // Nearer to the shortest time than grids tell apart, motions are the same.
+      if (const PlanCost cost = request->cost();
+          met && cost.duration_s < front.back().duration_s * (1 - 1e-9))
+        front.push_back(cost);
     }
+    if (!moved) return front;
   }
-  return front;
 }
 
 Result<Plan> plan(const robot::RobotModel& robot, const Path& path, const Problem& problem,

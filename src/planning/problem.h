@@ -36,6 +36,7 @@ struct Problem {
       regeneration;  // fraction of braking power that returns, 0 to 1; else the robot's effects say
   std::size_t intervals_per_run = 64;  // speed grid of a run whose power does not change along its way
   bool rows = true;                    // whether the plan carries its profile
+  bool hurried = false;                // keep as closely to the motors' limits as where there is a deadline
 };
 
 }  // namespace joulecast::planning

@@ -6,13 +6,12 @@
 #include <string>
 #include <utility>
 
-#include "planning/peaks.h"
-
 namespace joulecast::planning {
 namespace {
 
 constexpr std::size_t most_cells = 200'000;
 
+constexpr double motor_tolerance = 7e-4;                          // as UniformTask's, of a grid
 constexpr double coarse_tolerance = 1e-5, fine_tolerance = 1e-6;  // of the cost
 
 std::string number(double x) {
@@ -91,6 +90,13 @@ bool RunPlanner::motors_break(double v, double q) const {
   return false;
 }
 
+// Whether torque and voltage, linear in speed and acceleration, keep their limits up to a speed and an
+// acceleration: they do where they do at the corners.
+bool RunPlanner::motors_hold(double top, double most) const {
+  return !motors_break(0, -most) && !motors_break(0, most) && !motors_break(top, -most) &&
+         !motors_break(top, most);
+}
+
 // Prepares the closed form where power is quadratic.
 void RunPlanner::find_line() {
   const Electric& e = loads_->electric();
@@ -108,12 +114,10 @@ void RunPlanner::find_line() {
   task.distance = run_->length();
   task.start_speed = start_, task.end_speed = end_;
   line_ = task;
-  // Torque and voltage are linear in speed and acceleration: within the corners' values.
   const Limits& l = problem_->limits;
   const double top = std::sqrt(ceiling_at(0)), most = acceleration_limit();
   motors_never_break_ = (!std::isfinite(l.current_a) && !std::isfinite(l.voltage_v)) ||
-                        (std::isfinite(most) && !motors_break(0, -most) && !motors_break(0, most) &&
-                         !motors_break(top, -most) && !motors_break(top, most));
+                        (std::isfinite(most) && motors_hold(top, most));
   shortest_s_ = std::max(start_, end_) <= top ? shortest_time_within(task, top, most)
                                               : std::numeric_limits<double>::infinity();
   if (std::fabs(start_ * start_ - end_ * end_) > 2 * most * task.distance * (1 + 1e-9))
@@ -132,6 +136,7 @@ void RunPlanner::find_motion() {
   task.torque_limit_nm = problem_->limits.current_a * task.electric.torque_constant_nm_a;
   task.voltage_limit_v = problem_->limits.voltage_v;
   task.cells = std::max<std::size_t>(8, problem_->intervals_per_run);
+  if (problem_->deadline_s || problem_->hurried) task.motor_tolerance = UniformMotion::hurried_tolerance;
   if (auto motion = UniformMotion::make(task)) motion_ = std::make_unique<UniformMotion>(std::move(*motion));
 }
 
@@ -172,11 +177,31 @@ void RunPlanner::build(std::vector<double> nodes) {
       const double middle = 0.5 * (nodes_[k] + nodes_[k + 1]);
       grid->loads.push_back(loads_->at(*run_, run_->at(middle), run_->curvature_slope(middle)));
     }
+    add_end_loads(*grid);
   }
   solver_.reset();
   grid_ = std::move(grid);
   envelope_ = std::make_unique<SpeedEnvelope>(speed_envelope(*grid_));
   shortest_s_ = envelope_->shortest_s;
+  fastest_known_ = false;
+}
+
+// Only where motors could come near their limits.
+void RunPlanner::add_end_loads(SpeedGrid& grid) const {
+  bool near = false;
+  for (std::size_t k = 0; k < grid.cells() && !near; ++k) {
+    const Reachable may =
+        reachable(grid, grid.load(k), std::sqrt(std::max(grid.ceiling[k], grid.ceiling[k + 1])), 0.8);
+    near = may.torque[0] || may.torque[1] || may.voltage[0] || may.voltage[1];
+  }
+  if (!near) return;
+  grid.end_loads.reserve(grid.cells());
+  for (std::size_t k = 0; k < grid.cells(); ++k) {
+    // The slope of the curvature may jump at a node.
+    const double slope = run_->curvature_slope(nodes_[k] + 0.5 * grid.step[k]);
+    grid.end_loads.push_back(
+        {loads_->at(*run_, run_->at(nodes_[k]), slope), loads_->at(*run_, run_->at(nodes_[k + 1]), slope)});
+  }
 }
 
 Result<void> RunPlanner::check_feasible() const {
@@ -308,7 +333,29 @@ std::vector<double> RunPlanner::first_nodes(std::size_t cells) const {
     }
     apart = std::move(smooth);
   }
-  return apart;
+  return with_corners(std::move(apart));
+}
+
+// Where the slope of the curvature jumps, torque does: such places are nodes exactly.
+std::vector<double> RunPlanner::with_corners(std::vector<double> nodes) const {
+  constexpr double jump_1_m2 = 0.05;
+  const auto& knots = run_->knots;
+  const auto slope = [&](std::size_t k) {
+    return (knots[k].curvature_1_m - knots[k - 1].curvature_1_m) / (knots[k].way - knots[k - 1].way);
+  };
+  for (std::size_t k = 1; k + 1 < knots.size(); ++k) {
+    if (std::fabs(slope(k + 1) - slope(k)) < jump_1_m2) continue;
+    const double corner = knots[k].way;
+    const auto after = std::lower_bound(nodes.begin() + 1, nodes.end() - 1, corner);
+    if (*after == corner || nodes.size() < 4) continue;
+    const auto near =
+        after - 1 > nodes.begin() && corner - *(after - 1) < *after - corner ? after - 1 : after;
+    if (near + 1 < nodes.end() && std::fabs(*near - corner) < 0.5 * (*(near + 1) - *(near - 1)))
+      *near = corner;
+    else
+      nodes.insert(after, corner);
+  }
+  return nodes;
 }
 
 // Every second node.
@@ -385,14 +432,72 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
     // Without motors to mind, the closed form knows what is feasible; the grid waits until it is needed.
     if (planner.line_ && planner.motors_never_break_ && std::isfinite(planner.shortest_s_)) return planner;
     planner.find_motion();
-    if (planner.motion_ && std::isfinite(planner.motion_->shortest_s())) {
-      planner.shortest_s_ = planner.motion_->shortest_s();
-      return planner;
-    }
+    planner.shortest_s_ = 0;
+    // From rest to rest some motion covers any way.
+    const bool rests = start_speed == 0 && end_speed == 0;
+    if (planner.motion_ && (rests || std::isfinite(planner.shortest_s()))) return planner;
     planner.motion_.reset();
   }
   if (auto ok = planner.build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
   return planner;
+}
+
+double RunPlanner::shortest_s() {
+  if (shortest_s_ == 0 && motion_) shortest_s_ = motion_->shortest_s();
+  if (grid_) find_fastest();
+  return shortest_s_;
+}
+
+// Where motors' limits can bind, the profile of the envelope is drivable but not always the fastest: the
+// solver is asked for one at a price of time that makes energy unimportant.
+void RunPlanner::find_fastest() {
+  if (std::exchange(fastest_known_, true)) return;
+  SpeedSolver solver(*grid_, *envelope_);
+  if (!solver.bounds_motors() || !envelope_->feasible) return;
+  constexpr double unimportant = 1e5;  // times the mean power
+  const double mean_w = solver.cost_j(envelope_->fastest, 0) / envelope_->shortest_s;
+  SpeedSolution s = solver.solve(unimportant * std::max(std::fabs(mean_w), 1e-3), fine_tolerance);
+  if (!s.converged || s.duration_s > envelope_->shortest_s) {
+    s.z = envelope_->fastest, s.duration_s = envelope_->shortest_s;
+    s.binding = {};
+  }
+  s.gap_j = s.ends_j = s.residual = 0;
+  s.cost_j = solver.cost_j(s.z, 0);
+  if (!fastest_ || s.duration_s < fastest_->solution.duration_s) fastest_ = FastMotion{nodes_, std::move(s)};
+  shortest_s_ = fastest_->solution.duration_s;
+}
+
+std::optional<double> RunPlanner::cruise_speed(double price_w) {
+  if (!uniform_) return {};
+  if (line_ && motors_never_break_) {
+    LineTask task = *line_;
+    task.value_of_time_w = price_w;
+    return std::min(best_speed_of(task), std::sqrt(ceiling_at(0)));
+  }
+  if (!motion_ && !grid_) find_motion();
+  if (!motion_) return {};
+  return motion_->cruise_speed(price_w);
+}
+
+std::optional<RestMotion> RunPlanner::to_peak(double peak, double price_w) {
+  const Electric& e = loads_->electric();
+  if (line_ && e.up == e.down) {
+    LineTask task = *line_;
+    task.value_of_time_w = price_w;
+    if (peak < best_speed_of(task)) {
+      const LineMotion line = line_to_peak(task, peak, acceleration_limit());
+      if (motors_never_break_ || motors_hold(peak, line.peak_acceleration()))
+        return RestMotion{line.distance(), line.duration_s(), line.energy_j()};
+    }
+  }
+  if (!motion_ && !grid_) find_motion();
+  if (!motion_) return {};
+  return motion_->to_peak(peak, price_w);
+}
+
+double RunPlanner::steady_power_w(double speed) const {
+  const dynamics::Instant at = loads_->instant(*run_, run_->at(0), 0, speed, 0);
+  return loads_->model().flow(at).battery_power_w;
 }
 
 Result<void> RunPlanner::build_grid() {
@@ -401,7 +506,7 @@ Result<void> RunPlanner::build_grid() {
     build(first_nodes(cells / 2));
   } else {
     fine_nodes_ = first_nodes(2 * cells);
-    build(thinned(fine_nodes_));
+    build(with_corners(thinned(fine_nodes_)));
   }
   return check_feasible();
 }
@@ -418,8 +523,7 @@ std::optional<RunAnswer> RunPlanner::closed_form(double price_w, double length) 
   const double top = line->peak_speed(), most = line->peak_acceleration();
   const bool lossy = e.up != e.down;
   // The corners of the box that the profile stays in decide quickly, its samples where they do not.
-  const bool sure = motors_never_break_ || (!motors_break(0, -most) && !motors_break(0, most) &&
-                                            !motors_break(top, -most) && !motors_break(top, most));
+  const bool sure = motors_never_break_ || motors_hold(top, most);
   if (lossy || !sure) {
     for (const double t : line->times(128)) {
       const auto [way, v, q] = line->state(t);
@@ -438,41 +542,23 @@ std::optional<RunAnswer> RunPlanner::closed_form(double price_w, double length) 
   return answer;
 }
 
-// The solver holds the motors' limits at the middle of each cell. Where they are exceeded towards its ends,
-// the cell gets a smaller share of them; false when none needs it.
-bool RunPlanner::tighten(const std::vector<double>& z) {
-  const std::size_t n = nodes_.size() - 1;
-  bool any = false;
-  for (std::size_t k = 0; k < n; ++k) {
+// Constant acceleration between nodes uses a motor fully at one end of a cell and less at the other. Where it
+// is used to its limit, cells are cut until that difference is small; the same nodes where it is.
+std::vector<double> RunPlanner::split_for_motors(const std::vector<double>& z) const {
+  constexpr double most_parts = 16, full = 0.99;
+  std::vector<double> nodes{0};
+  for (std::size_t k = 0; k < grid_->cells(); ++k) {
     const double q = (z[k + 1] - z[k]) / (2 * grid_->step[k]);
-    const auto use = [&](double f, double acceleration) {
-      const double way = nodes_[k] + f * grid_->step[k], v = std::sqrt(z[k] + f * (z[k + 1] - z[k]));
-      const double slope = run_->turn == 0 ? run_->curvature_slope(way) : 0;
-      const auto at = loads_->instant(*run_, run_->at(way), slope, v, acceleration);
-      if (creeps(at.wheel_speed_rad_s)) return 0.0;
-      const auto flow = loads_->model().flow(at);
-      double most = 0;
-      for (std::size_t s : {0u, 1u}) {
-        most = std::max({most, std::fabs(flow.torque_nm[s]) / grid_->torque_limit_nm,
-                         std::fabs(flow.voltage_v[s]) / grid_->voltage_limit_v});
-      }
-      return most;
-    };
-    const double excess = std::max(use(0.001, q), use(0.999, q)) - 1, holding = use(0.5, 0);
-    if (excess > UniformMotion::motor_tolerance) {
-      if (grid_->motor_share.empty()) grid_->motor_share.assign(n, 1);
-      double& share = grid_->motor_share[k];
-      // A steady speed must stay possible.
-      const double less = std::max(share * (1 - 1e-5) / (1 + excess), std::min(share, 1.001 * holding));
-      any = any || less < share;
-      share = less;
-    }
+    const double from = motor_use(*grid_, grid_->load(k, 0), std::sqrt(z[k]), q),
+                 to = motor_use(*grid_, grid_->load(k, 1), std::sqrt(z[k + 1]), q);
+    const double change = std::fabs(to - from) / motor_tolerance;
+    const double parts = std::max(from, to) < full || nodes.size() > most_cells
+                             ? 1
+                             : std::clamp(std::ceil(change - 0.5), 1.0, most_parts);
+    for (double i = 1; i <= parts; ++i) nodes.push_back(nodes_[k] + grid_->step[k] * i / parts);
+    nodes.back() = nodes_[k + 1];
   }
-  if (any) {
-    *envelope_ = speed_envelope(*grid_);
-    solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
-  }
-  return any;
+  return nodes;
 }
 
 Result<RunAnswer> RunPlanner::solve(double price_w, const std::stop_token& stop) {
@@ -490,7 +576,7 @@ Result<RunAnswer> RunPlanner::solve(double price_w, const std::stop_token& stop)
   }
   const auto solution = solve_grid(price_w, stop);
   if (!solution) return tl::unexpected(solution.error());
-  return answer_of(*solution, price_w);
+  return answer_of(*solution, nodes_, price_w);
 }
 
 Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_token& stop) {
@@ -512,11 +598,25 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     discretisation_j_ = std::fabs(coarse_cost - s.cost_j);
     refined_ = true;
   }
-  const double before_tightening = s.cost_j;
-  for (int round = 0; round < 4 && s.converged && solver_->bounds_motors() && tighten(s.z); ++round) {
-    if (auto ok = check_feasible(); !ok) return tl::unexpected(std::move(ok.error()));
-    s = solver_->solve(price_w, fine_tolerance, stop);
-    iterations += s.iterations;
+  for (int round = 0; round < 2 && s.converged && solver_->bounds_motors(); ++round) {
+    std::vector<double> nodes = split_for_motors(s.z);
+    if (nodes.size() < nodes_.size() + nodes_.size() / 50 + 1) break;
+    const std::vector<double> coarse_nodes = nodes_, z = resampled(nodes_, s.z, nodes);
+    const auto rebuild = [&](std::vector<double> onto, const std::vector<double>& from) {
+      build(std::move(onto));
+      solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
+      solver_->start_from(from);
+    };
+    rebuild(std::move(nodes), z);
+    SpeedSolution finer;
+    if (envelope_->feasible) finer = solver_->solve(price_w, fine_tolerance, stop);
+    if (!finer.converged) {
+      rebuild(coarse_nodes, s.z);
+      break;
+    }
+    iterations += finer.iterations;
+    discretisation_j_ = std::max(discretisation_j_, std::fabs(s.cost_j - finer.cost_j));
+    s = std::move(finer);
   }
   if (stop.stop_requested()) return stopped();
   if (!s.converged) {
@@ -524,7 +624,6 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     if (s.z.empty()) return fail(Fault::internal, "path", "the speed profile of a run did not converge");
     return s;
   }
-  discretisation_j_ += std::max(0.0, s.cost_j - before_tightening);
   s.iterations = iterations;
   return s;
 }
@@ -535,7 +634,6 @@ SpeedSolution RunPlanner::best_capped(double price_w) {
   SpeedSolution best;
   best.cost_j = std::numeric_limits<double>::infinity();
   SpeedGrid capped = *grid_;
-  capped.motor_share.clear();
   for (double part = 1; part > 1e-3; part *= 0.95) {
     for (std::size_t k = 1; k + 1 < nodes_.size(); ++k) capped.ceiling[k] = part * part * grid_->ceiling[k];
     const SpeedEnvelope envelope = speed_envelope(capped);
@@ -548,16 +646,17 @@ SpeedSolution RunPlanner::best_capped(double price_w) {
   return best;
 }
 
-RunAnswer RunPlanner::answer_of(const SpeedSolution& s, double price_w) const {
+RunAnswer RunPlanner::answer_of(const SpeedSolution& s, const std::vector<double>& nodes,
+                                double price_w) const {
   RunAnswer answer;
   answer.method = Method::interior_point;
-  answer.way = nodes_;
+  answer.way = nodes;
   for (const double z : s.z) answer.speed.push_back(std::sqrt(z));
   answer.peak_speed = *std::max_element(answer.speed.begin(), answer.speed.end());
   answer.duration_s = s.duration_s;
   answer.energy_j = s.cost_j - price_w * s.duration_s;
   answer.gap_j = s.gap_j;
-  answer.discretisation_j = discretisation_j_;
+  answer.discretisation_j = discretisation_j_ + s.ends_j;
   answer.residual = s.residual;
   answer.convex = s.convex && loads_->electric().idle_w + price_w >= 0;
   answer.iterations = s.iterations;
@@ -565,10 +664,9 @@ RunAnswer RunPlanner::answer_of(const SpeedSolution& s, double price_w) const {
   if (s.binding[static_cast<std::size_t>(Bound::speed)]) {
     // Tell which of the limits behind the ceiling it was, where the profile is closest to it.
     answer.binding[static_cast<std::size_t>(Bound::speed)] = false;
-    for (std::size_t k = 1; k + 1 < nodes_.size(); ++k) {
-      if (s.z[k] > (1 - 2e-3) * grid_->ceiling[k]) {
-        answer.binding[static_cast<std::size_t>(ceiling_bound(nodes_[k]))] = true;
-      }
+    for (std::size_t k = 1; k + 1 < nodes.size(); ++k) {
+      if (s.z[k] > (1 - 2e-3) * ceiling_at(nodes[k]))
+        answer.binding[static_cast<std::size_t>(ceiling_bound(nodes[k]))] = true;
     }
   }
   return answer;
@@ -586,13 +684,13 @@ Result<RunAnswer> RunPlanner::fastest() {
   if (!grid_) {
     if (auto ok = build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
   }
-  grid_->motor_share.clear();
-  const SpeedEnvelope envelope = speed_envelope(*grid_);
+  find_fastest();
+  if (fastest_) return answer_of(fastest_->solution, fastest_->nodes, 0);
   SpeedSolution solution;
-  solution.z = envelope.fastest;
-  solution.duration_s = envelope.shortest_s;
-  solution.cost_j = SpeedSolver(*grid_, envelope).cost_j(solution.z, 0);
-  return answer_of(solution, 0);
+  solution.z = envelope_->fastest;
+  solution.duration_s = envelope_->shortest_s;
+  solution.cost_j = SpeedSolver(*grid_, *envelope_).cost_j(solution.z, 0);
+  return answer_of(solution, nodes_, 0);
 }
 
 }  // namespace joulecast::planning

@@ -49,10 +49,18 @@ class RunPlanner {
   std::optional<RunAnswer> closed_form(double price_w) const { return closed_form(price_w, run_->length()); }
   std::optional<RunAnswer> closed_form(double price_w, double length) const;
 
+  // Of a uniform run from rest to rest, over whatever length that takes, in free time: the motion that turns
+  // at `peak`, up to the speed at which long ways are driven. Nothing where neither the closed form nor the
+  // quadrature answers.
+  std::optional<RestMotion> to_peak(double peak, double price_w);
+  std::optional<double> cruise_speed(double price_w);
+  // At that steady speed.
+  double steady_power_w(double speed) const;
+
   const Run& run() const { return *run_; }
   bool uniform() const { return uniform_; }  // loads are the same all along
   // Of a grid: of the finest so far.
-  double shortest_s() const { return shortest_s_; }
+  double shortest_s();
 
   // Of the run's coordinate.
   double acceleration_limit() const;
@@ -69,13 +77,17 @@ class RunPlanner {
   Result<RunAnswer> fastest();
   Result<SpeedSolution> solve_grid(double price_w, const std::stop_token& stop);
   SpeedSolution best_capped(double price_w);
-  RunAnswer answer_of(const SpeedSolution& solution, double price_w) const;
+  RunAnswer answer_of(const SpeedSolution& solution, const std::vector<double>& nodes, double price_w) const;
+  void find_fastest();
   bool motors_break(double speed, double acceleration) const;
+  bool motors_hold(double top, double most) const;
   Result<void> build_grid();
   void build(std::vector<double> nodes);
   Result<void> check_feasible() const;
-  bool tighten(const std::vector<double>& z);
+  std::vector<double> split_for_motors(const std::vector<double>& z) const;
+  void add_end_loads(SpeedGrid& grid) const;
   std::vector<double> first_nodes(std::size_t cells) const;
+  std::vector<double> with_corners(std::vector<double> nodes) const;
   static std::vector<double> thinned(const std::vector<double>& nodes);
   std::vector<double> refined_nodes(const std::vector<double>& z, std::size_t cells) const;
   std::vector<double> resampled(const std::vector<double>& nodes, const std::vector<double>& z,
@@ -91,7 +103,14 @@ class RunPlanner {
   std::array<dynamics::QuadraticPower, 2> motor_power_{};
   WheelLoads loads_here_{};          // of a uniform run
   bool motors_never_break_ = false;  // at any speed and acceleration within the other limits
-  double shortest_s_ = 0;
+  double shortest_s_ = 0;            // of a quadrature: 0 until asked for
+  // On a grid on which motors' limits can bind, the fastest motion found so far.
+  struct FastMotion {
+    std::vector<double> nodes;
+    SpeedSolution solution;
+  };
+  std::optional<FastMotion> fastest_;
+  bool fastest_known_ = false;  // of the present grid
   double discretisation_j_ = 0;
   std::unique_ptr<UniformMotion> motion_;  // of a uniform run, where wanted
   std::vector<double> nodes_;

@@ -5,7 +5,6 @@
 
 #include "dynamics/stribeck_curve.h"
 #include "planning/root.h"
-#include "planning/uniform_motion.h"
 
 namespace joulecast::planning {
 namespace {
@@ -20,21 +19,37 @@ double torque_of(const WheelLoad& w, double v, double q) {
   return t;
 }
 
-bool motors_allow(const SpeedGrid& grid, std::size_t cell, double v, double q, double tolerance = 0) {
-  const double share = grid.share(cell) * (1 + tolerance);
+}  // namespace
+
+double motor_use(const SpeedGrid& grid, const WheelLoads& loads, double v, double q) {
+  double most = 0;
   for (std::size_t s : {0u, 1u}) {
-    const WheelLoad& w = grid.load(cell)[s];
+    const WheelLoad& w = loads[s];
     const double t = torque_of(w, v, q);
-    if (std::fabs(t) > grid.torque_limit_nm * share) return false;
     const Electric& e = grid.electric;
     const double volts =
         e.resistance_ohm[s] / e.torque_constant_nm_a * t + e.voltage_constant_v_s_rad * w.pace * v;
-    if (std::fabs(volts) > grid.voltage_limit_v * share) return false;
+    most = std::max({most, std::fabs(t) / grid.torque_limit_nm, std::fabs(volts) / grid.voltage_limit_v});
   }
-  return true;
+  return most;
 }
 
-}  // namespace
+Reachable reachable(const SpeedGrid& grid, const WheelLoads& loads, double v, double share) {
+  Reachable may;
+  for (std::size_t s : {0u, 1u}) {
+    const WheelLoad& w = loads[s];
+    const double through = std::fabs(w.inertia) * grid.acceleration_limit + std::fabs(w.t0) +
+                           v * (std::fabs(w.t1) + v * std::fabs(w.t2));
+    const double torque = through * (1 + std::fabs(w.gear)) + std::fabs(w.f0) +
+                          v * (std::fabs(w.f1) + v * std::fabs(w.f2)) + std::fabs(w.stribeck);
+    const Electric& e = grid.electric;
+    const double volts = e.resistance_ohm[s] / e.torque_constant_nm_a * torque +
+                         e.voltage_constant_v_s_rad * std::fabs(w.pace) * v;
+    may.torque[s] = std::isfinite(grid.torque_limit_nm) && !(torque < share * grid.torque_limit_nm);
+    may.voltage[s] = std::isfinite(grid.voltage_limit_v) && !(volts < share * grid.voltage_limit_v);
+  }
+  return may;
+}
 
 double mean_speed(double z0, double z1) {
   return 0.5 * (std::sqrt(z0) + std::sqrt(z1));
@@ -63,6 +78,17 @@ double duration_of(const SpeedGrid& grid, const std::vector<double>& z) {
   return sum;
 }
 
+std::vector<double> fastest_without_motors(const SpeedGrid& grid) {
+  std::vector<double> fastest = grid.ceiling;
+  fastest.front() = grid.start, fastest.back() = grid.end;
+  if (!std::isfinite(grid.acceleration_limit)) return fastest;
+  const auto rise = [&](std::size_t cell) { return 2 * grid.step[cell] * grid.acceleration_limit; };
+  for (std::size_t k = 0; k < grid.cells(); ++k)
+    fastest[k + 1] = std::min(fastest[k + 1], fastest[k] + rise(k));
+  for (std::size_t k = grid.cells(); k-- > 0;) fastest[k] = std::min(fastest[k], fastest[k + 1] + rise(k));
+  return fastest;
+}
+
 SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
   const std::size_t n = grid.cells();
   SpeedEnvelope e;
@@ -71,19 +97,19 @@ SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
   e.fastest.back() = grid.end;
 
   const bool motors = std::isfinite(grid.torque_limit_nm) || std::isfinite(grid.voltage_limit_v);
-  // As UniformMotion: the limits at the middle of a cell, a tolerance more at its ends.
+  // Between the ends of a cell motors are used between what they are used there.
   const auto allowed = [&](std::size_t cell, double z0, double z1) {
     const double q = (z1 - z0) / (2 * grid.step[cell]);
-    return motors_allow(grid, cell, mean_speed(z0, z1), q) &&
-           motors_allow(grid, cell, std::sqrt(z0), q, UniformMotion::motor_tolerance) &&
-           motors_allow(grid, cell, std::sqrt(z1), q, UniformMotion::motor_tolerance);
+    return motor_use(grid, grid.load(cell, 0), std::sqrt(z0), q) <= 1 &&
+           motor_use(grid, grid.load(cell, 1), std::sqrt(z1), q) <= 1;
   };
   // Where a steady speed is already too much for the motors, the ceiling is lower.
   if (motors) {
     for (std::size_t k = 0; k <= n; ++k) {
       const std::size_t before = k > 0 ? k - 1 : 0, after = std::min(k, n - 1);
       const auto fits = [&](double z) {
-        return motors_allow(grid, before, std::sqrt(z), 0) && motors_allow(grid, after, std::sqrt(z), 0);
+        return motor_use(grid, grid.load(before, 1), std::sqrt(z), 0) <= 1 &&
+               motor_use(grid, grid.load(after, 0), std::sqrt(z), 0) <= 1;
       };
       if (!fits(e.fastest[k])) e.fastest[k] = last_that(fits, 0, e.fastest[k], bisections);
     }

@@ -17,13 +17,26 @@ struct SpeedGrid {
   double acceleration_limit = 0;  // of q; may be infinite
   double torque_limit_nm = 0;     // from the current limit
   double voltage_limit_v = 0;
-  std::vector<double> motor_share;  // of the torque and voltage limits that a cell may use; empty: all
+  // Of each cell just within its ends, where the motors' limits hold; empty: as in its middle.
+  std::vector<std::array<WheelLoads, 2>> end_loads;
   Electric electric;
 
-  double share(std::size_t cell) const { return motor_share.empty() ? 1 : motor_share[cell]; }
   std::size_t cells() const { return step.size(); }
   const WheelLoads& load(std::size_t cell) const { return loads.size() == 1 ? loads[0] : loads[cell]; }
+  const WheelLoads& load(std::size_t cell, std::size_t at_end) const {
+    return end_loads.empty() ? load(cell) : end_loads[cell][at_end];
+  }
 };
+
+// The most that a motor is used of its current and voltage limits at a speed and an acceleration.
+double motor_use(const SpeedGrid& grid, const WheelLoads& loads, double v, double q);
+
+// Which limits of the motors speeds up to `v` within the acceleration limit could reach: of torque and of
+// voltage, by side.
+struct Reachable {
+  std::array<bool, 2> torque{}, voltage{};
+};
+Reachable reachable(const SpeedGrid& grid, const WheelLoads& loads, double v, double share = 1);
 
 // The fastest and the slowest profile that the limits allow. Where `fastest` falls below `slowest` there is
 // none.
@@ -34,6 +47,9 @@ struct SpeedEnvelope {
   std::size_t broken_at = 0;  // node, when not feasible
 };
 SpeedEnvelope speed_envelope(const SpeedGrid& grid);
+
+// The fastest that ceilings and the limit of acceleration leave.
+std::vector<double> fastest_without_motors(const SpeedGrid& grid);
 
 // The slowest profile whose acceleration stays within a bound; at rest in between where the way is long
 // enough.

@@ -44,6 +44,11 @@ constexpr double barrier_decrease = 0.2;      // kappa_mu of W&B (7)
 constexpr double quick_decrease = 0.05;       // after a full step whose decrement is below the gap
 constexpr int most_iterations = 200;
 
+// The first of the two bounds, positive and negative, of a motor at an end of a cell.
+constexpr unsigned bound_of(std::size_t end, std::size_t side, bool voltage) {
+  return static_cast<unsigned>(2 + 8 * end + (voltage ? 4 : 0) + 2 * side);
+}
+
 // Shortens a step so that a positive value keeps its share: N&W (19.9).
 void shorten(double value, double change, double& step) {
   if (change < 0 && -change * step > to_boundary * value) step = to_boundary * value / -change;
@@ -64,25 +69,17 @@ SpeedSolver::SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope)
   }
   bounds_.assign(n, 0);
   bound_total_ = 2 * (n - 1);
+  const std::vector<double> fastest = fastest_without_motors(grid);
   for (std::size_t k = 0; k < n; ++k) {
-    std::uint16_t mask = 0;
+    std::uint32_t mask = 0;
     if (std::isfinite(grid.acceleration_limit)) mask = 3;
     // A bound is left out where no speed and acceleration inside the others can reach it.
-    const double v = std::sqrt(std::max(envelope.fastest[k], envelope.fastest[k + 1]));
-    for (std::size_t s : {0u, 1u}) {
-      const WheelLoad& w = grid.load(k)[s];
-      const double through = std::fabs(w.inertia) * grid.acceleration_limit + std::fabs(w.t0) +
-                             v * (std::fabs(w.t1) + v * std::fabs(w.t2));
-      const double most = through * (1 + std::fabs(w.gear)) + std::fabs(w.f0) +
-                          v * (std::fabs(w.f1) + v * std::fabs(w.f2)) + std::fabs(w.stribeck);
-      const Electric& e = grid.electric;
-      const double volts = e.resistance_ohm[s] / e.torque_constant_nm_a * most +
-                           e.voltage_constant_v_s_rad * std::fabs(w.pace) * v;
-      if (std::isfinite(grid.torque_limit_nm) && !(most < 0.99 * grid.share(k) * grid.torque_limit_nm)) {
-        mask = static_cast<std::uint16_t>(mask | (3u << (2 + 2 * s)));
-      }
-      if (std::isfinite(grid.voltage_limit_v) && !(volts < 0.99 * grid.share(k) * grid.voltage_limit_v)) {
-        mask = static_cast<std::uint16_t>(mask | (3u << (6 + 2 * s)));
+    const double v = std::sqrt(std::max(fastest[k], fastest[k + 1]));
+    for (const std::size_t end : {0u, 1u}) {
+      const Reachable may = reachable(grid, grid.load(k, end), v, 0.99);
+      for (const std::size_t s : {0u, 1u}) {
+        if (may.torque[s]) mask |= 3u << bound_of(end, s, false);
+        if (may.voltage[s]) mask |= 3u << bound_of(end, s, true);
       }
     }
     bounds_[k] = mask;
@@ -135,34 +132,45 @@ double SpeedSolver::cost(std::size_t cell, double v, double q) const {
   return f * grid_.step[cell];
 }
 
-// visit(index, g, gv, gq, gvv, gvq, gqq) for each bound g <= 0 of the cell.
+// visit(index, g, g0, g1, g00, g01, g11) for each bound g <= 0 of the cell, with its derivatives by z0 and
+// z1.
 template <class Visit>
-void SpeedSolver::each_bound(std::size_t cell, double v, double q, Visit&& visit) const {
+void SpeedSolver::each_bound(std::size_t cell, double z0, double z1, Visit&& visit) const {
   const unsigned mask = bounds_[cell];
+  const double p = 0.5 / grid_.step[cell], q = (z1 - z0) * p;
   if (mask & 3u) {
     const double a = 1 / grid_.acceleration_limit;
-    visit(0u, q * a - 1, 0.0, a, 0.0, 0.0, 0.0);
-    visit(1u, -q * a - 1, 0.0, -a, 0.0, 0.0, 0.0);
+    visit(0u, q * a - 1, -p * a, p * a, 0.0, 0.0, 0.0);
+    visit(1u, -q * a - 1, p * a, -p * a, 0.0, 0.0, 0.0);
   }
   if (mask < 4u) return;
-  for (unsigned s : {0u, 1u}) {
-    if (!(mask & ((3u << (2 + 2 * s)) | (3u << (6 + 2 * s))))) continue;
-    const WheelLoad& w = grid_.load(cell)[s];
-    const Torque t = torque(w, v, q);
-    if (mask & (3u << (2 + 2 * s))) {
-      for (double sign : {1.0, -1.0}) {
-        const double a = sign / (grid_.torque_limit_nm * grid_.share(cell));
-        visit(2 + 2 * s + (sign < 0), a * t.t - 1, a * t.tv, a * t.tq, a * t.tvv, a * t.tvq, a * t.tqq);
-      }
-    }
-    if (mask & (3u << (6 + 2 * s))) {
+  for (const std::size_t end : {0u, 1u}) {
+    if (!(mask >> bound_of(end, 0, false) & 0xffu)) continue;
+    const double z = end == 0 ? z0 : z1, v = std::sqrt(z);
+    const double vz = z > 0 ? 0.5 / v : 0, vzz = z > 0 ? -0.25 / (z * v) : 0;
+    // a T + b v - 1, T of speed and acceleration.
+    const auto bound = [&](unsigned j, double a, double b, const Torque& t) {
+      const double by_v = a * t.tv + b, own = by_v * vz, by_q = a * t.tq * p;
+      const double cross = a * t.tvq * vz * p, square = a * t.tqq * p * p,
+                   bend = a * t.tvv * vz * vz + by_v * vzz;
+      const double g = a * t.t + b * v - 1;
+      if (end == 0)
+        visit(j, g, own - by_q, by_q, bend - 2 * cross + square, cross - square, square);
+      else
+        visit(j, g, -by_q, own + by_q, square, -cross - square, bend + 2 * cross + square);
+    };
+    for (const std::size_t s : {0u, 1u}) {
+      const unsigned of_torque = bound_of(end, s, false), of_voltage = bound_of(end, s, true);
+      if (!(mask & (3u << of_torque | 3u << of_voltage))) continue;
+      const WheelLoad& w = grid_.load(cell, end)[s];
+      const Torque t = torque(w, v, q);
       const Electric& e = grid_.electric;
-      const double ohm = e.resistance_ohm[s] / e.torque_constant_nm_a,
-                   emf = e.voltage_constant_v_s_rad * w.pace;
-      for (double sign : {1.0, -1.0}) {
-        const double a = sign / (grid_.voltage_limit_v * grid_.share(cell));
-        visit(6 + 2 * s + (sign < 0), a * (ohm * t.t + emf * v) - 1, a * (ohm * t.tv + emf), a * ohm * t.tq,
-              a * ohm * t.tvv, a * ohm * t.tvq, a * ohm * t.tqq);
+      const double emf = e.voltage_constant_v_s_rad * w.pace / grid_.voltage_limit_v,
+                   ohm = e.resistance_ohm[s] / e.torque_constant_nm_a / grid_.voltage_limit_v;
+      for (const unsigned negative : {0u, 1u}) {
+        const double sign = negative ? -1 : 1;
+        if (mask >> of_torque & 1u) bound(of_torque + negative, sign / grid_.torque_limit_nm, 0, t);
+        if (mask >> of_voltage & 1u) bound(of_voltage + negative, sign * ohm, sign * emf, t);
       }
     }
   }
@@ -175,8 +183,7 @@ bool SpeedSolver::inside(const std::vector<double>& z) const {
   }
   for (std::size_t k = 0; k < n; ++k) {
     bool ok = true;
-    each_bound(k, mean_speed(z[k], z[k + 1]), (z[k + 1] - z[k]) / (2 * grid_.step[k]),
-               [&](unsigned, double g, auto...) { ok = ok && g < 0; });
+    each_bound(k, z[k], z[k + 1], [&](unsigned, double g, auto...) { ok = ok && g < 0; });
     if (!ok) return false;
   }
   return true;
@@ -193,7 +200,7 @@ double SpeedSolver::merit(const std::vector<double>& z, double mu) const {
   for (std::size_t k = 0; k < n; ++k) {
     const double v = mean_speed(z[k], z[k + 1]), q = (z[k + 1] - z[k]) / (2 * grid_.step[k]);
     bool ok = true;
-    each_bound(k, v, q, [&](unsigned, double g, auto...) {
+    each_bound(k, z[k], z[k + 1], [&](unsigned, double g, auto...) {
       ok = ok && g < 0;
       if (ok) barrier(-g);
     });
@@ -279,35 +286,33 @@ void SpeedSolver::assemble(double mu) {
   for (std::size_t k = 0; k < n; ++k) {
     Cell& c = cells_[k];
     const double z0 = z_[k], z1 = z_[k + 1], r0 = std::sqrt(z0), r1 = std::sqrt(z1), h = grid_.step[k];
-    const double v = c.v = 0.5 * (r0 + r1), q = c.q = (z1 - z0) / (2 * h);
+    c.v = 0.5 * (r0 + r1), c.q = (z1 - z0) / (2 * h);
     Local l = local(k);
     l.fv *= h, l.fq *= h, l.fvv *= h, l.fvq *= h, l.fqq *= h;
     // From (v, q) to (z0, z1).
     const double v0 = r0 > 0 ? 0.25 / r0 : 0, v1 = r1 > 0 ? 0.25 / r1 : 0;
     const double v00 = r0 > 0 ? -0.125 / (z0 * r0) : 0, v11 = r1 > 0 ? -0.125 / (z1 * r1) : 0, p = 0.5 / h;
     cost_here_ += l.f * h;
-    double lv = l.dual_v * h, lq = l.dual_q * h;  // of the Lagrangian
-    double hv = l.fv;                             // what multiplies the second derivative of v
-    double bv = l.fv, bq = l.fq;                  // of the barrier problem
-    each_bound(k, v, q, [&](unsigned j, double g, double gv, double gq, double gvv, double gvq, double gqq) {
-      const double slack = -g, y = c.multiplier[j];
-      c.slack[j] = slack;
-      const double weight = y / slack;
-      l.fvv += weight * gv * gv + y * gvv;
-      l.fvq += weight * gv * gq + y * gvq;
-      l.fqq += weight * gq * gq + y * gqq;
-      lv += y * gv, lq += y * gq, hv += y * gv;
-      bv += mu / slack * gv, bq += mu / slack * gq;
-    });
-    gradient_[k] += bv * v0 - bq * p, gradient_[k + 1] += bv * v1 + bq * p;
+    const double lv = l.dual_v * h, lq = l.dual_q * h;  // of the Lagrangian
+    gradient_[k] += l.fv * v0 - l.fq * p, gradient_[k + 1] += l.fv * v1 + l.fq * p;
     stationarity_[k] += lv * v0 - lq * p, stationarity_[k + 1] += lv * v1 + lq * p;
     const double mixed = l.fvq * p;
-    const double d0 = l.fvv * v0 * v0 - 2 * mixed * v0 + l.fqq * p * p,
-                 d1 = l.fvv * v1 * v1 + 2 * mixed * v1 + l.fqq * p * p;
-    diagonal_[k] += d0 + hv * v00, diagonal_[k + 1] += d1 + hv * v11;
-    off_[k] += l.fvv * v0 * v1 + mixed * (v0 - v1) - l.fqq * p * p;
-    magnitude_[k] += std::fabs(d0) + std::fabs(hv * v00),
-        magnitude_[k + 1] += std::fabs(d1) + std::fabs(hv * v11);
+    double d0 = l.fvv * v0 * v0 - 2 * mixed * v0 + l.fqq * p * p,
+           d1 = l.fvv * v1 * v1 + 2 * mixed * v1 + l.fqq * p * p,
+           d01 = l.fvv * v0 * v1 + mixed * (v0 - v1) - l.fqq * p * p;
+    each_bound(k, z0, z1,
+               [&](unsigned j, double g, double g0, double g1, double g00, double g01, double g11) {
+                 const double slack = -g, y = c.multiplier[j], weight = y / slack;
+                 c.slack[j] = slack;
+                 d0 += weight * g0 * g0 + y * g00, d1 += weight * g1 * g1 + y * g11,
+                     d01 += weight * g0 * g1 + y * g01;
+                 gradient_[k] += mu / slack * g0, gradient_[k + 1] += mu / slack * g1;
+                 stationarity_[k] += y * g0, stationarity_[k + 1] += y * g1;
+               });
+    diagonal_[k] += d0 + l.fv * v00, diagonal_[k + 1] += d1 + l.fv * v11;
+    off_[k] += d01;
+    magnitude_[k] += std::fabs(d0) + std::fabs(l.fv * v00),
+        magnitude_[k + 1] += std::fabs(d1) + std::fabs(l.fv * v11);
   }
   for (std::size_t k = 1; k < n; ++k) {
     const double a = 1 / grid_.ceiling[k], high = 1 - z_[k] * a, low = z_[k] * a;
@@ -424,8 +429,7 @@ void SpeedSolver::start_duals(double mu) {
   const std::size_t n = grid_.cells();
   for (std::size_t k = 0; k < n; ++k) {
     Cell& c = cells_[k];
-    const double v = mean_speed(z_[k], z_[k + 1]), q = (z_[k + 1] - z_[k]) / (2 * grid_.step[k]);
-    each_bound(k, v, q, [&](unsigned j, double g, auto...) { c.multiplier[j] = mu / -g; });
+    each_bound(k, z_[k], z_[k + 1], [&](unsigned j, double g, auto...) { c.multiplier[j] = mu / -g; });
     c.kink = {0, 0};
   }
   for (std::size_t k = 1; k < n; ++k) {
@@ -464,6 +468,19 @@ double SpeedSolver::complementarity() const {
     }
   }
   return gap;
+}
+
+double SpeedSolver::cost_of_ends() const {
+  double sum = 0;
+  for (std::size_t k = 0; k < grid_.cells(); ++k) {
+    const Cell& c = cells_[k];
+    for (unsigned j = 2; j < most_bounds; ++j) {
+      const unsigned other = j < 10 ? j + 8 : j - 8;
+      if ((bounds_[k] >> j & 1u) && (bounds_[k] >> other & 1u))
+        sum += c.multiplier[j] * 0.5 * std::max(0.0, c.slack[other] - c.slack[j]);
+    }
+  }
+  return sum;
 }
 
 // Largest residual of the stationarity, each by its speed squared.
@@ -512,9 +529,9 @@ void SpeedSolver::update_duals(double mu) {
     const double r0 = std::sqrt(z_[k]), r1 = std::sqrt(z_[k + 1]);
     const double dv = (r0 > 0 ? 0.25 / r0 * step_[k] : 0) + (r1 > 0 ? 0.25 / r1 * step_[k + 1] : 0);
     const double dq = (step_[k + 1] - step_[k]) / (2 * grid_.step[k]);
-    each_bound(k, c.v, c.q, [&](unsigned j, double g, double gv, double gq, auto...) {
-      const double slack = -g;
-      const double change = mu / slack - c.multiplier[j] + c.multiplier[j] / slack * (gv * dv + gq * dq);
+    each_bound(k, z_[k], z_[k + 1], [&](unsigned j, double g, double g0, double g1, auto...) {
+      const double slack = -g, dg = g0 * step_[k] + g1 * step_[k + 1];
+      const double change = mu / slack - c.multiplier[j] + c.multiplier[j] / slack * dg;
       c.slack[j] = change;  // reused until the next assembly
       shorten(c.multiplier[j], change, longest);
     });
@@ -558,9 +575,9 @@ std::array<bool, bound_count> SpeedSolver::binding(double unit_j) const {
     for (unsigned j = 0; j < most_bounds; ++j) {
       if (bounds_[k] >> j & 1u) {
         binds(cells_[k].multiplier[j], cells_[k].slack[j],
-              j < 2   ? Bound::acceleration
-              : j < 6 ? Bound::current
-                      : Bound::voltage);
+              j < 2             ? Bound::acceleration
+              : (j - 2) % 8 < 4 ? Bound::current
+                                : Bound::voltage);
       }
     }
     if (k > 0) binds(ceiling_multiplier_[k], 1 - z_[k] / grid_.ceiling[k], Bound::speed);
@@ -604,6 +621,7 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::st
     if (barrier.at_finest() && gap < 3 * allowed && decrement < (iteration < 60 ? 1e-3 : 0.3) * allowed) {
       solution.converged = true;
       solution.gap_j = gap + kink_gap_;
+      solution.ends_j = cost_of_ends();
       solution.residual = stationarity_residual() / barrier.scale();
       solution.convex = !corrected && damping == 0;
       break;

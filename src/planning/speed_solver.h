@@ -15,6 +15,9 @@ struct SpeedSolution {
   std::vector<double> z;
   double cost_j = 0;  // motors, idle power and price of time, of the grid's midpoint rule
   double gap_j = 0;   // see Certificate
+  // What limits of motors cost at most that hold at the ends of cells: along a cell of constant acceleration
+  // a motor is used fully at one end only. Their multipliers times half the difference between the ends.
+  double ends_j = 0;
   double residual = 0;
   double duration_s = 0;
   bool convex = true;  // the Hessian at the solution needed no correction and the whole region is convex
@@ -46,7 +49,8 @@ class SpeedSolver {
   void start_from(const std::vector<double>& z);
 
  private:
-  static constexpr std::size_t most_bounds = 10;  // of a cell: 2 acceleration, 4 torque, 4 voltage
+  // Of a cell: 2 of acceleration; at either end 4 of torque, 4 of voltage.
+  static constexpr std::size_t most_bounds = 18;
 
   struct Local {
     double f = 0, fv = 0, fq = 0, fvv = 0, fvq = 0, fqq = 0;
@@ -81,7 +85,7 @@ class SpeedSolver {
   Torque torque(const WheelLoad& w, double v, double q) const;
   double cost(std::size_t cell, double v, double q) const;
   template <class Visit>
-  void each_bound(std::size_t cell, double v, double q, Visit&& visit) const;
+  void each_bound(std::size_t cell, double z0, double z1, Visit&& visit) const;
   double merit(const std::vector<double>& z, double mu) const;
   bool inside(const std::vector<double>& z) const;
   std::vector<double> initial_point() const;
@@ -92,6 +96,7 @@ class SpeedSolver {
   bool regularise(double damping, bool& corrected);
   void solve_step();
   double complementarity() const;
+  double cost_of_ends() const;
   double stationarity_residual() const;
   double step_to_boundary() const;
   double line_search(double longest, double decrement, double mu, double scale);
@@ -103,7 +108,7 @@ class SpeedSolver {
   const SpeedEnvelope& envelope_;
   double idle_ = 0, smoothing_ = 0, gear_smoothing_ = 0;
   double mean_slope_ = 1, half_jump_ = 0;
-  std::vector<std::uint16_t> bounds_;  // mask of bounds that can bind, per cell
+  std::vector<std::uint32_t> bounds_;  // mask of bounds that can bind, per cell
   std::size_t bound_total_ = 0;
   std::vector<double> z_, trial_;
   std::vector<Cell> cells_;

@@ -19,6 +19,7 @@ constexpr double spare = 1e-7;     // of the distance: less is spread over the n
 constexpr int speed_samples = 64;  // where f is looked at for its minima
 constexpr int most_cuts =
     8;  // in halves, of a cell in which the acceleration or a motor's limit changes fast
+constexpr double least_share = 0.8;  // of a cell's middle acceleration that motors must allow at its ends
 
 // x with x + gear |x| = t.
 double through_gear(double t, double gear) {
@@ -180,17 +181,20 @@ void UniformMotion::piece(const End& from, const End& to, double change, const P
   Most at_middle = wanted(middle, direction, price);
   const auto [least, greatest] = std::minmax({from.acceleration, at_middle.acceleration, to.acceleration});
   const bool jumps = greatest > change * least && halvings < most_cuts;
+  const End cut{middle, at_middle.acceleration};
+  const double tolerance = closeness_ * (price.fastest ? hurried_tolerance : task_.motor_tolerance);
   bool beyond = false;
   if (!price.rough && has_motor_limits()) {
     for (const double end : {from.v, to.v}) {
-      const double allowed = most(local(end), direction, motor_tolerance).acceleration;
-      if (at_middle.acceleration <= allowed) continue;
-      beyond = true;
-      if (halvings >= most_cuts) at_middle.acceleration = std::max(allowed, 1e-3 * at_middle.acceleration);
+      const Local there = local(end);
+      const Most strict = most(there, direction, 0);
+      beyond = beyond || at_middle.acceleration > most(there, direction, tolerance).acceleration ||
+               strict.acceleration < least_share * cut.acceleration;
+      if (strict.acceleration < at_middle.acceleration)
+        at_middle = {std::max(strict.acceleration, 1e-3 * at_middle.acceleration), strict.bound, true};
     }
   }
   if (jumps || (beyond && halvings < most_cuts)) {
-    const End cut{middle, at_middle.acceleration};
     piece(from, cut, change, price, halvings + 1, visit);
     piece(cut, to, change, price, halvings + 1, visit);
   } else {
@@ -268,6 +272,13 @@ UniformMotion::Shape UniformMotion::turning(Shape shape, double nearest, double 
     const double next = v - (m + 0.5 * spare) / slope - (k > 5 ? 1e-4 * (v - nearest) : 0);
     v = std::clamp(next, std::min(nearest, farthest), std::max(nearest, farthest));
   }
+  // Cells that are cut where the acceleration jumps make the distance jump a little with the speed.
+  if (missing(v) > spare) {
+    double low = v, step = 1e-4 * (v - nearest);
+    for (int k = 0; k < 20 && missing(low) > spare; ++k, step *= 2)
+      low = nearest + std::max(0.0, low - step - nearest);
+    missing(last_that([&](double speed) { return missing(speed) <= spare; }, low, v, 30));
+  }
   return shape;
 }
 
@@ -322,18 +333,19 @@ std::optional<UniformMotion::Shape> UniformMotion::shape_at(double fixed_w) cons
   return turning(shape, shape.middle, cheapest);
 }
 
-// The integral of the least L/|a| over the speeds of a piece.
-double UniformMotion::pointwise_least(const Piece& piece, const Price& price) const {
+// The integral of the least L/|a| over the speeds of a piece, and the way that such accelerations take.
+UniformMotion::Least UniformMotion::pointwise_least(const Piece& piece, const Price& price) const {
   const double change = piece.to - piece.from, direction = change > 0 ? 1 : -1;
-  double sum = 0;
+  Least sum;
   for (const auto& [at, weight] : gauss3) {
     const Local here = local(piece.from + at * change);
     const double rate = price.fixed_w - price.lambda * here.v;
     const double bound = std::max(most(here, direction, 0).acceleration, 1e-3 * piece.acceleration);
     const double a = best(here, direction, rate, bound);
-    sum += weight * (motors(here, direction * a).w + rate) / a;
+    sum.integral_j += weight * std::fabs(change) * (motors(here, direction * a).w + rate) / a;
+    sum.distance += weight * std::fabs(change) * here.v / a;
   }
-  return sum * std::fabs(change);
+  return sum;
 }
 
 SteppedMotion UniformMotion::written(const Shape& shape) const {
@@ -351,12 +363,17 @@ SteppedMotion UniformMotion::written(const Shape& shape) const {
     const double duration = cruise / shape.middle;
     motion.duration_s += duration;
     motion.energy_j += (motors(local(shape.middle), 0).w + idle_w) * duration;
+    if (bare_top_ > 0 && shape.middle >= top_ && !shape.price.fastest)
+      motion.discretisation_j += std::max(0.0, steady_cost(top_, shape.price.fixed_w) -
+                                                   steady_cost(bare_top_, shape.price.fixed_w)) *
+                                 cruise;
     way += cruise;
     motion.way.push_back(way * scale), motion.speed.push_back(shape.middle);
     if (shape.middle >= task_.speed_limit * (1 - rounding))
       motion.binding[static_cast<std::size_t>(Bound::speed)] = true;
   };
   bool held = false;
+  double best_distance = cruise;
   if (task_.start_speed == shape.middle) hold(), held = true;
   pieces(shape, [&](const Piece& piece) {
     const double duration = piece.duration_s(), change = piece.to - piece.from;
@@ -369,15 +386,25 @@ SteppedMotion UniformMotion::written(const Shape& shape) const {
     }
     motion.duration_s += duration * scale;
     motion.energy_j += (power + idle_w) * duration * scale;
-    if (!shape.price.fastest)
-      motion.discretisation_j += std::clamp(least * duration - pointwise_least(piece, shape.price), 0.0,
-                                            std::max(0.0, least * duration));  // L is not negative
+    if (!shape.price.fastest) {
+      const Least best = pointwise_least(piece, shape.price);
+      motion.discretisation_j += std::max(0.0, least * duration - best.integral_j);
+      best_distance += best.distance;
+    }
     if (piece.bounded) motion.binding[static_cast<std::size_t>(piece.bound)] = true;
     way += piece.distance();
     motion.way.push_back(way * scale), motion.speed.push_back(piece.to);
     if (!held && piece.to == shape.middle) hold(), held = true;
   });
   motion.way.back() = task_.distance;
+  // Those least integrals are of the best motion over another distance: lambda, which is the cost of a unit
+  // of it more, is that of the speed there, which changes by no larger a share than the distance.
+  if (cruise == 0 && shape.cruises && !shape.price.fastest && best_distance > 0) {
+    const double off = std::fabs(task_.distance - best_distance), share = std::min(0.5, off / best_distance);
+    motion.discretisation_j +=
+        off *
+        std::max(0.0, steady_cost(shape.middle * (1 - share), shape.price.fixed_w) - shape.price.lambda);
+  }
   return motion;
 }
 
@@ -386,7 +413,14 @@ std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
   const bool bounded = std::isfinite(task.acceleration_limit) || motion.has_motor_limits();
   if ((!bounded && !(task.electric.down > 0)) || task.loads[0].gear != 0 || task.loads[1].gear != 0)
     return std::nullopt;
-  const auto holds = [&](double v) { return motion.most(motion.local(v), 1, 0).acceleration > 0; };
+  // Of little that friction leaves, little may be left unused: full tolerance from two fifths on.
+  const double room = last_that(
+      [&](double share) { return motion.most(motion.local(0), 1, -share).acceleration > 0; }, 0, 1, 20);
+  motion.closeness_ = std::clamp(2.5 * room, 0.05, 1.0);
+  // Something must be left to accelerate with at the top speed.
+  double left = 0.5 * motion.closeness_ * hurried_tolerance;
+  const auto holds = [&](double v) { return motion.most(motion.local(v), 1, -left).acceleration > 0; };
+  for (int k = 0; k < 30 && !holds(0); ++k) left *= 0.5;
   if (!holds(0)) return std::nullopt;
   motion.top_ = task.speed_limit;
   double last = 0;
@@ -394,6 +428,8 @@ std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
     const double v = task.speed_limit * k / speed_samples;
     if (!holds(v)) {
       motion.top_ = last_that(holds, last, v, 60);
+      left = 0;
+      motion.bare_top_ = last_that(holds, motion.top_, v, 60);
       break;
     }
     last = v;
@@ -409,9 +445,64 @@ std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
     if (*speed > motion.top_ * (1 + rounding)) return std::nullopt;
     *speed = std::min(*speed, motion.top_);
   }
-  const auto shape = motion.fastest_shape();
-  motion.shortest_s_ = shape ? motion.written(*shape).duration_s : infinite;
   return motion;
+}
+
+double UniformMotion::shortest_s() const {
+  const auto shape = fastest_shape();
+  return shape ? written(*shape).duration_s : infinite;
+}
+
+// Which limit holds the acceleration, if any, and which motors brake or coast.
+int UniformMotion::regime(double v, double direction, const Price& price) const {
+  const Most at = wanted(v, direction, price);
+  const Local here = local(v);
+  int flows = 0;
+  for (const std::size_t s : {0u, 1u}) {
+    const WheelLoad& w = task_.loads[s];
+    const double inertial = w.inertia * direction * at.acceleration;
+    const double torque = here.through[s] + inertial + here.inside[s];
+    const double coasting =
+        1e-6 * (std::fabs(here.through[s]) + std::fabs(inertial) + std::fabs(here.inside[s]));
+    flows = 3 * flows + (torque * w.pace > coasting ? 2 : torque * w.pace < -coasting ? 0 : 1);
+  }
+  return 9 * (at.bounded ? 1 + static_cast<int>(at.bound) : 0) + flows;
+}
+
+// Over y in v = peak (1 - y^2), in which the acceleration does not vanish as a root at the peak.
+void UniformMotion::integrate(double from, double to, double peak, double direction, const Price& price,
+                              int depth, RestMotion& sum) const {
+  constexpr double near_peak = 1e-6;
+  const auto speed = [&](double y) { return peak * (1 - y * y); };
+  const auto regime_at = [&](double y) {
+    return regime(speed(std::clamp(y, near_peak, 1.0)), direction, price);
+  };
+  if (const int first = regime_at(from); depth > 0 && regime_at(to) != first) {
+    const double cut = last_that([&](double y) { return regime_at(y) == first; }, from, to, 12);
+    integrate(from, cut, peak, direction, price, 0, sum);
+    integrate(cut + (to - from) / 4096, to, peak, direction, price, depth - 1, sum);
+    return;
+  }
+  for (const auto& [at, weight] : gauss4) {
+    const double y = from + at * (to - from), v = speed(y), a = wanted(v, direction, price).acceleration;
+    const double seconds = weight * (to - from) * 2 * peak * y / a;
+    sum.duration_s += seconds;
+    sum.distance += v * seconds;
+    sum.energy_j += (motors(local(v), direction * a).w + task_.electric.idle_w) * seconds;
+  }
+}
+
+RestMotion UniformMotion::to_peak(double peak, double price_w) const {
+  Price price;
+  price.fixed_w = task_.electric.idle_w + price_w;
+  price.lambda = steady_cost(peak, price.fixed_w);
+  constexpr int panels = 6;
+  RestMotion sum;
+  for (const double direction : {1.0, -1.0})
+    for (int k = 0; k < panels; ++k)
+      integrate(static_cast<double>(k) / panels, static_cast<double>(k + 1) / panels, peak, direction, price,
+                3, sum);
+  return sum;
 }
 
 Result<SteppedMotion> UniformMotion::solve(double price_w) const {

@@ -22,6 +22,8 @@ struct UniformTask {
   double acceleration_limit = 0;
   double torque_limit_nm = 0, voltage_limit_v = 0;
   std::size_t cells = 64;  // of the speed range on either side of the cruise
+  // How far below its limit a motor may be used within a cell where that limit binds.
+  double motor_tolerance = 7e-4;
 };
 
 // Speeds at places along the way, the acceleration being constant in between.
@@ -31,6 +33,13 @@ struct SteppedMotion {
   double energy_j = 0;          // idle power included
   double discretisation_j = 0;  // what constant acceleration between the nodes costs
   std::array<bool, bound_count> binding{};
+};
+
+// A motion from rest to rest in free time.
+struct RestMotion {
+  double distance = 0;
+  double duration_s = 0;
+  double energy_j = 0;  // idle power included
 };
 
 // Why no best end time exists: power at standstill and price of time, together `standing_w`, are not
@@ -52,11 +61,12 @@ tl::unexpected<Error> endless(double standing_w);
 // it are left likewise.
 //
 // Between nodes of the speed the acceleration is constant, so the answer is a motion that can be driven as it
-// is told. A cell's acceleration obeys current and voltage limits at its middle, and passes them at its ends
-// by motor_tolerance at most.
+// is told: current and voltage limits are kept all along a cell. Cells are as small as motor_tolerance asks
+// for.
 class UniformMotion {
  public:
-  static constexpr double motor_tolerance = 1e-3;
+  // motor_tolerance of the fastest motion, and what is to be asked for where time is short.
+  static constexpr double hurried_tolerance = 1e-4;
 
   // Nothing when f has several minima within the speed limit (friction that falls steeply with the speed),
   // the motors cannot hold a steady speed from rest to the end speeds, nothing bounds braking that neither
@@ -70,7 +80,15 @@ class UniformMotion {
   std::optional<SteppedMotion> fastest() const;
   // Time of that motion; distance over speed limit when the acceleration is unbounded, infinite when the way
   // is too short.
-  double shortest_s() const { return shortest_s_; }
+  double shortest_s() const;
+
+  // Of all free-time motions from rest to rest, that which turns at `peak`: the integrals of 1/|a|, v/|a| and
+  // P/|a| over the speed, by Gauss's rule between the speeds at which limits or the flow of power change.
+  RestMotion to_peak(double peak, double price_w) const;
+  // The speed at which long ways are driven.
+  double cruise_speed(double price_w) const { return cheapest_speed(task_.electric.idle_w + price_w); }
+  // At that speed.
+  double steady_power_w(double v) const { return motors(local(v), 0).w + task_.electric.idle_w; }
 
  private:
   // What the motors bear at a speed, acceleration left out.
@@ -135,11 +153,18 @@ class UniformMotion {
   std::optional<Shape> monotone(Shape shape, double highest_lambda) const;
   std::optional<Shape> fastest_shape() const;
   SteppedMotion written(const Shape& shape) const;
-  double pointwise_least(const Piece& piece, const Price& price) const;
+  struct Least {
+    double integral_j = 0, distance = 0;
+  };
+  Least pointwise_least(const Piece& piece, const Price& price) const;
+  int regime(double v, double direction, const Price& price) const;
+  void integrate(double from, double to, double peak, double direction, const Price& price, int depth,
+                 RestMotion& sum) const;
 
   UniformTask task_;
-  double top_ = 0;  // the speed limit, or what the motors can hold
-  double shortest_s_ = 0;
+  double closeness_ = 1;  // share of motor_tolerance that the room above friction allows
+  double top_ = 0;        // the speed limit, or what the motors can hold with something left to accelerate
+  double bare_top_ = 0;   // what they can just hold, where that is less than the speed limit
 };
 
 }  // namespace joulecast::planning

@@ -127,6 +127,46 @@ TEST(Estimate, TellsTheLimitsThatAMotionBreaks) {
   EXPECT_TRUE(answer(estimated, {{"path", path}})["beyond_limits"].empty());
 }
 
+// The plan's columns, as they are told, given back: within the limits, at the same price, over the same way.
+TEST(Estimate, PlansAreWithinTheirLimits) {
+  const auto straight = [](double m) { return json{{"kind", "straight"}, {"length_m", m}}; };
+  const std::vector<json> paths = {
+      {straight(5)},
+      {straight(0.4)},
+      {{{"kind", "turn"}, {"angle_rad", 1.3}}},
+      {{{"kind", "arc"}, {"radius_m", 1.2}, {"angle_rad", 2}}},
+      {straight(2), {{"kind", "arc"}, {"radius_m", 0.8}, {"angle_rad", -1.5}}, straight(1)},
+      {{{"kind", "clothoid"}, {"length_m", 4}, {"start_curvature_1_m", 0}, {"end_curvature_1_m", 0.7}}}};
+  for (const double current_a : {8.0, 0.8, 0.4}) {
+    robot::RobotModel robot = testing::nomad();
+    robot.limits.current_a = current_a;
+    for (const double returned : {1.0, 0.0}) {
+      robot.effects = {{"no_regeneration", {{"fraction", 1 - returned}}}};
+      const auto weak = **model_in_force(robot, 1);
+      for (const json& path : paths) {
+        const auto text = profile_answer({{"path", path}, {"payload_kg", 5}}, weak);
+        if (!text) {
+          EXPECT_EQ(text.error().fault, Fault::infeasible) << describe(text.error());
+          continue;
+        }
+        const json plan = json::parse(*text);
+        const json& rows = plan["profile"];
+        json given;
+        for (const char* column : {"time_s", "speed_m_s", "yaw_rate_rad_s"}) given[column] = rows[column];
+        const auto back = estimated({{"profile", given}, {"payload_kg", 5}}, weak);
+        ASSERT_TRUE(back) << describe(back.error());
+        const json told = json::parse(*back);
+        EXPECT_TRUE(told["beyond_limits"].empty())
+            << path.dump() << " " << current_a << told["beyond_limits"].dump();
+        EXPECT_NEAR(told["energy_j"].get<double>(), plan["energy_j"].get<double>(),
+                    1e-3 * plan["energy_j"].get<double>());
+        EXPECT_NEAR(told["distance_m"].get<double>(), plan["distance_m"].get<double>(),
+                    1e-4 * plan["distance_m"].get<double>() + 1e-9);
+      }
+    }
+  }
+}
+
 TEST(Estimate, PricesTheFloorOfAGivenProfile) {
   robot::RobotModel climber = testing::nomad();
   climber.effects = {{"grade", {{"share", 1}}}};

@@ -247,8 +247,7 @@ double planned_power_w(const planning::Electric& e, const planning::WheelLoads& 
   return power_w;
 }
 
-TEST_P(EffectEverywhere, IsPlannedAsTheInverseModelHasIt) {
-  const robot::RobotModel robot = robot_with(GetParam());
+void expect_planned(const robot::RobotModel& robot) {
   const auto loads = planning::DriveLoads::make(robot, std::nullopt);
   ASSERT_TRUE(loads) << describe(loads.error());
   std::vector<planning::Run> runs(3);
@@ -271,6 +270,30 @@ TEST_P(EffectEverywhere, IsPlannedAsTheInverseModelHasIt) {
             << "turn " << run.turn << " speed " << speed << " acceleration " << acceleration;
       }
     }
+  }
+}
+
+TEST_P(EffectEverywhere, IsPlannedAsTheInverseModelHasIt) {
+  expect_planned(robot_with(GetParam()));
+}
+
+TEST_P(EffectEverywhere, IsPlannedWithEveryOther) {
+  for (const Effect* other : dynamics::catalogue()) {
+    if (other == GetParam()) continue;
+    robot::RobotModel robot = robot_with(GetParam());
+    robot.effects.push_back(robot_with(other).effects.front());
+    SCOPED_TRACE(other->info().id);
+    expect_planned(robot);
+  }
+}
+
+// The gear passes on some of the friction with the load.
+TEST(EffectsTogether, LossesOfAGearOnItsFrictionArePlanned) {
+  for (const double of_friction : {0.0, 0.4, 1.0}) {
+    robot::RobotModel robot = robot_with(nullptr);
+    robot.effects = {{"gear_efficiency", {{"loss", 0.2}, {"of_friction", of_friction}}},
+                     {"stribeck_friction", {{"ratio", 0.5}, {"speed_rad_s", 3.0}}}};
+    expect_planned(robot);
   }
 }
 

@@ -1,0 +1,100 @@
+// Plans under every kind of limit against a transcription of another hand, solved by IPOPT.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "planning/planner.h"
+#include "tests/planning/oracle/random_question.h"
+
+namespace joulecast::planning {
+namespace {
+
+// What the optimum costs: limits of motors at the middles of cells, which errs as the square of a cell.
+constexpr int cells = 240;
+constexpr double of_the_oracle = 6e-5;  // its own error, of the cost
+
+double bounds_of(const Certificate& c) {
+  return c.gap_j + c.discretisation_j;
+}
+
+// The greatest use of any limit of a motor between the rows, played with the speed linear in time.
+double greatest_use(const test::Asked& asked, const Profile& rows) {
+  const bool turn = asked.question.way.turns_in_place;
+  const std::vector<double>&speed = turn ? rows.yaw_rate_rad_s : rows.speed_m_s,
+        &way = turn ? rows.heading_rad : rows.distance_m;
+  double most = 0;
+  for (std::size_t k = 0; k + 1 < rows.size(); ++k) {
+    const double span = rows.time_s[k + 1] - rows.time_s[k], slope = (speed[k + 1] - speed[k]) / span;
+    for (const double f : {1e-6, 0.25, 0.5, 0.75, 1 - 1e-6}) {
+      const double t = f * span;
+      const oracle::Drive d = oracle::drive_at(asked.question, way[k] + (speed[k] + 0.5 * slope * t) * t,
+                                               speed[k] + slope * t, slope);
+      for (const int s : {0, 1})
+        most = std::max({most, std::fabs(d.current_a[s]) / asked.question.current_a,
+                         std::fabs(d.voltage_v[s]) / asked.question.voltage_v});
+    }
+  }
+  return most;
+}
+
+class AgainstIpopt : public testing::TestWithParam<int> {};
+
+TEST_P(AgainstIpopt, PlansAreOptimalTrueAndWithinLimits) {
+  test::Asked asked = test::random_question(static_cast<std::uint64_t>(GetParam()));
+  SCOPED_TRACE(asked.label);
+  asked.question.cells = cells;
+  asked.question.strict = false;
+  const auto planner = Planner::make(asked.robot, asked.problem.regeneration);
+  ASSERT_TRUE(planner);
+  const auto free = planner->plan(asked.path, asked.problem);
+  ASSERT_TRUE(free) << describe(free.error());
+  EXPECT_LT(greatest_use(asked, free->profile), 1 + 5e-5);
+  const double price = asked.problem.value_of_time_w;
+  const double cost = free->summary.energy_j + price * free->summary.duration_s;
+  const oracle::Found best = oracle::least_energy(asked.question);
+  ASSERT_TRUE(best.solved);
+  EXPECT_NEAR(cost, best.cost_j, 1e-3 * best.cost_j);
+  EXPECT_LT(cost - bounds_of(free->certificate), best.cost_j * (1 + of_the_oracle));
+
+  // Half of the time that can be saved.
+  const double shortest = free->certificate.shortest_time_s;
+  asked.problem.deadline_s = shortest + 0.5 * (free->summary.duration_s - shortest);
+  asked.question.deadline_s = asked.problem.deadline_s;
+  const auto hurried = planner->plan(asked.path, asked.problem);
+  ASSERT_TRUE(hurried) << describe(hurried.error());
+  EXPECT_LE(hurried->summary.duration_s, *asked.problem.deadline_s * (1 + 1e-9));
+  EXPECT_LT(greatest_use(asked, hurried->profile), 1 + 5e-5);
+  // IPOPT does not find every motion in so short a time.
+  if (const oracle::Found soon = oracle::least_energy(asked.question); soon.solved) {
+    EXPECT_NEAR(hurried->summary.energy_j, soon.energy_j, 1e-3 * soon.energy_j);
+    EXPECT_LT(hurried->summary.energy_j - bounds_of(hurried->certificate),
+              soon.energy_j * (1 + of_the_oracle));
+  }
+}
+
+TEST_P(AgainstIpopt, TheShortestTimeIsExactAndCanBeAskedFor) {
+  test::Asked asked = test::random_question(static_cast<std::uint64_t>(GetParam()));
+  SCOPED_TRACE(asked.label);
+  const auto free = plan(asked.robot, asked.path, asked.problem);
+  ASSERT_TRUE(free) << describe(free.error());
+  const double shortest = free->certificate.shortest_time_s;
+  asked.question.cells = cells;
+  asked.question.strict = false;
+  asked.question.fastest = true;
+  // Grids of curves know it to a thousandth.
+  const bool curve = free->certificate.method == Method::interior_point;
+  if (const oracle::Found soonest = oracle::least_energy(asked.question); soonest.solved) {
+    EXPECT_NEAR(shortest, soonest.duration_s, (curve ? 1e-3 : 1.2e-4) * soonest.duration_s);
+  }
+  for (const double later : {0.0, 1e-7, 1e-5, 1e-3}) {
+    asked.problem.deadline_s = shortest * (1 + later);
+    const auto answer = plan(asked.robot, asked.path, asked.problem);
+    ASSERT_TRUE(answer) << later << ": " << describe(answer.error());
+    EXPECT_LE(answer->summary.duration_s, *asked.problem.deadline_s * (1 + 1e-7));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(FortyProblems, AgainstIpopt, testing::Range(100, 140));
+
+}  // namespace
+}  // namespace joulecast::planning
