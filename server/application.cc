@@ -79,7 +79,8 @@ bool within(milliseconds limit, std::function<void()> work) {
 
 // Without tokens only this machine is served, unless the settings say otherwise.
 Result<void> check_exposure(const Settings& settings) {
-  for (const std::string& origin : http_options(settings).allowed_origins)
+  const std::vector<std::string> origins = http_options(settings).allowed_origins;
+  for (const std::string& origin : origins)
     if (Result<void> sound = http::check_origin(origin); !sound) return sound;
   const std::string& address = settings.text("http.address");
   if (http::is_loopback(address)) return {};
