@@ -154,7 +154,7 @@ std::vector<TableRow> gap_history_rows() {
   return rows;
 }
 
-std::vector<TableRow> audit_rows() {
+std::vector<TableRow> audit_log_rows() {
   using Type = Parameter::Type;
   std::vector<TableRow> rows;
   rows.push_back(
