@@ -116,8 +116,8 @@ std::optional<std::string> broken_constraint(const Parameter& parameter, std::st
   return std::nullopt;
 }
 
-// Errors name the field as the code that found them knows it; here it is named as the client sent it. A name that is no
-// parameter is a member of the body, or, where there is none, what the path names.
+// Errors name the field as the code that found them knows it; here it is named as the client sent it. A name
+// that is no parameter is a member of the body, or, where there is none, what the path names.
 std::string field_of(const Endpoint& endpoint, const Request& request, const Error& error) {
   const std::string& field = error.field;
   const unsigned status = status_of(error.fault);

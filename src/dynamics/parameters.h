@@ -39,9 +39,6 @@ struct Parameters {
 
   std::array<S, 2> friction_torque_nm{};
   S viscous_friction_nm_s_rad = 0;
-  // Of the robot file: changes of a constant by several effects are over these, and add.
-  std::array<S, 2> file_friction_torque_nm{};
-  S file_wheel_radius_m = 0;
   S gear_loss = 0;  // fraction of the torque that the gear transmits
   S gear_friction_share =
       0;  // of T_m and viscous friction: 1 on the wheel's side of the gear, 0 on the motor's
@@ -82,8 +79,6 @@ Parameters<S> nominal_parameters(const robot::RobotModel& robot) {
   p.yaw_inertia_kg_m2 = robot.mass.yaw_inertia_kg_m2;
   p.wheel_inertia_kg_m2 = robot.mass.wheel_inertia_kg_m2 + robot.motor.rotor_inertia_kg_m2;
   p.friction_torque_nm = {S(robot.motor.friction_torque_nm[0]), S(robot.motor.friction_torque_nm[1])};
-  p.file_friction_torque_nm = p.friction_torque_nm;
-  p.file_wheel_radius_m = robot.kinematics.wheel_radius_m;
   p.viscous_friction_nm_s_rad = robot.motor.viscous_friction_nm_s_rad;
   p.torque_constant_nm_a = robot.motor.torque_constant_nm_a * robot.motor.gear_ratio;
   p.voltage_constant_v_s_rad = robot.motor.voltage_constant_v_s_rad * robot.motor.gear_ratio;

@@ -29,7 +29,7 @@ Result<DriveLoads> DriveLoads::make(const robot::RobotModel& robot, std::optiona
     loads.needs_position_ |= effect.effect->info().needs_position;
     loads.needs_heading_ |= effect.effect->info().needs_heading;
     if (effect.effect->info().id == "stribeck_friction") {
-      for (std::size_t s : {0u, 1u}) loads.stribeck_nm_[s] = effect.values[0] * p.file_friction_torque_nm[s];
+      for (std::size_t s : {0u, 1u}) loads.stribeck_nm_[s] = effect.values[0] * p.friction_torque_nm[s];
       loads.stribeck_speed_rad_s_ = effect.values[1];
       loads.stribeck_exponent_ = effect.values[2];
     }

@@ -148,7 +148,7 @@ class Programs:
         return done.stdout
 
     def missions(self, robot_id):
-        return self.get(f"/v1/missions?limit=500&robot_id={robot_id}")["missions"]
+        return self.get(f"/v1/missions?limit=500&digits=17&robot_id={robot_id}")["missions"]
 
     def wait_for(self, robot_id, count, seconds=60):
         """The robot's missions, once so many have ended."""

@@ -199,6 +199,31 @@ TEST(TwoEffects, GiveTheSameInEitherOrder) {
   }
 }
 
+// Those that share T_m, as their parameters' meanings say: each scales what those named in it have made.
+TEST(TwoEffects, DryFrictionScalesWhatTheTextNames) {
+  const robot::RobotModel robot = testing::nomad();
+  const auto with = [](const char* id, double strength) {
+    ActiveEffect active = initial(*find_effect(id));
+    active.values[0] = strength;
+    return active;
+  };
+  const ActiveEffect both[] = {with("coulomb_friction", 1), with("friction_asymmetry", 1.5)};
+  const DriveModel nominal(robot, {}), worn(robot, both);
+  const auto dry = nominal.parameters().friction_torque_nm, of_worn = worn.parameters().friction_torque_nm;
+  EXPECT_NEAR(of_worn[0], 2 * 2.5 * dry[0], 1e-12);
+  EXPECT_NEAR(of_worn[1], 2 * dry[1], 1e-12);
+  Instant at;
+  at.wheel_speed_rad_s = {1, 1};
+  const ActiveEffect three[] = {both[0], both[1], with("stribeck_friction", 0.5)}, alone[] = {three[2]};
+  const DriveModel sticking(robot, three), sticking_alone(robot, alone);
+  for (const std::size_t s : {0u, 1u}) {
+    const double extra = sticking.balance(at).total_nm[s] - worn.balance(at).total_nm[s];
+    const double extra_alone = sticking_alone.balance(at).total_nm[s] - nominal.balance(at).total_nm[s];
+    EXPECT_GT(extra_alone, 0);
+    EXPECT_NEAR(extra / extra_alone, of_worn[s] / dry[s], 1e-9);
+  }
+}
+
 TEST(YawInertiaError, LeavesThePayloadsYawInertia) {
   const robot::RobotModel robot = testing::nomad();
   ActiveEffect error = initial(*find_effect("yaw_inertia_error"));

@@ -14,7 +14,7 @@ struct CoulombFriction {
 
   template <class S>
   static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    for (std::size_t s : {0u, 1u}) p.friction_torque_nm[s] += a[0] * p.file_friction_torque_nm[s] + a[1];
+    for (S& torque : p.friction_torque_nm) torque = torque * (S(1) + a[0]) + a[1];
   }
 };
 

@@ -6,7 +6,7 @@ namespace joulecast::dynamics {
 
 struct FrictionAsymmetry {
   static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"ratio", "1", 0, -0.9, 20, "extra dry friction of that side over its nominal T_m"},
+      {{"ratio", "1", 0, -0.9, 20, "extra dry friction of that side over its T_m, coulomb_friction included"},
        {"side", "1", 0, 0, 1, "0 right, 1 left"}});
   static constexpr EffectInfo info{"friction_asymmetry",
                                    ActsOn::wheel_torque,
@@ -17,8 +17,7 @@ struct FrictionAsymmetry {
 
   template <class S>
   static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    const std::size_t side = value_of(a[1]) < 0.5 ? 0 : 1;
-    p.friction_torque_nm[side] += a[0] * p.file_friction_torque_nm[side];
+    p.friction_torque_nm[value_of(a[1]) < 0.5 ? 0 : 1] *= S(1) + a[0];
   }
 };
 

@@ -7,7 +7,8 @@ namespace joulecast::dynamics {
 
 struct StribeckFriction {
   static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"ratio", "1", 0, 0, 20, "breakaway friction above dry friction, over the nominal T_m of each side"},
+      {{"ratio", "1", 0, 0, 20,
+        "breakaway friction above T_m, over T_m with coulomb_friction and friction_asymmetry"},
        {"speed_rad_s", "rad/s", 2, 0.2, 20, "Stribeck speed of the wheel"},
        {"exponent", "1", 2, 1, 2, "of the speed in the exponential"}});
   static constexpr EffectInfo info{"stribeck_friction",
@@ -22,7 +23,7 @@ struct StribeckFriction {
     for (std::size_t s : {0u, 1u}) {
       const S x = S(c.at.wheel_speed_rad_s[s]) / a[1];
       loads.wheel(Load::internal, s,
-                  a[0] * c.parameters.file_friction_torque_nm[s] * stribeck_curve(x, a[2]) * c.direction[s]);
+                  a[0] * c.parameters.friction_torque_nm[s] * stribeck_curve(x, a[2]) * c.direction[s]);
     }
   }
 };

@@ -16,8 +16,8 @@ struct WheelRadiusAsymmetry {
 
   template <class S>
   static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    p.wheel_radius_m[0] += 0.5 * a[0] * p.file_wheel_radius_m;
-    p.wheel_radius_m[1] -= 0.5 * a[0] * p.file_wheel_radius_m;
+    p.wheel_radius_m[0] *= S(1) + a[0] * 0.5;
+    p.wheel_radius_m[1] *= S(1) - a[0] * 0.5;
   }
 };
 

@@ -17,7 +17,7 @@ struct WheelRadiusError {
 
   template <class S>
   static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    for (S& radius : p.wheel_radius_m) radius += a[0] * p.file_wheel_radius_m;
+    for (S& radius : p.wheel_radius_m) radius *= S(1) + a[0];
   }
 };
 

@@ -173,13 +173,16 @@ void Gatherer::turning() {
   }
   if (!heading) return;
   // Headings jump by a turn, of one unit or the other: whichever reading follows better is the heading's.
+  // Read in degrees, the jumps of radians stay in, and may follow something by chance; so that reading has to
+  // be the only one that follows anything.
   const auto follow = [&](Relation relation) {
     const BlockFit radians = fit_blocks(blocks(relation), 0, others),
                    degrees = fit_blocks(blocks(relation), 1, others);
     const auto unsure = [](const BlockFit& fit) {
       return fit.known() ? std::fabs(fit.sd(0) / fit.coefficient[0]) : 1e9;
     };
-    return unsure(degrees) < 0.5 * unsure(radians) ? degrees : radians;
+    const bool follows = estimate(radians, 0).sure();
+    return !follows && unsure(degrees) < 0.5 * unsure(radians) ? degrees : radians;
   };
   if (wheels) turning_by_wheels(follow(Relation::heading_wheels), "the map's heading turns", S::heading);
   if (gyro) {
