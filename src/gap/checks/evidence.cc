@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -173,18 +172,14 @@ void Gatherer::turning() {
     turning_by_wheels(fit_blocks(blocks(Relation::gyro), 0, sides_and_one), "the gyro reads", S::yaw_rate);
   }
   if (!heading) return;
-  // Headings jump by a turn, of one unit or the other: whichever reading follows better is the heading's. One
-  // in degrees that has not passed 2 pi has turned by nothing that tells its unit; read so, the jumps of one
-  // in radians that lies about pi would be turning.
-  const ValueTally& seen = tally(reading::heading);
-  const bool may_be_degrees = std::max(-seen.low(), seen.high()) > 2 * std::numbers::pi;
+  // Headings jump by a turn, of one unit or the other: whichever reading follows better is the heading's.
   const auto follow = [&](Relation relation) {
     const BlockFit radians = fit_blocks(blocks(relation), 0, others),
                    degrees = fit_blocks(blocks(relation), 1, others);
     const auto unsure = [](const BlockFit& fit) {
       return fit.known() ? std::fabs(fit.sd(0) / fit.coefficient[0]) : 1e9;
     };
-    return may_be_degrees && unsure(degrees) < 0.5 * unsure(radians) ? degrees : radians;
+    return unsure(degrees) < 0.5 * unsure(radians) ? degrees : radians;
   };
   if (wheels) turning_by_wheels(follow(Relation::heading_wheels), "the map's heading turns", S::heading);
   if (gyro) {
