@@ -40,16 +40,7 @@ void print_proposals(const json& page) {
 Exit list(const Options& options) {
   const std::string path =
       options.robot_id ? "/v1/robots/" + percent_encoded(*options.robot_id) + "/proposals" : "/v1/proposals";
-  const auto reply = ask(options.server, HttpMethod::get, path, {}, {{"id", "--robot-id"}});
-  if (!reply) return report(reply.error());
-  if (options.json) {
-    std::puts(reply->body.c_str());
-    return Exit::ok;
-  }
-  const auto page = object_of(*reply, options.server);
-  if (!page) return report(page.error());
-  print_proposals(*page);
-  return Exit::ok;
+  return show(options.server, path, {{"id", "--robot-id"}}, options.json, print_proposals);
 }
 
 Result<json> request_of(const Options& options) {

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -74,16 +73,7 @@ void print_state(const json& s) {
 }
 
 Exit run(const Options& options, const std::string& target, void (*print)(const json&)) {
-  const auto reply = ask(options.server, HttpMethod::get, target, {}, {{"id", "--robot-id"}});
-  if (!reply) return report(reply.error());
-  if (options.json) {
-    std::puts(reply->body.c_str());
-    return Exit::ok;
-  }
-  const auto answer = object_of(*reply, options.server);
-  if (!answer) return report(answer.error());
-  print(*answer);
-  return Exit::ok;
+  return show(options.server, target, {{"id", "--robot-id"}}, options.json, print);
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
-#include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -39,16 +38,7 @@ void print_ledger(const json& answer) {
 
 Exit run(const Options& options) {
   const std::string target = "/v1/missions/" + std::to_string(options.mission) + "/ledger";
-  const auto reply = ask(options.server, HttpMethod::get, target, {}, {{"id", "mission"}});
-  if (!reply) return report(reply.error());
-  if (options.json) {
-    std::puts(reply->body.c_str());
-    return Exit::ok;
-  }
-  const auto answer = object_of(*reply, options.server);
-  if (!answer) return report(answer.error());
-  print_ledger(*answer);
-  return Exit::ok;
+  return show(options.server, target, {{"id", "mission"}}, options.json, print_ledger);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <nlohmann/json.hpp>
 
 namespace joulecast::client {
@@ -54,6 +55,20 @@ Result<json> object_of(const HttpReply& reply, const std::string& server) {
   json answer = json::parse(reply.body, nullptr, false);
   if (!answer.is_object()) return fail(Fault::corrupt, server, "did not answer with a JSON object");
   return answer;
+}
+
+Exit show(const std::string& server, const std::string& target, const Renamed& renamed, bool as_json,
+          void (*print)(const json&)) {
+  const auto reply = ask(server, HttpMethod::get, target, {}, renamed);
+  if (!reply) return report(reply.error());
+  if (as_json) {
+    std::puts(reply->body.c_str());
+    return Exit::ok;
+  }
+  const auto answer = object_of(*reply, server);
+  if (!answer) return report(answer.error());
+  print(*answer);
+  return Exit::ok;
 }
 
 std::string text_of(const json& value) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "client/commands/outcome.h"
 #include "client/http_client.h"
 
 namespace CLI {
@@ -34,6 +35,10 @@ using Renamed = std::vector<std::pair<std::string, std::string>>;
                                     const std::string& accept = accept_json);
 // The same with a JSON object as its body; Fault::corrupt when it is none.
 [[nodiscard]] Result<nlohmann::json> object_of(const HttpReply& reply, const std::string& server);
+
+// Asks by GET and prints the object that is answered: as it was sent when `as_json`, else by `print`.
+Exit show(const std::string& server, const std::string& target, const Renamed& renamed, bool as_json,
+          void (*print)(const nlohmann::json&));
 
 // "-" for null.
 [[nodiscard]] std::string text_of(const nlohmann::json& value);
