@@ -5,7 +5,6 @@
 
 #include <array>
 #include <cerrno>
-#include <concepts>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -13,249 +12,139 @@
 #include <limits>
 #include <map>
 #include <optional>
-#include <type_traits>
 #include <utility>
 
+#include "base/byte_archive.h"
 #include "history/chunk_bytes.h"
 
 namespace joulecast::history {
 namespace {
 
 // The members of everything that a command holds, once for both directions.
-template <class Archive>
-void members(Archive& a, AddModel& c) {
-  a(c.robot_id, c.utime_us, c.origin, c.note, c.model_json, c.expected_active, c.evidence_json);
-}
-template <class Archive>
-void members(Archive& a, ActivateModel& c) {
-  a(c.robot_id, c.version);
-}
-template <class Archive>
-void members(Archive& a, signals::Accounts& c) {
-  a(c.battery_j, c.measured_j, c.measured_s, c.measured_motor_j, c.motor_measured_s, c.modelled_j,
-    c.modelled_motor_j, c.drawn_j, c.returned_j, c.charge_ah, c.distance_m, c.turned_rad, c.duration_s,
-    c.ledger.value);
-}
-template <class Archive>
-void members(Archive& a, CovariateSummary& c) {
-  a(c.name, c.mean, c.min, c.max, c.known_s, c.counted_utime_us, c.value, c.value_utime_us);
-}
-template <class Archive>
-void members(Archive& a, Mission& c) {
-  a(c.key, c.robot_id, c.mission_id, c.start_utime_us, c.end_utime_us, c.state, c.implicit, c.incomplete,
-    c.incomplete_reason, c.payload_kg, c.note, c.model_version, c.accounts, c.samples, c.sample_faults,
-    c.gap_count, c.gap_s, c.findings_json, c.covariates);
-}
-template <class Archive>
-void members(Archive& a, StartMission& c) {
-  a(c.mission, c.epoch);
-}
-template <class Archive>
-void members(Archive& a, Band& c) {
-  a(c.min, c.mean, c.max);
-}
-template <class Archive>
-void members(Archive& a, TraceBucket& c) {
-  a(c.start_utime_us, c.covered_s, c.measured_power_w, c.modelled_power_w, c.speed_m_s, c.state_of_charge,
-    c.measured_j, c.modelled_j, c.x_m, c.y_m);
-}
-template <class Archive>
-void members(Archive& a, signals::Sample& c) {
-  a(c.utime_us, c.sequence);
-  signals::visit_fields(c, [&a](const signals::SampleField&, double& number) { a(number); });
-}
-template <class Archive>
-void members(Archive& a, signals::CovariateChange& c) {
-  a(c.utime_us, c.name, c.value);
-}
-template <class Archive>
-void members(Archive& a, ResumeState& c) {
-  a(c.robot_id, c.utime_us, c.sequence, c.state_of_charge, c.winding_temperature_c);
-}
-template <class Archive>
-void members(Archive& a, StreamPosition& c) {
-  a(c.utime_us, c.sequence);
-}
-template <class Archive>
-void members(Archive& a, CheckpointMission& c) {
-  a(c.mission, c.trace, c.samples, c.resume_state, c.covariates, c.epoch, c.position);
-}
-template <class Archive>
-void members(Archive& a, PutResumeState& c) {
-  a(c.state, c.epoch);
-}
-template <class Archive>
-void members(Archive& a, PutLearned& c) {
-  a(c.learned.robot_id, c.learned.topic, c.learned.utime_us, c.learned.body_json, c.epoch);
-}
-template <class Archive>
-void members(Archive& a, AppendEvent& c) {
-  a(c.event.id, c.event.utime_us, c.event.robot_id, c.event.kind, c.event.detail_json, c.epoch);
-}
-template <class Archive>
-void members(Archive& a, AppendAudit& c) {
-  a(c.entry.utime_us, c.entry.actor, c.entry.address, c.entry.request_id, c.entry.action,
-    c.entry.detail_json);
-}
-template <class Archive>
-void members(Archive& a, Prune& c) {
-  a(c.retention.telemetry_max_age_us, c.retention.telemetry_max_bytes, c.max_chunks);
-}
-template <class Archive>
-void members(Archive& a, DiagnosisRecord& c) {
-  a(c.id, c.robot_id, c.created_utime_us, c.started_utime_us, c.finished_utime_us, c.state, c.cause,
-    c.request_json, c.model_version, c.fitted_on, c.held_back, c.result_json, c.summary_json, c.model_json,
-    c.error);
-}
-template <class Archive>
-void members(Archive& a, AddDiagnosis& c) {
-  a(c.diagnosis);
-}
-template <class Archive>
-void members(Archive& a, UpdateDiagnosis& c) {
-  a(c.diagnosis, c.report_html);
-}
-template <class Archive>
-void members(Archive& a, InterruptDiagnoses& c) {
-  a(c.utime_us);
-}
-template <class Archive>
-void members(Archive& a, AddProposal& c) {
-  Proposal& p = c.proposal;
-  a(p.id, p.robot_id, p.created_utime_us, p.kind, p.state, p.note, p.base_version, p.adopted_version,
-    p.fitted_on, p.model_json, p.detail_json, c.epoch);
-}
-template <class Archive>
-void members(Archive& a, CloseProposal& c) {
-  a(c.id, c.state, c.adopted_version);
-}
-template <class Archive>
-void members(Archive& a, PruneMissions& c) {
-  a(c.max_age_us, c.max_missions);
-}
-template <class Archive>
-void members(Archive& a, RemoveRobot& c) {
-  a(c.robot_id, c.purge);
-}
-template <class Archive>
-void members(Archive& a, ReleaseLease& c) {
-  a(c.robot_id, c.epoch);
-}
-
-template <class T>
-concept Plain = std::is_arithmetic_v<T> || std::is_enum_v<T>;
-
-class Saver {
- public:
-  explicit Saver(Bytes& out) : out_(out) {}
-  template <class... T>
-  void operator()(T&... values) {
-    (put(values), ...);
+struct Members {
+  template <class Archive>
+  static void of(Archive& a, AddModel& c) {
+    a(c.robot_id, c.utime_us, c.origin, c.note, c.model_json, c.expected_active, c.evidence_json);
   }
-
- private:
-  template <Plain T>
-  void put(T value) {
-    const auto* bytes = reinterpret_cast<const std::byte*>(&value);
-    out_.insert(out_.end(), bytes, bytes + sizeof(T));
+  template <class Archive>
+  static void of(Archive& a, ActivateModel& c) {
+    a(c.robot_id, c.version);
   }
-  void put(const std::string& text) {
-    put(text.size());
-    const auto* bytes = reinterpret_cast<const std::byte*>(text.data());
-    out_.insert(out_.end(), bytes, bytes + text.size());
+  template <class Archive>
+  static void of(Archive& a, signals::Accounts& c) {
+    a(c.battery_j, c.measured_j, c.measured_s, c.measured_motor_j, c.motor_measured_s, c.modelled_j,
+      c.modelled_motor_j, c.drawn_j, c.returned_j, c.charge_ah, c.distance_m, c.turned_rad, c.duration_s,
+      c.ledger.value);
   }
-  template <class T>
-  void put(std::optional<T>& value) {
-    put(value.has_value());
-    if (value) put(*value);
+  template <class Archive>
+  static void of(Archive& a, CovariateSummary& c) {
+    a(c.name, c.mean, c.min, c.max, c.known_s, c.counted_utime_us, c.value, c.value_utime_us);
   }
-  template <class T>
-  void put(std::vector<T>& values) {
-    put(values.size());
-    for (T& value : values) put(value);
+  template <class Archive>
+  static void of(Archive& a, Mission& c) {
+    a(c.key, c.robot_id, c.mission_id, c.start_utime_us, c.end_utime_us, c.state, c.implicit, c.incomplete,
+      c.incomplete_reason, c.payload_kg, c.note, c.model_version, c.accounts, c.samples, c.sample_faults,
+      c.gap_count, c.gap_s, c.findings_json, c.covariates);
   }
-  template <class T, std::size_t n>
-  void put(std::array<T, n>& values) {
-    for (T& value : values) put(value);
+  template <class Archive>
+  static void of(Archive& a, StartMission& c) {
+    a(c.mission, c.epoch);
   }
-  void put(std::map<std::string, std::int64_t>& counts) {
-    put(counts.size());
-    for (auto& [name, count] : counts) {
-      put(name);
-      put(count);
-    }
+  template <class Archive>
+  static void of(Archive& a, Band& c) {
+    a(c.min, c.mean, c.max);
   }
-  template <class T>
-  requires(std::is_class_v<T> && !std::same_as<std::remove_const_t<T>, std::string>) void put(T& value) {
-    members(*this, value);
+  template <class Archive>
+  static void of(Archive& a, TraceBucket& c) {
+    a(c.start_utime_us, c.covered_s, c.measured_power_w, c.modelled_power_w, c.speed_m_s, c.state_of_charge,
+      c.measured_j, c.modelled_j, c.x_m, c.y_m);
   }
-
-  Bytes& out_;
+  template <class Archive>
+  static void of(Archive& a, signals::Sample& c) {
+    a(c.utime_us, c.sequence);
+    signals::visit_fields(c, [&a](const signals::SampleField&, double& number) { a(number); });
+  }
+  template <class Archive>
+  static void of(Archive& a, signals::CovariateChange& c) {
+    a(c.utime_us, c.name, c.value);
+  }
+  template <class Archive>
+  static void of(Archive& a, ResumeState& c) {
+    a(c.robot_id, c.utime_us, c.sequence, c.state_of_charge, c.winding_temperature_c);
+  }
+  template <class Archive>
+  static void of(Archive& a, StreamPosition& c) {
+    a(c.utime_us, c.sequence);
+  }
+  template <class Archive>
+  static void of(Archive& a, CheckpointMission& c) {
+    a(c.mission, c.trace, c.samples, c.resume_state, c.covariates, c.epoch, c.position);
+  }
+  template <class Archive>
+  static void of(Archive& a, PutResumeState& c) {
+    a(c.state, c.epoch);
+  }
+  template <class Archive>
+  static void of(Archive& a, PutLearned& c) {
+    a(c.learned.robot_id, c.learned.topic, c.learned.utime_us, c.learned.body_json, c.epoch);
+  }
+  template <class Archive>
+  static void of(Archive& a, AppendEvent& c) {
+    a(c.event.id, c.event.utime_us, c.event.robot_id, c.event.kind, c.event.detail_json, c.epoch);
+  }
+  template <class Archive>
+  static void of(Archive& a, AppendAudit& c) {
+    a(c.entry.utime_us, c.entry.actor, c.entry.address, c.entry.request_id, c.entry.action,
+      c.entry.detail_json);
+  }
+  template <class Archive>
+  static void of(Archive& a, Prune& c) {
+    a(c.retention.telemetry_max_age_us, c.retention.telemetry_max_bytes, c.max_chunks);
+  }
+  template <class Archive>
+  static void of(Archive& a, DiagnosisRecord& c) {
+    a(c.id, c.robot_id, c.created_utime_us, c.started_utime_us, c.finished_utime_us, c.state, c.cause,
+      c.request_json, c.model_version, c.fitted_on, c.held_back, c.result_json, c.summary_json, c.model_json,
+      c.error);
+  }
+  template <class Archive>
+  static void of(Archive& a, AddDiagnosis& c) {
+    a(c.diagnosis);
+  }
+  template <class Archive>
+  static void of(Archive& a, UpdateDiagnosis& c) {
+    a(c.diagnosis, c.report_html);
+  }
+  template <class Archive>
+  static void of(Archive& a, InterruptDiagnoses& c) {
+    a(c.utime_us);
+  }
+  template <class Archive>
+  static void of(Archive& a, AddProposal& c) {
+    Proposal& p = c.proposal;
+    a(p.id, p.robot_id, p.created_utime_us, p.kind, p.state, p.note, p.base_version, p.adopted_version,
+      p.fitted_on, p.model_json, p.detail_json, c.epoch);
+  }
+  template <class Archive>
+  static void of(Archive& a, CloseProposal& c) {
+    a(c.id, c.state, c.adopted_version);
+  }
+  template <class Archive>
+  static void of(Archive& a, PruneMissions& c) {
+    a(c.max_age_us, c.max_missions);
+  }
+  template <class Archive>
+  static void of(Archive& a, RemoveRobot& c) {
+    a(c.robot_id, c.purge);
+  }
+  template <class Archive>
+  static void of(Archive& a, ReleaseLease& c) {
+    a(c.robot_id, c.epoch);
+  }
 };
 
-// After the bytes have run out everything reads as empty, and sound() is false.
-class Loader {
- public:
-  explicit Loader(std::span<const std::byte> bytes) : reader_(bytes) {}
-  template <class... T>
-  void operator()(T&... values) {
-    (get(values), ...);
-  }
-  bool sound() const { return sound_; }
-  bool at_end() const { return reader_.at_end(); }
-
- private:
-  template <Plain T>
-  void get(T& value) {
-    const auto bytes = reader_.take(sizeof(T));
-    if (!bytes) {
-      sound_ = false;
-      return;
-    }
-    std::memcpy(&value, bytes->data(), sizeof(T));
-  }
-  void get(std::string& text) {
-    std::size_t size = 0;
-    get(size);
-    const auto bytes = sound_ ? reader_.take(size) : std::nullopt;
-    if (!bytes) {
-      sound_ = false;
-      return;
-    }
-    text.assign(reinterpret_cast<const char*>(bytes->data()), size);
-  }
-  template <class T>
-  void get(std::optional<T>& value) {
-    bool there = false;
-    get(there);
-    if (there && sound_) get(value.emplace());
-  }
-  template <class T>
-  void get(std::vector<T>& values) {
-    std::size_t size = 0;
-    get(size);
-    for (std::size_t k = 0; k < size && sound_; ++k) get(values.emplace_back());
-  }
-  template <class T, std::size_t n>
-  void get(std::array<T, n>& values) {
-    for (T& value : values) get(value);
-  }
-  void get(std::map<std::string, std::int64_t>& counts) {
-    std::size_t size = 0;
-    get(size);
-    for (std::size_t k = 0; k < size && sound_; ++k) {
-      std::string name;
-      get(name);
-      get(counts[name]);
-    }
-  }
-  template <class T>
-  requires std::is_class_v<T>
-  void get(T& value) { members(*this, value); }
-
-  ByteReader reader_;
-  bool sound_ = true;
-};
+using Saver = ByteSaver<Members>;
+using Loader = ByteLoader<Members>;
 
 // What a file begins with: another layout has another size of something.
 std::string layout() {
