@@ -118,9 +118,10 @@ BlockFit fit_terms(std::span<const Products::Block> blocks, std::size_t y, std::
   for (const Products::Block& block : blocks) normals.push_back(normal_of(block, y, x));
   std::vector<double> weight(blocks.size(), 1.0);
   Eigen::MatrixXd xx;
-  for (int round = 0; round < rounds; ++round) {
+  Eigen::VectorXd xy;
+  for (int round = 1;; ++round) {
     xx = Eigen::MatrixXd::Zero(n, n);
-    Eigen::VectorXd xy = Eigen::VectorXd::Zero(n);
+    xy = Eigen::VectorXd::Zero(n);
     for (std::size_t k = 0; k < blocks.size(); ++k) {
       xx += weight[k] * normals[k].xx;
       xy += weight[k] * normals[k].xy;
@@ -128,6 +129,7 @@ BlockFit fit_terms(std::span<const Products::Block> blocks, std::size_t y, std::
     const auto solved = solve(xx, xy);
     if (!solved) return fit;
     fit.coefficient = *solved;
+    if (round == rounds) break;
     std::vector<double> misfits;
     misfits.reserve(blocks.size());
     for (const Products::Block& block : blocks) misfits.push_back(misfit(block, y, x, fit.coefficient));
@@ -136,13 +138,14 @@ BlockFit fit_terms(std::span<const Products::Block> blocks, std::size_t y, std::
       weight[k] = statistics::huber_weight(misfits[k], usual, bound);
     }
   }
-  Eigen::MatrixXd middle = Eigen::MatrixXd::Zero(n, n);
+  fit.covariance = Eigen::MatrixXd::Zero(n, n);
   for (std::size_t k = 0; k < blocks.size(); ++k) {
-    const Eigen::VectorXd score = weight[k] * (normals[k].xy - normals[k].xx * fit.coefficient);
-    middle += score * score.transpose();
+    const auto without = solve(xx - weight[k] * normals[k].xx, xy - weight[k] * normals[k].xy);
+    if (!without) return fit;  // one block alone distinguishes the terms
+    const Eigen::VectorXd change = *without - fit.coefficient;
+    fit.covariance += change * change.transpose();
   }
-  const Eigen::MatrixXd inverse = xx.inverse();
-  fit.covariance = static_cast<double>(blocks.size()) / freedom * inverse * middle * inverse;
+  fit.covariance *= (static_cast<double>(blocks.size()) - 1) / static_cast<double>(blocks.size());
   fit.freedom = freedom;
   return fit;
 }

@@ -54,8 +54,9 @@ struct BlockFit {
 };
 
 // quantity[y] on quantity[x...]. Blocks that fit far worse than the others count less (Huber); the covariance
-// is the sandwich over blocks (Liang and Zeger 1986). A quantity that is 0 throughout leaves its own
-// coefficient unknown; others that cannot be distinguished, or too few blocks, leave all of them unknown.
+// is the jackknife over blocks (Bell and McCaffrey 2002), which few blocks and such that decide alone do not
+// make too small. A quantity that is 0 throughout leaves its own coefficient unknown; others that cannot be
+// distinguished, also without any one block, or too few blocks, leave all of them unknown.
 BlockFit fit_blocks(std::span<const Products::Block> blocks, std::size_t y, std::span<const std::size_t> x);
 
 // A number with its standard deviation.

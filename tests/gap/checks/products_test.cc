@@ -39,6 +39,28 @@ TEST(Products, ItsIntervalsHoldTheTruthAsOftenAsTheySay) {
   EXPECT_LT(covered, 398);
 }
 
+// Two wheels that turn alike in all blocks but one, and a heading that drifts with the way, but for a jolt in
+// that one: two coefficients fit all of it, and only that block says which.
+TEST(Products, ABlockThatDecidesAloneMakesNothingSure) {
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal;
+  int sure = 0;
+  constexpr int trials = 300;
+  for (int k = 0; k < trials; ++k) {
+    Products products(3);
+    for (int block = 0; block < 6; ++block) {
+      for (int row = 0; row < 3; ++row) {
+        const double way = 5 + normal(random), apart = block == 2 ? 0.05 : 1e-4 * normal(random);
+        products.add({0.01 * way + (block == 2 ? 0.5 : 1e-4 * normal(random)), way, way + apart});
+      }
+      products.next_block();
+    }
+    products.finish();
+    sure += estimate(fit_blocks(products.blocks(), 0, both), 0).sure();
+  }
+  EXPECT_LE(sure, trials / 50);
+}
+
 TEST(Products, SpoiltBlocksHardlyCount) {
   std::mt19937_64 random(8);
   const Products products = relation(random, 40, 0.1, 8);
