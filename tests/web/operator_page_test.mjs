@@ -272,7 +272,10 @@ await check('charts of live values begin filled when the page opens', async () =
   const filled = (canvas) => {
     const hex = getComputedStyle(document.documentElement).getPropertyValue('--measured').trim();
     const wanted = [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
-    const { data, width, height } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+    const { width, height } = canvas;
+    const copy = new OffscreenCanvas(width, height).getContext('2d');
+    copy.drawImage(canvas, 0, 0);
+    const { data } = copy.getImageData(0, 0, width, height);
     let columns = 0;
     for (let x = 0; x < width; ++x)
       for (let y = 0; y < height; ++y) {

@@ -6,17 +6,7 @@ import { saveText } from '../export.js';
 import * as format from '../format.js';
 import { keepInAddress } from '../route.js';
 import { Table } from '../table.jsx';
-import {
-  Answer,
-  Choice,
-  Empty,
-  Panel,
-  Quantity,
-  Ratio,
-  Readout,
-  useNarrow,
-  useTitleOf,
-} from '../widgets.jsx';
+import { Answer, Choice, Empty, Panel, Quantity, Readout, useNarrow, useTitleOf } from '../widgets.jsx';
 import { Field, RobotsField, dayField, utimeUs } from './choosing.jsx';
 import { FloorCanvas } from './floor_canvas.jsx';
 
@@ -151,9 +141,7 @@ function Squares({ map }) {
     { key: 'square', title: 'Square', head: true, cell: (c) => square(c, map.cell_m) },
     figure('use', 'Energy over distance', (c) => <Quantity of={consumption(c.energy_j_per_m)} />),
     figure('departure', 'Departure', (c) => share(c.departure)),
-    figure('ratio', 'Ratio', (c) => <Ratio value={c.ratio} />),
     figure('missions', 'Missions', (c) => format.fixed(c.missions)),
-    figure('time', 'Time', (c) => format.span(c.covered_s)),
   ];
   return (
     <details class="model" open={!narrow}>
