@@ -74,9 +74,8 @@ export function FloorCanvas({ map, value, kind, title, unit, marked, onMark }) {
   const dark = useTheme();
   const b = map.bounds;
   const aspect = (b.y_max_m - b.y_min_m) / (b.x_max_m - b.x_min_m);
-  const height = Math.round(
-    narrow ? Math.min(440, Math.max(240, 330 * aspect)) : Math.min(600, Math.max(300, 900 * aspect)),
-  );
+  const wide = narrow ? Math.min(720, innerWidth - 30) : 740; // about
+  const height = Math.round(Math.min(600, 1.3 * wide, Math.max(240, wide * aspect)));
   const scale = scaleFor(
     kind,
     map.cells.map(value).filter((v) => v !== null),

@@ -51,9 +51,13 @@ const names = [
   ['time', 'Time'],
 ];
 
-const place = (low, high) => format.range(low, high).replace(' to ', '–');
+// As finely as squares are.
+const place = (low, high, side) => {
+  const places = Number.isInteger(side) ? 0 : 1;
+  return `${format.fixed(low, places)} to ${format.fixed(high, places)}`;
+};
 const square = (cell, side) =>
-  `x ${place(cell.x_m, cell.x_m + side)}, y ${place(cell.y_m, cell.y_m + side)} m`;
+  `x ${place(cell.x_m, cell.x_m + side, side)}, y ${place(cell.y_m, cell.y_m + side, side)} m`;
 const share = (value) => format.signed(format.text(format.percent(value)));
 
 function departure(cell) {
@@ -95,7 +99,10 @@ function Zones({ map, onMark }) {
         mission’s usual ratio, beyond chance.
       </p>
     );
-  const scale = energyScale(map.zones.map((z) => z.excess_j));
+  const scale = energyScale(
+    map.zones.map((z) => z.excess_j),
+    2,
+  );
   const inZone = (z) => (c) =>
     c.stands_out && c.x_m >= z.x_min_m && c.x_m < z.x_max_m && c.y_m >= z.y_min_m && c.y_m < z.y_max_m;
   const columns = [
@@ -109,8 +116,8 @@ function Zones({ map, onMark }) {
         </button>
       ),
     },
-    { key: 'x', title: 'x, m', cell: (z) => place(z.x_min_m, z.x_max_m) },
-    { key: 'y', title: 'y, m', cell: (z) => place(z.y_min_m, z.y_max_m) },
+    { key: 'x', title: 'x, m', cell: (z) => place(z.x_min_m, z.x_max_m, map.cell_m) },
+    { key: 'y', title: 'y, m', cell: (z) => place(z.y_min_m, z.y_max_m, map.cell_m) },
     figure(
       'departure',
       'Departure',

@@ -60,7 +60,7 @@ function LiveMap({ entry }) {
   if (rows.length === 0 || x === null)
     return (
       <Empty title="No position">
-        {entry.state.silent_s === null ? 'No telemetry yet.' : 'This robot does not report its position.'}
+        {entry.state.live ? 'This robot does not report its position.' : 'None since the service started.'}
       </Empty>
     );
   return (
