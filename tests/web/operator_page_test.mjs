@@ -651,7 +651,7 @@ await check('zones of the floor that stand out are numbered, listed and found', 
   await go(page, '#/floor?from=2020-01-01&cell=2&show=gap');
   const row = page.locator('.zones tbody tr');
   await row.getByText('+31').waitFor();
-  expect((await row.textContent()).includes('+0.500'), await row.textContent());
+  expect((await row.textContent()).includes('+0.50'), await row.textContent());
   await row.getByRole('button', { name: 'Zone 1' }).click();
   const strip = page.locator('.floor-strip');
   await strip.getByText('+31 % (+22 % to +40 %)'.replaceAll(' %', '\u00a0%')).waitFor();
