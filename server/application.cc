@@ -335,9 +335,9 @@ struct Application::Parts {
   }
 
   Result<void> start_http() {
-    services = std::make_unique<api::Services>(api::Services{*store, *writer, models, fleet, *forecasts,
-                                                             cost_tables, *drift_view, *adoption, *diagnoses,
-                                                             cluster.get(), host_utime_us});
+    services = std::make_unique<api::Services>(api::Services{*store, *writer, models, fleet, recent,
+                                                             *forecasts, cost_tables, *drift_view, *adoption,
+                                                             *diagnoses, cluster.get(), host_utime_us});
     Result<std::unique_ptr<http::Gate>> opened =
         http::Gate::open({.token_file = settings.text("auth.token_file"),
                           .now_utime_us = host_utime_us,
@@ -480,7 +480,7 @@ struct Application::Parts {
   }
 
   void run_beat() {
-    server::FleetEvents fleet_events(fleet, models, *forecasts, *store, events,
+    server::FleetEvents fleet_events(fleet, recent, models, *forecasts, *store, events,
                                      [this](const history::Mission& mission, const std::string& json) {
                                        if (webhooks)
                                          webhooks->offer("mission", mission.robot_id, mission.end_utime_us,
@@ -503,6 +503,7 @@ struct Application::Parts {
   http::EventHub events;
   ingest::ModelRegistry models;
   ingest::FleetView fleet;
+  ingest::RecentValues recent;
   std::unique_ptr<ingest::Forecasts> forecasts;
   planning::CostTableCache cost_tables;
   ingest::IngestCounters counters;

@@ -30,7 +30,9 @@ void FleetEvents::tell_contradictions(const ingest::RobotSnapshot& now, Told& to
 
 void FleetEvents::publish(std::int64_t now_utime_us) {
   std::erase_if(told_, [&](const auto& each) { return fleet_.find(each.first) == nullptr; });
+  recent_.keep([&](const std::string& id) { return fleet_.find(id) != nullptr; });
   for (const auto& snapshot : fleet_.all()) {
+    recent_.take(*snapshot);
     Told& told = told_[snapshot->robot_id];
     const bool live = api::is_live(*snapshot, now_utime_us);
     if (told.snapshot != nullptr && told.snapshot->mission_key > 0 &&

@@ -10,22 +10,24 @@
 #include "ingest/fleet_view.h"
 #include "ingest/forecasts.h"
 #include "ingest/model_registry.h"
+#include "ingest/recent_values.h"
 #include "server/http/event_hub.h"
 
 namespace joulecast::server {
 
 // Tells the event stream what changed in the fleet: `state` for each robot whose snapshot is new, `mission`
 // for each mission that ended, `contradiction` for each
-// contradiction that is told. One thread.
+// contradiction that is told. Keeps the last values of each robot. One thread.
 class FleetEvents {
  public:
   // Also told of each mission that ended: the mission, and itself as JSON.
   using MissionSink = std::function<void(const history::Mission&, const std::string& json)>;
 
-  FleetEvents(const ingest::FleetView& fleet, const ingest::ModelRegistry& models,
-              ingest::Forecasts& forecasts, const history::Store& store, http::EventHub& hub,
-              MissionSink mission_ended)
+  FleetEvents(const ingest::FleetView& fleet, ingest::RecentValues& recent,
+              const ingest::ModelRegistry& models, ingest::Forecasts& forecasts, const history::Store& store,
+              http::EventHub& hub, MissionSink mission_ended)
       : fleet_(fleet),
+        recent_(recent),
         models_(models),
         forecasts_(forecasts),
         store_(store),
@@ -43,6 +45,7 @@ class FleetEvents {
   void tell_contradictions(const ingest::RobotSnapshot& now, Told& told);
 
   const ingest::FleetView& fleet_;
+  ingest::RecentValues& recent_;
   const ingest::ModelRegistry& models_;
   ingest::Forecasts& forecasts_;
   const history::Store& store_;

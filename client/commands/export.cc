@@ -25,7 +25,7 @@ namespace {
 struct Options {
   std::string server, out = "-";
   bool force = false;
-  std::optional<std::string> robot_id, from, to, points;
+  std::optional<std::string> robot_id, from, to, points, cell_m;
   std::int64_t mission = 0;
 };
 
@@ -72,8 +72,9 @@ Exit write_pages(const Options& options, std::string target, const Renamed& rena
   return Exit::ok;
 }
 
-Exit export_missions(const Options& options) {
-  Query query{{"limit", "1000"}, {"robot_id", options.robot_id}};
+// The missions of a period, by what else is asked of them.
+Exit export_period(const Options& options, const char* path, Query query) {
+  query.emplace_back("robot_id", options.robot_id);
   for (const auto& [name, flag, text] : {std::tuple{"from_utime_us", "--from", &options.from},
                                          std::tuple{"to_utime_us", "--to", &options.to}}) {
     if (!*text) continue;
@@ -81,7 +82,7 @@ Exit export_missions(const Options& options) {
     if (!utime_us) return report(utime_us.error());
     query.emplace_back(name, std::to_string(*utime_us));
   }
-  return write_pages(options, target_of("/v1/missions", query), {{"robot_id", "--robot-id"}});
+  return write_pages(options, target_of(path, query), {{"robot_id", "--robot-id"}, {"cell_m", "--cell"}});
 }
 
 Exit export_of_mission(const Options& options, const char* what, const Query& query) {
@@ -109,6 +110,13 @@ CLI::App* add(CLI::App& group, const char* name, const char* what, Options& opti
   return command;
 }
 
+void add_period(CLI::App& command, Options& options) {
+  command.add_option("--robot-id", options.robot_id, "only this robot's");
+  command.add_option("--from", options.from,
+                     "started at or after: 2024-07-18, 2024-07-18T09:10:45Z or microseconds since 1970");
+  command.add_option("--to", options.to, "started before, the same");
+}
+
 void add_mission(CLI::App& command, Options& options) {
   command.add_option("--mission", options.mission, "number of the mission, as joulecast missions lists it")
       ->required()
@@ -122,11 +130,16 @@ void add_export(CLI::App& program, Exit& exit) {
   auto* group = program.add_subcommand("export", "Write tables of a daemon's history as CSV files");
   group->require_subcommand(1);
   auto* missions = add(*group, "missions", "Missions with their energy and ratio, one a line", *options);
-  missions->add_option("--robot-id", options->robot_id, "only this robot's");
-  missions->add_option("--from", options->from,
-                       "started at or after: 2024-07-18, 2024-07-18T09:10:45Z or microseconds since 1970");
-  missions->add_option("--to", options->to, "started before, the same");
-  missions->callback([options, &exit] { exit = export_missions(*options); });
+  add_period(*missions, *options);
+  missions->callback([options, &exit] {
+    exit = export_period(*options, "/v1/missions", {{"limit", "1000"}});
+  });
+  auto* floor = add(*group, "floor", "Energy and gap by squares of the floor, over all missions", *options);
+  add_period(*floor, *options);
+  floor->add_option("--cell", options->cell_m, "side of a square, m; 1 without it");
+  floor->callback([options, &exit] {
+    exit = export_period(*options, "/v1/floor-map", {{"limit", "20000"}, {"cell_m", options->cell_m}});
+  });
   auto* telemetry =
       add(*group, "telemetry", "Every sample of a mission as received, with all digits", *options);
   add_mission(*telemetry, *options);

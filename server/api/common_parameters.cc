@@ -6,6 +6,7 @@
 
 #include "base/utc_time.h"
 #include "server/http/json_digits.h"
+#include "server/http/text.h"
 
 namespace joulecast::api {
 
@@ -70,6 +71,14 @@ std::vector<Parameter> with(std::vector<Parameter> parameters, std::vector<Param
   parameters.insert(parameters.end(), std::make_move_iterator(more.begin()),
                     std::make_move_iterator(more.end()));
   return parameters;
+}
+
+Result<std::vector<std::string>> robot_ids_of(const http::Request& request) {
+  const auto given = request.query_value("robot_id");
+  if (!given) return std::vector<std::string>{};
+  std::vector<std::string> ids = http::listed(*given);
+  if (ids.empty()) return invalid("robot_id", "must name a robot");
+  return ids;
 }
 
 std::vector<Parameter> time_parameters(const std::string& name, const std::string& what) {

@@ -46,6 +46,9 @@ history::PageRequest page_of(const http::Request& request, std::int64_t limit);
 
 std::vector<http::Parameter> with(std::vector<http::Parameter> parameters, std::vector<http::Parameter> more);
 
+// ?robot_id=: ids separated by commas; empty where it is absent. Fault::invalid where it names none.
+Result<std::vector<std::string>> robot_ids_of(const http::Request& request);
+
 // ?<name>= in ISO 8601 and ?<name>_utime_us=: one time in either form. `what` begins the description.
 std::vector<http::Parameter> time_parameters(const std::string& name, const std::string& what);
 // What they say; nothing where both are absent. Fault::invalid for text of no such form and for both at once.

@@ -38,22 +38,11 @@ constexpr std::array<std::pair<std::string_view, MissionOrder>, 12> orders{{
     {"charge", MissionOrder::charge},
 }};
 
-std::vector<std::string> listed(std::string_view text) {
-  std::vector<std::string> items;
-  while (true) {
-    const auto comma = text.find(',');
-    if (const auto item = text.substr(0, comma); !item.empty()) items.emplace_back(item);
-    if (comma == std::string_view::npos) return items;
-    text.remove_prefix(comma + 1);
-  }
-}
-
 Result<history::MissionFilter> filter_of(const Request& request) {
   history::MissionFilter filter;
-  if (const auto robots = request.query_value("robot_id")) {
-    filter.robot_ids = listed(*robots);
-    if (filter.robot_ids.empty()) return invalid("robot_id", "must name a robot");
-  }
+  auto robots = robot_ids_of(request);
+  if (!robots) return tl::unexpected(robots.error());
+  filter.robot_ids = std::move(*robots);
   if (const auto mission = request.query_value("mission_id")) filter.mission_id = std::string(*mission);
   if (const auto part = request.query_value("name_contains")) filter.name_contains = std::string(*part);
   const auto from = time_of(request, "from"), to = time_of(request, "to");

@@ -9,6 +9,7 @@
 #include "ingest/fleet_view.h"
 #include "ingest/forecasts.h"
 #include "ingest/model_registry.h"
+#include "ingest/recent_values.h"
 #include "planning/cost_table_cache.h"
 #include "server/cluster/cluster.h"
 #include "server/diagnosis/diagnosis_service.h"
@@ -24,6 +25,7 @@ struct Services {
   history::Writer& writer;
   ingest::ModelRegistry& models;
   const ingest::FleetView& fleet;
+  const ingest::RecentValues& recent;
   ingest::Forecasts& forecasts;
   planning::CostTableCache& cost_tables;
   const server::DriftView& drift;
@@ -61,11 +63,13 @@ std::vector<TableRow> model_rows();
 std::vector<TableRow> diagnosis_rows();
 std::vector<TableRow> audit_rows();
 std::vector<TableRow> audit_log_rows();
+std::vector<TableRow> floor_map_rows();
 std::vector<TableRow> gap_history_rows();
 std::vector<TableRow> mission_list_rows();
 std::vector<TableRow> mission_rows();
 std::vector<TableRow> planning_rows();
 std::vector<TableRow> cluster_rows();
+std::vector<TableRow> recent_value_rows();
 
 // The model of a robot that `field` of the request names, or the error that says why there is none.
 Result<std::shared_ptr<const ingest::ModelInForce>> model_of(const Services& services,

@@ -37,13 +37,12 @@ std::string_view cookie_value(std::string_view header, std::string_view name) {
   return {};
 }
 
-// The one robot that a request is about by its path or query.
-std::optional<std::string> robot_of(const Endpoint& endpoint, const Request& request) {
+// The robots that a request is about by its path or query; empty: all.
+std::vector<std::string> robots_of(const Endpoint& endpoint, const Request& request) {
   const std::string_view path = endpoint.path;
   if (path.starts_with(robot_path) && (path.size() == robot_path.size() || path[robot_path.size()] == '/'))
-    return request.param("id");
-  if (const auto named = request.query_value("robot_id")) return std::string(*named);
-  return std::nullopt;
+    return {request.param("id")};
+  return listed(request.query_value("robot_id").value_or(std::string_view{}));
 }
 
 ordered_json description_of(const Token& token) {
@@ -175,10 +174,12 @@ std::optional<std::string> Gate::why_not(const Token& token, const Endpoint& end
     return "This needs a token of role " + std::string(access::name(endpoint.role)) + "; " + token.name +
            " has role " + std::string(access::name(token.role));
   if (token.robots.empty()) return std::nullopt;
-  const std::optional<std::string> robot = robot_of(endpoint, request);
-  if (!robot) return "This needs a token for all robots; " + token.name + " is for " + token.robots;
-  if (!access::is_for_robot(token, *robot))
-    return token.name + " is for the robots " + token.robots + " alone";
+  const std::vector<std::string> robots = robots_of(endpoint, request);
+  if (robots.empty()) return "This needs a token for all robots; " + token.name + " is for " + token.robots;
+  // Each by itself: a pattern that begins one name would fit a list of names.
+  for (const std::string& robot : robots)
+    if (!access::is_for_robot(token, robot))
+      return token.name + " is for the robots " + token.robots + " alone";
   return std::nullopt;
 }
 

@@ -10,13 +10,19 @@ const here = path.dirname(fileURLToPath(import.meta.url));
 const firstLoad = ['index.html', 'app.js', 'base.js', 'app.css', 'favicon.svg'];
 const limits = {
   'first load': [firstLoad, 26_000],
-  'other views': [['views.js', 'views.css'], 46_000],
+  'other views': [['views.js', 'views.css'], 50_000],
   charts: [['uplot.js'], 24_000],
 };
 
 const options = {
   absWorkingDir: here,
-  entryPoints: { app: 'source/main.jsx', views: 'source/views/index.js', uplot: 'source/uplot.js' },
+  entryPoints: [
+    { in: 'source/main.jsx', out: 'app' },
+    { in: 'source/views/index.js', out: 'views' },
+    // Not by an import of index.js, which would put it into app.css, too.
+    { in: 'source/views/views.css', out: 'views' },
+    { in: 'source/uplot.js', out: 'uplot' },
+  ],
   splitting: true,
   chunkNames: 'base',
   outdir: here,

@@ -6,27 +6,13 @@
 #include <utility>
 
 #include "history/cursor.h"
+#include "history/sql_filter.h"
 #include "history/sql_queries.h"
 #include "history/sql_rows.h"
 #include "signals/account_ratios.h"
 
 namespace joulecast::history::queries {
 namespace {
-
-// signals::energy_ratio() and signals::energy_per_distance_wh_km().
-const std::string& ratio_sql() {
-  static const std::string sql =
-      "(CASE WHEN measured_s > 0 AND measured_j - ledger_unexplained_j > 0 THEN measured_j / (measured_j - "
-      "ledger_unexplained_j) END)";
-  return sql;
-}
-
-const std::string& wh_per_km_sql() {
-  static const std::string sql = "(CASE WHEN distance_m > " +
-                                 std::to_string(signals::least_compared_distance_m) +
-                                 " THEN battery_j / distance_m / 3.6 END)";
-  return sql;
-}
 
 const std::string& state_sql() {
   static const std::string sql = [] {
@@ -36,112 +22,6 @@ const std::string& state_sql() {
     return text + " END)";
   }();
   return sql;
-}
-
-std::string among(const std::string& column, std::size_t values) {
-  std::string sql = column + " IN (?";
-  for (std::size_t k = 1; k < values; ++k) sql += ", ?";
-  return sql + ")";
-}
-
-// A pattern of LIKE, whose escape is '!', for texts in lower case that contain the part. Like SQL's lower(),
-// it knows the letters of ASCII.
-std::string pattern_of(const std::string& part) {
-  std::string pattern = "%";
-  for (const char c : part) {
-    if (c == '%' || c == '_' || c == '!') pattern += '!';
-    pattern += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  }
-  return pattern + "%";
-}
-
-// A filter as SQL. Outlives the rows that it is bound to.
-class Where {
- public:
-  explicit Where(const MissionFilter& filter) : filter_(filter) {
-    if (filter.name_contains) pattern_ = pattern_of(*filter.name_contains);
-    // In an order of their own and once each.
-    for (std::size_t k = 0; k < mission_state_count; ++k) {
-      const auto state = static_cast<MissionState>(k);
-      if (std::ranges::find(filter.states, state) != filter.states.end()) states_.emplace_back(name(state));
-    }
-    visit([this](const std::string& condition, const auto&) { sql_ += " AND " + condition; });
-  }
-
-  const std::string& sql() const { return sql_; }
-
-  void bind(Rows& rows) const {
-    visit([&rows](const std::string&, const auto& value) {
-      if constexpr (std::is_same_v<std::decay_t<decltype(value)>, std::vector<std::string>>) {
-        for (const std::string& one : value) rows.bind(one);
-      } else {
-        rows.bind(value);
-      }
-    });
-  }
-
-  // Tells filters apart for cursors. Text values carry their length, so that no two read alike.
-  std::string identity() const {
-    std::string text = sql_;
-    const auto add = [&text](const std::string& value) {
-      text += '|' + std::to_string(value.size()) + ':' + value;
-    };
-    visit([&](const std::string&, const auto& value) {
-      using Value = std::decay_t<decltype(value)>;
-      if constexpr (std::is_same_v<Value, std::string>) {
-        add(value);
-      } else if constexpr (std::is_same_v<Value, std::vector<std::string>>) {
-        for (const std::string& one : value) add(one);
-      } else {
-        text += '|' + std::to_string(std::bit_cast<std::int64_t>(value));
-      }
-    });
-    return text;
-  }
-
- private:
-  // Visits the conditions that are set, each with what it binds.
-  template <class Visit>
-  void visit(Visit visit) const {
-    const MissionFilter& f = filter_;
-    // One robot by itself lets the index by robot and start give the order, too.
-    if (f.robot_ids.size() == 1) visit("robot_id = ?", f.robot_ids.front());
-    if (f.robot_ids.size() > 1) visit(among("robot_id", f.robot_ids.size()), f.robot_ids);
-    if (f.mission_id) visit("mission_id = ?", *f.mission_id);
-    if (f.name_contains) visit("lower(mission_id) LIKE ? ESCAPE '!'", pattern_);
-    if (f.start_from_utime_us) visit("start_utime_us >= ?", *f.start_from_utime_us);
-    if (f.start_to_utime_us) visit("start_utime_us < ?", *f.start_to_utime_us);
-    if (!states_.empty()) visit(among("state", states_.size()), states_);
-    if (f.incomplete) visit("incomplete = ?", std::int64_t{*f.incomplete});
-    if (f.payload_min_kg) visit("payload_kg >= ?", *f.payload_min_kg);
-    if (f.payload_max_kg) visit("payload_kg <= ?", *f.payload_max_kg);
-    if (f.ratio_min) visit(ratio_sql() + " >= ?", *f.ratio_min);
-    if (f.ratio_max) visit(ratio_sql() + " <= ?", *f.ratio_max);
-  }
-
-  const MissionFilter& filter_;
-  std::string pattern_;
-  std::vector<std::string> states_;
-  std::string sql_ = " WHERE TRUE";
-};
-
-Result<void> check_bounds(const std::string& field, const std::string& other, std::optional<double> min,
-                          std::optional<double> max) {
-  if ((min && std::isnan(*min)) || (max && std::isnan(*max)))
-    return invalid(field, "must be a number, like " + other);
-  if (min && max && *min > *max) return invalid(field, "must not be greater than " + other);
-  return {};
-}
-
-Result<void> check_filter(const MissionFilter& f) {
-  if (f.robot_ids.size() > max_filter_robots)
-    return invalid("robot_id", "must name at most " + std::to_string(max_filter_robots) + " robots");
-  if (f.states.size() > mission_state_count) return invalid("state", "names a state more than once");
-  if (f.start_from_utime_us && f.start_to_utime_us && *f.start_from_utime_us > *f.start_to_utime_us)
-    return invalid("from_utime_us", "must not be later than to_utime_us");
-  if (auto ok = check_bounds("payload_min_kg", "payload_max_kg", f.payload_min_kg, f.payload_max_kg); !ok)
-    return ok;
-  return check_bounds("ratio_min", "ratio_max", f.ratio_min, f.ratio_max);
 }
 
 enum class Kind { integer, real, text };
@@ -232,11 +112,6 @@ bool has_mission(Database& database, MissionKey key) {
   Rows rows(database.statement("SELECT 1 FROM mission WHERE mission_key = ?"));
   return rows.bind(key).next();
 }
-
-// Annulled missions are in no sum. Of the findings, whose text is as annulled_findings() writes it, only the
-// name of a member has its quotes without a backslash.
-constexpr std::string_view not_annulled =
-    " AND (findings_json IS NULL OR findings_json NOT LIKE '%\"annulled\":%')";
 
 const std::string& select_totals() {
   static const std::string sql = [] {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -41,6 +42,25 @@ Result<MissionPage> missions(Database& database, const MissionFilter& filter, co
 Result<Totals> totals(Database& database, const MissionFilter& filter);
 Result<std::vector<TotalsGroup>> grouped_totals(Database& database, const MissionFilter& filter, Grouping by,
                                                 std::int64_t utc_offset_s);
+// Which missions are read for a map of the floor.
+struct FloorChoice {
+  struct Chosen {
+    MissionKey key = 0;
+    std::string robot_id;
+    std::int64_t from_utime_us = 0, to_utime_us = 0;
+    std::int64_t points = 0;  // at most
+  };
+  std::int64_t missions = 0;   // that match
+  std::vector<Chosen> chosen;  // by key: all of them, or an even share that has at most so many points
+};
+Result<FloorChoice> floor_missions(Database& database, const MissionFilter& filter, std::int64_t max_points);
+// How many of the first are to be read at once; 0 of none.
+std::size_t next_at_once(std::span<const FloorChoice::Chosen> chosen);
+struct FloorSums {
+  std::vector<std::vector<FloorVisit>> visits;  // of each mission
+  std::int64_t points = 0;
+};
+Result<FloorSums> floor_sums(Database& database, std::span<const FloorChoice::Chosen> chosen, double cell_m);
 Result<std::vector<Mission>> open_missions(Database& database);
 std::optional<MissionKey> key_of(Database& database, std::string_view robot_id, std::string_view mission_id,
                                  std::int64_t start_utime_us);

@@ -134,6 +134,27 @@ Result<Trace> SqlStore::trace(MissionKey key, TimeRange range, std::int64_t max_
   return read([&](Database& database) { return queries::trace(database, key, range, max_points); });
 }
 
+Result<FloorReading> SqlStore::floor_visits(const MissionFilter& filter, double cell_m,
+                                            std::int64_t max_points, const FloorSink& sink) const {
+  if (!(cell_m >= least_floor_cell_m && cell_m <= greatest_floor_cell_m))
+    return invalid("cell_m", "must be 0.1 to 100");
+  const auto choice =
+      read([&](Database& database) { return queries::floor_missions(database, filter, max_points); });
+  if (!choice) return tl::unexpected(choice.error());
+  FloorReading reading{.missions = choice->missions};
+  // Each part by itself: one that is read again after a lost connection is told once.
+  for (std::span rest(choice->chosen); !rest.empty();) {
+    const auto part = rest.first(queries::next_at_once(rest));
+    const auto sums = read([&](Database& database) { return queries::floor_sums(database, part, cell_m); });
+    if (!sums) return tl::unexpected(sums.error());
+    reading.points += sums->points;
+    for (std::size_t k = 0; k < part.size(); ++k, ++reading.missions_read)
+      if (!sink({part[k].key, part[k].robot_id, sums->visits[k]})) return reading;
+    rest = rest.subspan(part.size());
+  }
+  return reading;
+}
+
 Result<TelemetryPage> SqlStore::telemetry(MissionKey key, TimeRange range, const PageRequest& page) const {
   return read([&](Database& database) { return queries::telemetry(database, key, range, page); });
 }

@@ -86,6 +86,8 @@ class SqlStore : public Store {
   Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& filter, Grouping by,
                                                   std::int64_t utc_offset_s) const override;
   Result<Trace> trace(MissionKey key, TimeRange range, std::int64_t max_points) const override;
+  Result<FloorReading> floor_visits(const MissionFilter& filter, double cell_m, std::int64_t max_points,
+                                    const FloorSink& sink) const override;
   Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const override;
   Result<CovariatePage> covariates(MissionKey key, TimeRange range, const PageRequest& page) const override;
   Result<std::optional<RequestAnswer>> answer(std::string_view actor, std::string_view key) const override;

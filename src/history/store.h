@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "history/commands.h"
+#include "history/floor.h"
 #include "history/records.h"
 
 namespace joulecast::history {
@@ -185,6 +186,12 @@ class Store {
   // At most max_points buckets (1 to max_trace_points): neighbours are merged by least, time-weighted mean
   // and greatest, cumulative values by the last. not_found when the mission is unknown.
   virtual Result<Trace> trace(MissionKey key, TimeRange range, std::int64_t max_points) const = 0;
+  // Tells the sink of each mission that matches what it spent in which square of `cell_m` metres
+  // (least_floor_cell_m to greatest_floor_cell_m), in the order of keys, outside of any lock. Reads at most
+  // about `max_points` seconds of missions (1 to max_floor_points): of more, those of an even share of them.
+  virtual Result<FloorReading> floor_visits(const MissionFilter& filter, double cell_m,
+                                            std::int64_t max_points, const FloorSink& sink) const = 0;
+
   // At most `page.limit` samples (1 to max_telemetry_samples). Empty when the retention dropped them;
   // not_found when the mission is unknown.
   virtual Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const = 0;

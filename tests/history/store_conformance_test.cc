@@ -8,6 +8,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <set>
 #include <thread>
 #include <tuple>
@@ -839,6 +840,139 @@ TEST_P(StoreConformance, ReplacesABucketAndReadsRanges) {
   EXPECT_EQ(few.width_us, 4 * trace_bucket_us);
   ASSERT_EQ(few.buckets.size(), 3U);
   EXPECT_EQ(few.buckets[2].covered_s, 2);
+}
+
+// Sums of each square that a reading told, by its column and row.
+struct Floor {
+  std::map<std::pair<int, int>, FloorVisit> squares;
+  std::vector<MissionKey> missions;
+  FloorReading reading;
+};
+
+Floor floor_of(const Store& store, const MissionFilter& filter, double cell_m,
+               std::int64_t max_points = max_floor_points) {
+  Floor floor;
+  floor.reading = need(store.floor_visits(filter, cell_m, max_points, [&](const FloorMission& mission) {
+    floor.missions.push_back(mission.key);
+    for (const FloorVisit& v : mission.visits) {
+      FloorVisit& sum = floor.squares[{v.column, v.row}];
+      sum.covered_s += v.covered_s;
+      sum.distance_m += v.distance_m;
+      sum.energy_j += v.energy_j;
+      sum.measured_j += v.measured_j;
+      sum.modelled_j += v.modelled_j;
+    }
+    return true;
+  }));
+  return floor;
+}
+
+// A finished mission that drives along x from `x_m` on, a metre a second, one second a bucket.
+Mission drive_along(Store& store, const std::string& robot_id, const std::string& name, int start_s,
+                    double x_m, int seconds) {
+  Mission m = start_mission(store, robot_id, name, start_s * 1'000'000LL);
+  m.end_utime_us = m.start_utime_us + seconds * 1'000'000LL;
+  m.state = MissionState::finished;
+  std::vector<TraceBucket> trace;
+  for (int k = 0; k < seconds; ++k) {
+    TraceBucket bucket;
+    bucket.start_utime_us = (start_s + k) * trace_bucket_us;
+    bucket.covered_s = 1;
+    bucket.speed_m_s = {-1, -1, -1};
+    bucket.measured_power_w = {40, 50, 60};
+    bucket.modelled_power_w = {30, 40, 50};
+    bucket.x_m = x_m + k;
+    bucket.y_m = -0.25;
+    trace.push_back(bucket);
+  }
+  need(apply_one(store, CheckpointMission{m, trace, {}, {}}));
+  return m;
+}
+
+TEST_P(StoreConformance, SumsTracesBySquaresOfTheFloor) {
+  const Mission first = drive_along(*store_, "amr-1", "a", 100, -2.5, 6);
+  const Mission second = drive_along(*store_, "amr-2", "b", 200, -0.5, 2);
+  const Floor floor = floor_of(*store_, {}, 2);
+  EXPECT_THAT(floor.missions, testing::UnorderedElementsAre(first.key, second.key));
+  EXPECT_EQ(floor.reading.missions, 2);
+  EXPECT_EQ(floor.reading.missions_read, 2);
+  EXPECT_EQ(floor.reading.points, 8);
+  // x -2.5 | -1.5 -0.5 | 0.5 1.5 | 2.5, and -0.5 | 0.5
+  ASSERT_EQ(floor.squares.size(), 4U);
+  const auto seconds = [&](int column) { return floor.squares.at({column, -1}).covered_s; };
+  EXPECT_EQ(seconds(-2), 1);
+  EXPECT_EQ(seconds(-1), 3);
+  EXPECT_EQ(seconds(0), 3);
+  EXPECT_EQ(seconds(1), 1);
+  const FloorVisit& square = floor.squares.at({0, -1});
+  EXPECT_EQ(square.distance_m, 3);
+  EXPECT_EQ(square.energy_j, 150);
+  EXPECT_EQ(square.measured_j, 150);
+  EXPECT_EQ(square.modelled_j, 120);
+
+  MissionFilter of_one;
+  of_one.robot_ids = {"amr-2"};
+  EXPECT_EQ(floor_of(*store_, of_one, 2).missions, std::vector{second.key});
+  MissionFilter later;
+  later.start_from_utime_us = 150'000'000;
+  EXPECT_EQ(floor_of(*store_, later, 2).missions, std::vector{second.key});
+}
+
+TEST_P(StoreConformance, LeavesOutOfTheFloorWhatHasNoPlaceOrIsNotTrue) {
+  Mission m = start_mission(*store_, "amr-1", "m", 0);
+  m.end_utime_us = 5'000'000;
+  std::vector<TraceBucket> trace(5);
+  for (std::size_t k = 0; k < trace.size(); ++k) {
+    trace[k].start_utime_us = static_cast<std::int64_t>(k) * trace_bucket_us;
+    trace[k].covered_s = 1;
+    trace[k].modelled_power_w = {20, 20, 20};
+    trace[k].x_m = trace[k].y_m = 0.5;
+  }
+  trace[1].x_m = signals::unmeasured;
+  trace[2].x_m = 1e300;
+  trace[3].measured_power_w = {30, 30, 30};
+  trace[4].modelled_power_w = {};
+  need(apply(CheckpointMission{m, trace, {}, {}}));
+  const Floor floor = floor_of(*store_, {}, 1);
+  ASSERT_EQ(floor.squares.size(), 1U);
+  EXPECT_EQ(floor.squares.begin()->second.energy_j, 50) << "measured, or else modelled";
+  EXPECT_EQ(floor.squares.begin()->second.measured_j, 30) << "where both are known";
+  EXPECT_EQ(floor.squares.begin()->second.modelled_j, 20);
+  for (const std::string& findings :
+       {annulled_findings(m, 1, "spilt"), std::string(R"({"contradictions":["battery_current"]})")}) {
+    m.findings_json = findings;
+    need(apply(CheckpointMission{m, {}, {}, {}}));
+    EXPECT_EQ(floor_of(*store_, {}, 1).reading.missions, 0) << findings;
+  }
+}
+
+TEST_P(StoreConformance, ReadsAnEvenShareOfAFloorThatIsTooLong) {
+  constexpr int missions = 200;
+  for (int k = 0; k < missions; ++k)
+    drive_along(*store_, "amr-" + std::to_string(k % 4), "m" + std::to_string(k), 100 * k, 0.5, 10);
+  const Floor all = floor_of(*store_, {}, 1);
+  EXPECT_EQ(all.reading.points, 10 * missions);
+  EXPECT_EQ(all.squares.at({3, -1}).covered_s, missions);
+  const Floor share = floor_of(*store_, {}, 1, 600);
+  EXPECT_EQ(share.reading.missions, missions);
+  EXPECT_LE(share.reading.points, 600);
+  EXPECT_GE(share.reading.missions_read, 35);
+  std::map<std::string, int> robots;
+  int early = 0;
+  for (const MissionKey key : share.missions) {
+    const Mission m = need(store_->mission(key));
+    ++robots[m.robot_id];
+    early += m.start_utime_us < 100 * missions / 2 * 1'000'000LL;
+  }
+  ASSERT_EQ(robots.size(), 4U) << "of robots that take turns none is missing";
+  const auto read = static_cast<double>(share.reading.missions_read);
+  for (const auto& [robot, count] : robots) EXPECT_NEAR(count, read / 4, 4) << robot;
+  EXPECT_NEAR(early, read / 2, 4);
+  int told = 0;
+  need(store_->floor_visits({}, 1, max_floor_points, [&](const FloorMission&) { return ++told < 3; }));
+  EXPECT_EQ(told, 3) << "the sink ends the reading";
+  EXPECT_EQ(store_->floor_visits({}, 0.01, 1000, [](const FloorMission&) { return true; }).error().field,
+            "cell_m");
 }
 
 TEST_P(StoreConformance, RefusesABucketOffTheGridWithAllOfItsCheckpoint) {

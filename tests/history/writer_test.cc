@@ -63,6 +63,10 @@ class FailingStore final : public Store {
     return store_->missions(f, p, s);
   }
   Result<Totals> totals(const MissionFilter& f) const override { return store_->totals(f); }
+  Result<FloorReading> floor_visits(const MissionFilter& f, double c, std::int64_t p,
+                                    const FloorSink& sink) const override {
+    return store_->floor_visits(f, c, p, sink);
+  }
   Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& f, Grouping by,
                                                   std::int64_t utc_offset_s) const override {
     return store_->grouped_totals(f, by, utc_offset_s);

@@ -239,6 +239,8 @@ TEST_F(AccessTest, ATokenForSomeRobotsReachesTheseAlone) {
   EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/robots/amr-1/state").status, 200U);
   EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/robots/tug-1/state").status, 403U);
   EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions?robot_id=amr-1").status, 200U);
+  EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions?robot_id=amr-1,amr-2").status, 200U);
+  EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions?robot_id=amr-1,tug-1").status, 403U);
   EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions?robot_id=tug-1").status, 403U);
   EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions").status, 403U) << "the whole fleet's";
   EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions/7").status, 403U) << "nobody knows whose";

@@ -281,6 +281,11 @@ def hold_mission_lists(checker):
     for group in ("robot", "day", "week", "kind"):
         checker.check("GET", "/v1/mission-totals", f"/v1/mission-totals?group_by={group}&utc_offset_min=60", expect=200)
     checker.check("GET", "/v1/mission-totals", "/v1/mission-totals?group_by=moon", expect=422)
+    for query, status in (("cell_m=2&limit=3", 200), ("robot_id=check-1,nobody&from=2020-01-01", 200), ("cell_m=0.01", 422),
+                          ("cell_m=wide", 422), ("robot_id=,", 422), ("from=yesterday", 422), ("limit=0", 422)):
+        checker.check("GET", "/v1/floor-map", f"/v1/floor-map?{query}", expect=status)
+    for query, status in (("", 200), ("robot_id=nobody", 200), ("limit=1", 200), ("robot_id=,", 422), ("limit=201", 422)):
+        checker.check("GET", "/v1/recent-values", f"/v1/recent-values?{query}", expect=status)
     for template, query in (("/v1/missions", ""), ("/v1/mission-totals", "?group_by=robot")):
         text = checker.check("GET", template, template + query, expect=200, headers={"Accept": "text/csv"})
         if not isinstance(text, bytes) or b",battery_j," not in text.split(b"\r\n")[0]:

@@ -101,6 +101,10 @@ export async function serveManyRobots(pageDirectory, robots) {
         JSON.stringify({ robots: Array.from({ length: robots }, (_, k) => stateOf(k, now)) }),
         'application/json',
       );
+    } else if (url.pathname === '/v1/cluster') {
+      send(JSON.stringify({ name: null, node: null, nodes: [], leases: [] }), 'application/json');
+    } else if (url.pathname === '/v1/recent-values') {
+      send(JSON.stringify({ window_s: 90, robots: [], next_cursor: null }), 'application/json');
     } else if (url.pathname === '/v1/events') {
       response.writeHead(200, { 'content-type': 'text/event-stream', 'cache-control': 'no-cache' });
       streams.add(response);

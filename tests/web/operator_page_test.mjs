@@ -263,6 +263,46 @@ await check('the fleet is live', async () => {
   await page.getByText('Live', { exact: true }).first().waitFor();
 });
 
+await check('charts of live values begin filled when the page opens', async () => {
+  const windowS = 90;
+  const kept = () => get(`/v1/recent-values?robot_id=${robot}`);
+  // Enough that a page which waited for live values would not have them yet.
+  await until('half a minute of values', async () => (await kept()).robots[0].utime_us.length > 30, 60);
+  // Columns of a canvas in which the measured power is drawn, as a share of all.
+  const filled = (canvas) => {
+    const hex = getComputedStyle(document.documentElement).getPropertyValue('--measured').trim();
+    const wanted = [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
+    const { width, height } = canvas;
+    const copy = new OffscreenCanvas(width, height).getContext('2d');
+    copy.drawImage(canvas, 0, 0);
+    const { data } = copy.getImageData(0, 0, width, height);
+    let columns = 0;
+    for (let x = 0; x < width; ++x)
+      for (let y = 0; y < height; ++y) {
+        const at = 4 * (y * width + x);
+        if (data[at + 3] > 200 && wanted.every((v, k) => Math.abs(data[at + k] - v) < 40)) {
+          columns += 1;
+          break;
+        }
+      }
+    return columns / width;
+  };
+  for (const [hash, trace] of [
+    ['#/fleet', `.fleet tbody tr:has-text("${robot}") .sparkline`],
+    [`#/robots/${robot}`, '.readouts .sparkline'],
+  ]) {
+    const fresh = await openPage();
+    await go(fresh, hash);
+    await fresh.locator(trace).first().waitFor();
+    const began = Date.now();
+    const known = Math.min(windowS, (await kept()).robots[0].utime_us.length) / windowS;
+    const shown = () => fresh.locator(trace).first().evaluate(filled);
+    await until(`a filled chart at ${hash}`, async () => (await shown()) > 0.6 * known, 5);
+    expect(Date.now() - began < 5000, `${hash} was filled after ${Date.now() - began} ms`);
+    await fresh.context().close();
+  }
+});
+
 await check('a robot without telemetry is folded away, and a removed one is gone', async () => {
   const rows = page.locator('.fleet tbody tr:not(.spacer)');
   const spare = { ...JSON.parse(await readFile(hourRobot, 'utf8')), robot_id: 'spare-01' };
@@ -543,6 +583,129 @@ await check('trends sum missions by day and week, of the fleet and of robots sid
   const [download] = await Promise.all([page.waitForEvent('download'), button.click()]);
   const [head, ...lines] = (await readFile(await download.path(), 'utf8')).trim().split('\r\n');
   expect(head.startsWith('robots,from,to,missions,') && lines.length > 0, head);
+});
+
+await check(
+  'the floor shows energy over distance and gap by squares, read by keys and as tables',
+  async () => {
+    const asked = page.waitForResponse((r) => r.url().includes('/v1/floor-map') && r.ok());
+    await go(page, '#/floor?from=2020-01-01&cell=2&robot=worn-01');
+    const map = await (await asked).json();
+    const { missions } = await get('/v1/missions?robot_id=worn-01&limit=50');
+    equal(map.missions, missions.length, 'missions');
+    equal(map.missions_read, missions.length, 'missions read');
+    const sum = missions.reduce((total, m) => total + m.energy.battery_j, 0);
+    expect(Math.abs(map.energy_j / sum - 1) < 0.02, `${map.energy_j} J on the map, ${sum} J of missions`);
+    const distance = missions.reduce((total, m) => total + m.energy.distance_m, 0);
+    expect(Math.abs(map.distance_m / distance - 1) < 0.03, `${map.distance_m} m, ${distance} m of missions`);
+    const figures = await page.locator('.readouts').first().textContent();
+    expect(figures.includes((map.energy_j / map.distance_m / 3.6).toFixed(1)), figures);
+    const canvas = page.getByRole('application', { name: /^Map of the floor: energy over distance/ });
+    await canvas.focus();
+    await page.keyboard.press('ArrowRight');
+    const strip = page.locator('.floor-strip');
+    await strip.waitFor();
+    const [first, one] = [await strip.textContent(), map.cells[0]];
+    expect(
+      first.includes(`${one.missions}`) && first.includes(one.ratio.toFixed(3)),
+      `${first} of ${JSON.stringify(one)}`,
+    );
+    await page.keyboard.press('ArrowLeft');
+    await until('another square', async () => (await strip.textContent()) !== first);
+    await page.getByRole('button', { name: 'Gap', exact: true }).click();
+    await page.getByRole('application', { name: /^Map of the floor: departure/ }).waitFor();
+    await page.getByText('neutral at').waitFor();
+    expect(page.url().includes('show=gap'), page.url());
+    await page.getByText(/squares of most energy over distance, as a table/).waitFor();
+    const most = Math.max(...map.cells.map((c) => c.energy_j_per_m ?? 0));
+    const told = await page.locator('.squares tbody tr').first().locator('td').first().textContent();
+    expect(Math.abs(number(told) - most / 3.6) < 0.06, `${told} against ${most} J/m`);
+    const button = page.getByRole('button', { name: 'Export CSV' });
+    const [download] = await Promise.all([page.waitForEvent('download'), button.click()]);
+    const lines = (await readFile(await download.path(), 'utf8')).trim().split('\r\n');
+    equal(lines.length - 1, map.cells_total, 'squares of the CSV');
+  },
+);
+
+await check('zones of the floor that stand out are numbered, listed and found', async () => {
+  const path = '**/v1/floor-map?*';
+  await page.route(path, async (route) => {
+    const map = await (await route.fetch()).json();
+    const [one] = map.cells;
+    Object.assign(one, { departure: 0.31, departure_ci: [0.22, 0.4], stands_out: true });
+    map.zones = [
+      {
+        x_min_m: one.x_m,
+        y_min_m: one.y_m,
+        x_max_m: one.x_m + map.cell_m,
+        y_max_m: one.y_m + map.cell_m,
+        cells: 1,
+        covered_s: one.covered_s,
+        distance_m: one.distance_m,
+        departure: 0.31,
+        excess_j: 1800,
+      },
+    ];
+    await route.fulfill({ json: map });
+  });
+  await go(page, '#/floor?from=2020-01-01&cell=2&show=gap');
+  const row = page.locator('.zones tbody tr');
+  await row.getByText('+31').waitFor();
+  expect((await row.textContent()).includes('+0.50'), await row.textContent());
+  await row.getByRole('button', { name: 'Zone 1' }).click();
+  const strip = page.locator('.floor-strip');
+  await strip.getByText('+31 % (+22 % to +40 %)'.replaceAll(' %', '\u00a0%')).waitFor();
+  await page.unroute(path);
+});
+
+// The shape of the answer is held against a running cluster by tests/openapi.
+const clusterExample = JSON.parse(
+  await readFile(path.join(given.page, '../../schemas/examples/getCluster.answer.json'), 'utf8'),
+);
+const inCluster = (more = {}) => {
+  const [first, second] = clusterExample.leases;
+  return {
+    ...clusterExample,
+    leases: [
+      { ...first, robot_id: robot, stored_utime_us: (Date.now() - 60_000) * 1000 },
+      { ...second, node: null },
+    ],
+    nodes: [clusterExample.nodes[0], { ...clusterExample.nodes[1], alive: false, lease_left_s: -3 }],
+    ...more,
+  };
+};
+await check('a cluster is shown where there is one, and there alone', async () => {
+  await go(page, '#/fleet');
+  await page.locator('.fleet tbody th a').first().waitFor();
+  await page.waitForTimeout(300);
+  equal(await page.getByRole('link', { name: 'Cluster' }).count(), 0, 'links to a cluster of a daemon alone');
+  await go(page, '#/cluster');
+  await page.getByText('This daemon is in no cluster').waitFor();
+  const fresh = await openPage();
+  let answer = inCluster();
+  await fresh.route('**/v1/cluster', (route) => route.fulfill({ json: answer }));
+  await go(fresh, '#/fleet');
+  await fresh.getByRole('link', { name: 'Cluster' }).click();
+  await fresh.getByRole('heading', { level: 1, name: 'Cluster site' }).waitFor();
+  const gone = await fresh.locator('.cluster tbody tr', { hasText: 'berta' }).textContent();
+  expect(gone.includes('gone') && gone.includes('lapsed'), gone);
+  expect(
+    (await fresh.locator('.cluster tbody tr', { hasText: 'anna' }).textContent()).includes('answers you'),
+    'which daemon answers',
+  );
+  equal(
+    (await fresh.locator('.readouts').first().locator('dd').allTextContents()).slice(0, 3).join('; '),
+    '1of 2; 1of 2; 1',
+    'daemons alive, robots kept, takeovers',
+  );
+  await fresh.locator('.leases tbody tr', { hasText: 'tug' }).getByText('nobody').waitFor();
+  const state = async () => (await get(`/v1/robots/${robot}/state`)).mission !== null;
+  await until('a running mission', state, 60);
+  const lag = () => fresh.locator('.leases tbody tr', { hasText: robot }).locator('td').nth(2).textContent();
+  await until('a lag of a minute', async () => /min|5\d/.test(await lag()), 30);
+  answer = inCluster({ error: 'connection refused' });
+  await fresh.getByText('anna does not reach the database').waitFor();
+  await fresh.context().close();
 });
 
 await check('robots, periods and missions are compared side by side', async () => {
@@ -1253,12 +1416,16 @@ const views = {
   worn: '#/robots/worn-01',
   trends: '#/trends?by=day&from=2020-01-01',
   compare: '#/compare?a_robot=worn-01&b_robot=oval-01',
+  floor: '#/floor?from=2020-01-01&cell=2',
+  floor_gap: '#/floor?from=2020-01-01&cell=2&robot=worn-01&show=gap',
+  cluster: '#/cluster',
   audit: '#/audit',
   help: '#/help',
 };
 for (const [size, viewport] of Object.entries(sizes)) {
   for (const colorScheme of ['light', 'dark']) {
     const shown = await openPage({ viewport, colorScheme });
+    await shown.route('**/v1/cluster', (route) => route.fulfill({ json: inCluster() }));
     for (const [name, hash] of Object.entries(views)) {
       await check(
         `${name}, ${size}, ${colorScheme}: no serious accessibility fault, nothing wider than the window`,

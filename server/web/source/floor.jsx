@@ -5,7 +5,7 @@ import { scaleFor } from './colour.js';
 import { digits } from './format.js';
 
 // Where the floor lies on the canvas.
-function fit(points, width, height, margin = 28, leastM = 2) {
+export function fit(points, width, height, margin = 28, leastM = 2) {
   let [x0, x1, y0, y1] = [Infinity, -Infinity, Infinity, -Infinity];
   for (const [x, y] of points) {
     if (!Number.isFinite(x) || !Number.isFinite(y)) continue;
@@ -235,7 +235,7 @@ export function FloorPath({
   );
 }
 
-function Legend({ scale, title, unit = 'W' }) {
+export function Legend({ scale, title, unit = 'W' }) {
   const middle = (scale.low + scale.high) / 2;
   const draw = (c, width, height) => {
     const step = width / scale.colours.length;
@@ -252,14 +252,14 @@ function Legend({ scale, title, unit = 'W' }) {
         draw={draw}
         height={10}
         label={`Colours from ${scale.low} to ${scale.high} ${unit}`}
-        changes={[scale.low, scale.high, title]}
+        changes={[scale.low, scale.high, title, scale.colours]}
       />
       <span class="number">
         {digits(scale.high, 2)}
         {'\u00a0'}
         {unit}
       </span>
-      {title !== 'power' && <span class="note">neutral at {digits(middle, 1)}</span>}
+      {scale.low < 0 && <span class="note">neutral at {digits(middle, 1)}</span>}
     </div>
   );
 }

@@ -1,7 +1,7 @@
 // The live fleet: the list once, then the event stream. Events change the map at once; components are
 // notified at most once an animation frame and five times a second, however many robots report.
 import { useEffect, useState } from 'preact/hooks';
-import { get } from './api.js';
+import { get, query } from './api.js';
 
 const powerSamples = 90;
 const pathSamples = 600;
@@ -16,6 +16,11 @@ class Track {
   push(row) {
     this.rows.push(row);
     if (this.rows.length > 2 * this.length) this.rows.splice(0, this.rows.length - this.length);
+  }
+  // Rows that others have kept, by their first column.
+  join(rows) {
+    const all = new Map([...rows, ...this.rows].map((row) => [row[0], row]));
+    this.rows = [...all.values()].sort((a, b) => a[0] - b[0]);
   }
   last() {
     return this.rows.length > this.length ? this.rows.slice(-this.length) : this.rows;
@@ -68,9 +73,43 @@ function take(next) {
   entry.revision += 1;
   if (fresh && next.utime_us !== null) {
     entry.power.push([next.utime_us, next.measured_power_w ?? NaN, next.modelled_power_w ?? NaN]);
-    const [x, y, heading] = next.pose;
+    const [x, y] = next.pose;
     if (x !== null && y !== null)
-      entry.path.push([x, y, heading ?? 0, next.measured_power_w ?? next.modelled_power_w ?? NaN]);
+      entry.path.push([next.utime_us, x, y, next.measured_power_w ?? next.modelled_power_w ?? NaN]);
+  }
+}
+
+// The service keeps the last values of each robot: those of robots that are shown are asked for, once.
+const wanted = new Set();
+const mostWanted = 100; // in one question
+
+async function fill() {
+  const ids = [...wanted].slice(0, mostWanted);
+  ids.forEach((id) => wanted.delete(id));
+  if (wanted.size > 0) setTimeout(fill, 50);
+  try {
+    const answer = await get(`/v1/recent-values${query({ robot_id: ids.join(), digits: 7 })}`);
+    for (const of of answer.robots) {
+      const entry = robots.get(of.robot_id);
+      if (!entry) continue;
+      const rows = (...columns) => of.utime_us.map((us, k) => [us, ...columns.map((c) => c[k] ?? NaN)]);
+      const drawn = of.measured_power_w.map((w, k) => w ?? of.modelled_power_w[k]);
+      entry.power.join(rows(of.measured_power_w, of.modelled_power_w));
+      entry.path.join(rows(of.x_m, of.y_m, drawn));
+      entry.revision += 1;
+    }
+    changed();
+  } catch {
+    // The charts fill as the robots speak.
+  }
+}
+
+export function showRecent(entries) {
+  for (const entry of entries) {
+    if (entry.filled) continue;
+    entry.filled = true;
+    if (wanted.size === 0) setTimeout(fill, 50);
+    wanted.add(entry.id);
   }
 }
 
@@ -88,6 +127,7 @@ async function load() {
     const present = new Set(list.map((robot) => robot.robot_id));
     for (const id of robots.keys()) if (!present.has(id)) robots.delete(id);
     for (const robot of list) take(robot);
+    for (const entry of robots.values()) entry.filled = false;
     state.loaded = true;
     state.loads += 1;
     state.error = null;

@@ -1,6 +1,7 @@
 import { render } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import './style.css';
+import { useGet } from './api.js';
 import { clock } from './format.js';
 import { toggleEnergyUnit, useEnergyUnit } from './energy.js';
 import { startLive, useLive } from './live.js';
@@ -18,9 +19,11 @@ const views = {
   mission: later('Mission'),
   trends: later('Trends'),
   compare: later('Compare'),
+  floor: later('Floor'),
   plan: later('Plan'),
   gap: later('Gap'),
   audit: later('Audit'),
+  cluster: later('Cluster'),
   help: later('Help'),
 };
 
@@ -59,6 +62,7 @@ function App() {
   const first = useRef(true);
   const dark = useTheme();
   const unit = useEnergyUnit();
+  const clustered = useGet('/v1/cluster').value?.name;
   useEffect(() => {
     const change = () => setRoute(routeOf(location.hash));
     addEventListener('hashchange', change);
@@ -98,9 +102,11 @@ function App() {
           {tab('fleet', 'Fleet')}
           {tab('missions', 'Missions')}
           {tab('trends', 'Trends')}
+          {tab('floor', 'Floor')}
           {tab('plan', 'Plan')}
           {tab('gap', 'Gap')}
           {tab('audit', 'Log')}
+          {clustered && tab('cluster', 'Cluster')}
           {tab('help', 'Help')}
         </nav>
         <Link />

@@ -45,6 +45,13 @@ const kinds = {
   contradiction: ['Telemetry contradicted', (d) => d.says],
   mission_annulled: ['Mission annulled', (d) => d.reason],
   mission_id_reused: ['Mission name used again', (d) => d.mission_id],
+  robot_removed: [
+    'Robot removed',
+    (d) =>
+      d.history === 'purge'
+        ? `with its history, ${d.missions_deleted} ${d.missions_deleted === 1 ? 'mission' : 'missions'}`
+        : 'its history is kept',
+  ],
   charged: [
     'Charged',
     (d) =>
@@ -52,13 +59,22 @@ const kinds = {
   ],
 };
 
+// Of a kind that this page does not know.
+const inWords = (detail) =>
+  Object.entries(detail)
+    .filter(([, value]) => value !== null)
+    .map(
+      ([key, value]) => `${format.words(key)}: ${typeof value === 'object' ? JSON.stringify(value) : value}`,
+    )
+    .join('; ');
+
 const titleOf = (event) => kinds[event.kind]?.[0] ?? format.words(event.kind);
 
 function Detail({ of: { kind, detail } }) {
   const diagnosis = detail.diagnosis_id;
   return (
     <>
-      {kinds[kind] ? kinds[kind][1](detail) : JSON.stringify(detail)}
+      {kinds[kind] ? kinds[kind][1](detail) : inWords(detail)}
       {detail.mission && (
         <>
           {' '}

@@ -4,7 +4,7 @@ import { energy, energyIn, energyScale } from '../energy.js';
 import { useFleetGap } from '../fleet_gap.js';
 import * as format from '../format.js';
 import { Charge, Health, between, lowCharge, now, unheard } from '../health.jsx';
-import { useLive } from '../live.js';
+import { showRecent, useLive } from '../live.js';
 import { keepInAddress, missionLink, robotLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
 import { Head, SortChoice, names, sorted, turned } from '../table.jsx';
@@ -248,6 +248,7 @@ function RobotTable({ live, shown, sort, onSort, gaps }) {
   const heightPx = useNarrow() ? cardPx : rowPx;
   const [body, first, last] = useWindow(shown.length, heightPx);
   const scale = energyScale([...live.robots.values()].map(({ state }) => state.mission?.energy.battery_j));
+  useEffect(() => showRecent(shown.slice(first, last)), [shown, first, last]);
   return (
     <table class="grid fleet" aria-rowcount={shown.length + 1}>
       <Head columns={columns} sort={sort} onSort={onSort} />

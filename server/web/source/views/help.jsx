@@ -10,6 +10,12 @@ const entries = [...glossary.matchAll(/^- \*\*(.+?)\*\*: (.+(?:\n {2}.+)*)$/gm)]
 const views = [
   ['#/fleet', 'Fleet', 'every robot now: power, charge, range, and how well its model fits'],
   ['#/missions', 'Missions', 'what each mission cost, where its energy went, and a cheaper way to drive it'],
+  ['#/trends', 'Trends', 'energy, consumption and ratio by day or week, and comparisons side by side'],
+  [
+    '#/floor',
+    'Floor',
+    'where on the floor energy goes over weeks, and which places take more than their models say',
+  ],
   ['#/plan', 'Plan', 'energy and time of a drive before it is driven, and whether the charge suffices'],
   ['#/gap', 'Gap', 'diagnoses: why measured energy departs from the model, and what to change'],
   ['#/audit', 'Log', 'what happened to robots and their models'],
@@ -36,7 +42,8 @@ export function Help() {
       <p>
         Every control is reached with Tab. In the charts of a mission the arrow keys move the cursor (with
         Shift in larger steps), + zooms in and − zooms out. In the drawing of a path the arrow keys move the
-        cross, Enter adds a point and Backspace removes the last.
+        cross, Enter adds a point and Backspace removes the last. On the map of the floor the arrow keys go
+        from square to square.
       </p>
       <h2 id="glossary">Glossary</h2>
       <dl class="glossary">

@@ -1,8 +1,7 @@
-import 'uplot/dist/uPlot.min.css';
-import './views.css';
-
 export { Audit } from './audit.jsx';
+export { Cluster } from './cluster.jsx';
 export { Compare } from './compare.jsx';
+export { Floor } from './floor_map.jsx';
 export { Gap } from './gap.jsx';
 export { Help } from './help.jsx';
 export { Mission } from './mission.jsx';

@@ -116,13 +116,20 @@ export function priceOfHaste({ duration_s: durationS, time_multiplier_w: priceW 
   return durationS - shortestS < 1 ? `less time costs ${price}` : `one second less costs ${price}`;
 }
 
+// A front that is all but flat is shown flat: at least a hundredth of the energy from end to end.
+const leastSpan = 0.01;
+function energyRange(_, low, high) {
+  const [middle, half] = [(low + high) / 2, Math.max(0.55 * (high - low), (leastSpan / 2) * Math.abs(high))];
+  return [middle - half, middle + half];
+}
+
 function frontOptions(unit) {
   const c = palette();
   const points = { show: true, size: 12, width: 2, stroke: c.accent, fill: c.accent };
   return {
-    scales: { x: { time: false } },
+    scales: { x: { time: false }, y: { range: energyRange } },
     cursor: { y: false, drag: { x: false, y: false }, points: { show: false } },
-    axes: [axis('duration, s', { size: 28, space: 70 }), axis(`energy, ${unit}`, { size: 64 })],
+    axes: [axis('duration, s', { size: 28, space: 70 }), axis(`energy, ${unit}`, { size: 72 })],
     series: [
       {},
       { stroke: c.modelled, width: 1.5, spanGaps: true, points: { show: true, size: 5, fill: c.modelled } },

@@ -4,7 +4,7 @@ import { energy } from '../energy.js';
 import { FloorPath } from '../floor.jsx';
 import * as format from '../format.js';
 import { Contradictions, Health, between, chargeNote, now, since, unheard } from '../health.jsx';
-import { useLive } from '../live.js';
+import { showRecent, useLive } from '../live.js';
 import { missionLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
 import { useTheme } from '../theme.js';
@@ -55,12 +55,12 @@ function LiveMap({ entry }) {
           begun.value.measured_power_w.mean[k] ?? begun.value.modelled_power_w.mean[k] ?? NaN,
         ])
       : [];
-  const rows = [...before, ...live.map(([x, y, , w]) => [x, y, w])];
+  const rows = [...before, ...live.map(([, x, y, w]) => [x, y, w])];
   const [x, y, heading] = entry.state.pose;
   if (rows.length === 0 || x === null)
     return (
       <Empty title="No position">
-        {entry.state.silent_s === null ? 'No telemetry yet.' : 'This robot does not report its position.'}
+        {entry.state.live ? 'This robot does not report its position.' : 'None since the service started.'}
       </Empty>
     );
   return (
@@ -248,6 +248,9 @@ export function Robot({ id }) {
   const detail = useGet(`/v1/robots/${idPath(id)}`);
   const entry = live.robots.get(id);
   const s = entry?.state;
+  useEffect(() => {
+    if (entry) showRecent([entry]);
+  }, [entry, live.loads]);
   if (!s && live.loaded && detail.error?.status === 404)
     return (
       <Empty title={`There is no robot ${id}`}>

@@ -1,0 +1,234 @@
+// The daemons that share the fleet, and which of them keeps which robot.
+import { useEffect, useState } from 'preact/hooks';
+import { useGet } from '../api.js';
+import * as format from '../format.js';
+import { useLive } from '../live.js';
+import { robotLink } from '../route.js';
+import { SortChoice, Table, sorted, turned } from '../table.jsx';
+import { Answer, Empty, Panel, Readout, useTitleOf } from '../widgets.jsx';
+
+const renewMs = 2000;
+const lateStoredS = 10; // samples are stored twice a second
+
+const ago = (second) => (format.known(second) ? `${format.span(second)} ago` : 'never');
+
+function Alive({ node }) {
+  return (
+    <span class={node.alive ? '' : 'fault'}>
+      <span class={`lamp ${node.alive ? 'good' : 'bad'}`} aria-hidden="true" />
+      {node.alive ? 'alive' : 'gone'}
+    </span>
+  );
+}
+
+const figure = (key, title, value, cell, hint) => ({
+  key,
+  title,
+  class: 'figure',
+  hint,
+  sort: value,
+  cell: cell ?? ((row) => format.fixed(value(row))),
+});
+
+const nodeColumns = (own) => [
+  {
+    key: 'node',
+    title: 'Daemon',
+    head: true,
+    sort: (n) => n.node,
+    cell: (n) => (
+      <>
+        {n.node}
+        {n.node === own && (
+          <>
+            {' '}
+            <span class="flag calm">answers you</span>
+          </>
+        )}
+      </>
+    ),
+  },
+  { key: 'alive', title: 'State', sort: (n) => (n.alive ? 1 : 0), cell: (n) => <Alive node={n} /> },
+  { key: 'address', title: 'Address', sort: (n) => n.address, cell: (n) => n.address },
+  { key: 'version', title: 'Version', sort: (n) => n.version, cell: (n) => n.version },
+  figure(
+    'joined',
+    'Joined',
+    (n) => n.joined_s,
+    (n) => ago(n.joined_s),
+  ),
+  figure(
+    'lease',
+    'Lease left',
+    (n) => n.lease_left_s,
+    (n) => (n.lease_left_s > 0 ? format.span(n.lease_left_s) : 'lapsed'),
+    'until others take its robots, unless it renews',
+  ),
+  figure('kept', 'Keeps', (n) => n.robots_kept),
+  figure('heard', 'Hears', (n) => n.robots_heard),
+];
+
+// Seconds of a running mission that are not stored yet; null where none runs.
+function lagOf(lease, state) {
+  if (!state?.mission || lease.stored_utime_us === null || state.utime_us === null) return null;
+  return Math.max(0, (state.utime_us - lease.stored_utime_us) * 1e-6);
+}
+
+function Lag({ second }) {
+  if (second === null) return <span class="note">–</span>;
+  return <span class={second > lateStoredS ? 'fault' : ''}>{format.span(second)}</span>;
+}
+
+const leaseColumns = [
+  {
+    key: 'robot',
+    title: 'Robot',
+    head: true,
+    sort: (l) => l.robot_id,
+    cell: (l) => <a href={robotLink(l.robot_id)}>{l.robot_id}</a>,
+  },
+  {
+    key: 'node',
+    title: 'Kept by',
+    sort: (l) => l.node ?? '',
+    cell: (l) => l.node ?? <span class="fault">nobody</span>,
+  },
+  figure(
+    'taken',
+    'Since',
+    (l) => l.taken_s,
+    (l) => format.span(l.taken_s),
+  ),
+  figure(
+    'lag',
+    'Lag',
+    (l) => l.lag,
+    (l) => <Lag second={l.lag} />,
+    'from the newest sample of a running mission back to the last stored one',
+  ),
+  figure('takeovers', 'Takeovers', (l) => l.takeovers, undefined, 'from daemons that were gone'),
+  figure('epoch', 'Epoch', (l) => l.epoch, undefined, 'grows with every change of the keeper'),
+];
+
+function Summary({ nodes, leases }) {
+  const sum = (of) => leases.reduce((total, lease) => total + of(lease), 0);
+  const alive = nodes.filter((n) => n.alive).length;
+  const homeless = sum((l) => (l.node === null ? 1 : 0));
+  const lags = leases.map((l) => l.lag).filter((s) => s !== null);
+  return (
+    <dl class="readouts">
+      <Readout large label="Daemons alive" of={`${alive}`} note={`of ${nodes.length}`} />
+      <Readout large label="Robots kept" of={`${leases.length - homeless}`} note={`of ${leases.length}`} />
+      <Readout large label="Takeovers" of={format.fixed(sum((l) => l.takeovers))} />
+      <Readout
+        large
+        label="Greatest lag"
+        of={lags.length > 0 ? format.span(Math.max(...lags)) : '–'}
+        note={lags.length > 0 ? '' : 'no mission runs'}
+      />
+    </dl>
+  );
+}
+
+const ownFacts = [
+  ['takeovers', 'Robots taken from daemons that were gone'],
+  ['handovers', 'Robots given to daemons that joined or hear them'],
+  ['missions_resumed', 'Open missions taken over'],
+  ['held_messages', 'Messages held for robots that others keep'],
+  ['held_messages_dropped', 'Held messages dropped for want of room'],
+  ['commands_dropped', 'Records dropped, since another daemon keeps the robot'],
+  ['memberships_lost', 'Times that it was away for longer than the lease'],
+];
+
+function Own({ own }) {
+  return (
+    <table class="facts counts">
+      <tbody>
+        {ownFacts.map(([key, name]) => (
+          <tr key={key}>
+            <th scope="row">{name}</th>
+            <td>{format.fixed(own[key])}</td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}
+
+function Leases({ leases }) {
+  const [sort, setSort] = useState({ key: 'robot', down: false });
+  const onSort = (key) => setSort(turned(sort, key));
+  if (leases.length === 0) return <Empty title="No robot has been kept yet" />;
+  return (
+    <>
+      <SortChoice columns={leaseColumns} sort={sort} onSort={onSort} />
+      <Table
+        class="leases"
+        columns={leaseColumns}
+        rows={sorted(leases, leaseColumns, sort)}
+        keyOf={(l) => l.robot_id}
+        sort={sort}
+        onSort={onSort}
+      />
+    </>
+  );
+}
+
+function Shown({ of, live }) {
+  const leases = of.leases.map((l) => ({ ...l, lag: lagOf(l, live.robots.get(l.robot_id)?.state) }));
+  return (
+    <>
+      {of.error && (
+        <div class="failure" role="alert">
+          <p class="empty-title">{of.node} does not reach the database</p>
+          <p>
+            {of.error}. What is shown is as of {ago(of.read_s)}.
+          </p>
+        </div>
+      )}
+      <Summary nodes={of.nodes} leases={leases} />
+      <Panel title="Daemons">
+        <Table class="cluster" columns={nodeColumns(of.node)} rows={of.nodes} keyOf={(n) => n.node} />
+      </Panel>
+      <div class="columns">
+        <Panel title="Robots">
+          <Leases leases={leases} />
+        </Panel>
+        <Panel title={`${of.node}, since it started`}>
+          <Own own={of.own} />
+        </Panel>
+      </div>
+    </>
+  );
+}
+
+export function Cluster() {
+  useTitleOf('Cluster');
+  const live = useLive();
+  const cluster = useGet('/v1/cluster');
+  useEffect(() => {
+    const timer = setInterval(cluster.reload, renewMs);
+    return () => clearInterval(timer);
+  }, []);
+  return (
+    <>
+      <div class="heading">
+        <h1>Cluster{cluster.value?.name && ` ${cluster.value.name}`}</h1>
+        <span class="note">
+          daemons that share the fleet; when one is gone, another goes on with its robots
+        </span>
+      </div>
+      <Answer of={cluster} what="the cluster">
+        {(value) =>
+          value.name === null ? (
+            <Empty title="This daemon is in no cluster">
+              The setting <code>cluster.name</code> puts it into one.
+            </Empty>
+          ) : (
+            <Shown of={value} live={live} />
+          )
+        }
+      </Answer>
+    </>
+  );
+}

@@ -1,0 +1,124 @@
+// Squares of the floor in colours, with the zones that stand out, read by the pointer or by keys.
+import { useRef } from 'preact/hooks';
+import { scaleFor } from '../colour.js';
+import { Canvas, Legend, drawGrid, drawScaleBar, fit } from '../floor.jsx';
+import { palette, useTheme } from '../theme.js';
+import { useNarrow } from '../widgets.jsx';
+
+const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+
+// The nearest square in a direction, which need not touch.
+function stepFrom(cells, at, [dx, dy]) {
+  let best = at;
+  let least = Infinity;
+  for (const cell of cells) {
+    const [x, y] = [cell.x_m - at.x_m, cell.y_m - at.y_m];
+    const along = x * dx + y * dy;
+    const far = along + 3 * Math.abs(x * dy - y * dx);
+    if (along > 1e-9 && far < least) [best, least] = [cell, far];
+  }
+  return best;
+}
+
+function outlineZones(c, view, zones) {
+  const p = palette();
+  c.font = 'bold 13px "Liberation Sans", "Helvetica Neue", Arial, sans-serif';
+  c.textAlign = 'center';
+  c.textBaseline = 'middle';
+  zones.forEach((zone, k) => {
+    const [left, top] = view.to(zone.x_min_m, zone.y_max_m);
+    const [right, bottom] = view.to(zone.x_max_m, zone.y_min_m);
+    c.lineWidth = 4;
+    c.strokeStyle = p.screen;
+    c.strokeRect(left - 2, top - 2, right - left + 4, bottom - top + 4);
+    c.lineWidth = 2;
+    c.strokeStyle = p.ink;
+    c.strokeRect(left - 2, top - 2, right - left + 4, bottom - top + 4);
+    const [x, y] = [right + 11, Math.max(top, 12)];
+    c.fillStyle = p.ink;
+    c.beginPath();
+    c.arc(x, y, 10, 0, 7);
+    c.fill();
+    c.fillStyle = p.screen;
+    c.fillText(String(k + 1), x, y + 1);
+  });
+}
+
+function drawSquares(c, view, { map, value, scale, marked }) {
+  const p = palette();
+  const side = map.cell_m * view.scale;
+  const gap = side > 6 ? 1 : 0;
+  for (const cell of map.cells) {
+    const [x, y] = view.to(cell.x_m, cell.y_m + map.cell_m);
+    const of = value(cell);
+    if (of === null) {
+      c.strokeStyle = p.line;
+      c.lineWidth = 1;
+      c.strokeRect(x + 0.5, y + 0.5, Math.max(1, side - 1 - gap), Math.max(1, side - 1 - gap));
+    } else {
+      c.fillStyle = scale.colourOf(of);
+      c.fillRect(x, y, side - gap, side - gap);
+    }
+  }
+  if (marked === null) return;
+  const [x, y] = view.to(marked.x_m, marked.y_m + map.cell_m);
+  c.lineWidth = 3;
+  c.strokeStyle = p.accent;
+  c.strokeRect(x - 1.5, y - 1.5, side + 3, side + 3);
+}
+
+// `value(cell)`: what its colour shows, null where that is not known. `kind` as of scaleFor().
+export function FloorCanvas({ map, value, kind, title, unit, marked, onMark }) {
+  const view = useRef(null);
+  const narrow = useNarrow();
+  const dark = useTheme();
+  const b = map.bounds;
+  const aspect = (b.y_max_m - b.y_min_m) / (b.x_max_m - b.x_min_m);
+  const wide = narrow ? Math.min(720, innerWidth - 30) : 740; // about
+  const height = Math.round(Math.min(600, 1.3 * wide, Math.max(240, wide * aspect)));
+  const scale = scaleFor(
+    kind,
+    map.cells.map(value).filter((v) => v !== null),
+  );
+  const draw = (c, width, tall) => {
+    const corners = [
+      [b.x_min_m, b.y_min_m],
+      [b.x_max_m, b.y_max_m],
+    ];
+    const v = (view.current = fit(corners, width, tall, 30));
+    drawGrid(c, v);
+    drawSquares(c, v, { map, value, scale, marked });
+    outlineZones(c, v, map.zones);
+    drawScaleBar(c, v);
+  };
+  const point = (event) => {
+    const box = event.currentTarget.getBoundingClientRect();
+    const [x, y] = view.current.from(event.clientX - box.left, event.clientY - box.top);
+    const within = (low, at) => at >= low && at < low + map.cell_m;
+    const cell = map.cells.find((one) => within(one.x_m, x) && within(one.y_m, y));
+    if (cell) onMark(cell);
+  };
+  const key = (event) => {
+    if (event.key === 'Escape') onMark(null);
+    else if (event.key in steps)
+      onMark(marked === null ? map.cells[0] : stepFrom(map.cells, marked, steps[event.key]));
+    else return;
+    event.preventDefault();
+  };
+  return (
+    <div class="floor-box">
+      <Canvas
+        draw={draw}
+        height={height}
+        changes={[map, title, unit, marked, height]}
+        role="application"
+        tabindex="0"
+        label={`Map of the floor: ${title}, ${map.cells.length} squares of ${map.cell_m} metres, ${map.zones.length} zones that stand out. Arrow keys go from square to square; the tables below have the same figures.`}
+        onPointerMove={point}
+        onPointerDown={point}
+        onKeyDown={key}
+      />
+      <Legend scale={scale} dark={dark} title={title} unit={unit} />
+    </div>
+  );
+}

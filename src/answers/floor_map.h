@@ -1,0 +1,102 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "history/floor.h"
+#include "signals/sample.h"
+
+// Where on the floor a fleet spends its energy, and where it spends other than its models say.
+//
+// Each mission is its own standard: what a square takes is compared with what the mission's model says of it
+// times the mission's usual ratio of measured to modelled energy, the median over its squares weighted by
+// modelled energy. So a robot whose model is off everywhere, or whose sensor is, does not mark the floor. The
+// departure of a square is the ratio estimator of all missions' excess over that expectation, its error that
+// of the ratio estimator with missions as the units (Cochran, Sampling Techniques, 2.11 and 6.4).
+//
+// What stands out need not be the floor: a place where all robots turn, brake or climb shows how well the
+// models know turning, braking and climbing.
+namespace joulecast::answers {
+
+inline constexpr std::int64_t least_floor_missions = 5;  // for a departure
+inline constexpr double least_floor_departure = 0.05;    // that may stand out
+inline constexpr std::size_t most_floor_cells = 200'000;
+
+struct FloorCell {
+  double x_m = 0, y_m = 0;  // the corner of least coordinates
+  std::int64_t missions = 0;
+  std::int64_t robots = 0;
+  double covered_s = 0;
+  double distance_m = 0;
+  double energy_j = 0;
+  double measured_j = 0, modelled_j = 0;  // over the seconds in which both are known
+  // Excess over what is expected, as a share of it, with its 95 % interval; NaN: too few missions.
+  double departure = signals::unmeasured;
+  std::array<double, 2> interval{signals::unmeasured, signals::unmeasured};
+  // Departs by least_floor_departure, and by more than chance makes of all squares together (5 %).
+  bool stands_out = false;
+
+  // J/m; NaN where robots stand.
+  double energy_per_distance_j_m(double cell_m) const;
+};
+
+// Squares that touch, by a side or a corner, and stand out in the same direction.
+struct FloorZone {
+  double x_min_m = 0, y_min_m = 0, x_max_m = 0, y_max_m = 0;
+  std::int64_t cells = 0;
+  double covered_s = 0;
+  double distance_m = 0;
+  double departure = 0;
+  double excess_j = 0;  // over what is expected
+};
+
+struct FloorMap {
+  double cell_m = 0;
+  history::FloorReading reading;
+  std::vector<std::string> robots;
+  double covered_s = 0, distance_m = 0, energy_j = 0, measured_j = 0, modelled_j = 0;
+  std::vector<FloorCell> cells;  // the longest visited first
+  std::vector<FloorZone> zones;  // the greatest excess first, whatever its sign
+};
+
+// Sums missions up.
+class FloorMapper {
+ public:
+  explicit FloorMapper(double cell_m) : cell_m_(cell_m) {}
+
+  // False once there are more than most_floor_cells squares.
+  bool add(const history::FloorMission& mission);
+  // Fault::invalid on "cell_m" for more than most_floor_cells squares.
+  Result<FloorMap> finish(const history::FloorReading& reading) const;
+
+ private:
+  // Of the missions that measured: the excess over what was expected and the expected energy, J.
+  struct Departure {
+    std::int64_t missions = 0;
+    double excess_j = 0, expected_j = 0;
+    double excess2 = 0, product = 0, expected2 = 0;
+    void add(double excess_j, double expected_j);
+  };
+  struct Square {
+    FloorCell cell;
+    std::set<std::size_t> robots;
+    Departure departure;
+  };
+  using Place = std::pair<std::int32_t, std::int32_t>;
+  using Squares = std::map<Place, Square>;
+
+  static void judge(std::vector<std::pair<Place, const Departure*>>& of, std::map<Place, FloorCell>& cells);
+  std::vector<FloorZone> zones(const std::map<Place, FloorCell>& cells) const;
+
+  double cell_m_;
+  Squares squares_;
+  std::map<std::string, std::size_t, std::less<>> robots_;
+};
+
+}  // namespace joulecast::answers

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "base/error.h"
+#include "history/records.h"
+
+namespace joulecast::history {
+
+inline constexpr std::int64_t max_floor_points = 1'000'000;  // seconds of missions
+inline constexpr double least_floor_cell_m = 0.1;
+inline constexpr double greatest_floor_cell_m = 100;
+// Positions beyond are no robot's.
+inline constexpr double farthest_floor_m = 1e6;
+
+// What a mission spent within one square of the floor, [column, column + 1) x [row, row + 1) cells from the
+// origin of its robot's map, by the mission's trace: a second belongs to the square of its mean position.
+struct FloorVisit {
+  std::int32_t column = 0, row = 0;
+  double covered_s = 0;
+  double distance_m = 0;  // of the mean speed of each second, whatever its sign
+  double energy_j = 0;    // measured, or modelled where it was not
+  // Over the seconds in which both are known.
+  double measured_j = 0;
+  double modelled_j = 0;
+};
+
+struct FloorMission {
+  MissionKey key = 0;
+  std::string_view robot_id;
+  std::span<const FloorVisit> visits;  // each square at most once, in no order
+};
+
+// What was read of what there is. Missions that were annulled or contradicted do not count.
+struct FloorReading {
+  std::int64_t missions = 0;       // that match
+  std::int64_t missions_read = 0;  // all of them, or an even share where they last longer than was allowed
+  std::int64_t points = 0;         // seconds read
+};
+
+// Takes one mission after the other; false ends the reading.
+using FloorSink = std::function<bool(const FloorMission&)>;
+
+}  // namespace joulecast::history

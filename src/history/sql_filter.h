@@ -1,0 +1,50 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "history/sql.h"
+#include "history/store.h"
+
+// Filters of missions as SQL.
+namespace joulecast::history::queries {
+
+// signals::energy_ratio() and signals::energy_per_distance_wh_km().
+const std::string& ratio_sql();
+const std::string& wh_per_km_sql();
+
+// Annulled missions are in no sum. Of the findings, whose text is as annulled_findings() writes it, only the
+// name of a member has its quotes without a backslash.
+inline constexpr std::string_view not_annulled =
+    " AND (findings_json IS NULL OR findings_json NOT LIKE '%\"annulled\":%')";
+// Nor is anything drawn from missions whose telemetry is contradicted.
+inline constexpr std::string_view not_contradicted =
+    " AND (findings_json IS NULL OR findings_json NOT LIKE '%\"contradictions\":%')";
+
+// Fault::invalid on the field that is at fault.
+Result<void> check_filter(const MissionFilter& filter);
+
+// " WHERE ..." of a filter that was checked and outlives this, which outlives the rows that it is bound to.
+class Where {
+ public:
+  explicit Where(const MissionFilter& filter);
+
+  const std::string& sql() const { return sql_; }
+  void bind(Rows& rows) const;
+  // Tells filters apart for cursors. Text values carry their length, so that no two read alike.
+  std::string identity() const;
+
+ private:
+  // Visits the conditions that are set, each with what it binds.
+  template <class Visit>
+  void visit(Visit visit) const;
+
+  const MissionFilter& filter_;
+  std::string pattern_;
+  std::vector<std::string> states_;
+  std::string sql_ = " WHERE TRUE";
+};
+
+}  // namespace joulecast::history::queries

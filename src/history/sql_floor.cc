@@ -1,0 +1,156 @@
+// Traces summed by squares of the floor. What is read at a time is bounded, however long the history.
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+#include <utility>
+
+#include "history/sql_filter.h"
+#include "history/sql_queries.h"
+
+namespace joulecast::history::queries {
+namespace {
+
+constexpr std::size_t missions_at_once = 32;
+constexpr std::int64_t points_at_once = 50'000;
+
+// Keys in a row are spread over the range as evenly as can be: multiples of the golden section
+// (Knuth, The Art of Computer Programming 3, 6.4), so that robots that take turns are all in a share.
+constexpr const char* spread_key = "(mission_key % 65536) * 40503 % 65536";
+constexpr std::int64_t spread = 65536;
+
+constexpr const char* points_of_mission = "((end_utime_us - start_utime_us) / 1000000 + 2)";
+
+std::string conditions(const Where& where) {
+  return where.sql() + std::string(not_annulled) + std::string(not_contradicted);
+}
+
+// One mission's sums while its points come.
+class Sums {
+ public:
+  explicit Sums(double cell_m) : cell_m_(cell_m) {}
+
+  void add(Rows& row) {
+    const double covered_s = row.real(), measured_w = row.real(), modelled_w = row.real();
+    const double speed_m_s = row.real(), x_m = row.real(), y_m = row.real();
+    const double power_w = std::isnan(measured_w) ? modelled_w : measured_w;
+    if (!(std::fabs(x_m) < farthest_floor_m && std::fabs(y_m) < farthest_floor_m && covered_s > 0)) return;
+    if (std::isnan(power_w)) return;
+    FloorVisit& visit = at(index(x_m), index(y_m));
+    visit.covered_s += covered_s;
+    if (!std::isnan(speed_m_s)) visit.distance_m += std::fabs(speed_m_s) * covered_s;
+    visit.energy_j += power_w * covered_s;
+    if (std::isnan(measured_w) || std::isnan(modelled_w)) return;
+    visit.measured_j += measured_w * covered_s;
+    visit.modelled_j += modelled_w * covered_s;
+  }
+
+  std::vector<FloorVisit> take() {
+    places_.clear();
+    return std::exchange(visits_, {});
+  }
+
+ private:
+  std::int32_t index(double metre) const { return static_cast<std::int32_t>(std::floor(metre / cell_m_)); }
+
+  FloorVisit& at(std::int32_t column, std::int32_t row) {
+    const std::uint64_t place =
+        std::uint64_t{static_cast<std::uint32_t>(column)} << 32 | static_cast<std::uint32_t>(row);
+    const auto [found, is_new] = places_.try_emplace(place, visits_.size());
+    if (is_new) visits_.push_back({.column = column, .row = row});
+    return visits_[found->second];
+  }
+
+  const double cell_m_;
+  std::vector<FloorVisit> visits_;
+  std::unordered_map<std::uint64_t, std::size_t> places_;
+};
+
+const std::string& select_points() {
+  static const std::string sql = [] {
+    std::string keys = "?";
+    for (std::size_t k = 1; k < missions_at_once; ++k) keys += ", ?";
+    // The times tell a database that keeps traces by time where to look.
+    return "SELECT mission_key, covered_s, measured_power_mean_w, modelled_power_mean_w, speed_mean_m_s, "
+           "x_m, y_m FROM trace WHERE mission_key IN (" +
+           keys +
+           ") AND start_utime_us >= ? AND start_utime_us < ? AND x_m IS NOT NULL AND y_m IS NOT NULL "
+           "ORDER BY mission_key";
+  }();
+  return sql;
+}
+
+}  // namespace
+
+Result<FloorChoice> floor_missions(Database& database, const MissionFilter& filter, std::int64_t max_points) {
+  if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_limit("max_points", max_points, max_floor_points); !ok)
+    return tl::unexpected(ok.error());
+  const Where where(filter);
+  FloorChoice choice;
+  std::int64_t points = 0;
+  {
+    const auto statement =
+        database.prepare("SELECT count(*), CAST(coalesce(sum(" + std::string(points_of_mission) +
+                         "), 0) AS BIGINT) FROM mission" + conditions(where));
+    Rows rows(*statement);
+    where.bind(rows);
+    if (rows.next()) {
+      choice.missions = rows.integer();
+      points = rows.integer();
+    }
+  }
+  // A share is even, but not to the point.
+  const double share =
+      points > max_points ? 0.95 * static_cast<double>(max_points) / static_cast<double>(points) : 1;
+  const auto statement = database.prepare(
+      "SELECT mission_key, robot_id, start_utime_us, end_utime_us, " + std::string(points_of_mission) +
+      " FROM mission" + conditions(where) + " AND " + spread_key + " < ? ORDER BY mission_key");
+  Rows rows(*statement);
+  where.bind(rows);
+  rows.bind(std::max<std::int64_t>(1, static_cast<std::int64_t>(share * static_cast<double>(spread))));
+  std::int64_t left = max_points;
+  while (rows.next()) {
+    FloorChoice::Chosen next{.key = rows.integer(), .robot_id = rows.text()};
+    next.from_utime_us = rows.integer();
+    next.to_utime_us = rows.integer();
+    next.points = rows.integer();
+    if ((left -= next.points) < 0 && !choice.chosen.empty()) break;
+    choice.chosen.push_back(std::move(next));
+  }
+  return choice;
+}
+
+std::size_t next_at_once(std::span<const FloorChoice::Chosen> chosen) {
+  std::size_t count = 0;
+  std::int64_t points = 0;
+  while (count < chosen.size() && count < missions_at_once &&
+         (count == 0 || points + chosen[count].points <= points_at_once))
+    points += chosen[count++].points;
+  return count;
+}
+
+Result<FloorSums> floor_sums(Database& database, std::span<const FloorChoice::Chosen> chosen, double cell_m) {
+  FloorSums sums;
+  sums.visits.resize(chosen.size());
+  if (chosen.empty()) return sums;
+  using Chosen = FloorChoice::Chosen;
+  Rows rows(database.statement(select_points()));
+  for (std::size_t k = 0; k < missions_at_once; ++k) rows.bind(chosen[std::min(k, chosen.size() - 1)].key);
+  rows.bind(std::ranges::min(chosen, {}, &Chosen::from_utime_us).from_utime_us - trace_bucket_us);
+  rows.bind(std::ranges::max(chosen, {}, &Chosen::to_utime_us).to_utime_us + trace_bucket_us);
+  Sums mission(cell_m);
+  std::size_t at = 0;
+  while (rows.next()) {
+    const MissionKey key = rows.integer();
+    if (chosen[at].key != key) {
+      sums.visits[at] = mission.take();
+      while (chosen[at].key != key) ++at;
+    }
+    mission.add(rows);
+    ++sums.points;
+  }
+  sums.visits[at] = mission.take();
+  return sums;
+}
+
+}  // namespace joulecast::history::queries
