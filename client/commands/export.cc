@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/output_file.h"
+#include "client/commands/accepts.h"
 #include "client/commands/parse_time.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
@@ -112,7 +113,7 @@ CLI::App* add(CLI::App& group, const char* name, const char* what, Options& opti
 void add_mission(CLI::App& command, Options& options) {
   command.add_option("--mission", options.mission, "number of the mission, as joulecast missions lists it")
       ->required()
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
 }
 
 }  // namespace
