@@ -31,7 +31,7 @@ constexpr std::size_t most_effects = 16;
 struct ModelRequest {
   const json* model = nullptr;
   std::optional<std::int64_t> diagnosis_id, proposal_id, version;
-  std::vector<std::string> effects;  // of those that the diagnosis does not tell apart, the ones to adopt
+  std::vector<std::string> effects;  // of those that the diagnosis does not distinguish, the ones to adopt
   std::optional<std::string> note;
   std::optional<std::int64_t> since_utime_us, expected_version;
   bool force = false, dry_run = false;
