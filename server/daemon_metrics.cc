@@ -123,6 +123,8 @@ void export_writer(Metrics& metrics, const history::Writer& writer) {
   const Counter seconds = metrics.counter("joulecast_store_commit_seconds_total", "Time spent in commits");
   const Counter pruned_missions =
       metrics.counter("joulecast_store_pruned_missions_total", "Missions dropped by the retention");
+  const Counter pruned_events =
+      metrics.counter("joulecast_store_pruned_events_total", "Events dropped by the retention");
   const Counter pruned_chunks = metrics.counter("joulecast_store_pruned_chunks_total",
                                                 "Raw telemetry chunks that the retention dropped");
   metrics.before_scrape([=, &writer] {
@@ -138,6 +140,7 @@ void export_writer(Metrics& metrics, const history::Writer& writer) {
     refused.raise_to(static_cast<double>(status.refused));
     seconds.raise_to(status.total_commit_s);
     pruned_missions.raise_to(static_cast<double>(status.pruned_missions));
+    pruned_events.raise_to(static_cast<double>(status.pruned_events));
     pruned_chunks.raise_to(static_cast<double>(status.pruned_chunks));
   });
 }

@@ -15,7 +15,20 @@ extern const std::string_view postgres_cluster_sql;  // schemas/cluster.postgres
 namespace {
 
 std::span<const Migration> postgres_migrations() {
-  static const std::array migrations{Migration{1, postgres_cluster_sql}};
+  static const std::array migrations{Migration{1, postgres_cluster_sql},
+                                     Migration{2, R"sql(CREATE TABLE request_answer (
+  actor TEXT COLLATE "C" NOT NULL,  -- name of a token; empty: nobody who is known
+  idempotency_key TEXT COLLATE "C" NOT NULL CHECK (idempotency_key <> ''),
+  fingerprint TEXT NOT NULL,
+  utime_us BIGINT NOT NULL,
+  status BIGINT NOT NULL,    -- of HTTP
+  location TEXT NOT NULL,  -- its Location header; empty: none
+  body TEXT NOT NULL,
+  PRIMARY KEY (actor, idempotency_key)
+);
+
+CREATE INDEX request_answer_by_age ON request_answer (utime_us);
+)sql"}};
   return migrations;
 }
 

@@ -7,7 +7,7 @@
 
 namespace joulecast::history {
 
-inline constexpr std::int64_t postgres_schema_version = 2;
+inline constexpr std::int64_t postgres_schema_version = 3;
 
 // Brings the current schema of a PostgreSQL database (the first of its search_path) to
 // schemas/store.postgresql.sql and cluster.postgresql.sql, all in one transaction: creates the tables where
