@@ -51,7 +51,7 @@ class Progress {
 };
 
 // The line's text for a terminal `width` columns wide, without control characters: a bar where the total is
-// known, the rate, and the time left once it can be told.
+// known, the rate, and the time left once it can be estimated.
 [[nodiscard]] std::string progress_line(const std::string& work, const std::string& unit, std::uint64_t done,
                                         std::uint64_t total, double elapsed_s, int width);
 

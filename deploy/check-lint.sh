@@ -7,7 +7,7 @@ cd "$(dirname "$0")/.."
 # which growth does not invalidate; macros and concepts that it cannot parse).
 cppcheck --std=c++20 --language=c++ --enable=warning,portability --inline-suppr --quiet --error-exitcode=1 -j "$(nproc)" \
   --suppress=missingIncludeSystem --suppress=internalAstError --suppress=syntaxError --suppress=accessMoved \
-  --suppress=invalidContainer --suppress=duplicateAssignExpression -I src -I . src server client
+  --suppress=invalidContainer --suppress=duplicateAssignExpression -I src -I . src server client tests/study
 # eslint and prettier in the versions of server/web/package-lock.json; npm brings them once.
 lock=server/web/package-lock.json
 tools=server/web/node_modules
@@ -19,5 +19,5 @@ cmp -s "$lock" "$tools/.installed.json" || {
 "$tools/.bin/prettier" --config server/web/.prettierrc.json --log-level warn --check \
   'server/web/*.mjs' 'server/web/source/**/*.{js,jsx,css}' 'tests/web/*.mjs'
 if [ $# -gt 0 ]; then
-  git ls-files -- 'src/*.cc' 'server/*.cc' 'client/*.cc' | xargs -P "$(nproc)" -n 4 clang-tidy -p "$1" --quiet
+  git ls-files -- 'src/*.cc' 'server/*.cc' 'client/*.cc' 'tests/study/*.cc' | xargs -P "$(nproc)" -n 4 clang-tidy -p "$1" --quiet
 fi

@@ -10,17 +10,7 @@ lcm="udpm://239.255.76.67:7669?ttl=0&recv_buf_size=4194304"
 nodes=(one two three)
 robots=30
 
-end_programs() {
-  local file
-  for file in "$home"/*.pid; do
-    [ -e "$file" ] || continue
-    # After a restart of the machine the number may be another program's.
-    case "$(readlink "/proc/$(cat "$file")/exe" 2>/dev/null || true)" in
-      "$PWD"/build/demo-build/*) kill "$(cat "$file")" 2>/dev/null || true ;;
-    esac
-    rm -f "$file"
-  done
-}
+. deploy/demo_programs.sh
 stop() {
   end_programs
   sleep 2
@@ -43,8 +33,7 @@ if [ "${1:-}" = stop ]; then
 fi
 
 deploy/install-dependencies.sh postgresql
-cmake --preset release -DJOULECAST_TESTS=OFF -B build/demo-build >/dev/null
-cmake --build build/demo-build --target joulecastd joulecast
+build_programs
 stop
 mkdir -p "$home"
 # Where a user that is not root may go, and a socket's path is short.
@@ -55,13 +44,7 @@ primary="$databases/db1" standby="$databases/db2"
 mkdir "$primary" "$standby"
 database="postgresql://joulecast@/postgres?host=$primary,$standby&target_session_attrs=read-write"
 
-# LCM travels by multicast over the loopback interface.
-if ! ip route get 239.255.76.67 >/dev/null 2>&1; then
-  sudo=()
-  [ "$(id -u)" -eq 0 ] || sudo=(sudo)
-  "${sudo[@]}" ip link set lo multicast on
-  "${sudo[@]}" ip route add 224.0.0.0/4 dev lo
-fi
+route_multicast
 
 sql() { psql "$database" -XqtAF ' ' -c "$1"; }
 start() { # which daemon

@@ -8,28 +8,17 @@ port="${DEMO_PORT:-8080}"
 url="http://127.0.0.1:$port"
 home="build/demo"
 
-stop() {
-  local file
-  for file in "$home"/*.pid; do
-    [ -e "$file" ] || continue
-    # After a restart of the machine the number may be another program's.
-    case "$(readlink "/proc/$(cat "$file")/exe" 2>/dev/null || true)" in
-      "$PWD"/build/demo-build/*) kill "$(cat "$file")" 2>/dev/null || true ;;
-    esac
-    rm -f "$file"
-  done
-}
+. deploy/demo_programs.sh
 if [ "${1:-}" = stop ]; then
-  stop
+  end_programs
   echo "stopped"
   exit 0
 fi
 
 deploy/install-dependencies.sh
-cmake --preset release -DJOULECAST_TESTS=OFF -B build/demo-build >/dev/null
-cmake --build build/demo-build --target joulecastd joulecast
+build_programs
 mkdir -p "$home"
-stop
+end_programs
 
 for _ in $(seq 50); do
   curl -s -o /dev/null "$url" || break
@@ -40,13 +29,7 @@ if curl -s -o /dev/null "$url"; then
   exit 1
 fi
 
-# LCM travels by multicast over the loopback interface.
-if ! ip route get 239.255.76.67 >/dev/null 2>&1; then
-  sudo=()
-  [ "$(id -u)" -eq 0 ] || sudo=(sudo)
-  "${sudo[@]}" ip link set lo multicast on
-  "${sudo[@]}" ip route add 224.0.0.0/4 dev lo
-fi
+route_multicast
 
 build/demo-build/server/joulecastd --store-path "$home/history.db" --http-port "$port" >"$home/joulecastd.log" 2>&1 &
 echo $! >"$home/joulecastd.pid"

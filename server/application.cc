@@ -175,7 +175,7 @@ struct Application::Parts {
         }) {}
 
   ~Parts() {
-    (void)stop();
+    (void)stop();  // what did not end has been logged, and whoever asks how it went calls stop() before
     observe_faults({});
   }
 
@@ -341,7 +341,13 @@ struct Application::Parts {
     Result<std::unique_ptr<http::Gate>> opened =
         http::Gate::open({.token_file = settings.text("auth.token_file"),
                           .now_utime_us = host_utime_us,
-                          .audit = audit_into(*writer)});
+                          .audit = audit_into(*writer),
+                          .not_audited = [](const http::AccessEvent& event, const Error& error) {
+                            log_error("not audited", {{"operation", event.action},
+                                                      {"request_id", event.request_id},
+                                                      {"actor", event.actor},
+                                                      {"cause", describe(error)}});
+                          }});
     if (!opened) return tl::unexpected(std::move(opened.error()));
     gate = std::move(*opened);
     idempotency = std::make_unique<http::IdempotencyKeys>(answers_in(*store, *writer));
@@ -372,7 +378,10 @@ struct Application::Parts {
       log_error("internal fault", Error{Fault::internal, std::string(part), std::string(why)});
       JsonWriter detail;
       detail.begin_object().field("part", part).field("why", why).end_object();
-      (void)writer.offer(history::AppendEvent{{0, host_utime_us(), "", "internal_fault", detail.take()}});
+      if (const auto kept =
+              writer.offer(history::AppendEvent{{0, host_utime_us(), "", "internal_fault", detail.take()}});
+          !kept)
+        log_error("internal fault is not in the log of events", kept.error());
     });
   }
 
@@ -380,10 +389,10 @@ struct Application::Parts {
   bool stop() {
     if (stopped.exchange(true)) return true;
     if (cluster) cluster->settle_down();
-    const milliseconds patience(std::llround(1e3 * settings.number("http.stop_deadline_s")));
-    std::future<bool> http_ended = std::async(std::launch::async, [this, patience] {
-      return within(patience + milliseconds(500), [this, patience] {
-        if (http && !http->stop(patience)) log_warning("requests were cut off at the stop deadline");
+    const milliseconds grace(std::llround(1e3 * settings.number("http.stop_deadline_s")));
+    std::future<bool> http_ended = std::async(std::launch::async, [this, grace] {
+      return within(grace + milliseconds(500), [this, grace] {
+        if (http && !http->stop(grace)) log_warning("requests were cut off at the stop deadline");
       });
     });
     bool ended = within(milliseconds(3000), [this] {

@@ -15,9 +15,9 @@ std::string rounded(JsonWriter& json) {
 
 }  // namespace
 
-void FleetEvents::tell_contradictions(const ingest::RobotSnapshot& now, Told& told) {
+void FleetEvents::publish_contradictions(const ingest::RobotSnapshot& now, Published& published) {
   for (const ingest::Contradiction& c : now.contradictions) {
-    std::int64_t& last = told.contradictions[c.id + ' ' + c.channel];
+    std::int64_t& last = published.contradictions[c.id + ' ' + c.channel];
     if (last == c.told_utime_us) continue;
     last = c.told_utime_us;
     JsonWriter json;
@@ -29,15 +29,15 @@ void FleetEvents::tell_contradictions(const ingest::RobotSnapshot& now, Told& to
 }
 
 void FleetEvents::publish(std::int64_t now_utime_us) {
-  std::erase_if(told_, [&](const auto& each) { return fleet_.find(each.first) == nullptr; });
+  std::erase_if(published_, [&](const auto& each) { return fleet_.find(each.first) == nullptr; });
   recent_.keep([&](const std::string& id) { return fleet_.find(id) != nullptr; });
   for (const auto& snapshot : fleet_.all()) {
     recent_.take(*snapshot);
-    Told& told = told_[snapshot->robot_id];
+    Published& published = published_[snapshot->robot_id];
     const bool live = api::is_live(*snapshot, now_utime_us);
-    if (told.snapshot != nullptr && told.snapshot->mission_key > 0 &&
-        told.snapshot->mission_key != snapshot->mission_key) {
-      if (const auto mission = store_.mission(told.snapshot->mission_key)) {
+    if (published.snapshot != nullptr && published.snapshot->mission_key > 0 &&
+        published.snapshot->mission_key != snapshot->mission_key) {
+      if (const auto mission = store_.mission(published.snapshot->mission_key)) {
         JsonWriter json;
         answers::write_mission(json, *mission);
         const std::string text = rounded(json);
@@ -45,16 +45,16 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
         mission_ended_(*mission, text);
       }
     }
-    if (told.snapshot == snapshot && told.live == live) continue;
-    tell_contradictions(*snapshot, told);
+    if (published.snapshot == snapshot && published.live == live) continue;
+    publish_contradictions(*snapshot, published);
     const auto model = models_.find(snapshot->robot_id);
     JsonWriter json;
     std::optional<forecast::Reach> reach;
     if (model != nullptr) reach = forecasts_.reach(model, *snapshot);
     api::write_state(json, *snapshot, reach, now_utime_us);
     hub_.publish_newest("state", rounded(json), snapshot->robot_id);
-    told.snapshot = snapshot;
-    told.live = live;
+    published.snapshot = snapshot;
+    published.live = live;
   }
 }
 

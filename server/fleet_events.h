@@ -17,10 +17,10 @@ namespace joulecast::server {
 
 // Tells the event stream what changed in the fleet: `state` for each robot whose snapshot is new, `mission`
 // for each mission that ended, `contradiction` for each
-// contradiction that is told. Keeps the last values of each robot. One thread.
+// contradiction that is published. Keeps the last values of each robot. One thread.
 class FleetEvents {
  public:
-  // Also told of each mission that ended: the mission, and itself as JSON.
+  // Also called with each mission that ended: the mission, and itself as JSON.
   using MissionSink = std::function<void(const history::Mission&, const std::string& json)>;
 
   FleetEvents(const ingest::FleetView& fleet, ingest::RecentValues& recent,
@@ -37,12 +37,12 @@ class FleetEvents {
   void publish(std::int64_t now_utime_us);
 
  private:
-  struct Told {
+  struct Published {
     std::shared_ptr<const ingest::RobotSnapshot> snapshot;
     bool live = false;
-    std::map<std::string, std::int64_t> contradictions;  // host's time when each was told
+    std::map<std::string, std::int64_t> contradictions;  // host's time when each was published
   };
-  void tell_contradictions(const ingest::RobotSnapshot& now, Told& told);
+  void publish_contradictions(const ingest::RobotSnapshot& now, Published& published);
 
   const ingest::FleetView& fleet_;
   ingest::RecentValues& recent_;
@@ -51,7 +51,7 @@ class FleetEvents {
   const history::Store& store_;
   http::EventHub& hub_;
   const MissionSink mission_ended_;
-  std::map<std::string, Told> told_;
+  std::map<std::string, Published> published_;
 };
 
 }  // namespace joulecast::server

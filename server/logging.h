@@ -30,9 +30,6 @@ bool log_enabled(LogLevel level);
 std::string format_log_line(LogFormat format, LogLevel level, std::string_view message,
                             const LogFields& fields, std::int64_t utime_us);
 
-inline void log_debug(std::string_view message, const LogFields& fields = {}) {
-  log(LogLevel::debug, message, fields);
-}
 inline void log_info(std::string_view message, const LogFields& fields = {}) {
   log(LogLevel::info, message, fields);
 }

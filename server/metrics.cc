@@ -32,26 +32,25 @@ void check_name(const std::string& name, bool is_counter) {
 }  // namespace
 
 void Counter::add(double amount) const {
-  if (counter_ != nullptr) static_cast<prometheus::Counter*>(counter_)->Increment(amount);
+  if (counter_ != nullptr) counter_->Increment(amount);
 }
 
 void Counter::raise_to(double total) const {
   if (counter_ == nullptr) return;
-  auto* counter = static_cast<prometheus::Counter*>(counter_);
-  const double missing = total - counter->Value();
-  if (missing > 0) counter->Increment(missing);
+  const double missing = total - counter_->Value();
+  if (missing > 0) counter_->Increment(missing);
 }
 
 void Gauge::set(double value) const {
-  if (gauge_ != nullptr) static_cast<prometheus::Gauge*>(gauge_)->Set(value);
+  if (gauge_ != nullptr) gauge_->Set(value);
 }
 
 void Gauge::add(double amount) const {
-  if (gauge_ != nullptr) static_cast<prometheus::Gauge*>(gauge_)->Increment(amount);
+  if (gauge_ != nullptr) gauge_->Increment(amount);
 }
 
 void Histogram::observe(double value) const {
-  if (histogram_ != nullptr) static_cast<prometheus::Histogram*>(histogram_)->Observe(value);
+  if (histogram_ != nullptr) histogram_->Observe(value);
 }
 
 struct Metrics::State {

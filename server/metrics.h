@@ -8,6 +8,12 @@
 #include <utility>
 #include <vector>
 
+namespace prometheus {
+class Counter;
+class Gauge;
+class Histogram;
+}  // namespace prometheus
+
 // Prometheus metrics behind handles. Names are joulecast_<what>_<base unit>[_total]; a label's values are
 // fixed when the metric is made, so that no client can make their number grow. Handles are small, copyable,
 // usable from any thread, and valid as long as the Metrics they come from.
@@ -22,8 +28,8 @@ class Counter {
 
  private:
   friend class Metrics;
-  explicit Counter(void* counter) : counter_(counter) {}
-  void* counter_ = nullptr;  // null: counts nothing
+  explicit Counter(prometheus::Counter* counter) : counter_(counter) {}
+  prometheus::Counter* counter_ = nullptr;  // null: counts nothing
 };
 
 class Gauge {
@@ -34,8 +40,8 @@ class Gauge {
 
  private:
   friend class Metrics;
-  explicit Gauge(void* gauge) : gauge_(gauge) {}
-  void* gauge_ = nullptr;
+  explicit Gauge(prometheus::Gauge* gauge) : gauge_(gauge) {}
+  prometheus::Gauge* gauge_ = nullptr;
 };
 
 class Histogram {
@@ -45,8 +51,8 @@ class Histogram {
 
  private:
   friend class Metrics;
-  explicit Histogram(void* histogram) : histogram_(histogram) {}
-  void* histogram_ = nullptr;
+  explicit Histogram(prometheus::Histogram* histogram) : histogram_(histogram) {}
+  prometheus::Histogram* histogram_ = nullptr;
 };
 
 using Labels = std::vector<std::pair<std::string, std::string>>;

@@ -31,7 +31,7 @@ constexpr Setting table[] = {
      "alone, TLS 1.2 or newer"},
     {"http.tls_key", Type::text, "", 0, 0, "", "PEM file of the certificate's private key"},
     {"http.tls_client_authorities", Type::text, "", 0, 0, "",
-     "PEM file of certificate authorities: only clients with a certificate of one of them are spoken to"},
+     "PEM file of certificate authorities: only clients with a certificate of one of them are accepted"},
     {"http.insecure", Type::boolean, "false", 0, 0, "",
      "let everybody who reaches http.address do everything, though there are no tokens"},
     {"http.port", Type::integer, "8080", 0, 65535, "", "port to listen on; 0 lets the system choose"},
@@ -82,7 +82,7 @@ constexpr Setting table[] = {
      "empty: none is needed"},
 
     {"webhooks.file", Type::text, "", 0, 0, "",
-     "file of the URLs that are told of events, see operations.md; empty: none"},
+     "file of the URLs that receive events, see operations.md; empty: none"},
     {"webhooks.queue", Type::integer, "1000", 1, 1000000, "",
      "events that may wait for one of these; beyond: the oldest is dropped and counted"},
 
@@ -128,7 +128,8 @@ constexpr Setting table[] = {
     {"ingest.implicit_missions", Type::boolean, "true", 0, 0, "",
      "open a mission for a robot that sends telemetry without having announced one"},
     {"ingest.max_unknown_robots", Type::integer, "100", 0, 1000000, "",
-     "ids without a model whose messages are counted apart, silent ones give way after a minute; robots with "
+     "ids without a model whose messages are counted apart, silent ones are discarded after a minute; robots "
+     "with "
      "a model "
      "are always followed"},
     {"ingest.reorder_s", Type::number, "0.5", 0, 60, "s",

@@ -9,10 +9,10 @@ namespace joulecast::server {
 void export_webhook_metrics(Metrics& metrics, const Webhooks& webhooks) {
   metrics.series([&webhooks] {
     std::vector<Metrics::Series> all{
-        {"joulecast_webhook_delivered_total", "Events that a webhook took"},
-        {"joulecast_webhook_failed_total", "Attempts to tell an event that failed"},
-        {"joulecast_webhook_dropped_total", "Events left out since too many waited (webhooks.queue)"},
-        {"joulecast_webhook_given_up_total", "Events left out after their last attempt"},
+        {"joulecast_webhook_delivered_total", "Events delivered"},
+        {"joulecast_webhook_failed_total", "Attempts to deliver an event that failed"},
+        {"joulecast_webhook_dropped_total", "Events dropped since too many waited (webhooks.queue)"},
+        {"joulecast_webhook_given_up_total", "Events dropped after their last attempt"},
         {"joulecast_webhook_waiting", "Events that wait for a webhook"}};
     for (const auto& [url, counts] : webhooks.status()) {
       const Labels labels{{"url", url}};

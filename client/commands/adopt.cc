@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/json_text.h"
+#include "client/commands/accepts.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/files.h"
@@ -119,17 +120,16 @@ void add_adopt(CLI::App& program, Exit& exit) {
   add_server(*command, options->server);
   command->add_option("--robot-id", options->robot_id, "robot whose model it is to be")->required();
   auto* what = command->add_option_group("what");
-  what->add_option("--proposal", options->proposal, "a proposal, by its number")->check(CLI::PositiveNumber);
-  what->add_option("--diagnosis", options->diagnosis, "what this diagnosis found")
-      ->check(CLI::PositiveNumber);
+  what->add_option("--proposal", options->proposal, "a proposal, by its number")->check(positive());
+  what->add_option("--diagnosis", options->diagnosis, "what this diagnosis found")->check(positive());
   what->add_option("--version", options->version, "a stored version again, without a back-test")
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
   what->add_option("--model", options->model_file, "a robot file");
   what->require_option(1);
   command->add_option("--effect", options->effects,
-                      "with --diagnosis: the one to adopt of effects that it does not tell apart");
+                      "with --diagnosis: the one to adopt of effects that it does not distinguish");
   command->add_option("--note", options->note, "why, for the list of versions");
-  command->add_flag("--force", options->force, "also where the back-test or the diagnosis speaks against it");
+  command->add_flag("--force", options->force, "also against the back-test or the diagnosis");
   command->add_flag("--dry-run", options->dry_run, "test only");
   command->add_flag("--json", options->json, "print the answer as the server sends it");
   command->callback([options, &exit] { exit = adopt(*options); });

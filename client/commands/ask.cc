@@ -19,6 +19,7 @@
 #include "answers/json/estimate_json.h"
 #include "answers/json/profile_json.h"
 #include "base/json_text.h"
+#include "client/commands/accepts.h"
 #include "client/commands/examples.h"
 #include "client/commands/print_autonomy.h"
 #include "client/commands/table.h"
@@ -230,18 +231,18 @@ void print_ledger(const json& ledger) {
       fmt::print("  {:<20} {:>12.3f} J\n", term, joules.get<double>());
 }
 
-// What less time would cost, and how little the limits allow.
-void print_haste(double duration_s, const json& certificate) {
+// What less time would cost, and the shortest time that the limits allow.
+void print_price_of_time(double duration_s, const json& certificate) {
   const double shortest_s = number(certificate, "shortest_time_s"),
                price_w = number(certificate, "time_multiplier_w");
   if (duration_s <= shortest_s * (1 + answers::at_the_limit)) {
     fmt::print("no faster time is possible: the robot is at its limits\n");
     return;
   }
-  constexpr double dear_w = 0.005;  // less is not worth a word
+  constexpr double least_shown_w = 0.005;
   const std::string least =
       std::isfinite(shortest_s) ? fmt::format("; the robot's limits allow {:.2f} s at best", shortest_s) : "";
-  if (!(price_w >= dear_w)) {
+  if (!(price_w >= least_shown_w)) {
     fmt::print("this is the cheapest time{}\n", least);
   } else if (duration_s - shortest_s < 1) {
     fmt::print("less time would cost {:.3g} J a second or more{}\n", price_w, least);
@@ -256,7 +257,7 @@ void print_profile(json a) {
              number(a, "peak_power_w"), number(a, "braking_j"), number(a, "recovered_j"));
   const json& c = a["certificate"];
   fmt::print("{}: at most {:.3g} J above the optimum\n", c.value("method", ""), number(c, "gap_j"));
-  print_haste(number(a, "duration_s"), c);
+  print_price_of_time(number(a, "duration_s"), c);
   for (const auto& [shape, baseline] : a["baselines"].items()) {
     if (baseline.is_null()) continue;
     fmt::print("against a {:<10} {:>10.2f} J, {:.1f} % saved{}\n", shape, number(baseline, "energy_j"),
@@ -338,7 +339,7 @@ std::pair<CLI::App*, std::shared_ptr<Options>> add(CLI::App& program, Exit& exit
       "--request", options->request_file,
       "request as JSON (schemas/*-request.schema.json), - for standard input; flags override it");
   command->add_option("--timeout", options->timeout_s, "seconds to wait for the server")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->capture_default_str();
   command->add_flag("--json", options->json, "print the answer as the server sends it");
   add_example(*command, question.example);
@@ -366,7 +367,7 @@ void add_driving(CLI::App& command, Options& options, const char* help) {
   command
       .add_option("--driving", options.texts.emplace_back(Member<std::string>{"--driving", "driving"}).value,
                   help)
-      ->check(CLI::IsMember({"usual", "minimum_energy"}));
+      ->check(one_of({"usual", "minimum_energy"}));
 }
 
 void add_drive_flags(CLI::App& command, Options& options) {
@@ -420,7 +421,7 @@ void add_autonomy(CLI::App& program, Exit& exit) {
       ->add_option("--dialect",
                    options->texts.emplace_back(Member<std::string>{"--dialect", "dialect"}).value,
                    "answer as another standard's battery message")
-      ->check(CLI::IsMember(
+      ->check(one_of(
           std::vector<std::string>(std::begin(answers::dialect_names), std::end(answers::dialect_names))));
 }
 

@@ -53,7 +53,8 @@ Exit verify(const Options& options) {
 }  // namespace
 
 void add_audit(CLI::App& program, Exit& exit) {
-  auto* group = program.add_subcommand("audit", "Who changed what, and who was refused, by a store's audit");
+  auto* group = program.add_subcommand(
+      "audit", "List and verify a store's audit: who changed what, and who was refused");
   group->require_subcommand(1);
   auto options = std::make_shared<Options>();
   const auto add = [&](const char* name, const char* what, Exit (*run)(const Options&)) {

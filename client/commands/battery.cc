@@ -2,7 +2,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -10,6 +9,7 @@
 
 #include "battery/circuit.h"
 #include "battery/prediction.h"
+#include "client/commands/accepts.h"
 #include "client/commands/table.h"
 #include "robot/robot_file.h"
 
@@ -25,7 +25,8 @@ struct Options {
   bool json = false;
 };
 
-const std::map<std::string, Load::Kind> kinds{{"current", Load::Kind::current}, {"power", Load::Kind::power}};
+const std::vector<std::pair<std::string, Load::Kind>> kinds{{"current", Load::Kind::current},
+                                                            {"power", Load::Kind::power}};
 
 struct Predicted {
   std::vector<battery::Prediction> done;
@@ -132,7 +133,7 @@ void add_battery(CLI::App& program, Exit& exit) {
   command->add_option("--battery", options->battery, "battery object of a robot file, as calibrate writes it")
       ->required();
   command->add_option("--from", options->from, "what of the recording is given to the model")
-      ->transform(CLI::CheckedTransformer(kinds))
+      ->transform(one_of(kinds))
       ->default_str("current");
   command->add_flag("--json", options->json, "print the result as JSON");
   command->callback([options, &exit] { exit = run(*options); });

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "battery/recording.h"
+#include "client/commands/accepts.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "robot/robot_file.h"
@@ -134,9 +135,9 @@ void add_calibrate(CLI::App& program, Exit& exit) {
           "whatever its name")
       ->required();
   command->add_option("--capacity-ah", options->rated_capacity_ah, "rated capacity; gives an ageing factor")
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
   command->add_option("--reserve", options->reserve_fraction, "share of the charge that planning leaves")
-      ->check(CLI::Range(0.0, 0.99))
+      ->check(between(0.0, 0.99))
       ->capture_default_str();
   command->add_option("--out", options->out, "file for the battery object of a robot file")->required();
   command->add_flag("--force", options->force, force_help);

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdio>
 #include <deque>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "base/json_number.h"
+#include "client/commands/accepts.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/progress.h"
@@ -38,8 +38,8 @@ struct Options {
   bool force = false;
 };
 
-const std::map<std::string, CalibrationMethod> methods{{"steady", CalibrationMethod::steady},
-                                                       {"whole", CalibrationMethod::whole}};
+const std::vector<std::pair<std::string, CalibrationMethod>> methods{{"steady", CalibrationMethod::steady},
+                                                                     {"whole", CalibrationMethod::whole}};
 
 // One mission's energy, measured and by both models, at the motors or, where measured, at the battery.
 struct Comparison {
@@ -213,15 +213,15 @@ void add_calibrate_drive(CLI::App& calibrate, Exit& exit) {
   command
       ->add_option("--method", options->calibration.method,
                    "steady: thesis (3-1) at constant speed; whole: every moving sample")
-      ->transform(CLI::CheckedTransformer(methods))
+      ->transform(one_of(methods))
       ->default_str("steady");
   command->add_option("--known", options->known, "what the robot file already knows: resistance, constants")
       ->delimiter(',')
-      ->check(CLI::IsMember({"resistance", "constants"}));
+      ->check(one_of({"resistance", "constants"}));
   command
       ->add_option("--steady-acceleration", options->calibration.steady_fraction_1_s,
                    "constant speed: acceleration below this share of the top speed a second")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->capture_default_str();
   command->add_flag("--json", options->json, "print the result as JSON");
   command->callback([options, &exit] { exit = run(*options); });

@@ -40,7 +40,8 @@ const CLI::Option* option_named(CLI::App& app, const std::string& word) {
 }
 
 CLI::App* subcommand_named(CLI::App& app, const std::string& word) {
-  for (CLI::App* sub : app.get_subcommands([](const CLI::App* s) { return !s->get_name().empty(); }))
+  for (CLI::App* sub : app.get_subcommands(
+           [](const CLI::App* s) { return !s->get_name().empty() && !s->get_group().empty(); }))
     if (sub->get_name() == word) return sub;
   return nullptr;
 }
@@ -96,10 +97,10 @@ std::vector<std::string> robots_of(const std::string& server) {
   if (!address) return {};
   const auto reply = http_request(*address, HttpMethod::get, "/v1/robots", {}, std::chrono::seconds(1));
   if (!reply || !reply->ok()) return {};
-  const auto told = nlohmann::json::parse(reply->body, nullptr, false);
+  const auto answer = nlohmann::json::parse(reply->body, nullptr, false);
   std::vector<std::string> ids;
-  if (!told.is_object() || !told.contains("robots")) return ids;
-  for (const auto& robot : told["robots"]) ids.push_back(robot.value("robot_id", ""));
+  if (!answer.is_object() || !answer.contains("robots")) return ids;
+  for (const auto& robot : answer["robots"]) ids.push_back(robot.value("robot_id", ""));
   return ids;
 }
 
@@ -138,8 +139,8 @@ std::vector<Candidate> candidates(CLI::App& program, const std::vector<std::stri
     add_options(*at.app, at, all);
   } else {
     if (at.positionals == 0)
-      for (const CLI::App* sub :
-           at.app->get_subcommands([](const CLI::App* s) { return !s->get_name().empty(); }))
+      for (const CLI::App* sub : at.app->get_subcommands(
+               [](const CLI::App* s) { return !s->get_name().empty() && !s->get_group().empty(); }))
         all.push_back({sub->get_name(), sub->get_description()});
     std::vector<const CLI::Option*> positionals;
     for (const CLI::Option* option : at.app->get_options())

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "base/json_text.h"
+#include "client/commands/accepts.h"
 #include "client/commands/check_findings.h"
 #include "client/commands/import_tables.h"
 #include "client/commands/listen.h"
@@ -48,7 +49,7 @@ struct Report {
   telemetry::ChannelWatch watch;
   std::optional<robot::RobotModel> robot;  // what recordings are held against
 
-  void tell(const std::string& name, const char* kind, json more = json::object()) {
+  void add(const std::string& name, const char* kind, json more = json::object()) {
     more["name"] = name;
     more["kind"] = kind;
     subjects.push_back(std::move(more));
@@ -82,7 +83,7 @@ Result<void> check_robot_file(const std::string& path, Report& report) {
   const auto text = read_file(path);
   if (!text) return tl::unexpected(text.error());
   const auto document = parse_json(*text);
-  report.tell(path, "robot");
+  report.add(path, "robot");
   if (!document) {
     report.findings.push_back({true, path, document.error().field, document.error().message});
     return {};
@@ -105,7 +106,7 @@ Result<void> check_robot_file(const std::string& path, Report& report) {
 Result<void> check_mapping(const std::string& path, Report& report) {
   const auto text = read_file(path);
   if (!text) return tl::unexpected(text.error());
-  report.tell(path, "mapping");
+  report.add(path, "mapping");
   const auto mapping = telemetry::ImportMapping::parse(*text);
   if (!mapping) {
     report.findings.push_back({true, path, mapping.error().field, mapping.error().message});
@@ -143,7 +144,7 @@ Result<void> check_logs(const std::vector<std::string>& logs, const Options& opt
   for (const std::string& log : logs) {
     const auto before = tally;
     if (auto read = telemetry::read_events(log, take, tally); !read) return tl::unexpected(read.error());
-    report.tell(log, "log", {{"events", tally.events - before.events}});
+    report.add(log, "log", {{"events", tally.events - before.events}});
     if (tally.damaged_places > before.damaged_places)
       report.findings.push_back(
           {true, log, "",
@@ -167,7 +168,7 @@ Result<void> check_tables(const std::vector<std::string>& tables, const Options&
   std::vector<telemetry::Recording> recordings;
   for (const std::string& table : tables) {
     auto imports = import_table(table, *mapping, how);
-    report.tell(table, "table");
+    report.add(table, "table");
     if (!imports) {
       report.findings.push_back({true, table, imports.error().field, imports.error().message});
       continue;
@@ -195,7 +196,7 @@ Result<void> check_live(const Options& options, Report& report) {
   if (auto heard = listen({options.lcm_url, options.robot_id, options.seconds}, listened, {}, take); !heard)
     return heard;
   report.watch = std::move(listened.watch);
-  report.tell(options.robot_id, "robot over LCM", {{"seconds", options.seconds}});
+  report.add(options.robot_id, "robot over LCM", {{"seconds", options.seconds}});
   if (const std::string dropped = dropped_datagrams(listened); !dropped.empty())
     report.findings.push_back({false, options.lcm_url, "", "datagrams not taken: " + dropped});
   if (recording.samples.empty()) {
@@ -225,7 +226,7 @@ Result<void> check_server(const Options& options, Report& report) {
   if (!server) return tl::unexpected(server.error());
   const auto state = ask(*server, "/v1/robots/" + options.robot_id + "/state");
   if (!state) return tl::unexpected(state.error());
-  report.tell(options.robot_id, "robot of a daemon", {{"state", *state}});
+  report.add(options.robot_id, "robot of a daemon", {{"state", *state}});
   const auto add = [&](bool fault, const char* field, std::string says) {
     report.findings.push_back({fault, options.robot_id, field, std::move(says)});
   };
@@ -317,7 +318,7 @@ Exit run(const Options& options) {
 void add_check(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
   auto* command = program.add_subcommand(
-      "check", "Tell what is wrong or suspicious in robot files, mappings, recordings or a running robot");
+      "check", "Report what is wrong or suspicious in robot files, mappings, recordings or a running robot");
   command->add_option(
       "file", options->files,
       "robot files, import mappings, LCM event logs, or tables with --mapping; none: a running "
@@ -330,7 +331,7 @@ void add_check(CLI::App& program, Exit& exit) {
   command->add_option("--lcm-url", options->lcm_url, "where to listen to the running robot")
       ->capture_default_str();
   command->add_option("--seconds", options->seconds, "how long to listen")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->capture_default_str();
   command->add_flag("--json", options->json, "print the findings as JSON");
   command->callback([options, &exit] { exit = run(*options); });

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "client/commands/accepts.h"
 #include "client/commands/candidates.h"
 #include "client/commands/table.h"
 
@@ -50,7 +51,7 @@ void add_completion(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
   auto* command = program.add_subcommand("completion", "Print a completion script for a shell");
   command->add_option("shell", options->shell, "which shell")
-      ->check(CLI::IsMember({"bash", "zsh", "fish"}))
+      ->check(one_of({"bash", "zsh", "fish"}))
       ->capture_default_str();
   // For the scripts alone: what may stand in place of the last word.
   command->add_flag("--candidates", options->candidates)->group("");
@@ -62,8 +63,8 @@ void add_completion(CLI::App& program, Exit& exit) {
       return;
     }
     for (const Candidate& c : candidates(program, options->words)) {
-      const bool told = options->shell == "fish" && !c.meaning.empty();
-      std::printf("%s%s%s\n", c.text.c_str(), told ? "\t" : "", told ? c.meaning.c_str() : "");
+      const bool described = options->shell == "fish" && !c.meaning.empty();
+      std::printf("%s%s%s\n", c.text.c_str(), described ? "\t" : "", described ? c.meaning.c_str() : "");
     }
   });
 }

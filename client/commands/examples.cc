@@ -66,9 +66,6 @@ constexpr Examples table[] = {
      "joulecast gap amr.lcmlog --robot amr.json --apply amr-adopted.json --json\n"
      "joulecast gap amr.lcmlog --robot amr.json --test fresh.lcmlog\n"
      "joulecast gap amr.lcmlog --robot amr.json --controls 0 --report amr-gap.html --force"},
-    {"gap trial",
-     "joulecast gap trial --count 2 --seed 1\n"
-     "joulecast gap trial --motion . --count 2 --seed 1"},
     {"effects", "joulecast effects"},
     {"explore",
      "joulecast explore --case 1 --plot case1.svg\n"
@@ -83,7 +80,6 @@ constexpr Examples table[] = {
     {"token revoke", "joulecast token revoke --file tokens.json --name yard"},
     {"audit list", "joulecast audit list --store history.db"},
     {"audit verify", "joulecast audit verify --store history.db"},
-    {"thesis", "joulecast thesis\njoulecast thesis --table 4-1 --json\njoulecast thesis --figure 4-2a --csv"},
     {"store copy", "joulecast store copy --from history.db --to copy.db"},
     {"store verify", "joulecast store verify --store history.db"},
     {"store stats", "joulecast store stats --store history.db --json"},
@@ -123,7 +119,7 @@ void add_example(CLI::App& command, const char* request) {
 void add_examples(CLI::App& program) {
   for (const auto& [command, text] : table) {
     CLI::App* app = find(program, command);
-    // What a command tells of its own stands before.
+    // A footer of the command itself stands before.
     std::string footer = app->get_footer() == program.get_footer() ? "" : app->get_footer() + "\n\n";
     footer += "Examples:\n  ";
     for (const char* c = text; *c != '\0'; ++c)

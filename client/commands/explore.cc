@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "client/commands/accepts.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/progress.h"
@@ -128,8 +129,9 @@ void add_explore(CLI::App& program, Exit& exit) {
   auto* command = program.add_subcommand(
       "explore", "Explore a map by next best views and DistBug, and price the mission (thesis chapter 5)");
   auto* ground = command->add_option_group("ground");
-  ground->add_option("--case", options->number, "case of the thesis, table 5-1")
-      ->check(CLI::Range(1, thesis_case_count));
+  std::vector<std::string> cases;
+  for (int k = 1; k <= thesis_case_count; ++k) cases.push_back(std::to_string(k));
+  ground->add_option("--case", options->number, "case of the thesis, table 5-1")->check(one_of(cases));
   ground->add_option("--map", options->map_file, "map file (schemas/map.schema.json)");
   ground->require_option(1);
   command->add_option("--robot", options->robot_file, "robot file; the Nomad of the thesis when not given");

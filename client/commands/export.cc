@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/output_file.h"
+#include "client/commands/accepts.h"
 #include "client/commands/parse_time.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
@@ -120,7 +121,7 @@ void add_period(CLI::App& command, Options& options) {
 void add_mission(CLI::App& command, Options& options) {
   command.add_option("--mission", options.mission, "number of the mission, as joulecast missions lists it")
       ->required()
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
 }
 
 }  // namespace

@@ -88,7 +88,7 @@ void add_robots(CLI::App& program, Exit& exit) {
 
 void add_state(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
-  auto* command = program.add_subcommand("state", "Tell the live state of a robot");
+  auto* command = program.add_subcommand("state", "Show the live state of a robot");
   add_server(*command, options->server);
   command->add_option("--robot-id", options->robot_id, "robot of the server")->required();
   command->add_flag("--json", options->json, "print the answer as the server sends it");

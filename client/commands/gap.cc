@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/commands/accepts.h"
 #include "client/commands/gap_compare.h"
 #include "client/commands/gap_missions.h"
 #include "client/commands/gap_output.h"
@@ -95,7 +96,7 @@ Result<Judged> judge(const Options& options, const telemetry::RecordingSet& reco
   Judged judged{std::move(*diagnosis), gap::take(offer, robot, {options.effect, options.force}),
                 std::nullopt};
   if (options.test.empty()) return judged;
-  // A test asks what is found, whether or not it may be adopted.
+  // The test is of what was found, whether or not it may be adopted.
   const Result<robot::RobotModel> tried =
       offer.effects.empty() ? robot : gap::take(offer, robot, {options.effect, true});
   if (!tried) return tl::unexpected(of_option(tried.error(), "--test"));
@@ -184,7 +185,7 @@ void add_gap(CLI::App& program, Exit& exit) {
                        ->excludes(logs);
   command
       ->add_flag("--robot-model", options->missions.robot_model,
-                 "with --missions: judge the robot file even where the table brings a model's energies")
+                 "with --missions: judge the robot file even where the table has a model's energies")
       ->needs(missions);
   auto* robot = command->add_option("--robot", options->robot_file, "robot file: the model");
   command->add_option("--robot-id", options->robot_id,
@@ -201,11 +202,11 @@ void add_gap(CLI::App& program, Exit& exit) {
   command
       ->add_option("--controls", options->controls,
                    "surrogates of the recordings on which every finding is tried (default: 20); 0: none")
-      ->check(CLI::Range(0, 1000));
+      ->check(between(0, 1000));
   command->add_option(
       "--apply", options->apply,
       "write the robot file with what was found, or corrected where it is not this robot's; refused, "
-      "with the reason, where the diagnosis does not bear it out");
+      "with the reason, where the diagnosis does not support it");
   command->add_option("--effect", options->effect,
                       "with --apply or --adopt: the one to take of effects that cannot be distinguished");
   command
@@ -222,7 +223,7 @@ void add_gap(CLI::App& program, Exit& exit) {
                      ->excludes(robot);
   command->add_option("--max-missions", options->max_missions, "with --server: newest missions to judge by")
       ->needs(server)
-      ->check(CLI::Range(1, 1000));
+      ->check(between(1, 1000));
   command
       ->add_flag("--adopt", options->adopt,
                  "with --server: adopt what is found, after the daemon's back-test")
@@ -232,7 +233,6 @@ void add_gap(CLI::App& program, Exit& exit) {
                     "write over files that are "
                     "there");
   command->footer(run_columns_help());
-  add_gap_trial(*command, exit);
   command->callback([options, command, logs, missions, robot, server, &exit] {
     if (!command->get_subcommands().empty()) return;
     // Not required() by the parser, which would ask for them of the subcommands too.

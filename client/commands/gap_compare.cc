@@ -50,18 +50,27 @@ void print_rest(const gap::Comparison& c) {
 
 }  // namespace
 
-Exit tell(const gap::Comparison& comparison, const robot::RobotModel& robot, bool json,
-          const std::string& report_file, bool force, const report::ReportOrigin& origin) {
-  const nlohmann::ordered_json document = gap::comparison_to_json(comparison);
-  if (json) {
+Exit compare_and_print(const std::function<Result<gap::Comparison>(const gap::CompareSettings&)>& compare,
+                       const robot::RobotModel& robot, const GapCompareOptions& options,
+                       const report::ReportOrigin& origin) {
+  const auto comparison = [&] {
+    Progress progress("comparing", "%", 100);
+    gap::CompareSettings settings;
+    settings.controls = options.controls.value_or(settings.controls);
+    settings.progress = progress.shares();
+    return compare(settings);
+  }();
+  if (!comparison) return report(comparison.error());
+  const nlohmann::ordered_json document = gap::comparison_to_json(*comparison);
+  if (options.json) {
     fmt::print("{}\n", document.dump(2));
   } else {
     print_diagnosis(document);
-    print_rest(comparison);
+    print_rest(*comparison);
   }
-  if (report_file.empty()) return Exit::ok;
-  const auto written =
-      write_text_file(report_file, report::report_html(comparison, robot, origin), existing(force));
+  if (options.report.empty()) return Exit::ok;
+  const auto written = write_text_file(options.report, report::report_html(*comparison, robot, origin),
+                                       existing(options.force));
   return written ? Exit::ok : report(written.error());
 }
 
@@ -69,15 +78,11 @@ Exit gap_between_groups(const telemetry::RecordingSet& recordings, const robot::
                         const GapCompareOptions& options, const report::ReportOrigin& origin) {
   const auto groups = gap::groups_of(recordings, options.by);
   if (!groups) return report(groups.error());
-  const auto comparison = [&] {
-    Progress progress("comparing", "%", 100);
-    gap::CompareSettings settings;
-    settings.controls = options.controls.value_or(settings.controls);
-    settings.progress = progress.shares();
-    return gap::compare_recordings(recordings, *groups, robot, settings);
-  }();
-  if (!comparison) return report(comparison.error());
-  return tell(*comparison, robot, options.json, options.report, options.force, origin);
+  return compare_and_print(
+      [&](const gap::CompareSettings& settings) {
+        return gap::compare_recordings(recordings, *groups, robot, settings);
+      },
+      robot, options, origin);
 }
 
 }  // namespace joulecast::client

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -22,8 +23,9 @@ struct GapCompareOptions {
 Exit gap_between_groups(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
                         const GapCompareOptions& options, const report::ReportOrigin& origin);
 
-// Prints a comparison and writes its page.
-Exit tell(const gap::Comparison& comparison, const robot::RobotModel& robot, bool json,
-          const std::string& report_file, bool force, const report::ReportOrigin& origin);
+// Makes a comparison, prints it and writes its page.
+Exit compare_and_print(const std::function<Result<gap::Comparison>(const gap::CompareSettings&)>& compare,
+                       const robot::RobotModel& robot, const GapCompareOptions& options,
+                       const report::ReportOrigin& origin);
 
 }  // namespace joulecast::client

@@ -58,16 +58,10 @@ Result<gap::RunSet> read_tables(const GapMissionsOptions& options, const robot::
 Exit compare(const GapMissionsOptions& options, const gap::RunSet& runs, const robot::RobotModel& robot) {
   const auto groups = runs.groups_by(options.compare_by);
   if (!groups) return report(groups.error());
-  const auto comparison = [&] {
-    Progress progress("comparing", "%", 100);
-    gap::CompareSettings settings;
-    settings.controls = options.controls.value_or(settings.controls);
-    settings.progress = progress.shares();
-    return gap::compare_runs(runs, *groups, robot, settings);
-  }();
-  if (!comparison) return report(comparison.error());
-  return tell(*comparison, robot, options.json, options.report, options.force,
-              report_origin(options.runs, options.robot_file));
+  return compare_and_print(
+      [&](const gap::CompareSettings& settings) { return gap::compare_runs(runs, *groups, robot, settings); },
+      robot, {options.compare_by, options.controls, options.json, options.report, options.force},
+      report_origin(options.runs, options.robot_file));
 }
 
 }  // namespace

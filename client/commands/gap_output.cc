@@ -200,7 +200,7 @@ void print_diagnosis(const json& d) {
   print_where(d["where"]);
   for (const json& n : d["next_drive"]) {
     const json& evidence = n["expected_log_evidence"];
-    fmt::print("next drive, to tell {}: {}{}\n", text(n["separates"]), text(n["manoeuvre"]),
+    fmt::print("next drive, to distinguish {}: {}{}\n", text(n["separates"]), text(n["manoeuvre"]),
                evidence.is_null() ? "" : fmt::format(" (log evidence +{:.1f})", number(evidence)));
   }
   print_adoption(d);

@@ -14,7 +14,7 @@ namespace joulecast::client {
 // One effect of a diagnosis's JSON with its strength and what it cannot be distinguished from.
 void print_effect(const nlohmann::json& effect);
 
-// A diagnosis of recordings as its JSON tells it, offline or by a daemon.
+// A diagnosis of recordings as its JSON has it, offline or by a daemon.
 void print_diagnosis(const nlohmann::json& diagnosis);
 
 // What is wrong with adopting, as of the option that asked for it; a choice among effects is --effect's.

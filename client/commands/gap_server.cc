@@ -22,15 +22,14 @@ namespace {
 using nlohmann::json;
 using std::chrono::milliseconds;
 
-constexpr milliseconds patience{60'000};
+constexpr milliseconds timeout{60'000};
 constexpr milliseconds between_looks{250};
 
 struct Daemon {
   ServerAddress address;
 
   Result<HttpReply> ask(HttpMethod method, const std::string& target, const json& body = {}) const {
-    auto reply =
-        http_request(address, method, target, method == HttpMethod::get ? "" : body.dump(), patience);
+    auto reply = http_request(address, method, target, method == HttpMethod::get ? "" : body.dump(), timeout);
     if (!reply) return reply;
     if (!reply->ok() && reply->status != 409) return tl::unexpected(error_of(*reply));
     return reply;

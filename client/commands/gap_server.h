@@ -21,7 +21,7 @@ struct GapServerOptions {
   bool adopt = false;  // in the daemon, after a back-test
 };
 
-// Has a daemon diagnose its own history of a robot, follows the job and tells what came of it. An interrupt
+// Has a daemon diagnose its own history of a robot, follows the job and reports what came of it. An interrupt
 // cancels the job.
 Exit gap_from_server(const GapServerOptions& options);
 

@@ -27,7 +27,7 @@ class HelpFormatter : public CLI::Formatter {
   std::string row(const std::string& left, const std::string& text) const;
 
   std::size_t width_;
-  mutable std::string command_;  // whose help is being written: options do not tell theirs
+  mutable std::string command_;  // whose help is being written: options do not hold theirs
 };
 
 }  // namespace joulecast::client

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "client/commands/accepts.h"
 #include "client/commands/import_tables.h"
 #include "client/commands/parse_time.h"
 #include "client/commands/table.h"
@@ -186,7 +187,7 @@ void add_import(CLI::App& program, Exit& exit) {
       "UTC (2024-07-18T09:10:45Z) or microseconds since 1970 of the first row, for tables without "
       "a date; each further table follows the one before, as given");
   command->add_option("--pause", options->pause_s, "seconds between one table and the next, with --start")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->capture_default_str();
   command->add_option("--robot-id", options->robot_id, "instead of the mapping's");
   command->add_flag("--force", options->force, force_help);

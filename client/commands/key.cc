@@ -2,11 +2,11 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <memory>
 #include <string>
 
 #include "access/robot_keys.h"
 #include "access/sha256.h"
+#include "client/commands/on_file.h"
 #include "client/commands/table.h"
 #include "signals/ids.h"
 
@@ -55,20 +55,17 @@ void add_key(CLI::App& program, Exit& exit) {
   auto* group =
       program.add_subcommand("key", "Make and revoke the keys by which robots sign their telemetry");
   group->require_subcommand(1);
-  auto options = std::make_shared<Options>();
-  const auto add = [&](const char* name, const char* what, Exit (*run)(const Options&)) {
-    auto* command = group->add_subcommand(name, what);
-    command->add_option("--file", options->file, "the file that the daemon's ingest.key_file names")
-        ->required();
-    command->callback([options, run, &exit] { exit = run(*options); });
-    return command;
-  };
-  add("create", "Add a robot's key, and print it for its publisher: from now on it is heard signed alone",
-      create)
+  FileCommands<Options> options(*group, "the file that the daemon's ingest.key_file names", exit);
+  options
+      .add("create",
+           "Add a robot's key, and print it for its publisher: from now on only its signed telemetry is "
+           "accepted",
+           create)
       ->add_option("--robot-id", options->robot_id, "whose")
       ->required();
-  add("list", "List the robots that have keys", list);
-  add("revoke", "Remove a robot's key: from now on it is heard as robots without a key are", revoke)
+  options.add("list", "List the robots that have keys", list);
+  options
+      .add("revoke", "Remove a robot's key: from now on it is treated as robots without a key are", revoke)
       ->add_option("--robot-id", options->robot_id, "whose")
       ->required();
 }

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "client/commands/accepts.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 
@@ -45,10 +46,10 @@ Exit run(const Options& options) {
 
 void add_ledger(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
-  auto* command = program.add_subcommand("ledger", "Tell where the energy of a mission went");
+  auto* command = program.add_subcommand("ledger", "Show where the energy of a mission went");
   command->add_option("mission", options->mission, "number of the mission, as joulecast missions lists it")
       ->required()
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
   add_server(*command, options->server);
   command->add_flag("--json", options->json, "print the answer as the server sends it");
   command->callback([options, &exit] { exit = run(*options); });

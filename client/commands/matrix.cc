@@ -13,6 +13,7 @@
 
 #include "answers/json/matrix_json.h"
 #include "base/json_text.h"
+#include "client/commands/accepts.h"
 #include "client/commands/examples.h"
 #include "client/commands/table.h"
 #include "client/files.h"
@@ -166,11 +167,11 @@ void add_matrix(CLI::App& program, Exit& exit) {
   command
       ->add_option("--driving", options->driving,
                    "by minimum-energy profiles (the default), or as each robot usually drives")
-      ->check(CLI::IsMember({"usual", "minimum_energy"}));
+      ->check(one_of({"usual", "minimum_energy"}));
   auto* server = command->add_option("--server", options->server, "joulecastd to ask, host:port");
   server->excludes(files);
   command->add_option("--timeout", options->timeout_s, "seconds to wait for the server")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->capture_default_str();
   command->add_flag("--json", options->json, "print the answer as the server sends it");
   add_example(*command, example);

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/commands/accepts.h"
 #include "client/commands/parse_time.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
@@ -103,8 +104,8 @@ void add_missions(CLI::App& program, Exit& exit) {
     command->add_option(flag, options->query.back().value, help);
   }
   command->get_option("--state")->check(
-      CLI::IsMember({"open", "finished", "aborted", "unfinished", "superseded", "interrupted"}));
-  command->get_option("--incomplete")->check(CLI::IsMember({"true", "false"}));
+      one_of({"open", "finished", "aborted", "unfinished", "superseded", "interrupted"}));
+  command->get_option("--incomplete")->check(one_of({"true", "false"}));
   command->add_flag("--json", options->json, "print the page as the server sends it");
   command->callback([options, &exit] { exit = run(*options); });
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "client/commands/accepts.h"
 #include "client/commands/replay_into.h"
 #include "client/commands/table.h"
 #include "client/interrupt.h"
@@ -31,7 +32,7 @@ struct Options {
 };
 
 // When each message may go: by the log's own clock, and never faster than the ceiling. LCM has no flow
-// control, so without a ceiling a receiver loses messages and neither side is told.
+// control, so without a ceiling a receiver loses messages and neither side notices.
 class Pacer {
  public:
   Pacer(double speed, double max_rate_hz) : speed_(speed), gap_(to_duration(1 / max_rate_hz)) {}
@@ -123,10 +124,10 @@ void add_replay(CLI::App& program, Exit& exit) {
   command
       ->add_option("--speed", options->speed,
                    "1 = as recorded, 10 = ten times faster, 0 = as fast as --max-rate lets")
-      ->check(CLI::NonNegativeNumber)
+      ->check(not_negative())
       ->capture_default_str();
   command->add_option("--max-rate", options->max_rate_hz, "messages a second that the receivers can take")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->capture_default_str();
   auto* into = command->add_option(
       "--into", options->into,

@@ -12,7 +12,7 @@ namespace joulecast::client {
 namespace {
 
 using nlohmann::json;
-constexpr std::chrono::seconds patience{60};
+constexpr std::chrono::seconds timeout{60};
 
 }  // namespace
 
@@ -43,7 +43,7 @@ Result<HttpReply> ask(const std::string& server, HttpMethod method, const std::s
                       std::string body, const Renamed& renamed, const std::string& accept) {
   const auto address = parse_server_url(server);
   if (!address) return tl::unexpected(address.error());
-  auto reply = http_request(*address, method, target, std::move(body), patience, accept);
+  auto reply = http_request(*address, method, target, std::move(body), timeout, accept);
   if (!reply || reply->ok()) return reply;
   Error error = error_of(*reply);
   const auto by_name = std::ranges::find(renamed, error.field, &Renamed::value_type::first);

@@ -21,6 +21,7 @@
 #include "base/host_clock.h"
 #include "base/text_file.h"
 #include "base/utc_time.h"
+#include "client/commands/accepts.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/http_client.h"
@@ -411,36 +412,36 @@ void add_habits(CLI::App* command, const std::shared_ptr<Options>& options) {
                       "id=strength, an imperfection of the robots; may be repeated");
   command->add_flag("--list-effects", options->list_effects, "print the effects with their units and exit");
   command->add_option("--scatter", options->scatter, "size of the differences between missions, 0 = none")
-      ->check(CLI::NonNegativeNumber)
+      ->check(not_negative())
       ->capture_default_str();
   command
       ->add_option("--jitter", options->jitter,
                    "how far sampling strays from its instant, part of the period")
-      ->check(CLI::Range(0.0, 0.45))
+      ->check(between(0.0, 0.45))
       ->capture_default_str();
   command->add_option("--loss", options->loss, "probability that a sample is lost")
-      ->check(CLI::Range(0.0, 0.99))
+      ->check(between(0.0, 0.99))
       ->capture_default_str();
   command->add_option("--pickups", options->pickups, "part of the halts at which the payload changes")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(between(0.0, 1.0))
       ->capture_default_str();
   command
       ->add_option("--undeclared", options->undeclared,
                    "part of the missions that carry more than they declare")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(between(0.0, 1.0))
       ->capture_default_str();
   command
       ->add_option("--charge-below", options->charge_below,
                    "charge under which a robot charges between missions; 0 = packs are exchanged")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(between(0.0, 1.0))
       ->capture_default_str();
   command
       ->add_option("--charge-rate", options->charge_rate_per_h,
                    "how fast chargers are, part of the capacity an hour")
-      ->check(CLI::Range(0.05, 10.0))
+      ->check(between(0.05, 10.0))
       ->capture_default_str();
   command->add_option("--initial-charge", options->initial_charge, "charge at the beginning")
-      ->check(CLI::Range(0.05, 1.0))
+      ->check(between(0.05, 1.0))
       ->capture_default_str();
 }
 
@@ -457,7 +458,7 @@ void add_sensors(CLI::App* command, const std::shared_ptr<Options>& options) {
   command
       ->add_option("--covariates", options->covariates_hz,
                    "robots that publish the covariates cpu_load and height_m so often, Hz; 0 = not")
-      ->check(CLI::Range(0.0, 200.0))
+      ->check(between(0.0, 200.0))
       ->capture_default_str();
 }
 
@@ -467,7 +468,7 @@ void add_simulate(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
   auto* command = program.add_subcommand("simulate", "Run a fleet of virtual robots that publish telemetry");
   auto* robots = command->add_option("--robots", options->robots, "how many robots")
-                     ->check(CLI::Range(1, 10'000))
+                     ->check(between(1, 10'000))
                      ->capture_default_str();
   auto* files = command->add_option("--robot", options->robot_files,
                                     "robot file, may be repeated; without it the shipped kinds take turns");
@@ -487,22 +488,22 @@ void add_simulate(CLI::App& program, Exit& exit) {
   command->add_option("--server", options->server,
                       "put the robot files into this joulecastd first, http://host:port");
   command->add_option("--rate", options->rate_hz, "telemetry of each robot, Hz")
-      ->check(CLI::Range(1.0, 200.0))
+      ->check(between(1.0, 200.0))
       ->capture_default_str();
   command
       ->add_option("--speed", options->speed,
                    "robot seconds in one second; 0 = unpaced, with --log alone. Above 1 the robots' clocks "
                    "begin in the past, so that no stamp lies in the future")
-      ->check(CLI::NonNegativeNumber)
+      ->check(not_negative())
       ->capture_default_str();
   command->add_option("--duration", options->duration_s, "robot seconds to run; 0 = until stopped")
-      ->check(CLI::NonNegativeNumber)
+      ->check(not_negative())
       ->capture_default_str();
   command->add_option("--missions", options->missions, "missions of each robot; 0 = without end")
-      ->check(CLI::NonNegativeNumber)
+      ->check(not_negative())
       ->capture_default_str();
   command->add_option("--mission-duration", options->mission_duration_s, "about how long a mission takes, s")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->capture_default_str();
   add_habits(command, options);
   add_sensors(command, options);

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "client/commands/accepts.h"
 #include "client/commands/listen.h"
 #include "client/commands/table.h"
 #include "client/commands/tally_json.h"
@@ -90,7 +91,7 @@ std::size_t terminal_width() {
 
 Exit run(const Options& options) {
   const bool terminal = isatty(STDOUT_FILENO) == 1 && !options.json;
-  // Without a terminal nobody sees it change; ten seconds tell what there is.
+  // Without a terminal nobody sees it change; ten seconds show what there is.
   const double seconds = options.seconds > 0 ? options.seconds : terminal ? 0 : 10;
   auto redraw = [&](const Listened& listened) {
     if (!terminal) return;
@@ -119,7 +120,7 @@ void add_spy(CLI::App& program, Exit& exit) {
   command
       ->add_option("--seconds", options->seconds,
                    "listen so long and leave; 0: until ctrl-C on a terminal, else 10 s")
-      ->check(CLI::NonNegativeNumber)
+      ->check(not_negative())
       ->capture_default_str();
   command->add_flag("--json", options->json, "print the channels as JSON at the end");
   command->callback([options, &exit] { exit = run(*options); });

@@ -29,7 +29,7 @@ class TableLines {
  public:
   explicit TableLines(std::string work) : work_(std::move(work)) {}
 
-  history::TableProgress told() {
+  history::TableProgress progress() {
     return [this](std::string_view table, std::int64_t done, std::int64_t rows) {
       if (table != table_ || static_cast<std::uint64_t>(done) < done_) {
         line_.emplace(work_ + " " + std::string(table), "rows", static_cast<std::uint64_t>(rows));
@@ -79,7 +79,7 @@ Exit copy(const Options& options) {
   const auto to = history::open_tables(options.to, false);
   if (!to) return report_of(to.error(), "--to");
   TableLines lines("copying");
-  const auto copied = history::copy_tables(**from, **to, lines.told());
+  const auto copied = history::copy_tables(**from, **to, lines.progress());
   if (!copied) return report_of(copied.error(), "--to");
   print(options, {{"tables", to_json(copied->tables)}, {"rows_found", copied->rows_found}});
   if (options.json) return Exit::ok;
@@ -89,11 +89,16 @@ Exit copy(const Options& options) {
   return Exit::ok;
 }
 
-Exit verify(const Options& options) {
+template <class T>
+Result<T> read(const Options& options, Result<T> (*work)(history::Database&, const history::TableProgress&)) {
   const auto store = history::open_tables(options.from, true);
-  if (!store) return report_of(store.error(), "--store");
+  if (!store) return tl::unexpected(store.error());
   TableLines lines("reading");
-  const auto found = history::verify_tables(**store, lines.told());
+  return work(**store, lines.progress());
+}
+
+Exit verify(const Options& options) {
+  const auto found = read(options, &history::verify_tables);
   if (!found) return report_of(found.error(), "--store");
   print(options, {{"tables", to_json(found->tables)},
                   {"missions", found->missions},
@@ -112,10 +117,7 @@ Exit verify(const Options& options) {
 }
 
 Exit stats(const Options& options) {
-  const auto store = history::open_tables(options.from, true);
-  if (!store) return report_of(store.error(), "--store");
-  TableLines lines("reading");
-  const auto tables = history::summarize_tables(**store, lines.told());
+  const auto tables = read(options, &history::summarize_tables);
   if (!tables) return report_of(tables.error(), "--store");
   print(options, {{"tables", to_json(*tables)}});
   if (!options.json) print_tables(*tables);

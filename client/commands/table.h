@@ -41,13 +41,12 @@ void add_simulate(CLI::App& program, Exit& exit);
 void add_spy(CLI::App& program, Exit& exit);
 void add_state(CLI::App& program, Exit& exit);
 void add_store(CLI::App& program, Exit& exit);
-void add_thesis(CLI::App& program, Exit& exit);
+// Hands `thesis` and `gap trial` on to joulecast-study. After add_gap.
+void add_study(CLI::App& program, Exit& exit);
 void add_key(CLI::App& program, Exit& exit);
 void add_token(CLI::App& program, Exit& exit);
 
 // Subcommands of calibrate.
 void add_calibrate_drive(CLI::App& calibrate, Exit& exit);
-// Subcommands of gap.
-void add_gap_trial(CLI::App& gap, Exit& exit);
 
 }  // namespace joulecast::client

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -15,6 +14,8 @@
 #include "access/sha256.h"
 #include "base/host_clock.h"
 #include "base/utc_time.h"
+#include "client/commands/accepts.h"
+#include "client/commands/on_file.h"
 #include "client/commands/table.h"
 
 // The tokens that joulecastd takes, in the file of its auth.token_file. The file and not the store, which a
@@ -91,31 +92,24 @@ Exit revoke(const Options& options) {
 }  // namespace
 
 void add_token(CLI::App& program, Exit& exit) {
-  auto* group = program.add_subcommand("token", "Make and revoke the tokens that a joulecastd asks for");
+  auto* group = program.add_subcommand("token", "Make and revoke the tokens that a joulecastd requires");
   group->require_subcommand(1);
-  auto options = std::make_shared<Options>();
-  const auto add = [&](const char* name, const char* what, Exit (*run)(const Options&)) {
-    auto* command = group->add_subcommand(name, what);
-    command->add_option("--file", options->file, "the file that the daemon's auth.token_file names")
-        ->required();
-    command->callback([options, run, &exit] { exit = run(*options); });
-    return command;
-  };
-  auto* creating = add("create", "Add a token, and print it this once", create);
-  creating->add_option("--name", options->name, "who or what uses it, as the audit will say")->required();
+  FileCommands<Options> options(*group, "the file that the daemon's auth.token_file names", exit);
+  auto* creating = options.add("create", "Add a token, and print it this once", create);
+  creating->add_option("--name", options->name, "who or what uses it, as the audit will show")->required();
   creating
       ->add_option("--role", options->role,
                    "read; plan: also plans and forecasts; operate: also adopts models and runs diagnoses; "
                    "admin: also gives robots their models")
-      ->check(CLI::IsMember({"read", "plan", "operate", "admin"}))
+      ->check(one_of({"read", "plan", "operate", "admin"}))
       ->capture_default_str();
   creating->add_option("--robots", options->robots,
                        "shell pattern of the robot ids that it is for, as amr-*; otherwise all");
   creating->add_option("--days", options->days, "days until it expires; 0: never")
-      ->check(CLI::Range(0.0, 36500.0))
+      ->check(between(0.0, 36500.0))
       ->capture_default_str();
-  add("list", "List the tokens, without their secrets", list);
-  add("revoke", "Remove a token: what is asked with it is refused from now on", revoke)
+  options.add("list", "List the tokens, without their secrets", list);
+  options.add("revoke", "Remove a token: requests with it are refused from now on", revoke)
       ->add_option("--name", options->name, "the token's")
       ->required();
 }

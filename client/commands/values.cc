@@ -61,11 +61,6 @@ constexpr auto table = std::to_array<Named>({
     {"gap", "--report", "FILE", "*.html"},
     {"gap", "--compare-by", "LABEL", ""},
     {"gap", "--test", "FILE", "*.lcmlog"},
-    {"gap trial", "--keep", "FOLDER", "/"},
-    {"gap trial", "--outcomes", "FILE", "*.jsonl"},
-    {"gap trial", "--again", "FOLDER", "/"},
-    {"gap trial", "--only", "KIND", ""},
-    {"gap trial", "--motion", "FOLDER", "/"},
     {"simulate", "--effect", "ID=STRENGTH", ""},
     {"", "--model", "FILE", "*.json"},
     {"adopt", "--note", "WORDS", ""},
@@ -84,27 +79,15 @@ constexpr auto table = std::to_array<Named>({
     {"missions", "--cursor", "TEXT", ""},
 });
 
-// "TEXT:{a,b}" -> {a, b}; "ENUM:value in {steady->0,whole->1} OR {0,1}" -> {steady, whole}.
-std::vector<std::string> members(std::string_view type) {
-  const std::size_t open = type.find('{'), close = type.find('}');
-  if (open == std::string_view::npos || close == std::string_view::npos) return {};
+// "{a,b}" -> {a, b}.
+std::vector<std::string> words_of(std::string_view set) {
   std::vector<std::string> words;
-  std::string_view list = type.substr(open + 1, close - open - 1);
-  while (!list.empty()) {
-    const std::size_t comma = std::min(list.find(','), list.size());
-    words.emplace_back(list.substr(0, std::min(list.substr(0, comma).find("->"), comma)));
-    list.remove_prefix(std::min(comma + 1, list.size()));
+  for (set = set.substr(1, set.size() - 2); !set.empty();) {
+    const std::size_t comma = std::min(set.find(','), set.size());
+    words.emplace_back(set.substr(0, comma));
+    set.remove_prefix(std::min(comma + 1, set.size()));
   }
   return words;
-}
-
-// "FLOAT:FLOAT in [0 - 1]" -> {"0", "1"}.
-std::vector<std::string> ends(std::string_view type) {
-  const std::size_t open = type.find('['), dash = type.find(" - "), close = type.find(']');
-  if (open == std::string_view::npos || dash == std::string_view::npos || close == std::string_view::npos)
-    return {};
-  return {std::string(type.substr(open + 1, dash - open - 1)),
-          std::string(type.substr(dash + 3, close - dash - 3))};
 }
 
 std::vector<std::string> ids(std::span<const virtual_robot::EffectEntry> effects, std::string_view end) {
@@ -116,11 +99,6 @@ std::vector<std::string> ids(std::span<const virtual_robot::EffectEntry> effects
 std::vector<std::string> special_words(std::string_view command, std::string_view option) {
   if (command == "simulate" && option == "--effect") return ids(virtual_robot::all_effects(), "=");
   if (command == "gap" && option == "--effect") return ids(virtual_robot::effect_table(), "");
-  if (command == "gap trial" && option == "--only") {
-    std::vector<std::string> words = ids(virtual_robot::effect_table(), "");
-    words.insert(words.begin(), {"none", "single", "double", "outside"});
-    return words;
-  }
   return {};
 }
 
@@ -129,23 +107,19 @@ std::vector<std::string> special_words(std::string_view command, std::string_vie
 ValueKind value_kind(const CLI::Option& option, const std::string& command) {
   ValueKind kind;
   if (option.get_items_expected_max() == 0) return kind;
+  // "FLOAT", or with a check of accepts.h "FLOAT:0 to 1" or "TEXT:{a,b}".
   const std::string type = option.get_type_name();
+  const std::size_t colon = std::min(type.find(':'), type.size());
+  const std::string accepted = type.substr(std::min(colon + 1, type.size()));
   const std::string name = option.get_positional() ? option.get_name(true, false) : option.get_name();
-  kind.words = members(type);
-  if (!kind.words.empty()) {
-    for (const auto& word : kind.words) kind.name += (kind.name.empty() ? '{' : ',') + word;
-    kind.name += '}';
+  if (accepted.starts_with('{')) {
+    kind.name = accepted;
+    kind.words = words_of(accepted);
     return kind;
   }
-  const bool count = type.starts_with("INT") || type.starts_with("UINT");
-  kind.name = type.starts_with("FLOAT") ? "NUMBER" : count ? "COUNT" : "TEXT";
-  if (const auto bounds = ends(type); !bounds.empty()) {
-    kind.bounds = bounds[0] + " to " + bounds[1];
-    if (count && bounds[1].size() == 1)
-      for (char digit = bounds[0][0]; digit <= bounds[1][0]; ++digit) kind.words.emplace_back(1, digit);
-  } else if (type.find("POSITIVE") != std::string::npos) {
-    kind.bounds = "above 0";
-  }
+  kind.bounds = accepted;
+  const std::string base = type.substr(0, colon);
+  kind.name = base == "FLOAT" ? "NUMBER" : base == "INT" || base == "UINT" ? "COUNT" : base;
   const auto own = std::ranges::find_if(table, [&](const Named& row) {
     return row.option == name && (row.command.empty() || row.command == command);
   });

@@ -24,7 +24,8 @@ std::vector<std::string> names_of_options(const CLI::App& app) {
 
 std::vector<std::string> names_of_commands(const CLI::App& app) {
   std::vector<std::string> names;
-  for (const CLI::App* sub : app.get_subcommands([](const CLI::App* s) { return !s->get_name().empty(); }))
+  for (const CLI::App* sub : app.get_subcommands(
+           [](const CLI::App* s) { return !s->get_name().empty() && !s->get_group().empty(); }))
     names.push_back(sub->get_name());
   return names;
 }
@@ -79,7 +80,7 @@ std::string wrong_use(const CLI::App& program, const CLI::ParseError& error) {
     const std::size_t equals = text.find(" = ");
     if (!kind.empty())
       text =
-          name + " wants a " + kind + (equals == std::string::npos ? "" : ", not " + text.substr(equals + 3));
+          name + " takes a " + kind + (equals == std::string::npos ? "" : ", not " + text.substr(equals + 3));
   }
   return fmt::format("{}: {}\n{} --help lists what it accepts\n", command, text, command);
 }

@@ -46,7 +46,7 @@ struct SimulationSpec {
   double scatter = 1;         // size of the differences between missions; 0: none, 1: 1 to 2 % of energy
   double initial_charge = 0.8;
   std::int64_t start_utime_us = 1'700'000'000'000'000;
-  std::string run;  // in the missions' ids, to tell them from another run's; may be empty
+  std::string run;  // in the missions' ids, to distinguish them from another run's; may be empty
 };
 
 // What happened on the way of one mission, in truth, without sensors.

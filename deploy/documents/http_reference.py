@@ -64,7 +64,7 @@ def fields(document, schema, prefix="", depth=3):
     required = set(schema.get("required", ()))
     rows = []
     for choice in schema.get("oneOf", ()):
-        # Choices told apart by a constant, such as the kinds of a path's segments.
+        # Choices distinguished by a constant, such as the kinds of a path's segments.
         told = next((f"{key}={value['const']}" for key, value in resolve(document, choice).get("properties", {}).items()
                      if "const" in value), None)
         if told:

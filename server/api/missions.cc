@@ -23,11 +23,19 @@ using http::Response;
 
 constexpr std::size_t most_reason = 1024;  // bytes
 
-Result<history::TimeRange> range_of(const Request& request) {
+// Of a mission the time that is asked for.
+struct Span {
+  history::MissionKey key;
+  history::TimeRange range;
+};
+
+Result<Span> span_of(const Request& request) {
+  const Result<history::MissionKey> key = path_id(request, "mission");
+  if (!key) return tl::unexpected(key.error());
   const auto from = time_of(request, "from"), to = time_of(request, "to");
   if (!from) return tl::unexpected(from.error());
   if (!to) return tl::unexpected(to.error());
-  return history::TimeRange{from->value_or(history::whole_past), to->value_or(history::whole_future)};
+  return Span{*key, {from->value_or(history::whole_past), to->value_or(history::whole_future)}};
 }
 
 Result<history::Mission> mission_of(const Services& services, const Request& request) {
@@ -176,17 +184,15 @@ Response telemetry_csv(const Request& request, const history::TelemetryPage& pag
 }
 
 Result<Response> trace(const Services& services, const Request& request) {
-  const Result<history::MissionKey> key = path_id(request, "mission");
-  if (!key) return tl::unexpected(key.error());
-  const auto range = range_of(request);
-  if (!range) return tl::unexpected(range.error());
+  const Result<Span> span = span_of(request);
+  if (!span) return tl::unexpected(span.error());
   const Result<history::Trace> found =
-      services.store.trace(*key, *range, request.query_integer("points").value_or(1000));
+      services.store.trace(span->key, span->range, request.query_integer("points").value_or(1000));
   if (!found) return tl::unexpected(found.error());
-  if (request.csv) return trace_csv(request, *found, *key);
+  if (request.csv) return trace_csv(request, *found, span->key);
   JsonWriter json;
   json.begin_object();
-  json.field("id", *key);
+  json.field("id", span->key);
   json.field("width_us", found->width_us);
   std::vector<double> column(found->buckets.size());
   const auto write = [&](std::string_view name, auto&& value, int places) {
@@ -227,17 +233,16 @@ Result<Response> trace(const Services& services, const Request& request) {
 }
 
 Result<Response> raw_telemetry(const Services& services, const Request& request) {
-  const Result<history::MissionKey> key = path_id(request, "mission");
-  if (!key) return tl::unexpected(key.error());
-  const auto range = range_of(request);
-  if (!range) return tl::unexpected(range.error());
-  const Result<history::TelemetryPage> found = services.store.telemetry(*key, *range, page_of(request, 1000));
+  const Result<Span> span = span_of(request);
+  if (!span) return tl::unexpected(span.error());
+  const Result<history::TelemetryPage> found =
+      services.store.telemetry(span->key, span->range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
-  if (request.csv) return telemetry_csv(request, *found, *key);
+  if (request.csv) return telemetry_csv(request, *found, span->key);
   const auto& samples = found->samples;
   JsonWriter json;
   json.begin_object();
-  json.field("id", *key);
+  json.field("id", span->key);
   using signals::Sample;
   json.key("utime_us").begin_array();
   for (const Sample& s : samples) json.value(s.utime_us);
@@ -262,17 +267,15 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
 }
 
 Result<Response> covariates(const Services& services, const Request& request) {
-  const Result<history::MissionKey> key = path_id(request, "mission");
-  if (!key) return tl::unexpected(key.error());
-  const auto range = range_of(request);
-  if (!range) return tl::unexpected(range.error());
+  const Result<Span> span = span_of(request);
+  if (!span) return tl::unexpected(span.error());
   const Result<history::CovariatePage> found =
-      services.store.covariates(*key, *range, page_of(request, 1000));
+      services.store.covariates(span->key, span->range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
-  if (request.csv) return covariates_csv(request, *found, *key);
+  if (request.csv) return covariates_csv(request, *found, span->key);
   JsonWriter json;
   json.begin_object();
-  json.field("id", *key);
+  json.field("id", span->key);
   json.key("covariates").begin_array();
   for (const signals::CovariateSeries& series : signals::series_of(found->changes)) {
     json.begin_object().field("name", series.name).array("utime_us", series.utime_us);
@@ -288,6 +291,7 @@ Result<Response> covariates(const Services& services, const Request& request) {
 
 }  // namespace
 
+// A table, as long as its rows.
 std::vector<TableRow> mission_rows() {
   using Type = Parameter::Type;
   const std::vector<Parameter> span =

@@ -16,7 +16,7 @@ namespace joulecast::api {
 struct ModelRequest {
   const nlohmann::json* model = nullptr;  // within the body
   std::optional<std::int64_t> diagnosis_id, proposal_id, version;
-  std::vector<std::string> effects;  // of those that the diagnosis does not tell apart, the ones to adopt
+  std::vector<std::string> effects;  // of those that the diagnosis does not distinguish, the ones to adopt
   std::optional<std::string> note;
   std::optional<std::int64_t> since_utime_us, expected_version;
   bool force = false, dry_run = false;

@@ -192,9 +192,9 @@ Result<Response> remove(Services& services, const Request& request) {
   const history::Outcome missions =
       wait_for_end_of_session(services, id)
           ? services.writer.execute(history::RemoveRobot{id, history == "purge"})
-          : fail(Fault::unavailable, "", "accounting does not let the robot go; try again later");
+          : fail(Fault::unavailable, "", "telemetry of the robot is still being stored; try again later");
   if (!missions) {
-    if (model != nullptr) (void)services.models.put(model->robot, model->version);
+    if (model != nullptr) services.models.put_back(model);
     return tl::unexpected(missions.error());
   }
   JsonWriter detail;

@@ -81,7 +81,7 @@ class Cluster::Impl {
     keeper_.join();
     exchanger_.join();
     if (const Result<void> left = leases_->leave(); !left)
-      parts_.note("the cluster was not told that this daemon leaves: " + describe(left.error()));
+      parts_.note("the cluster was not notified that this daemon leaves: " + describe(left.error()));
   }
 
   ClusterStatus status() const {
@@ -107,8 +107,8 @@ class Cluster::Impl {
   void on_dropped(const std::string& robot_id, history::Epoch epoch, std::uint64_t count) {
     parts_.keeping.withdraw({robot_id, epoch, false});
     const std::lock_guard lock(mutex_);
-    if (status_.dropped_commands == 0 || Clock::now() - told_dropped_ > std::chrono::minutes(1)) {
-      told_dropped_ = Clock::now();
+    if (status_.dropped_commands == 0 || Clock::now() - reported_dropped_ > std::chrono::minutes(1)) {
+      reported_dropped_ = Clock::now();
       parts_.note("commands for " + robot_id + " were dropped: another daemon keeps it since");
     }
     status_.dropped_commands += count;
@@ -149,7 +149,7 @@ class Cluster::Impl {
   // True when there is more to do at once.
   Result<bool> turn() {
     if (Result<void> renewed = renew(); !renewed) return tl::unexpected(renewed.error());
-    if (Result<void> told = tell_heard(); !told) return tl::unexpected(told.error());
+    if (Result<void> done = publish_heard(); !done) return tl::unexpected(done.error());
     auto state = leases_->state();
     if (!state) return tl::unexpected(state.error());
     {
@@ -188,7 +188,7 @@ class Cluster::Impl {
     return renewed;
   }
 
-  Result<void> tell_heard() {
+  Result<void> publish_heard() {
     const std::int64_t now = parts_.now_utime_us();
     std::set<std::string> heard;
     for (const auto& [robot_id, utime_us] : parts_.keeping.heard()) {
@@ -201,9 +201,9 @@ class Cluster::Impl {
     for (const std::string& robot_id : said_heard_)
       if (!heard.contains(robot_id)) no_longer.push_back(robot_id);
     if (more.empty() && no_longer.empty()) return {};
-    Result<void> told = leases_->hear(more, no_longer);
-    if (told) said_heard_ = std::move(heard);
-    return told;
+    Result<void> done = leases_->hear(more, no_longer);
+    if (done) said_heard_ = std::move(heard);
+    return done;
   }
 
   // How long this daemon has seen the database without a break.
@@ -297,13 +297,13 @@ class Cluster::Impl {
     Exchange exchange(options_.node, history::open_shared_state(options_.url, options_.writer + "-exchange"),
                       parts_.store, parts_.keeping, parts_.fleet, parts_.models, parts_.forecasts,
                       parts_.now_utime_us);
-    bool told = false;
+    bool reported = false;
     do {
       survive("cluster exchange", [&] {
         const Result<void> turned = exchange.turn();
-        if (!turned && !told)
+        if (!turned && !reported)
           parts_.note("live states are not exchanged with the other daemons: " + describe(turned.error()));
-        told = !turned;
+        reported = !turned;
       });
     } while (wait(exchange_period));
   }
@@ -317,7 +317,7 @@ class Cluster::Impl {
   bool running_ = false, settling_ = false;
   ClusterStatus status_;
   std::optional<Clock::time_point> read_, renewed_, steady_since_;
-  Clock::time_point told_dropped_;
+  Clock::time_point reported_dropped_;
 
   // The keeper's own.
   std::set<std::string> said_heard_;

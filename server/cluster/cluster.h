@@ -56,7 +56,7 @@ class Cluster {
     ingest::Forecasts& forecasts;
     std::function<std::int64_t()> now_utime_us;
     std::function<void(const std::string& text)> note;  // into the log
-    // Is told of diagnoses that this daemon has to run in the place of one that is gone.
+    // Is called with diagnoses that this daemon has to run in the place of one that is gone.
     std::function<void(std::int64_t diagnosis_id)> take_job;
   };
 

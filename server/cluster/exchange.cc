@@ -28,26 +28,26 @@ Exchange::Exchange(std::string node, std::unique_ptr<history::SharedState> share
       now_utime_us_(std::move(now_utime_us)) {}
 
 Result<void> Exchange::turn() {
-  Result<void> done = tell();
+  Result<void> done = publish();
   if (done) done = hear();
   if (done) done = follow_models();
   if (done && turns_++ % turns_between_learning == 0) done = follow_learning();
   return done;
 }
 
-Result<void> Exchange::tell() {
+Result<void> Exchange::publish() {
   std::vector<history::LiveState> news;
   std::map<std::string, std::shared_ptr<const ingest::RobotSnapshot>> now;
   for (const auto& [robot_id, epoch] : keeping_.kept()) {
     auto snapshot = fleet_.find(robot_id);
     if (snapshot == nullptr) continue;
-    const auto told = told_.find(robot_id);
-    if (told == told_.end() || told->second != snapshot)
+    const auto published = published_.find(robot_id);
+    if (published == published_.end() || published->second != snapshot)
       news.push_back({robot_id, node_, epoch, ingest::snapshot_bytes(*snapshot)});
     now.emplace(robot_id, std::move(snapshot));
   }
   Result<void> put = shared_->put(news);
-  if (put) told_ = std::move(now);
+  if (put) published_ = std::move(now);
   return put;
 }
 
@@ -60,9 +60,9 @@ Result<void> Exchange::hear() {
     // Not in an earlier or later version's layout; under its own name.
     if (snapshot == nullptr || snapshot->robot_id != state.robot_id) continue;
     if (const std::int64_t now = now_utime_us_(); snapshot->received_utime_us > now) {
-      auto told_now = std::make_shared<ingest::RobotSnapshot>(*snapshot);
-      told_now->received_utime_us = now;  // the keeper's clock is ahead of this host's
-      snapshot = std::move(told_now);
+      auto received = std::make_shared<ingest::RobotSnapshot>(*snapshot);
+      received->received_utime_us = now;  // the keeper's clock is ahead of this host's
+      snapshot = std::move(received);
     }
     fleet_.publish(std::move(snapshot));
   }

@@ -17,7 +17,7 @@
 
 namespace joulecast::server {
 
-// What the daemons of a cluster tell each other through the database: the live state of the robots that each
+// What the daemons of a cluster exchange through the database: the live state of the robots that each
 // keeps, models that were put in force, what was learnt. After a turn, this daemon answers for the others'
 // robots as of then.
 class Exchange {
@@ -30,7 +30,7 @@ class Exchange {
   Result<void> turn();
 
  private:
-  Result<void> tell();
+  Result<void> publish();
   Result<void> hear();
   Result<void> follow_models();
   Result<void> follow_learning();
@@ -44,7 +44,7 @@ class Exchange {
   ingest::ModelRegistry& models_;
   ingest::Forecasts& forecasts_;
   const std::function<std::int64_t()> now_utime_us_;
-  std::map<std::string, std::shared_ptr<const ingest::RobotSnapshot>> told_;
+  std::map<std::string, std::shared_ptr<const ingest::RobotSnapshot>> published_;
   std::map<std::string, std::int64_t> learned_;
   std::uint64_t turns_ = 0;
 };

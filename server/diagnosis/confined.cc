@@ -59,7 +59,7 @@ void confine(const Confinement& limits, std::uint64_t had_bytes, pid_t parent) {
   if (getppid() != parent) _exit(1);
   // The first to go where the machine itself runs out of memory.
   if (const int score = open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC); score >= 0) {
-    (void)write_all(score, "1000", 4);
+    (void)write_all(score, "1000", 4);  // where that is forbidden, the limit below holds all the same
     close(score);
   }
   const rlimit no_core{0, 0};
@@ -88,6 +88,7 @@ void confine(const Confinement& limits, std::uint64_t had_bytes, pid_t parent) {
     };
     const Result<std::string> answer = work(report);
     const std::string& text = answer ? *answer : answer.error().message;
+    // A frame that is not sent, here and below, has lost its parent: nobody is left to be answered.
     (void)send(to, answer ? Frame::answer : Frame::error, text.data(), text.size());
   } catch (const std::bad_alloc&) {
     (void)send(to, Frame::out_of_memory, "", 0);
@@ -124,7 +125,7 @@ class Child {
   ~Child() {
     close(from_);
     kill(id_, SIGKILL);
-    (void)wait();
+    (void)wait();  // its status is of no interest: it was killed
   }
   int from() const { return from_; }
   int wait() {

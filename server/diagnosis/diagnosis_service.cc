@@ -354,12 +354,12 @@ class DiagnosisService::Impl {
         report_fault("diagnosis", answer.error().message);
       return tl::unexpected(answer.error());
     }
-    const ordered_json told = ordered_json::parse(*answer);
-    record.result_json = told["result"].dump();
-    record.summary_json = told["summary"].dump();
-    record.model_json = told["model"].get<std::string>();
-    report_ = told["report"].get<std::string>();
-    if (const auto& error = told["error"]; error != "")
+    const ordered_json found = ordered_json::parse(*answer);
+    record.result_json = found["result"].dump();
+    record.summary_json = found["summary"].dump();
+    record.model_json = found["model"].get<std::string>();
+    report_ = found["report"].get<std::string>();
+    if (const auto& error = found["error"]; error != "")
       on_error_({Fault::internal, "model", error.get<std::string>()});
     return {};
   }
@@ -378,20 +378,20 @@ class DiagnosisService::Impl {
     origin.model = "version " + std::to_string(model.version) + " of " + record.robot_id;
     origin.made_at = made_at;
     origin.software = "joulecastd " JOULECAST_VERSION;
-    ordered_json told = {{"summary", summary_of(result)},
-                         {"report", report::report_html(diagnosis, model.robot, origin)},
-                         {"model", ""},
-                         {"error", ""}};
-    told["result"] = std::move(result);
+    ordered_json found = {{"summary", summary_of(result)},
+                          {"report", report::report_html(diagnosis, model.robot, origin)},
+                          {"model", ""},
+                          {"error", ""}};
+    found["result"] = std::move(result);
     // What a forced adoption would take; of effects that are indistinguishable none has been chosen yet.
     const gap::Offer offer = gap::offer_of(diagnosis);
-    if (offer.effects.empty()) return told;
+    if (offer.effects.empty()) return found;
     const Result<robot::RobotModel> extended = gap::take(offer, model.robot, {{}, true});
     if (extended)
-      told["model"] = robot::to_json_text(*extended);
+      found["model"] = robot::to_json_text(*extended);
     else if (extended.error().fault != Fault::conflict)
-      told["error"] = describe(extended.error());
-    return told;
+      found["error"] = describe(extended.error());
+    return found;
   }
 
   void finish(Job& job, DiagnosisState state, std::string error, std::string report) {
@@ -405,7 +405,9 @@ class DiagnosisService::Impl {
     if (const auto stored = writer_.execute(update); !stored) {
       on_error_(stored.error());
       // Minutes of work wait until the store takes data again.
-      if (stored.error().fault == Fault::unavailable) (void)writer_.offer(std::move(update));
+      if (stored.error().fault == Fault::unavailable) {
+        if (const auto waits = writer_.offer(std::move(update)); !waits) on_error_(waits.error());
+      }
     }
     if (on_ended_) on_ended_(record);
     {

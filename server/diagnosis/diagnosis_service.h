@@ -61,7 +61,7 @@ class DiagnosisService {
  public:
   using Ended = std::function<void(const history::DiagnosisRecord&)>;
 
-  // `on_ended` is told of every job that has ended and is stored; called on the service's thread.
+  // `on_ended` is called with every job that has ended and is stored; called on the service's thread.
   DiagnosisService(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
                    const DriftView& drift, std::function<std::int64_t()> now_utime_us,
                    const DiagnosisOptions& options, std::function<void(const Error&)> on_error,

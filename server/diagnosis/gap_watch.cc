@@ -20,7 +20,7 @@ using nlohmann::json;
 constexpr const char* topic = "gap_watch";
 
 struct Memory {
-  std::int64_t announced_utime_us = 0;  // the newest mark that was told of
+  std::int64_t announced_utime_us = 0;  // the newest mark that was announced
   bool stood_out = false;
 };
 
@@ -119,14 +119,14 @@ bool GapWatch::is_own(const std::string& robot_id) const {
 
 void GapWatch::look() {
   const std::lock_guard looking(looking_);
-  const auto told = [this](const Result<void>& done) {
+  const auto report_fault = [this](const Result<void>& done) {
     if (!done) on_error_(done.error());
   };
   WatchCounts counts;
   std::vector<double> now;
   for (const auto& model : models_.all()) {
     if (!watches(model->robot.robot_id)) continue;
-    if (is_own(model->robot.robot_id)) told(look_at(*model, counts));
+    if (is_own(model->robot.robot_id)) report_fault(look_at(*model, counts));
     const auto recent = drift_.recent(*model);
     if (!recent) {
       on_error_(recent.error());
@@ -136,7 +136,7 @@ void GapWatch::look() {
     for (const drift::MissionRatio& m : *recent) measured += m.measured_j, modelled += m.modelled_j;
     if (modelled > 0) now.push_back(measured / modelled);
   }
-  told(compare_kinds(counts));
+  report_fault(compare_kinds(counts));
   if (now.empty()) {
     counts.ratio_min = counts.ratio_median = counts.ratio_max = std::nan("");
   } else {
@@ -208,15 +208,15 @@ void GapWatch::on_diagnosis(const history::DiagnosisRecord& diagnosis) {
   const json result = json::parse(diagnosis.result_json, nullptr, false);
   if (!result.is_object()) return;
   json detail = {{"diagnosis_id", diagnosis.id}, {"verdict", result["verdict"]}, {"gap", result["gap"]}};
-  std::map<std::string, double> blame;
+  std::map<std::string, double> by_cause;
   detail["effects"] = json::array();
   for (const json& effect : result["effects"]) {
     const std::string id = effect["id"];
     detail["effects"].push_back(id);
-    blame[std::string(cause_of(id))] += effect["share"].is_number() ? effect["share"].get<double>() : 0;
+    by_cause[std::string(cause_of(id))] += effect["share"].is_number() ? effect["share"].get<double>() : 0;
   }
-  const auto most = std::ranges::max_element(blame, {}, [](const auto& entry) { return entry.second; });
-  detail["blames"] = most == blame.end() ? json(nullptr) : json(most->first);
+  const auto most = std::ranges::max_element(by_cause, {}, [](const auto& entry) { return entry.second; });
+  detail["blames"] = most == by_cause.end() ? json(nullptr) : json(most->first);
   record(diagnosis.robot_id, "gap_diagnosed", detail.dump());
 }
 

@@ -51,7 +51,7 @@ class GapWatch {
 
   // One look at all robots, as the schedule does.
   void look();
-  // To be told of ended diagnoses.
+  // To be called with ended diagnoses.
   void on_diagnosis(const history::DiagnosisRecord& diagnosis);
 
   WatchCounts counts() const;

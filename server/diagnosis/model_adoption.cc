@@ -183,8 +183,8 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
                    {"tested_on_missions", adoption.tested_on.size()},
                    {"error_before", report["error_before"]},
                    {"error_after", report["error_after"]}});
-  if (Result<void> told = record(robot_id, "model_adopted", evidence.dump()); !told)
-    return tl::unexpected(std::move(told.error()));
+  if (Result<void> recorded = record(robot_id, "model_adopted", evidence.dump()); !recorded)
+    return tl::unexpected(std::move(recorded.error()));
   if (request.proposal_id) {
     const history::Outcome closed = writer_.execute(
         history::CloseProposal{*request.proposal_id, history::ProposalState::adopted, adoption.version});
@@ -231,10 +231,10 @@ Result<std::int64_t> ModelAdoption::activate(const std::string& robot_id, std::i
   if (Result<void> placed = models_.put(std::move(*robot), version); !placed)
     return tl::unexpected(std::move(placed.error()));
   const json detail = {{"model_version", version}, {"previous_version", previous}, {"note", note}};
-  if (Result<void> told =
+  if (Result<void> recorded =
           record(robot_id, "model_activated", detail.dump(-1, ' ', false, json::error_handler_t::replace));
-      !told)
-    return tl::unexpected(std::move(told.error()));
+      !recorded)
+    return tl::unexpected(std::move(recorded.error()));
   return previous;
 }
 

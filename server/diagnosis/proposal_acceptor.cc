@@ -16,9 +16,9 @@ constexpr std::int64_t proposals_a_look = 100;  // newest first; older ones are 
 }  // namespace
 
 ProposalAcceptor::ProposalAcceptor(const history::Store& store, ModelAdoption& adoption,
-                                   std::function<void(const std::string&, const std::string&)> tell,
+                                   std::function<void(const std::string&, const std::string&)> warn,
                                    std::function<bool(const std::string&)> is_own)
-    : store_(store), adoption_(adoption), tell_(std::move(tell)), is_own_(std::move(is_own)) {}
+    : store_(store), adoption_(adoption), warn_(std::move(warn)), is_own_(std::move(is_own)) {}
 
 ProposalAcceptor::~ProposalAcceptor() {
   stop();
@@ -27,7 +27,7 @@ ProposalAcceptor::~ProposalAcceptor() {
 int ProposalAcceptor::look() {
   auto found = store_.proposals(std::nullopt, std::numeric_limits<std::int64_t>::max(), proposals_a_look);
   if (!found) {
-    tell_("", "proposals cannot be read: " + describe(found.error()));
+    warn_("", "proposals cannot be read: " + describe(found.error()));
     return 0;
   }
   int adopted = 0;
@@ -47,7 +47,7 @@ int ProposalAcceptor::look() {
 bool ProposalAcceptor::try_one(const history::Proposal& proposal) {
   auto model = robot::parse_robot(proposal.model_json);
   if (!model) {
-    tell_(proposal.robot_id, "a proposal holds no valid robot file: " + describe(model.error()));
+    warn_(proposal.robot_id, "a proposal holds no valid robot file: " + describe(model.error()));
     return false;
   }
   AdoptionRequest request;
@@ -59,10 +59,10 @@ bool ProposalAcceptor::try_one(const history::Proposal& proposal) {
   request.expected_version = proposal.base_version;
   const auto adoption = adoption_.adopt(request);
   if (!adoption) {
-    tell_(proposal.robot_id, "a proposal was not tested: " + describe(adoption.error()));
+    warn_(proposal.robot_id, "a proposal was not tested: " + describe(adoption.error()));
     return false;
   }
-  if (!adoption->adopted) tell_(proposal.robot_id, "a proposal was not adopted: " + adoption->refusal);
+  if (!adoption->adopted) warn_(proposal.robot_id, "a proposal was not adopted: " + adoption->refusal);
   return adoption->adopted;
 }
 

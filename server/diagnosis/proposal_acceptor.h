@@ -18,7 +18,7 @@ class ProposalAcceptor {
  public:
   // `is_own`: whose proposals this daemon of a cluster looks at; empty: all robots'.
   ProposalAcceptor(const history::Store& store, ModelAdoption& adoption,
-                   std::function<void(const std::string& robot_id, const std::string& text)> tell,
+                   std::function<void(const std::string& robot_id, const std::string& text)> warn,
                    std::function<bool(const std::string& robot_id)> is_own = {});
   ~ProposalAcceptor();
 
@@ -34,7 +34,7 @@ class ProposalAcceptor {
 
   const history::Store& store_;
   ModelAdoption& adoption_;
-  std::function<void(const std::string&, const std::string&)> tell_;
+  std::function<void(const std::string&, const std::string&)> warn_;
   std::function<bool(const std::string&)> is_own_;
   std::int64_t seen_id_ = 0;
   std::mutex mutex_;

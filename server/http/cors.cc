@@ -22,7 +22,7 @@ bool Cors::allows(std::string_view origin) const {
   return std::ranges::find(origins_, origin) != origins_.end();
 }
 
-void Cors::tell(const Request& request, Response& response) const {
+void Cors::add_headers(const Request& request, Response& response) const {
   if (origins_.empty()) return;
   response.headers.emplace_back("Vary", "Origin");
   const std::string origin(request.header("origin"));

@@ -18,7 +18,7 @@ class Cors {
   bool allows(std::string_view origin) const;
 
   // Adds what the browser must read in an answer, and in that to a preflight request.
-  void tell(const Request& request, Response& response) const;
+  void add_headers(const Request& request, Response& response) const;
 
  private:
   std::vector<std::string> origins_;

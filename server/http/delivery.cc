@@ -60,7 +60,7 @@ void code(const Request& request, Response& response) {
 }  // namespace
 
 std::string entity_tag(std::string_view bytes) {
-  // FNV-1a, 64 bits: tells versions apart; nothing here relies on it against an adversary.
+  // FNV-1a, 64 bits: distinguishes versions; nothing here relies on it against an adversary.
   std::uint64_t hash = 14695981039346656037ULL;
   for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
   char text[20];

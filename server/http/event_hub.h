@@ -12,9 +12,10 @@
 namespace joulecast::http {
 
 // Server-sent events: what is published goes to every subscriber through a bounded queue of its own. A
-// subscriber whose queue is full is dropped, told nothing, and counted; it may reconnect with Last-Event-ID.
-// Event ids are "<epoch>-<n>", the epoch naming this run of the daemon. A returning client whose id is still
-// in the backlog gets what it missed; any other id is answered by an event "reset": read the state afresh.
+// subscriber whose queue is full is dropped without a notice, and counted; it may reconnect with
+// Last-Event-ID. Event ids are "<epoch>-<n>", the epoch naming this run of the daemon. A returning client
+// whose id is still in the backlog gets what it missed; any other id is answered by an event "reset": read
+// the state afresh.
 class EventHub {
  public:
   struct Options {

@@ -55,7 +55,7 @@ ordered_json description_of(const Token& token) {
 
 AccessEvent token_event(std::string action, const Token& token) {
   ordered_json detail = description_of(token);
-  // Enough to tell two tokens of one name apart.
+  // Enough to distinguish two tokens of one name.
   detail["sha256_begins"] = token.sha256.substr(0, 16);
   return {.action = std::move(action), .detail_json = detail.dump()};
 }
@@ -99,9 +99,9 @@ Result<void> Gate::load() {
     return std::ranges::find(list, token) != list.end();
   };
   for (const Token& token : tokens_)
-    if (!holds(*read, token)) tell(token_event("token_removed", token));
+    if (!holds(*read, token)) record(token_event("token_removed", token));
   for (const Token& token : *read)
-    if (!holds(tokens_, token)) tell(token_event("token_in_force", token));
+    if (!holds(tokens_, token)) record(token_event("token_in_force", token));
   tokens_ = std::move(*read);
   return {};
 }
@@ -123,23 +123,26 @@ Result<void> Gate::check() const {
   return {};
 }
 
-void Gate::tell(AccessEvent event) {
-  if (options_.audit) (void)options_.audit(std::move(event));
+// Of what has happened and cannot be undone.
+void Gate::record(const AccessEvent& event) {
+  if (!options_.audit) return;
+  if (const Result<void> kept = options_.audit(event); !kept && options_.not_audited)
+    options_.not_audited(event, kept.error());
 }
 
 // Whoever is refused may ask as often as he likes: a minute's further refusals are counted, not listed.
-void Gate::tell_refusal(const Endpoint& endpoint, const Request& request, unsigned status) {
+void Gate::record_refusal(const Endpoint& endpoint, const Request& request, unsigned status) {
   const std::int64_t minute = options_.now_utime_us() / (60 * microseconds_per_s);
   if (minute != refusals_minute_) {
     if (const std::int64_t omitted = refusals_ - refusals_kept_per_minute; omitted > 0)
-      tell({.action = "refusals_omitted", .detail_json = text_of({{"count", omitted}})});
+      record({.action = "refusals_omitted", .detail_json = text_of({{"count", omitted}})});
     refusals_minute_ = minute;
     refusals_ = 0;
   }
   if (++refusals_ > refusals_kept_per_minute) return;
   ordered_json detail = wanted(request);
   detail["status"] = status;
-  tell({request.actor, request.address, request.id, endpoint.operation_id, text_of(detail)});
+  record({request.actor, request.address, request.id, endpoint.operation_id, text_of(detail)});
 }
 
 // The token that a request proves to have; null: none that is valid. With the mutex held.
@@ -198,12 +201,12 @@ std::optional<Response> Gate::refuse(const Endpoint& endpoint, Request& request)
     response.headers.emplace_back(
         "WWW-Authenticate",
         presented ? R"(Bearer realm="joulecast", error="invalid_token")" : R"(Bearer realm="joulecast")");
-    tell_refusal(endpoint, request, 401);
+    record_refusal(endpoint, request, 401);
     return response;
   }
   request.actor = token->name;
   if (const auto why = why_not(*token, endpoint, request)) {
-    tell_refusal(endpoint, request, 403);
+    record_refusal(endpoint, request, 403);
     const bool lacks_role = token->role < endpoint.role;
     return problem(403, "forbidden", *why, request.id, "Authorization",
                    lacks_role
@@ -217,21 +220,22 @@ Endpoint Gate::audited(Endpoint endpoint) {
   if (endpoint.role != Role::operate && endpoint.role != Role::admin) return endpoint;
   endpoint.handler = [this, inner = std::move(endpoint.handler),
                       action = endpoint.operation_id](const Request& request) -> Result<Response> {
-    const auto keep = [&](const ordered_json& detail) -> Result<void> {
-      if (!options_.audit) return {};
-      return options_.audit({request.actor, request.address, request.id, action, text_of(detail)});
+    const auto event = [&](const ordered_json& detail) {
+      return AccessEvent{request.actor, request.address, request.id, action, text_of(detail)};
     };
     ordered_json asked = wanted(request);
     if (!request.body.empty()) asked["body_sha256"] = access::sha256_hex(request.body);
     // What is kept is committed in its order: this before the change.
-    if (Result<void> kept = keep(asked); !kept)
-      return fail(Fault::unavailable, "", "the audit takes nothing: " + describe(kept.error()));
+    if (options_.audit) {
+      if (const Result<void> kept = options_.audit(event(asked)); !kept)
+        return fail(Fault::unavailable, "", "the audit cannot be kept: " + describe(kept.error()));
+    }
     try {
       Result<Response> response = inner(request);
-      (void)keep({{"status", response ? response->status : status_of(response.error().fault)}});
+      record(event({{"status", response ? response->status : status_of(response.error().fault)}}));
       return response;
     } catch (...) {
-      (void)keep({{"status", 500}});
+      record(event({{"status", 500}}));
       throw;
     }
   };
@@ -257,7 +261,7 @@ Result<Response> Gate::sign_in(const Request& request) {
   Endpoint here;
   here.operation_id = "createSession";
   if (token == nullptr || access::has_expired(*token, now)) {
-    tell_refusal(here, request, 401);
+    record_refusal(here, request, 401);
     Response refused = problem(401, "unauthorized", "The token is unknown, expired or revoked", request.id,
                                "/token", "must be a token that is in force");
     refused.headers.emplace_back("WWW-Authenticate", R"(Bearer realm="joulecast", error="invalid_token")");
@@ -272,7 +276,7 @@ Result<Response> Gate::sign_in(const Request& request) {
   }
   const std::string value = access::random_hex(32);
   sessions_[access::sha256_hex(value)] = {token->sha256, now + session_s * microseconds_per_s};
-  tell({token->name, request.address, request.id, here.operation_id, text_of({{"status", 200}})});
+  record({token->name, request.address, request.id, here.operation_id, text_of({{"status", 200}})});
   Response response = json_response(description_of(*token).dump());
   response.headers.emplace_back("Set-Cookie", cookie(value, session_s, request.secure));
   return response;
@@ -283,7 +287,7 @@ Result<Response> Gate::sign_out(const Request& request) {
     const std::lock_guard lock(mutex_);
     bool presented = false;
     if (const Token* token = token_of(request, presented))
-      tell({token->name, request.address, request.id, "deleteSession", text_of({{"status", 204}})});
+      record({token->name, request.address, request.id, "deleteSession", text_of({{"status", 204}})});
     sessions_.erase(access::sha256_hex(cookie_value(request.header("cookie"), session_cookie)));
   }
   Response response;

@@ -27,7 +27,7 @@ struct AccessEvent {
 
 // Who may what. With a token file every request needs the role of its endpoint, by a bearer token or by the
 // cookie of a session that a token began; without one everybody may do everything. The file is read again
-// when it has changed; one that cannot be read leaves the tokens as they were and is told of by check(). Any
+// when it has changed; one that cannot be read leaves the tokens as they were and is reported by check(). Any
 // thread.
 class Gate {
  public:
@@ -36,6 +36,8 @@ class Gate {
     std::function<std::int64_t()> now_utime_us = {};
     // Keeps an event; an error means that it is not and will not be kept. Must not block.
     std::function<Result<void>(AccessEvent)> audit = {};
+    // What `audit` did not keep of something that has happened already; any thread. Empty: not reported.
+    std::function<void(const AccessEvent&, const Error&)> not_audited = {};
   };
 
   // The file must be readable once.
@@ -74,8 +76,8 @@ class Gate {
   const access::Token* token_of(const Request& request, bool& presented);
   std::optional<std::string> why_not(const access::Token& token, const Endpoint& endpoint,
                                      const Request& request) const;
-  void tell(AccessEvent event);
-  void tell_refusal(const Endpoint& endpoint, const Request& request, unsigned status);
+  void record(const AccessEvent& event);
+  void record_refusal(const Endpoint& endpoint, const Request& request, unsigned status);
   Result<Response> sign_in(const Request& request);
   Result<Response> sign_out(const Request& request);
   // One of `secure` is sent over HTTPS alone.

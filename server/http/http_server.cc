@@ -111,7 +111,7 @@ struct HttpServer::Impl {
   void admit(Socket socket);
   bool make_room(const Peer* of, bool guests);
   Task<void> tick();
-  void begin_stop(std::chrono::milliseconds patience);
+  void begin_stop(std::chrono::milliseconds grace);
   bool settled();
 
   std::shared_ptr<Core> core;
@@ -235,9 +235,9 @@ Task<void> HttpServer::Impl::tick() {
   }
 }
 
-void HttpServer::Impl::begin_stop(std::chrono::milliseconds patience) {
+void HttpServer::Impl::begin_stop(std::chrono::milliseconds grace) {
   core->stopping = true;
-  stop_deadline = Clock::now() + patience;
+  stop_deadline = Clock::now() + grace;
   boost::system::error_code ignored;
   acceptor.close(ignored);
   for (Session* session : core->sessions) session->begin_stop();

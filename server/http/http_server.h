@@ -87,9 +87,9 @@ struct Exchange {
 class ServerObserver {
  public:
   virtual ~ServerObserver() = default;
-  virtual void exchanged(const Exchange& exchange) { (void)exchange; }
-  virtual void refused(Refusal refusal) { (void)refusal; }
-  virtual void connections(std::size_t open) { (void)open; }
+  virtual void exchanged(const Exchange& /*exchange*/) {}
+  virtual void refused(Refusal /*refusal*/) {}
+  virtual void connections(std::size_t /*open*/) {}
 };
 
 // Whether only this machine reaches that IP address; false for what is none.

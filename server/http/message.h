@@ -40,7 +40,7 @@ struct Request {
   bool csv = false;                            // Accept asks for text/csv of an endpoint that has it
   std::string id;                              // request id: the client's X-Request-Id when sane, else ours
   // Set when the answer is no longer wanted: past http.request_deadline_s or when the client has gone (see
-  // Run), and when the server's patience at a stop has ended. What the handler then returns is not sent.
+  // Run), and when the server's grace time at a stop has ended. What the handler then returns is not sent.
   std::stop_token stop;
 
   // Value of a path parameter of the endpoint's template. Asking for one that is not in the template is our
@@ -72,7 +72,7 @@ class StreamSource {
   // Appends the next piece to `out`.
   virtual Next pull(std::string& out) = 0;
   // Gives the function, callable from any thread and at any time, that makes the server pull again.
-  virtual void on_wake(std::function<void()> wake) { (void)wake; }
+  virtual void on_wake(std::function<void()> /*wake*/) {}
   // The client left or the server stops; may come while pull() runs on another thread.
   virtual void cancel() {}
   // True when the source wants its connection closed even though a piece is still on its way (a slow client).

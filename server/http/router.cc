@@ -317,7 +317,7 @@ std::optional<Response> Router::run_brief(const Endpoint& endpoint, Request& req
     if (response) deliver(endpoint, request, *response, true);
     return response;
   } catch (const std::exception&) {
-    return std::nullopt;  // to be met again, and told of, by the handler
+    return std::nullopt;  // the handler meets it again and reports it
   }
 }
 

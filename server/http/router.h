@@ -19,7 +19,7 @@ using access::Role;
 enum class Run : std::uint8_t {
   worker,      // reads the store or answers within some milliseconds
   io,          // on the I/O thread: neither blocks nor computes for more than some tens of microseconds
-  operations,  // tells how the service is
+  operations,  // reports how the service is
   compute,     // plans or forecasts; cancelled past the deadline and when its client leaves
   write        // changes the store; cancelled past the deadline only where it has not begun
 };

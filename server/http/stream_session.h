@@ -73,8 +73,8 @@ class StreamSession final : public Session {
           parser_->get().count(beast::http::field::expect) > 0) {
         const Clock::time_point until = deadline_;
         const net::const_buffer go_on = net::buffer("HTTP/1.1 100 Continue\r\n\r\n", 25);
-        const bool told = co_await write(go_on);
-        if (!told) co_return false;
+        const bool sent = co_await write(go_on);
+        if (!sent) co_return false;
         deadline_ = until;
       }
       const bool more = co_await read_some();
@@ -172,7 +172,7 @@ class StreamSession final : public Session {
     const bool chunked = response_.stream && !old_client;
     const bool streamed = response_.stream && request_.method != Method::head;
     if (response_.stream && old_client) keep_alive_ = false;
-    core_->cors.tell(request_, response_);
+    core_->cors.add_headers(request_, response_);
     write_head(head_, response_, {core_->date, request_.id, chunked, keep_alive_, old_client});
     std::string_view body;
     if (request_.method != Method::head && response_.status != 204 && response_.status != 304)

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "base/json_fields.h"
-#include "base/json_text.h"
 #include "base/text_file.h"
 
 namespace joulecast::server {
@@ -73,13 +72,8 @@ Result<Webhook> read_webhook(const json& value, const std::string& at, const std
 }
 
 Result<std::vector<Webhook>> parse(std::string_view text, const std::filesystem::path& folder) {
-  const auto document = parse_json(text);
-  if (!document) return tl::unexpected(document.error());
-  if (!document->is_object()) return invalid("", "must be an object with the member webhooks");
-  Fields fields(*document);
-  const json* list = fields.required("webhooks");
-  if (list != nullptr && !list->is_array()) fields.fault("webhooks", "must be an array");
-  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  const auto list = read_list(text, "webhooks");
+  if (!list) return tl::unexpected(list.error());
   std::vector<Webhook> webhooks;
   for (std::size_t k = 0; k < list->size(); ++k) {
     Result<Webhook> webhook = read_webhook((*list)[k], "/webhooks/" + std::to_string(k), folder);

@@ -10,17 +10,17 @@
 
 namespace joulecast::server {
 
-// Somebody who wants to be told of events by HTTP.
+// A receiver of events by HTTP.
 struct Webhook {
   std::string url;
   http_client::ServerAddress address;  // of that URL, its path included
   std::string secret;                  // key of the signatures
-  std::set<std::string> events;        // kinds to be told of
+  std::set<std::string> events;        // kinds that it receives
 };
 
 // {"webhooks": [{"url": "https://...", "secret_file": "path", "events": ["mission", ...]}]}. A relative
 // secret_file is beside the file; it holds 16 bytes at least, whitespace around them not counted, and is for
-// no other user to read. "events" may be left out: all kinds. Faults are told by JSON pointer.
+// no other user to read. "events" may be left out: all kinds. Faults name the JSON pointer.
 Result<std::vector<Webhook>> read_webhooks(const std::string& path);
 
 // Every kind that there is, in order of the alphabet: those of the audit log and "mission", a mission that

@@ -11,7 +11,6 @@
 #include "access/secret_file.h"
 #include "access/sha256.h"
 #include "base/json_fields.h"
-#include "base/json_text.h"
 #include "base/text_file.h"
 
 namespace joulecast::access {
@@ -24,13 +23,8 @@ constexpr std::size_t longest_robot_id = 47;
 }  // namespace
 
 Result<RobotKeys> parse_robot_keys(std::string_view json_text) {
-  const auto document = parse_json(json_text);
-  if (!document) return tl::unexpected(document.error());
-  if (!document->is_object()) return invalid("", "must be an object with the member keys");
-  Fields fields(*document);
-  const json* list = fields.required("keys");
-  if (list != nullptr && !list->is_array()) fields.fault("keys", "must be an array");
-  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  const auto list = read_list(json_text, "keys");
+  if (!list) return tl::unexpected(list.error());
   RobotKeys keys;
   for (std::size_t k = 0; k < list->size(); ++k) {
     const std::string at = "/keys/" + std::to_string(k);

@@ -15,6 +15,4 @@ std::string_view name(Role role);
 // One of the four roles that a token can have.
 std::optional<Role> role_of(std::string_view name);
 
-inline constexpr std::string_view role_names = "read, plan, operate or admin";
-
 }  // namespace joulecast::access

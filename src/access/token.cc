@@ -8,7 +8,6 @@
 #include "access/secret_file.h"
 #include "access/sha256.h"
 #include "base/json_fields.h"
-#include "base/json_text.h"
 #include "base/text_file.h"
 #include "base/utc_time.h"
 
@@ -74,13 +73,8 @@ Result<void> check_token_name(std::string_view name) {
 }
 
 Result<std::vector<Token>> parse_tokens(std::string_view json_text) {
-  const auto document = parse_json(json_text);
-  if (!document) return tl::unexpected(document.error());
-  if (!document->is_object()) return invalid("", "must be an object with the member tokens");
-  Fields fields(*document);
-  const json* list = fields.required("tokens");
-  if (list != nullptr && !list->is_array()) fields.fault("tokens", "must be an array");
-  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  const auto list = read_list(json_text, "tokens");
+  if (!list) return tl::unexpected(list.error());
   std::vector<Token> tokens;
   for (const json& each : *list) {
     const std::string at = "/tokens/" + std::to_string(tokens.size());

@@ -123,7 +123,7 @@ Result<EstimateOutput> of_habit(const DriveInput& drive, const RobotOutlook& rob
   out.distance_m = path->distance_m();
   out.turned_rad = path->turned_rad();
   auto& quantiles = out.energy_quantiles_j.emplace();
-  std::ranges::transform(forecast::told_quantiles, quantiles.begin(),
+  std::ranges::transform(forecast::stated_quantiles, quantiles.begin(),
                          [&](double q) { return expected.quantile(q); });
   return out;
 }

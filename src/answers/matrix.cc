@@ -103,14 +103,8 @@ std::vector<Cell> Matrix::State::usual_cells(std::size_t r, std::vector<double>&
   for (std::size_t t = 0; t < cells.size(); ++t) {
     const planning::MatrixTask& task = input.tasks[t];
     Cell& cell = cells[t];
-    if (task.payload_kg > robot.model->robot.limits.payload_kg) {
-      cell.obstacle = Obstacle::payload;
-      continue;
-    }
-    if (task.empty.empty() && !robot.pose) {
-      cell.obstacle = Obstacle::pose;
-      continue;
-    }
+    cell.obstacle = planning::obstacle_of(task, robot.model->robot.limits.payload_kg, robot.pose.has_value());
+    if (cell.obstacle != Obstacle::none) continue;
     planning::stretches_of(task, r, robot.pose, stretches);
     legs.clear();
     for (const planning::Stretch& s : stretches)

@@ -55,7 +55,7 @@ struct MatrixRow {
 };
 
 // Every robot on every task. What is amiss with one robot, that it is not known or nobody knows where it
-// stands, is told in its row.
+// stands, is stated in its row.
 class Matrix {
  public:
   Matrix(MatrixInput input, const MatrixFleet& fleet, planning::CostTableCache& tables);

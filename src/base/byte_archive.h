@@ -101,6 +101,7 @@ class ByteLoader {
     }
     return number;
   }
+  // What take() could not give is remembered in sound_.
   template <PlainValue T>
   void get(T& value) {
     if constexpr (std::same_as<T, bool>) {

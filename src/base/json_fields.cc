@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/json_text.h"
 #include "base/utc_time.h"
 
 namespace joulecast {
@@ -186,6 +187,17 @@ Result<void> Fields::finish() {
   }
   if (error_) return tl::unexpected(*error_);
   return {};
+}
+
+Result<json> read_list(std::string_view json_text, const std::string& member) {
+  const auto document = parse_json(json_text);
+  if (!document) return tl::unexpected(document.error());
+  if (!document->is_object()) return invalid("", "must be an object with the member " + member);
+  Fields fields(*document);
+  const json* list = fields.required(member);
+  if (list != nullptr && !list->is_array()) fields.fault(member, "must be an array");
+  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  return *list;
 }
 
 }  // namespace joulecast

@@ -61,4 +61,7 @@ class Fields {
   bool misses_ = false;  // error_ is a required member of this object
 };
 
+// The array that is the one member of a document: {"tokens": [...]}.
+Result<nlohmann::json> read_list(std::string_view json_text, const std::string& member);
+
 }  // namespace joulecast

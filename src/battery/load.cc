@@ -38,16 +38,4 @@ Result<Load> held_load(Load::Kind kind, std::span<const double> time_s, std::spa
   return load;
 }
 
-Result<Load> linear_load(Load::Kind kind, std::span<const double> time_s, std::span<const double> value) {
-  if (const auto checked = check(time_s, value); !checked) return tl::unexpected(checked.error());
-  Load load{kind, {}};
-  for (std::size_t i = 1; i < time_s.size(); ++i)
-    load.pieces.push_back({time_s[i] - time_s[i - 1], value[i - 1], value[i]});
-  return load;
-}
-
-Load constant_load(Load::Kind kind, double value, double duration_s) {
-  return {kind, {{duration_s, value, value}}};
-}
-
 }  // namespace joulecast::battery

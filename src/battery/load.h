@@ -28,9 +28,4 @@ struct Load {
 // all finite; the error names the column.
 Result<Load> held_load(Load::Kind kind, std::span<const double> time_s, std::span<const double> value);
 
-// The value runs straight from each point to the next. Same constraints.
-Result<Load> linear_load(Load::Kind kind, std::span<const double> time_s, std::span<const double> value);
-
-Load constant_load(Load::Kind kind, double value, double duration_s);
-
 }  // namespace joulecast::battery

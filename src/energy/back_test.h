@@ -49,7 +49,6 @@ struct BackTest {
   std::array<double, 2> power_gap_fall_interval{};
 
   double improvement() const { return error_before - error_after; }
-  double power_gap_fall() const { return power_gap_before - power_gap_after; }
   // One of the two falls beyond doubt (its whole interval above zero) while the other does not grow: the
   // power gap not at all, the energy error, where chance alone moves it, not beyond doubt. False without
   // runs.

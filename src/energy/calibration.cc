@@ -12,11 +12,17 @@
 #include "base/median.h"
 #include "dynamics/drive_model.h"
 #include "energy/acceleration_filter.h"
+#include "energy/drive_equations.h"
 #include "telemetry/payload.h"
 
 namespace joulecast::energy {
 namespace {
 
+// Stretches of constant speed last at least three quarters of segment_s (longer ones are cut into pieces of
+// it) and go straight: wheel speeds differ by less than straight_share of their mean. Thesis (3-1) is about
+// such stretches alone, which the smooth windows of windows/windows.h, made for any motion, do not find.
+constexpr double segment_s = 0.5;
+constexpr double straight_share = 0.2;
 constexpr double block_s = 1.0;
 constexpr double least_significance = 2;  // estimates within so many standard errors of zero say nothing
 constexpr std::size_t least_blocks = 4;
@@ -109,7 +115,7 @@ class Calibrator {
     const bool whole = options.method == CalibrationMethod::whole;
     fitted_ = {true, true, true, whole, whole};
     notes_.fill("");
-    if (!whole) notes_[straight] = notes_[turning] = "constant speed tells no inertia";
+    if (!whole) notes_[straight] = notes_[turning] = "constant speed does not show inertia";
   }
 
   Result<DriveCalibration> run(std::span<const DriveRun> runs) {
@@ -146,7 +152,7 @@ class Calibrator {
       }
     }
     if (!any_current) return invalid("motor_current", "is not measured in any of the runs");
-    moving_rad_s_ = options_.moving_fraction * top;
+    moving_rad_s_ = moving_share * top;
     steady_rad_s2_ = options_.steady_fraction_1_s * top;
     half_window_s_ = half_window_for(runs);
     for (const DriveRun& run : runs) gather(run);
@@ -174,7 +180,7 @@ class Calibrator {
       for (std::size_t j = first; j < run.samples.size() && seconds(j) - seconds(k) <= reach; ++j)
         window.push_back({seconds(j), run.samples[j].wheel_velocity_rad_s});
       const std::array<double, 2> acceleration = fitted_acceleration(window, k - first);
-      const double length = options_.method == CalibrationMethod::steady ? options_.segment_s : block_s;
+      const double length = options_.method == CalibrationMethod::steady ? segment_s : block_s;
       const bool gap = !stretch.empty() && seconds(k) - stretch.back().t_s > 2 * half_window_s_;
       // At the ends of a record the filter has only a line to offer.
       const bool inside = k > first && k + 1 < first + window.size();
@@ -195,7 +201,7 @@ class Calibrator {
     if (options_.method == CalibrationMethod::whole) return true;
     const double right = s.wheel_velocity_rad_s[0], left = s.wheel_velocity_rad_s[1];
     return std::fabs(acceleration[0]) < steady_rad_s2_ && std::fabs(acceleration[1]) < steady_rad_s2_ &&
-           std::fabs(right - left) < options_.straight_fraction * std::fabs(right + left) / 2;
+           std::fabs(right - left) < straight_share * std::fabs(right + left) / 2;
   }
 
   Moment observe(const signals::Sample& s, double climb_rad, const std::array<double, 2>& acceleration,
@@ -233,7 +239,7 @@ class Calibrator {
   // Ends a stretch that lasted `length_s` and counts it in.
   void close(std::vector<Moment>& stretch, double length_s) {
     const bool steady = options_.method == CalibrationMethod::steady;
-    if (stretch.empty() || (steady && length_s < options_.segment_s * 0.75)) return stretch.clear();
+    if (stretch.empty() || (steady && length_s < segment_s * 0.75)) return stretch.clear();
     Block block;
     for (std::size_t side : {0u, 1u}) {
       if (!steady) {
@@ -279,7 +285,7 @@ class Calibrator {
       }
       others = a.ldlt().solve(b);
       left -= b.dot(others);
-      if (!(left > 1e-9 * own)) hold(k, file_.torque[k], "these runs do not tell it from the others");
+      if (!(left > 1e-9 * own)) hold(k, file_.torque[k], "these runs do not distinguish it from the others");
     }
   }
 
@@ -351,8 +357,8 @@ class Calibrator {
   }
 
   bool drop_weakest(const Solution& s, const Flat& error) {
-    // Where the voltages do not tell R from K_w, the file's K_w is the surer of the two: it follows from
-    // geometry and the motor's speed constant.
+    // Where the voltages do not distinguish R from K_w, the file's K_w is the surer of the two: it follows
+    // from geometry and the motor's speed constant.
     if (fit_electrical_ && !options_.resistance_known && !resistance_held_ &&
         !(s.resistance_ohm > least_significance * error[0])) {
       (options_.constants_known || constant_held_ ? resistance_held_ : constant_held_) = true;
@@ -389,7 +395,7 @@ class Calibrator {
     const auto electrical = [&](bool known, bool held) -> std::string_view {
       if (!data_.has_voltage) return "voltage is not measured; the file's";
       if (known) return "given as known";
-      return held ? "the voltages do not tell R from K_w; held at the file's" : "";
+      return held ? "the voltages do not distinguish R from K_w; held at the file's" : "";
     };
     const auto add = [&](std::string_view name, std::string_view unit, double value, double standard_error,
                          bool fitted, std::string_view note) {

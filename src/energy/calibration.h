@@ -22,7 +22,7 @@ namespace joulecast::energy {
 //   r/(2l)
 //
 // `known` is what the robot file's model says of payload, centre of mass and adopted effects. What no set of
-// such runs can tell apart: mass from rotor inertia (only J_f is seen), and the scale of all torques from
+// such runs can distinguish: mass from rotor inertia (only J_f is seen), and the scale of all torques from
 // K_t. The file's ratio K_t/K_w (1 for an ideal machine) ties K_t to the K_w that the voltages show.
 
 // steady: thesis (3-1) on stretches of constant speed; i = b1 + b2 w and V = c1 + c2 w by least squares, with
@@ -36,14 +36,8 @@ struct CalibrationOptions {
   // Taken from the robot file instead of being fitted.
   bool resistance_known = false;
   bool constants_known = false;
-  double moving_fraction =
-      0.03;  // of the fastest wheel speed: slower samples tell of stiction and are left out
-  // Constant speed: both wheels' accelerations below this share of the fastest wheel speed a second, ...
+  // Constant speed: both wheels' accelerations below this share of the fastest wheel speed a second.
   double steady_fraction_1_s = 0.1;
-  // ... for at least this long; longer stretches are cut into pieces of it.
-  double segment_s = 0.5;
-  // ... and going straight: wheel speeds differ by less than this share of their mean.
-  double straight_fraction = 0.2;
 };
 
 struct DriveRun {

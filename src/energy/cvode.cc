@@ -98,7 +98,7 @@ struct Cvode::Impl {
                 message.empty() ? "failed with flag " + std::to_string(flag) : message);
   }
 
-  // Restarts at t0 and integrates towards t1; the flag tells an event from the end.
+  // Restarts at t0 and integrates towards t1; the flag distinguishes an event from the end.
   Result<int> run(double t0, double t1, double first_step, double& reached) {
     if (!(t1 > t0)) return invalid("t1", "must be after t0");
     message.clear();

@@ -10,7 +10,6 @@ namespace {
 
 constexpr double stretch_s = 10;              // of samples whose windows are made together
 constexpr double longest_gap_s = 2.0;         // between samples of one stretch
-constexpr double moving_share = 0.03;         // of the fastest wheel speed: slower wheels may stick
 constexpr std::size_t most_equations = 6000;  // half an hour of driving
 
 double seconds_between(const signals::Sample& from, const signals::Sample& to) {

@@ -53,6 +53,13 @@ struct DriveEquation {
   std::array<double, unknown_count> row{};
 };
 
+// Of the fastest wheel speed: friction of a slower wheel is not taken for dry and viscous friction alone,
+// since it follows the Stribeck curve (Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30 (1994),
+// sec. 2). Refinement and calibration go by it alike. A window of windows/windows.h is moving from 0.1 rad/s
+// on already: there only the sign of the friction must be sure, and its equations have a column for the
+// curve.
+inline constexpr double moving_share = 0.03;
+
 // Turns a mission's samples into equations, one or two a smooth window (windows/windows.h). The rows are
 // differences of the robot's own drive model, so that payloads and effects count as they do there.
 //

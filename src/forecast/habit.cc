@@ -177,13 +177,6 @@ Habit Habit::with(const StatedPace& stated) const {
   return habit;
 }
 
-Habit Habit::without_halts() const {
-  Habit habit = *this;
-  habit.halts = {};
-  habit.middle.pause_s = 0;
-  return habit;
-}
-
 HaltDistribution Habit::standing(const std::array<double, 2>& stops, double unit) const {
   double mean = 0, variance = 0, log_none = 0;
   for (std::size_t k = 0; k < stops.size(); ++k) {

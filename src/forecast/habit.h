@@ -68,7 +68,6 @@ struct Habit {
 
   // What is stated replaces the habit.
   Habit with(const StatedPace& stated) const;
-  Habit without_halts() const;
   // Of so many stops after drives and after turns, each second counting `unit`; how well the habit is known
   // is in the variance.
   HaltDistribution standing(const std::array<double, 2>& stops, double unit) const;

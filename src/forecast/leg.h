@@ -32,7 +32,7 @@ struct PastMission {
 // Slower than this, of body and wheel rims, a robot stands: 1 % of its speed limit.
 double still_speed_m_s(const robot::RobotModel& robot);
 
-// What the tracker is told of one sample.
+// What the tracker takes of one sample.
 struct LegSample {
   double interval_s = 0;  // since the previous sample; 0: nothing is known between them
   double speed_m_s = 0;

@@ -29,14 +29,14 @@ std::optional<Limitation> limitation(const LegPricer& pricer, const robot::Robot
   slower.reached.yaw_rate_rad_s = turn.cruise.speed;
   slower.reached.yaw_acceleration_rad_s2 = turn.cruise.acceleration;
   std::string what;
-  const auto tell = [&](double reached, double asked, const char* unit) {
+  const auto add = [&](double reached, double asked, const char* unit) {
     if (!less(reached, asked)) return;
     what += fmt::format("{}{:.3g} {} instead of {:.3g}", what.empty() ? "" : ", ", reached, unit, asked);
   };
-  tell(drive.cruise.speed, wanted.speed_m_s, "m/s");
-  tell(drive.cruise.acceleration, wanted.acceleration_m_s2, "m/s^2");
-  tell(turn.cruise.speed, wanted.yaw_rate_rad_s, "rad/s");
-  tell(turn.cruise.acceleration, wanted.yaw_acceleration_rad_s2, "rad/s^2");
+  add(drive.cruise.speed, wanted.speed_m_s, "m/s");
+  add(drive.cruise.acceleration, wanted.acceleration_m_s2, "m/s^2");
+  add(turn.cruise.speed, wanted.yaw_rate_rad_s, "rad/s");
+  add(turn.cruise.acceleration, wanted.yaw_acceleration_rad_s2, "rad/s^2");
   if (what.empty()) return std::nullopt;
   slower.sentence =
       fmt::format("With {:.4g} kg the robot's motors, which have {}, reach {}.", payload_kg, allowed, what);

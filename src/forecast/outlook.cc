@@ -47,7 +47,7 @@ TaskOutlook stage(const Forecaster& forecaster, const ChargeMap& battery, const 
   TaskOutlook out;
   out.duration_s = forecaster.duration(sum).quantile(0.5);
   out.probability = p.probability_below(spend.energy_j, spend.deviation_j);
-  for (std::size_t k = 0; k < told_quantiles.size(); ++k) out.energy_j[k] = p.quantile(told_quantiles[k]);
+  for (std::size_t k = 0; k < stated_quantiles.size(); ++k) out.energy_j[k] = p.quantile(stated_quantiles[k]);
   out.charge = arrival_charge(p, battery, charge, power);
   return out;
 }
@@ -77,14 +77,15 @@ double longest_wait(const Forecaster& forecaster, const ChargeMap& battery, cons
 std::array<double, 3> arrival_charge(const Prediction& prediction, const ChargeMap& battery,
                                      const Charge& charge, double mean_power_w) {
   std::array<double, 3> out;
-  for (std::size_t k = 0; k < told_quantiles.size(); ++k)
-    out[k] = battery.charge_after(charge.fraction, prediction.quantile(1 - told_quantiles[k]), mean_power_w);
+  for (std::size_t k = 0; k < stated_quantiles.size(); ++k)
+    out[k] =
+        battery.charge_after(charge.fraction, prediction.quantile(1 - stated_quantiles[k]), mean_power_w);
   const double middle = out[1];
   const double deviation =
       std::hypot(charge.deviation, battery.relative_deviation() * (charge.fraction - middle));
-  for (std::size_t k = 0; k < told_quantiles.size(); ++k)
+  for (std::size_t k = 0; k < stated_quantiles.size(); ++k)
     out[k] =
-        joined(middle, out[k] - middle, normal_quantile[k] * deviation, told_quantiles[k] < 0.5 ? -1 : 1);
+        joined(middle, out[k] - middle, normal_quantile[k] * deviation, stated_quantiles[k] < 0.5 ? -1 : 1);
   for (double& c : out) c = std::clamp(c, 0.0, 1.0);
   return out;
 }
@@ -196,10 +197,11 @@ Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const
   for (std::size_t k = 0; k < tasks.size(); ++k) note(out.tasks[k], sums[k + 1], k);
   if (out.charger_given) note(out.charger.emplace(), whole, tasks.size());
   out.mean_j = all.mean();
-  for (std::size_t k = 0; k < told_quantiles.size(); ++k) out.energy_j[k] = all.quantile(told_quantiles[k]);
+  for (std::size_t k = 0; k < stated_quantiles.size(); ++k)
+    out.energy_j[k] = all.quantile(stated_quantiles[k]);
   const Prediction duration = forecaster.duration(whole);
-  for (std::size_t k = 0; k < told_quantiles.size(); ++k)
-    out.duration_s[k] = duration.quantile(told_quantiles[k]);
+  for (std::size_t k = 0; k < stated_quantiles.size(); ++k)
+    out.duration_s[k] = duration.quantile(stated_quantiles[k]);
   out.probability = probability_before;
   if (tasks.empty() && !out.charger_given)
     out.probability = probability_of_reserve(forecaster, battery, charge, whole);
@@ -245,11 +247,11 @@ Reach reach(const Forecaster& forecaster, const ChargeMap& battery, const Charge
   out.mean_power_w = mean_power(once, p.quantile(0.5) / copies);
   if (once.way_m > 0) out.energy_per_m_j = p.quantile(0.5) / (copies * once.way_m);
   const double middle = out.usable_j / p.quantile(0.5);
-  for (std::size_t k = 0; k < told_quantiles.size(); ++k) {
-    const double by_energy = out.usable_j / p.quantile(1 - told_quantiles[k]) - middle;
+  for (std::size_t k = 0; k < stated_quantiles.size(); ++k) {
+    const double by_energy = out.usable_j / p.quantile(1 - stated_quantiles[k]) - middle;
     const double by_charge = normal_quantile[k] * out.usable_deviation_j / p.quantile(0.5);
     const double times =
-        copies * std::max(0.0, joined(middle, by_energy, by_charge, told_quantiles[k] < 0.5 ? -1 : 1));
+        copies * std::max(0.0, joined(middle, by_energy, by_charge, stated_quantiles[k] < 0.5 ? -1 : 1));
     out.range_m[k] = once.way_m > 0 ? times * once.way_m : nowhere;
     out.run_time_s[k] = times * once.duration_s;
   }

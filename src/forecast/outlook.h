@@ -12,7 +12,7 @@
 
 namespace joulecast::forecast {
 
-inline constexpr std::array<double, 3> told_quantiles{0.05, 0.5, 0.95};
+inline constexpr std::array<double, 3> stated_quantiles{0.05, 0.5, 0.95};
 
 struct PricedTask {
   std::vector<PricedLeg> legs;
@@ -30,8 +30,8 @@ struct TaskOutlook {
   double mean_j = 0;                 // of this task alone
   double duration_s = 0;             // from now to its end, median
   double probability = 0;            // of holding the reserve to its end
-  std::array<double, 3> energy_j{};  // from now, at told_quantiles
-  std::array<double, 3> charge{};    // on arrival, at told_quantiles
+  std::array<double, 3> energy_j{};  // from now, at stated_quantiles
+  std::array<double, 3> charge{};    // on arrival, at stated_quantiles
 };
 
 // The last moment at which leaving for the charger still holds the reserve with the confidence asked for.
@@ -47,7 +47,7 @@ struct Outlook {
   std::optional<TaskOutlook> charger;  // the way to the charger after the last task
   double mean_j = 0;                   // of everything, the way to the charger included
   std::array<double, 3> energy_j{};
-  std::array<double, 3> duration_s{};   // at told_quantiles
+  std::array<double, 3> duration_s{};   // at stated_quantiles
   double probability = 0;               // of finishing everything with the reserve
   std::optional<std::size_t> fails_at;  // first task (tasks.size(): the way to the charger) likelier to break
                                         // the reserve than not
@@ -68,7 +68,7 @@ struct Reach {
   double usable_deviation_j = 0;
   double energy_per_m_j = 0;        // median over so long a way; NaN: its legs cover no way
   double mean_power_w = 0;          // likewise
-  std::array<double, 3> range_m{};  // at told_quantiles: the first is nearly always exceeded
+  std::array<double, 3> range_m{};  // at stated_quantiles: the first is nearly always exceeded
   std::array<double, 3> run_time_s{};
 };
 Reach reach(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
@@ -101,7 +101,7 @@ class QuickSuccess {
   double budget_j_, deviation_j_;
 };
 
-// The charge left after what was predicted, at told_quantiles.
+// The charge left after what was predicted, at stated_quantiles.
 std::array<double, 3> arrival_charge(const Prediction& prediction, const ChargeMap& battery,
                                      const Charge& charge, double mean_power_w);
 

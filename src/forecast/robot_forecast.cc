@@ -189,12 +189,12 @@ Forecaster RobotForecast::with_track(Subject subject) const {
   return now;
 }
 
-Prediction RobotForecast::Seen::told(Subject subject, const Forecaster& by) const {
+Prediction RobotForecast::Seen::predicted(Subject subject, const Forecaster& by) const {
   return subject == Subject::usual_duration ? by.duration(sum) : by.energy(sum);
 }
 
 double RobotForecast::Seen::score(Subject subject, const Forecaster& by) const {
-  return told(subject, by).score_of(std::max(least_amount, measured + halted));
+  return predicted(subject, by).score_of(std::max(least_amount, measured + halted));
 }
 
 RobotForecast::Seen RobotForecast::seen(Subject subject, const PastMission& mission,
@@ -250,7 +250,7 @@ double RobotForecast::score(Subject subject, const PastMission& mission, double&
   if (legs.foreseen == 0) return 0;
   const double z = legs.score(subject, with);
 
-  const double expected = std::max(least_amount, legs.told(subject, with).legs);
+  const double expected = std::max(least_amount, legs.predicted(subject, with).legs);
   const double measured = std::max(least_amount, legs.measured);
   log_ratio = std::log(measured / expected);
   const double relative = 1 / (expected * expected);
@@ -268,12 +268,12 @@ double RobotForecast::score(Subject subject, const PastMission& mission, double&
         std::clamp(learning.log_inflation + adapt_step * ((hit ? 0.0 : 1.0) - (1 - interval)),
                    std::log(narrowest), std::log(widest));
   }
-  // The scores of a robot hardly known tell of the model's error, mostly to one side, and not of the scatter
+  // The scores of a robot hardly known show the model's error, mostly to one side, and not of the scatter
   // about a corrected one.
   learning.scores.add(z, 1 - estimate_part / (estimate_part + leg_part + common_part));
 
   learn_scatter(subject, legs, now, measured / expected);
-  // A mission that the estimate's own error dominates tells little of what missions share.
+  // A mission that the estimate's own error dominates says little about what missions share.
   const double weight = common_part / (common_part + estimate_part);
   const double beyond_legs = log_ratio * log_ratio - leg_part - estimate_part;
   constexpr double outlier = 9;

@@ -88,7 +88,7 @@ class Forecaster {
 // predicted from what came before it; its score then calibrates the intervals (prequential split conformal).
 // Scores of a robot hardly known are those of another forecast than the one in force: they lean to one side
 // and are of another width. Each time that the missions have grown by a quarter all are therefore scored
-// anew, each by what the others tell (jackknife+, Barber, Candes, Ramdas and Tibshirani 2021). The hit or
+// anew, each by the others (jackknife+, Barber, Candes, Ramdas and Tibshirani 2021). The hit or
 // miss of the 90 % interval adapts their width (Gibbs and Candes 2021, on the logarithm of the width), and a
 // CUSUM of the scores watches for drift, upon which what came before the change is set aside.
 class RobotForecast {
@@ -99,8 +99,8 @@ class RobotForecast {
   // `drive` must be the drive model of `robot`.
   RobotForecast(robot::RobotModel robot, dynamics::DriveModel drive);
 
-  // Learns with what siblings told so far. Returns the drift when this mission reveals it. Missions without
-  // measured legs teach nothing.
+  // Learns with what siblings have given so far. Returns the drift when this mission reveals it. Missions
+  // without measured legs teach nothing.
   std::optional<Drift> learn(PastMission mission);
 
   // Puts another model in force and learns the kept missions anew.
@@ -134,7 +134,7 @@ class RobotForecast {
     double halted = 0;    // measured while standing, where halts are not foreseen one by one
     PlanSum sum;          // of the foreseen
 
-    Prediction told(Subject subject, const Forecaster& by) const;
+    Prediction predicted(Subject subject, const Forecaster& by) const;
     double score(Subject subject, const Forecaster& by) const;
   };
 

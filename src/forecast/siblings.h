@@ -12,7 +12,6 @@ namespace joulecast::forecast {
 
 // Whether the plan says how fast legs are driven, or leaves it to the robot's habit.
 enum class Driving { stated, usual };
-inline constexpr std::size_t driving_count = 2;
 
 // What is learnt of a robot: what it spends on legs whose pace is known, what it spends, and how long it
 // takes, on legs that it drives as it likes.
@@ -26,7 +25,7 @@ struct OwnFinding {
   std::int64_t missions = 0;
 };
 
-// What the other robots of one kind tell a robot.
+// What a robot learns from the others of its kind.
 struct Siblings {
   Correction prior = untried();
   std::vector<Scores::Entry> scores;

@@ -168,7 +168,7 @@ struct RemoveRobot {
   bool purge = false;
 };
 
-// Lets a robot's lease go, after all that was commanded under it. Outcome: 0.
+// Releases a robot's lease, after all that was commanded under it. Outcome: 0.
 struct ReleaseLease {
   std::string robot_id;
   Epoch epoch = 0;

@@ -10,7 +10,7 @@ constexpr std::size_t words = 3;
 constexpr std::size_t raw_bytes = 8 * words;
 constexpr std::size_t text_bytes = raw_bytes / 3 * 4;
 
-// FNV-1a, 64 bits. It tells mistakes, not forgeries: a cursor gives access to nothing that the query itself
+// FNV-1a, 64 bits. It detects mistakes, not forgeries: a cursor gives access to nothing that the query itself
 // does not.
 std::uint64_t fingerprint(std::string_view query, CursorPlace place) {
   std::uint64_t hash = 0xcbf29ce484222325;

@@ -13,7 +13,8 @@ namespace joulecast::history {
 // A place in an ordered result: two numbers whose meaning is the query's.
 using CursorPlace = std::array<std::int64_t, 2>;
 
-// `query` is any text that tells queries apart; its fingerprint goes into the cursor. The result is URL-safe.
+// `query` is any text that distinguishes queries; its fingerprint goes into the cursor. The result is
+// URL-safe.
 std::string encode_cursor(std::string_view query, CursorPlace place);
 
 // Fault::invalid on field "cursor" for a malformed cursor or one of another query.

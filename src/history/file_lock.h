@@ -8,7 +8,7 @@
 
 namespace joulecast::history {
 
-// Keeps a second program off the same file; the kernel lets go of it however the process ends.
+// Keeps a second program off the same file; the kernel releases it however the process ends.
 class FileLock {
  public:
   explicit FileLock(int descriptor) : descriptor_(descriptor) {}

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "history/postgres.h"
+#include "history/postgres_schema.h"
 #include "history/postgres_store.h"
 #include "history/schema.h"
 #include "history/sql_store.h"
@@ -26,6 +27,35 @@ SqliteOptions sqlite_options(const std::string& url) {
   SqliteOptions options;
   options.path = sqlite_path(url);
   return options;
+}
+
+constexpr std::int64_t busy_timeout_ms = 10'000;
+
+Result<std::unique_ptr<SqliteDatabase>> connect_file(const std::string& path, OpenMode mode) {
+  if (!std::filesystem::is_regular_file(path)) return fail(Fault::not_found, path, "there is no such file");
+  auto open = [&]() -> Result<std::unique_ptr<SqliteDatabase>> {
+    auto database = std::make_unique<SqliteDatabase>(path, mode, busy_timeout_ms);
+    if (database->integer("PRAGMA application_id") != store_application_id)
+      return fail(Fault::corrupt, path, "is not a joulecast store");
+    return database;
+  };
+  return guarded(open, path);
+}
+
+Result<std::unique_ptr<PostgresDatabase>> connect_server(const std::string& url) {
+  return guarded([&]() -> Result<std::unique_ptr<PostgresDatabase>> {
+    auto database = std::make_unique<PostgresDatabase>(url, "joulecast-reader");
+    if (!database->has_table("joulecast_store"))
+      return fail(Fault::corrupt, "url", "is not a joulecast store");
+    return database;
+  });
+}
+
+Result<void> check_version(const std::string& where, std::int64_t version, std::int64_t own) {
+  if (version == own) return {};
+  return fail(Fault::conflict, where,
+              "has schema version " + std::to_string(version) + "; this program's is " + std::to_string(own) +
+                  (version < own ? ", to which a start of the daemon brings it" : ""));
 }
 
 }  // namespace
@@ -69,30 +99,39 @@ Result<std::unique_ptr<Store>> open_shared_store(
 
 Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_exist) {
   if (auto ok = check_store_url(url); !ok) return tl::unexpected(ok.error());
+  if (is_postgres_url(url)) {
+    if (must_exist)
+      if (const auto there = connect_server(url); !there) return tl::unexpected(there.error());
+    return open_postgres_tables(postgres_options(url));
+  }
   if (must_exist)
-    if (const auto there = open_to_read(url); !there) return tl::unexpected(there.error());
-  if (is_postgres_url(url)) return open_postgres_tables(postgres_options(url));
+    if (const auto there = connect_file(sqlite_path(url), OpenMode::read_only); !there)
+      return fail(there.error().fault, "url", describe(there.error()));
   return open_sqlite_tables(sqlite_options(url));
+}
+
+Result<std::unique_ptr<SqliteDatabase>> open_file(const std::string& path, OpenMode mode) {
+  auto database = connect_file(path, mode);
+  if (!database) return database;
+  const auto version =
+      guarded([&]() -> Result<std::int64_t> { return (*database)->integer("PRAGMA user_version"); }, path);
+  if (!version) return tl::unexpected(version.error());
+  if (auto ok = check_version(path, *version, store_schema().version); !ok) return tl::unexpected(ok.error());
+  return database;
 }
 
 Result<std::unique_ptr<Database>> open_to_read(const std::string& url) {
   if (auto ok = check_store_url(url); !ok) return tl::unexpected(ok.error());
-  return guarded([&]() -> Result<std::unique_ptr<Database>> {
-    std::unique_ptr<Database> database;
-    bool is_store = false;
-    if (is_postgres_url(url)) {
-      database = std::make_unique<PostgresDatabase>(url, "joulecast-reader");
-      is_store = database->has_table("joulecast_store");
-    } else {
-      const SqliteOptions options = sqlite_options(url);
-      if (!std::filesystem::exists(options.path))
-        return fail(Fault::not_found, "url", "there is no file " + options.path);
-      database = std::make_unique<SqliteDatabase>(options.path, OpenMode::read_only, options.busy_timeout_ms);
-      is_store = database->integer("PRAGMA application_id") == store_application_id;
-    }
-    if (!is_store) return fail(Fault::corrupt, "url", "is not a joulecast store");
-    return database;
+  if (!is_postgres_url(url)) return open_file(sqlite_path(url));
+  auto database = connect_server(url);
+  if (!database) return tl::unexpected(database.error());
+  const auto version = guarded([&]() -> Result<std::int64_t> {
+    return (*database)->integer("SELECT schema_version FROM joulecast_store");
   });
+  if (!version) return tl::unexpected(version.error());
+  if (auto ok = check_version("url", *version, postgres_schema_version); !ok)
+    return tl::unexpected(ok.error());
+  return std::unique_ptr<Database>(std::move(*database));
 }
 
 }  // namespace joulecast::history

@@ -7,11 +7,11 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "history/sql.h"
+#include "history/sqlite.h"
 #include "history/store.h"
 
 namespace joulecast::history {
-
-class Database;
 
 // Whether the URL names a database of PostgreSQL, which libpq reads: postgresql://... or postgres://...
 bool is_postgres_url(std::string_view url);
@@ -34,8 +34,13 @@ Result<std::unique_ptr<Store>> open_shared_store(
 Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_exist);
 
 // A connection to the tables of a URL that reads beside whoever holds them, and migrates nothing.
-// Fault::not_found when there is no such file, ::corrupt when it is no store.
+// Fault::not_found when there is no such file, ::corrupt when it is no store, ::conflict when its schema is
+// of another version than this program's.
 Result<std::unique_ptr<Database>> open_to_read(const std::string& url);
+
+// The same of a store's file; errors are on its path.
+Result<std::unique_ptr<SqliteDatabase>> open_file(const std::string& path,
+                                                  OpenMode mode = OpenMode::read_only);
 
 // The URL without its password, to be shown.
 std::string shown_url(const std::string& url);

@@ -104,7 +104,7 @@ class PostgresSharedState final : public SharedState {
       if (!database_ || !database_->is_usable()) {
         database_.reset();
         database_ = std::make_unique<PostgresDatabase>(url_, name_);
-        // Live states are told again in a moment: a commit need not wait for the disk.
+        // Live states are published again in a moment: a commit need not wait for the disk.
         database_->execute("SET synchronous_commit = off; SET statement_timeout = '5s'");
       }
       return work(*database_);

@@ -13,7 +13,7 @@
 
 namespace joulecast::history {
 
-// The live state of a robot as its keeper tells the other daemons of a cluster.
+// The live state of a robot as its keeper publishes it to the other daemons of a cluster.
 struct LiveState {
   std::string robot_id;
   std::string node;  // its keeper
@@ -36,7 +36,7 @@ class SharedState {
   virtual Result<std::map<std::string, std::int64_t>> learned(const std::string& topic) = 0;
 };
 
-// `application_name` tells the connection apart at the server.
+// `application_name` identifies the connection at the server.
 std::unique_ptr<SharedState> open_shared_state(const std::string& url, const std::string& application_name);
 
 }  // namespace joulecast::history

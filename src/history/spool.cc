@@ -16,12 +16,14 @@
 
 #include "base/byte_archive.h"
 #include "history/chunk_bytes.h"
+#include "signals/archive_members.h"
 
 namespace joulecast::history {
 namespace {
 
 // The members of everything that a command holds, once for both directions.
-struct Members {
+struct Members : signals::ArchiveMembers {
+  using ArchiveMembers::of;
   template <class Archive>
   static void of(Archive& a, AddModel& c) {
     a(c.robot_id, c.utime_us, c.origin, c.note, c.model_json, c.expected_active, c.evidence_json);
@@ -29,12 +31,6 @@ struct Members {
   template <class Archive>
   static void of(Archive& a, ActivateModel& c) {
     a(c.robot_id, c.version);
-  }
-  template <class Archive>
-  static void of(Archive& a, signals::Accounts& c) {
-    a(c.battery_j, c.measured_j, c.measured_s, c.measured_motor_j, c.motor_measured_s, c.modelled_j,
-      c.modelled_motor_j, c.drawn_j, c.returned_j, c.charge_ah, c.distance_m, c.turned_rad, c.duration_s,
-      c.ledger.value);
   }
   template <class Archive>
   static void of(Archive& a, CovariateSummary& c) {
@@ -58,11 +54,6 @@ struct Members {
   static void of(Archive& a, TraceBucket& c) {
     a(c.start_utime_us, c.covered_s, c.measured_power_w, c.modelled_power_w, c.speed_m_s, c.state_of_charge,
       c.measured_j, c.modelled_j, c.x_m, c.y_m);
-  }
-  template <class Archive>
-  static void of(Archive& a, signals::Sample& c) {
-    a(c.utime_us, c.sequence);
-    signals::visit_fields(c, [&a](const signals::SampleField&, double& number) { a(number); });
   }
   template <class Archive>
   static void of(Archive& a, signals::CovariateChange& c) {

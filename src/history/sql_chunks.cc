@@ -179,6 +179,16 @@ Result<std::string> read_page(Database& database, MissionKey key, TimeRange rang
   }
 }
 
+template <class Page, class Item>
+Result<Page> page_of(Database& database, MissionKey key, TimeRange range, const PageRequest& page,
+                     std::vector<Item> Page::*items) {
+  Page result;
+  Result<std::string> next = read_page(database, key, range, page, result.*items);
+  if (!next) return tl::unexpected(std::move(next.error()));
+  result.next_cursor = std::move(*next);
+  return result;
+}
+
 }  // namespace
 
 void append(Database& database, MissionKey key, std::span<const Sample> samples, bool ended,
@@ -193,20 +203,12 @@ void append(Database& database, MissionKey key, std::span<const CovariateChange>
 
 Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range,
                                 const PageRequest& page) {
-  TelemetryPage result;
-  Result<std::string> next = read_page(database, key, range, page, result.samples);
-  if (!next) return tl::unexpected(std::move(next.error()));
-  result.next_cursor = std::move(*next);
-  return result;
+  return page_of<TelemetryPage>(database, key, range, page, &TelemetryPage::samples);
 }
 
 Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange range,
                                  const PageRequest& page) {
-  CovariatePage result;
-  Result<std::string> next = read_page(database, key, range, page, result.changes);
-  if (!next) return tl::unexpected(std::move(next.error()));
-  result.next_cursor = std::move(*next);
-  return result;
+  return page_of<CovariatePage>(database, key, range, page, &CovariatePage::changes);
 }
 
 std::int64_t encoded_bytes(Database& database) {

@@ -92,6 +92,13 @@ Result<Proposal> read_proposal(Rows& rows) {
   return p;
 }
 
+template <class T, class Read, class None>
+Result<T> by_id(Database& database, const std::string& sql, std::int64_t id, Read read, None none) {
+  Rows rows(database.statement(sql));
+  if (!rows.bind(id).next()) return none(id);
+  return read(rows);
+}
+
 template <class T, class Read>
 Result<std::vector<T>> page(Database& database, const std::string& select, std::string_view id,
                             const std::optional<std::string>& robot_id, std::int64_t before_id,
@@ -220,9 +227,7 @@ namespace queries {
 
 Result<DiagnosisRecord> diagnosis(Database& database, std::int64_t id) {
   static const std::string sql = select_diagnoses(true) + " WHERE diagnosis_id = ?";
-  Rows rows(database.statement(sql));
-  if (!rows.bind(id).next()) return no_diagnosis(id);
-  return read_diagnosis(rows);
+  return by_id<DiagnosisRecord>(database, sql, id, read_diagnosis, no_diagnosis);
 }
 
 Result<std::vector<DiagnosisRecord>> diagnoses(Database& database, const std::optional<std::string>& robot_id,
@@ -240,9 +245,7 @@ Result<std::string> diagnosis_report(Database& database, std::int64_t id) {
 
 Result<Proposal> proposal(Database& database, std::int64_t id) {
   static const std::string sql = std::string(select_proposals) + " WHERE proposal_id = ?";
-  Rows rows(database.statement(sql));
-  if (!rows.bind(id).next()) return no_proposal(id);
-  return read_proposal(rows);
+  return by_id<Proposal>(database, sql, id, read_proposal, no_proposal);
 }
 
 Result<std::vector<Proposal>> proposals(Database& database, const std::optional<std::string>& robot_id,

@@ -62,6 +62,14 @@ Result<void> check_limit(std::string_view field, std::int64_t limit, std::int64_
   return invalid(std::string(field), std::to_string(limit) + " is outside 1 to " + std::to_string(greatest));
 }
 
+// What both kinds of raw pages ask of their arguments.
+static Result<void> check_page(Database& database, MissionKey key, TimeRange range, const PageRequest& page) {
+  if (auto ok = check_range(range); !ok) return ok;
+  if (auto ok = check_limit("limit", page.limit, max_telemetry_samples); !ok) return ok;
+  if (!has_mission(database, key)) return no_mission(key);
+  return {};
+}
+
 Result<std::vector<RobotRecord>> robots(Database& database) {
   Rows rows(
       database.statement("SELECT robot_id, created_utime_us, active_version FROM robot ORDER BY robot_id"));
@@ -148,19 +156,13 @@ Result<Trace> trace(Database& database, MissionKey key, TimeRange range, std::in
 
 Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range,
                                 const PageRequest& page) {
-  if (auto ok = check_range(range); !ok) return tl::unexpected(ok.error());
-  if (auto ok = check_limit("limit", page.limit, max_telemetry_samples); !ok)
-    return tl::unexpected(ok.error());
-  if (!has_mission(database, key)) return no_mission(key);
+  if (auto ok = check_page(database, key, range, page); !ok) return tl::unexpected(ok.error());
   return chunks::telemetry(database, key, range, page);
 }
 
 Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange range,
                                  const PageRequest& page) {
-  if (auto ok = check_range(range); !ok) return tl::unexpected(ok.error());
-  if (auto ok = check_limit("limit", page.limit, max_telemetry_samples); !ok)
-    return tl::unexpected(ok.error());
-  if (!has_mission(database, key)) return no_mission(key);
+  if (auto ok = check_page(database, key, range, page); !ok) return tl::unexpected(ok.error());
   return chunks::covariates(database, key, range, page);
 }
 

@@ -19,13 +19,13 @@ namespace joulecast::history {
 
 // Runs work that throws SqlError; nothing is thrown past this.
 template <class Work>
-auto guarded(Work work) -> decltype(work()) {
+auto guarded(Work work, const std::string& field = "database") -> decltype(work()) {
   try {
     return work();
   } catch (const SqlError& error) {
-    return fail(error.fault(), "database", error.what());
+    return fail(error.fault(), field, error.what());
   } catch (const std::exception& error) {
-    return fail(Fault::unavailable, "database", error.what());
+    return fail(Fault::unavailable, field, error.what());
   }
 }
 

@@ -10,7 +10,9 @@
 #include "base/output_file.h"
 #include "base/utc_time.h"
 #include "history/file_lock.h"
+#include "history/open_store.h"
 #include "history/schema.h"
+#include "history/sql_store.h"
 #include "history/sqlite.h"
 
 namespace joulecast::history {
@@ -20,35 +22,6 @@ namespace fs = std::filesystem;
 
 constexpr std::int64_t busy_timeout_ms = 10'000;
 constexpr int most_failures = 10'000;  // of reads of one table
-
-template <class Work>
-auto guarded(const std::string& path, Work work) -> decltype(work()) {
-  try {
-    return work();
-  } catch (const SqlError& error) {
-    return fail(error.fault(), path, error.what());
-  } catch (const std::exception& error) {
-    return fail(Fault::unavailable, path, error.what());
-  }
-}
-
-// SQLite copies only what it might write.
-Result<std::unique_ptr<SqliteDatabase>> open_existing(const std::string& path,
-                                                      OpenMode mode = OpenMode::read_only) {
-  if (!fs::is_regular_file(path)) return fail(Fault::not_found, path, "there is no such file");
-  return guarded(path, [&]() -> Result<std::unique_ptr<SqliteDatabase>> {
-    auto database = std::make_unique<SqliteDatabase>(path, mode, busy_timeout_ms);
-    if (database->integer("PRAGMA application_id") != store_application_id)
-      return fail(Fault::corrupt, path, "is not a joulecast store");
-    const std::int64_t version = database->integer("PRAGMA user_version");
-    if (version != store_schema().version)
-      return fail(Fault::conflict, path,
-                  "has schema version " + std::to_string(version) + "; this program's is " +
-                      std::to_string(store_schema().version) +
-                      (version < store_schema().version ? ", to which a start of the daemon brings it" : ""));
-    return database;
-  });
-}
 
 void add_texts(StoreCheck& check, Database& database, const std::string& sql) {
   Rows rows(database.statement(sql));
@@ -66,13 +39,15 @@ Result<OutputFile> new_file(const std::string& path) {
   return OutputFile::create(path, Existing::refuse);
 }
 
-// A compact copy, which gives free pages back from now on.
+// A compact copy, for which SQLite wants a connection that might write; it gives free pages back from now on.
 Result<void> copy_into(Database& from, const std::string& file) {
-  return guarded(file, [&]() -> Result<void> {
-    from.execute("PRAGMA auto_vacuum = INCREMENTAL");
-    from.execute("VACUUM INTO " + quoted(file));
-    return {};
-  });
+  return guarded(
+      [&]() -> Result<void> {
+        from.execute("PRAGMA auto_vacuum = INCREMENTAL");
+        from.execute("VACUUM INTO " + quoted(file));
+        return {};
+      },
+      file);
 }
 
 // The tables in an order in which what refers comes after what it refers to, as the schema creates them.
@@ -100,7 +75,7 @@ class LostKeys {
       ranges_.push_back({from, to, why});
   }
 
-  void tell(std::vector<std::string>& losses) const {
+  void append_to(std::vector<std::string>& losses) const {
     for (const Range& range : ranges_) {
       if (losses.size() >= max_faults) return;
       losses.push_back(table_ + ", what it had with " + key_ + " " + std::to_string(range.from) +
@@ -145,17 +120,17 @@ std::int64_t greatest(Database& database, const std::string& table, const std::s
 }
 
 // A page whose content reads as nothing hides its rows without an error.
-void tell_damage(Database& database, Salvage& salvage) {
-  const auto tell = [&](const std::string& what) {
+void report_damage(Database& database, Salvage& salvage) {
+  const auto add = [&](const std::string& what) {
     if (what != "ok")
       salvage.losses.push_back("the damaged file, of which rows may be gone that nothing else names: " +
                                what);
   };
   try {
     Rows damage(database.statement("PRAGMA damaged.integrity_check(3)"));
-    while (damage.next()) tell(damage.text());
+    while (damage.next()) add(damage.text());
   } catch (const SqlError& error) {
-    tell(error.what());
+    add(error.what());
   }
 }
 
@@ -197,27 +172,30 @@ void drop_loose_ends(Database& database, Salvage& salvage) {
 }  // namespace
 
 Result<StoreCheck> check_store(const std::string& path) {
-  auto database = open_existing(path);
+  auto database = open_file(path);
   if (!database) return tl::unexpected(database.error());
-  return guarded(path, [&]() -> Result<StoreCheck> {
-    StoreCheck check = check_content(**database);
-    try {
-      add_texts(check, **database,
-                "SELECT integrity_check FROM pragma_integrity_check(100) WHERE integrity_check <> 'ok'");
-      add_texts(check, **database,
-                "SELECT \"table\" || ', row ' || coalesce(rowid, 0) || ': refers to nothing in ' || parent "
-                "FROM pragma_foreign_key_check");
-    } catch (const SqlError& error) {
-      check.add_fault(error.what());
-    }
-    return check;
-  });
+  return guarded(
+      [&]() -> Result<StoreCheck> {
+        StoreCheck check = check_content(**database);
+        try {
+          add_texts(check, **database,
+                    "SELECT integrity_check FROM pragma_integrity_check(100) WHERE integrity_check <> 'ok'");
+          add_texts(
+              check, **database,
+              "SELECT \"table\" || ', row ' || coalesce(rowid, 0) || ': refers to nothing in ' || parent "
+              "FROM pragma_foreign_key_check");
+        } catch (const SqlError& error) {
+          check.add_fault(error.what());
+        }
+        return check;
+      },
+      path);
 }
 
 Result<StoreCheck> back_up_store(const std::string& path, const std::string& copy) {
   auto file = new_file(copy);
   if (!file) return tl::unexpected(file.error());
-  auto database = open_existing(path, OpenMode::read_write_create);
+  auto database = open_file(path, OpenMode::read_write_create);
   if (!database) return tl::unexpected(database.error());
   if (auto copied = copy_into(**database, file->written_to()); !copied) return tl::unexpected(copied.error());
   auto check = check_store(file->written_to());
@@ -240,7 +218,7 @@ Result<std::string> restore_store(const std::string& from, const std::string& pa
     auto check = check_store(from);
     if (!check) return tl::unexpected(check.error());
     if (!check->faults.empty()) return fail(Fault::corrupt, from, "is damaged: " + check->faults.front());
-    auto source = open_existing(from, OpenMode::read_write_create);
+    auto source = open_file(from, OpenMode::read_write_create);
     if (!source) return tl::unexpected(source.error());
     if (auto copied = copy_into(**source, file->written_to()); !copied) return tl::unexpected(copied.error());
   }
@@ -258,28 +236,30 @@ Result<std::string> restore_store(const std::string& from, const std::string& pa
 }
 
 Result<Salvage> salvage_store(const std::string& damaged, const std::string& into) {
-  if (auto readable = open_existing(damaged); !readable) return tl::unexpected(readable.error());
+  if (auto readable = open_file(damaged); !readable) return tl::unexpected(readable.error());
   auto file = new_file(into);
   if (!file) return tl::unexpected(file.error());
   Salvage salvage;
-  auto done = guarded(damaged, [&]() -> Result<void> {
-    SqliteDatabase database(file->written_to(), OpenMode::read_write_create, busy_timeout_ms);
-    database.execute("PRAGMA auto_vacuum = INCREMENTAL");
-    if (auto made = bring_to_schema(database, store_schema()); !made) return made;
-    database.execute("PRAGMA synchronous = OFF");
-    database.execute("ATTACH " + quoted(damaged) + " AS damaged");
-    for (const auto& [table, key] : tables_and_keys(database)) {
-      int failures = 0;
-      LostKeys losses(table, key);
-      salvage_range(database, table, key, 0, greatest(database, table, key), failures, losses);
-      losses.tell(salvage.losses);
-    }
-    drop_loose_ends(database, salvage);
-    tell_damage(database, salvage);
-    for (const auto& [table, key] : tables_and_keys(database))
-      salvage.rows += database.integer("SELECT count(*) FROM main." + table);
-    return {};
-  });
+  auto done = guarded(
+      [&]() -> Result<void> {
+        SqliteDatabase database(file->written_to(), OpenMode::read_write_create, busy_timeout_ms);
+        database.execute("PRAGMA auto_vacuum = INCREMENTAL");
+        if (auto made = bring_to_schema(database, store_schema()); !made) return made;
+        database.execute("PRAGMA synchronous = OFF");
+        database.execute("ATTACH " + quoted(damaged) + " AS damaged");
+        for (const auto& [table, key] : tables_and_keys(database)) {
+          int failures = 0;
+          LostKeys losses(table, key);
+          salvage_range(database, table, key, 0, greatest(database, table, key), failures, losses);
+          losses.append_to(salvage.losses);
+        }
+        drop_loose_ends(database, salvage);
+        report_damage(database, salvage);
+        for (const auto& [table, key] : tables_and_keys(database))
+          salvage.rows += database.integer("SELECT count(*) FROM main." + table);
+        return {};
+      },
+      damaged);
   if (!done) return tl::unexpected(done.error());
   if (auto named = file->commit(); !named) return tl::unexpected(named.error());
   return salvage;

@@ -203,8 +203,13 @@ Result<std::int64_t> copy_table(Database& from, Database& to, const Table& table
     Transaction transaction(to, Database::Access::write);
     const std::int64_t got = scan(from, table, columns, after, table.batch_rows, [&](const Statement& row) {
       Rows target(to.statement(insert));
-      for (int k = 0; k < row.columns(); ++k)
-        k == later ? (void)target.bind_null() : bind_column(target, row, k);
+      for (int k = 0; k < row.columns(); ++k) {
+        if (k == later) {
+          target.bind_null();
+        } else {
+          bind_column(target, row, k);
+        }
+      }
       target.run_later();
     });
     transaction.commit();

@@ -62,6 +62,7 @@ class Writer::Impl {
   }
 
   ~Impl() {
+    // Whoever must know whether everything was committed has called stop().
     if (!stopping_) (void)stop(options_.retry_last);
     if (thread_.joinable()) thread_.join();
   }

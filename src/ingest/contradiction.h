@@ -37,7 +37,7 @@ struct Contradiction {
   std::string says;     // what was found, its likely cause, and what joulecast expects
   // A mission in which it holds is not what its accounts say: nothing is learnt from it.
   bool untrue = false;
-  std::int64_t told_utime_us = 0;  // host's, when it was last told as an event
+  std::int64_t told_utime_us = 0;  // host's, when it was last reported as an event
 
   bool same(const Contradiction& other) const { return id == other.id && channel == other.channel; }
 };

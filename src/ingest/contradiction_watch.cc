@@ -74,15 +74,15 @@ struct Telling {
 };
 constexpr Telling tellings[] = {
     {IngestFault::implausible, ContradictionKind::implausible, "implausible", "", true,
-     "are turned away for a value that no robot sends"},
+     "are refused for a value that no robot sends"},
     {IngestFault::undecodable, ContradictionKind::implausible, "undecodable", "", false,
      "cannot be decoded: are the publisher's message types those of joulecast?"},
     {IngestFault::wrong_channel, ContradictionKind::identity, "wrong_channel", "robot_id", false,
-     "name another robot_id than the channel that they come on, and are turned away"},
+     "name another robot_id than the channel that they come on, and are refused"},
     {IngestFault::second_sender, ContradictionKind::sender, "second_sender", "", false,
-     "come from a second sender under this robot's id, and are turned away: each robot needs its own id"},
+     "come from a second sender under this robot's id, and are refused: each robot needs its own id"},
     {IngestFault::too_far_ahead, ContradictionKind::clock, "clock_far_ahead", "utime", false,
-     "are stamped too far ahead of the service's clock and turned away: is the robot's clock set (NTP), and "
+     "are stamped too far ahead of the service's clock and refused: is the robot's clock set (NTP), and "
      "utime "
      "in microseconds?"},
     {IngestFault::clock_ahead, ContradictionKind::clock, "clock_ahead", "utime", false,
@@ -94,7 +94,7 @@ constexpr Telling tellings[] = {
      "are stamped more than an hour after the one before: utime must be the instant of sampling, in "
      "microseconds"},
     {IngestFault::restart, ContradictionKind::sequence, "sequence_standing", "sequence", false,
-     "do not count on: sequence stands or begins anew, so that lost messages cannot be told; joulecast "
+     "do not count on: sequence stands or begins anew, so that lost messages cannot be counted; joulecast "
      "expects "
      "it "
      "one higher with each message"},
@@ -106,8 +106,8 @@ bool told_in(const std::vector<Contradiction>& list, const Contradiction& one) {
 
 }  // namespace
 
-ContradictionWatch::ContradictionWatch(const robot::RobotModel& robot)
-    : robot_(robot), observer_(robot, false) {}
+ContradictionWatch::ContradictionWatch(const robot::RobotModel& robot, const dynamics::DriveModel& drive)
+    : robot_(robot), observer_(robot, drive, false) {}
 
 void ContradictionWatch::hear(std::uint64_t messages) {
   messages_ += messages;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "dynamics/drive_model.h"
 #include "gap/checks/observation.h"
 #include "ingest/contradiction.h"
 #include "ingest/counters.h"
@@ -18,7 +19,8 @@ namespace joulecast::ingest {
 // after some hundred samples of a mission, then whenever it has become twice as long, and at its end.
 class ContradictionWatch {
  public:
-  explicit ContradictionWatch(const robot::RobotModel& robot);
+  // `drive`: of that robot.
+  ContradictionWatch(const robot::RobotModel& robot, const dynamics::DriveModel& drive);
 
   // A message of the robot, before anything is known of it.
   void hear(std::uint64_t messages = 1);

@@ -11,7 +11,7 @@
 
 namespace joulecast::ingest {
 
-// Why a message, a sample or an event was turned away or repaired. Each has one counter for the daemon and
+// Why a message, a sample or an event was refused or repaired. Each has one counter for the daemon and
 // one in the mission it happened in; names are labels of the metrics and keys of a mission's `sample_faults`.
 enum class IngestFault : std::size_t {
   undecodable,      // the guard or the decoder refused the bytes
@@ -70,7 +70,7 @@ struct IngestCounters {
   std::array<std::atomic<std::uint64_t>, 2> missions_started{};  // announced, implicit
   std::array<std::atomic<std::uint64_t>, history::mission_state_count> missions_ended{};  // by state
   std::array<std::atomic<std::uint64_t>, ingest_fault_count> faults{};
-  std::array<std::atomic<std::uint64_t>, contradiction_kind_count> contradictions{};  // told
+  std::array<std::atomic<std::uint64_t>, contradiction_kind_count> contradictions{};  // reported
   std::array<std::atomic<std::uint64_t>, left_out_count> missions_left_out{};
   telemetry::DatagramCounters datagrams;
 

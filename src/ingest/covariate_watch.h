@@ -21,10 +21,10 @@ namespace joulecast::ingest {
 // that follows from its pitch or its height.
 class CovariateWatch {
  public:
-  // Values behind the last one of their name by more than `reorder_us` tell of a clock set back.
+  // Values behind the last one of their name by more than `reorder_us` show a clock set back.
   explicit CovariateWatch(std::int64_t reorder_us) : tracker_(reorder_us) {}
 
-  // Takes a message with a plausible clock; `fault` is told of every value turned away, and why.
+  // Takes a message with a plausible clock; `fault` is called with every value refused, and why.
   using Fault = std::function<void(IngestFault, std::string why)>;
   void take(const signals::CovariateMessage& message, const Fault& fault);
 

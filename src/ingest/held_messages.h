@@ -18,7 +18,7 @@ class HeldMessages {
  public:
   HeldMessages(std::int64_t age_us, std::size_t room) : age_us_(age_us), room_(room) {}
 
-  // Answers how many gave way for want of room.
+  // Answers how many were discarded for want of room.
   std::size_t add(const InboundMessage& message);
   // The robot's, oldest first; they are no longer held.
   std::deque<InboundMessage> take(std::string_view robot_id);

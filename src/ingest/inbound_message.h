@@ -13,13 +13,13 @@
 
 namespace joulecast::ingest {
 
-// A message on a robot's channel that was turned away before it was read; counted already.
+// A message on a robot's channel that was refused before it was read; counted already.
 struct RefusedMessage {
   IngestFault fault = IngestFault::undecodable;
   std::string why;
 };
 
-// A message off the wire that passed the guard, or of which the robot whose channel it came on is told.
+// A message off the wire that passed the guard, or of which the robot of its channel is known.
 struct InboundMessage {
   std::string robot_id;
   std::variant<signals::Sample, signals::MissionEvent, signals::CovariateMessage, RefusedMessage> content;

@@ -13,10 +13,15 @@ Error unknown_robot(std::string field, std::string_view robot_id) {
 Result<void> ModelRegistry::put(robot::RobotModel robot, std::int64_t version) {
   Result<std::shared_ptr<const ModelInForce>> model = model_in_force(std::move(robot), version);
   if (!model) return tl::unexpected(std::move(model.error()));
-  const std::unique_lock lock(mutex_);
-  models_.insert_or_assign((*model)->robot.robot_id, *model);
-  epoch_.fetch_add(1, std::memory_order_release);
+  put_back(*std::move(model));
   return {};
+}
+
+void ModelRegistry::put_back(std::shared_ptr<const ModelInForce> model) {
+  const std::unique_lock lock(mutex_);
+  const std::string& id = model->robot.robot_id;
+  models_.insert_or_assign(id, std::move(model));
+  epoch_.fetch_add(1, std::memory_order_release);
 }
 
 void ModelRegistry::remove(std::string_view robot_id) {

@@ -25,6 +25,9 @@ class ModelRegistry {
   // Puts a robot's model in force; an effect that the catalogue rejects is an error and changes nothing.
   Result<void> put(robot::RobotModel robot, std::int64_t version);
 
+  // Puts one in force that was before.
+  void put_back(std::shared_ptr<const ModelInForce> model);
+
   // Takes it out of force.
   void remove(std::string_view robot_id);
 

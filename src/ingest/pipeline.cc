@@ -28,7 +28,7 @@ Pipeline::Pipeline(const SessionSettings& settings, std::size_t max_unknown_robo
       held_(held_us, held_room) {}
 
 Pipeline::Robot& Pipeline::add(const std::string& robot_id, const SessionOutputs& outputs) {
-  strangers_.erase(robot_id);
+  unknown_robots_.erase(robot_id);
   auto made = std::unique_ptr<Robot>(
       new Robot{{robot_id, settings_, outputs}, {settings_.sender_takeover_us, waiting_room_}});
   const auto model = models_.find(robot_id);
@@ -80,13 +80,13 @@ void Pipeline::refresh_models() {
       (each++)->second->session.set_model(nullptr);
     }
   }
-  for (auto stranger = strangers_.begin(); stranger != strangers_.end();) {
-    const std::string id = (stranger++)->first;
+  for (auto unknown = unknown_robots_.begin(); unknown != unknown_robots_.end();) {
+    const std::string id = (unknown++)->first;
     if (models_.find(id) == nullptr) continue;
     if (keeping_ == nullptr)
       add(id, outputs_);
     else
-      strangers_.erase(id);
+      unknown_robots_.erase(id);
   }
 }
 
@@ -170,12 +170,12 @@ bool Pipeline::discard_unknown_robot(std::int64_t host_utime_us) {
   if (host_utime_us - forgot_utime_us_ < forget_period_us && host_utime_us >= forgot_utime_us_) return false;
   forgot_utime_us_ = host_utime_us;
   const auto silent = std::ranges::min_element(
-      strangers_, {}, [](const auto& each) { return each.second.snapshot.received_utime_us; });
-  if (silent == strangers_.end() ||
+      unknown_robots_, {}, [](const auto& each) { return each.second.snapshot.received_utime_us; });
+  if (silent == unknown_robots_.end() ||
       host_utime_us - silent->second.snapshot.received_utime_us < stranger_silence_us)
     return false;
   outputs_.fleet.remove(silent->first);
-  strangers_.erase(silent);
+  unknown_robots_.erase(silent);
   return true;
 }
 
@@ -186,11 +186,11 @@ void Pipeline::count_unknown_robot(const InboundMessage& message) {
   } else {
     outputs_.counters.add(fault);
   }
-  auto found = strangers_.find(message.robot_id);
-  if (found == strangers_.end()) {
-    if (strangers_.size() >= max_unknown_robots_ && !discard_unknown_robot(message.host_utime_us))
+  auto found = unknown_robots_.find(message.robot_id);
+  if (found == unknown_robots_.end()) {
+    if (unknown_robots_.size() >= max_unknown_robots_ && !discard_unknown_robot(message.host_utime_us))
       return outputs_.counters.add(IngestFault::too_many_robots);
-    found = strangers_.try_emplace(message.robot_id).first;
+    found = unknown_robots_.try_emplace(message.robot_id).first;
     found->second.snapshot.robot_id = message.robot_id;
     if (told_utime_us_ == 0 || message.host_utime_us - told_utime_us_ >= tell_period_us) {
       told_utime_us_ = message.host_utime_us;
@@ -250,9 +250,9 @@ void Pipeline::on_host_clock_step(std::int64_t host_utime_us, std::int64_t step_
 
 void Pipeline::publish() {
   for (auto& [id, robot] : robots_) robot->session.publish();
-  for (auto& [id, stranger] : strangers_) {
-    if (std::exchange(stranger.changed, false))
-      outputs_.fleet.publish(std::make_shared<const RobotSnapshot>(stranger.snapshot));
+  for (auto& [id, unknown] : unknown_robots_) {
+    if (std::exchange(unknown.changed, false))
+      outputs_.fleet.publish(std::make_shared<const RobotSnapshot>(unknown.snapshot));
   }
 }
 

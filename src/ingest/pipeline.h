@@ -26,7 +26,7 @@ class Pipeline {
   // Opens sessions for the missions that were open when the last daemon stopped. In a cluster leases do.
   Result<void> recover();
 
-  // Takes up robots that this daemon of a cluster is to keep from now on, and lets others go. Call often.
+  // Takes up robots that this daemon of a cluster is to keep from now on, and releases others. Call often.
   void follow_orders();
 
   void handle(const InboundMessage& message);
@@ -39,7 +39,7 @@ class Pipeline {
   void publish();
   // Ends missions as if the robots had fallen silent for good; for offline replay.
   void finish();
-  // Checkpoints all open missions, to be resumed by the next daemon, and lets the leases go.
+  // Checkpoints all open missions, to be resumed by the next daemon, and releases the leases.
   void suspend();
 
  private:
@@ -49,7 +49,7 @@ class Pipeline {
     bool had_model = false;
     history::Epoch epoch = 0;  // of its lease, in a cluster
   };
-  struct Stranger {
+  struct UnknownRobot {
     RobotSnapshot snapshot;
     bool changed = true;
   };
@@ -76,7 +76,7 @@ class Pipeline {
   std::uint64_t epoch_ = 0;
   std::size_t waiting_room_;  // of all gates
   std::map<std::string, std::unique_ptr<Robot>, std::less<>> robots_;
-  std::map<std::string, Stranger, std::less<>> strangers_;
+  std::map<std::string, UnknownRobot, std::less<>> unknown_robots_;
   Keeping* keeping_;
   HeldMessages held_;
   std::vector<Keeping::Grant> granted_;  // to be taken up

@@ -12,7 +12,7 @@
 
 namespace joulecast::ingest {
 
-// Refines one robot's friction and idle power from its missions as they come, tells payloads that were not
+// Refines one robot's friction and idle power from its missions as they come, reports payloads that were not
 // declared, and proposes a new model version when the refined one departs from that in force.
 class RefinementWatch {
  public:

@@ -19,8 +19,8 @@ constexpr std::string_view refinement_topic = "refinement";  // of what is learn
 constexpr std::int64_t clock_ahead_us = 10'000'000;          // beyond what transport and drift explain
 constexpr auto json_replace = nlohmann::json::error_handler_t::replace;
 constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
-constexpr std::int64_t tell_period_us = 600'000'000;
-constexpr std::int64_t tell_contradiction_us = 3'600'000'000;
+constexpr std::int64_t report_period_us = 600'000'000;
+constexpr std::int64_t report_contradiction_us = 3'600'000'000;
 constexpr double least_measured = 0.5;  // of a mission's time, for forecasts to learn from it
 // Events that a robot may send at once, and how many each sample earns it: recordings are replayed faster
 // than they were.
@@ -139,7 +139,7 @@ void RobotSession::meter_with(std::shared_ptr<const ModelInForce> model) {
       charge->recall(stored_charge_utime_us_, snapshot_.state_of_charge);
     }
     charge_ = std::move(charge);
-    contradictions_ = std::make_unique<ContradictionWatch>(model_->robot);
+    contradictions_ = std::make_unique<ContradictionWatch>(model_->robot, model_->drive);
     if (refinement_ != nullptr) {
       refinement_->use(model_->robot, model_->version);
     } else {
@@ -209,6 +209,7 @@ void RobotSession::take_over(const Handover& handover) {
   if (handover.position) {
     const auto& [utime_us, sequence] = *handover.position;
     order_.start_after(sequence, utime_us);
+    // What it finds here and in the tail is counted already, by the daemon that accounted for them.
     if (open == nullptr || handover.tail.empty()) (void)sequence_.place(sequence, utime_us);
     last_sequence_ = sequence;
   }
@@ -251,7 +252,7 @@ void RobotSession::note_fault(IngestFault fault, std::uint64_t count, std::strin
   if (why.empty()) return;
   const auto [told, first] = told_.try_emplace(fault);
   told->second.since += count;
-  if (first || host_utime_us - told->second.utime_us >= tell_period_us) {
+  if (first || host_utime_us - told->second.utime_us >= report_period_us) {
     outputs_.warn(robot_id_, name + ": " + why + " (" + std::to_string(told->second.since) +
                                  (first ? " so far)" : " since this was last logged)"));
     told->second = {host_utime_us, 0};
@@ -291,7 +292,7 @@ void RobotSession::tell_contradictions() {
   for (Contradiction& c : snapshot_.contradictions) {
     const std::int64_t now = snapshot_.received_utime_us;
     const auto [told, first] = contradictions_told_.try_emplace(c.id + ' ' + c.channel, now);
-    if (first || now - told->second >= tell_contradiction_us || now < told->second) {
+    if (first || now - told->second >= report_contradiction_us || now < told->second) {
       told->second = now;
       outputs_.warn(robot_id_, "contradiction: " + c.says);
       outputs_.counters.contradictions[static_cast<std::size_t>(c.kind)].fetch_add(1,
@@ -690,7 +691,7 @@ void RobotSession::close(const telemetry::MissionAction& action) {
       outputs_.mission_ended(outputs_.post, model_, {record.start_utime_us, legs_->take()});
   } else {
     on_fault(IngestFault::empty_mission);
-    (void)covariates_.settle(record);
+    (void)covariates_.settle(record);  // ends them; of an empty mission nothing is stored
   }
   open_.reset();
   covariates_.end_mission();

@@ -101,7 +101,7 @@ class RobotSession {
 
   // Call about once a second: ends missions that fell silent, checkpoints the open one, publishes what
   // changed.
-  // The host's clock was set by so much: what it stamped before is told by its new time.
+  // The host's clock was set by so much: what it stamped before is converted to its new time.
   void on_host_clock_step(std::int64_t host_utime_us, std::int64_t step_us);
   void on_tick(std::int64_t host_utime_us);
   // Checkpoints and publishes at once; for an orderly stop, which leaves an open mission to be resumed.
@@ -173,7 +173,7 @@ class RobotSession {
   std::deque<signals::Sample> held_;  // until it is clear whether a charger feeds the robot
   bool at_charger_ = false;
   std::unique_ptr<ContradictionWatch> contradictions_;
-  std::map<std::string, std::int64_t> contradictions_told_;  // host's time when each was last told
+  std::map<std::string, std::int64_t> contradictions_told_;  // host's time when each was last reported
   CovariateWatch covariates_;
   TraceBuilder trace_;
   std::optional<forecast::LegTracker> legs_;

@@ -10,11 +10,11 @@
 
 namespace joulecast::ingest {
 
-// Lets one sender speak for a robot. Where a second one sends under the robot's id, told apart by its address
-// or, behind one address, by its own stream of sequence numbers, its messages wait: when the first one speaks
-// again they are refused, so that no energy is booked twice; when it has fallen silent they pass, so that a
-// robot whose publisher was started anew or whose address changed loses nothing. Messages of unknown senders
-// (logs) have the streams only.
+// Lets one sender speak for a robot. Where a second one sends under the robot's id, distinguished by its
+// address or, behind one address, by its own stream of sequence numbers, its messages wait: when the first
+// one speaks again they are refused, so that no energy is booked twice; when it has fallen silent they pass,
+// so that a robot whose publisher was started anew or whose address changed loses nothing. Messages of
+// unknown senders (logs) have the streams only.
 class SenderGate {
  public:
   // `takeover_us`: silence after which another sender takes over at the latest. `room`: units (about one

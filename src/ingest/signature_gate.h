@@ -44,7 +44,7 @@ class SignatureGate {
  private:
   class Window {
    public:
-    bool take(std::int64_t sequence);  // false: not new, or too old to tell
+    bool take(std::int64_t sequence);  // false: not new, or too old to judge
 
    private:
     std::int64_t highest_ = INT64_MIN;

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "base/byte_archive.h"
+#include "signals/archive_members.h"
 
 namespace joulecast::ingest {
 namespace {
@@ -10,7 +11,8 @@ namespace {
 // Grows with every change of what follows.
 constexpr std::uint32_t layout = 2;
 
-struct Members {
+struct Members : signals::ArchiveMembers {
+  using ArchiveMembers::of;
   template <class Archive>
   static void of(Archive& a, Contradiction& c) {
     a(c.kind, c.id, c.channel, c.value, c.says, c.untrue, c.told_utime_us);
@@ -29,19 +31,6 @@ struct Members {
     a(c.phase, s.start_utime_us, s.end_utime_us, s.start_charge, s.charged_ah, s.charged_j, s.complete);
     a(c.to_full.duration_s, c.to_full.sd_s);
     a(c.habit.current_a, c.habit.taper_charge, c.habit.taper_time_s, c.habit.end_current_a);
-  }
-
-  template <class Archive>
-  static void of(Archive& a, signals::Accounts& c) {
-    a(c.battery_j, c.measured_j, c.measured_s, c.measured_motor_j, c.motor_measured_s, c.modelled_j,
-      c.modelled_motor_j, c.drawn_j, c.returned_j, c.charge_ah, c.distance_m, c.turned_rad, c.duration_s,
-      c.ledger.value);
-  }
-
-  template <class Archive>
-  static void of(Archive& a, signals::Sample& c) {
-    a(c.utime_us, c.sequence);
-    signals::visit_fields(c, [&a](const signals::SampleField&, double& number) { a(number); });
   }
 
   template <class Archive>

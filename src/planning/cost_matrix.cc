@@ -98,6 +98,11 @@ std::string_view name_of(Obstacle obstacle) {
   return "";
 }
 
+Obstacle obstacle_of(const MatrixTask& task, double payload_limit_kg, bool pose_known) {
+  if (task.payload_kg > payload_limit_kg) return Obstacle::payload;
+  return task.empty.empty() && !pose_known ? Obstacle::pose : Obstacle::none;
+}
+
 void stretches_of(const MatrixTask& task, std::size_t robot, const std::optional<Pose>& pose,
                   std::vector<Stretch>& stretches) {
   stretches.clear();
@@ -146,14 +151,8 @@ void CostMatrix::row(std::size_t r, std::vector<Cell>& cells) const {
   for (std::size_t t = 0; t < tasks_.size(); ++t) {
     const MatrixTask& task = tasks_[t];
     Cell& cell = cells[t];
-    if (task.payload_kg > robot.payload_limit_kg) {
-      cell.obstacle = Obstacle::payload;
-      continue;
-    }
-    if (task.empty.empty() && !robot.pose) {
-      cell.obstacle = Obstacle::pose;
-      continue;
-    }
+    cell.obstacle = obstacle_of(task, robot.payload_limit_kg, robot.pose.has_value());
+    if (cell.obstacle != Obstacle::none) continue;
     // In this order: sums of equal cells are equal to the last bit.
     Pricer empty{costs, 0, {}}, at_pickup{costs, task.payload_kg, {}};
     drive_empty(task, r, robot.pose, empty);

@@ -60,6 +60,8 @@ enum class Obstacle : unsigned char {
   model     // nothing is known of the robot
 };
 std::string_view name_of(Obstacle obstacle);
+// What stands in the way before any motion is priced: payload or pose.
+Obstacle obstacle_of(const MatrixTask& task, double payload_limit_kg, bool pose_known);
 
 // One robot doing one task. NaN where an obstacle stands.
 struct Cell {

@@ -39,11 +39,11 @@ inline constexpr double widest_turn_rad = 314.16;
 // nodes, interpolated by cubics in between, in the logarithm of the length and in the payload. For
 // schedulers, who ask for millions. Immutable, any thread.
 //
-// Motions in free time are one family, told apart by their peak speed alone; each member's length, duration
-// and energy are integrals over the speed (UniformMotion). So a payload's row is a walk along the family, in
-// which nothing is searched for. Where the planner has neither closed form nor quadrature (losses of gears,
-// friction that falls steeply with the speed) its solver gives the nodes, which takes a thousand times as
-// long.
+// Motions in free time are one family, distinguished by their peak speed alone; each member's length,
+// duration and energy are integrals over the speed (UniformMotion). So a payload's row is a walk along the
+// family, in which nothing is searched for. Where the planner has neither closed form nor quadrature (losses
+// of gears, friction that falls steeply with the speed) its solver gives the nodes, which takes a thousand
+// times as long.
 class CostTable {
  public:
   // Effects tied to places or headings of the floor are left out, since a leg here has no place; see

@@ -439,6 +439,14 @@ Result<Plan> Request::written() {
   return writer.finish();
 }
 
+Result<Request> solved(const robot::RobotModel& robot, const DriveLoads& loads, const Path& path,
+                       const Problem& problem, const std::stop_token& stop) {
+  auto request = Request::make(robot, loads, path, problem, stop);
+  if (!request) return request;
+  if (auto done = request->solve(); !done) return tl::unexpected(std::move(done.error()));
+  return request;
+}
+
 }  // namespace
 
 Limits limits_of(const robot::RobotModel& robot) {
@@ -479,10 +487,9 @@ Result<Planner> Planner::make(const robot::RobotModel& robot, std::optional<doub
 }
 
 Result<Plan> Planner::plan(const Path& path, const Problem& problem, std::stop_token stop) const {
-  auto request = Request::make(robot_, loads_, path, problem, stop);
-  if (!request) return tl::unexpected(std::move(request.error()));
-  if (auto solved = request->solve(); !solved) return tl::unexpected(std::move(solved.error()));
-  return request->written();
+  return solved(robot_, loads_, path, problem, stop).and_then([](Request&& request) {
+    return request.written();
+  });
 }
 
 std::optional<Plan> Planner::plan_at_once(const Path& path, const Problem& problem) const {
@@ -495,10 +502,9 @@ std::optional<Plan> Planner::plan_at_once(const Path& path, const Problem& probl
 }
 
 Result<PlanCost> Planner::cost(const Path& path, const Problem& problem, std::stop_token stop) const {
-  auto request = Request::make(robot_, loads_, path, problem, stop);
-  if (!request) return tl::unexpected(std::move(request.error()));
-  if (auto solved = request->solve(); !solved) return tl::unexpected(std::move(solved.error()));
-  return request->cost();
+  return solved(robot_, loads_, path, problem, stop).map([](const Request& request) {
+    return request.cost();
+  });
 }
 
 Result<double> Planner::needed_speed(const Path& path, const Problem& problem, std::stop_token stop) const {
@@ -571,7 +577,7 @@ Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& p
       // Finer grids on the way may have moved the shortest time: again, towards the new one.
       moved = !met && met.error().fault == Fault::infeasible && attempt < 8;
       if (!met && !moved) return tl::unexpected(std::move(met.error()));
-      // Nearer to the shortest time than grids tell apart, motions are the same.
+      // Nearer to the shortest time than grids distinguish, motions are the same.
       if (const PlanCost cost = request->cost();
           met && cost.duration_s < front.back().duration_s * (1 - 1e-9))
         front.push_back(cost);

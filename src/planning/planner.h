@@ -46,7 +46,7 @@ class Planner {
   Result<double> needed_speed(const Path& path, const Problem& problem, std::stop_token stop = {}) const;
 
   // Energy against duration from the free optimum to near the shortest time: `count` >= 2 deadlines, evenly
-  // spaced, fewer where the grid does not tell their motions apart; only the free optimum where that is the
+  // spaced, fewer where the grid does not distinguish their motions; only the free optimum where that is the
   // shortest time already.
   Result<std::vector<PlanCost>> pareto(const Path& path, const Problem& problem, std::size_t count,
                                        std::stop_token stop = {}) const;

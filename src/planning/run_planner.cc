@@ -585,7 +585,7 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
   SpeedSolution s = solver_->solve(price_w, refined_ ? fine_tolerance : coarse_tolerance, stop);
   int iterations = s.iterations;
   if (!refined_ && s.converged) {
-    // A coarse solution starts the fine one, places its nodes where they are free, and tells its error.
+    // A coarse solution starts the fine one, places its nodes where they are free, and gives its error.
     const std::vector<double> coarse_nodes = nodes_, coarse = s.z;
     const double coarse_cost = s.cost_j;
     build(uniform_ ? refined_nodes(coarse, std::max<std::size_t>(8, problem_->intervals_per_run))

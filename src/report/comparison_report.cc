@@ -64,7 +64,7 @@ std::string report_html(const Comparison& c, const robot::RobotModel& robot, con
   difference_section(page, c);
   strengths_section(page, c);
   checks_section(page, c.diagnosis.checks);
-  page.section("What these data cannot tell");
+  page.section("What these data do not show");
   page.list(c.limits);
   std::vector<std::vector<std::string>> rows;
   for (const ComparedGroup& g : c.groups) {

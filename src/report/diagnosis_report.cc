@@ -29,7 +29,7 @@ std::string names_of(std::span<const DiagnosedEffect> effects) {
     if (!e.alternatives.empty()) {
       std::vector<std::string> others;
       for (const std::string& id : e.alternatives) others.push_back(words_of(id));
-      name += " (or " + enumerate(others) + ", which these data do not tell from it)";
+      name += " (or " + enumerate(others) + ", which these data do not distinguish from it)";
     }
     names.push_back(std::move(name));
   }
@@ -80,7 +80,7 @@ std::vector<std::string> limits_of(const Diagnosis& d) {
   if (!d.motor_channels) {
     limits.emplace_back(
         "The motors' currents were not recorded. The judgement rests on battery power and motion, so that "
-        "effects in the motors, the drivers and friction are harder to tell apart.");
+        "effects in the motors, the drivers and friction are harder to distinguish.");
   }
   if (d.power == PowerSource::motors)
     limits.emplace_back(
@@ -116,7 +116,7 @@ void method_section(Page& page) {
       "run is no effect.");
   method.emplace_back(
       "Negative controls: the recorded motion with power made without the finding and with the recordings' "
-      "own residuals, in blocks, tells how often the same would be named there.");
+      "own residuals, in blocks, shows how often the same would be named there.");
   page.list(method);
 }
 
@@ -124,12 +124,12 @@ void method_section(Page& page) {
 
 void next_drive_section(Page& page, std::span<const NextDrive> drives) {
   if (drives.empty()) return;
-  page.section("What to drive next", "Manoeuvres that would tell apart what these data cannot.");
+  page.section("What to drive next", "Manoeuvres that would distinguish what these data cannot.");
   std::vector<std::vector<std::string>> rows;
   for (const NextDrive& n : drives)
     rows.push_back(
         {xml_escaped(n.manoeuvre), xml_escaped(words_of(n.separates)), brief(n.expected_log_evidence, 2)});
-  const std::vector<std::string> header{"Drive", "to tell", "log evidence it adds"};
+  const std::vector<std::string> header{"Drive", "to distinguish", "log evidence it adds"};
   page.table(header, rows, 2);
 }
 

@@ -79,7 +79,7 @@ std::string card_of(const DiagnosedEffect& e, double mean_power_w) {
         fmt::format("Its strength varies along the recordings by {} of itself.", share_text(e.varies)));
   if (e.controls) card += paragraph(controls_text(*e.controls));
   if (!e.alternatives.empty())
-    card += fmt::format("<p><b>These data do not tell it from</b> {}.</p>",
+    card += fmt::format("<p><b>These data do not distinguish it from</b> {}.</p>",
                         xml_escaped(names_of(e.alternatives)));
   if (known == nullptr) return card;
   card += fmt::format("<p><b>To check in the workshop:</b> {}.</p>", xml_escaped(traits_of(e.id).workshop));

@@ -79,7 +79,7 @@ std::string report_html(const RunDiagnosis& r, const robot::RobotModel& robot, c
   held_out_section(page, d);
   runs_section(page, r);
   conditions_section(page, r);
-  page.section("What these energies cannot tell");
+  page.section("What these energies do not show");
   page.list(r.limits);
   origin_section(page, origin, robot);
   return page.str();

@@ -30,7 +30,7 @@ Figures figures_of(const RobotModel& model);
 // equations V = R i + K_w n w, K_t n i = T_m + nu w at the nominal voltage; adopted effects are left out.
 std::vector<ReviewFinding> review(const RobotModel& model);
 
-// Every fault as one Fault::invalid, as read_robot tells of several.
+// Every fault as one Fault::invalid, as read_robot reports several.
 Result<void> plannable(const std::vector<ReviewFinding>& findings);
 
 }  // namespace joulecast::robot

@@ -21,7 +21,7 @@ class CovariateTracker {
     no_room,  // a name beyond max_covariates
   };
 
-  // A value older by more than `reorder_us` than the one that holds tells of a clock set back, and is news.
+  // A value older by more than `reorder_us` than the one that holds shows a clock set back, and is news.
   explicit CovariateTracker(std::int64_t reorder_us = 5'000'000) : reorder_us_(reorder_us) {}
 
   // Takes one value of a message; `change` is set where it is news. Within a mission no change is earlier

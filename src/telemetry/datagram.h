@@ -42,7 +42,7 @@ enum class DatagramFault : std::size_t {
   too_large,           // of a message larger than any of the contract
   bad_fragment,        // offset, length, number or count impossible, or contradicting an earlier fragment's
   duplicate_fragment,  // came already
-  incomplete           // messages given up because fragments did not come in time, or too many were begun
+  incomplete           // messages discarded because fragments did not come in time, or too many were begun
 };
 
 inline constexpr std::array<std::string_view, 8> datagram_fault_names = {
@@ -65,7 +65,7 @@ struct ChannelMessage {
 };
 
 struct ReassemblyLimits {
-  std::size_t messages = 64;  // begun at once, so 4 MiB; beyond: the oldest is given up
+  std::size_t messages = 64;  // begun at once, so 4 MiB; beyond: the oldest is discarded
   std::size_t messages_a_sender = 4;
   std::int64_t timeout_us = 1'000'000;  // from a message's first fragment to its last
 };
@@ -80,7 +80,7 @@ class DatagramReader {
   // `now_us` of any clock that does not go back.
   std::optional<ChannelMessage> take(const Sender& sender, std::span<const std::uint8_t> datagram,
                                      std::int64_t now_us);
-  // Gives up what has waited too long for its fragments.
+  // Discards what has waited too long for its fragments.
   void expire(std::int64_t now_us);
 
   [[nodiscard]] std::size_t messages_begun() const noexcept { return begun_.size(); }

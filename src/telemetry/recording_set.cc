@@ -36,7 +36,7 @@ bool same(double a, double b) {
 std::vector<Recording> joined(std::vector<Recording> missions, std::vector<std::string>& notes) {
   std::vector<Recording> result;
   std::vector<std::string> names;  // joined into the last of the result
-  const auto told = [&] {
+  const auto report = [&] {
     if (names.size() > 1)
       notes.push_back(fmt::format("missions {} last less than {:g} s each and were joined",
                                   listed({names.begin(), names.end()}), shortest_mission_s));
@@ -53,15 +53,15 @@ std::vector<Recording> joined(std::vector<Recording> missions, std::vector<std::
       changes.insert(changes.end(), more.begin(), more.end());
       whole.covariates = signals::series_of(changes);
     } else {
-      told();
+      report();
       result.push_back(std::move(mission));
     }
     if (is_short)
       names.push_back(name);
     else
-      told();
+      report();
   }
-  told();
+  report();
   return result;
 }
 

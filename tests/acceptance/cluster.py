@@ -283,24 +283,23 @@ def energy_j(samples):
     return total
 
 
-def all_missions(node):
-    missions, cursor = [], ""
+def paged(node, path, name):
+    """What all pages of a list have under a name."""
+    items, cursor = [], ""
     while True:
-        page = node.get(f"/v1/missions?limit=500{cursor}")
-        missions += page["missions"]
+        page = node.get(path + cursor)
+        items += page[name]
         if not page["next_cursor"]:
-            return missions
+            return items
         cursor = "&cursor=" + page["next_cursor"]
+
+
+def all_missions(node):
+    return paged(node, "/v1/missions?limit=500", "missions")
 
 
 def stored_samples(node, mission):
-    sequences, cursor = [], ""
-    while True:
-        page = node.get(f"/v1/missions/{mission['id']}/telemetry?limit=100000{cursor}")
-        sequences += page["sequence"]
-        if not page["next_cursor"]:
-            return sequences
-        cursor = "&cursor=" + page["next_cursor"]
+    return paged(node, f"/v1/missions/{mission['id']}/telemetry?limit=100000", "sequence")
 
 
 def reference(cluster, log):

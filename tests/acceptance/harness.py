@@ -165,8 +165,9 @@ class Programs:
 
 def shared_folder(options, *parts):
     folder = pathlib.Path(options.shared, "data", *parts)
-    if not folder.is_dir():
-        skip(f"{folder} is not beside the project")
+    if not os.path.isdir(options.shared):
+        skip("no shared folder beside the project")
+    check(folder.is_dir(), f"{folder} is missing")
     return folder
 
 

@@ -87,7 +87,7 @@ def gears(programs, options):
 def main():
     options = arguments()
     if not os.path.isdir(options.shared):
-        skip("no recordings beside the project")
+        skip("no shared folder beside the project")
     programs = Programs(options)
     husky(programs, options)
     warthog(programs, options)

@@ -12,6 +12,15 @@ namespace {
 
 using Kind = Load::Kind;
 
+Load constant_load(Kind kind, double value, double duration_s) {
+  return {kind, {{duration_s, value, value}}};
+}
+
+// From 0 to `value`.
+Load ramp(Kind kind, double value, double duration_s) {
+  return {kind, {{duration_s, 0, value}}};
+}
+
 TEST(Discharge, ReachesTheReserveWhenTheChargeSays) {
   const Circuit circuit(plain_battery());
   DischargeLimits limits;
@@ -27,11 +36,9 @@ TEST(Discharge, ReachesTheReserveWhenTheChargeSays) {
 // Charge falls with t²: 10 Ah at 0 to 10 A over 2 h; half of it after 2 h / sqrt 2.
 TEST(Discharge, FollowsALinearRamp) {
   const Circuit circuit(plain_battery());
-  const double time_s[] = {0, 7200}, current_a[] = {0, 10};
   DischargeLimits limits;
   limits.charge = 0.5;
-  const auto out =
-      discharge(circuit, Circuit::rested(1), *linear_load(Kind::current, time_s, current_a), limits);
+  const auto out = discharge(circuit, Circuit::rested(1), ramp(Kind::current, 10, 7200), limits);
   ASSERT_TRUE(out);
   EXPECT_EQ(out->ending, Ending::charge);
   EXPECT_NEAR(out->duration_s, 7200 / std::sqrt(2), 1e-3);
@@ -80,10 +87,9 @@ TEST(Discharge, EndsAtOnceWhenTheLoadJumpsTooHigh) {
 
 TEST(Discharge, FindsWhereRisingPowerCanNoLongerBeGiven) {
   const Circuit circuit(plain_battery());
-  const double time_s[] = {0, 10}, power_w[] = {0, 2880};
   DischargeLimits limits;
   limits.voltage_v = 0;
-  const auto out = discharge(circuit, Circuit::rested(1), *linear_load(Kind::power, time_s, power_w), limits);
+  const auto out = discharge(circuit, Circuit::rested(1), ramp(Kind::power, 2880, 10), limits);
   ASSERT_TRUE(out);
   EXPECT_EQ(out->ending, Ending::power);
   EXPECT_NEAR(out->duration_s, 5, 1e-6);
@@ -130,8 +136,8 @@ TEST(Discharge, RefusesWhatIsNotFinite) {
   EXPECT_FALSE(discharge(circuit, start, constant_load(Kind::current, 1, 1)));
   const double time_s[] = {0, 1, 1}, nan_s[] = {0, start.charge, 2}, value[] = {1, 2, 3};
   EXPECT_EQ(held_load(Kind::power, time_s, value).error().field, "time_s");
-  EXPECT_EQ(linear_load(Kind::power, nan_s, value).error().field, "time_s");
-  EXPECT_EQ(linear_load(Kind::power, value, nan_s).error().field, "value");
+  EXPECT_EQ(held_load(Kind::power, nan_s, value).error().field, "time_s");
+  EXPECT_EQ(held_load(Kind::power, value, nan_s).error().field, "value");
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ TEST(GapOutput, TellsChecksThenVerdictThenEffectsThenTheRefereeThenWhere) {
         "gap: energy +10.1 %, absolute power 20.2 % (noise floor 3.3 %)",
         "other readings: yaw_rate 5.2 %",
         "verdict: effects (probability 0.93)",
-        "These data do not tell slope from grade.",
+        "These data do not distinguish slope from grade.",
         "coulomb_friction: probability 0.96, closes 72 % of the gap, 19.5 W",
         "ratio = 0.41 +- 0.02",
         "named in 1 of 20 surrogates",
@@ -50,7 +50,7 @@ TEST(GapOutput, TellsChecksThenVerdictThenEffectsThenTheRefereeThenWhere) {
         "motor.friction_torque_nm 1.69 +- 0.03 instead of 1.2",
         "where:",
         "battery_power, phase turning: +61 % of the gap [51, 71] in 17 % of the time",
-        "next drive, to tell a from b: drive fast (log evidence +7.5)"}) {
+        "next drive, to distinguish a from b: drive fast (log evidence +7.5)"}) {
     const std::size_t found = text.find(next, at);
     ASSERT_NE(found, std::string::npos) << next << "\n" << text;
     at = found;

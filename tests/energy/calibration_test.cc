@@ -181,7 +181,7 @@ TEST(CalibrateDrive, SaysWhatIsMissing) {
   const auto fit = calibrate_drive(robot, runs, {});
   ASSERT_FALSE(fit);
   EXPECT_EQ(fit.error().field, "motor_current");
-  // One speed alone cannot tell T_m from nu: nu stays as it was.
+  // One speed alone cannot distinguish T_m from nu: nu stays as it was.
   const auto steady = prescribed(robot, {5, 0, 0}, {5, 0, 0}, 0);
   const std::vector<DriveRun> one_speed{{"", steady, 0}};
   const auto held = calibrate_drive(robot, one_speed, {.resistance_known = true, .constants_known = true});

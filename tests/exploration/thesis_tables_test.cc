@@ -7,8 +7,8 @@
 #include <set>
 #include <sstream>
 
-#include "client/thesis/gaussian_detour.h"
-#include "client/thesis/tables.h"
+#include "tests/study/thesis/gaussian_detour.h"
+#include "tests/study/thesis/tables.h"
 #include "tests/support/shared_folder.h"
 
 namespace joulecast::client::thesis {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "base/median.h"
+#include "tests/support/shared_folder.h"
 #include "virtual_missions.h"
 
 namespace joulecast::forecast {
@@ -55,7 +56,7 @@ TEST(Autonomy, IsHonestOfAForeignFleet) {
     if (auto run = recorded_fleet_robot(std::string(JOULECAST_SHARED "/data/fleets/") + robot))
       runs.push_back(std::move(*run));
   }
-  if (runs.empty()) GTEST_SKIP() << "the fleet's recordings are not beside the project";
+  JOULECAST_NEED_SHARED(runs.size() == 2, "the fleet's recordings");
   // Durations by habit are off by 0.062 in the median of 40; 0.05 is wanted.
   expect_honest(runs, 30, {0.02, 0.065}, "foreign fleet");
 }

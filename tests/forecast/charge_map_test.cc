@@ -22,9 +22,8 @@ TEST(ChargeMap, AgreesWithTheCircuitUnderConstantPower) {
     for (const double from : {0.95, 0.6, 0.4}) {
       const double duration_s =
           0.2 * 3600 * circuit.capacity_ah() * robot.battery.nominal_voltage_v / power_w;
-      const auto truth =
-          battery::discharge(circuit, battery::Circuit::rested(from),
-                             battery::constant_load(battery::Load::Kind::power, power_w, duration_s));
+      const auto truth = battery::discharge(circuit, battery::Circuit::rested(from),
+                                            {battery::Load::Kind::power, {{duration_s, power_w, power_w}}});
       ASSERT_TRUE(truth);
       ASSERT_EQ(truth->ending, battery::Ending::load_ended);
       const double drawn = from - truth->state.charge;

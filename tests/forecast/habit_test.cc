@@ -83,7 +83,6 @@ TEST(Habit, HaltsCountAsOftenAsTheyHappen) {
   EXPECT_NEAR(ten.mean(), 12, 1e-12);
   EXPECT_NEAR(ten.probability_of_none(), std::pow(0.8, 10), 1e-12);
   EXPECT_TRUE(habit.standing({0, 10}, 2).none());
-  EXPECT_TRUE(habit.without_halts().standing({10, 10}, 1).none());
 }
 
 TEST(Habit, WhatIsStatedReplacesIt) {

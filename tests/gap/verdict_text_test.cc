@@ -83,7 +83,7 @@ TEST(VerdictText, NamesWhatSpeaksAgainstTheLikeliest) {
   d.outside.probability = 0.35;
   EXPECT_THAT(
       said_of(d),
-      ElementsAre("These data do not tell coulomb friction from viscous friction and gear efficiency.",
+      ElementsAre("These data do not distinguish coulomb friction from viscous friction and gear efficiency.",
                   HasSubstr("may be at work as well (probability 0.35)")));
   d.effects[0].alternatives.clear();
   d.outside.probability = 0;

@@ -108,6 +108,10 @@ TEST_F(AuditTest, RefusesWhatIsNoStore) {
   SqliteDatabase(folder_.file("foreign.db"), OpenMode::read_write_create, 100)
       .execute("CREATE TABLE audit (x)");
   EXPECT_EQ(verify_audit(folder_.file("foreign.db")).error().fault, Fault::corrupt);
+  close();
+  EXPECT_TRUE(verify_audit(path_));
+  run("PRAGMA user_version = 1");
+  EXPECT_EQ(verify_audit(path_).error().fault, Fault::conflict);
 }
 
 }  // namespace

@@ -364,7 +364,7 @@ TEST(Contradictions, OfRealRecordingsNoneIsUntrue) {
                                                  .start_utime_us = 1'700'000'000'000'000});
       if (!import) continue;
       ++missions;
-      ContradictionWatch watch(*robot);
+      ContradictionWatch watch(*robot, dynamics::DriveModel(*robot, {}));
       watch.begin_mission("m", import->recording.payload_kg);
       std::string told;
       const auto note = [&] {

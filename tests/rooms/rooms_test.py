@@ -19,6 +19,9 @@ def calls(text, function):
     return [m.split() for m in re.findall(rf"\b{function}\(([^()]*)\)", text)]
 
 
+PRODUCTS = ("src", "server", "client", "tests/study")
+
+
 class Library:
     def __init__(self, name, folder):
         self.name, self.folder = name, folder
@@ -31,7 +34,7 @@ class Library:
 def libraries_of(source):
     """The libraries by name and, of each source file or header, its library."""
     libraries, owner = {}, {}
-    lists = [f for top in ("src", "server", "client") for f in sorted((source / top).rglob("CMakeLists.txt"))]
+    lists = [f for top in PRODUCTS for f in sorted((source / top).rglob("CMakeLists.txt"))]
     for file in lists:
         folder, text = file.parent, file.read_text()
         made = [("joulecast_" + a[0], a[1:]) for a in calls(text, "joulecast_room") if a[0] != "name"]
@@ -49,7 +52,7 @@ def libraries_of(source):
                 elif name in libraries and word.startswith("joulecast_") and word != "joulecast_options":
                     libraries[name].links[scope].add(word)
     # A header without a source belongs to the library of its name, or else of its folder's.
-    for header in [h for top in ("src", "server", "client") for h in (source / top).rglob("*.h") if h not in owner]:
+    for header in [h for top in PRODUCTS for h in (source / top).rglob("*.h") if h not in owner]:
         folder = next(f for f in header.parents if f == source or (f / "CMakeLists.txt").exists())
         near = [l for l in libraries.values() if source / l.folder == folder]
         named = [l for n in (header.stem, folder.name) for l in near + list(libraries.values()) if l.name == f"joulecast_{n}"]

@@ -93,7 +93,11 @@ class AccessTest : public testing::Test {
                            if (!audit_open_) return fail(Fault::unavailable, "", "stopping");
                            events_.push_back(std::move(event));
                            return {};
-                         }});
+                         },
+                         .not_audited =
+                             [this](const AccessEvent& event, const Error& error) {
+                               lost_.push_back(event.action + ": " + error.message);
+                             }});
     std::vector<Endpoint> table;
     for (Endpoint& row : whole_table(metrics_, hub_)) table.push_back(gate_->audited(std::move(row)));
     for (Endpoint& row : gate_->session_endpoints()) table.push_back(std::move(row));
@@ -123,6 +127,7 @@ class AccessTest : public testing::Test {
   std::filesystem::path folder_;
   std::int64_t now_us_ = 1'790'000'000'000'000;
   bool audit_open_ = true, secure_ = false;
+  std::vector<std::string> lost_;
   std::vector<AccessEvent> events_;
   Metrics metrics_;
   EventHub hub_;
@@ -315,6 +320,9 @@ TEST_F(AccessTest, AChangeIsAuditedBeforeItIsMadeAndWithItsAnswer) {
   }
   audit_open_ = false;
   EXPECT_EQ(ask(Method::put, "/v1/robots/7", "Bearer s-admin", "", "{}").status, 503U);
+  EXPECT_TRUE(lost_.empty());  // nothing was changed
+  (void)ask(Method::put, "/v1/robots/7", "Bearer s-read");
+  EXPECT_EQ(lost_, std::vector<std::string>{"putRobot: stopping"});  // but this has been refused
 }
 
 TEST_F(AccessTest, RefusalsAreAuditedAFloodOfThemIsCounted) {

@@ -208,19 +208,19 @@ TEST(CrossOrigin, IsForTheOriginsOfTheSettings) {
   request.headers = {{"origin", "https://fleet.example"}, {"access-control-request-method", "POST"}};
   Response response;
   response.headers = {{"Allow", "POST, OPTIONS"}};
-  cors.tell(request, response);
+  cors.add_headers(request, response);
   EXPECT_EQ(header(response, "Access-Control-Allow-Origin"), "https://fleet.example");
   EXPECT_EQ(header(response, "Access-Control-Allow-Methods"), "POST, OPTIONS");
   EXPECT_THAT(header(response, "Access-Control-Allow-Headers"), testing::HasSubstr("Authorization"));
   for (const char* foreign : {"https://fleet.example.evil", "http://fleet.example", "null", ""}) {
     Response refused;
     request.headers[0].second = foreign;
-    cors.tell(request, refused);
+    cors.add_headers(request, refused);
     EXPECT_EQ(header(refused, "Access-Control-Allow-Origin"), "") << foreign;
     EXPECT_EQ(header(refused, "Vary"), "Origin");
   }
   Response without;
-  Cors({}).tell(request, without);
+  Cors({}).add_headers(request, without);
   EXPECT_TRUE(without.headers.empty());
 }
 

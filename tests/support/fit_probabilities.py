@@ -4,7 +4,7 @@
 usage: fit_probabilities.py OUTCOMES...         write src/gap/verdict/probabilities.{json,inc}
        fit_probabilities.py --check [OUTCOMES...]
 
-OUTCOMES are files of `joulecast gap trial --outcomes FILE`: one line of JSON a case, of the trial on virtual robots
+OUTCOMES are files of `joulecast-study trial --outcomes FILE`: one line of JSON a case, of the trial on virtual robots
 and of the one on recorded motion. A name is right when the very effect was put in. For each standing of an answer
 (gap/verdict/diagnosis.h) names are counted in cells of their posterior (probabilities.json), cells are joined until
 each bin has LEAST_NAMED names and until the rate falls nowhere (pool-adjacent-violators; Ayer and others 1955), then

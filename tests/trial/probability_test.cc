@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "client/trial/rate.h"
+#include "tests/study/trial/rate.h"
 
 namespace joulecast::gap {
 namespace {

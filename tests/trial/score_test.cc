@@ -1,11 +1,11 @@
-#include "client/trial/score.h"
+#include "tests/study/trial/score.h"
 
 #include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
 
-#include "client/trial/score_text.h"
+#include "tests/study/trial/score_text.h"
 
 namespace joulecast::trial {
 namespace {

@@ -1,14 +1,14 @@
-#include "client/trial/trial_case.h"
+#include "tests/study/trial/trial_case.h"
 
 #include <gtest/gtest.h>
 
 #include <set>
 #include <string>
 
-#include "client/trial/robot_draw.h"
 #include "client/virtual_robot/fleet.h"
 #include "client/virtual_robot/simulate.h"
 #include "robot/robot_file.h"
+#include "tests/study/trial/robot_draw.h"
 
 namespace joulecast::trial {
 namespace {

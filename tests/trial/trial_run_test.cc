@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "client/trial/run.h"
-#include "client/trial/score.h"
-#include "client/trial/score_text.h"
+#include "tests/study/trial/run.h"
+#include "tests/study/trial/score.h"
+#include "tests/study/trial/score_text.h"
 
 namespace joulecast::trial {
 namespace {

@@ -1,4 +1,4 @@
-#include "client/trial/window_power.h"
+#include "tests/study/trial/window_power.h"
 
 #include <gtest/gtest.h>
 

@@ -70,12 +70,18 @@ Check make_check(std::string id, std::string channel, const Estimate& value, std
 
 namespace {
 
+// The drive with the effects that the catalogue accepts; Asking::ask_effects reports a file that it rejects.
+dynamics::DriveModel drive_of(const robot::RobotModel& robot,
+                              const Result<std::vector<dynamics::ActiveEffect>>& effects) {
+  return {robot, effects ? *effects : std::vector<dynamics::ActiveEffect>{}};
+}
+
 // Checks that go on from one another: what one contradicts, the next do not ask again.
 class Asking {
  public:
   Asking(std::span<const Observation> observations, const robot::RobotModel& robot, double motor_delay_s)
       : effects_(dynamics::active_effects(robot)),
-        model_(robot, effects_.value_or(std::vector<dynamics::ActiveEffect>{})),
+        model_(drive_of(robot, effects_)),
         context_{observations, robot, model_, motor_delay_s} {
     for (const Observation& o : observations) {
       for (std::size_t k = 0; k < reading_count; ++k) context_.tallies[k].append(o.of(k));
@@ -140,9 +146,9 @@ std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
                                     const robot::RobotModel& robot) {
   std::vector<Observation> observations;
   observations.reserve(recordings.missions.size());
-  for (const telemetry::Recording& mission : recordings.missions) {
-    observations.push_back(observe(mission, robot));
-  }
+  const dynamics::DriveModel drive = drive_of(robot, dynamics::active_effects(robot));
+  for (const telemetry::Recording& mission : recordings.missions)
+    observations.push_back(observe(mission, robot, drive));
   return check_observations(observations, robot);
 }
 

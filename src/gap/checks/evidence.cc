@@ -132,7 +132,7 @@ void Gatherer::torques() {
     const auto b = blocks(k == 0 ? Relation::torque_right : Relation::torque_left);
     const BlockFit fit = fit_blocks(b, 0, terms);
     const std::string side = side_name[k];
-    add("the " + side + " motor's current for acceleration is", "what the file's inertia asks",
+    add("the " + side + " motor's current for acceleration is", "what the file's inertia gives",
         estimate(fit, 2) * (p_.torque_constant_nm_a / inertia), inertia_off, inertia_off, 6,
         {{side_of(S::current_right, k), 1}, {side_of(S::wheel_right, k), -1}});
     double rows = 0, speed = 0;
@@ -144,7 +144,7 @@ void Gatherer::torques() {
     steady[1] = speed;
     const double torque = p_.friction_torque_nm[k] + p_.viscous_friction_nm_s_rad * speed;
     if (!(torque > 0)) continue;
-    Evidence* e = add("the " + side + " motor's current at steady speed is", "what the file's friction asks",
+    Evidence* e = add("the " + side + " motor's current at steady speed is", "what the file's friction gives",
                       estimate(fit, steady) * (p_.torque_constant_nm_a / torque), load_off, load_off, 4,
                       {{side_of(S::current_right, k), 1}, {side_of(S::wheel_right, k), -1}});
     if (e != nullptr) lost(e, {side_of(S::wheel_right, k)});
@@ -158,7 +158,7 @@ void Gatherer::turning_by_wheels(const BlockFit& fit, const std::string& turner,
     const double expected = (k == 0 ? share : -share) * p_.wheel_radius_m[k];
     Evidence* e =
         add(std::string("over the turning of the ") + side_name[k] + " wheel " + turner,
-            "what the file's track asks", estimate(fit, static_cast<Eigen::Index>(k)) * (1 / expected), skid,
+            "what the file's track gives", estimate(fit, static_cast<Eigen::Index>(k)) * (1 / expected), skid,
             track_off, 8, {{source, 1}, {side_of(S::wheel_right, k), -1}});
     if (e != nullptr) e->turned_by = 1;
   }
@@ -198,7 +198,7 @@ void Gatherer::moving() {
     for (std::size_t k : {0u, 1u}) {
       Evidence* e =
           add(std::string("the map moves forward over the turning of the ") + side_name[k] + " wheel",
-              "what the file's wheel radius asks",
+              "what the file's wheel radius gives",
               estimate(fit, static_cast<Eigen::Index>(k)) * (2 / p_.wheel_radius_m[k]), travel_off,
               travel_off, 8, {{S::position, 1}, {side_of(S::wheel_right, k), -1}});
       if (e != nullptr) lost(e, {S::heading});
@@ -255,7 +255,7 @@ void Gatherer::batteries() {
   for (const bool mean : {true, false}) {
     Evidence* e = add(mean ? "while the robot drives, the battery's power is"
                            : "with the motion, the battery's power changes by",
-                      "what the model asks", mean ? driving : motion, load_off, load_off, mean ? 8 : 6,
+                      "what the model gives", mean ? driving : motion, load_off, load_off, mean ? 8 : 6,
                       {{S::battery_voltage, 1}, {S::battery_current, 1}});
     if (e == nullptr) continue;
     lost(e, {S::wheel_right, S::wheel_left, S::payload});
@@ -267,7 +267,7 @@ void Gatherer::loads() {
   constexpr std::array<std::size_t, 2> with_one{1, 2};
   if (!heard({reading::pitch})) return;
   if (heard({0, 1, reading::battery_voltage, reading::battery_current})) {
-    Evidence* e = add("uphill and downhill, the battery's power changes by", "what the pitch asks",
+    Evidence* e = add("uphill and downhill, the battery's power changes by", "what the pitch gives",
                       estimate(fit_blocks(blocks(Relation::climb), 0, with_one), 0), load_off, load_off, 8,
                       {{S::pitch, -1}, {S::battery_voltage, 1}, {S::battery_current, 1}});
     if (e != nullptr)

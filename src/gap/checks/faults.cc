@@ -11,11 +11,11 @@ namespace {
 using S = Source;
 
 constexpr double sign_surprise = 4, unit_surprise = 4, swap_surprise = 4.5, odd_surprise = 5.5;
-constexpr double lost_surprise = 1;  // of evidence that a fault would make meaningless
-constexpr double least_support = 1;  // nats beyond its surprise that what a fault predicts must speak for it
-constexpr double least_gain = 4;     // nats, beyond the fault's own surprise
-constexpr double nearly = 1.5;       // nats between explanations that do as well
-constexpr double telling = 2.0;      // factors nearer to 1 than this are errors of calibration, not of units
+constexpr double lost_surprise = 1;   // of evidence that a fault would make meaningless
+constexpr double least_support = 1;   // nats beyond its surprise that what a fault predicts must speak for it
+constexpr double least_gain = 4;      // nats, beyond the fault's own surprise
+constexpr double nearly = 1.5;        // nats between explanations that do as well
+constexpr double least_factor = 2.0;  // factors nearer to 1 than this are errors of calibration, not of units
 constexpr double degrees = 180 / std::numbers::pi, rpm = 30 / std::numbers::pi;
 
 using Set = std::vector<const Fault*>;
@@ -86,7 +86,7 @@ class Table {
  public:
   void add(std::string id, std::string channel, std::string cause, std::initializer_list<S> sources,
            double factor, double surprise, std::uint32_t swaps = 0) {
-    if (swaps == 0 && factor > 0 && std::fabs(std::log(factor)) < std::log(telling)) return;
+    if (swaps == 0 && factor > 0 && std::fabs(std::log(factor)) < std::log(least_factor)) return;
     Fault& f = faults_.emplace_back();
     f.id = std::move(id);
     f.channel = std::move(channel);
@@ -239,9 +239,9 @@ Measured measured_factor(std::span<const Evidence> evidence, const Explanation& 
   for (const Evidence& e : evidence) {
     const auto without = predicted(e, others), with = predicted(e, explanation.faults);
     if (!without || !with || *without == *with) continue;
-    const double tells = surprise_of(e, others) - surprise_of(e, explanation.faults);
-    if (tells <= most) continue;
-    most = tells;
+    const double supports = surprise_of(e, others) - surprise_of(e, explanation.faults);
+    if (supports <= most) continue;
+    most = supports;
     // The exponent by which the fault's own factor enters: swaps turn the sign alone.
     int exponent = 1;
     for (std::size_t k = 0; k < source_count; ++k) {

@@ -104,14 +104,6 @@ std::array<MotorConstants, 2> motor_constants(std::span<const Observation> obser
   return {constants_of(observations, 0, delay_s), constants_of(observations, 1, delay_s)};
 }
 
-std::array<MotorConstants, 2> motor_constants(const telemetry::RecordingSet& recordings,
-                                              const robot::RobotModel& robot) {
-  std::vector<Observation> observations;
-  for (const telemetry::Recording& mission : recordings.missions)
-    observations.push_back(observe(mission, robot));
-  return motor_constants(observations, motor_delay(observations).value_or(Delay{}).value_s);
-}
-
 std::vector<Check> check_motors(const CheckContext& c) {
   if (!c.heard({0, 1, 2, 3, 4, 5})) return {};
   const auto m = motor_constants(c.seen, c.motor_delay_s);

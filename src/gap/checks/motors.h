@@ -7,7 +7,6 @@
 
 #include "gap/checks/observation.h"
 #include "gap/checks/products.h"
-#include "telemetry/recording_set.h"
 
 namespace joulecast::gap {
 
@@ -34,7 +33,5 @@ std::vector<Products::Block> armature_blocks(std::span<const Observation> observ
 
 // [0] right, [1] left. The same of every robot of a kind are its siblings' to compare with.
 std::array<MotorConstants, 2> motor_constants(std::span<const Observation> observations, double delay_s);
-std::array<MotorConstants, 2> motor_constants(const telemetry::RecordingSet& recordings,
-                                              const robot::RobotModel& robot);
 
 }  // namespace joulecast::gap

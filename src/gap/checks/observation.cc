@@ -46,9 +46,9 @@ Relation right_or_left(Relation right, std::size_t side) {
 
 }  // namespace
 
-Observer::Observer(const robot::RobotModel& robot, bool delays)
+Observer::Observer(const robot::RobotModel& robot, const dynamics::DriveModel& drive, bool delays)
     : robot_(robot),
-      model_(robot, dynamics::active_effects(robot).value_or(std::vector<dynamics::ActiveEffect>{})),
+      model_(drive),
       limit_rad_s_(robot.limits.speed_m_s / robot.kinematics.wheel_radius_m),
       delays_(delays) {}
 
@@ -231,8 +231,9 @@ double least_delay_s(std::span<const Observation> observations, std::initializer
   return least;
 }
 
-Observation observe(const telemetry::Recording& mission, const robot::RobotModel& robot) {
-  Observer observer(robot);
+Observation observe(const telemetry::Recording& mission, const robot::RobotModel& robot,
+                    const dynamics::DriveModel& drive) {
+  Observer observer(robot, drive);
   observer.begin(mission.mission_id, mission.payload_kg);
   for (const Sample& sample : mission.samples) observer.add(sample);
   return observer.finish();

@@ -65,9 +65,9 @@ struct Observation {
 // Makes an observation from a mission's samples as they come. Work and memory a sample do not grow.
 class Observer {
  public:
-  // Effects of the file that the catalogue rejects are left out.
-  // Without `delays` the lags stay empty, which saves most of the work a sample makes.
-  explicit Observer(const robot::RobotModel& robot, bool delays = true);
+  // `drive`: of that robot. Without `delays` the lags stay empty, which saves most of the work a sample
+  // makes.
+  Observer(const robot::RobotModel& robot, const dynamics::DriveModel& drive, bool delays = true);
 
   void begin(std::string mission_id, double declared_payload_kg);
   void add(const signals::Sample& sample);
@@ -104,6 +104,7 @@ std::optional<Delay> delay_of(std::span<const Observation> observations, std::sp
 // speeds are held.
 double least_delay_s(std::span<const Observation> observations, std::initializer_list<std::size_t> readings);
 
-Observation observe(const telemetry::Recording& mission, const robot::RobotModel& robot);
+Observation observe(const telemetry::Recording& mission, const robot::RobotModel& robot,
+                    const dynamics::DriveModel& drive);
 
 }  // namespace joulecast::gap

@@ -87,7 +87,7 @@ Check constant_check(const CheckContext& c, const std::string& channel, double v
   check.contradicted = std::fabs(value / c.robot.battery.nominal_voltage_v - 1) > near_nominal;
   check.says = fmt::format(
       "battery_voltage is {:.5g} V all the time where the current must move it by {:.2g} V: a "
-      "constant written in, or a converter that cannot tell. {}.",
+      "constant written in, or a converter that does not measure it. {}.",
       value, expected_swing(c) * c.robot.battery.nominal_voltage_v,
       check.contradicted ? "It is far from the file's nominal voltage, so that power is not known"
                          : "Power is the current times it; nothing is learnt from the voltage");

@@ -177,6 +177,90 @@ std::vector<double> refereed(const Material& m, const Grouped& g, std::size_t gr
   return answer;
 }
 
+// The groups by name in `c`, and their windows; contradicted channels are silenced.
+Result<Grouped> make_groups(const telemetry::RecordingSet& recordings,
+                            std::span<const std::string> group_of_mission, const robot::RobotModel& robot,
+                            std::span<const dynamics::ActiveEffect> adopted, Comparison& c) {
+  const std::set<std::string> names(group_of_mission.begin(), group_of_mission.end());
+  if (names.size() < 2) return invalid("log", "holds missions of one group only; two are needed to compare");
+  for (const std::string& name : names) c.groups.push_back({name, 0, 0, 0, 0, 0});
+  std::vector<std::size_t> index;
+  for (const std::string& name : group_of_mission)
+    index.push_back(static_cast<std::size_t>(std::distance(names.begin(), names.find(name))));
+  Grouped g;
+  g.recordings = recordings;
+  std::vector<Check>& checks = c.diagnosis.checks;
+  checks = check_recordings(g.recordings, robot);
+  // What steps from one mission to the next is what is compared.
+  std::erase_if(checks, [](const Check& check) { return check.id == "step_between_missions"; });
+  silence_contradicted(g.recordings, checks);
+  sort_by_group(g, index, names.size());
+  make_windows(g, robot, adopted);
+  std::vector<std::size_t> count(names.size(), 0);
+  for (const Window& w : g.windows) ++count[g.group_of_mission[w.mission]];
+  for (std::size_t k = 0; k < count.size(); ++k) {
+    if (count[k] < fewest_windows)
+      return invalid("log", "holds too little motion in group " + c.groups[k].name);
+  }
+  if (g.power == PowerSource::none && g.from_motion.power && !g.from_motion.voltage)
+    return invalid("log", "measures neither power nor voltage nor current of the motors");
+  return g;
+}
+
+// Gaps and noise of all groups together, around what they share.
+void describe(const telemetry::RecordingSet& recordings, const Grouped& g, const Material& material,
+              std::span<const Cause> causes, std::span<const double> common_w, Comparison& c) {
+  Diagnosis& d = c.diagnosis;
+  d.robot_id = recordings.robot_id;
+  d.missions = recordings.missions.size();
+  d.samples = recordings.samples;
+  d.notes = recordings.notes;
+  d.motor_channels = !g.from_motion.power;
+  d.power = g.power;
+  const GapSize size = gap_size(g.power_w, common_w);
+  d.energy_relative = size.energy_relative;
+  d.power_absolute_relative = size.absolute_relative;
+  d.channels = channel_gaps(material);
+  const auto floor = std::ranges::find(
+      d.channels, g.power == PowerSource::battery ? "battery_power" : "motor_power", &ChannelGap::channel);
+  d.noise_floor = g.power == PowerSource::none || floor == d.channels.end() ? missing : floor->noise_floor;
+  if (g.power == PowerSource::none) d.energy_relative = d.power_absolute_relative = missing;
+  for (const Cause& cause : causes) {
+    c.common.push_back(cause.by ? "covariate:" + g.covariates[cause.by->covariate]
+                                : std::string(cause.effect.effect->info().id));
+  }
+  add_limits(g, c);
+}
+
+Cause strengthened(Cause cause, const Eigen::VectorXd& coefficients) {
+  if (coefficients.size() == 2) {
+    cause.effect.values[0] = coefficients.norm();
+    cause.effect.values[1] = std::atan2(coefficients[1], coefficients[0]);
+  } else {
+    cause.effect.values[cause.parameter] = coefficients[0];
+  }
+  return cause;
+}
+
+// Power of every window with what all groups share and what its own has besides.
+std::vector<double> predicted(const Material& material, const Grouped& g, const std::vector<Cause>& shared,
+                              const std::vector<std::vector<Cause>>& by_group) {
+  std::vector<double> power_w;
+  std::size_t from = 0;
+  while (from < g.windows.size()) {
+    const std::size_t group = g.group_of_mission[g.windows[from].mission];
+    std::size_t to = from;
+    while (to < g.windows.size() && g.group_of_mission[g.windows[to].mission] == group) ++to;
+    std::vector<Cause> causes = shared;
+    causes.insert(causes.end(), by_group[group].begin(), by_group[group].end());
+    const auto own = modelled_power(material.robot, material.adopted, causes,
+                                    std::span(g.windows).subspan(from, to - from));
+    power_w.insert(power_w.end(), own.begin(), own.end());
+    from = to;
+  }
+  return power_w;
+}
+
 }  // namespace
 
 Result<std::vector<std::string>> groups_of(const telemetry::RecordingSet& recordings, const std::string& by) {
@@ -213,30 +297,11 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
                                       const robot::RobotModel& robot, const CompareSettings& settings) {
   const auto adopted = dynamics::active_effects(robot);
   if (!adopted) return tl::unexpected(adopted.error());
-  const std::set<std::string> names(group_of_mission.begin(), group_of_mission.end());
-  if (names.size() < 2) return invalid("log", "holds missions of one group only; two are needed to compare");
   Comparison c;
-  for (const std::string& name : names) c.groups.push_back({name, 0, 0, 0, 0, 0});
-  std::vector<std::size_t> index;
-  for (const std::string& name : group_of_mission)
-    index.push_back(static_cast<std::size_t>(std::distance(names.begin(), names.find(name))));
-  Grouped g;
-  g.recordings = recordings;
-  Diagnosis& d = c.diagnosis;
-  d.checks = check_recordings(g.recordings, robot);
-  // What steps from one mission to the next is what is compared.
-  std::erase_if(d.checks, [](const Check& check) { return check.id == "step_between_missions"; });
-  silence_contradicted(g.recordings, d.checks);
-  sort_by_group(g, index, names.size());
-  make_windows(g, robot, *adopted);
-  std::vector<std::size_t> count(names.size(), 0);
-  for (const Window& w : g.windows) ++count[g.group_of_mission[w.mission]];
-  for (std::size_t k = 0; k < count.size(); ++k) {
-    if (count[k] < fewest_windows)
-      return invalid("log", "holds too little motion in group " + c.groups[k].name);
-  }
-  if (g.power == PowerSource::none && g.from_motion.power && !g.from_motion.voltage)
-    return invalid("log", "measures neither power nor voltage nor current of the motors");
+  const auto grouped = make_groups(recordings, group_of_mission, robot, *adopted, c);
+  if (!grouped) return tl::unexpected(grouped.error());
+  const Grouped& g = *grouped;
+  const std::size_t groups = c.groups.size();
 
   // What all groups share is found first, and everything linearised around it.
   const Material material{robot,         *adopted,         g.windows,   g.group_of_block.size(),
@@ -252,28 +317,10 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
     return fail(Fault::conflict, "", "comparison cancelled");
 
   const std::vector<double> common_w = modelled_power(robot, *adopted, fit->causes, g.windows);
-  d.robot_id = recordings.robot_id;
-  d.missions = recordings.missions.size();
-  d.samples = recordings.samples;
-  d.notes = recordings.notes;
-  d.motor_channels = !g.from_motion.power;
-  d.power = g.power;
-  const GapSize size = gap_size(g.power_w, common_w);
-  d.energy_relative = size.energy_relative;
-  d.power_absolute_relative = size.absolute_relative;
-  d.channels = channel_gaps(material);
-  const auto floor = std::ranges::find(
-      d.channels, g.power == PowerSource::battery ? "battery_power" : "motor_power", &ChannelGap::channel);
-  d.noise_floor = g.power == PowerSource::none || floor == d.channels.end() ? missing : floor->noise_floor;
-  if (g.power == PowerSource::none) d.energy_relative = d.power_absolute_relative = missing;
-  for (const Cause& cause : fit->causes) {
-    c.common.push_back(cause.by ? "covariate:" + g.covariates[cause.by->covariate]
-                                : std::string(cause.effect.effect->info().id));
-  }
-  add_limits(g, c);
+  describe(recordings, g, material, fit->causes, common_w, c);
 
   GroupedData data{robot,
-                   problem_of(fit->linear, g, names.size(), {}),
+                   problem_of(fit->linear, g, groups, {}),
                    g.group_of_block,
                    measure(g, robot, common_w, c),
                    {},
@@ -286,34 +333,15 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   data.shared = fit->causes;
   data.explain.most_families = 1;
   data.explain.beam = 5;
-  data.without = [&](const std::vector<bool>& out) { return problem_of(fit->linear, g, names.size(), out); };
+  data.without = [&](const std::vector<bool>& out) { return problem_of(fit->linear, g, groups, out); };
   data.cause = [&](std::size_t h, const Eigen::VectorXd& coefficients) {
-    Cause cause = fit->linear.columns->hypotheses()[h].cause();
-    if (coefficients.size() == 2) {
-      cause.effect.values[0] = coefficients.norm();
-      cause.effect.values[1] = std::atan2(coefficients[1], coefficients[0]);
-    } else {
-      cause.effect.values[cause.parameter] = coefficients[0];
-    }
-    return cause;
+    return strengthened(fit->linear.columns->hypotheses()[h].cause(), coefficients);
   };
   data.predict = [&](const std::vector<std::vector<Cause>>& by_group) {
-    std::vector<double> power_w;
-    std::size_t from = 0;
-    while (from < g.windows.size()) {
-      const std::size_t group = g.group_of_mission[g.windows[from].mission];
-      std::size_t to = from;
-      while (to < g.windows.size() && g.group_of_mission[g.windows[to].mission] == group) ++to;
-      std::vector<Cause> causes = fit->causes;
-      causes.insert(causes.end(), by_group[group].begin(), by_group[group].end());
-      const auto own = modelled_power(robot, *adopted, causes, std::span(g.windows).subspan(from, to - from));
-      power_w.insert(power_w.end(), own.begin(), own.end());
-      from = to;
-    }
-    return power_w;
+    return predicted(material, g, fit->causes, by_group);
   };
   data.referee = [&](const std::vector<double>& missed, const std::vector<bool>& use) {
-    return refereed(material, g, names.size(), missed, use);
+    return refereed(material, g, groups, missed, use);
   };
   CompareSettings rest = settings;
   if (settings.progress)

@@ -86,7 +86,8 @@ void fill_gap(Diagnosis& d, const GroupedRuns& runs, std::span<const Item> items
 
 Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> group_of_run,
                                 const robot::RobotModel& robot, const CompareSettings& settings) {
-  if (const auto adopted = dynamics::active_effects(robot); !adopted) return tl::unexpected(adopted.error());
+  auto adopted = dynamics::active_effects(robot);
+  if (!adopted) return tl::unexpected(adopted.error());
   const std::set<std::string> names(group_of_run.begin(), group_of_run.end());
   if (names.size() < 2) return invalid("--compare-by", "gives one group only; two are needed to compare");
   Comparison c;
@@ -96,7 +97,7 @@ Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> 
     group.push_back(static_cast<std::size_t>(std::distance(names.begin(), names.find(name))));
 
   const RunSet compared = without_own_label(set, group_of_run);
-  RunColumns columns(compared, robot);
+  RunColumns columns(compared, robot, *std::move(adopted));
   const std::vector<std::size_t> block = blocks_of(compared.runs, group_of_run);
   // What all runs share is found first; differences are judged around it.
   const RunFinding shared = search_runs(columns, block);

@@ -43,7 +43,7 @@ class Comparer {
   Problem alike(Problem base, const HypothesisSet& set, const Eigen::VectorXd& differences) const;
   std::vector<Controls> permuted(const Mixture& mixture, const Explanation& explanation) const;
   bool hold_out();
-  Explanation told(const std::vector<Contrasted>& members) const;
+  Explanation explanation_of(const std::vector<Contrasted>& members) const;
   void add_differences();
   void add_baseline();
   void judge_all();
@@ -272,7 +272,7 @@ void Comparer::add_differences() {
 }
 
 // The explanation as one of single strengths: the stronger group less the weaker.
-Explanation Comparer::told(const std::vector<Contrasted>& members) const {
+Explanation Comparer::explanation_of(const std::vector<Contrasted>& members) const {
   Explanation e = explanation_;
   for (Member& m : e.members) {
     const auto c = std::ranges::find(members, m.hypothesis, &Contrasted::hypothesis);
@@ -301,7 +301,7 @@ void Comparer::judge_all() {
   HypothesisSet members;
   for (const Member& m : explanation_.members) members.push_back(m.hypothesis);
   std::ranges::sort(members);
-  const Explanation explanation = told(contrasted(data_.base, problem_, members, {}));
+  const Explanation explanation = explanation_of(contrasted(data_.base, problem_, members, {}));
   const std::optional<Ripple> no_ripple;
   Findings f{.problem = problem_,
              .explanation = explanation,

@@ -58,11 +58,12 @@ std::vector<std::pair<std::string, std::vector<bool>>> levels_of(const RunSet& s
 
 class RunDiagnoser {
  public:
-  RunDiagnoser(RunSet set, const robot::RobotModel& robot, const RunSettings& settings)
+  RunDiagnoser(RunSet set, const robot::RobotModel& robot, std::vector<dynamics::ActiveEffect> adopted,
+               const RunSettings& settings)
       : set_(std::move(set)),
         robot_(robot),
         settings_(settings),
-        columns_(set_, robot),
+        columns_(set_, robot, std::move(adopted)),
         block_(blocks_of(set_.runs, {})),
         referee_(columns_) {}
 
@@ -303,7 +304,8 @@ Result<RunDiagnosis> RunDiagnoser::run() {
 
 Result<RunDiagnosis> diagnose_runs(const RunSet& set, const robot::RobotModel& robot,
                                    const RunSettings& settings) {
-  if (const auto adopted = dynamics::active_effects(robot); !adopted) return tl::unexpected(adopted.error());
+  auto adopted = dynamics::active_effects(robot);
+  if (!adopted) return tl::unexpected(adopted.error());
   RunSet judged = set;
   if (settings.robot_file_model) {
     for (MissionRun& run : judged.runs) {
@@ -311,7 +313,7 @@ Result<RunDiagnosis> diagnose_runs(const RunSet& set, const robot::RobotModel& r
       run.model_motor_j = {MissionRun::absent, MissionRun::absent};
     }
   }
-  auto diagnosis = RunDiagnoser(std::move(judged), robot, settings).run();
+  auto diagnosis = RunDiagnoser(std::move(judged), robot, *std::move(adopted), settings).run();
   if (diagnosis && settings.robot_file_model) diagnosis->turning = turning_term(set.runs, robot);
   return diagnosis;
 }

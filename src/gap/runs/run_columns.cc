@@ -28,7 +28,7 @@ constexpr double too_small_share =
 constexpr double common_scale = 0.01;   // of a calibrated model and of the meter that measured the runs
 constexpr std::size_t most_levels = 8;  // of a label
 
-// Which variants of an effect energies of runs can speak of: shapes that they cannot tell apart are left at
+// Which variants of an effect energies of runs can speak of: shapes that they cannot distinguish are left at
 // their initial values.
 std::vector<Cause> variants_of(const dynamics::Effect& effect, bool by_motor) {
   const std::string_view id = effect.info().id;
@@ -73,11 +73,8 @@ constexpr std::array<Trend, 7> trends{
 
 }  // namespace
 
-RunColumns::RunColumns(const RunSet& set, const robot::RobotModel& robot)
-    : set_(set),
-      robot_(robot),
-      adopted_(dynamics::active_effects(robot).value_or(std::vector<ActiveEffect>{})),
-      covariate_names_(set.covariates) {
+RunColumns::RunColumns(const RunSet& set, const robot::RobotModel& robot, std::vector<ActiveEffect> adopted)
+    : set_(set), robot_(robot), adopted_(std::move(adopted)), covariate_names_(set.covariates) {
   double given = 0, ours = 0;
   for (const MissionRun& run : runs()) {
     tables_.emplace(run.table, tables_.size());

@@ -26,7 +26,8 @@ struct RunRow {
 // never a finding, a common scale of model and meter and a shift of each table.
 class RunColumns {
  public:
-  RunColumns(const RunSet& set, const robot::RobotModel& robot);
+  // `adopted`: the effects of the robot file.
+  RunColumns(const RunSet& set, const robot::RobotModel& robot, std::vector<dynamics::ActiveEffect> adopted);
 
   // Differentiates around these from now on; at first around none. `only`: just the columns of these
   // hypotheses, the others' become zero; empty: all. Sets are compared around none, since effects that act

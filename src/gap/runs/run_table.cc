@@ -52,7 +52,7 @@ constexpr std::array<RunColumn, place_count> columns{
      {"energy_j", "J", "measured at the battery, idle power included"},
      {"right_j", "J", "or measured at the right motor"},
      {"left_j", "J", "and at the left motor"},
-     {"model_j", "J", "what the model in question gave at the battery; by default the robot file is asked"},
+     {"model_j", "J", "what the model in question gave at the battery; by default that of the robot file"},
      {"model_right_j", "J", "the same at the right motor"},
      {"model_left_j", "J", "and at the left motor"}}};
 // Columns beside these are named by what they are and how they are called.

@@ -52,7 +52,7 @@ struct DiagnosedEffect {
   double share = 0;                       // Shapley: fraction of the gap that it closes on held-out blocks
   double power_w = 0;                     // mean |change of battery power|
   double varies = 0;                      // of its strength along the recordings, sd over the strength
-  std::vector<std::string> alternatives;  // that these data cannot tell from it
+  std::vector<std::string> alternatives;  // that these data cannot distinguish from it
   // Those of them that a robot file can take, each with the strength that it has in this one's place.
   std::vector<robot::AdoptedEffect> instead{};
   std::optional<Controls> controls;
@@ -109,7 +109,7 @@ struct Shrinkage {
 struct NextDrive {
   std::string manoeuvre;             // what to drive
   std::string separates;             // "a from b"
-  double expected_log_evidence = 0;  // that it adds for telling them apart; NaN: not known
+  double expected_log_evidence = 0;  // that it adds for distinguishing them; NaN: not known
 };
 
 // One parameter of the robot file as these recordings would have it.

@@ -26,9 +26,9 @@ ordered_json effect_to_json(const AdoptedEffect& effect) {
 
 // `value_of` takes the number of one parameter.
 template <class ValueOf>
-AdoptedEffect effect_from(const json& told, ValueOf value_of) {
-  AdoptedEffect effect{told.at("id").get<std::string>(), {}};
-  for (const auto& [name, value] : told.at("parameters").items()) {
+AdoptedEffect effect_from(const json& document, ValueOf value_of) {
+  AdoptedEffect effect{document.at("id").get<std::string>(), {}};
+  for (const auto& [name, value] : document.at("parameters").items()) {
     if (const json& number = value_of(value); number.is_number())
       effect.parameters.emplace_back(name, number.template get<double>());
   }

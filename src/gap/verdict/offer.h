@@ -10,7 +10,7 @@
 
 namespace joulecast::gap {
 
-// One effect that a robot file could take, or one of several that the data do not tell apart.
+// One effect that a robot file could take, or one of several that the data do not distinguish.
 struct OfferedEffect {
   robot::AdoptedEffect effect;
   std::vector<robot::AdoptedEffect> instead;  // without parameters: its strength is not known
@@ -27,7 +27,7 @@ struct Offer {
 
 // What a person asks for.
 struct Choice {
-  std::vector<std::string> effects;  // one of each group that the data do not tell apart
+  std::vector<std::string> effects;  // one of each group that the data do not distinguish
   bool force = false;                // in spite of the refusal
 };
 

@@ -72,7 +72,7 @@ void say_shrinkage(const Diagnosis& d, bool unexplained, std::vector<std::string
 void say_effects(const Diagnosis& d, std::vector<std::string>& reasons) {
   for (const DiagnosedEffect& e : d.effects) {
     if (!e.alternatives.empty()) {
-      reasons.push_back(sentence(fmt::format("these data do not tell {} from {}", words_of(e.id),
+      reasons.push_back(sentence(fmt::format("these data do not distinguish {} from {}", words_of(e.id),
                                              enumerate(names_of(e.alternatives)))));
     }
     if (e.controls && e.controls->named_in > 0) {

@@ -200,7 +200,7 @@ TEST(CheckRecordings, ADelayOfTheElectricalChannelsIsMeasured) {
 // As they come to a daemon: one at a time, mission after mission.
 TEST(Observer, GivesWhatTheWholeRecordingGives) {
   const made::Robot& robot = scout();
-  Observer observer(robot.model);
+  Observer observer(robot.model, dynamics::DriveModel(robot.model, {}));
   std::vector<Observation> observations;
   for (const auto& mission : robot.recordings.missions) {
     observer.begin(mission.mission_id, mission.payload_kg);

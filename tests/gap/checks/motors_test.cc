@@ -56,9 +56,17 @@ std::vector<Check> about(const std::vector<Check>& checks, std::string_view id) 
   return some;
 }
 
+std::array<MotorConstants, 2> motor_constants(const telemetry::RecordingSet& set) {
+  std::vector<Observation> observations;
+  for (const telemetry::Recording& mission : set.missions)
+    observations.push_back(observe(mission, robot(), dynamics::DriveModel(robot(), {})));
+  const auto delay = motor_delay(observations);
+  return gap::motor_constants(observations, delay ? delay->value_s : 0);
+}
+
 TEST(MotorConstants, AreThoseOfEachMotor) {
   const Truth left{1.4, 1.62, 0.3, 1.1, 0.02, 0.6};
-  const auto m = motor_constants(drive({}, left), robot());
+  const auto m = motor_constants(drive({}, left));
   for (std::size_t k : {0u, 1u}) {
     const Truth truth = k == 0 ? Truth{} : left;
     EXPECT_NEAR(m[k].resistance_ohm.value, truth.resistance, 0.05);
@@ -71,7 +79,7 @@ TEST(MotorConstants, AreThoseOfEachMotor) {
 }
 
 TEST(MotorConstants, AreNotThrownOffByADelay) {
-  const auto m = motor_constants(drive({}, {}, 0.15), robot());
+  const auto m = motor_constants(drive({}, {}, 0.15));
   EXPECT_NEAR(m[0].resistance_ohm.value, 1.5, 0.1);
   EXPECT_NEAR(m[0].constant_v_s_rad.value, 1.6, 0.02);
 }

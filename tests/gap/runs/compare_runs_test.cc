@@ -59,8 +59,8 @@ TEST(CompareRuns, FindsTheFrictionOfASurface) {
   }
 }
 
-// Energies of whole runs hardly tell a loss in the drivers from friction or a weaker magnet: it stands in the
-// group that is stated, mostly, and nothing else is stated as sure.
+// Energies of whole runs hardly distinguish a loss in the drivers from friction or a weaker magnet: it stands
+// in the group that is stated, mostly, and nothing else is stated as sure.
 TEST(CompareRuns, FindsTheDriverLossOfAGroupOrWhatDoesTheSame) {
   robot::RobotModel robot = testing::nomad();
   robot.idle_power_w = 1;

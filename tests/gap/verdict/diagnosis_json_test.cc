@@ -53,7 +53,7 @@ TEST(DiagnosisJson, TellsEveryField) {
         {"yaw_rate", {{"absolute_relative", 0.052}, {"noise_floor", nullptr}}}}},
       {"verdict", "effects"},
       {"verdict_probability", 0.93},
-      {"reasons", {"These data do not tell slope from grade."}},
+      {"reasons", {"These data do not distinguish slope from grade."}},
       {"effects",
        {{{"id", "coulomb_friction"},
          {"probability", 0.96},

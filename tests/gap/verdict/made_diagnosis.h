@@ -35,7 +35,7 @@ inline Diagnosis made_diagnosis() {
              {"wheel_torque", "speed_m_s", "", 0.2, 0.4, -0.12, 0.09, {-0.19, -0.05}}};
   d.verdict = Verdict::effects;
   d.verdict_probability = 0.93;
-  d.reasons = {"These data do not tell slope from grade."};
+  d.reasons = {"These data do not distinguish slope from grade."};
   DiagnosedEffect friction;
   friction.id = "coulomb_friction";
   friction.probability = 0.96;

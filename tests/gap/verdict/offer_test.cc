@@ -22,7 +22,7 @@ using testing::made_diagnosis;
 const std::vector<std::string> friction{"coulomb_friction ratio 0.41"},
     viscous{"viscous_friction ratio 3.00"};
 
-// Coulomb friction that the data do not tell from viscous friction.
+// Coulomb friction that the data do not distinguish from viscous friction.
 Diagnosis undecided() {
   Diagnosis d = made_diagnosis();
   d.effects[0].alternatives = {"viscous_friction", "turning_scrub"};

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "client/trial/motion/base_robot.h"
-#include "client/trial/motion/judged.h"
+#include "tests/study/trial/motion/base_robot.h"
+#include "tests/study/trial/motion/judged.h"
 #include "tests/trial/motion/driven_log.h"
 
 namespace joulecast::trial::motion {

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "client/trial/motion/motion_log.h"
 #include "client/virtual_robot/rng.h"
 #include "robot/robot_file.h"
 #include "telemetry/event_log.h"
 #include "telemetry/recording.h"
+#include "tests/study/trial/motion/motion_log.h"
 
 namespace joulecast::trial::motion {
 

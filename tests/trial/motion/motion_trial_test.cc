@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "client/trial/motion/motion_run.h"
-#include "client/trial/motion/motion_score.h"
-#include "client/trial/motion/motion_text.h"
+#include "tests/study/trial/motion/motion_run.h"
+#include "tests/study/trial/motion/motion_score.h"
+#include "tests/study/trial/motion/motion_text.h"
 #include "tests/trial/motion/driven_log.h"
 
 namespace joulecast::trial::motion {

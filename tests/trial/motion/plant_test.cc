@@ -1,4 +1,4 @@
-#include "client/trial/motion/plant.h"
+#include "tests/study/trial/motion/plant.h"
 
 #include <gtest/gtest.h>
 
@@ -6,9 +6,9 @@
 #include <cmath>
 #include <set>
 
-#include "client/trial/motion/base_robot.h"
-#include "client/trial/motion/judged.h"
-#include "client/trial/motion/made_recording.h"
+#include "tests/study/trial/motion/base_robot.h"
+#include "tests/study/trial/motion/judged.h"
+#include "tests/study/trial/motion/made_recording.h"
 #include "tests/trial/motion/driven_log.h"
 
 namespace joulecast::trial::motion {

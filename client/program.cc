@@ -1,0 +1,33 @@
+#include "client/program.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+
+#include "client/commands/help.h"
+#include "client/commands/wrong_use.h"
+#include "client/wrapped.h"
+
+namespace joulecast::client {
+
+void prepare(CLI::App& program, const std::string& version) {
+  program.formatter(std::make_shared<HelpFormatter>(help_width()));
+  program.get_help_ptr()->description("print this help and exit");
+  program.set_version_flag("--version", version, "print the version and exit");
+  program.footer(exit_codes_help);
+  program.require_subcommand(1);
+}
+
+int run(CLI::App& program, int argc, char** argv, const Exit& exit) {
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    // Help and version come this way too, with code 0; every other parse error is wrong use.
+    if (error.get_exit_code() == 0) return program.exit(error);
+    std::fputs(wrong_use(program, error).c_str(), stderr);
+    return static_cast<int>(Exit::usage);
+  }
+  return static_cast<int>(exit);
+}
+
+}  // namespace joulecast::client

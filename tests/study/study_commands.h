@@ -1,0 +1,15 @@
+#pragma once
+
+#include "client/commands/outcome.h"
+
+namespace CLI {
+class App;
+}
+
+namespace joulecast::client {
+
+// The subcommands of joulecast-study, as client/commands/table.h has those of joulecast.
+void add_trial(CLI::App& program, Exit& exit);
+void add_thesis(CLI::App& program, Exit& exit);
+
+}  // namespace joulecast::client

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "robot/robot_model.h"
+#include "telemetry/recording.h"
+#include "tests/study/trial/motion/motion_log.h"
+
+// All that the trial on real motion knows of the diagnosis that it judges.
+namespace joulecast::trial::motion {
+
+struct NamedEffect {
+  std::string id;
+  double probability = 0;
+  std::vector<std::string> alternatives;  // that the data cannot distinguish from it
+  double strength = 0, deviation = 0;
+  double posterior = 0;  // before the table of probabilities
+  std::string standing{};
+};
+
+struct Answer {
+  std::string refused;  // why nothing was answered; empty: there is an answer
+  std::string verdict;
+  double verdict_probability = 0;
+  std::vector<NamedEffect> effects;  // likeliest first
+  std::string outside_channel, outside_follows;
+  double gap = 0, noise_floor = 0;          // absolute, relative to the power measured
+  std::optional<double> referee_error;      // of its own plain regression, on data held out
+  std::optional<double> explanation_error;  // of what it found, on the same
+  std::optional<double> unchanged_error;    // of the robot file, on the same
+  robot::RobotModel explained;              // the robot file with what may be adopted
+  double processor_s = 0;
+};
+
+struct JudgeSettings {
+  std::size_t controls = 20;  // surrogates that the diagnosis makes
+  double prior_factor = 1;    // on its tolerances and scatter
+};
+
+// The missions of a log as the diagnosis reads them.
+[[nodiscard]] Result<std::vector<telemetry::Recording>> recorded_missions(const std::filesystem::path& log);
+
+// As `joulecast gap LOG --robot FILE` answers: nothing else is read. A log that the diagnosis refuses is an
+// answer too.
+[[nodiscard]] Result<Answer> judge(const std::filesystem::path& log, const std::filesystem::path& robot_file,
+                                   const JudgeSettings& settings);
+
+// Battery power as the product's drive model has it for a robot file at each instant [W].
+[[nodiscard]] Result<std::vector<double>> modelled_power_w(const robot::RobotModel& robot,
+                                                           std::span<const Instant> instants);
+
+}  // namespace joulecast::trial::motion

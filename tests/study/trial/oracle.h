@@ -1,0 +1,19 @@
+#pragma once
+
+#include <optional>
+
+#include "robot/robot_model.h"
+#include "telemetry/recording_set.h"
+#include "tests/study/trial/case_files.h"
+
+namespace joulecast::trial {
+
+// Fraction of the held-out absolute power gap that goes away when the true effects are known, with their
+// shapes, and only their strengths are fitted to the other missions (least absolute deviations). What a
+// diagnosis can at best reach. Empty without an effect of the catalogue, with fewer than two missions, or
+// without battery power.
+[[nodiscard]] std::optional<double> oracle_shrinkage(const telemetry::RecordingSet& recordings,
+                                                     const robot::RobotModel& robot,
+                                                     const SealedTruth& truth);
+
+}  // namespace joulecast::trial

@@ -1,0 +1,148 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "base/nearest_word.h"
+#include "client/commands/accepts.h"
+#include "client/virtual_robot/imperfections.h"
+#include "tests/study/motion_command.h"
+#include "tests/study/outcome_lines.h"
+#include "tests/study/study_commands.h"
+#include "tests/study/trial/run.h"
+#include "tests/study/trial/score_text.h"
+
+namespace joulecast::client {
+namespace {
+
+struct Options {
+  trial::RunSettings run;
+  std::string only;
+  std::string channels = "mixed";
+  std::string keep, again, motion, outcomes;
+  bool json = false;
+  bool usual_plant = false;
+};
+
+// One line a case on a terminal or in a log; nothing of it on standard output, which holds the answer.
+void show(const trial::CaseOutcome& outcome, std::size_t finished, std::size_t count) {
+  std::fprintf(stderr, "[%zu/%zu] %s\n", finished, count, trial::case_text(outcome).c_str());
+}
+
+Exit run(Options& options) {
+  trial::TrialSettings& t = options.run.trial;
+  if (!options.motion.empty() || holds_motion_cases(options.again)) {
+    return run_motion({options.motion, options.only, options.again.empty() ? options.keep : options.again,
+                       !options.again.empty(), t.seed, t.count, options.run.jobs,
+                       options.run.diagnosis.controls, options.run.diagnosis.prior_factor, options.outcomes,
+                       options.json});
+  }
+  if (!options.only.empty()) {
+    t.only = trial::kind_of(options.only == "double" ? "pair" : options.only);
+    const auto known = virtual_robot::effect_table();
+    if (!t.only && std::ranges::find(known, options.only, &virtual_robot::EffectEntry::id) == known.end()) {
+      return report({Fault::invalid, "--only",
+                     options.only + " is neither a kind of case nor an effect" +
+                         did_you_mean(options.only, known, &virtual_robot::EffectEntry::id)});
+    }
+    if (!t.only) t.only_effect = options.only;
+  }
+  t.channels = options.channels == "full"      ? trial::ChannelChoice::full
+               : options.channels == "battery" ? trial::ChannelChoice::battery
+                                               : trial::ChannelChoice::mixed;
+  t.vary_plant = !options.usual_plant;
+  options.run.keep = options.keep;
+  options.run.again = !options.again.empty();
+  if (options.run.again) options.run.keep = options.again;
+  auto lines = OutcomeLines::open(options.outcomes);
+  if (!lines) return report(lines.error());
+  std::size_t finished = 0;
+  options.run.done = [&](const trial::CaseOutcome& outcome) {
+    show(outcome, ++finished, t.count);
+    lines->add(trial::case_json(outcome));
+  };
+
+  const auto outcomes = trial::run_trial(options.run);
+  if (!outcomes) return report(outcomes.error());
+  if (auto done = lines->close(); !done) return report(done.error());
+  const trial::Score score = trial::score_of(*outcomes);
+  const auto rows = options.run.compare ? trial::compare(*outcomes) : std::vector<trial::ComparisonRow>{};
+  if (options.json) {
+    nlohmann::json cases = nlohmann::json::array();
+    for (const auto& outcome : *outcomes) cases.push_back(trial::case_json(outcome));
+    nlohmann::json answer{
+        {"seed", t.seed}, {"count", t.count}, {"score", trial::score_json(score)}, {"cases", cases}};
+    if (!rows.empty()) answer["comparison"] = trial::comparison_json(rows);
+    std::printf("%s\n", answer.dump(2).c_str());
+  } else {
+    std::printf("%s", trial::score_text(score).c_str());
+    if (!rows.empty()) std::printf("\n%s", trial::comparison_text(rows).c_str());
+  }
+  return Exit::ok;
+}
+
+}  // namespace
+
+void add_trial(CLI::App& program, Exit& exit) {
+  auto options = std::make_shared<Options>();
+  auto* command = program.add_subcommand("trial",
+                                         "Put known effects into virtual robots or into recorded motion, "
+                                         "diagnose the logs blindly and score the answers");
+  command->add_option("--count", options->run.trial.count, "cases")
+      ->check(between(1, 100'000))
+      ->capture_default_str();
+  command->add_option("--seed", options->run.trial.seed, "the same seed gives the same cases, bit for bit")
+      ->capture_default_str();
+  command->add_option("--jobs", options->run.jobs, "cases at work at once")
+      ->check(between(1, 64))
+      ->capture_default_str();
+  command
+      ->add_option("--only", options->only, "none, single, double, outside, or the id of one effect or load")
+      ->type_name("KIND");
+  auto* channels =
+      command->add_option("--channels", options->channels, "full, battery (no motor channels) or mixed")
+          ->check(one_of({"full", "battery", "mixed"}))
+          ->capture_default_str();
+  auto* usual = command->add_flag("--usual-plant", options->usual_plant,
+                                  "leave out the sensors, drives and missions unlike the usual");
+  auto* compare =
+      command->add_flag("--compare", options->run.compare,
+                        "judge every log by simpler methods too, and by the method with parts left out");
+  command
+      ->add_option("--motion", options->motion,
+                   "folder of event logs with battery power: effects are planted into their motion; "
+                   "NAME.json beside NAME.lcmlog gives the robot's wheels")
+      ->type_name("FOLDER")
+      ->excludes(channels)
+      ->excludes(usual)
+      ->excludes(compare);
+  command
+      ->add_option("--controls", options->run.diagnosis.controls,
+                   "surrogates that the diagnosis makes of each log")
+      ->check(between(0, 1000))
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--prior-factor", options->run.diagnosis.prior_factor,
+          "multiplies the tolerances and scatter that the diagnosis expects of a robot as its file says")
+      ->check(between(0.1, 10.0))
+      ->capture_default_str();
+  command
+      ->add_option("--outcomes", options->outcomes, "file to which a line of JSON is added as each case ends")
+      ->type_name("FILE");
+  command->add_option("--keep", options->keep, "folder that keeps robot files, logs and truths of all cases")
+      ->type_name("FOLDER");
+  command
+      ->add_option(
+          "--again", options->again,
+          "judge the first --count cases that an earlier --keep left in this folder; nothing is drawn")
+      ->type_name("FOLDER")
+      ->excludes("--keep");
+  command->add_flag("--json", options->json, "print scores and cases as JSON");
+  command->callback([options, &exit] { exit = run(*options); });
+}
+
+}  // namespace joulecast::client
