@@ -1,5 +1,7 @@
 #include "history/sql_changes.h"
 
+#include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
@@ -7,6 +9,7 @@
 #include <utility>
 
 #include "history/audit.h"
+#include "history/keyed_sql.h"
 #include "history/sql_chunks.h"
 #include "history/sql_rows.h"
 
@@ -29,6 +32,24 @@ Result<void> check_trace(const std::vector<TraceBucket>& trace) {
                      std::to_string(trace[i].start_utime_us) + " is not a multiple of " +
                          std::to_string(trace_bucket_us));
   return {};
+}
+
+// Brings a mission's row up to date and answers where what belongs to it goes on. Parameters: the content,
+// how many samples and changes come, the key.
+std::string checkpoint_sql(bool keyed_by_robot) {
+  const int key = 3 + static_cast<int>(std::ranges::count(mission_content_columns(), ',') + 1);
+  const std::string number = "?" + std::to_string(key);
+  return "UPDATE mission SET (" + mission_content_columns() + ") = (" +
+         placeholders(mission_content_columns()) +
+         "), telemetry_samples = telemetry_samples + ?, covariate_changes = covariate_changes + ? WHERE "
+         "mission_key = " +
+         number + " RETURNING robot_id, start_utime_us, telemetry_samples, covariate_changes, " +
+         chunks::samples_in_tail_sql(key, keyed_by_robot) + ", " +
+         chunks::changes_in_tail_sql(key, keyed_by_robot) +
+         // As it was before.
+         (keyed_by_robot
+              ? ", (SELECT state <> 'open' FROM mission AS old WHERE old.mission_key = " + number + ")"
+              : ", FALSE");
 }
 
 Result<void> check_covariates(const std::vector<signals::CovariateChange>& changes) {
@@ -79,16 +100,20 @@ void SqlChanges::apply(std::span<const Command> commands, const std::function<vo
   // Nearly always no command is refused, and then none needs a savepoint of its own.
   {
     Transaction transaction(database_, Database::Access::write);
+    days_.clear();
     lock_leases(commands);
     if (apply_unguarded(commands, outcomes)) {
+      days_.add_up(database_);
       if (before_commit) before_commit();
       return transaction.commit();
     }
   }
   outcomes.clear();
   Transaction transaction(database_, Database::Access::write);
+  days_.clear();
   lock_leases(commands);
   for (const Command& command : commands) outcomes.push_back(apply_guarded(command));
+  days_.add_up(database_);
   if (before_commit) before_commit();
   transaction.commit();
 }
@@ -212,6 +237,7 @@ Outcome SqlChanges::run(const StartMission& c) {
                       m.robot_id + "' do not belong together");
   }
   Rows(database_.statement("DELETE FROM mission WHERE mission_key = ?")).bind(m.key).run_later();
+  days_.changed(m.robot_id, m.start_utime_us);
   static const std::string insert = "INSERT INTO mission (" + std::string(mission_identity_columns) + ", " +
                                     mission_content_columns() + ") VALUES (" +
                                     placeholders(mission_identity_columns) + ", " +
@@ -228,24 +254,29 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
   const Mission& m = c.mission;
   if (auto ok = check_trace(c.trace); !ok) return tl::unexpected(ok.error());
   if (auto ok = check_covariates(c.covariates); !ok) return tl::unexpected(ok.error());
-  static const std::string update = "UPDATE mission SET (" + mission_content_columns() + ") = (" +
-                                    placeholders(mission_content_columns()) + ") WHERE mission_key = ?";
+  static const std::array updates = {checkpoint_sql(false), checkpoint_sql(true)};
+  const bool ended = m.state != MissionState::open;
+  const auto samples = static_cast<std::int64_t>(c.samples.size());
+  const auto changes = static_cast<std::int64_t>(c.covariates.size());
+  std::string robot_id;
+  chunks::End telemetry_end, covariates_end;
   {
     const std::string faults = sample_faults_json(m), covariates = covariates_json(m);
-    Rows rows(database_.statement(update));
+    Rows rows(database_.statement(updates[database_.keyed_by_robot()]));
     bind_mission_content(rows, m, faults, covariates);
-    if (rows.bind(m.key).run() == 0) return no_mission(m.key);
+    if (!rows.bind(samples).bind(changes).bind(m.key).next()) return no_mission(m.key);
+    robot_id = rows.text();
+    const std::int64_t start_utime_us = rows.integer();
+    telemetry_end = {robot_id, m.key, rows.integer() - samples};
+    covariates_end = {robot_id, m.key, rows.integer() - changes};
+    telemetry_end.in_tail = rows.integer();
+    covariates_end.in_tail = rows.integer();
+    if (rows.boolean() || ended) days_.changed(robot_id, start_utime_us);
+    rows.run();
   }
-  static const std::string replace = insert_or_replace("trace", "mission_key, start_utime_us", trace_columns);
-  for (const TraceBucket& bucket : c.trace) {
-    Rows rows(database_.statement(replace));
-    rows.bind(m.key);
-    bind_bucket(rows, bucket);
-    rows.run_later();
-  }
-  const bool ended = m.state != MissionState::open;
-  chunks::append(database_, m.key, c.samples, ended, now_utime_us_());
-  chunks::append(database_, m.key, c.covariates, ended, now_utime_us_());
+  put(robot_id, m.key, c.trace);
+  chunks::append(database_, telemetry_end, c.samples, ended, now_utime_us_());
+  chunks::append(database_, covariates_end, c.covariates, ended, now_utime_us_());
   if (c.resume_state) put(*c.resume_state);
   if (c.epoch != 0 && c.position)
     Rows(database_.statement("UPDATE cluster_lease SET utime_us = ?, sequence = ? WHERE robot_id = ?"))
@@ -254,6 +285,18 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
         .bind(m.robot_id)
         .run_later();
   return m.key;
+}
+
+void SqlChanges::put(const std::string& robot_id, MissionKey key, const std::vector<TraceBucket>& trace) {
+  static const std::array replace = {
+      insert_or_replace("trace", "mission_key, start_utime_us", trace_columns),
+      insert_or_replace("trace", "robot_id, mission_key, start_utime_us", trace_columns)};
+  for (const TraceBucket& bucket : trace) {
+    Rows rows(database_.statement(replace[database_.keyed_by_robot()]));
+    bind_key(rows, database_, robot_id, key);
+    bind_bucket(rows, bucket);
+    rows.run_later();
+  }
 }
 
 void SqlChanges::put(const ResumeState& state) {
@@ -306,12 +349,16 @@ Outcome SqlChanges::run(const Prune& c) {
 
 Outcome SqlChanges::run(const PruneMissions& c) {
   if (c.max_missions < 1) return invalid("max_missions", "must be at least 1");
-  return Rows(database_.statement("DELETE FROM mission WHERE mission_key IN (SELECT mission_key FROM mission "
-                                  "WHERE state <> 'open' "
-                                  "AND end_utime_us < ? ORDER BY start_utime_us, mission_key LIMIT ?)"))
-      .bind(now_utime_us_() - c.max_age_us)
-      .bind(c.max_missions)
-      .run();
+  Rows rows(database_.statement(
+      "DELETE FROM mission WHERE mission_key IN (SELECT mission_key FROM mission WHERE state <> 'open' AND "
+      "end_utime_us < ? ORDER BY start_utime_us, mission_key LIMIT ?) RETURNING robot_id, start_utime_us"));
+  rows.bind(now_utime_us_() - c.max_age_us).bind(c.max_missions);
+  std::int64_t dropped = 0;
+  for (; rows.next(); ++dropped) {
+    const std::string robot_id = rows.text();
+    days_.changed(robot_id, rows.integer());
+  }
+  return dropped;
 }
 
 Outcome SqlChanges::run(const RemoveRobot& c) {
@@ -321,8 +368,19 @@ Outcome SqlChanges::run(const RemoveRobot& c) {
   if (change("UPDATE robot SET active_version = NULL WHERE robot_id = ?") == 0)
     return fail(Fault::not_found, "robot_id", "no robot is called '" + c.robot_id + "'");
   if (!c.purge) {
-    change("UPDATE mission SET state = 'interrupted' WHERE robot_id = ? AND state = 'open'");
+    Rows rows(
+        database_.statement("UPDATE mission SET state = 'interrupted' WHERE robot_id = ? AND state = 'open' "
+                            "RETURNING start_utime_us"));
+    rows.bind(c.robot_id);
+    while (rows.next()) days_.changed(c.robot_id, rows.integer());
     return 0;
+  }
+  if (database_.keyed_by_robot()) {
+    change(
+        "DELETE FROM cluster_job WHERE diagnosis_id IN (SELECT diagnosis_id FROM diagnosis WHERE robot_id = "
+        "?)");
+    change("DELETE FROM mission_day WHERE robot_id = ?");
+    days_.forget(c.robot_id);
   }
   for (const char* sql :
        {"DELETE FROM diagnosis WHERE robot_id = ?", "DELETE FROM proposal WHERE robot_id = ?",

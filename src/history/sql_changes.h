@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "history/commands.h"
+#include "history/mission_days.h"
 #include "history/sql.h"
 #include "history/store.h"
 
@@ -66,12 +67,14 @@ class SqlChanges {
   bool has_job(std::int64_t diagnosis_id);
   void make_robot(const std::string& robot_id);
   void put(const ResumeState& state);
+  void put(const std::string& robot_id, MissionKey key, const std::vector<TraceBucket>& trace);
 
   Database& database_;
   std::function<std::int64_t()> now_utime_us_;
   const std::string writer_;
   std::map<std::string, Epoch, std::less<>> epochs_;  // of the leases locked
   std::map<std::string, DroppedCommands> dropped_;    // by robot
+  ChangedDays days_;
 };
 
 }  // namespace joulecast::history
