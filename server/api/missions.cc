@@ -180,10 +180,11 @@ Result<Response> trace(const Services& services, const Request& request) {
   if (!key) return tl::unexpected(key.error());
   const auto range = range_of(request);
   if (!range) return tl::unexpected(range.error());
+  const history::Past past = past_of(services, request);
   const Result<history::Trace> found =
-      services.store.trace(*key, *range, request.query_integer("points").value_or(1000));
+      past.history.trace(*key, *range, request.query_integer("points").value_or(1000));
   if (!found) return tl::unexpected(found.error());
-  if (request.csv) return trace_csv(request, *found, *key);
+  if (request.csv) return told_staleness(trace_csv(request, *found, *key), past);
   JsonWriter json;
   json.begin_object();
   json.field("id", *key);
@@ -223,7 +224,7 @@ Result<Response> trace(const Services& services, const Request& request) {
   write(
       "y_m", [](const Bucket& b) { return b.y_m; }, 4);
   json.end_object();
-  return http::json_response(json.take());
+  return told_staleness(http::json_response(json.take()), past);
 }
 
 Result<Response> raw_telemetry(const Services& services, const Request& request) {
@@ -231,9 +232,10 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
   if (!key) return tl::unexpected(key.error());
   const auto range = range_of(request);
   if (!range) return tl::unexpected(range.error());
-  const Result<history::TelemetryPage> found = services.store.telemetry(*key, *range, page_of(request, 1000));
+  const history::Past past = past_of(services, request);
+  const Result<history::TelemetryPage> found = past.history.telemetry(*key, *range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
-  if (request.csv) return telemetry_csv(request, *found, *key);
+  if (request.csv) return told_staleness(telemetry_csv(request, *found, *key), past);
   const auto& samples = found->samples;
   JsonWriter json;
   json.begin_object();
@@ -258,7 +260,7 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
   }
   write_cursor(json, found->next_cursor);
   json.end_object();
-  return http::json_response(json.take());
+  return told_staleness(http::json_response(json.take()), past);
 }
 
 Result<Response> covariates(const Services& services, const Request& request) {
@@ -266,10 +268,10 @@ Result<Response> covariates(const Services& services, const Request& request) {
   if (!key) return tl::unexpected(key.error());
   const auto range = range_of(request);
   if (!range) return tl::unexpected(range.error());
-  const Result<history::CovariatePage> found =
-      services.store.covariates(*key, *range, page_of(request, 1000));
+  const history::Past past = past_of(services, request);
+  const Result<history::CovariatePage> found = past.history.covariates(*key, *range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
-  if (request.csv) return covariates_csv(request, *found, *key);
+  if (request.csv) return told_staleness(covariates_csv(request, *found, *key), past);
   JsonWriter json;
   json.begin_object();
   json.field("id", *key);
@@ -283,7 +285,7 @@ Result<Response> covariates(const Services& services, const Request& request) {
   json.end_array();
   write_cursor(json, found->next_cursor);
   json.end_object();
-  return http::json_response(json.take());
+  return told_staleness(http::json_response(json.take()), past);
 }
 
 }  // namespace

@@ -221,7 +221,8 @@ Result<void> check_postgres_url(const std::string& url) {
   return sound;
 }
 
-PostgresDatabase::PostgresDatabase(const std::string& url, const std::string& application_name) {
+PostgresDatabase::PostgresDatabase(const std::string& url, const std::string& application_name,
+                                   const char* session) {
   // What the URL says comes later and prevails, but for the name. A peer that vanished is noticed within half
   // a minute.
   const std::array<const char*, 10> keywords = {"connect_timeout",
@@ -235,7 +236,7 @@ PostgresDatabase::PostgresDatabase(const std::string& url, const std::string& ap
                                                 "client_encoding",
                                                 nullptr};
   const std::array<const char*, 10> values = {
-      "5", "read-write", "15000", "10", "5", "3", url.c_str(), application_name.c_str(), "UTF8", nullptr};
+      "5", session, "15000", "10", "5", "3", url.c_str(), application_name.c_str(), "UTF8", nullptr};
   handle_ = PQconnectdbParams(keywords.data(), values.data(), 1);
   if (PQstatus(handle_) != CONNECTION_OK) {
     const std::string message = trimmed(PQerrorMessage(handle_));

@@ -13,6 +13,7 @@
 #include "history/postgres.h"
 #include "history/postgres_partitions.h"
 #include "history/postgres_schema.h"
+#include "history/postgres_standby.h"
 #include "history/spool.h"
 #include "history/sql_changes.h"
 #include "history/sql_chunks.h"
@@ -139,6 +140,13 @@ class PostgresStore final : public SqlStore {
     else
       for (int k = 0; k < 2; ++k) add_keys(writer->integer(next_keys));
     use(std::move(writer));
+    if (!options.standby.url.empty())
+      standby_ = std::make_unique<PostgresStandby>(options.standby, url_, name_, *this);
+  }
+
+  Past past() const override { return standby_ ? standby_->past() : SqlStore::past(); }
+  std::optional<StandbyStatus> standby() const override {
+    return standby_ ? std::optional(standby_->status()) : std::nullopt;
   }
 
   Result<std::vector<Outcome>> apply(std::span<const Command> commands) override {
@@ -352,7 +360,8 @@ class PostgresStore final : public SqlStore {
   std::int64_t partitions_seen_utime_us_ = 0;
   std::int64_t batch_ = 0;  // the last one tried
   std::optional<InDoubt> in_doubt_;
-  std::string taken_over_;  // why the store is lost to this program; empty: it is not
+  std::string taken_over_;                    // why the store is lost to this program; empty: it is not
+  std::unique_ptr<PostgresStandby> standby_;  // the first to go
 };
 
 }  // namespace
