@@ -34,22 +34,40 @@ Result<void> check_trace(const std::vector<TraceBucket>& trace) {
   return {};
 }
 
-// Brings a mission's row up to date and answers where what belongs to it goes on. Parameters: the content,
-// how many samples and changes come, the key.
-std::string checkpoint_sql(bool keyed_by_robot) {
-  const int key = 3 + static_cast<int>(std::ranges::count(mission_content_columns(), ',') + 1);
-  const std::string number = "?" + std::to_string(key);
-  return "UPDATE mission SET (" + mission_content_columns() + ") = (" +
-         placeholders(mission_content_columns()) +
-         "), telemetry_samples = telemetry_samples + ?, covariate_changes = covariate_changes + ? WHERE "
-         "mission_key = " +
-         number + " RETURNING robot_id, start_utime_us, telemetry_samples, covariate_changes, " +
-         chunks::samples_in_tail_sql(key, keyed_by_robot) + ", " +
-         chunks::changes_in_tail_sql(key, keyed_by_robot) +
-         // As it was before.
-         (keyed_by_robot
-              ? ", (SELECT state <> 'open' FROM mission AS old WHERE old.mission_key = " + number + ")"
-              : ", FALSE");
+// Where missions go on; `which` says of which missions.
+std::string places_sql(bool keyed_by_robot, const std::string& which) {
+  return "SELECT mission_key, robot_id, start_utime_us, telemetry_samples, covariate_changes, " +
+         chunks::samples_in_tail_sql(keyed_by_robot) + ", " + chunks::changes_in_tail_sql(keyed_by_robot) +
+         ", state <> 'open' FROM mission WHERE " + which;
+}
+
+const std::string& checkpoint_columns() {
+  static const std::string columns =
+      mission_content_columns() + ", telemetry_samples, covariate_changes, robot_id, mission_key";
+  return columns;
+}
+
+BulkRows bulk_checkpoints() {
+  return {"mission", checkpoint_columns(), [](const std::string& from) {
+            std::string values;
+            const std::string& all = mission_content_columns();
+            for (std::size_t at = 0; at < all.size();) {
+              const std::size_t end = std::min(all.find(", ", at), all.size());
+              values += "new." + all.substr(at, end - at) + ", ";
+              at = end + 2;
+            }
+            return "UPDATE mission SET (" + all + ", telemetry_samples, covariate_changes) = (" + values +
+                   "mission.telemetry_samples + new.telemetry_samples, mission.covariate_changes + "
+                   "new.covariate_changes) FROM " +
+                   from + " WHERE mission.robot_id = new.robot_id AND mission.mission_key = new.mission_key";
+          }};
+}
+
+BulkRows bulk_tails() {
+  return {"telemetry_chunk", chunks::telemetry_tail_columns(), [](const std::string& from) {
+            return "INSERT INTO telemetry_chunk (" + chunks::telemetry_tail_columns() + ") SELECT " +
+                   chunks::telemetry_tail_columns() + " FROM " + from;
+          }};
 }
 
 Result<void> check_covariates(const std::vector<signals::CovariateChange>& changes) {
@@ -61,8 +79,81 @@ Result<void> check_covariates(const std::vector<signals::CovariateChange>& chang
 
 }  // namespace
 
+struct SqlChanges::Bulk {
+  BulkRows missions = bulk_checkpoints();
+  BulkRows trace = bulk_replace("trace", "robot_id, mission_key, start_utime_us", std::string(trace_columns));
+  BulkRows telemetry = bulk_tails();
+  BulkRows states = bulk_replace("energy_state", "robot_id", std::string(resume_state_columns));
+  std::set<MissionKey> keys;        // of missions with rows here
+  std::set<std::string> robot_ids;  // of states here
+};
+
 SqlChanges::SqlChanges(Database& database, std::function<std::int64_t()> now_utime_us, std::string writer)
-    : database_(database), now_utime_us_(std::move(now_utime_us)), writer_(std::move(writer)) {}
+    : database_(database), now_utime_us_(std::move(now_utime_us)), writer_(std::move(writer)) {
+  if (database.keyed_by_robot()) bulk_ = std::make_unique<Bulk>();
+}
+
+SqlChanges::~SqlChanges() = default;
+
+void SqlChanges::forget_collected() {
+  places_.clear();
+  known_robots_.clear();
+  if (!bulk_) return;
+  for (BulkRows* rows : {&bulk_->missions, &bulk_->trace, &bulk_->telemetry, &bulk_->states}) rows->clear();
+  bulk_->keys.clear();
+  bulk_->robot_ids.clear();
+}
+
+void SqlChanges::begin(std::span<const Command> commands) {
+  days_.clear();
+  forget_collected();
+  lock_leases(commands);
+}
+
+void SqlChanges::flush() {
+  if (!bulk_) return;
+  for (BulkRows* rows : {&bulk_->missions, &bulk_->trace, &bulk_->telemetry, &bulk_->states})
+    rows->flush(database_);
+  bulk_->keys.clear();
+  bulk_->robot_ids.clear();
+}
+
+// Of all missions at once, instead of one at a time when they come.
+void SqlChanges::look_up_places(std::span<const Command> commands) {
+  if (!bulk_) return;
+  std::string keys;
+  for (const Command& command : commands)
+    if (const auto* checkpoint = std::get_if<CheckpointMission>(&command))
+      keys += (keys.empty() ? "{" : ",") + std::to_string(checkpoint->mission.key);
+  if (keys.empty()) return;
+  keys += '}';
+  static const std::string sql = places_sql(true, "mission_key = ANY (?::text::bigint[])");
+  Rows rows(database_.statement(sql));
+  rows.bind(keys);
+  read_places(rows);
+}
+
+void SqlChanges::read_places(Rows& rows) {
+  while (rows.next()) {
+    Place& place = places_[rows.integer()];
+    place.robot_id = rows.text();
+    for (std::int64_t* number : {&place.start_utime_us, &place.samples, &place.changes,
+                                 &place.samples_in_tail, &place.changes_in_tail})
+      *number = rows.integer();
+    place.was_ended = rows.boolean();
+  }
+}
+
+std::optional<SqlChanges::Place> SqlChanges::take_place(MissionKey key) {
+  if (places_.find(key) == places_.end()) {
+    static const std::array sql = {places_sql(false, "mission_key = ?"), places_sql(true, "mission_key = ?")};
+    Rows rows(database_.statement(sql[database_.keyed_by_robot()]));
+    rows.bind(key);
+    read_places(rows);
+  }
+  auto found = places_.extract(key);
+  return found ? std::optional(std::move(found.mapped())) : std::nullopt;
+}
 
 // In one statement for all robots, in the order of their names, so that no two programs wait for each other.
 void SqlChanges::lock_leases(std::span<const Command> commands) {
@@ -100,8 +191,8 @@ void SqlChanges::apply(std::span<const Command> commands, const std::function<vo
   // Nearly always no command is refused, and then none needs a savepoint of its own.
   {
     Transaction transaction(database_, Database::Access::write);
-    days_.clear();
-    lock_leases(commands);
+    begin(commands);
+    look_up_places(commands);
     if (apply_unguarded(commands, outcomes)) {
       days_.add_up(database_);
       if (before_commit) before_commit();
@@ -110,8 +201,7 @@ void SqlChanges::apply(std::span<const Command> commands, const std::function<vo
   }
   outcomes.clear();
   Transaction transaction(database_, Database::Access::write);
-  days_.clear();
-  lock_leases(commands);
+  begin(commands);
   for (const Command& command : commands) outcomes.push_back(apply_guarded(command));
   days_.add_up(database_);
   if (before_commit) before_commit();
@@ -124,6 +214,7 @@ bool SqlChanges::apply_unguarded(std::span<const Command> commands, std::vector<
       outcomes.push_back(run_one(command));
       if (!outcomes.back()) return false;
     }
+    flush();
     database_.finish_later();
   } catch (const SqlError& error) {
     if (!error.is_about_values()) throw;
@@ -134,6 +225,13 @@ bool SqlChanges::apply_unguarded(std::span<const Command> commands, std::vector<
 
 Outcome SqlChanges::run_one(const Command& command) {
   if (!stands(command)) return 0;
+  // What is collected may wait for these alone.
+  if (!std::holds_alternative<CheckpointMission>(command) && !std::holds_alternative<StartMission>(command) &&
+      !std::holds_alternative<PutResumeState>(command) && !std::holds_alternative<AppendEvent>(command) &&
+      !std::holds_alternative<PutLearned>(command)) {
+    flush();
+    places_.clear();
+  }
   return std::visit([this](const auto& c) { return run(c); }, command);
 }
 
@@ -142,6 +240,7 @@ Outcome SqlChanges::apply_guarded(const Command& command) {
   Outcome outcome = [&]() -> Outcome {
     try {
       Outcome done = run_one(command);
+      if (done) flush();
       database_.finish_later();
       return done;
     } catch (const SqlError& error) {
@@ -149,12 +248,16 @@ Outcome SqlChanges::apply_guarded(const Command& command) {
       return invalid("", error.what());
     }
   }();
-  if (!outcome) Rows(database_.statement("ROLLBACK TO command")).run();
+  if (!outcome) {
+    Rows(database_.statement("ROLLBACK TO command")).run();
+    forget_collected();
+  }
   Rows(database_.statement("RELEASE command")).run();
   return outcome;
 }
 
 void SqlChanges::make_robot(const std::string& robot_id) {
+  if (bulk_ && !known_robots_.insert(robot_id).second) return;
   Rows(database_.statement(
            "INSERT INTO robot (robot_id, created_utime_us) VALUES (?, ?) ON CONFLICT DO NOTHING"))
       .bind(robot_id)
@@ -223,6 +326,7 @@ Outcome SqlChanges::run(const StartMission& c) {
   const Mission& m = c.mission;
   if (auto ok = check_robot_id(m.robot_id); !ok) return tl::unexpected(ok.error());
   if (m.key <= 0) return invalid("key", "must be one that mission_key() gave");
+  if (bulk_ && bulk_->keys.contains(m.key)) flush();
   make_robot(m.robot_id);
   {
     Rows rows(
@@ -247,6 +351,9 @@ Outcome SqlChanges::run(const StartMission& c) {
   bind_mission_identity(rows, m);
   bind_mission_content(rows, m, faults, covariates);
   rows.run_later();
+  Place& place = places_[m.key] = {};
+  place.robot_id = m.robot_id;
+  place.start_utime_us = m.start_utime_us;
   return m.key;
 }
 
@@ -254,29 +361,19 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
   const Mission& m = c.mission;
   if (auto ok = check_trace(c.trace); !ok) return tl::unexpected(ok.error());
   if (auto ok = check_covariates(c.covariates); !ok) return tl::unexpected(ok.error());
-  static const std::array updates = {checkpoint_sql(false), checkpoint_sql(true)};
+  if (bulk_ && bulk_->keys.contains(m.key)) flush();
+  const std::optional<Place> place = take_place(m.key);
+  if (!place) return no_mission(m.key);
   const bool ended = m.state != MissionState::open;
-  const auto samples = static_cast<std::int64_t>(c.samples.size());
-  const auto changes = static_cast<std::int64_t>(c.covariates.size());
-  std::string robot_id;
-  chunks::End telemetry_end, covariates_end;
-  {
-    const std::string faults = sample_faults_json(m), covariates = covariates_json(m);
-    Rows rows(database_.statement(updates[database_.keyed_by_robot()]));
-    bind_mission_content(rows, m, faults, covariates);
-    if (!rows.bind(samples).bind(changes).bind(m.key).next()) return no_mission(m.key);
-    robot_id = rows.text();
-    const std::int64_t start_utime_us = rows.integer();
-    telemetry_end = {robot_id, m.key, rows.integer() - samples};
-    covariates_end = {robot_id, m.key, rows.integer() - changes};
-    telemetry_end.in_tail = rows.integer();
-    covariates_end.in_tail = rows.integer();
-    if (rows.boolean() || ended) days_.changed(robot_id, start_utime_us);
-    rows.run();
-  }
-  put(robot_id, m.key, c.trace);
-  chunks::append(database_, telemetry_end, c.samples, ended, now_utime_us_());
-  chunks::append(database_, covariates_end, c.covariates, ended, now_utime_us_());
+  if (place->was_ended || ended) days_.changed(place->robot_id, place->start_utime_us);
+  update(c, *place);
+  put(place->robot_id, m.key, c.trace);
+  chunks::End telemetry{place->robot_id, m.key, place->samples, place->samples_in_tail};
+  if (bulk_) telemetry.collected = &bulk_->telemetry;
+  chunks::append(database_, telemetry, c.samples, ended, now_utime_us_());
+  chunks::append(database_, {place->robot_id, m.key, place->changes, place->changes_in_tail}, c.covariates,
+                 ended, now_utime_us_());
+  if (bulk_) bulk_->keys.insert(m.key);
   if (c.resume_state) put(*c.resume_state);
   if (c.epoch != 0 && c.position)
     Rows(database_.statement("UPDATE cluster_lease SET utime_us = ?, sequence = ? WHERE robot_id = ?"))
@@ -287,12 +384,27 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
   return m.key;
 }
 
+void SqlChanges::update(const CheckpointMission& c, const Place& place) {
+  static const std::string one =
+      "UPDATE mission SET (" + mission_content_columns() + ") = (" + placeholders(mission_content_columns()) +
+      "), telemetry_samples = telemetry_samples + ?, covariate_changes = covariate_changes + ? WHERE "
+      "robot_id = ? AND mission_key = ?";
+  const std::string faults = sample_faults_json(c.mission), covariates = covariates_json(c.mission);
+  Rows rows(bulk_ ? bulk_->missions : database_.statement(one));
+  bind_mission_content(rows, c.mission, faults, covariates);
+  rows.bind(static_cast<std::int64_t>(c.samples.size())).bind(static_cast<std::int64_t>(c.covariates.size()));
+  rows.bind(place.robot_id).bind(c.mission.key).run_later();
+}
+
 void SqlChanges::put(const std::string& robot_id, MissionKey key, const std::vector<TraceBucket>& trace) {
-  static const std::array replace = {
-      insert_or_replace("trace", "mission_key, start_utime_us", trace_columns),
-      insert_or_replace("trace", "robot_id, mission_key, start_utime_us", trace_columns)};
+  static const std::string one = insert_or_replace("trace", "mission_key, start_utime_us", trace_columns);
+  std::set<std::int64_t> starts;
   for (const TraceBucket& bucket : trace) {
-    Rows rows(database_.statement(replace[database_.keyed_by_robot()]));
+    if (bulk_ && !starts.insert(bucket.start_utime_us).second) {
+      flush();
+      starts = {bucket.start_utime_us};
+    }
+    Rows rows(bulk_ ? bulk_->trace : database_.statement(one));
     bind_key(rows, database_, robot_id, key);
     bind_bucket(rows, bucket);
     rows.run_later();
@@ -302,7 +414,11 @@ void SqlChanges::put(const std::string& robot_id, MissionKey key, const std::vec
 void SqlChanges::put(const ResumeState& state) {
   make_robot(state.robot_id);
   static const std::string replace = insert_or_replace("energy_state", "robot_id", resume_state_columns);
-  Rows rows(database_.statement(replace));
+  if (bulk_ && !bulk_->robot_ids.insert(state.robot_id).second) {
+    flush();
+    bulk_->robot_ids.insert(state.robot_id);
+  }
+  Rows rows(bulk_ ? bulk_->states : database_.statement(replace));
   bind_resume_state(rows, state);
   rows.run_later();
 }
@@ -389,6 +505,7 @@ Outcome SqlChanges::run(const RemoveRobot& c) {
   const std::int64_t missions = change("DELETE FROM mission WHERE robot_id = ?");
   change("DELETE FROM model WHERE robot_id = ?");
   change("DELETE FROM robot WHERE robot_id = ?");
+  known_robots_.erase(c.robot_id);
   return missions;
 }
 

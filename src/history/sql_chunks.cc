@@ -66,7 +66,7 @@ void insert_chunk(Database& database, const End& mission, std::int64_t first_ord
   static const KeyedSql sql(
       sql_of<Item>("INSERT INTO $table ($key, first_ordinal, $items, start_utime_us, end_utime_us, "
                    "stored_utime_us, sealed, bytes, body) VALUES ($values, ?, ?, ?, ?, ?, ?, ?, ?)"));
-  Rows rows(sql.in(database));
+  Rows rows(!sealed && mission.collected != nullptr ? *mission.collected : sql.in(database));
   bind_key(rows, database, mission.robot_id, mission.key);
   rows.bind(first_ordinal)
       .bind(static_cast<std::int64_t>(items.size()))
@@ -124,11 +124,10 @@ void append_items(Database& database, const End& end, std::span<const Item> item
 }
 
 template <class Item>
-std::string in_tail_sql(int parameter, bool keyed_by_robot) {
-  const std::string key = "?" + std::to_string(parameter);
-  return sql_of<Item>("(SELECT CAST(coalesce(sum($items), 0) AS BIGINT) FROM $table WHERE ") +
-         (keyed_by_robot ? "robot_id = mission.robot_id AND " : "") + "mission_key = " + key +
-         " AND sealed = 0)";
+std::string in_tail_sql(bool keyed_by_robot) {
+  return sql_of<Item>("(SELECT CAST(coalesce(sum($items), 0) AS BIGINT) FROM $table AS tail WHERE ") +
+         (keyed_by_robot ? "tail.robot_id = mission.robot_id AND " : "") +
+         "tail.mission_key = mission.mission_key AND tail.sealed = 0)";
 }
 
 // A page of items of the range in order of arrival, into `out`; answers the cursor of the next page.
@@ -170,12 +169,19 @@ Result<std::string> read_page(Database& database, MissionKey key, TimeRange rang
 
 }  // namespace
 
-std::string samples_in_tail_sql(int parameter, bool keyed_by_robot) {
-  return in_tail_sql<Sample>(parameter, keyed_by_robot);
+std::string samples_in_tail_sql(bool keyed_by_robot) {
+  return in_tail_sql<Sample>(keyed_by_robot);
 }
 
-std::string changes_in_tail_sql(int parameter, bool keyed_by_robot) {
-  return in_tail_sql<CovariateChange>(parameter, keyed_by_robot);
+std::string changes_in_tail_sql(bool keyed_by_robot) {
+  return in_tail_sql<CovariateChange>(keyed_by_robot);
+}
+
+const std::string& telemetry_tail_columns() {
+  static const std::string columns =
+      "robot_id, mission_key, first_ordinal, samples, start_utime_us, end_utime_us, stored_utime_us, sealed, "
+      "bytes, body";
+  return columns;
 }
 
 void append(Database& database, const End& end, std::span<const Sample> samples, bool ended,

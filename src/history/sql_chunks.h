@@ -23,11 +23,17 @@ struct End {
   MissionKey key = 0;
   std::int64_t next_ordinal = 0;
   std::int64_t in_tail = 0;  // of items that are not sealed
+  // Collects chunks that are not sealed, of the columns of telemetry_tail_columns(); null: they are stored at
+  // once.
+  Statement* collected = nullptr;
 };
 
-// How many items of the mission, whose key is the parameter of that number, are in its tail.
-std::string samples_in_tail_sql(int parameter, bool keyed_by_robot);
-std::string changes_in_tail_sql(int parameter, bool keyed_by_robot);
+// The key first. Where keys begin with the robot.
+const std::string& telemetry_tail_columns();
+
+// How many items of a row of `mission` are in its tail.
+std::string samples_in_tail_sql(bool keyed_by_robot);
+std::string changes_in_tail_sql(bool keyed_by_robot);
 
 // Appends to the mission's unsealed tail and seals it in full chunks, or all of it when the mission has
 // ended. The mission's row counts them already.
