@@ -5,6 +5,9 @@
 -- (telemetry) or a week (covariates) of the daemons' clocks, from midnight UTC on. src/history/postgres_partitions.cc makes
 -- them ahead of need and drops them. What no partition is there for is in the one called _other. Chunks that are not sealed,
 -- which change every second, have a small partition of their own, called _tail.
+--
+-- Their missions are no references of PostgreSQL's: its check costs several times what storing the row does. Who stores such
+-- rows holds the mission's row locked, and who deletes the mission deletes them after it.
 
 CREATE TABLE trace (
   robot_id TEXT COLLATE "C" NOT NULL,
@@ -25,8 +28,7 @@ CREATE TABLE trace (
   modelled_j DOUBLE PRECISION,
   x_m DOUBLE PRECISION,
   y_m DOUBLE PRECISION,
-  PRIMARY KEY (robot_id, mission_key, start_utime_us),
-  FOREIGN KEY (robot_id, mission_key) REFERENCES mission (robot_id, mission_key) ON DELETE CASCADE
+  PRIMARY KEY (robot_id, mission_key, start_utime_us)
 ) PARTITION BY RANGE (start_utime_us);
 
 CREATE TABLE trace_other PARTITION OF trace DEFAULT;
@@ -44,8 +46,7 @@ CREATE TABLE telemetry_chunk (
   sealed BIGINT NOT NULL CHECK (sealed IN (0, 1)),
   bytes BIGINT NOT NULL CHECK (bytes = length(body)),
   body BYTEA NOT NULL,  -- src/history/telemetry_chunk.h
-  PRIMARY KEY (robot_id, mission_key, first_ordinal, sealed, stored_utime_us),
-  FOREIGN KEY (robot_id, mission_key) REFERENCES mission (robot_id, mission_key) ON DELETE CASCADE
+  PRIMARY KEY (robot_id, mission_key, first_ordinal, sealed, stored_utime_us)
 ) PARTITION BY RANGE (sealed, stored_utime_us);
 
 ALTER TABLE telemetry_chunk ALTER body SET STORAGE EXTERNAL;  -- compressed already
@@ -68,8 +69,7 @@ CREATE TABLE covariate_chunk (
   sealed BIGINT NOT NULL CHECK (sealed IN (0, 1)),
   bytes BIGINT NOT NULL CHECK (bytes = length(body)),
   body BYTEA NOT NULL,  -- src/history/covariate_chunk.h
-  PRIMARY KEY (robot_id, mission_key, first_ordinal, sealed, stored_utime_us),
-  FOREIGN KEY (robot_id, mission_key) REFERENCES mission (robot_id, mission_key) ON DELETE CASCADE
+  PRIMARY KEY (robot_id, mission_key, first_ordinal, sealed, stored_utime_us)
 ) PARTITION BY RANGE (sealed, stored_utime_us);
 
 ALTER TABLE covariate_chunk ALTER body SET STORAGE EXTERNAL;  -- compressed already

@@ -5,9 +5,11 @@
 #include <chrono>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "history/mission_days.h"
+#include "history/sql_chunks.h"
 
 namespace joulecast::history {
 namespace {
@@ -152,6 +154,7 @@ std::int64_t drop_past_traces(Database& database, const PruneMissions& prune, st
   Transaction transaction(database, Database::Access::write);
   database.execute("SET LOCAL lock_timeout = '1s'");
   ChangedDays days;
+  std::vector<std::pair<std::string, MissionKey>> deleted;
   for (const Partition& partition : partitions_of(database, tables[0])) {
     if (partition.to_utime_us > past_utime_us) break;
     // A mission's trace begins no earlier than the mission does.
@@ -161,12 +164,15 @@ std::int64_t drop_past_traces(Database& database, const PruneMissions& prune, st
     const std::int64_t missions = count(database, begun);
     if (dropped + missions > prune.max_missions || count(database, begun + living) > 0) break;
     database.execute("DROP TABLE " + partition.name);
-    const auto remove = database.prepare("DELETE FROM " + begun + " RETURNING robot_id, start_utime_us");
+    const auto remove =
+        database.prepare("DELETE FROM " + begun + " RETURNING robot_id, mission_key, start_utime_us");
     for (Rows rows(*remove); rows.next(); ++dropped) {
       const std::string robot_id = rows.text();
+      deleted.emplace_back(robot_id, rows.integer());
       days.changed(robot_id, rows.integer());
     }
   }
+  for (const auto& [robot_id, key] : deleted) chunks::drop_recordings(database, robot_id, key);
   days.add_up(database);
   transaction.commit();
   return dropped;

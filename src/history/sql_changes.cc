@@ -38,7 +38,9 @@ Result<void> check_trace(const std::vector<TraceBucket>& trace) {
 std::string places_sql(bool keyed_by_robot, const std::string& which) {
   return "SELECT mission_key, robot_id, start_utime_us, telemetry_samples, covariate_changes, " +
          chunks::samples_in_tail_sql(keyed_by_robot) + ", " + chunks::changes_in_tail_sql(keyed_by_robot) +
-         ", state <> 'open' FROM mission WHERE " + which;
+         ", state <> 'open' FROM mission WHERE " + which +
+         // Whoever deletes the mission waits, and finds what is stored of it.
+         (keyed_by_robot ? " FOR NO KEY UPDATE OF mission" : "");
 }
 
 const std::string& checkpoint_columns() {
@@ -328,19 +330,25 @@ Outcome SqlChanges::run(const StartMission& c) {
   if (m.key <= 0) return invalid("key", "must be one that mission_key() gave");
   if (bulk_ && bulk_->keys.contains(m.key)) flush();
   make_robot(m.robot_id);
+  bool was_there = false;
   {
     Rows rows(
-        database_.statement("SELECT mission_key FROM mission WHERE (mission_key = ?1) <> "
-                            "(robot_id = ?2 AND mission_id = ?3 AND start_utime_us = ?4) "
-                            "AND (mission_key = ?1 OR robot_id = ?2 AND mission_id = ?3 AND "
-                            "start_utime_us = ?4)"));
+        database_.statement("SELECT (mission_key = ?1) <> (robot_id = ?2 AND mission_id = ?3 AND "
+                            "start_utime_us = ?4) FROM mission WHERE mission_key = ?1 OR robot_id = ?2 AND "
+                            "mission_id = ?3 AND start_utime_us = ?4"));
     bind_mission_identity(rows, m);
-    if (rows.next())
-      return fail(Fault::conflict, "key",
-                  "key " + std::to_string(m.key) + " and mission '" + m.mission_id + "' of robot '" +
-                      m.robot_id + "' do not belong together");
+    while (rows.next()) {
+      if (rows.boolean())
+        return fail(Fault::conflict, "key",
+                    "key " + std::to_string(m.key) + " and mission '" + m.mission_id + "' of robot '" +
+                        m.robot_id + "' do not belong together");
+      was_there = true;
+    }
   }
-  Rows(database_.statement("DELETE FROM mission WHERE mission_key = ?")).bind(m.key).run_later();
+  if (was_there) {
+    Rows(database_.statement("DELETE FROM mission WHERE mission_key = ?")).bind(m.key).run_later();
+    chunks::drop_recordings(database_, m.robot_id, m.key);
+  }
   days_.changed(m.robot_id, m.start_utime_us);
   static const std::string insert = "INSERT INTO mission (" + std::string(mission_identity_columns) + ", " +
                                     mission_content_columns() + ") VALUES (" +
@@ -467,14 +475,17 @@ Outcome SqlChanges::run(const PruneMissions& c) {
   if (c.max_missions < 1) return invalid("max_missions", "must be at least 1");
   Rows rows(database_.statement(
       "DELETE FROM mission WHERE mission_key IN (SELECT mission_key FROM mission WHERE state <> 'open' AND "
-      "end_utime_us < ? ORDER BY start_utime_us, mission_key LIMIT ?) RETURNING robot_id, start_utime_us"));
+      "end_utime_us < ? ORDER BY start_utime_us, mission_key LIMIT ?) RETURNING robot_id, start_utime_us, "
+      "mission_key"));
   rows.bind(now_utime_us_() - c.max_age_us).bind(c.max_missions);
-  std::int64_t dropped = 0;
-  for (; rows.next(); ++dropped) {
+  std::vector<std::pair<std::string, MissionKey>> dropped;
+  while (rows.next()) {
     const std::string robot_id = rows.text();
     days_.changed(robot_id, rows.integer());
+    dropped.emplace_back(robot_id, rows.integer());
   }
-  return dropped;
+  for (const auto& [robot_id, key] : dropped) chunks::drop_recordings(database_, robot_id, key);
+  return static_cast<std::int64_t>(dropped.size());
 }
 
 Outcome SqlChanges::run(const RemoveRobot& c) {
@@ -503,6 +514,11 @@ Outcome SqlChanges::run(const RemoveRobot& c) {
         "DELETE FROM learned WHERE robot_id = ?", "DELETE FROM energy_state WHERE robot_id = ?"})
     change(sql);
   const std::int64_t missions = change("DELETE FROM mission WHERE robot_id = ?");
+  if (database_.keyed_by_robot())
+    for (const char* sql :
+         {"DELETE FROM trace WHERE robot_id = ?", "DELETE FROM telemetry_chunk WHERE robot_id = ?",
+          "DELETE FROM covariate_chunk WHERE robot_id = ?"})
+      change(sql);
   change("DELETE FROM model WHERE robot_id = ?");
   change("DELETE FROM robot WHERE robot_id = ?");
   known_robots_.erase(c.robot_id);

@@ -194,6 +194,14 @@ void append(Database& database, const End& end, std::span<const CovariateChange>
   append_items(database, end, changes, ended, now_utime_us);
 }
 
+void drop_recordings(Database& database, std::string_view robot_id, MissionKey key) {
+  if (!database.keyed_by_robot()) return;
+  for (const char* sql : {"DELETE FROM trace WHERE robot_id = ? AND mission_key = ?",
+                          "DELETE FROM telemetry_chunk WHERE robot_id = ? AND mission_key = ?",
+                          "DELETE FROM covariate_chunk WHERE robot_id = ? AND mission_key = ?"})
+    Rows(database.statement(sql)).bind(robot_id).bind(key).run_later();
+}
+
 Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range,
                                 const PageRequest& page) {
   TelemetryPage result;

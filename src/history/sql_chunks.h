@@ -42,6 +42,9 @@ void append(Database& database, const End& end, std::span<const signals::Sample>
 void append(Database& database, const End& end, std::span<const signals::CovariateChange> changes, bool ended,
             std::int64_t now_utime_us);
 
+// Deletes the trace and the chunks of a mission that was deleted, where no reference does so.
+void drop_recordings(Database& database, std::string_view robot_id, MissionKey key);
+
 // As Store's; the mission is known to be there.
 Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range, const PageRequest& page);
 Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange range,
