@@ -36,11 +36,17 @@ Result<void> check_trace(const std::vector<TraceBucket>& trace) {
 
 // Where missions go on; `which` says of which missions.
 std::string places_sql(bool keyed_by_robot, const std::string& which) {
-  return "SELECT mission_key, robot_id, start_utime_us, telemetry_samples, covariate_changes, " +
-         chunks::samples_in_tail_sql(keyed_by_robot) + ", " + chunks::changes_in_tail_sql(keyed_by_robot) +
-         ", state <> 'open' FROM mission WHERE " + which +
+  return "SELECT mission_key, robot_id, start_utime_us, telemetry_samples, covariate_changes, state <> "
+         "'open' "
+         "FROM mission WHERE " +
+         which +
          // Whoever deletes the mission waits, and finds what is stored of it.
-         (keyed_by_robot ? " FOR NO KEY UPDATE OF mission" : "");
+         (keyed_by_robot ? " FOR NO KEY UPDATE" : "");
+}
+
+std::string tails_sql(bool keyed_by_robot) {
+  return "SELECT " + chunks::samples_in_tail_sql(keyed_by_robot) + ", " +
+         chunks::changes_in_tail_sql(keyed_by_robot) + " FROM mission WHERE mission_key = ?";
 }
 
 const std::string& checkpoint_columns() {
@@ -99,6 +105,7 @@ SqlChanges::~SqlChanges() = default;
 
 void SqlChanges::forget_collected() {
   places_.clear();
+  tails_.clear();
   known_robots_.clear();
   if (!bulk_) return;
   for (BulkRows* rows : {&bulk_->missions, &bulk_->trace, &bulk_->telemetry, &bulk_->states}) rows->clear();
@@ -108,7 +115,13 @@ void SqlChanges::forget_collected() {
 
 void SqlChanges::begin(std::span<const Command> commands) {
   days_.clear();
+  // After a transaction that was not committed nothing that was found out in it holds.
+  constexpr std::size_t most_tails = 100'000;
+  if (!committed_ || tails_.size() > most_tails) tails_.clear();
+  auto tails = std::move(tails_);
   forget_collected();
+  tails_ = std::move(tails);
+  committed_ = false;
   lock_leases(commands);
 }
 
@@ -139,8 +152,7 @@ void SqlChanges::read_places(Rows& rows) {
   while (rows.next()) {
     Place& place = places_[rows.integer()];
     place.robot_id = rows.text();
-    for (std::int64_t* number : {&place.start_utime_us, &place.samples, &place.changes,
-                                 &place.samples_in_tail, &place.changes_in_tail})
+    for (std::int64_t* number : {&place.start_utime_us, &place.samples, &place.changes})
       *number = rows.integer();
     place.was_ended = rows.boolean();
   }
@@ -154,7 +166,25 @@ std::optional<SqlChanges::Place> SqlChanges::take_place(MissionKey key) {
     read_places(rows);
   }
   auto found = places_.extract(key);
-  return found ? std::optional(std::move(found.mapped())) : std::nullopt;
+  if (!found) return std::nullopt;
+  find_tails(key, found.mapped());
+  return std::move(found.mapped());
+}
+
+// Whoever else changed the tails has added to what the mission counts, or ended it.
+void SqlChanges::find_tails(MissionKey key, Place& place) {
+  const auto left = tails_.find(key);
+  if (left != tails_.end() && !place.was_ended && left->second.samples == place.samples &&
+      left->second.changes == place.changes) {
+    place.samples_in_tail = left->second.samples_in_tail;
+    place.changes_in_tail = left->second.changes_in_tail;
+    return;
+  }
+  static const std::array sql = {tails_sql(false), tails_sql(true)};
+  Rows rows(database_.statement(sql[database_.keyed_by_robot()]));
+  if (!rows.bind(key).next()) return;
+  place.samples_in_tail = rows.integer();
+  place.changes_in_tail = rows.integer();
 }
 
 // In one statement for all robots, in the order of their names, so that no two programs wait for each other.
@@ -198,7 +228,9 @@ void SqlChanges::apply(std::span<const Command> commands, const std::function<vo
     if (apply_unguarded(commands, outcomes)) {
       days_.add_up(database_);
       if (before_commit) before_commit();
-      return transaction.commit();
+      transaction.commit();
+      committed_ = true;
+      return;
     }
   }
   outcomes.clear();
@@ -208,6 +240,7 @@ void SqlChanges::apply(std::span<const Command> commands, const std::function<vo
   days_.add_up(database_);
   if (before_commit) before_commit();
   transaction.commit();
+  committed_ = true;
 }
 
 bool SqlChanges::apply_unguarded(std::span<const Command> commands, std::vector<Outcome>& outcomes) {
@@ -362,6 +395,7 @@ Outcome SqlChanges::run(const StartMission& c) {
   Place& place = places_[m.key] = {};
   place.robot_id = m.robot_id;
   place.start_utime_us = m.start_utime_us;
+  tails_[m.key] = {};
   return m.key;
 }
 
@@ -378,9 +412,13 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
   put(place->robot_id, m.key, c.trace);
   chunks::End telemetry{place->robot_id, m.key, place->samples, place->samples_in_tail};
   if (bulk_) telemetry.collected = &bulk_->telemetry;
-  chunks::append(database_, telemetry, c.samples, ended, now_utime_us_());
-  chunks::append(database_, {place->robot_id, m.key, place->changes, place->changes_in_tail}, c.covariates,
-                 ended, now_utime_us_());
+  Tails left{place->samples + static_cast<std::int64_t>(c.samples.size()),
+             place->changes + static_cast<std::int64_t>(c.covariates.size())};
+  left.samples_in_tail = chunks::append(database_, telemetry, c.samples, ended, now_utime_us_());
+  left.changes_in_tail =
+      chunks::append(database_, {place->robot_id, m.key, place->changes, place->changes_in_tail},
+                     c.covariates, ended, now_utime_us_());
+  ended ? void(tails_.erase(m.key)) : void(tails_[m.key] = left);
   if (bulk_) bulk_->keys.insert(m.key);
   if (c.resume_state) put(*c.resume_state);
   if (c.epoch != 0 && c.position)

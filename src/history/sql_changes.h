@@ -50,12 +50,19 @@ class SqlChanges {
     bool was_ended = false;
   };
 
+  // How much of a mission is in its tails, which the rows there would have to be read for, when its counts
+  // were these.
+  struct Tails {
+    std::int64_t samples = 0, changes = 0, samples_in_tail = 0, changes_in_tail = 0;
+  };
+
   void begin(std::span<const Command> commands);
   void forget_collected();
   // Stores what was collected.
   void flush();
   void look_up_places(std::span<const Command> commands);
   void read_places(Rows& rows);
+  void find_tails(MissionKey key, Place& place);
   std::optional<Place> take_place(MissionKey key);
   void update(const CheckpointMission& command, const Place& place);
   // Locks the leases that the commands stand under until the transaction ends.
@@ -99,6 +106,8 @@ class SqlChanges {
   ChangedDays days_;
   std::unique_ptr<Bulk> bulk_;
   std::map<MissionKey, Place> places_;  // read ahead
+  bool committed_ = false;              // the last transaction
+  std::map<MissionKey, Tails> tails_;   // of open missions, as they were left
   std::set<std::string> known_robots_;  // that are stored
 };
 

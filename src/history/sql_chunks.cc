@@ -103,13 +103,13 @@ std::vector<Item> take_tail(Database& database, MissionKey key) {
 }
 
 template <class Item>
-void append_items(Database& database, const End& end, std::span<const Item> items, bool ended,
-                  std::int64_t now_utime_us) {
-  if (items.empty() && (!ended || end.in_tail == 0)) return;
+std::int64_t append_items(Database& database, const End& end, std::span<const Item> items, bool ended,
+                          std::int64_t now_utime_us) {
+  if (items.empty() && (!ended || end.in_tail == 0)) return end.in_tail;
   const std::size_t unsealed = static_cast<std::size_t>(end.in_tail) + items.size();
   if (!ended && unsealed < sealed_items) {
     insert_chunk<Item>(database, end, end.next_ordinal, items, false, now_utime_us);
-    return;
+    return static_cast<std::int64_t>(unsealed);
   }
   std::vector<Item> all;
   if (end.in_tail > 0) all = take_tail<Item>(database, end.key);
@@ -121,6 +121,7 @@ void append_items(Database& database, const End& end, std::span<const Item> item
     ordinal += static_cast<std::int64_t>(piece.size());
     rest = rest.subspan(piece.size());
   }
+  return ended ? 0 : static_cast<std::int64_t>(all.size() % sealed_items);
 }
 
 template <class Item>
@@ -184,14 +185,14 @@ const std::string& telemetry_tail_columns() {
   return columns;
 }
 
-void append(Database& database, const End& end, std::span<const Sample> samples, bool ended,
-            std::int64_t now_utime_us) {
-  append_items(database, end, samples, ended, now_utime_us);
+std::int64_t append(Database& database, const End& end, std::span<const Sample> samples, bool ended,
+                    std::int64_t now_utime_us) {
+  return append_items(database, end, samples, ended, now_utime_us);
 }
 
-void append(Database& database, const End& end, std::span<const CovariateChange> changes, bool ended,
-            std::int64_t now_utime_us) {
-  append_items(database, end, changes, ended, now_utime_us);
+std::int64_t append(Database& database, const End& end, std::span<const CovariateChange> changes, bool ended,
+                    std::int64_t now_utime_us) {
+  return append_items(database, end, changes, ended, now_utime_us);
 }
 
 void drop_recordings(Database& database, std::string_view robot_id, MissionKey key) {

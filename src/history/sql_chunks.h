@@ -36,11 +36,11 @@ std::string samples_in_tail_sql(bool keyed_by_robot);
 std::string changes_in_tail_sql(bool keyed_by_robot);
 
 // Appends to the mission's unsealed tail and seals it in full chunks, or all of it when the mission has
-// ended. The mission's row counts them already.
-void append(Database& database, const End& end, std::span<const signals::Sample> samples, bool ended,
-            std::int64_t now_utime_us);
-void append(Database& database, const End& end, std::span<const signals::CovariateChange> changes, bool ended,
-            std::int64_t now_utime_us);
+// ended. The mission's row counts them already. Answers how many are in the tail then.
+std::int64_t append(Database& database, const End& end, std::span<const signals::Sample> samples, bool ended,
+                    std::int64_t now_utime_us);
+std::int64_t append(Database& database, const End& end, std::span<const signals::CovariateChange> changes,
+                    bool ended, std::int64_t now_utime_us);
 
 // Deletes the trace and the chunks of a mission that was deleted, where no reference does so.
 void drop_recordings(Database& database, std::string_view robot_id, MissionKey key);
