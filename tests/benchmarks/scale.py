@@ -135,7 +135,7 @@ class Run:
     def settled(self, stored):
         """Samples booked once no more come, and how long that took."""
         began, last, since = time.monotonic(), -1, time.monotonic()
-        while time.monotonic() - since < 4 and time.monotonic() - began < 90:
+        while time.monotonic() - since < 8 and time.monotonic() - began < 90:
             now = int(rows(self.folder, "SELECT coalesce(sum(samples), 0) FROM mission"))
             if now != last:
                 last, since = now, time.monotonic()
