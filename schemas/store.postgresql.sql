@@ -1,7 +1,7 @@
--- The history of a fleet in PostgreSQL, schema version 3 (src/history/postgres_schema.cc lists the migrations to it), but for
+-- The history of a fleet in PostgreSQL, schema version 4 (src/history/postgres_schema.cc lists the migrations to it), but for
 -- what store_by_robot.postgresql.sql adds. The tables and columns are those of store.sql, where what they hold is described.
 -- Every key of a table that is about robots begins with the robot, and every reference between two of them holds it, so that
--- they can be distributed by it. joulecast_store, event, audit and the tables of the cluster are not.
+-- they can be distributed by it. joulecast_store, event, audit, request_answer and the tables of the cluster are not.
 -- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a DOUBLE PRECISION column: not measured.
 -- Names compare by their bytes (COLLATE "C"), as SQLite compares them. JSON is kept as text, byte for byte.
 
@@ -191,3 +191,17 @@ CREATE FUNCTION audit_is_appended_to() RETURNS trigger LANGUAGE plpgsql AS
 $$BEGIN RAISE EXCEPTION 'the audit is only appended to'; END$$;
 CREATE TRIGGER audit_keeps_entries BEFORE DELETE OR TRUNCATE ON audit EXECUTE FUNCTION audit_is_appended_to();
 CREATE TRIGGER audit_keeps_content BEFORE UPDATE ON audit EXECUTE FUNCTION audit_is_appended_to();
+
+-- Answers of requests with an Idempotency-Key, for when they are repeated.
+CREATE TABLE request_answer (
+  actor TEXT COLLATE "C" NOT NULL,  -- name of a token; empty: nobody who is known
+  idempotency_key TEXT COLLATE "C" NOT NULL CHECK (idempotency_key <> ''),
+  fingerprint TEXT NOT NULL,
+  utime_us BIGINT NOT NULL,
+  status BIGINT NOT NULL,    -- of HTTP
+  location TEXT NOT NULL,  -- its Location header; empty: none
+  body TEXT NOT NULL,
+  PRIMARY KEY (actor, idempotency_key)
+);
+
+CREATE INDEX request_answer_by_age ON request_answer (utime_us);

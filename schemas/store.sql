@@ -1,4 +1,4 @@
--- The history of a fleet, schema version 7 (user_version; src/history/schema.cc lists the migrations to it).
+-- The history of a fleet, schema version 8 (user_version; src/history/schema.cc lists the migrations to it).
 -- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a REAL column: not measured.
 -- Energy leaving the battery is positive. Sides: right, left.
 
@@ -238,3 +238,17 @@ CREATE TRIGGER audit_keeps_entries BEFORE DELETE ON audit
 BEGIN SELECT RAISE(ABORT, 'the audit is only appended to'); END;
 CREATE TRIGGER audit_keeps_content BEFORE UPDATE ON audit
 BEGIN SELECT RAISE(ABORT, 'the audit is only appended to'); END;
+
+-- Answers of requests with an Idempotency-Key, for when they are repeated.
+CREATE TABLE request_answer (
+  actor TEXT NOT NULL,  -- name of a token; empty: nobody who is known
+  idempotency_key TEXT NOT NULL CHECK (idempotency_key <> ''),
+  fingerprint TEXT NOT NULL,
+  utime_us INTEGER NOT NULL,
+  status INTEGER NOT NULL,    -- of HTTP
+  location TEXT NOT NULL,  -- its Location header; empty: none
+  body TEXT NOT NULL,
+  PRIMARY KEY (actor, idempotency_key)
+) STRICT;
+
+CREATE INDEX request_answer_by_age ON request_answer (utime_us);

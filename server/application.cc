@@ -37,6 +37,7 @@
 #include "server/http/gate.h"
 #include "server/http/http_metrics.h"
 #include "server/http/http_server.h"
+#include "server/http/idempotency.h"
 #include "server/http/openapi.h"
 #include "server/http/operations.h"
 #include "server/http/static_files.h"
@@ -112,6 +113,29 @@ std::function<Result<void>(http::AccessEvent)> audit_into(history::Writer& write
   };
 }
 
+// What was answered under idempotency keys, in the store.
+http::IdempotencyKeys::Options answers_in(const history::Store& store, history::Writer& writer) {
+  using Answer = http::IdempotencyKeys::Answer;
+  return {
+      .find = [&store](const std::string& actor, const std::string& key) -> Result<std::optional<Answer>> {
+        auto kept = store.answer(actor, key);
+        if (!kept) return tl::unexpected(std::move(kept.error()));
+        if (!*kept) return std::nullopt;
+        history::RequestAnswer& answer = **kept;
+        return Answer{std::move(answer.actor),       std::move(answer.key),
+                      std::move(answer.fingerprint), static_cast<unsigned>(answer.status),
+                      std::move(answer.location),    std::move(answer.body)};
+      },
+      .keep =
+          [&writer](Answer answer) {
+            const history::Outcome kept = writer.execute(history::KeepAnswer{
+                {std::move(answer.actor), std::move(answer.key), std::move(answer.fingerprint),
+                 host_utime_us(), answer.status, std::move(answer.location), std::move(answer.body)}});
+            if (!kept)
+              log_error("the answer of a request was not kept under its idempotency key", kept.error());
+          }};
+}
+
 void log_failed_request(const http::Endpoint& endpoint, const http::Request& request, const Error& error) {
   log_error("request failed",
             {{"operation", endpoint.operation_id}, {"request_id", request.id}, {"cause", describe(error)}});
@@ -120,10 +144,12 @@ void log_failed_request(const http::Endpoint& endpoint, const http::Request& req
 // Every documented endpoint and the page.
 Result<std::vector<http::Endpoint>> endpoint_table(api::Services& services, Metrics& metrics,
                                                    http::EventHub& events, http::Gate& gate,
+                                                   const http::IdempotencyKeys& keys,
                                                    std::vector<http::ReadinessCheck> checks,
                                                    const std::string& web_directory) {
   std::vector<http::Endpoint> table;
-  for (http::Endpoint& row : api::endpoints(services)) table.push_back(gate.audited(std::move(row)));
+  for (http::Endpoint& row : api::endpoints(services))
+    table.push_back(gate.audited(keys.honoured(std::move(row))));
   for (http::Endpoint& row : gate.session_endpoints()) table.push_back(std::move(row));
   table.push_back(http::events_endpoint(events));
   for (http::Endpoint& row : http::operations_endpoints(metrics, std::move(checks)))
@@ -322,8 +348,10 @@ struct Application::Parts {
                           .audit = audit_into(*writer)});
     if (!opened) return tl::unexpected(std::move(opened.error()));
     gate = std::move(*opened);
-    Result<std::vector<http::Endpoint>> table = endpoint_table(
-        *services, metrics, events, *gate, readiness_checks(), settings.text("http.web_directory"));
+    idempotency = std::make_unique<http::IdempotencyKeys>(answers_in(*store, *writer));
+    Result<std::vector<http::Endpoint>> table =
+        endpoint_table(*services, metrics, events, *gate, *idempotency, readiness_checks(),
+                       settings.text("http.web_directory"));
     if (!table) return tl::unexpected(std::move(table.error()));
     router = std::make_unique<http::Router>(std::move(*table), log_failed_request,
                                             [this](const http::Endpoint& endpoint, http::Request& request) {
@@ -498,6 +526,7 @@ struct Application::Parts {
   std::unique_ptr<server::GapWatch> watch;
   std::unique_ptr<api::Services> services;
   std::unique_ptr<http::Gate> gate;
+  std::unique_ptr<http::IdempotencyKeys> idempotency;
   std::unique_ptr<http::Router> router;
   std::unique_ptr<http::HttpMetrics> http_metrics;
   std::unique_ptr<http::HttpServer> http;

@@ -79,6 +79,8 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
   const Counter seconds = metrics.counter("joulecast_store_commit_seconds_total", "Time spent in commits");
   const Counter pruned_missions =
       metrics.counter("joulecast_store_pruned_missions_total", "Missions dropped by the retention");
+  const Counter pruned_events =
+      metrics.counter("joulecast_store_pruned_events_total", "Events dropped by the retention");
   const Counter pruned = metrics.counter("joulecast_store_pruned_chunks_total",
                                          "Raw telemetry chunks that the retention dropped");
   const Gauge streams = metrics.gauge("joulecast_event_streams", "Clients of the event stream");
@@ -133,6 +135,7 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
         refused.raise_to(static_cast<double>(writing.refused));
         seconds.raise_to(writing.total_commit_s);
         pruned_missions.raise_to(static_cast<double>(writing.pruned_missions));
+        pruned_events.raise_to(static_cast<double>(writing.pruned_events));
         pruned.raise_to(static_cast<double>(writing.pruned_chunks));
         if (const auto size = store.size()) {
           database.set(static_cast<double>(size->database_bytes));

@@ -96,6 +96,8 @@ history::WriterOptions writer_options(const Settings& settings) {
     options.retention.telemetry_max_bytes = bytes;
   if (const double days = settings.number("store.retention_missions_days"); days > 0)
     options.missions_max_age_us = microseconds(days * seconds_per_day);
+  if (const auto events = settings.integer("store.retention_events"); events > 0)
+    options.events_kept = events;
   options.queue_bytes = static_cast<std::size_t>(settings.integer("store.queue_bytes"));
   options.spool_path = spool_path(settings);
   options.on_error = [](const Error& error) { log_error("store", error); };
@@ -128,6 +130,7 @@ ingest::IngestOptions ingest_options(const Settings& settings) {
 
 server::AdoptionOptions adoption_options(const Settings& settings) {
   server::AdoptionOptions options;
+  options.most_robots = static_cast<std::size_t>(settings.integer("robots.most"));
   options.max_missions = static_cast<std::size_t>(settings.integer("adoption.max_missions"));
   options.max_samples = static_cast<std::size_t>(settings.integer("adoption.max_samples"));
   options.meter.tolerance = settings.number("meter.tolerance");

@@ -105,6 +105,8 @@ constexpr Setting table[] = {
      "age since their end, by the robot's clock, at which missions are deleted with all that is stored of "
      "them, "
      "at most 5 % of them an hour; 0: never"},
+    {"store.retention_events", Type::integer, "1000000", 0, 1e12, "",
+     "events kept; beyond: the oldest are deleted; 0: no limit"},
     {"store.queue_bytes", Type::integer, "67108864", 1048576, 1e12, "B",
      "memory for what waits while the store takes no data; beyond: raw samples are left out and counted"},
 
@@ -152,6 +154,8 @@ constexpr Setting table[] = {
      "ones are "
      "refused"},
 
+    {"robots.most", Type::integer, "10000", 1, 1e6, "",
+     "robots that may have a model; PUT of one more is refused, files of robots.directory are not"},
     {"robots.directory", Type::text, "", 0, 0, "", "robot files (*.json) loaded at start; empty: none"},
     {"energy_state.period_s", Type::number, "1", 0.05, 3600, "s",
      "period of each robot's energy state on LCM"},

@@ -7,6 +7,7 @@
 #include "base/utc_time.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
+#include "server/api/requests.h"
 #include "server/api/services.h"
 #include "server/diagnosis/diagnosis_service.h"
 
@@ -19,10 +20,6 @@ using http::Parameter;
 using http::Request;
 using http::Response;
 using nlohmann::json;
-
-constexpr std::size_t most_missions = 1000;  // of one request
-constexpr std::size_t most_controls = 1000;
-constexpr double most_held_back = 0.9;
 
 enum class Detail { list, whole };
 
@@ -67,30 +64,11 @@ Result<Response> answer(const Services& services, std::int64_t id, unsigned stat
 }
 
 Result<Response> start(Services& services, const Request& request) {
-  Fields fields(*request.json);
-  server::DiagnosisRequest wanted;
-  wanted.robot_id = fields.text("robot_id", 64);
-  if (const json* missions = fields.member("missions")) {
-    if (!missions->is_array() || missions->empty() || missions->size() > most_missions)
-      fields.fault("missions", "must be an array of 1 to " + std::to_string(most_missions) + " mission ids");
-    for (std::size_t k = 0; fields.ok() && k < missions->size(); ++k) {
-      if (!(*missions)[k].is_number_integer() || (*missions)[k] < 1) {
-        fields.fault("missions/" + std::to_string(k), "must be a positive integer, the id of a mission");
-      } else {
-        wanted.missions.push_back((*missions)[k].get<std::int64_t>());
-      }
-    }
-  }
-  wanted.since_utime_us = fields.time("since");
-  wanted.max_missions = static_cast<std::size_t>(
-      fields.integer("max_missions", 1, static_cast<std::int64_t>(most_missions), 200));
-  if (const auto controls = fields.optional_integer("controls", 0, static_cast<std::int64_t>(most_controls)))
-    wanted.controls = static_cast<std::size_t>(*controls);
-  wanted.hold_back = fields.number("hold_back", {0, most_held_back}, wanted.hold_back);
-  if (Result<void> read = fields.finish(); !read) return tl::unexpected(std::move(read.error()));
-  if (const auto known = model_of(services, wanted.robot_id, "/robot_id"); !known)
+  const Result<server::DiagnosisRequest> wanted = read_diagnosis_request(*request.json);
+  if (!wanted) return tl::unexpected(wanted.error());
+  if (const auto known = model_of(services, wanted->robot_id, "/robot_id"); !known)
     return tl::unexpected(known.error());
-  const Result<std::int64_t> id = services.diagnoses.submit(wanted);
+  const Result<std::int64_t> id = services.diagnoses.submit(*wanted);
   if (!id) return tl::unexpected(id.error());
   return answer(services, *id, 202);
 }

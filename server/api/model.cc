@@ -8,6 +8,7 @@
 #include "robot/robot_file.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
+#include "server/api/requests.h"
 #include "server/api/services.h"
 #include "server/diagnosis/diagnosed_model.h"
 #include "server/diagnosis/model_adoption.h"
@@ -22,59 +23,6 @@ using http::Parameter;
 using http::Request;
 using http::Response;
 using nlohmann::json;
-
-constexpr std::int64_t greatest_id = std::int64_t{1} << 53;  // what JSON numbers hold exactly
-constexpr std::size_t longest_note = 1000;
-constexpr std::size_t most_effects = 16;
-
-// The body of POST /v1/robots/{id}/model: what to adopt, one of four, and how.
-struct ModelRequest {
-  const json* model = nullptr;
-  std::optional<std::int64_t> diagnosis_id, proposal_id, version;
-  std::vector<std::string> effects;  // of those that the diagnosis does not tell apart, the ones to adopt
-  std::optional<std::string> note;
-  std::optional<std::int64_t> since_utime_us, expected_version;
-  bool force = false, dry_run = false;
-};
-
-std::vector<std::string> read_effects(Fields& fields) {
-  const json* given = fields.member("effect");
-  if (given == nullptr) return {};
-  const json ids = given->is_string() ? json::array({*given}) : *given;
-  const auto is_text = [](const json& id) { return id.is_string(); };
-  if (!ids.is_array() || ids.size() > most_effects || !std::ranges::all_of(ids, is_text)) {
-    fields.fault("effect",
-                 "must be the id of an effect, or an array of at most " + std::to_string(most_effects));
-    return {};
-  }
-  return ids.get<std::vector<std::string>>();
-}
-
-Result<ModelRequest> read_request(const json& body) {
-  Fields fields(body);
-  ModelRequest r;
-  r.model = fields.member("model");
-  r.diagnosis_id = fields.optional_integer("diagnosis_id", 1, greatest_id);
-  r.effects = read_effects(fields);
-  r.proposal_id = fields.optional_integer("proposal_id", 1, greatest_id);
-  r.version = fields.optional_integer("version", 1, greatest_id);
-  r.since_utime_us = fields.time("since");
-  r.expected_version = fields.optional_integer("expected_version", 1, greatest_id);
-  if (fields.has("note")) r.note = fields.text("note", longest_note);
-  r.force = fields.boolean("force", false);
-  r.dry_run = fields.boolean("dry_run", false);
-  const int given =
-      (r.model != nullptr) + r.diagnosis_id.has_value() + r.proposal_id.has_value() + r.version.has_value();
-  if (fields.ok() && given != 1)
-    fields.fault("model", "exactly one of model, diagnosis_id, proposal_id and version must be given, not " +
-                              std::to_string(given));
-  if (fields.ok() && !r.effects.empty() && !r.diagnosis_id)
-    fields.fault("effect", "goes with diagnosis_id alone");
-  if (fields.ok() && r.version && (r.force || r.dry_run || r.since_utime_us))
-    fields.fault("version", "is put in force without a back-test: leave out force, dry_run and since");
-  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
-  return r;
-}
 
 Result<robot::RobotModel> candidate_of(const std::string& model_json, const std::string& robot_id,
                                        const std::string& owner, std::string_view field) {
@@ -201,7 +149,7 @@ Result<Response> roll(Services& services, const Request& request, const ModelReq
 Result<Response> post_model(Services& services, const Request& request) {
   const std::string& id = request.param("id");
   if (auto known = model_of(services, id); !known) return tl::unexpected(std::move(known.error()));
-  const Result<ModelRequest> read = read_request(*request.json);
+  const Result<ModelRequest> read = read_model_request(*request.json);
   if (!read) return tl::unexpected(read.error());
   if (read->version) return roll(services, request, *read);
   const Result<server::AdoptionRequest> wanted = adoption_of(services, id, *read);

@@ -149,15 +149,8 @@ Result<Response> put(Services& services, const Request& request) {
   const std::vector<robot::ReviewFinding> findings = robot::review(*robot);
   if (auto plannable = robot::plannable(findings); !plannable)
     return tl::unexpected(std::move(plannable.error()));
-  history::AddModel command;
-  command.robot_id = id;
-  command.utime_us = services.now_utime_us();
-  command.origin = history::ModelOrigin::http;
-  command.model_json = robot::to_json_text(*robot);
-  const history::Outcome version = services.writer.execute(std::move(command));
+  const Result<std::int64_t> version = services.adoption.put(*robot);
   if (!version) return tl::unexpected(version.error());
-  if (Result<void> placed = services.models.put(std::move(*robot), *version); !placed)
-    return tl::unexpected(std::move(placed.error()));
   JsonWriter json;
   json.begin_object().field("robot_id", id).field("model_version", *version).key("warnings").begin_array();
   for (const robot::ReviewFinding& warning : findings)
@@ -192,6 +185,9 @@ Result<Response> remove(Services& services, const Request& request) {
   if (services.diagnoses.waits_or_runs(id))
     return fail(Fault::conflict, "id", "a diagnosis of robot " + id + " waits or runs; cancel it first");
   const auto model = services.models.find(id);
+  if (model == nullptr && history == "keep")
+    return fail(Fault::not_found, "id",
+                "robot " + id + " has no model in force; history=purge deletes what is stored of it");
   services.models.remove(id);
   const history::Outcome missions =
       wait_for_end_of_session(services, id)
@@ -286,7 +282,7 @@ std::vector<TableRow> robot_rows() {
                    .summary = "Gives a robot a model; a changed one is a new version, used at once",
                    .request_schema = "robot",
                    .response_schema = "robot-version",
-                   .error_statuses = {422},
+                   .error_statuses = {409, 422},
                    .run = http::Run::write},
                   answered_by(put)});
   rows.push_back(

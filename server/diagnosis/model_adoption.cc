@@ -171,14 +171,9 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
   command.model_json = robot::to_json_text(request.model);
   command.expected_active = before->version;
   command.evidence_json = evidence.dump();
-  {
-    const std::lock_guard lock(putting_);
-    const history::Outcome version = writer_.execute(std::move(command));
-    if (!version) return tl::unexpected(version.error());
-    if (Result<void> placed = models_.put(request.model, *version); !placed)
-      return tl::unexpected(std::move(placed.error()));
-    adoption.version = *version;
-  }
+  const Result<std::int64_t> version = put(std::move(command), request.model);
+  if (!version) return tl::unexpected(version.error());
+  adoption.version = *version;
   adoption.adopted = true;
   ++(forced ? forced_ : adopted_);
   evidence.erase("back_test");
@@ -196,6 +191,29 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
     if (!closed && closed.error().fault != Fault::conflict) return tl::unexpected(closed.error());
   }
   return adoption;
+}
+
+Result<std::int64_t> ModelAdoption::put(history::AddModel command, const robot::RobotModel& model) {
+  const std::lock_guard lock(putting_);
+  const history::Outcome version = writer_.execute(std::move(command));
+  if (!version) return tl::unexpected(version.error());
+  if (Result<void> placed = models_.put(model, *version); !placed)
+    return tl::unexpected(std::move(placed.error()));
+  return *version;
+}
+
+Result<std::int64_t> ModelAdoption::put(const robot::RobotModel& model) {
+  if (models_.find(model.robot_id) == nullptr && models_.size() >= options_.most_robots)
+    return fail(Fault::conflict, "id",
+                std::to_string(models_.size()) +
+                    " robots have a model, and no more may (robots.most): DELETE "
+                    "one that is gone, or raise robots.most");
+  history::AddModel command;
+  command.robot_id = model.robot_id;
+  command.utime_us = now_utime_us_();
+  command.origin = history::ModelOrigin::http;
+  command.model_json = robot::to_json_text(model);
+  return put(std::move(command), model);
 }
 
 Result<std::int64_t> ModelAdoption::activate(const std::string& robot_id, std::int64_t version,

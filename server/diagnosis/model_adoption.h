@@ -55,6 +55,7 @@ struct AdoptionCounts {
 };
 
 struct AdoptionOptions {
+  std::size_t most_robots = 10'000;  // that may have a model
   std::size_t max_missions = 50;
   std::size_t max_samples = 400'000;
   energy::MeterSettings meter;
@@ -78,6 +79,10 @@ class ModelAdoption {
   // store fails. A candidate that does not improve is no error: see Adoption::adopted.
   Result<Adoption> adopt(const AdoptionRequest& request, const std::function<bool()>& go_on = {});
 
+  // Puts a model that a person gives in force, untested; that of a robot without one too. Outcome: its
+  // version. Fault::conflict: as many robots as may have a model have one.
+  Result<std::int64_t> put(const robot::RobotModel& model);
+
   // Puts a stored version in force without a back-test. Outcome: the version that was in force before.
   Result<std::int64_t> activate(const std::string& robot_id, std::int64_t version, const std::string& note);
 
@@ -89,6 +94,8 @@ class ModelAdoption {
   // The back-test on the history: fills what of the adoption it decides.
   Result<void> test(const AdoptionRequest& request, const ingest::ModelInForce& before,
                     const std::function<bool()>& go_on, Adoption& adoption);
+  // Stores the model and puts it in force.
+  Result<std::int64_t> put(history::AddModel command, const robot::RobotModel& model);
   Result<void> record(const std::string& robot_id, const std::string& kind, std::string detail_json);
 
   const history::Store& store_;

@@ -10,6 +10,7 @@
 #include "base/json_text.h"
 #include "server/http/asset.h"
 #include "server/http/gate.h"
+#include "server/http/idempotency.h"
 #include "server/http/problem.h"
 #include "server/http/uri.h"
 
@@ -142,7 +143,7 @@ std::set<unsigned> errors_of(const Endpoint& endpoint) {
   statuses.insert({400, 406, 421, 500});
   if (endpoint.role != Role::open) statuses.insert({401, 403});
   if (endpoint.method != Method::get) statuses.insert(403);
-  if (!endpoint.parameters.empty()) statuses.insert(422);
+  if (!endpoint.parameters.empty() || takes_idempotency_key(endpoint)) statuses.insert(422);
   if (!endpoint.request_schema.empty()) statuses.insert({413, 415, 422});
   if (endpoint.run != Run::io) statuses.insert({429, 503});
   return statuses;
@@ -211,6 +212,16 @@ Result<ordered_json> parameters_of(const Endpoint& endpoint) {
                           {"schema", {{"type", "string"}, {"minLength", 1}}}});
   }
   for (const Parameter& parameter : endpoint.parameters) parameters.push_back(parameter_of(parameter));
+  if (takes_idempotency_key(endpoint))
+    parameters.push_back(
+        {{"name", idempotency_header},
+         {"in", "header"},
+         {"required", false},
+         {"description",
+          "chosen by the client, new for each new request: within 7 days a repetition of the "
+          "request under the key is answered as the request was, with Idempotency-Replayed: "
+          "true, and changes nothing"},
+         {"schema", {{"type", "string"}, {"minLength", 1}, {"maxLength", 255}}}});
   return parameters;
 }
 

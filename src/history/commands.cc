@@ -71,6 +71,13 @@ std::size_t content_bytes(const CloseProposal&) {
 std::size_t content_bytes(const PruneMissions&) {
   return 0;
 }
+std::size_t content_bytes(const PruneEvents&) {
+  return 0;
+}
+std::size_t content_bytes(const KeepAnswer& c) {
+  const RequestAnswer& a = c.answer;
+  return a.actor.size() + a.key.size() + a.fingerprint.size() + a.location.size() + a.body.size();
+}
 std::size_t content_bytes(const RemoveRobot& c) {
   return c.robot_id.size();
 }

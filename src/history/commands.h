@@ -143,6 +143,22 @@ struct PruneMissions {
   std::int64_t max_missions = 0;
 };
 
+// Deletes the oldest events beyond the `keep` newest, which are at least one, at most `max_events` of them.
+// Outcome: how many.
+struct PruneEvents {
+  std::int64_t keep = 0;
+  std::int64_t max_events = 0;
+};
+
+// How long the answer of a request with an idempotency key is kept.
+inline constexpr std::int64_t kept_answer_us = std::int64_t{7 * 86400} * 1'000'000;
+
+// Keeps a request's answer in place of one under the same actor and key, and drops those that are more than
+// kept_answer_us older than it. Outcome: 0.
+struct KeepAnswer {
+  RequestAnswer answer;
+};
+
 // Takes a robot's model out of force. With `purge` all that is stored of the robot goes, but for its events:
 // models, missions, recordings, what was learned, diagnoses, proposals. Else all of it stays, and missions
 // that are open are interrupted. Outcome: the number of missions deleted. Fault::not_found when the robot is
@@ -158,10 +174,10 @@ struct ReleaseLease {
   Epoch epoch = 0;
 };
 
-using Command =
-    std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutResumeState, PutLearned,
-                 AppendEvent, Prune, AddDiagnosis, UpdateDiagnosis, InterruptDiagnoses, AddProposal,
-                 CloseProposal, AppendAudit, PruneMissions, RemoveRobot, ReleaseLease>;
+using Command = std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutResumeState,
+                             PutLearned, AppendEvent, Prune, AddDiagnosis, UpdateDiagnosis,
+                             InterruptDiagnoses, AddProposal, CloseProposal, AppendAudit, PruneMissions,
+                             RemoveRobot, ReleaseLease, PruneEvents, KeepAnswer>;
 
 // What a command with an epoch stands under.
 struct Fence {

@@ -14,6 +14,22 @@ extern const std::string_view postgres_cluster_sql;   // schemas/cluster.postgre
 
 namespace {
 
+// From version 2 to 3.
+constexpr const char* request_answers = R"(
+CREATE TABLE request_answer (
+  actor TEXT COLLATE "C" NOT NULL,  -- name of a token; empty: nobody who is known
+  idempotency_key TEXT COLLATE "C" NOT NULL CHECK (idempotency_key <> ''),
+  fingerprint TEXT NOT NULL,
+  utime_us BIGINT NOT NULL,
+  status BIGINT NOT NULL,    -- of HTTP
+  location TEXT NOT NULL,  -- its Location header; empty: none
+  body TEXT NOT NULL,
+  PRIMARY KEY (actor, idempotency_key)
+);
+
+CREATE INDEX request_answer_by_age ON request_answer (utime_us);
+)";
+
 // The tables that are made anew go out of the way of their names and of those of their indexes.
 constexpr const char* set_aside = R"(
 ALTER TABLE trace RENAME TO old_trace;
@@ -66,7 +82,7 @@ void expect_rows_of(Database& database, const std::string& table, const std::str
                        database.integer("SELECT max(" + time + ")" + from));
 }
 
-// From version 2 to 3: keys that begin with the robot, partitions, sums of days.
+// From version 3 to 4: keys that begin with the robot, partitions, sums of days.
 void key_by_robot(Database& database) {
   database.execute(set_aside);
   database.execute(std::string(postgres_by_robot_sql));
@@ -100,6 +116,10 @@ Result<void> bring_to_postgres_schema(Database& database) {
     ++version;
   }
   if (version == 2) {
+    database.execute(request_answers);
+    ++version;
+  }
+  if (version == 3) {
     key_by_robot(database);
     ++version;
   }

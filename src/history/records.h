@@ -164,6 +164,19 @@ struct AuditEntry {
   std::string hash;  // given by the store
 };
 
+// The answer that a request with an idempotency key got, for when it is repeated.
+struct RequestAnswer {
+  std::string actor;        // name of a token; empty: nobody who is known
+  std::string key;          // Idempotency-Key of the request
+  std::string fingerprint;  // of the request: another one under the same key differs
+  std::int64_t utime_us = 0;
+  std::int64_t status = 0;  // of HTTP
+  std::string location;     // its Location header; empty: none
+  std::string body;
+
+  friend bool operator==(const RequestAnswer&, const RequestAnswer&) = default;
+};
+
 // What happened in the fleet, in the order it was stored.
 struct Event {
   std::int64_t id = 0;  // increasing in order of commit; given by the store

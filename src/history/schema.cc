@@ -8,7 +8,7 @@ extern const std::string_view store_sql;  // schemas/store.sql, embedded at buil
 
 namespace {
 
-constexpr std::int64_t store_version = 7;
+constexpr std::int64_t store_version = 8;
 constexpr Migration store_migrations[] = {
     {1, R"(
 CREATE TABLE learned (
@@ -115,6 +115,19 @@ CREATE TRIGGER audit_keeps_entries BEFORE DELETE ON audit
 BEGIN SELECT RAISE(ABORT, 'the audit is only appended to'); END;
 CREATE TRIGGER audit_keeps_content BEFORE UPDATE ON audit
 BEGIN SELECT RAISE(ABORT, 'the audit is only appended to'); END;
+)sql"},
+    {7, R"sql(CREATE TABLE request_answer (
+  actor TEXT NOT NULL,  -- name of a token; empty: nobody who is known
+  idempotency_key TEXT NOT NULL CHECK (idempotency_key <> ''),
+  fingerprint TEXT NOT NULL,
+  utime_us INTEGER NOT NULL,
+  status INTEGER NOT NULL,    -- of HTTP
+  location TEXT NOT NULL,  -- its Location header; empty: none
+  body TEXT NOT NULL,
+  PRIMARY KEY (actor, idempotency_key)
+) STRICT;
+
+CREATE INDEX request_answer_by_age ON request_answer (utime_us);
 )sql"},
 };
 

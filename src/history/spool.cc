@@ -134,6 +134,16 @@ struct Members {
     a(c.max_age_us, c.max_missions);
   }
   template <class Archive>
+  static void of(Archive& a, PruneEvents& c) {
+    a(c.keep, c.max_events);
+  }
+  template <class Archive>
+  static void of(Archive& a, KeepAnswer& c) {
+    RequestAnswer& answer = c.answer;
+    a(answer.actor, answer.key, answer.fingerprint, answer.utime_us, answer.status, answer.location,
+      answer.body);
+  }
+  template <class Archive>
   static void of(Archive& a, RemoveRobot& c) {
     a(c.robot_id, c.purge);
   }
@@ -198,6 +208,21 @@ Bytes command_bytes(std::span<const Command* const> commands) {
   return plain;
 }
 
+std::optional<std::vector<Command>> commands_of(std::span<const std::byte> bytes) {
+  Loader load(bytes);
+  std::size_t count = 0;
+  load(count);
+  std::vector<Command> commands;
+  for (std::size_t k = 0; k < count && load.sound(); ++k) {
+    std::size_t kind = 0;
+    load(kind);
+    get_command(load, kind, commands.emplace_back(),
+                std::make_index_sequence<std::variant_size_v<Command>>());
+  }
+  if (!load.sound() || !load.at_end()) return std::nullopt;
+  return commands;
+}
+
 Result<void> write_spool(const std::string& path, std::span<const Command* const> commands) {
   const Bytes plain = command_bytes(commands);
   Bytes file;
@@ -220,18 +245,9 @@ Result<std::vector<Command>> read_spool(const std::string& path) {
   const Result<Bytes> plain =
       decompressed(frame, std::numeric_limits<std::int32_t>::max(), "the spool's content");
   if (!plain) return fail(Fault::corrupt, path, describe(plain.error()));
-  Loader load(*plain);
-  std::size_t count = 0;
-  load(count);
-  std::vector<Command> commands;
-  for (std::size_t k = 0; k < count && load.sound(); ++k) {
-    std::size_t kind = 0;
-    load(kind);
-    get_command(load, kind, commands.emplace_back(),
-                std::make_index_sequence<std::variant_size_v<Command>>());
-  }
-  if (!load.sound() || !load.at_end()) return fail(Fault::corrupt, path, "is cut off");
-  return commands;
+  std::optional<std::vector<Command>> commands = commands_of(*plain);
+  if (!commands) return fail(Fault::corrupt, path, "is cut off");
+  return std::move(*commands);
 }
 
 Result<std::size_t> take_in_spool(const std::string& path, Store& store,

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -15,6 +16,8 @@ namespace joulecast::history {
 
 // The commands as the bytes of a spool: equal for equal commands.
 std::vector<std::byte> command_bytes(std::span<const Command* const> commands);
+// And back; absent for bytes that are not whole commands.
+std::optional<std::vector<Command>> commands_of(std::span<const std::byte> bytes);
 
 // Replaces the file whole; it is on the disk when this returns.
 Result<void> write_spool(const std::string& path, std::span<const Command* const> commands);

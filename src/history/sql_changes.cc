@@ -526,6 +526,32 @@ Outcome SqlChanges::run(const PruneMissions& c) {
   return static_cast<std::int64_t>(dropped.size());
 }
 
+Outcome SqlChanges::run(const PruneEvents& c) {
+  if (c.keep < 1) return invalid("keep", "must be at least 1: the last event's number must not come again");
+  if (c.max_events < 1) return invalid("max_events", "must be at least 1");
+  return Rows(database_.statement(
+                  "DELETE FROM event WHERE event_id IN (SELECT event_id FROM event WHERE event_id <= (SELECT "
+                  "event_id FROM event ORDER BY event_id DESC LIMIT 1 OFFSET ?) ORDER BY event_id LIMIT ?)"))
+      .bind(c.keep)
+      .bind(c.max_events)
+      .run();
+}
+
+Outcome SqlChanges::run(const KeepAnswer& c) {
+  const RequestAnswer& answer = c.answer;
+  if (answer.key.empty()) return invalid("key", "must not be empty");
+  static const std::string replace = insert_or_replace("request_answer", "actor, idempotency_key",
+                                                       "fingerprint, utime_us, status, location, body");
+  Rows rows(database_.statement(replace));
+  rows.bind(answer.actor).bind(answer.key).bind(answer.fingerprint).bind(answer.utime_us);
+  rows.bind(answer.status).bind(answer.location).bind(answer.body);
+  rows.run();
+  Rows(database_.statement("DELETE FROM request_answer WHERE utime_us < ?"))
+      .bind(answer.utime_us - kept_answer_us)
+      .run();
+  return 0;
+}
+
 Outcome SqlChanges::run(const RemoveRobot& c) {
   const auto change = [&](std::string_view sql) {
     return Rows(database_.statement(sql)).bind(c.robot_id).run();

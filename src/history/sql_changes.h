@@ -89,6 +89,8 @@ class SqlChanges {
   Outcome run(const AddProposal& command);
   Outcome run(const CloseProposal& command);
   Outcome run(const PruneMissions& command);
+  Outcome run(const PruneEvents& command);
+  Outcome run(const KeepAnswer& command);
   Outcome run(const RemoveRobot& command);
   Outcome run(const ReleaseLease& command);
 

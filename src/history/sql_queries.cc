@@ -198,6 +198,22 @@ Result<std::optional<ResumeState>> resume_state(Database& database, std::string_
   return read_resume_state(rows);
 }
 
+Result<std::optional<RequestAnswer>> answer(Database& database, std::string_view actor,
+                                            std::string_view key) {
+  Rows rows(database.statement(
+      "SELECT fingerprint, utime_us, status, location, body FROM request_answer WHERE actor = ? AND "
+      "idempotency_key = ?"));
+  rows.bind(actor).bind(key);
+  if (!rows.next()) return std::nullopt;
+  RequestAnswer found{std::string(actor), std::string(key), {}, 0, 0, {}, {}};
+  found.fingerprint = rows.text();
+  found.utime_us = rows.integer();
+  found.status = rows.integer();
+  found.location = rows.text();
+  found.body = rows.text();
+  return found;
+}
+
 Result<std::optional<Learned>> learned(Database& database, std::string_view robot_id,
                                        std::string_view topic) {
   Rows rows(database.statement("SELECT utime_us, body_json FROM learned WHERE robot_id = ? AND topic = ?"));

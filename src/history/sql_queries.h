@@ -62,6 +62,7 @@ Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange r
 Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std::int64_t limit,
                                   const std::optional<std::string>& robot_id);
 Result<std::optional<ResumeState>> resume_state(Database& database, std::string_view robot_id);
+Result<std::optional<RequestAnswer>> answer(Database& database, std::string_view actor, std::string_view key);
 Result<std::optional<Learned>> learned(Database& database, std::string_view robot_id, std::string_view topic);
 
 Result<DiagnosisRecord> diagnosis(Database& database, std::int64_t id);

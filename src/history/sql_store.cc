@@ -151,6 +151,10 @@ Result<std::vector<Event>> SqlStore::events(std::int64_t after_id, std::int64_t 
   return read([&](Database& database) { return queries::events(database, after_id, limit, robot_id); });
 }
 
+Result<std::optional<RequestAnswer>> SqlStore::answer(std::string_view actor, std::string_view key) const {
+  return read([&](Database& database) { return queries::answer(database, actor, key); });
+}
+
 Result<std::optional<Learned>> SqlStore::learned(std::string_view robot_id, std::string_view topic) const {
   return read([&](Database& database) { return queries::learned(database, robot_id, topic); });
 }

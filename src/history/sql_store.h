@@ -90,6 +90,7 @@ class SqlStore : public Store {
   Result<Trace> trace(MissionKey key, TimeRange range, std::int64_t max_points) const override;
   Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const override;
   Result<CovariatePage> covariates(MissionKey key, TimeRange range, const PageRequest& page) const override;
+  Result<std::optional<RequestAnswer>> answer(std::string_view actor, std::string_view key) const override;
   Result<std::vector<AuditEntry>> audit(std::int64_t before_id, std::int64_t limit) const override;
   Result<std::vector<Event>> events(std::int64_t after_id, std::int64_t limit,
                                     std::optional<std::string> robot_id) const override;

@@ -70,7 +70,7 @@ void configure_writer(Database& database) {
 
 bool deletes(const Command& command) {
   return std::holds_alternative<Prune>(command) || std::holds_alternative<PruneMissions>(command) ||
-         std::holds_alternative<RemoveRobot>(command);
+         std::holds_alternative<PruneEvents>(command) || std::holds_alternative<RemoveRobot>(command);
 }
 
 // Free pages are used again; only a store that has shrunk gives them back to the disk, 16 MB at a time. A

@@ -220,6 +220,9 @@ class Store : public History {
   virtual Result<std::vector<Event>> events(std::int64_t after_id, std::int64_t limit,
                                             std::optional<std::string> robot_id = std::nullopt) const = 0;
 
+  // The answer kept of that request; absent when there is none.
+  virtual Result<std::optional<RequestAnswer>> answer(std::string_view actor, std::string_view key) const = 0;
+
   // Entries of the audit, newest first, with id < before_id, at most `limit` (1 to max_page_size).
   virtual Result<std::vector<AuditEntry>> audit(std::int64_t before_id, std::int64_t limit) const = 0;
 

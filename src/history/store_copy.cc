@@ -38,6 +38,7 @@ const std::vector<Table>& all_tables() {
       {"diagnosis_report", {"diagnosis_id"}, 50, "diagnosis", "diagnosis_id"},
       {"proposal", {"proposal_id"}, 50},
       {"audit", {"audit_id"}, 1000},
+      {"request_answer", {"actor", "idempotency_key"}, 100},
   };
   return tables;
 }

@@ -22,15 +22,20 @@ using Seconds = std::chrono::duration<double>;
 
 constexpr std::chrono::milliseconds longest_sleep{1000};
 constexpr std::chrono::seconds slow_commit{5};  // longer, and the store counts as stalled
-constexpr std::chrono::seconds patience{4};     // with a commit that runs when its waiter's time is up
+constexpr std::chrono::seconds patience{4};     // with a commit that runs when stop()'s grace is over
 constexpr std::chrono::seconds tell_again{60};  // of a store that still takes no data
 constexpr double seconds_per_hour = 3600;
+constexpr std::int64_t events_at_once = 5000;  // that the retention drops in one transaction
 
 Error unavailable(std::string message) {
   return Error{Fault::unavailable, "store", std::move(message)};
 }
 Error stopping() {
   return unavailable("the writer is stopping; not done");
+}
+Error cut_off() {
+  return unavailable(
+      "the writer stopped while this was being committed; the store shows whether it was done");
 }
 
 // `later` follows `earlier` and concerns the same mission: one checkpoint that does what both would.
@@ -98,8 +103,8 @@ class Writer::Impl {
       queue_.erase(item);
       return tl::unexpected(unavailable("not committed in time and withdrawn; not done"));
     }
-    if (!waiter->done.wait_for(lock, patience, answered))
-      return tl::unexpected(unavailable("the commit does not return; whether it was done will be seen"));
+    // It is being committed: only the commit's end says whether it was done.
+    waiter->done.wait(lock, answered);
     return std::move(*waiter->outcome);
   }
 
@@ -412,7 +417,9 @@ class Writer::Impl {
     const auto now = Clock::now();
     if (steps_.take_step_us() != 0) distrust_until_ = now + options_.clock_distrust;
     const Retention& keep = options_.retention;
-    if (!keep.telemetry_max_age_us && !keep.telemetry_max_bytes && !options_.missions_max_age_us) return;
+    if (!keep.telemetry_max_age_us && !keep.telemetry_max_bytes && !options_.missions_max_age_us &&
+        !options_.events_kept)
+      return;
     if (options_.prunes && !options_.prunes()) return;
     if (now - last_prune_ < options_.prune_interval) return;
     bool more_is_due = false;
@@ -438,10 +445,14 @@ class Writer::Impl {
       // A full measure means that more is due: after the commands that came meanwhile.
       more_is_due = prune(by_size) == by_size.max_chunks;
     }
+    if (options_.events_kept) {
+      const PruneEvents events{*options_.events_kept, events_at_once};
+      more_is_due |= prune(events) == events.max_events;
+    }
     if (!more_is_due) last_prune_ = now;
   }
 
-  // The number of chunks or missions dropped.
+  // The number of chunks, missions or events dropped.
   std::int64_t prune(const Command& command) {
     const auto outcomes = store_.apply({&command, 1});
     const Outcome outcome = outcomes ? outcomes->front() : Outcome(tl::unexpected(outcomes.error()));
@@ -450,8 +461,10 @@ class Writer::Impl {
       return 0;
     }
     const std::lock_guard lock(mutex_);
-    (std::holds_alternative<Prune>(command) ? status_.pruned_chunks : status_.pruned_missions) +=
-        static_cast<std::uint64_t>(*outcome);
+    std::uint64_t& count = std::holds_alternative<Prune>(command)           ? status_.pruned_chunks
+                           : std::holds_alternative<PruneMissions>(command) ? status_.pruned_missions
+                                                                            : status_.pruned_events;
+    count += static_cast<std::uint64_t>(*outcome);
     return *outcome;
   }
 
@@ -463,9 +476,11 @@ class Writer::Impl {
     std::size_t k = 0;
     for (const Item& item : batch_.items) {
       const Command& command = batch_.commands[k++];
-      item.waiter ? refuse(*item.waiter) : spooled.push_back(&command);
+      item.waiter ? refuse(*item.waiter, attempt_since_ ? cut_off() : stopping())
+                  : spooled.push_back(&command);
     }
-    for (const Item& item : queue_) item.waiter ? refuse(*item.waiter) : spooled.push_back(&item.command);
+    for (const Item& item : queue_)
+      item.waiter ? refuse(*item.waiter, stopping()) : spooled.push_back(&item.command);
     left_ = batch_.items.size() + queue_.size();
     committed_.notify_all();
     if (spooled.empty()) return;
@@ -477,8 +492,8 @@ class Writer::Impl {
                           : number + "lost at the stop: " + describe(kept.error())));
   }
 
-  static void refuse(Waiter& waiter) {
-    waiter.outcome = tl::unexpected(stopping());
+  static void refuse(Waiter& waiter, Error why) {
+    waiter.outcome = tl::unexpected(std::move(why));
     waiter.queued = false;
     waiter.done.notify_all();
   }

@@ -22,6 +22,7 @@ struct WriterOptions {
   std::chrono::milliseconds retry_last{5000};       // up to this
   Retention retention;                              // enforced every prune_interval
   std::optional<std::int64_t> missions_max_age_us;  // as PruneMissions; absent: missions are kept for ever
+  std::optional<std::int64_t> events_kept;          // as PruneEvents; absent: events are kept for ever
   std::chrono::milliseconds prune_interval{60'000};
   std::function<bool()> prunes;  // whether this program enforces the retention now; empty: always
   // Retention by age goes by the wall clock, so it rests for this long after a step of that clock, and never
@@ -52,7 +53,7 @@ struct WriterStatus {
   std::uint64_t refused = 0;       // commands that the store refused (bad content, not trouble with the disk)
   std::uint64_t commits = 0;       // transactions committed
   std::uint64_t failed_commits = 0;  // attempts that failed and were tried again
-  std::uint64_t pruned_chunks = 0, pruned_missions = 0;
+  std::uint64_t pruned_chunks = 0, pruned_missions = 0, pruned_events = 0;
   double last_commit_s = 0;  // duration of the last successful apply()
   double max_commit_s = 0;
   double total_commit_s = 0;  // over all `commits`
@@ -81,8 +82,9 @@ class Writer {
   Result<void> offer(Command command);
   // Queues a command and waits for its commit. Fault::unavailable means that it was not done and will not be:
   // at once while the store takes no data; when an attempt to commit it fails; when the timeout passes before
-  // one began. Only a commit that does not return within 4 s after the timeout, or whose answer was cut off,
-  // is answered without being known.
+  // one began. An attempt that runs is waited for until it ends, however long that takes. Only where stop()
+  // cuts it off, or where the connection to the store broke during the commit and it stays unknown at the
+  // stop, is the outcome unknown, and the message says so.
   Outcome execute(Command command, std::chrono::milliseconds timeout = std::chrono::milliseconds{10'000});
   // Waits until everything posted before the call is committed.
   Result<void> flush(std::chrono::milliseconds timeout = std::chrono::milliseconds{30'000});

@@ -19,7 +19,9 @@ constexpr std::size_t most_lenders = 20;
 
 // Digits beyond the fifth are noise, and cost space.
 double shortened(double value) {
-  if (value == 0 || !std::isfinite(value)) return value;
+  constexpr double nothing = 1e-200;
+  if (std::fabs(value) < nothing) return 0;
+  if (!std::isfinite(value)) return value;
   const double scale = std::pow(10.0, 4 - std::floor(std::log10(std::fabs(value))));
   return std::round(value * scale) / scale;
 }

@@ -31,6 +31,11 @@ std::shared_ptr<const ModelInForce> ModelRegistry::find(std::string_view robot_i
   return found == models_.end() ? nullptr : found->second;
 }
 
+std::size_t ModelRegistry::size() const {
+  const std::shared_lock lock(mutex_);
+  return models_.size();
+}
+
 std::vector<std::shared_ptr<const ModelInForce>> ModelRegistry::all() const {
   const std::shared_lock lock(mutex_);
   std::vector<std::shared_ptr<const ModelInForce>> models;

@@ -34,6 +34,8 @@ class ModelRegistry {
   // All, by robot id.
   std::vector<std::shared_ptr<const ModelInForce>> all() const;
 
+  std::size_t size() const;
+
   // Grows with every change, so that users know when to look again.
   std::uint64_t epoch() const { return epoch_.load(std::memory_order_acquire); }
 

@@ -96,6 +96,7 @@ class Programs:
         self.lcm_url = f"udpm://{GROUP}:{self.lcm_port}?ttl=0&recv_buf_size=4194304"
         self.store = self.path("history.db")
         self.settings = []  # further options of the daemon
+        self.environment = {}  # and what its environment has besides
         self.process = None
         atexit.register(self.end)
 
@@ -112,7 +113,7 @@ class Programs:
         begin = self.log.seek(0, os.SEEK_END)
         self.process = subprocess.Popen(
             [self.options.daemon, "--http-port", "0", "--store-path", self.store, "--log-format", "json",
-             "--lcm-url", self.lcm_url, *self.settings], stderr=self.log)
+             "--lcm-url", self.lcm_url, *self.settings], stderr=self.log, env=os.environ | self.environment)
         until = time.monotonic() + 30
         while time.monotonic() < until and self.process.poll() is None:
             self.log.seek(begin)

@@ -2,78 +2,29 @@
 """The host's clock is set while robots drive: by an hour back, by an hour and then by sixty days forward. Robots stay live, their
 silence is counted by the time that passes, missions go on, no recording is deleted, and the step is told. The clock that the
 daemon sees is set through a preloaded library, not the machine's."""
-import mmap
 import os
-import shutil
 import sqlite3
-import struct
 import subprocess
 import time
 
-from harness import Programs, arguments, check, need_multicast, skip
+from harness import Programs, arguments, check, need_multicast
+from host_faults import HostFaults
 
 DAY_S = 86400
-CLOCK = r"""
-#include <fcntl.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <sys/mman.h>
-#include <sys/syscall.h>
-#include <sys/time.h>
-#include <time.h>
-#include <unistd.h>
-static const volatile int64_t* offset_s;
-__attribute__((constructor)) static void begin(void) {
-  int file = open(getenv("CLOCK_OFFSET"), O_RDONLY);
-  offset_s = mmap(0, 8, PROT_READ, MAP_SHARED, file, 0);
-}
-int clock_gettime(clockid_t clock, struct timespec* t) {
-  int code = syscall(SYS_clock_gettime, clock, t);
-  if (clock == CLOCK_REALTIME && offset_s) t->tv_sec += *offset_s;
-  return code;
-}
-int gettimeofday(struct timeval* restrict t, void* restrict zone) {
-  struct timespec now;
-  clock_gettime(CLOCK_REALTIME, &now);
-  t->tv_sec = now.tv_sec;
-  t->tv_usec = now.tv_nsec / 1000;
-  return 0;
-}
-"""
-
-
-def make_clock(programs):
-    """The preloaded library, and what sets the clock by so many seconds."""
-    if shutil.which("cc") is None:
-        skip("no C compiler")
-    source, library, offset = programs.path("clock.c"), programs.path("clock.so"), programs.path("offset")
-    with open(source, "w") as file:
-        file.write(CLOCK)
-    subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", library, source], check=True)
-    with open(offset, "wb") as file:
-        file.write(bytes(8))
-    shared = mmap.mmap(os.open(offset, os.O_RDWR), 8)
-
-    def set_clock(seconds):
-        shared[:8] = struct.pack("q", seconds)
-
-    return {"LD_PRELOAD": library, "CLOCK_OFFSET": offset}, set_clock
 
 
 def main():
     options = arguments()
     need_multicast()
     programs = Programs(options)
-    environment, set_clock = make_clock(programs)
+    faults = HostFaults(programs)
     # Recordings that are there already, which a wrong clock could age.
     log = programs.path("old.lcmlog")
     programs.run("simulate", "--robots", "1", "--robot", os.path.join(options.source, "deploy/robots/tug.json"), "--seed", "3",
                  "--missions", "2", "--mission-duration", "40", "--speed", "0", "--log", log)
     programs.run("replay", log, "--into", programs.store, "--robot", os.path.join(options.source, "deploy/robots/tug.json"))
-    os.environ.update(environment)
+    programs.environment = faults.environment
     programs.start()
-    for name in environment:
-        os.environ.pop(name)
     fleet = subprocess.Popen([options.client, "simulate", "--robots", "2", "--lcm-url", programs.lcm_url, "--server", programs.url,
                               "--rate", "50", "--missions", "1", "--mission-duration", "300", "--quiet"])
 
@@ -89,7 +40,7 @@ def main():
         started = {m["robot_id"]: m["id"] for m in programs.get("/v1/missions?state=open")["missions"]}
         check(len(started) == 2, f"open missions: {started}")
         for offset_s in (-3600, 3600, 60 * DAY_S):
-            set_clock(offset_s)
+            faults.set_clock(offset_s)
             time.sleep(3)
             open_now = {m["robot_id"]: m["id"] for m in programs.get("/v1/missions?state=open")["missions"]}
             check(open_now == started, f"missions after a step to {offset_s} s: {open_now} were {started}")

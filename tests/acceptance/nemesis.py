@@ -4,6 +4,7 @@ what came of it: every write that was acknowledged is stored and in force, every
 accepted sample is in exactly one mission, every ledger closes, the store is sound. By hand: --hours N --seed S."""
 import argparse
 import collections
+import errno
 import json
 import os
 import random
@@ -19,6 +20,7 @@ import urllib.request
 
 import harness
 from harness import GROUP, Programs, check, need_multicast
+from host_faults import READS, SYNCS, WRITES, HostFaults
 
 ROBOTS, RATE_HZ = 4, 20
 LOST_S = 1.3  # of each robot's samples, by a kill; or between the copy of a store and its coming into place
@@ -122,7 +124,10 @@ class Nemesis:
         self.mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", room, "tmpfs", self.volume],
                                       capture_output=True).returncode == 0
         self.programs.store = os.path.join(self.volume, "history.db")
-        self.kinds = ["kill", "kill", "pause", "lock", "term", "replaced", "deleted"] + ["full"] * self.mounted
+        self.host = HostFaults(self.programs)
+        self.programs.environment = self.host.environment
+        self.kinds = (["kill", "kill", "pause", "lock", "term", "replaced", "deleted", "read_only"] + ["broken"] * 2
+                      + ["clock"] * 2 + ["full"] * self.mounted)
 
     def metric(self, name):
         with urllib.request.urlopen(self.programs.url + "/metrics", timeout=10) as reply:
@@ -187,6 +192,30 @@ class Nemesis:
             time.sleep(5)
         time.sleep(self.random.uniform(0, 3))
         os.remove(ballast)
+
+    def broken(self):
+        """Accesses to the store's files fail with EIO, for a while or in short bursts."""
+        what = self.random.choice([WRITES, WRITES | SYNCS, SYNCS, READS, WRITES | READS | SYNCS])
+        for _ in range(self.random.choice([1, 1, 10])):
+            self.host.fail_disk(what, errno.EIO)
+            time.sleep(self.random.uniform(0.01, 2))
+            self.host.fail_disk(0)
+            time.sleep(self.random.uniform(0, 0.2))
+
+    def clock(self):
+        """The host's clock goes wrong, and right again."""
+        self.host.set_clock(self.random.choice([-86400, -3600, -30, 30, 3600, 60 * 86400]))
+        time.sleep(self.random.uniform(0.5, 4))
+        self.host.set_clock(0)
+
+    def read_only(self):
+        """The folder is mounted read-only over itself."""
+        mount = subprocess.run(["mount", "--bind", self.volume, self.volume], capture_output=True)
+        if mount.returncode == 0:
+            subprocess.run(["mount", "-o", "remount,ro,bind", self.volume], check=True)
+            self.wait(lambda: not self.ready(), "a store that cannot be written is noticed", 5)
+            time.sleep(self.random.uniform(0, 2))
+            subprocess.run(["umount", "-l", self.volume], check=True)
 
     def replaced(self, deleted=False):
         """A copy of the store comes into its place, or nothing does until the daemon has ended."""

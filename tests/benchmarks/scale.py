@@ -126,9 +126,11 @@ class Run:
         spent = [stat(daemon.pid)[1] - c for daemon, c in zip(self.daemons, cpu)]
         server = cpu_of_server(self.folder) - server
         received = sum(a["joulecast_ingest_messages_total"] - b["joulecast_ingest_messages_total"] for a, b in zip(after, before))
-        lost = 'joulecast_ingest_faults_total{reason="missing"}'
+        faults = sorted({name for a in after for name in a if name.startswith("joulecast_ingest_faults_total")})
+        grown = {re.search('"(.*)"', name)[1]: sum(a.get(name, 0) - b.get(name, 0) for a, b in zip(after, before)) for name in faults}
+        told = ", ".join(f"{reason} {count:.0f}" for reason, count in grown.items() if count) or "none"
         print(f"{self.count} daemon(s): {taken} samples booked in {played_s + settled_s:.0f} s, played in {played_s:.0f} s; received in all "
-              f"{received:.0f}, missing {sum(a[lost] - b[lost] for a, b in zip(after, before)):.0f}; processor time a booked sample: "
+              f"{received:.0f}, faults: {told}; processor time a booked sample: "
               f"daemons {1e6 * sum(spent) / taken:.1f} us ({', '.join(f'{s:.1f} s' for s in spent)}), PostgreSQL "
               f"{1e6 * server / taken:.1f} us; oldest commit waited {latest:.2f} s", flush=True)
 

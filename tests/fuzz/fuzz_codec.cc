@@ -8,6 +8,7 @@
 #include "signals/mission_event.h"
 #include "telemetry/codec.h"
 #include "telemetry/covariate_tracker.h"
+#include "telemetry/signature.h"
 #include "telemetry/validation.h"
 
 namespace t = joulecast::telemetry;
@@ -37,6 +38,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* raw, std::size_t size)
   static const auto mission =
       t::encode_mission_event("r", {0, "m", joulecast::signals::MissionPhase::started, 0, ""}).value();
   static const auto covariates = t::encode_covariates("r", {0, {{"a", 0}}}).value();
+  static const auto signed_message = t::encode_signed({}).value();
   static const auto state = [] {
     joulecast::signals::EnergyState s;
     s.robot_id = "r";
@@ -66,6 +68,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* raw, std::size_t size)
         if (joulecast::signals::changes_of(joulecast::signals::series_of(changes)).size() != changes.size())
           std::abort();
         return t::encode_covariates(d.robot_id, d.message);
+      });
+  try_type(
+      signed_message, data, [](const auto& bytes) { return t::decode_signed(bytes); },
+      [](const t::SignedMessage& d) {
+        if (t::is_authentic("ROBOT_TELEMETRY.r", d, "a key that signed nothing of this")) std::abort();
+        return t::encode_signed(d);
       });
   try_type(
       state, data, [](auto bytes) { return t::decode_energy_state(bytes); },

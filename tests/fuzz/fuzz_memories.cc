@@ -1,4 +1,5 @@
 #include "ingest/charge_watch.h"
+#include "ingest/forecasts.h"
 #include "ingest/refinement_watch.h"
 #include "robot/robot_file.h"
 #include "text_input.h"
@@ -17,5 +18,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   ingest::RefinementWatch refinement(robot, 1);
   refinement.recall(text);
   (void)refinement.memory_json();
+  if (const auto missions = ingest::legs_from_json(text)) {
+    static const auto model = answers::model_in_force(robot, 1).value();
+    forecast::RobotForecast forecast(model->robot, model->drive);
+    for (const forecast::PastMission& mission : *missions) forecast.learn(mission);
+    testing::require(ingest::legs_from_json(ingest::legs_json(*missions)).has_value());
+  }
   return 0;
 }

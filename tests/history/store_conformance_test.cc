@@ -1126,6 +1126,48 @@ TEST_P(StoreConformance, OldMissionsAreDroppedOldestFirst) {
   EXPECT_EQ(walk({}, 10), (std::vector<MissionKey>{missions[4].key, open.key}));
 }
 
+TEST_P(StoreConformance, EventsBeyondTheNewestAreDroppedOldestFirst) {
+  for (int k = 1; k <= 7; ++k) need(apply(AppendEvent{{0, k, k % 2 == 0 ? "amr-1" : "", "kind", "{}"}}));
+  const auto times = [&] {
+    std::vector<std::int64_t> all;
+    for (const Event& event : need(store_->events(0, 100, {}))) all.push_back(event.utime_us);
+    return all;
+  };
+  EXPECT_EQ(apply(PruneEvents{3, 0}).error().fault, Fault::invalid);
+  EXPECT_EQ(apply(PruneEvents{0, 1}).error().fault, Fault::invalid);
+  EXPECT_EQ(apply(PruneEvents{7, 10}), 0);
+  EXPECT_EQ(apply(PruneEvents{3, 2}), 2);
+  EXPECT_EQ(times(), (std::vector<std::int64_t>{3, 4, 5, 6, 7}));
+  EXPECT_EQ(apply(PruneEvents{3, 10}), 2);
+  EXPECT_EQ(times(), (std::vector<std::int64_t>{5, 6, 7}));
+  // Numbers go on: a reader that has seen event 7 misses nothing.
+  EXPECT_EQ(apply(PruneEvents{1, 10}), 2);
+  const std::int64_t last = need(store_->events(0, 100, {})).front().id;
+  EXPECT_EQ(need(apply(AppendEvent{{0, 8, "", "kind", "{}"}})), last + 1);
+}
+
+TEST_P(StoreConformance, AnswersOfRequestsAreKeptByActorAndKeyForAWeek) {
+  const RequestAnswer first{"ops", "key-1", "f1", 1'000, 202, "/v1/diagnoses/1", R"({"id": 1})"};
+  RequestAnswer nobody = first;
+  nobody.actor = "";
+  nobody.body = "{}";
+  need(apply(KeepAnswer{first}));
+  need(apply(KeepAnswer{nobody}));
+  EXPECT_EQ(need(store_->answer("ops", "key-1")), first);
+  EXPECT_EQ(need(store_->answer("", "key-1")), nobody);
+  EXPECT_EQ(need(store_->answer("ops", "key-2")), std::nullopt);
+  EXPECT_EQ(apply(KeepAnswer{{"ops", "", "f", 0, 200, "", ""}}).error().fault, Fault::invalid);
+  RequestAnswer later = first;
+  later.key = "key-2";
+  later.utime_us = first.utime_us + kept_answer_us;
+  need(apply(KeepAnswer{later}));
+  EXPECT_EQ(need(store_->answer("ops", "key-1")), first);
+  ++later.utime_us;
+  need(apply(KeepAnswer{later}));
+  EXPECT_EQ(need(store_->answer("ops", "key-1")), std::nullopt);
+  EXPECT_EQ(need(store_->answer("ops", "key-2")), later);
+}
+
 INSTANTIATE_TEST_SUITE_P(Stores, StoreConformance, testing::Values(store_kind()),
                          [](const auto& kind) { return kind.param.name; });
 

@@ -76,6 +76,9 @@ class FailingStore final : public Store {
   Result<TelemetryPage> telemetry(MissionKey k, TimeRange r, const PageRequest& p) const override {
     return store_->telemetry(k, r, p);
   }
+  Result<std::optional<RequestAnswer>> answer(std::string_view a, std::string_view k) const override {
+    return store_->answer(a, k);
+  }
   Result<std::vector<AuditEntry>> audit(std::int64_t before, std::int64_t n) const override {
     return store_->audit(before, n);
   }
@@ -359,12 +362,26 @@ TEST_F(WriterTest, ExecuteIsAnsweredByTheAttemptThatRunsWhenItsTimeIsUp) {
   Writer writer(store_, options());
   store_.hangs = true;
   std::thread disk([&] {
-    std::this_thread::sleep_for(milliseconds(200));
+    std::this_thread::sleep_for(milliseconds(6000));  // the store counts as stalled by then
     store_.hangs = false;
   });
   EXPECT_TRUE(writer.execute(event(0), milliseconds(50)));
   disk.join();
   EXPECT_EQ(stored(), numbers_to(1));
+}
+
+TEST_F(WriterTest, AnAttemptThatTheStopCutsOffIsNotCalledUndone) {
+  Writer writer(store_, options());
+  store_.hangs = true;
+  Outcome cut = 0;
+  std::thread caller([&] { cut = writer.execute(event(0), milliseconds(10)); });
+  ASSERT_TRUE(eventually([&] { return writer.status().attempt_s > 0; }));
+  EXPECT_FALSE(writer.stop(milliseconds(10)));
+  caller.join();
+  ASSERT_FALSE(cut);
+  EXPECT_THAT(cut.error().message, testing::HasSubstr("shows whether it was done"));
+  EXPECT_THAT(cut.error().message, testing::Not(testing::HasSubstr("not done")));
+  store_.hangs = false;
 }
 
 TEST_F(WriterTest, AFailedAttemptAnswersAtOnceAndIsNotRepeated) {

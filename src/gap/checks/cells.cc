@@ -13,6 +13,7 @@ constexpr double longest_gap_s = 1.0;  // within a cell or span, but for slower 
 constexpr double moving_part = 0.02;   // of the fastest wheel speed
 constexpr double resting_part = 0.005;
 constexpr double span_s = 2.0;
+constexpr double straight_rad = 0.1;  // turned between two samples at most, where a jump is judged
 
 double seconds(std::int64_t from_us, std::int64_t to_us) {
   return 1e-6 * static_cast<double>(to_us - from_us);
@@ -119,8 +120,11 @@ std::optional<Span> SpanCutter::add(const signals::Sample& sample) {
   }
   span_.gyro_rad += 0.5 * step * (last_->yaw_rate_rad_s + sample.yaw_rate_rad_s);
   const double turn = sample.pose[2] - last_->pose[2];
-  span_.heading_rad += std::remainder(turn, 2 * std::numbers::pi);
-  span_.heading_deg += std::remainder(turn, 360.0);
+  const double turn_rad = std::remainder(turn, 2 * std::numbers::pi);
+  // A jump by a turn in radians, of a robot that drives straight along the jump, is none in degrees.
+  const bool wraps_in_radians = std::fabs(turn) > 1 && std::fabs(turn_rad) < straight_rad;
+  span_.heading_rad += turn_rad;
+  span_.heading_deg += wraps_in_radians ? turn_rad : std::remainder(turn, 360.0);
   heading_sum_ += span_.heading_rad;
   ++rows_;
   last_ = sample;

@@ -48,6 +48,24 @@ TEST(Cells, DoNotReachAcrossGaps) {
   EXPECT_EQ(count, 0u);  // ten rows at 50 Hz are half a cell
 }
 
+// Along the heading at which radians wrap: its jumps are no turns, in either unit.
+TEST(Spans, JumpsOfAWrappedHeadingAreNoTurns) {
+  const auto recording = made::mission(20, 20, [](double, signals::Sample& s) {
+    s.wheel_velocity_rad_s = {10, 10};
+    s.pose = {0, 0, (s.sequence % 5 < 2 ? 1 : -1) * (std::numbers::pi - 0.01)};
+  });
+  SpanCutter cutter;
+  std::size_t count = 0;
+  for (const auto& s : recording.samples) {
+    const auto span = cutter.add(s);
+    if (!span) continue;
+    ++count;
+    EXPECT_LE(std::fabs(span->heading_rad), 0.021);
+    EXPECT_LE(std::fabs(span->heading_deg), 0.021);
+  }
+  EXPECT_GE(count, 8u);
+}
+
 // Along an arc to the left, by a map whose heading is in radians or in degrees.
 TEST(Spans, FollowAnArc) {
   const double radius = 4, speed = 0.8, rate = speed / radius;

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "server/diagnosis/diagnosis_service.h"
+
+// Bodies of requests that several fields make up, read from JSON. All that is wrong is told at once.
+namespace joulecast::api {
+
+// The body of POST /v1/robots/{id}/model: what to adopt, one of four, and how.
+struct ModelRequest {
+  const nlohmann::json* model = nullptr;  // within the body
+  std::optional<std::int64_t> diagnosis_id, proposal_id, version;
+  std::vector<std::string> effects;  // of those that the diagnosis does not tell apart, the ones to adopt
+  std::optional<std::string> note;
+  std::optional<std::int64_t> since_utime_us, expected_version;
+  bool force = false, dry_run = false;
+};
+
+Result<ModelRequest> read_model_request(const nlohmann::json& body);
+
+// The body of POST /v1/diagnoses.
+Result<server::DiagnosisRequest> read_diagnosis_request(const nlohmann::json& body);
+
+}  // namespace joulecast::api

@@ -1,0 +1,33 @@
+"""A host whose clock and disk fail under a program, by a library that is preloaded into it; see host_faults.c."""
+import errno
+import mmap
+import os
+import pathlib
+import shutil
+import struct
+import subprocess
+
+from harness import skip
+
+WRITES, READS, SYNCS = 1, 2, 4
+
+
+class HostFaults:
+    def __init__(self, programs, files="history.db"):
+        """Files: what the names of the files that fail contain."""
+        if shutil.which("cc") is None:
+            skip("no C compiler")
+        library, control = programs.path("host_faults.so"), programs.path("host_faults")
+        subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", library, pathlib.Path(__file__).with_suffix(".c"), "-ldl"],
+                       check=True)
+        pathlib.Path(control).write_bytes(bytes(24))
+        self.shared = mmap.mmap(os.open(control, os.O_RDWR), 24)
+        self.environment = {"LD_PRELOAD": library, "HOST_FAULTS": control, "HOST_FAULTS_FILE": files}
+
+    def set_clock(self, ahead_s):
+        self.shared[:8] = struct.pack("q", ahead_s)
+
+    def fail_disk(self, what, how=errno.EIO):
+        """What: of WRITES, READS and SYNCS, added; 0: the disk is well again."""
+        self.shared[16:24] = struct.pack("q", how)
+        self.shared[8:16] = struct.pack("q", what)

@@ -1,0 +1,47 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "client/commands/examples.h"
+#include "client/commands/table.h"
+#include "client/commands/wrong_use.h"
+#include "text_input.h"
+
+using namespace joulecast;
+
+namespace {
+
+CLI::App& program() {
+  static CLI::App app("joulecast", "joulecast");
+  static client::Exit exit = client::Exit::ok;
+  static const bool ready = [] {
+    for (const auto add : client::commands()) add(app, exit);
+    client::add_examples(app);
+    app.require_subcommand(1);
+    // What was parsed is not carried out.
+    app.parse_complete_callback([] { throw CLI::Success(); });
+    return true;
+  }();
+  (void)ready;
+  return app;
+}
+
+}  // namespace
+
+// Arguments of the command line, one a line.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  std::vector<std::string> arguments;
+  std::string text(testing::as_text(data, size));
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    arguments.insert(arguments.begin(), text.substr(begin, end - begin));  // CLI11 takes them last first
+    begin = end + 1;
+  }
+  try {
+    program().parse(std::move(arguments));
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() != 0) testing::require(!client::wrong_use(program(), error).empty());
+  }
+  return 0;
+}

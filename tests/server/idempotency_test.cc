@@ -1,0 +1,128 @@
+#include "server/http/idempotency.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+namespace joulecast::http {
+namespace {
+
+// One endpoint that counts how often it is done, behind keys kept in memory.
+class IdempotencyTest : public testing::Test {
+ protected:
+  IdempotencyTest() {
+    Endpoint change;
+    change.method = Method::post;
+    change.path = "/things/{id}";
+    change.operation_id = "changeThing";
+    change.role = Role::operate;
+    change.success_status = 202;
+    change.handler = [this](const Request& request) -> Result<Response> {
+      ++done_;
+      if (fails_) return fail(Fault::unavailable, "", "not now; not done");
+      Response response = json_response("{\"done\": " + std::to_string(done_) + "}");
+      response.status = 202;
+      response.headers.emplace_back("Location", "/things/" + request.param("id"));
+      return response;
+    };
+    Endpoint read;
+    read.path = "/things";
+    read.operation_id = "getThings";
+    read.role = Role::read;
+    read.handler = change.handler;
+    std::vector<Endpoint> table;
+    table.push_back(keys_.honoured(std::move(change)));
+    router_ = std::make_unique<Router>(std::move(table));
+    EXPECT_FALSE(takes_idempotency_key(read));
+  }
+
+  Response ask(const std::string& key, const std::string& actor = "ops", const std::string& body = "",
+               const std::string& target = "/things/a") {
+    Request request;
+    request.method = Method::post;
+    request.target = target;
+    request.actor = actor;
+    request.body = body;
+    if (!key.empty()) request.headers.emplace_back("Idempotency-Key", key);
+    return router_->handle(request);
+  }
+
+  static std::string header(const Response& response, const std::string& name) {
+    for (const auto& [each, value] : response.headers)
+      if (each == name) return value;
+    return "";
+  }
+
+  int done_ = 0;
+  bool fails_ = false, readable_ = true;
+  std::map<std::pair<std::string, std::string>, IdempotencyKeys::Answer> kept_;
+  IdempotencyKeys keys_{
+      {.find = [this](const std::string& actor,
+                      const std::string& key) -> Result<std::optional<IdempotencyKeys::Answer>> {
+         if (!readable_) return fail(Fault::unavailable, "store", "cannot be read");
+         const auto found = kept_.find({actor, key});
+         if (found == kept_.end()) return std::nullopt;
+         return found->second;
+       },
+       .keep =
+           [this](IdempotencyKeys::Answer answer) {
+             kept_[{answer.actor, answer.key}] = answer;
+           }}};
+  std::unique_ptr<Router> router_;
+};
+
+TEST_F(IdempotencyTest, ARepetitionIsAnsweredAsBeforeAndChangesNothing) {
+  const Response first = ask("k1");
+  const Response again = ask("k1");
+  EXPECT_EQ(done_, 1);
+  EXPECT_EQ(again.status, 202u);
+  EXPECT_EQ(again.body, first.body);
+  EXPECT_EQ(header(again, "Location"), "/things/a");
+  EXPECT_EQ(header(again, "Idempotency-Replayed"), "true");
+  EXPECT_EQ(header(first, "Idempotency-Replayed"), "");
+}
+
+TEST_F(IdempotencyTest, KeysAreOfOneActorAndRequestsWithoutOneAreDoneEachTime) {
+  ask("k1");
+  ask("k1", "someone else");
+  EXPECT_EQ(done_, 2);
+  ask("");
+  ask("");
+  EXPECT_EQ(done_, 4);
+  EXPECT_EQ(kept_.size(), 2u);
+}
+
+TEST_F(IdempotencyTest, AnotherRequestUnderAUsedKeyIsRefused) {
+  ask("k1");
+  for (const Response& refused : {ask("k1", "ops", "{}"), ask("k1", "ops", "", "/things/b")}) {
+    EXPECT_EQ(refused.status, 422u);
+    EXPECT_NE(refused.body.find("Idempotency-Key"), std::string::npos) << refused.body;
+  }
+  EXPECT_EQ(done_, 1);
+}
+
+TEST_F(IdempotencyTest, WhatWasNotDoneMayBeTriedAgainUnderItsKey) {
+  fails_ = true;
+  EXPECT_EQ(ask("k1").status, 503u);
+  fails_ = false;
+  EXPECT_EQ(ask("k1").status, 202u);
+  EXPECT_EQ(done_, 2);
+}
+
+TEST_F(IdempotencyTest, NothingIsDoneWhereItIsUnknownWhetherItWasDone) {
+  readable_ = false;
+  EXPECT_EQ(ask("k1").status, 503u);
+  EXPECT_EQ(done_, 0);
+}
+
+TEST_F(IdempotencyTest, KeysAreVisibleAsciiOfLimitedLength) {
+  for (const std::string& key : {std::string(256, 'k'), std::string("a b"), std::string("\xc3\xa4")})
+    EXPECT_EQ(ask(key).status, 422u) << key;
+  EXPECT_EQ(done_, 0);
+  EXPECT_EQ(ask(std::string(255, 'k')).status, 202u);
+}
+
+}  // namespace
+}  // namespace joulecast::http
