@@ -48,9 +48,10 @@ CREATE TABLE cluster_writer (
 -- Keys of missions are given out a thousand at a time.
 CREATE SEQUENCE cluster_mission_keys INCREMENT 1000 MINVALUE 1;
 
--- Diagnoses that wait or run, and the writer of the daemon that has each.
+-- Diagnoses that wait or run, and the writer of the daemon that has each. Not a reference, for diagnoses can be distributed by
+-- robot and this table cannot.
 CREATE TABLE cluster_job (
-  diagnosis_id BIGINT NOT NULL PRIMARY KEY REFERENCES diagnosis (diagnosis_id) ON DELETE CASCADE,
+  diagnosis_id BIGINT NOT NULL PRIMARY KEY,
   writer TEXT NOT NULL
 );
 

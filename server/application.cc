@@ -185,13 +185,16 @@ struct Application::Parts {
       return tl::unexpected(std::move(wanted.error()));
     else if (!wanted->name.empty())
       in_cluster = std::move(*wanted);
+    const Result<history::StandbyOptions> standby = standby_options(settings);
+    if (!standby) return tl::unexpected(standby.error());
     Result<std::unique_ptr<history::Store>> opened =
         in_cluster ? history::open_shared_store(
                          in_cluster->url, in_cluster->writer,
                          [this](const std::string& robot_id, history::Epoch epoch, std::uint64_t count) {
                            if (joined) cluster->on_dropped(robot_id, epoch, count);
-                         })
-                   : history::open_store(store_url(settings));
+                         },
+                         *standby)
+                   : history::open_store(store_url(settings), *standby);
     if (!opened)
       return fail(opened.error().fault, by_path ? "store.path" : "store.url",
                   std::move(opened.error().message));
@@ -329,6 +332,7 @@ struct Application::Parts {
     server::export_metrics(metrics, counters, *ingest, fleet, *writer, *store, events, host_utime_us);
     server::export_gap_metrics(metrics, *diagnoses, *watch, *adoption);
     if (cluster) server::export_cluster_metrics(metrics, *cluster);
+    if (store->standby()) server::export_standby_metrics(metrics, *store);
     server::export_process_metrics(metrics);
     server::export_robot_metrics(metrics, fleet, *watch, host_utime_us,
                                  static_cast<std::size_t>(settings.integer("metrics.robots")));
@@ -639,8 +643,9 @@ std::vector<Error> faulty_robot_files(const Settings& settings) {
 
 std::vector<Error> faults_of_store(const Settings& settings) {
   const Result<void> sound = history::check_store_url(store_url(settings));
-  return sound ? std::vector<Error>{}
-               : std::vector<Error>{{Fault::invalid, "store.url", sound.error().message}};
+  if (!sound) return {{Fault::invalid, "store.url", sound.error().message}};
+  const auto standby = standby_options(settings);
+  return standby ? std::vector<Error>{} : std::vector<Error>{standby.error()};
 }
 
 bool Application::stop() {

@@ -184,4 +184,24 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
   export_streams(metrics, events);
 }
 
+void export_standby_metrics(Metrics& metrics, const history::Store& store) {
+  const Gauge standby_used =
+      metrics.gauge("joulecast_store_standby_in_use", "1 while the standby of store.read_url answers");
+  const Gauge standby_age = metrics.gauge("joulecast_store_standby_staleness_seconds",
+                                          "How old what this standby shows may be; NaN: unknown");
+  const Counter standby_answers =
+      metrics.counter("joulecast_store_standby_answers_total", "Questions that the standby answered");
+  const Counter standby_passed =
+      metrics.counter("joulecast_store_standby_passed_on_total",
+                      "Questions that the server of store.url answered instead of the standby");
+  metrics.before_scrape([=, &store] {
+    const auto standby = store.standby();
+    if (!standby) return;
+    standby_used.set(standby->in_use ? 1 : 0);
+    standby_age.set(standby->staleness_s.value_or(std::nan("")));
+    standby_answers.raise_to(static_cast<double>(standby->answered));
+    standby_passed.raise_to(static_cast<double>(standby->passed_on));
+  });
+}
+
 }  // namespace joulecast::server

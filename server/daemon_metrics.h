@@ -16,4 +16,7 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
                     const history::Writer& writer, const history::Store& store, const http::EventHub& events,
                     std::function<std::int64_t()> now_utime_us);
 
+// Of the standby that the store reads beside itself.
+void export_standby_metrics(Metrics& metrics, const history::Store& store);
+
 }  // namespace joulecast::server

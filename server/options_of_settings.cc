@@ -42,6 +42,18 @@ std::string store_url(const Settings& settings) {
   return url.empty() ? "sqlite:" + settings.text("store.path") : url;
 }
 
+Result<history::StandbyOptions> standby_options(const Settings& settings) {
+  history::StandbyOptions options;
+  options.url = settings.text("store.read_url");
+  options.max_staleness_s = settings.number("store.read_staleness_s");
+  if (options.url.empty()) return options;
+  if (!history::is_postgres_url(options.url) || !history::is_postgres_url(store_url(settings)))
+    return invalid("store.read_url", "must be the postgresql://... of a standby of the server of store.url");
+  if (Result<void> sound = history::check_store_url(options.url); !sound)
+    return invalid("store.read_url", sound.error().message);
+  return options;
+}
+
 // Beside the SQLite file; a file of this machine also where the history is kept elsewhere.
 std::string spool_path(const Settings& settings) {
   const std::string url = store_url(settings);

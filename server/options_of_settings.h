@@ -3,6 +3,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "history/open_store.h"
 #include "history/writer.h"
 #include "ingest/ingest_service.h"
 #include "server/cluster/cluster.h"
@@ -19,6 +20,8 @@
 namespace joulecast {
 
 std::string store_url(const Settings& settings);
+// Fault::invalid on "store.read_url".
+Result<history::StandbyOptions> standby_options(const Settings& settings);
 // Beside the SQLite file; a file of this machine also where the history is kept elsewhere.
 std::string spool_path(const Settings& settings);
 

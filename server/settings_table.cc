@@ -91,6 +91,12 @@ constexpr Setting table[] = {
     {"store.url", Type::text, "", 0, 0, "",
      "database of the history: sqlite:PATH or postgresql://user@host1,host2/database; empty: sqlite: and "
      "store.path"},
+    {"store.read_url", Type::text, "", 0, 0, "",
+     "standby of the PostgreSQL of store.url that answers questions of the history; the answer says how old "
+     "it "
+     "may be; empty: none"},
+    {"store.read_staleness_s", Type::number, "5", 0.5, 3600, "s",
+     "age of what this standby shows beyond which the server of store.url answers instead"},
     {"store.retention_days", Type::number, "30", 0, 36500, "d",
      "age at which raw telemetry is deleted, at most 5 % of it an hour; 0: never"},
     {"store.retention_bytes", Type::integer, "10737418240", 0, 1e15, "B",

@@ -157,17 +157,17 @@ Response list_csv(const Request& request, const history::MissionPage& page) {
 Result<Response> list(const Services& services, const Request& request) {
   const Result<history::MissionFilter> filter = filter_of(request);
   if (!filter) return tl::unexpected(filter.error());
-  Result<history::MissionPage> found =
-      services.store.missions(*filter, page_of(request, 50), sort_of(request));
+  const history::Past past = past_of(services, request);
+  Result<history::MissionPage> found = past.history.missions(*filter, page_of(request, 50), sort_of(request));
   if (!found) return tl::unexpected(std::move(found.error()));
-  if (request.csv) return list_csv(request, *found);
+  if (request.csv) return told_staleness(list_csv(request, *found), past);
   JsonWriter json;
   json.begin_object().key("missions").begin_array();
   for (const history::Mission& mission : found->missions) answers::write_mission(json, mission);
   json.end_array();
   write_cursor(json, found->next_cursor);
   json.end_object();
-  return http::json_response(json.take());
+  return told_staleness(http::json_response(json.take()), past);
 }
 
 // Missions that are summed together.
@@ -178,8 +178,9 @@ struct Group {
 };
 
 // Robots of one kind together; those without a model are one more kind.
-Result<std::vector<Group>> groups_by_kind(const Services& services, history::MissionFilter filter) {
-  const auto robots = services.store.grouped_totals(filter, history::Grouping::robot, 0);
+Result<std::vector<Group>> groups_by_kind(const Services& services, const history::History& history,
+                                          history::MissionFilter filter) {
+  const auto robots = history.grouped_totals(filter, history::Grouping::robot, 0);
   if (!robots) return tl::unexpected(robots.error());
   std::map<std::string, std::vector<std::string>> kinds;
   for (const history::TotalsGroup& each : *robots) {
@@ -189,25 +190,25 @@ Result<std::vector<Group>> groups_by_kind(const Services& services, history::Mis
   std::vector<Group> groups;
   for (auto& [kind, ids] : kinds) {
     filter.robot_ids = ids;
-    const Result<history::Totals> totals = services.store.totals(filter);
+    const Result<history::Totals> totals = history.totals(filter);
     if (!totals) return tl::unexpected(totals.error());
     groups.push_back({std::move(ids), std::nullopt, std::nullopt, *totals});
   }
   return groups;
 }
 
-Result<std::vector<Group>> groups_of(const Services& services, const Request& request,
-                                     const history::MissionFilter& filter) {
+Result<std::vector<Group>> groups_of(const Services& services, const history::History& history,
+                                     const Request& request, const history::MissionFilter& filter) {
   const auto by = request.query_value("group_by");
   if (!by) return std::vector<Group>{};
-  if (*by == "kind") return groups_by_kind(services, filter);
+  if (*by == "kind") return groups_by_kind(services, history, filter);
   const bool robot = *by == "robot";
   const std::int64_t days = *by == "week" ? 7 : 1;
   const auto grouping = robot       ? history::Grouping::robot
                         : days == 7 ? history::Grouping::week
                                     : history::Grouping::day;
-  const auto found = services.store.grouped_totals(filter, grouping,
-                                                   60 * request.query_integer("utc_offset_min").value_or(0));
+  const auto found =
+      history.grouped_totals(filter, grouping, 60 * request.query_integer("utc_offset_min").value_or(0));
   if (!found) return tl::unexpected(found.error());
   std::vector<Group> groups;
   for (const history::TotalsGroup& each : *found) {
@@ -256,12 +257,15 @@ Response totals_csv(const Request& request, const std::vector<Group>& groups) {
 Result<Response> totals(const Services& services, const Request& request) {
   const Result<history::MissionFilter> filter = filter_of(request);
   if (!filter) return tl::unexpected(filter.error());
-  Result<history::Totals> all = services.store.totals(*filter);
+  const history::Past past = past_of(services, request);
+  Result<history::Totals> all = past.history.totals(*filter);
   if (!all) return tl::unexpected(std::move(all.error()));
-  const Result<std::vector<Group>> groups = groups_of(services, request, *filter);
+  const Result<std::vector<Group>> groups = groups_of(services, past.history, request, *filter);
   if (!groups) return tl::unexpected(groups.error());
   const bool grouped = request.query_value("group_by").has_value();
-  if (request.csv) return totals_csv(request, grouped ? *groups : std::vector<Group>{{{}, {}, {}, *all}});
+  if (request.csv)
+    return told_staleness(totals_csv(request, grouped ? *groups : std::vector<Group>{{{}, {}, {}, *all}}),
+                          past);
   JsonWriter json;
   json.begin_object();
   write_totals(json, *all);
@@ -279,7 +283,7 @@ Result<Response> totals(const Services& services, const Request& request) {
     json.end_array();
   }
   json.end_object();
-  return http::json_response(json.take());
+  return told_staleness(http::json_response(json.take()), past);
 }
 
 }  // namespace

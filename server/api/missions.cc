@@ -186,10 +186,11 @@ Response telemetry_csv(const Request& request, const history::TelemetryPage& pag
 Result<Response> trace(const Services& services, const Request& request) {
   const Result<Span> span = span_of(request);
   if (!span) return tl::unexpected(span.error());
+  const history::Past past = past_of(services, request);
   const Result<history::Trace> found =
-      services.store.trace(span->key, span->range, request.query_integer("points").value_or(1000));
+      past.history.trace(span->key, span->range, request.query_integer("points").value_or(1000));
   if (!found) return tl::unexpected(found.error());
-  if (request.csv) return trace_csv(request, *found, span->key);
+  if (request.csv) return told_staleness(trace_csv(request, *found, span->key), past);
   JsonWriter json;
   json.begin_object();
   json.field("id", span->key);
@@ -229,16 +230,17 @@ Result<Response> trace(const Services& services, const Request& request) {
   write(
       "y_m", [](const Bucket& b) { return b.y_m; }, 4);
   json.end_object();
-  return http::json_response(json.take());
+  return told_staleness(http::json_response(json.take()), past);
 }
 
 Result<Response> raw_telemetry(const Services& services, const Request& request) {
   const Result<Span> span = span_of(request);
   if (!span) return tl::unexpected(span.error());
+  const history::Past past = past_of(services, request);
   const Result<history::TelemetryPage> found =
-      services.store.telemetry(span->key, span->range, page_of(request, 1000));
+      past.history.telemetry(span->key, span->range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
-  if (request.csv) return telemetry_csv(request, *found, span->key);
+  if (request.csv) return told_staleness(telemetry_csv(request, *found, span->key), past);
   const auto& samples = found->samples;
   JsonWriter json;
   json.begin_object();
@@ -263,16 +265,17 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
   }
   write_cursor(json, found->next_cursor);
   json.end_object();
-  return http::json_response(json.take());
+  return told_staleness(http::json_response(json.take()), past);
 }
 
 Result<Response> covariates(const Services& services, const Request& request) {
   const Result<Span> span = span_of(request);
   if (!span) return tl::unexpected(span.error());
+  const history::Past past = past_of(services, request);
   const Result<history::CovariatePage> found =
-      services.store.covariates(span->key, span->range, page_of(request, 1000));
+      past.history.covariates(span->key, span->range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
-  if (request.csv) return covariates_csv(request, *found, span->key);
+  if (request.csv) return told_staleness(covariates_csv(request, *found, span->key), past);
   JsonWriter json;
   json.begin_object();
   json.field("id", span->key);
@@ -286,7 +289,7 @@ Result<Response> covariates(const Services& services, const Request& request) {
   json.end_array();
   write_cursor(json, found->next_cursor);
   json.end_object();
-  return http::json_response(json.take());
+  return told_staleness(http::json_response(json.take()), past);
 }
 
 }  // namespace

@@ -1,6 +1,10 @@
 #include "server/api/services.h"
 
+#include <array>
+#include <charconv>
 #include <iterator>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include "server/api/common_parameters.h"
@@ -51,6 +55,21 @@ Result<std::shared_ptr<const ingest::ModelInForce>> model_of(const Services& ser
     return tl::unexpected(ingest::unknown_robot(std::move(field), robot_id));
   return fail(Fault::not_found, std::move(field),
               "robot " + robot_id + " publishes telemetry but has no model yet: PUT /v1/robots/" + robot_id);
+}
+
+history::Past past_of(const Services& services, const http::Request& request) {
+  const bool newest = request.header("cache-control").find("no-cache") != std::string_view::npos;
+  return newest ? history::Past{services.store, std::nullopt} : services.store.past();
+}
+
+http::Response told_staleness(http::Response response, const history::Past& past) {
+  if (past.staleness_s) {
+    std::array<char, 32> text{};
+    const auto end =
+        std::to_chars(text.data(), text.data() + text.size(), *past.staleness_s, std::chars_format::fixed, 3);
+    response.headers.emplace_back("Joulecast-Staleness", std::string(text.data(), end.ptr));
+  }
+  return response;
 }
 
 }  // namespace joulecast::api

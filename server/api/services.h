@@ -76,4 +76,10 @@ Result<std::shared_ptr<const ingest::ModelInForce>> model_of(const Services& ser
                                                              const std::string& robot_id,
                                                              std::string field = "id");
 
+// Where a request's questions of what was are asked: at a standby where there is one, but of a client that
+// says Cache-Control: no-cache, which sees all that was committed.
+history::Past past_of(const Services& services, const http::Request& request);
+// The answer with how old it may be, in seconds: Joulecast-Staleness, absent where nothing is missing.
+http::Response told_staleness(http::Response response, const history::Past& past);
+
 }  // namespace joulecast::api

@@ -33,12 +33,13 @@ void Cors::add_headers(const Request& request, Response& response) const {
     response.headers.emplace_back("Access-Control-Allow-Methods", methods);
     response.headers.emplace_back(
         "Access-Control-Allow-Headers",
-        "Accept, Authorization, Content-Type, Idempotency-Key, If-None-Match, Last-Event-ID, X-Request-Id");
+        "Accept, Authorization, Cache-Control, Content-Type, Idempotency-Key, If-None-Match, Last-Event-ID, "
+        "X-Request-Id");
     response.headers.emplace_back("Access-Control-Max-Age", preflight_age_s);
   } else {
     response.headers.emplace_back(
         "Access-Control-Expose-Headers",
-        "ETag, Idempotency-Replayed, Link, Location, Retry-After, WWW-Authenticate, "
+        "ETag, Idempotency-Replayed, Joulecast-Staleness, Link, Location, Retry-After, WWW-Authenticate, "
         "X-Request-Id");
   }
 }

@@ -81,19 +81,25 @@ std::string sqlite_path(const std::string& url) {
   return url.starts_with(sqlite_scheme) ? url.substr(sqlite_scheme.size()) : url;
 }
 
-Result<std::unique_ptr<Store>> open_store(const std::string& url) {
+Result<std::unique_ptr<Store>> open_store(const std::string& url, const StandbyOptions& standby) {
   if (auto ok = check_store_url(url); !ok) return tl::unexpected(ok.error());
-  if (is_postgres_url(url)) return open_postgres_store(postgres_options(url));
+  if (is_postgres_url(url)) {
+    PostgresOptions options = postgres_options(url);
+    options.standby = standby;
+    return open_postgres_store(options);
+  }
+  if (!standby.url.empty()) return invalid("standby", "only a PostgreSQL has standbys");
   return open_sqlite_store(sqlite_options(url));
 }
 
 Result<std::unique_ptr<Store>> open_shared_store(
     const std::string& url, const std::string& writer,
-    std::function<void(const std::string&, Epoch, std::uint64_t)> on_dropped) {
+    std::function<void(const std::string&, Epoch, std::uint64_t)> on_dropped, const StandbyOptions& standby) {
   if (!is_postgres_url(url)) return invalid("url", "must be postgresql://...");
   PostgresOptions options = postgres_options(url);
   options.shared_writer = writer;
   options.on_dropped = std::move(on_dropped);
+  options.standby = standby;
   return open_postgres_store(options);
 }
 

@@ -19,15 +19,23 @@ bool is_postgres_url(std::string_view url);
 // Whether it is a URL or path of a store at all; asks nothing of it. Fault::invalid on "url".
 Result<void> check_store_url(const std::string& url);
 
+// A standby of a store's server, for Store::past().
+struct StandbyOptions {
+  std::string url;             // as the store's; empty: none
+  double max_staleness_s = 5;  // beyond, the store itself is asked
+  std::size_t readers = 4;     // connections; a question beyond that many waits for one
+};
+
 // Opens the store of a URL: sqlite:PATH, a PATH, or postgresql://... The errors are open_sqlite_store()'s and
-// open_postgres_store()'s; Fault::invalid on "url" for any other scheme.
-Result<std::unique_ptr<Store>> open_store(const std::string& url);
+// open_postgres_store()'s; Fault::invalid on "url" for any other scheme. Of the standby nothing is asked yet.
+Result<std::unique_ptr<Store>> open_store(const std::string& url, const StandbyOptions& standby = {});
 
 // The store of a PostgreSQL URL, which other programs that name themselves write to as well: see
 // PostgresOptions for `writer` and `on_dropped`.
 Result<std::unique_ptr<Store>> open_shared_store(
     const std::string& url, const std::string& writer,
-    std::function<void(const std::string& robot_id, Epoch epoch, std::uint64_t count)> on_dropped);
+    std::function<void(const std::string& robot_id, Epoch epoch, std::uint64_t count)> on_dropped,
+    const StandbyOptions& standby = {});
 
 // The same as tables, held against every other program until it is let go. When `must_exist`, nothing is
 // made: the errors are then also open_to_read()'s.

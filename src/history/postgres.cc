@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "history/postgres_partitions.h"
+
 namespace joulecast::history {
 namespace {
 
@@ -219,7 +221,8 @@ Result<void> check_postgres_url(const std::string& url) {
   return sound;
 }
 
-PostgresDatabase::PostgresDatabase(const std::string& url, const std::string& application_name) {
+PostgresDatabase::PostgresDatabase(const std::string& url, const std::string& application_name,
+                                   const char* session) {
   // What the URL says comes later and prevails, but for the name. A peer that vanished is noticed within half
   // a minute.
   const std::array<const char*, 10> keywords = {"connect_timeout",
@@ -233,7 +236,7 @@ PostgresDatabase::PostgresDatabase(const std::string& url, const std::string& ap
                                                 "client_encoding",
                                                 nullptr};
   const std::array<const char*, 10> values = {
-      "5", "read-write", "15000", "10", "5", "3", url.c_str(), application_name.c_str(), "UTF8", nullptr};
+      "5", session, "15000", "10", "5", "3", url.c_str(), application_name.c_str(), "UTF8", nullptr};
   handle_ = PQconnectdbParams(keywords.data(), values.data(), 1);
   if (PQstatus(handle_) != CONNECTION_OK) {
     const std::string message = trimmed(PQerrorMessage(handle_));
@@ -289,6 +292,14 @@ std::unique_ptr<Statement> PostgresDatabase::prepare_to_keep(std::string_view sq
 bool PostgresDatabase::has_table(std::string_view name) {
   Rows rows(statement("SELECT to_regclass(?) IS NOT NULL"));
   return rows.bind(name).next() && rows.boolean();
+}
+
+void PostgresDatabase::expect_rows(std::string_view table, std::int64_t first_utime_us,
+                                   std::int64_t last_utime_us) {
+  if (in_transaction()) return make_partitions(*this, table, first_utime_us, last_utime_us);
+  Transaction transaction(*this, Access::write);
+  make_partitions(*this, table, first_utime_us, last_utime_us);
+  transaction.commit();
 }
 
 std::string PostgresDatabase::prepare_as_name(const std::string& sql) {

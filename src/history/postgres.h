@@ -22,13 +22,17 @@ Result<void> check_postgres_url(const std::string& url);
 // A connection through libpq. The URL is libpq's (postgresql://user@host1,host2/database?option=value).
 class PostgresDatabase final : public Database {
  public:
-  // `application_name` tells the connection apart in pg_stat_activity.
-  PostgresDatabase(const std::string& url, const std::string& application_name);
+  // `application_name` tells the connection apart in pg_stat_activity. `session`: which of several hosts will
+  // do, unless the URL says it (libpq's target_session_attrs).
+  PostgresDatabase(const std::string& url, const std::string& application_name,
+                   const char* session = "read-write");
   ~PostgresDatabase() override;
 
   void execute(const std::string& sql) override;
   std::unique_ptr<Statement> prepare(std::string_view sql) override;
   bool has_table(std::string_view name) override;
+  bool keyed_by_robot() const override { return true; }
+  void expect_rows(std::string_view table, std::int64_t first_utime_us, std::int64_t last_utime_us) override;
   void finish_later() override;
   bool is_usable() const override;
   bool in_transaction() const override;

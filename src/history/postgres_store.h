@@ -8,6 +8,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "history/open_store.h"
 #include "history/sql.h"
 #include "history/store.h"
 
@@ -23,6 +24,7 @@ struct PostgresOptions {
   std::string shared_writer;
   // How many commands were dropped for carrying this epoch of a robot's lease; called on apply()'s thread.
   std::function<void(const std::string& robot_id, Epoch epoch, std::uint64_t count)> on_dropped;
+  StandbyOptions standby;
 };
 
 // Names this run of the program among all that ever wrote to a store.

@@ -141,6 +141,12 @@ class Database {
   std::string text(std::string_view sql);
 
   virtual bool has_table(std::string_view name) = 0;
+  // Whether its tables are those of schemas/store_by_robot.postgresql.sql: keys begin with the robot, and
+  // what belongs to a mission names it.
+  virtual bool keyed_by_robot() const { return false; }
+  // Rows of the table with times from the first to the last one will be inserted.
+  virtual void expect_rows(std::string_view /*table*/, std::int64_t /*first_utime_us*/,
+                           std::int64_t /*last_utime_us*/) {}
 
   // False when the connection is lost for good.
   virtual bool is_usable() const { return true; }

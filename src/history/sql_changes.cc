@@ -1,5 +1,7 @@
 #include "history/sql_changes.h"
 
+#include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
@@ -7,6 +9,7 @@
 #include <utility>
 
 #include "history/audit.h"
+#include "history/keyed_sql.h"
 #include "history/sql_chunks.h"
 #include "history/sql_rows.h"
 
@@ -31,6 +34,50 @@ Result<void> check_trace(const std::vector<TraceBucket>& trace) {
   return {};
 }
 
+// Where missions go on; `which` says of which missions.
+std::string places_sql(bool keyed_by_robot, const std::string& which) {
+  return "SELECT mission_key, robot_id, start_utime_us, telemetry_samples, covariate_changes, state <> "
+         "'open' "
+         "FROM mission WHERE " +
+         which +
+         // Whoever deletes the mission waits, and finds what is stored of it.
+         (keyed_by_robot ? " FOR NO KEY UPDATE" : "");
+}
+
+std::string tails_sql(bool keyed_by_robot) {
+  return "SELECT " + chunks::samples_in_tail_sql(keyed_by_robot) + ", " +
+         chunks::changes_in_tail_sql(keyed_by_robot) + " FROM mission WHERE mission_key = ?";
+}
+
+const std::string& checkpoint_columns() {
+  static const std::string columns =
+      mission_content_columns() + ", telemetry_samples, covariate_changes, robot_id, mission_key";
+  return columns;
+}
+
+BulkRows bulk_checkpoints() {
+  return {"mission", checkpoint_columns(), [](const std::string& from) {
+            std::string values;
+            const std::string& all = mission_content_columns();
+            for (std::size_t at = 0; at < all.size();) {
+              const std::size_t end = std::min(all.find(", ", at), all.size());
+              values += "new." + all.substr(at, end - at) + ", ";
+              at = end + 2;
+            }
+            return "UPDATE mission SET (" + all + ", telemetry_samples, covariate_changes) = (" + values +
+                   "mission.telemetry_samples + new.telemetry_samples, mission.covariate_changes + "
+                   "new.covariate_changes) FROM " +
+                   from + " WHERE mission.robot_id = new.robot_id AND mission.mission_key = new.mission_key";
+          }};
+}
+
+BulkRows bulk_tails() {
+  return {"telemetry_chunk", chunks::telemetry_tail_columns(), [](const std::string& from) {
+            return "INSERT INTO telemetry_chunk (" + chunks::telemetry_tail_columns() + ") SELECT " +
+                   chunks::telemetry_tail_columns() + " FROM " + from;
+          }};
+}
+
 Result<void> check_covariates(const std::vector<signals::CovariateChange>& changes) {
   for (std::size_t i = 0; i < changes.size(); ++i)
     if (!signals::is_valid_covariate_name(changes[i].name))
@@ -40,8 +87,105 @@ Result<void> check_covariates(const std::vector<signals::CovariateChange>& chang
 
 }  // namespace
 
+struct SqlChanges::Bulk {
+  BulkRows missions = bulk_checkpoints();
+  BulkRows trace = bulk_replace("trace", "robot_id, mission_key, start_utime_us", std::string(trace_columns));
+  BulkRows telemetry = bulk_tails();
+  BulkRows states = bulk_replace("energy_state", "robot_id", std::string(resume_state_columns));
+  std::set<MissionKey> keys;        // of missions with rows here
+  std::set<std::string> robot_ids;  // of states here
+};
+
 SqlChanges::SqlChanges(Database& database, std::function<std::int64_t()> now_utime_us, std::string writer)
-    : database_(database), now_utime_us_(std::move(now_utime_us)), writer_(std::move(writer)) {}
+    : database_(database), now_utime_us_(std::move(now_utime_us)), writer_(std::move(writer)) {
+  if (database.keyed_by_robot()) bulk_ = std::make_unique<Bulk>();
+}
+
+SqlChanges::~SqlChanges() = default;
+
+void SqlChanges::forget_collected() {
+  places_.clear();
+  tails_.clear();
+  known_robots_.clear();
+  if (!bulk_) return;
+  for (BulkRows* rows : {&bulk_->missions, &bulk_->trace, &bulk_->telemetry, &bulk_->states}) rows->clear();
+  bulk_->keys.clear();
+  bulk_->robot_ids.clear();
+}
+
+void SqlChanges::begin(std::span<const Command> commands) {
+  days_.clear();
+  // After a transaction that was not committed nothing that was found out in it holds.
+  constexpr std::size_t most_tails = 100'000;
+  if (!committed_ || tails_.size() > most_tails) tails_.clear();
+  auto tails = std::move(tails_);
+  forget_collected();
+  tails_ = std::move(tails);
+  committed_ = false;
+  lock_leases(commands);
+}
+
+void SqlChanges::flush() {
+  if (!bulk_) return;
+  for (BulkRows* rows : {&bulk_->missions, &bulk_->trace, &bulk_->telemetry, &bulk_->states})
+    rows->flush(database_);
+  bulk_->keys.clear();
+  bulk_->robot_ids.clear();
+}
+
+// Of all missions at once, instead of one at a time when they come.
+void SqlChanges::look_up_places(std::span<const Command> commands) {
+  if (!bulk_) return;
+  std::string keys;
+  for (const Command& command : commands)
+    if (const auto* checkpoint = std::get_if<CheckpointMission>(&command))
+      keys += (keys.empty() ? "{" : ",") + std::to_string(checkpoint->mission.key);
+  if (keys.empty()) return;
+  keys += '}';
+  static const std::string sql = places_sql(true, "mission_key = ANY (?::text::bigint[])");
+  Rows rows(database_.statement(sql));
+  rows.bind(keys);
+  read_places(rows);
+}
+
+void SqlChanges::read_places(Rows& rows) {
+  while (rows.next()) {
+    Place& place = places_[rows.integer()];
+    place.robot_id = rows.text();
+    for (std::int64_t* number : {&place.start_utime_us, &place.samples, &place.changes})
+      *number = rows.integer();
+    place.was_ended = rows.boolean();
+  }
+}
+
+std::optional<SqlChanges::Place> SqlChanges::take_place(MissionKey key) {
+  if (places_.find(key) == places_.end()) {
+    static const std::array sql = {places_sql(false, "mission_key = ?"), places_sql(true, "mission_key = ?")};
+    Rows rows(database_.statement(sql[database_.keyed_by_robot()]));
+    rows.bind(key);
+    read_places(rows);
+  }
+  auto found = places_.extract(key);
+  if (!found) return std::nullopt;
+  find_tails(key, found.mapped());
+  return std::move(found.mapped());
+}
+
+// Whoever else changed the tails has added to what the mission counts, or ended it.
+void SqlChanges::find_tails(MissionKey key, Place& place) {
+  const auto left = tails_.find(key);
+  if (left != tails_.end() && !place.was_ended && left->second.samples == place.samples &&
+      left->second.changes == place.changes) {
+    place.samples_in_tail = left->second.samples_in_tail;
+    place.changes_in_tail = left->second.changes_in_tail;
+    return;
+  }
+  static const std::array sql = {tails_sql(false), tails_sql(true)};
+  Rows rows(database_.statement(sql[database_.keyed_by_robot()]));
+  if (!rows.bind(key).next()) return;
+  place.samples_in_tail = rows.integer();
+  place.changes_in_tail = rows.integer();
+}
 
 // In one statement for all robots, in the order of their names, so that no two programs wait for each other.
 void SqlChanges::lock_leases(std::span<const Command> commands) {
@@ -79,18 +223,24 @@ void SqlChanges::apply(std::span<const Command> commands, const std::function<vo
   // Nearly always no command is refused, and then none needs a savepoint of its own.
   {
     Transaction transaction(database_, Database::Access::write);
-    lock_leases(commands);
+    begin(commands);
+    look_up_places(commands);
     if (apply_unguarded(commands, outcomes)) {
+      days_.add_up(database_);
       if (before_commit) before_commit();
-      return transaction.commit();
+      transaction.commit();
+      committed_ = true;
+      return;
     }
   }
   outcomes.clear();
   Transaction transaction(database_, Database::Access::write);
-  lock_leases(commands);
+  begin(commands);
   for (const Command& command : commands) outcomes.push_back(apply_guarded(command));
+  days_.add_up(database_);
   if (before_commit) before_commit();
   transaction.commit();
+  committed_ = true;
 }
 
 bool SqlChanges::apply_unguarded(std::span<const Command> commands, std::vector<Outcome>& outcomes) {
@@ -99,6 +249,7 @@ bool SqlChanges::apply_unguarded(std::span<const Command> commands, std::vector<
       outcomes.push_back(run_one(command));
       if (!outcomes.back()) return false;
     }
+    flush();
     database_.finish_later();
   } catch (const SqlError& error) {
     if (!error.is_about_values()) throw;
@@ -109,6 +260,13 @@ bool SqlChanges::apply_unguarded(std::span<const Command> commands, std::vector<
 
 Outcome SqlChanges::run_one(const Command& command) {
   if (!stands(command)) return 0;
+  // What is collected may wait for these alone.
+  if (!std::holds_alternative<CheckpointMission>(command) && !std::holds_alternative<StartMission>(command) &&
+      !std::holds_alternative<PutResumeState>(command) && !std::holds_alternative<AppendEvent>(command) &&
+      !std::holds_alternative<PutLearned>(command)) {
+    flush();
+    places_.clear();
+  }
   return std::visit([this](const auto& c) { return run(c); }, command);
 }
 
@@ -117,6 +275,7 @@ Outcome SqlChanges::apply_guarded(const Command& command) {
   Outcome outcome = [&]() -> Outcome {
     try {
       Outcome done = run_one(command);
+      if (done) flush();
       database_.finish_later();
       return done;
     } catch (const SqlError& error) {
@@ -124,12 +283,16 @@ Outcome SqlChanges::apply_guarded(const Command& command) {
       return invalid("", error.what());
     }
   }();
-  if (!outcome) Rows(database_.statement("ROLLBACK TO command")).run();
+  if (!outcome) {
+    Rows(database_.statement("ROLLBACK TO command")).run();
+    forget_collected();
+  }
   Rows(database_.statement("RELEASE command")).run();
   return outcome;
 }
 
 void SqlChanges::make_robot(const std::string& robot_id) {
+  if (bulk_ && !known_robots_.insert(robot_id).second) return;
   Rows(database_.statement(
            "INSERT INTO robot (robot_id, created_utime_us) VALUES (?, ?) ON CONFLICT DO NOTHING"))
       .bind(robot_id)
@@ -198,20 +361,28 @@ Outcome SqlChanges::run(const StartMission& c) {
   const Mission& m = c.mission;
   if (auto ok = check_robot_id(m.robot_id); !ok) return tl::unexpected(ok.error());
   if (m.key <= 0) return invalid("key", "must be one that mission_key() gave");
+  if (bulk_ && bulk_->keys.contains(m.key)) flush();
   make_robot(m.robot_id);
+  bool was_there = false;
   {
     Rows rows(
-        database_.statement("SELECT mission_key FROM mission WHERE (mission_key = ?1) <> "
-                            "(robot_id = ?2 AND mission_id = ?3 AND start_utime_us = ?4) "
-                            "AND (mission_key = ?1 OR robot_id = ?2 AND mission_id = ?3 AND "
-                            "start_utime_us = ?4)"));
+        database_.statement("SELECT (mission_key = ?1) <> (robot_id = ?2 AND mission_id = ?3 AND "
+                            "start_utime_us = ?4) FROM mission WHERE mission_key = ?1 OR robot_id = ?2 AND "
+                            "mission_id = ?3 AND start_utime_us = ?4"));
     bind_mission_identity(rows, m);
-    if (rows.next())
-      return fail(Fault::conflict, "key",
-                  "key " + std::to_string(m.key) + " and mission '" + m.mission_id + "' of robot '" +
-                      m.robot_id + "' do not belong together");
+    while (rows.next()) {
+      if (rows.boolean())
+        return fail(Fault::conflict, "key",
+                    "key " + std::to_string(m.key) + " and mission '" + m.mission_id + "' of robot '" +
+                        m.robot_id + "' do not belong together");
+      was_there = true;
+    }
   }
-  Rows(database_.statement("DELETE FROM mission WHERE mission_key = ?")).bind(m.key).run_later();
+  if (was_there) {
+    Rows(database_.statement("DELETE FROM mission WHERE mission_key = ?")).bind(m.key).run_later();
+    chunks::drop_recordings(database_, m.robot_id, m.key);
+  }
+  days_.changed(m.robot_id, m.start_utime_us);
   static const std::string insert = "INSERT INTO mission (" + std::string(mission_identity_columns) + ", " +
                                     mission_content_columns() + ") VALUES (" +
                                     placeholders(mission_identity_columns) + ", " +
@@ -221,6 +392,10 @@ Outcome SqlChanges::run(const StartMission& c) {
   bind_mission_identity(rows, m);
   bind_mission_content(rows, m, faults, covariates);
   rows.run_later();
+  Place& place = places_[m.key] = {};
+  place.robot_id = m.robot_id;
+  place.start_utime_us = m.start_utime_us;
+  tails_[m.key] = {};
   return m.key;
 }
 
@@ -228,24 +403,23 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
   const Mission& m = c.mission;
   if (auto ok = check_trace(c.trace); !ok) return tl::unexpected(ok.error());
   if (auto ok = check_covariates(c.covariates); !ok) return tl::unexpected(ok.error());
-  static const std::string update = "UPDATE mission SET (" + mission_content_columns() + ") = (" +
-                                    placeholders(mission_content_columns()) + ") WHERE mission_key = ?";
-  {
-    const std::string faults = sample_faults_json(m), covariates = covariates_json(m);
-    Rows rows(database_.statement(update));
-    bind_mission_content(rows, m, faults, covariates);
-    if (rows.bind(m.key).run() == 0) return no_mission(m.key);
-  }
-  static const std::string replace = insert_or_replace("trace", "mission_key, start_utime_us", trace_columns);
-  for (const TraceBucket& bucket : c.trace) {
-    Rows rows(database_.statement(replace));
-    rows.bind(m.key);
-    bind_bucket(rows, bucket);
-    rows.run_later();
-  }
+  if (bulk_ && bulk_->keys.contains(m.key)) flush();
+  const std::optional<Place> place = take_place(m.key);
+  if (!place) return no_mission(m.key);
   const bool ended = m.state != MissionState::open;
-  chunks::append(database_, m.key, c.samples, ended, now_utime_us_());
-  chunks::append(database_, m.key, c.covariates, ended, now_utime_us_());
+  if (place->was_ended || ended) days_.changed(place->robot_id, place->start_utime_us);
+  update(c, *place);
+  put(place->robot_id, m.key, c.trace);
+  chunks::End telemetry{place->robot_id, m.key, place->samples, place->samples_in_tail};
+  if (bulk_) telemetry.collected = &bulk_->telemetry;
+  Tails left{place->samples + static_cast<std::int64_t>(c.samples.size()),
+             place->changes + static_cast<std::int64_t>(c.covariates.size())};
+  left.samples_in_tail = chunks::append(database_, telemetry, c.samples, ended, now_utime_us_());
+  left.changes_in_tail =
+      chunks::append(database_, {place->robot_id, m.key, place->changes, place->changes_in_tail},
+                     c.covariates, ended, now_utime_us_());
+  ended ? void(tails_.erase(m.key)) : void(tails_[m.key] = left);
+  if (bulk_) bulk_->keys.insert(m.key);
   if (c.resume_state) put(*c.resume_state);
   if (c.epoch != 0 && c.position)
     Rows(database_.statement("UPDATE cluster_lease SET utime_us = ?, sequence = ? WHERE robot_id = ?"))
@@ -256,10 +430,41 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
   return m.key;
 }
 
+void SqlChanges::update(const CheckpointMission& c, const Place& place) {
+  static const std::string one =
+      "UPDATE mission SET (" + mission_content_columns() + ") = (" + placeholders(mission_content_columns()) +
+      "), telemetry_samples = telemetry_samples + ?, covariate_changes = covariate_changes + ? WHERE "
+      "robot_id = ? AND mission_key = ?";
+  const std::string faults = sample_faults_json(c.mission), covariates = covariates_json(c.mission);
+  Rows rows(bulk_ ? bulk_->missions : database_.statement(one));
+  bind_mission_content(rows, c.mission, faults, covariates);
+  rows.bind(static_cast<std::int64_t>(c.samples.size())).bind(static_cast<std::int64_t>(c.covariates.size()));
+  rows.bind(place.robot_id).bind(c.mission.key).run_later();
+}
+
+void SqlChanges::put(const std::string& robot_id, MissionKey key, const std::vector<TraceBucket>& trace) {
+  static const std::string one = insert_or_replace("trace", "mission_key, start_utime_us", trace_columns);
+  std::set<std::int64_t> starts;
+  for (const TraceBucket& bucket : trace) {
+    if (bulk_ && !starts.insert(bucket.start_utime_us).second) {
+      flush();
+      starts = {bucket.start_utime_us};
+    }
+    Rows rows(bulk_ ? bulk_->trace : database_.statement(one));
+    bind_key(rows, database_, robot_id, key);
+    bind_bucket(rows, bucket);
+    rows.run_later();
+  }
+}
+
 void SqlChanges::put(const ResumeState& state) {
   make_robot(state.robot_id);
   static const std::string replace = insert_or_replace("energy_state", "robot_id", resume_state_columns);
-  Rows rows(database_.statement(replace));
+  if (bulk_ && !bulk_->robot_ids.insert(state.robot_id).second) {
+    flush();
+    bulk_->robot_ids.insert(state.robot_id);
+  }
+  Rows rows(bulk_ ? bulk_->states : database_.statement(replace));
   bind_resume_state(rows, state);
   rows.run_later();
 }
@@ -306,12 +511,19 @@ Outcome SqlChanges::run(const Prune& c) {
 
 Outcome SqlChanges::run(const PruneMissions& c) {
   if (c.max_missions < 1) return invalid("max_missions", "must be at least 1");
-  return Rows(database_.statement("DELETE FROM mission WHERE mission_key IN (SELECT mission_key FROM mission "
-                                  "WHERE state <> 'open' "
-                                  "AND end_utime_us < ? ORDER BY start_utime_us, mission_key LIMIT ?)"))
-      .bind(now_utime_us_() - c.max_age_us)
-      .bind(c.max_missions)
-      .run();
+  Rows rows(database_.statement(
+      "DELETE FROM mission WHERE mission_key IN (SELECT mission_key FROM mission WHERE state <> 'open' AND "
+      "end_utime_us < ? ORDER BY start_utime_us, mission_key LIMIT ?) RETURNING robot_id, start_utime_us, "
+      "mission_key"));
+  rows.bind(now_utime_us_() - c.max_age_us).bind(c.max_missions);
+  std::vector<std::pair<std::string, MissionKey>> dropped;
+  while (rows.next()) {
+    const std::string robot_id = rows.text();
+    days_.changed(robot_id, rows.integer());
+    dropped.emplace_back(robot_id, rows.integer());
+  }
+  for (const auto& [robot_id, key] : dropped) chunks::drop_recordings(database_, robot_id, key);
+  return static_cast<std::int64_t>(dropped.size());
 }
 
 Outcome SqlChanges::run(const PruneEvents& c) {
@@ -347,16 +559,33 @@ Outcome SqlChanges::run(const RemoveRobot& c) {
   if (change("UPDATE robot SET active_version = NULL WHERE robot_id = ?") == 0)
     return fail(Fault::not_found, "robot_id", "no robot is called '" + c.robot_id + "'");
   if (!c.purge) {
-    change("UPDATE mission SET state = 'interrupted' WHERE robot_id = ? AND state = 'open'");
+    Rows rows(
+        database_.statement("UPDATE mission SET state = 'interrupted' WHERE robot_id = ? AND state = 'open' "
+                            "RETURNING start_utime_us"));
+    rows.bind(c.robot_id);
+    while (rows.next()) days_.changed(c.robot_id, rows.integer());
     return 0;
+  }
+  if (database_.keyed_by_robot()) {
+    change(
+        "DELETE FROM cluster_job WHERE diagnosis_id IN (SELECT diagnosis_id FROM diagnosis WHERE robot_id = "
+        "?)");
+    change("DELETE FROM mission_day WHERE robot_id = ?");
+    days_.forget(c.robot_id);
   }
   for (const char* sql :
        {"DELETE FROM diagnosis WHERE robot_id = ?", "DELETE FROM proposal WHERE robot_id = ?",
         "DELETE FROM learned WHERE robot_id = ?", "DELETE FROM energy_state WHERE robot_id = ?"})
     change(sql);
   const std::int64_t missions = change("DELETE FROM mission WHERE robot_id = ?");
+  if (database_.keyed_by_robot())
+    for (const char* sql :
+         {"DELETE FROM trace WHERE robot_id = ?", "DELETE FROM telemetry_chunk WHERE robot_id = ?",
+          "DELETE FROM covariate_chunk WHERE robot_id = ?"})
+      change(sql);
   change("DELETE FROM model WHERE robot_id = ?");
   change("DELETE FROM robot WHERE robot_id = ?");
+  known_robots_.erase(c.robot_id);
   return missions;
 }
 

@@ -3,12 +3,17 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
+#include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "base/error.h"
+#include "history/bulk_rows.h"
 #include "history/commands.h"
+#include "history/mission_days.h"
 #include "history/sql.h"
 #include "history/store.h"
 
@@ -25,6 +30,7 @@ class SqlChanges {
   // `writer`: this program's name among those that write to the store at the same time; empty: it is the only
   // one.
   SqlChanges(Database& database, std::function<std::int64_t()> now_utime_us, std::string writer = {});
+  ~SqlChanges();
 
   // As Store::apply. `before_commit` is called in the transaction. Throws SqlError when nothing was applied,
   // or when the COMMIT's outcome is not known; then `outcomes` are what they are if it was done.
@@ -35,6 +41,30 @@ class SqlChanges {
   const std::map<std::string, DroppedCommands>& dropped() const { return dropped_; }
 
  private:
+  // What checkpoints collect, to be stored by one statement for each table; null: each row is stored at once.
+  struct Bulk;
+  // Where a mission goes on: how many samples and changes of covariates it has.
+  struct Place {
+    std::string robot_id;
+    std::int64_t start_utime_us = 0, samples = 0, changes = 0, samples_in_tail = 0, changes_in_tail = 0;
+    bool was_ended = false;
+  };
+
+  // How much of a mission is in its tails, which the rows there would have to be read for, when its counts
+  // were these.
+  struct Tails {
+    std::int64_t samples = 0, changes = 0, samples_in_tail = 0, changes_in_tail = 0;
+  };
+
+  void begin(std::span<const Command> commands);
+  void forget_collected();
+  // Stores what was collected.
+  void flush();
+  void look_up_places(std::span<const Command> commands);
+  void read_places(Rows& rows);
+  void find_tails(MissionKey key, Place& place);
+  std::optional<Place> take_place(MissionKey key);
+  void update(const CheckpointMission& command, const Place& place);
   // Locks the leases that the commands stand under until the transaction ends.
   void lock_leases(std::span<const Command> commands);
   // Whether the command's lease holds, or it needs none; counts it if not.
@@ -68,12 +98,19 @@ class SqlChanges {
   bool has_job(std::int64_t diagnosis_id);
   void make_robot(const std::string& robot_id);
   void put(const ResumeState& state);
+  void put(const std::string& robot_id, MissionKey key, const std::vector<TraceBucket>& trace);
 
   Database& database_;
   std::function<std::int64_t()> now_utime_us_;
   const std::string writer_;
   std::map<std::string, Epoch, std::less<>> epochs_;  // of the leases locked
   std::map<std::string, DroppedCommands> dropped_;    // by robot
+  ChangedDays days_;
+  std::unique_ptr<Bulk> bulk_;
+  std::map<MissionKey, Place> places_;  // read ahead
+  bool committed_ = false;              // the last transaction
+  std::map<MissionKey, Tails> tails_;   // of open missions, as they were left
+  std::set<std::string> known_robots_;  // that are stored
 };
 
 }  // namespace joulecast::history

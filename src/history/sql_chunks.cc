@@ -7,6 +7,8 @@
 
 #include "history/covariate_chunk.h"
 #include "history/cursor.h"
+#include "history/keyed_sql.h"
+#include "history/postgres_partitions.h"
 #include "history/telemetry_chunk.h"
 
 namespace joulecast::history::chunks {
@@ -22,7 +24,7 @@ constexpr std::int64_t chunks_at_once = 64;
 constexpr int tail_level = 1;
 constexpr int sealed_level = 3;
 
-// One of the two tables: its name, the mission's column that counts what ever went in, and its chunks' codec.
+// One of the two tables: its name, the column that counts a chunk's items, and its chunks' codec.
 template <class Item>
 struct Table;
 
@@ -30,7 +32,6 @@ template <>
 struct Table<Sample> {
   static constexpr const char* name = "telemetry_chunk";
   static constexpr const char* items = "samples";
-  static constexpr const char* counter = "telemetry_samples";
   static auto encode(std::span<const Sample> samples, int level) { return encode_chunk(samples, level); }
   static auto decode(std::span<const std::byte> bytes) { return decode_chunk(bytes); }
 };
@@ -39,19 +40,17 @@ template <>
 struct Table<CovariateChange> {
   static constexpr const char* name = "covariate_chunk";
   static constexpr const char* items = "changes";
-  static constexpr const char* counter = "covariate_changes";
   static auto encode(std::span<const CovariateChange> changes, int level) {
     return encode_covariates(changes, level);
   }
   static auto decode(std::span<const std::byte> bytes) { return decode_covariates(bytes); }
 };
 
-// The text with the table's names in it: $table, $items, $counter.
+// The text with the table's names in it: $table, $items.
 template <class Item>
 std::string sql_of(std::string text) {
-  for (const auto& [place, name] : {std::pair<std::string, std::string>{"$table", Table<Item>::name},
-                                    {"$items", Table<Item>::items},
-                                    {"$counter", Table<Item>::counter}}) {
+  for (const auto& [place, name] :
+       {std::pair<std::string, std::string>{"$table", Table<Item>::name}, {"$items", Table<Item>::items}}) {
     for (std::size_t at = 0; (at = text.find(place, at)) != std::string::npos; at += name.size())
       text.replace(at, place.size(), name);
   }
@@ -59,17 +58,17 @@ std::string sql_of(std::string text) {
 }
 
 template <class Item>
-void insert_chunk(Database& database, MissionKey key, std::int64_t first_ordinal, std::span<const Item> items,
-                  bool sealed, std::int64_t now_utime_us) {
+void insert_chunk(Database& database, const End& mission, std::int64_t first_ordinal,
+                  std::span<const Item> items, bool sealed, std::int64_t now_utime_us) {
   const auto [first, last] = std::minmax_element(
       items.begin(), items.end(), [](const Item& a, const Item& b) { return a.utime_us < b.utime_us; });
   const std::vector<std::byte> body = Table<Item>::encode(items, sealed ? sealed_level : tail_level);
-  static const std::string sql = sql_of<Item>(
-      "INSERT INTO $table (mission_key, first_ordinal, $items, start_utime_us, end_utime_us, "
-      "stored_utime_us, sealed, bytes, body) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
-  Rows(database.statement(sql))
-      .bind(key)
-      .bind(first_ordinal)
+  static const KeyedSql sql(
+      sql_of<Item>("INSERT INTO $table ($key, first_ordinal, $items, start_utime_us, end_utime_us, "
+                   "stored_utime_us, sealed, bytes, body) VALUES ($values, ?, ?, ?, ?, ?, ?, ?, ?)"));
+  Rows rows(!sealed && mission.collected != nullptr ? *mission.collected : sql.in(database));
+  bind_key(rows, database, mission.robot_id, mission.key);
+  rows.bind(first_ordinal)
       .bind(static_cast<std::int64_t>(items.size()))
       .bind(first->utime_us)
       .bind(last->utime_us)
@@ -82,15 +81,14 @@ void insert_chunk(Database& database, MissionKey key, std::int64_t first_ordinal
 
 template <class Item>
 std::vector<Item> take_tail(Database& database, MissionKey key) {
-  static const std::string select =
-      sql_of<Item>("SELECT body FROM $table WHERE mission_key = ? AND sealed = 0 ORDER BY first_ordinal");
-  static const std::string seal =
-      sql_of<Item>("UPDATE $table SET sealed = 1 WHERE mission_key = ? AND sealed = 0");
-  static const std::string drop = sql_of<Item>("DELETE FROM $table WHERE mission_key = ? AND sealed = 0");
+  static const KeyedSql select(
+      sql_of<Item>("SELECT body FROM $table WHERE $of_mission AND sealed = 0 ORDER BY first_ordinal"));
+  static const KeyedSql seal(sql_of<Item>("UPDATE $table SET sealed = 1 WHERE $of_mission AND sealed = 0"));
+  static const KeyedSql drop(sql_of<Item>("DELETE FROM $table WHERE $of_mission AND sealed = 0"));
   std::vector<Item> all;
   bool readable = true;
   {
-    Rows rows(database.statement(select));
+    Rows rows(select.in(database));
     rows.bind(key);
     while (readable && rows.next()) {
       const auto items = Table<Item>::decode(rows.blob());
@@ -99,47 +97,38 @@ std::vector<Item> take_tail(Database& database, MissionKey key) {
     }
   }
   // Damaged on disk: left as it is for the reader to report, and out of the way of what still comes.
-  Rows(database.statement(readable ? drop : seal)).bind(key).run_later();
+  Rows((readable ? drop : seal).in(database)).bind(key).run_later();
   if (!readable) all.clear();
   return all;
 }
 
 template <class Item>
-void append_items(Database& database, MissionKey key, std::span<const Item> items, bool ended,
-                  std::int64_t now_utime_us) {
-  if (items.empty() && !ended) return;
-  static const std::string count = sql_of<Item>(
-      "SELECT $counter, (SELECT CAST(coalesce(sum($items), 0) AS BIGINT) FROM $table WHERE mission_key = ?1 "
-      "AND sealed = 0) "
-      "FROM mission WHERE mission_key = ?1");
-  std::int64_t next_ordinal = 0, in_tail = 0;
-  {
-    Rows rows(database.statement(count));
-    if (rows.bind(key).next()) {
-      next_ordinal = rows.integer();
-      in_tail = rows.integer();
-    }
-  }
-  if (items.empty() && in_tail == 0) return;
-  const std::size_t unsealed = static_cast<std::size_t>(in_tail) + items.size();
+std::int64_t append_items(Database& database, const End& end, std::span<const Item> items, bool ended,
+                          std::int64_t now_utime_us) {
+  if (items.empty() && (!ended || end.in_tail == 0)) return end.in_tail;
+  const std::size_t unsealed = static_cast<std::size_t>(end.in_tail) + items.size();
   if (!ended && unsealed < sealed_items) {
-    insert_chunk<Item>(database, key, next_ordinal, items, false, now_utime_us);
-  } else {
-    std::vector<Item> all = take_tail<Item>(database, key);
-    std::int64_t ordinal = next_ordinal - static_cast<std::int64_t>(all.size());
-    all.insert(all.end(), items.begin(), items.end());
-    for (std::span<const Item> rest = all; !rest.empty();) {
-      const auto piece = rest.first(std::min(rest.size(), sealed_items));
-      insert_chunk<Item>(database, key, ordinal, piece, ended || piece.size() == sealed_items, now_utime_us);
-      ordinal += static_cast<std::int64_t>(piece.size());
-      rest = rest.subspan(piece.size());
-    }
+    insert_chunk<Item>(database, end, end.next_ordinal, items, false, now_utime_us);
+    return static_cast<std::int64_t>(unsealed);
   }
-  static const std::string advance = sql_of<Item>("UPDATE mission SET $counter = ? WHERE mission_key = ?");
-  Rows(database.statement(advance))
-      .bind(next_ordinal + static_cast<std::int64_t>(items.size()))
-      .bind(key)
-      .run_later();
+  std::vector<Item> all;
+  if (end.in_tail > 0) all = take_tail<Item>(database, end.key);
+  std::int64_t ordinal = end.next_ordinal - static_cast<std::int64_t>(all.size());
+  all.insert(all.end(), items.begin(), items.end());
+  for (std::span<const Item> rest = all; !rest.empty();) {
+    const auto piece = rest.first(std::min(rest.size(), sealed_items));
+    insert_chunk<Item>(database, end, ordinal, piece, ended || piece.size() == sealed_items, now_utime_us);
+    ordinal += static_cast<std::int64_t>(piece.size());
+    rest = rest.subspan(piece.size());
+  }
+  return ended ? 0 : static_cast<std::int64_t>(all.size() % sealed_items);
+}
+
+template <class Item>
+std::string in_tail_sql(bool keyed_by_robot) {
+  return sql_of<Item>("(SELECT CAST(coalesce(sum($items), 0) AS BIGINT) FROM $table AS tail WHERE ") +
+         (keyed_by_robot ? "tail.robot_id = mission.robot_id AND " : "") +
+         "tail.mission_key = mission.mission_key AND tail.sealed = 0)";
 }
 
 // A page of items of the range in order of arrival, into `out`; answers the cursor of the next page.
@@ -154,12 +143,12 @@ Result<std::string> read_page(Database& database, MissionKey key, TimeRange rang
     if (!place) return tl::unexpected(place.error());
     from_ordinal = (*place)[0];
   }
-  static const std::string select = sql_of<Item>(
-      "SELECT first_ordinal, body FROM $table WHERE mission_key = ?1 AND first_ordinal >= "
-      "coalesce((SELECT max(first_ordinal) FROM $table WHERE mission_key = ?1 AND first_ordinal <= ?2), 0) "
-      "AND end_utime_us >= ?3 AND start_utime_us < ?4 ORDER BY first_ordinal LIMIT ?5");
+  static const KeyedSql select(sql_of<Item>(
+      "SELECT first_ordinal, body FROM $table WHERE $of_mission AND first_ordinal >= "
+      "coalesce((SELECT max(first_ordinal) FROM $table WHERE $of_mission AND first_ordinal <= ?2), 0) "
+      "AND end_utime_us >= ?3 AND start_utime_us < ?4 ORDER BY first_ordinal LIMIT ?5"));
   for (;;) {
-    Rows rows(database.statement(select));
+    Rows rows(select.in(database));
     rows.bind(key).bind(from_ordinal).bind(range.from_utime_us).bind(range.to_utime_us).bind(chunks_at_once);
     std::int64_t chunks = 0, ordinal = from_ordinal;
     for (; rows.next(); ++chunks) {
@@ -191,14 +180,37 @@ Result<Page> page_of(Database& database, MissionKey key, TimeRange range, const 
 
 }  // namespace
 
-void append(Database& database, MissionKey key, std::span<const Sample> samples, bool ended,
-            std::int64_t now_utime_us) {
-  append_items(database, key, samples, ended, now_utime_us);
+std::string samples_in_tail_sql(bool keyed_by_robot) {
+  return in_tail_sql<Sample>(keyed_by_robot);
 }
 
-void append(Database& database, MissionKey key, std::span<const CovariateChange> changes, bool ended,
-            std::int64_t now_utime_us) {
-  append_items(database, key, changes, ended, now_utime_us);
+std::string changes_in_tail_sql(bool keyed_by_robot) {
+  return in_tail_sql<CovariateChange>(keyed_by_robot);
+}
+
+const std::string& telemetry_tail_columns() {
+  static const std::string columns =
+      "robot_id, mission_key, first_ordinal, samples, start_utime_us, end_utime_us, stored_utime_us, sealed, "
+      "bytes, body";
+  return columns;
+}
+
+std::int64_t append(Database& database, const End& end, std::span<const Sample> samples, bool ended,
+                    std::int64_t now_utime_us) {
+  return append_items(database, end, samples, ended, now_utime_us);
+}
+
+std::int64_t append(Database& database, const End& end, std::span<const CovariateChange> changes, bool ended,
+                    std::int64_t now_utime_us) {
+  return append_items(database, end, changes, ended, now_utime_us);
+}
+
+void drop_recordings(Database& database, std::string_view robot_id, MissionKey key) {
+  if (!database.keyed_by_robot()) return;
+  for (const char* sql : {"DELETE FROM trace WHERE robot_id = ? AND mission_key = ?",
+                          "DELETE FROM telemetry_chunk WHERE robot_id = ? AND mission_key = ?",
+                          "DELETE FROM covariate_chunk WHERE robot_id = ? AND mission_key = ?"})
+    Rows(database.statement(sql)).bind(robot_id).bind(key).run_later();
 }
 
 Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range,
@@ -224,8 +236,16 @@ std::int64_t count(Database& database) {
 
 std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_chunks,
                    std::int64_t now_utime_us) {
-  std::int64_t total_bytes = encoded_bytes(database);
-  std::vector<std::pair<bool, std::int64_t>> dropped;  // of covariates, and the key
+  std::int64_t total_bytes = keep.telemetry_max_bytes ? encoded_bytes(database) : 0;
+  std::optional<std::int64_t> past_utime_us;
+  if (keep.telemetry_max_age_us)
+    past_utime_us = database.keyed_by_robot() ? past_chunks_utime_us(now_utime_us, *keep.telemetry_max_age_us)
+                                              : now_utime_us - *keep.telemetry_max_age_us;
+  struct Chunk {
+    bool of_covariates = false;
+    std::int64_t key = 0, stored_utime_us = 0;
+  };
+  std::vector<Chunk> dropped;
   {
     // Only sealed chunks: a tail stays whole until it is merged.
     Rows rows(database.statement(
@@ -237,19 +257,24 @@ std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_c
       const bool of_covariates = rows.boolean();
       const std::int64_t key = rows.integer();
       const std::int64_t stored = rows.integer();
-      const bool too_old = keep.telemetry_max_age_us && now_utime_us - stored > *keep.telemetry_max_age_us;
+      const bool too_old = past_utime_us && stored < *past_utime_us;
       const bool too_much = keep.telemetry_max_bytes && total_bytes > *keep.telemetry_max_bytes;
       if (!too_old && !too_much) break;
       total_bytes -= rows.integer();
-      dropped.emplace_back(of_covariates, key);
+      dropped.push_back({of_covariates, key, stored});
     }
   }
-  for (const auto& [of_covariates, key] : dropped) {
-    Rows(database.statement(of_covariates ? "DELETE FROM covariate_chunk WHERE chunk_key = ?"
-                                          : "DELETE FROM telemetry_chunk WHERE chunk_key = ?"))
-        .bind(key)
-        .run();
+  // The time says which partition it is in.
+  for (const Chunk& chunk : dropped) {
+    Rows(database.statement(
+             chunk.of_covariates
+                 ? "DELETE FROM covariate_chunk WHERE chunk_key = ? AND sealed = 1 AND stored_utime_us = ?"
+                 : "DELETE FROM telemetry_chunk WHERE chunk_key = ? AND sealed = 1 AND stored_utime_us = ?"))
+        .bind(chunk.key)
+        .bind(chunk.stored_utime_us)
+        .run_later();
   }
+  database.finish_later();
   return static_cast<std::int64_t>(dropped.size());
 }
 

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
+#include <string_view>
 
 #include "base/error.h"
 #include "history/commands.h"
@@ -15,12 +17,33 @@ namespace joulecast::history::chunks {
 // of a millisecond.
 inline constexpr std::size_t sealed_items = 1024;
 
+// Where a mission's next samples or changes go.
+struct End {
+  std::string_view robot_id;
+  MissionKey key = 0;
+  std::int64_t next_ordinal = 0;
+  std::int64_t in_tail = 0;  // of items that are not sealed
+  // Collects chunks that are not sealed, of the columns of telemetry_tail_columns(); null: they are stored at
+  // once.
+  Statement* collected = nullptr;
+};
+
+// The key first. Where keys begin with the robot.
+const std::string& telemetry_tail_columns();
+
+// How many items of a row of `mission` are in its tail.
+std::string samples_in_tail_sql(bool keyed_by_robot);
+std::string changes_in_tail_sql(bool keyed_by_robot);
+
 // Appends to the mission's unsealed tail and seals it in full chunks, or all of it when the mission has
-// ended.
-void append(Database& database, MissionKey key, std::span<const signals::Sample> samples, bool ended,
-            std::int64_t now_utime_us);
-void append(Database& database, MissionKey key, std::span<const signals::CovariateChange> changes, bool ended,
-            std::int64_t now_utime_us);
+// ended. The mission's row counts them already. Answers how many are in the tail then.
+std::int64_t append(Database& database, const End& end, std::span<const signals::Sample> samples, bool ended,
+                    std::int64_t now_utime_us);
+std::int64_t append(Database& database, const End& end, std::span<const signals::CovariateChange> changes,
+                    bool ended, std::int64_t now_utime_us);
+
+// Deletes the trace and the chunks of a mission that was deleted, where no reference does so.
+void drop_recordings(Database& database, std::string_view robot_id, MissionKey key);
 
 // As Store's; the mission is known to be there.
 Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range, const PageRequest& page);
@@ -30,7 +53,8 @@ Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange r
 std::int64_t encoded_bytes(Database& database);
 std::int64_t count(Database& database);
 
-// Drops chunks beyond the retention, oldest first, at most `max_chunks`; answers how many.
+// Drops chunks beyond the retention, oldest first, at most `max_chunks`; answers how many. Where chunks are
+// in partitions by the day, an age of weeks is up to a day longer: see past_chunks_utime_us().
 std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_chunks,
                    std::int64_t now_utime_us);
 

@@ -15,13 +15,9 @@ namespace joulecast::history::queries {
 const std::string& ratio_sql();
 const std::string& wh_per_km_sql();
 
-// Annulled missions are in no sum. Of the findings, whose text is as annulled_findings() writes it, only the
-// name of a member has its quotes without a backslash.
-inline constexpr std::string_view not_annulled =
-    " AND (findings_json IS NULL OR findings_json NOT LIKE '%\"annulled\":%')";
-// Nor is anything drawn from missions whose telemetry is contradicted.
+// A condition: the mission's telemetry is not contradicted. Nothing is drawn from such missions.
 inline constexpr std::string_view not_contradicted =
-    " AND (findings_json IS NULL OR findings_json NOT LIKE '%\"contradictions\":%')";
+    "(findings_json IS NULL OR findings_json NOT LIKE '%\"contradictions\":%')";
 
 // Fault::invalid on the field that is at fault.
 Result<void> check_filter(const MissionFilter& filter);

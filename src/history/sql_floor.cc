@@ -4,6 +4,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "history/mission_days.h"
 #include "history/sql_filter.h"
 #include "history/sql_queries.h"
 
@@ -21,7 +22,7 @@ constexpr std::int64_t spread = 65536;
 constexpr const char* points_of_mission = "((end_utime_us - start_utime_us) / 1000000 + 2)";
 
 std::string conditions(const Where& where) {
-  return where.sql() + std::string(not_annulled) + std::string(not_contradicted);
+  return where.sql() + " AND " + std::string(not_annulled) + " AND " + std::string(not_contradicted);
 }
 
 // One mission's sums while its points come.
@@ -65,18 +66,21 @@ class Sums {
   std::unordered_map<std::uint64_t, std::size_t> places_;
 };
 
-const std::string& select_points() {
-  static const std::string sql = [] {
-    std::string keys = "?";
-    for (std::size_t k = 1; k < missions_at_once; ++k) keys += ", ?";
+// `by_robot`: the key of traces begins with the robot.
+const std::string& select_points(bool by_robot) {
+  const auto make = [](std::string_view key, std::string_view one) {
+    std::string keys(one);
+    for (std::size_t k = 1; k < missions_at_once; ++k) keys.append(", ").append(one);
     // The times tell a database that keeps traces by time where to look.
     return "SELECT mission_key, covered_s, measured_power_mean_w, modelled_power_mean_w, speed_mean_m_s, "
-           "x_m, y_m FROM trace WHERE mission_key IN (" +
-           keys +
+           "x_m, y_m FROM trace WHERE " +
+           std::string(key) + " IN (" + keys +
            ") AND start_utime_us >= ? AND start_utime_us < ? AND x_m IS NOT NULL AND y_m IS NOT NULL "
            "ORDER BY mission_key";
-  }();
-  return sql;
+  };
+  static const std::string of_missions = make("mission_key", "?");
+  static const std::string of_robots = make("(robot_id, mission_key)", "(?, ?)");
+  return by_robot ? of_robots : of_missions;
 }
 
 }  // namespace
@@ -134,8 +138,13 @@ Result<FloorSums> floor_sums(Database& database, std::span<const FloorChoice::Ch
   sums.visits.resize(chosen.size());
   if (chosen.empty()) return sums;
   using Chosen = FloorChoice::Chosen;
-  Rows rows(database.statement(select_points()));
-  for (std::size_t k = 0; k < missions_at_once; ++k) rows.bind(chosen[std::min(k, chosen.size() - 1)].key);
+  const bool by_robot = database.keyed_by_robot();
+  Rows rows(database.statement(select_points(by_robot)));
+  for (std::size_t k = 0; k < missions_at_once; ++k) {
+    const Chosen& mission = chosen[std::min(k, chosen.size() - 1)];
+    if (by_robot) rows.bind(mission.robot_id);
+    rows.bind(mission.key);
+  }
   rows.bind(std::ranges::min(chosen, {}, &Chosen::from_utime_us).from_utime_us - trace_bucket_us);
   rows.bind(std::ranges::max(chosen, {}, &Chosen::to_utime_us).to_utime_us + trace_bucket_us);
   Sums mission(cell_m);

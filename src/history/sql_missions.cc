@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "history/cursor.h"
+#include "history/mission_days.h"
 #include "history/sql_filter.h"
 #include "history/sql_queries.h"
 #include "history/sql_rows.h"
@@ -113,18 +114,6 @@ bool has_mission(Database& database, MissionKey key) {
   return rows.bind(key).next();
 }
 
-const std::string& select_totals() {
-  static const std::string sql = [] {
-    std::string sums = "sum(";
-    for (const char c : accounts_columns()) sums += c == ',' ? std::string("), sum(") : std::string(1, c);
-    return "count(*), count(*) FILTER (WHERE measured_s > 0), count(*) FILTER (WHERE incomplete = 1), "
-           "CAST(coalesce(sum(samples), 0) AS BIGINT), CAST(coalesce(sum(gap_count), 0) AS BIGINT), "
-           "coalesce(sum(gap_s), 0.0), " +
-           sums + ") FROM mission";
-  }();
-  return sql;
-}
-
 Totals read_totals(Rows& rows) {
   Totals t;
   t.missions = rows.integer();
@@ -187,13 +176,89 @@ Result<MissionPage> missions(Database& database, const MissionFilter& filter, co
   return result;
 }
 
+namespace {
+
+// Missions to be summed up: "FROM ... WHERE ...", with what it binds.
+class Summed {
+ public:
+  // `whole_days`: nothing tells apart the missions of a day.
+  Summed(const Database& database, const MissionFilter& filter, bool whole_days)
+      : filter_(filter), where_(filter) {
+    rolled_up_ = database.keyed_by_robot() && whole_days && names_robots_and_times(filter);
+    if (rolled_up_)
+      add_parts();
+    else
+      sql_ = " FROM mission" + where_.sql() + " AND " + std::string(not_annulled);
+  }
+
+  std::string sums() const { return rolled_up_ ? totals_of_parts() : totals_of_missions(); }
+  const std::string& sql() const { return sql_; }
+
+  void bind(Rows& rows) const {
+    if (!rolled_up_) where_.bind(rows);
+    for (int k = 0; k < parts_; ++k)
+      for (const std::string& robot_id : filter_.robot_ids) rows.bind(robot_id);
+  }
+
+ private:
+  static bool names_robots_and_times(const MissionFilter& f) {
+    return !f.mission_id && !f.name_contains && f.states.empty() && !f.incomplete && !f.payload_min_kg &&
+           !f.payload_max_kg && !f.ratio_min && !f.ratio_max;
+  }
+
+  // Ended missions of whole days are added up already. The others are: those of the first and of the last
+  // day where the times asked for begin or end within them, and those that are open.
+  void add_parts() {
+    const std::int64_t day_before_end = whole_future - day_us, day_after_begin = whole_past + day_us;
+    const std::int64_t from = filter_.start_from_utime_us.value_or(whole_past);
+    const std::int64_t to = filter_.start_to_utime_us.value_or(whole_future);
+    const std::int64_t first = from <= day_after_begin  ? whole_past
+                               : from >= day_before_end ? whole_future
+                                                        : floor_to(from + day_us - 1, day_us);
+    const std::int64_t last = to >= day_before_end    ? whole_future
+                              : to <= day_after_begin ? whole_past
+                                                      : floor_to(to, day_us);
+    sql_ = " FROM (SELECT robot_id, day_utime_us AS start_utime_us, " + totals_columns() +
+           " FROM mission_day WHERE missions > 0" + within("day_utime_us", first, last);
+    add_missions(" AND state = 'open'", from, to);
+    if (first >= last) {
+      add_missions(" AND state <> 'open'", from, to);
+    } else {
+      if (from < first) add_missions(" AND state <> 'open'", from, first);
+      if (last < to) add_missions(" AND state <> 'open'", last, to);
+    }
+    sql_ += ") AS parts WHERE TRUE";
+  }
+
+  void add_missions(const std::string& condition, std::int64_t from, std::int64_t to) {
+    sql_ += " UNION ALL SELECT robot_id, start_utime_us, " + totals_of_one() + " FROM mission WHERE " +
+            std::string(not_annulled) + condition + within("start_utime_us", from, to);
+  }
+
+  std::string within(const std::string& time, std::int64_t from, std::int64_t to) {
+    ++parts_;
+    std::string sql;
+    if (from != whole_past) sql += " AND " + time + " >= " + std::to_string(from);
+    if (to != whole_future) sql += " AND " + time + " < " + std::to_string(to);
+    if (!filter_.robot_ids.empty()) sql += " AND " + among("robot_id", filter_.robot_ids.size());
+    return sql;
+  }
+
+  const MissionFilter& filter_;
+  const Where where_;
+  bool rolled_up_ = false;
+  int parts_ = 0;
+  std::string sql_;
+};
+
+}  // namespace
+
 Result<Totals> totals(Database& database, const MissionFilter& filter) {
   if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
-  const Where where(filter);
-  const std::string sql = "SELECT " + select_totals() + where.sql() + std::string(not_annulled);
-  const auto statement = database.prepare(sql);
+  const Summed summed(database, filter, true);
+  const auto statement = database.prepare("SELECT " + summed.sums() + summed.sql());
   Rows rows(*statement);
-  where.bind(rows);
+  summed.bind(rows);
   rows.next();
   return read_totals(rows);
 }
@@ -201,21 +266,20 @@ Result<Totals> totals(Database& database, const MissionFilter& filter) {
 Result<std::vector<TotalsGroup>> grouped_totals(Database& database, const MissionFilter& filter, Grouping by,
                                                 std::int64_t utc_offset_s) {
   if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
-  constexpr std::int64_t day_us = 86'400'000'000;
-  const Where where(filter);
+  // A day of another clock has parts of two.
+  const Summed summed(database, filter, by == Grouping::robot || utc_offset_s * 1'000'000 % day_us == 0);
   const std::string period = std::to_string(by == Grouping::week ? 7 * day_us : day_us);
   const std::string group = by == Grouping::robot ? "robot_id"
                                                   : "start_utime_us - ((start_utime_us + ?) % " + period +
                                                         " + " + period + ") % " + period;
-  const std::string sql = "SELECT " + group + ", " + select_totals() + where.sql() +
-                          std::string(not_annulled) + " GROUP BY 1 ORDER BY 1 LIMIT " +
-                          std::to_string(max_groups + 1);
+  const std::string sql = "SELECT " + group + ", " + summed.sums() + summed.sql() +
+                          " GROUP BY 1 ORDER BY 1 LIMIT " + std::to_string(max_groups + 1);
   const auto statement = database.prepare(sql);
   Rows rows(*statement);
   // 1970 began on a Thursday, three days after a Monday.
   if (by != Grouping::robot)
     rows.bind(utc_offset_s * 1'000'000 + (by == Grouping::week ? 3 * day_us : std::int64_t{0}));
-  where.bind(rows);
+  summed.bind(rows);
   std::vector<TotalsGroup> groups;
   while (rows.next()) {
     if (groups.size() == max_groups)

@@ -12,9 +12,9 @@ namespace joulecast::history {
 // After a connection could not be made: many ask, and each attempt may take its time.
 constexpr std::chrono::seconds connect_pause{1};
 
-ReaderPool::ReaderPool(Connect connect, std::size_t count)
+ReaderPool::ReaderPool(Connect connect, std::size_t count, At at)
     : connect_(std::move(connect)), size_(std::max<std::size_t>(count, 1)) {
-  while (idle_.size() < size_) idle_.push_back(connect_());
+  while (idle_.size() < size_) idle_.push_back(at == At::once ? connect_() : nullptr);
 }
 
 Database& ReaderPool::Lease::operator*() {

@@ -130,16 +130,57 @@ struct StoreSize {
 // What came of one command: a number that its description names, or why it was refused.
 using Outcome = Result<std::int64_t>;
 
+// The questions of what was. Their errors are the Store's.
+class History {
+ public:
+  virtual ~History() = default;
+
+  virtual Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page,
+                                       MissionSort sort = {}) const = 0;
+  virtual Result<Totals> totals(const MissionFilter& filter) const = 0;
+  // Groups that have missions, ascending. Days begin at midnight, weeks on Monday, of a clock that is
+  // `utc_offset_s` ahead of UTC. Fault::invalid on "group_by" for more than max_groups.
+  virtual Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& filter, Grouping by,
+                                                          std::int64_t utc_offset_s) const = 0;
+
+  // At most max_points buckets (1 to max_trace_points): neighbours are merged by least, time-weighted mean
+  // and greatest, cumulative values by the last. not_found when the mission is unknown.
+  virtual Result<Trace> trace(MissionKey key, TimeRange range, std::int64_t max_points) const = 0;
+  // At most `page.limit` samples (1 to max_telemetry_samples). Empty when the retention dropped them;
+  // not_found when the mission is unknown.
+  virtual Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const = 0;
+
+  // What changed of the covariates: at most `page.limit` changes (1 to max_telemetry_samples). What holds at
+  // the range's beginning changed before it. Empty when the retention dropped them; not_found when the
+  // mission is unknown.
+  virtual Result<CovariatePage> covariates(MissionKey key, TimeRange range,
+                                           const PageRequest& page) const = 0;
+};
+
+// Where to ask questions of what was: the store itself, or a copy of it that is at most so old. It is to be
+// asked at once: a copy grows older.
+struct Past {
+  const History& history;
+  std::optional<double> staleness_s;  // absent: nothing that was committed is missing
+};
+
+// Of the copy that a store reads beside itself.
+struct StandbyStatus {
+  std::optional<double> staleness_s;  // absent: it is not known
+  bool in_use = false;
+  std::uint64_t answered = 0;   // questions
+  std::uint64_t passed_on = 0;  // questions that the store itself answered instead
+  std::string why_not;          // it is not in use, where that is known
+};
+
 // The history of a fleet: one implementation for each database.
 //
 // Threads: apply() from one thread at a time (the Writer's); everything else from any thread, also during
 // apply(). A query sees what was committed before it began. Errors: Fault::not_found for a named thing that
 // is absent, ::invalid for a broken constraint of the arguments,
 // ::unavailable when the disk or database fails for now, ::corrupt when stored bytes cannot be trusted.
-class Store {
+class Store : public History {
  public:
-  virtual ~Store() = default;
-
   // Applies the commands in order in one transaction. The result is one outcome a command: a refused one
   // (not_found, conflict, invalid) leaves no trace and the others stand. An error means that nothing was
   // applied.
@@ -175,32 +216,11 @@ class Store {
   virtual Result<std::vector<ModelVersion>> model_versions(std::string_view robot_id) const = 0;
 
   virtual Result<Mission> mission(MissionKey key) const = 0;
-  virtual Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page,
-                                       MissionSort sort = {}) const = 0;
-  virtual Result<Totals> totals(const MissionFilter& filter) const = 0;
-  // Groups that have missions, ascending. Days begin at midnight, weeks on Monday, of a clock that is
-  // `utc_offset_s` ahead of UTC. Fault::invalid on "group_by" for more than max_groups.
-  virtual Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& filter, Grouping by,
-                                                          std::int64_t utc_offset_s) const = 0;
-
-  // At most max_points buckets (1 to max_trace_points): neighbours are merged by least, time-weighted mean
-  // and greatest, cumulative values by the last. not_found when the mission is unknown.
-  virtual Result<Trace> trace(MissionKey key, TimeRange range, std::int64_t max_points) const = 0;
   // Tells the sink of each mission that matches what it spent in which square of `cell_m` metres
   // (least_floor_cell_m to greatest_floor_cell_m), in the order of keys, outside of any lock. Reads at most
   // about `max_points` seconds of missions (1 to max_floor_points): of more, those of an even share of them.
   virtual Result<FloorReading> floor_visits(const MissionFilter& filter, double cell_m,
                                             std::int64_t max_points, const FloorSink& sink) const = 0;
-
-  // At most `page.limit` samples (1 to max_telemetry_samples). Empty when the retention dropped them;
-  // not_found when the mission is unknown.
-  virtual Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const = 0;
-
-  // What changed of the covariates: at most `page.limit` changes (1 to max_telemetry_samples). What holds at
-  // the range's beginning changed before it. Empty when the retention dropped them; not_found when the
-  // mission is unknown.
-  virtual Result<CovariatePage> covariates(MissionKey key, TimeRange range,
-                                           const PageRequest& page) const = 0;
 
   // Events with id > after_id, ascending, at most `limit` (1 to max_page_size); of one robot when given.
   virtual Result<std::vector<Event>> events(std::int64_t after_id, std::int64_t limit,
@@ -229,6 +249,11 @@ class Store {
   // As diagnoses().
   virtual Result<std::vector<Proposal>> proposals(std::optional<std::string> robot_id, std::int64_t before_id,
                                                   std::int64_t limit) const = 0;
+
+  // For questions that need not see what was committed in the last seconds.
+  virtual Past past() const { return {*this, std::nullopt}; }
+  // Absent where there is no copy to read.
+  virtual std::optional<StandbyStatus> standby() const { return std::nullopt; }
 
   // At start: the missions that were open when the last daemon ended, oldest first. Each is to be resumed
   // (just go on checkpointing it) or ended by a checkpoint with MissionState::interrupted.

@@ -7,6 +7,7 @@
 #include <span>
 #include <variant>
 
+#include "history/mission_days.h"
 #include "history/sql_store.h"
 
 namespace joulecast::history {
@@ -16,6 +17,10 @@ struct Table {
   std::string_view name;
   std::vector<std::string> key;  // its columns
   std::int64_t batch_rows;       // read at once and written in one transaction
+  // In tables that are keyed by robot: what says whose a row is, and the column that refers to it.
+  std::string_view owner = {}, owner_key = {};
+  // The time by which there may be partitions.
+  std::string_view time = {};
 };
 
 const std::vector<Table>& all_tables() {
@@ -23,14 +28,14 @@ const std::vector<Table>& all_tables() {
       {"robot", {"robot_id"}, 1000},
       {"model", {"robot_id", "version"}, 100},
       {"mission", {"mission_key"}, 500},
-      {"trace", {"mission_key", "start_utime_us"}, 2000},
-      {"telemetry_chunk", {"chunk_key"}, 200},
-      {"covariate_chunk", {"chunk_key"}, 200},
+      {"trace", {"mission_key", "start_utime_us"}, 2000, "mission", "mission_key", "start_utime_us"},
+      {"telemetry_chunk", {"chunk_key"}, 200, "mission", "mission_key", "stored_utime_us"},
+      {"covariate_chunk", {"chunk_key"}, 200, "mission", "mission_key", "stored_utime_us"},
       {"event", {"event_id"}, 1000},
       {"energy_state", {"robot_id"}, 1000},
       {"learned", {"robot_id", "topic"}, 100},
       {"diagnosis", {"diagnosis_id"}, 50},
-      {"diagnosis_report", {"diagnosis_id"}, 50},
+      {"diagnosis_report", {"diagnosis_id"}, 50, "diagnosis", "diagnosis_id"},
       {"proposal", {"proposal_id"}, 50},
       {"audit", {"audit_id"}, 1000},
       {"request_answer", {"actor", "idempotency_key"}, 100},
@@ -40,7 +45,8 @@ const std::vector<Table>& all_tables() {
 
 using Key = std::vector<std::variant<std::int64_t, std::string>>;
 
-// The key's columns first, then the others by name: the same in every database.
+// The key's columns first, then the others by name: the same in every database. Whose a row is that belongs
+// to a mission or diagnosis is said there.
 std::vector<std::string> columns_of(Database& database, const Table& table) {
   const auto all = database.prepare("SELECT * FROM " + std::string(table.name) + " LIMIT 0");
   Rows rows(*all);
@@ -48,6 +54,7 @@ std::vector<std::string> columns_of(Database& database, const Table& table) {
   std::vector<std::string> columns = table.key, others;
   for (int k = 0; k < rows.columns(); ++k) {
     std::string name = all->name(k);
+    if (!table.owner.empty() && name == "robot_id") continue;
     if (std::find(columns.begin(), columns.end(), name) == columns.end()) others.push_back(std::move(name));
   }
   std::sort(others.begin(), others.end());
@@ -66,10 +73,62 @@ std::int64_t rows_of(Database& database, const Table& table) {
   return database.integer("SELECT count(*) FROM " + std::string(table.name));
 }
 
-// Visits the next rows by key, at most `limit`, and moves the key on; answers how many they were.
+// Visits the rows that the statement gives, and puts the last one's key into `last`; answers how many they
+// were.
+template <class Visit>
+std::int64_t visit_rows(Rows& rows, Statement& select, const Table& table, Key& last, Visit visit) {
+  std::int64_t count = 0;
+  Key key;
+  for (; rows.next(); ++count) {
+    visit(select);
+    key.clear();
+    for (int k = 0; k < static_cast<int>(table.key.size()); ++k) {
+      if (select.type(k) == Statement::Type::integer)
+        key.emplace_back(select.integer(k));
+      else
+        key.emplace_back(std::string(select.bytes(k)));
+    }
+  }
+  if (count > 0) last = key;
+  return count;
+}
+
+// The same as scan() of traces where they are keyed by robot first: mission by mission.
+template <class Visit>
+std::int64_t scan_by_mission(Database& database, const Table& table, const std::vector<std::string>& columns,
+                             Key& after, std::int64_t limit, Visit visit) {
+  Statement& select =
+      database.statement("SELECT " + joined(columns) + " FROM " + std::string(table.name) +
+                         " WHERE robot_id = ? AND mission_key = ? AND start_utime_us > ? ORDER BY "
+                         "start_utime_us LIMIT ?");
+  std::int64_t mission = after.empty() ? 0 : std::get<std::int64_t>(after[0]);
+  std::int64_t start = after.empty() ? whole_past : std::get<std::int64_t>(after[1]);
+  for (;;) {
+    std::string robot_id;
+    std::int64_t key = 0;
+    {
+      Rows next(database.statement(
+          "SELECT robot_id, mission_key FROM mission WHERE mission_key >= ? ORDER BY mission_key LIMIT 1"));
+      if (!next.bind(mission).next()) return 0;
+      robot_id = next.text();
+      key = next.integer();
+    }
+    if (key != mission) start = whole_past;
+    Rows rows(select);
+    rows.bind(robot_id).bind(key).bind(start).bind(limit);
+    if (const std::int64_t count = visit_rows(rows, select, table, after, visit); count > 0) return count;
+    mission = key + 1;
+    start = whole_past;
+  }
+}
+
+// Visits the next rows by key, at most `limit`, and moves the key on; answers how many they were, 0 at the
+// end.
 template <class Visit>
 std::int64_t scan(Database& database, const Table& table, const std::vector<std::string>& columns, Key& after,
                   std::int64_t limit, Visit visit) {
+  if (table.key.front() == "mission_key" && !table.owner.empty() && database.keyed_by_robot())
+    return scan_by_mission(database, table, columns, after, limit, visit);
   const std::string key = joined(table.key);
   const std::string beyond = " WHERE (" + key + ") > (" + placeholders(key) + ")";
   Statement& select = database.statement("SELECT " + joined(columns) + " FROM " + std::string(table.name) +
@@ -77,20 +136,7 @@ std::int64_t scan(Database& database, const Table& table, const std::vector<std:
   Rows rows(select);
   for (const auto& part : after) std::visit([&](const auto& value) { rows.bind(value); }, part);
   rows.bind(limit);
-  std::int64_t count = 0;
-  Key last;
-  for (; rows.next(); ++count) {
-    visit(select);
-    last.clear();
-    for (int k = 0; k < static_cast<int>(table.key.size()); ++k) {
-      if (select.type(k) == Statement::Type::integer)
-        last.emplace_back(select.integer(k));
-      else
-        last.emplace_back(std::string(select.bytes(k)));
-    }
-  }
-  if (count > 0) after = last;
-  return count;
+  return visit_rows(rows, select, table, after, visit);
 }
 
 // Adds rows up to a TableSummary.
@@ -182,6 +228,19 @@ void bind_column(Rows& to, const Statement& from, int column) {
   }
 }
 
+std::string insert_into(const Database& to, const Table& table, const std::vector<std::string>& columns) {
+  const bool owned = to.keyed_by_robot() && !table.owner.empty();
+  std::string values;
+  for (std::size_t k = 1; k <= columns.size(); ++k) values += (k > 1 ? ", ?" : "?") + std::to_string(k);
+  const std::string owner_key(table.owner_key);
+  const std::string robot = owned ? "(SELECT robot_id FROM " + std::string(table.owner) + " WHERE " +
+                                        owner_key + " = ?" +
+                                        std::to_string(index_of(columns, owner_key) + 1) + "), "
+                                  : "";
+  return "INSERT INTO " + std::string(table.name) + " (" + (owned ? "robot_id, " : "") + joined(columns) +
+         ") VALUES (" + robot + values + ")";
+}
+
 // Robots before their models: which one is active comes when both are there. Answers the rows found.
 Result<std::int64_t> copy_table(Database& from, Database& to, const Table& table,
                                 const TableProgress& progress) {
@@ -197,8 +256,12 @@ Result<std::int64_t> copy_table(Database& from, Database& to, const Table& table
     return fail(
         Fault::conflict, "to",
         "table " + std::string(table.name) + " holds rows that are not the beginning of what is copied");
-  const std::string insert = "INSERT INTO " + std::string(table.name) + " (" + joined(columns) +
-                             ") VALUES (" + placeholders(joined(columns)) + ")";
+  const std::string insert = insert_into(to, table, columns);
+  if (!table.time.empty() && rows > found) {
+    const std::string time(table.time), of = " FROM " + std::string(table.name);
+    to.expect_rows(table.name, from.integer("SELECT min(" + time + ")" + of),
+                   from.integer("SELECT max(" + time + ")" + of));
+  }
   for (std::int64_t done = found; done < rows;) {
     Transaction transaction(to, Database::Access::write);
     const std::int64_t got = scan(from, table, columns, after, table.batch_rows, [&](const Statement& row) {
@@ -259,6 +322,11 @@ Result<CopyReport> copy_tables(Database& from, Database& to, const TableProgress
       report.rows_found += *found;
     }
     copy_active_versions(from, to);
+    if (to.keyed_by_robot()) {
+      Transaction transaction(to, Database::Access::write);
+      add_up_all_days(to);
+      transaction.commit();
+    }
     for (const Table& table : all_tables()) {
       const TableSummary before = summarize(from, table, progress);
       report.tables.push_back(summarize(to, table, progress));

@@ -293,7 +293,7 @@ TEST_F(LeasesTest, LiveStatesReachTheOthersOnce) {
 }
 
 TEST_F(LeasesTest, AStoreOfVersionOneIsMigrated) {
-  (void)need(open_store(url()));
+  make_store_of_version_2(folder_);
   administer(
       "DROP TABLE cluster_hears, cluster_node, cluster_lease, cluster_writer, cluster_job, cluster_live");
   administer("DROP SEQUENCE cluster_incarnation, cluster_mission_keys");

@@ -62,6 +62,7 @@ class StoreCopyTest : public testing::Test {
     need(apply_one(*store, AddProposal{p}));
     for (int k = 0; k < 3; ++k)
       need(apply_one(*store, AppendAudit{{0, k, "größer", "::1", "r", "putRobot", "{}", ""}}));
+    need(apply_one(*store, KeepAnswer{{"planner", "key-1", "print", 5, 201, "/v1/diagnoses/1", "{}"}}));
   }
 
   std::shared_ptr<Database> tables(const std::string& url) const { return need(open_tables(url, false)); }

@@ -1,0 +1,140 @@
+#include "history/bulk_rows.h"
+
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <utility>
+
+namespace joulecast::history {
+namespace {
+
+std::vector<std::string> split(const std::string& columns) {
+  std::vector<std::string> all;
+  for (std::size_t from = 0; from < columns.size();) {
+    const std::size_t end = std::min(columns.find(", ", from), columns.size());
+    all.push_back(columns.substr(from, end - from));
+    from = end + 2;
+  }
+  return all;
+}
+
+template <class Number>
+void append(std::string& text, Number number) {
+  std::array<char, 32> digits{};
+  text.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr);
+}
+
+}  // namespace
+
+BulkRows::BulkRows(std::string table, std::string columns,
+                   std::function<std::string(const std::string& from)> sql)
+    : table_(std::move(table)), columns_(std::move(columns)), sql_(std::move(sql)) {
+  row_.resize(split(columns_).size());
+  collected_.resize(row_.size());
+}
+
+std::string& BulkRows::at(int parameter) {
+  return row_.at(static_cast<std::size_t>(parameter));
+}
+
+void BulkRows::bind_null(int parameter) {
+  at(parameter) = "NULL";
+}
+
+void BulkRows::bind(int parameter, std::int64_t value) {
+  at(parameter).clear();
+  append(at(parameter), value);
+}
+
+void BulkRows::bind(int parameter, double value) {
+  at(parameter).clear();
+  append(at(parameter), value);
+}
+
+// Within quotes a backslash stands before quotes and backslashes.
+void BulkRows::bind(int parameter, std::string_view value) {
+  std::string& text = at(parameter);
+  text = '"';
+  for (const char c : value) {
+    if (c == '"' || c == '\\') text += '\\';
+    text += c;
+  }
+  text += '"';
+}
+
+void BulkRows::bind(int parameter, std::span<const std::byte> value) {
+  constexpr std::string_view digits = "0123456789abcdef";
+  std::string& text = at(parameter);
+  text = "\"\\\\x";
+  text.reserve(2 * value.size() + 8);
+  for (const std::byte byte : value) {
+    text += digits[std::to_integer<unsigned>(byte) >> 4U];
+    text += digits[std::to_integer<unsigned>(byte) & 15U];
+  }
+  text += '"';
+}
+
+void BulkRows::step_later() {
+  for (std::size_t k = 0; k < row_.size(); ++k) {
+    collected_[k] += any_ ? ',' : '{';
+    collected_[k] += row_[k];
+  }
+  any_ = true;
+}
+
+void BulkRows::reset() {
+  for (std::string& value : row_) value = "NULL";
+}
+
+void BulkRows::clear() {
+  for (std::string& values : collected_) values.clear();
+  any_ = false;
+}
+
+std::string BulkRows::from(Database& database) const {
+  std::map<std::string, std::string> types;
+  const auto select = database.prepare(
+      "SELECT attname::text, format_type(atttypid, atttypmod) FROM pg_attribute WHERE attrelid = "
+      "to_regclass(?) "
+      "AND attnum > 0");
+  {
+    Rows rows(*select);
+    rows.bind(table_);
+    while (rows.next()) {
+      const std::string name = rows.text();
+      types[name] = rows.text();
+    }
+  }
+  std::string text = "unnest(";
+  int number = 0;
+  for (const std::string& column : split(columns_))
+    text += (number++ == 0 ? "?" : ", ?") + std::string("::text::") + types[column] + "[]";
+  return text + ") AS new (" + columns_ + ")";
+}
+
+void BulkRows::flush(Database& database) {
+  if (!any_) return;
+  if (text_.empty()) text_ = sql_(from(database));
+  for (std::string& values : collected_) values += '}';
+  Statement& statement = database.statement(text_);
+  Rows rows(statement);
+  for (const std::string& values : collected_) rows.bind(values);
+  rows.run_later();
+  clear();
+}
+
+BulkRows bulk_replace(const std::string& table, const std::string& key, const std::string& others) {
+  const std::string columns = key + ", " + others;
+  return {table, columns, [=](const std::string& from) {
+            std::string sql = "INSERT INTO " + table + " (" + columns + ") SELECT " + columns + " FROM " +
+                              from + " ON CONFLICT (" + key + ") DO UPDATE SET ";
+            std::string comma;
+            for (const std::string& column : split(others)) {
+              sql += comma + column + " = excluded." + column;
+              comma = ", ";
+            }
+            return sql;
+          }};
+}
+
+}  // namespace joulecast::history

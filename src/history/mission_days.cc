@@ -1,0 +1,108 @@
+#include "history/mission_days.h"
+
+#include <algorithm>
+
+#include "history/sql_rows.h"
+
+namespace joulecast::history {
+namespace {
+
+// The parts of a comma-separated text, each put into `text` at $, joined again.
+std::string each(const std::string& columns, const std::string& text) {
+  const std::size_t place = text.find('$');
+  std::string all;
+  for (std::size_t from = 0; from < columns.size();) {
+    const std::size_t end = std::min(columns.find(", ", from), columns.size());
+    all += (all.empty() ? "" : ", ") + std::string(text).replace(place, 1, columns.substr(from, end - from));
+    from = end + 2;
+  }
+  return all;
+}
+
+// Rows of mission_day of the ended missions of `where`.
+std::string insert_days(const std::string& where) {
+  const std::string counted = " FILTER (WHERE counted)";
+  const std::string day = std::to_string(day_us);
+  return "INSERT INTO mission_day (robot_id, day_utime_us, stored, " + totals_columns() +
+         ") SELECT robot_id, day, count(*), count(*)" + counted +
+         ", count(*) FILTER (WHERE counted AND measured_s > 0), count(*) FILTER (WHERE counted AND "
+         "incomplete "
+         "= 1), coalesce(sum(samples)" +
+         counted + ", 0), coalesce(sum(gap_count)" + counted + ", 0), " +
+         each("gap_s, " + accounts_columns(), "sum($)" + counted) + " FROM (SELECT *, " +
+         std::string(not_annulled) + " AS counted, start_utime_us - ((start_utime_us % " + day + " + " + day +
+         ") % " + day + ") AS day FROM mission WHERE state <> 'open'" + where +
+         ") AS ended GROUP BY robot_id, day";
+}
+
+}  // namespace
+
+std::int64_t floor_to(std::int64_t utime_us, std::int64_t width_us) {
+  return utime_us - ((utime_us % width_us + width_us) % width_us);
+}
+
+const std::string& totals_columns() {
+  static const std::string columns =
+      "missions, measured_missions, incomplete_missions, samples, gap_count, gap_s, " + accounts_columns();
+  return columns;
+}
+
+const std::string& totals_of_missions() {
+  static const std::string sums =
+      "count(*), count(*) FILTER (WHERE measured_s > 0), count(*) FILTER (WHERE incomplete = 1), "
+      "CAST(coalesce(sum(samples), 0) AS BIGINT), CAST(coalesce(sum(gap_count), 0) AS BIGINT), "
+      "coalesce(sum(gap_s), 0.0), " +
+      each(accounts_columns(), "sum($)");
+  return sums;
+}
+
+const std::string& totals_of_one() {
+  static const std::string values =
+      "1, CASE WHEN measured_s > 0 THEN 1 ELSE 0 END, incomplete, samples, gap_count, gap_s, " +
+      accounts_columns();
+  return values;
+}
+
+const std::string& totals_of_parts() {
+  static const std::string sums = each("missions, measured_missions, incomplete_missions, samples, gap_count",
+                                       "CAST(coalesce(sum($), 0) AS BIGINT)") +
+                                  ", coalesce(sum(gap_s), 0.0), " + each(accounts_columns(), "sum($)");
+  return sums;
+}
+
+void ChangedDays::changed(std::string_view robot_id, std::int64_t start_utime_us) {
+  days_.emplace(robot_id, floor_to(start_utime_us, day_us));
+}
+
+void ChangedDays::forget(std::string_view robot_id) {
+  std::erase_if(days_, [&](const auto& day) { return day.first == robot_id; });
+}
+
+void ChangedDays::add_up(Database& database) const {
+  if (!database.keyed_by_robot()) return;
+  static const std::string insert =
+      insert_days(" AND robot_id = ? AND start_utime_us >= ? AND start_utime_us < ?");
+  for (const auto& [robot_id, day_utime_us] : days_) {
+    // Who else changes a mission of that robot waits, and then adds up what it finds.
+    Rows(database.statement("SELECT 1 FROM robot WHERE robot_id = ? FOR NO KEY UPDATE"))
+        .bind(robot_id)
+        .run_later();
+    Rows(database.statement("DELETE FROM mission_day WHERE robot_id = ? AND day_utime_us = ?"))
+        .bind(robot_id)
+        .bind(day_utime_us)
+        .run_later();
+    Rows(database.statement(insert))
+        .bind(robot_id)
+        .bind(day_utime_us)
+        .bind(day_utime_us + day_us)
+        .run_later();
+  }
+}
+
+void add_up_all_days(Database& database) {
+  if (!database.keyed_by_robot()) return;
+  database.execute("DELETE FROM mission_day");
+  database.execute(insert_days(""));
+}
+
+}  // namespace joulecast::history

@@ -1,0 +1,179 @@
+#include "history/postgres_standby.h"
+
+#include <utility>
+
+#include "history/postgres.h"
+#include "history/sql_queries.h"
+
+namespace joulecast::history {
+namespace {
+
+constexpr std::chrono::milliseconds between_looks{250};
+constexpr std::size_t most_looks = 4000;  // beyond, the older half is thinned out
+
+// libpq's, of 14 and later.
+constexpr const char* any_server = "prefer-standby";
+
+std::string system_of(Database& database) {
+  return database.text("SELECT system_identifier::text FROM pg_control_system()");
+}
+
+}  // namespace
+
+PostgresStandby::PostgresStandby(StandbyOptions options, std::string primary_url, std::string name,
+                                 const History& store)
+    : options_(std::move(options)),
+      primary_url_(std::move(primary_url)),
+      name_(std::move(name)),
+      store_(store),
+      readers_(
+          [this] { return std::make_unique<PostgresDatabase>(options_.url, name_ + "-standby", any_server); },
+          options_.readers, ReaderPool::At::need),
+      watch_([this](const std::stop_token& stop) { watch(stop); }) {}
+
+PostgresStandby::~PostgresStandby() {
+  watch_.request_stop();
+  watch_.join();
+}
+
+void PostgresStandby::watch(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    look();
+    std::unique_lock lock(mutex_);
+    wake_.wait_for(lock, stop, between_looks, [] { return false; });
+  }
+}
+
+void PostgresStandby::look() {
+  std::string why;
+  // The server may be away for a while and the standby still be as new as before.
+  try {
+    look_at_server();
+  } catch (const SqlError& error) {
+    server_.reset();
+    why = error.what();
+  }
+  try {
+    look_at_standby();
+  } catch (const SqlError& error) {
+    standby_.reset();
+    why = error.what();
+    const std::lock_guard lock(mutex_);
+    as_of_.reset();
+  }
+  const std::lock_guard lock(mutex_);
+  if (!why.empty() || as_of_) why_not_ = std::move(why);
+}
+
+void PostgresStandby::look_at_server() {
+  if (!server_) {
+    server_ = std::make_unique<PostgresDatabase>(primary_url_, name_ + "-watch");
+    system_ = system_of(*server_);
+  }
+  const Clock::time_point before = Clock::now();
+  Rows rows(server_->statement("SELECT (pg_current_wal_insert_lsn() - '0/0')::bigint"));
+  if (!rows.next()) return;
+  const std::lock_guard lock(mutex_);
+  looks_.push_back({before, rows.integer()});
+  // Of a standby that is far behind, it is told in coarser steps how far.
+  if (looks_.size() > most_looks)
+    for (std::size_t k = 1; k < looks_.size() / 2; ++k) looks_.erase(looks_.begin() + static_cast<long>(k));
+}
+
+void PostgresStandby::look_at_standby() {
+  if (!standby_) {
+    auto connected = std::make_unique<PostgresDatabase>(options_.url, name_ + "-watch", any_server);
+    if (!system_.empty() && system_of(*connected) != system_)
+      throw SqlError(SqlError::Kind::unavailable, "store.read_url is no standby of the server of store.url");
+    standby_ = std::move(connected);
+  }
+  Rows rows(
+      standby_->statement("SELECT (pg_last_wal_replay_lsn() - '0/0')::bigint WHERE pg_is_in_recovery()"));
+  // One that was promoted takes part in no replication that could be measured.
+  if (!rows.next())
+    throw SqlError(SqlError::Kind::unavailable, "the server of store.read_url is no standby any more");
+  const std::int64_t replayed = rows.integer();
+  const std::lock_guard lock(mutex_);
+  while (!looks_.empty() && looks_.front().position <= replayed) {
+    as_of_ = looks_.front().at;
+    looks_.pop_front();
+  }
+}
+
+std::optional<double> PostgresStandby::staleness_s() const {
+  if (!as_of_) return std::nullopt;
+  return std::chrono::duration<double>(Clock::now() - *as_of_).count();
+}
+
+Past PostgresStandby::past() const {
+  const std::lock_guard lock(mutex_);
+  const auto staleness = staleness_s();
+  if (!staleness || *staleness > options_.max_staleness_s) {
+    ++passed_on_;
+    return {store_, std::nullopt};
+  }
+  return {*this, staleness};
+}
+
+StandbyStatus PostgresStandby::status() const {
+  const std::lock_guard lock(mutex_);
+  StandbyStatus status;
+  status.staleness_s = staleness_s();
+  status.in_use = status.staleness_s && *status.staleness_s <= options_.max_staleness_s;
+  status.answered = answered_;
+  status.passed_on = passed_on_;
+  status.why_not = status.in_use ? "" : why_not_;
+  return status;
+}
+
+template <class Query, class Instead>
+auto PostgresStandby::ask(Query query, Instead instead) const -> decltype(instead()) {
+  auto answer = guarded([&]() -> decltype(instead()) {
+    auto lease = readers_.lend();
+    Transaction snapshot(*lease, Database::Access::read);
+    return query(*lease);
+  });
+  // What it does not know it may not know yet.
+  const bool passed_on = !answer && answer.error().fault != Fault::invalid;
+  {
+    const std::lock_guard lock(mutex_);
+    ++(passed_on ? passed_on_ : answered_);
+  }
+  return passed_on ? instead() : answer;
+}
+
+Result<MissionPage> PostgresStandby::missions(const MissionFilter& filter, const PageRequest& page,
+                                              MissionSort sort) const {
+  return ask([&](Database& database) { return queries::missions(database, filter, page, sort); },
+             [&] { return store_.missions(filter, page, sort); });
+}
+
+Result<Totals> PostgresStandby::totals(const MissionFilter& filter) const {
+  return ask([&](Database& database) { return queries::totals(database, filter); },
+             [&] { return store_.totals(filter); });
+}
+
+Result<std::vector<TotalsGroup>> PostgresStandby::grouped_totals(const MissionFilter& filter, Grouping by,
+                                                                 std::int64_t utc_offset_s) const {
+  return ask([&](Database& database) { return queries::grouped_totals(database, filter, by, utc_offset_s); },
+             [&] { return store_.grouped_totals(filter, by, utc_offset_s); });
+}
+
+Result<Trace> PostgresStandby::trace(MissionKey key, TimeRange range, std::int64_t max_points) const {
+  return ask([&](Database& database) { return queries::trace(database, key, range, max_points); },
+             [&] { return store_.trace(key, range, max_points); });
+}
+
+Result<TelemetryPage> PostgresStandby::telemetry(MissionKey key, TimeRange range,
+                                                 const PageRequest& page) const {
+  return ask([&](Database& database) { return queries::telemetry(database, key, range, page); },
+             [&] { return store_.telemetry(key, range, page); });
+}
+
+Result<CovariatePage> PostgresStandby::covariates(MissionKey key, TimeRange range,
+                                                  const PageRequest& page) const {
+  return ask([&](Database& database) { return queries::covariates(database, key, range, page); },
+             [&] { return store_.covariates(key, range, page); });
+}
+
+}  // namespace joulecast::history

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "history/open_store.h"
+#include "history/sql_store.h"
+#include "history/store.h"
+
+namespace joulecast::history {
+
+class PostgresDatabase;
+
+// Questions of the past, asked at a standby of the store's server. What the standby cannot answer, for it is
+// away, has not replayed that far yet or ended the query, the store itself answers. Several times a second it
+// is looked up how far the server is in its log (WAL) and how far the standby has replayed it; what the
+// standby shows is then at least as new as the last look at which the server had got no farther. No clocks of
+// other machines are compared.
+class PostgresStandby final : public History {
+ public:
+  // `store` answers otherwise; it is at `primary_url` and outlives this.
+  PostgresStandby(StandbyOptions options, std::string primary_url, std::string name, const History& store);
+  ~PostgresStandby() override;
+
+  // The standby while it is no staler than StandbyOptions::max_staleness_s, else the store.
+  Past past() const;
+  StandbyStatus status() const;
+
+  Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page,
+                               MissionSort sort) const override;
+  Result<Totals> totals(const MissionFilter& filter) const override;
+  Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& filter, Grouping by,
+                                                  std::int64_t utc_offset_s) const override;
+  Result<Trace> trace(MissionKey key, TimeRange range, std::int64_t max_points) const override;
+  Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const override;
+  Result<CovariatePage> covariates(MissionKey key, TimeRange range, const PageRequest& page) const override;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  // At that time the server's log was that long, in bytes.
+  struct Look {
+    Clock::time_point at;
+    std::int64_t position = 0;
+  };
+
+  template <class Query, class Instead>
+  auto ask(Query query, Instead instead) const -> decltype(instead());
+  void watch(const std::stop_token& stop);
+  void look();
+  void look_at_server();
+  void look_at_standby();
+  std::optional<double> staleness_s() const;  // with the mutex held
+
+  const StandbyOptions options_;
+  const std::string primary_url_, name_;
+  const History& store_;
+  mutable ReaderPool readers_;
+  std::unique_ptr<PostgresDatabase> server_, standby_;  // the watch's own
+  std::string system_;  // identifier of the server's data, from its creation on
+
+  mutable std::mutex mutex_;
+  std::deque<Look> looks_;  // that the standby has not reached, but for the first one
+  std::optional<Clock::time_point> as_of_;
+  std::string why_not_;
+  mutable std::uint64_t answered_ = 0, passed_on_ = 0;
+  std::condition_variable_any wake_;
+  std::jthread watch_;
+};
+
+}  // namespace joulecast::history

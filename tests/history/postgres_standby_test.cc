@@ -1,0 +1,148 @@
+// Questions of the past at a standby of the server: a real one, that follows, falls behind and goes.
+
+#include "history/postgres_standby.h"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <thread>
+
+#include "history/postgres.h"
+#include "history/postgres_store.h"
+#include "temporary_store.h"
+
+namespace joulecast::history {
+namespace {
+
+using namespace std::chrono_literals;
+
+int tell(const std::string& what) {
+  return std::system((JOULECAST_SOURCE_DIR "/tests/support/postgresql.sh " + what).c_str());
+}
+
+class PostgresStandbyTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    primary_ = new TemporaryFolder;
+    standby_ = new TemporaryFolder;
+    ASSERT_EQ(tell("start " + primary_->file("")), 0);
+    ASSERT_EQ(tell("standby " + primary_->file("") + " " + standby_->file("")), 0);
+    // Commits do not wait for it.
+    administer(*primary_, "ALTER SYSTEM RESET synchronous_standby_names");
+    administer(*primary_, "SELECT pg_reload_conf()");
+  }
+  static void TearDownTestSuite() {
+    tell("stop " + standby_->file(""));
+    tell("stop " + primary_->file(""));
+    delete standby_;
+    delete primary_;
+  }
+
+  void SetUp() override {
+    const std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
+    administer(*primary_, "CREATE SCHEMA " + name);
+    PostgresOptions options;
+    options.url = url(*primary_) + "&options=-csearch_path%3D" + name;
+    options.standby.url = url(*standby_) + "&options=-csearch_path%3D" + name;
+    options.standby.max_staleness_s = 2;
+    store_ = need(open_postgres_store(options));
+  }
+
+  static std::string url(const TemporaryFolder& folder) {
+    return "postgresql://joulecast@/postgres?host=" + folder.file("");
+  }
+  static void administer(const TemporaryFolder& folder, const std::string& sql) {
+    PostgresDatabase(url(folder), "test", "any").execute(sql);
+  }
+  StandbyStatus need_status() const { return store_->standby().value(); }
+  bool uses_standby(bool wanted) const {
+    for (int tries = 0; tries < 400; ++tries, std::this_thread::sleep_for(25ms))
+      if (store_->past().staleness_s.has_value() == wanted) return true;
+    return false;
+  }
+
+  static TemporaryFolder *primary_, *standby_;
+  std::unique_ptr<Store> store_;
+};
+
+TemporaryFolder *PostgresStandbyTest::primary_, *PostgresStandbyTest::standby_;
+
+TEST_F(PostgresStandbyTest, AnswersAndSaysHowOldItMayBe) {
+  const Mission m = start_mission(*store_, "amr-1", "m", 1'000'000);
+  need(apply_one(*store_, CheckpointMission{m, {}, some_samples(0, 0, 20), {}}));
+  ASSERT_TRUE(uses_standby(true));
+  std::this_thread::sleep_for(600ms);  // for what was committed to be within what it says to show
+  const Past past = store_->past();
+  ASSERT_TRUE(past.staleness_s);
+  EXPECT_GE(*past.staleness_s, 0);
+  EXPECT_LT(*past.staleness_s, 2);
+  EXPECT_NE(&past.history, static_cast<const History*>(store_.get()));
+  const std::uint64_t before = need_status().answered;
+  EXPECT_EQ(need(past.history.missions({}, {10, {}}, {})).missions.size(), 1u);
+  EXPECT_EQ(need(past.history.totals({})).missions, 1);
+  EXPECT_EQ(need(past.history.grouped_totals({}, Grouping::day, 0)).size(), 1u);
+  EXPECT_EQ(need(past.history.telemetry(m.key, {}, {100, {}})).samples.size(), 20u);
+  EXPECT_TRUE(need(past.history.trace(m.key, {}, 10)).buckets.empty());
+  EXPECT_TRUE(need(past.history.covariates(m.key, {}, {100, {}})).changes.empty());
+  MissionFilter impossible;
+  impossible.payload_min_kg = 2;
+  impossible.payload_max_kg = 1;
+  EXPECT_EQ(past.history.totals(impossible).error().fault, Fault::invalid);
+  EXPECT_EQ(need_status().answered, before + 7);
+}
+
+TEST_F(PostgresStandbyTest, OneThatFallsBehindIsLeftUntilItHasCaughtUp) {
+  start_mission(*store_, "amr-1", "first", 1'000'000);
+  ASSERT_TRUE(uses_standby(true));
+  std::this_thread::sleep_for(600ms);
+  administer(*standby_, "SELECT pg_wal_replay_pause()");
+  const Mission second = start_mission(*store_, "amr-1", "second", 2'000'000);
+  {
+    // While it is used, it shows what was, and says so; what it does not know at all the store itself
+    // answers.
+    const Past past = store_->past();
+    ASSERT_TRUE(past.staleness_s);
+    EXPECT_EQ(need(past.history.totals({})).missions, 1);
+    EXPECT_TRUE(past.history.trace(second.key, {}, 10));
+    EXPECT_EQ(past.history.trace(99'999, {}, 10).error().fault, Fault::not_found);
+  }
+  ASSERT_TRUE(uses_standby(false));
+  EXPECT_FALSE(need_status().in_use);
+  EXPECT_GT(need_status().staleness_s.value_or(0), 2);
+  EXPECT_EQ(need(store_->past().history.totals({})).missions, 2);
+  administer(*standby_, "SELECT pg_wal_replay_resume()");
+  ASSERT_TRUE(uses_standby(true));
+  EXPECT_EQ(need(store_->past().history.totals({})).missions, 2);
+}
+
+TEST_F(PostgresStandbyTest, OneThatIsGoneIsDoneWithout) {
+  start_mission(*store_, "amr-1", "m", 1'000'000);
+  ASSERT_TRUE(uses_standby(true));
+  std::this_thread::sleep_for(600ms);
+  const Past past = store_->past();
+  ASSERT_EQ(tell("stop " + standby_->file("")), 0);
+  EXPECT_EQ(need(past.history.totals({})).missions, 1) << "asked while it goes";
+  ASSERT_TRUE(uses_standby(false));
+  EXPECT_FALSE(need_status().why_not.empty());
+  EXPECT_EQ(need(store_->past().history.totals({})).missions, 1);
+  ASSERT_EQ(tell("start " + standby_->file("")), 0);
+  EXPECT_TRUE(uses_standby(true));
+}
+
+TEST_F(PostgresStandbyTest, AServerThatIsNoStandbyIsNotAsked) {
+  PostgresOptions options;
+  const std::string schema = "&options=-csearch_path%3Dno_standby";
+  administer(*primary_, "CREATE SCHEMA no_standby");
+  options.url = url(*primary_) + schema;
+  options.standby.url = url(*primary_) + schema;
+  const auto store = need(open_postgres_store(options));
+  for (int tries = 0; tries < 200 && store->standby()->why_not.empty(); ++tries)
+    std::this_thread::sleep_for(25ms);
+  EXPECT_NE(store->standby()->why_not.find("no standby"), std::string::npos) << store->standby()->why_not;
+  EXPECT_FALSE(store->past().staleness_s);
+}
+
+}  // namespace
+}  // namespace joulecast::history
