@@ -10,12 +10,6 @@
 namespace joulecast::history::queries {
 namespace {
 
-std::string among(const std::string& column, std::size_t values) {
-  std::string sql = column + " IN (?";
-  for (std::size_t k = 1; k < values; ++k) sql += ", ?";
-  return sql + ")";
-}
-
 // A pattern of LIKE, whose escape is '!', for texts in lower case that contain the part. Like SQL's lower(),
 // it knows the letters of ASCII.
 std::string pattern_of(const std::string& part) {
@@ -36,6 +30,12 @@ Result<void> check_bounds(const std::string& field, const std::string& other, st
 }
 
 }  // namespace
+
+std::string among(const std::string& column, std::size_t values) {
+  std::string sql = column + " IN (?";
+  for (std::size_t k = 1; k < values; ++k) sql += ", ?";
+  return sql + ")";
+}
 
 const std::string& ratio_sql() {
   static const std::string sql =

@@ -41,6 +41,9 @@ class Recorder : public ServerObserver {
 // Waits for what another thread is about to make true.
 template <class Condition>
 bool soon(Condition condition, std::chrono::milliseconds time = 3000ms) {
+#ifdef __SANITIZE_THREAD__
+  time *= 6;
+#endif
   const auto end = std::chrono::steady_clock::now() + time;
   while (!condition()) {
     if (std::chrono::steady_clock::now() > end) return false;
