@@ -32,7 +32,7 @@ isolated build/sanitize-thread/tests/server/http_server_test
 build/sanitize-thread/tests/history/history_test --gtest_filter='Writer*'
 if $threads; then
   cmake --build --preset sanitize-thread --target ingest_test diagnosis_service_test joulecastd joulecast
-  isolated build/sanitize-thread/tests/ingest/ingest_test
+  isolated build/sanitize-thread/tests/ingest/ingest_test --gtest_filter='*Pipeline*:*Takeover*:*FleetView*:*Hostile*:*Signature*:*Recent*'
   build/sanitize-thread/tests/diagnosis/diagnosis_service_test
   isolated ctest --preset sanitize-thread -R '^acceptance_(killed_daemon|signed_telemetry|stalled_store|webhooks)$'
   exit

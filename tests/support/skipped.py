@@ -23,5 +23,6 @@ def faults_of(report, reasons):
 
 if __name__ == "__main__":
     found = faults_of(sys.argv[1], sys.argv[2:])
-    print("\n".join(found))
+    for fault in found:
+        print(fault)
     sys.exit(1 if found else 0)
