@@ -65,7 +65,10 @@ Result<MissionKey> SqlStore::mission_key(std::string_view robot_id, std::string_
   auto stored = read([&](Database& database) -> Result<std::optional<MissionKey>> {
     return queries::key_of(database, robot_id, mission_id, start_utime_us);
   });
-  if (!stored && stored.error().fault != Fault::unavailable) return tl::unexpected(stored.error());
+  // A read that fails in the middle of the journal is told as corruption by SQLite, and may pass as well.
+  const bool unreadable =
+      !stored && (stored.error().fault == Fault::unavailable || stored.error().fault == Fault::corrupt);
+  if (!stored && !unreadable) return tl::unexpected(stored.error());
   if (stored && *stored) return **stored;
   const Result<MissionKey> key = new_key();
   if (key) reserved_[mission] = *key;
