@@ -2,7 +2,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "base/json_fields.h"
 #include "base/json_writer.h"
 #include "base/utc_time.h"
 #include "server/api/common_parameters.h"

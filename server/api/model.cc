@@ -1,8 +1,6 @@
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "base/json_fields.h"
 #include "base/json_writer.h"
 #include "base/utc_time.h"
 #include "robot/robot_file.h"

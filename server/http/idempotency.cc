@@ -10,11 +10,9 @@
 namespace joulecast::http {
 namespace {
 
-constexpr std::size_t longest_key = 255;
-
 bool is_valid(std::string_view key) {
   const auto visible = [](char c) { return c > 0x20 && c < 0x7f; };
-  return key.size() <= longest_key && std::ranges::all_of(key, visible);
+  return key.size() <= longest_idempotency_key && std::ranges::all_of(key, visible);
 }
 
 std::string fingerprint_of(const Request& request) {
@@ -27,6 +25,11 @@ std::string location_of(const Response& response) {
   const auto found = std::ranges::find_if(
       response.headers, [](const auto& each) { return equals_ignoring_case(each.first, "Location"); });
   return found == response.headers.end() ? "" : found->second;
+}
+
+Response refused(const Request& request, const std::string& detail, const std::string& constraint) {
+  const std::string header(idempotency_header);
+  return problem(422, "invalid", header + ": " + detail, request.id, header, constraint);
 }
 
 Response repeated(IdempotencyKeys::Answer&& answer) {
@@ -56,17 +59,18 @@ Result<Response> IdempotencyKeys::answer(const Request& request, const Handler& 
   Answer now;
   now.key = trim(request.header(idempotency_header));
   if (now.key.empty()) return handler(request);
-  if (!is_valid(now.key))
-    return problem(422, "invalid", "Idempotency-Key: must be at most 255 visible ASCII characters",
-                   request.id, std::string(idempotency_header),
-                   "must be at most 255 visible ASCII characters");
+  if (!is_valid(now.key)) {
+    const std::string form =
+        "must be at most " + std::to_string(longest_idempotency_key) + " visible ASCII characters";
+    return refused(request, form, form);
+  }
   now.actor = request.actor;
   now.fingerprint = fingerprint_of(request);
   Result<std::optional<Answer>> before = options_.find(now.actor, now.key);
   if (!before) return tl::unexpected(std::move(before.error()));
   if (*before && (*before)->fingerprint != now.fingerprint)
-    return problem(422, "invalid", "Idempotency-Key: another request was answered under this key", request.id,
-                   std::string(idempotency_header), "must be new for each request that is new");
+    return refused(request, "another request was answered under this key",
+                   "must be new for each request that is new");
   if (*before) return repeated(std::move(**before));
   Result<Response> response = handler(request);
   if (!response || response->status >= 300 || response->stream) return response;

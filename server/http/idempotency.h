@@ -11,6 +11,7 @@ namespace joulecast::http {
 // The header by which a client says that a request is the repetition of one whose answer it did not get, as
 // draft-ietf-httpapi-idempotency-key-header defines it.
 inline constexpr std::string_view idempotency_header = "Idempotency-Key";
+inline constexpr std::size_t longest_idempotency_key = 255;  // visible ASCII characters
 
 // Whether requests of the endpoint may carry a key: those that change what the service keeps.
 bool takes_idempotency_key(const Endpoint& endpoint);

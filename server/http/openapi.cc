@@ -221,7 +221,7 @@ Result<ordered_json> parameters_of(const Endpoint& endpoint) {
           "chosen by the client, new for each new request: within 7 days a repetition of the "
           "request under the key is answered as the request was, with Idempotency-Replayed: "
           "true, and changes nothing"},
-         {"schema", {{"type", "string"}, {"minLength", 1}, {"maxLength", 255}}}});
+         {"schema", {{"type", "string"}, {"minLength", 1}, {"maxLength", longest_idempotency_key}}}});
   return parameters;
 }
 

@@ -8,16 +8,6 @@
 namespace joulecast::history {
 namespace {
 
-std::vector<std::string> split(const std::string& columns) {
-  std::vector<std::string> all;
-  for (std::size_t from = 0; from < columns.size();) {
-    const std::size_t end = std::min(columns.find(", ", from), columns.size());
-    all.push_back(columns.substr(from, end - from));
-    from = end + 2;
-  }
-  return all;
-}
-
 template <class Number>
 void append(std::string& text, Number number) {
   std::array<char, 32> digits{};
@@ -29,7 +19,7 @@ void append(std::string& text, Number number) {
 BulkRows::BulkRows(std::string table, std::string columns,
                    std::function<std::string(const std::string& from)> sql)
     : table_(std::move(table)), columns_(std::move(columns)), sql_(std::move(sql)) {
-  row_.resize(split(columns_).size());
+  row_.resize(column_names(columns_).size());
   collected_.resize(row_.size());
 }
 
@@ -107,7 +97,7 @@ std::string BulkRows::from(Database& database) const {
   }
   std::string text = "unnest(";
   int number = 0;
-  for (const std::string& column : split(columns_))
+  for (const std::string& column : column_names(columns_))
     text += (number++ == 0 ? "?" : ", ?") + std::string("::text::") + types[column] + "[]";
   return text + ") AS new (" + columns_ + ")";
 }
@@ -126,14 +116,8 @@ void BulkRows::flush(Database& database) {
 BulkRows bulk_replace(const std::string& table, const std::string& key, const std::string& others) {
   const std::string columns = key + ", " + others;
   return {table, columns, [=](const std::string& from) {
-            std::string sql = "INSERT INTO " + table + " (" + columns + ") SELECT " + columns + " FROM " +
-                              from + " ON CONFLICT (" + key + ") DO UPDATE SET ";
-            std::string comma;
-            for (const std::string& column : split(others)) {
-              sql += comma + column + " = excluded." + column;
-              comma = ", ";
-            }
-            return sql;
+            return "INSERT INTO " + table + " (" + columns + ") SELECT " + columns + " FROM " + from +
+                   or_replace(key, others);
           }};
 }
 

@@ -11,11 +11,8 @@ namespace {
 std::string each(const std::string& columns, const std::string& text) {
   const std::size_t place = text.find('$');
   std::string all;
-  for (std::size_t from = 0; from < columns.size();) {
-    const std::size_t end = std::min(columns.find(", ", from), columns.size());
-    all += (all.empty() ? "" : ", ") + std::string(text).replace(place, 1, columns.substr(from, end - from));
-    from = end + 2;
-  }
+  for (const std::string& column : column_names(columns))
+    all += (all.empty() ? "" : ", ") + std::string(text).replace(place, 1, column);
   return all;
 }
 

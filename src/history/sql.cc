@@ -106,18 +106,31 @@ std::string placeholders(std::string_view columns) {
   return marks;
 }
 
-std::string insert_or_replace(std::string_view table, std::string_view key, std::string_view columns) {
-  const std::string all = std::string(key) + ", " + std::string(columns);
-  std::string sql = "INSERT INTO " + std::string(table) + " (" + all + ") VALUES (" + placeholders(all) +
-                    ") ON CONFLICT (" + std::string(key) + ") DO UPDATE SET ";
-  for (std::string_view rest = columns; !rest.empty();) {
-    const std::size_t end = std::min(rest.find(','), rest.size());
-    const std::string column(rest.substr(0, end));
-    if (rest.size() != columns.size()) sql += ", ";
-    sql += column + " = excluded." + column;
-    rest.remove_prefix(std::min(rest.size(), end + 2));
+std::vector<std::string> column_names(std::string_view columns) {
+  constexpr std::string_view separator = ", ";
+  std::vector<std::string> names;
+  for (std::size_t from = 0; from < columns.size();) {
+    const std::size_t end = std::min(columns.find(separator, from), columns.size());
+    names.emplace_back(columns.substr(from, end - from));
+    from = end + separator.size();
+  }
+  return names;
+}
+
+std::string or_replace(std::string_view key, std::string_view columns) {
+  std::string sql = " ON CONFLICT (" + std::string(key) + ") DO UPDATE SET ";
+  std::string comma;
+  for (const std::string& column : column_names(columns)) {
+    sql += comma + column + " = excluded." + column;
+    comma = ", ";
   }
   return sql;
+}
+
+std::string insert_or_replace(std::string_view table, std::string_view key, std::string_view columns) {
+  const std::string all = std::string(key) + ", " + std::string(columns);
+  return "INSERT INTO " + std::string(table) + " (" + all + ") VALUES (" + placeholders(all) + ")" +
+         or_replace(key, columns);
 }
 
 }  // namespace joulecast::history

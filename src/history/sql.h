@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/error.h"
 
@@ -178,6 +179,12 @@ class Transaction {
  private:
   Database& database_;
 };
+
+// The names of comma-separated columns.
+std::vector<std::string> column_names(std::string_view columns);
+
+// " ON CONFLICT (key) DO UPDATE SET ...": an insert replaces the columns of the row of the same key.
+std::string or_replace(std::string_view key, std::string_view columns);
 
 // "INSERT INTO table (key, columns) VALUES (?, ...)", replacing the columns of the row of the same key. All
 // comma-separated.

@@ -59,11 +59,7 @@ BulkRows bulk_checkpoints() {
   return {"mission", checkpoint_columns(), [](const std::string& from) {
             std::string values;
             const std::string& all = mission_content_columns();
-            for (std::size_t at = 0; at < all.size();) {
-              const std::size_t end = std::min(all.find(", ", at), all.size());
-              values += "new." + all.substr(at, end - at) + ", ";
-              at = end + 2;
-            }
+            for (const std::string& column : column_names(all)) values += "new." + column + ", ";
             return "UPDATE mission SET (" + all + ", telemetry_samples, covariate_changes) = (" + values +
                    "mission.telemetry_samples + new.telemetry_samples, mission.covariate_changes + "
                    "new.covariate_changes) FROM " +

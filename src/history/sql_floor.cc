@@ -4,6 +4,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "history/keyed_sql.h"
 #include "history/mission_days.h"
 #include "history/sql_filter.h"
 #include "history/sql_queries.h"
@@ -66,21 +67,19 @@ class Sums {
   std::unordered_map<std::uint64_t, std::size_t> places_;
 };
 
-// `by_robot`: the key of traces begins with the robot.
-const std::string& select_points(bool by_robot) {
-  const auto make = [](std::string_view key, std::string_view one) {
-    std::string keys(one);
-    for (std::size_t k = 1; k < missions_at_once; ++k) keys.append(", ").append(one);
+const KeyedSql& select_points() {
+  static const KeyedSql sql = [] {
+    std::string keys = "($values)";
+    for (std::size_t k = 1; k < missions_at_once; ++k) keys += ", ($values)";
     // The times tell a database that keeps traces by time where to look.
-    return "SELECT mission_key, covered_s, measured_power_mean_w, modelled_power_mean_w, speed_mean_m_s, "
-           "x_m, y_m FROM trace WHERE " +
-           std::string(key) + " IN (" + keys +
-           ") AND start_utime_us >= ? AND start_utime_us < ? AND x_m IS NOT NULL AND y_m IS NOT NULL "
-           "ORDER BY mission_key";
-  };
-  static const std::string of_missions = make("mission_key", "?");
-  static const std::string of_robots = make("(robot_id, mission_key)", "(?, ?)");
-  return by_robot ? of_robots : of_missions;
+    return KeyedSql(
+        "SELECT mission_key, covered_s, measured_power_mean_w, modelled_power_mean_w, speed_mean_m_s, "
+        "x_m, y_m FROM trace WHERE ($key) IN (" +
+        keys +
+        ") AND start_utime_us >= ? AND start_utime_us < ? AND x_m IS NOT NULL AND y_m IS NOT NULL "
+        "ORDER BY mission_key");
+  }();
+  return sql;
 }
 
 }  // namespace
@@ -138,12 +137,10 @@ Result<FloorSums> floor_sums(Database& database, std::span<const FloorChoice::Ch
   sums.visits.resize(chosen.size());
   if (chosen.empty()) return sums;
   using Chosen = FloorChoice::Chosen;
-  const bool by_robot = database.keyed_by_robot();
-  Rows rows(database.statement(select_points(by_robot)));
+  Rows rows(select_points().in(database));
   for (std::size_t k = 0; k < missions_at_once; ++k) {
-    const Chosen& mission = chosen[std::min(k, chosen.size() - 1)];
-    if (by_robot) rows.bind(mission.robot_id);
-    rows.bind(mission.key);
+    const Chosen& one = chosen[std::min(k, chosen.size() - 1)];
+    bind_key(rows, database, one.robot_id, one.key);
   }
   rows.bind(std::ranges::min(chosen, {}, &Chosen::from_utime_us).from_utime_us - trace_bucket_us);
   rows.bind(std::ranges::max(chosen, {}, &Chosen::to_utime_us).to_utime_us + trace_bucket_us);

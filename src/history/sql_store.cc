@@ -65,11 +65,10 @@ Result<MissionKey> SqlStore::mission_key(std::string_view robot_id, std::string_
   auto stored = read([&](Database& database) -> Result<std::optional<MissionKey>> {
     return queries::key_of(database, robot_id, mission_id, start_utime_us);
   });
-  // A read that fails in the middle of the journal is told as corruption by SQLite, and may pass as well.
-  const bool unreadable =
-      !stored && (stored.error().fault == Fault::unavailable || stored.error().fault == Fault::corrupt);
-  if (!stored && !unreadable) return tl::unexpected(stored.error());
   if (stored && *stored) return **stored;
+  // SQLite reports a read that fails in the middle of the journal as corruption, which passes as well.
+  if (!stored && stored.error().fault != Fault::unavailable && stored.error().fault != Fault::corrupt)
+    return tl::unexpected(stored.error());
   const Result<MissionKey> key = new_key();
   if (key) reserved_[mission] = *key;
   return key;

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <mutex>
 #include <string>
@@ -42,14 +43,8 @@ class RecentValues {
   std::vector<RecentValue> of(std::string_view robot_id) const;
 
  private:
-  struct Ring {
-    std::array<RecentValue, most_recent_values> values;
-    std::size_t next = 0, count = 0;
-    const RecentValue& newest() const { return values[(next + most_recent_values - 1) % most_recent_values]; }
-  };
-
   mutable std::mutex mutex_;
-  std::map<std::string, Ring, std::less<>> robots_;
+  std::map<std::string, std::deque<RecentValue>, std::less<>> robots_;  // oldest first
 };
 
 }  // namespace joulecast::ingest

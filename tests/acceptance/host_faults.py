@@ -18,7 +18,7 @@ class HostFaults:
         if shutil.which("cc") is None:
             skip("no C compiler")
         library, control = programs.path("host_faults.so"), programs.path("host_faults")
-        subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", library, pathlib.Path(__file__).with_suffix(".c"), "-ldl"],
+        subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", library, pathlib.Path(__file__).with_suffix(".c")],
                        check=True)
         pathlib.Path(control).write_bytes(bytes(24))
         self.shared = mmap.mmap(os.open(control, os.O_RDWR), 24)
