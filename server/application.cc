@@ -185,16 +185,16 @@ struct Application::Parts {
       return tl::unexpected(std::move(wanted.error()));
     else if (!wanted->name.empty())
       in_cluster = std::move(*wanted);
-    const Result<history::StandbyOptions> standby = standby_options(settings);
-    if (!standby) return tl::unexpected(standby.error());
+    const Result<history::StoreOptions> options_of_store = store_options(settings);
+    if (!options_of_store) return tl::unexpected(options_of_store.error());
     Result<std::unique_ptr<history::Store>> opened =
         in_cluster ? history::open_shared_store(
                          in_cluster->url, in_cluster->writer,
                          [this](const std::string& robot_id, history::Epoch epoch, std::uint64_t count) {
                            if (joined) cluster->on_dropped(robot_id, epoch, count);
                          },
-                         *standby)
-                   : history::open_store(store_url(settings), *standby);
+                         options_of_store->standby)
+                   : history::open_store(store_url(settings), *options_of_store);
     if (!opened)
       return fail(opened.error().fault, by_path ? "store.path" : "store.url",
                   std::move(opened.error().message));
@@ -644,8 +644,8 @@ std::vector<Error> faulty_robot_files(const Settings& settings) {
 std::vector<Error> faults_of_store(const Settings& settings) {
   const Result<void> sound = history::check_store_url(store_url(settings));
   if (!sound) return {{Fault::invalid, "store.url", sound.error().message}};
-  const auto standby = standby_options(settings);
-  return standby ? std::vector<Error>{} : std::vector<Error>{standby.error()};
+  const auto store = store_options(settings);
+  return store ? std::vector<Error>{} : std::vector<Error>{store.error()};
 }
 
 bool Application::stop() {

@@ -42,14 +42,15 @@ std::string store_url(const Settings& settings) {
   return url.empty() ? "sqlite:" + settings.text("store.path") : url;
 }
 
-Result<history::StandbyOptions> standby_options(const Settings& settings) {
-  history::StandbyOptions options;
-  options.url = settings.text("store.read_url");
-  options.max_staleness_s = settings.number("store.read_staleness_s");
-  if (options.url.empty()) return options;
-  if (!history::is_postgres_url(options.url) || !history::is_postgres_url(store_url(settings)))
+Result<history::StoreOptions> store_options(const Settings& settings) {
+  history::StoreOptions options;
+  if (settings.text("store.synchronous") == "normal") options.durability = history::Durability::process_end;
+  options.standby.url = settings.text("store.read_url");
+  options.standby.max_staleness_s = settings.number("store.read_staleness_s");
+  if (options.standby.url.empty()) return options;
+  if (!history::is_postgres_url(options.standby.url) || !history::is_postgres_url(store_url(settings)))
     return invalid("store.read_url", "must be the postgresql://... of a standby of the server of store.url");
-  if (Result<void> sound = history::check_store_url(options.url); !sound)
+  if (Result<void> sound = history::check_store_url(options.standby.url); !sound)
     return invalid("store.read_url", sound.error().message);
   return options;
 }

@@ -21,7 +21,7 @@ namespace joulecast {
 
 std::string store_url(const Settings& settings);
 // Fault::invalid on "store.read_url".
-Result<history::StandbyOptions> standby_options(const Settings& settings);
+Result<history::StoreOptions> store_options(const Settings& settings);
 // Beside the SQLite file; a file of this machine also where the history is kept elsewhere.
 std::string spool_path(const Settings& settings);
 

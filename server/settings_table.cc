@@ -5,6 +5,7 @@ namespace joulecast {
 namespace {
 
 using Type = Setting::Type;
+constexpr std::string_view store_synchronous[] = {"full", "normal"};
 constexpr std::string_view log_formats[] = {"text", "json"};
 constexpr std::string_view log_levels[] = {"debug", "info", "warning", "error"};
 constexpr double megabyte = 1024.0 * 1024.0;
@@ -97,6 +98,11 @@ constexpr Setting table[] = {
      "may be; empty: none"},
     {"store.read_staleness_s", Type::number, "5", 0.5, 3600, "s",
      "age of what this standby shows beyond which the server of store.url answers instead"},
+    {"store.synchronous", Type::choice, "full", 0, 0, "",
+     "what an acknowledged commit to the SQLite file survives: full, also a power cut; normal, for slow "
+     "disks, "
+     "the end of the daemon only",
+     store_synchronous},
     {"store.retention_days", Type::number, "30", 0, 36500, "d",
      "age at which raw telemetry is deleted, at most 5 % of it an hour; 0: never"},
     {"store.retention_bytes", Type::integer, "10737418240", 0, 1e15, "B",

@@ -10,7 +10,6 @@
 #include "history/schema.h"
 #include "history/sql_store.h"
 #include "history/sqlite.h"
-#include "history/sqlite_store.h"
 
 namespace joulecast::history {
 namespace {
@@ -81,15 +80,17 @@ std::string sqlite_path(const std::string& url) {
   return url.starts_with(sqlite_scheme) ? url.substr(sqlite_scheme.size()) : url;
 }
 
-Result<std::unique_ptr<Store>> open_store(const std::string& url, const StandbyOptions& standby) {
+Result<std::unique_ptr<Store>> open_store(const std::string& url, const StoreOptions& options) {
   if (auto ok = check_store_url(url); !ok) return tl::unexpected(ok.error());
   if (is_postgres_url(url)) {
-    PostgresOptions options = postgres_options(url);
-    options.standby = standby;
-    return open_postgres_store(options);
+    PostgresOptions server = postgres_options(url);
+    server.standby = options.standby;
+    return open_postgres_store(server);
   }
-  if (!standby.url.empty()) return invalid("standby", "only a PostgreSQL has standbys");
-  return open_sqlite_store(sqlite_options(url));
+  if (!options.standby.url.empty()) return invalid("standby", "only a PostgreSQL has standbys");
+  SqliteOptions file = sqlite_options(url);
+  file.durability = options.durability;
+  return open_sqlite_store(file);
 }
 
 Result<std::unique_ptr<Store>> open_shared_store(

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "history/sql.h"
 #include "history/sqlite.h"
+#include "history/sqlite_store.h"
 #include "history/store.h"
 
 namespace joulecast::history {
@@ -26,9 +27,14 @@ struct StandbyOptions {
   std::size_t readers = 4;     // connections; a question beyond that many waits for one
 };
 
+struct StoreOptions {
+  StandbyOptions standby;                         // of a PostgreSQL
+  Durability durability = Durability::power_cut;  // of SQLite's file; a PostgreSQL has its own settings
+};
+
 // Opens the store of a URL: sqlite:PATH, a PATH, or postgresql://... The errors are open_sqlite_store()'s and
 // open_postgres_store()'s; Fault::invalid on "url" for any other scheme. Of the standby nothing is asked yet.
-Result<std::unique_ptr<Store>> open_store(const std::string& url, const StandbyOptions& standby = {});
+Result<std::unique_ptr<Store>> open_store(const std::string& url, const StoreOptions& options = {});
 
 // The store of a PostgreSQL URL, which other programs that name themselves write to as well: see
 // PostgresOptions for `writer` and `on_dropped`.

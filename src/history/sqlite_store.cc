@@ -58,11 +58,10 @@ class OpenedFiles {
   std::string lost_;
 };
 
-void configure_writer(Database& database) {
+void configure_writer(Database& database, Durability durability) {
   database.execute("PRAGMA journal_mode = WAL");
-  // In WAL mode NORMAL never corrupts; a power cut may lose the last commits, the end of the process loses
-  // none.
-  database.execute("PRAGMA synchronous = NORMAL");
+  database.execute(durability == Durability::power_cut ? "PRAGMA synchronous = FULL"
+                                                       : "PRAGMA synchronous = NORMAL");
   database.execute("PRAGMA foreign_keys = ON");
   // Give back a journal that a long read let grow.
   database.execute("PRAGMA journal_size_limit = 67108864");
@@ -156,7 +155,7 @@ Result<OpenedDatabase> open_database(const SqliteOptions& options) {
   // The schema first, so that a file which is refused is left exactly as it was.
   if (auto ready = bring_to_schema(*opened.writer, store_schema()); !ready)
     return tl::unexpected(ready.error());
-  configure_writer(*opened.writer);
+  configure_writer(*opened.writer, options.durability);
   return opened;
 }
 

@@ -118,6 +118,32 @@ void single_solves() {
   }
 }
 
+// Ten segments of each kind, with limits, from path to plan.
+void ten_segments() {
+  std::printf("ten segments within limits          regeneration 1         0.3           0\n");
+  std::vector<Segment> turns, arcs;
+  std::vector<Point> corners{{2, 0}};
+  for (int k = 0; k < 5; ++k) {
+    turns.insert(turns.end(), {Straight{2.0 + 0.1 * k}, TurnInPlace{k % 2 ? 1.2 : -0.9}});
+    arcs.insert(arcs.end(), {Straight{2.0 + 0.1 * k}, Arc{1.5, k % 2 ? 0.8 : -0.8}});
+  }
+  for (int k = 1; k < 10; ++k) corners.push_back({2.0 * (k + 1), k % 2 ? 1.0 : 0.0});
+  for (const auto& [name, segments] : {std::pair{"straights and turns in place", turns},
+                                       {"straights and arcs", arcs},
+                                       {"polyline", {Polyline{corners}}}}) {
+    std::printf("  %-32s", name);
+    const auto path = make_path(segments, PathOptions{.start = {}, .payload_kg = 20});
+    Problem problem;
+    problem.limits = limits_of(test::amr());
+    for (const double regeneration : {1.0, 0.3, 0.0}) {
+      const auto planner = Planner::make(test::amr(), regeneration);
+      std::printf("  %8.3f ms",
+                  1e3 * cost_s([&] { sink += planner->plan(*path, problem)->summary.energy_j; }));
+    }
+    std::printf("\n");
+  }
+}
+
 void paths() {
   std::printf("paths within limits, regeneration 0.3\n");
   const auto planner = Planner::make(test::amr(), 0.3);
@@ -283,6 +309,7 @@ int main(int argc, char** argv) {
     solve_limited(std::atol(argv[2]));
   } else if (argc == 1) {
     single_solves();
+    ten_segments();
     paths();
     against_the_peer();
     savings();

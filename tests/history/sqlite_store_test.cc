@@ -31,6 +31,14 @@ class SqliteStoreTest : public testing::Test {
   const std::string path_ = folder_.file("store.db");
 };
 
+TEST_F(SqliteStoreTest, WritesThroughToTheDiskAtEachCommitUnlessItIsToldOtherwise) {
+  SqliteOptions options;
+  options.path = path_;
+  EXPECT_EQ(need(open_sqlite_tables(options))->integer("PRAGMA synchronous"), 2);
+  options.durability = Durability::process_end;
+  EXPECT_EQ(need(open_sqlite_tables(options))->integer("PRAGMA synchronous"), 1);
+}
+
 TEST_F(SqliteStoreTest, WritesAheadWithForeignKeys) {
   auto store = need(open());
   SqliteDatabase other(path_, OpenMode::read_only, 50);
