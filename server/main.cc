@@ -1,3 +1,4 @@
+#include <sys/stat.h>
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
@@ -157,6 +158,9 @@ int care_for_store(const Invocation& invocation) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Histories, spools and backups are for this user and its group, whatever more the caller's mask allows.
+  const mode_t allowed = umask(0077);
+  umask(allowed | 0007);
   const auto invocation = joulecast::read_settings({argv + 1, argv + argc}, joulecast::process_environment());
   if (!invocation) {
     complain(invocation.error());

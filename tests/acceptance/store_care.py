@@ -136,6 +136,9 @@ def main():
     programs = Programs(options)
     files(programs)
     programs.start()
+    for name in ("", "-wal", "-shm", ".lock"):
+        mode = os.stat(programs.store + name).st_mode & 0o777
+        check(mode & 0o007 == 0, f"history.db{name} has the mode {mode:o}")
     removed(programs)
 
 
