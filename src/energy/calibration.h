@@ -56,7 +56,7 @@ struct ParameterEstimate {
   double standard_error =
       0;                  // delete-a-block jackknife over stretches of a second: allows for correlated errors
   bool fitted = false;    // false: held at `value`
-  std::string_view note;  // why it was held, or what it stands for
+  std::string note;       // why it was held, or what it stands for
 };
 
 struct DriveCalibration {
