@@ -1,11 +1,8 @@
 #include "energy/power_fit.h"
 
-#include <ceres/ceres.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <memory>
 #include <vector>
 
 #include "statistics/regression.h"
@@ -14,13 +11,12 @@
 namespace joulecast::energy {
 namespace {
 
-constexpr int most_rounds = 12, steps_a_round = 4;
-constexpr double settled = 2e-3;           // of what is expected of a parameter
-constexpr double least_spread = 1e-4;      // of the mean power: what is exact is still to be weighed
+constexpr int most_rounds = 60;
+constexpr double settled = 1e-3;             // of what is expected of a parameter
+constexpr double first_damping = 1e-3, most_damping = 1e4;
+constexpr double least_spread = 2e-3;         // of the mean power: what is exact is still to be weighed
 constexpr std::size_t fewest_to_class = 20;  // windows that have a spread of their own
 constexpr auto parameter_count = static_cast<Eigen::Index>(power_parameter_count);
-
-using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 // Measured less modelled power of the windows that take part.
 class Misfit {
@@ -45,15 +41,16 @@ class Misfit {
     return e;
   }
 
-  // What a unit more of each parameter adds to the model [W], by central differences.
+  // What a unit more of each parameter adds to the model [W], by differences.
   Eigen::MatrixXd slopes(const Eigen::VectorXd& x) const {
-    constexpr double step = 1e-3;
+    constexpr double step = 1e-4;
+    const Eigen::VectorXd here = left(x);
     Eigen::MatrixXd j = Eigen::MatrixXd::Zero(rows(), parameter_count);
     for (Eigen::Index p = 0; p < parameter_count; ++p) {
       if (!(parameters_.expected(static_cast<PowerParameter>(p)) > 0)) continue;
-      Eigen::VectorXd up = x, down = x;
-      up[p] += step, down[p] -= step;
-      j.col(p) = (left(down) - left(up)) / (2 * step);
+      Eigen::VectorXd up = x;
+      up[p] += step;
+      j.col(p) = (here - left(up)) / step;
     }
     return j;
   }
@@ -88,54 +85,28 @@ Weights weigh(const Misfit& misfit, const Eigen::VectorXd& left, double power_w)
   return w;
 }
 
-// The weighted residuals and the prior's, as Ceres wants them.
-struct Residuals {
-  const Misfit& misfit;
-  const Weights& weights;
-  double inflation;
-  const std::vector<Eigen::Index>& free;
-  const Eigen::VectorXd& start;
-
-  bool operator()(double const* const* given, double* residual) const {
-    Eigen::VectorXd x = start;
-    for (std::size_t k = 0; k < free.size(); ++k) x[free[k]] = given[0][k];
-    misfit.left(x, residual);
-    for (Eigen::Index k = 0; k < misfit.rows(); ++k)
-      *residual++ *= weights.of_row[k] / std::sqrt(inflation);
-    for (std::size_t k = 0; k < free.size(); ++k) *residual++ = given[0][k];
-    return true;
+// The least of a quadratic, x' A x / 2 - g' x, between bounds: what runs into a bound stays there, and what a
+// bound keeps from going on is let go of it no more (the number of parameters bounds the rounds).
+Eigen::VectorXd bounded_step(const Eigen::MatrixXd& a, const Eigen::VectorXd& g, const Eigen::VectorXd& least,
+                             const Eigen::VectorXd& most) {
+  Eigen::VectorXd step = Eigen::VectorXd::Zero(g.size());
+  std::vector<Eigen::Index> moving;
+  for (Eigen::Index k = 0; k < g.size(); ++k)
+    if (!(g[k] < 0 && least[k] >= 0) && !(g[k] > 0 && most[k] <= 0)) moving.push_back(k);
+  while (!moving.empty()) {
+    const Eigen::VectorXd rest = g - a * step;
+    const Eigen::VectorXd own = a(moving, moving).ldlt().solve(rest(moving) + a(moving, moving) * step(moving));
+    std::vector<Eigen::Index> inside;
+    for (std::size_t k = 0; k < moving.size(); ++k) {
+      const Eigen::Index at = moving[k];
+      const double wanted = own[static_cast<Eigen::Index>(k)];
+      step[at] = std::clamp(wanted, least[at], most[at]);
+      if (step[at] == wanted) inside.push_back(at);
+    }
+    if (inside.size() == moving.size()) break;
+    moving = std::move(inside);
   }
-};
-
-Result<Eigen::VectorXd> solved(const Misfit& misfit, const PowerParameters& parameters,
-                               const Weights& weights, double inflation,
-                               const std::vector<Eigen::Index>& free, const Eigen::VectorXd& start) {
-  std::vector<double> values;
-  for (const Eigen::Index k : free) values.push_back(start[k]);
-  ceres::Problem problem;
-  auto* cost = new ceres::DynamicNumericDiffCostFunction<Residuals, ceres::CENTRAL>(
-      new Residuals{misfit, weights, inflation, free, start});
-  cost->AddParameterBlock(static_cast<int>(free.size()));
-  cost->SetNumResiduals(static_cast<int>(misfit.rows()) + static_cast<int>(free.size()));
-  problem.AddResidualBlock(cost, nullptr, values.data());
-  for (std::size_t k = 0; k < free.size(); ++k) {
-    const auto p = static_cast<PowerParameter>(free[k]);
-    const double least = parameters.least(p), most = parameters.most(p);
-    if (std::isfinite(least)) problem.SetParameterLowerBound(values.data(), static_cast<int>(k), least);
-    if (std::isfinite(most)) problem.SetParameterUpperBound(values.data(), static_cast<int>(k), most);
-    values[k] = std::clamp(values[k], least, most);
-  }
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
-  options.max_num_iterations = steps_a_round;
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
-  if (!summary.IsSolutionUsable())
-    return fail(Fault::infeasible, "runs", "the fit to battery power found no parameters: " + summary.message);
-  Eigen::VectorXd x = start;
-  for (std::size_t k = 0; k < free.size(); ++k) x[free[k]] = values[k];
-  return x;
+  return step;
 }
 
 // Sums of scores over blocks, a row each, about their mean.
@@ -153,36 +124,103 @@ Eigen::MatrixXd scores(const Misfit& misfit, const Eigen::MatrixXd& weighted, co
   return all;
 }
 
-// What the data say and how surely, at the parameters that were found.
-void judge(const Misfit& misfit, const PowerParameters& parameters, const Weights& weights, PowerFit& fit) {
-  const Eigen::MatrixXd j = weights.of_row.asDiagonal() * misfit.slopes(fit.x);
-  const Eigen::VectorXd left = weights.of_row.cwiseProduct(misfit.left(fit.x));
-  const Eigen::MatrixXd information = j.transpose() * j;
-  const Eigen::MatrixXd score = scores(misfit, j, left);
+struct Linear {
+  Eigen::MatrixXd weighted;  // slopes by the spread of each row
+  Eigen::VectorXd left;      // what is left, likewise
+  Eigen::MatrixXd information, scatter;
+  double inflation = 1;
+};
+
+Linear linearise(const Misfit& misfit, const Weights& weights, const Eigen::VectorXd& x) {
+  Linear l;
+  l.weighted = weights.of_row.asDiagonal() * misfit.slopes(x);
+  l.left = weights.of_row.cwiseProduct(misfit.left(x));
+  l.information = l.weighted.transpose() * l.weighted;
+  const Eigen::MatrixXd score = scores(misfit, l.weighted, l.left);
   const auto blocks = static_cast<double>(score.rows());
-  const double few = blocks > 1 ? blocks / (blocks - 1) : 1;
-  const Eigen::MatrixXd scatter = few * score.transpose() * score;
+  l.scatter = (blocks > 1 ? blocks / (blocks - 1) : 1) * score.transpose() * score;
   double ratio = 0, count = 0;
   for (Eigen::Index p = 0; p < parameter_count; ++p) {
-    if (!(information(p, p) > 0)) continue;
-    ratio += scatter(p, p) / information(p, p);
+    if (!(l.information(p, p) > 0)) continue;
+    ratio += l.scatter(p, p) / l.information(p, p);
     ++count;
   }
-  fit.inflation = count > 0 ? std::max(1.0, ratio / count) : 1;
-  fit.information = information / fit.inflation;
-  fit.spread_w = weights.spread_w;
+  if (count > 0) l.inflation = std::max(1.0, ratio / count);
+  return l;
+}
+
+// What the data say and how surely.
+void judge(const PowerParameters& parameters, const Linear& l, PowerFit& fit) {
+  fit.inflation = l.inflation;
+  fit.information = l.information / l.inflation;
   std::vector<Eigen::Index> known;
   for (Eigen::Index p = 0; p < parameter_count; ++p)
     if (parameters.expected(static_cast<PowerParameter>(p)) > 0) known.push_back(p);
   const auto n = static_cast<Eigen::Index>(known.size());
   const Eigen::MatrixXd prior = Eigen::MatrixXd::Identity(n, n);
   const Eigen::MatrixXd covariance = (fit.information(known, known) + prior).inverse();
-  const Eigen::MatrixXd middle = scatter(known, known) / (fit.inflation * fit.inflation) + prior;
+  const Eigen::MatrixXd middle = l.scatter(known, known) / (l.inflation * l.inflation) + prior;
   const Eigen::MatrixXd own = covariance * middle * covariance;
   fit.deviation = Eigen::VectorXd::Zero(parameter_count);
   for (Eigen::Index k = 0; k < n; ++k)
     fit.deviation[known[static_cast<std::size_t>(k)]] = std::sqrt(std::max(covariance(k, k), own(k, k)));
 }
+
+// Damped Gauss-Newton steps between bounds, with weights and inflation of the point where each begins.
+class Descent {
+ public:
+  Descent(const PowerParameters& parameters, const Misfit& misfit, const PowerFree& free, double power_w)
+      : misfit_(misfit), power_w_(power_w) {
+    for (std::size_t p = 0; p < power_parameter_count; ++p)
+      if (free[p] && parameters.expected(static_cast<PowerParameter>(p)) > 0)
+        moved_.push_back(static_cast<Eigen::Index>(p));
+    const auto n = static_cast<Eigen::Index>(moved_.size());
+    least_.resize(n), most_.resize(n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const auto p = static_cast<PowerParameter>(moved_[static_cast<std::size_t>(k)]);
+      least_[k] = parameters.least(p), most_[k] = parameters.most(p);
+    }
+  }
+
+  Eigen::VectorXd within(Eigen::VectorXd x) const {
+    x(moved_) = x(moved_).cwiseMax(least_).cwiseMin(most_).eval();
+    return x;
+  }
+
+  // Moves x; false when it rests.
+  bool step(Eigen::VectorXd& x) {
+    const Weights weights = weigh(misfit_, misfit_.left(x), power_w_);
+    const Linear l = linearise(misfit_, weights, x);
+    const Eigen::VectorXd start = x(moved_);
+    const auto worth = [&](const Eigen::VectorXd& at) {
+      return weights.of_row.cwiseProduct(misfit_.left(at)).squaredNorm() / l.inflation +
+             at(moved_).squaredNorm();
+    };
+    const Eigen::MatrixXd a = l.information(moved_, moved_) / l.inflation;
+    const Eigen::VectorXd g = (l.weighted.transpose() * l.left)(moved_) / l.inflation - start;
+    const double before = worth(x);
+    for (; damping_ < most_damping; damping_ *= 10) {
+      Eigen::MatrixXd damped = a;
+      damped.diagonal() *= 1 + damping_;
+      damped.diagonal().array() += 1;
+      const Eigen::VectorXd moved = bounded_step(damped, g, least_ - start, most_ - start);
+      Eigen::VectorXd next = x;
+      next(moved_) = start + moved;
+      if (!(worth(next) < before)) continue;
+      x = next;
+      damping_ = std::max(damping_ / 100, 1e-9);
+      return moved.cwiseAbs().maxCoeff() > settled;
+    }
+    return false;
+  }
+
+ private:
+  const Misfit& misfit_;
+  double power_w_;
+  std::vector<Eigen::Index> moved_;
+  Eigen::VectorXd least_, most_;
+  double damping_ = first_damping;
+};
 
 }  // namespace
 
@@ -190,23 +228,15 @@ Result<PowerFit> fit_power(const PowerParameters& parameters, const PowerWindows
                            const std::function<bool(std::size_t block)>& use, const PowerFree& free,
                            const Eigen::VectorXd& start) {
   const Misfit misfit(parameters, data, use);
-  if (misfit.rows() == 0) return invalid("runs", "hold no window with battery power in which wheels keep moving or still");
-  std::vector<Eigen::Index> moved;
-  for (std::size_t p = 0; p < power_parameter_count; ++p)
-    if (free[p] && parameters.expected(static_cast<PowerParameter>(p)) > 0)
-      moved.push_back(static_cast<Eigen::Index>(p));
+  if (misfit.rows() == 0)
+    return invalid("runs", "hold no window with battery power in which wheels keep moving or still");
   const double power_w = scale_of(data.windows).power_w;
-  PowerFit fit{start, {}, {}, 1, 0};
-  Weights weights;
-  for (int round = 0; round < most_rounds; ++round) {
-    weights = weigh(misfit, misfit.left(fit.x), power_w);
-    const auto next = solved(misfit, parameters, weights, fit.inflation, moved, fit.x);
-    if (!next) return tl::unexpected(next.error());
-    const double change = (*next - fit.x).cwiseAbs().maxCoeff();
-    fit.x = *next;
-    judge(misfit, parameters, weights, fit);
-    if (change < settled) break;
-  }
+  Descent descent(parameters, misfit, free, power_w);
+  PowerFit fit{descent.within(start), {}, {}, 1, 0};
+  for (int round = 0; round < most_rounds && descent.step(fit.x); ++round) continue;
+  const Weights weights = weigh(misfit, misfit.left(fit.x), power_w);
+  fit.spread_w = weights.spread_w;
+  judge(parameters, linearise(misfit, weights, fit.x), fit);
   return fit;
 }
 

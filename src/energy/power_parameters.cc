@@ -14,7 +14,7 @@ namespace {
 constexpr double file_side = 0.3;        // of the friction, one side against the other
 constexpr double file_inertia = 0.5;     // rotors are often left out, bodies of cars are guessed
 constexpr double file_resistance = 0.5;  // cold against warm is a third of it
-constexpr double file_scrub = 0.5;       // coefficient; rubber on floors has up to one
+constexpr double file_scrub = 1;         // coefficient; a long wheel base has more than its rubber
 constexpr double file_driver = 0.05;     // of the motors' power
 constexpr double file_unreturned = 0.5;  // of the braking power
 constexpr double least_share = 0.05;     // of the file's inertia: a bound, as none is without

@@ -8,6 +8,7 @@ namespace joulecast::energy {
 namespace {
 
 constexpr std::size_t fewest_windows = 40;
+constexpr std::size_t most_windows = 3000;  // more say little that these do not, and a fit takes long
 constexpr std::size_t fewest_blocks = 4;  // of 15 s or more
 
 bool keeps_still_or_moves(const windows::Window& w) {
@@ -29,7 +30,9 @@ Result<PowerWindows> power_windows(std::span<const telemetry::Recording> mission
   if (!measured) return invalid("battery_current", "is not measured together with battery_voltage in any run");
   PowerWindows p;
   p.readings = windows::find_readings(driven, robot);
-  p.windows = windows::make_windows(driven, robot, p.readings);
+  windows::WindowSettings settings;
+  settings.most_windows = most_windows;
+  p.windows = windows::make_windows(driven, robot, p.readings, settings);
   std::vector<double> length_s;
   for (const telemetry::Recording& mission : driven)
     length_s.push_back(
