@@ -70,6 +70,7 @@ nlohmann::json coverage_json(const battery::Coverage& seen) {
                                     {"rate_1_h", left->rate_1_h},
                                     {"seen_to_1_h", left->seen_to_1_h},
                                     {"time_error", left->time_error},
+                                    {"own_time_error", left->own_time_error},
                                     {"voltage_rms_v", left->voltage_rms_v},
                                     {"own_voltage_rms_v", left->own_voltage_rms_v}};
   for (const battery::Coverage::Temperature& t : seen.unseen_temperatures)

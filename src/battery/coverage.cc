@@ -36,7 +36,7 @@ const Recording* named(const std::vector<Recording>& recordings, const std::stri
 
 struct Test {
   const Recording* recording;
-  double rate_1_h, own_rms_v;
+  double rate_1_h;
 };
 
 // What one test adds to what was seen.
@@ -52,7 +52,8 @@ void see(const Recording& recording, double capacity_ah, bool open_circuit, Cove
 }
 
 Result<void> leave_out_fastest(const std::vector<Recording>& recordings, const std::vector<Test>& tests,
-                               const CalibrationOptions& options, Coverage& seen) {
+                               const robot::Battery& battery, const CalibrationOptions& options,
+                               Coverage& seen) {
   const auto fastest = std::ranges::max_element(tests, {}, &Test::rate_1_h);
   double next = 0;
   std::vector<Recording> rest;
@@ -71,8 +72,11 @@ Result<void> leave_out_fastest(const std::vector<Recording>& recordings, const s
   if (!without) return {};  // what is left is not enough for a calibration, and says nothing of the rate
   const auto prediction = predict(Circuit(without->battery), *fastest->recording, Load::Kind::current);
   if (!prediction) return tl::unexpected(prediction.error());
-  seen.fastest_left_out = {fastest->recording->name, fastest->rate_1_h,         next,
-                           prediction->time_error,   prediction->voltage_rms_v, fastest->own_rms_v};
+  const auto own = predict(Circuit(battery), *fastest->recording, Load::Kind::current);
+  if (!own) return tl::unexpected(own.error());
+  seen.fastest_left_out = {fastest->recording->name,  fastest->rate_1_h, next,
+                           prediction->time_error,    own->time_error,   prediction->voltage_rms_v,
+                           own->voltage_rms_v};
   return {};
 }
 
@@ -122,9 +126,10 @@ std::string of_rates(const Coverage& seen) {
   std::string text = fmt::format("a rate above {:.2g} C was never seen", seen.most_rate_1_h);
   if (const auto& left = seen.fastest_left_out) {
     return text + fmt::format("; what that costs: without {}, from rates up to {:.2g} C, its {:.2g} C would "
-                              "have been predicted {:+.1f} % in time, {:.0f} mV in voltage ({:.0f} mV with it)",
+                              "be predicted {:+.1f} % off in time and {:.0f} mV in voltage; with it {:+.1f} % and {:.0f} mV",
                               left->name, left->seen_to_1_h, left->rate_1_h, 1e2 * left->time_error,
-                              1e3 * left->voltage_rms_v, 1e3 * left->own_voltage_rms_v);
+                              1e3 * left->voltage_rms_v, 1e2 * left->own_time_error,
+                              1e3 * left->own_voltage_rms_v);
   }
   return text + "; what that costs is not known, for no two rates were seen of which one could be predicted "
                 "from the other. Add a test at another rate";
@@ -158,14 +163,14 @@ Result<Coverage> coverage(const std::vector<Recording>& recordings, const Calibr
       seen.slow_rate_1_h = rate_1_h;
       continue;
     }
-    tests.push_back({recording, rate_1_h, fit.voltage_rms_v});
+    tests.push_back({recording, rate_1_h});
   }
   for (const Recording& r : recordings)
     seen.charging = seen.charging || *std::ranges::min_element(r.current_a) < -0.01 * capacity_ah;
   if (tests.empty()) return seen;
   seen.least_rate_1_h = std::ranges::min_element(tests, {}, &Test::rate_1_h)->rate_1_h;
   seen.most_rate_1_h = std::ranges::max_element(tests, {}, &Test::rate_1_h)->rate_1_h;
-  if (const auto left = leave_out_fastest(recordings, tests, options, seen); !left)
+  if (const auto left = leave_out_fastest(recordings, tests, battery, options, seen); !left)
     return tl::unexpected(left.error());
   if (const auto tried = try_temperatures(battery, seen); !tried) return tl::unexpected(tried.error());
   return seen;
@@ -176,8 +181,8 @@ std::vector<std::string> sentences(const Coverage& seen) {
   for (const Coverage::Temperature& t : seen.unseen_temperatures) all.push_back(of_temperature(seen, t));
   if (seen.lowest_charge > 0.05)
     all.push_back(fmt::format("less than {:.0f} % of the charge was never seen under load; the resistance is "
-                              "held there, where that of cells rises, so that the end of a discharge comes "
-                              "sooner than is said",
+                              "held there, where that of cells rises: when a discharge under load ends is less "
+                              "sure",
                               1e2 * seen.lowest_charge));
   all.push_back(seen.charging ? "charging was seen and is passed over; its losses are taken as those of "
                                 "discharging, and all that is put in counts as charge"

@@ -25,9 +25,8 @@ struct Coverage {
   struct FastestLeftOut {
     std::string name;
     double rate_1_h = 0, seen_to_1_h = 0;
-    double time_error = 0;     // of the discharge, predicted / measured - 1
-    double voltage_rms_v = 0;  // as Prediction
-    double own_voltage_rms_v = 0;  // the same with the test in the calibration
+    double time_error = 0, own_time_error = 0;        // as Prediction; own: with the test in the calibration
+    double voltage_rms_v = 0, own_voltage_rms_v = 0;  // likewise
   };
   std::optional<FastestLeftOut> fastest_left_out;
 

@@ -22,9 +22,16 @@ constexpr double least_share = 0.05;     // of the file's inertia: a bound, as n
 constexpr PowerParameter all[] = {
     PowerParameter::idle_power,          PowerParameter::friction,
     PowerParameter::friction_difference, PowerParameter::viscous,
-    PowerParameter::straight_inertia,    PowerParameter::yaw_inertia,
+    PowerParameter::straight_inertia,    PowerParameter::turning_inertia,
     PowerParameter::resistance,          PowerParameter::turning_scrub,
     PowerParameter::driver_loss,         PowerParameter::unreturned};
+
+// That wheels on their axle have at least, and robot files must.
+double least_yaw_inertia(const robot::RobotModel& robot) {
+  const double d = robot.kinematics.com_offset_m, l = robot.kinematics.half_track_m;
+  return std::max(least_share * robot.mass.yaw_inertia_kg_m2,
+                  1.0001 * (robot.mass.chassis_kg * d * d + 2 * robot.mass.wheel_kg * l * l));
+}
 
 dynamics::ActiveEffect effect_of(std::string_view id, double strength) {
   dynamics::ActiveEffect effect = dynamics::initial(*dynamics::find_effect(id));
@@ -58,8 +65,11 @@ Result<PowerParameters> PowerParameters::make(const robot::RobotModel& robot, co
   set(PowerParameter::viscous, motor.viscous_friction_nm_s_rad, torque_nm / scale.speed_rad_s, 0);
   set(PowerParameter::straight_inertia, inertia.straight, file_inertia * inertia.straight,
       least_share * inertia.straight);
-  set(PowerParameter::yaw_inertia, robot.mass.yaw_inertia_kg_m2, file_inertia * robot.mass.yaw_inertia_kg_m2,
-      least_share * robot.mass.yaw_inertia_kg_m2);
+  robot::RobotModel lightest = robot;
+  lightest.mass.yaw_inertia_kg_m2 = least_yaw_inertia(robot);
+  lightest.motor.rotor_inertia_kg_m2 = 0;
+  set(PowerParameter::turning_inertia, inertia.turning, file_inertia * inertia.turning,
+      wheel_inertia(lightest).turning);
   set(PowerParameter::resistance, motor.resistance_ohm,
       resistance_known ? 0 : file_resistance * motor.resistance_ohm, 0);
   for (const auto& [which, expected, most] :
@@ -94,15 +104,27 @@ double PowerParameters::most(PowerParameter p) const {
   return expected_[at] > 0 ? (most_[at] - file_[at]) / expected_[at] : 0;
 }
 
+std::array<double, 2> PowerParameters::friction_nm(const Eigen::VectorXd& x) const {
+  const double mean = plain_value(PowerParameter::friction, x),
+               half = plain_value(PowerParameter::friction_difference, x) / 2;
+  return {std::max(mean + half, 0.0), std::max(mean - half, 0.0)};
+}
+
+double PowerParameters::value(PowerParameter p, const Eigen::VectorXd& x) const {
+  const std::array<double, 2> side_nm = friction_nm(x);
+  if (p == PowerParameter::friction) return (side_nm[0] + side_nm[1]) / 2;
+  if (p == PowerParameter::friction_difference) return side_nm[0] - side_nm[1];
+  return plain_value(p, x);
+}
+
 robot::RobotModel PowerParameters::without_effects(const Eigen::VectorXd& x) const {
   robot::RobotModel robot = robot_;
-  const double friction = value(PowerParameter::friction, x),
-               half_difference = value(PowerParameter::friction_difference, x) / 2;
   robot.idle_power_w = value(PowerParameter::idle_power, x);
-  robot.motor.friction_torque_nm = {friction + half_difference, friction - half_difference};
+  robot.motor.friction_torque_nm = friction_nm(x);
   robot.motor.viscous_friction_nm_s_rad = value(PowerParameter::viscous, x);
   place_straight_inertia(value(PowerParameter::straight_inertia, x), robot);
-  robot.mass.yaw_inertia_kg_m2 = value(PowerParameter::yaw_inertia, x);
+  place_turning_inertia(value(PowerParameter::turning_inertia, x), robot);
+  robot.mass.yaw_inertia_kg_m2 = std::max(robot.mass.yaw_inertia_kg_m2, least_yaw_inertia(robot_));
   robot.motor.resistance_ohm = value(PowerParameter::resistance, x);
   return robot;
 }
@@ -125,7 +147,6 @@ dynamics::DriveModel PowerParameters::model(const Eigen::VectorXd& x) const {
 
 robot::RobotModel PowerParameters::robot(const Eigen::VectorXd& x) const {
   robot::RobotModel robot = without_effects(x);
-  for (double& side_nm : robot.motor.friction_torque_nm) side_nm = std::max(side_nm, 0.0);
   for (const dynamics::ActiveEffect& e : found_effects(x)) {
     robot::AdoptedEffect more = dynamics::adopt(e);
     const auto had = std::ranges::find(robot.effects, more.id, &robot::AdoptedEffect::id);

@@ -20,7 +20,7 @@ enum class PowerParameter : std::size_t {
   friction_difference,  // N m, right less left
   viscous,              // N m s/rad
   straight_inertia,     // kg m^2 (wheel_inertia.h)
-  yaw_inertia,          // kg m^2
+  turning_inertia,      // kg m^2 (wheel_inertia.h)
   resistance,           // ohm, through the copper loss R (T/(K_t n))^2 alone
   turning_scrub,        // 1, friction coefficient of turning contacts
   driver_loss,          // 1, of the motors' absolute power
@@ -29,7 +29,7 @@ enum class PowerParameter : std::size_t {
 inline constexpr std::size_t power_parameter_count = 10;
 inline constexpr std::array<std::string_view, power_parameter_count> power_parameter_names{
     "idle_power_w",           "friction_torque_nm mean", "friction_torque_nm right - left",
-    "viscous_friction_nm_s_rad", "straight inertia",     "yaw_inertia_kg_m2",
+    "viscous_friction_nm_s_rad", "straight inertia",     "turning inertia",
     "resistance_ohm",         "turning_scrub",           "driver_loss",
     "no_regeneration"};
 inline constexpr std::array<std::string_view, power_parameter_count> power_parameter_units{
@@ -63,9 +63,8 @@ class PowerParameters {
   bool scrub_rate_is_free() const { return !file_has_scrub_; }
 
   double expected(PowerParameter p) const { return expected_[index_of(p)]; }  // 0: held at the file's
-  double value(PowerParameter p, const Eigen::VectorXd& x) const {
-    return file_[index_of(p)] + expected_[index_of(p)] * x[index_of(p)];
-  }
+  // In its own unit. No side's friction is below nothing, whatever mean and difference say.
+  double value(PowerParameter p, const Eigen::VectorXd& x) const;
   double least(PowerParameter p) const;  // bounds in units of x
   double most(PowerParameter p) const;
 
@@ -75,6 +74,10 @@ class PowerParameters {
 
  private:
   explicit PowerParameters(const robot::RobotModel& robot) : robot_(robot) {}
+  double plain_value(PowerParameter p, const Eigen::VectorXd& x) const {
+    return file_[index_of(p)] + expected_[index_of(p)] * x[index_of(p)];
+  }
+  std::array<double, 2> friction_nm(const Eigen::VectorXd& x) const;
   robot::RobotModel without_effects(const Eigen::VectorXd& x) const;
   std::vector<dynamics::ActiveEffect> found_effects(const Eigen::VectorXd& x) const;
 

@@ -29,7 +29,7 @@ constexpr std::array<std::string_view, power_parameter_count> meanings{
     "",
     "",
     "m r^2/2 + I_w + I_s; the rotors take what the file's mass does not explain",
-    "",
+    "2 I c^2 + I_w + I_s",
     "from the copper loss alone, as resistance / torque constant^2",
     "effect, adopted",
     "effect, adopted",
@@ -37,7 +37,7 @@ constexpr std::array<std::string_view, power_parameter_count> meanings{
 
 constexpr std::array all{PowerParameter::idle_power,          PowerParameter::friction,
                          PowerParameter::friction_difference, PowerParameter::viscous,
-                         PowerParameter::straight_inertia,    PowerParameter::yaw_inertia,
+                         PowerParameter::straight_inertia,    PowerParameter::turning_inertia,
                          PowerParameter::resistance,          PowerParameter::turning_scrub,
                          PowerParameter::driver_loss,         PowerParameter::unreturned};
 
@@ -106,9 +106,9 @@ std::vector<Untold> untold_parameters(const PowerParameters& parameters, const P
   untold.push_back({"gear efficiency",
                     "a loss in proportion to the torque passes for friction, inertia and resistance, "
                     "which contain it"});
-  untold.push_back({"mass against rotor inertia",
-                    "only their sum is felt while the speed changes; the mass alone shows on a slope or with "
-                    "scrub"});
+  untold.push_back({"mass, yaw inertia and rotor inertia apart",
+                    "only the straight and the turning inertia, their sums, are felt while the speed changes; "
+                    "the mass alone shows on a slope"});
   untold.push_back({"wheel_radius_m, half_track_m",
                     "friction and inertia are those of the file's wheels; a map or a gyroscope shows these"});
   untold.push_back({"battery internal_resistance_ohm",
