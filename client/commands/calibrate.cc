@@ -55,15 +55,12 @@ Result<Read> read_all(const std::vector<std::string>& sources) {
 }
 
 nlohmann::json coverage_json(const battery::Coverage& seen) {
-  nlohmann::json document{{"slow_rate_1_h", seen.slow_rate_1_h},
-                          {"least_rate_1_h", seen.least_rate_1_h},
-                          {"most_rate_1_h", seen.most_rate_1_h},
-                          {"temperature_c", nullptr},
-                          {"lowest_charge", seen.lowest_charge},
-                          {"charging", seen.charging},
-                          {"fastest_left_out", nullptr},
-                          {"unseen_temperatures", nlohmann::json::array()},
-                          {"sentences", battery::sentences(seen)}};
+  nlohmann::json document{
+      {"slow_rate_1_h", seen.slow_rate_1_h},  {"least_rate_1_h", seen.least_rate_1_h},
+      {"most_rate_1_h", seen.most_rate_1_h},  {"temperature_c", nullptr},
+      {"lowest_charge", seen.lowest_charge},  {"charging", seen.charging},
+      {"fastest_left_out", nullptr},          {"unseen_temperatures", nlohmann::json::array()},
+      {"sentences", battery::sentences(seen)}};
   if (seen.temperature_c) document["temperature_c"] = {seen.temperature_c->first, seen.temperature_c->second};
   if (const auto& left = seen.fastest_left_out)
     document["fastest_left_out"] = {{"name", left->name},

@@ -27,9 +27,8 @@ namespace {
 using energy::CalibrationMethod;
 
 enum class Method { steady, whole, power };
-const std::vector<std::pair<std::string, Method>> methods{{"steady", Method::steady},
-                                                          {"whole", Method::whole},
-                                                          {"power", Method::power}};
+const std::vector<std::pair<std::string, Method>> methods{
+    {"steady", Method::steady}, {"whole", Method::whole}, {"power", Method::power}};
 
 struct Options {
   std::vector<std::string> logs;
@@ -126,7 +125,7 @@ Result<DriveOutcome> calibrate(const Options& options) {
     runs.push_back(all.back());
     chosen.push_back(r);
   }
-  const Method method = options.method         ? *options.method
+  const Method method = options.method              ? *options.method
                         : has_motor_current(chosen) ? Method::steady
                                                     : Method::power;
   DriveOutcome outcome;

@@ -74,8 +74,8 @@ Result<void> leave_out_fastest(const std::vector<Recording>& recordings, const s
   if (!prediction) return tl::unexpected(prediction.error());
   const auto own = predict(Circuit(battery), *fastest->recording, Load::Kind::current);
   if (!own) return tl::unexpected(own.error());
-  seen.fastest_left_out = {fastest->recording->name,  fastest->rate_1_h, next,
-                           prediction->time_error,    own->time_error,   prediction->voltage_rms_v,
+  seen.fastest_left_out = {fastest->recording->name, fastest->rate_1_h, next,
+                           prediction->time_error,   own->time_error,   prediction->voltage_rms_v,
                            own->voltage_rms_v};
   return {};
 }
@@ -97,7 +97,8 @@ Result<double> lasts(const robot::Battery& battery, double rate_1_h, double temp
 }
 
 Result<void> try_temperatures(const robot::Battery& battery, Coverage& seen) {
-  const auto [low, high] = seen.temperature_c.value_or(std::pair(reference_temperature_c, reference_temperature_c));
+  const auto [low, high] =
+      seen.temperature_c.value_or(std::pair(reference_temperature_c, reference_temperature_c));
   const double middle_c = (low + high) / 2;
   for (const double temperature_c : worked_at_c) {
     if (temperature_c > low - near_k && temperature_c < high + near_k) continue;
@@ -125,25 +126,28 @@ Result<void> try_temperatures(const robot::Battery& battery, Coverage& seen) {
 std::string of_rates(const Coverage& seen) {
   std::string text = fmt::format("a rate above {:.2g} C was never seen", seen.most_rate_1_h);
   if (const auto& left = seen.fastest_left_out) {
-    return text + fmt::format("; what that costs: without {}, from rates up to {:.2g} C, its {:.2g} C would "
-                              "be predicted {:+.1f} % off in time and {:.0f} mV in voltage; with it {:+.1f} % and {:.0f} mV",
-                              left->name, left->seen_to_1_h, left->rate_1_h, 1e2 * left->time_error,
-                              1e3 * left->voltage_rms_v, 1e2 * left->own_time_error,
-                              1e3 * left->own_voltage_rms_v);
+    return text +
+           fmt::format(
+               "; what that costs: without {}, from rates up to {:.2g} C, its {:.2g} C would "
+               "be predicted {:+.1f} % off in time and {:.0f} mV in voltage; with it {:+.1f} % and {:.0f} mV",
+               left->name, left->seen_to_1_h, left->rate_1_h, 1e2 * left->time_error,
+               1e3 * left->voltage_rms_v, 1e2 * left->own_time_error, 1e3 * left->own_voltage_rms_v);
   }
-  return text + "; what that costs is not known, for no two rates were seen of which one could be predicted "
-                "from the other. Add a test at another rate";
+  return text +
+         "; what that costs is not known, for no two rates were seen of which one could be predicted "
+         "from the other. Add a test at another rate";
 }
 
 std::string of_temperature(const Coverage& seen, const Coverage::Temperature& t) {
-  return fmt::format("{:.0f} °C was never seen{}; what that costs: there a discharge at {:.2g} C lasts {:.0f} "
-                     "to {:.0f} % of its time at {}, as lithium-ion cells differ; this battery says {:.0f} %",
-                     t.temperature_c,
-                     seen.temperature_c ? fmt::format(" (the tests: {:.0f} to {:.0f} °C)",
-                                                      seen.temperature_c->first, seen.temperature_c->second)
-                                        : " (no temperature was measured; 25 °C is assumed)",
-                     t.rate_1_h, 1e2 * t.least, 1e2 * t.most,
-                     seen.temperature_c ? "the tests' temperature" : "25 °C", 1e2 * t.by_this);
+  return fmt::format(
+      "{:.0f} °C was never seen{}; what that costs: there a discharge at {:.2g} C lasts {:.0f} "
+      "to {:.0f} % of its time at {}, as lithium-ion cells differ; this battery says {:.0f} %",
+      t.temperature_c,
+      seen.temperature_c ? fmt::format(" (the tests: {:.0f} to {:.0f} °C)", seen.temperature_c->first,
+                                       seen.temperature_c->second)
+                         : " (no temperature was measured; 25 °C is assumed)",
+      t.rate_1_h, 1e2 * t.least, 1e2 * t.most, seen.temperature_c ? "the tests' temperature" : "25 °C",
+      1e2 * t.by_this);
 }
 
 }  // namespace
@@ -180,14 +184,16 @@ std::vector<std::string> sentences(const Coverage& seen) {
   std::vector<std::string> all{of_rates(seen)};
   for (const Coverage::Temperature& t : seen.unseen_temperatures) all.push_back(of_temperature(seen, t));
   if (seen.lowest_charge > 0.05)
-    all.push_back(fmt::format("less than {:.0f} % of the charge was never seen under load; the resistance is "
-                              "held there, where that of cells rises: when a discharge under load ends is less "
-                              "sure",
-                              1e2 * seen.lowest_charge));
-  all.push_back(seen.charging ? "charging was seen and is passed over; its losses are taken as those of "
-                                "discharging, and all that is put in counts as charge"
-                              : "charging was never seen; its losses are taken as those of discharging, and all "
-                                "that is put in counts as charge");
+    all.push_back(
+        fmt::format("less than {:.0f} % of the charge was never seen under load; the resistance is "
+                    "held there, where that of cells rises: when a discharge under load ends is less "
+                    "sure",
+                    1e2 * seen.lowest_charge));
+  all.push_back(seen.charging
+                    ? "charging was seen and is passed over; its losses are taken as those of "
+                      "discharging, and all that is put in counts as charge"
+                    : "charging was never seen; its losses are taken as those of discharging, and all "
+                      "that is put in counts as charge");
   return all;
 }
 

@@ -14,10 +14,10 @@ namespace joulecast::battery {
 // What the recordings of a calibration held of the conditions under which a battery may be used, and what it
 // costs where they held nothing. Rates are currents over the measured capacity [1/h].
 struct Coverage {
-  double slow_rate_1_h = 0;                       // of the slow discharge
-  double least_rate_1_h = 0, most_rate_1_h = 0;   // largest currents of the other tests, least and most
+  double slow_rate_1_h = 0;                      // of the slow discharge
+  double least_rate_1_h = 0, most_rate_1_h = 0;  // largest currents of the other tests, least and most
   std::optional<std::pair<double, double>> temperature_c;  // lowest and highest; none: never measured
-  double lowest_charge = 1;                       // under load
+  double lowest_charge = 1;                                // under load
   bool charging = false;
 
   // The test with the highest rate, predicted by a calibration without it: what a rate costs that was never

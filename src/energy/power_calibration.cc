@@ -104,8 +104,7 @@ Result<Found> find(const PowerParameters& given, const PowerWindows& data, const
     }
     if (!parameters.scrub_rate_is_free()) break;
   }
-  if (const auto dropped = drop_effects(data, use, *best); !dropped)
-    return tl::unexpected(dropped.error());
+  if (const auto dropped = drop_effects(data, use, *best); !dropped) return tl::unexpected(dropped.error());
   return std::move(*best);
 }
 
@@ -168,10 +167,10 @@ Result<PowerCalibration> calibrate_from_power(const robot::RobotModel& robot,
                                               const PowerCalibrationOptions& options) {
   const auto data = power_windows(missions, robot);
   if (!data) return tl::unexpected(data.error());
-  const auto parameters =
-      PowerParameters::make(robot, scale_of(data->windows), options.resistance_known);
+  const auto parameters = PowerParameters::make(robot, scale_of(data->windows), options.resistance_known);
   if (!parameters) return tl::unexpected(parameters.error());
-  const auto found = find(*parameters, *data, [](std::size_t) { return true; }, robot);
+  const auto found = find(
+      *parameters, *data, [](std::size_t) { return true; }, robot);
   if (!found) return tl::unexpected(found.error());
   const auto halves = predict_halves(*parameters, *data, robot);
   if (!halves) return tl::unexpected(halves.error());

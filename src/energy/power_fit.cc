@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "statistics/regression.h"
@@ -12,9 +13,9 @@ namespace joulecast::energy {
 namespace {
 
 constexpr int most_rounds = 60;
-constexpr double settled = 1e-3;             // of what is expected of a parameter
+constexpr double settled = 1e-3;  // of what is expected of a parameter
 constexpr double first_damping = 1e-3, most_damping = 1e4;
-constexpr double least_spread = 2e-3;         // of the mean power: what is exact is still to be weighed
+constexpr double least_spread = 2e-3;        // of the mean power: what is exact is still to be weighed
 constexpr std::size_t fewest_to_class = 20;  // windows that have a spread of their own
 constexpr auto parameter_count = static_cast<Eigen::Index>(power_parameter_count);
 
@@ -95,7 +96,8 @@ Eigen::VectorXd bounded_step(const Eigen::MatrixXd& a, const Eigen::VectorXd& g,
     if (!(g[k] < 0 && least[k] >= 0) && !(g[k] > 0 && most[k] <= 0)) moving.push_back(k);
   while (!moving.empty()) {
     const Eigen::VectorXd rest = g - a * step;
-    const Eigen::VectorXd own = a(moving, moving).ldlt().solve(rest(moving) + a(moving, moving) * step(moving));
+    const Eigen::VectorXd own =
+        a(moving, moving).ldlt().solve(rest(moving) + a(moving, moving) * step(moving));
     std::vector<Eigen::Index> inside;
     for (std::size_t k = 0; k < moving.size(); ++k) {
       const Eigen::Index at = moving[k];
@@ -113,8 +115,8 @@ Eigen::VectorXd bounded_step(const Eigen::MatrixXd& a, const Eigen::VectorXd& g,
 Eigen::MatrixXd scores(const Misfit& misfit, const Eigen::MatrixXd& weighted, const Eigen::VectorXd& left) {
   std::map<std::size_t, Eigen::VectorXd> by_block;
   for (Eigen::Index k = 0; k < left.size(); ++k) {
-    auto& sum = by_block.try_emplace(misfit.window(k).block, Eigen::VectorXd::Zero(parameter_count))
-                    .first->second;
+    auto& sum =
+        by_block.try_emplace(misfit.window(k).block, Eigen::VectorXd::Zero(parameter_count)).first->second;
     sum += left[k] * weighted.row(k).transpose();
   }
   Eigen::MatrixXd all(static_cast<Eigen::Index>(by_block.size()), parameter_count);
@@ -139,13 +141,12 @@ Linear linearise(const Misfit& misfit, const Weights& weights, const Eigen::Vect
   const Eigen::MatrixXd score = scores(misfit, l.weighted, l.left);
   const auto blocks = static_cast<double>(score.rows());
   l.scatter = (blocks > 1 ? blocks / (blocks - 1) : 1) * score.transpose() * score;
-  double ratio = 0, count = 0;
-  for (Eigen::Index p = 0; p < parameter_count; ++p) {
-    if (!(l.information(p, p) > 0)) continue;
-    ratio += l.scatter(p, p) / l.information(p, p);
-    ++count;
-  }
-  if (count > 0) l.inflation = std::max(1.0, ratio / count);
+  std::vector<double> ratios;
+  for (Eigen::Index p = 0; p < parameter_count; ++p)
+    if (l.information(p, p) > 0) ratios.push_back(l.scatter(p, p) / l.information(p, p));
+  // The middle one: idle power that wanders from mission to mission says nothing of how surely friction is
+  // told.
+  if (!ratios.empty()) l.inflation = std::max(1.0, statistics::median(std::move(ratios)));
   return l;
 }
 

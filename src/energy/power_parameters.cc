@@ -19,12 +19,11 @@ constexpr double file_driver = 0.05;     // of the motors' power
 constexpr double file_unreturned = 0.5;  // of the braking power
 constexpr double least_share = 0.05;     // of the file's inertia: a bound, as none is without
 
-constexpr PowerParameter all[] = {
-    PowerParameter::idle_power,          PowerParameter::friction,
-    PowerParameter::friction_difference, PowerParameter::viscous,
-    PowerParameter::straight_inertia,    PowerParameter::turning_inertia,
-    PowerParameter::resistance,          PowerParameter::turning_scrub,
-    PowerParameter::driver_loss,         PowerParameter::unreturned};
+constexpr PowerParameter all[] = {PowerParameter::idle_power,          PowerParameter::friction,
+                                  PowerParameter::friction_difference, PowerParameter::viscous,
+                                  PowerParameter::straight_inertia,    PowerParameter::turning_inertia,
+                                  PowerParameter::resistance,          PowerParameter::turning_scrub,
+                                  PowerParameter::driver_loss,         PowerParameter::unreturned};
 
 // That wheels on their axle have at least, and robot files must.
 double least_yaw_inertia(const robot::RobotModel& robot) {
@@ -72,10 +71,9 @@ Result<PowerParameters> PowerParameters::make(const robot::RobotModel& robot, co
       wheel_inertia(lightest).turning);
   set(PowerParameter::resistance, motor.resistance_ohm,
       resistance_known ? 0 : file_resistance * motor.resistance_ohm, 0);
-  for (const auto& [which, expected, most] :
-       {std::tuple{PowerParameter::turning_scrub, file_scrub, 3.0},
-        std::tuple{PowerParameter::driver_loss, file_driver, 1.0},
-        std::tuple{PowerParameter::unreturned, file_unreturned, 1.0}}) {
+  for (const auto& [which, expected, most] : {std::tuple{PowerParameter::turning_scrub, file_scrub, 3.0},
+                                              std::tuple{PowerParameter::driver_loss, file_driver, 1.0},
+                                              std::tuple{PowerParameter::unreturned, file_unreturned, 1.0}}) {
     double had = 0;
     for (const dynamics::ActiveEffect& e : p.adopted_) {
       if (e.effect->info().id != power_parameter_names[static_cast<std::size_t>(which)]) continue;

@@ -28,9 +28,15 @@ enum class PowerParameter : std::size_t {
 };
 inline constexpr std::size_t power_parameter_count = 10;
 inline constexpr std::array<std::string_view, power_parameter_count> power_parameter_names{
-    "idle_power_w",           "friction_torque_nm mean", "friction_torque_nm right - left",
-    "viscous_friction_nm_s_rad", "straight inertia",     "turning inertia",
-    "resistance_ohm",         "turning_scrub",           "driver_loss",
+    "idle_power_w",
+    "friction_torque_nm mean",
+    "friction_torque_nm right - left",
+    "viscous_friction_nm_s_rad",
+    "straight inertia",
+    "turning inertia",
+    "resistance_ohm",
+    "turning_scrub",
+    "driver_loss",
     "no_regeneration"};
 inline constexpr std::array<std::string_view, power_parameter_count> power_parameter_units{
     "W", "N m", "N m", "N m s/rad", "kg m2", "kg m2", "ohm", "1", "1", "1"};

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t fewest_windows = 40;
 constexpr std::size_t most_windows = 3000;  // more say little that these do not, and a fit takes long
-constexpr std::size_t fewest_blocks = 4;  // of 15 s or more
+constexpr std::size_t fewest_blocks = 4;    // of 15 s or more
 
 bool keeps_still_or_moves(const windows::Window& w) {
   return (w.moving[0] || w.resting[0]) && (w.moving[1] || w.resting[1]);
@@ -27,7 +27,8 @@ Result<PowerWindows> power_windows(std::span<const telemetry::Recording> mission
       return std::isfinite(s.battery_voltage_v * s.battery_current_a);
     });
   });
-  if (!measured) return invalid("battery_current", "is not measured together with battery_voltage in any run");
+  if (!measured)
+    return invalid("battery_current", "is not measured together with battery_voltage in any run");
   PowerWindows p;
   p.readings = windows::find_readings(driven, robot);
   windows::WindowSettings settings;

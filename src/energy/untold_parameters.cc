@@ -83,8 +83,12 @@ std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters
     const auto at = static_cast<std::size_t>(p);
     const bool known = !(parameters.expected(p) > 0), seen = told(parameters, fit, p);
     if (is_effect(p) && !seen && !free[at]) continue;
-    ParameterEstimate e{power_parameter_names[at], power_parameter_units[at], parameters.value(p, fit.x),
-                        parameters.expected(p) * fit.deviation[index_of(p)], seen, std::string(meanings[at])};
+    ParameterEstimate e{power_parameter_names[at],
+                        power_parameter_units[at],
+                        parameters.value(p, fit.x),
+                        parameters.expected(p) * fit.deviation[index_of(p)],
+                        seen,
+                        std::string(meanings[at])};
     if (known) e.note = "given as known";
     if (!known && !seen) e.note = "stays near the file's: " + why(parameters, fit, p);
     if (is_effect(p) && !free[at]) e.note = "nothing of it is seen";
@@ -106,9 +110,10 @@ std::vector<Untold> untold_parameters(const PowerParameters& parameters, const P
   untold.push_back({"gear efficiency",
                     "a loss in proportion to the torque passes for friction, inertia and resistance, "
                     "which contain it"});
-  untold.push_back({"mass, yaw inertia and rotor inertia apart",
-                    "only the straight and the turning inertia, their sums, are felt while the speed changes; "
-                    "the mass alone shows on a slope"});
+  untold.push_back(
+      {"mass, yaw inertia and rotor inertia apart",
+       "only the straight and the turning inertia, their sums, are felt while the speed changes; "
+       "the mass alone shows on a slope"});
   untold.push_back({"wheel_radius_m, half_track_m",
                     "friction and inertia are those of the file's wheels; a map or a gyroscope shows these"});
   untold.push_back({"battery internal_resistance_ohm",

@@ -51,7 +51,8 @@ Case misjudged(const virtual_robot::ShippedRobot& shipped, std::uint64_t seed) {
   spec.missions = 10;
   virtual_robot::Rng rng = virtual_robot::Rng::stream(seed, 91);
   const double dry = rng.uniform(-0.4, 0.8), viscous = rng.uniform(-0.6, 1), scrub = rng.uniform(0, 0.2);
-  const double idle_w = rng.uniform(-0.4, 0.6) * c.file.idle_power_w, heavier = rng.uniform(0, 0.25);  // rotors that the file leaves out
+  const double idle_w = rng.uniform(-0.4, 0.6) * c.file.idle_power_w,
+               heavier = rng.uniform(0, 0.25);  // rotors that the file leaves out
   spec.imperfections.coulomb_friction = dry;
   spec.imperfections.viscous_friction = viscous;
   spec.imperfections.turning_scrub = scrub;
@@ -67,8 +68,7 @@ Case misjudged(const virtual_robot::ShippedRobot& shipped, std::uint64_t seed) {
       {"friction_torque_nm right - left",
        (motor.friction_torque_nm[0] - motor.friction_torque_nm[1]) * (1 + dry)},
       {"viscous_friction_nm_s_rad", motor.viscous_friction_nm_s_rad * (1 + viscous)},
-      {"straight inertia",
-       wheel_inertia(c.file).straight + heavier * c.file.total_mass_kg(0) * r * r / 2},
+      {"straight inertia", wheel_inertia(c.file).straight + heavier * c.file.total_mass_kg(0) * r * r / 2},
       {"turning inertia", wheel_inertia(c.file).turning},
       {"resistance_ohm", motor.resistance_ohm},
       {"turning_scrub", scrub},
@@ -79,25 +79,28 @@ Case misjudged(const virtual_robot::ShippedRobot& shipped, std::uint64_t seed) {
 
 struct Coverage {
   int told = 0, within_two = 0, untold = 0;
+  double square = 0;  // of the departure in standard errors, of those told
 };
 
 TEST(CalibrateFromPower, TheTrueParametersLieWithinTheStatedIntervals) {
   std::map<std::string, Coverage> by_name;
   Coverage all;
   for (const auto& shipped : virtual_robot::shipped_robots()) {
-    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
       const Case c = misjudged(shipped, seed);
       const auto found = calibrate_from_power(c.file, c.missions);
       ASSERT_TRUE(found) << describe(found.error());
       ASSERT_TRUE(robot::validate(found->robot));
       for (const ParameterEstimate& e : found->estimates) {
         const double z = (e.value - c.truth.at(std::string(e.name))) / e.standard_error;
-        std::printf("%-5s %llu %-32s %10.4g +- %-8.3g true %10.4g z %5.1f %s\n", std::string(shipped.kind).c_str(),
-                    static_cast<unsigned long long>(seed), std::string(e.name).c_str(), e.value, e.standard_error,
-                    c.truth.at(std::string(e.name)), z, e.fitted ? "" : e.note.c_str());
+        std::printf("%-5s %llu %-32s %10.4g +- %-8.3g true %10.4g z %5.1f %s\n",
+                    std::string(shipped.kind).c_str(), static_cast<unsigned long long>(seed),
+                    std::string(e.name).c_str(), e.value, e.standard_error, c.truth.at(std::string(e.name)),
+                    z, e.fitted ? "" : e.note.c_str());
         for (Coverage* count : {&all, &by_name[std::string(e.name)]}) {
           (e.fitted ? count->told : count->untold)++;
           count->within_two += e.fitted && std::fabs(z) <= 2;
+          if (e.fitted) count->square += z * z;
         }
       }
       std::printf("halves: file %.3f calibrated %.3f regression %.3f\n", found->halves.file,
@@ -106,10 +109,11 @@ TEST(CalibrateFromPower, TheTrueParametersLieWithinTheStatedIntervals) {
     }
   }
   for (const auto& [name, count] : by_name)
-    std::printf("%-32s told %2d, within two standard errors %2d, untold %2d\n", name.c_str(), count.told,
-                count.within_two, count.untold);
+    std::printf("%-32s told %2d, within two standard errors %2d, rms of z %.2f, untold %2d\n", name.c_str(),
+                count.told, count.within_two, std::sqrt(count.square / std::max(count.told, 1)),
+                count.untold);
   std::printf("all: told %d, within two standard errors %d\n", all.told, all.within_two);
-  EXPECT_GE(all.within_two, 0.88 * all.told);
+  EXPECT_GE(all.within_two, 0.9 * all.told);
 }
 
 // Straight on at one speed: what grows with it is one with what does not, and nothing turns or accelerates.
