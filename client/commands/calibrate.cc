@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "battery/coverage.h"
 #include "battery/recording.h"
 #include "client/commands/accepts.h"
 #include "client/commands/table.h"
@@ -53,7 +54,32 @@ Result<Read> read_all(const std::vector<std::string>& sources) {
   return all;
 }
 
-void print_json(const battery::Calibration& calibration) {
+nlohmann::json coverage_json(const battery::Coverage& seen) {
+  nlohmann::json document{
+      {"slow_rate_1_h", seen.slow_rate_1_h},  {"least_rate_1_h", seen.least_rate_1_h},
+      {"most_rate_1_h", seen.most_rate_1_h},  {"temperature_c", nullptr},
+      {"lowest_charge", seen.lowest_charge},  {"charging", seen.charging},
+      {"fastest_left_out", nullptr},          {"unseen_temperatures", nlohmann::json::array()},
+      {"sentences", battery::sentences(seen)}};
+  if (seen.temperature_c) document["temperature_c"] = {seen.temperature_c->first, seen.temperature_c->second};
+  if (const auto& left = seen.fastest_left_out)
+    document["fastest_left_out"] = {{"name", left->name},
+                                    {"rate_1_h", left->rate_1_h},
+                                    {"seen_to_1_h", left->seen_to_1_h},
+                                    {"time_error", left->time_error},
+                                    {"own_time_error", left->own_time_error},
+                                    {"voltage_rms_v", left->voltage_rms_v},
+                                    {"own_voltage_rms_v", left->own_voltage_rms_v}};
+  for (const battery::Coverage::Temperature& t : seen.unseen_temperatures)
+    document["unseen_temperatures"].push_back({{"temperature_c", t.temperature_c},
+                                               {"rate_1_h", t.rate_1_h},
+                                               {"duration_by_this", t.by_this},
+                                               {"duration_least", t.least},
+                                               {"duration_most", t.most}});
+  return document;
+}
+
+void print_json(const battery::Calibration& calibration, const battery::Coverage& seen) {
   nlohmann::json document{{"battery", robot::battery_to_json(calibration.battery)},
                           {"iterations", calibration.iterations},
                           {"recordings", nlohmann::json::array()}};
@@ -63,10 +89,11 @@ void print_json(const battery::Calibration& calibration) {
   document["passed_over"] = nlohmann::json::array();
   for (const battery::PassedOver& p : calibration.passed_over)
     document["passed_over"].push_back({{"name", p.name}, {"reason", p.reason}});
+  document["coverage"] = coverage_json(seen);
   std::puts(document.dump(2).c_str());
 }
 
-void print_text(const battery::Calibration& calibration) {
+void print_text(const battery::Calibration& calibration, const battery::Coverage& seen) {
   const robot::Battery& battery = calibration.battery;
   fmt::print("capacity            {:.4f} Ah\n", battery.capacity_ah * battery.ageing_factor.value_or(1));
   if (battery.ageing_factor) fmt::print("ageing factor       {:.4f}\n", *battery.ageing_factor);
@@ -86,6 +113,12 @@ void print_text(const battery::Calibration& calibration) {
                fit.open_circuit ? ", gives the open-circuit voltage" : "");
   for (const battery::PassedOver& p : calibration.passed_over)
     fmt::print("passed over: {}: {}\n", p.name, p.reason);
+  fmt::print("seen: rates of {:.2g} to {:.2g} C, and {:.2g} C all the way", seen.least_rate_1_h,
+             seen.most_rate_1_h, seen.slow_rate_1_h);
+  if (seen.temperature_c)
+    fmt::print("; {:.0f} to {:.0f} °C", seen.temperature_c->first, seen.temperature_c->second);
+  fmt::print("\n");
+  for (const std::string& sentence : battery::sentences(seen)) fmt::print("- {}.\n", sentence);
 }
 
 Exit run(const Options& options) {
@@ -93,13 +126,15 @@ Exit run(const Options& options) {
     return report(may.error());
   auto read = read_all(options.sources);
   if (!read) return report(read.error());
-  auto calibration =
-      battery::calibrate(read->recordings, {options.rated_capacity_ah, options.reserve_fraction});
+  const battery::CalibrationOptions how{options.rated_capacity_ah, options.reserve_fraction};
+  auto calibration = battery::calibrate(read->recordings, how);
   if (!calibration) {
     for (const battery::PassedOver& p : read->unreadable)
       fmt::print(stderr, "joulecast: passed over: {}: {}\n", p.name, p.reason);
     return report(calibration.error());
   }
+  const auto seen = battery::coverage(read->recordings, *calibration, how);
+  if (!seen) return report(seen.error());
   std::ranges::move(read->unreadable, std::back_inserter(calibration->passed_over));
   const std::string text = robot::to_json_text(calibration->battery);
   // What is written must be readable again, whatever was measured.
@@ -107,9 +142,9 @@ Exit run(const Options& options) {
   if (const auto written = write_text_file(options.out, text + '\n', existing(options.force)); !written)
     return report(written.error());
   if (options.json) {
-    print_json(*calibration);
+    print_json(*calibration, *seen);
   } else {
-    print_text(*calibration);
+    print_text(*calibration, *seen);
   }
   return Exit::ok;
 }

@@ -1,23 +1,22 @@
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <deque>
 #include <memory>
-#include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "base/json_number.h"
 #include "client/commands/accepts.h"
+#include "client/commands/drive_calibration_output.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/progress.h"
 #include "dynamics/drive_model.h"
 #include "energy/calibration.h"
+#include "energy/power_calibration.h"
 #include "robot/robot_file.h"
 #include "telemetry/log_recordings.h"
 #include "telemetry/recording_climb.h"
@@ -27,36 +26,20 @@ namespace {
 
 using energy::CalibrationMethod;
 
+enum class Method { steady, whole, power };
+const std::vector<std::pair<std::string, Method>> methods{
+    {"steady", Method::steady}, {"whole", Method::whole}, {"power", Method::power}};
+
 struct Options {
   std::vector<std::string> logs;
   std::string robot_file;
   std::string out;
   std::vector<std::string> train;
   std::vector<std::string> known;
+  std::optional<Method> method;
   energy::CalibrationOptions calibration;
   bool json = false;
   bool force = false;
-};
-
-const std::vector<std::pair<std::string, CalibrationMethod>> methods{{"steady", CalibrationMethod::steady},
-                                                                     {"whole", CalibrationMethod::whole}};
-
-// One mission's energy, measured and by both models, at the motors or, where measured, at the battery.
-struct Comparison {
-  std::string mission_id;
-  bool trained_on = false;
-  bool at_battery = false;
-  double measured_j = 0;
-  double before_j = 0;  // by the robot file as given
-  double after_j = 0;   // by the calibrated one
-
-  double error_before() const { return before_j / measured_j - 1; }
-  double error_after() const { return after_j / measured_j - 1; }
-};
-
-struct Outcome {
-  energy::DriveCalibration calibration;
-  std::vector<Comparison> missions;
 };
 
 Result<std::vector<telemetry::Recording>> load(const Options& options, const std::string& robot_id) {
@@ -77,7 +60,54 @@ Result<std::vector<telemetry::Recording>> load(const Options& options, const std
   return std::move(all);
 }
 
-Result<Outcome> calibrate(const Options& options) {
+bool has_motor_current(const std::vector<telemetry::Recording>& recordings) {
+  return std::ranges::any_of(recordings, [](const telemetry::Recording& r) {
+    return std::ranges::any_of(r.samples, [](const signals::Sample& s) {
+      return std::isfinite(s.motor_current_a[0]) || std::isfinite(s.motor_current_a[1]);
+    });
+  });
+}
+
+// Fills in the calibration, by `method` and from the chosen missions.
+Result<void> identify(const robot::RobotModel& robot, const Options& options, Method method,
+                      std::span<const telemetry::Recording> chosen, std::span<const energy::DriveRun> runs,
+                      DriveOutcome& outcome) {
+  if (method == Method::power) {
+    auto found = energy::calibrate_from_power(robot, chosen, {options.calibration.resistance_known});
+    if (!found) return tl::unexpected(found.error());
+    outcome.by_power = std::move(*found);
+    return {};
+  }
+  energy::CalibrationOptions how = options.calibration;
+  how.method = method == Method::whole ? CalibrationMethod::whole : CalibrationMethod::steady;
+  auto found = energy::calibrate_drive(robot, runs, how);
+  if (!found) return tl::unexpected(found.error());
+  outcome.by_motors = std::move(*found);
+  return {};
+}
+
+Result<void> account(const robot::RobotModel& robot, std::span<const energy::DriveRun> all,
+                     const std::set<std::string>& train, DriveOutcome& outcome) {
+  energy::MeterSettings meter;
+  meter.half_window_s = energy::half_window_for(all);
+  Progress progress("accounting", "missions", all.size());
+  for (const energy::DriveRun& run : all) {
+    progress.reach(outcome.missions.size());
+    const auto before = energy::metered(robot, run, meter);
+    if (!before) return tl::unexpected(before.error());
+    const auto after = energy::metered(outcome.robot(), run, meter);
+    if (!after) return tl::unexpected(after.error());
+    CalibratedMission c{run.name, train.empty() || train.contains(run.name), after->measured_s > 0};
+    c.measured_j = c.at_battery ? after->measured_j : after->measured_motor_j[0] + after->measured_motor_j[1];
+    c.before_j =
+        c.at_battery ? before->modelled_j : before->modelled_motor_j[0] + before->modelled_motor_j[1];
+    c.after_j = c.at_battery ? after->modelled_j : after->modelled_motor_j[0] + after->modelled_motor_j[1];
+    outcome.missions.push_back(c);
+  }
+  return {};
+}
+
+Result<DriveOutcome> calibrate(const Options& options) {
   const auto robot = robot::load_robot(options.robot_file);
   if (!robot) return tl::unexpected(robot.error());
   const auto recordings = load(options, robot->robot_id);
@@ -85,93 +115,26 @@ Result<Outcome> calibrate(const Options& options) {
   const std::set<std::string> train(options.train.begin(), options.train.end());
   const auto drive = dynamics::drive_model(*robot);
   if (!drive) return tl::unexpected(drive.error());
-  std::vector<energy::DriveRun> all, chosen;
+  std::vector<energy::DriveRun> all, runs;
+  std::vector<telemetry::Recording> chosen;
   std::deque<std::vector<double>> climbs;
   for (const telemetry::Recording& r : *recordings) {
     climbs.push_back(telemetry::climb_of(r, drive->parameters()));
     all.push_back({r.mission_id, r.samples, r.payload_kg, climbs.back()});
-    if (train.empty() || train.contains(r.mission_id)) chosen.push_back(all.back());
+    if (!train.empty() && !train.contains(r.mission_id)) continue;
+    runs.push_back(all.back());
+    chosen.push_back(r);
   }
-  auto calibration = energy::calibrate_drive(*robot, chosen, options.calibration);
-  if (!calibration) return tl::unexpected(calibration.error());
-  Outcome outcome{std::move(*calibration), {}};
-  energy::MeterSettings meter;
-  meter.half_window_s = energy::half_window_for(all);
-  Progress progress("accounting", "missions", all.size());
-  for (const energy::DriveRun& run : all) {
-    progress.reach(outcome.missions.size());
-    const auto before = energy::metered(*robot, run, meter);
-    if (!before) return tl::unexpected(before.error());
-    const auto after = energy::metered(outcome.calibration.robot, run, meter);
-    if (!after) return tl::unexpected(after.error());
-    Comparison c{run.name, train.empty() || train.contains(run.name), after->measured_s > 0};
-    c.measured_j = c.at_battery ? after->measured_j : after->measured_motor_j[0] + after->measured_motor_j[1];
-    c.before_j =
-        c.at_battery ? before->modelled_j : before->modelled_motor_j[0] + before->modelled_motor_j[1];
-    c.after_j = c.at_battery ? after->modelled_j : after->modelled_motor_j[0] + after->modelled_motor_j[1];
-    outcome.missions.push_back(c);
-  }
+  const Method method = options.method              ? *options.method
+                        : has_motor_current(chosen) ? Method::steady
+                                                    : Method::power;
+  DriveOutcome outcome;
+  const auto name = std::ranges::find(methods, method, &std::pair<std::string, Method>::second);
+  outcome.method = name->first;
+  if (const auto done = identify(*robot, options, method, chosen, runs, outcome); !done)
+    return tl::unexpected(done.error());
+  if (const auto done = account(*robot, all, train, outcome); !done) return tl::unexpected(done.error());
   return outcome;
-}
-
-void print_json(const Options& options, const Outcome& outcome) {
-  const energy::DriveCalibration& fit = outcome.calibration;
-  nlohmann::json document{
-      {"robot", robot::robot_to_json(fit.robot)},
-      {"method", options.calibration.method == CalibrationMethod::steady ? "steady" : "whole"},
-      {"blocks", fit.blocks},
-      {"samples", fit.samples},
-      {"slowest_rad_s", fit.slowest_rad_s},
-      {"fastest_rad_s", fit.fastest_rad_s},
-      {"voltage_rms_v", json_number(fit.voltage_rms_v)},
-      {"torque_rms_nm", json_number(fit.torque_rms_nm)},
-      {"parameters", nlohmann::json::array()},
-      {"missions", nlohmann::json::array()}};
-  for (const energy::ParameterEstimate& e : fit.estimates)
-    document["parameters"].push_back({{"name", e.name},
-                                      {"unit", e.unit},
-                                      {"value", e.value},
-                                      {"standard_error", e.fitted ? json_number(e.standard_error) : nullptr},
-                                      {"fitted", e.fitted},
-                                      {"note", e.note}});
-  for (const Comparison& c : outcome.missions)
-    document["missions"].push_back({{"mission_id", c.mission_id},
-                                    {"trained_on", c.trained_on},
-                                    {"measured_at", c.at_battery ? "battery" : "motors"},
-                                    {"measured_j", c.measured_j},
-                                    {"file_j", c.before_j},
-                                    {"calibrated_j", c.after_j},
-                                    {"file_error", json_number(c.error_before())},
-                                    {"calibrated_error", json_number(c.error_after())}});
-  std::puts(document.dump(2).c_str());
-}
-
-void print_text(const Outcome& outcome) {
-  const energy::DriveCalibration& fit = outcome.calibration;
-  for (const energy::ParameterEstimate& e : fit.estimates) {
-    fmt::print("{:<26} {:>12.5g}", e.name, e.value);
-    e.fitted ? fmt::print(" +- {:<10.3g}", e.standard_error) : fmt::print(" {:<13}", "(held)");
-    fmt::print(" {:<10} {}\n", e.unit, e.note);
-  }
-  fmt::print(
-      "from {} stretches, {} samples, wheels at {:.2f} to {:.2f} rad/s; residuals {:.3g} V, {:.3g} N m "
-      "rms\n\n",
-      fit.blocks, fit.samples, fit.slowest_rad_s, fit.fastest_rad_s, fit.voltage_rms_v, fit.torque_rms_nm);
-  fmt::print("{:<32} {:<8} {:<8} {:>12} {:>12} {:>9} {:>12} {:>9}\n", "mission", "used", "at", "measured J",
-             "file J", "error", "fitted J", "error");
-  double unused = 0, total = 0, error = 0;
-  for (const Comparison& c : outcome.missions) {
-    fmt::print("{:<32} {:<8} {:<8} {:>12.2f} {:>12.2f} {:>+8.1f}% {:>12.2f} {:>+8.1f}%\n", c.mission_id,
-               c.trained_on ? "to fit" : "to test", c.at_battery ? "battery" : "motors", c.measured_j,
-               c.before_j, 1e2 * c.error_before(), c.after_j, 1e2 * c.error_after());
-    if (c.trained_on) continue;
-    unused += 1;
-    total += c.measured_j;
-    error += std::fabs(c.after_j - c.measured_j);
-  }
-  if (unused > 0)
-    fmt::print("on the {:.0f} missions not used: {:.1f} % of their energy missed\n", unused,
-               1e2 * error / total);
 }
 
 Exit run(Options& options) {
@@ -184,13 +147,13 @@ Exit run(Options& options) {
   const auto outcome = calibrate(options);
   if (!outcome) return report(outcome.error());
   // What is written must be readable again, whatever was measured.
-  if (const auto valid = robot::validate(outcome->calibration.robot); !valid) return report(valid.error());
+  if (const auto valid = robot::validate(outcome->robot()); !valid) return report(valid.error());
   if (!options.out.empty()) {
-    const std::string text = robot::to_json_text(outcome->calibration.robot) + "\n";
+    const std::string text = robot::to_json_text(outcome->robot()) + "\n";
     if (const auto written = write_text_file(options.out, text, existing(options.force)); !written)
       return report(written.error());
   }
-  options.json ? print_json(options, *outcome) : print_text(*outcome);
+  options.json ? print_json(*outcome) : print_text(*outcome);
   return Exit::ok;
 }
 
@@ -200,7 +163,8 @@ void add_calibrate_drive(CLI::App& calibrate, Exit& exit) {
   auto options = std::make_shared<Options>();
   auto* command = calibrate.add_subcommand(
       "drive",
-      "Identify a drive from event logs with motor voltages and currents, and test it on other missions");
+      "Identify a drive from event logs, of motor voltages and currents or of battery power alone, and test "
+      "it on other missions");
   command->add_option("log", options->logs, "LCM event logs")->required();
   command->add_option("--robot", options->robot_file, "robot file to begin with; says whose missions count")
       ->required();
@@ -211,10 +175,11 @@ void add_calibrate_drive(CLI::App& calibrate, Exit& exit) {
                    "missions to fit to, comma-separated; the others test (default: all)")
       ->delimiter(',');
   command
-      ->add_option("--method", options->calibration.method,
-                   "steady: thesis (3-1) at constant speed; whole: every moving sample")
-      ->transform(one_of(methods))
-      ->default_str("steady");
+      ->add_option("--method", options->method,
+                   "steady: thesis (3-1) at constant speed; whole: every moving sample; power: battery power "
+                   "alone, which says what it cannot tell (default: steady, or power where no motor current "
+                   "was recorded)")
+      ->transform(one_of(methods));
   command->add_option("--known", options->known, "what the robot file already knows: resistance, constants")
       ->delimiter(',')
       ->check(one_of({"resistance", "constants"}));

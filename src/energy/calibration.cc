@@ -13,6 +13,7 @@
 #include "dynamics/drive_model.h"
 #include "energy/acceleration_filter.h"
 #include "energy/drive_equations.h"
+#include "energy/wheel_inertia.h"
 #include "telemetry/payload.h"
 
 namespace joulecast::energy {
@@ -104,13 +105,11 @@ class Calibrator {
  public:
   Calibrator(const robot::RobotModel& robot, const CalibrationOptions& options, dynamics::DriveModel known)
       : robot_(robot), options_(options), known_(std::move(known)) {
-    const double r = robot.kinematics.wheel_radius_m, c = r / (2 * robot.kinematics.half_track_m);
-    const double wheel = robot.mass.wheel_inertia_kg_m2 + robot.motor.rotor_inertia_kg_m2;
+    const WheelInertia inertia = wheel_inertia(robot);
     file_.resistance_ohm = robot.motor.resistance_ohm;
     file_.constant_v_s_rad = robot.motor.voltage_constant_v_s_rad * robot.motor.gear_ratio;
     file_.torque << robot.motor.friction_torque_nm[0], robot.motor.friction_torque_nm[1],
-        robot.motor.viscous_friction_nm_s_rad, robot.total_mass_kg(0) * r * r / 2 + wheel,
-        2 * robot.mass.yaw_inertia_kg_m2 * c * c + wheel;
+        robot.motor.viscous_friction_nm_s_rad, inertia.straight, inertia.turning;
     ratio_ = robot.motor.torque_constant_nm_a / robot.motor.voltage_constant_v_s_rad;
     const bool whole = options.method == CalibrationMethod::whole;
     fitted_ = {true, true, true, whole, whole};
@@ -399,7 +398,7 @@ class Calibrator {
     };
     const auto add = [&](std::string_view name, std::string_view unit, double value, double standard_error,
                          bool fitted, std::string_view note) {
-      result.estimates.push_back({name, unit, value, fitted ? standard_error : 0, fitted, note});
+      result.estimates.push_back({name, unit, value, fitted ? standard_error : 0, fitted, std::string(note)});
     };
     const std::string_view r_note = electrical(options_.resistance_known, resistance_held_);
     const std::string_view k_note = electrical(options_.constants_known, constant_held_);
@@ -427,7 +426,8 @@ class Calibrator {
     motor.torque_constant_nm_a = ratio_ * s.constant_v_s_rad / gear;
     motor.friction_torque_nm = {s.torque[friction_right], s.torque[friction_left]};
     motor.viscous_friction_nm_s_rad = s.torque[viscous];
-    place_inertia(s, result.robot);
+    if (fitted_[straight]) place_straight_inertia(s.torque[straight], result.robot);
+    if (fitted_[turning]) place_turning_inertia(s.torque[turning], result.robot);
 
     double torque_square = 0, voltage_square = 0;
     for (const Observation& o : data_.observations) {
@@ -440,27 +440,6 @@ class Calibrator {
     result.torque_rms_nm = std::sqrt(torque_square / n);
     result.voltage_rms_v = std::sqrt(voltage_square / n);
     return result;
-  }
-
-  // The rotor takes what the file's mass does not explain; a rotor cannot be lighter than nothing, so then
-  // the mass gives way.
-  void place_inertia(const Solution& s, robot::RobotModel& robot) const {
-    const double r = robot.kinematics.wheel_radius_m, c = r / (2 * robot.kinematics.half_track_m);
-    if (fitted_[straight]) {
-      const double rotor =
-          s.torque[straight] - robot.total_mass_kg(0) * r * r / 2 - robot.mass.wheel_inertia_kg_m2;
-      robot.motor.rotor_inertia_kg_m2 = std::max(rotor, 0.0);
-      if (rotor < 0) {
-        const double mass = 2 * (s.torque[straight] - robot.mass.wheel_inertia_kg_m2) / (r * r);
-        robot.mass.chassis_kg = std::max(mass - 2 * robot.mass.wheel_kg, 0.01 * robot.mass.chassis_kg);
-      }
-    }
-    if (fitted_[turning]) {
-      const double yaw =
-          (s.torque[turning] - robot.mass.wheel_inertia_kg_m2 - robot.motor.rotor_inertia_kg_m2) /
-          (2 * c * c);
-      if (yaw > 0) robot.mass.yaw_inertia_kg_m2 = yaw;
-    }
   }
 
   const robot::RobotModel& robot_;

@@ -54,9 +54,9 @@ struct ParameterEstimate {
   std::string_view unit;
   double value = 0;
   double standard_error =
-      0;                  // delete-a-block jackknife over stretches of a second: allows for correlated errors
-  bool fitted = false;    // false: held at `value`
-  std::string_view note;  // why it was held, or what it stands for
+      0;                // delete-a-block jackknife over stretches of a second: allows for correlated errors
+  bool fitted = false;  // false: held at `value`
+  std::string note;     // why it was held, or what it stands for
 };
 
 struct DriveCalibration {

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "energy/calibration.h"
+#include "robot/robot_model.h"
+#include "telemetry/recording.h"
+
+namespace joulecast::energy {
+
+// A parameter, or several, that battery power alone cannot tell, and why.
+struct Untold {
+  std::string what;  // as in the robot file
+  std::string why;   // a sentence's end, without its full stop
+};
+
+// Mean absolute error of battery power over the windows of one half by what was found in the other, of the
+// mean absolute power; both halves together.
+struct HalvesError {
+  double file = 0;
+  double calibrated = 0;
+  double regression = 0;  // P = c0 + c1 |v| + c2 |yaw rate| + c3 v a, and climb where it is known
+};
+
+struct PowerCalibration {
+  robot::RobotModel robot;  // the file with what was found in it
+  // `fitted`: the data tell it, with its standard error (about 95 % lie within two). Otherwise it stays near
+  // the file's, which the data hardly move, and the standard error is the file's as well.
+  std::vector<ParameterEstimate> estimates;
+  std::vector<Untold> untold;
+  std::size_t windows = 0, blocks = 0;
+  double effective_windows = 0;  // that many independent ones would say as much
+  double reading_s = 0;          // between readings of battery power
+  bool held = false;             // rows repeat these readings
+  double slowest_rad_s = 0, fastest_rad_s = 0;
+  double power_w = 0, left_w = 0;  // mean absolute power, and mean absolute residual of the fit
+  HalvesError halves;
+};
+
+struct PowerCalibrationOptions {
+  bool resistance_known = false;  // taken from the robot file
+};
+
+// Identifies what battery voltage and current [V, A, discharging positive] and wheel speeds tell of a drive,
+// without any motor channel: P = idle + sum over sides of (T w + R (T/(K_t n))^2), with driver loss and
+// unreturned braking, T from friction, inertia and scrub (dynamics/drive_model.h). Readings count where the
+// sensor was read anew (windows/windows.h); the robot file stands in where they tell nothing
+// (power_parameters.h, power_fit.h). Scrub, driver loss and unreturned braking enter the robot file only
+// where they are two standard errors from nothing.
+//
+// Fault::invalid when battery power is not measured, or for less than 40 windows in 4 stretches of 15 s.
+Result<PowerCalibration> calibrate_from_power(const robot::RobotModel& robot,
+                                              std::span<const telemetry::Recording> missions,
+                                              const PowerCalibrationOptions& options = {});
+
+}  // namespace joulecast::energy

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <array>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "dynamics/catalogue.h"
+#include "dynamics/drive_model.h"
+#include "robot/robot_model.h"
+
+namespace joulecast::energy {
+
+// What battery power and motion may tell of a drive, at the wheel. The last three are effects of the
+// catalogue and count beyond what the robot file has adopted of them.
+enum class PowerParameter : std::size_t {
+  idle_power,           // W
+  friction,             // N m, mean of both sides
+  friction_difference,  // N m, right less left
+  viscous,              // N m s/rad
+  straight_inertia,     // kg m^2 (wheel_inertia.h)
+  turning_inertia,      // kg m^2 (wheel_inertia.h)
+  resistance,           // ohm, through the copper loss R (T/(K_t n))^2 alone
+  turning_scrub,        // 1, friction coefficient of turning contacts
+  driver_loss,          // 1, of the motors' absolute power
+  unreturned            // 1, of the motors' braking power
+};
+inline constexpr std::size_t power_parameter_count = 10;
+inline constexpr std::array<std::string_view, power_parameter_count> power_parameter_names{
+    "idle_power_w",
+    "friction_torque_nm mean",
+    "friction_torque_nm right - left",
+    "viscous_friction_nm_s_rad",
+    "straight inertia",
+    "turning inertia",
+    "resistance_ohm",
+    "turning_scrub",
+    "driver_loss",
+    "no_regeneration"};
+inline constexpr std::array<std::string_view, power_parameter_count> power_parameter_units{
+    "W", "N m", "N m", "N m s/rad", "kg m2", "kg m2", "ohm", "1", "1", "1"};
+
+constexpr Eigen::Index index_of(PowerParameter p) {
+  return static_cast<Eigen::Index>(p);
+}
+constexpr bool is_effect(PowerParameter p) {
+  return p >= PowerParameter::turning_scrub;
+}
+
+// Sizes from which it follows how far a parameter may lie from a robot file that knows little.
+struct PowerScale {
+  double power_w = 1;      // mean absolute battery power
+  double speed_rad_s = 1;  // mean absolute wheel speed while moving
+};
+
+// The parameters as departures from the robot file, each in units of what it is expected to depart by: x = 0
+// is the file, and x ~ N(0, 1) all that is known before the data. Idle power and friction may be anything of
+// the size of the power, since files seldom know them; inertia, resistance and effects are held as a data
+// sheet holds them.
+class PowerParameters {
+ public:
+  // Fault::invalid when the catalogue rejects an effect of the robot file.
+  static Result<PowerParameters> make(const robot::RobotModel& robot, const PowerScale& scale,
+                                      bool resistance_known);
+
+  // Yaw rate at which the moment of turning has built up [rad/s]; a file that has scrub keeps its own.
+  void set_scrub_rate(double rate_rad_s);
+  bool scrub_rate_is_free() const { return !file_has_scrub_; }
+
+  double expected(PowerParameter p) const { return expected_[index_of(p)]; }  // 0: held at the file's
+  // In its own unit. No side's friction is below nothing, whatever mean and difference say.
+  double value(PowerParameter p, const Eigen::VectorXd& x) const;
+  double least(PowerParameter p) const;  // bounds in units of x
+  double most(PowerParameter p) const;
+
+  dynamics::DriveModel model(const Eigen::VectorXd& x) const;
+  // The robot file with these values in it. Effects without strength are left out.
+  robot::RobotModel robot(const Eigen::VectorXd& x) const;
+
+ private:
+  explicit PowerParameters(const robot::RobotModel& robot) : robot_(robot) {}
+  double plain_value(PowerParameter p, const Eigen::VectorXd& x) const {
+    return file_[index_of(p)] + expected_[index_of(p)] * x[index_of(p)];
+  }
+  std::array<double, 2> friction_nm(const Eigen::VectorXd& x) const;
+  robot::RobotModel without_effects(const Eigen::VectorXd& x) const;
+  std::vector<dynamics::ActiveEffect> found_effects(const Eigen::VectorXd& x) const;
+
+  robot::RobotModel robot_;
+  std::vector<dynamics::ActiveEffect> adopted_;
+  Eigen::VectorXd file_, expected_, least_, most_;
+  double scrub_rate_rad_s_ = 0;
+  bool file_has_scrub_ = false;
+};
+
+}  // namespace joulecast::energy

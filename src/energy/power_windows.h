@@ -1,0 +1,48 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <span>
+#include <vector>
+
+#include "base/error.h"
+#include "dynamics/drive_model.h"
+#include "energy/power_parameters.h"
+#include "statistics/regression.h"
+#include "telemetry/recording.h"
+#include "windows/windows.h"
+
+namespace joulecast::energy {
+
+// Smooth windows in which battery power was read anew, with the blocks that are left out together.
+struct PowerWindows {
+  std::vector<windows::Window> windows;
+  std::vector<bool> whole;  // each wheel moves or rests throughout: the model is sure of the friction's sign
+  std::size_t blocks = 0;   // numbered with time
+  windows::Readings readings;
+};
+
+// Fault::invalid where battery power is not measured, or too little of it.
+Result<PowerWindows> power_windows(std::span<const telemetry::Recording> missions,
+                                   const robot::RobotModel& robot);
+
+PowerScale scale_of(std::span<const windows::Window> windows);
+
+// What the battery's power meter reads on the mean of a window by a model [W]: begin, middle and end each
+// with their own speed.
+double metered_power_w(const dynamics::DriveModel& model, const windows::Window& window);
+
+// What anybody would try before a model: P = c0 + c1 |v| + c2 |yaw rate| + c3 v a, and c4 v sin(climb) where
+// the climb is known, by robust regression.
+class PlainRegression {
+ public:
+  PlainRegression(std::span<const windows::Window> windows, const robot::RobotModel& robot);
+  double power_w(const windows::Window& window) const;
+  double copperless_friction_nm() const;  // of each wheel, if all that grows with speed were dry friction
+
+ private:
+  Eigen::VectorXd terms(const windows::Window& window) const;
+  double wheel_radius_m_, half_track_m_;
+  statistics::Regression fit_;
+};
+
+}  // namespace joulecast::energy

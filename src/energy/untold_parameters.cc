@@ -1,0 +1,124 @@
+#include "energy/untold_parameters.h"
+
+#include <array>
+#include <string>
+
+namespace joulecast::energy {
+namespace {
+
+constexpr double told_deviation = 0.5;  // of what is expected
+// Information that a parameter has of its own, were all others known: with less it is the motion that is
+// missing, with more another parameter is in the way.
+constexpr double own_information = 3;
+
+constexpr std::array<std::string_view, power_parameter_count> not_in_the_motion{
+    "power hardly differs from nothing",
+    "the robot hardly moves",
+    "both wheels turn alike, so that only the sum of their frictions counts",
+    "the robot hardly moves, or always at one speed",
+    "the speed changes too little",
+    "the rate of turning changes too little",
+    "only the copper loss shows it, which is too small beside the rest",
+    "the robot hardly turns",
+    "the motors' power hardly differs from that of friction and inertia",
+    "the motors hardly brake"};
+
+constexpr std::array<std::string_view, power_parameter_count> meanings{
+    "computers, drivers and all else that draws at rest",
+    "",
+    "",
+    "",
+    "m r^2/2 + I_w + I_s; the rotors take what the file's mass does not explain",
+    "2 I c^2 + I_w + I_s",
+    "from the copper loss alone, as resistance / torque constant^2",
+    "effect, adopted",
+    "effect, adopted",
+    "effect, adopted"};
+
+constexpr std::array all{PowerParameter::idle_power,          PowerParameter::friction,
+                         PowerParameter::friction_difference, PowerParameter::viscous,
+                         PowerParameter::straight_inertia,    PowerParameter::turning_inertia,
+                         PowerParameter::resistance,          PowerParameter::turning_scrub,
+                         PowerParameter::driver_loss,         PowerParameter::unreturned};
+
+// The parameter that, were it known, would make `p` surest; `p` itself where none helps.
+PowerParameter in_the_way(const PowerParameters& parameters, const PowerFit& fit, PowerParameter p) {
+  Eigen::MatrixXd precision = fit.information;
+  precision.diagonal().array() += 1;
+  const auto variance = [&](PowerParameter known) {
+    Eigen::MatrixXd with = precision;
+    if (known != p) with(index_of(known), index_of(known)) += 1e9;
+    return with.inverse()(index_of(p), index_of(p));
+  };
+  PowerParameter most = p;
+  double least = variance(p);
+  for (const PowerParameter other : all) {
+    if (other == p || !(parameters.expected(other) > 0) || !(variance(other) < 0.9 * least)) continue;
+    least = variance(other);
+    most = other;
+  }
+  return most;
+}
+
+std::string why(const PowerParameters& parameters, const PowerFit& fit, PowerParameter p) {
+  const auto at = static_cast<std::size_t>(p);
+  const Eigen::Index k = index_of(p);
+  if (!(fit.information(k, k) > own_information)) return std::string(not_in_the_motion[at]);
+  const PowerParameter other = in_the_way(parameters, fit, p);
+  if (other == p) return "it changes power in this motion as several others together do";
+  return "it changes power in this motion nearly as " +
+         std::string(power_parameter_names[static_cast<std::size_t>(other)]) + " does";
+}
+
+}  // namespace
+
+bool told(const PowerParameters& parameters, const PowerFit& fit, PowerParameter p) {
+  return parameters.expected(p) > 0 && fit.deviation[index_of(p)] < told_deviation;
+}
+
+std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters, const PowerFit& fit,
+                                               const PowerFree& free) {
+  std::vector<ParameterEstimate> estimates;
+  for (const PowerParameter p : all) {
+    const auto at = static_cast<std::size_t>(p);
+    const bool known = !(parameters.expected(p) > 0), seen = told(parameters, fit, p);
+    if (is_effect(p) && !seen && !free[at]) continue;
+    ParameterEstimate e{power_parameter_names[at],
+                        power_parameter_units[at],
+                        parameters.value(p, fit.x),
+                        parameters.expected(p) * fit.deviation[index_of(p)],
+                        seen,
+                        std::string(meanings[at])};
+    if (known) e.note = "given as known";
+    if (!known && !seen) e.note = "stays near the file's: " + why(parameters, fit, p);
+    if (is_effect(p) && !free[at]) e.note = "nothing of it is seen";
+    estimates.push_back(std::move(e));
+  }
+  return estimates;
+}
+
+std::vector<Untold> untold_parameters(const PowerParameters& parameters, const PowerFit& fit) {
+  std::vector<Untold> untold;
+  for (const PowerParameter p : all) {
+    if (!(parameters.expected(p) > 0) || told(parameters, fit, p)) continue;
+    untold.push_back(
+        {std::string(power_parameter_names[static_cast<std::size_t>(p)]), why(parameters, fit, p)});
+  }
+  untold.push_back({"torque_constant_nm_a, voltage_constant_v_s_rad",
+                    "torque times speed is the same power whatever the constants; only the copper loss "
+                    "contains them, together with the resistance. The file's are kept"});
+  untold.push_back({"gear efficiency",
+                    "a loss in proportion to the torque passes for friction, inertia and resistance, "
+                    "which contain it"});
+  untold.push_back(
+      {"mass, yaw inertia and rotor inertia apart",
+       "only the straight and the turning inertia, their sums, are felt while the speed changes; "
+       "the mass alone shows on a slope"});
+  untold.push_back({"wheel_radius_m, half_track_m",
+                    "friction and inertia are those of the file's wheels; a map or a gyroscope shows these"});
+  untold.push_back({"battery internal_resistance_ohm",
+                    "power at the terminals is what is drawn beyond it; see joulecast calibrate battery"});
+  return untold;
+}
+
+}  // namespace joulecast::energy
