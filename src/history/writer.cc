@@ -424,23 +424,8 @@ class Writer::Impl {
     if (options_.prunes && !options_.prunes()) return;
     if (now - last_prune_ < options_.prune_interval) return;
     bool more_is_due = false;
-    if ((keep.telemetry_max_age_us || options_.missions_max_age_us) && now >= distrust_until_) {
-      const StoreSize size = store_.size().value_or(StoreSize{});
-      const double hours = Seconds(now - last_prune_).count() / seconds_per_hour;
-      // What an hour allows, saved up; of a small store one at least.
-      const auto allow = [&](double& allowance, std::int64_t there) {
-        const double share = options_.age_share_per_hour * static_cast<double>(there);
-        allowance = std::min(allowance + share * hours, std::max(share, 1.0));
-        return static_cast<std::int64_t>(allowance);
-      };
-      if (keep.telemetry_max_age_us)
-        if (const auto most = allow(age_allowance_, size.telemetry_chunks); most >= 1)
-          age_allowance_ -= static_cast<double>(prune(Prune{{keep.telemetry_max_age_us, {}}, most}));
-      if (options_.missions_max_age_us)
-        if (const auto most = allow(mission_allowance_, size.missions); most >= 1)
-          mission_allowance_ -=
-              static_cast<double>(prune(PruneMissions{*options_.missions_max_age_us, most}));
-    }
+    if ((keep.telemetry_max_age_us || options_.missions_max_age_us) && now >= distrust_until_)
+      prune_by_age(Seconds(now - last_prune_).count() / seconds_per_hour);
     if (keep.telemetry_max_bytes) {
       const Prune by_size{{{}, keep.telemetry_max_bytes}};
       // A full measure means that more is due: after the commands that came meanwhile.
@@ -451,6 +436,24 @@ class Writer::Impl {
       more_is_due |= prune(events) == events.max_events;
     }
     if (!more_is_due) last_prune_ = now;
+  }
+
+  void prune_by_age(double hours) {
+    const Result<StoreSize> size = store_.size();
+    if (!size) return tell(size.error());
+    // What an hour allows, saved up; of a small store one at least.
+    const auto allow = [&](double& allowance, std::int64_t there) {
+      const double share = options_.age_share_per_hour * static_cast<double>(there);
+      allowance = std::min(allowance + share * hours, std::max(share, 1.0));
+      return static_cast<std::int64_t>(allowance);
+    };
+    const Retention& keep = options_.retention;
+    if (keep.telemetry_max_age_us)
+      if (const auto most = allow(age_allowance_, size->telemetry_chunks); most >= 1)
+        age_allowance_ -= static_cast<double>(prune(Prune{{keep.telemetry_max_age_us, {}}, most}));
+    if (options_.missions_max_age_us)
+      if (const auto most = allow(mission_allowance_, size->missions); most >= 1)
+        mission_allowance_ -= static_cast<double>(prune(PruneMissions{*options_.missions_max_age_us, most}));
   }
 
   // The number of chunks, missions or events dropped.

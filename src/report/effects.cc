@@ -68,7 +68,7 @@ std::string card_of(const DiagnosedEffect& e, double mean_power_w) {
   card += strengths_of(e, known);
   std::string sure = "Probability " + chance_text(e.probability);
   if (e.posterior > 0) sure += fmt::format(" ({} by the data alone)", chance_text(e.posterior));
-  sure += fmt::format("; it closes {} of the gap", share_text(e.share));
+  if (std::isfinite(e.share)) sure += fmt::format("; it closes {} of the gap", share_text(e.share));
   if (e.power_w > 0) {
     sure += fmt::format("; it moves {} W on average", brief(e.power_w));
     if (mean_power_w > 0) sure += fmt::format(", where the mean power is {} W", brief(mean_power_w));

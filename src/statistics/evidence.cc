@@ -66,7 +66,12 @@ double Evidence::log_odds(std::span<const Candidate* const> set) const {
   if (!solve(set, p)) return impossible;
   const Eigen::Index n = p.mean.size();
   double result = 0.5 * p.b.dot(p.mean) - p.factor.matrixLLT().diagonal().array().log().sum();
-  Eigen::MatrixXd covariance;
+  // Each variance by itself: mostly few of the coefficients are bounded.
+  const auto sd = [&](Eigen::Index k) {
+    Eigen::VectorXd column = Eigen::VectorXd::Unit(n, k);
+    p.factor.matrixL().solveInPlace(column);
+    return column.norm();
+  };
   Eigen::Index at = 0;
   for (const Candidate* c : set) {
     result += c->log_prior;
@@ -74,11 +79,9 @@ double Evidence::log_odds(std::span<const Candidate* const> set) const {
       at += static_cast<Eigen::Index>(c->columns.size());
       continue;
     }
-    if (covariance.size() == 0) covariance = p.factor.solve(Eigen::MatrixXd::Identity(n, n));
     const double least = c->least / c->expected, most = c->most / c->expected;
     for (std::size_t k = 0; k < c->columns.size(); ++k, ++at) {
-      result += log_normal_within(p.mean[at], std::sqrt(covariance(at, at)), least, most) -
-                log_normal_within(0, 1, least, most);
+      result += log_normal_within(p.mean[at], sd(at), least, most) - log_normal_within(0, 1, least, most);
     }
   }
   return result;

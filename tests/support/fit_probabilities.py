@@ -28,8 +28,8 @@ import sys
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 JSON = SOURCE / "src/gap/verdict/probabilities.json"
 TABLE = SOURCE / "src/gap/verdict/probabilities.inc"
-METHOD = ("src/gap/traits.h", "src/gap/equations/*", "src/gap/diagnose/*", "src/gap/verdict/judge*",
-          "src/statistics/*", "src/windows/*")
+METHOD = ("src/dynamics/*", "src/dynamics/effects/*", "src/gap/traits.h", "src/gap/checks/*", "src/gap/equations/*",
+          "src/gap/diagnose/*", "src/gap/verdict/judge*", "src/statistics/*", "src/windows/*")
 STANDINGS = ("alone", "grouped", "inconclusive", "outside")
 EDGES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.925, 0.95, 0.975, 0.99)
 LEAST_NAMED, MOST_BINS = 25, 5

@@ -17,6 +17,7 @@ constexpr double least_gain = 4;      // nats, beyond the fault's own surprise
 constexpr double nearly = 1.5;        // nats between explanations that do as well
 constexpr double least_factor = 2.0;  // factors nearer to 1 than this are errors of calibration, not of units
 constexpr double degrees = 180 / std::numbers::pi, rpm = 30 / std::numbers::pi;
+constexpr double km_h = 3.6, mph = 2.2369, feet = 3.2808;  // in a m/s
 
 using Set = std::vector<const Fault*>;
 
@@ -148,6 +149,14 @@ void add_wheel_faults(Table& t, const robot::RobotModel& robot) {
         odd_surprise);
   t.add("wheel_velocity_scale", "wheel_velocity", "divided by the gear ratio once too often", both, 1 / gear,
         odd_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "computed from km/h as if they were m/s", both, km_h,
+        odd_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "computed from m/s as if they were km/h", both, 1 / km_h,
+        odd_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "computed from miles an hour as if they were m/s", both,
+        mph, odd_surprise);
+  t.add("wheel_velocity_scale", "wheel_velocity", "computed from feet a second as if they were m/s", both,
+        feet, odd_surprise);
 }
 
 }  // namespace

@@ -65,6 +65,7 @@ class Surrogates {
       const ChannelRows& r = linear.rows[c];
       if (r.y.size() == 0) continue;
       told_.fitted[c] = fitted(r, coefficients_);
+      told_.fitted[c] += by_block(r, linear.noise[c], r.y - told_.fitted[c]);
       told_.left[c] = r.y - told_.fitted[c];
       row_of_[c].assign(m.windows.size(), -1);
       for (std::size_t k = 0; k < r.window.size(); ++k)
@@ -94,6 +95,35 @@ class Surrogates {
     for (std::size_t j = 0; j < r.columns.size(); ++j)
       local[static_cast<Eigen::Index>(j)] = coefficients[static_cast<Eigen::Index>(r.columns[j])];
     return r.x * local;
+  }
+
+  // What differs from block to block and is nothing else (a battery's level, a gyro's bias), as each block's
+  // leftovers have it [channel's unit]. Shuffled among the leftovers it would be steps that no robot makes.
+  Eigen::VectorXd by_block(const ChannelRows& r, const ChannelNoise& noise,
+                           const Eigen::VectorXd& left) const {
+    Eigen::VectorXd told = Eigen::VectorXd::Zero(left.size());
+    std::vector<Eigen::Index> own;
+    std::vector<double> scatter;
+    for (std::size_t j = 0; j < r.columns.size(); ++j) {
+      const Column& column = linear_.columns->columns()[r.columns[j]];
+      if (column.tolerance > 0 || !(column.scatter > 0)) continue;
+      own.push_back(static_cast<Eigen::Index>(j));
+      scatter.push_back(column.scatter);
+    }
+    if (own.empty() || !(noise.sigma > 0)) return told;
+    const Eigen::Map<const Eigen::VectorXd> sd(scatter.data(), static_cast<Eigen::Index>(scatter.size()));
+    std::vector<std::vector<Eigen::Index>> rows(material_.blocks);
+    for (std::size_t k = 0; k < r.block.size(); ++k) rows[r.block[k]].push_back(static_cast<Eigen::Index>(k));
+    for (const std::vector<Eigen::Index>& block : rows) {
+      if (block.empty()) continue;
+      const Eigen::VectorXd weight =
+          (noise.spread(block).array().square() * noise.inflation).max(1e-300).inverse();
+      const Eigen::MatrixXd x = r.x(block, own) * sd.asDiagonal();
+      Eigen::MatrixXd information = x.transpose() * weight.asDiagonal() * x;
+      information.diagonal().array() += 1;
+      told(block) = x * information.ldlt().solve(x.transpose() * weight.cwiseProduct(left(block)));
+    }
+    return told;
   }
 
   Responses response_without(const Hypothesis& own, std::uint64_t seed) const {
@@ -138,7 +168,9 @@ std::optional<std::vector<Controls>> control(const Material& material, const Lin
   std::vector<Controls> controls(members, Controls{n, 0});
   if (members * n == 0) return controls;
   const Surrogates surrogates(material, linear, problem, explanation);
+  // The more members that a large gap may have make a false name likelier by nothing, and cost most.
   ExplainSettings quick = settings.explain;
+  quick.most_members = std::min(quick.most_members, ExplainSettings{}.most_members);
   std::atomic<std::size_t> next = 0;
   std::atomic<bool> stopped = false;
   std::mutex mutex;

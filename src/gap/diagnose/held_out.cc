@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "gap/diagnose/fewer_causes.h"
 #include "gap/diagnose/naming.h"
 #include "gap/diagnose/power_fit.h"
 #include "gap/diagnose/referee.h"
@@ -96,8 +97,10 @@ Found find_without(const std::vector<bool>& out, const Material& m, const FitRes
   const Noise noise = learn_noise(*linear.columns, linear.rows, out);
   Problem problem = make_problem(*linear.columns, linear.rows, noise, m.blocks);
   if (!zone) forbid_zones(problem);
-  const Explanation explanation = explain(problem, out, settings.explain);
+  const Mixture mixture(problem, out);
+  Explanation explanation = explain(mixture, out, settings.explain);
   const Equations equations{*linear.columns, linear.rows, noise, out};
+  prefer_fewer_causes(equations, mixture, explanation);
   Found found;
   found.named = name_causes(m, equations, problem, explanation, power_w);
   for (const std::size_t h : found.named.set) found.ids.push_back(problem.hypotheses[h].id());

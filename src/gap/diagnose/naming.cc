@@ -13,10 +13,6 @@
 namespace joulecast::gap {
 namespace {
 
-// What comes back when a cause is left out that the gap needs: of the gap, and of the mean power.
-constexpr double least_necessary_part = 0.05,
-                 least_necessary_share = ExplainSettings{}.least_share_for_certain;
-
 // Causes that only the motors' readings show, not battery power.
 bool moves_motors_alone(const Hypothesis& h) {
   const std::string id = h.id();

@@ -11,6 +11,9 @@ namespace joulecast::gap {
 inline constexpr double least_named = 0.5;     // probability of a name
 inline constexpr double most_wander = 0.8;     // of a strength, over the strength, that still is that cause
 inline constexpr double steady_wander = 0.45;  // up to which it stands still
+// What comes back when a cause is left out that the gap needs: of the gap, and of the mean power.
+inline constexpr double least_necessary_part = 0.05,
+                        least_necessary_share = ExplainSettings{}.least_share_for_certain;
 
 // Whether both judges see this function outside the catalogue.
 bool told_outside(const Hypothesis& hypothesis, const Member& member);

@@ -7,6 +7,7 @@
 #include "gap/diagnose/account.h"
 #include "gap/diagnose/channel_gaps.h"
 #include "gap/diagnose/controls.h"
+#include "gap/diagnose/fewer_causes.h"
 #include "gap/diagnose/held_out.h"
 #include "gap/diagnose/naming.h"
 #include "gap/diagnose/referee.h"
@@ -48,6 +49,14 @@ void take_out(std::span<const Cause> causes, windows::WindowSettings& settings) 
     if (id == "sensor_delay") settings.electrical_delay_s = values[0];
     if (id == "current_sensor_bias") settings.motor_current_bias_a = values[0] * values[1];
   }
+}
+
+// Whether a strength stands where the catalogue ends.
+bool at_its_bound(const Cause& cause) {
+  constexpr double close = 0.02;  // of the range
+  const dynamics::EffectParameter& strength = cause.effect.effect->info().parameters.front();
+  const double value = cause.effect.values[0], room = close * (strength.maximum - strength.minimum);
+  return std::fabs(value) > room && (value < strength.minimum + room || value > strength.maximum - room);
 }
 
 class Diagnoser {
@@ -242,6 +251,9 @@ void Diagnoser::name_base(const Problem& problem, Explanation& explanation, std:
                           Named& named) {
   const std::vector<Cause> all = refit(material(), joined(fit_->base, named.causes));
   const std::vector<Need> needed = base_needed(material(), *fit_, *held_out_, view_.power_w);
+  // Where one would have to go beyond what any robot has, the others make up for what it is not.
+  const double surest =
+      std::ranges::any_of(std::span(all).first(fit_->base.size()), at_its_bound) ? least_named : 1;
   for (std::size_t b = 0; b < fit_->base.size(); ++b) {
     const Cause& cause = all[b];
     const auto same = [&](const Hypothesis& h) { return h.is_effect() && h.cause().same_kind(cause); };
@@ -259,7 +271,7 @@ void Diagnoser::name_base(const Problem& problem, Explanation& explanation, std:
     m.hypothesis = h;
     m.coefficients = {value};
     m.sd = {std::sqrt((parts - 1) / parts * squares)};
-    m.by_evidence = m.by_prediction = needed[b].probability;
+    m.by_evidence = m.by_prediction = std::min(needed[b].probability, surest);
     m.group_by_evidence = m.group_by_prediction = m.any_by_evidence = m.any_by_prediction = m.by_evidence;
     m.share = problem.moved(*at, Eigen::VectorXd::Constant(1, value));
     // What was found beside it of the same kind is part of it.
@@ -350,6 +362,7 @@ bool Diagnoser::judge_all() {
   const Mixture mixture(problem);
   const std::vector<bool> all_blocks;
   Explanation explanation = explain(mixture, all_blocks, fit_settings_.explain);
+  prefer_fewer_causes(equations(), mixture, explanation);
   d_.detectable_share = seen_share(mixture);
   Named named;
   if (!fit_->alone)
@@ -403,6 +416,9 @@ bool Diagnoser::judge_all() {
     d_.shrinkage = shrinkage_of(*held_out_, problem.hypotheses, sought, d_.noise_floor);
   lower_noise_floor(std::min(held_out_->explained(), held_out_->referee()));
   judge(d_, f, robot_);
+  if (d_.power == PowerSource::none) {  // nothing says what a name closes, or moves at the battery
+    for (DiagnosedEffect& e : d_.effects) e.share = e.power_w = missing;
+  }
   if (d_.effects.empty()) d_.shrinkage.reset();
   d_.next_drive = next_drives(fit_->linear, problem, robot_, d_.effects);
   if (!d_.outside.channel.empty()) {

@@ -12,7 +12,6 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr double least_necessary_part = 0.05;  // of the gap, that comes back when a cause is left out
 constexpr int most_refits = 8;
 constexpr double settled = 0.005;  // relative change of the strengths
 

@@ -21,7 +21,7 @@ constexpr double mostly_closed = 0.5;                 // of what held-out parts 
 constexpr double beyond_usual = 3;                    // strengths that no robot has, over the usual ones
 constexpr double doubtful = 0.6;          // factor on names beside which something speaks against all
 constexpr double sure = 0.9;              // probability of such a name
-constexpr double varying = 0.7;           // most that a name whose strength varies may have
+constexpr double varying = 0.7;           // most of a name whose strength varies, or that nothing proves
 constexpr double most_detectable = 0.08;  // share below which effects must be seen for "none"
 
 // A battery sensor that reads too much while the motors' are right: a load that follows the current would
@@ -33,6 +33,8 @@ bool like_a_load(const Cause& cause) {
 
 bool implausible(const Cause& cause) {
   const Traits& traits = traits_of(cause.effect.effect->info().id);
+  // What sensors do is no strength of the robot's.
+  if (traits.cause == "sensors") return false;
   return !cause.by && traits.usual > 0 && std::fabs(cause.effect.values[0]) > beyond_usual * traits.usual;
 }
 
@@ -90,7 +92,8 @@ class Judge {
     decide();
     state_probabilities();
     settle_adoption();
-    d_.reasons = reasons_for(d_, doubts_.worse, doubts_.unexplained);
+    d_.outside.probability = std::min(d_.outside.probability, 1.0);
+    d_.reasons = reasons_for(d_, d_.baseline && d_.baseline->wins(), doubts_.unexplained);
   }
 
  private:
@@ -104,6 +107,10 @@ class Judge {
     return made.surrogates > 0 ? std::optional(made) : std::nullopt;
   }
 
+  // Where no power is known, no part left out says whether a cause that would show in power predicts
+  // anything.
+  bool unproved(const Hypothesis& h) const { return d_.power == PowerSource::none && shows_in_power(h); }
+
   void name_effects() {
     const std::vector<dynamics::ActiveEffect> none;
     for (std::size_t k = 0; k < f_.named.size(); ++k) {
@@ -112,12 +119,14 @@ class Judge {
       DiagnosedEffect e;
       e.id = h.id();
       e.posterior = m.probability();
-      if (m.wander > steady_wander) e.posterior = std::min(e.posterior, varying);
+      if (m.wander > steady_wander || unproved(h)) e.posterior = std::min(e.posterior, varying);
       e.controls = controls_of(m);
       // Found where it is not: no surer than the surrogates allow.
+      double not_by_chance = 1;
       if (e.controls) {
         const double n = static_cast<double>(e.controls->surrogates);
-        e.posterior = std::min(e.posterior, 1 - static_cast<double>(e.controls->named_in) / n);
+        not_by_chance = 1 - static_cast<double>(e.controls->named_in) / n;
+        e.posterior = std::min(e.posterior, not_by_chance);
       }
       e.parameters = parameters_of(f_.causes[k], h, m);
       e.share = f_.shares[k];
@@ -127,8 +136,8 @@ class Judge {
       for (const dynamics::ActiveEffect& effect : k < f_.instead.size() ? f_.instead[k] : none)
         e.instead.push_back(dynamics::adopt(effect));
       if (h.is_effect()) e.calibrates = traits_of(e.id).calibrates;
-      weakest_ =
-          std::min(weakest_, e.alternatives.empty() ? e.posterior : std::max(e.posterior, group_of(m, e)));
+      const double group = e.alternatives.empty() ? e.posterior : std::max(e.posterior, group_of(m, e));
+      weakest_ = std::min({weakest_, group, not_by_chance});
       named_share_ += m.share;
       d_.effects.push_back(std::move(e));
     }
@@ -141,6 +150,7 @@ class Judge {
   // than by the regression.
   bool functions_help() const {
     if (!f_.held_out) return true;
+    if (f_.of_groups && d_.baseline && d_.baseline->wins()) return false;
     const double without = f_.held_out->explained(), with = f_.held_out->explained_with_functions();
     return !(with > without || with < without) || (with < without && !baseline_of(*f_.held_out, true).wins());
   }

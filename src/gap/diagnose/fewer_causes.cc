@@ -1,0 +1,301 @@
+#include "gap/diagnose/fewer_causes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "gap/diagnose/naming.h"
+#include "gap/diagnose/power_fit.h"
+#include "gap/equations/zone_scan.h"
+#include "statistics/bootstrap.h"
+
+namespace joulecast::gap {
+namespace {
+
+constexpr std::size_t most_parts = 6;
+constexpr std::size_t function_size = 2;      // of a function outside the catalogue, counted in causes
+constexpr std::size_t most_first_causes = 6;  // that pairs are made of
+constexpr double contested = 0.7;             // most that evidence against it leaves of a probability
+
+class ThirdJudge {
+ public:
+  ThirdJudge(const Equations& equations, const Mixture& mixture, Explanation& explanation)
+      : e_(equations), mixture_(mixture), problem_(mixture.problem()), x_(explanation) {
+    for (std::size_t b = 0; b < problem_.block_count(); ++b) {
+      if (!e_.leaves_out(b)) blocks_.push_back(b);
+    }
+  }
+
+  void run() {
+    const HypothesisSet named = likely_causes(problem_, x_);
+    HypothesisSet with_functions = named;
+    for (const std::size_t h : named) {
+      if (!in_search(h)) kept_.push_back(h);
+    }
+    for (const Member& m : x_.members) {
+      if (told_outside(hypothesis(m.hypothesis), m)) with_functions.push_back(m.hypothesis);
+    }
+    std::ranges::sort(with_functions);
+    kept_strengths_ = kept_.empty() ? Eigen::VectorXd() : mixture_.estimate(kept_).mean;
+    add(kept_);
+    add(named);
+    add(with_functions);
+    for (const std::size_t h : best_variants(kept_)) add(with(kept_, h));
+    const std::vector<HypothesisSet> firsts = best_singles();
+    for (const std::size_t function : with_functions) {
+      if (!hypothesis(function).outside()) continue;
+      add(with(kept_, function));
+      for (const HypothesisSet& first : firsts) add(with(first, function));
+    }
+    for (const HypothesisSet& first : firsts)
+      for (const std::size_t h : best_variants(first)) add(with(first, h));
+    choose(with_functions);
+  }
+
+ private:
+  const Hypothesis& hypothesis(std::size_t h) const { return problem_.hypotheses[h]; }
+  bool in_search(std::size_t h) const {
+    return !hypothesis(h).outside() && shows_in_power(hypothesis(h)) && hypothesis(h).id() != zone_effect;
+  }
+  static HypothesisSet with(HypothesisSet set, std::size_t h) {
+    set.insert(std::ranges::lower_bound(set, h), h);
+    return set;
+  }
+  bool fits(const HypothesisSet& set, std::size_t h) const {
+    return std::ranges::none_of(
+        set, [&](std::size_t o) { return o == h || hypothesis(o).excludes(hypothesis(h)); });
+  }
+  std::size_t size_of(const HypothesisSet& set) const {
+    std::size_t size = 0;
+    for (const std::size_t h : set) size += hypothesis(h).outside() ? function_size : 1;
+    return size;
+  }
+
+  // Of each cause that may join, the variant that leaves least of all blocks.
+  std::vector<std::size_t> best_variants(const HypothesisSet& base) const {
+    std::map<std::string, std::pair<double, std::size_t>> best;
+    for (std::size_t h = 0; h < problem_.hypotheses.size(); ++h) {
+      if (!in_search(h) || !fits(base, h)) continue;
+      const HypothesisSet set = with(base, h);
+      const double left = left_by(set, fitted(set, e_), {}).sum();
+      const auto [at, first] = best.try_emplace(hypothesis(h).id(), left, h);
+      if (!first && left < at->second.first) at->second = {left, h};
+    }
+    std::vector<std::size_t> variants;
+    for (const auto& [id, found] : best) variants.push_back(found.second);
+    return variants;
+  }
+
+  Eigen::VectorXd fitted(const HypothesisSet& set, const Equations& of) const {
+    const std::size_t columns = columns_of(problem_.hypotheses, set).size();
+    Eigen::VectorXd start = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(columns));
+    Eigen::Index at = 0, of_kept = 0;
+    for (const std::size_t h : set) {
+      const auto n = static_cast<Eigen::Index>(hypothesis(h).candidate.columns.size());
+      if (std::ranges::binary_search(kept_, h)) {
+        start.segment(at, n) = kept_strengths_.segment(of_kept, n);
+        of_kept += n;
+      }
+      at += n;
+    }
+    return set.empty() ? start : fitted_to_power(of, set, start);
+  }
+
+  // Sum of |error| in each block [W], of those that `in` says.
+  Eigen::VectorXd left_by(const HypothesisSet& set, const Eigen::VectorXd& coefficients,
+                          const std::vector<bool>& in) const {
+    const ChannelRows& r = e_.rows[index_of(Channel::power)];
+    const Eigen::VectorXd left = r.y - moved_power(e_, set, coefficients);
+    Eigen::VectorXd sums = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem_.block_count()));
+    for (std::size_t k = 0; k < r.block.size(); ++k) {
+      if (e_.leaves_out(r.block[k]) || (!in.empty() && !in[r.block[k]])) continue;
+      sums[static_cast<Eigen::Index>(r.block[k])] += std::fabs(left[static_cast<Eigen::Index>(k)]);
+    }
+    return sums;
+  }
+
+  void add(const HypothesisSet& set) {
+    if (errors_.contains(set)) return;
+    Eigen::VectorXd sums = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem_.block_count()));
+    const std::size_t parts = std::min(most_parts, blocks_.size());
+    for (std::size_t part = 0; part < parts; ++part) {
+      std::vector<bool> part_of(problem_.block_count()), left_out = part_of;
+      for (std::size_t b = 0; b < problem_.block_count(); ++b) left_out[b] = e_.leaves_out(b);
+      for (std::size_t k = 0; k < blocks_.size(); ++k) {
+        if (k * parts / blocks_.size() == part) part_of[blocks_[k]] = left_out[blocks_[k]] = true;
+      }
+      const Equations rest{e_.columns, e_.rows, e_.noise, left_out};
+      sums += left_by(set, fitted(set, rest), part_of);
+    }
+    errors_[set] = sums;
+  }
+
+  std::vector<HypothesisSet> best_singles() const {
+    std::vector<std::pair<double, HypothesisSet>> singles;
+    for (const auto& [set, errors] : errors_) {
+      if (set.size() == kept_.size() + 1 && in_search_alone(set)) singles.emplace_back(errors.sum(), set);
+    }
+    std::ranges::sort(singles);
+    std::vector<HypothesisSet> best;
+    for (const auto& [error, set] : singles) {
+      if (best.size() < most_first_causes) best.push_back(set);
+    }
+    return best;
+  }
+  bool in_search_alone(const HypothesisSet& set) const {
+    return std::ranges::none_of(set, [&](std::size_t h) { return hypothesis(h).outside(); });
+  }
+
+  // What is left, with what each member has to close by itself to be worth its place [W, summed over rows].
+  struct Weighed {
+    std::vector<HypothesisSet> sets;
+    Eigen::MatrixXd left;  // of sets, by block
+    Eigen::VectorXd price;
+    double a_member = 0;
+
+    std::size_t best(std::span<const int> counts) const {
+      Eigen::VectorXd total = price;
+      for (Eigen::Index b = 0; b < left.cols(); ++b)
+        total += (counts.empty() ? 1 : counts[static_cast<std::size_t>(b)]) * left.col(b);
+      Eigen::Index least = 0;
+      total.minCoeff(&least);
+      return static_cast<std::size_t>(least);
+    }
+  };
+
+  Weighed weighed() const {
+    Weighed w;
+    const ChannelRows& r = e_.rows[index_of(Channel::power)];
+    const auto rows =
+        static_cast<double>(std::ranges::count_if(r.block, [&](std::size_t b) { return !e_.leaves_out(b); }));
+    w.a_member = std::max(least_necessary_part * errors_.at(kept_).sum(),
+                          least_necessary_share * e_.columns.mean_power_w() * rows);
+    w.left.resize(static_cast<Eigen::Index>(errors_.size()), static_cast<Eigen::Index>(blocks_.size()));
+    w.price.resize(w.left.rows());
+    for (const auto& [set, errors] : errors_) {
+      const auto at = static_cast<Eigen::Index>(w.sets.size());
+      for (std::size_t k = 0; k < blocks_.size(); ++k)
+        w.left(at, static_cast<Eigen::Index>(k)) = errors[static_cast<Eigen::Index>(blocks_[k])];
+      w.price[at] = w.a_member * static_cast<double>(size_of(set));
+      w.sets.push_back(set);
+    }
+    return w;
+  }
+
+  // How often each set is the best of its blocks drawn anew.
+  static std::vector<double> probabilities(const Weighed& w) {
+    std::vector<double> p(w.sets.size());
+    const auto draws = statistics::bootstrap_counts(static_cast<std::size_t>(w.left.cols()));
+    for (const std::vector<int>& counts : draws) p[w.best(counts)] += 1.0 / static_cast<double>(draws.size());
+    return p;
+  }
+
+  void choose(const HypothesisSet& with_functions) {
+    const Weighed w = weighed();
+    const HypothesisSet chosen = likeliest_like(w.sets[w.best({})], w);
+    if (chosen == with_functions || chosen == kept_) return;
+    take(chosen, w);
+  }
+
+  void take(const HypothesisSet& chosen, const Weighed& w) {
+    const std::vector<double> p = probabilities(w);
+    const auto probability = [&](const std::set<std::string>& ids) {
+      double sum = 0;
+      for (std::size_t m = 0; m < w.sets.size(); ++m) {
+        if (std::ranges::any_of(w.sets[m], [&](std::size_t h) { return ids.contains(hypothesis(h).id()); }))
+          sum += p[m];
+      }
+      return sum;
+    };
+    const Eigen::VectorXd strengths = fitted(chosen, e_);
+    const Mixture::Estimate estimate = mixture_.estimate(chosen);
+    std::vector<Member> members;
+    Eigen::Index at = 0;
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+      const Hypothesis& h = hypothesis(chosen[k]);
+      const auto n = static_cast<Eigen::Index>(h.candidate.columns.size());
+      const Eigen::VectorXd own = strengths.segment(at, n), sd = estimate.sd.segment(at, n);
+      at += n;
+      const auto known = std::ranges::find(x_.members, chosen[k], &Member::hypothesis);
+      Member m;
+      if (known != x_.members.end()) {
+        m = *known;
+      } else {
+        m.hypothesis = chosen[k];
+        m.coefficients.assign(own.begin(), own.end());
+        m.sd.assign(sd.begin(), sd.end());
+        m.share = problem_.moved(h, own);
+        std::set<std::string> group{h.id()};
+        m.by_prediction = probability(group);
+        m.alternatives = as_good(chosen, chosen[k], w);
+        for (const Alternative& a : m.stated()) group.insert(hypothesis(a.hypothesis).id());
+        m.group_by_prediction = probability(group);
+        for (const Alternative& a : m.alternatives) group.insert(hypothesis(a.hypothesis).id());
+        m.any_by_prediction = probability(group);
+        m.by_evidence = m.group_by_evidence = m.any_by_evidence = contested;
+      }
+      m.wander = 0;
+      const std::vector<double> wander = mixture_.wander(chosen, k);
+      for (std::size_t g = 0; g < wander.size(); ++g) m.wander += wander[g] * wander_grid[g];
+      members.push_back(std::move(m));
+    }
+    x_.members = std::move(members);
+    x_.whole = chosen;
+    x_.none = std::min(x_.none, 1 - contested);
+    x_.outside = x_.outside_by_prediction = 0;
+  }
+
+  // Which of those that leave hardly more it is, only the evidence says.
+  HypothesisSet likeliest_like(const HypothesisSet& best, const Weighed& w) const {
+    HypothesisSet likeliest = best;
+    double most = mixture_.log_joint(best);
+    for (std::size_t m = 0; m < w.sets.size(); ++m) {
+      const HypothesisSet& set = w.sets[m];
+      if (set.size() != best.size() || size_of(set) != size_of(best) ||
+          errors_.at(set).sum() - errors_.at(best).sum() > w.a_member)
+        continue;
+      if (const double log_joint = mixture_.log_joint(set); log_joint > most)
+        most = log_joint, likeliest = set;
+    }
+    return likeliest;
+  }
+
+  // Other causes that leave hardly more in the place of one, the best first.
+  std::vector<Alternative> as_good(const HypothesisSet& chosen, std::size_t member, const Weighed& w) const {
+    const double own = errors_.at(chosen).sum();
+    HypothesisSet rest = chosen;
+    std::erase(rest, member);
+    std::vector<std::pair<double, Alternative>> found;
+    for (const auto& [set, errors] : errors_) {
+      if (set.size() != chosen.size() || !in_search_alone(set)) continue;
+      HypothesisSet other = set;
+      for (const std::size_t h : rest) std::erase(other, h);
+      if (other.size() != 1 || hypothesis(other.front()).id() == hypothesis(member).id()) continue;
+      const double more = errors.sum() - own;
+      if (more < w.a_member) found.push_back({more, {other.front(), std::exp(-more / w.a_member)}});
+    }
+    std::ranges::sort(found, {}, [](const auto& f) { return f.first; });
+    std::vector<Alternative> result;
+    for (const auto& [more, alternative] : found) result.push_back(alternative);
+    return result;
+  }
+
+  const Equations& e_;
+  const Mixture& mixture_;
+  const Problem& problem_;
+  Explanation& x_;
+  std::vector<std::size_t> blocks_;
+  HypothesisSet kept_;  // named causes that other channels show
+  Eigen::VectorXd kept_strengths_;
+  std::map<HypothesisSet, Eigen::VectorXd> errors_;  // of sets, by block, each without its part
+};
+
+}  // namespace
+
+void prefer_fewer_causes(const Equations& equations, const Mixture& mixture, Explanation& explanation) {
+  if (!power_speaks_alone(equations)) return;
+  ThirdJudge(equations, mixture, explanation).run();
+}
+
+}  // namespace joulecast::gap
