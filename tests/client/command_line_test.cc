@@ -92,7 +92,7 @@ TEST_F(CommandLine, CompletesOptionsThatAreNotGivenYet) {
 
 TEST_F(CommandLine, CompletesEnumerations) {
   EXPECT_THAT(complete({"autonomy", "--driving", ""}), ElementsAre("usual", "minimum_energy"));
-  EXPECT_THAT(complete({"calibrate", "drive", "--method", ""}), ElementsAre("steady", "whole"));
+  EXPECT_THAT(complete({"calibrate", "drive", "--method", ""}), ElementsAre("steady", "whole", "power"));
   EXPECT_THAT(complete({"missions", "--state", "in"}), ElementsAre("interrupted"));
   EXPECT_THAT(complete({"completion", ""}), IsSupersetOf({"bash", "zsh", "fish"}));
   EXPECT_THAT(complete({"explore", "--case", ""}), ElementsAre("1", "2", "3", "4", "5"));
@@ -182,7 +182,7 @@ TEST_F(WrongUse, SaysWhatIsWanted) {
   EXPECT_THAT(told({"explore", "--case", "6"}), HasSubstr("--case: must be one of {1,2,3,4,5}, not 6"));
   EXPECT_THAT(told({"token", "create", "--days", "-1"}), HasSubstr("--days: must be 0 to 36500, not -1"));
   EXPECT_THAT(told({"calibrate", "drive", "--method", "slow"}),
-              HasSubstr("must be one of {steady,whole}, not slow"));
+              HasSubstr("must be one of {steady,whole,power}, not slow"));
   EXPECT_THAT(told({"calibrate"}), HasSubstr("requires a command: drive, battery"));
 }
 

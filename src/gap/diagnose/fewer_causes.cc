@@ -18,10 +18,34 @@ constexpr std::size_t function_size = 2;      // of a function outside the catal
 constexpr std::size_t most_first_causes = 6;  // that pairs are made of
 constexpr double contested = 0.7;             // most that evidence against it leaves of a probability
 
+// Rows of a long recording, evenly, that are enough to compare sets by.
+Rows thinned_power(const Equations& e) {
+  constexpr std::size_t most_rows = 3000;
+  const ChannelRows& all = e.rows[index_of(Channel::power)];
+  const std::size_t every = (all.block.size() + most_rows - 1) / most_rows;
+  std::vector<Eigen::Index> kept;
+  Rows rows;
+  ChannelRows& thin = rows[index_of(Channel::power)];
+  for (std::size_t k = 0; k < all.block.size(); k += every) {
+    kept.push_back(static_cast<Eigen::Index>(k));
+    thin.window.push_back(all.window[k]);
+    thin.block.push_back(all.block[k]);
+    thin.resting.push_back(all.resting[k]);
+  }
+  thin.columns = all.columns;
+  thin.x = all.x(kept, Eigen::all);
+  thin.y = all.y(kept);
+  return rows;
+}
+
 class ThirdJudge {
  public:
   ThirdJudge(const Equations& equations, const Mixture& mixture, Explanation& explanation)
-      : e_(equations), mixture_(mixture), problem_(mixture.problem()), x_(explanation) {
+      : rows_(thinned_power(equations)),
+        e_{equations.columns, rows_, equations.noise, equations.left_out},
+        mixture_(mixture),
+        problem_(mixture.problem()),
+        x_(explanation) {
     for (std::size_t b = 0; b < problem_.block_count(); ++b) {
       if (!e_.leaves_out(b)) blocks_.push_back(b);
     }
@@ -41,7 +65,14 @@ class ThirdJudge {
     add(kept_);
     add(named);
     add(with_functions);
-    for (const std::size_t h : best_variants(kept_)) add(with(kept_, h));
+    const std::vector<Variant> variants = best_variants(kept_);
+    const double nothing = errors_.at(kept_).sum();
+    // What closes too little of all blocks closes too little of parts left out.
+    if (with_functions == kept_ && std::ranges::none_of(variants, [&](const Variant& v) {
+          return nothing - v.left >= price_of_a_member();
+        }))
+      return;
+    for (const Variant& v : variants) add(with(kept_, v.hypothesis));
     const std::vector<HypothesisSet> firsts = best_singles();
     for (const std::size_t function : with_functions) {
       if (!hypothesis(function).outside()) continue;
@@ -49,7 +80,7 @@ class ThirdJudge {
       for (const HypothesisSet& first : firsts) add(with(first, function));
     }
     for (const HypothesisSet& first : firsts)
-      for (const std::size_t h : best_variants(first)) add(with(first, h));
+      for (const Variant& v : best_variants(first)) add(with(first, v.hypothesis));
     choose(with_functions);
   }
 
@@ -72,19 +103,32 @@ class ThirdJudge {
     return size;
   }
 
-  // Of each cause that may join, the variant that leaves least of all blocks.
-  std::vector<std::size_t> best_variants(const HypothesisSet& base) const {
-    std::map<std::string, std::pair<double, std::size_t>> best;
+  // Of each cause that may join, the variant that leaves least of all blocks [W, summed over rows].
+  struct Variant {
+    std::size_t hypothesis = 0;
+    double left = 0;
+  };
+  std::vector<Variant> best_variants(const HypothesisSet& base) const {
+    std::map<std::string, Variant> best;
     for (std::size_t h = 0; h < problem_.hypotheses.size(); ++h) {
       if (!in_search(h) || !fits(base, h)) continue;
       const HypothesisSet set = with(base, h);
       const double left = left_by(set, fitted(set, e_), {}).sum();
-      const auto [at, first] = best.try_emplace(hypothesis(h).id(), left, h);
-      if (!first && left < at->second.first) at->second = {left, h};
+      const auto [at, first] = best.try_emplace(hypothesis(h).id(), Variant{h, left});
+      if (!first && left < at->second.left) at->second = {h, left};
     }
-    std::vector<std::size_t> variants;
-    for (const auto& [id, found] : best) variants.push_back(found.second);
+    std::vector<Variant> variants;
+    for (const auto& [id, variant] : best) variants.push_back(variant);
     return variants;
+  }
+
+  // What each cause has to close by itself to be worth its place [W, summed over rows].
+  double price_of_a_member() const {
+    const ChannelRows& r = e_.rows[index_of(Channel::power)];
+    const auto rows =
+        static_cast<double>(std::ranges::count_if(r.block, [&](std::size_t b) { return !e_.leaves_out(b); }));
+    return std::max(least_necessary_part * errors_.at(kept_).sum(),
+                    least_necessary_share * e_.columns.mean_power_w() * rows);
   }
 
   Eigen::VectorXd fitted(const HypothesisSet& set, const Equations& of) const {
@@ -147,7 +191,7 @@ class ThirdJudge {
     return std::ranges::none_of(set, [&](std::size_t h) { return hypothesis(h).outside(); });
   }
 
-  // What is left, with what each member has to close by itself to be worth its place [W, summed over rows].
+  // What is left, with what the members have to close [W, summed over rows].
   struct Weighed {
     std::vector<HypothesisSet> sets;
     Eigen::MatrixXd left;  // of sets, by block
@@ -166,11 +210,7 @@ class ThirdJudge {
 
   Weighed weighed() const {
     Weighed w;
-    const ChannelRows& r = e_.rows[index_of(Channel::power)];
-    const auto rows =
-        static_cast<double>(std::ranges::count_if(r.block, [&](std::size_t b) { return !e_.leaves_out(b); }));
-    w.a_member = std::max(least_necessary_part * errors_.at(kept_).sum(),
-                          least_necessary_share * e_.columns.mean_power_w() * rows);
+    w.a_member = price_of_a_member();
     w.left.resize(static_cast<Eigen::Index>(errors_.size()), static_cast<Eigen::Index>(blocks_.size()));
     w.price.resize(w.left.rows());
     for (const auto& [set, errors] : errors_) {
@@ -281,7 +321,8 @@ class ThirdJudge {
     return result;
   }
 
-  const Equations& e_;
+  const Rows rows_;  // of power alone
+  const Equations e_;
   const Mixture& mixture_;
   const Problem& problem_;
   Explanation& x_;
