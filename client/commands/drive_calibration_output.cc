@@ -94,13 +94,14 @@ void print_json(const DriveOutcome& outcome) {
                           {"parameters", nlohmann::json::array()},
                           {"missions", nlohmann::json::array()}};
   outcome.by_motors ? add(document, *outcome.by_motors) : add(document, *outcome.by_power);
-  const bool both = outcome.by_power.has_value();
+  // Battery power leaves a deviation of what it does not tell, too.
+  const bool always = outcome.by_power.has_value();
   for (const energy::ParameterEstimate& e : outcome.estimates())
     document["parameters"].push_back(
         {{"name", e.name},
          {"unit", e.unit},
          {"value", e.value},
-         {"standard_error", e.fitted || both ? json_number(e.standard_error) : nullptr},
+         {"standard_error", e.fitted || always ? json_number(e.standard_error) : nullptr},
          {"fitted", e.fitted},
          {"note", e.note}});
   for (const CalibratedMission& c : outcome.missions)

@@ -134,9 +134,8 @@ void print_text(const Options& options, const std::vector<Imported>& all) {
     const telemetry::Recording& r = one.import.recording;
     const telemetry::ImportReport& report = one.import.report;
     fmt::print("{:<20} {:<32} {:>8.1f} {:>8} {:>9} {:>8} {:>9}\n", r.robot_id, r.mission_id,
-               1e-6 * static_cast<double>(r.samples.back().utime_us - r.samples.front().utime_us),
-               report.rows, report.samples, report.rows + report.samples_added - report.samples,
-               report.glitches.size());
+               telemetry::length_s(r), report.rows, report.samples,
+               report.rows + report.samples_added - report.samples, report.glitches.size());
   }
   for (const Imported& one : all) {
     constexpr std::size_t shown = 10;

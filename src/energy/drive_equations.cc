@@ -137,23 +137,15 @@ void DriveEquations::close_windows() {
 
 void DriveEquations::add(const windows::Window& w) {
   if (equations_.size() >= most_equations) return;
-  dynamics::Instant at;
-  at.wheel_speed_rad_s = w.speed_rad_s;
-  at.wheel_acceleration_rad_s2 = w.acceleration_rad_s2;
-  at.payload_kg = w.payload_kg;
-  at.x_m = w.x_m;
-  at.y_m = w.y_m;
-  at.heading_rad = w.heading_rad;
-  at.climb_rad = w.climb_rad;
+  dynamics::Instant at = windows::instant_of(w);
   payload_sum_kg_ += w.payload_kg;
   ++windows_;
   const bool motors = std::isfinite(w.current_a[0] + w.current_a[1]);
   const bool battery = std::isfinite(w.battery_power_w);
-  const bool whole = (w.moving[0] || w.resting[0]) && (w.moving[1] || w.resting[1]);
   if (motors) torque_equations(at, w);
   if (battery && std::isfinite(w.motor_power_w[0] + w.motor_power_w[1])) {
     idle_equation(w);
-  } else if (battery && whole) {
+  } else if (battery && windows::steady(w)) {
     if (w.resting[0] && w.resting[1]) at.wheel_speed_rad_s = at.wheel_acceleration_rad_s2 = {};
     power_equation(at, w.battery_power_w);
   }

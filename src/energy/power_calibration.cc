@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -30,6 +31,13 @@ double mean_left_w(const dynamics::DriveModel& model, const PowerWindows& data, 
   return left / count;
 }
 
+std::vector<windows::Window> windows_of(const PowerWindows& data, const Use& use) {
+  std::vector<windows::Window> own;
+  std::ranges::copy_if(data.windows, std::back_inserter(own),
+                       [&](const windows::Window& w) { return use(w.block); });
+  return own;
+}
+
 struct Found {
   PowerParameters parameters;
   PowerFit fit;
@@ -45,12 +53,9 @@ Result<PowerFit> first_fit(const PowerParameters& parameters, const PowerWindows
   const Eigen::VectorXd file = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(power_parameter_count));
   auto from_file = fit_power(parameters, data, use, free, file);
   if (!from_file) return from_file;
-  std::vector<windows::Window> own;
-  for (const windows::Window& w : data.windows)
-    if (use(w.block)) own.push_back(w);
   Eigen::VectorXd plain = file;
   const Eigen::Index friction = index_of(PowerParameter::friction);
-  plain[friction] = (PlainRegression(own, robot).copperless_friction_nm() -
+  plain[friction] = (PlainRegression(windows_of(data, use), robot).copperless_friction_nm() -
                      parameters.value(PowerParameter::friction, file)) /
                     parameters.expected(PowerParameter::friction);
   plain[index_of(PowerParameter::resistance)] = parameters.least(PowerParameter::resistance) / 2;
@@ -121,10 +126,7 @@ Result<HalvesError> predict_halves(const PowerParameters& parameters, const Powe
     const auto found = find(parameters, data, use, robot);
     if (!found) return tl::unexpected(found.error());
     const dynamics::DriveModel model = found->parameters.model(found->fit.x);
-    std::vector<windows::Window> own;
-    for (const windows::Window& w : data.windows)
-      if (use(w.block)) own.push_back(w);
-    const PlainRegression plain(own, robot);
+    const PlainRegression plain(windows_of(data, use), robot);
     for (const windows::Window& w : data.windows) {
       if (use(w.block)) continue;
       total += std::fabs(w.battery_power_w);

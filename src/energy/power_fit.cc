@@ -32,20 +32,17 @@ class Misfit {
   Eigen::Index rows() const { return static_cast<Eigen::Index>(windows_.size()); }
   const windows::Window& window(Eigen::Index k) const { return *windows_[static_cast<std::size_t>(k)]; }
 
-  void left(const Eigen::VectorXd& x, double* out) const {
-    const dynamics::DriveModel model = parameters_.model(x);
-    for (const windows::Window* w : windows_) *out++ = w->battery_power_w - metered_power_w(model, *w);
-  }
   Eigen::VectorXd left(const Eigen::VectorXd& x) const {
+    const dynamics::DriveModel model = parameters_.model(x);
     Eigen::VectorXd e(rows());
-    left(x, e.data());
+    for (Eigen::Index k = 0; k < e.size(); ++k)
+      e[k] = window(k).battery_power_w - metered_power_w(model, window(k));
     return e;
   }
 
-  // What a unit more of each parameter adds to the model [W], by differences.
-  Eigen::MatrixXd slopes(const Eigen::VectorXd& x) const {
+  // What a unit more of each parameter adds to the model [W], by differences from what is left at x.
+  Eigen::MatrixXd slopes(const Eigen::VectorXd& x, const Eigen::VectorXd& here) const {
     constexpr double step = 1e-4;
-    const Eigen::VectorXd here = left(x);
     Eigen::MatrixXd j = Eigen::MatrixXd::Zero(rows(), parameter_count);
     for (Eigen::Index p = 0; p < parameter_count; ++p) {
       if (!(parameters_.expected(static_cast<PowerParameter>(p)) > 0)) continue;
@@ -133,10 +130,11 @@ struct Linear {
   double inflation = 1;
 };
 
-Linear linearise(const Misfit& misfit, const Weights& weights, const Eigen::VectorXd& x) {
+Linear linearise(const Misfit& misfit, const Weights& weights, const Eigen::VectorXd& x,
+                 const Eigen::VectorXd& left) {
   Linear l;
-  l.weighted = weights.of_row.asDiagonal() * misfit.slopes(x);
-  l.left = weights.of_row.cwiseProduct(misfit.left(x));
+  l.weighted = weights.of_row.asDiagonal() * misfit.slopes(x, left);
+  l.left = weights.of_row.cwiseProduct(left);
   l.information = l.weighted.transpose() * l.weighted;
   const Eigen::MatrixXd score = scores(misfit, l.weighted, l.left);
   const auto blocks = static_cast<double>(score.rows());
@@ -190,8 +188,9 @@ class Descent {
 
   // Moves x; false when it rests.
   bool step(Eigen::VectorXd& x) {
-    const Weights weights = weigh(misfit_, misfit_.left(x), power_w_);
-    const Linear l = linearise(misfit_, weights, x);
+    const Eigen::VectorXd left = misfit_.left(x);
+    const Weights weights = weigh(misfit_, left, power_w_);
+    const Linear l = linearise(misfit_, weights, x, left);
     const Eigen::VectorXd start = x(moved_);
     const auto worth = [&](const Eigen::VectorXd& at) {
       return weights.of_row.cwiseProduct(misfit_.left(at)).squaredNorm() / l.inflation +
@@ -199,7 +198,7 @@ class Descent {
     };
     const Eigen::MatrixXd a = l.information(moved_, moved_) / l.inflation;
     const Eigen::VectorXd g = (l.weighted.transpose() * l.left)(moved_) / l.inflation - start;
-    const double before = worth(x);
+    const double before = l.left.squaredNorm() / l.inflation + start.squaredNorm();
     for (; damping_ < most_damping; damping_ *= 10) {
       Eigen::MatrixXd damped = a;
       damped.diagonal() *= 1 + damping_;
@@ -235,9 +234,10 @@ Result<PowerFit> fit_power(const PowerParameters& parameters, const PowerWindows
   Descent descent(parameters, misfit, free, power_w);
   PowerFit fit{descent.within(start), {}, {}, 1, 0};
   for (int round = 0; round < most_rounds && descent.step(fit.x); ++round) continue;
-  const Weights weights = weigh(misfit, misfit.left(fit.x), power_w);
+  const Eigen::VectorXd left = misfit.left(fit.x);
+  const Weights weights = weigh(misfit, left, power_w);
   fit.spread_w = weights.spread_w;
-  judge(parameters, linearise(misfit, weights, fit.x), fit);
+  judge(parameters, linearise(misfit, weights, fit.x, left), fit);
   return fit;
 }
 

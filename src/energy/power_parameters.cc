@@ -19,12 +19,6 @@ constexpr double file_driver = 0.05;     // of the motors' power
 constexpr double file_unreturned = 0.5;  // of the braking power
 constexpr double least_share = 0.05;     // of the file's inertia: a bound, as none is without
 
-constexpr PowerParameter all[] = {PowerParameter::idle_power,          PowerParameter::friction,
-                                  PowerParameter::friction_difference, PowerParameter::viscous,
-                                  PowerParameter::straight_inertia,    PowerParameter::turning_inertia,
-                                  PowerParameter::resistance,          PowerParameter::turning_scrub,
-                                  PowerParameter::driver_loss,         PowerParameter::unreturned};
-
 // That wheels on their axle have at least, and robot files must.
 double least_yaw_inertia(const robot::RobotModel& robot) {
   const double d = robot.kinematics.com_offset_m, l = robot.kinematics.half_track_m;
@@ -129,7 +123,7 @@ robot::RobotModel PowerParameters::without_effects(const Eigen::VectorXd& x) con
 
 std::vector<dynamics::ActiveEffect> PowerParameters::found_effects(const Eigen::VectorXd& x) const {
   std::vector<dynamics::ActiveEffect> found;
-  for (const PowerParameter p : all) {
+  for (const PowerParameter p : all_power_parameters) {
     if (!is_effect(p) || value(p, x) == 0) continue;
     found.push_back(effect_of(power_parameter_names[static_cast<std::size_t>(p)], value(p, x)));
     if (p == PowerParameter::turning_scrub) found.back().values[1] = scrub_rate_rad_s_;

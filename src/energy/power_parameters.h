@@ -41,6 +41,12 @@ inline constexpr std::array<std::string_view, power_parameter_count> power_param
 inline constexpr std::array<std::string_view, power_parameter_count> power_parameter_units{
     "W", "N m", "N m", "N m s/rad", "kg m2", "kg m2", "ohm", "1", "1", "1"};
 
+inline constexpr auto all_power_parameters = [] {
+  std::array<PowerParameter, power_parameter_count> all{};
+  for (std::size_t k = 0; k < all.size(); ++k) all[k] = static_cast<PowerParameter>(k);
+  return all;
+}();
+
 constexpr Eigen::Index index_of(PowerParameter p) {
   return static_cast<Eigen::Index>(p);
 }

@@ -11,10 +11,6 @@ constexpr std::size_t fewest_windows = 40;
 constexpr std::size_t most_windows = 3000;  // more say little that these do not, and a fit takes long
 constexpr std::size_t fewest_blocks = 4;    // of 15 s or more
 
-bool keeps_still_or_moves(const windows::Window& w) {
-  return (w.moving[0] || w.resting[0]) && (w.moving[1] || w.resting[1]);
-}
-
 }  // namespace
 
 Result<PowerWindows> power_windows(std::span<const telemetry::Recording> missions,
@@ -34,13 +30,9 @@ Result<PowerWindows> power_windows(std::span<const telemetry::Recording> mission
   windows::WindowSettings settings;
   settings.most_windows = most_windows;
   p.windows = windows::make_windows(driven, robot, p.readings, settings);
-  std::vector<double> length_s;
-  for (const telemetry::Recording& mission : driven)
-    length_s.push_back(
-        1e-6 * static_cast<double>(mission.samples.back().utime_us - mission.samples.front().utime_us));
   std::erase_if(p.windows, [](const windows::Window& w) { return !std::isfinite(w.battery_power_w); });
-  p.blocks = windows::assign_blocks(p.windows, length_s);
-  for (const windows::Window& w : p.windows) p.whole.push_back(keeps_still_or_moves(w));
+  p.blocks = windows::assign_blocks(p.windows, driven);
+  for (const windows::Window& w : p.windows) p.whole.push_back(windows::steady(w));
   const auto whole = static_cast<std::size_t>(std::ranges::count(p.whole, true));
   if (whole < fewest_windows || p.blocks < fewest_blocks)
     return invalid("runs", "hold only " + std::to_string(whole) + " windows with battery power in " +
@@ -67,15 +59,9 @@ PowerScale scale_of(std::span<const windows::Window> windows) {
 }
 
 double metered_power_w(const dynamics::DriveModel& model, const windows::Window& w) {
-  dynamics::Instant at;
-  at.wheel_acceleration_rad_s2 = w.acceleration_rad_s2;
-  at.payload_kg = w.payload_kg;
-  at.x_m = w.x_m;
-  at.y_m = w.y_m;
-  at.heading_rad = w.heading_rad;
-  at.climb_rad = w.climb_rad;
+  dynamics::Instant at = windows::instant_of(w);
   if (w.resting[0] && w.resting[1]) {
-    at.wheel_acceleration_rad_s2 = {};
+    at.wheel_speed_rad_s = at.wheel_acceleration_rad_s2 = {};
     return model.metered_battery_power(model.flow(at).battery_power_w, w.battery_voltage_v);
   }
   double power_w = 0;
@@ -87,22 +73,15 @@ double metered_power_w(const dynamics::DriveModel& model, const windows::Window&
   return model.metered_battery_power(power_w, w.battery_voltage_v);
 }
 
-Eigen::VectorXd PlainRegression::terms(const windows::Window& w) const {
-  const double speed = 0.5 * wheel_radius_m_ * (w.speed_rad_s[0] + w.speed_rad_s[1]);
-  const double yaw = wheel_radius_m_ * (w.speed_rad_s[0] - w.speed_rad_s[1]) / (2 * half_track_m_);
-  const double acceleration = 0.5 * wheel_radius_m_ * (w.acceleration_rad_s2[0] + w.acceleration_rad_s2[1]);
-  const double climb = std::isfinite(w.climb_rad) ? speed * std::sin(w.climb_rad) : 0;
-  return Eigen::Matrix<double, 5, 1>{1.0, std::fabs(speed), std::fabs(yaw), speed * acceleration, climb};
-}
-
 PlainRegression::PlainRegression(std::span<const windows::Window> windows, const robot::RobotModel& robot)
-    : wheel_radius_m_(robot.kinematics.wheel_radius_m), half_track_m_(robot.kinematics.half_track_m) {
+    : wheel_radius_m_(robot.kinematics.wheel_radius_m) {
   Eigen::MatrixXd x(static_cast<Eigen::Index>(windows.size()), 5);
   Eigen::VectorXd y(x.rows());
   std::vector<std::size_t> block;
   for (const windows::Window& w : windows) {
     const auto row = static_cast<Eigen::Index>(block.size());
-    x.row(row) = terms(w).transpose();
+    const std::array<double, 5> terms = windows::plain_terms(w, wheel_radius_m_);
+    x.row(row) = Eigen::Map<const Eigen::RowVectorXd>(terms.data(), 5);
     y[row] = w.battery_power_w;
     block.push_back(w.block);
   }
@@ -110,7 +89,8 @@ PlainRegression::PlainRegression(std::span<const windows::Window> windows, const
 }
 
 double PlainRegression::power_w(const windows::Window& window) const {
-  return fit_.coefficients.dot(terms(window));
+  const std::array<double, 5> terms = windows::plain_terms(window, wheel_radius_m_);
+  return fit_.coefficients.dot(Eigen::Map<const Eigen::VectorXd>(terms.data(), 5));
 }
 
 double PlainRegression::copperless_friction_nm() const {

@@ -31,8 +31,7 @@ PowerScale scale_of(std::span<const windows::Window> windows);
 // with their own speed.
 double metered_power_w(const dynamics::DriveModel& model, const windows::Window& window);
 
-// What anybody would try before a model: P = c0 + c1 |v| + c2 |yaw rate| + c3 v a, and c4 v sin(climb) where
-// the climb is known, by robust regression.
+// Power on windows::plain_terms(), by robust regression.
 class PlainRegression {
  public:
   PlainRegression(std::span<const windows::Window> windows, const robot::RobotModel& robot);
@@ -40,8 +39,7 @@ class PlainRegression {
   double copperless_friction_nm() const;  // of each wheel, if all that grows with speed were dry friction
 
  private:
-  Eigen::VectorXd terms(const windows::Window& window) const;
-  double wheel_radius_m_, half_track_m_;
+  double wheel_radius_m_;
   statistics::Regression fit_;
 };
 

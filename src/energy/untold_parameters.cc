@@ -35,12 +35,6 @@ constexpr std::array<std::string_view, power_parameter_count> meanings{
     "effect, adopted",
     "effect, adopted"};
 
-constexpr std::array all{PowerParameter::idle_power,          PowerParameter::friction,
-                         PowerParameter::friction_difference, PowerParameter::viscous,
-                         PowerParameter::straight_inertia,    PowerParameter::turning_inertia,
-                         PowerParameter::resistance,          PowerParameter::turning_scrub,
-                         PowerParameter::driver_loss,         PowerParameter::unreturned};
-
 // The parameter that, were it known, would make `p` surest; `p` itself where none helps.
 PowerParameter in_the_way(const PowerParameters& parameters, const PowerFit& fit, PowerParameter p) {
   Eigen::MatrixXd precision = fit.information;
@@ -52,7 +46,7 @@ PowerParameter in_the_way(const PowerParameters& parameters, const PowerFit& fit
   };
   PowerParameter most = p;
   double least = variance(p);
-  for (const PowerParameter other : all) {
+  for (const PowerParameter other : all_power_parameters) {
     if (other == p || !(parameters.expected(other) > 0) || !(variance(other) < 0.9 * least)) continue;
     least = variance(other);
     most = other;
@@ -79,7 +73,7 @@ bool told(const PowerParameters& parameters, const PowerFit& fit, PowerParameter
 std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters, const PowerFit& fit,
                                                const PowerFree& free) {
   std::vector<ParameterEstimate> estimates;
-  for (const PowerParameter p : all) {
+  for (const PowerParameter p : all_power_parameters) {
     const auto at = static_cast<std::size_t>(p);
     const bool known = !(parameters.expected(p) > 0), seen = told(parameters, fit, p);
     if (is_effect(p) && !seen && !free[at]) continue;
@@ -99,7 +93,7 @@ std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters
 
 std::vector<Untold> untold_parameters(const PowerParameters& parameters, const PowerFit& fit) {
   std::vector<Untold> untold;
-  for (const PowerParameter p : all) {
+  for (const PowerParameter p : all_power_parameters) {
     if (!(parameters.expected(p) > 0) || told(parameters, fit, p)) continue;
     untold.push_back(
         {std::string(power_parameter_names[static_cast<std::size_t>(p)]), why(parameters, fit, p)});

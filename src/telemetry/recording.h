@@ -21,6 +21,11 @@ struct Recording {
   bool implicit = false;  // no STARTED declared it
 };
 
+// From the first sample to the last, of a recording that has some.
+inline double length_s(const Recording& recording) {
+  return 1e-6 * static_cast<double>(recording.samples.back().utime_us - recording.samples.front().utime_us);
+}
+
 // Sorts samples by time and drops those whose time is that of another; returns how many.
 std::size_t put_in_order(std::vector<signals::Sample>& samples);
 

@@ -23,10 +23,6 @@ std::string listed(const std::set<std::string, std::less<>>& names) {
   return text;
 }
 
-double length_s(const Recording& mission) {
-  return 1e-6 * static_cast<double>(mission.samples.back().utime_us - mission.samples.front().utime_us);
-}
-
 bool same(double a, double b) {
   return a == b || (std::isnan(a) && std::isnan(b));
 }

@@ -272,8 +272,7 @@ std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
                                  const WindowSettings& settings) {
   double expected = 0;
   for (const telemetry::Recording& mission : missions) {
-    const auto us = static_cast<double>(mission.samples.back().utime_us - mission.samples.front().utime_us);
-    expected += 2e-6 * us / window_length_s(settings, median_period_s(mission));
+    expected += 2 * telemetry::length_s(mission) / window_length_s(settings, median_period_s(mission));
   }
   const auto keep_every = static_cast<std::size_t>(
       std::max(1.0, std::ceil(expected / static_cast<double>(settings.most_windows))));

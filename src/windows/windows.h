@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "dynamics/motion.h"
 #include "robot/robot_model.h"
 #include "telemetry/recording.h"
 
@@ -61,6 +62,16 @@ struct Window {
   std::array<double, 2> span_angle_rad{};  // turned by each wheel in that span
 };
 
+// Whether each wheel turns or stands throughout: then the sign of its friction is sure.
+bool steady(const Window& w);
+
+// The mean motion of a window, at its place and under its load.
+dynamics::Instant instant_of(const Window& w);
+
+// What anybody would try before a model: 1, |v|, |v_right - v_left|, v a and v sin(climb), in m and s; the
+// last 0 where the climb is not known.
+std::array<double, 5> plain_terms(const Window& w, double wheel_radius_m);
+
 struct WindowSettings {
   double length_s = 0.4;
   std::size_t fewest_samples = 8;   // in a window; slow recordings get longer windows
@@ -101,5 +112,6 @@ std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
 // enough of them, several where there are many, stretches of one where there are few. Sets Window::block and
 // returns how many there are.
 std::size_t assign_blocks(std::span<Window> windows, std::span<const double> mission_length_s);
+std::size_t assign_blocks(std::span<Window> windows, std::span<const telemetry::Recording> missions);
 
 }  // namespace joulecast::windows

@@ -19,16 +19,6 @@ constexpr double beyond_tolerance = 2.5;  // of a coefficient, for effects seen 
 constexpr double alternative_odds = 0.04;
 constexpr double cancelling = 3;  // from which on members undo each other
 
-HypothesisSet with(HypothesisSet set, std::size_t h) {
-  set.insert(std::ranges::lower_bound(set, h), h);
-  return set;
-}
-
-HypothesisSet without(HypothesisSet set, std::size_t h) {
-  std::erase(set, h);
-  return set;
-}
-
 class Explainer {
  public:
   Explainer(const Mixture& mixture, const std::vector<bool>& left_out, const ExplainSettings& settings)
@@ -350,10 +340,7 @@ class Explainer {
       const Eigen::VectorXd sd = own(problem_, set, estimate.sd, set[k]);
       m.coefficients.assign(mean.begin(), mean.end());
       m.sd.assign(sd.begin(), sd.end());
-      if (settings_.predictive) {
-        const std::vector<double> wander = mixture_.wander(set, k);
-        for (std::size_t g = 0; g < wander.size(); ++g) m.wander += wander[g] * wander_grid[g];
-      }
+      if (settings_.predictive) m.wander = mixture_.mean_wander(set, k);
       e.members.push_back(std::move(m));
     }
     return e;

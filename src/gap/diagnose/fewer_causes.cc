@@ -89,10 +89,6 @@ class ThirdJudge {
   bool in_search(std::size_t h) const {
     return !hypothesis(h).outside() && shows_in_power(hypothesis(h)) && hypothesis(h).id() != zone_effect;
   }
-  static HypothesisSet with(HypothesisSet set, std::size_t h) {
-    set.insert(std::ranges::lower_bound(set, h), h);
-    return set;
-  }
   bool fits(const HypothesisSet& set, std::size_t h) const {
     return std::ranges::none_of(
         set, [&](std::size_t o) { return o == h || hypothesis(o).excludes(hypothesis(h)); });
@@ -275,9 +271,7 @@ class ThirdJudge {
         m.any_by_prediction = probability(group);
         m.by_evidence = m.group_by_evidence = m.any_by_evidence = contested;
       }
-      m.wander = 0;
-      const std::vector<double> wander = mixture_.wander(chosen, k);
-      for (std::size_t g = 0; g < wander.size(); ++g) m.wander += wander[g] * wander_grid[g];
+      m.wander = mixture_.mean_wander(chosen, k);
       members.push_back(std::move(m));
     }
     x_.members = std::move(members);
@@ -304,8 +298,7 @@ class ThirdJudge {
   // Other causes that leave hardly more in the place of one, the best first.
   std::vector<Alternative> as_good(const HypothesisSet& chosen, std::size_t member, const Weighed& w) const {
     const double own = errors_.at(chosen).sum();
-    HypothesisSet rest = chosen;
-    std::erase(rest, member);
+    const HypothesisSet rest = without(chosen, member);
     std::vector<std::pair<double, Alternative>> found;
     for (const auto& [set, errors] : errors_) {
       if (set.size() != chosen.size() || !in_search_alone(set)) continue;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace joulecast::gap {
 namespace {
@@ -142,6 +143,11 @@ std::vector<double> Mixture::wander(const HypothesisSet& set, std::size_t member
   const double total = log_sum(result);
   for (double& r : result) r = std::exp(r - total);
   return result;
+}
+
+double Mixture::mean_wander(const HypothesisSet& set, std::size_t member) const {
+  const std::vector<double> probability = wander(set, member);
+  return std::inner_product(probability.begin(), probability.end(), wander_grid.begin(), 0.0);
 }
 
 std::vector<double> Mixture::by_block(const HypothesisSet& set, std::size_t member) const {

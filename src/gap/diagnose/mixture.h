@@ -34,6 +34,8 @@ class Mixture {
   // itself, is distributed: probabilities of the values in wander_grid.
   std::vector<double> wander(const HypothesisSet& set, std::size_t member) const;
 
+  double mean_wander(const HypothesisSet& set, std::size_t member) const;
+
   // First coefficient of one member in every block, as far as each block says something beyond what all
   // together do: the strength of all, drawn to what the block alone would have, with the wander that is
   // likeliest. NaN: left out.

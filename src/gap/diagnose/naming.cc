@@ -127,9 +127,7 @@ Named name_causes(const Material& m, const Equations& e, const Problem& problem,
       std::optional<std::size_t> spare;
       for (const std::size_t h : set) {
         if (!shows_in_power(problem.hypotheses[h]) || moves_motors_alone(problem.hypotheses[h])) continue;
-        HypothesisSet others = set;
-        std::erase(others, h);
-        if (const double o = gap_with(others) - all; o < opened) opened = o, spare = h;
+        if (const double o = gap_with(without(set, h)) - all; o < opened) opened = o, spare = h;
       }
       if (!spare) break;
       std::erase(set, *spare);

@@ -129,10 +129,7 @@ Diagnoser::View Diagnoser::view_of(const windows::WindowSettings& settings) cons
   View view;
   view.windows = windows::make_windows(recordings_.missions, robot_, readings_, settings);
   mark_turning_power(view.windows, dynamics::DriveModel(robot_, adopted_));
-  std::vector<double> lengths;
-  for (const telemetry::Recording& m : recordings_.missions)
-    lengths.push_back(1e-6 * static_cast<double>(m.samples.back().utime_us - m.samples.front().utime_us));
-  windows::assign_blocks(view.windows, lengths);
+  windows::assign_blocks(view.windows, recordings_.missions);
   view.power_w = measured_power(view.windows, robot_, d_.power == PowerSource::motors);
   return view;
 }

@@ -1,17 +1,15 @@
 #include "gap/diagnose/referee.h"
 
+#include <array>
 #include <cmath>
 
 namespace joulecast::gap {
 
 Eigen::VectorXd Referee::values_of(const Window& w) const {
-  const double speed = 0.5 * wheel_radius_m_ * (w.speed_rad_s[0] + w.speed_rad_s[1]);
-  const double difference = wheel_radius_m_ * (w.speed_rad_s[0] - w.speed_rad_s[1]);
-  const double acceleration = 0.5 * wheel_radius_m_ * (w.acceleration_rad_s2[0] + w.acceleration_rad_s2[1]);
+  const std::array<double, 5> plain = windows::plain_terms(w, wheel_radius_m_);
   Eigen::VectorXd x(static_cast<Eigen::Index>(terms_.size()));
-  x.head(4) << 1.0, std::fabs(speed), std::fabs(difference), speed * acceleration;
-  Eigen::Index at = 4;
-  if (climb_) x[at++] = std::isfinite(w.climb_rad) ? speed * std::sin(w.climb_rad) : 0;
+  Eigen::Index at = climb_ ? 5 : 4;
+  x.head(at) = Eigen::Map<const Eigen::VectorXd>(plain.data(), at);
   for (const Modulation& by : covariates_) x[at++] = by.of(w);
   return x;
 }

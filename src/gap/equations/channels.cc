@@ -29,14 +29,7 @@ std::array<double, 2> heat_at(const Window& w, double time_constant_s) {
 
 template <class S>
 dynamics::Instant instant_of(const dynamics::BasicDriveModel<S>& model, const Window& w) {
-  dynamics::Instant at;
-  at.wheel_speed_rad_s = w.speed_rad_s;
-  at.wheel_acceleration_rad_s2 = w.acceleration_rad_s2;
-  at.payload_kg = w.payload_kg;
-  at.x_m = w.x_m;
-  at.y_m = w.y_m;
-  at.heading_rad = w.heading_rad;
-  at.climb_rad = w.climb_rad;
+  dynamics::Instant at = windows::instant_of(w);
   at.copper_heat_w = heat_at(w, model.parameters().thermal_time_constant_s);
   for (std::size_t s : {0u, 1u}) {
     // A wheel at rest bears what its friction holds; the drive asks nothing of its motor.

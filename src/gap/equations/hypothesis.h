@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <string>
 #include <string_view>
@@ -20,6 +21,15 @@ struct Column {
 };
 
 using HypothesisSet = std::vector<std::size_t>;  // ascending indices of hypotheses
+
+inline HypothesisSet with(HypothesisSet set, std::size_t h) {
+  set.insert(std::ranges::lower_bound(set, h), h);
+  return set;
+}
+inline HypothesisSet without(HypothesisSet set, std::size_t h) {
+  std::erase(set, h);
+  return set;
+}
 
 // Something that may be there: an effect of the catalogue (one variant of its shapes), a covariate, or a
 // family of functions that stands for what the catalogue does not know. Recordings, tables of runs and

@@ -49,15 +49,14 @@ void assign_blocks(Grouped& g) {
     const std::size_t group = g.group_of_mission[g.windows[from].mission];
     std::size_t first = 0;
     while (g.group_of_mission[first] != group) ++first;
-    std::vector<double> lengths;
-    for (std::size_t m = first; m < g.group_of_mission.size() && g.group_of_mission[m] == group; ++m) {
-      const auto& samples = g.recordings.missions[m].samples;
-      lengths.push_back(1e-6 * static_cast<double>(samples.back().utime_us - samples.front().utime_us));
-    }
+    std::size_t last = first;
+    while (last < g.group_of_mission.size() && g.group_of_mission[last] == group) ++last;
+    const std::span<const telemetry::Recording> missions(g.recordings.missions);
     std::size_t to = from;
     for (; to < g.windows.size() && g.group_of_mission[g.windows[to].mission] == group; ++to)
       g.windows[to].mission -= first;
-    const std::size_t own = windows::assign_blocks(std::span(g.windows).subspan(from, to - from), lengths);
+    const std::size_t own = windows::assign_blocks(std::span(g.windows).subspan(from, to - from),
+                                                   missions.subspan(first, last - first));
     for (std::size_t k = from; k < to; ++k) {
       g.windows[k].mission += first;
       g.windows[k].block += blocks;

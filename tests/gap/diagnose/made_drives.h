@@ -18,10 +18,7 @@ class Drives {
   explicit Drives(std::vector<Cause> causes) : truth(std::move(causes)) {
     const auto readings = windows::find_readings(robot_.recordings.missions, robot_.model);
     windows_ = windows::make_windows(robot_.recordings.missions, robot_.model, readings);
-    std::vector<double> lengths_s;
-    for (const telemetry::Recording& m : robot_.recordings.missions)
-      lengths_s.push_back(1e-6 * static_cast<double>(m.samples.back().utime_us - m.samples.front().utime_us));
-    blocks_ = windows::assign_blocks(windows_, lengths_s);
+    blocks_ = windows::assign_blocks(windows_, robot_.recordings.missions);
     power_w = modelled_power(robot_.model, {}, truth, windows_);
     set_power();
   }
