@@ -23,7 +23,14 @@ std::uint64_t weight(std::string_view node, std::string_view robot_id) {
 }
 
 struct Hearers {
-  std::vector<std::string> all, settled;
+  std::vector<std::string> settled, longest;
+  double longest_s = -1;
+
+  void add(const history::Hearing& each) {
+    if (each.since_s >= settled_s) settled.push_back(each.node);
+    if (each.since_s > longest_s) longest.clear();
+    if (each.since_s >= longest_s) longest.push_back(each.node), longest_s = each.since_s;
+  }
 };
 
 }  // namespace
@@ -44,10 +51,7 @@ Assignment assign(const history::ClusterState& state, const Asker& asker) {
   }
   std::map<std::string, Hearers, std::less<>> hearers;
   for (const history::Hearing& each : state.hearings) {
-    if (std::ranges::find(alive, each.node) == alive.end()) continue;
-    Hearers& of_robot = hearers[each.robot_id];
-    of_robot.all.push_back(each.node);
-    if (each.since_s >= settled_s) of_robot.settled.push_back(each.node);
+    if (std::ranges::find(alive, each.node) != alive.end()) hearers[each.robot_id].add(each);
   }
   std::map<std::string, history::Lease, std::less<>> leases;
   for (const history::Lease& lease : state.leases) leases.emplace(lease.robot_id, lease);
@@ -64,9 +68,9 @@ Assignment assign(const history::ClusterState& state, const Asker& asker) {
     const bool own = lease.node == asker.node, left_over = own && !asker.keeps(lease);
     if (left_over || lease.node.empty() || !members.contains(lease.node)) {
       // A mission that is open must be ended even when its robot is never heard again.
-      const auto& candidates = !of_robot.settled.empty() ? of_robot.settled
-                               : !of_robot.all.empty()   ? of_robot.all
-                                                         : alive;
+      const auto& candidates = !of_robot.settled.empty()   ? of_robot.settled
+                               : !of_robot.longest.empty() ? of_robot.longest
+                                                           : alive;
       if (keeper_of(robot_id, candidates) == asker.node)
         decided.take.push_back(lease);
       else if (left_over)

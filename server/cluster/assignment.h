@@ -11,7 +11,8 @@
 namespace joulecast::server {
 
 // How long a daemon must have received a robot before it is handed the robot by one that is alive: what it
-// holds of the robot's messages must reach back to before the other one's last commit.
+// holds of the robot's messages must reach back to before the other one's last commit. Where no daemon has
+// received a robot that nobody keeps for so long, the one that has for longest takes it.
 inline constexpr double settled_s = 3;
 
 // What one daemon does about the cluster's robots, from the state that all of them read. Rendezvous hashing:

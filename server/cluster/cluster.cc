@@ -29,6 +29,7 @@ constexpr milliseconds exchange_period{250};
 constexpr milliseconds gone_patience{1000};
 constexpr std::int64_t heard_us = 5'000'000;       // a robot not received from for longer is not heard
 constexpr std::int64_t own_heard_us = 10'000'000;  // the same of one that is kept, so that others cease first
+constexpr milliseconds settling_patience{2000};
 constexpr milliseconds job_period{2000};
 constexpr std::chrono::minutes longest_release{2};  // a writer that takes no data for so long has lost it
 
@@ -68,8 +69,10 @@ class Cluster::Impl {
   }
 
   void settle_down() {
-    const std::lock_guard lock(mutex_);
+    std::unique_lock lock(mutex_);
     settling_ = true;
+    wake_.wait_for(lock, settling_patience, [this] { return settled_ || !running_; });
+    settled_ = true;
   }
 
   void leave() {
@@ -157,11 +160,20 @@ class Cluster::Impl {
       status_.state = *state;
       read_ = Clock::now();
       if (!steady_since_) steady_since_ = read_;
-      if (settling_) return false;
+      if (settled_) return false;
     }
     const Result<bool> buried = bury(*state);
     if (!buried || *buried) return buried;
-    if (Result<void> done = reassign(*state); !done) return tl::unexpected(done.error());
+    const Result<std::size_t> taken = reassign(*state);
+    if (!taken) return tl::unexpected(taken.error());
+    {
+      const std::lock_guard lock(mutex_);
+      if (settling_) {
+        settled_ = *taken == 0 && gone_since_.empty();
+        wake_.notify_all();
+        return *taken > 0;
+      }
+    }
     return take_jobs().map([] { return false; });
   }
 
@@ -244,7 +256,8 @@ class Cluster::Impl {
     return any;
   }
 
-  Result<void> reassign(const history::ClusterState& state) {
+  // Answers how many robots this daemon took.
+  Result<std::size_t> reassign(const history::ClusterState& state) {
     const Assignment assigned =
         assign(state, {options_.node, [this](const history::Member& member) { return is_alive(member); },
                        [this](const history::Lease& lease) { return keeps(lease); }});
@@ -265,7 +278,10 @@ class Cluster::Impl {
       const std::lock_guard lock(mutex_);
       ++status_.handovers;
     }
-    return assigned.free.empty() ? Result<void>() : leases_->free(assigned.free);
+    if (!assigned.free.empty()) {
+      if (Result<void> done = leases_->free(assigned.free); !done) return tl::unexpected(done.error());
+    }
+    return assigned.take.size();
   }
 
   bool keeps(const history::Lease& lease) {
@@ -314,7 +330,7 @@ class Cluster::Impl {
 
   mutable std::mutex mutex_;
   std::condition_variable wake_;
-  bool running_ = false, settling_ = false;
+  bool running_ = false, settling_ = false, settled_ = false;
   ClusterStatus status_;
   std::optional<Clock::time_point> read_, renewed_, steady_since_;
   Clock::time_point reported_dropped_;

@@ -262,9 +262,9 @@ void Pipeline::finish() {
 }
 
 void Pipeline::suspend() {
+  follow_orders();  // a robot that was granted a moment ago has messages here that nobody else may have
   for (auto& [id, robot] : robots_) suspend(*robot);
   if (keeping_ == nullptr) return;
-  follow_orders();
   for (const auto& [id, epoch] : keeping_->kept()) outputs_.post(history::ReleaseLease{id, epoch});
 }
 

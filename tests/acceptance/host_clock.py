@@ -17,7 +17,7 @@ def main():
     options = arguments()
     need_multicast()
     programs = Programs(options)
-    faults = HostFaults(programs)
+    faults = HostFaults(programs.folder.name)
     # Recordings that are there already, which a wrong clock could age.
     log = programs.path("old.lcmlog")
     programs.run("simulate", "--robots", "1", "--robot", os.path.join(options.source, "deploy/robots/tug.json"), "--seed", "3",

@@ -11,6 +11,7 @@
 #include <sys/mman.h>
 #include <sys/syscall.h>
 #include <sys/time.h>
+#include <sys/uio.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -62,6 +63,11 @@ ssize_t pwrite(int d, const void* bytes, size_t size, off_t at) {
   return fails(d, WRITES) ? -1 : syscall(SYS_pwrite64, d, bytes, size, at);
 }
 ssize_t pwrite64(int d, const void* bytes, size_t size, off64_t at) { return pwrite(d, bytes, size, at); }
+ssize_t pwritev(int d, const struct iovec* parts, int count, off_t at) {
+  // The kernel takes the offset in two halves; 64-bit ones ignore the second.
+  return fails(d, WRITES) ? -1 : syscall(SYS_pwritev, d, parts, count, at, 0L);
+}
+ssize_t pwritev64(int d, const struct iovec* parts, int count, off64_t at) { return pwritev(d, parts, count, at); }
 int ftruncate(int d, off_t size) { return fails(d, WRITES) ? -1 : (int)syscall(SYS_ftruncate, d, size); }
 int ftruncate64(int d, off64_t size) { return ftruncate(d, size); }
 ssize_t read(int d, void* bytes, size_t size) { return fails(d, READS) ? -1 : syscall(SYS_read, d, bytes, size); }

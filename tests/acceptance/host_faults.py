@@ -13,11 +13,11 @@ WRITES, READS, SYNCS = 1, 2, 4
 
 
 class HostFaults:
-    def __init__(self, programs, files="history.db"):
-        """Files: what the names of the files that fail contain."""
+    def __init__(self, folder, files="history.db"):
+        """In that folder the library and what tells it the faults; files: what the names of those that fail contain."""
         if shutil.which("cc") is None:
             skip("no C compiler")
-        library, control = programs.path("host_faults.so"), programs.path("host_faults")
+        library, control = os.path.join(folder, "host_faults.so"), os.path.join(folder, "host_faults")
         subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", library, pathlib.Path(__file__).with_suffix(".c")],
                        check=True)
         pathlib.Path(control).write_bytes(bytes(24))

@@ -125,7 +125,7 @@ class Nemesis:
         self.mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", room, "tmpfs", self.volume],
                                       capture_output=True).returncode == 0
         self.programs.store = os.path.join(self.volume, "history.db")
-        self.host = HostFaults(self.programs)
+        self.host = HostFaults(self.programs.folder.name)
         self.programs.environment = self.host.environment
         self.kinds = (["kill", "kill", "pause", "lock", "term", "replaced", "deleted", "read_only"] + ["broken"] * 2
                       + ["clock"] * 2 + ["full"] * self.mounted)

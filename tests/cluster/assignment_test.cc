@@ -90,6 +90,14 @@ TEST(Assignment, ADaemonIsHandedNoRobotThatItHasNotHeardForLong) {
   EXPECT_TRUE(assign(state, {"a", everybody, all_kept}).hand_over.empty());
 }
 
+TEST(Assignment, AFreeRobotThatNobodyHasHeardForLongGoesToWhoHasForLongest) {
+  ClusterState state = state_of({"a", "b", "c"}, 50);
+  for (history::Hearing& each : state.hearings)
+    each.since_s = each.node == "b" ? settled_s / 2 : settled_s / 4;
+  for (const auto& [robot_id, node] : taken_by_all(state)) EXPECT_EQ(node, "b") << robot_id;
+  EXPECT_EQ(taken_by_all(state).size(), 50u);
+}
+
 TEST(Assignment, ARobotThatOneDaemonHearsIsKeptByIt) {
   ClusterState state = state_of({"a", "b"}, 0);
   for (const std::string robot : {"x", "y", "z", "w"}) {

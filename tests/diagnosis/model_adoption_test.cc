@@ -181,6 +181,8 @@ TEST_F(ModelAdoptionTest, RollsBackAndRecordsIt) {
 
 TEST_F(ModelAdoptionTest, NewMissionsAreMeteredByTheAdoptedModel) {
   ASSERT_TRUE(adoption_->adopt(candidate(1.4))->adopted);
+  adoption_.reset();
+  writer_.reset();  // the harness writes by itself, and a store takes one writer
   drive(harness_, truth_, 9);
   const auto mission = harness_.missions().back();
   EXPECT_EQ(mission.model_version, 2);

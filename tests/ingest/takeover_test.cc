@@ -202,6 +202,30 @@ TEST_F(TakeoverTest, RobotsAreHandedBackAndForth) {
   expect_same(*shared, *expected);
 }
 
+// The second hears all from the middle on and ends as soon as it is granted the robot; the third comes after the first.
+TEST_F(TakeoverTest, ADaemonThatEndsWhenItIsGrantedARobotStoresWhatItHeard) {
+  const auto expected = alone();
+  const auto shared = store("shared.db");
+  std::optional<history::StreamPosition> position;
+  Daemon first(*shared, position), second(*shared, position), third(*shared, position);
+  first.keeping.grant({"nomad", 1, {}});
+  const auto messages = drive();
+  for (std::size_t k = 0; k < messages.size(); ++k) {
+    if (k < 500) first.handle(messages[k]);
+    if (k == 500) first.pipeline.suspend();
+    if (k < 530) second.handle(messages[k]);
+    if (k == 530) {
+      second.keeping.grant({"nomad", 2, position});
+      second.pipeline.suspend();
+      EXPECT_EQ(second.releases, 1);
+      third.keeping.grant({"nomad", 3, position});
+    }
+    if (k >= 530) third.handle(messages[k]);
+  }
+  third.pipeline.finish();
+  expect_same(*shared, *expected);
+}
+
 TEST_F(TakeoverTest, ADaemonThatLostARobotStoresNothingMoreOfIt) {
   const auto shared = store("shared.db");
   std::optional<history::StreamPosition> position;
