@@ -202,7 +202,8 @@ TEST_F(TakeoverTest, RobotsAreHandedBackAndForth) {
   expect_same(*shared, *expected);
 }
 
-// The second hears all from the middle on and ends as soon as it is granted the robot; the third comes after the first.
+// The second hears all from the middle on and ends as soon as it is granted the robot; the third comes after
+// the first.
 TEST_F(TakeoverTest, ADaemonThatEndsWhenItIsGrantedARobotStoresWhatItHeard) {
   const auto expected = alone();
   const auto shared = store("shared.db");
