@@ -1,5 +1,6 @@
 // A button that asks once before it does what it says; its children tell what will change.
 import { useEffect, useRef, useState } from 'preact/hooks';
+import { DialogForm } from './dialog_form.jsx';
 
 export function ConfirmButton({ label, title, action, onConfirm, disabled, class: name, children }) {
   const dialog = useRef(null);
@@ -7,8 +8,7 @@ export function ConfirmButton({ label, title, action, onConfirm, disabled, class
   useEffect(() => {
     if (open) dialog.current.showModal(); // with its content, so that a control in it gets the focus
   }, [open]);
-  const answer = (event) => {
-    event.preventDefault();
+  const answer = () => {
     dialog.current.close();
     onConfirm();
   };
@@ -19,18 +19,9 @@ export function ConfirmButton({ label, title, action, onConfirm, disabled, class
       </button>
       <dialog ref={dialog} aria-label={title} onClose={() => setOpen(false)}>
         {open && (
-          <form onSubmit={answer}>
-            <h2>{title}</h2>
+          <DialogForm dialog={dialog} title={title} action={action ?? label} onSubmit={answer}>
             {children}
-            <p class="tools">
-              <button type="submit" class="primary">
-                {action ?? label}
-              </button>
-              <button type="button" onClick={() => dialog.current.close()}>
-                Cancel
-              </button>
-            </p>
-          </form>
+          </DialogForm>
         )}
       </dialog>
     </>

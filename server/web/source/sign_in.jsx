@@ -1,15 +1,15 @@
 // Asks for a token when the service refuses a request for want of one.
 import { useLayoutEffect, useRef, useState } from 'preact/hooks';
 import { onUnauthorized, post } from './api.js';
+import { DialogForm } from './dialog_form.jsx';
 
 export function SignIn() {
   const dialog = useRef(null);
   const [said, setSaid] = useState('');
   // Before the first answer comes.
   useLayoutEffect(() => onUnauthorized(() => dialog.current.open || dialog.current.showModal()), []);
-  const submit = async (event) => {
-    event.preventDefault();
-    const token = new FormData(event.target).get('token').trim();
+  const submit = async (form) => {
+    const token = new FormData(form).get('token').trim();
     try {
       await post('/v1/session', { token });
       location.reload();
@@ -19,23 +19,14 @@ export function SignIn() {
   };
   return (
     <dialog ref={dialog} class="sign-in" aria-label="Sign in">
-      <form onSubmit={submit}>
-        <h2>Sign in</h2>
+      <DialogForm dialog={dialog} title="Sign in" action="Sign in" onSubmit={submit}>
         <p>
           <label>
             Token <input name="token" type="password" autocomplete="current-password" required />
           </label>
         </p>
         <p role="alert">{said}</p>
-        <p class="tools">
-          <button type="submit" class="primary">
-            Sign in
-          </button>
-          <button type="button" onClick={() => dialog.current.close()}>
-            Cancel
-          </button>
-        </p>
-      </form>
+      </DialogForm>
     </dialog>
   );
 }

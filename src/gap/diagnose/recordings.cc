@@ -382,11 +382,12 @@ bool Diagnoser::judge_all() {
     ripple = find_ripple(recordings_, robot_, all, d_.motor_channels, taken_out_.electrical_delay_s,
                          ripple_surrogates);
 
-  Findings f{problem,   explanation, settings_.controls > 0 ? std::move(*made) : std::vector<Controls>{},
-             named_,    {},          {},
-             {},        {},          {},
-             held_out_, ripple,      std::nullopt,
-             {}};
+  Findings f{.problem = problem,
+             .explanation = explanation,
+             .controls = settings_.controls > 0 ? std::move(*made) : std::vector<Controls>{},
+             .named = named_,
+             .held_out = held_out_,
+             .ripple = ripple};
   const std::vector<double> after = modelled(causes_);
   f.shares = held_out_shares(material(), *fit_, problem, named_, view_.power_w);
   // Together these move far more than one by one: of each, what comes back without it.

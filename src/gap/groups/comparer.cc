@@ -302,19 +302,11 @@ void Comparer::judge_all() {
   for (const Member& m : explanation_.members) members.push_back(m.hypothesis);
   std::ranges::sort(members);
   const Explanation explanation = explanation_of(contrasted(data_.base, problem_, members, {}));
-  const std::optional<Ripple> no_ripple;
   Findings f{.problem = problem_,
              .explanation = explanation,
              .controls = controls_,
              .named = named_,
-             .causes = {},
-             .base = {},
-             .shares = {},
-             .power_w = {},
              .held_out = held_out_,
-             .ripple = no_ripple,
-             .wandering = std::nullopt,
-             .wandering_power_w = {},
              .of_groups = true};
   for (const Contrasted& c : causes_) {
     const auto low = static_cast<Eigen::Index>(c.low), high = static_cast<Eigen::Index>(c.high);

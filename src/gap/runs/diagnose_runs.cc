@@ -201,20 +201,12 @@ bool RunDiagnoser::judge_all() {
                                [&](double part) { return goes_on(std::lerp(after_conditions, 1.0, part)); });
   if (!controls) return false;
   const std::vector<Cause>& causes = finding_.causes;
-  const std::optional<Ripple> no_ripple;
   Findings f{.problem = finding_.problem,
              .explanation = finding_.explanation,
              .controls = settings_.controls > 0 ? std::move(*controls) : std::vector<Controls>{},
              .named = finding_.named,
              .causes = causes,
-             .base = {},
-             .shares = {},
-             .power_w = {},
-             .held_out = held_out_,
-             .ripple = no_ripple,
-             .wandering = std::nullopt,
-             .wandering_power_w = {},
-             .of_groups = false};
+             .held_out = held_out_};
   f.shares = statistics::shapley_shares(causes.size(), [&](const std::vector<std::size_t>& members) {
     std::vector<Cause> some;
     for (const std::size_t k : members) some.push_back(causes[k]);

@@ -17,16 +17,16 @@ struct Findings {
   const Explanation& explanation;
   std::vector<Controls> controls;  // of each member of the explanation; empty: not made
   HypothesisSet named;
-  std::vector<Cause> causes;  // the named, with their own strengths
-  std::vector<Cause> base;    // what else was estimated where the robot file is far off
+  std::vector<Cause> causes{};  // the named, with their own strengths
+  std::vector<Cause> base{};    // what else was estimated where the robot file is far off
   // Of each, what would be there in its place: its alternatives, the others fitted again.
   std::vector<std::vector<dynamics::ActiveEffect>> instead{};
-  std::vector<double> shares;   // of the gap, Shapley
-  std::vector<double> power_w;  // mean |change of battery power|
+  std::vector<double> shares{};   // of the gap, Shapley
+  std::vector<double> power_w{};  // mean |change of battery power|
   const std::optional<HeldOut>& held_out;
-  const std::optional<Ripple>& ripple;
+  std::optional<Ripple> ripple{};
   // Member whose strength does not stand still, the one that moves most.
-  std::optional<std::size_t> wandering;
+  std::optional<std::size_t> wandering{};
   std::array<double, 2> wandering_power_w{};
   bool of_groups = false;  // strengths are differences between groups: large ones make no other robot
 };

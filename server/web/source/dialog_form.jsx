@@ -1,0 +1,21 @@
+// What a dialog asks, with a button that does it and one that does not.
+export function DialogForm({ dialog, title, action, onSubmit, children }) {
+  const submit = (event) => {
+    event.preventDefault();
+    onSubmit(event.target);
+  };
+  return (
+    <form onSubmit={submit}>
+      <h2>{title}</h2>
+      {children}
+      <p class="tools">
+        <button type="submit" class="primary">
+          {action}
+        </button>
+        <button type="button" onClick={() => dialog.current.close()}>
+          Cancel
+        </button>
+      </p>
+    </form>
+  );
+}
