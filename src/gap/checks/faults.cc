@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <numbers>
 
 namespace joulecast::gap {
@@ -21,24 +22,28 @@ constexpr double km_h = 3.6, mph = 2.2369, feet = 3.2808;  // in a m/s
 
 using Set = std::vector<const Fault*>;
 
-Sources<double> combined_factor(const Set& set) {
-  Sources<double> factor;
-  factor.fill(1);
-  for (const Fault* fault : set) {
-    for (std::size_t k = 0; k < source_count; ++k) factor[k] *= fault->factor[k];
+// Faults at once.
+struct Combined {
+  explicit Combined(const Set& set) {
+    factor.fill(1);
+    for (const Fault* fault : set) {
+      for (std::size_t k = 0; k < source_count; ++k) factor[k] *= fault->factor[k];
+      swaps ^= fault->swaps;
+      surprise += fault->surprise;
+    }
   }
-  return factor;
-}
-
-// What the set makes of this evidence's ratio; empty where it makes it meaningless.
-std::optional<double> predicted(const Evidence& e, const Set& set) {
-  const Sources<double> factor = combined_factor(set);
+  Sources<double> factor;
   std::uint32_t swaps = 0;
-  for (const Fault* fault : set) swaps ^= fault->swaps;
+  double surprise = 0;
+};
+
+// What the faults make of this evidence's ratio; empty where they make it meaningless.
+std::optional<double> predicted(const Evidence& e, const Combined& faults) {
+  const Sources<double>& factor = faults.factor;
   double ratio = 1;
   for (std::size_t k = 0; k < source_count; ++k) {
     if (e.lost_by[k] && std::fabs(factor[k]) != 1) return std::nullopt;
-    if (e.exponent[k] != 0) ratio *= std::pow(factor[k], e.exponent[k]);
+    if (e.exponent[k] != 0 && factor[k] != 1) ratio *= std::pow(factor[k], e.exponent[k]);
   }
   if (e.both_sides) {
     for (const S right : {S::wheel_right, S::voltage_right, S::current_right}) {
@@ -47,13 +52,13 @@ std::optional<double> predicted(const Evidence& e, const Set& set) {
     }
   }
   for (std::uint32_t bit = 1; bit <= 4; bit *= 2) {
-    if ((swaps & e.turned_by & bit) != 0) ratio = -ratio;
+    if ((faults.swaps & e.turned_by & bit) != 0) ratio = -ratio;
   }
   return e.magnitude ? std::fabs(ratio) : ratio;
 }
 
-double surprise_of(const Evidence& e, const Set& set) {
-  const auto expected = predicted(e, set);
+double surprise_of(const Evidence& e, const Combined& faults) {
+  const auto expected = predicted(e, faults);
   if (!expected) return std::min(lost_surprise, e.trust);
   const double ratio = e.ratio.value / *expected;
   if (ratio < 0) return e.trust;
@@ -63,21 +68,27 @@ double surprise_of(const Evidence& e, const Set& set) {
   return std::min(0.5 * off * off / (tolerance * tolerance + log_sd * log_sd), e.trust);
 }
 
-double surprise_of(std::span<const Evidence> evidence, const Set& set) {
-  double total = 0;
-  for (const Fault* fault : set) total += fault->surprise;
-  for (const Evidence& e : evidence) total += surprise_of(e, set);
+// Of all together; what exceeds `most` is not added up to its end.
+double surprise_of(std::span<const Evidence> evidence, const Combined& faults,
+                   double most = std::numeric_limits<double>::infinity()) {
+  double total = faults.surprise;
+  for (const Evidence& e : evidence) {
+    if (total > most) break;
+    total += surprise_of(e, faults);
+  }
   return total;
 }
 
 // Whether each fault foretells what is seen, and not only takes away the meaning of what speaks against it.
 bool supported(std::span<const Evidence> evidence, const Set& set) {
+  const Combined all(set);
   return std::ranges::all_of(set, [&](const Fault* fault) {
-    Set others;
-    std::ranges::copy_if(set, std::back_inserter(others), [&](const Fault* f) { return f != fault; });
+    Set rest;
+    std::ranges::copy_if(set, std::back_inserter(rest), [&](const Fault* f) { return f != fault; });
+    const Combined others(rest);
     double support = 0;
     for (const Evidence& e : evidence) {
-      if (predicted(e, set)) support += surprise_of(e, others) - surprise_of(e, set);
+      if (predicted(e, all)) support += surprise_of(e, others) - surprise_of(e, all);
     }
     return support >= fault->surprise + least_support;
   });
@@ -203,11 +214,11 @@ std::vector<Fault> known_faults(const robot::RobotModel& robot) {
 Explanation explain(std::span<const Evidence> evidence, std::span<const Fault> faults) {
   Explanation best;
   Set set;
-  const double none = surprise_of(evidence, set);
+  const double none = surprise_of(evidence, Combined(set));
   double least = none;
   if (none < least_gain) return best;
   const auto try_set = [&](const Set& candidate) {
-    const double s = surprise_of(evidence, candidate);
+    const double s = surprise_of(evidence, Combined(candidate), least);
     if (!(s < least - 1e-9) || !supported(evidence, candidate)) return;
     least = s;
     set = candidate;
@@ -230,7 +241,8 @@ Explanation explain(std::span<const Evidence> evidence, std::span<const Fault> f
     for (const Fault& fault : faults) {
       Set with = set;
       with[k] = &fault;
-      if (&fault == set[k] || surprise_of(evidence, with) > least + nearly) continue;
+      if (&fault == set[k] || surprise_of(evidence, Combined(with), least + nearly) > least + nearly)
+        continue;
       if (supported(evidence, with)) others.push_back(&fault);
     }
   }
@@ -239,16 +251,17 @@ Explanation explain(std::span<const Evidence> evidence, std::span<const Fault> f
 
 Measured measured_factor(std::span<const Evidence> evidence, const Explanation& explanation,
                          const Fault& fault) {
-  Set others;
+  Set rest;
   for (const Fault* f : explanation.faults) {
-    if (f != &fault) others.push_back(f);
+    if (f != &fault) rest.push_back(f);
   }
+  const Combined others(rest), all(explanation.faults);
   Measured best;
   double most = 0;
   for (const Evidence& e : evidence) {
-    const auto without = predicted(e, others), with = predicted(e, explanation.faults);
+    const auto without = predicted(e, others), with = predicted(e, all);
     if (!without || !with || *without == *with) continue;
-    const double supports = surprise_of(e, others) - surprise_of(e, explanation.faults);
+    const double supports = surprise_of(e, others) - surprise_of(e, all);
     if (supports <= most) continue;
     most = supports;
     // The exponent by which the fault's own factor enters: swaps turn the sign alone.
