@@ -7,13 +7,13 @@ packages=(
   liblcm-dev liblcm-bin libglib2.0-dev libeigen3-dev libsundials-dev libsqlite3-dev libpq-dev
   nlohmann-json3-dev
   libboost-dev libceres-dev libcli11-dev libspdlog-dev libfmt-dev prometheus-cpp-dev libexpected-dev
-  libssl-dev libsystemd-dev libzstd-dev zlib1g-dev
+  libssl-dev libmosquitto-dev libsystemd-dev libzstd-dev zlib1g-dev
   iproute2 curl python3
 )
 if [ "${1:-}" = --tests ]; then
   packages+=(
     libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev coinor-libipopt-dev
-    clang-format clang-tidy cppcheck lintian openssl postgresql python3-jsonschema chromium nginx-light caddy prometheus
+    clang-format clang-tidy cppcheck lintian openssl postgresql python3-jsonschema chromium nginx-light caddy prometheus mosquitto mosquitto-clients
   )
   # The page's tests run on whatever node there is.
   command -v node >/dev/null && command -v npm >/dev/null || packages+=(nodejs npm)

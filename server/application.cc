@@ -9,6 +9,7 @@
 #include <functional>
 #include <future>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -24,6 +25,8 @@
 #include "ingest/keeping.h"
 #include "ingest/model_loading.h"
 #include "ingest/signature_gate.h"
+#include "server/api/live_robot.h"
+#include "server/api/robot_json.h"
 #include "server/api/services.h"
 #include "server/cluster/cluster.h"
 #include "server/cluster_metrics.h"
@@ -43,6 +46,7 @@
 #include "server/http/static_files.h"
 #include "server/logging.h"
 #include "server/metrics.h"
+#include "server/mqtt_metrics.h"
 #include "server/options_of_settings.h"
 #include "server/process_metrics.h"
 #include "server/robot_metrics.h"
@@ -270,6 +274,32 @@ struct Application::Parts {
     return done;
   }
 
+  Result<void> start_mqtt() {
+    if (settings.text("mqtt.url").empty()) return {};
+    Result<server::BatteryTopics::Options> options = mqtt_options(settings);
+    if (!options) return tl::unexpected(std::move(options.error()));
+    const std::string dialect = settings.text("mqtt.dialect");
+    batteries = std::make_unique<server::BatteryTopics>(std::move(*options),
+                                                        [this, dialect] { return live_batteries(dialect); });
+    server::export_mqtt_metrics(metrics, *batteries);
+    return batteries->start();
+  }
+
+  std::vector<server::BatteryTopics::Battery> live_batteries(const std::string& dialect) {
+    std::vector<server::BatteryTopics::Battery> all;
+    const std::int64_t now = host_utime_us();
+    for (const auto& snapshot : fleet.all()) {
+      const auto model = models.find(snapshot->robot_id);
+      if (model == nullptr || !api::is_live(*snapshot, now)) continue;
+      if (in_cluster && keeping.epoch_of(snapshot->robot_id) == 0) continue;
+      // Without a known charge there is nothing to tell.
+      auto object = answers::autonomy_answer(nlohmann::json{{"dialect", dialect}}, forecasts->of(model),
+                                             api::live_robot(snapshot.get()), cost_tables);
+      if (object) all.push_back({snapshot->robot_id, std::move(*object)});
+    }
+    return all;
+  }
+
   // Whether this daemon does what one of the cluster's should do about a robot.
   std::function<bool(const std::string&)> is_own() {
     if (!in_cluster) return {};
@@ -393,17 +423,20 @@ struct Application::Parts {
   bool stop() {
     if (stopped.exchange(true)) return true;
     if (cluster) cluster->settle_down();
+    bool told = within(milliseconds(2000), [this] {
+      if (batteries) batteries->stop();
+    });
     const milliseconds grace(std::llround(1e3 * settings.number("http.stop_deadline_s")));
     std::future<bool> http_ended = std::async(std::launch::async, [this, grace] {
       return within(grace + milliseconds(500), [this, grace] {
         if (http && !http->stop(grace)) log_warning("requests were cut off at the stop deadline");
       });
     });
-    bool ended = within(milliseconds(3000), [this] {
-      if (acceptor) acceptor->stop();
-      if (watch) watch->stop();
-      if (diagnoses) diagnoses->stop();
-    });
+    bool ended = told & within(milliseconds(3000), [this] {
+                   if (acceptor) acceptor->stop();
+                   if (watch) watch->stop();
+                   if (diagnoses) diagnoses->stop();
+                 });
     ended &= within(milliseconds(2000), [this] {
       if (ingest) ingest->stop();
       {
@@ -522,7 +555,8 @@ struct Application::Parts {
   ingest::IngestCounters counters;
   std::function<void(const std::string&, const std::string&)> warn;
   std::unique_ptr<history::Store> store;
-  std::unique_ptr<server::Webhooks> webhooks;  // null: nobody listens
+  std::unique_ptr<server::BatteryTopics> batteries;  // null: no MQTT broker
+  std::unique_ptr<server::Webhooks> webhooks;        // null: nobody listens
   std::unique_ptr<history::Writer> writer;
   std::optional<server::ClusterOptions> in_cluster;  // absent: this daemon keeps all robots
   ingest::Keeping keeping;
@@ -560,6 +594,7 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   if (done) done = parts->start_diagnosis();
   if (done) done = parts->start_http();
   if (done) done = parts->join_cluster();
+  if (done) done = parts->start_mqtt();
   if (!done) return tl::unexpected(std::move(done.error()));
   parts->beat = std::thread([&p = *parts] { p.run_beat(); });
   parts->warming = std::thread([&p = *parts] { p.warm_forecasts(); });
@@ -617,6 +652,12 @@ std::vector<Error> faults_of_webhooks(const Settings& settings) {
   if (file.empty()) return {};
   const auto webhooks = server::read_webhooks(file);
   return webhooks ? std::vector<Error>{} : std::vector<Error>{webhooks.error()};
+}
+
+std::vector<Error> faults_of_mqtt(const Settings& settings) {
+  if (settings.text("mqtt.url").empty()) return {};
+  const auto options = mqtt_options(settings);
+  return options ? std::vector<Error>{} : std::vector<Error>{options.error()};
 }
 
 std::vector<Error> faults_of_telemetry(const Settings& settings) {

@@ -56,6 +56,8 @@ std::vector<Error> faults_of_telemetry(const Settings& settings);
 std::vector<Error> faults_of_cluster(const Settings& settings);
 // What is wrong with the file of the webhooks and their secrets.
 std::vector<Error> faults_of_webhooks(const Settings& settings);
+// What is wrong with the MQTT broker that the settings name; it is not asked.
+std::vector<Error> faults_of_mqtt(const Settings& settings);
 
 // What is wrong with the robot files that the settings name, one a file; or with their directory.
 std::vector<Error> faulty_robot_files(const Settings& settings);

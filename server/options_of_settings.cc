@@ -7,6 +7,7 @@
 #include <sstream>
 #include <utility>
 
+#include "access/secret_file.h"
 #include "base/host_clock.h"
 #include "history/open_store.h"
 #include "history/postgres_store.h"
@@ -176,6 +177,34 @@ server::Webhooks::Options webhook_options(const Settings& settings) {
   options.queue = static_cast<std::size_t>(settings.integer("webhooks.queue"));
   options.now_utime_us = host_utime_us;
   options.on_error = [](const Error& error) { log_error("webhook", error); };
+  return options;
+}
+
+Result<server::BatteryTopics::Options> mqtt_options(const Settings& settings) {
+  server::BatteryTopics::Options options;
+  Result<server::BrokerOptions> broker = server::parse_broker_url(settings.text("mqtt.url"), "mqtt.url");
+  if (!broker) return tl::unexpected(std::move(broker.error()));
+  for (const char* key : {"mqtt.client_id", "mqtt.interface", "mqtt.manufacturer"}) {
+    const std::string& level = settings.text(key);
+    if (level.empty() || level.find_first_of("/+#$") != std::string::npos)
+      return invalid(key, "is a level of MQTT topics: not empty, and without /, +, # and $");
+  }
+  options.broker = std::move(*broker);
+  options.broker.authorities = settings.text("mqtt.authorities");
+  options.broker.client_id = settings.text("mqtt.client_id");
+  options.broker.user = settings.text("mqtt.user");
+  if (const std::string& file = settings.text("mqtt.password_file"); !file.empty()) {
+    Result<std::string> password = access::read_secret(file, 1);
+    if (!password) return invalid("mqtt.password_file", describe(password.error()));
+    options.broker.password = std::move(*password);
+  }
+  options.interface = settings.text("mqtt.interface");
+  options.manufacturer = settings.text("mqtt.manufacturer");
+  options.dialect = settings.text("mqtt.dialect") == "vda5050-2.1" ? answers::Dialect::vda5050_2_1
+                                                                   : answers::Dialect::vda5050_3_0;
+  options.period = seconds(settings.number("mqtt.period_s"));
+  options.now_utime_us = host_utime_us;
+  options.note = [](const std::string& text) { log_info(text, {}); };
   return options;
 }
 

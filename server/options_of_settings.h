@@ -13,6 +13,7 @@
 #include "server/diagnosis/model_adoption.h"
 #include "server/http/event_hub.h"
 #include "server/http/http_server.h"
+#include "server/mqtt/battery_topics.h"
 #include "server/settings.h"
 #include "server/webhooks/webhooks.h"
 
@@ -36,6 +37,9 @@ server::DriftOptions drift_options(const Settings& settings);
 server::WatchOptions watch_options(const Settings& settings);
 http::TlsFiles tls_files(const Settings& settings);
 server::Webhooks::Options webhook_options(const Settings& settings);
+// Fault::invalid on "mqtt.url", "mqtt.client_id", "mqtt.interface", "mqtt.manufacturer" or
+// "mqtt.password_file".
+Result<server::BatteryTopics::Options> mqtt_options(const Settings& settings);
 http::ServerOptions http_options(const Settings& settings);
 http::EventHub::Options event_options(const Settings& settings);
 

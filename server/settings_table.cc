@@ -8,6 +8,7 @@ using Type = Setting::Type;
 constexpr std::string_view store_synchronous[] = {"full", "normal"};
 constexpr std::string_view log_formats[] = {"text", "json"};
 constexpr std::string_view log_levels[] = {"debug", "info", "warning", "error"};
+constexpr std::string_view mqtt_dialects[] = {"vda5050-3.0", "vda5050-2.1"};
 constexpr double megabyte = 1024.0 * 1024.0;
 
 // key, type, default, minimum, maximum, unit, help
@@ -86,6 +87,24 @@ constexpr Setting table[] = {
      "file of the URLs that receive events, see operations.md; empty: none"},
     {"webhooks.queue", Type::integer, "1000", 1, 1000000, "",
      "events that may wait for one of these; beyond: the oldest is dropped and counted"},
+
+    {"mqtt.url", Type::text, "", 0, 0, "",
+     "MQTT broker that is told the batteries of live robots, mqtt://host[:port] or mqtts://host[:port]; "
+     "empty: none"},
+    {"mqtt.authorities", Type::text, "", 0, 0, "",
+     "PEM file of the certificate authorities that the broker's certificate is of; empty: those of the "
+     "system"},
+    {"mqtt.user", Type::text, "", 0, 0, "", "name by which the broker knows joulecastd; empty: none"},
+    {"mqtt.password_file", Type::text, "", 0, 0, "",
+     "file that holds this user's password, for no other user to read"},
+    {"mqtt.client_id", Type::text, "joulecast", 0, 0, "",
+     "MQTT client identifier; each daemon on a broker needs one of its own"},
+    {"mqtt.interface", Type::text, "joulecast", 0, 0, "",
+     "first level of the topics, the interface name of VDA 5050; not the one that the robots use"},
+    {"mqtt.manufacturer", Type::text, "unknown", 0, 0, "",
+     "manufacturer of the robots, a level of the topics"},
+    {"mqtt.dialect", Type::choice, "vda5050-3.0", 0, 0, "", "what the messages follow", mqtt_dialects},
+    {"mqtt.period_s", Type::number, "5", 0.5, 3600, "s", "how often each robot's battery is published"},
 
     {"store.path", Type::text, "joulecast.db", 0, 0, "",
      "SQLite file of the history; beside it, PATH.spool keeps what was not committed at a stop"},

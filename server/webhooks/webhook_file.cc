@@ -1,13 +1,10 @@
 #include "server/webhooks/webhook_file.h"
 
-#include <sys/stat.h>
-
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "access/secret_file.h"
 #include "base/json_fields.h"
 #include "base/text_file.h"
 
@@ -18,22 +15,6 @@ using nlohmann::json;
 
 constexpr std::size_t longest_text = 2048;
 constexpr std::size_t shortest_secret = 16;
-constexpr std::size_t most_secret_bytes = 4096;
-
-Result<std::string> read_secret(const std::filesystem::path& path) {
-  struct stat status {};
-  if (stat(path.c_str(), &status) != 0) return fail(Fault::unavailable, path.string(), std::strerror(errno));
-  if ((status.st_mode & S_IROTH) != 0)
-    return invalid(path.string(), "may be read by every user of this machine: chmod o-r");
-  Result<std::string> text = read_text_file(path, most_secret_bytes);
-  if (!text) return text;
-  constexpr const char* space = " \t\r\n";
-  text->erase(0, text->find_first_not_of(space));
-  text->erase(text->find_last_not_of(space) + 1);
-  if (text->size() < shortest_secret)
-    return invalid(path.string(), "must hold " + std::to_string(shortest_secret) + " bytes at least");
-  return text;
-}
 
 std::string all_kinds() {
   std::string text;
@@ -65,7 +46,7 @@ Result<Webhook> read_webhook(const json& value, const std::string& at, const std
   auto address = http_client::parse_url(webhook.url, at + "/url");
   if (!address) return tl::unexpected(std::move(address.error()));
   webhook.address = std::move(*address);
-  auto secret = read_secret(folder / secret_file);
+  auto secret = access::read_secret((folder / secret_file).string(), shortest_secret);
   if (!secret) return invalid(at + "/secret_file", describe(secret.error()));
   webhook.secret = std::move(*secret);
   return webhook;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -8,6 +9,10 @@
 
 // Files of secrets, which commands change while a daemon reads them.
 namespace joulecast::access {
+
+// What a file holds, without the whitespace around it. Fault::invalid where every user of the machine may
+// read the file or it holds fewer than `least` bytes.
+Result<std::string> read_secret(const std::string& path, std::size_t least);
 
 // The new file beside the old one, as `<path>.new`, which exists only while somebody writes it.
 class FileReplacement {

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "answers/json/battery_dialects.h"
+#include "server/mqtt/broker_link.h"
+
+namespace joulecast::server {
+
+// The batteries of live robots on an MQTT broker, in the words of VDA 5050:
+//   <interface>/<v3 or v2>/<manufacturer>/<robot_id>/<powerSupply or batteryState>
+// every period, not retained: the header that every VDA 5050 message has (headerId, timestamp, version,
+// manufacturer, serialNumber) and the object of that name from the state of the standard's own topic. Other
+// members of the state, orders and nodes, are not known here, and the robot's own topics stay the robot's.
+//   <interface>/<v3 or v2>/joulecast/<client id>/connection
+// retained: the standard's connection message, of this daemon: ONLINE, OFFLINE after an orderly stop,
+// CONNECTION_BROKEN (2.1: CONNECTIONBROKEN) published by the broker.
+class BatteryTopics {
+ public:
+  struct Options {
+    BrokerOptions broker;
+    std::string interface, manufacturer;
+    answers::Dialect dialect = answers::Dialect::vda5050_3_0;  // or vda5050_2_1
+    std::chrono::milliseconds period{5000};
+    std::function<std::int64_t()> now_utime_us = {};
+    std::function<void(const std::string&)> note = {};  // into the log; any thread
+  };
+  struct Battery {
+    std::string robot_id;
+    std::string object;  // JSON, {"powerSupply": {...}} or {"batteryState": {...}}
+  };
+  // What is known of all live robots of this daemon, in that dialect.
+  using Batteries = std::function<std::vector<Battery>()>;
+
+  BatteryTopics(Options options, Batteries batteries);
+  ~BatteryTopics() { stop(); }
+
+  // Fault::invalid: see BrokerLink.
+  Result<void> start();
+  void stop();
+
+  struct Status {
+    bool connected = false;
+    std::uint64_t connections = 0, published = 0, failed = 0;  // messages
+  };
+  Status status() const;
+
+ private:
+  BrokerOptions broker_with_last_words();
+  std::string topic(const std::string& manufacturer, const std::string& serial_number,
+                    const std::string& name) const;
+  std::string connection_message(const std::string& state);
+  std::string begin_message(const std::string& topic, const std::string& manufacturer,
+                            const std::string& serial_number);
+  void on_change(const std::string& why);
+  void run();
+  void publish_all();
+
+  Options options_;
+  const Batteries batteries_;
+  const std::string connection_topic_;
+  std::map<std::string, std::uint32_t> header_ids_;  // of each topic
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  bool running_ = false, refused_ = false, greet_ = false;
+  std::atomic<std::uint64_t> connections_ = 0, published_ = 0, failed_ = 0;
+  BrokerLink link_;
+  std::thread thread_;
+};
+
+}  // namespace joulecast::server

@@ -1,0 +1,162 @@
+#!/usr/bin/env python3
+"""The batteries of robots on a real broker (mosquitto), with a password and TLS: messages hold against VDA 5050's published schema; the
+broker may come later than the daemon and go away in between; how the daemon ended is on the broker afterwards."""
+import json
+import pathlib
+import re
+import shutil
+import socket
+import subprocess
+import time
+import urllib.request
+
+import jsonschema
+
+from harness import Programs, arguments, check, need_multicast, skip
+
+HEADER = ("headerId", "timestamp", "version", "manufacturer", "serialNumber")
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Broker:
+    def __init__(self, folder):
+        self.folder, self.port, self.process = pathlib.Path(folder), free_port(), None
+        self.folder.chmod(0o755)
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=localhost", "-addext",
+                        "subjectAltName=DNS:localhost", "-keyout", "key.pem", "-out", "certificate.pem", "-days", "2"], cwd=folder,
+                       check=True, capture_output=True)
+        (self.folder / "key.pem").chmod(0o644)
+        subprocess.run(["mosquitto_passwd", "-b", "-c", "passwords", "fleet", "let me in"], cwd=folder, check=True)
+        (self.folder / "passwords").chmod(0o644)
+        (self.folder / "mosquitto.conf").write_text(
+            f"listener {self.port} localhost\ncertfile {folder}/certificate.pem\nkeyfile {folder}/key.pem\n"
+            f"password_file {folder}/passwords\nallow_anonymous false\n")
+
+    def start(self):
+        self.process = subprocess.Popen(["mosquitto", "-c", self.folder / "mosquitto.conf"], stderr=subprocess.DEVNULL)
+
+    def stop(self):
+        if self.process:
+            self.process.terminate()
+            self.process.wait()
+
+    def heard(self, topic, count, seconds):
+        """So many messages of a topic, (topic, document) each."""
+        done = subprocess.run(["mosquitto_sub", "-h", "localhost", "-p", str(self.port), "--cafile", self.folder / "certificate.pem",
+                               "-u", "fleet", "-P", "let me in", "-t", topic, "-C", str(count), "-W", str(seconds), "-v"],
+                              capture_output=True, text=True)
+        check(done.returncode == 0, f"{topic}: not {count} messages in {seconds} s: {done.stdout}{done.stderr}")
+        return [(line.split(" ", 1)[0], json.loads(line.split(" ", 1)[1])) for line in done.stdout.splitlines()]
+
+    def state(self):
+        """What the retained connection message says."""
+        return self.heard("joulecast/+/joulecast/warehouse-1/connection", 1, 10)[0][1]["connectionState"]
+
+
+def metric(programs, name):
+    with urllib.request.urlopen(programs.url + "/metrics", timeout=10) as reply:
+        return float(re.search(rf"^{name} (\S+)$", reply.read().decode(), re.M)[1])
+
+
+def wait_until(condition, seconds, text):
+    until = time.monotonic() + seconds
+    while not condition():
+        check(time.monotonic() < until, f"not within {seconds} s: {text}")
+        time.sleep(0.1)
+
+
+def schema_of_messages(shared):
+    """The header and the power supply of the standard's state."""
+    path = pathlib.Path(shared, "data", "vda5050", "state.schema.json")
+    if not path.exists():
+        return None
+    state = json.loads(path.read_text())
+    return {**state, "required": [*HEADER, "powerSupply"],
+            "properties": {name: state["properties"][name] for name in (*HEADER, "powerSupply")}, "additionalProperties": False}
+
+
+def faults_are_told(options, secret):
+    here = ["--mqtt-url", "mqtt://here"]
+    for settings, field in ((["--mqtt-url", "http://here"], "mqtt.url"), ([*here, "--mqtt-interface", "a/b"], "mqtt.interface"),
+                            ([*here, "--mqtt-password-file", secret], "mqtt.password_file")):
+        done = subprocess.run([options.daemon, "--check-config", *settings], capture_output=True, text=True)
+        check(done.returncode == 2 and field + ":" in done.stderr, f"{settings}: {done.returncode}, {done.stderr}")
+
+
+def main():
+    options = arguments()
+    need_multicast()
+    if not (shutil.which("mosquitto") or pathlib.Path("/usr/sbin/mosquitto").exists()) or not shutil.which("mosquitto_sub"):
+        skip("mosquitto is not installed")
+    programs = Programs(options)
+    broker = Broker(programs.folder.name)
+    secret = pathlib.Path(programs.path("password"))
+    secret.write_text("let me in\n")
+    secret.chmod(0o644)
+    faults_are_told(options, str(secret))
+    secret.chmod(0o600)
+    programs.settings = ["--mqtt-url", f"mqtts://localhost:{broker.port}", "--mqtt-authorities", str(broker.folder / "certificate.pem"),
+                         "--mqtt-user", "fleet", "--mqtt-password-file", str(secret), "--mqtt-client-id", "warehouse-1",
+                         "--mqtt-manufacturer", "acme", "--mqtt-period-s", "0.5"]
+    fleet = None
+    try:
+        programs.start()  # there is no broker yet
+        fleet = subprocess.Popen([options.client, "simulate", "--robots", "2", "--lcm-url", programs.lcm_url, "--server", programs.url,
+                                  "--duration", "120", "--quiet"])
+        wait_until(lambda: len([r for r in programs.get("/v1/robots")["robots"] if r["live"]]) == 2, 20, "both robots are live")
+        robots = {r["robot_id"] for r in programs.get("/v1/robots")["robots"]}
+        check(metric(programs, "joulecast_mqtt_connected") == 0, "connected to a broker that is not there")
+        broker.start()
+        wait_until(lambda: metric(programs, "joulecast_mqtt_connected") == 1, 20, "the broker is connected once it is there")
+
+        messages = broker.heard("joulecast/v3/acme/+/powerSupply", 8, 20)
+        schema = schema_of_messages(options.shared)
+        told = {}
+        for topic, message in messages:
+            robot = topic.split("/")[3]
+            check(message["serialNumber"] == robot and robot in robots and message["manufacturer"] == "acme", f"{topic}: {message}")
+            check(re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z", message["timestamp"]), message["timestamp"])
+            check(robot not in told or message["headerId"] == told[robot] + 1, f"{topic}: headerId {message['headerId']} after {told.get(robot)}")
+            told[robot] = message["headerId"]
+            if schema:
+                jsonschema.validate(message, schema)
+        check(set(told) == robots, f"{told} of {robots}")
+        live = programs.get(f"/v1/robots/{robot}/state")
+        supply = message["powerSupply"]
+        check(abs(supply["stateOfCharge"] - 100 * live["state_of_charge"]) < 1, f"{supply}, {live['state_of_charge']}")
+        check(broker.state() == "ONLINE", "the daemon is there")
+
+        broker.stop()
+        wait_until(lambda: metric(programs, "joulecast_mqtt_connected") == 0, 30, "the broker is missed")
+        broker.start()
+        wait_until(lambda: metric(programs, "joulecast_mqtt_connected") == 1, 70, "the broker is connected again")
+        broker.heard("joulecast/v3/acme/+/powerSupply", 4, 20)
+        check(programs.stop() == 0, "the daemon did not stop in order")
+        check(broker.state() == "OFFLINE", "the daemon took leave")
+
+        programs.settings += ["--mqtt-dialect", "vda5050-2.1"]
+        programs.start()
+        wait_until(lambda: metric(programs, "joulecast_mqtt_connected") == 1, 20, "the broker is connected")
+        _, message = broker.heard("joulecast/v2/acme/+/batteryState", 1, 20)[0]
+        check(message["version"] == "2.1.0" and 0 <= message["batteryState"]["batteryCharge"] <= 100, message)
+        programs.kill()
+        wait_until(lambda: broker.heard("joulecast/v2/joulecast/warehouse-1/connection", 1, 10)[0][1]["connectionState"] == "CONNECTIONBROKEN",
+                   60, "the broker says that the daemon is gone")
+
+        programs.settings = ["--mqtt-url", f"mqtt://localhost:{free_port()}"]
+        programs.start()
+        check(programs.stop() == 0, "without a broker the daemon did not stop in order")
+    finally:
+        if fleet:
+            fleet.kill()
+            fleet.wait()
+        broker.stop()
+    print(f"{len(messages)} messages of {len(told)} robots")
+
+
+main()
