@@ -67,8 +67,8 @@ class Cluster {
 
   // Joins, and starts the threads. Fault::conflict on "cluster.node" or "cluster.name".
   Result<void> start(const std::string& address);
-  // Before this daemon ends: takes the robots of daemons that are gone, as nobody else may have what they said
-  // since, and then no more; 2 s at most. The membership is renewed on.
+  // Before this daemon ends: takes the robots of daemons that are gone, as nobody else may have what they
+  // said since, and then no more; 2 s at most. The membership is renewed on.
   void settle_down();
   // Ends the membership: other daemons take what this one has let go.
   void leave();
