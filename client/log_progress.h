@@ -13,6 +13,10 @@ class LogProgress {
  public:
   LogProgress(const std::string& work, const std::vector<std::string>& logs);
   void passed(const telemetry::LogEvent& event);
+  // Not to outlive this.
+  [[nodiscard]] telemetry::LogObserver observer() {
+    return [this](const telemetry::LogEvent& event) { passed(event); };
+  }
 
  private:
   std::uint64_t bytes_ = 0;

@@ -13,6 +13,7 @@
 #include "client/commands/drive_calibration_output.h"
 #include "client/commands/table.h"
 #include "client/files.h"
+#include "client/log_progress.h"
 #include "client/progress.h"
 #include "dynamics/drive_model.h"
 #include "energy/calibration.h"
@@ -43,7 +44,8 @@ struct Options {
 };
 
 Result<std::vector<telemetry::Recording>> load(const Options& options, const std::string& robot_id) {
-  auto log = telemetry::read_recordings(options.logs, robot_id);
+  LogProgress progress("reading", options.logs);
+  auto log = telemetry::read_recordings(options.logs, robot_id, progress.observer());
   if (!log) return tl::unexpected(log.error());
   std::vector<telemetry::Recording>& all = log->recordings;
   // What a robot does between its missions counts only where it declares none.
@@ -73,7 +75,9 @@ Result<void> identify(const robot::RobotModel& robot, const Options& options, Me
                       std::span<const telemetry::Recording> chosen, std::span<const energy::DriveRun> runs,
                       DriveOutcome& outcome) {
   if (method == Method::power) {
-    auto found = energy::calibrate_from_power(robot, chosen, {options.calibration.resistance_known});
+    Progress progress("identifying", "%", 100);
+    auto found = energy::calibrate_from_power(robot, chosen,
+                                              {options.calibration.resistance_known, progress.shares()});
     if (!found) return tl::unexpected(found.error());
     outcome.by_power = std::move(*found);
     return {};

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,6 +23,7 @@
 #include "client/files.h"
 #include "client/http_client.h"
 #include "client/lcm_url.h"
+#include "client/log_progress.h"
 #include "dynamics/drive_model.h"
 #include "robot/review.h"
 #include "robot/robot_file.h"
@@ -135,7 +137,9 @@ void check_channels(bool live, Report& report) {
 
 Result<void> check_logs(const std::vector<std::string>& logs, const Options& options, Report& report) {
   telemetry::LogTally tally;
+  std::optional<LogProgress> progress(std::in_place, "reading", logs);
   const auto take = [&](const telemetry::LogEvent& event) -> Result<bool> {
+    progress->passed(event);
     const auto channel = telemetry::parse_channel(event.channel);
     if (channel && (options.robot_id.empty() || channel->robot_id == options.robot_id))
       report.watch.add(event.channel, event.data, event.timestamp_us);
@@ -155,8 +159,12 @@ Result<void> check_logs(const std::vector<std::string>& logs, const Options& opt
     report.findings.push_back({true, logs.front(), "",
                                "holds no channel of joulecast's (ROBOT_TELEMETRY.<robot_id> and the like)"});
   check_channels(false, report);
-  if (report.robot)
-    check_recordings(telemetry::load_recordings(logs, options.robot_id), logs.front(), report);
+  progress.reset();
+  if (report.robot) {
+    progress.emplace("checking", logs);
+    check_recordings(telemetry::load_recordings(logs, options.robot_id, progress->observer()), logs.front(),
+                     report);
+  }
   return {};
 }
 

@@ -19,6 +19,7 @@
 #include "client/commands/gap_server.h"
 #include "client/commands/table.h"
 #include "client/files.h"
+#include "client/log_progress.h"
 #include "client/progress.h"
 #include "energy/back_test.h"
 #include "energy/back_test_json.h"
@@ -115,8 +116,11 @@ Exit apply(const Options& options, const Judged& judged) {
 }
 
 Exit gap_of_logs(const Options& options, const robot::RobotModel& robot) {
-  const auto recordings =
-      telemetry::load_recordings(options.logs, options.robot_id.empty() ? robot.robot_id : options.robot_id);
+  const auto recordings = [&] {
+    LogProgress progress("reading", options.logs);
+    return telemetry::load_recordings(
+        options.logs, options.robot_id.empty() ? robot.robot_id : options.robot_id, progress.observer());
+  }();
   if (!recordings) return report(recordings.error());
   const report::ReportOrigin origin = report_origin(options.logs, options.robot_file);
   if (!options.compare_by.empty())

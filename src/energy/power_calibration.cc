@@ -174,6 +174,7 @@ Result<PowerCalibration> calibrate_from_power(const robot::RobotModel& robot,
   const auto found = find(
       *parameters, *data, [](std::size_t) { return true; }, robot);
   if (!found) return tl::unexpected(found.error());
+  if (options.progress) options.progress(0.4);
   const auto halves = predict_halves(*parameters, *data, robot);
   if (!halves) return tl::unexpected(halves.error());
   PowerCalibration out;

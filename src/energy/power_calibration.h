@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -43,7 +44,8 @@ struct PowerCalibration {
 };
 
 struct PowerCalibrationOptions {
-  bool resistance_known = false;  // taken from the robot file
+  bool resistance_known = false;                    // taken from the robot file
+  std::function<void(double share)> progress = {};  // is told the share done
 };
 
 // Identifies what battery voltage and current [V, A, discharging positive] and wheel speeds tell of a drive,

@@ -34,6 +34,8 @@ struct LogEvent {
   std::span<const std::uint8_t> data;  // likewise
 };
 
+using LogObserver = std::function<void(const LogEvent&)>;
+
 enum class LogStatus {
   event,      // an event was read
   end,        // the file ends exactly after its last event

@@ -111,11 +111,13 @@ class Collector {
 
 }  // namespace
 
-Result<LogRecordings> read_recordings(std::span<const std::string> paths, const std::string& robot_id) {
+Result<LogRecordings> read_recordings(std::span<const std::string> paths, const std::string& robot_id,
+                                      const LogObserver& passed) {
   Collector collector(robot_id);
   LogTally tally;
   const auto take = [&](const LogEvent& event) -> Result<bool> {
     collector.take(event);
+    if (passed) passed(event);
     return true;
   };
   for (const std::string& path : paths) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "telemetry/event_log.h"
 #include "telemetry/recording.h"
 
 namespace joulecast::telemetry {
@@ -33,7 +34,9 @@ struct LogRecordings {
 
 // Reads LCM event logs, one going on where the other ends, into missions as the daemon would follow them
 // (MissionTracker): telemetry outside declared missions forms implicit ones. `robot_id` picks one robot;
-// empty: all. Fault::not_found for a file that cannot be opened, Fault::invalid for one that holds no event.
-Result<LogRecordings> read_recordings(std::span<const std::string> paths, const std::string& robot_id = {});
+// empty: all. `passed`, where there is one, is called with every event that has been read. Fault::not_found
+// for a file that cannot be opened, Fault::invalid for one that holds no event.
+Result<LogRecordings> read_recordings(std::span<const std::string> paths, const std::string& robot_id = {},
+                                      const LogObserver& passed = {});
 
 }  // namespace joulecast::telemetry

@@ -97,8 +97,9 @@ Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<Record
   return set;
 }
 
-Result<RecordingSet> load_recordings(std::span<const std::string> paths, const std::string& robot_id) {
-  Result<LogRecordings> log = read_recordings(paths, robot_id);
+Result<RecordingSet> load_recordings(std::span<const std::string> paths, const std::string& robot_id,
+                                     const LogObserver& passed) {
+  Result<LogRecordings> log = read_recordings(paths, robot_id, passed);
   if (!log) return tl::unexpected(std::move(log.error()));
   if (log->robots.empty()) return invalid("log", "holds no telemetry");
   if (!robot_id.empty() && !log->robots.contains(robot_id))

@@ -25,7 +25,8 @@ inline constexpr double shortest_mission_s = 5.0;
 // The missions of one robot in event logs (read_recordings). Where several robots are recorded, `robot_id`
 // picks one; empty: the logs must hold one robot only. Errors of read_recordings, and Fault::invalid without
 // a usable mission.
-Result<RecordingSet> load_recordings(std::span<const std::string> paths, const std::string& robot_id = {});
+Result<RecordingSet> load_recordings(std::span<const std::string> paths, const std::string& robot_id = {},
+                                     const LogObserver& passed = {});
 
 // The same from samples in memory, put in order. Short missions that follow each other with the
 // same payload are joined; what is still too short is left out; `notes` names both.
