@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "client/virtual_robot/imperfections.h"
+#include "dynamics/catalogue.h"
 
 namespace joulecast::client {
 namespace {
@@ -90,16 +91,14 @@ std::vector<std::string> words_of(std::string_view set) {
   return words;
 }
 
-std::vector<std::string> ids(std::span<const virtual_robot::EffectEntry> effects, std::string_view end) {
-  std::vector<std::string> words;
-  for (const auto& effect : effects) words.push_back(std::string(effect.id) + std::string(end));
-  return words;
-}
-
 std::vector<std::string> special_words(std::string_view command, std::string_view option) {
-  if (command == "simulate" && option == "--effect") return ids(virtual_robot::all_effects(), "=");
-  if (command == "gap" && option == "--effect") return ids(virtual_robot::effect_table(), "");
-  return {};
+  std::vector<std::string> words;
+  if (command == "simulate" && option == "--effect") {
+    for (const auto& effect : virtual_robot::all_effects()) words.push_back(std::string(effect.id) + '=');
+  } else if ((command == "gap" || command == "adopt") && option == "--effect") {
+    for (const dynamics::Effect* effect : dynamics::catalogue()) words.emplace_back(effect->info().id);
+  }
+  return words;
 }
 
 }  // namespace

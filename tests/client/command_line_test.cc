@@ -102,6 +102,8 @@ TEST_F(CommandLine, CompletesEffectsUpToTheirStrength) {
   EXPECT_THAT(complete({"simulate", "--effect", ""}), Each(EndsWith("=")));
   EXPECT_THAT(complete({"simulate", "--effect", "coul"}), ElementsAre("coulomb_friction="));
   EXPECT_THAT(complete({"gap", "--effect", "coul"}), ElementsAre("coulomb_friction"));
+  EXPECT_THAT(complete({"adopt", "--effect", "grad"}), ElementsAre("grade"));
+  EXPECT_THAT(complete({"gap", "--effect", "x_"}), IsEmpty());  // of virtual robots alone
 }
 
 TEST_F(CommandLine, CompletesFilesOfTheKindThatIsAsked) {

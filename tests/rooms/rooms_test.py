@@ -104,14 +104,20 @@ def faults_of_order(source, libraries):
     folders = sorted(p.name for p in (source / "src").iterdir() if p.is_dir())
     if folders != sorted(order):
         faults.append(f"architecture.md lists {sorted(order)}, src/ has {folders}")
-    place = {name: k for k, name in enumerate(order)}
+    # Of the server those that have a folder; log, metrics and settings lie in server/ itself.
+    rooms = re.findall(r"^((?:src|server)/[a-z_]+) ", architecture, re.M)
+    built = sorted("/".join(library.folder.parts[:2]) for library in libraries.values()
+                   if library.folder.parts[0] == "server" and len(library.folder.parts) > 1)
+    if faulty := set(built) - set(rooms):
+        faults.append(f"architecture.md does not list {sorted(faulty)}")
+    place = {name: k for k, name in enumerate(rooms)}
     for library in libraries.values():
-        if library.folder.parts[0] != "src":
+        own = "/".join(library.folder.parts[:2])
+        if own not in place:
             continue
-        own = library.folder.parts[1]
         for name in library.links["PUBLIC"] | library.links["PRIVATE"]:
-            to = libraries[name].folder if name in libraries else None
-            if to is None or to.parts[0] == "src" and place.get(to.parts[1], -1) <= place.get(own, -1):
+            to = "/".join(libraries[name].folder.parts[:2]) if name in libraries else None
+            if to is None or to in place and place[to] <= place[own] or own.startswith("server/") and to == "server":
                 continue
             faults.append(f"{library} uses {name}, which is not above it")
     return faults
