@@ -33,7 +33,7 @@ Evidence::Evidence(const Information& data, const Eigen::VectorXd& tolerance,
   factor.matrixL().solveInPlace(solved);
   const Eigen::VectorXd solved_y = factor.matrixL().solve(tolerance.asDiagonal() * data.xy);
   xx_ = data.xx(kept, kept);
-  xx_.triangularView<Eigen::Lower>() -= solved.transpose() * solved;
+  if (solved.size() > 0) xx_.triangularView<Eigen::Lower>() -= solved.transpose() * solved;
   xx_.triangularView<Eigen::StrictlyUpper>() = xx_.transpose();
   xy_ = data.xy(kept) - solved.transpose() * solved_y;
   for (Eigen::Index k = 0; k < xx_.rows(); ++k) xx_(k, k) = std::max(0.0, xx_(k, k));

@@ -37,7 +37,8 @@ Information& Information::operator*=(double factor) {
 
 void Information::add(const Eigen::Ref<const Eigen::MatrixXd>& x,
                       const Eigen::Ref<const Eigen::VectorXd>& y) {
-  xx.triangularView<Eigen::Lower>() += x.transpose() * x;
+  // Eigen's product into a triangle refers to the first coefficient, which an empty matrix has not.
+  if (x.size() > 0) xx.triangularView<Eigen::Lower>() += x.transpose() * x;
   xx.triangularView<Eigen::StrictlyUpper>() = xx.transpose();
   xy += x.transpose() * y;
   yy += y.squaredNorm();

@@ -43,6 +43,14 @@ TEST(Information, IsProductsOfRows) {
   EXPECT_EQ(info.log_scale, 0);
 }
 
+TEST(Information, OfNoColumnsOrNoRowsIsNothingOfThem) {
+  Information no_columns(0), no_rows(2);
+  no_columns.add(Eigen::MatrixXd(3, 0), Eigen::Vector3d(1, 2, 2));
+  EXPECT_EQ(no_columns.yy, 9);
+  no_rows.add(Eigen::MatrixXd(0, 2), Eigen::VectorXd(0));
+  EXPECT_EQ(no_rows.xx.norm() + no_rows.xy.norm() + no_rows.yy, 0);
+}
+
 TEST(Information, OfSomeColumnsIsThatOfZerosElsewhere) {
   const Eigen::MatrixXd x = numbers(7, 2, 3);
   const Eigen::VectorXd y = numbers(7, 1, 4);

@@ -37,7 +37,7 @@ FlexibleFit fit_everything(const ChannelRows& rows, const Eigen::VectorXd& weigh
   const Eigen::MatrixXd weighted = weight.asDiagonal() * scaled;
   const Eigen::Index p = scaled.cols();
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(p, p);
-  normal.triangularView<Eigen::Lower>() += weighted.transpose() * scaled;
+  if (scaled.size() > 0) normal.triangularView<Eigen::Lower>() += weighted.transpose() * scaled;
   normal = normal.selfadjointView<Eigen::Lower>();
   normal.diagonal().array() += 1.0;
   const Eigen::LDLT<Eigen::MatrixXd> factor(normal);

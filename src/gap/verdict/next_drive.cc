@@ -219,7 +219,7 @@ std::vector<NextDrive> next_drives(const Linear& linear, const Problem& problem,
     if (effect.alternatives.empty()) continue;
     const auto ours = find(effect.id), other = find(effect.alternatives.front());
     if (ours == all.end() || other == all.end()) continue;
-    const double strength = effect.parameters[ours->parameter].value;
+    const double strength = effect.parameters.front().value;
     const auto separation = [&](const statistics::Information& information) {
       const statistics::Evidence evidence(information, now.tolerance);
       return evidence.separation(ours->candidate.columns[0], strength, other->candidate.columns[0],
