@@ -42,26 +42,6 @@ class Application {
   std::unique_ptr<Parts> parts_;
 };
 
-// What is wrong with who may use the service: an address open to all, a token file or a
-// certificate that cannot be used.
-std::vector<Error> faults_of_access(const Settings& settings);
-
-// What is wrong with the URL of the history; nothing is asked of it.
-std::vector<Error> faults_of_store(const Settings& settings);
-
-// What is wrong with whose telemetry is taken: the robots' keys, the list of senders.
-std::vector<Error> faults_of_telemetry(const Settings& settings);
-
-// What is wrong with the part in a cluster that the settings name.
-std::vector<Error> faults_of_cluster(const Settings& settings);
-// What is wrong with the file of the webhooks and their secrets.
-std::vector<Error> faults_of_webhooks(const Settings& settings);
-// What is wrong with the MQTT broker that the settings name; it is not asked.
-std::vector<Error> faults_of_mqtt(const Settings& settings);
-
-// What is wrong with the robot files that the settings name, one a file; or with their directory.
-std::vector<Error> faulty_robot_files(const Settings& settings);
-
 // The SQLite file of the history. Fault::invalid on "store.url" where the history is in PostgreSQL, whose own
 // programs check it, back it up and restore it.
 Result<std::string> store_file(const Settings& settings);

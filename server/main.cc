@@ -13,6 +13,7 @@
 #include "server/application.h"
 #include "server/logging.h"
 #include "server/settings.h"
+#include "server/settings_faults.h"
 
 namespace {
 
@@ -95,11 +96,7 @@ int print(const joulecast::Result<std::string>& text) {
 }
 
 int check(const joulecast::Settings& settings) {
-  auto faulty = joulecast::faults_of_access(settings);
-  for (const auto part :
-       {joulecast::faults_of_store, joulecast::faults_of_cluster, joulecast::faults_of_telemetry,
-        joulecast::faults_of_webhooks, joulecast::faults_of_mqtt, joulecast::faulty_robot_files})
-    for (joulecast::Error& error : part(settings)) faulty.push_back(std::move(error));
+  const auto faulty = joulecast::faults_of(settings);
   for (const joulecast::Error& error : faulty) complain(error);
   return faulty.empty() ? print(std::string("the settings are valid\n")) : 2;
 }
