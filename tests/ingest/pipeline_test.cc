@@ -424,7 +424,7 @@ TEST_F(PipelineTest, AnEventWithAnAbsurdPayloadBeginsItsMissionWithoutOne) {
   send(started);
   MissionEvent timeless = event(MissionPhase::started, 0, "m0");
   timeless.utime_us = std::numeric_limits<std::int64_t>::min();
-  send(timeless);
+  harness.pipeline->handle({"nomad", timeless, start_us});
   send_range(0, 100);
   send(event(MissionPhase::finished, 101));
   EXPECT_EQ(harness.faults(IngestFault::implausible), 2u);
