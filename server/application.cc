@@ -250,23 +250,25 @@ struct Application::Parts {
     if (settings.text("mqtt.url").empty()) return {};
     Result<server::BatteryTopics::Options> options = mqtt_options(settings);
     if (!options) return tl::unexpected(std::move(options.error()));
-    const std::string dialect = settings.text("mqtt.dialect");
-    batteries = std::make_unique<server::BatteryTopics>(std::move(*options),
-                                                        [this, dialect] { return live_batteries(dialect); });
+    batteries = std::make_unique<server::BatteryTopics>(
+        std::move(*options), [this, request = nlohmann::json{{"dialect", settings.text("mqtt.dialect")}}] {
+          return live_batteries(request);
+        });
     server::export_mqtt_metrics(metrics, *batteries);
     return batteries->start();
   }
 
-  std::vector<server::BatteryTopics::Battery> live_batteries(const std::string& dialect) {
+  std::vector<server::BatteryTopics::Battery> live_batteries(const nlohmann::json& request) {
     std::vector<server::BatteryTopics::Battery> all;
     const std::int64_t now = host_utime_us();
+    const auto own = is_own();
     for (const auto& snapshot : fleet.all()) {
       const auto model = models.find(snapshot->robot_id);
       if (model == nullptr || !api::is_live(*snapshot, now)) continue;
-      if (in_cluster && keeping.epoch_of(snapshot->robot_id) == 0) continue;
+      if (own && !own(snapshot->robot_id)) continue;
       // Without a known charge there is nothing to tell.
-      auto object = answers::autonomy_answer(nlohmann::json{{"dialect", dialect}}, forecasts->of(model),
-                                             api::live_robot(snapshot.get()), cost_tables);
+      auto object = answers::autonomy_answer(request, forecasts->of(model), api::live_robot(snapshot.get()),
+                                             cost_tables);
       if (object) all.push_back({snapshot->robot_id, std::move(*object)});
     }
     return all;
@@ -395,7 +397,7 @@ struct Application::Parts {
   bool stop() {
     if (stopped.exchange(true)) return true;
     if (cluster) cluster->settle_down();
-    bool told = within(milliseconds(2000), [this] {
+    bool ended = within(milliseconds(2000), [this] {
       if (batteries) batteries->stop();
     });
     const milliseconds grace(std::llround(1e3 * settings.number("http.stop_deadline_s")));
@@ -404,11 +406,11 @@ struct Application::Parts {
         if (http && !http->stop(grace)) log_warning("requests were cut off at the stop deadline");
       });
     });
-    bool ended = told & within(milliseconds(3000), [this] {
-                   if (acceptor) acceptor->stop();
-                   if (watch) watch->stop();
-                   if (diagnoses) diagnoses->stop();
-                 });
+    ended &= within(milliseconds(3000), [this] {
+      if (acceptor) acceptor->stop();
+      if (watch) watch->stop();
+      if (diagnoses) diagnoses->stop();
+    });
     ended &= within(milliseconds(2000), [this] {
       if (ingest) ingest->stop();
       {

@@ -15,6 +15,15 @@ using answers::Dialect;
 
 constexpr const char* own_manufacturer = "joulecast";
 
+// What differs between the versions of the standard.
+struct Words {
+  const char *level, *version, *object, *broken;
+};
+constexpr Words words_of(Dialect dialect) {
+  return dialect == Dialect::vda5050_2_1 ? Words{"v2", "2.1.0", "batteryState", "CONNECTIONBROKEN"}
+                                         : Words{"v3", "3.0.0", "powerSupply", "CONNECTION_BROKEN"};
+}
+
 // VDA 5050: YYYY-MM-DDTHH:mm:ss.fffZ.
 std::string timestamp(std::int64_t utime_us) {
   return fmt::format("{}.{:03}Z", format_utc(utime_us, "%Y-%m-%dT%H:%M:%S"), utime_us / 1000 % 1000);
@@ -31,16 +40,14 @@ BatteryTopics::BatteryTopics(Options options, Batteries batteries)
 BrokerOptions BatteryTopics::broker_with_last_words() {
   BrokerOptions broker = options_.broker;
   broker.last_topic = connection_topic_;
-  broker.last_words =
-      connection_message(options_.dialect == Dialect::vda5050_2_1 ? "CONNECTIONBROKEN" : "CONNECTION_BROKEN");
+  broker.last_words = connection_message(words_of(options_.dialect).broken);
   return broker;
 }
 
 std::string BatteryTopics::topic(const std::string& manufacturer, const std::string& serial_number,
                                  const std::string& name) const {
-  return fmt::format("{}/{}/{}/{}/{}", options_.interface,
-                     options_.dialect == Dialect::vda5050_2_1 ? "v2" : "v3", manufacturer, serial_number,
-                     name);
+  return fmt::format("{}/{}/{}/{}/{}", options_.interface, words_of(options_.dialect).level, manufacturer,
+                     serial_number, name);
 }
 
 std::string BatteryTopics::begin_message(const std::string& topic, const std::string& manufacturer,
@@ -49,7 +56,7 @@ std::string BatteryTopics::begin_message(const std::string& topic, const std::st
   json.begin_object()
       .field("headerId", std::uint64_t{header_ids_[topic]++})
       .field("timestamp", timestamp(options_.now_utime_us()))
-      .field("version", options_.dialect == Dialect::vda5050_2_1 ? "2.1.0" : "3.0.0")
+      .field("version", words_of(options_.dialect).version)
       .field("manufacturer", manufacturer)
       .field("serialNumber", serial_number)
       .end_object();
@@ -114,9 +121,8 @@ void BatteryTopics::run() {
 }
 
 void BatteryTopics::publish_all() {
-  const char* name = options_.dialect == Dialect::vda5050_2_1 ? "batteryState" : "powerSupply";
   for (const Battery& battery : batteries_()) {
-    const std::string to = topic(options_.manufacturer, battery.robot_id, name);
+    const std::string to = topic(options_.manufacturer, battery.robot_id, words_of(options_.dialect).object);
     const std::string message =
         begin_message(to, options_.manufacturer, battery.robot_id) + battery.object.substr(1);
     ++(link_.publish(to, message, 0, false) ? published_ : failed_);

@@ -31,7 +31,6 @@ constexpr std::array<PlausibleRange, 18> ranges{{
 }};
 
 constexpr std::size_t wheel_channels = 2;
-constexpr std::int64_t year_2200_us = 7'258'118'400'000'000;
 
 std::array<double, ranges.size()> channels(const signals::Sample& s) noexcept {
   return {s.wheel_velocity_rad_s[0],

@@ -22,6 +22,8 @@ struct PlausibleRange {
 
 [[nodiscard]] std::span<const PlausibleRange> plausible_ranges() noexcept;
 
+inline constexpr std::int64_t year_2200_us = 7'258'118'400'000'000;  // from which on no clock is right
+
 enum class Implausibility {
   missing,       // NaN in wheel_velocity, the one channel that every robot must measure
   infinite,      // an infinity, in any field

@@ -17,8 +17,8 @@ import time
 import jsonschema
 
 from cluster_faults import EACH, Faults
-from cluster_parts import BEGAN, NODES, Cluster, Node, Server, say, wait_until
-from harness import SKIP, check, need_multicast, skip
+from cluster_parts import BEGAN, NODES, Cluster, Node, Server, say
+from harness import SKIP, check, need_multicast, skip, wait_until
 
 RATE_HZ = 50
 
@@ -208,7 +208,7 @@ def main():
         while time.monotonic() < until:
             faults(draw.choice(EACH)[0], draw.choice(NODES))
             time.sleep(draw.uniform(0, 5))
-        for what, took_s in faults.longest.items():
+        for what, took_s in faults.took_s.items():
             print(f"{what}: {len(took_s)} times, median {statistics.median(took_s):.2f} s, longest {max(took_s):.2f} s")
         check(not faults.late, f"others took over late: {faults.late}")
         live_everywhere(cluster, robots)

@@ -3,8 +3,8 @@ import errno
 import signal
 import time
 
-from cluster_parts import LEASE_S, NODES, Connection, say, wait_until
-from harness import check
+from cluster_parts import LEASE_S, NODES, Connection, say
+from harness import check, wait_until
 from host_faults import WRITES
 
 KILLED_S, PAUSED_S = 3, 10  # within which another daemon goes on
@@ -14,7 +14,7 @@ class Faults:
     def __init__(self, cluster, robots):
         self.cluster, self.robots = cluster, robots
         self.late = []
-        self.longest = {}
+        self.took_s = {}
 
     def __call__(self, fault, node):
         getattr(self, fault)(self.cluster.nodes.get("gamma" if fault == "cut_off" else node))
@@ -30,7 +30,7 @@ class Faults:
         self.note(what, taken_s, limit_s)
 
     def note(self, what, took_s, limit_s):
-        self.longest.setdefault(what, []).append(took_s)
+        self.took_s.setdefault(what, []).append(took_s)
         if took_s > limit_s:
             self.late.append(f"{what}: {took_s:.2f} s, at most {limit_s} s")
 

@@ -17,21 +17,11 @@ from host_faults import HostFaults
 
 LEASE_S = 5
 NODES = ("alpha", "beta", "gamma")
-
-
 BEGAN = time.time()
 
 
 def say(text):
     print(f"{time.time() - BEGAN:7.1f} s: {text}", flush=True)
-
-
-def wait_until(condition, seconds, text):
-    began = time.monotonic()
-    while not condition():
-        check(time.monotonic() - began < seconds, f"not within {seconds} s: {text}")
-        time.sleep(0.05)
-    return time.monotonic() - began
 
 
 class Server:
@@ -147,13 +137,6 @@ class Node(Programs):
         self.name, self.lcm_url = name, lcm_url
         self.settings = ["--store-url", url, "--cluster-name", "test", "--cluster-node", name,
                          "--cluster-lease-s", str(LEASE_S), "--diagnosis-controls", "2"]
-
-    def metric(self, name):
-        with urllib.request.urlopen(self.url + "/metrics", timeout=10) as reply:
-            for line in reply.read().decode().splitlines():
-                if line.startswith(name + " "):
-                    return float(line.split()[1])
-        check(False, f"{self.name} has no metric {name}")
 
     def post(self, path, document):
         request = urllib.request.Request(self.url + path, data=json.dumps(document).encode(),

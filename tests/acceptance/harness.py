@@ -39,9 +39,24 @@ def arguments():
     return parser.parse_args()
 
 
+def wait_until(condition, seconds, text):
+    """How long that took; the test fails where it takes longer."""
+    began = time.monotonic()
+    while not condition():
+        check(time.monotonic() - began < seconds, f"not within {seconds} s: {text}")
+        time.sleep(0.05)
+    return time.monotonic() - began
+
+
 def free_port():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("", 0))
+        return probe.getsockname()[1]
+
+
+def free_tcp_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
 
 
@@ -136,6 +151,14 @@ class Programs:
     def get(self, path):
         with urllib.request.urlopen(self.url + path, timeout=30) as reply:
             return json.load(reply)
+
+    def metric(self, name):
+        """Of a metric without labels."""
+        with urllib.request.urlopen(self.url + "/metrics", timeout=10) as reply:
+            for line in reply.read().decode().splitlines():
+                if line.startswith(name + " "):
+                    return float(line.split()[1])
+        check(False, f"there is no metric {name}")
 
     def put(self, path, document):
         request = urllib.request.Request(self.url + path, method="PUT", data=json.dumps(document).encode(),

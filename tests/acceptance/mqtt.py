@@ -5,27 +5,18 @@ import json
 import pathlib
 import re
 import shutil
-import socket
 import subprocess
-import time
-import urllib.request
 
 import jsonschema
 
-from harness import Programs, arguments, check, need_multicast, skip
+from harness import Programs, arguments, check, free_tcp_port, need_multicast, skip, wait_until
 
 HEADER = ("headerId", "timestamp", "version", "manufacturer", "serialNumber")
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 class Broker:
     def __init__(self, folder):
-        self.folder, self.port, self.process = pathlib.Path(folder), free_port(), None
+        self.folder, self.port, self.process = pathlib.Path(folder), free_tcp_port(), None
         self.folder.chmod(0o755)
         subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=localhost", "-addext",
                         "subjectAltName=DNS:localhost", "-keyout", "key.pem", "-out", "certificate.pem", "-days", "2"], cwd=folder,
@@ -56,18 +47,6 @@ class Broker:
     def state(self):
         """What the retained connection message says."""
         return self.heard("joulecast/+/joulecast/warehouse-1/connection", 1, 10)[0][1]["connectionState"]
-
-
-def metric(programs, name):
-    with urllib.request.urlopen(programs.url + "/metrics", timeout=10) as reply:
-        return float(re.search(rf"^{name} (\S+)$", reply.read().decode(), re.M)[1])
-
-
-def wait_until(condition, seconds, text):
-    until = time.monotonic() + seconds
-    while not condition():
-        check(time.monotonic() < until, f"not within {seconds} s: {text}")
-        time.sleep(0.1)
 
 
 def schema_of_messages(shared):
@@ -110,9 +89,9 @@ def main():
                                   "--duration", "120", "--quiet"])
         wait_until(lambda: len([r for r in programs.get("/v1/robots")["robots"] if r["live"]]) == 2, 20, "both robots are live")
         robots = {r["robot_id"] for r in programs.get("/v1/robots")["robots"]}
-        check(metric(programs, "joulecast_mqtt_connected") == 0, "connected to a broker that is not there")
+        check(programs.metric("joulecast_mqtt_connected") == 0, "connected to a broker that is not there")
         broker.start()
-        wait_until(lambda: metric(programs, "joulecast_mqtt_connected") == 1, 20, "the broker is connected once it is there")
+        wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 1, 20, "the broker is connected once it is there")
 
         messages = broker.heard("joulecast/v3/acme/+/powerSupply", 8, 20)
         schema = schema_of_messages(options.shared)
@@ -132,23 +111,23 @@ def main():
         check(broker.state() == "ONLINE", "the daemon is there")
 
         broker.stop()
-        wait_until(lambda: metric(programs, "joulecast_mqtt_connected") == 0, 30, "the broker is missed")
+        wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 0, 30, "the broker is missed")
         broker.start()
-        wait_until(lambda: metric(programs, "joulecast_mqtt_connected") == 1, 70, "the broker is connected again")
+        wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 1, 70, "the broker is connected again")
         broker.heard("joulecast/v3/acme/+/powerSupply", 4, 20)
         check(programs.stop() == 0, "the daemon did not stop in order")
         check(broker.state() == "OFFLINE", "the daemon took leave")
 
         programs.settings += ["--mqtt-dialect", "vda5050-2.1"]
         programs.start()
-        wait_until(lambda: metric(programs, "joulecast_mqtt_connected") == 1, 20, "the broker is connected")
+        wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 1, 20, "the broker is connected")
         _, message = broker.heard("joulecast/v2/acme/+/batteryState", 1, 20)[0]
         check(message["version"] == "2.1.0" and 0 <= message["batteryState"]["batteryCharge"] <= 100, message)
         programs.kill()
         wait_until(lambda: broker.heard("joulecast/v2/joulecast/warehouse-1/connection", 1, 10)[0][1]["connectionState"] == "CONNECTIONBROKEN",
                    60, "the broker says that the daemon is gone")
 
-        programs.settings = ["--mqtt-url", f"mqtt://localhost:{free_port()}"]
+        programs.settings = ["--mqtt-url", f"mqtt://localhost:{free_tcp_port()}"]
         programs.start()
         check(programs.stop() == 0, "without a broker the daemon did not stop in order")
     finally:

@@ -130,10 +130,6 @@ class Nemesis:
         self.kinds = (["kill", "kill", "pause", "lock", "term", "replaced", "deleted", "read_only"] + ["broken"] * 2
                       + ["clock"] * 2 + ["full"] * self.mounted)
 
-    def metric(self, name):
-        with urllib.request.urlopen(self.programs.url + "/metrics", timeout=10) as reply:
-            return next(float(line.split()[-1]) for line in reply.read().decode().splitlines() if line.startswith(name + " "))
-
     def ready(self):
         try:
             with urllib.request.urlopen(self.programs.url + "/readyz", timeout=5):
@@ -155,7 +151,7 @@ class Nemesis:
         self.worst_ready_s = max(self.worst_ready_s, time.monotonic() - began)
 
     def count(self):
-        self.accepted += self.metric("joulecast_ingest_samples_total")
+        self.accepted += self.programs.metric("joulecast_ingest_samples_total")
 
     def kill(self):
         self.count()
@@ -253,7 +249,7 @@ class Nemesis:
         self.writers = Writers(self.programs, model)
         hostile = Hostile(self.programs, self.options.seed)
         try:
-            self.wait(lambda: self.metric("joulecast_robots_live") >= ROBOTS, "robots are live", 60)
+            self.wait(lambda: self.programs.metric("joulecast_robots_live") >= ROBOTS, "robots are live", 60)
             self.writers.start()
             hostile.start()
             until = time.monotonic() + 3600 * self.options.hours

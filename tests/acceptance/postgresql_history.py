@@ -11,19 +11,12 @@ import time
 import urllib.error
 import urllib.request
 
-from harness import SKIP, Programs, arguments, check, need_multicast, skip
+from harness import SKIP, Programs, arguments, check, need_multicast, skip, wait_until
 
 ROBOTS = 3
 RATE_HZ = 50
 MISSION_S = 30
 DOWN_S = 6  # of the server
-
-
-def wait_until(condition, seconds, text):
-    until = time.monotonic() + seconds
-    while not condition():
-        check(time.monotonic() < until, f"not within {seconds} s: {text}")
-        time.sleep(0.05)
 
 
 class Server:

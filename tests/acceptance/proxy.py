@@ -12,15 +12,9 @@ import subprocess
 import tempfile
 import time
 
-from harness import arguments, check, skip
+from harness import arguments, check, free_tcp_port, skip
 
 NAME = "joulecast.example"
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 class ByAddress(http.client.HTTPSConnection):
@@ -126,12 +120,12 @@ def main():
                             "-keyout", folder / "tls.key", "-out", folder / "tls.crt"], check=True, capture_output=True)
             token = subprocess.run([options.client, "token", "create", "--file", folder / "tokens.json", "--name", "t",
                                     "--role", "admin"], check=True, capture_output=True, text=True).stdout.strip()
-            daemon_port = free_port()
+            daemon_port = free_tcp_port()
             daemon = [options.daemon, "--http-port", str(daemon_port), "--store-path", folder / "history.db", "--lcm-url",
                       "memq://", "--auth-token-file", folder / "tokens.json", "--http-trusted-proxies", "127.0.0.1",
                       "--http-allowed-hosts", NAME]
             with running(daemon, daemon_port) as process:
-                through(proxy, options, folder, free_port(), daemon_port, token)
+                through(proxy, options, folder, free_tcp_port(), daemon_port, token)
                 check(process.poll() is None, "the daemon ended")
             listed = subprocess.run([options.client, "audit", "list", "--store", folder / "history.db"], check=True,
                                     capture_output=True, text=True).stdout

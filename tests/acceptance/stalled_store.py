@@ -12,7 +12,7 @@ import time
 import urllib.error
 import urllib.request
 
-from harness import Programs, arguments, check, need_multicast
+from harness import Programs, arguments, check, need_multicast, wait_until
 
 STALL_S = 12
 ROBOTS = 8
@@ -30,18 +30,6 @@ def status_of(programs, path, document=None):
     except urllib.error.HTTPError as error:
         status = error.code
     return status, time.monotonic() - began
-
-
-def metric(programs, name):
-    with urllib.request.urlopen(programs.url + "/metrics", timeout=10) as reply:
-        return next(float(line.split()[-1]) for line in reply.read().decode().splitlines() if line.startswith(name + " "))
-
-
-def wait_until(condition, seconds, text):
-    until = time.monotonic() + seconds
-    while not condition():
-        check(time.monotonic() < until, f"not within {seconds} s: {text}")
-        time.sleep(0.05)
 
 
 class Watchdog:
@@ -76,12 +64,12 @@ def stalled(programs, options):
     fleet = subprocess.Popen([options.client, "simulate", "--robots", str(ROBOTS), "--lcm-url", programs.lcm_url, "--server",
                               programs.url, "--rate", "50", "--mission-duration", "20", "--quiet"])
     try:
-        wait_until(lambda: metric(programs, "joulecast_robots_live") == ROBOTS, 30, "robots are live")
+        wait_until(lambda: programs.metric("joulecast_robots_live") == ROBOTS, 30, "robots are live")
         holder = lock(programs)
         began = time.monotonic()
         model["idle_power_w"] += 10
         beats = watchdog.beats
-        samples = metric(programs, "joulecast_ingest_samples_total")
+        samples = programs.metric("joulecast_ingest_samples_total")
         worst_read = 0
         refused = []
         while time.monotonic() - began < STALL_S:
@@ -95,13 +83,13 @@ def stalled(programs, options):
             time.sleep(0.2)
         check(worst_read < READ_S, f"a read took {worst_read:.2f} s")
         check(status_of(programs, "/readyz")[0] == 503, "readyz says ready")
-        accounted = metric(programs, "joulecast_ingest_samples_total") - samples
+        accounted = programs.metric("joulecast_ingest_samples_total") - samples
         expected = ROBOTS * 50 * STALL_S
         check(accounted > 0.9 * expected, f"{accounted} samples accounted for of {expected}")
         check(watchdog.beats - beats >= STALL_S - 3, f"{watchdog.beats - beats} beats of the watchdog in {STALL_S} s")
-        commands = metric(programs, "joulecast_store_queue_commands")
+        commands = programs.metric("joulecast_store_queue_commands")
         print(f"stalled for {STALL_S} s: {accounted:.0f} samples accounted for, {commands:.0f} commands and "
-              f"{metric(programs, 'joulecast_store_queue_bytes') / 1e6:.1f} MB wait, worst read {worst_read:.2f} s, "
+              f"{programs.metric('joulecast_store_queue_bytes') / 1e6:.1f} MB wait, worst read {worst_read:.2f} s, "
               f"PUT refused within {max(took for _, took in refused):.2f} s")
         check(commands < 100 * ROBOTS, f"{commands} commands wait: checkpoints were not merged")
         holder.close()
@@ -151,7 +139,7 @@ def taken_away(programs, options, how):
     began = time.monotonic()
     wait_until(lambda: status_of(programs, "/readyz")[0] == 503, 2.0, f"readyz of a store that was {how}")
     print(f"{how}: noticed within {time.monotonic() - began:.2f} s")
-    check(metric(programs, "joulecast_store_healthy") == 0, "joulecast_store_healthy")
+    check(programs.metric("joulecast_store_healthy") == 0, "joulecast_store_healthy")
     model["idle_power_w"] += 20
     check(status_of(programs, "/v1/robots/amr", model)[0] == 503, "a PUT was acknowledged")
     check(programs.stop() == 0, "stop")

@@ -3,11 +3,10 @@
 #include "signals/mission_event.h"
 #include "telemetry/mission_tracker.h"
 #include "telemetry/sequence_tracker.h"
+#include "telemetry/validation.h"
 #include "text_input.h"
 
 using namespace joulecast;
-
-constexpr std::int64_t latest_us = 7'258'118'400'000'000;  // the year 2200, as in telemetry/validation.cc
 
 // Nine bytes a step: what comes, and a number. Opened and closed missions take turns, and what is current
 // says which of them is open.
@@ -26,8 +25,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     std::int64_t number = 0;
     std::memcpy(&number, data + at + 1, sizeof number);
     // Any time that validation lets through, or one of the same minutes.
-    const std::int64_t utime_us =
-        data[at] & 16 ? std::abs(number % latest_us) : 1'700'000'000'000'000 + number % 100'000'000;
+    const std::int64_t utime_us = data[at] & 16 ? std::abs(number % telemetry::year_2200_us)
+                                                : 1'700'000'000'000'000 + number % 100'000'000;
     switch (data[at] % 5) {
       case 0:
         carry_out(missions.on_sample(utime_us, 0).actions);
