@@ -390,7 +390,7 @@ await check('a robot that stands, is silent or was restarted is shown as that', 
   expect((await cells('lossy'))[0].includes('3 missing'), `lost samples: ${(await cells('lossy'))[0]}`);
   expect((await cells('negated'))[0].includes('battery_current: sign'), 'a contradiction');
   const quiet = await cells('quiet');
-  expect(/^silent since (\d\d:\d\d|\w+ \d+)$/.test(quiet[0]), `silence: ${quiet[0]}`);
+  expect(/^silent since (\d\d:\d\d|\w+ \d+(, \d{4})?)$/.test(quiet[0]), `silence: ${quiet[0]}`);
   equal([quiet[1], quiet[6], quiet[8]].join(' '), '– – –', 'power, speed and mission of a silent robot');
   const standing = await cells('standing');
   expect(standing[6].startsWith('0.00') && standing[8] === 'idle', `a standing robot: ${standing}`);

@@ -16,9 +16,10 @@ export const now = (state, value) => (state.live ? value : null);
 // A time, as short as today allows.
 export function since(utimeUs) {
   const at = new Date(utimeUs / 1000);
-  return Date.now() - at < 86_400e3
-    ? format.clock(utimeUs).slice(0, 5)
-    : at.toLocaleDateString('en', { day: 'numeric', month: 'short' });
+  const now = new Date();
+  if (now - at < 86_400e3) return format.clock(utimeUs).slice(0, 5);
+  const year = at.getFullYear() === now.getFullYear() ? {} : { year: 'numeric' };
+  return at.toLocaleDateString('en', { day: 'numeric', month: 'short', ...year });
 }
 
 function telemetryOf(state) {
