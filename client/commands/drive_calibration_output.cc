@@ -32,7 +32,7 @@ void add(nlohmann::json& document, const energy::PowerCalibration& fit) {
   document["power_w"] = fit.power_w;
   document["power_left_w"] = fit.left_w;
   document["other_half"] = {{"file_error", json_number(fit.halves.file)},
-                            {"calibrated_error", json_number(fit.halves.calibrated)},
+                            {"calibrated_error", json_number(fit.halves.corrected)},
                             {"regression_error", json_number(fit.halves.regression)}};
   document["untold"] = nlohmann::json::array();
   for (const energy::Untold& u : fit.untold)
@@ -53,13 +53,13 @@ void print(const energy::PowerCalibration& fit) {
       fit.windows, fit.blocks, fit.effective_windows, fit.slowest_rad_s, fit.fastest_rad_s);
   if (fit.held) fmt::print("power was read every {:.2g} s; rows between repeat it\n", fit.reading_s);
   fmt::print("{:.3g} W of {:.4g} W are left, mean absolute\n", fit.left_w, fit.power_w);
-  const energy::HalvesError& h = fit.halves;
+  const energy::MissedPower& h = fit.halves;
   fmt::print(
       "each half of the recordings, predicted from the other: {:.1f} % of its power missed; by the robot "
       "file {:.1f} %, by a plain regression on speed, turning and acceleration {:.1f} %\n",
-      1e2 * h.calibrated, 1e2 * h.file, 1e2 * h.regression);
+      1e2 * h.corrected, 1e2 * h.file, 1e2 * h.regression);
   constexpr double clearly_worse = 1.05;
-  if (h.calibrated > clearly_worse * h.regression)
+  if (h.corrected > clearly_worse * h.regression)
     fmt::print(
         "The regression predicts better: something moves this robot's power that its model lacks. Ask "
         "joulecast gap.\n");

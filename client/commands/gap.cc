@@ -1,8 +1,5 @@
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -17,12 +14,11 @@
 #include "client/commands/gap_missions.h"
 #include "client/commands/gap_output.h"
 #include "client/commands/gap_server.h"
+#include "client/commands/gap_test.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/log_progress.h"
 #include "client/progress.h"
-#include "energy/back_test.h"
-#include "energy/back_test_json.h"
 #include "gap/diagnose/recordings.h"
 #include "gap/verdict/diagnosis_json.h"
 #include "gap/verdict/offer.h"
@@ -49,37 +45,11 @@ struct Options {
   GapMissionsOptions missions;
 };
 
-void print(const energy::BackTest& test) {
-  std::printf("%-24s %12s %14s %14s\n", "tested on mission", "measured J", "error before", "error after");
-  for (const energy::RunComparison& run : test.runs)
-    std::printf("%-24s %12.2f %12.2f %% %12.2f %%\n", run.name.c_str(), run.measured_j,
-                100 * run.before.relative, 100 * run.after.relative);
-  const auto fall = [](const char* what, double before, double after, const std::array<double, 2>& interval) {
-    std::printf("%s %.2f %% -> %.2f %%, falls by %.2f %% [%.2f, %.2f]\n", what, 100 * before, 100 * after,
-                100 * (before - after), 100 * interval[0], 100 * interval[1]);
-  };
-  fall("energy error", test.error_before, test.error_after, test.improvement_interval);
-  fall("power gap", test.power_gap_before, test.power_gap_after, test.power_gap_fall_interval);
-  std::puts(test.improves() ? "it improves" : "no improvement is shown");
-}
-
-// The robot file and the one with the effects found, on missions of other logs.
-Result<energy::BackTest> test_of(const Options& options, const robot::RobotModel& robot,
-                                 const robot::RobotModel& extended) {
-  const auto recordings = telemetry::load_recordings(options.test, options.robot_id);
-  if (!recordings) return tl::unexpected(recordings.error());
-  std::vector<energy::DriveRun> runs;
-  for (const telemetry::Recording& mission : recordings->missions)
-    runs.push_back(
-        {mission.mission_id, mission.samples, std::isfinite(mission.payload_kg) ? mission.payload_kg : 0});
-  return energy::back_test(runs, robot, extended);
-}
-
 // Of logs: the diagnosis, and what came of trying it on other missions.
 struct Judged {
   gap::Diagnosis diagnosis;
   Result<robot::RobotModel> extended;  // the robot file with what was found, or why it is not to be adopted
-  std::optional<energy::BackTest> test;
+  std::optional<GapTest> test;
 };
 
 Result<Judged> judge(const Options& options, const telemetry::RecordingSet& recordings,
@@ -101,7 +71,7 @@ Result<Judged> judge(const Options& options, const telemetry::RecordingSet& reco
   const Result<robot::RobotModel> tried =
       offer.effects.empty() ? robot : gap::take(offer, robot, {options.effect, true});
   if (!tried) return tl::unexpected(of_option(tried.error(), "--test"));
-  auto tested = test_of(options, robot, *tried);
+  auto tested = test_on_other_missions(options.test, options.robot_id, recordings.missions, robot, *tried);
   if (!tested) return tl::unexpected(tested.error());
   judged.test = std::move(*tested);
   return judged;
@@ -109,9 +79,9 @@ Result<Judged> judge(const Options& options, const telemetry::RecordingSet& reco
 
 Exit apply(const Options& options, const Judged& judged) {
   if (!judged.extended) return report(of_option(judged.extended.error(), "--apply"));
-  if (judged.test && !judged.test->improves() && !options.force)
-    return report(
-        {Fault::conflict, "--apply", "the back-test shows no improvement; --force writes it all the same"});
+  if (const std::string objection = judged.test ? judged.test->objection() : "";
+      !objection.empty() && !options.force)
+    return report({Fault::conflict, "--apply", objection + "; --force writes it all the same"});
   return write_robot(*judged.extended, options.apply, options.force);
 }
 
@@ -131,7 +101,7 @@ Exit gap_of_logs(const Options& options, const robot::RobotModel& robot) {
   if (!judged) return report(judged.error());
   nlohmann::ordered_json document = gap::diagnosis_to_json(judged->diagnosis);
   if (options.json) {
-    if (judged->test) document["back_test"] = energy::back_test_to_json(*judged->test);
+    if (judged->test) document["back_test"] = to_json(*judged->test);
     std::printf("%s\n", document.dump(2).c_str());
   } else {
     print_diagnosis(document);
@@ -216,8 +186,9 @@ void add_gap(CLI::App& program, Exit& exit) {
   command
       ->add_option(
           "--test", options->test,
-          "logs of other missions: replay them with and without the effects found; --apply is refused "
-          "where they show no improvement")
+          "logs of other missions: replay them with and without the effects found, and compare with a plain "
+          "regression on the missions of the diagnosis; --apply is refused where they show no improvement or "
+          "the regression predicts them better")
       ->excludes(missions);
   auto* server = command
                      ->add_option("--server", options->server,

@@ -115,12 +115,11 @@ Result<Found> find(const PowerParameters& given, const PowerWindows& data, const
 
 // Fits each half of the recordings and predicts the other; of all windows, in which wheels start and stop
 // too.
-Result<HalvesError> predict_halves(const PowerParameters& parameters, const PowerWindows& data,
+Result<MissedPower> predict_halves(const PowerParameters& parameters, const PowerWindows& data,
                                    const robot::RobotModel& robot) {
   const Eigen::VectorXd file = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(power_parameter_count));
   const dynamics::DriveModel by_file = parameters.model(file);
-  HalvesError error;
-  double total = 0;
+  MissedPowerMeter missed;
   for (const bool second : {false, true}) {
     const Use use = [&](std::size_t block) { return (2 * block >= data.blocks) == second; };
     const auto found = find(parameters, data, use, robot);
@@ -128,15 +127,10 @@ Result<HalvesError> predict_halves(const PowerParameters& parameters, const Powe
     const dynamics::DriveModel model = found->parameters.model(found->fit.x);
     const PlainRegression plain(windows_of(data, use), robot);
     for (const windows::Window& w : data.windows) {
-      if (use(w.block)) continue;
-      total += std::fabs(w.battery_power_w);
-      error.file += std::fabs(w.battery_power_w - metered_power_w(by_file, w));
-      error.calibrated += std::fabs(w.battery_power_w - metered_power_w(model, w));
-      error.regression += std::fabs(w.battery_power_w - plain.power_w(w));
+      if (!use(w.block)) missed.add(w, by_file, model, plain);
     }
   }
-  for (double* e : {&error.file, &error.calibrated, &error.regression}) *e /= total;
-  return error;
+  return missed.value();
 }
 
 void tell_extent(const PowerWindows& data, const Found& found, PowerCalibration& out) {

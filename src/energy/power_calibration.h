@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "energy/calibration.h"
+#include "energy/power_windows.h"
 #include "robot/robot_model.h"
 #include "telemetry/recording.h"
 
@@ -18,14 +19,6 @@ namespace joulecast::energy {
 struct Untold {
   std::string what;  // as in the robot file
   std::string why;   // a sentence's end, without its full stop
-};
-
-// Mean absolute error of battery power over the windows of one half by what was found in the other, of the
-// mean absolute power; both halves together.
-struct HalvesError {
-  double file = 0;
-  double calibrated = 0;
-  double regression = 0;  // P = c0 + c1 |v| + c2 |yaw rate| + c3 v a, and climb where it is known
 };
 
 struct PowerCalibration {
@@ -40,7 +33,7 @@ struct PowerCalibration {
   bool held = false;             // rows repeat these readings
   double slowest_rad_s = 0, fastest_rad_s = 0;
   double power_w = 0, left_w = 0;  // mean absolute power, and mean absolute residual of the fit
-  HalvesError halves;
+  MissedPower halves;              // each half predicted from the other, both together
 };
 
 struct PowerCalibrationOptions {

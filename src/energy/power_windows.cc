@@ -97,4 +97,18 @@ double PlainRegression::copperless_friction_nm() const {
   return 0.5 * std::max(0.0, fit_.coefficients[1]) * wheel_radius_m_;
 }
 
+void MissedPowerMeter::add(const windows::Window& window, const dynamics::DriveModel& file,
+                           const dynamics::DriveModel& corrected, const PlainRegression& regression) {
+  const double measured_w = window.battery_power_w;
+  measured_w_ += std::fabs(measured_w);
+  missed_w_.file += std::fabs(measured_w - metered_power_w(file, window));
+  missed_w_.corrected += std::fabs(measured_w - metered_power_w(corrected, window));
+  missed_w_.regression += std::fabs(measured_w - regression.power_w(window));
+}
+
+MissedPower MissedPowerMeter::value() const {
+  return {missed_w_.file / measured_w_, missed_w_.corrected / measured_w_,
+          missed_w_.regression / measured_w_};
+}
+
 }  // namespace joulecast::energy

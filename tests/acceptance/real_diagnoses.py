@@ -2,6 +2,7 @@
 """Diagnoses of public recordings, as a user runs them. What they pin follows from the intervals that are printed."""
 import json
 import os
+import subprocess
 
 from harness import Programs, arguments, check, shared_folder, skip
 
@@ -64,6 +65,33 @@ def warthog(programs, options):
     check(baseline["explanation_held_out"] < 0.3 * baseline["unchanged_model_held_out"], "the gap shrinks")
 
 
+def halves(programs, options):
+    """A file corrected from one half of the Warthog's drive predicts the other as well as a regression on the first, or it
+    is refused."""
+    table = next(shared_folder(options, "real", "warthog_grass").glob("*.csv"))
+    head, *rows = table.read_text(encoding="utf-8").splitlines(keepends=True)
+    logs = {}
+    for half, part in (("early", rows[:len(rows) // 2]), ("late", rows[len(rows) // 2:])):
+        csv, logs[half] = programs.path(half + ".csv"), programs.path(half + ".lcmlog")
+        with open(csv, "w", encoding="utf-8") as file:
+            file.writelines([head, *part])
+        programs.run("import", csv, "--mapping", f"{options.source}/deploy/import/warthog_grass.json", "--out", logs[half])
+    for learnt, other in (("early", "late"), ("late", "early")):
+        corrected = programs.path(f"corrected-{learnt}.json")
+        done = subprocess.run([options.client, "gap", logs[learnt], "--robot", f"{options.source}/deploy/robots/warthog-grass.json",
+                               "--controls", "4", "--json", "--test", logs[other], "--apply", corrected],
+                              capture_output=True, text=True)
+        answer = json.loads(done.stdout)
+        beside = answer["back_test"]["beside_regression"]
+        written = os.path.exists(corrected)
+        print(f"{learnt} half: {beside}, {'written' if written else 'refused'}")
+        check(beside["windows"] > 40, "the other half was compared")
+        worse = beside["corrected_missed"] > 1.05 * beside["regression_missed"]
+        check(worse == beside["regression_wins"], "says who wins")
+        check(not (written and worse), f"written though the regression predicts better: {beside}")
+        check(written or "--apply: " in done.stderr, f"refused without a reason: {done.stderr}")
+
+
 def gears(programs, options):
     """The competition robot: whatever is named is judged on runs left out, with the motors' own power."""
     folder = shared_folder(options, "real", "frc3314_drivetrain")
@@ -91,6 +119,7 @@ def main():
     programs = Programs(options)
     husky(programs, options)
     warthog(programs, options)
+    halves(programs, options)
     gears(programs, options)
 
 

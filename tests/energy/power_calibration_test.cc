@@ -105,8 +105,8 @@ TEST(CalibrateFromPower, TheTrueParametersLieWithinTheStatedIntervals) {
         }
       }
       std::printf("halves: file %.3f calibrated %.3f regression %.3f\n", found->halves.file,
-                  found->halves.calibrated, found->halves.regression);
-      EXPECT_LT(found->halves.calibrated, 1.02 * found->halves.regression);
+                  found->halves.corrected, found->halves.regression);
+      EXPECT_LT(found->halves.corrected, 1.02 * found->halves.regression);
     }
   }
   for (const auto& [name, count] : by_name)

@@ -1,0 +1,88 @@
+#include "client/commands/gap_test.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "base/json_number.h"
+#include "energy/back_test_json.h"
+#include "telemetry/recording_set.h"
+
+namespace joulecast::client {
+namespace {
+
+double percent(double share) {
+  return 100 * share;
+}
+
+void print_fall(const char* what, double before, double after, const std::array<double, 2>& interval) {
+  fmt::print("{} {:.2f} % -> {:.2f} %, falls by {:.2f} % [{:.2f}, {:.2f}]\n", what, percent(before),
+             percent(after), percent(before - after), percent(interval[0]), percent(interval[1]));
+}
+
+void print(const energy::BackTest& test) {
+  fmt::print("{:<24} {:>12} {:>14} {:>14}\n", "tested on mission", "measured J", "error before",
+             "error after");
+  for (const energy::RunComparison& run : test.runs)
+    fmt::print("{:<24} {:>12.2f} {:>12.2f} % {:>12.2f} %\n", run.name, run.measured_j,
+               percent(run.before.relative), percent(run.after.relative));
+  print_fall("energy error", test.error_before, test.error_after, test.improvement_interval);
+  print_fall("power gap", test.power_gap_before, test.power_gap_after, test.power_gap_fall_interval);
+  fmt::print("{}\n", test.improves() ? "it improves" : "no improvement is shown");
+}
+
+}  // namespace
+
+std::string GapTest::objection() const {
+  if (!replayed.improves()) return "the back-test shows no improvement";
+  if (!beside_regression || !beside_regression->regression_wins()) return {};
+  const energy::MissedPower& missed = beside_regression->missed;
+  return fmt::format(
+      "of the power of the missions of --test the corrected file misses {:.1f} %, a plain regression on the "
+      "missions of the diagnosis {:.1f} %",
+      percent(missed.corrected), percent(missed.regression));
+}
+
+Result<GapTest> test_on_other_missions(const std::vector<std::string>& logs, const std::string& robot_id,
+                                       std::span<const telemetry::Recording> diagnosed,
+                                       const robot::RobotModel& robot, const robot::RobotModel& corrected) {
+  const auto others = telemetry::load_recordings(logs, robot_id);
+  if (!others) return tl::unexpected(others.error());
+  std::vector<energy::DriveRun> runs;
+  for (const telemetry::Recording& mission : others->missions)
+    runs.push_back(
+        {mission.mission_id, mission.samples, std::isfinite(mission.payload_kg) ? mission.payload_kg : 0});
+  auto replayed = energy::back_test(runs, robot, corrected);
+  if (!replayed) return tl::unexpected(replayed.error());
+  return GapTest{std::move(*replayed),
+                 energy::compare_with_regression(diagnosed, others->missions, robot, corrected)};
+}
+
+nlohmann::ordered_json to_json(const GapTest& test) {
+  nlohmann::ordered_json document = energy::back_test_to_json(test.replayed);
+  document["beside_regression"] = nullptr;
+  if (const auto& beside = test.beside_regression) {
+    const energy::MissedPower& missed = beside->missed;
+    document["beside_regression"] = {{"windows", beside->windows},
+                                     {"file_missed", json_number(missed.file)},
+                                     {"corrected_missed", json_number(missed.corrected)},
+                                     {"regression_missed", json_number(missed.regression)},
+                                     {"regression_wins", beside->regression_wins()}};
+  }
+  return document;
+}
+
+void print(const GapTest& test) {
+  print(test.replayed);
+  if (!test.beside_regression)
+    return fmt::print("not compared with a plain regression: {}\n", describe(test.beside_regression.error()));
+  const energy::MissedPower& missed = test.beside_regression->missed;
+  fmt::print(
+      "power missed in windows in which it was read anew: robot file {:.1f} %, corrected {:.1f} %, plain "
+      "regression on the missions of the diagnosis {:.1f} %\n",
+      percent(missed.file), percent(missed.corrected), percent(missed.regression));
+}
+
+}  // namespace joulecast::client
