@@ -3,6 +3,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <string>
 #include <string_view>
 
 #include "history/records.h"
@@ -52,6 +53,10 @@ inline constexpr std::array<std::string_view, ingest_fault_count> ingest_fault_n
     "unsigned",          "bad_signature",       "replayed",    "second_sender",   "gap",
     "zero_payload",      "outside_mission",     "bad_event",   "event_flood",     "empty_mission",
     "reused_mission_id", "too_many_covariates", "solver"};
+
+inline std::string name_of(IngestFault fault) {
+  return std::string(ingest_fault_names[static_cast<std::size_t>(fault)]);
+}
 
 // Why nothing is learnt from a mission that ended.
 enum class LeftOut : std::size_t {

@@ -199,7 +199,7 @@ void Pipeline::count_unknown_robot(const InboundMessage& message) {
   }
   RobotSnapshot& snapshot = found->second.snapshot;
   snapshot.received_utime_us = message.host_utime_us;
-  ++snapshot.faults[std::string(ingest_fault_names[static_cast<std::size_t>(fault)])];
+  ++snapshot.faults[name_of(fault)];
   found->second.changed = true;
 }
 

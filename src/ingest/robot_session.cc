@@ -19,33 +19,8 @@ constexpr std::string_view refinement_topic = "refinement";  // of what is learn
 constexpr std::int64_t clock_ahead_us = 10'000'000;          // beyond what transport and drift explain
 constexpr auto json_replace = nlohmann::json::error_handler_t::replace;
 constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
-constexpr std::int64_t report_period_us = 600'000'000;
 constexpr std::int64_t report_contradiction_us = 3'600'000'000;
 constexpr double least_measured = 0.5;  // of a mission's time, for forecasts to learn from it
-// Events that a robot may send at once, and how many each sample earns it: recordings are replayed faster
-// than they were.
-constexpr double event_burst = 100, events_a_sample = 0.2;
-
-history::MissionState state_of(telemetry::MissionEnd end) {
-  switch (end) {
-    case telemetry::MissionEnd::finished:
-    case telemetry::MissionEnd::idle:
-    case telemetry::MissionEnd::expired:
-      return history::MissionState::finished;
-    case telemetry::MissionEnd::aborted:
-      return history::MissionState::aborted;
-    case telemetry::MissionEnd::superseded:
-      return history::MissionState::superseded;
-    case telemetry::MissionEnd::unfinished:
-      return history::MissionState::unfinished;
-  }
-  return history::MissionState::unfinished;
-}
-
-std::string name_of(IngestFault fault) {
-  return std::string(ingest_fault_names[static_cast<std::size_t>(fault)]);
-}
-
 nlohmann::json json_of(const Contradiction& c) {
   return {{"kind", contradiction_kind_names[static_cast<std::size_t>(c.kind)]},
           {"id", c.id},
@@ -65,26 +40,6 @@ Result<std::shared_ptr<const ModelInForce>> stored_model(const history::Store& s
 
 }  // namespace
 
-// The mission that is open, as stored, with what came since its last checkpoint.
-struct RobotSession::OpenMission {
-  void end_at(std::int64_t utime_us) {  // a clock that is set back would end it before its start
-    record.end_utime_us = std::max(record.start_utime_us, utime_us);
-  }
-
-  history::Mission record;
-  bool stored = false;
-  std::vector<signals::Sample> samples;
-  std::uint64_t unsaved = 0;
-  telemetry::MissionPayload payload;
-  // Gaps that an earlier run of the daemon counted; the meter counts those of this run.
-  std::int64_t earlier_gaps = 0;
-  double earlier_gap_s = 0;
-  bool resumed_silent = false;                   // resumed after a restart, and nothing came since
-  std::optional<std::int64_t> stepped_utime_us;  // host's, when the robot's clock was first set
-  std::int64_t booked_us = 0;                    // since then
-  std::string charge_memory;                     // of its begin
-};
-
 RobotSession::RobotSession(std::string robot_id, const SessionSettings& settings, SessionOutputs outputs)
     : robot_id_(std::move(robot_id)),
       settings_(settings),
@@ -94,7 +49,7 @@ RobotSession::RobotSession(std::string robot_id, const SessionSettings& settings
       sequence_(settings.sequence),
       missions_(settings.mission),
       covariates_(settings.mission.reorder_us),
-      event_allowance_(event_burst) {
+      event_allowance_(settings.event_rate_hz) {
   snapshot_.robot_id = robot_id_;
   if (const auto stored = outputs_.store.resume_state(robot_id_); stored && stored->has_value()) {
     snapshot_.state_of_charge = (*stored)->state_of_charge;
@@ -148,9 +103,7 @@ void RobotSession::meter_with(std::shared_ptr<const ModelInForce> model) {
     }
     snapshot_.state_of_charge = charge_->estimate().charge;
     if (open_ != nullptr) {
-      open_->earlier_gaps = open_->record.gap_count;
-      open_->earlier_gap_s = open_->record.gap_s;
-      open_->record.model_version = model_->version;
+      open_->use_another_meter(model_->version);
       meter_->resume(accounts.duration_s > 0 ? accounts : open_->record.accounts);
       contradictions_->begin_mission(open_->record.mission_id, open_->record.payload_kg);
     }
@@ -169,15 +122,7 @@ void RobotSession::resume(const history::Mission& mission) {
       outputs_.warn(robot_id_, describe(earlier.error()));
     }
   }
-  open_ = std::make_unique<OpenMission>();
-  open_->record = mission;
-  open_->stored = true;
-  open_->earlier_gaps = mission.gap_count;
-  open_->earlier_gap_s = mission.gap_s;
-  open_->resumed_silent = true;
-  const auto zeros = mission.sample_faults.find(name_of(IngestFault::zero_payload));
-  const std::int64_t contradicted = zeros == mission.sample_faults.end() ? 0 : zeros->second;
-  open_->payload = telemetry::MissionPayload(mission.payload_kg, mission.samples > contradicted);
+  open_ = std::make_unique<OpenMission>(mission);
   covariates_.resume(mission);
   missions_.resume({mission.mission_id, mission.start_utime_us, mission.end_utime_us, mission.payload_kg,
                     mission.implicit});
@@ -250,13 +195,7 @@ void RobotSession::note_fault(IngestFault fault, std::uint64_t count, std::strin
     contradictions_->hear(fault, count, why);
   }
   if (why.empty()) return;
-  const auto [told, first] = told_.try_emplace(fault);
-  told->second.since += count;
-  if (first || host_utime_us - told->second.utime_us >= report_period_us) {
-    outputs_.warn(robot_id_, name + ": " + why + " (" + std::to_string(told->second.since) +
-                                 (first ? " so far)" : " since this was last logged)"));
-    told->second = {host_utime_us, 0};
-  }
+  if (const auto line = fault_log_.add(fault, count, why, host_utime_us)) outputs_.warn(robot_id_, *line);
   snapshot_.fault_notes[name] = std::move(why);
 }
 
@@ -329,26 +268,21 @@ void RobotSession::on_clock_step(const signals::Sample& sample) {
   interrupt();
   missions_.on_clock_step(sample.utime_us);
   covariates_.on_clock_step(sample.utime_us);
-  if (open_ == nullptr || open_->record.samples == 0) return;
-  open_->record.incomplete = true;
-  open_->record.incomplete_reason = "the robot's clock was set during the mission";
-  if (!open_->stepped_utime_us) open_->stepped_utime_us = snapshot_.received_utime_us;
+  if (open_ != nullptr) open_->on_clock_step(snapshot_.received_utime_us);
 }
 
 bool RobotSession::is_too_fast(std::int64_t elapsed_us) {
-  if (open_ == nullptr || !open_->stepped_utime_us) return false;
-  const std::int64_t passed_us = snapshot_.received_utime_us - *open_->stepped_utime_us;
-  if (open_->booked_us + elapsed_us <= passed_us + settings_.booked_margin_us) {
-    open_->booked_us += elapsed_us;
-    return false;
-  }
+  const auto too_fast =
+      open_ == nullptr ? std::nullopt
+                       : open_->book(elapsed_us, snapshot_.received_utime_us, settings_.booked_margin_us);
+  if (!too_fast) return false;
   interrupt();
   on_fault(
       IngestFault::too_fast, 1,
       fmt::format(
           "since the robot's clock was set, samples of {:.1f} s came in {:.1f} s; at most {:.0f} s more than "
           "passed are accounted for",
-          static_cast<double>(open_->booked_us + elapsed_us) * 1e-6, static_cast<double>(passed_us) * 1e-6,
+          static_cast<double>(too_fast->booked_us) * 1e-6, static_cast<double>(too_fast->passed_us) * 1e-6,
           static_cast<double>(settings_.booked_margin_us) * 1e-6));
   return true;
 }
@@ -499,10 +433,8 @@ void RobotSession::remember_charge() {
 
 void RobotSession::keep(const signals::Sample& sample) {
   if (!open_->stored) begin_record();
-  event_allowance_ = std::min(event_burst, event_allowance_ + events_a_sample);
-  ++open_->record.samples;
-  ++open_->unsaved;
-  open_->samples.push_back(sample);
+  event_allowance_.earn_by_sample();
+  open_->keep(sample);
   taken_in_ = {sample.utime_us, sample.sequence};
   if (open_->samples.size() >= settings_.checkpoint_samples) checkpoint();
 }
@@ -515,16 +447,7 @@ void RobotSession::on_own_sample(const signals::Sample& sample) {
     return on_fault(IngestFault::outside_mission);
   }
 
-  if (open_->resumed_silent) {
-    open_->resumed_silent = false;
-    const double down_s = static_cast<double>(sample.utime_us - open_->record.end_utime_us) * 1e-6;
-    if (down_s > settings_.meter.gap_bridge_s) {
-      ++open_->earlier_gaps;
-      open_->earlier_gap_s += down_s;
-      open_->record.incomplete = true;
-      open_->record.incomplete_reason = "the service was down during the mission";
-    }
-  }
+  if (open_->resumed_silent) open_->go_on_after_silence(sample.utime_us, settings_.meter.gap_bridge_s);
   ++snapshot_.samples;
   outputs_.counters.samples.fetch_add(1, std::memory_order_relaxed);
   if (open_->payload.contradicts(sample.payload_kg)) on_fault(IngestFault::zero_payload);
@@ -542,18 +465,10 @@ void RobotSession::on_own_sample(const signals::Sample& sample) {
 }
 
 bool RobotSession::may_send_event(std::int64_t host_utime_us) {
-  const double passed_s =
-      1e-6 * static_cast<double>(std::max<std::int64_t>(0, host_utime_us - event_utime_us_));
-  event_utime_us_ = host_utime_us;
-  event_allowance_ = std::min(event_burst, event_allowance_ + passed_s * settings_.event_rate_hz);
-  if (event_allowance_ < 1) {
-    on_fault(
-        IngestFault::event_flood, 1,
-        fmt::format("more than {:g} mission events a second are not looked at", settings_.event_rate_hz));
-    return false;
-  }
-  --event_allowance_;
-  return true;
+  if (event_allowance_.spend(host_utime_us)) return true;
+  on_fault(IngestFault::event_flood, 1,
+           fmt::format("more than {:g} mission events a second are not looked at", settings_.event_rate_hz));
+  return false;
 }
 
 void RobotSession::on_event(const signals::MissionEvent& event, std::int64_t host_utime_us) {
@@ -575,7 +490,7 @@ void RobotSession::on_event(const signals::MissionEvent& event, std::int64_t hos
   };
   const std::uint64_t before = refused();
   telemetry::MissionActions actions = missions_.on_event(event);
-  if (actions.empty()) ++event_allowance_;  // robots may repeat themselves
+  if (actions.empty()) event_allowance_.give_back();  // robots may repeat themselves
   carry_out(actions);
   if (refused() != before && !repeats_) on_fault(IngestFault::bad_event);
   changed_ = true;
@@ -610,17 +525,8 @@ void RobotSession::open(const telemetry::MissionAction& action) {
   legs_->begin();
   covariates_.begin_mission(action.utime_us);
   contradictions_->begin_mission(action.mission_id, action.payload_kg);
-  open_ = std::make_unique<OpenMission>();
-  open_->charge_memory = charge_->memory_json();
-  history::Mission& record = open_->record;
-  record.robot_id = robot_id_;
-  record.mission_id = action.mission_id;
-  record.start_utime_us = record.end_utime_us = action.utime_us;
-  record.implicit = action.implicit;
-  record.payload_kg = action.payload_kg;
-  open_->payload = telemetry::MissionPayload(action.payload_kg);
-  record.note = action.note;
-  record.model_version = model_->version;
+  open_ = std::make_unique<OpenMission>(robot_id_, action, model_->version, charge_->memory_json());
+  const history::Mission& record = open_->record;
   snapshot_.mission_id = record.mission_id;
   snapshot_.mission_key = 0;
   snapshot_.mission_start_utime_us = record.start_utime_us;
@@ -662,20 +568,7 @@ void RobotSession::close(const telemetry::MissionAction& action) {
   if (open_ == nullptr) return;
   flush_meter();
   history::Mission& record = open_->record;
-  record.state = open_->resumed_silent ? history::MissionState::interrupted : state_of(action.end);
-  if (record.state == history::MissionState::unfinished ||
-      record.state == history::MissionState::interrupted) {
-    record.incomplete = true;
-    if (record.incomplete_reason.empty()) {
-      record.incomplete_reason =
-          open_->resumed_silent ? "the service stopped during the mission and the robot did not come back"
-                                : "the robot fell silent before the end";
-    }
-  }
-  // Robots tend to say the same of a mission at its start and its end.
-  if (!action.note.empty() && action.note != record.note)
-    record.note += (record.note.empty() ? "" : "; ") + action.note;
-  record.end_utime_us = std::max(record.end_utime_us, action.utime_us);
+  open_->finish(action);
   const std::vector<Contradiction> found =
       contradictions_ != nullptr ? contradictions_->end_mission() : std::vector<Contradiction>{};
   tell_contradictions();
@@ -710,15 +603,7 @@ void RobotSession::flush_meter() {
 }
 
 void RobotSession::refresh_record() {
-  history::Mission& record = open_->record;
-  if (meter_ == nullptr || open_->resumed_silent) return;
-  record.accounts = meter_->accounts();
-  record.gap_count = open_->earlier_gaps + static_cast<std::int64_t>(meter_->gaps());
-  record.gap_s = open_->earlier_gap_s + meter_->gap_seconds();
-  if (meter_->gaps() > 0 && !record.incomplete) {
-    record.incomplete = true;
-    record.incomplete_reason = "no samples for longer than can be bridged";
-  }
+  if (meter_ != nullptr) open_->refresh(*meter_);
 }
 
 void RobotSession::checkpoint() {

@@ -17,15 +17,17 @@
 #include "ingest/contradiction_watch.h"
 #include "ingest/counters.h"
 #include "ingest/covariate_watch.h"
+#include "ingest/event_allowance.h"
+#include "ingest/fault_log.h"
 #include "ingest/fleet_view.h"
 #include "ingest/model_registry.h"
+#include "ingest/open_mission.h"
 #include "ingest/refinement_watch.h"
 #include "ingest/sample_order.h"
 #include "ingest/trace_builder.h"
 #include "signals/mission_event.h"
 #include "signals/sample.h"
 #include "telemetry/mission_tracker.h"
-#include "telemetry/payload.h"
 #include "telemetry/sequence_tracker.h"
 
 namespace joulecast::ingest {
@@ -39,7 +41,7 @@ struct SessionSettings {
   std::int64_t sender_takeover_us =
       2'000'000;                          // silence of a robot's sender after which another one may speak
   std::int64_t max_ahead_us = INT64_MAX;  // of robots' clocks ahead of the host's; a log has none
-  std::int64_t booked_margin_us = 60'000'000;  // see RobotSession::is_too_fast
+  std::int64_t booked_margin_us = 60'000'000;  // see OpenMission::book
   double event_rate_hz = 5;                    // of mission events, in the long run
   std::size_t checkpoint_samples = 1024;       // a mission is checkpointed at this many samples at the latest
 };
@@ -115,15 +117,12 @@ class RobotSession {
   const std::string& robot_id() const { return robot_id_; }
 
  private:
-  struct OpenMission;
-
   // A sample in the order of its sequence number, or that no order helps.
   void place(const signals::Sample& sample);
   void on_clock_step(const signals::Sample& sample);
   // What is integrated next does not continue what was.
   void interrupt();
-  // Once a robot's clock was set within a mission, its time may pass no faster than the host's, but for a
-  // margin: else a clock that is set again and again would book more energy than there was time for.
+  // Whether what came is not looked at, which is counted as a fault.
   bool is_too_fast(std::int64_t elapsed_us);
   bool is_too_far_ahead(std::int64_t utime_us, std::int64_t host_utime_us);
   bool may_send_event(std::int64_t host_utime_us);
@@ -182,13 +181,8 @@ class RobotSession {
   std::int64_t last_sequence_ = 0;
   std::optional<history::StreamPosition> taken_in_;  // the last sample that a mission took in
   bool repeats_ = false;
-  double event_allowance_;
-  std::int64_t event_utime_us_ = 0;  // host's, when it was last counted up
-  struct Told {
-    std::int64_t utime_us = 0;  // host's, when it was last logged
-    std::uint64_t since = 0;    // further ones
-  };
-  std::map<IngestFault, Told> told_;
+  EventAllowance event_allowance_;
+  FaultLog fault_log_;
   bool changed_ = false;
 };
 

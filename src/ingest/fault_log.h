@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "ingest/counters.h"
+
+namespace joulecast::ingest {
+
+// What is logged of a robot's faults: each kind at once, and then at most every ten minutes, with how many
+// came since.
+class FaultLog {
+ public:
+  // The line to log, if it is time for one.
+  std::optional<std::string> add(IngestFault fault, std::uint64_t count, const std::string& why,
+                                 std::int64_t host_utime_us);
+
+ private:
+  struct Logged {
+    std::int64_t utime_us = 0;  // host's, when it was last logged
+    std::uint64_t since = 0;    // further ones
+  };
+  std::map<IngestFault, Logged> logged_;
+};
+
+}  // namespace joulecast::ingest

@@ -1,0 +1,121 @@
+#include "ingest/open_mission.h"
+
+#include <algorithm>
+
+namespace joulecast::ingest {
+namespace {
+
+history::MissionState state_of(telemetry::MissionEnd end) {
+  switch (end) {
+    case telemetry::MissionEnd::finished:
+    case telemetry::MissionEnd::idle:
+    case telemetry::MissionEnd::expired:
+      return history::MissionState::finished;
+    case telemetry::MissionEnd::aborted:
+      return history::MissionState::aborted;
+    case telemetry::MissionEnd::superseded:
+      return history::MissionState::superseded;
+    case telemetry::MissionEnd::unfinished:
+      return history::MissionState::unfinished;
+  }
+  return history::MissionState::unfinished;
+}
+
+// Whether any of its stored samples said a payload that holds for the mission.
+bool payload_was_said(const history::Mission& stored) {
+  const auto zeros = stored.sample_faults.find(name_of(IngestFault::zero_payload));
+  return stored.samples > (zeros == stored.sample_faults.end() ? 0 : zeros->second);
+}
+
+}  // namespace
+
+OpenMission::OpenMission(const std::string& robot_id, const telemetry::MissionAction& action,
+                         std::int64_t model_version, std::string memory)
+    : payload(action.payload_kg), charge_memory(std::move(memory)) {
+  record.robot_id = robot_id;
+  record.mission_id = action.mission_id;
+  record.start_utime_us = record.end_utime_us = action.utime_us;
+  record.implicit = action.implicit;
+  record.payload_kg = action.payload_kg;
+  record.note = action.note;
+  record.model_version = model_version;
+}
+
+OpenMission::OpenMission(const history::Mission& from)
+    : record(from),
+      stored(true),
+      payload(from.payload_kg, payload_was_said(from)),
+      resumed_silent(true),
+      earlier_gaps_(from.gap_count),
+      earlier_gap_s_(from.gap_s) {}
+
+void OpenMission::end_at(std::int64_t utime_us) {
+  record.end_utime_us = std::max(record.start_utime_us, utime_us);
+}
+
+void OpenMission::keep(const signals::Sample& sample) {
+  ++record.samples;
+  ++unsaved;
+  samples.push_back(sample);
+}
+
+void OpenMission::mark_incomplete(const char* reason) {
+  record.incomplete = true;
+  record.incomplete_reason = reason;
+}
+
+void OpenMission::use_another_meter(std::int64_t model_version) {
+  earlier_gaps_ = record.gap_count;
+  earlier_gap_s_ = record.gap_s;
+  record.model_version = model_version;
+}
+
+void OpenMission::go_on_after_silence(std::int64_t utime_us, double gap_bridge_s) {
+  resumed_silent = false;
+  const double down_s = static_cast<double>(utime_us - record.end_utime_us) * 1e-6;
+  if (down_s <= gap_bridge_s) return;
+  ++earlier_gaps_;
+  earlier_gap_s_ += down_s;
+  mark_incomplete("the service was down during the mission");
+}
+
+void OpenMission::refresh(const energy::Meter& meter) {
+  if (resumed_silent) return;
+  record.accounts = meter.accounts();
+  record.gap_count = earlier_gaps_ + static_cast<std::int64_t>(meter.gaps());
+  record.gap_s = earlier_gap_s_ + meter.gap_seconds();
+  if (meter.gaps() > 0 && !record.incomplete) mark_incomplete("no samples for longer than can be bridged");
+}
+
+void OpenMission::finish(const telemetry::MissionAction& action) {
+  record.state = resumed_silent ? history::MissionState::interrupted : state_of(action.end);
+  if (record.state == history::MissionState::unfinished ||
+      record.state == history::MissionState::interrupted) {
+    record.incomplete = true;
+    if (record.incomplete_reason.empty())
+      mark_incomplete(resumed_silent
+                          ? "the service stopped during the mission and the robot did not come back"
+                          : "the robot fell silent before the end");
+  }
+  // Robots tend to say the same of a mission at its start and its end.
+  if (!action.note.empty() && action.note != record.note)
+    record.note += (record.note.empty() ? "" : "; ") + action.note;
+  record.end_utime_us = std::max(record.end_utime_us, action.utime_us);
+}
+
+void OpenMission::on_clock_step(std::int64_t host_utime_us) {
+  if (record.samples == 0) return;
+  mark_incomplete("the robot's clock was set during the mission");
+  if (!stepped_utime_us_) stepped_utime_us_ = host_utime_us;
+}
+
+std::optional<OpenMission::TooFast> OpenMission::book(std::int64_t elapsed_us, std::int64_t host_utime_us,
+                                                      std::int64_t margin_us) {
+  if (!stepped_utime_us_) return {};
+  const std::int64_t passed_us = host_utime_us - *stepped_utime_us_;
+  if (booked_us_ + elapsed_us > passed_us + margin_us) return TooFast{booked_us_ + elapsed_us, passed_us};
+  booked_us_ += elapsed_us;
+  return {};
+}
+
+}  // namespace joulecast::ingest

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "energy/meter.h"
+#include "history/records.h"
+#include "ingest/counters.h"
+#include "signals/sample.h"
+#include "telemetry/mission_tracker.h"
+#include "telemetry/payload.h"
+
+namespace joulecast::ingest {
+
+// The mission that is open, as stored, with what came since its last checkpoint.
+struct OpenMission {
+  // Begun by its robot, with what the battery's watch knew then.
+  OpenMission(const std::string& robot_id, const telemetry::MissionAction& action, std::int64_t model_version,
+              std::string charge_memory);
+  // Left open by the last daemon.
+  explicit OpenMission(const history::Mission& stored);
+
+  void end_at(std::int64_t utime_us);  // a clock that is set back would end it before its start
+  void keep(const signals::Sample& sample);
+  void mark_incomplete(const char* reason);
+  // The meter was replaced: its gaps are counted from zero again.
+  void use_another_meter(std::int64_t model_version);
+  // The first sample after a restart.
+  void go_on_after_silence(std::int64_t utime_us, double gap_bridge_s);
+  void refresh(const energy::Meter& meter);
+  void finish(const telemetry::MissionAction& action);
+
+  // Once its robot's clock was set within a mission, the robot's time may pass no faster than the host's, but
+  // for a margin: else a clock that is set again and again would book more energy than there was time for.
+  void on_clock_step(std::int64_t host_utime_us);
+  // How long its samples have lasted since the clock was set, with this one, and the host's time since then,
+  // where that is too fast; else the sample's time is booked.
+  struct TooFast {
+    std::int64_t booked_us, passed_us;
+  };
+  std::optional<TooFast> book(std::int64_t elapsed_us, std::int64_t host_utime_us, std::int64_t margin_us);
+
+  history::Mission record;
+  bool stored = false;
+  std::vector<signals::Sample> samples;
+  std::uint64_t unsaved = 0;
+  telemetry::MissionPayload payload;
+  bool resumed_silent = false;  // resumed after a restart, and nothing came since
+  std::string charge_memory;    // of its begin
+
+ private:
+  // Gaps that earlier meters counted.
+  std::int64_t earlier_gaps_ = 0;
+  double earlier_gap_s_ = 0;
+  std::optional<std::int64_t> stepped_utime_us_;  // host's, when the robot's clock was first set
+  std::int64_t booked_us_ = 0;                    // since then
+};
+
+}  // namespace joulecast::ingest
