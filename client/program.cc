@@ -1,8 +1,12 @@
 #include "client/program.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "client/commands/help.h"
 #include "client/commands/wrong_use.h"
@@ -19,8 +23,15 @@ void prepare(CLI::App& program, const std::string& version) {
 }
 
 int run(CLI::App& program, int argc, char** argv, const Exit& exit) {
+  // `joulecast help missions` as `joulecast missions --help`.
+  std::vector<std::string> words(argv + 1, argv + argc);
+  if (!words.empty() && words.front() == "help") {
+    words.erase(words.begin());
+    words.emplace_back("--help");
+  }
+  std::ranges::reverse(words);  // as the parser takes them
   try {
-    program.parse(argc, argv);
+    program.parse(std::move(words));
   } catch (const CLI::ParseError& error) {
     // Help and version come this way too, with code 0; every other parse error is wrong use.
     if (error.get_exit_code() == 0) return program.exit(error);

@@ -217,7 +217,7 @@ Result<void> Settings::read_file_text(std::string_view json_text, std::string_vi
   auto document = parse_json(json_text);
   const std::string prefix = std::string(file) + ": ";
   if (!document) {
-    return invalid(prefix + document.error().field, document.error().message);
+    return invalid(std::string(file), describe(document.error()));
   }
   if (!document->is_object()) return invalid(std::string(file), "must be a JSON object of sections");
   const std::vector<std::string> keys = all_names([](const Setting& each) { return std::string(each.key); });

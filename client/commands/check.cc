@@ -63,11 +63,12 @@ Result<Kind> kind_of(const std::string& path) {
   if (!file) return fail(Fault::not_found, path, "cannot be opened");
   std::array<unsigned char, 4> first{};
   file.read(reinterpret_cast<char*>(first.data()), first.size());
+  if (file.gcount() == 0) return invalid(path, "is empty");
   std::uint32_t word = 0;
   for (const unsigned char byte : first) word = word << 8 | byte;
   if (word == telemetry::log_sync_word) return Kind::log;
   const auto text = std::find_if(first.begin(), first.end(), [](unsigned char c) { return c > ' '; });
-  if (text == first.end() || *text != '{') return Kind::table;
+  if (text == first.end() || (*text != '{' && *text != '[')) return Kind::table;
   const auto content = read_file(path);
   if (!content) return tl::unexpected(content.error());
   const json document = json::parse(*content, nullptr, false);
@@ -297,15 +298,16 @@ void print(const Report& report) {
   print(report.findings);
 }
 
-Exit run(const Options& options) {
+Exit run(Options options) {
   Report found;
   if (!options.robot.empty()) {
     auto robot = robot::load_robot(options.robot);
     if (!robot) return report(robot.error());
     found.robot = std::move(*robot);
+    if (options.files.empty() && options.robot_id.empty()) options.robot_id = found.robot->robot_id;
   }
   if (options.files.empty() && options.robot_id.empty())
-    return report(Error{Fault::invalid, "--robot-id", "is needed where no file is given"});
+    return report(Error{Fault::invalid, "--robot-id", "is needed where neither a file nor --robot is given"});
   const auto done = !options.files.empty()    ? check_files(options, found)
                     : !options.server.empty() ? check_server(options, found)
                                               : check_live(options, found);

@@ -139,11 +139,13 @@ void print(const Findings& findings) {
     fmt::print("{}\n", wrapped(fmt::format("{} {}: {}", f.fault ? "fault  " : "warning", where, f.says),
                                help_width(), 8));
   }
+  if (findings.empty()) return fmt::print("nothing found\n");
+  const auto told = [](std::ptrdiff_t count, const char* what) {
+    return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+  };
   const auto faults = std::ranges::count_if(findings, &Finding::fault);
-  if (findings.empty())
-    fmt::print("nothing found\n");
-  else
-    fmt::print("{} faults, {} warnings\n", faults, static_cast<std::ptrdiff_t>(findings.size()) - faults);
+  const auto warnings = static_cast<std::ptrdiff_t>(findings.size()) - faults;
+  fmt::print("{}, {}\n", told(faults, "fault"), told(warnings, "warning"));
 }
 
 Exit exit_of(const Findings& findings) {

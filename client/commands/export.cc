@@ -79,7 +79,7 @@ Exit export_period(const Options& options, const char* path, Query query) {
   for (const auto& [name, flag, text] : {std::tuple{"from_utime_us", "--from", &options.from},
                                          std::tuple{"to_utime_us", "--to", &options.to}}) {
     if (!*text) continue;
-    const auto utime_us = parse_time(**text, flag);
+    const auto utime_us = text == &options.to ? parse_end_time(**text, flag) : parse_time(**text, flag);
     if (!utime_us) return report(utime_us.error());
     query.emplace_back(name, std::to_string(*utime_us));
   }

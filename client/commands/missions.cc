@@ -31,6 +31,11 @@ struct Options {
   bool json = false;
 };
 
+std::string state_of(const json& mission) {
+  if (!mission.value("annulled", json()).is_null()) return "annulled";
+  return text_of(mission["state"]) + (mission.value("incomplete", false) ? "*" : "");
+}
+
 std::string joules(const json& energy, const char* name) {
   const auto found = energy.find(name);
   return found != energy.end() && found->is_number() ? fmt::format("{:.2f}", found->get<double>()) : "-";
@@ -42,8 +47,7 @@ void print_table(const json& page) {
   for (const json& m : page["missions"]) {
     const json& energy = m["energy"];
     fmt::print("{:>6} {:<20} {:<28} {:<12} {:<19} {:>9} {:>9} {:>12} {:>12}\n", text_of(m["id"]),
-               text_of(m["robot_id"]), text_of(m["mission_id"]),
-               text_of(m["state"]) + (m.value("incomplete", false) ? "*" : ""), to_second(m["start"]),
+               text_of(m["robot_id"]), text_of(m["mission_id"]), state_of(m), to_second(m["start"]),
                joules(energy, "duration_s"), joules(energy, "distance_m"), joules(energy, "battery_j"),
                joules(energy, "modelled_j"));
   }
@@ -60,7 +64,7 @@ Exit run(const Options& options) {
     if (!value) continue;
     std::string sent = *value;
     if (name.ends_with("_utime_us")) {
-      const auto utime_us = parse_time(sent, flag);
+      const auto utime_us = flag == "--to" ? parse_end_time(sent, flag) : parse_time(sent, flag);
       if (!utime_us) return report(utime_us.error());
       sent = std::to_string(*utime_us);
     }
@@ -92,7 +96,7 @@ void add_missions(CLI::App& program, Exit& exit) {
       {"--incomplete", "incomplete", "true: only those with unmeasured parts; false: only those without"},
       {"--from", "from_utime_us",
        "started at or after: 2024-07-18, 2024-07-18T09:10:45Z or microseconds since 1970"},
-      {"--to", "to_utime_us", "started before, the same"},
+      {"--to", "to_utime_us", "started before, the same; a day alone is in it"},
       {"--payload-min", "payload_min_kg", "kg"},
       {"--payload-max", "payload_max_kg", "kg"},
       {"--limit", "limit", "missions on the page"},

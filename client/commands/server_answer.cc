@@ -48,6 +48,10 @@ Result<HttpReply> ask(const std::string& server, HttpMethod method, const std::s
   Error error = error_of(*reply);
   const auto by_name = std::ranges::find(renamed, error.field, &Renamed::value_type::first);
   if (by_name != renamed.end()) error.field = by_name->second;
+  // Names of times stand in messages too.
+  for (const auto& [name, flag] : renamed)
+    if (const auto at = error.message.find(name); name.ends_with("_utime_us") && at != std::string::npos)
+      error.message.replace(at, name.size(), flag);
   return tl::unexpected(std::move(error));
 }
 

@@ -22,6 +22,7 @@
 #include "base/text_file.h"
 #include "base/utc_time.h"
 #include "client/commands/accepts.h"
+#include "client/commands/parse_time.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/http_client.h"
@@ -43,14 +44,13 @@ namespace {
 using Clock = std::chrono::steady_clock;
 namespace vr = virtual_robot;
 
-constexpr std::int64_t batch_start_us = 1'700'000'000'000'000;  // logs made without a clock begin here
-
 struct Options {
   std::size_t robots = 4;
   std::uint64_t seed = 1;
   std::string lcm_url = usual_lcm_url();
   double rate_hz = 50;
   double speed = 1;
+  std::string start = "2023-11-14T22:13:20Z";  // of logs alone
   double duration_s = 0;
   int missions = 0;
   double mission_duration_s = 110;
@@ -313,10 +313,10 @@ Result<Outlets> open_outlets(const Options& options, bool over_lcm) {
 }
 
 std::vector<vr::SimulationSpec> timed_specs(const std::vector<Member>& members, const Options& options,
-                                            bool over_lcm) {
+                                            std::int64_t log_start_utime_us, bool over_lcm) {
   std::vector<vr::SimulationSpec> specs;
   for (const Member& member : members) specs.push_back(member.spec);
-  std::int64_t start_us = batch_start_us;
+  std::int64_t start_us = log_start_utime_us;
   if (over_lcm) {
     // Robots whose time runs faster begin as far in the past as brings their last stamp to the time it is
     // sent.
@@ -381,6 +381,8 @@ Result<Sent> publish(vr::Fleet& fleet, std::int64_t start_us, const Options& opt
 
 Result<void> run(const Options& options, bool over_lcm) {
   if (auto checked = check_options(options, over_lcm); !checked) return checked;
+  const auto start_utime_us = parse_time(options.start, "--start");
+  if (!start_utime_us) return tl::unexpected(start_utime_us.error());
   auto members = assemble(options);
   if (!members) return tl::unexpected(members.error());
   auto outlets = open_outlets(options, over_lcm);
@@ -388,7 +390,7 @@ Result<void> run(const Options& options, bool over_lcm) {
   if (!options.server.empty()) {
     if (auto known = introduce(*members, options.server); !known) return known;
   }
-  const std::vector<vr::SimulationSpec> specs = timed_specs(*members, options, over_lcm);
+  const std::vector<vr::SimulationSpec> specs = timed_specs(*members, options, *start_utime_us, over_lcm);
   vr::Fleet fleet(specs, options.seed);
   if (!options.quiet && over_lcm) announce(specs, options.lcm_url);
   const auto began = Clock::now();
@@ -478,8 +480,8 @@ void add_simulate(CLI::App& program, Exit& exit) {
                   ->add_option("--lcm-url", options->lcm_url,
                                "LCM provider to publish on; JOULECAST_LCM_URL without it")
                   ->capture_default_str();
-  command->add_option("--log", options->log,
-                      "write an LCM event log; without --lcm-url nothing is published");
+  auto* log = command->add_option("--log", options->log,
+                                  "write an LCM event log; without --lcm-url nothing is published");
   command->add_option("--key-file", options->key_file,
                       "sign what is published for robots that have keys in this file of joulecast key");
   command->add_option("--truth", options->truth,
@@ -496,6 +498,13 @@ void add_simulate(CLI::App& program, Exit& exit) {
                    "begin in the past, so that no stamp lies in the future")
       ->check(not_negative())
       ->capture_default_str();
+  command
+      ->add_option(
+          "--start", options->start,
+          "with --log alone: when the robots begin, UTC (2026-11-16T08:00:00Z) or microseconds since 1970")
+      ->capture_default_str()
+      ->needs(log)
+      ->excludes(url);
   command->add_option("--duration", options->duration_s, "robot seconds to run; 0 = until stopped")
       ->check(not_negative())
       ->capture_default_str();

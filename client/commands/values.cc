@@ -53,6 +53,7 @@ constexpr auto table = std::to_array<Named>({
     {"", "--name", "NAME", ""},
     {"token create", "--robots", "PATTERN", ""},
     {"audit verify", "--head", "HASH", ""},
+    {"simulate", "--start", "TIME", ""},
     {"simulate", "--key-file", "FILE", "*.json"},
     {"simulate", "--log", "FILE", "*.lcmlog"},
     {"simulate", "--truth", "FILE", "*.json"},

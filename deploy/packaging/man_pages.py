@@ -1,6 +1,7 @@
-"""Writes the manual pages from what the programs' --help says: joulecastd.8, joulecast.1 and one for each command.
+"""Writes the manual pages from what the programs' --help says: joulecastd.8, joulecast.1, joulecast-study.1 and one for each
+command.
 
-man_pages.py DAEMON CLIENT FOLDER
+man_pages.py DAEMON CLIENT STUDY PROJECT FOLDER
 """
 
 import gzip
@@ -48,7 +49,7 @@ def rows(lines):
     return table
 
 
-def page(name, section, text, related):
+def page(name, section, text, related, project):
     parts = sections(text)
     summary = " ".join(line for line in parts[0][1] if line).removeprefix("joulecast: ").removeprefix("joulecastd: ")
     out = [f'.TH {name.upper()} {section} "" joulecast', ".SH NAME", f"{name} \\- {roff(summary)}"]
@@ -59,6 +60,8 @@ def page(name, section, text, related):
                 out += [".TP", ".B " + roff(left), roff(meaning)]
             else:
                 out += [".PP", roff(left or meaning)]
+    out += [".SH FILES", ".TP", ".B " + roff(project),
+            roff("README.md and the documents it lists (package joulecastd); robot files, mappings and examples to start from")]
     out += [".SH SEE ALSO", ", ".join(map(roff, related))]
     return "\n".join(out) + "\n"
 
@@ -68,24 +71,26 @@ def commands_of(text):
 
 
 def main():
-    daemon, client, folder = sys.argv[1], sys.argv[2], Path(sys.argv[3])
+    daemon, client, study, project, folder = *sys.argv[1:5], Path(sys.argv[5])
     folder.mkdir(parents=True, exist_ok=True)
+    for earlier in folder.glob("*.gz"):
+        earlier.unlink()
 
     def write(name, section, text, related):
-        content = page(name, section, text, related).encode()
+        content = page(name, section, text, related, project).encode()
         (folder / f"{name}.{section}.gz").write_bytes(gzip.compress(content, 9, mtime=0))
 
-    def write_client(command):
-        text = help_of(client, *command)
-        name = "-".join(["joulecast", *command])
+    def write_commands(program, first, related, command=()):
+        text = help_of(program, *command)
+        name = "-".join([first, *command])
         below = commands_of(text)
-        write(name, 1, text, [f"{name}-{each}(1)" for each in below] + (["joulecast(1)"] if command else []) +
-              ["joulecastd(8)"])
+        write(name, 1, text, [f"{name}-{each}(1)" for each in below] + ([f"{first}(1)"] if command else []) + related)
         for each in below:
-            write_client([*command, each])
+            write_commands(program, first, related, (*command, each))
 
     write("joulecastd", 8, help_of(daemon), ["joulecast(1)"])
-    write_client([])
+    write_commands(client, "joulecast", ["joulecast-study(1)", "joulecastd(8)"])
+    write_commands(study, "joulecast-study", ["joulecast(1)", "joulecastd(8)"])
 
 
 main()

@@ -143,13 +143,13 @@ std::vector<std::string> titled(std::vector<std::string> first, std::vector<std:
 Response list_csv(const Request& request, const history::MissionPage& page) {
   Csv csv(request, titled({"id", "robot_id", "mission_id", "state", "incomplete", "incomplete_reason",
                            "start", "end", "start_utime_us", "end_utime_us", "payload_kg", "model_version"},
-                          {"note"}));
+                          {"annulled", "note"}));
   for (const history::Mission& m : page.missions) {
     csv.field(m.key).field(m.robot_id).field(m.mission_id).field(history::name(m.state)).field(m.incomplete);
     csv.field(m.incomplete_reason).field(utc_text(m.start_utime_us)).field(utc_text(m.end_utime_us));
     csv.field(m.start_utime_us).field(m.end_utime_us).field(m.payload_kg).field(m.model_version);
     add_accounts(csv, m);
-    csv.field(m.note).end_row();
+    csv.field(!history::findings_of(m).annulled.empty()).field(m.note).end_row();
   }
   return csv.response("missions", request, page.next_cursor);
 }

@@ -1,6 +1,7 @@
 #include "server/http/gate.h"
 
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -78,9 +79,12 @@ Result<std::unique_ptr<Gate>> Gate::open(Options options) {
   auto gate = std::unique_ptr<Gate>(new Gate(std::move(options)));
   if (!gate->enabled()) return gate;
   gate->stamp_ = gate->stamp();
-  if (Result<void> loaded = gate->load(); !loaded)
+  if (Result<void> loaded = gate->load(); !loaded) {
+    const bool there = ::access(gate->options_.token_file.c_str(), F_OK) == 0;
     return fail(loaded.error().fault, "auth.token_file",
-                describe(loaded.error()) + "; joulecast token create makes it");
+                describe(loaded.error()) + (there ? "; the daemon's user must be able to read it"
+                                                  : "; joulecast token create makes it"));
+  }
   return gate;
 }
 

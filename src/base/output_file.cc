@@ -56,7 +56,7 @@ OutputFile::~OutputFile() {
 }
 
 Result<OutputFile> OutputFile::create(const std::string& path, Existing existing) {
-  if (const auto may = may_write(path, path, existing); !may) return tl::unexpected(may.error());
+  if (const auto may = may_write("", path, existing); !may) return tl::unexpected(may.error());
   std::string part;
   int descriptor = -1;
   if (is_written_directly(path)) {

@@ -1,7 +1,12 @@
 #include "history/store_care.h"
 
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <utility>
@@ -169,6 +174,16 @@ void drop_loose_ends(Database& database, Salvage& salvage) {
        salvage);
 }
 
+// What root makes is its daemon's, as what was there before or its directory is.
+Result<void> give_to_owner(const std::string& file, const fs::path& example) {
+  struct stat owner {};
+  if (geteuid() != 0) return {};
+  if (stat(example.c_str(), &owner) != 0 || chown(file.c_str(), owner.st_uid, owner.st_gid) != 0)
+    return fail(Fault::unavailable, file,
+                std::string("cannot be given to its owner: ") + std::strerror(errno));
+  return {};
+}
+
 }  // namespace
 
 Result<StoreCheck> check_store(const std::string& path) {
@@ -222,6 +237,10 @@ Result<std::string> restore_store(const std::string& from, const std::string& pa
     if (!source) return tl::unexpected(source.error());
     if (auto copied = copy_into(**source, file->written_to()); !copied) return tl::unexpected(copied.error());
   }
+  if (auto owned =
+          give_to_owner(file->written_to(), replaces ? fs::path(path) : fs::absolute(path).parent_path());
+      !owned)
+    return tl::unexpected(owned.error());
   std::string before;
   if (replaces) {
     before = path + ".before-" + format_utc(host_utime_us(), "%Y%m%dT%H%M%S");

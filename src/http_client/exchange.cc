@@ -112,7 +112,7 @@ class Exchange {
   void receive() {
     with_stream([this](auto& stream) {
       http::async_read(stream, buffer_, parser_, [this](beast::error_code failed, std::size_t) {
-        if (!settle(failed, "receive")) finish();
+        if (!settle(failed, "receive", tls_ ? "" : "; does the port want https?")) finish();
       });
     });
   }

@@ -186,13 +186,16 @@ class Reader {
       refuse(pointer, "must be an object");
       return targets;
     }
+    bool all = true;
     for (const auto& [name, member] : value.items()) {
       const std::string here = pointer + "/" + name;
       std::vector<std::size_t> numbers;
       for (std::size_t k = 0; k < signals::sample_numbers; ++k)
         if (signals::sample_fields[k].name == name) numbers.push_back(k);
-      if (numbers.empty() || name == "payload_mass") {  // the payload is the mission's
-        refuse(here, "is no field of a sample that a table can fill");
+      if (name == "payload_mass") refuse(here, "is the mission's: give payload_kg beside fields");
+      if (numbers.empty()) refuse(here, "is no field of a sample that a table can fill");
+      if (numbers.empty() || name == "payload_mass") {
+        all = false;
         break;
       }
       if (numbers.size() == 1) {
@@ -202,6 +205,7 @@ class Reader {
       if (!member.is_array() || member.size() != numbers.size()) {
         refuse(here,
                "must be an array of " + std::to_string(numbers.size()) + " expressions (null: not measured)");
+        all = false;
         break;
       }
       for (std::size_t i = 0; i < numbers.size(); ++i) {
@@ -213,7 +217,8 @@ class Reader {
     const auto wheels = std::ranges::count_if(targets, [](const FieldTarget& target) {
       return signals::sample_fields[target.number].name == "wheel_velocity";
     });
-    if (wheels != 2) refuse(pointer + "/wheel_velocity", "must give both wheels: no sample is without them");
+    if (all && wheels != 2)
+      refuse(pointer + "/wheel_velocity", "must give both wheels: no sample is without them");
     return targets;
   }
 

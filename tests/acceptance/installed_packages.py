@@ -93,8 +93,8 @@ class Service:
         return self.process.wait(timeout=limit_s)
 
 
-def get(path):
-    with urllib.request.urlopen("http://127.0.0.1:8080" + path, timeout=10) as reply:
+def get(path, port=8080):
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}{path}", timeout=10) as reply:
         return reply.read().decode()
 
 
@@ -117,13 +117,31 @@ def check_with_systemd(root, path):
 
 def check_programs(root):
     """Manual pages and completions of what is installed."""
-    for page in ("man8/joulecastd.8.gz", "man1/joulecast.1.gz", "man1/joulecast-calibrate-drive.1.gz"):
+    for page in ("man8/joulecastd.8.gz", "man1/joulecast.1.gz", "man1/joulecast-calibrate-drive.1.gz", "man1/joulecast-study-trial.1.gz"):
         check((root / "usr/share/man" / page).exists(), f"no {page}")
     for script in ("bash-completion/completions/joulecast", "zsh/vendor-completions/_joulecast",
                    "fish/vendor_completions.d/joulecast.fish"):
         check("joulecast" in (root / "usr/share" / script).read_text(), f"no {script}")
-    answer = run("chroot", root, "joulecast", "profile", "--robot", "/usr/share/joulecast/robots/amr.json", "--length", "10", "--json")
+    answer = run("chroot", root, "joulecast", "profile", "--robot", "/usr/share/joulecast/deploy/robots/amr.json", "--length", "10", "--json")
     check(json.loads(answer)["robot_id"] == "amr", answer)
+
+
+def check_documents(root):
+    """Every file that the documents link to is there, and the first steps for those who have the packages alone work."""
+    for folder in ("usr/share/joulecast", "usr/share/doc/joulecastd"):
+        documents = [root / folder / "README.md", *(root / folder / "deploy/documents").glob("*.md")]
+        check(len(documents) > 20, f"{folder} has {len(documents)} documents")
+        for document in documents:
+            for target in re.findall(r"\]\(([^)#\s=]+)(?:#[^)]*)?\)", document.read_text()):
+                there = "://" in target or os.path.exists(os.path.normpath(document.parent / target))
+                check(there, f"{document} links to {target}")
+    run("chroot", root, "cp", "-r", "/usr/share/joulecast", "/run/project")
+    first_look = ["chroot", str(root), "env", "HOME=/run", "/run/project/deploy/first_look.sh"]
+    try:
+        run(*first_look, "8086")
+        check(len(json.loads(get("/v1/missions", 8086))["missions"]) == 6, "the first look has six missions")
+    finally:
+        run(*first_look, "stop")
 
 
 def check_library(root):
@@ -133,7 +151,7 @@ def check_library(root):
     source = "/usr/share/doc/libjoulecast-dev/examples"
     run("chroot", root, "cmake", "-S", source, "-B", "/run/example", "-DCMAKE_BUILD_TYPE=Release")
     run("chroot", root, "cmake", "--build", "/run/example")
-    answer = run("chroot", root, "/run/example/price_a_path", "/usr/share/joulecast/robots/amr.json")
+    answer = run("chroot", root, "/run/example/price_a_path", "/usr/share/joulecast/deploy/robots/amr.json")
     print("the example of libjoulecast-dev says", answer.strip())
     check(re.fullmatch(r"[1-9]\d+ J in \d+\.\d s\n", answer), answer)
 
@@ -165,6 +183,7 @@ def install_and_use(root, packages):
         shutil.copy(package, root / "run")
     run("chroot", root, "dpkg", "--install", *[f"/run/{p.name}" for p in packages])
     check_programs(root)
+    check_documents(root)
     check_library(root)
     check_bill_of_materials(root)
     path, unit = unit_of(root)
@@ -174,7 +193,7 @@ def install_and_use(root, packages):
     check(run("chroot", root, program, flag, settings, "--check-config") == "the settings are valid\n", "--check-config")
 
     robots = root / "etc/joulecast/robots"
-    shutil.copy(root / "usr/share/joulecast/robots/amr.json", robots)
+    shutil.copy(root / "usr/share/joulecast/deploy/robots/amr.json", robots)
     (robots / "broken.json").write_text("{")
     (robots / "negative.json").write_text((robots / "amr.json").read_text().replace('"amr"', '"other"')
                                           .replace('"wheel_radius_m": 0', '"wheel_radius_m": -1'))

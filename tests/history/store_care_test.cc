@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <fstream>
 
@@ -145,6 +147,25 @@ TEST_F(StoreCare, ABackupIsTakenWhileTheStoreIsUsedAndRestored) {
   EXPECT_EQ(restore_store(path_, path_).error().fault, Fault::invalid);
   EXPECT_EQ(need(restore_store(copy, folder_.file("new.db"))), "");
   EXPECT_EQ(missions_of(folder_.file("new.db")), 3);
+}
+
+TEST_F(StoreCare, WhatRootRestoresBelongsToItsDaemonsUser) {
+  if (geteuid() != 0) GTEST_SKIP() << "only root gives files away";
+  constexpr uid_t daemon = 4711;
+  fill(1);
+  const std::string copy = folder_.file("copy.db");
+  need(back_up_store(path_, copy));
+  store_.reset();
+  const auto owner_of = [](const std::string& path) {
+    struct stat file {};
+    return stat(path.c_str(), &file) == 0 ? file.st_uid : uid_t{0};
+  };
+  ASSERT_EQ(chown(path_.c_str(), daemon, daemon), 0);
+  need(restore_store(copy, path_));
+  EXPECT_EQ(owner_of(path_), daemon) << "as the one before";
+  ASSERT_EQ(chown(folder_.file("").c_str(), daemon, daemon), 0);
+  need(restore_store(copy, folder_.file("new.db")));
+  EXPECT_EQ(owner_of(folder_.file("new.db")), daemon) << "as its directory";
 }
 
 TEST_F(StoreCare, ADamagedPageIsFoundAndTheRestIsSalvaged) {

@@ -165,7 +165,7 @@ def hold_events(examples, url, name, thing, kind):
 
 
 def ended(url, diagnosis):
-    for _ in range(600):
+    for _ in range(6000):  # a sanitized program takes its time
         if ask(url, "GET", f"/v1/diagnoses/{diagnosis}")[1]["state"] not in ("queued", "running"):
             return
         time.sleep(0.1)
