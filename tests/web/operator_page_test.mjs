@@ -29,9 +29,13 @@ const sizes = {
   phone: { width: 360, height: 740 },
   wide_phone: { width: 390, height: 844 },
   tablet: { width: 768, height: 1024 },
+  landscape_tablet: { width: 1024, height: 768 },
+  small_laptop: { width: 1280, height: 800 },
   laptop: { width: 1440, height: 900 },
   wall: { width: 2560, height: 1440 },
 };
+// Checked for their width more than for their colours: in one theme.
+const sizesForWidth = { landscape_tablet: true, small_laptop: true };
 const firstViewLimitMs = 1000;
 const missionLimitMs = 1000;
 const firstLoadLimitBytes = 26_000;
@@ -390,7 +394,7 @@ await check('a robot that stands, is silent or was restarted is shown as that', 
   expect((await cells('lossy'))[0].includes('3 missing'), `lost samples: ${(await cells('lossy'))[0]}`);
   expect((await cells('negated'))[0].includes('battery_current: sign'), 'a contradiction');
   const quiet = await cells('quiet');
-  expect(/^silent since (\d\d:\d\d|\w+ \d+(, \d{4})?)$/.test(quiet[0]), `silence: ${quiet[0]}`);
+  expect(/^silent since (\d\d:\d\d|\w+\s\d+(,\s\d{4})?)$/.test(quiet[0]), `silence: ${quiet[0]}`);
   equal([quiet[1], quiet[6], quiet[8]].join(' '), '– – –', 'power, speed and mission of a silent robot');
   const standing = await cells('standing');
   expect(standing[6].startsWith('0.00') && standing[8] === 'idle', `a standing robot: ${standing}`);
@@ -585,6 +589,48 @@ await check('trends sum missions by day and week, of the fleet and of robots sid
   expect(head.startsWith('robots,from,to,missions,') && lines.length > 0, head);
 });
 
+// "2026-11-21T06:10" of a time, as the fields of the browser have it.
+function localMinute(utimeUs) {
+  const at = new Date(utimeUs / 1000);
+  const two = (value) => String(value).padStart(2, '0');
+  const day = `${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())}`;
+  return `${day}T${two(at.getHours())}:${two(at.getMinutes())}`;
+}
+await check('the day or minute of To belongs to the time, and From is not later', async () => {
+  const { missions } = await get('/v1/missions?robot_id=worn-01&limit=50');
+  const minute = localMinute(missions[0].start_utime_us);
+  const day = minute.slice(0, 10);
+  const ofDay = missions.filter((m) => localMinute(m.start_utime_us).startsWith(day)).length;
+  await go(page, `#/trends?robot=worn-01&from=${day}&to=${day}`);
+  await page.locator('.trends tbody tr').first().waitFor();
+  equal(number(await page.locator('.trends tbody td').first().textContent()), ofDay, 'missions of the day');
+  await go(page, `#/compare?a_robot=worn-01&b_robot=oval-01&from=${day}&to=${day}`);
+  const compared = page.locator('.compare tbody tr').first().locator('td').first();
+  equal(number(await compared.textContent()), ofDay, 'missions compared');
+  const mapped = page.waitForResponse((r) => r.url().includes('/v1/floor-map') && r.ok());
+  await go(page, `#/floor?robot=worn-01&from=${day}&to=${day}`);
+  equal((await (await mapped).json()).missions, ofDay, 'missions on the floor');
+  await go(page, `#/missions?robot=worn-01&from=${minute}&to=${minute}`);
+  await page.getByRole('link', { name: missions[0].mission_id, exact: true }).waitFor();
+  await go(page, `#/trends?robot=worn-01&to=${day}`);
+  await page.locator('.trends tbody tr').first().waitFor();
+  const asked = [];
+  const note = (request) => asked.push(request.url());
+  page.on('request', note);
+  for (const [view, unit] of [
+    ['trends', ''],
+    ['compare', ''],
+    ['floor', ''],
+    ['missions', 'T10:00'],
+  ]) {
+    asked.length = 0;
+    await go(page, `#/${view}?from=2026-01-02${unit}&to=2026-01-01${unit}`);
+    await page.getByText('From must not be later than To.').waitFor();
+    equal(asked.filter((url) => url.includes('utime_us')).join(), '', `questions of ${view}`);
+  }
+  page.off('request', note);
+});
+
 await check(
   'the floor shows energy over distance and gap by squares, read by keys and as tables',
   async () => {
@@ -706,6 +752,20 @@ await check('a cluster is shown where there is one, and there alone', async () =
   answer = inCluster({ error: 'connection refused' });
   await fresh.getByText('anna does not reach the database').waitFor();
   await fresh.context().close();
+});
+
+await check('a comparison begins with the robots of the most missions and offers no others', async () => {
+  const { groups } = await get('/v1/mission-totals?group_by=robot');
+  const driven = groups.map((group) => group.robots[0]);
+  await go(page, '#/compare');
+  await page.locator('.compare tbody tr').first().waitFor();
+  const first = page.getByRole('combobox', { name: 'First', exact: true });
+  const most = Math.max(...groups.map((group) => group.missions));
+  const counts = new Map(groups.map((group) => [group.robots[0], group.missions]));
+  const chosen = await first.inputValue();
+  expect(counts.get(chosen) >= most - 1, `${chosen} with ${counts.get(chosen)} of ${most} missions`);
+  const offered = await first.locator('option').allTextContents();
+  expect(offered.every((id) => driven.includes(id)) && offered.length >= driven.length, `offered ${offered}`);
 });
 
 await check('robots, periods and missions are compared side by side', async () => {
@@ -1403,6 +1463,78 @@ await check('robots are cards on a phone, and nothing in them is cut off', async
   await phone.context().close();
 });
 
+const markedRobot = 'oval-01';
+// Everything that robots and missions can be marked with, at once.
+async function markAll(shown) {
+  const answered = (pattern, change) =>
+    shown.route(pattern, async (route) => {
+      const answer = await (await route.fetch()).json();
+      await route.fulfill({ json: change(answer, route.request().url()) ?? answer });
+    });
+  const payload = { verdict: 'undeclared', declared_kg: 0, undeclared_kg: 12.3, undeclared_sd_kg: 1 };
+  await answered('**/v1/missions?*', ({ missions }) => {
+    for (const m of missions)
+      Object.assign(m, {
+        incomplete: true,
+        findings: { payload },
+        mission_id: `${m.robot_id}-261123-200923-m132`,
+      });
+  });
+  const longAgo = { live: false, silent_s: 1e8, faults: { missing: 66, out_of_order: 3 } };
+  await answered('**/v1/robots', ({ robots }) => {
+    for (const one of robots) if (one.robot_id === markedRobot) Object.assign(one, longAgo);
+  });
+  await answered('**/v1/robots/*/gap-history?*', ({ siblings }) => {
+    siblings.push({ ...siblings[0], robot_id: markedRobot, ratio: 1.18, stands_out: true });
+  });
+  await answered('**/v1/proposals?*', () => ({
+    proposals: [{ robot_id: markedRobot, closed_reason: null }],
+  }));
+  const detail = { ratio_before: 1, ratio_after: 1.112, utime_us: 1.7e15 };
+  const event = { id: 1, robot_id: markedRobot, kind: 'gap_drift', utime_us: 1.7e15, detail };
+  await answered('**/v1/audit-log?*', (_, url) => ({ events: url.includes('cursor') ? [] : [event] }));
+}
+const leftOpen = [];
+for (const size of ['phone', 'landscape_tablet', 'small_laptop', 'laptop']) {
+  await check(`whatever robots and missions are marked with stays in its place, ${size}`, async () => {
+    const shown = await openPage({ viewport: sizes[size] });
+    await markAll(shown);
+    leftOpen.push(shown);
+    const wide = () => shown.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+    await go(shown, '#/missions');
+    await shown.locator('.missions .flag').first().waitFor();
+    expect((await wide()) <= 0, `missions are ${await wide()} px wider than the window`);
+    if (size === 'phone') {
+      const heights = await shown
+        .locator('.missions tbody td.figure')
+        .evaluateAll((all) => all.map((cell) => cell.offsetHeight));
+      expect(Math.max(...heights) < 30, `values beside their titles: ${Math.max(...heights)} px high`);
+    }
+    await go(shown, '#/fleet');
+    const row = shown.locator('.fleet tbody tr', { hasText: markedRobot });
+    await until('three badges', async () => (await row.locator('.flag').count()) === 3);
+    expect((await wide()) <= 0, `the fleet is ${await wide()} px wider than the window`);
+    const outside = await row.evaluate((tr) => {
+      const inside = (inner, outer) =>
+        inner.left >= outer.left - 1 &&
+        inner.right <= outer.right + 1 &&
+        inner.top >= outer.top - 1 &&
+        inner.bottom <= outer.bottom + 1;
+      const bottom = tr.getBoundingClientRect().bottom;
+      return [...tr.querySelectorAll('.flag, .telemetry, .ratio, .below.fault')]
+        .filter((part) => {
+          const { left, right, top } = part.closest('td').getBoundingClientRect();
+          return !inside(part.getBoundingClientRect(), { left, right, top, bottom });
+        })
+        .map((part) => part.textContent);
+    });
+    equal(outside.join('; '), '', 'what leaves its cell');
+    expect(/20\d\d$/.test(await row.locator('.telemetry').textContent()), 'the year of the silence');
+    await shown.screenshot({ path: path.join(given.out, 'screenshots', `marked-${size}.png`) });
+  });
+}
+for (const shown of leftOpen) await shown.context().close(); // of failed checks, too: it asks on
+
 const views = {
   fleet: '#/fleet',
   robot: `#/robots/${robot}`,
@@ -1423,7 +1555,7 @@ const views = {
   help: '#/help',
 };
 for (const [size, viewport] of Object.entries(sizes)) {
-  for (const colorScheme of ['light', 'dark']) {
+  for (const colorScheme of size in sizesForWidth ? ['light'] : ['light', 'dark']) {
     const shown = await openPage({ viewport, colorScheme });
     await shown.route('**/v1/cluster', (route) => route.fulfill({ json: inCluster() }));
     for (const [name, hash] of Object.entries(views)) {

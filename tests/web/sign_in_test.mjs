@@ -1,8 +1,9 @@
 // The page of a daemon with tokens in headless Chromium: it asks for a token, keeps it from scripts,
 // and works then.
-// node sign_in_test.mjs --daemon joulecastd --client joulecast --out directory [--chromium /usr/bin/chromium]
+// node sign_in_test.mjs --daemon joulecastd --client joulecast --robot amr.json --out directory
+//   [--chromium /usr/bin/chromium] [--page server/web, instead of the page built in]
 import assert from 'node:assert/strict';
-import { mkdir, rm } from 'node:fs/promises';
+import { mkdir, readFile, rm } from 'node:fs/promises';
 import path from 'node:path';
 import { parseArgs } from 'node:util';
 import { chromium } from 'playwright-core';
@@ -12,12 +13,15 @@ const { values: given } = parseArgs({
   options: {
     daemon: { type: 'string' },
     client: { type: 'string' },
+    robot: { type: 'string' },
     out: { type: 'string' },
+    page: { type: 'string', default: '' },
     chromium: { type: 'string', default: '/usr/bin/chromium' },
   },
 });
 await rm(given.out, { recursive: true, force: true });
 await mkdir(given.out, { recursive: true });
+const model = JSON.parse(await readFile(given.robot, 'utf8'));
 const tokens = path.join(given.out, 'tokens.json');
 const makeToken = async (name, role) => {
   const made = await run(given.client, ['token', 'create', '--file', tokens, '--name', name, '--role', role]);
@@ -28,6 +32,7 @@ const adminToken = await makeToken('root', 'admin');
 const base = `http://127.0.0.1:${await freePort()}`;
 const options = { '--http-port': new URL(base).port, '--store-path': path.join(given.out, 'history.db') };
 Object.assign(options, { '--lcm-url': 'memq://', '--auth-token-file': tokens });
+if (given.page !== '') options['--http-web-directory'] = given.page;
 const answers = async () => (await fetch(`${base}/healthz`).catch(() => ({ ok: false }))).ok;
 const daemon = await startUntil(given.daemon, Object.entries(options).flat(), answers);
 const browser = await chromium.launch({ executablePath: given.chromium, args: ['--no-sandbox'] });
@@ -36,6 +41,12 @@ try {
   await page.goto(base);
   const dialog = page.locator('dialog.sign-in');
   await dialog.waitFor({ state: 'visible' });
+  await page.getByText('Sign in to see the fleet.').waitFor();
+  await page.waitForTimeout(2000); // by then a service that is gone would be told
+  assert.equal(await page.locator('.link').textContent(), 'Signed out');
+  assert.equal(await page.getByText(/No connection|Authorization|Bearer/).count(), 0);
+  await dialog.locator('button', { hasText: 'Cancel' }).click();
+  await page.getByRole('button', { name: 'Sign in', exact: true }).click();
   await dialog.locator('input').fill('jc_wrong');
   await dialog.locator('button[type=submit]').click();
   await page.waitForFunction(() => /unknown, expired or revoked/.test(document.body.innerText));
@@ -52,12 +63,31 @@ try {
   assert.equal(await asked('PUT', '/v1/robots/amr'), 403);
   await page.goto(`${base}/#/audit?of=requests`);
   await page.getByText('needs a token of role admin').waitFor();
+  // Two versions of a model, of which one that may only read puts no other in force.
+  for (const idle of [20, 21]) {
+    const { status } = await fetch(`${base}/v1/robots/amr`, {
+      method: 'PUT',
+      headers: { authorization: `Bearer ${adminToken}`, 'content-type': 'application/json' },
+      body: JSON.stringify({ ...model, robot_id: 'amr', idle_power_w: idle }),
+    });
+    assert.equal(status, 200);
+  }
+  await page.goto(`${base}/#/robots/amr`);
+  const activate = page.getByRole('button', { name: 'Put version 1 in force again' });
+  await activate.waitFor();
+  assert.equal(await activate.isDisabled(), true);
+  assert.match(await activate.getAttribute('title'), /token of role operate; yours has the role read/);
+  await page.goto(`${base}/#/audit?of=requests`);
   await run(given.client, ['token', 'revoke', '--file', tokens, '--name', 'carol']);
   assert.equal(await asked('GET', '/v1/robots'), 401);
   await page.reload();
   await dialog.waitFor({ state: 'visible' });
   await dialog.locator('input').fill(adminToken);
   await dialog.locator('button[type=submit]').click();
+  await page.goto(`${base}/#/robots/amr`);
+  await activate.waitFor();
+  assert.equal(await activate.isDisabled(), false);
+  await page.goto(`${base}/#/audit?of=requests`);
   await page.getByRole('row', { name: /carol.*127\.0\.0\.1.*putRobot.*403/ }).waitFor();
   await page.screenshot({ path: path.join(given.out, 'requests.png') });
   await page.getByRole('button', { name: 'Robots and models' }).click();

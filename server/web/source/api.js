@@ -1,5 +1,7 @@
 import { useEffect, useRef, useState } from 'preact/hooks';
 
+export const sessionPath = '/v1/session';
+
 // What the service refused, or that it could not be reached (status 0).
 class Problem extends Error {
   constructor(status, title, detail, field) {
@@ -16,10 +18,15 @@ export function onUnauthorized(callback) {
   return () => unauthorized.removeEventListener('refused', callback);
 }
 
+export const askToSignIn = () => unauthorized.dispatchEvent(new Event('refused'));
+
 async function answer(response) {
   if (response.ok) return response.json();
-  if (response.status === 401) unauthorized.dispatchEvent(new Event('refused'));
   const problem = await response.json().catch(() => ({}));
+  if (response.status === 401 && !response.url.endsWith(sessionPath)) {
+    askToSignIn();
+    throw new Problem(401, 'You are not signed in', 'Sign in to see the fleet.');
+  }
   throw Object.assign(
     new Problem(response.status, problem.title ?? response.statusText, problem.detail ?? '', problem.field),
     { body: problem },

@@ -2,7 +2,7 @@
 import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 import { energyUnit } from './energy.js';
 import { palette, useTheme } from './theme.js';
-import { clock, fixed } from './format.js';
+import { clock, fixed, time } from './format.js';
 
 const narrow = '"Liberation Sans Narrow", "Arial Narrow", "Helvetica Neue", Arial, sans-serif';
 
@@ -69,6 +69,30 @@ function clockValues(_, splits, index, space, step) {
     return text;
   });
 }
+
+const datePx = 84; // of one label
+
+// The first and the last day and, as far as there is room, days evenly before the last.
+function dateSplits(u, _, low, high, step) {
+  const days = u.data[0];
+  const [first, last] = [days[0], days[days.length - 1]];
+  const room = (datePx / (u.bbox.width / devicePixelRatio)) * (high - low);
+  const splits = [];
+  const at = new Date(last * 1000);
+  for (const day = Math.max(1, Math.round(step / 86_400)); at / 1000 - first >= room;) {
+    splits.unshift(at / 1000);
+    at.setDate(at.getDate() - day);
+  }
+  return [first, ...splits];
+}
+
+// Periods of so many days that begin at a local midnight.
+export const dateAxis = (days) => ({
+  incrs: clockSteps.filter((step) => step >= days * day),
+  splits: dateSplits,
+  values: (_, splits) => splits.map((second) => time(second * 1e6).slice(0, 10)),
+  space: datePx,
+});
 
 let uPlot = null;
 let loading = null;

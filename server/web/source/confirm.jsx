@@ -1,8 +1,9 @@
-// A button that asks once before it does what it says; its children tell what will change.
+// A button that asks once before it does what it says; its children tell what will change, `refusal`
+// why it may not be pressed.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { DialogForm } from './dialog_form.jsx';
 
-export function ConfirmButton({ label, title, action, onConfirm, disabled, class: name, children }) {
+export function ConfirmButton({ label, title, action, onConfirm, disabled, class: name, refusal, children }) {
   const dialog = useRef(null);
   const [open, setOpen] = useState(false);
   useEffect(() => {
@@ -14,7 +15,13 @@ export function ConfirmButton({ label, title, action, onConfirm, disabled, class
   };
   return (
     <>
-      <button type="button" class={name} disabled={disabled} onClick={() => setOpen(true)}>
+      <button
+        type="button"
+        class={name}
+        disabled={disabled || refusal !== undefined}
+        title={refusal}
+        onClick={() => setOpen(true)}
+      >
         {label}
       </button>
       <dialog ref={dialog} aria-label={title} onClose={() => setOpen(false)}>

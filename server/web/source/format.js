@@ -49,8 +49,9 @@ export function length(metre) {
   return { n: size < 1 ? fixed(metre, 2) : digits(metre), u: 'm' }; // no robot knows its way to the millimetre
 }
 
-// For columns of ranges, which are all of the size of kilometres.
+// For columns of distances of the size of kilometres; shorter ones in whole metres.
 export function kilometres(metre) {
+  if (known(metre) && Math.abs(metre) < 999.5) return { n: fixed(metre), u: 'm' };
   return known(metre) ? { n: fixed(metre / 1000, metre < 99_500 ? 1 : 0), u: 'km' } : { n: dash, u: '' };
 }
 

@@ -19,7 +19,7 @@ export function since(utimeUs) {
   const now = new Date();
   if (now - at < 86_400e3) return format.clock(utimeUs).slice(0, 5);
   const year = at.getFullYear() === now.getFullYear() ? {} : { year: 'numeric' };
-  return at.toLocaleDateString('en', { day: 'numeric', month: 'short', ...year });
+  return at.toLocaleDateString('en', { day: 'numeric', month: 'short', ...year }).replaceAll(' ', '\u00a0');
 }
 
 function telemetryOf(state) {

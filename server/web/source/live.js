@@ -1,7 +1,7 @@
 // The live fleet: the list once, then the event stream. Events change the map at once; components are
 // notified at most once an animation frame and five times a second, however many robots report.
 import { useEffect, useState } from 'preact/hooks';
-import { get, query } from './api.js';
+import { get, onUnauthorized, query } from './api.js';
 
 const powerSamples = 90;
 const pathSamples = 600;
@@ -139,6 +139,7 @@ async function load() {
 }
 
 function connect() {
+  if (state.link === 'refused') return;
   source = new EventSource('/v1/events');
   source.addEventListener('open', () => {
     heardMs = performance.now();
@@ -157,6 +158,7 @@ function connect() {
   });
   source.addEventListener('reset', load);
   source.addEventListener('error', () => {
+    if (state.link === 'refused') return;
     link('offline');
     if (source.readyState === EventSource.CLOSED) again(); // the browser retries by itself otherwise
   });
@@ -164,6 +166,7 @@ function connect() {
 
 function again() {
   source.close();
+  get('/version').catch(() => {}); // tells a service that refuses from one that is gone
   setTimeout(connect, retryMs);
   retryMs = Math.min(2 * retryMs, 15_000);
 }
@@ -180,7 +183,14 @@ async function check() {
   }
 }
 
+// Until the page is loaded again after the sign-in.
+function refused() {
+  source.close();
+  link('refused');
+}
+
 export function startLive() {
+  onUnauthorized(refused);
   load();
   connect();
   setInterval(check, 5000);

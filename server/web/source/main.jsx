@@ -29,7 +29,9 @@ const views = {
 
 function Link() {
   const live = useLive();
-  const name = { live: 'Live', connecting: 'Connecting', offline: 'Offline' }[live.link];
+  const name = { live: 'Live', connecting: 'Connecting', offline: 'Offline', refused: 'Signed out' }[
+    live.link
+  ];
   return (
     <span class={`link ${live.link}`} role="status">
       <span class="lamp" aria-hidden="true" />
@@ -43,7 +45,7 @@ function OfflineBanner() {
   const [late, setLate] = useState(false);
   useEffect(() => {
     setLate(false);
-    if (live.link !== 'offline') return undefined;
+    if (live.link !== 'offline' && !(live.link === 'refused' && live.loaded)) return undefined;
     const timer = setTimeout(() => setLate(true), 1500); // the stream reconnects by itself
     return () => clearTimeout(timer);
   }, [live.link]);
@@ -51,7 +53,9 @@ function OfflineBanner() {
   const since = clock(live.sinceMs * 1000);
   return (
     <div class="banner" role="alert">
-      No connection to the service since {since}. What is shown is as of then; trying again.
+      {live.link === 'offline'
+        ? `No connection to the service since ${since}. What is shown is as of then; trying again.`
+        : `Signed out since ${since}. What is shown is as of then.`}
     </div>
   );
 }

@@ -25,12 +25,15 @@ const names = {
 const rowPx = 30;
 const negligible = 1e-5; // of the whole
 
+// What is recovered is told as a positive energy and lowers the sum.
+export const effectOn = (term, value) => (term === 'recovered' && value ? -value : value);
+
 function rowsOf(terms, total) {
   const empty = ([term, value]) => Math.abs(value) <= negligible * Math.abs(total) && term !== 'unexplained';
   const rows = [];
   let at = 0;
   for (const [term, value] of Object.entries(terms)) {
-    const change = term === 'recovered' ? -value : value;
+    const change = effectOn(term, value);
     if (term === 'unexplained')
       rows.push({ key: 'modelled', name: 'Modelled', from: 0, to: at, total: true });
     if (!empty([term, value]))

@@ -1,5 +1,6 @@
 import { Component } from 'preact';
 import { useEffect, useMemo, useState } from 'preact/hooks';
+import { askToSignIn } from './api.js';
 import * as format from './format.js';
 
 // A number with its unit; `of` comes from a function of format.js or energy.js.
@@ -58,19 +59,17 @@ export function Loading({ what }) {
 export function Failure({ error, retry }) {
   const where = error.field && !error.message.includes(error.field) ? ` (${error.field})` : '';
   return (
-    <div class="failure" role="alert">
+    <div class={error.status === 401 ? 'empty' : 'failure'} role="alert">
       <p class="empty-title">
-        {error.status === 0
-          ? error.title
-          : `${error.title ?? 'Error'}${error.status ? ` · ${error.status}` : ''}`}
+        {[error.title ?? 'Error', error.status !== 401 && error.status].filter(Boolean).join(' · ')}
       </p>
       <p>
         {error.message}
         {where}
       </p>
-      {retry && (
-        <button type="button" onClick={retry}>
-          Try again
+      {(retry || error.status === 401) && (
+        <button type="button" onClick={error.status === 401 ? askToSignIn : retry}>
+          {error.status === 401 ? 'Sign in' : 'Try again'}
         </button>
       )}
     </div>

@@ -5,6 +5,7 @@ import { idPath, post, useGet } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
 import * as format from '../format.js';
 import { robotLink } from '../route.js';
+import { refusalFor } from '../session.js';
 import { Failure } from '../widgets.jsx';
 import { BackTest } from './back_test.jsx';
 import { Changes, changesOf } from './changes.jsx';
@@ -96,6 +97,7 @@ export function Adopt({ job }) {
   const robot = useGet(`/v1/robots/${idPath(job.robot_id)}`);
   const [state, ask] = useAdoption(job, effect);
   const refused = state.error?.status === 409 && (state.error.body?.back_test ?? null) !== null;
+  const barred = refusalFor('operate');
   const hold = state.busy !== '' || effect.includes('');
   const confirm = (label, name, more) => (
     <ConfirmButton
@@ -104,6 +106,7 @@ export function Adopt({ job }) {
       class={name}
       title={`Change the model of ${job.robot_id}?`}
       disabled={hold}
+      refusal={barred}
       onConfirm={() => ask('adopt', more)}
     >
       <p>
@@ -129,7 +132,12 @@ export function Adopt({ job }) {
               onChange={(id) => setChosen({ ...chosen, [g.id]: id })}
             />
           ))}
-          <button type="button" disabled={hold} onClick={() => ask('test', { dry_run: true })}>
+          <button
+            type="button"
+            disabled={hold || barred !== undefined}
+            title={barred}
+            onClick={() => ask('test', { dry_run: true })}
+          >
             {state.busy === 'test' ? 'Testing …' : 'Test on other missions'}
           </button>
           {!refusal && confirm('Adopt', 'primary', {})}

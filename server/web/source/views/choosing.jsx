@@ -3,8 +3,29 @@ import { useLive } from '../live.js';
 import { useOptions } from '../widgets.jsx';
 
 // "2026-11-21T06:10" or "2026-11-21" in local time, as the inputs of the browser give it, to microseconds.
-export const utimeUs = (local) =>
-  local ? new Date(local.includes('T') ? local : `${local}T00:00`).getTime() * 1000 : undefined;
+const dateOf = (local) => new Date(local.includes('T') ? local : `${local}T00:00`);
+const utimeUs = (local) => (local ? dateOf(local).getTime() * 1000 : undefined);
+
+// The end of that day or minute: `to` of the service is the first time that no longer belongs.
+function endUs(local) {
+  if (!local) return undefined;
+  const end = dateOf(local);
+  if (local.includes('T')) end.setSeconds(60, 0);
+  else end.setDate(end.getDate() + 1);
+  return end.getTime() * 1000;
+}
+
+// What the fields From and To choose, as the service takes it; the day or minute of To belongs to it.
+export const timesOf = (from, to) => ({ from_utime_us: utimeUs(from), to_utime_us: endUs(to) });
+
+// Whether no time is left between them.
+export const misordered = (from, to) => Boolean(from && to) && utimeUs(from) >= endUs(to);
+
+export const Misordered = () => (
+  <p class="fault" role="alert">
+    From must not be later than To.
+  </p>
+);
 
 // Minutes that local time is ahead of UTC.
 export const offsetMin = () => -new Date().getTimezoneOffset();

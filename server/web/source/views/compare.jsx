@@ -1,13 +1,14 @@
 // Two robots, two periods or two missions side by side.
 import { useState } from 'preact/hooks';
-import { useGet } from '../api.js';
+import { query, useGet } from '../api.js';
 import { consumption, energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
 import { useLive } from '../live.js';
 import { keepInAddress, missionLink, robotLink } from '../route.js';
-import { Table } from '../table.jsx';
+import { Table, names } from '../table.jsx';
+import { effectOn } from '../waterfall.jsx';
 import { Choice, Failure, Loading, Quantity, Ratio, useOptions, useTitleOf } from '../widgets.jsx';
-import { Field, dayField, utimeUs } from './choosing.jsx';
+import { Field, Misordered, dayField, misordered, timesOf } from './choosing.jsx';
 import { totalsPath } from './trends.jsx';
 
 const sides = ['a', 'b'];
@@ -18,6 +19,12 @@ const dayAgo = (days) => {
   const two = (v) => String(v).padStart(2, '0');
   return `${d.getFullYear()}-${two(d.getMonth() + 1)}-${two(d.getDate())}`;
 };
+
+// The robot of a side for which none is chosen: another than the other side's.
+function freeRobot(given, side, robots) {
+  const other = given[side === 'a' ? 'b_robot' : 'a_robot'];
+  return robots.filter((id) => id !== other)[side === 'b' && !other ? 1 : 0];
+}
 
 // What one side asks the service: {path, name, link}; path null while something is not chosen.
 function sideOf(given, side, kind, robots) {
@@ -30,12 +37,15 @@ function sideOf(given, side, kind, robots) {
       link: missionLink(id),
     };
   }
-  const robot = kind === 'robots' ? (at('robot') ?? robots[side === 'a' ? 0 : 1]) : given.robot;
-  const from = at('from') ?? (kind === 'periods' ? dayAgo(side === 'a' ? 14 : 7) : undefined);
-  const to = at('to') ?? (kind === 'periods' && side === 'a' ? dayAgo(7) : undefined);
-  const span = kind === 'robots' ? [given.from, given.to] : [from, to];
+  const robot = kind === 'robots' ? (at('robot') ?? freeRobot(given, side, robots)) : given.robot;
+  // Seven days each, the second ending today.
+  const from = kind === 'robots' ? given.from : (at('from') ?? dayAgo(side === 'a' ? 13 : 6));
+  const to = kind === 'robots' ? given.to : (at('to') ?? (side === 'a' ? dayAgo(7) : undefined));
+  const none = misordered(from, to);
   return {
-    path: totalsPath({ robot_id: robot, from_utime_us: utimeUs(span[0]), to_utime_us: utimeUs(span[1]) }),
+    path:
+      none || (kind === 'robots' && !robot) ? null : totalsPath({ robot_id: robot, ...timesOf(from, to) }),
+    none,
     robot,
     from,
     to,
@@ -44,9 +54,18 @@ function sideOf(given, side, kind, robots) {
   };
 }
 
-function RobotChoice({ label, value, onChange, all }) {
+// The robots that have missions, those of the most first; null until they are known.
+function useDriven(kind) {
+  const totals = useGet(kind === 'missions' ? null : `/v1/mission-totals${query({ group_by: 'robot' })}`);
   const live = useLive();
-  const options = useOptions([...live.robots.keys()].sort());
+  if (totals.error !== null) return [...live.robots.keys()].sort();
+  const groups = [...(totals.value?.groups ?? [])].sort((a, b) => b.missions - a.missions);
+  return totals.value && groups.map((group) => group.robots[0]);
+}
+
+function RobotChoice({ label, value, onChange, all, robots }) {
+  const others = value && !robots?.includes(value) ? [value] : [];
+  const options = useOptions([...others, ...(robots ?? [])].sort(names.compare));
   return (
     <Field label={label}>
       <select value={value ?? ''} onChange={(event) => onChange(event.currentTarget.value)}>
@@ -73,7 +92,7 @@ function MissionChoice({ label, value, onChange, recent }) {
   );
 }
 
-function Fields({ given, kind, change, shown }) {
+function Fields({ given, kind, change, shown, robots }) {
   const recent = useGet(kind === 'missions' ? '/v1/missions?limit=200' : null);
   const set = (key) => (value) => change({ [key]: value });
   if (kind === 'missions')
@@ -89,15 +108,15 @@ function Fields({ given, kind, change, shown }) {
   if (kind === 'robots')
     return (
       <>
-        <RobotChoice label="First" value={shown[0].robot} onChange={set('a_robot')} />
-        <RobotChoice label="Second" value={shown[1].robot} onChange={set('b_robot')} />
+        <RobotChoice label="First" value={shown[0].robot} onChange={set('a_robot')} robots={robots} />
+        <RobotChoice label="Second" value={shown[1].robot} onChange={set('b_robot')} robots={robots} />
         {dayField('From', given.from, set('from'))}
         {dayField('To', given.to, set('to'))}
       </>
     );
   return (
     <>
-      <RobotChoice label="Robot" value={given.robot} onChange={set('robot')} all />
+      <RobotChoice label="Robot" value={given.robot} onChange={set('robot')} robots={robots} all />
       {sides.map((side, k) => (
         <fieldset class="field" key={side}>
           <legend>{k === 0 ? 'First period' : 'Second period'}</legend>
@@ -152,7 +171,7 @@ function rowsOf(one, other, ledgers) {
     row('Consumption', (t) => (t.wh_per_km === null ? null : 3.6 * t.wh_per_km), plain(consumption)),
     ...terms.map((term) => ({
       name: `of it ${format.words(term)}`,
-      values: [one, other].map((t, k) => perMetre(t, ledgers[k].terms_j[term])),
+      values: [one, other].map((t, k) => perMetre(t, effectOn(term, ledgers[k].terms_j[term]))),
       least: Math.abs(perMetre(one, one.energy.battery_j) ?? 0) / 100,
       cell: plain(consumption),
     })),
@@ -175,7 +194,7 @@ function Figures({ shown, values, ledgers }) {
     {
       key: 'change',
       title: 'Second to first',
-      class: 'figure',
+      class: 'figure long',
       cell: (r) => <Quantity of={format.percent(change(r.values, r.least), 1)} sign />,
     },
   ];
@@ -192,15 +211,20 @@ function Figures({ shown, values, ledgers }) {
       </p>
       <Table class="compare" columns={columns} rows={rowsOf(...values, ledgers)} keyOf={(r) => r.name} />
       <p class="note foot">
-        Terms of the ledger are shown over the distance, which makes unequal sides compare.
+        Terms of the ledger are shown over the distance, so that unequal sides can be compared.
       </p>
     </>
   );
 }
 
+function Unchosen({ kind, robots }) {
+  if (kind === 'missions') return <p class="note">Choose two missions.</p>;
+  if (robots === null) return <Loading what="the robots" />;
+  return <p class="note">Two robots with missions are needed to compare them.</p>;
+}
+
 export function Compare({ given: asked }) {
   useTitleOf('Compare');
-  const live = useLive();
   const [given, setGiven] = useState(asked);
   const kind = given.kind in kinds ? given.kind : 'robots';
   const change = (part) => {
@@ -208,8 +232,9 @@ export function Compare({ given: asked }) {
     setGiven(next);
     keepInAddress(next);
   };
-  const robots = [...live.robots.keys()].sort();
-  const shown = sides.map((side) => sideOf(given, side, kind, robots));
+  const robots = useDriven(kind);
+  const shown = sides.map((side) => sideOf(given, side, kind, robots ?? []));
+  const none = shown.some((side) => side.none);
   const [one, other] = [useGet(shown[0].path), useGet(shown[1].path)];
   const ledgerPath = (k) => (kind === 'missions' && shown[k].path ? `${shown[k].path}/ledger` : null);
   const [first, second] = [useGet(ledgerPath(0)), useGet(ledgerPath(1))];
@@ -219,6 +244,7 @@ export function Compare({ given: asked }) {
       ? first.value && second.value && [first.value.ledger, second.value.ledger]
       : ready && [one.value.ledger, other.value.ledger];
   const error = one.error ?? other.error;
+  const choosing = shown.some((side) => side.path === null);
   return (
     <>
       <h1 class="hidden">Compare</h1>
@@ -229,15 +255,18 @@ export function Compare({ given: asked }) {
           onChange={(next) => change({ kind: next })}
           options={Object.entries(kinds)}
         />
-        <Fields given={given} kind={kind} change={change} shown={shown} />
+        <Fields given={given} kind={kind} change={change} shown={shown} robots={robots} />
         <a class="button" href="#/trends">
           Trends
         </a>
       </form>
-      {error && <Failure error={error} retry={() => [one, other].forEach((each) => each.reload())} />}
-      {!error && shown.some((side) => side.path === null) && <p class="note">Choose two missions.</p>}
-      {!error && !ready && shown.every((side) => side.path !== null) && <Loading what="the comparison" />}
-      {!error && ready && (
+      {none && <Misordered />}
+      {!none && choosing && <Unchosen kind={kind} robots={robots} />}
+      {!choosing && error && (
+        <Failure error={error} retry={() => [one, other].forEach((each) => each.reload())} />
+      )}
+      {!choosing && !error && !ready && <Loading what="the comparison" />}
+      {!choosing && !error && ready && (
         <Figures shown={shown} values={[one.value, other.value]} ledgers={ledgers || null} />
       )}
     </>

@@ -22,7 +22,7 @@ import {
 } from '../widgets.jsx';
 
 const rowPx = 50;
-const cardPx = 152; // with the space below it, as in the style sheet
+const cardPx = 158; // with the space below it, as in the style sheet
 const spareRows = 8;
 const reorderMs = 3000;
 
@@ -65,26 +65,24 @@ const ownPart = (missionId, robotId) =>
 function GapBadges({ gap }) {
   if (gap === undefined) return <span class="note">–</span>;
   return (
-    <>
+    <span class="badges">
       <Ratio value={gap.ratio ?? null} />
-      <span class="below">
-        {format.known(gap.drift) && (
-          <span class="flag" title={`Consumption changed on ${format.time(gap.driftUs)}`}>
-            drift {format.signed(format.text(format.percent(gap.drift, 1)))}
-          </span>
-        )}
-        {gap.proposed && (
-          <span class="flag" title="A better model is proposed; the robot's page shows what it changes">
-            proposal
-          </span>
-        )}
-        {gap.standsOut && (
-          <span class="flag" title="Differs from the other robots of its kind">
-            stands out
-          </span>
-        )}
-      </span>
-    </>
+      {format.known(gap.drift) && (
+        <span class="flag" title={`Consumption changed on ${format.time(gap.driftUs)}`}>
+          drift {format.signed(format.text(format.percent(gap.drift, 1)))}
+        </span>
+      )}
+      {gap.proposed && (
+        <span class="flag" title="A better model is proposed; the robot's page shows what it changes">
+          proposal
+        </span>
+      )}
+      {gap.standsOut && (
+        <span class="flag" title="Differs from the other robots of its kind">
+          stands out
+        </span>
+      )}
+    </span>
   );
 }
 

@@ -7,7 +7,7 @@ import * as format from '../format.js';
 import { keepInAddress } from '../route.js';
 import { Table } from '../table.jsx';
 import { Answer, Choice, Empty, Panel, Quantity, Readout, useNarrow, useTitleOf } from '../widgets.jsx';
-import { Field, RobotsField, dayField, utimeUs } from './choosing.jsx';
+import { Field, Misordered, RobotsField, dayField, misordered, timesOf } from './choosing.jsx';
 import { FloorCanvas } from './floor_canvas.jsx';
 
 const usualDays = 28;
@@ -16,11 +16,12 @@ const sides = [0.5, 1, 2, 5, 10];
 const listed = 12;
 
 function filterOf(given) {
-  const midnight = new Date().setHours(0, 0, 0, 0);
+  const midnightUs = new Date().setHours(0, 0, 0, 0) * 1000;
+  const times = timesOf(given.from, given.to);
   return {
     robot_id: given.robot,
-    from_utime_us: given.from ? utimeUs(given.from) : (midnight - usualDays * dayMs) * 1000,
-    to_utime_us: utimeUs(given.to),
+    ...times,
+    from_utime_us: times.from_utime_us ?? (times.to_utime_us ?? midnightUs) - usualDays * dayMs * 1000,
     cell_m: given.cell ?? 1,
   };
 }
@@ -242,7 +243,8 @@ export function Floor({ given: asked }) {
   };
   const show = given.show in subjects ? given.show : 'energy';
   const filter = filterOf(given);
-  const map = useGet(`/v1/floor-map${query({ ...filter, limit: 20_000, digits: 7 })}`);
+  const none = misordered(given.from, given.to);
+  const map = useGet(none ? null : `/v1/floor-map${query({ ...filter, limit: 20_000, digits: 7 })}`);
   return (
     <>
       <h1 class="hidden">Floor</h1>
@@ -266,14 +268,22 @@ export function Floor({ given: asked }) {
           options={names}
         />
         <span class="export">
-          <button type="button" onClick={() => saveText(`/v1/floor-map${query(filter)}`, 'floor')}>
+          <button
+            type="button"
+            disabled={none}
+            onClick={() => saveText(`/v1/floor-map${query(filter)}`, 'floor')}
+          >
             Export CSV
           </button>
         </span>
       </form>
-      <Answer of={map} what="the floor">
-        {(value) => <Shown map={value} show={show} stale={map.loading} />}
-      </Answer>
+      {none ? (
+        <Misordered />
+      ) : (
+        <Answer of={map} what="the floor">
+          {(value) => <Shown map={value} show={show} stale={map.loading} />}
+        </Answer>
+      )}
     </>
   );
 }

@@ -4,6 +4,7 @@ import { del, post, query, useGet } from '../api.js';
 import * as format from '../format.js';
 import { useLive } from '../live.js';
 import { robotLink } from '../route.js';
+import { refusalFor } from '../session.js';
 import { Answer, Empty, Failure, Panel, useOptions, useTitleOf } from '../widgets.jsx';
 import { Result } from './diagnosis.jsx';
 import { JobRows, State, stateNotes } from './jobs.jsx';
@@ -31,6 +32,7 @@ function Progress({ job, onEnd }) {
   const now = useProgress(job, onEnd);
   const [error, setError] = useState(null);
   const part = Math.round(100 * now.progress);
+  const refusal = refusalFor('operate');
   const words =
     now.state === 'queued' ? (now.ahead > 0 ? `${now.ahead} before it` : 'about to start') : `${part} %`;
   return (
@@ -39,7 +41,12 @@ function Progress({ job, onEnd }) {
         Diagnosis {job.id} of {job.robot_id}: {stateNotes[now.state]}, {words}
       </label>
       <progress id="progress" max="100" value={now.state === 'queued' ? undefined : part} />
-      <button type="button" onClick={() => del(`/v1/diagnoses/${job.id}`).catch(setError)}>
+      <button
+        type="button"
+        disabled={refusal !== undefined}
+        title={refusal}
+        onClick={() => del(`/v1/diagnoses/${job.id}`).catch(setError)}
+      >
         Cancel
       </button>
       {error && <Failure error={error} />}
@@ -65,6 +72,7 @@ function Start({ given, onStart }) {
   const ofOthers = useOptions(others);
   const chosen = robot || (newest.loading ? '' : (driven[0] ?? robots[0] ?? ''));
   const past = useGet(chosen && `/v1/mission-totals${query({ robot_id: chosen, state: 'finished' })}`);
+  const refusal = refusalFor('operate');
   const count = chosen && past.value !== null && !past.loading ? past.value.missions : null;
   const start = async (event) => {
     event.preventDefault();
@@ -114,7 +122,12 @@ function Start({ given, onStart }) {
           onInput={(e) => setMissions(e.currentTarget.value)}
         />
       </label>
-      <button type="submit" class="primary" disabled={busy || !count}>
+      <button
+        type="submit"
+        class="primary"
+        disabled={busy || !count || refusal !== undefined}
+        title={refusal}
+      >
         Diagnose
       </button>
       <p class="note" role="status">

@@ -137,7 +137,7 @@ export function Mission({ id, given }) {
               </Panel>
               {m.findings && (
                 <Panel title="Payload by the motion">
-                  <Findings of={m.findings} />
+                  <Findings of={m.findings} mission={m} />
                 </Panel>
               )}
               {conditions.value?.covariates.length > 0 && (

@@ -123,7 +123,7 @@ export function missionColumns(missions, models, withRobot) {
     {
       key: 'consumption',
       title: 'Consumption',
-      class: 'figure',
+      class: 'figure long',
       hint: 'energy over distance',
       sort: true,
       cell: (m) => <Quantity of={consumption(m.wh_per_km === null ? null : 3.6 * m.wh_per_km)} />,

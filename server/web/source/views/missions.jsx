@@ -7,7 +7,7 @@ import { useModels } from '../models.js';
 import { keepInAddress } from '../route.js';
 import { SortChoice, turned } from '../table.jsx';
 import { Answer, Empty, Failure, Loading, Readout, stateNotes, useTitleOf } from '../widgets.jsx';
-import { Field, RobotsField, utimeUs } from './choosing.jsx';
+import { Field, Misordered, RobotsField, misordered, timesOf } from './choosing.jsx';
 import { MissionTable, missionColumns, sortNames } from './mission_rows.jsx';
 
 const pageRows = 50;
@@ -18,8 +18,7 @@ function filterOf(given) {
     robot_id: given.robot,
     state: given.state,
     incomplete: given.incomplete,
-    from_utime_us: utimeUs(given.from),
-    to_utime_us: utimeUs(given.to),
+    ...timesOf(given.from, given.to),
     payload_min_kg: given.payload_min,
     payload_max_kg: given.payload_max,
     ratio_min: given.ratio_min,
@@ -179,7 +178,8 @@ function Export({ filter, total }) {
 }
 
 // Missions of `filter` in its order, page by page into one list: {rows, next, error, loading, more, reload}.
-function useList(filter, limit) {
+// With `none` nothing is asked.
+function useList(filter, limit, none) {
   const empty = { rows: null, next: null, error: null, loading: true };
   const [list, setList] = useState(empty);
   const abort = useRef(null);
@@ -196,9 +196,10 @@ function useList(filter, limit) {
   };
   const reload = () => read([], undefined);
   useEffect(() => {
+    if (none) return undefined;
     reload();
     return () => abort.current?.abort();
-  }, [JSON.stringify(filter), limit]);
+  }, [JSON.stringify(filter), limit, none]);
   return { ...list, more: () => read(list.rows, list.next), reload };
 }
 
@@ -252,8 +253,9 @@ export function Missions({ given: asked }) {
   const order = given.sort
     ? { sort: sortNames[given.sort] ?? given.sort, order: given.down === '1' ? 'desc' : 'asc' }
     : {};
-  const list = useList({ ...filter, ...order }, pageRows);
-  const totals = useGet(`/v1/mission-totals${query(filter)}`);
+  const none = misordered(given.from, given.to);
+  const list = useList({ ...filter, ...order }, pageRows, none);
+  const totals = useGet(none ? null : `/v1/mission-totals${query(filter)}`);
   const refresh = () => {
     list.reload();
     totals.reload();
@@ -268,23 +270,29 @@ export function Missions({ given: asked }) {
     <>
       <h1 class="hidden">Missions</h1>
       <Filters given={given} change={change} />
-      <Totals of={totals} />
-      <div class="tools">
-        <button type="button" onClick={refresh}>
-          Refresh
-        </button>
-        <a class="button" href={`#/trends${query({ robot: given.robot })}`}>
-          Trends
-        </a>
-        <a class="button" href="#/compare">
-          Compare
-        </a>
-        <span class="note">Local times ({Intl.DateTimeFormat().resolvedOptions().timeZone}).</span>
-        <Export filter={{ ...filter, ...order }} total={total ?? 0} />
-      </div>
-      {list.rows === null && list.error && <Failure error={list.error} retry={list.reload} />}
-      {list.rows === null && !list.error && <Loading what="missions" />}
-      {list.rows !== null && <List given={given} list={list} total={total} onSort={onSort} />}
+      {none ? (
+        <Misordered />
+      ) : (
+        <>
+          <Totals of={totals} />
+          <div class="tools">
+            <button type="button" onClick={refresh}>
+              Refresh
+            </button>
+            <a class="button" href={`#/trends${query({ robot: given.robot })}`}>
+              Trends
+            </a>
+            <a class="button" href="#/compare">
+              Compare
+            </a>
+            <span class="note">Local times ({Intl.DateTimeFormat().resolvedOptions().timeZone}).</span>
+            <Export filter={{ ...filter, ...order }} total={total ?? 0} />
+          </div>
+          {list.rows === null && list.error && <Failure error={list.error} retry={list.reload} />}
+          {list.rows === null && !list.error && <Loading what="missions" />}
+          {list.rows !== null && <List given={given} list={list} total={total} onSort={onSort} />}
+        </>
+      )}
     </>
   );
 }

@@ -3,6 +3,7 @@ import { useEffect, useState } from 'preact/hooks';
 import { idPath, post, useGet } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
 import * as format from '../format.js';
+import { refusalFor } from '../session.js';
 import { Failure, Panel } from '../widgets.jsx';
 import { BackTest } from './back_test.jsx';
 import { Changes, changesOf } from './changes.jsx';
@@ -34,6 +35,7 @@ function Proposal({ of: p, robot, inForce, onChange }) {
   const changes = parameterChanges(p, inForce);
   const next = `Adopt proposal ${p.id}?`;
   const busy = result.busy !== '';
+  const refusal = refusalFor('operate');
   return (
     <li class="active">
       <p>
@@ -46,7 +48,12 @@ function Proposal({ of: p, robot, inForce, onChange }) {
       {result.test && <BackTest test={result.test} />}
       {result.error && <Failure error={result.error} />}
       <p class="tools">
-        <button type="button" disabled={busy} onClick={() => ask('test', { dry_run: true })}>
+        <button
+          type="button"
+          disabled={busy || refusal !== undefined}
+          title={refusal}
+          onClick={() => ask('test', { dry_run: true })}
+        >
           {result.busy === 'test' ? 'Testing …' : 'Test on other missions'}
         </button>
         <ConfirmButton
@@ -55,6 +62,7 @@ function Proposal({ of: p, robot, inForce, onChange }) {
           class="primary"
           title={next}
           disabled={busy}
+          refusal={refusal}
           onConfirm={() => ask('adopt', { expected_version: inForce.model_version })}
         >
           <p>

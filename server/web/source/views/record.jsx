@@ -72,7 +72,7 @@ const payloadVerdicts = {
 };
 
 // What the motion of this mission says of payload and friction.
-export function Findings({ of: f }) {
+export function Findings({ of: f, mission }) {
   const p = f.payload;
   return (
     <table class="facts">
@@ -81,7 +81,15 @@ export function Findings({ of: f }) {
           {payloadVerdicts[p.verdict]}{' '}
           {p.verdict === 'undeclared' && <span class="flag">undeclared payload</span>}
         </Row>
-        <Row name="Declared">{format.text(format.unit(p.declared_kg, 'kg'))}</Row>
+        <Row name="Declared, mean">
+          {mission.payload_kg === null && p.declared_kg === 0 ? (
+            <>
+              – <span class="note">taken as 0 kg</span>
+            </>
+          ) : (
+            format.text(format.unit(p.declared_kg, 'kg'))
+          )}
+        </Row>
         <Row name="Beyond the declared">
           {format.withDeviation(p.undeclared_kg, p.undeclared_sd_kg)}
           {'\u00a0'}kg

@@ -40,6 +40,12 @@ function Model({ model }) {
   );
 }
 
+function whyNowhere(state) {
+  if (!state.has_model)
+    return 'Telemetry of a robot without a model, its position with it, is counted but not kept.';
+  return state.live ? 'This robot does not report its position.' : 'None since the service started.';
+}
+
 // Where the robot is and was: the running mission's trace so far, then the live positions.
 function LiveMap({ entry }) {
   const mission = entry.state.mission?.id;
@@ -57,12 +63,7 @@ function LiveMap({ entry }) {
       : [];
   const rows = [...before, ...live.map(([, x, y, w]) => [x, y, w])];
   const [x, y, heading] = entry.state.pose;
-  if (rows.length === 0 || x === null)
-    return (
-      <Empty title="No position">
-        {entry.state.live ? 'This robot does not report its position.' : 'None since the service started.'}
-      </Empty>
-    );
+  if (rows.length === 0 || x === null) return <Empty title="No position">{whyNowhere(entry.state)}</Empty>;
   return (
     <FloorPath
       points={rows}

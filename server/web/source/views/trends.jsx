@@ -1,7 +1,7 @@
 // Energy a day or week, consumption and ratio: of the fleet, or of some robots side by side.
 import { useEffect, useMemo, useState } from 'preact/hooks';
 import { get, query } from '../api.js';
-import { Chart, axis, clockAxis } from '../chart.jsx';
+import { Chart, axis, dateAxis } from '../chart.jsx';
 import { consumption, energyIn, energyScale } from '../energy.js';
 import { saveText } from '../export.js';
 import * as format from '../format.js';
@@ -9,7 +9,7 @@ import { keepInAddress } from '../route.js';
 import { Table } from '../table.jsx';
 import { palette } from '../theme.js';
 import { Answer, Choice, Panel, Quantity, Ratio, useTitleOf } from '../widgets.jsx';
-import { RobotsField, dayField, offsetMin, robotsOf, utimeUs } from './choosing.jsx';
+import { Misordered, RobotsField, dayField, misordered, offsetMin, robotsOf, timesOf } from './choosing.jsx';
 
 const defaultDays = { day: 30, week: 182 };
 const dayMs = 86_400_000;
@@ -19,11 +19,12 @@ const dayOf = (utime) => format.time(utime).slice(0, 10);
 export const totalsPath = (filter) => `/v1/mission-totals${query(filter)}`;
 
 function filterOf(given, kind, robot) {
-  const from = given.from ? utimeUs(given.from) : (Date.now() - defaultDays[kind] * dayMs) * 1000;
+  const times = timesOf(given.from, given.to);
   return {
     robot_id: robot,
-    from_utime_us: Math.round(from),
-    to_utime_us: utimeUs(given.to),
+    ...times,
+    from_utime_us:
+      times.from_utime_us ?? (times.to_utime_us ?? Date.now() * 1000) - defaultDays[kind] * dayMs * 1000,
     group_by: kind,
     utc_offset_min: offsetMin(),
   };
@@ -34,7 +35,9 @@ function useSeries(given, kind) {
   const [state, setState] = useState({ value: null, error: null });
   const [turn, setTurn] = useState(0);
   const robots = robotsOf(given);
+  const none = misordered(given.from, given.to);
   useEffect(() => {
+    if (none) return undefined;
     const abort = new AbortController();
     const ask = async (robot) => ({
       name: robot ?? 'Fleet',
@@ -64,8 +67,6 @@ function aligned(series, kind) {
   };
 }
 
-const dates = { ...clockAxis, values: (_, splits) => splits.map((second) => dayOf(second * 1e6)), space: 90 };
-
 function TrendChart({ series, kind, label, value, unit, zero }) {
   const data = useMemo(() => {
     const { x, column } = aligned(series, kind);
@@ -75,9 +76,9 @@ function TrendChart({ series, kind, label, value, unit, zero }) {
     const p = palette();
     const colours = [p.measured, p.modelled, p.gap, p.ink, p.muted];
     return {
-      padding: [8, 30, 0, 0],
+      padding: [8, 44, 0, 0],
       scales: { y: zero ? { range: (_, low, high) => [Math.min(0, low), high > 0 ? 1.08 * high : 1] } : {} },
-      axes: [axis('', dates), axis(unit)],
+      axes: [axis('', dateAxis(kind === 'week' ? 7 : 1)), axis(unit)],
       series: [
         {},
         ...series.map((s, k) => ({
@@ -123,7 +124,7 @@ function Periods({ series, kind }) {
   const rows = series.flatMap((s) => s.groups.map((g) => ({ ...g, name: s.name })));
   rows.sort((a, b) => b.from_utime_us - a.from_utime_us);
   const scale = energyScale(rows.map((g) => g.energy.battery_j));
-  const figure = (key, title, cell) => ({ key, title, class: 'figure', cell });
+  const figure = (key, title, cell, more = '') => ({ key, title, class: `figure ${more}`, cell });
   const columns = [
     {
       key: 'period',
@@ -135,9 +136,12 @@ function Periods({ series, kind }) {
     figure('missions', 'Missions', (g) => format.fixed(g.missions)),
     figure('energy', 'Energy', (g) => <Quantity of={energyIn(scale, g.energy.battery_j)} />),
     figure('distance', 'Distance', (g) => <Quantity of={format.kilometres(g.energy.distance_m)} />),
-    figure('consumption', 'Consumption', (g) => (
-      <Quantity of={consumption(g.wh_per_km === null ? null : 3.6 * g.wh_per_km)} />
-    )),
+    figure(
+      'consumption',
+      'Consumption',
+      (g) => <Quantity of={consumption(g.wh_per_km === null ? null : 3.6 * g.wh_per_km)} />,
+      'long',
+    ),
     figure('ratio', 'Ratio', (g) => <Ratio value={g.ratio} />),
   ];
   return <Table class="trends" columns={columns} rows={rows} keyOf={(g) => `${g.from_utime_us} ${g.name}`} />;
@@ -200,6 +204,7 @@ export function Trends({ given: asked }) {
   const kind = given.by === 'week' ? 'week' : 'day';
   const series = useSeries(given, kind);
   const robots = robotsOf(given);
+  const none = misordered(given.from, given.to);
   return (
     <>
       <h1 class="hidden">Trends</h1>
@@ -222,6 +227,7 @@ export function Trends({ given: asked }) {
         <span class="export">
           <button
             type="button"
+            disabled={none}
             onClick={() =>
               saveText(totalsPath(filterOf(given, kind, robots.join(',') || undefined)), 'trends')
             }
@@ -230,9 +236,13 @@ export function Trends({ given: asked }) {
           </button>
         </span>
       </form>
-      <Answer of={series} what="trends">
-        {(value) => <Shown series={value} kind={kind} />}
-      </Answer>
+      {none ? (
+        <Misordered />
+      ) : (
+        <Answer of={series} what="trends">
+          {(value) => <Shown series={value} kind={kind} />}
+        </Answer>
+      )}
     </>
   );
 }

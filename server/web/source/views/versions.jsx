@@ -3,6 +3,7 @@ import { useState } from 'preact/hooks';
 import { idPath, post } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
 import * as format from '../format.js';
+import { refusalFor } from '../session.js';
 import { Failure } from '../widgets.jsx';
 import { Changes, changesOf } from './changes.jsx';
 import { share } from './jobs.jsx';
@@ -47,6 +48,7 @@ function Version({ of: v, versions, robot, busy, onActivate }) {
           action={`Put version ${number} in force`}
           title={`Put version ${number} of ${robot} in force again?`}
           disabled={busy !== null}
+          refusal={refusalFor('operate')}
           onConfirm={() => onActivate(number)}
         >
           <p>
