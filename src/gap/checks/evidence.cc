@@ -96,9 +96,11 @@ void Gatherer::armatures() {
     const auto relation = k == 0 ? Relation::armature_right : Relation::armature_left;
     const BlockFit fit = fit_blocks(armature_blocks(c_.seen, relation, c_.motor_delay_s), 0, terms);
     const std::string side = side_name[k];
-    add("the " + side + " motor's voltage constant, from its voltage, current and speed, is", "the file's",
-        estimate(fit, 1) * (1 / p_.voltage_constant_v_s_rad), constant_off, constant_off, 12,
-        {{side_of(S::voltage_right, k), 1}, {side_of(S::wheel_right, k), -1}});
+    Evidence* constant =
+        add("the " + side + " motor's voltage constant, from its voltage, current and speed, is",
+            "the file's", estimate(fit, 1) * (1 / p_.voltage_constant_v_s_rad), constant_off, constant_off,
+            12, {{side_of(S::voltage_right, k), 1}, {side_of(S::wheel_right, k), -1}});
+    if (constant != nullptr) constant->by_gear = true;
     add("the " + side + " motor's resistance, from its voltage, current and speed, is", "the file's",
         estimate(fit, 0) * (1 / p_.resistance_ohm[k]), resistance_off, resistance_off, 8,
         {{side_of(S::voltage_right, k), 1}, {side_of(S::current_right, k), -1}});
@@ -112,10 +114,11 @@ void Gatherer::armatures() {
     e->turned_by = pairs;
     e->both_sides = true;
   };
-  sides(add("the voltage constant, from the differences of the sides, is", "the file's",
-            estimate(fit, 1) * (1 / p_.voltage_constant_v_s_rad), constant_off, constant_off, 12,
-            {{S::voltage_right, 1}, {S::wheel_right, -1}}),
-        1 | 2);
+  Evidence* constant = add("the voltage constant, from the differences of the sides, is", "the file's",
+                           estimate(fit, 1) * (1 / p_.voltage_constant_v_s_rad), constant_off, constant_off,
+                           12, {{S::voltage_right, 1}, {S::wheel_right, -1}});
+  if (constant != nullptr) constant->by_gear = true;
+  sides(constant, 1 | 2);
   sides(add("the resistance, from the differences of the sides, is", "the file's",
             estimate(fit, 0) * (2 / (p_.resistance_ohm[0] + p_.resistance_ohm[1])), resistance_off,
             resistance_off, 10, {{S::voltage_right, 1}, {S::current_right, -1}}),

@@ -258,10 +258,12 @@ Measured measured_factor(std::span<const Evidence> evidence, const Explanation& 
   const Combined others(rest), all(explanation.faults);
   Measured best;
   double most = 0;
+  bool by_gear = true;
   for (const Evidence& e : evidence) {
     const auto without = predicted(e, others), with = predicted(e, all);
     if (!without || !with || *without == *with) continue;
     const double supports = surprise_of(e, others) - surprise_of(e, all);
+    if (supports >= least_support) by_gear = by_gear && e.by_gear;
     if (supports <= most) continue;
     most = supports;
     // The exponent by which the fault's own factor enters: swaps turn the sign alone.
@@ -276,6 +278,7 @@ Measured measured_factor(std::span<const Evidence> evidence, const Explanation& 
     best.interval = {factor(interval[0]), factor(interval[1])};
     if (best.interval[0] > best.interval[1]) std::swap(best.interval[0], best.interval[1]);
   }
+  best.by_gear = by_gear && best.evidence != nullptr;
   return best;
 }
 

@@ -38,6 +38,8 @@ struct Measured {
   const Evidence* evidence = nullptr;
   double factor = 1;
   std::array<double, 2> interval{};
+  // Whether all that speaks for the fault goes by the file's gear ratio: a wrong one would look the same.
+  bool by_gear = false;
 };
 Measured measured_factor(std::span<const Evidence> evidence, const Explanation& explanation,
                          const Fault& fault);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <string>
 
 #include "gap/checks/evaluation.h"
 #include "gap/checks/motors.h"
@@ -9,18 +10,20 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr double far = 1.3;  // times the file's value, or that part of it
+constexpr double far = 1.3;   // times the file's value, or that part of it
+constexpr double same = 0.2;  // two ratios nearer to each other than this, of their logarithm, may be one
 
 class List {
  public:
   // `ratio` over the file's value; told where its whole interval is far from 1.
-  void add(const char* name, const Estimate& ratio) {
+  bool add(const char* name, const Estimate& ratio) {
     const auto interval = ratio.interval();
-    if (!ratio.known() || !(ratio.value > 0)) return;
-    if (!(interval[0] > far || interval[1] < 1 / far)) return;
+    if (!ratio.known() || !(ratio.value > 0)) return false;
+    if (!(interval[0] > far || interval[1] < 1 / far)) return false;
     text_ += fmt::format("{}{} {:.3g} times", text_.empty() ? "" : ", ", name, ratio.value);
     const double size = std::fabs(std::log(ratio.value));
     if (size > most_) most_ = size, worst_ = ratio;
+    return true;
   }
   const std::string& text() const { return text_; }
   const Estimate& worst() const { return worst_; }
@@ -46,18 +49,26 @@ std::vector<Check> check_robot_file(const CheckContext& c) {
   const auto m = motor_constants(c.seen, c.motor_delay_s);
   const bool motors = c.has({0, 1, 2, 3, 4, 5}), currents = c.has({0, 1, 4, 5});
   const bool battery = c.heard({reading::battery_voltage, reading::battery_current});
+  std::string gear;
+  Estimate constant;
   if (motors) {
     list.add("motor resistance", nearer(m[0].resistance_ohm * (1 / p.resistance_ohm[0]),
                                         m[1].resistance_ohm * (1 / p.resistance_ohm[1])));
-    list.add("voltage constant with gear", nearer(m[0].constant_v_s_rad * (1 / p.voltage_constant_v_s_rad),
-                                                  m[1].constant_v_s_rad * (1 / p.voltage_constant_v_s_rad)));
+    const Estimate ratio = nearer(m[0].constant_v_s_rad * (1 / p.voltage_constant_v_s_rad),
+                                  m[1].constant_v_s_rad * (1 / p.voltage_constant_v_s_rad));
+    if (list.add("voltage constant with gear", ratio)) constant = ratio;
   }
   if (currents) {
     const auto friction = [&](std::size_t k) {
       const double torque = p.friction_torque_nm[k] + p.viscous_friction_nm_s_rad * m[k].mean_speed_rad_s;
       return torque > 0 ? m[k].steady_current_a * (p.torque_constant_nm_a / torque) : Estimate{};
     };
-    list.add("friction", nearer(friction(0), friction(1)));
+    const Estimate ratio = nearer(friction(0), friction(1));
+    // Both go by the gear ratio, the one inversely to the other.
+    if (list.add("friction", ratio) && constant.known() &&
+        std::fabs(std::log(ratio.value * constant.value)) < same) {
+      gear = fmt::format(", as with a gear_ratio {:.3g} times the robot's", 1 / constant.value);
+    }
   }
   if (battery) {
     const Estimate idle = ratio_of_sums(c.blocks(Relation::idle), 0, 1, 1);
@@ -72,8 +83,9 @@ std::vector<Check> check_robot_file(const CheckContext& c) {
     }
   }
   if (list.text().empty()) return {};
-  return {make_check("robot_file", "", list.worst(),
-                     fmt::format("The robot file is far from this robot: {} the file's.", list.text()))};
+  return {
+      make_check("robot_file", "", list.worst(),
+                 fmt::format("The robot file is far from this robot: {} the file's{}.", list.text(), gear))};
 }
 
 }  // namespace joulecast::gap

@@ -35,10 +35,12 @@ std::string_view contract_of(std::string_view channel) {
   return "";
 }
 
-std::string also(const std::vector<const Fault*>& alternatives) {
+std::string also(const std::vector<const Fault*>& alternatives, const Measured& measured) {
   std::string text;
-  for (const Fault* f : alternatives) {
-    text += fmt::format("{}{} {}", text.empty() ? "; " : " or ", f->channel, f->cause);
+  const auto add = [&](const std::string& what) { text += (text.empty() ? "; " : " or ") + what; };
+  for (const Fault* f : alternatives) add(f->channel + " " + f->cause);
+  if (measured.by_gear && measured.factor > 0) {
+    add(fmt::format("a gear_ratio in the robot file {:.3g} times the robot's", measured.factor));
   }
   return text.empty() ? text : text + " would look the same";
 }
@@ -60,7 +62,7 @@ std::vector<Check> check_signs_and_units(const CheckContext& c) {
     Check check{fault.id, fault.channel, measured.factor, measured.interval, {}, true};
     check.says = fmt::format("{} looks {}: {} {} times {}; joulecast expects {}{}.", fault.channel,
                              fault.cause, e.says, with_interval(e.ratio.value, e.ratio.interval()), e.against,
-                             contract_of(fault.channel), also(explanation.alternatives[k]));
+                             contract_of(fault.channel), also(explanation.alternatives[k], measured));
     checks.push_back(std::move(check));
   }
   return checks;

@@ -142,6 +142,24 @@ TEST(CheckRecordings, AFileOfAnotherRobotIsTold) {
   EXPECT_TRUE(std::ranges::none_of(checks, &Check::contradicted));
 }
 
+TEST(CheckRecordings, AWrongGearRatioOfTheFileIsTold) {
+  for (const double factor : {0.5, 1.5}) {
+    robot::RobotModel other = scout().model;
+    other.motor.gear_ratio *= factor;
+    const auto checks = check_recordings(scout().recordings, other);
+    ASSERT_TRUE(find(checks, "robot_file")) << factor;
+    const std::string& says = find(checks, "robot_file")->says;
+    const std::size_t at = says.find("a gear_ratio ");
+    ASSERT_NE(at, std::string::npos) << says;
+    EXPECT_NEAR(std::stod(says.substr(at + 13)), factor, 0.1 * factor) << says;
+  }
+  robot::RobotModel other = scout().model;
+  for (double& t : other.motor.friction_torque_nm) t *= 2;
+  const auto checks = check_recordings(scout().recordings, other);
+  ASSERT_TRUE(find(checks, "robot_file"));
+  EXPECT_EQ(find(checks, "robot_file")->says.find("gear_ratio"), std::string::npos);
+}
+
 TEST(CheckRecordings, AStepIsSplitBetweenItsMissions) {
   telemetry::RecordingSet set = scout().recordings;
   mistakes::step(set, {reading::battery_current}, 1.25);

@@ -103,5 +103,23 @@ TEST_F(Faults, WhatCannotBeToldApartIsNamed) {
   EXPECT_NE(std::ranges::find(names, "wheel_velocity_reversed"), names.end());
 }
 
+// Speeds in rpm, or a file whose gear ratio is as much too large: only what the file has no part in tells
+// them apart.
+TEST_F(Faults, AGearRatioOfTheFileMayLookLikeAUnit) {
+  const double rpm = 30 / std::numbers::pi;
+  std::vector<Evidence> some{evidence(1 / rpm, {{Source::wheel_right, -1}}, 0.3, 12),
+                             evidence(1 / rpm, {{Source::wheel_left, -1}}, 0.3, 12)};
+  for (Evidence& e : some) e.by_gear = true;
+  const auto measured = [&] {
+    const Explanation explanation = explain(some, faults_);
+    EXPECT_EQ(explanation.faults.size(), 1u);
+    return measured_factor(some, explanation, *explanation.faults.at(0));
+  };
+  EXPECT_TRUE(measured().by_gear);
+  EXPECT_NEAR(measured().factor, rpm, 0.1);
+  std::ranges::copy(kinematics(1, rpm), std::back_inserter(some));
+  EXPECT_FALSE(measured().by_gear);
+}
+
 }  // namespace
 }  // namespace joulecast::gap
