@@ -2,17 +2,26 @@
 
 #include <mosquitto.h>
 
+#include <algorithm>
 #include <atomic>
 #include <charconv>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <thread>
 #include <utility>
 
+#include "base/fault_boundary.h"
 #include "http_client/http_client.h"
 
 namespace joulecast::server {
 namespace {
 
 constexpr int keep_alive_s = 15;
-constexpr unsigned first_pause_s = 1, last_pause_s = 60;
+constexpr int longest_wait_ms = 1000;  // what is published ends a wait
+constexpr std::chrono::seconds first_pause{1}, last_pause{60};
+constexpr std::chrono::seconds farewell{2};  // for a broker that takes nothing any more
 
 Result<void> done(int code, const char* field) {
   if (code == MOSQ_ERR_SUCCESS) return {};
@@ -51,11 +60,11 @@ class BrokerLink::Impl {
     if (handle_ == nullptr) return fail(Fault::internal, "mqtt.url", "no memory for the connection");
     mosquitto_connect_callback_set(
         handle_, [](mosquitto*, void* self, int code) { static_cast<Impl*>(self)->on_connect(code); });
-    mosquitto_disconnect_callback_set(
-        handle_, [](mosquitto*, void* self, int code) { static_cast<Impl*>(self)->on_disconnect(code); });
-    mosquitto_reconnect_delay_set(handle_, first_pause_s, last_pause_s, true);
-    Result<void> set;
-    if (options_.tls) set = set_tls();
+    mosquitto_publish_callback_set(handle_, [](mosquitto*, void* self, int message) {
+      static_cast<Impl*>(self)->on_acknowledged(message);
+    });
+    Result<void> set = done(mosquitto_threaded_set(handle_, true), "mqtt.url");
+    if (set && options_.tls) set = set_tls();
     if (set && !options_.user.empty())
       set = done(mosquitto_username_pw_set(handle_, options_.user.c_str(), options_.password.c_str()),
                  "mqtt.user");
@@ -65,12 +74,10 @@ class BrokerLink::Impl {
                                     1, true),
                  "mqtt.interface");
     if (!set) return set;
-    // Whether the broker is there now does not matter: the thread goes on trying.
-    if (const int code = mosquitto_connect_async(handle_, options_.host.c_str(), options_.port, keep_alive_s);
-        code == MOSQ_ERR_INVAL)
-      return done(code, "mqtt.url");
-    running_ = true;
-    return done(mosquitto_loop_start(handle_), "mqtt.url");
+    const int code = mosquitto_connect_async(handle_, options_.host.c_str(), options_.port, keep_alive_s);
+    if (code == MOSQ_ERR_INVAL) return done(code, "mqtt.url");
+    thread_ = std::thread([this, code] { run(code); });
+    return {};
   }
 
   Result<void> set_tls() {
@@ -84,37 +91,86 @@ class BrokerLink::Impl {
 
   Result<void> publish(const std::string& topic, const std::string& message, int quality, bool retained) {
     if (!connected_) return fail(Fault::unavailable, "mqtt.url", "the broker is not connected");
-    return done(mosquitto_publish(handle_, nullptr, topic.c_str(), static_cast<int>(message.size()),
-                                  message.data(), quality, retained),
-                "mqtt.url");
+    int id = 0;
+    const int code = mosquitto_publish(handle_, &id, topic.c_str(), static_cast<int>(message.size()),
+                                       message.data(), quality, retained);
+    if (code == MOSQ_ERR_SUCCESS && quality > 0) {
+      const std::lock_guard lock(mutex_);
+      awaited_ = id;
+    }
+    return done(code, "mqtt.url");
   }
 
   void stop() {
     if (handle_ == nullptr) return;
-    if (running_) {
-      running_ = false;
+    if (thread_.joinable()) {
+      {
+        std::unique_lock lock(mutex_);
+        leave_until_ = std::chrono::steady_clock::now() + farewell;
+        wake_.notify_all();
+        // An acknowledgement that comes later makes the library close the connection without a farewell, and
+        // the broker publish the last words.
+        wake_.wait_until(lock, *leave_until_, [this] { return !connected_ || acknowledged_ == awaited_; });
+      }
       mosquitto_disconnect(handle_);
-      mosquitto_loop_stop(handle_, !connected_);
+      thread_.join();
     }
     mosquitto_destroy(std::exchange(handle_, nullptr));
     mosquitto_lib_cleanup();
   }
 
  private:
+  // The library's own thread ends for good at the first fault of TLS or of its protocol, a broker killed
+  // among them.
+  void run(int code) {
+    std::chrono::seconds pause = first_pause;
+    for (;;) {
+      while (code == MOSQ_ERR_SUCCESS && !has_left()) {
+        if (connected_) pause = first_pause;
+        code = mosquitto_loop(handle_, longest_wait_ms, 1);
+      }
+      std::unique_lock lock(mutex_);
+      connected_ = false;
+      wake_.notify_all();
+      if (leave_until_) return;
+      lock.unlock();
+      tell(mosquitto_strerror(code));
+      lock.lock();
+      if (wake_.wait_for(lock, pause, [this] { return leave_until_.has_value(); })) return;
+      lock.unlock();
+      pause = std::min(2 * pause, last_pause);
+      code = mosquitto_reconnect_async(handle_);
+    }
+  }
+
+  bool has_left() {
+    const std::lock_guard lock(mutex_);
+    return leave_until_ && (!connected_ || std::chrono::steady_clock::now() > *leave_until_);
+  }
+
   void on_connect(int code) {
     connected_ = code == 0;
-    on_change_(code == 0 ? "" : mosquitto_connack_string(code));
+    tell(code == 0 ? "" : mosquitto_connack_string(code));
   }
-  void on_disconnect(int code) {
-    connected_ = false;
-    if (code != 0) on_change_(mosquitto_strerror(code));
+  void on_acknowledged(int message) {
+    const std::lock_guard lock(mutex_);
+    acknowledged_ = message;
+    wake_.notify_all();
+  }
+  void tell(const char* why) {
+    survive("MQTT", [&] { on_change_(why); });
   }
 
   const BrokerOptions options_;
   const std::function<void(const std::string&)> on_change_;
   mosquitto* handle_ = nullptr;
-  bool running_ = false;
   std::atomic<bool> connected_ = false;
+  std::thread thread_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  int awaited_ = 0;       // the last message that wants an acknowledgement
+  int acknowledged_ = 0;  // the last that has one, or wants none and is sent
+  std::optional<std::chrono::steady_clock::time_point> leave_until_;  // set: no connection is made any more
 };
 
 BrokerLink::BrokerLink(BrokerOptions options, std::function<void(const std::string& why)> on_change)

@@ -27,7 +27,8 @@ Result<BrokerOptions> parse_broker_url(const std::string& url, const std::string
 // thread.
 class BrokerLink {
  public:
-  // `on_change(text)` when the connection is made (empty text) or ends: a thread of the library's.
+  // `on_change(text)` when the connection is made (empty text), and why whenever there is none: a thread of
+  // the link's.
   BrokerLink(BrokerOptions options, std::function<void(const std::string& why)> on_change);
   ~BrokerLink();
   BrokerLink(const BrokerLink&) = delete;

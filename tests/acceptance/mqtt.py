@@ -5,6 +5,7 @@ import json
 import pathlib
 import re
 import shutil
+import socket
 import subprocess
 
 import jsonschema
@@ -35,6 +36,20 @@ class Broker:
         if self.process:
             self.process.terminate()
             self.process.wait()
+
+    def kill(self):
+        """No farewell, in TLS neither."""
+        self.process.kill()
+        self.process.wait()
+
+    def refuses(self, times):
+        """In its place something that takes connections and closes them in the middle of their handshake."""
+        with socket.create_server(("localhost", self.port)) as server:
+            server.settimeout(30)
+            for _ in range(times):
+                connection, _ = server.accept()
+                connection.recv(100)
+                connection.close()
 
     def heard(self, topic, count, seconds):
         """So many messages of a topic, (topic, document) each."""
@@ -86,10 +101,11 @@ def main():
     try:
         programs.start()  # there is no broker yet
         fleet = subprocess.Popen([options.client, "simulate", "--robots", "2", "--lcm-url", programs.lcm_url, "--server", programs.url,
-                                  "--duration", "120", "--quiet"])
+                                  "--duration", "300", "--quiet"])
         wait_until(lambda: len([r for r in programs.get("/v1/robots")["robots"] if r["live"]]) == 2, 20, "both robots are live")
         robots = {r["robot_id"] for r in programs.get("/v1/robots")["robots"]}
         check(programs.metric("joulecast_mqtt_connected") == 0, "connected to a broker that is not there")
+        broker.refuses(2)
         broker.start()
         wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 1, 20, "the broker is connected once it is there")
 
@@ -110,13 +126,18 @@ def main():
         check(abs(supply["stateOfCharge"] - 100 * live["state_of_charge"]) < 1, f"{supply}, {live['state_of_charge']}")
         check(broker.state() == "ONLINE", "the daemon is there")
 
-        broker.stop()
-        wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 0, 30, "the broker is missed")
-        broker.start()
-        wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 1, 70, "the broker is connected again")
+        for end in (broker.stop, broker.kill):
+            end()
+            wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 0, 30, f"the broker is missed after its {end.__name__}")
+            broker.start()
+            wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 1, 70, f"the broker is connected again after its {end.__name__}")
         broker.heard("joulecast/v3/acme/+/powerSupply", 4, 20)
-        check(programs.stop() == 0, "the daemon did not stop in order")
-        check(broker.state() == "OFFLINE", "the daemon took leave")
+        for turn in range(6):  # a farewell is a race with its acknowledgement
+            check(programs.stop() == 0, "the daemon did not stop in order")
+            check(broker.state() == "OFFLINE", f"turn {turn}: the daemon took leave")
+            programs.start()
+            wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 1, 20, "the broker is connected")
+        programs.stop()
 
         programs.settings += ["--mqtt-dialect", "vda5050-2.1"]
         programs.start()
