@@ -40,6 +40,11 @@ try {
   const page = await browser.newPage();
   await page.goto(base);
   const dialog = page.locator('dialog.sign-in');
+  // The page loads anew once it is signed in; a view opened before that would be lost.
+  const signIn = async (secret) => {
+    await dialog.locator('input').fill(secret);
+    await Promise.all([page.waitForEvent('load'), dialog.locator('button[type=submit]').click()]);
+  };
   await dialog.waitFor({ state: 'visible' });
   await page.getByText('Sign in to see the fleet.').waitFor();
   await page.waitForTimeout(2000); // by then a service that is gone would be told
@@ -50,8 +55,7 @@ try {
   await dialog.locator('input').fill('jc_wrong');
   await dialog.locator('button[type=submit]').click();
   await page.waitForFunction(() => /unknown, expired or revoked/.test(document.body.innerText));
-  await dialog.locator('input').fill(token);
-  await dialog.locator('button[type=submit]').click();
+  await signIn(token);
   await page.waitForFunction(() => document.querySelector('.link.live') !== null);
   assert.equal(await dialog.isVisible(), false);
   assert.equal(await page.evaluate(() => document.cookie), '', 'a script reads the session');
@@ -82,8 +86,7 @@ try {
   assert.equal(await asked('GET', '/v1/robots'), 401);
   await page.reload();
   await dialog.waitFor({ state: 'visible' });
-  await dialog.locator('input').fill(adminToken);
-  await dialog.locator('button[type=submit]').click();
+  await signIn(adminToken);
   await page.goto(`${base}/#/robots/amr`);
   await activate.waitFor();
   assert.equal(await activate.isDisabled(), false);

@@ -1,5 +1,5 @@
 import { render } from 'preact';
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 import './style.css';
 import { useGet } from './api.js';
 import { clock } from './format.js';
@@ -67,7 +67,8 @@ function App() {
   const dark = useTheme();
   const unit = useEnergyUnit();
   const clustered = useGet('/v1/cluster').value?.name;
-  useEffect(() => {
+  // At once: an address that changed before the first paint would be missed.
+  useLayoutEffect(() => {
     const change = () => setRoute(routeOf(location.hash));
     addEventListener('hashchange', change);
     return () => removeEventListener('hashchange', change);

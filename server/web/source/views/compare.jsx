@@ -1,10 +1,10 @@
 // Two robots, two periods or two missions side by side.
-import { useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
+import { useChoices } from '../choices.js';
 import { consumption, energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
 import { useLive } from '../live.js';
-import { keepInAddress, missionLink, robotLink } from '../route.js';
+import { missionLink, robotLink } from '../route.js';
 import { Table, names } from '../table.jsx';
 import { effectOn } from '../waterfall.jsx';
 import { Choice, Failure, Loading, Quantity, Ratio, useOptions, useTitleOf } from '../widgets.jsx';
@@ -225,13 +225,8 @@ function Unchosen({ kind, robots }) {
 
 export function Compare({ given: asked }) {
   useTitleOf('Compare');
-  const [given, setGiven] = useState(asked);
+  const [given, change] = useChoices(asked);
   const kind = given.kind in kinds ? given.kind : 'robots';
-  const change = (part) => {
-    const next = Object.fromEntries(Object.entries({ ...given, ...part }).filter(([, value]) => value));
-    setGiven(next);
-    keepInAddress(next);
-  };
   const robots = useDriven(kind);
   const shown = sides.map((side) => sideOf(given, side, kind, robots ?? []));
   const none = shown.some((side) => side.none);

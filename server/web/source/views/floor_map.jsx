@@ -1,10 +1,10 @@
 // Where on the floor the fleet spends its energy over weeks, and where other than its models say.
 import { useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
+import { useChoices } from '../choices.js';
 import { consumption, energy, energyIn, energyScale } from '../energy.js';
 import { saveText } from '../export.js';
 import * as format from '../format.js';
-import { keepInAddress } from '../route.js';
 import { Table } from '../table.jsx';
 import { Answer, Choice, Empty, Panel, Quantity, Readout, useNarrow, useTitleOf } from '../widgets.jsx';
 import { Field, Misordered, RobotsField, dayField, misordered, timesOf } from './choosing.jsx';
@@ -235,12 +235,7 @@ function Shown({ map, show, stale }) {
 
 export function Floor({ given: asked }) {
   useTitleOf('Floor');
-  const [given, setGiven] = useState(asked);
-  const change = (part) => {
-    const next = Object.fromEntries(Object.entries({ ...given, ...part }).filter(([, value]) => value));
-    setGiven(next);
-    keepInAddress(next);
-  };
+  const [given, change] = useChoices(asked);
   const show = given.show in subjects ? given.show : 'energy';
   const filter = filterOf(given);
   const none = misordered(given.from, given.to);

@@ -1,10 +1,10 @@
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import { get, query, useGet } from '../api.js';
+import { useChoices } from '../choices.js';
 import { consumption, energy } from '../energy.js';
 import { exportMissions } from '../export.js';
 import * as format from '../format.js';
 import { useModels } from '../models.js';
-import { keepInAddress } from '../route.js';
 import { SortChoice, turned } from '../table.jsx';
 import { Answer, Empty, Failure, Loading, Readout, stateNotes, useTitleOf } from '../widgets.jsx';
 import { Field, Misordered, RobotsField, misordered, timesOf } from './choosing.jsx';
@@ -29,8 +29,9 @@ function filterOf(given) {
 
 const views = ['sort', 'down']; // how missions are shown, not which
 
-// Whether the address chooses among the missions.
-const choosing = (given) => Object.entries(given).some(([key, value]) => value && !views.includes(key));
+// By what the address chooses among the missions.
+const chosen = (given) => Object.keys(given).filter((key) => given[key] && !views.includes(key));
+const choosing = (given) => chosen(given).length > 0;
 
 function BoundFields({ label, name, given, set, ...more }) {
   const input = (end, word) => (
@@ -57,7 +58,7 @@ function BoundFields({ label, name, given, set, ...more }) {
 }
 
 function Filters({ given, change }) {
-  const set = (key) => (event) => change({ ...given, [key]: event.currentTarget.value });
+  const set = (key) => (event) => change({ [key]: event.currentTarget.value });
   const date = (label, key) => (
     <Field label={label}>
       <input type="datetime-local" value={given[key] ?? ''} onChange={set(key)} />
@@ -65,7 +66,7 @@ function Filters({ given, change }) {
   );
   return (
     <form class="filters" aria-label="Filter missions" onSubmit={(e) => e.preventDefault()}>
-      <RobotsField value={given.robot} onChange={(robot) => change({ ...given, robot })} none="all" />
+      <RobotsField value={given.robot} onChange={(robot) => change({ robot })} none="all" />
       {date('From', 'from')}
       {date('To', 'to')}
       <BoundFields label="Payload, kg" name="payload" given={given} set={set} min="0" />
@@ -94,7 +95,7 @@ function Filters({ given, change }) {
         type="button"
         class="plain"
         disabled={!choosing(given)}
-        onClick={() => change(Object.fromEntries(views.map((key) => [key, given[key]])))}
+        onClick={() => change(Object.fromEntries(chosen(given).map((key) => [key, ''])))}
       >
         Clear
       </button>
@@ -243,12 +244,7 @@ function List({ given, list, total, onSort }) {
 
 export function Missions({ given: asked }) {
   useTitleOf('Missions');
-  const [given, setGiven] = useState(asked);
-  const change = (next) => {
-    const kept = Object.fromEntries(Object.entries(next).filter(([, value]) => value));
-    setGiven(kept);
-    keepInAddress(kept);
-  };
+  const [given, change] = useChoices(asked);
   const filter = useMemo(() => filterOf(given), [given]);
   const order = given.sort
     ? { sort: sortNames[given.sort] ?? given.sort, order: given.down === '1' ? 'desc' : 'asc' }
@@ -263,7 +259,7 @@ export function Missions({ given: asked }) {
   const onSort = (key) => {
     const sort = given.sort ? { key: given.sort, down: given.down === '1' } : { key: 'start', down: true };
     const next = turned(sort, key, true);
-    change({ ...given, sort: next.key, down: next.down ? '1' : '' });
+    change({ sort: next.key, down: next.down ? '1' : '' });
   };
   const total = totals.value?.missions ?? null;
   return (

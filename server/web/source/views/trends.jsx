@@ -2,10 +2,10 @@
 import { useEffect, useMemo, useState } from 'preact/hooks';
 import { get, query } from '../api.js';
 import { Chart, axis, dateAxis } from '../chart.jsx';
+import { useChoices } from '../choices.js';
 import { consumption, energyIn, energyScale } from '../energy.js';
 import { saveText } from '../export.js';
 import * as format from '../format.js';
-import { keepInAddress } from '../route.js';
 import { Table } from '../table.jsx';
 import { palette } from '../theme.js';
 import { Answer, Choice, Panel, Quantity, Ratio, useTitleOf } from '../widgets.jsx';
@@ -195,12 +195,7 @@ function Shown({ series, kind }) {
 
 export function Trends({ given: asked }) {
   useTitleOf('Trends');
-  const [given, setGiven] = useState(asked);
-  const change = (part) => {
-    const next = Object.fromEntries(Object.entries({ ...given, ...part }).filter(([, value]) => value));
-    setGiven(next);
-    keepInAddress(next);
-  };
+  const [given, change] = useChoices(asked);
   const kind = given.by === 'week' ? 'week' : 'day';
   const series = useSeries(given, kind);
   const robots = robotsOf(given);
