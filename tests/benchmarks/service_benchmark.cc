@@ -298,6 +298,10 @@ int main(int argc, char** argv) {
   }
   const std::string program = argv[1];
   const std::string lcm_url = argc > 2 ? argv[2] : "udpm://239.255.76.67:7701?ttl=0&recv_buf_size=4194304";
+  if (!lcm_url.starts_with("udpm://")) {
+    std::fprintf(stderr, "LCM_URL must be udpm://..., as the daemon is another process\n");
+    return 2;
+  }
   const double seconds = argc > 3 ? std::atof(argv[3]) : 1;
   const int rounds = argc > 4 ? std::atoi(argv[4]) : 11;
   const std::uint16_t port = free_port();
