@@ -2,8 +2,8 @@
 # $home/*.pid.
 
 build_programs() {
-  cmake --preset release -DJOULECAST_TESTS=OFF -B build/demo-build >/dev/null
-  cmake --build build/demo-build --target joulecastd joulecast
+  cmake --preset demo >/dev/null
+  cmake --build --preset demo
 }
 
 end_programs() {

@@ -334,6 +334,9 @@ Result<void> read_flags(const std::vector<std::string>& arguments, Given& given)
   return {};
 }
 
+constexpr std::string_view of_the_command_line[] = {"JOULECAST_SERVER", "JOULECAST_TOKEN",
+                                                    "JOULECAST_CLIENT_CERTIFICATE", "JOULECAST_CLIENT_KEY"};
+
 void read_environment(const std::vector<std::string>& environment, Given& given, Problems& problems) {
   const auto table = settings_table();
   for (const std::string& entry : environment) {
@@ -345,8 +348,7 @@ void read_environment(const std::vector<std::string>& environment, Given& given,
       if (!given.config) given.config = std::move(value);
       continue;
     }
-    // The command line's own.
-    if (name == "JOULECAST_TOKEN") continue;
+    if (std::ranges::find(of_the_command_line, name) != std::end(of_the_command_line)) continue;
     const auto setting = std::find_if(table.begin(), table.end(),
                                       [&](const Setting& each) { return each.environment() == name; });
     if (setting == table.end()) {

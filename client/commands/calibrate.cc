@@ -17,6 +17,7 @@
 #include "client/commands/accepts.h"
 #include "client/commands/table.h"
 #include "client/files.h"
+#include "client/progress.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::client {
@@ -121,13 +122,20 @@ void print_text(const battery::Calibration& calibration, const battery::Coverage
   for (const std::string& sentence : battery::sentences(seen)) fmt::print("- {}.\n", sentence);
 }
 
+Result<battery::Calibration> fitted(const std::vector<battery::Recording>& recordings,
+                                    battery::CalibrationOptions how) {
+  Progress progress("identifying", "steps");
+  how.on_step = [&](int step) { progress.reach(static_cast<std::uint64_t>(step)); };
+  return battery::calibrate(recordings, how);
+}
+
 Exit run(const Options& options) {
   if (const auto may = may_write("--out", options.out, existing(options.force)); !may)
     return report(may.error());
   auto read = read_all(options.sources);
   if (!read) return report(read.error());
   const battery::CalibrationOptions how{options.rated_capacity_ah, options.reserve_fraction};
-  auto calibration = battery::calibrate(read->recordings, how);
+  auto calibration = fitted(read->recordings, how);
   if (!calibration) {
     for (const battery::PassedOver& p : read->unreadable)
       fmt::print(stderr, "joulecast: passed over: {}: {}\n", p.name, p.reason);

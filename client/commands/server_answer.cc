@@ -17,7 +17,9 @@ constexpr std::chrono::seconds timeout{60};
 }  // namespace
 
 void add_server(CLI::App& command, std::string& server) {
-  command.add_option("--server", server, "joulecastd to ask, host:port")->required();
+  command.add_option("--server", server, "joulecastd to ask, host:port")
+      ->envname("JOULECAST_SERVER")
+      ->required();
 }
 
 std::string percent_encoded(std::string_view text) {

@@ -372,9 +372,19 @@ Result<std::vector<Target>> targets_of(const std::vector<Recording>& recordings,
   return invalid("recordings", "need a constant-current or pulse discharge besides the slow one" + unused);
 }
 
+struct StepsTold : ceres::IterationCallback {
+  explicit StepsTold(const std::function<void(int)>& told) : on_step(told) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& step) override {
+    on_step(step.iteration);
+    return ceres::SOLVER_CONTINUE;
+  }
+  const std::function<void(int)>& on_step;
+};
+
 // The parameters of least misfit, within their ranges.
 Result<std::vector<double>> fitted(const Layout& layout, const SlowTest& slow, const robot::Battery& known,
-                                   const std::vector<Target>& targets, int& iterations) {
+                                   const std::vector<Target>& targets,
+                                   const std::function<void(int)>& on_step, int& iterations) {
   std::vector<double> p(layout.size());
   std::size_t rows = layout.knots.size() - 2;
   for (const Target& target : targets) rows += target.recording->size();
@@ -408,6 +418,8 @@ Result<std::vector<double>> fitted(const Layout& layout, const SlowTest& slow, c
   solver.max_num_iterations = 60;
   solver.function_tolerance = 1e-5;
   solver.logging_type = ceres::SILENT;
+  StepsTold steps(on_step);
+  if (on_step) solver.callbacks.push_back(&steps);
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   if (!summary.IsSolutionUsable())
@@ -454,7 +466,7 @@ Result<Calibration> calibrate(const std::vector<Recording>& given, const Calibra
 
   const Layout layout{resistance_knots(*targets, slow.capacity_ah),
                       temperature_span_k(*targets) >= least_temperature_span_k};
-  const auto p = fitted(layout, slow, known, *targets, out.iterations);
+  const auto p = fitted(layout, slow, known, *targets, options.on_step, out.iterations);
   if (!p) return tl::unexpected(p.error());
   out.battery = battery_of(layout, p->data(), slow, known);
   if (layout.with_activation) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +16,8 @@ struct CalibrationOptions {
   // capacity stands in the file and there is no ageing factor.
   std::optional<double> rated_capacity_ah;
   double reserve_fraction = 0.15;
+  // Called with the number of each step of the fit, some 10 to 60 of them.
+  std::function<void(int)> on_step = {};
 };
 
 struct RecordingFit {

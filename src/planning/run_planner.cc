@@ -133,8 +133,10 @@ void RunPlanner::find_motion() {
   task.start_speed = start_, task.end_speed = end_;
   task.speed_limit = std::sqrt(ceiling_at(0));
   task.acceleration_limit = acceleration_limit();
-  task.torque_limit_nm = problem_->limits.current_a * task.electric.torque_constant_nm_a;
-  task.voltage_limit_v = problem_->limits.voltage_v;
+  const bool motors_bind = !line_ || !motors_never_break_;
+  task.torque_limit_nm =
+      motors_bind ? problem_->limits.current_a * task.electric.torque_constant_nm_a : unlimited;
+  task.voltage_limit_v = motors_bind ? problem_->limits.voltage_v : unlimited;
   task.cells = std::max<std::size_t>(8, problem_->intervals_per_run);
   if (problem_->deadline_s || problem_->hurried) task.motor_tolerance = UniformMotion::hurried_tolerance;
   if (auto motion = UniformMotion::make(task)) motion_ = std::make_unique<UniformMotion>(std::move(*motion));
@@ -143,6 +145,7 @@ void RunPlanner::find_motion() {
 RunAnswer RunPlanner::answer_of(SteppedMotion motion) const {
   RunAnswer answer;
   answer.method = Method::quadrature;
+  answer.convex = loads_->electric().down >= 0;  // else a braking motor's power is concave in its torque
   answer.peak_speed = *std::max_element(motion.speed.begin(), motion.speed.end());
   answer.way = std::move(motion.way), answer.speed = std::move(motion.speed);
   answer.duration_s = motion.duration_s, answer.energy_j = motion.energy_j;

@@ -21,12 +21,23 @@ constexpr int most_cuts =
     8;  // in halves, of a cell in which the acceleration or a motor's limit changes fast
 constexpr double least_share = 0.8;  // of a cell's middle acceleration that motors must allow at its ends
 
-// x with x + gear |x| = t.
-double through_gear(double t, double gear) {
-  return t / (t > 0 ? 1 + gear : 1 - gear);
+// Whether a motor does what the other does, or its mirror image, as the left one in a turn in place.
+bool alike(const WheelLoad& a, const WheelLoad& b) {
+  const double sign = a.pace == b.pace ? 1 : -1;
+  const auto same = [&](auto... member) { return ((a.*member == sign * (b.*member)) && ...); };
+  return same(&WheelLoad::pace, &WheelLoad::inertia, &WheelLoad::t0, &WheelLoad::t1, &WheelLoad::t2,
+              &WheelLoad::f0, &WheelLoad::f1, &WheelLoad::f2, &WheelLoad::stribeck) &&
+         a.stribeck_speed == b.stribeck_speed && a.stribeck_exponent == b.stribeck_exponent;
 }
 
 }  // namespace
+
+UniformMotion::UniformMotion(const UniformTask& task) : task_(task) {
+  const Electric& e = task.electric;
+  if (alike(task.loads[0], task.loads[1]) && e.copper_w_n2_m2[0] == e.copper_w_n2_m2[1] &&
+      e.resistance_ohm[0] == e.resistance_ohm[1])
+    motors_ = 1, each_ = 2;
+}
 
 tl::unexpected<Error> endless(double standing_w) {
   return fail(Fault::infeasible, "value_of_time_w",
@@ -45,12 +56,11 @@ bool UniformMotion::has_motor_limits() const {
 UniformMotion::Local UniformMotion::local(double v) const {
   Local l;
   l.v = v;
-  for (const std::size_t s : {0u, 1u}) {
+  for (std::size_t s = 0; s < motors_; ++s) {
     const WheelLoad& w = task_.loads[s];
-    l.through[s] = w.t0 + v * (w.t1 + v * w.t2);
-    l.inside[s] = w.f0 + v * (w.f1 + v * w.f2);
+    l.torque[s] = w.t0 + w.f0 + v * (w.t1 + w.f1 + v * (w.t2 + w.f2));
     if (w.stribeck != 0)
-      l.inside[s] += w.stribeck * dynamics::stribeck_curve(v / w.stribeck_speed, w.stribeck_exponent);
+      l.torque[s] += w.stribeck * dynamics::stribeck_curve(v / w.stribeck_speed, w.stribeck_exponent);
   }
   return l;
 }
@@ -58,10 +68,9 @@ UniformMotion::Local UniformMotion::local(double v) const {
 UniformMotion::Power UniformMotion::motors(const Local& l, double acceleration) const {
   const Electric& e = task_.electric;
   Power sum;
-  for (const std::size_t s : {0u, 1u}) {
+  for (std::size_t s = 0; s < motors_; ++s) {
     const WheelLoad& w = task_.loads[s];
-    const double x = l.through[s] + w.inertia * acceleration, t = x + w.gear * std::fabs(x) + l.inside[s];
-    const double by_acceleration = w.inertia * (1 + std::copysign(w.gear, w.gear * x));
+    const double t = l.torque[s] + w.inertia * acceleration;
     const double emf = e.back_emf * w.pace * l.v, copper = e.copper_w_n2_m2[s];
     double power = (copper * t + emf) * t, slope = 2 * copper * t + emf, bend = 2 * copper;
     if (e.brush_w_nm != 0) {
@@ -69,10 +78,10 @@ UniformMotion::Power UniformMotion::motors(const Local& l, double acceleration) 
       power += e.brush_w_nm * t * t / root;
       slope += e.brush_w_nm * t * (t * t + 2 * width) / (root * root * root);
     }
-    const double share = power > 0 ? e.up : e.down;
+    const double share = each_ * (power > 0 ? e.up : e.down);
     sum.w += share * power;
-    sum.slope += share * slope * by_acceleration;
-    sum.bend += share * bend * by_acceleration * by_acceleration;
+    sum.slope += share * slope * w.inertia;
+    sum.bend += share * bend * w.inertia * w.inertia;
   }
   return sum;
 }
@@ -84,7 +93,7 @@ UniformMotion::Most UniformMotion::most(const Local& l, double direction, double
   const Electric& e = task_.electric;
   const double torque_limit = task_.torque_limit_nm * (1 + tolerance),
                voltage_limit = task_.voltage_limit_v * (1 + tolerance);
-  for (const std::size_t s : {0u, 1u}) {
+  for (std::size_t s = 0; s < motors_; ++s) {
     const WheelLoad& w = task_.loads[s];
     const double ohm = e.resistance_ohm[s] / e.torque_constant_nm_a,
                  emf = e.voltage_constant_v_s_rad * w.pace * l.v;
@@ -92,7 +101,7 @@ UniformMotion::Most UniformMotion::most(const Local& l, double direction, double
       const double by_voltage = (voltage_limit - side * emf) / ohm;
       const bool by_current = torque_limit <= by_voltage;
       const double torque = side * (by_current ? torque_limit : by_voltage);
-      const double room = through_gear(torque - l.inside[s], w.gear) - l.through[s];
+      const double room = torque - l.torque[s];
       // Bounded on this side where `direction` pushes towards it.
       const double push = direction * w.inertia * side;
       const double allowed = side * room < 0 ? -1 : push > 0 ? side * room / push : infinite;
@@ -109,21 +118,25 @@ double UniformMotion::best(const Local& l, double direction, double rate_w, doub
     here = motors(l, direction * a);
     return a * direction * here.slope - here.w - rate_w;
   };
-  const double standing = std::max(-excess(0), 1e-14 * (std::fabs(here.w) + std::fabs(rate_w)));
-  double low = 0, high = most;
+  double low = 0, high = most, at_low = excess(0);
+  at_low = std::min(at_low, -1e-14 * (std::fabs(here.w) + std::fabs(rate_w)));
   if (task_.electric.up != task_.electric.down) {
     // Where a motor begins to brake, the slope jumps; the optimum likes to be there, which is coasting.
-    for (const std::size_t s : {0u, 1u}) {
-      const WheelLoad& w = task_.loads[s];
-      const double kink = (through_gear(-l.inside[s], w.gear) - l.through[s]) / (direction * w.inertia);
+    for (std::size_t s = 0; s < motors_; ++s) {
+      const double kink = -l.torque[s] / (direction * task_.loads[s].inertia);
       if (!(kink > low && kink < high)) continue;
-      const double below = excess(kink * (1 - 1e-10)), above = excess(kink * (1 + 1e-10));
-      if (below <= 0 && above >= 0) return kink;
-      (below > 0 ? high : low) = kink;
+      const Power before = here;
+      if (excess(kink * (1 - 1e-10)) > 0) {
+        high = kink;
+        here = before;
+        continue;
+      }
+      at_low = excess(kink * (1 + 1e-10));
+      if (at_low >= 0) return kink;
+      low = kink;
     }
-    excess(low > 0 ? low * (1 + 1e-10) : 0);
   }
-  double a = std::clamp(std::sqrt(2 * standing / here.bend), low, high);
+  double a = std::clamp(std::sqrt(low * low - 2 * at_low / here.bend), low, high);
   bool at_most = false;
   for (int k = 0; k < 100 && high - low > 1e-12 * low; ++k) {
     at_most = at_most || a == most;
@@ -263,21 +276,25 @@ UniformMotion::Shape UniformMotion::turning(Shape shape, double nearest, double 
     }
   }
   double v = at_far > 0 ? zero_between(missing, near, at_near, far, at_far, 1e-6) : far;
-  const double aside = v - 1e-3 * (v - nearest), slope = (missing(v) - missing(aside)) / (v - aside);
+  const double aside = v - 1e-3 * (v - nearest), rough_slope = (missing(v) - missing(aside)) / (v - aside);
   shape.price.rough = false;
   // The rest of the way, if any, is driven at the speed of the turn: the motion must not be too long.
-  for (int k = 0; k < 12; ++k) {
-    const double m = missing(v);
-    if (m <= spare && (m >= -spare || v == farthest || k > 8)) break;
-    const double next = v - (m + 0.5 * spare) / slope - (k > 5 ? 1e-4 * (v - nearest) : 0);
+  double m = missing(v), slope = rough_slope;
+  const double close = shape.price.fastest ? 1e-3 * spare : spare;  // deadlines are held against it
+  for (int k = 0; k < 12 && !(m <= close && (m >= -close || v == farthest || k > 8)); ++k) {
+    const double next = v - (m + 0.5 * close) / slope - (k > 5 ? 1e-4 * (v - nearest) : 0);
+    const double v_before = v, m_before = m;
     v = std::clamp(next, std::min(nearest, farthest), std::max(nearest, farthest));
+    m = missing(v);
+    if (const double share = (m - m_before) / (v - v_before) / rough_slope; share > 0.2 && share < 5)
+      slope = share * rough_slope;
   }
   // Cells that are cut where the acceleration jumps make the distance jump a little with the speed.
-  if (missing(v) > spare) {
+  if (m > close) {
     double low = v, step = 1e-4 * (v - nearest);
-    for (int k = 0; k < 20 && missing(low) > spare; ++k, step *= 2)
+    for (int k = 0; k < 20 && missing(low) > close; ++k, step *= 2)
       low = nearest + std::max(0.0, low - step - nearest);
-    missing(last_that([&](double speed) { return missing(speed) <= spare; }, low, v, 30));
+    missing(last_that([&](double speed) { return missing(speed) <= close; }, low, v, 12));
   }
   return shape;
 }
@@ -351,7 +368,12 @@ UniformMotion::Least UniformMotion::pointwise_least(const Piece& piece, const Pr
 SteppedMotion UniformMotion::written(const Shape& shape) const {
   SteppedMotion motion;
   const double idle_w = task_.electric.idle_w;
-  double covered = distance(shape), way = 0;
+  std::vector<Piece> driven;
+  double covered = 0, way = 0;
+  pieces(shape, [&](const Piece& piece) {
+    driven.push_back(piece);
+    covered += piece.distance();
+  });
   const double cruise =
       shape.cruises && task_.distance > covered * (1 + spare) ? task_.distance - covered : 0;
   covered += cruise;
@@ -367,6 +389,11 @@ SteppedMotion UniformMotion::written(const Shape& shape) const {
       motion.discretisation_j += std::max(0.0, steady_cost(top_, shape.price.fixed_w) -
                                                    steady_cost(bare_top_, shape.price.fixed_w)) *
                                  cruise;
+    // The cost over the distance grows by f(v_turn) a unit, which is no less than f at the cheapest speed.
+    if (!shape.price.fastest)
+      motion.discretisation_j +=
+          cruise * std::max(0.0, steady_cost(shape.middle, shape.price.fixed_w) -
+                                     steady_cost(cheapest_speed(shape.price.fixed_w), shape.price.fixed_w));
     way += cruise;
     motion.way.push_back(way * scale), motion.speed.push_back(shape.middle);
     if (shape.middle >= task_.speed_limit * (1 - rounding))
@@ -375,7 +402,7 @@ SteppedMotion UniformMotion::written(const Shape& shape) const {
   bool held = false;
   double best_distance = cruise;
   if (task_.start_speed == shape.middle) hold(), held = true;
-  pieces(shape, [&](const Piece& piece) {
+  for (const Piece& piece : driven) {
     const double duration = piece.duration_s(), change = piece.to - piece.from;
     double power = 0, least = 0;
     for (const auto& [at, weight] : gauss3) {
@@ -395,7 +422,7 @@ SteppedMotion UniformMotion::written(const Shape& shape) const {
     way += piece.distance();
     motion.way.push_back(way * scale), motion.speed.push_back(piece.to);
     if (!held && piece.to == shape.middle) hold(), held = true;
-  });
+  }
   motion.way.back() = task_.distance;
   // Those least integrals are of the best motion over another distance: lambda, which is the cost of a unit
   // of it more, is that of the speed there, which changes by no larger a share than the distance.
@@ -458,12 +485,10 @@ int UniformMotion::regime(double v, double direction, const Price& price) const 
   const Most at = wanted(v, direction, price);
   const Local here = local(v);
   int flows = 0;
-  for (const std::size_t s : {0u, 1u}) {
+  for (std::size_t s = 0; s < motors_; ++s) {
     const WheelLoad& w = task_.loads[s];
-    const double inertial = w.inertia * direction * at.acceleration;
-    const double torque = here.through[s] + inertial + here.inside[s];
-    const double coasting =
-        1e-6 * (std::fabs(here.through[s]) + std::fabs(inertial) + std::fabs(here.inside[s]));
+    const double inertial = w.inertia * direction * at.acceleration, torque = here.torque[s] + inertial;
+    const double coasting = 1e-6 * (std::fabs(here.torque[s]) + std::fabs(inertial));
     flows = 3 * flows + (torque * w.pace > coasting ? 2 : torque * w.pace < -coasting ? 0 : 1);
   }
   return 9 * (at.bounded ? 1 + static_cast<int>(at.bound) : 0) + flows;

@@ -94,7 +94,7 @@ class UniformMotion {
   // What the motors bear at a speed, acceleration left out.
   struct Local {
     double v = 0;
-    std::array<double, 2> through{}, inside{};  // torques [N m]
+    std::array<double, 2> torque{};  // [N m]
   };
   struct Power {
     double w = 0, slope = 0, bend = 0;  // of the motors at the battery, by acceleration
@@ -129,7 +129,7 @@ class UniformMotion {
     bool cruises = true;
   };
 
-  explicit UniformMotion(const UniformTask& task) : task_(task) {}
+  explicit UniformMotion(const UniformTask& task);
 
   Local local(double v) const;
   Power motors(const Local& l, double acceleration) const;
@@ -162,9 +162,11 @@ class UniformMotion {
                  RestMotion& sum) const;
 
   UniformTask task_;
-  double closeness_ = 1;  // share of motor_tolerance that the room above friction allows
-  double top_ = 0;        // the speed limit, or what the motors can hold with something left to accelerate
-  double bare_top_ = 0;   // what they can just hold, where that is less than the speed limit
+  std::size_t motors_ = 2;  // that are reckoned; where both are alike, one
+  double each_ = 1;         // how many each of them stands for
+  double closeness_ = 1;    // share of motor_tolerance that the room above friction allows
+  double top_ = 0;          // the speed limit, or what the motors can hold with something left to accelerate
+  double bare_top_ = 0;     // what they can just hold, where that is less than the speed limit
 };
 
 }  // namespace joulecast::planning

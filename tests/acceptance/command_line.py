@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """joulecast answers the same JSON from a robot file as through a daemon that holds it; faults have their exit codes."""
 import json
+import os
 import subprocess
 import xml.etree.ElementTree
 
@@ -18,6 +19,8 @@ def read_history(options, programs):
     url = next(event["http"] for event in map(json.loads, process.stderr) if event["message"] == "ready")
     server = ["--server", url.removeprefix("http://")]
     fleet = programs.run("robots", *server)
+    told = subprocess.run([options.client, "robots"], capture_output=True, text=True, env=os.environ | {"JOULECAST_SERVER": server[1]})
+    check(told.returncode == 0 and "amr" in told.stdout, f"JOULECAST_SERVER: {told.stdout}{told.stderr}")
     check(fleet.splitlines()[1].startswith("amr ") and "charge %" in fleet, fleet)
     check(json.loads(programs.run("robots", *server, "--json"))["robots"][0]["robot_id"] == "amr", fleet)
     state = programs.run("state", *server, "--robot-id", "amr")

@@ -4,9 +4,12 @@ what came of it: every write that was acknowledged is stored and in force, every
 accepted sample is in exactly one mission, every ledger closes, the store is sound. By hand: --hours N --seed S."""
 import argparse
 import collections
+import contextlib
 import errno
+import http.client
 import json
 import os
+import pathlib
 import random
 import shutil
 import socket
@@ -38,59 +41,77 @@ def options_of():
     return parser.parse_args()
 
 
-class Writers(threading.Thread):
+class Party(threading.Thread):
+    """Does `turn` again and again until it is ended; what it failed with is raised by `finish`."""
+
+    def __init__(self):
+        super().__init__(daemon=True)
+        self.ended, self.failure = False, None
+
+    def run(self):
+        try:
+            while not self.ended:
+                self.turn()
+        except BaseException as failure:  # a check that does not hold is a SystemExit, which would end this thread alone
+            self.failure = failure
+
+    def finish(self):
+        self.ended = True
+        self.join()
+        if self.failure:
+            raise self.failure
+
+
+class Writers(Party):
     """Gives robots new models one after the other and keeps what was answered."""
 
     def __init__(self, programs, model):
-        super().__init__(daemon=True)
+        super().__init__()
         self.programs, self.model = programs, model
         self.pause = threading.Lock()  # held while a write is under way
         self.written = {f"written-{k}": [] for k in range(3)}  # robot -> [(idle power, outcome)]
-        self.ended = False
+        self.count = 0
 
-    def run(self):
-        count = 0
-        while not self.ended:
-            for robot, history in self.written.items():
-                with self.pause:
-                    count += 1
-                    power = 10 + count / 64  # W: another one each time, and in an hour no more than the battery gives
-                    history.append((power, self.put(robot, power)))
-                time.sleep(0.05)
+    def turn(self):
+        for robot, history in self.written.items():
+            with self.pause:
+                self.count += 1
+                power = 10 + self.count / 64  # W: another one each time, and in an hour no more than the battery gives
+                history.append((power, self.put(robot, power)))
+            time.sleep(0.05)
 
     def put(self, robot, power):
         try:
             self.programs.put(f"/v1/robots/{robot}", self.model | {"robot_id": robot, "idle_power_w": power})
             return "done"
         except urllib.error.HTTPError as error:
-            check(error.code == 503, f"PUT of {robot}: {error.code} {error.read()[:500]}")
+            check(error.code == 503, f"PUT of {robot}: {error.code}")
             return "not done"
-        except OSError:
-            return "unknown"  # no answer: either is right
+        except (OSError, http.client.HTTPException):
+            return "unknown"  # no answer, or not a whole one: either is right
 
 
-class Hostile(threading.Thread):
+class Hostile(Party):
     """Sends what no robot sends, and what a robot of its own sends with some of it wrong. Never as an honest robot."""
 
     def __init__(self, programs, seed):
-        super().__init__(daemon=True)
+        super().__init__()
         self.random = random.Random(seed)
-        self.port, self.ended, self.sent = programs.lcm_port, False, 0
+        self.port, self.sent = programs.lcm_port, 0
         self.heard = collections.deque(maxlen=50)
+        self.listener = harness.Listener(self.port)
+        self.sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
 
-    def run(self):
-        listener = harness.Listener(self.port)
-        sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
-        while not self.ended:
-            for _, channel, payload in listener.messages(0.05):
-                if channel.startswith("ROBOT_") and "hostile" not in channel:
-                    self.heard.append((channel.split(".")[0], payload))
-                    break
-            for _ in range(10):
-                sender.sendto(self.packet(), (GROUP, self.port))
-                self.sent += 1
-            time.sleep(0.02)
+    def turn(self):
+        for _, channel, payload in self.listener.messages(0.05):
+            if channel.startswith("ROBOT_") and "hostile" not in channel:
+                self.heard.append((channel.split(".")[0], payload))
+                break
+        for _ in range(10):
+            self.sender.sendto(self.packet(), (GROUP, self.port))
+            self.sent += 1
+        time.sleep(0.02)
 
     def packet(self):
         r = self.random
@@ -134,7 +155,7 @@ class Nemesis:
         try:
             with urllib.request.urlopen(self.programs.url + "/readyz", timeout=5):
                 return True
-        except OSError:
+        except (OSError, http.client.HTTPException):
             return False
 
     def wait(self, truth, text, seconds=READY_S):
@@ -169,7 +190,7 @@ class Nemesis:
         self.programs.process.send_signal(18)
 
     def lock(self):
-        holder = sqlite3.connect(self.programs.store, isolation_level=None, timeout=10)
+        holder = sqlite3.connect(self.programs.store, isolation_level=None, timeout=READY_S)
         holder.execute("BEGIN EXCLUSIVE")
         time.sleep(self.random.uniform(1, 5))
         holder.close()
@@ -210,7 +231,7 @@ class Nemesis:
         mount = subprocess.run(["mount", "--bind", self.volume, self.volume], capture_output=True)
         if mount.returncode == 0:
             subprocess.run(["mount", "-o", "remount,ro,bind", self.volume], check=True)
-            self.wait(lambda: not self.ready(), "a store that cannot be written is noticed", 5)
+            self.wait(lambda: not self.ready(), "a store that cannot be written is noticed")
             time.sleep(self.random.uniform(0, 2))
             subprocess.run(["umount", "-l", self.volume], check=True)
 
@@ -219,16 +240,16 @@ class Nemesis:
         store, copy = self.programs.store, self.programs.path("copy.db")
         with self.writers.pause:
             began = time.monotonic()
-            with sqlite3.connect(store, timeout=10) as source, sqlite3.connect(copy) as target:
+            with (contextlib.closing(sqlite3.connect(store, timeout=READY_S)) as source,
+                  contextlib.closing(sqlite3.connect(copy)) as target):
                 source.backup(target)
             for suffix in ("", "-wal", "-shm"):
-                if os.path.exists(store + suffix):
-                    os.remove(store + suffix)
+                pathlib.Path(store + suffix).unlink(missing_ok=True)
             self.worst_copy_s = max(self.worst_copy_s, time.monotonic() - began)
             if not deleted:
                 shutil.copy(copy, store)
         self.losses += 1
-        self.wait(lambda: not self.ready(), "a store that is gone is noticed", 5)
+        self.wait(lambda: not self.ready(), "a store that is gone is noticed")
         time.sleep(0.5)
         self.count()
         check(self.programs.stop() == 0, "stop")
@@ -252,10 +273,12 @@ class Nemesis:
             self.wait(lambda: self.programs.metric("joulecast_robots_live") >= ROBOTS, "robots are live", 60)
             self.writers.start()
             hostile.start()
-            until = time.monotonic() + 3600 * self.options.hours
+            began = time.monotonic()
+            until = began + 3600 * self.options.hours
             while time.monotonic() < until:
                 time.sleep(self.random.uniform(1, 4))
                 kind = self.random.choice(self.kinds)
+                print(f"{time.monotonic() - began:6.1f} s {kind}", flush=True)  # where a run that fails came to
                 if kind == "term":
                     self.count()
                 getattr(self, kind)()
@@ -264,9 +287,8 @@ class Nemesis:
         finally:
             fleet.terminate()
             fleet.wait()
-        self.writers.ended = hostile.ended = True
-        self.writers.join()
-        hostile.join()
+        self.writers.finish()
+        hostile.finish()
         check(fleet.returncode in (0, -15, 130, 143), f"simulate ended {fleet.returncode}")
         self.count()
         self.term()

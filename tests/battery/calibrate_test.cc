@@ -19,8 +19,12 @@ TEST(Calibrate, FindsTheBatteryThatMadeTheRecordings) {
   robot::Battery true_battery = full_battery();
   true_battery.branches.resize(1);
   const Circuit truth(true_battery);
-  const auto calibration = calibrate(identification(truth), {2.5, 0.2});
+  std::vector<int> steps;
+  const auto calibration =
+      calibrate(identification(truth), {2.5, 0.2, [&](int step) { steps.push_back(step); }});
   ASSERT_TRUE(calibration) << describe(calibration.error());
+  EXPECT_EQ(static_cast<int>(steps.size()), calibration->iterations);
+  EXPECT_TRUE(std::ranges::is_sorted(steps));
   const robot::Battery& found = calibration->battery;
   EXPECT_TRUE(robot::parse_battery(robot::to_json_text(found)));
   // The slow test ends at the cut-off, a little before the true charge is gone.

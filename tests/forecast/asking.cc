@@ -1,5 +1,6 @@
 #include "asking.h"
 
+#include <boost/math/distributions/binomial.hpp>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -105,18 +106,11 @@ void judge(const RobotRun& run, std::size_t learnt, Asked asked, Coverage& cover
 }
 
 std::array<std::size_t, 2> expected_hits(std::size_t count, double share) {
-  double term = std::pow(0.1, static_cast<double>(count)), below = 0;
-  std::array<std::size_t, 2> hits{count, count};
-  for (std::size_t k = 0; k <= count; ++k) {
-    below += term;
-    if (below > 0.5 * (1 - share) && hits[0] == count) hits[0] = k;
-    if (below >= 0.5 * (1 + share)) {
-      hits[1] = k;
-      break;
-    }
-    term *= 9 * static_cast<double>(count - k) / static_cast<double>(k + 1);
-  }
-  return hits;
+  using namespace boost::math;
+  using Policy = policies::policy<policies::discrete_quantile<policies::integer_round_up>>;
+  const binomial_distribution<double, Policy> hits(static_cast<double>(count), 0.9);
+  return {static_cast<std::size_t>(quantile(hits, 0.5 * (1 - share))),
+          static_cast<std::size_t>(quantile(hits, 0.5 * (1 + share)))};
 }
 
 }  // namespace joulecast::forecast

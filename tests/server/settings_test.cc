@@ -109,8 +109,9 @@ TEST_F(SettingsTest, EveryFaultyValueIsToldAtOnce) {
   EXPECT_EQ(std::count(all.begin(), all.end(), '\n'), 4) << all;
 }
 
-TEST_F(SettingsTest, LeavesTheCommandLinesTokenAlone) {
-  EXPECT_TRUE(read_settings({}, {"JOULECAST_TOKEN=jc_1"}));
+TEST_F(SettingsTest, LeavesTheCommandLinesOwnVariablesAlone) {
+  for (const char* name : {"SERVER", "TOKEN", "CLIENT_CERTIFICATE", "CLIENT_KEY"})
+    EXPECT_TRUE(read_settings({}, {std::string("JOULECAST_") + name + "=x"})) << name;
 }
 
 TEST_F(SettingsTest, CommandsAreKnown) {
