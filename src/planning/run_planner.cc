@@ -139,7 +139,7 @@ void RunPlanner::find_motion() {
   task.voltage_limit_v = motors_bind ? problem_->limits.voltage_v : unlimited;
   task.cells = std::max<std::size_t>(8, problem_->intervals_per_run);
   if (problem_->deadline_s || problem_->hurried) task.motor_tolerance = UniformMotion::hurried_tolerance;
-  if (auto motion = UniformMotion::make(task)) motion_ = std::make_unique<UniformMotion>(std::move(*motion));
+  if (auto motion = UniformMotion::make(task)) motion_ = std::make_unique<UniformMotion>(*motion);
 }
 
 RunAnswer RunPlanner::answer_of(SteppedMotion motion) const {
