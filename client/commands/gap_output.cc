@@ -74,6 +74,8 @@ void print_checks(const json& d) {
 void print_gap(const json& d) {
   if (d["power"] == gap::name_of(gap::PowerSource::none)) {
     fmt::print("gap: no power was recorded; judged from torques\n");
+  } else if (d["gap"]["energy_relative"].is_null()) {
+    fmt::print("gap: not known, the model needs the wheels' motion\n");
   } else {
     fmt::print("gap: energy {:+.1f} %, absolute power {:.1f} % (noise floor {:.1f} %){}\n",
                100 * number(d["gap"]["energy_relative"]), 100 * number(d["gap"]["power_absolute_relative"]),
@@ -189,7 +191,7 @@ void print_diagnosis(const json& d) {
   fmt::print("verdict: {} (probability {:.2f})\n", text(d["verdict"]), number(d["verdict_probability"]));
   for (const json& reason : array_of(d, "reasons")) print_item(text(reason));
   for (const json& e : d["effects"]) print_effect(e);
-  if (text(d["outside"]["channel"]) != "") {
+  if (!text(d["outside"]["channel"]).empty()) {
     fmt::print("  outside the catalogue: {} follows {}, probability {:.2f}\n", text(d["outside"]["channel"]),
                text(d["outside"]["follows"]), number(d["outside"]["probability"]));
     print_controls(d["outside"].value("controls", json()));

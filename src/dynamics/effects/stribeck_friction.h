@@ -9,7 +9,7 @@ struct StribeckFriction {
   static constexpr std::array parameters = std::to_array<EffectParameter>(
       {{"ratio", "1", 0, 0, 20,
         "breakaway friction above T_m, over T_m with coulomb_friction and friction_asymmetry"},
-       {"speed_rad_s", "rad/s", 2, 0.2, 20, "Stribeck speed of the wheel"},
+       {"speed_rad_s", "rad/s", 2, 0.2, 100, "Stribeck speed of the wheel"},
        {"exponent", "1", 2, 1, 2, "of the speed in the exponential"}});
   static constexpr EffectInfo info{"stribeck_friction",
                                    ActsOn::wheel_torque,

@@ -85,7 +85,7 @@ class ClockTally {
 
  private:
   // Steps of a clock by size, 16 classes a factor of ten from 1 us on.
-  static constexpr std::size_t classes = 16 * 10;
+  static constexpr std::size_t classes = std::size_t{16} * 10;
   struct Class {
     std::size_t count = 0;
     double seconds = 0;

@@ -72,10 +72,12 @@ std::vector<ChannelGap> channel_gaps(const Material& whole) {
     // The level is a nuisance: only what changes counts, which the fit of everything leaves.
     terminals.add(volts.after[k], volts.after[k], w.battery_voltage_v);
     turning.add(gyro.before[k], gyro.after[k], w.yaw_rate_rad_s);
-    const double read_w = w.motor_power_w[0] + w.motor_power_w[1];
+    const double read_w = motor_power(w, whole.robot, 0) + motor_power(w, whole.robot, 1);
     double rest_w = 0;
-    for (const std::size_t s : {0u, 1u})
-      rest_w += std::hypot(torque[s].after[k] * w.voltage_v[s], voltage[s].after[k] * w.current_a[s]);
+    for (const std::size_t s : {0u, 1u}) {
+      const double winding = std::isfinite(w.voltage_v[s]) ? voltage[s].after[k] * w.current_a[s] : 0;
+      rest_w += std::hypot(torque[s].after[k] * motor_voltage(w, whole.robot, s), winding);
+    }
     motors.add(read_w - metered_powers(model, w).motors_w, rest_w, read_w);
   }
   std::vector<ChannelGap> gaps;

@@ -17,7 +17,8 @@ constexpr std::size_t most_predicted = 40;
 constexpr double certain = 50;            // log odds of a member
 constexpr double beyond_tolerance = 2.5;  // of a coefficient, for effects seen in other channels than power
 constexpr double alternative_odds = 0.04;
-constexpr double cancelling = 3;  // from which on members undo each other
+constexpr double least_odds = -2, most_of_candidate = 0.45;  // of a candidate: log odds, probability
+constexpr double cancelling = 3;                             // from which on members undo each other
 
 class Explainer {
  public:
@@ -288,7 +289,7 @@ class Explainer {
       const Hypothesis& other = hypothesis(h);
       if (other.outside() || other.id() == hypothesis(member).id() || !fits(rest, h)) continue;
       const double log_odds = mixture_.log_joint(with(rest, h)) - reference;
-      if (log_odds < std::log(alternative_odds)) continue;
+      if (log_odds < std::log(alternative_odds) && !problem_.alike(member, h)) continue;
       Alternative& kept = best[other.id()];
       const double odds = std::exp(std::min(50.0, log_odds));
       if (odds > kept.odds) kept = {h, odds};
@@ -343,7 +344,41 @@ class Explainer {
       if (settings_.predictive) m.wander = mixture_.mean_wander(set, k);
       e.members.push_back(std::move(m));
     }
+    if (settings_.predictive && std::ranges::all_of(e.members, [&](const Member& m) {
+          return hypothesis(m.hypothesis).outside() || m.there_probability() < least_named;
+        })) {
+      add_candidate(e);
+    }
     return e;
+  }
+
+  // The one effect that the data speak for most, however little.
+  void add_candidate(Explanation& e) const {
+    std::optional<std::size_t> best;
+    double most = least_odds;
+    for (std::size_t h = 0; h < problem_.hypotheses.size(); ++h) {
+      if (!hypothesis(h).is_effect() || traits_of(hypothesis(h).id()).elsewhere || cancels({h})) continue;
+      if (const double odds = mixture_.log_odds({h}); odds > most) most = odds, best = h;
+    }
+    if (!best) return;
+    const Mixture::Estimate estimate = mixture_.estimate({*best});
+    const double moves = problem_.moved(hypothesis(*best), estimate.mean);
+    if (moves < settings_.least_share) return;
+    if (const auto own = std::ranges::find(e.members, *best, &Member::hypothesis); own != e.members.end()) {
+      own->candidate = true;
+      return;
+    }
+    Member m;
+    m.hypothesis = *best;
+    m.candidate = true;
+    m.by_evidence = m.by_prediction = std::min(most_of_candidate, 1 / (1 + std::exp(-most)));
+    m.group_by_evidence = m.group_by_prediction = m.any_by_evidence = m.any_by_prediction = m.by_evidence;
+    m.alternatives = alternatives({*best}, *best);
+    m.coefficients.assign(estimate.mean.begin(), estimate.mean.end());
+    m.sd.assign(estimate.sd.begin(), estimate.sd.end());
+    m.share = moves;
+    m.wander = mixture_.mean_wander({*best}, 0);
+    e.members.push_back(std::move(m));
   }
 
   const Mixture& mixture_;

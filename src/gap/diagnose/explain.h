@@ -21,6 +21,7 @@ struct ExplainSettings {
   bool predictive = true;  // false: evidence alone, while a linearisation is sought
 };
 
+inline constexpr double least_named = 0.5;     // probability of a name
 inline constexpr std::size_t most_stated = 2;  // alternatives that an answer names
 
 // Something else that would explain the data nearly as well in a member's place.
@@ -39,6 +40,7 @@ struct Member {
   double any_by_evidence = 0, any_by_prediction = 0;
   double wander = 0;  // of its strength from block to block: posterior mean of the standard deviation over it
   double share = 0;   // of the mean power that it moves
+  bool candidate = false;  // not likely to be there, but likelier than any other cause
   std::vector<double> coefficients, sd;
   std::vector<Alternative> alternatives;  // likeliest first
 

@@ -16,6 +16,8 @@ namespace {
 constexpr std::size_t most_parts = 6;
 constexpr std::size_t function_size = 2;      // of a function outside the catalogue, counted in causes
 constexpr std::size_t most_first_causes = 6;  // that pairs are made of
+constexpr double equal = 0.02;                // of the price of a member, a nat of evidence
+constexpr double formulas_off = 0.03;         // of what is left, that says nothing
 constexpr double contested = 0.7;             // most that evidence against it leaves of a probability
 
 // Rows of a long recording, evenly, that are enough to compare sets by.
@@ -45,7 +47,8 @@ class ThirdJudge {
         e_{equations.columns, rows_, equations.noise, equations.left_out},
         mixture_(mixture),
         problem_(mixture.problem()),
-        x_(explanation) {
+        x_(explanation),
+        shows_elsewhere_(shown_elsewhere(equations, problem_)) {
     for (std::size_t b = 0; b < problem_.block_count(); ++b) {
       if (!e_.leaves_out(b)) blocks_.push_back(b);
     }
@@ -87,7 +90,20 @@ class ThirdJudge {
  private:
   const Hypothesis& hypothesis(std::size_t h) const { return problem_.hypotheses[h]; }
   bool in_search(std::size_t h) const {
-    return !hypothesis(h).outside() && shows_in_power(hypothesis(h)) && hypothesis(h).id() != zone_effect;
+    return !hypothesis(h).outside() && hypothesis(h).id() != zone_effect &&
+           (shows_in_power(hypothesis(h)) || !shows_elsewhere_[h]);
+  }
+  // Of each hypothesis, whether these recordings show it in another channel than power.
+  static std::vector<bool> shown_elsewhere(const Equations& e, const Problem& problem) {
+    std::vector<bool> shown(problem.hypotheses.size());
+    for (std::size_t h = 0; h < shown.size(); ++h) {
+      for (std::size_t c = 0; c < channel_count; ++c) {
+        if (c == index_of(Channel::power) || !(e.noise[c].sigma > 0)) continue;
+        for (const Eigen::Index k : places_of(e.rows[c], problem.hypotheses[h].candidate.columns))
+          shown[h] = shown[h] || k >= 0;
+      }
+    }
+    return shown;
   }
   bool fits(const HypothesisSet& set, std::size_t h) const {
     return std::ranges::none_of(
@@ -142,17 +158,21 @@ class ThirdJudge {
     return set.empty() ? start : fitted_to_power(of, set, start);
   }
 
-  // Sum of |error| in each block [W], of those that `in` says.
+  // What is missed of each block [W], of those that `in` says: of power the sum of |error|, and of energy the
+  // size of their sum. Power alone would not tell a load that is always there from noise that is skewed.
   Eigen::VectorXd left_by(const HypothesisSet& set, const Eigen::VectorXd& coefficients,
                           const std::vector<bool>& in) const {
     const ChannelRows& r = e_.rows[index_of(Channel::power)];
     const Eigen::VectorXd left = r.y - moved_power(e_, set, coefficients);
-    Eigen::VectorXd sums = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem_.block_count()));
+    Eigen::VectorXd power = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem_.block_count()));
+    Eigen::VectorXd energy = power;
     for (std::size_t k = 0; k < r.block.size(); ++k) {
       if (e_.leaves_out(r.block[k]) || (!in.empty() && !in[r.block[k]])) continue;
-      sums[static_cast<Eigen::Index>(r.block[k])] += std::fabs(left[static_cast<Eigen::Index>(k)]);
+      const auto b = static_cast<Eigen::Index>(r.block[k]), row = static_cast<Eigen::Index>(k);
+      power[b] += std::fabs(left[row]);
+      energy[b] += left[row];
     }
-    return sums;
+    return power + energy.cwiseAbs();
   }
 
   void add(const HypothesisSet& set) {
@@ -254,6 +274,7 @@ class ThirdJudge {
       const Eigen::VectorXd own = strengths.segment(at, n), sd = estimate.sd.segment(at, n);
       at += n;
       const auto known = std::ranges::find(x_.members, chosen[k], &Member::hypothesis);
+      const std::vector<Alternative> others = as_good(chosen, chosen[k], w);
       Member m;
       if (known != x_.members.end()) {
         m = *known;
@@ -262,15 +283,16 @@ class ThirdJudge {
         m.coefficients.assign(own.begin(), own.end());
         m.sd.assign(sd.begin(), sd.end());
         m.share = problem_.moved(h, own);
-        std::set<std::string> group{h.id()};
-        m.by_prediction = probability(group);
-        m.alternatives = as_good(chosen, chosen[k], w);
-        for (const Alternative& a : m.stated()) group.insert(hypothesis(a.hypothesis).id());
-        m.group_by_prediction = probability(group);
-        for (const Alternative& a : m.alternatives) group.insert(hypothesis(a.hypothesis).id());
-        m.any_by_prediction = probability(group);
+        m.alternatives = others;
         m.by_evidence = m.group_by_evidence = m.any_by_evidence = contested;
       }
+      std::set<std::string> group{h.id()};
+      m.by_prediction = std::max(m.by_prediction, probability(group));
+      for (const Alternative& a : m.stated()) group.insert(hypothesis(a.hypothesis).id());
+      m.group_by_prediction = std::max(m.group_by_prediction, probability(group));
+      for (const Alternative& a : m.alternatives) group.insert(hypothesis(a.hypothesis).id());
+      for (const Alternative& a : others) group.insert(hypothesis(a.hypothesis).id());
+      m.any_by_prediction = std::max(m.any_by_prediction, probability(group));
       m.wander = mixture_.mean_wander(chosen, k);
       members.push_back(std::move(m));
     }
@@ -280,15 +302,21 @@ class ThirdJudge {
     x_.outside = x_.outside_by_prediction = 0;
   }
 
+  // Whether parts left out are missed by more than what parts differ by and what formulas are off.
+  bool clearly_worse(const HypothesisSet& set, const HypothesisSet& best) const {
+    const Eigen::ArrayXd apart = (errors_.at(set) - errors_.at(best)).array();
+    const double n = static_cast<double>(blocks_.size());
+    const double square = std::max(0.0, apart.square().sum() - apart.sum() * apart.sum() / n);
+    return apart.sum() > std::max(std::sqrt(square), formulas_off * errors_.at(best).sum());
+  }
+
   // Which of those that leave hardly more it is, only the evidence says.
   HypothesisSet likeliest_like(const HypothesisSet& best, const Weighed& w) const {
     HypothesisSet likeliest = best;
     double most = mixture_.log_joint(best);
     for (std::size_t m = 0; m < w.sets.size(); ++m) {
       const HypothesisSet& set = w.sets[m];
-      if (set.size() != best.size() || size_of(set) != size_of(best) ||
-          errors_.at(set).sum() - errors_.at(best).sum() > w.a_member)
-        continue;
+      if (set.size() != best.size() || size_of(set) != size_of(best) || clearly_worse(set, best)) continue;
       if (const double log_joint = mixture_.log_joint(set); log_joint > most)
         most = log_joint, likeliest = set;
     }
@@ -299,6 +327,7 @@ class ThirdJudge {
   std::vector<Alternative> as_good(const HypothesisSet& chosen, std::size_t member, const Weighed& w) const {
     const double own = errors_.at(chosen).sum();
     const HypothesisSet rest = without(chosen, member);
+    const double evidence = mixture_.log_joint(chosen);
     std::vector<std::pair<double, Alternative>> found;
     for (const auto& [set, errors] : errors_) {
       if (set.size() != chosen.size() || !in_search_alone(set)) continue;
@@ -306,11 +335,17 @@ class ThirdJudge {
       for (const std::size_t h : rest) std::erase(other, h);
       if (other.size() != 1 || hypothesis(other.front()).id() == hypothesis(member).id()) continue;
       const double more = errors.sum() - own;
-      if (more < w.a_member) found.push_back({more, {other.front(), std::exp(-more / w.a_member)}});
+      if (more >= w.a_member && !problem_.alike(member, other.front())) continue;
+      // What leaves the same is put in the order of what is known beforehand.
+      const double known = std::clamp(mixture_.log_joint(set) - evidence, -2.0, 2.0);
+      found.push_back({more / w.a_member - equal * known, {other.front(), std::exp(-more / w.a_member)}});
     }
     std::ranges::sort(found, {}, [](const auto& f) { return f.first; });
     std::vector<Alternative> result;
-    for (const auto& [more, alternative] : found) result.push_back(alternative);
+    std::set<std::string> ids;  // of each its best variant
+    for (const auto& [more, alternative] : found) {
+      if (ids.insert(hypothesis(alternative.hypothesis).id()).second) result.push_back(alternative);
+    }
     return result;
   }
 
@@ -319,6 +354,7 @@ class ThirdJudge {
   const Mixture& mixture_;
   const Problem& problem_;
   Explanation& x_;
+  const std::vector<bool> shows_elsewhere_;
   std::vector<std::size_t> blocks_;
   HypothesisSet kept_;  // named causes that other channels show
   Eigen::VectorXd kept_strengths_;

@@ -114,7 +114,7 @@ Found find_without(const std::vector<bool>& out, const Material& m, const FitRes
 double HeldOut::relative(double BlockErrors::*error) const {
   double sum = 0, size = 0;
   for (const BlockErrors& b : blocks) {
-    sum += b.*error;
+    sum += std::fabs(b.*error);
     size += b.size;
   }
   return size > 0 ? sum / size : std::numeric_limits<double>::quiet_NaN();
@@ -132,7 +132,8 @@ std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::sp
     const Found found = fit.alone ? Found{} : find_without(out, whole, fit, power_w, settings);
     const std::vector<double>& left = found.left_w;
     held.named.push_back(found.ids);
-    held.causes.push_back(fit.base.empty()
+    // What is named may be something else than what everything is linear around.
+    held.causes.push_back(fit.base.empty() && !m.from_motion.alone()
                               ? found.named.causes
                               : refit(Rest(m, out).material, joined(fit.base, found.named.causes)));
     const std::vector<double> explained = modelled_power(m.robot, m.adopted, held.causes.back(), m.windows);
@@ -143,6 +144,8 @@ std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::sp
       if (others[k] || !std::isfinite(power_w[k] + unchanged[k])) continue;
       BlockErrors& b = held.blocks[m.windows[k].block];
       b.unchanged += std::fabs(power_w[k] - unchanged[k]);
+      b.unchanged_energy += power_w[k] - unchanged[k];
+      b.explained_energy += power_w[k] - explained[k];
       const double missed = std::fabs(power_w[k] - explained[k]);
       b.explained += missed;
       if (!left.empty() && std::isfinite(left[k])) b.spared += missed - std::fabs(left[k]);

@@ -16,6 +16,8 @@ struct BlockErrors {
   double spared = 0;  // how much of the last functions outside the catalogue that were found as well take off
   double referee = 0;  // of a plain regression without it
   double size = 0;     // of |power|
+  // Sums of errors with their signs: what is missed of the block's energy.
+  double unchanged_energy = 0, explained_energy = 0;
 };
 
 struct HeldOut {
@@ -29,6 +31,9 @@ struct HeldOut {
   double explained() const { return relative(&BlockErrors::explained); }
   double explained_with_functions() const { return explained() - relative(&BlockErrors::spared); }
   double referee() const { return relative(&BlockErrors::referee); }
+  // Sum over blocks of what is missed of their energies, over that of |power|.
+  double unchanged_energy() const { return relative(&BlockErrors::unchanged_energy); }
+  double explained_energy() const { return relative(&BlockErrors::explained_energy); }
 
  private:
   double relative(double BlockErrors::*error) const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 namespace joulecast::gap {
 namespace {
@@ -12,14 +13,22 @@ namespace {
 constexpr std::array keeping{0.5, 1.0, 2.0};
 constexpr std::array formulas{0.0, 0.001, 0.003};
 
+// About zero, without sign; 0 where one of them is nothing.
+double correlation(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+  const double size = a.norm() * b.norm();
+  return a.size() == b.size() && size > 0 ? std::fabs(a.dot(b)) / size : 0;
+}
+
 // Mean change that hypotheses make, of each channel and of the power.
 class Moved {
  public:
   Moved(const ColumnSet& columns, const Rows& rows) : columns_(columns.columns()) {
     constexpr Eigen::Index most = 400;
-    for (const ChannelRows& r : rows) {
+    for (std::size_t channel = 0; channel < channel_count; ++channel) {
+      const ChannelRows& r = rows[channel];
       if (r.y.size() == 0) continue;
       Sampled sampled;
+      sampled.level = channel == index_of(Channel::battery_voltage) || channel == index_of(Channel::gyro);
       sampled.place.assign(columns.size(), -1);
       for (std::size_t k = 0; k < r.columns.size(); ++k)
         sampled.place[r.columns[k]] = static_cast<Eigen::Index>(k);
@@ -46,6 +55,15 @@ class Moved {
       square += std::pow(coefficients[static_cast<Eigen::Index>(k)] * share, 2);
     }
     return std::sqrt(square);
+  }
+
+  double likeness(const Hypothesis& a, const Hypothesis& b) const {
+    std::optional<double> least;
+    for (const Sampled& c : channels_) {
+      const Eigen::VectorXd of_a = c.moved_by(a), of_b = c.moved_by(b);
+      if (of_a.size() > 0 || of_b.size() > 0) least = std::min(least.value_or(1), correlation(of_a, of_b));
+    }
+    return least.value_or(0);
   }
 
   // The largest ratio, over channels in which they matter, of what members move one by one to what they move
@@ -77,6 +95,7 @@ class Moved {
   struct Sampled {
     Eigen::MatrixXd x;
     double size = 1;                  // mean |response|
+    bool level = false;               // a constant in it is a nuisance
     std::vector<Eigen::Index> place;  // of each column, -1: does not speak here
 
     Eigen::VectorXd moved(const std::vector<std::size_t>& columns,
@@ -88,6 +107,15 @@ class Moved {
           sum += coefficients[static_cast<Eigen::Index>(k)] * x.col(at);
       }
       return sum;
+    }
+    // What says something of it; empty where nothing does.
+    Eigen::VectorXd moved_by(const Hypothesis& h) const {
+      constexpr double nothing = 1e-6;
+      const auto n = static_cast<Eigen::Index>(h.candidate.columns.size());
+      Eigen::VectorXd own = moved(h.candidate.columns, Eigen::VectorXd::Ones(n));
+      const double whole = own.norm();
+      if (level && own.size() > 0) own.array() -= own.mean();
+      return own.norm() > nothing * whole ? own : Eigen::VectorXd();
     }
   };
   std::vector<Column> columns_;
@@ -149,6 +177,7 @@ Problem make_problem(const ColumnSet& columns, const Rows& rows, const Noise& no
   problem.cancelling = [moved, &columns](const HypothesisSet& set, const Eigen::VectorXd& c) {
     return moved->cancelling(columns.hypotheses(), set, c);
   };
+  problem.likeness = [moved](const Hypothesis& a, const Hypothesis& b) { return moved->likeness(a, b); };
   const auto plain = block_information(columns, rows, noise, blocks, response);
   const auto p = static_cast<Eigen::Index>(columns.size());
   Eigen::VectorXd tolerance(p), scatter(p), discrepancy(p);

@@ -12,7 +12,8 @@ using statistics::Candidate;
 using statistics::Evidence;
 using statistics::Information;
 
-constexpr double implausible = 9.2;  // log odds, 1 to 10,000, from which circumstances are dropped
+constexpr std::size_t most_stretches = 8;  // in which a strength may wander
+constexpr double implausible = 9.2;        // log odds, 1 to 10,000, from which circumstances are dropped
 
 double log_sum(const std::vector<double>& logs) {
   const double top = *std::ranges::max_element(logs);
@@ -105,6 +106,29 @@ const Mixture::Part& Mixture::likeliest(const HypothesisSet& set) const {
   return parts_[static_cast<std::size_t>(std::ranges::max_element(logs) - logs.begin())];
 }
 
+// Neighbouring blocks together, of equal weight in what they say of these columns.
+std::vector<Information> Mixture::stretches_of(std::size_t noise,
+                                               const std::vector<std::size_t>& columns) const {
+  const auto& blocks = problem_->blocks[noise];
+  const auto weight = [&](std::size_t b) {
+    double sum = 0;
+    for (const std::size_t k : columns)
+      sum += blocks[b].xx(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(k));
+    return left_out_.empty() || !left_out_[b] ? sum : 0;
+  };
+  double all = 0, before = 0;
+  for (std::size_t b = 0; b < blocks.size(); ++b) all += weight(b);
+  std::vector<Information> stretches(most_stretches);
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    if (!left_out_.empty() && left_out_[b]) continue;
+    const double place = all > 0 ? (before + 0.5 * weight(b)) / all : 0;
+    stretches[std::min(most_stretches - 1, static_cast<std::size_t>(place * most_stretches))] += blocks[b];
+    before += weight(b);
+  }
+  std::erase_if(stretches, [](const Information& i) { return i.xx.size() == 0; });
+  return stretches;
+}
+
 std::vector<double> Mixture::wander(const HypothesisSet& set, std::size_t member) const {
   const Part& part = likeliest(set);
   const Circumstances& now = *part.circumstances;
@@ -118,17 +142,15 @@ std::vector<double> Mixture::wander(const HypothesisSet& set, std::size_t member
   std::vector<std::size_t> columns;
   for (const Candidate* c : candidates) columns.insert(columns.end(), c->columns.begin(), c->columns.end());
   std::ranges::sort(columns);
+  const std::vector<Information> stretches = stretches_of(now.noise, own.columns);
   std::vector<double> result;
   for (const double relative : wander_grid) {
     Eigen::VectorXd sd = Eigen::VectorXd::Zero(now.tolerance.size());
     for (const std::size_t k : own.columns) sd[static_cast<Eigen::Index>(k)] = relative * strength;
     Information total;
-    const auto& blocks = problem_->blocks[now.noise];
-    for (std::size_t b = 0; b < blocks.size(); ++b) {
-      if (!left_out_.empty() && left_out_[b]) continue;
-      Information block = blocks[b];
-      if (relative > 0) block.integrate_out(sd);
-      total += block;
+    for (Information stretch : stretches) {
+      if (relative > 0) stretch.integrate_out(sd);
+      total += stretch;
     }
     const Evidence evidence(total, now.tolerance, columns);
     const double z = relative / usual_wander;

@@ -48,6 +48,8 @@ class Mixture {
     statistics::Evidence evidence;
   };
   std::vector<double> log_terms(const HypothesisSet& set) const;
+  std::vector<statistics::Information> stretches_of(std::size_t noise,
+                                                    const std::vector<std::size_t>& columns) const;
   const Part& likeliest(const HypothesisSet& set) const;
 
   const Problem* problem_;

@@ -108,6 +108,8 @@ std::vector<double> left_with_functions(const Equations& e, const Problem& probl
 Named name_causes(const Material& m, const Equations& e, const Problem& problem,
                   const Explanation& explanation, std::span<const double> power_w) {
   HypothesisSet set = likely_causes(problem, explanation);
+  const auto candidate = std::ranges::find(explanation.members, true, &Member::candidate);
+  if (set.empty() && candidate != explanation.members.end()) set = {candidate->hypothesis};
   std::vector<double> measured;
   std::vector<Window> windows;
   for (std::size_t k = 0; k < m.windows.size(); ++k) {

@@ -8,7 +8,6 @@
 
 namespace joulecast::gap {
 
-inline constexpr double least_named = 0.5;     // probability of a name
 inline constexpr double most_wander = 0.8;     // of a strength, over the strength, that still is that cause
 inline constexpr double steady_wander = 0.45;  // up to which it stands still
 // What comes back when a cause is left out that the gap needs: of the gap, and of the mean power.
@@ -36,7 +35,8 @@ struct Named {
   std::vector<Cause> causes;  // in the order of the set
 };
 
-// The likely causes that the gap needs. `power_w`: measured, of the windows.
+// The likely causes that the gap needs; where none is likely, the candidate. `power_w`: measured, of the
+// windows.
 Named name_causes(const Material& material, const Equations& equations, const Problem& problem,
                   const Explanation& explanation, std::span<const double> power_w);
 

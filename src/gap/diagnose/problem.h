@@ -32,6 +32,14 @@ struct Problem {
   // What members of a set move one by one, over what they move together, in the channel where that is
   // largest: far above one where they undo each other.
   std::function<double(const HypothesisSet&, const Eigen::VectorXd&)> cancelling;
+  // How alike two hypotheses are: the least correlation about zero, over channels, of what they move there.
+  std::function<double(const Hypothesis&, const Hypothesis&)> likeness;
+
+  // Whether these data show both as the same, so that which of them it is hangs on how noise is described.
+  bool alike(std::size_t a, std::size_t b) const {
+    constexpr double same = 0.99;
+    return likeness && likeness(hypotheses[a], hypotheses[b]) > same;
+  }
 
   std::size_t block_count() const { return blocks.empty() ? 0 : blocks.front().size(); }
 };

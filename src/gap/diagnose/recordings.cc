@@ -13,6 +13,7 @@
 #include "gap/diagnose/referee.h"
 #include "gap/diagnose/refit.h"
 #include "gap/diagnose/ripple.h"
+#include "gap/diagnose/wheel_scale.h"
 #include "gap/equations/power.h"
 #include "gap/traits.h"
 #include "gap/verdict/figures.h"
@@ -33,6 +34,7 @@ constexpr double large_gap = 0.15,
 constexpr double usual_share = 0.07,
                  large_share = 0.3;  // of the mean power, that an effect which is there may move
 constexpr std::size_t more_members = 6;
+constexpr double contested = 0.7;  // most of the probability of one of many that are estimated together
 constexpr double settled_delay_s = 0.006, settled_bias = 0.1;
 constexpr int most_delay_rounds = 3;
 constexpr std::size_t ripple_surrogates = 20;
@@ -93,6 +95,7 @@ class Diagnoser {
 
   View view_of(const windows::WindowSettings& settings) const;
   bool prepare();
+  Diagnosis nothing_to_judge();
   void measure();
   bool fit();
   bool leave_out();
@@ -140,13 +143,16 @@ bool Diagnoser::prepare() {
   readings_ = windows::find_readings(recordings_.missions, robot_);
   plain_ = view_of({});
   const auto known = [](double p) { return std::isfinite(p); };
-  std::size_t currents = 0, voltages = 0, turns = 0;
+  std::size_t currents = 0, voltages = 0, turns = 0, moved = 0;
   for (const Window& w : plain_.windows) {
     currents += std::isfinite(w.current_a[0] + w.current_a[1]) ? 1 : 0;
     voltages += std::isfinite(w.voltage_v[0] + w.voltage_v[1]) ? 1 : 0;
     turns += std::isfinite(w.yaw_rate_rad_s) || std::isfinite(w.turn_rad) ? 1 : 0;
     blocks_ = std::max(blocks_, w.block + 1);
+    const auto settled = [&](std::size_t side) { return w.moving[side] || w.resting[side]; };
+    moved += settled(0) && settled(1) && known(w.speed_rad_s[0] + w.speed_rad_s[1]) ? 1 : 0;
   }
+  d_.motion_known = moved >= fewest_windows;
   const std::size_t few = plain_.windows.size() / 5;
   d_.motor_channels = currents > few;
   from_motion_.power = !d_.motor_channels;
@@ -157,8 +163,12 @@ bool Diagnoser::prepare() {
     plain_.power_w = measured_power(plain_.windows, robot_, true);
     if (std::ranges::none_of(plain_.power_w, known)) d_.power = PowerSource::none;
   }
+  if (d_.power == PowerSource::motors && voltages == 0)
+    d_.notes.emplace_back(
+        "The motors' voltages were not recorded: power is that of their currents at the voltages that the "
+        "robot file's windings need for them.");
   view_ = plain_;
-  return plain_.windows.size() >= fewest_windows &&
+  return d_.motion_known &&
          (d_.power == PowerSource::battery || d_.motor_channels || from_motion_.voltage || turns > few);
 }
 
@@ -190,7 +200,7 @@ bool Diagnoser::fit() {
   // what is found is taken out of the windows and fitted again.
   for (int round = 0;; ++round) {
     fit_ = fit_windows(material(), {}, fit_settings_, still);
-    if (fit_ && d_.power_absolute_relative > huge_gap && round == 0) {
+    if (fit_ && d_.power_absolute_relative > huge_gap && round == 0 && !from_motion_.alone()) {
       auto other = fit_windows(material(), base_fit(material(), view_.power_w, Starts::regression),
                                fit_settings_, still);
       if (!other) return false;
@@ -250,7 +260,7 @@ void Diagnoser::name_base(const Problem& problem, Explanation& explanation, std:
   const std::vector<Need> needed = base_needed(material(), *fit_, *held_out_, view_.power_w);
   // Where one would have to go beyond what any robot has, the others make up for what it is not.
   const double surest =
-      std::ranges::any_of(std::span(all).first(fit_->base.size()), at_its_bound) ? least_named : 1;
+      std::ranges::any_of(std::span(all).first(fit_->base.size()), at_its_bound) ? least_named : contested;
   for (std::size_t b = 0; b < fit_->base.size(); ++b) {
     const Cause& cause = all[b];
     const auto same = [&](const Hypothesis& h) { return h.is_effect() && h.cause().same_kind(cause); };
@@ -435,14 +445,26 @@ Result<Diagnosis> Diagnoser::run() {
   auto adopted = dynamics::active_effects(robot_);
   if (!adopted) return tl::unexpected(adopted.error());
   adopted_ = std::move(*adopted);
-  if (!prepare()) {
-    d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
-    d_.next_drive = first_drives(robot_);
-    d_.refusal = "nothing was found that a robot file could take";
-    return std::move(d_);
-  }
+  if (!prepare()) return nothing_to_judge();
   measure();
+  if (d_.power == PowerSource::battery && from_motion_.power) {
+    if (auto check = wheel_scale_by_power(material(), plain_.power_w, d_.power_absolute_relative)) {
+      d_.checks.push_back(std::move(*check));
+      d_.motion_known = false;
+      d_.channels.clear();
+      d_.where.clear();
+      return nothing_to_judge();
+    }
+  }
   if (!fit() || !judge_all()) return fail(Fault::conflict, "", "diagnosis cancelled");
+  return std::move(d_);
+}
+
+Diagnosis Diagnoser::nothing_to_judge() {
+  d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
+  d_.next_drive = first_drives(robot_);
+  d_.refusal = "nothing was found that a robot file could take";
+  d_.reasons = reasons_for(d_, false, false);
   return std::move(d_);
 }
 
@@ -459,8 +481,8 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   const auto sides = split_at_step(trusted, checks);
   Result<Diagnosis> d = Diagnoser(sides ? (*sides)[1] : trusted, robot, settings).run();
   if (!d) return d;
-  d->checks = std::move(checks);
-  d->notes = recordings.notes;
+  d->checks.insert(d->checks.begin(), checks.begin(), checks.end());
+  d->notes.insert(d->notes.begin(), recordings.notes.begin(), recordings.notes.end());
   if (sides) {
     DiagnosisSettings quick = settings;
     quick.controls = 0;

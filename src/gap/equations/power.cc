@@ -5,11 +5,22 @@
 
 namespace joulecast::gap {
 
+double motor_voltage(const Window& w, const robot::RobotModel& robot, std::size_t s) {
+  if (std::isfinite(w.voltage_v[s])) return w.voltage_v[s];
+  const robot::Motor& m = robot.motor;
+  return m.resistance_ohm * w.current_a[s] + m.voltage_constant_v_s_rad * m.gear_ratio * w.speed_rad_s[s];
+}
+
+double motor_power(const Window& w, const robot::RobotModel& robot, std::size_t s) {
+  return std::isfinite(w.motor_power_w[s]) ? w.motor_power_w[s] : w.current_a[s] * motor_voltage(w, robot, s);
+}
+
 std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot,
                                    bool of_motors) {
   std::vector<double> power(windows.size());
   std::ranges::transform(windows, power.begin(), [&](const Window& w) {
-    return of_motors ? robot.idle_power_w + w.motor_power_w[0] + w.motor_power_w[1] : w.battery_power_w;
+    return of_motors ? robot.idle_power_w + motor_power(w, robot, 0) + motor_power(w, robot, 1)
+                     : w.battery_power_w;
   });
   return power;
 }

@@ -8,6 +8,13 @@
 
 namespace joulecast::gap {
 
+// One motor's voltage in a window [V]: as it was read, or as the file's winding needs it for the current and
+// the speed. NaN where neither is known.
+double motor_voltage(const Window& w, const robot::RobotModel& robot, std::size_t side);
+
+// What one motor takes in a window [W], by that voltage where none was read. NaN without a current.
+double motor_power(const Window& w, const robot::RobotModel& robot, std::size_t side);
+
 // Battery power of every window [W]; NaN where the battery was not read. `of_motors`: what the motors take
 // and the idle power of the robot file in its place.
 std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot,

@@ -49,11 +49,19 @@ Variants zones(EffectValues<double> v, const ShapeSetting& s) {
   return variants;
 }
 
-Variants stribeck(EffectValues<double> v, const ShapeSetting& s) {
+Variants stribeck(EffectValues<double> v, const dynamics::EffectParameter& bounds, const ShapeSetting& s) {
+  constexpr std::array parts_of_top_speed{0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4};
+  std::vector<double> speeds_rad_s;
+  for (const double speed_m_s : s.shapes.stribeck_speeds_m_s)
+    speeds_rad_s.push_back(speed_m_s / s.robot.kinematics.wheel_radius_m);
+  if (speeds_rad_s.empty()) {
+    for (const double part : parts_of_top_speed) speeds_rad_s.push_back(part * s.ranges.wheel_speed_rad_s);
+  }
+  std::erase_if(speeds_rad_s, [&](double speed) { return speed < bounds.minimum || speed > bounds.maximum; });
   Variants variants;
-  for (const double speed_m_s : s.shapes.stribeck_speeds_m_s) {
+  for (const double speed_rad_s : speeds_rad_s) {
     for (const double exponent : s.shapes.stribeck_exponents) {
-      v[1] = speed_m_s / s.robot.kinematics.wheel_radius_m;
+      v[1] = speed_rad_s;
       v[2] = exponent;
       variants.push_back({v, 0, 6});
     }
@@ -98,7 +106,7 @@ std::vector<Variant> variants_of(const dynamics::Effect& effect, const ShapeSett
     const double speed = s.ranges.mean_wheel_speed_rad_s;
     return ratio_or_own(v, 2 * s.robot.motor.viscous_friction_nm_s_rad * speed * speed, s);
   }
-  if (id == "stribeck_friction") return stribeck(v, s);
+  if (id == "stribeck_friction") return stribeck(v, effect.info().parameters[1], s);
   if (id == "turning_scrub") return by_second(v, s.shapes.scrub_rates_rad_s, 4);
   if (id == "winding_temperature") return by_second(v, s.shapes.winding_time_constants_s, 6);
   if (id == "friction_asymmetry" || id == "torque_constant_loss" || id == "gear_efficiency")

@@ -19,7 +19,7 @@ struct Zone {
 struct Shapes {
   std::vector<Zone> zones;  // found for floor_resistance_zone
   std::vector<double> scrub_rates_rad_s{0.01, 0.03, 0.1, 0.3};
-  std::vector<double> stribeck_speeds_m_s{0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4};
+  std::vector<double> stribeck_speeds_m_s;  // empty: parts of the fastest speed of a wheel
   std::vector<double> stribeck_exponents{1, 2};
   std::vector<double> winding_time_constants_s{windows::heat_time_constants_s.begin(),
                                                windows::heat_time_constants_s.end()};

@@ -84,9 +84,9 @@ void make_windows(Grouped& g, const robot::RobotModel& robot,
   const auto known = [](double p) { return std::isfinite(p); };
   g.power_w = measured_power(g.windows, robot, false);
   if (std::ranges::any_of(g.power_w, known)) return;
-  g.power = PowerSource::motors;
-  g.power_w = measured_power(g.windows, robot, true);
-  if (std::ranges::none_of(g.power_w, known)) g.power = PowerSource::none;
+  // Power from currents and the file's winding would say nothing that the currents do not.
+  g.power = voltages > 0 ? PowerSource::motors : PowerSource::none;
+  if (voltages > 0) g.power_w = measured_power(g.windows, robot, true);
 }
 
 // The problem with the noise of each group its own: a quiet floor says more than a rough one.

@@ -122,18 +122,23 @@ Problem contrast(const Problem& base, std::span<const std::size_t> group_of_bloc
     for (std::size_t b = 0; b < blocks.size(); ++b)
       problem.blocks.back().push_back(layout.expanded(blocks[b], group_of_block[b]));
   }
-  const auto kept =
-      std::make_shared<const Problem>(Problem{base.hypotheses, {}, {}, {}, base.moved, base.cancelling});
-  problem.moved = [kept, share = layout.share](const Hypothesis& h, const Eigen::VectorXd& c) {
-    const Eigen::MatrixXd strengths = by_group(c, share);
-    // Any hypothesis of the base that is the same one has its columns.
-    const auto same = std::ranges::find_if(kept->hypotheses, [&](const Hypothesis& o) {
+  const auto kept = std::make_shared<const Problem>(
+      Problem{base.hypotheses, {}, {}, {}, base.moved, base.cancelling, base.likeness});
+  // Any hypothesis of the base that is the same one has its columns.
+  const auto in_base = [kept](const Hypothesis& h) -> const Hypothesis& {
+    return *std::ranges::find_if(kept->hypotheses, [&](const Hypothesis& o) {
       return o.id() == h.id() && o.effect.values == h.effect.values && o.parameter == h.parameter &&
              o.effect.effect == h.effect.effect;
     });
+  };
+  problem.likeness = [kept, in_base](const Hypothesis& a, const Hypothesis& b) {
+    return kept->likeness(in_base(a), in_base(b));
+  };
+  problem.moved = [kept, in_base, share = layout.share](const Hypothesis& h, const Eigen::VectorXd& c) {
+    const Eigen::MatrixXd strengths = by_group(c, share);
     double moved = 0;
     for (Eigen::Index g = 0; g < share.size(); ++g)
-      moved += share[g] * kept->moved(*same, strengths.row(g).transpose());
+      moved += share[g] * kept->moved(in_base(h), strengths.row(g).transpose());
     return moved;
   };
   problem.cancelling = [kept, share = layout.share](const HypothesisSet& set, const Eigen::VectorXd& c) {

@@ -75,6 +75,15 @@ class Moved {
     return std::fabs(coefficients[0]) * columns_[own].power_share;
   }
 
+  double likeness(const Hypothesis& a, const Hypothesis& b) const {
+    const auto moved = [&](const Hypothesis& h) {
+      return change(h, Eigen::VectorXd::Ones(static_cast<Eigen::Index>(h.candidate.columns.size())));
+    };
+    const Eigen::VectorXd of_a = moved(a), of_b = moved(b);
+    const double size = of_a.norm() * of_b.norm();
+    return size > 0 ? std::fabs(of_a.dot(of_b)) / size : 0;
+  }
+
   double cancelling(const std::vector<Hypothesis>& hypotheses, const HypothesisSet& set,
                     const Eigen::VectorXd& coefficients) const {
     constexpr double matters = 0.1;  // of what the response is
@@ -302,6 +311,7 @@ Problem make_problem(const RunColumns& columns, const RunScatter& scatter, std::
   }
   const auto moved = std::make_shared<const Moved>(columns, std::move(r));
   problem.moved = [moved](const Hypothesis& h, const Eigen::VectorXd& c) { return (*moved)(h, c); };
+  problem.likeness = [moved](const Hypothesis& a, const Hypothesis& b) { return moved->likeness(a, b); };
   problem.cancelling = [moved, hypotheses = problem.hypotheses](const HypothesisSet& set,
                                                                 const Eigen::VectorXd& c) {
     return moved->cancelling(hypotheses, set, c);

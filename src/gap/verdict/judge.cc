@@ -16,7 +16,10 @@ namespace {
 constexpr double largest_unnamed = 0.012;             // what may be left over while nothing is named
 constexpr double largest_left = 0.014, of_gap = 0.1;  // and beside names, with a part of the gap
 constexpr double closes_nothing = 0.95;               // of the gap on held-out parts, that still is left
+constexpr double closes_no_energy = 0.8;              // of what is missed of their energies
+constexpr double unbelieved = 0.1;                    // probability that nothing is there, by either judge
 constexpr double mostly_outside = 0.25;               // of what moves power, outside the catalogue
+constexpr double clearly_better = 0.95;               // of what the regression and the file miss
 constexpr double mostly_closed = 0.5;                 // of what held-out parts can be closed by
 constexpr double beyond_usual = 3;                    // strengths that no robot has, over the usual ones
 constexpr double doubtful = 0.6;          // factor on names beside which something speaks against all
@@ -75,6 +78,7 @@ struct Doubts {
   bool worse = false;        // than the referee or the unchanged model, on held-out parts
   bool worse_alone = false;  // the same without a function outside the catalogue that is told beside them
   bool unexplained = false;  // held-out parts keep more of the gap than right names leave
+  bool partly = false;       // the same, though they predict better than the regression
   bool like_load = false;
   bool any_against() const { return idle || worse || unexplained || like_load; }
 };
@@ -121,6 +125,9 @@ class Judge {
       e.posterior = m.probability();
       if (m.wander > steady_wander || unproved(h)) e.posterior = std::min(e.posterior, varying);
       e.controls = controls_of(m);
+      for (const Alternative& a : m.stated()) e.alternatives.push_back(hypothesis(a.hypothesis).id());
+      // What is not found again without each part is no surer than that.
+      if (f_.held_out && f_.base.empty()) e.posterior = std::min(e.posterior, found_again(e));
       // Found where it is not: no surer than the surrogates allow.
       double not_by_chance = 1;
       if (e.controls) {
@@ -132,7 +139,6 @@ class Judge {
       e.share = f_.shares[k];
       e.power_w = f_.power_w[k];
       e.varies = m.wander;
-      for (const Alternative& a : m.stated()) e.alternatives.push_back(hypothesis(a.hypothesis).id());
       for (const dynamics::ActiveEffect& effect : k < f_.instead.size() ? f_.instead[k] : none)
         e.instead.push_back(dynamics::adopt(effect));
       if (h.is_effect()) e.calibrates = traits_of(e.id).calibrates;
@@ -141,6 +147,15 @@ class Judge {
       named_share_ += m.share;
       d_.effects.push_back(std::move(e));
     }
+  }
+  // Of the fits that leave a part out, those that name it or one of its group.
+  double found_again(const DiagnosedEffect& e) const {
+    const auto named = [&](const std::string& id) {
+      return id == e.id || std::ranges::find(e.alternatives, id) != e.alternatives.end();
+    };
+    const auto times = std::ranges::count_if(
+        f_.held_out->named, [&](const auto& part) { return std::ranges::any_of(part, named); });
+    return static_cast<double>(times) / static_cast<double>(f_.held_out->parts);
   }
   static double group_of(const Member& m, const DiagnosedEffect& e) {
     return m.wander > steady_wander ? e.posterior : m.group_probability();
@@ -216,11 +231,16 @@ class Judge {
     closed_ = (f_.held_out->unchanged() - after) / (f_.held_out->unchanged() - d_.noise_floor);
     const bool by_power =
         std::ranges::all_of(f_.named, [&](std::size_t h) { return shows_in_power(hypothesis(h)); });
-    doubts_.idle = by_power && after > closes_nothing * f_.held_out->unchanged();
+    doubts_.idle = by_power && after > closes_nothing * f_.held_out->unchanged() &&
+                   f_.held_out->explained_energy() > closes_no_energy * f_.held_out->unchanged_energy();
     doubts_.worse = d_.baseline && d_.baseline->wins();
     doubts_.worse_alone = d_.baseline && baseline_of(*f_.held_out).wins();
-    doubts_.unexplained = !(closed_ > mostly_closed) &&
-                          after - d_.noise_floor > largest_left + of_gap * d_.power_absolute_relative;
+    const bool best =
+        d_.baseline && after < clearly_better * std::min(f_.held_out->referee(), f_.held_out->unchanged());
+    const bool much_left = !(closed_ > mostly_closed) &&
+                           after - d_.noise_floor > largest_left + of_gap * d_.power_absolute_relative;
+    doubts_.unexplained = much_left && !best;
+    doubts_.partly = much_left;
   }
 
   void decide() {
@@ -228,7 +248,10 @@ class Judge {
     const bool outside = !d_.outside.channel.empty() &&
                          (rippled_ || (outside_share_ > mostly_outside * (named_share_ + outside_share_) &&
                                        !(closed_ > mostly_closed)));
-    const bool open = beyond_noise_ > largest_unnamed;
+    // An effect smaller than the noise hardly shows in the gap: there the evidence says whether it is there.
+    const bool hidden = named_share_ > largest_unnamed && d_.noise_floor > named_share_;
+    const double none = std::max(f_.explanation.none, f_.explanation.none_by_prediction);
+    const bool open = beyond_noise_ > largest_unnamed || (hidden && none < unbelieved);
     // Where the gap is hardly larger than what nothing could remove, only a sure name says something.
     const bool all_unsure = std::ranges::all_of(d_.effects, [](const auto& e) { return e.posterior < sure; });
     const bool seen_elsewhere =
@@ -258,6 +281,7 @@ class Judge {
     const double trust = named_share_ > 0 ? named_share_ / (named_share_ + outside_share_) : 1;
     for (DiagnosedEffect& e : d_.effects) {
       e.posterior *= trust;
+      if (doubts_.partly) e.posterior = std::min(e.posterior, varying);
       if (doubts_.any_against()) e.posterior *= doubtful;
       const Standing standing = d_.verdict == Verdict::outside ? Standing::outside
                                 : doubts_.any_against()        ? Standing::inconclusive

@@ -135,6 +135,11 @@ std::string earlier_words(const Diagnosis& earlier, std::string_view first_missi
 
 std::vector<std::string> reasons_for(const Diagnosis& d, bool worse, bool unexplained) {
   std::vector<std::string> reasons;
+  if (!d.motion_known) {
+    reasons.emplace_back(
+        "The motion that asks for the power is not known, or too short: see the checks of the recordings.");
+    return reasons;
+  }
   if (!std::isfinite(d.power_absolute_relative)) {
     reasons.emplace_back(
         d.motor_channels && d.power == PowerSource::none
@@ -165,11 +170,7 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse, bool unexpl
         probability_text(d.outside.probability))));
   }
   if (d.effects.empty() && d.verdict == Verdict::inconclusive) {
-    if (!std::isfinite(d.noise_floor)) {
-      reasons.emplace_back(
-          "Power was measured, but the motion that asks for it is not known: see the checks of the "
-          "recordings.");
-    } else if (d.power_absolute_relative - d.noise_floor > 0.012) {
+    if (d.power_absolute_relative - d.noise_floor > 0.012) {
       reasons.push_back(sentence(fmt::format(
           "{} of the power is missed where nothing could remove {}, and no effect of the catalogue "
           "accounts for it well enough to be named",

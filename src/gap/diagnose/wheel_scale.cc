@@ -1,0 +1,75 @@
+#include "gap/diagnose/wheel_scale.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "gap/checks/faults.h"
+#include "gap/equations/power.h"
+#include "gap/verdict/words.h"
+
+namespace joulecast::gap {
+namespace {
+
+constexpr double huge_gap = 0.5, small_gap = 0.35;  // of the power: as recorded, and in the right unit
+constexpr double clearly = 0.5;                     // of the gap of any other unit
+
+double wheels_factor(const Fault& fault) {
+  const auto of = [&](Source s) { return fault.factor[static_cast<std::size_t>(s)]; };
+  const double right = of(Source::wheel_right);
+  const bool both = right == of(Source::wheel_left) && right > 0;
+  return fault.channel == "wheel_velocity" && both ? right : 1;
+}
+
+std::vector<Window> slowed(std::span<const Window> windows, double factor) {
+  std::vector<Window> all(windows.begin(), windows.end());
+  for (Window& w : all) {
+    for (const std::size_t s : {0u, 1u}) {
+      w.speed_rad_s[s] /= factor;
+      w.acceleration_rad_s2[s] /= factor;
+      for (auto& part : w.part_speed_rad_s) part[s] /= factor;
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+std::optional<Check> wheel_scale_by_power(const Material& m, std::span<const double> power_w, double gap) {
+  if (!(gap > huge_gap)) return std::nullopt;
+  struct Tried {
+    double gap;
+    const Fault* fault;
+  };
+  std::vector<Tried> tried;
+  const std::vector<Fault> faults = known_faults(m.robot);
+  for (const Fault& fault : faults) {
+    const double factor = wheels_factor(fault);
+    if (factor == 1) continue;
+    const std::vector<double> modelled = modelled_power(m.robot, m.adopted, {}, slowed(m.windows, factor));
+    tried.push_back({gap_size(power_w, modelled).absolute_relative, &fault});
+  }
+  const auto best = std::ranges::min_element(tried, {}, &Tried::gap);
+  if (best == tried.end() || best->gap > small_gap || best->gap > clearly * gap) return std::nullopt;
+  const double factor = wheels_factor(*best->fault);
+  std::string also;
+  for (const Tried& other : tried) {
+    if (other.fault == best->fault || other.gap > best->gap / clearly) continue;
+    also += (also.empty() ? "; " : " or ") + other.fault->cause;
+  }
+  if (!also.empty()) also += " would look nearly the same";
+  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+  return Check{best->fault->id,
+               best->fault->channel,
+               factor,
+               {unknown, unknown},
+               fmt::format("wheel_velocity looks {}: as recorded, the robot file misses {} of the battery's "
+                           "power, and of speeds divided by {:.3g} it misses {}; joulecast expects rad/s at "
+                           "the wheel, positive forward, right before left{}.",
+                           best->fault->cause, percent(gap), factor, percent(best->gap), also),
+               true};
+}
+
+}  // namespace joulecast::gap
