@@ -10,6 +10,7 @@ namespace joulecast::gap {
 namespace {
 
 namespace vr = virtual_robot;
+using signals::unmeasured;
 
 // Missions of the project's own plant, which shares no physics with the model.
 made::Robot virtual_missions(const std::vector<vr::EffectStrength>& effects, std::uint64_t seed, bool motors,
@@ -51,6 +52,23 @@ TEST(VirtualRobot, ASingleMissionSufficesForAStrongEffect) {
   EXPECT_EQ(d.missions, 1u);
   ASSERT_TRUE(d.shrinkage);
   EXPECT_GT(d.shrinkage->fraction, 0.5);
+}
+
+TEST(VirtualRobot, CurrentsOfTheMotorsAloneHaveAPowerByTheFilesWinding) {
+  made::Robot robot = virtual_missions({{"coulomb_friction", 0.6}}, 12, true, 3);
+  for (telemetry::Recording& mission : robot.recordings.missions) {
+    for (auto& s : mission.samples) {
+      s.motor_voltage_v = {unmeasured, unmeasured};
+      s.battery_voltage_v = s.battery_current_a = unmeasured;
+    }
+  }
+  const Diagnosis d = diagnose_robot(robot);
+  EXPECT_EQ(d.power, PowerSource::motors);
+  ASSERT_EQ(d.effects.size(), 1u);
+  EXPECT_EQ(d.effects[0].id, "coulomb_friction");
+  ASSERT_TRUE(d.shrinkage);
+  EXPECT_GT(d.shrinkage->fraction, 0.5);
+  EXPECT_EQ(d.notes.size(), 1u);
 }
 
 // Battery power alone, of a robot that has three times the friction of its file and a computer that the file

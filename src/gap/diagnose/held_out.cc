@@ -111,13 +111,20 @@ Found find_without(const std::vector<bool>& out, const Material& m, const FitRes
 
 }  // namespace
 
-double HeldOut::relative(double BlockErrors::*error) const {
+double HeldOut::relative(const std::function<double(const BlockErrors&)>& error) const {
   double sum = 0, size = 0;
   for (const BlockErrors& b : blocks) {
-    sum += std::fabs(b.*error);
+    sum += std::fabs(error(b));
     size += b.size;
   }
   return size > 0 ? sum / size : std::numeric_limits<double>::quiet_NaN();
+}
+
+double HeldOut::found_again(std::span<const std::string> ids) const {
+  const auto one_of = [&](const std::string& id) { return std::ranges::find(ids, id) != ids.end(); };
+  const auto times =
+      std::ranges::count_if(named, [&](const auto& part) { return std::ranges::any_of(part, one_of); });
+  return static_cast<double>(times) / static_cast<double>(parts);
 }
 
 std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::span<const double> power_w,

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,8 @@ struct HeldOut {
   std::vector<std::vector<std::string>> named;  // without each part
   std::vector<std::vector<Cause>> causes;       // and what was in force, the base of the fit first
 
+  // Of the fits without a part, how many name one of these.
+  double found_again(std::span<const std::string> ids) const;
   // Sum of an error over all blocks, over that of |power|; NaN where no power is known.
   double unchanged() const { return relative(&BlockErrors::unchanged); }
   double explained() const { return relative(&BlockErrors::explained); }
@@ -34,9 +37,13 @@ struct HeldOut {
   // Sum over blocks of what is missed of their energies, over that of |power|.
   double unchanged_energy() const { return relative(&BlockErrors::unchanged_energy); }
   double explained_energy() const { return relative(&BlockErrors::explained_energy); }
+  // The same of what the energies differ by with what was found.
+  double moved_energy() const {
+    return relative([](const BlockErrors& b) { return b.unchanged_energy - b.explained_energy; });
+  }
 
  private:
-  double relative(double BlockErrors::*error) const;
+  double relative(const std::function<double(const BlockErrors&)>& error) const;
 };
 
 // Leaves out a part of the blocks at a time and does everything again without it: zone, noise, effects with

@@ -34,6 +34,7 @@ constexpr double large_gap = 0.15,
 constexpr double usual_share = 0.07,
                  large_share = 0.3;  // of the mean power, that an effect which is there may move
 constexpr std::size_t more_members = 6;
+constexpr double most_parts_name = 0.5;
 constexpr double contested = 0.7;  // most of the probability of one of many that are estimated together
 constexpr double settled_delay_s = 0.006, settled_bias = 0.1;
 constexpr int most_delay_rounds = 3;
@@ -100,6 +101,7 @@ class Diagnoser {
   bool fit();
   bool leave_out();
   bool judge_all();
+  void keep_found_again(const Problem& problem, const Explanation& explanation, Named& named);
   void name_base(const Problem& problem, Explanation& explanation, std::vector<Controls>& controls,
                  Named& named);
   std::vector<dynamics::ActiveEffect> instead_of(const Problem& problem, const Member& member) const;
@@ -122,6 +124,7 @@ class Diagnoser {
   std::optional<FitResult> fit_;
   std::optional<FitResult> calibrated_;  // beside what every robot has, where the file is far off
   std::optional<HeldOut> held_out_;
+  std::optional<HeldOut> by_base_;          // by what every robot has, estimated anew, alone
   std::map<std::size_t, double> reopened_;  // of the gap, without a hypothesis that the base has
   HypothesisSet named_;
   std::vector<Cause> causes_;  // with their own strengths; beside the named, FitResult::base
@@ -243,6 +246,7 @@ bool Diagnoser::leave_out() {
   if (!alone) return false;
   if (alone->explained() > calibrated->explained()) {
     calibrated_->alone = false;
+    by_base_ = std::move(alone);
     alone = std::move(calibrated);
   }
   if (alone->explained() < held_out_->explained()) {
@@ -250,6 +254,22 @@ bool Diagnoser::leave_out() {
     fit_ = std::move(calibrated_);
   }
   return true;
+}
+
+// Beside what every robot has stands what most fits without a part name, too; without any the base stands
+// alone.
+void Diagnoser::keep_found_again(const Problem& problem, const Explanation& explanation, Named& named) {
+  for (std::size_t k = named.set.size(); k-- > 0;) {
+    std::vector<std::string> group{problem.hypotheses[named.set[k]].id()};
+    const Member& m = *std::ranges::find(explanation.members, named.set[k], &Member::hypothesis);
+    for (const Alternative& a : m.stated()) group.push_back(problem.hypotheses[a.hypothesis].id());
+    if (held_out_->found_again(group) >= most_parts_name) continue;
+    named.set.erase(named.set.begin() + static_cast<std::ptrdiff_t>(k));
+    named.causes.erase(named.causes.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+  if (!named.set.empty() || !by_base_) return;
+  fit_->alone = true;
+  held_out_ = std::move(by_base_);
 }
 
 // Of what every robot has, estimated anew, what parts left out need is named as well; its standard deviation
@@ -374,6 +394,7 @@ bool Diagnoser::judge_all() {
   Named named;
   if (!fit_->alone)
     named = name_causes(based(material(), *fit_), equations(), problem, explanation, view_.power_w);
+  if (!fit_->alone && !fit_->base.empty()) keep_found_again(problem, explanation, named);
   const ControlSettings controls{fit_settings_.explain, settings_.controls, settings_.threads};
   auto made = control(material(), fit_->linear, problem, explanation, controls,
                       [&](double part) { return goes_on(std::lerp(after_parts, 1.0, part)); });
@@ -396,6 +417,7 @@ bool Diagnoser::judge_all() {
              .explanation = explanation,
              .controls = settings_.controls > 0 ? std::move(*made) : std::vector<Controls>{},
              .named = named_,
+             .calibrated = !fit_->base.empty(),
              .held_out = held_out_,
              .ripple = ripple};
   const std::vector<double> after = modelled(causes_);

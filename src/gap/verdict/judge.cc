@@ -16,12 +16,14 @@ namespace {
 constexpr double largest_unnamed = 0.012;             // what may be left over while nothing is named
 constexpr double largest_left = 0.014, of_gap = 0.1;  // and beside names, with a part of the gap
 constexpr double closes_nothing = 0.95;               // of the gap on held-out parts, that still is left
-constexpr double closes_no_energy = 0.8;              // of what is missed of their energies
-constexpr double unbelieved = 0.1;                    // probability that nothing is there, by either judge
-constexpr double mostly_outside = 0.25;               // of what moves power, outside the catalogue
-constexpr double clearly_better = 0.95;               // of what the regression and the file miss
-constexpr double mostly_closed = 0.5;                 // of what held-out parts can be closed by
-constexpr double beyond_usual = 3;                    // strengths that no robot has, over the usual ones
+constexpr double closes_little = 0.8;
+constexpr double closes_energy = 0.5;     // of what is missed of their energies, that would close
+constexpr double closes_no_energy = 0.8;  // of what is missed of their energies
+constexpr double unbelieved = 0.1;        // probability that nothing is there, by either judge
+constexpr double mostly_outside = 0.25;   // of what moves power, outside the catalogue
+constexpr double clearly_better = 0.95;   // of what the regression and the file miss
+constexpr double mostly_closed = 0.5;     // of what held-out parts can be closed by
+constexpr double beyond_usual = 3;        // strengths that no robot has, over the usual ones
 constexpr double doubtful = 0.6;          // factor on names beside which something speaks against all
 constexpr double sure = 0.9;              // probability of such a name
 constexpr double varying = 0.7;           // most of a name whose strength varies, or that nothing proves
@@ -127,7 +129,11 @@ class Judge {
       e.controls = controls_of(m);
       for (const Alternative& a : m.stated()) e.alternatives.push_back(hypothesis(a.hypothesis).id());
       // What is not found again without each part is no surer than that.
-      if (f_.held_out && f_.base.empty()) e.posterior = std::min(e.posterior, found_again(e));
+      if (f_.held_out && !f_.calibrated) {
+        std::vector<std::string> group = e.alternatives;
+        group.push_back(e.id);
+        e.posterior = std::min(e.posterior, f_.held_out->found_again(group));
+      }
       // Found where it is not: no surer than the surrogates allow.
       double not_by_chance = 1;
       if (e.controls) {
@@ -147,15 +153,6 @@ class Judge {
       named_share_ += m.share;
       d_.effects.push_back(std::move(e));
     }
-  }
-  // Of the fits that leave a part out, those that name it or one of its group.
-  double found_again(const DiagnosedEffect& e) const {
-    const auto named = [&](const std::string& id) {
-      return id == e.id || std::ranges::find(e.alternatives, id) != e.alternatives.end();
-    };
-    const auto times = std::ranges::count_if(
-        f_.held_out->named, [&](const auto& part) { return std::ranges::any_of(part, named); });
-    return static_cast<double>(times) / static_cast<double>(f_.held_out->parts);
   }
   static double group_of(const Member& m, const DiagnosedEffect& e) {
     return m.wander > steady_wander ? e.posterior : m.group_probability();
@@ -231,8 +228,16 @@ class Judge {
     closed_ = (f_.held_out->unchanged() - after) / (f_.held_out->unchanged() - d_.noise_floor);
     const bool by_power =
         std::ranges::all_of(f_.named, [&](std::size_t h) { return shows_in_power(hypothesis(h)); });
-    doubts_.idle = by_power && after > closes_nothing * f_.held_out->unchanged() &&
-                   f_.held_out->explained_energy() > closes_no_energy * f_.held_out->unchanged_energy();
+    const double energy = f_.held_out->unchanged_energy();
+    const double energy_after = f_.held_out->explained_energy();
+    // What moves the energies of parts and brings them no nearer fits the skew of noise.
+    const bool skew = f_.held_out->moved_energy() > closes_energy * energy &&
+                      energy_after > closes_nothing * energy &&
+                      after > closes_little * f_.held_out->unchanged();
+    doubts_.idle =
+        by_power &&
+        ((after > closes_nothing * f_.held_out->unchanged() && energy_after > closes_no_energy * energy) ||
+         skew);
     doubts_.worse = d_.baseline && d_.baseline->wins();
     doubts_.worse_alone = d_.baseline && baseline_of(*f_.held_out).wins();
     const bool best =

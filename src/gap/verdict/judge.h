@@ -19,6 +19,7 @@ struct Findings {
   HypothesisSet named;
   std::vector<Cause> causes{};  // the named, with their own strengths
   std::vector<Cause> base{};    // what else was estimated where the robot file is far off
+  bool calibrated = false;      // whether that is so
   // Of each, what would be there in its place: its alternatives, the others fitted again.
   std::vector<std::vector<dynamics::ActiveEffect>> instead{};
   std::vector<double> shares{};   // of the gap, Shapley

@@ -132,6 +132,19 @@ TEST(Mixture, WanderIsThatOfTheStrengthFromBlockToBlock) {
   EXPECT_NEAR(strengths[1], 0.7, 0.02);
 }
 
+TEST(Mixture, ChangesFromBlockToBlockOfAColouredNoiseAreNoWander) {
+  const auto mean_of = [](const std::vector<Said>& blocks) {
+    const Problem problem = two_effects(blocks, {circumstances(0, 0.01)});
+    return Mixture(problem).mean_wander({0}, 0);
+  };
+  std::vector<Said> blocks(64, Said{.weight = {2000, 15}, .estimate = {0.4, 0}});
+  for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b].estimate[0] = b % 2 == 0 ? 0.3 : 0.5;
+  const double alternating = mean_of(blocks);
+  EXPECT_LT(alternating, 0.1);
+  for (std::size_t b = 0; b < blocks.size(); ++b) blocks[b].estimate[0] = b < 32 ? 0.3 : 0.5;
+  EXPECT_GT(mean_of(blocks), 2 * alternating);
+}
+
 HypothesisSet members_of(const Explanation& e) {
   HypothesisSet set;
   for (const Member& m : e.members) set.push_back(m.hypothesis);
@@ -165,6 +178,32 @@ TEST(Explain, WhatOneBlockAloneSaysIsNotPredicted) {
   EXPECT_GT(e.members[0].by_evidence, 0.9);
   EXPECT_LT(e.members[0].by_prediction, 0.5);
   EXPECT_LT(e.members[0].probability(), 0.5);
+}
+
+TEST(Explain, TheLikeliestIsACandidateWhereNoneIsLikely) {
+  const std::vector<Said> blocks(6, Said{.weight = {20, 15}, .estimate = {0.28, 0.02}});
+  const double odds = std::exp(log_odds_of(0, 120, 0.28, 0.1));
+  ASSERT_GT(odds, 0.2);
+  ASSERT_LT(odds, 0.8);
+  Problem problem = two_effects(blocks, {circumstances(0, 0.1)});
+  const Explanation e = explain(problem);
+  ASSERT_EQ(members_of(e), HypothesisSet{0});
+  EXPECT_TRUE(e.members[0].candidate);
+  EXPECT_NEAR(e.members[0].probability(), std::min(0.45, odds / (1 + odds)), 1e-9);
+  problem.moved = [](const Hypothesis&, const Eigen::VectorXd&) { return 0.001; };
+  EXPECT_TRUE(explain(problem).members.empty());
+}
+
+TEST(Explain, WhatTheDataShowAsTheSameIsToldWhateverTheOdds) {
+  const std::vector<Said> blocks(6, Said{.weight = {200, 150}, .estimate = {0.8, 0.02}});
+  Problem problem = two_effects(blocks, {circumstances(0, 0.1)});
+  EXPECT_TRUE(explain(problem).members.at(0).alternatives.empty());
+  problem.likeness = [](const Hypothesis&, const Hypothesis&) { return 0.98; };
+  EXPECT_TRUE(explain(problem).members.at(0).alternatives.empty());
+  problem.likeness = [](const Hypothesis&, const Hypothesis&) { return 0.995; };
+  const Explanation e = explain(problem);
+  ASSERT_EQ(e.members.at(0).alternatives.size(), 1u);
+  EXPECT_EQ(e.members[0].alternatives[0].hypothesis, 1u);
 }
 
 TEST(Explain, WhatHardlyMovesPowerIsNoMember) {

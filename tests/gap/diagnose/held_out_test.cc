@@ -61,6 +61,21 @@ TEST(HoldOut, WhatIsThereIsNamedWithoutEachPartAndPredictsIt) {
   EXPECT_LE(shares[0], 1);
 }
 
+TEST(HoldOut, CountsFitsThatNameOneOfAGroupAndWhatEnergiesDifferBy) {
+  HeldOut held;
+  held.parts = 4;
+  held.named = {{"slope"}, {}, {"accessory_load", "slope"}, {"current_sensor_bias"}};
+  const auto found = [&](std::vector<std::string> ids) { return held.found_again(ids); };
+  EXPECT_EQ(found({"slope"}), 0.5);
+  EXPECT_EQ(found({"accessory_load", "current_sensor_bias"}), 0.5);
+  EXPECT_EQ(found({"wheel_slip"}), 0);
+  held.blocks = {{.size = 10, .unchanged_energy = 3, .explained_energy = -1},
+                 {.size = 30, .unchanged_energy = -2, .explained_energy = 0}};
+  EXPECT_EQ(held.unchanged_energy(), 5.0 / 40);
+  EXPECT_EQ(held.explained_energy(), 1.0 / 40);
+  EXPECT_EQ(held.moved_energy(), 6.0 / 40);
+}
+
 TEST(HoldOut, IsCancelledBetweenParts) {
   const made::Robot robot = made::virtual_robot("nomad", 32);
   const auto readings = windows::find_readings(robot.recordings.missions, robot.model);

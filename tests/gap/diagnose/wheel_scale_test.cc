@@ -1,0 +1,46 @@
+#include "gap/diagnose/wheel_scale.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "tests/gap/diagnose/made_drives.h"
+
+namespace joulecast::gap {
+namespace {
+
+constexpr double rpm = 60 / (2 * std::numbers::pi);
+
+// The check of drives whose wheel speeds were recorded in another unit.
+std::optional<Check> judge(const std::vector<Cause>& causes, double unit) {
+  const made::Drives drives(causes);
+  const Material right = drives.material();
+  std::vector<Window> recorded(right.windows.begin(), right.windows.end());
+  for (Window& w : recorded) {
+    for (const std::size_t s : {0u, 1u}) {
+      w.speed_rad_s[s] *= unit;
+      w.acceleration_rad_s2[s] *= unit;
+      for (auto& part : w.part_speed_rad_s) part[s] *= unit;
+    }
+  }
+  const std::vector<double> modelled = modelled_power(right.robot, {}, {}, recorded);
+  const Material material{right.robot, {}, recorded, right.blocks, right.from_motion, right.row_s};
+  return wheel_scale_by_power(material, drives.power_w, gap_size(drives.power_w, modelled).absolute_relative);
+}
+
+TEST(WheelScale, TheUnitThatThePowerAgreesWithIsTold) {
+  const auto check = judge({made::cause("coulomb_friction", 0.2)}, rpm);
+  ASSERT_TRUE(check);
+  EXPECT_NE(check->says.find("wheel_velocity looks given in rpm"), std::string::npos) << check->says;
+  EXPECT_NEAR(check->value, rpm, 1e-3);
+  EXPECT_TRUE(check->contradicted);
+}
+
+TEST(WheelScale, AModelThatIsOffIsNoUnit) {
+  EXPECT_FALSE(judge({}, 1));
+  EXPECT_FALSE(judge({made::cause("coulomb_friction", 6)}, 1));
+  EXPECT_FALSE(judge({made::cause("accessory_load", 300)}, 1));
+}
+
+}  // namespace
+}  // namespace joulecast::gap
