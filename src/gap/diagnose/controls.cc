@@ -55,7 +55,11 @@ class Surrogates {
     statistics::Information total;
     for (const auto& block : problem.blocks[problem.plain.noise]) total += block;
     Eigen::VectorXd sd = problem.plain.tolerance;
-    for (const std::size_t h : explanation.whole) {
+    HypothesisSet all = explanation.whole;
+    for (const Member& member : explanation.members) {
+      if (member.candidate) all.push_back(member.hypothesis);
+    }
+    for (const std::size_t h : all) {
       const auto& c = problem.hypotheses[h].candidate;
       for (const std::size_t k : c.columns)
         sd[static_cast<Eigen::Index>(k)] = std::max(sd[static_cast<Eigen::Index>(k)], c.expected);
@@ -170,6 +174,7 @@ std::optional<std::vector<Controls>> control(const Material& material, const Lin
   const Surrogates surrogates(material, linear, problem, explanation);
   // The more members that a large gap may have make a false name likelier by nothing, and cost most.
   ExplainSettings quick = settings.explain;
+  quick.candidate = false;
   quick.most_members = std::min(quick.most_members, ExplainSettings{}.most_members);
   std::atomic<std::size_t> next = 0;
   std::atomic<bool> stopped = false;

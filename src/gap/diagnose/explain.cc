@@ -290,9 +290,9 @@ class Explainer {
       if (other.outside() || other.id() == hypothesis(member).id() || !fits(rest, h)) continue;
       const double log_odds = mixture_.log_joint(with(rest, h)) - reference;
       if (log_odds < std::log(alternative_odds) && !problem_.alike(member, h)) continue;
-      Alternative& kept = best[other.id()];
-      const double odds = std::exp(std::min(50.0, log_odds));
-      if (odds > kept.odds) kept = {h, odds};
+      const Alternative found{h, std::exp(std::min(50.0, log_odds))};
+      Alternative& kept = best.try_emplace(other.id(), found).first->second;
+      if (found.odds > kept.odds) kept = found;
     }
     std::vector<Alternative> result;
     for (const auto& [id, a] : best) result.push_back(a);
@@ -344,7 +344,7 @@ class Explainer {
       if (settings_.predictive) m.wander = mixture_.mean_wander(set, k);
       e.members.push_back(std::move(m));
     }
-    if (settings_.predictive && std::ranges::all_of(e.members, [&](const Member& m) {
+    if (settings_.candidate && settings_.predictive && std::ranges::all_of(e.members, [&](const Member& m) {
           return hypothesis(m.hypothesis).outside() || m.there_probability() < least_named;
         })) {
       add_candidate(e);
@@ -357,14 +357,17 @@ class Explainer {
     std::optional<std::size_t> best;
     double most = least_odds;
     for (std::size_t h = 0; h < problem_.hypotheses.size(); ++h) {
-      if (!hypothesis(h).is_effect() || traits_of(hypothesis(h).id()).elsewhere || cancels({h})) continue;
+      if (!hypothesis(h).is_effect() || traits_of(hypothesis(h).id()).elsewhere) continue;
       if (const double odds = mixture_.log_odds({h}); odds > most) most = odds, best = h;
     }
     if (!best) return;
     const Mixture::Estimate estimate = mixture_.estimate({*best});
     const double moves = problem_.moved(hypothesis(*best), estimate.mean);
     if (moves < settings_.least_share) return;
-    if (const auto own = std::ranges::find(e.members, *best, &Member::hypothesis); own != e.members.end()) {
+    const auto same = [&](const Member& m) {
+      return hypothesis(m.hypothesis).id() == hypothesis(*best).id();
+    };
+    if (const auto own = std::ranges::find_if(e.members, same); own != e.members.end()) {
       own->candidate = true;
       return;
     }

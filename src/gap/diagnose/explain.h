@@ -18,6 +18,7 @@ struct ExplainSettings {
   // the data leave no doubt.
   double least_share = 0.011, least_share_for_certain = 0.007;
   double least_outside_share = 0.012;
+  bool candidate = false;  // where no effect is likely, the likeliest is a member
   bool predictive = true;  // false: evidence alone, while a linearisation is sought
 };
 
@@ -38,8 +39,9 @@ struct Member {
   double by_evidence = 0, by_prediction = 0;
   double group_by_evidence = 0, group_by_prediction = 0;
   double any_by_evidence = 0, any_by_prediction = 0;
-  double wander = 0;  // of its strength from block to block: posterior mean of the standard deviation over it
-  double share = 0;   // of the mean power that it moves
+  double wander =
+      0;             // of its strength along the recordings: posterior mean of the standard deviation over it
+  double share = 0;  // of the mean power that it moves
   bool candidate = false;  // not likely to be there, but likelier than any other cause
   std::vector<double> coefficients, sd;
   std::vector<Alternative> alternatives;  // likeliest first

@@ -47,8 +47,8 @@ class ThirdJudge {
         e_{equations.columns, rows_, equations.noise, equations.left_out},
         mixture_(mixture),
         problem_(mixture.problem()),
-        x_(explanation),
-        shows_elsewhere_(shown_elsewhere(equations, problem_)) {
+        x_(explanation) {
+    for (const Hypothesis& h : problem_.hypotheses) shows_elsewhere_.push_back(shown_elsewhere(equations, h));
     for (std::size_t b = 0; b < problem_.block_count(); ++b) {
       if (!e_.leaves_out(b)) blocks_.push_back(b);
     }
@@ -92,18 +92,6 @@ class ThirdJudge {
   bool in_search(std::size_t h) const {
     return !hypothesis(h).outside() && hypothesis(h).id() != zone_effect &&
            (shows_in_power(hypothesis(h)) || !shows_elsewhere_[h]);
-  }
-  // Of each hypothesis, whether these recordings show it in another channel than power.
-  static std::vector<bool> shown_elsewhere(const Equations& e, const Problem& problem) {
-    std::vector<bool> shown(problem.hypotheses.size());
-    for (std::size_t h = 0; h < shown.size(); ++h) {
-      for (std::size_t c = 0; c < channel_count; ++c) {
-        if (c == index_of(Channel::power) || !(e.noise[c].sigma > 0)) continue;
-        for (const Eigen::Index k : places_of(e.rows[c], problem.hypotheses[h].candidate.columns))
-          shown[h] = shown[h] || k >= 0;
-      }
-    }
-    return shown;
   }
   bool fits(const HypothesisSet& set, std::size_t h) const {
     return std::ranges::none_of(
@@ -354,7 +342,7 @@ class ThirdJudge {
   const Mixture& mixture_;
   const Problem& problem_;
   Explanation& x_;
-  const std::vector<bool> shows_elsewhere_;
+  std::vector<bool> shows_elsewhere_;
   std::vector<std::size_t> blocks_;
   HypothesisSet kept_;  // named causes that other channels show
   Eigen::VectorXd kept_strengths_;

@@ -96,9 +96,7 @@ std::optional<FitResult> fit_windows(const Material& whole, std::span<const Caus
     const Mixture mixture(problem);
     const Explanation explanation = explain(mixture, {}, quick);
     result.log_joint = mixture.log_joint(explanation.whole);
-    // Power alone is nearly linear in every strength, and what evidence finds of it is not sure enough to see
-    // all other causes from there.
-    if (material.from_motion.alone()) break;
+    if (!settings.again) break;
     next = result.linear.columns->causes_of(chosen_of(*result.linear.columns, explanation));
     if (same(next, result.causes)) break;
     narrow(result.shapes, next, material.robot, factor);

@@ -12,6 +12,7 @@ namespace joulecast::gap {
 
 struct FitSettings {
   ExplainSettings explain;
+  bool again = true;                 // made linear again where what was found puts it
   std::vector<double> shares{0.07};  // of the mean power, that an effect which is there may move
 };
 

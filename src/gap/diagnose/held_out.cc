@@ -114,7 +114,7 @@ Found find_without(const std::vector<bool>& out, const Material& m, const FitRes
 double HeldOut::relative(const std::function<double(const BlockErrors&)>& error) const {
   double sum = 0, size = 0;
   for (const BlockErrors& b : blocks) {
-    sum += std::fabs(error(b));
+    sum += error(b);
     size += b.size;
   }
   return size > 0 ? sum / size : std::numeric_limits<double>::quiet_NaN();

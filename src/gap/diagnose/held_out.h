@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <span>
@@ -27,7 +28,7 @@ struct HeldOut {
   std::vector<std::vector<std::string>> named;  // without each part
   std::vector<std::vector<Cause>> causes;       // and what was in force, the base of the fit first
 
-  // Of the fits without a part, how many name one of these.
+  // Share of the fits without a part that name one of these.
   double found_again(std::span<const std::string> ids) const;
   // Sum of an error over all blocks, over that of |power|; NaN where no power is known.
   double unchanged() const { return relative(&BlockErrors::unchanged); }
@@ -35,11 +36,15 @@ struct HeldOut {
   double explained_with_functions() const { return explained() - relative(&BlockErrors::spared); }
   double referee() const { return relative(&BlockErrors::referee); }
   // Sum over blocks of what is missed of their energies, over that of |power|.
-  double unchanged_energy() const { return relative(&BlockErrors::unchanged_energy); }
-  double explained_energy() const { return relative(&BlockErrors::explained_energy); }
+  double unchanged_energy() const {
+    return relative([](const BlockErrors& b) { return std::fabs(b.unchanged_energy); });
+  }
+  double explained_energy() const {
+    return relative([](const BlockErrors& b) { return std::fabs(b.explained_energy); });
+  }
   // The same of what the energies differ by with what was found.
   double moved_energy() const {
-    return relative([](const BlockErrors& b) { return b.unchanged_energy - b.explained_energy; });
+    return relative([](const BlockErrors& b) { return std::fabs(b.unchanged_energy - b.explained_energy); });
   }
 
  private:

@@ -30,7 +30,7 @@ class Mixture {
   };
   Estimate estimate(const HypothesisSet& set) const;
 
-  // How the wander of one member's strength from block to block, as a standard deviation over the strength
+  // How the wander of one member's strength along the recordings, as a standard deviation over the strength
   // itself, is distributed: probabilities of the values in wander_grid.
   std::vector<double> wander(const HypothesisSet& set, std::size_t member) const;
 

@@ -31,6 +31,16 @@ std::vector<Eigen::Index> places_of(const ChannelRows& r, std::span<const std::s
   return places;
 }
 
+bool shown_elsewhere(const Equations& e, const Hypothesis& hypothesis) {
+  for (std::size_t c = 0; c < channel_count; ++c) {
+    if (c == index_of(Channel::power) || !(e.noise[c].sigma > 0)) continue;
+    if (std::ranges::any_of(places_of(e.rows[c], hypothesis.candidate.columns),
+                            [](Eigen::Index k) { return k >= 0; }))
+      return true;
+  }
+  return false;
+}
+
 Eigen::VectorXd moved_power(const Equations& e, const HypothesisSet& set,
                             const Eigen::VectorXd& coefficients) {
   const ChannelRows& r = e.rows[index_of(Channel::power)];
@@ -50,7 +60,8 @@ Eigen::VectorXd fitted_to_power(const Equations& e, const HypothesisSet& set, co
   std::vector<const statistics::Candidate*> of;
   for (const std::size_t h : set) {
     const Hypothesis& hypothesis = e.columns.hypotheses()[h];
-    const bool elsewhere = hypothesis.is_effect() && traits_of(hypothesis.id()).elsewhere;
+    const bool elsewhere =
+        hypothesis.is_effect() && traits_of(hypothesis.id()).elsewhere && shown_elsewhere(e, hypothesis);
     for (std::size_t k = 0; k < hypothesis.candidate.columns.size(); ++k) {
       if (!elsewhere) free.push_back(static_cast<Eigen::Index>(of.size()));
       of.push_back(&hypothesis.candidate);

@@ -11,6 +11,9 @@ namespace joulecast::gap {
 // Whether battery power from motion (Channel::power) is all that says something of power.
 bool power_speaks_alone(const Equations& equations);
 
+// Whether another channel than power shows this hypothesis.
+bool shown_elsewhere(const Equations& equations, const Hypothesis& hypothesis);
+
 // All columns of a set, in its order.
 std::vector<std::size_t> columns_of(std::span<const Hypothesis> hypotheses, const HypothesisSet& set);
 

@@ -166,7 +166,7 @@ bool Diagnoser::prepare() {
     plain_.power_w = measured_power(plain_.windows, robot_, true);
     if (std::ranges::none_of(plain_.power_w, known)) d_.power = PowerSource::none;
   }
-  if (d_.power == PowerSource::motors && voltages == 0)
+  if (d_.power == PowerSource::motors && !voltages_read(plain_.windows))
     d_.notes.emplace_back(
         "The motors' voltages were not recorded: power is that of their currents at the voltages that the "
         "robot file's windings need for them.");
@@ -193,6 +193,10 @@ void Diagnoser::measure() {
 bool Diagnoser::fit() {
   const bool far = d_.power_absolute_relative - d_.noise_floor > far_off;
   fit_settings_.shares = {usual_share};
+  fit_settings_.explain.candidate = true;
+  // Power alone is nearly linear in every strength, and what evidence finds of it is not sure enough to see
+  // all other causes from there.
+  fit_settings_.again = !from_motion_.alone();
   if (d_.power_absolute_relative > large_gap) fit_settings_.shares.push_back(large_share);
   // Of a file that is far off what every robot has is calibrated; the search is not for that.
   if (d_.power_absolute_relative > large_gap && !far) fit_settings_.explain.most_members = more_members;

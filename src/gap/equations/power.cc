@@ -5,6 +5,12 @@
 
 namespace joulecast::gap {
 
+bool voltages_read(std::span<const Window> windows) {
+  return std::ranges::any_of(windows, [](const Window& w) {
+    return std::isfinite(w.voltage_v[0]) || std::isfinite(w.voltage_v[1]);
+  });
+}
+
 double motor_voltage(const Window& w, const robot::RobotModel& robot, std::size_t s) {
   if (std::isfinite(w.voltage_v[s])) return w.voltage_v[s];
   const robot::Motor& m = robot.motor;
@@ -18,9 +24,12 @@ double motor_power(const Window& w, const robot::RobotModel& robot, std::size_t 
 std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot,
                                    bool of_motors) {
   std::vector<double> power(windows.size());
+  const bool volts = voltages_read(windows);
+  const auto motor = [&](const Window& w, std::size_t s) {
+    return volts ? w.motor_power_w[s] : motor_power(w, robot, s);
+  };
   std::ranges::transform(windows, power.begin(), [&](const Window& w) {
-    return of_motors ? robot.idle_power_w + motor_power(w, robot, 0) + motor_power(w, robot, 1)
-                     : w.battery_power_w;
+    return of_motors ? robot.idle_power_w + motor(w, 0) + motor(w, 1) : w.battery_power_w;
   });
   return power;
 }

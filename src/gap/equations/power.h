@@ -8,6 +8,9 @@
 
 namespace joulecast::gap {
 
+// Whether any voltage of a motor was read.
+bool voltages_read(std::span<const Window> windows);
+
 // One motor's voltage in a window [V]: as it was read, or as the file's winding needs it for the current and
 // the speed. NaN where neither is known.
 double motor_voltage(const Window& w, const robot::RobotModel& robot, std::size_t side);
@@ -16,7 +19,7 @@ double motor_voltage(const Window& w, const robot::RobotModel& robot, std::size_
 double motor_power(const Window& w, const robot::RobotModel& robot, std::size_t side);
 
 // Battery power of every window [W]; NaN where the battery was not read. `of_motors`: what the motors take
-// and the idle power of the robot file in its place.
+// and the idle power of the robot file in its place, by the file's windings where no voltage was read at all.
 std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot,
                                    bool of_motors);
 

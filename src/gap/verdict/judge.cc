@@ -16,8 +16,8 @@ namespace {
 constexpr double largest_unnamed = 0.012;             // what may be left over while nothing is named
 constexpr double largest_left = 0.014, of_gap = 0.1;  // and beside names, with a part of the gap
 constexpr double closes_nothing = 0.95;               // of the gap on held-out parts, that still is left
-constexpr double closes_little = 0.8;
-constexpr double closes_energy = 0.5;     // of what is missed of their energies, that would close
+constexpr double closes_little = 0.8;                 // the same, that may be the skew of noise
+constexpr double moves_energy = 0.5;      // of what is missed of their energies, that a name moves
 constexpr double closes_no_energy = 0.8;  // of what is missed of their energies
 constexpr double unbelieved = 0.1;        // probability that nothing is there, by either judge
 constexpr double mostly_outside = 0.25;   // of what moves power, outside the catalogue
@@ -80,7 +80,7 @@ struct Doubts {
   bool worse = false;        // than the referee or the unchanged model, on held-out parts
   bool worse_alone = false;  // the same without a function outside the catalogue that is told beside them
   bool unexplained = false;  // held-out parts keep more of the gap than right names leave
-  bool partly = false;       // the same, though they predict better than the regression
+  bool partly = false;       // the same, whether or not they predict better than the regression
   bool like_load = false;
   bool any_against() const { return idle || worse || unexplained || like_load; }
 };
@@ -107,6 +107,14 @@ class Judge {
   const Member& member_of(std::size_t h) const {
     return *std::ranges::find(f_.explanation.members, h, &Member::hypothesis);
   }
+  bool candidate(std::size_t k) const { return member_of(f_.named[k]).candidate; }
+  // Whether any of the named that is more than a candidate is so.
+  bool finding_is(bool (*so)(const Cause&)) const {
+    for (std::size_t k = 0; k < f_.causes.size(); ++k) {
+      if (!candidate(k) && so(f_.causes[k])) return true;
+    }
+    return false;
+  }
   std::optional<Controls> controls_of(const Member& m) const {
     if (f_.controls.empty()) return std::nullopt;
     const Controls& made = f_.controls[static_cast<std::size_t>(&m - f_.explanation.members.data())];
@@ -129,10 +137,12 @@ class Judge {
       e.controls = controls_of(m);
       for (const Alternative& a : m.stated()) e.alternatives.push_back(hypothesis(a.hypothesis).id());
       // What is not found again without each part is no surer than that.
+      double again = 1;
       if (f_.held_out && !f_.calibrated) {
         std::vector<std::string> group = e.alternatives;
         group.push_back(e.id);
-        e.posterior = std::min(e.posterior, f_.held_out->found_again(group));
+        again = f_.held_out->found_again(group);
+        e.posterior = std::min(e.posterior, again);
       }
       // Found where it is not: no surer than the surrogates allow.
       double not_by_chance = 1;
@@ -149,8 +159,8 @@ class Judge {
         e.instead.push_back(dynamics::adopt(effect));
       if (h.is_effect()) e.calibrates = traits_of(e.id).calibrates;
       const double group = e.alternatives.empty() ? e.posterior : std::max(e.posterior, group_of(m, e));
-      weakest_ = std::min({weakest_, group, not_by_chance});
-      named_share_ += m.share;
+      weakest_ = std::min({weakest_, group, not_by_chance, again});
+      if (!m.candidate) named_share_ += m.share;
       d_.effects.push_back(std::move(e));
     }
   }
@@ -221,8 +231,8 @@ class Judge {
 
   void weigh_doubts() {
     doubts_.far = !f_.of_groups && beyond_noise_ > far_off;
-    doubts_.strange = !f_.of_groups && std::ranges::any_of(f_.causes, implausible);
-    doubts_.like_load = d_.motor_channels && std::ranges::any_of(f_.causes, like_a_load);
+    doubts_.strange = !f_.of_groups && finding_is(implausible);
+    doubts_.like_load = d_.motor_channels && finding_is(like_a_load);
     if (!f_.held_out || d_.effects.empty() || d_.power == PowerSource::none) return;
     const double after = f_.held_out->explained();
     closed_ = (f_.held_out->unchanged() - after) / (f_.held_out->unchanged() - d_.noise_floor);
@@ -231,12 +241,12 @@ class Judge {
     const double energy = f_.held_out->unchanged_energy();
     const double energy_after = f_.held_out->explained_energy();
     // What moves the energies of parts and brings them no nearer fits the skew of noise.
-    const bool skew = f_.held_out->moved_energy() > closes_energy * energy &&
+    const bool skew = f_.held_out->moved_energy() > moves_energy * energy &&
                       energy_after > closes_nothing * energy &&
                       after > closes_little * f_.held_out->unchanged();
     doubts_.idle =
         by_power &&
-        ((after > closes_nothing * f_.held_out->unchanged() && energy_after > closes_no_energy * energy) ||
+        ((after > closes_nothing * f_.held_out->unchanged() && !(energy_after < closes_no_energy * energy)) ||
          skew);
     doubts_.worse = d_.baseline && d_.baseline->wins();
     doubts_.worse_alone = d_.baseline && baseline_of(*f_.held_out).wins();
@@ -305,8 +315,10 @@ class Judge {
 
   void settle_adoption() {
     std::vector<double> deviations;
-    for (const Cause& cause : f_.causes) {
-      if (cause.by) continue;  // a robot file has no covariates
+    for (std::size_t k = 0; k < f_.causes.size(); ++k) {
+      const Cause& cause = f_.causes[k];
+      // A robot file has no covariates, and a candidate is no finding.
+      if (cause.by || candidate(k)) continue;
       const std::string_view id = cause.effect.effect->info().id;
       const auto named = std::ranges::find(d_.effects, id, &DiagnosedEffect::id);
       if (named == d_.effects.end()) continue;

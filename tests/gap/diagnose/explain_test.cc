@@ -186,12 +186,16 @@ TEST(Explain, TheLikeliestIsACandidateWhereNoneIsLikely) {
   ASSERT_GT(odds, 0.2);
   ASSERT_LT(odds, 0.8);
   Problem problem = two_effects(blocks, {circumstances(0, 0.1)});
-  const Explanation e = explain(problem);
+  EXPECT_TRUE(explain(problem).members.empty());
+  ExplainSettings settings;
+  settings.candidate = true;
+  const Mixture mixture(problem);
+  const Explanation e = explain(mixture, std::vector<bool>(), settings);
   ASSERT_EQ(members_of(e), HypothesisSet{0});
   EXPECT_TRUE(e.members[0].candidate);
   EXPECT_NEAR(e.members[0].probability(), std::min(0.45, odds / (1 + odds)), 1e-9);
   problem.moved = [](const Hypothesis&, const Eigen::VectorXd&) { return 0.001; };
-  EXPECT_TRUE(explain(problem).members.empty());
+  EXPECT_TRUE(explain(mixture, std::vector<bool>(), settings).members.empty());
 }
 
 TEST(Explain, WhatTheDataShowAsTheSameIsToldWhateverTheOdds) {
