@@ -14,11 +14,11 @@ namespace joulecast::gap {
 namespace {
 
 constexpr std::size_t most_parts = 6;
-constexpr std::size_t function_size = 2;      // of a function outside the catalogue, counted in causes
-constexpr std::size_t most_first_causes = 6;  // that pairs are made of
-constexpr double equal = 0.02;                // of the price of a member, a nat of evidence
-constexpr double formulas_off = 0.03;         // of what is left, that says nothing
-constexpr double contested = 0.7;             // most that evidence against it leaves of a probability
+constexpr std::size_t function_size = 2;  // of a function outside the catalogue, counted in causes
+constexpr std::size_t most_first_causes = 6, most_by_power = 2;  // that pairs are made of
+constexpr double equal = 0.02;         // of the price of a member, a nat of evidence
+constexpr double formulas_off = 0.03;  // of what is left, that says nothing
+constexpr double contested = 0.7;      // most that evidence against it leaves of a probability
 
 // Rows of a long recording, evenly, that are enough to compare sets by.
 Rows thinned_power(const Equations& e) {
@@ -113,7 +113,7 @@ class ThirdJudge {
     for (std::size_t h = 0; h < problem_.hypotheses.size(); ++h) {
       if (!in_search(h) || !fits(base, h)) continue;
       const HypothesisSet set = with(base, h);
-      const double left = left_by(set, fitted(set, e_), {}).sum();
+      const double left = left_by(set, fitted(set, e_), {}).both().sum();
       const auto [at, first] = best.try_emplace(hypothesis(h).id(), Variant{h, left});
       if (!first && left < at->second.left) at->second = {h, left};
     }
@@ -122,13 +122,17 @@ class ThirdJudge {
     return variants;
   }
 
-  // What each cause has to close by itself to be worth its place [W, summed over rows].
+  // What each cause has to close of the power by itself to be worth its place [W, summed over rows].
   double price_of_a_member() const {
     const ChannelRows& r = e_.rows[index_of(Channel::power)];
-    const auto rows =
-        static_cast<double>(std::ranges::count_if(r.block, [&](std::size_t b) { return !e_.leaves_out(b); }));
-    return std::max(least_necessary_part * errors_.at(kept_).sum(),
-                    least_necessary_share * e_.columns.mean_power_w() * rows);
+    const Eigen::VectorXd kept = r.y - moved_power(e_, kept_, kept_strengths_);
+    double rows = 0, gap = 0;
+    for (std::size_t k = 0; k < r.block.size(); ++k) {
+      if (e_.leaves_out(r.block[k])) continue;
+      gap += std::fabs(kept[static_cast<Eigen::Index>(k)]);
+      ++rows;
+    }
+    return std::max(least_necessary_part * gap, least_necessary_share * e_.columns.mean_power_w() * rows);
   }
 
   Eigen::VectorXd fitted(const HypothesisSet& set, const Equations& of) const {
@@ -148,24 +152,30 @@ class ThirdJudge {
 
   // What is missed of each block [W], of those that `in` says: of power the sum of |error|, and of energy the
   // size of their sum. Power alone would not tell a load that is always there from noise that is skewed.
-  Eigen::VectorXd left_by(const HypothesisSet& set, const Eigen::VectorXd& coefficients,
-                          const std::vector<bool>& in) const {
+  struct Left {
+    Eigen::VectorXd power, energy;
+
+    Eigen::VectorXd both() const { return power + energy.cwiseAbs(); }
+  };
+  Left left_by(const HypothesisSet& set, const Eigen::VectorXd& coefficients,
+               const std::vector<bool>& in) const {
     const ChannelRows& r = e_.rows[index_of(Channel::power)];
     const Eigen::VectorXd left = r.y - moved_power(e_, set, coefficients);
-    Eigen::VectorXd power = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem_.block_count()));
-    Eigen::VectorXd energy = power;
+    Left sums{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem_.block_count())), {}};
+    sums.energy = sums.power;
     for (std::size_t k = 0; k < r.block.size(); ++k) {
       if (e_.leaves_out(r.block[k]) || (!in.empty() && !in[r.block[k]])) continue;
       const auto b = static_cast<Eigen::Index>(r.block[k]), row = static_cast<Eigen::Index>(k);
-      power[b] += std::fabs(left[row]);
-      energy[b] += left[row];
+      sums.power[b] += std::fabs(left[row]);
+      sums.energy[b] += left[row];
     }
-    return power + energy.cwiseAbs();
+    return sums;
   }
 
   void add(const HypothesisSet& set) {
     if (errors_.contains(set)) return;
     Eigen::VectorXd sums = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem_.block_count()));
+    double power = 0;
     const std::size_t parts = std::min(most_parts, blocks_.size());
     for (std::size_t part = 0; part < parts; ++part) {
       std::vector<bool> part_of(problem_.block_count()), left_out = part_of;
@@ -174,20 +184,29 @@ class ThirdJudge {
         if (k * parts / blocks_.size() == part) part_of[blocks_[k]] = left_out[blocks_[k]] = true;
       }
       const Equations rest{e_.columns, e_.rows, e_.noise, left_out};
-      sums += left_by(set, fitted(set, rest), part_of);
+      const Left left = left_by(set, fitted(set, rest), part_of);
+      sums += left.both();
+      power += left.power.sum();
     }
     errors_[set] = sums;
+    power_[set] = power;
   }
 
+  // The best by both, and the best by power: of two whose energies cancel neither closes any by itself.
   std::vector<HypothesisSet> best_singles() const {
-    std::vector<std::pair<double, HypothesisSet>> singles;
+    std::vector<std::pair<double, HypothesisSet>> by_both, by_power;
     for (const auto& [set, errors] : errors_) {
-      if (set.size() == kept_.size() + 1 && in_search_alone(set)) singles.emplace_back(errors.sum(), set);
+      if (set.size() != kept_.size() + 1 || !in_search_alone(set)) continue;
+      by_both.emplace_back(errors.sum(), set);
+      by_power.emplace_back(power_.at(set), set);
     }
-    std::ranges::sort(singles);
     std::vector<HypothesisSet> best;
-    for (const auto& [error, set] : singles) {
-      if (best.size() < most_first_causes) best.push_back(set);
+    for (auto* singles : {&by_both, &by_power}) {
+      std::ranges::sort(*singles);
+      const std::size_t most = singles == &by_both ? most_first_causes : most_by_power;
+      for (const auto& [error, set] : std::span(*singles).first(std::min(most, singles->size()))) {
+        if (std::ranges::find(best, set) == best.end()) best.push_back(set);
+      }
     }
     return best;
   }
@@ -347,6 +366,7 @@ class ThirdJudge {
   HypothesisSet kept_;  // named causes that other channels show
   Eigen::VectorXd kept_strengths_;
   std::map<HypothesisSet, Eigen::VectorXd> errors_;  // of sets, by block, each without its part
+  std::map<HypothesisSet, double> power_;            // of power alone
 };
 
 }  // namespace

@@ -34,6 +34,7 @@ constexpr double large_gap = 0.15,
 constexpr double usual_share = 0.07,
                  large_share = 0.3;  // of the mean power, that an effect which is there may move
 constexpr std::size_t more_members = 6;
+constexpr double clearly_better = 0.9;  // of what the file's point leaves, that another may
 constexpr double most_parts_name = 0.5;
 constexpr double contested = 0.7;  // most of the probability of one of many that are estimated together
 constexpr double settled_delay_s = 0.006, settled_bias = 0.1;
@@ -122,6 +123,7 @@ class Diagnoser {
   FromMotion from_motion_;
   FitSettings fit_settings_;
   std::optional<FitResult> fit_;
+  std::optional<FitResult> moved_;       // where the first is of the file's point: of what was found
   std::optional<FitResult> calibrated_;  // beside what every robot has, where the file is far off
   std::optional<HeldOut> held_out_;
   std::optional<HeldOut> by_base_;          // by what every robot has, estimated anew, alone
@@ -194,8 +196,8 @@ bool Diagnoser::fit() {
   const bool far = d_.power_absolute_relative - d_.noise_floor > far_off;
   fit_settings_.shares = {usual_share};
   fit_settings_.explain.candidate = true;
-  // Power alone is nearly linear in every strength, and what evidence finds of it is not sure enough to see
-  // all other causes from there.
+  // Power alone is nearly linear in every strength, and what evidence finds of it is not always sure enough
+  // to see all other causes from there.
   fit_settings_.again = !from_motion_.alone();
   if (d_.power_absolute_relative > large_gap) fit_settings_.shares.push_back(large_share);
   // Of a file that is far off what every robot has is calibrated; the search is not for that.
@@ -222,6 +224,12 @@ bool Diagnoser::fit() {
     if (settled || round >= most_delay_rounds) break;
     view_ = view_of(taken_out_);
   }
+  if (!fit_settings_.again) {
+    FitSettings settings = fit_settings_;
+    settings.again = true;
+    moved_ = fit_windows(material(), {}, settings, still);
+    if (!moved_) return false;
+  }
   if (far) {
     FitResult from;
     from.base = base_fit(material(), view_.power_w, Starts::both);
@@ -235,14 +243,24 @@ bool Diagnoser::fit() {
   return goes_on(after_fit);
 }
 
-// What predicts parts left out best is judged: effects alone, what every robot has, or both.
+// What predicts parts left out best is judged: effects alone, seen from the robot file or from what was
+// found, what every robot has, or both.
 bool Diagnoser::leave_out() {
   const auto hold = [&](const FitResult& fit) {
     return hold_out(material(), fit, view_.power_w, fit_settings_,
                     [&](double part) { return goes_on(std::lerp(after_fit, after_parts, part)); });
   };
   held_out_ = hold(*fit_);
-  if (!held_out_ || !calibrated_) return held_out_.has_value();
+  if (!held_out_) return false;
+  if (moved_) {
+    auto moved = hold(*moved_);
+    if (!moved) return false;
+    if (moved->explained() < clearly_better * held_out_->explained()) {
+      held_out_ = std::move(moved);
+      fit_ = std::move(moved_);
+    }
+  }
+  if (!calibrated_) return true;
   auto calibrated = hold(*calibrated_);
   if (!calibrated) return false;
   calibrated_->alone = true;
