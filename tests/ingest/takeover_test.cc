@@ -53,7 +53,7 @@ std::deque<InboundMessage> drive() {
 
 // A daemon of the cluster: its pipeline, on the store that all share.
 struct Daemon {
-  Daemon(history::Store& shared, std::optional<history::StreamPosition>& position)
+  Daemon(history::Store& shared, std::optional<history::StreamPosition>& position, bool knows_model = true)
       : store(shared),
         pipeline(
             {}, 10, models,
@@ -61,6 +61,10 @@ struct Daemon {
                 shared, [this, &position](history::Command command) { apply(std::move(command), position); },
                 fleet, counters, [](const std::string&, const std::string&) {}},
             &keeping) {
+    if (knows_model) learn_model();
+  }
+
+  void learn_model() {
     if (!models.put(testing::nomad(), 1)) throw std::runtime_error("the model");
   }
 
@@ -225,6 +229,29 @@ TEST_F(TakeoverTest, ADaemonThatEndsWhenItIsGrantedARobotStoresWhatItHeard) {
   }
   third.pipeline.finish();
   expect_same(*shared, *expected);
+}
+
+// A robot was made known to another daemon a moment before it spoke; the lease comes before or after the
+// model.
+TEST_F(TakeoverTest, WhatARobotSaysBeforeItsModelComesIsStored) {
+  const auto expected = alone();
+  const auto messages = drive();
+  for (const std::size_t granted_at : {45u, 55u}) {
+    const auto shared = store("shared-" + std::to_string(granted_at) + ".db");
+    std::optional<history::StreamPosition> position;
+    Daemon daemon(*shared, position, false);
+    for (std::size_t k = 0; k < messages.size(); ++k) {
+      if (k == 50) {
+        EXPECT_TRUE(daemon.keeping.heard().empty());
+        daemon.learn_model();
+      }
+      if (k == granted_at) daemon.keeping.grant({"nomad", 1, {}});
+      daemon.handle(messages[k]);
+    }
+    EXPECT_EQ(daemon.counters.faults[static_cast<std::size_t>(IngestFault::unknown_robot)], 50u);
+    daemon.pipeline.finish();
+    expect_same(*shared, *expected);
+  }
 }
 
 TEST_F(TakeoverTest, ADaemonThatLostARobotStoresNothingMoreOfIt) {
