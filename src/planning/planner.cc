@@ -134,26 +134,21 @@ class Request {
 
   // Ends at most `early_s` before the deadline.
   Result<void> meet(double deadline, double early_s) {
-    // The shortest time is known as finely as the grids are, which become finer while solving: a deadline
-    // found to be beyond reach on the way is refused as one that was known to be.
-    const auto beyond_reach = [&] { return deadline < least_time_s() * (1 - 1e-9); };
-    if (beyond_reach()) return too_soon(deadline, least_time_s());
+    const double least_s = least_time_s();
+    if (deadline < least_s * (1 - 1e-9)) return too_soon(deadline, least_s);
     deadline_binds_ = true;
-    if (deadline <= least_time_s() * (1 + 1e-7)) return solve(at_once_w);
+    if (deadline <= least_s * (1 + 1e-7)) return solve(at_once_w);
     // log(T - T_min) falls nearly linearly in log(idle + price): a bracket there, drawn in by the secant
     // through its ends (Illinois) or, where that stalls, by halving. Done a little
     // early.
     const double idle = endless_ ? 0 : std::max(loads_.electric().idle_w, 1e-3 * average_power_w());
     const auto late = [&] {
-      return std::log(std::max(1e-12, duration_s() - least_time_s()) / (deadline - least_time_s()));
+      return std::log(std::max(1e-12, duration_s() - least_s) / (deadline - least_s));
     };
     const auto met = [&] { return duration_s() <= deadline && duration_s() > deadline - early_s; };
-    const auto at = [&](double x) -> Result<void> {
-      if (auto ok = solve(std::exp(x) - idle); !ok) return ok;
-      if (beyond_reach()) return too_soon(deadline, least_time_s());
-      return {};
-    };
-    constexpr double steepest = 40;  // e^40 W: no price of time is higher
+    const auto at = [&](double x) { return solve(std::exp(x) - idle); };
+    // Of a higher price, energy is too small a share for solvers to see.
+    const double steepest = std::log(1e6 * std::max(std::fabs(average_power_w()), 1e-3));
     double slow = std::log(idle + price_w_), late_slow = late(), fast = slow, late_fast = late_slow;
     for (int k = 0; k < 60 && late_slow <= 0; ++k) {  // a Pareto front asks from the fast side
       fast = slow, late_fast = late_slow;
@@ -169,7 +164,7 @@ class Request {
     }
     int side = 0;
     for (int k = 0; k < 60 && late_fast <= 0 && !met(); ++k) {
-      const double aim = 0.5 * early_s / (deadline - least_time_s());
+      const double aim = 0.5 * early_s / (deadline - least_s);
       double x = slow + (fast - slow) * (late_slow + aim) / (late_slow - late_fast);
       if (k % 4 == 3 || !(x > slow && x < fast)) x = 0.5 * (slow + fast);
       if (auto ok = at(x); !ok) return ok;
@@ -562,28 +557,20 @@ Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& p
     return tl::unexpected(std::move(solved.error()));
   const PlanCost free = request->cost();
   std::vector<PlanCost> front{free};
-  for (int attempt = 0;; ++attempt) {
-    front.resize(1);
-    // The shortest time itself costs an unbounded price; the front ends a hundredth of the way before it.
-    const double shortest = request->least_time_s();
-    if (free.duration_s < shortest * (1 + 1e-5)) return std::vector<PlanCost>{free};
-    const double fastest = std::max(shortest * (1 + 2e-6), shortest + 0.01 * (free.duration_s - shortest));
-    bool moved = false;
-    for (std::size_t k = 1; k < count && !moved; ++k) {
-      const double f = static_cast<double>(k) / static_cast<double>(count - 1);
-      const double deadline = free.duration_s + f * (fastest - free.duration_s);
-      const double spacing = (free.duration_s - fastest) / static_cast<double>(count - 1);
-      auto met = request->meet(deadline, std::min(1e-4 * deadline, 0.1 * spacing));
-      // Finer grids on the way may have moved the shortest time: again, towards the new one.
-      moved = !met && met.error().fault == Fault::infeasible && attempt < 8;
-      if (!met && !moved) return tl::unexpected(std::move(met.error()));
-      // Nearer to the shortest time than grids distinguish, motions are the same.
-      if (const PlanCost cost = request->cost();
-          met && cost.duration_s < front.back().duration_s * (1 - 1e-9))
-        front.push_back(cost);
-    }
-    if (!moved) return front;
+  // The shortest time itself costs an unbounded price; the front ends a hundredth of the way before it.
+  const double shortest = request->least_time_s();
+  if (free.duration_s < shortest * (1 + 1e-5)) return front;
+  const double fastest = std::max(shortest * (1 + 2e-6), shortest + 0.01 * (free.duration_s - shortest));
+  const double spacing = (free.duration_s - fastest) / static_cast<double>(count - 1);
+  for (std::size_t k = 1; k < count; ++k) {
+    const double deadline = free.duration_s - static_cast<double>(k) * spacing;
+    if (auto met = request->meet(deadline, std::min(1e-4 * deadline, 0.1 * spacing)); !met)
+      return tl::unexpected(std::move(met.error()));
+    // Nearer to the shortest time than grids distinguish, motions are the same.
+    if (const PlanCost cost = request->cost(); cost.duration_s < front.back().duration_s * (1 - 1e-9))
+      front.push_back(cost);
   }
+  return front;
 }
 
 Result<Plan> plan(const robot::RobotModel& robot, const Path& path, const Problem& problem,

@@ -52,7 +52,8 @@ struct Certificate {
   double gap_j = 0;
   // How far the answer may lie above the optimum of a continuous acceleration. By quadrature, the integral of
   // what each cell's constant acceleration costs more than the best at each speed; of a grid, what one of
-  // half as many cells costs more, three times Richardson's estimate.
+  // half as many cells or fewer costs more, three times Richardson's estimate, and what cells cost more than
+  // the grid reckons with, as loads, limits of motors and the flow of power change within them.
   double discretisation_j = 0;
   double residual = 0;  // largest stationarity residual over the cost, 0 for the closed form to rounding
   bool convex = true;

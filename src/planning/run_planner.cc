@@ -3,16 +3,43 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <utility>
+
+#include "planning/gauss.h"
 
 namespace joulecast::planning {
 namespace {
 
 constexpr std::size_t most_cells = 200'000;
 
-constexpr double motor_tolerance = 7e-4;                          // as UniformTask's, of a grid
-constexpr double coarse_tolerance = 1e-5, fine_tolerance = 1e-6;  // of the cost
+// Of the cost: how well it is solved on a coarse and on a fine grid, and what its cells may lose.
+constexpr double coarse_tolerance = 1e-5, fine_tolerance = 1e-6;
+constexpr double lost_tolerance = 8e-5, hurried_tolerance = 4e-5;
+constexpr double most_residual = 5e-3;  // relative, of stationarity
+// Of the shortest time: what cells may lose of it.
+constexpr double time_tolerance = 5e-5;
+// How often cells are cut, and how many of them come of one of the first: not all that is lost falls with
+// their size.
+constexpr int most_rounds = 3;
+constexpr std::size_t most_growth = 8;
+
+double sum_of(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+// What a profile loses in each cell within which it goes over from more acceleration to less, at most, as
+// it is told between nodes only [s].
+std::vector<double> lost_at_corners_s(const SpeedGrid& grid, const std::vector<double>& z) {
+  std::vector<double> lost(grid.cells(), 0);
+  const auto slope = [&](std::size_t k) { return (z[k + 1] - z[k]) / grid.step[k]; };
+  for (std::size_t k = 1; k + 1 < grid.cells(); ++k) {
+    const double h = grid.step[k], higher = std::max(0.0, slope(k - 1) - slope(k + 1)) * h / 4;
+    lost[k] = 0.5 * higher * h / (2 * std::pow(mean_speed(z[k], z[k + 1]), 3));
+  }
+  return lost;
+}
 
 std::string number(double x) {
   return std::to_string(x);
@@ -76,6 +103,12 @@ double RunPlanner::acceleration_limit() const {
   return run_->turn == 0 ? limit : limit / robot_->kinematics.half_track_m;
 }
 
+// What the limit of voltage leaves a driving motor beyond its brushes.
+double RunPlanner::voltage_limit_v() const {
+  const Electric& e = loads_->electric();
+  return problem_->limits.voltage_v - e.brush_w_nm * e.torque_constant_nm_a;
+}
+
 // Whether a uniform run's motors would exceed their current or voltage limit.
 bool RunPlanner::motors_break(double v, double q) const {
   const Electric& e = loads_->electric();
@@ -136,7 +169,7 @@ void RunPlanner::find_motion() {
   const bool motors_bind = !line_ || !motors_never_break_;
   task.torque_limit_nm =
       motors_bind ? problem_->limits.current_a * task.electric.torque_constant_nm_a : unlimited;
-  task.voltage_limit_v = motors_bind ? problem_->limits.voltage_v : unlimited;
+  task.voltage_limit_v = motors_bind ? voltage_limit_v() : unlimited;
   task.cells = std::max<std::size_t>(8, problem_->intervals_per_run);
   if (problem_->deadline_s || problem_->hurried) task.motor_tolerance = UniformMotion::hurried_tolerance;
   if (auto motion = UniformMotion::make(task)) motion_ = std::make_unique<UniformMotion>(*motion);
@@ -157,40 +190,42 @@ RunAnswer RunPlanner::answer_of(SteppedMotion motion) const {
   return answer;
 }
 
-void RunPlanner::build(std::vector<double> nodes) {
-  nodes_ = std::move(nodes);
-  const std::size_t n = nodes_.size() - 1;
-  auto grid = std::make_unique<SpeedGrid>();
-  grid->step.resize(n);
-  grid->ceiling.resize(n + 1);
-  for (std::size_t k = 0; k < n; ++k) grid->step[k] = nodes_[k + 1] - nodes_[k];
-  for (std::size_t k = 0; k <= n; ++k) grid->ceiling[k] = ceiling_at(nodes_[k]);
+SpeedGrid RunPlanner::grid_over(const std::vector<double>& nodes) const {
+  const std::size_t n = nodes.size() - 1;
+  SpeedGrid grid;
+  grid.step.resize(n);
+  grid.ceiling.resize(n + 1);
+  for (std::size_t k = 0; k < n; ++k) grid.step[k] = nodes[k + 1] - nodes[k];
+  for (std::size_t k = 0; k <= n; ++k) grid.ceiling[k] = ceiling_at(nodes[k]);
   const Limits& l = problem_->limits;
-  grid->start = start_ * start_;
-  grid->end = end_ * end_;
-  grid->acceleration_limit = acceleration_limit();
-  grid->torque_limit_nm = l.current_a * loads_->electric().torque_constant_nm_a;
-  grid->voltage_limit_v = l.voltage_v;
-  grid->electric = loads_->electric();
+  grid.start = start_ * start_;
+  grid.end = end_ * end_;
+  grid.acceleration_limit = acceleration_limit();
+  grid.torque_limit_nm = l.current_a * loads_->electric().torque_constant_nm_a;
+  grid.voltage_limit_v = voltage_limit_v();
+  grid.electric = loads_->electric();
   if (uniform_) {
-    grid->loads = {loads_here_};
+    grid.loads = {loads_here_};
   } else {
-    grid->loads.reserve(n);
+    grid.loads.reserve(n);
     for (std::size_t k = 0; k < n; ++k) {
-      const double middle = 0.5 * (nodes_[k] + nodes_[k + 1]);
-      grid->loads.push_back(loads_->at(*run_, run_->at(middle), run_->curvature_slope(middle)));
+      const double middle = 0.5 * (nodes[k] + nodes[k + 1]);
+      grid.loads.push_back(loads_->at(*run_, run_->at(middle), run_->curvature_slope(middle)));
     }
-    add_end_loads(*grid);
+    add_end_loads(nodes, grid);
   }
+  return grid;
+}
+
+void RunPlanner::build(std::vector<double> nodes) {
   solver_.reset();
-  grid_ = std::move(grid);
+  nodes_ = std::move(nodes);
+  grid_ = std::make_unique<SpeedGrid>(grid_over(nodes_));
   envelope_ = std::make_unique<SpeedEnvelope>(speed_envelope(*grid_));
-  shortest_s_ = envelope_->shortest_s;
-  fastest_known_ = false;
 }
 
 // Only where motors could come near their limits.
-void RunPlanner::add_end_loads(SpeedGrid& grid) const {
+void RunPlanner::add_end_loads(const std::vector<double>& nodes, SpeedGrid& grid) const {
   bool near = false;
   for (std::size_t k = 0; k < grid.cells() && !near; ++k) {
     const Reachable may =
@@ -201,9 +236,9 @@ void RunPlanner::add_end_loads(SpeedGrid& grid) const {
   grid.end_loads.reserve(grid.cells());
   for (std::size_t k = 0; k < grid.cells(); ++k) {
     // The slope of the curvature may jump at a node.
-    const double slope = run_->curvature_slope(nodes_[k] + 0.5 * grid.step[k]);
-    grid.end_loads.push_back(
-        {loads_->at(*run_, run_->at(nodes_[k]), slope), loads_->at(*run_, run_->at(nodes_[k + 1]), slope)});
+    const auto within = [&](double share) { return run_->curvature_slope(nodes[k] + share * grid.step[k]); };
+    grid.end_loads.push_back({loads_->at(*run_, run_->at(nodes[k]), within(1e-6)),
+                              loads_->at(*run_, run_->at(nodes[k + 1]), within(1 - 1e-6))});
   }
 }
 
@@ -227,9 +262,10 @@ Result<void> RunPlanner::check_feasible() const {
                     "is " + number(problem_->limits.current_a) + ", friction and slope alone need " +
                         number(standing / loads_->electric().torque_constant_nm_a));
       }
+      const double brushes = problem_->limits.voltage_v - voltage_limit_v();
       const double volts =
-          grid_->electric.resistance_ohm[s] / grid_->electric.torque_constant_nm_a * standing;
-      if (volts >= grid_->voltage_limit_v) {
+          grid_->electric.resistance_ohm[s] / grid_->electric.torque_constant_nm_a * standing + brushes;
+      if (volts >= problem_->limits.voltage_v) {
         return fail(
             Fault::infeasible, "limits/voltage_v",
             "is " + number(problem_->limits.voltage_v) + ", friction and slope alone need " + number(volts));
@@ -283,22 +319,25 @@ std::vector<double> RunPlanner::first_nodes(std::size_t cells) const {
     }
     return nodes;
   }
-  // The way's own knots; stretches of constant curvature are cut more coarsely.
+  // Knots of the way, as far apart as the changes of what loads and limits depend on allow: of the way, the
+  // curvature, its slope, and the ceiling, which holds at nodes only. Longer stretches between knots are cut.
+  const double smallest = 1e-6 * length, count = static_cast<double>(cells);
+  const double most_m = length / count, most_1_m = 20 / count, most_1_m2 = 3.2 / count, most_log = 4 / count;
   nodes.push_back(0);
-  const auto& knots = run_->knots;
-  const double smallest = 1e-6 * length;
-  const double coarse = length / static_cast<double>(cells);
-  for (std::size_t k = 1; k < knots.size(); ++k) {
-    const double gap = knots[k].way - nodes.back();
-    if (gap < smallest && k + 1 < knots.size()) continue;
-    // Where the curvature changes quickly, torque does: such a stretch gets up to 16 cells.
-    const bool bends = std::fabs(knots[k].curvature_1_m - knots[k - 1].curvature_1_m) > 0.05;
-    const double cuts =
-        std::max(bends ? std::min(16.0, std::ceil(400 * gap)) : 1.0, std::ceil(gap / coarse - 1e-9));
-    const double from = nodes.back();
-    for (double i = 1; i <= cuts; ++i) nodes.push_back(from + gap * i / cuts);
+  double share = 0, slope = 0, ceiling = ceiling_at(0);  // share of a cell since the last node
+  for (std::size_t k = 1; k < run_->knots.size(); ++k) {
+    const Knot &a = run_->knots[k - 1], &b = run_->knots[k];
+    const double gap = b.way - a.way, bend = b.curvature_1_m - a.curvature_1_m;
+    const double before = std::exchange(ceiling, ceiling_at(b.way));
+    const double here =
+        gap / most_m + std::fabs(bend) / most_1_m + std::fabs(std::log(ceiling / before)) / most_log;
+    share += here + std::fabs(bend / gap - slope) / most_1_m2;
+    slope = bend / gap;
+    if (share > 1 && a.way > nodes.back()) nodes.push_back(a.way), share = here;
+    const double cuts = std::ceil(here - 1e-9);
+    for (double i = 1; i < cuts; ++i) nodes.push_back(a.way + gap * i / cuts), share = here / cuts;
   }
-  nodes.back() = length;
+  nodes.push_back(length);
   // Near the ends the speed changes with the root of the way: nodes even in time, s = L/2 (j/m)^2, until
   // their spacing reaches the grid's.
   std::vector<double> graded;
@@ -359,14 +398,6 @@ std::vector<double> RunPlanner::with_corners(std::vector<double> nodes) const {
       nodes.insert(after, corner);
   }
   return nodes;
-}
-
-// Every second node.
-std::vector<double> RunPlanner::thinned(const std::vector<double>& nodes) {
-  std::vector<double> coarse;
-  for (std::size_t k = 0; k + 1 < nodes.size(); k += 2) coarse.push_back(nodes[k]);
-  coarse.push_back(nodes.back());
-  return coarse;
 }
 
 // Nodes that share time and change of speed evenly.
@@ -446,28 +477,56 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
 }
 
 double RunPlanner::shortest_s() {
+  if (grid_) return fastest_motion().solution.duration_s;
   if (shortest_s_ == 0 && motion_) shortest_s_ = motion_->shortest_s();
-  if (grid_) find_fastest();
   return shortest_s_;
 }
 
 // Where motors' limits can bind, the profile of the envelope is drivable but not always the fastest: the
-// solver is asked for one at a price of time that makes energy unimportant.
-void RunPlanner::find_fastest() {
-  if (std::exchange(fastest_known_, true)) return;
-  SpeedSolver solver(*grid_, *envelope_);
-  if (!solver.bounds_motors() || !envelope_->feasible) return;
+// solver is asked for one at a price of time that makes energy unimportant, on cells that are cut until their
+// ends cost a small share of the time. Nodes are the same whatever was solved before, so that the shortest
+// time is a constant of the run.
+const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
+  if (fastest_) return *fastest_;
   constexpr double unimportant = 1e5;  // times the mean power
-  const double mean_w = solver.cost_j(envelope_->fastest, 0) / envelope_->shortest_s;
-  SpeedSolution s = solver.solve(unimportant * std::max(std::fabs(mean_w), 1e-3), fine_tolerance);
-  if (!s.converged || s.duration_s > envelope_->shortest_s) {
-    s.z = envelope_->fastest, s.duration_s = envelope_->shortest_s;
-    s.binding = {};
+  FastMotion fastest;
+  std::vector<double> nodes = fastest_nodes_;
+  SpeedGrid grid = grid_over(nodes);
+  SpeedEnvelope envelope = speed_envelope(grid);
+  if (!envelope.feasible) nodes = nodes_, grid = *grid_, envelope = *envelope_;
+  const auto keep = [&](const std::vector<double>& z, double duration_s) {
+    fastest.nodes = nodes;
+    fastest.solution.z = z, fastest.solution.duration_s = duration_s;
+  };
+  keep(envelope.fastest, envelope.shortest_s);
+  std::vector<double> start;
+  for (int round = 0; round <= most_rounds && envelope.feasible; ++round) {
+    SpeedSolution s;
+    s.z = envelope.fastest, s.duration_s = envelope.shortest_s;
+    std::vector<double> lost_s(grid.cells(), 0);
+    if (s.duration_s > duration_of(grid, fastest_without_motors(grid)) * (1 + coarse_tolerance)) {
+      SpeedSolver solver(grid, envelope);
+      if (round > 0) solver.start_from(start);
+      const double mean_w = sum_of(solver.costs_j(envelope.fastest, 0)) / envelope.shortest_s,
+                   price_w = unimportant * std::max(std::fabs(mean_w), 1e-3);
+      s = solver.solve(price_w, coarse_tolerance);
+      if (!s.converged) break;
+      for (std::size_t k = 0; k < s.ends_j.size(); ++k) lost_s[k] += s.ends_j[k] / price_w;
+    }
+    keep(s.z, s.duration_s);
+    fastest.solution.binding = s.binding;
+    const std::vector<double> corners_s = lost_at_corners_s(grid, s.z);
+    for (std::size_t k = 0; k < lost_s.size(); ++k) lost_s[k] += corners_s[k];
+    const double most_s = time_tolerance * s.duration_s;
+    if (sum_of(lost_s) <= most_s) break;
+    std::vector<double> finer = split(nodes, lost_s, 0.8 * most_s, 1);
+    start = resampled(nodes, s.z, finer);
+    nodes = std::move(finer);
+    grid = grid_over(nodes);
+    envelope = speed_envelope(grid);
   }
-  s.gap_j = s.ends_j = s.residual = 0;
-  s.cost_j = solver.cost_j(s.z, 0);
-  if (!fastest_ || s.duration_s < fastest_->solution.duration_s) fastest_ = FastMotion{nodes_, std::move(s)};
-  shortest_s_ = fastest_->solution.duration_s;
+  fastest.solution.cost_j = sum_of(driven_j(fastest.nodes, fastest.solution.z));
+  return fastest_.emplace(std::move(fastest));
 }
 
 std::optional<double> RunPlanner::cruise_speed(double price_w) {
@@ -505,12 +564,8 @@ double RunPlanner::steady_power_w(double speed) const {
 
 Result<void> RunPlanner::build_grid() {
   const std::size_t cells = std::max<std::size_t>(8, problem_->intervals_per_run);
-  if (uniform_) {
-    build(first_nodes(cells / 2));
-  } else {
-    fine_nodes_ = first_nodes(2 * cells);
-    build(with_corners(thinned(fine_nodes_)));
-  }
+  fastest_nodes_ = first_nodes(uniform_ ? 4 * cells : 2 * cells);
+  build(first_nodes(uniform_ ? cells / 2 : cells));
   return check_feasible();
 }
 
@@ -545,23 +600,21 @@ std::optional<RunAnswer> RunPlanner::closed_form(double price_w, double length) 
   return answer;
 }
 
-// Constant acceleration between nodes uses a motor fully at one end of a cell and less at the other. Where it
-// is used to its limit, cells are cut until that difference is small; the same nodes where it is.
-std::vector<double> RunPlanner::split_for_motors(const std::vector<double>& z) const {
-  constexpr double most_parts = 16, full = 0.99;
-  std::vector<double> nodes{0};
-  for (std::size_t k = 0; k < grid_->cells(); ++k) {
-    const double q = (z[k + 1] - z[k]) / (2 * grid_->step[k]);
-    const double from = motor_use(*grid_, grid_->load(k, 0), std::sqrt(z[k]), q),
-                 to = motor_use(*grid_, grid_->load(k, 1), std::sqrt(z[k + 1]), q);
-    const double change = std::fabs(to - from) / motor_tolerance;
-    const double parts = std::max(from, to) < full || nodes.size() > most_cells
-                             ? 1
-                             : std::clamp(std::ceil(change - 0.5), 1.0, most_parts);
-    for (double i = 1; i <= parts; ++i) nodes.push_back(nodes_[k] + grid_->step[k] * i / parts);
-    nodes.back() = nodes_[k + 1];
+// Cells in parts, so that together they lose at most `most` of what each loses now. That falls as the number
+// of a cell's parts, so that fewest nodes do where parts are as the roots of what cells lose.
+std::vector<double> RunPlanner::split(const std::vector<double>& nodes, const std::vector<double>& lost,
+                                      double most, double least_parts) {
+  constexpr double most_parts = 8;
+  double roots = 0;
+  for (const double each : lost) roots += std::sqrt(each);
+  std::vector<double> finer{nodes.front()};
+  for (std::size_t k = 0; k < lost.size(); ++k) {
+    const double wanted = std::ceil(std::sqrt(lost[k]) * roots / most - 0.5);
+    const double parts = nodes.size() > most_cells ? 1 : std::clamp(wanted, least_parts, most_parts);
+    for (double i = 1; i < parts; ++i) finer.push_back(nodes[k] + (nodes[k + 1] - nodes[k]) * i / parts);
+    finer.push_back(nodes[k + 1]);
   }
-  return nodes;
+  return finer;
 }
 
 Result<RunAnswer> RunPlanner::solve(double price_w, const std::stop_token& stop) {
@@ -587,38 +640,41 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
   if (!solver_) solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
   SpeedSolution s = solver_->solve(price_w, refined_ ? fine_tolerance : coarse_tolerance, stop);
   int iterations = s.iterations;
-  if (!refined_ && s.converged) {
-    // A coarse solution starts the fine one, places its nodes where they are free, and gives its error.
-    const std::vector<double> coarse_nodes = nodes_, coarse = s.z;
-    const double coarse_cost = s.cost_j;
-    build(uniform_ ? refined_nodes(coarse, std::max<std::size_t>(8, problem_->intervals_per_run))
-                   : std::move(fine_nodes_));
-    if (auto ok = check_feasible(); !ok) return tl::unexpected(std::move(ok.error()));
-    solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
-    solver_->start_from(resampled(coarse_nodes, coarse, nodes_));
-    s = solver_->solve(price_w, fine_tolerance, stop);
-    iterations += s.iterations;
-    discretisation_j_ = std::fabs(coarse_cost - s.cost_j);
-    refined_ = true;
-  }
-  for (int round = 0; round < 2 && s.converged && solver_->bounds_motors(); ++round) {
-    std::vector<double> nodes = split_for_motors(s.z);
-    if (nodes.size() < nodes_.size() + nodes_.size() / 50 + 1) break;
-    const std::vector<double> coarse_nodes = nodes_, z = resampled(nodes_, s.z, nodes);
-    const auto rebuild = [&](std::vector<double> onto, const std::vector<double>& from) {
+  const bool hurried = problem_->deadline_s || problem_->hurried;
+  std::vector<double> driven, lost;
+  // A coarse solution starts the fine one, tells where its nodes should be, and gives its error.
+  for (int round = 0; s.converged; ++round) {
+    driven = driven_j(nodes_, s.z);
+    lost = lost_j(s, driven, price_w);
+    const double most = (hurried ? hurried_tolerance : lost_tolerance) * std::fabs(s.cost_j);
+    const bool grown = round == most_rounds || nodes_.size() >= most_growth * fastest_nodes_.size();
+    if (refined_ && (grown || sum_of(lost) <= most)) break;
+    const std::vector<double> coarse_nodes = nodes_;
+    const auto rebuild = [&](std::vector<double> onto) {
+      const std::vector<double> start = resampled(coarse_nodes, s.z, onto);
       build(std::move(onto));
       solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
-      solver_->start_from(from);
+      solver_->start_from(start);
     };
-    rebuild(std::move(nodes), z);
-    SpeedSolution finer;
-    if (envelope_->feasible) finer = solver_->solve(price_w, fine_tolerance, stop);
-    if (!finer.converged) {
-      rebuild(coarse_nodes, s.z);
+    const auto solved_on = [&](std::vector<double> onto) {
+      rebuild(std::move(onto));
+      return envelope_->feasible ? solver_->solve(price_w, fine_tolerance, stop) : SpeedSolution{};
+    };
+    const auto stands = [](const SpeedSolution& of) { return of.converged && of.residual < most_residual; };
+    SpeedSolution finer = solved_on(
+        uniform_ && !refined_ ? refined_nodes(s.z, std::max<std::size_t>(8, problem_->intervals_per_run))
+                              : split(nodes_, lost, 0.5 * most, refined_ ? 1 : 2));
+    // Where power is concave, some grids make it hard to find an optimum: even halves are the gentlest.
+    if (!stands(finer) && !refined_)
+      finer = solved_on(split(coarse_nodes, std::vector<double>(lost.size()), 1, 2));
+    if (!(refined_ ? stands(finer) : finer.converged)) {
+      if (!refined_) s.gap_j = s.cost_j;  // nothing tells how far a coarse grid is off
+      rebuild(coarse_nodes);
       break;
     }
     iterations += finer.iterations;
-    discretisation_j_ = std::max(discretisation_j_, std::fabs(s.cost_j - finer.cost_j));
+    coarse_error_j_ = std::max(coarse_error_j_, std::fabs(s.cost_j - finer.cost_j));
+    refined_ = true;
     s = std::move(finer);
   }
   if (stop.stop_requested()) return stopped();
@@ -628,7 +684,41 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     return s;
   }
   s.iterations = iterations;
+  discretisation_j_ = coarse_error_j_ + sum_of(lost);
+  s.cost_j = sum_of(driven) + price_w * s.duration_s;
   return s;
+}
+
+// Energy of each cell as it is driven, by the drive model [J].
+std::vector<double> RunPlanner::driven_j(const std::vector<double>& nodes,
+                                         const std::vector<double>& z) const {
+  std::vector<double> energy(nodes.size() - 1, 0);
+  for (std::size_t k = 0; k < energy.size(); ++k) {
+    const double v0 = std::sqrt(z[k]), change = std::sqrt(z[k + 1]) - v0;
+    const double span = (nodes[k + 1] - nodes[k]) / (v0 + 0.5 * change);
+    for (const auto& [at, weight] : gauss2) {
+      const double way = nodes[k] + at * span * (v0 + 0.5 * at * change);
+      const dynamics::Instant instant =
+          loads_->instant(*run_, run_->at(way), run_->curvature_slope(way), v0 + at * change, change / span);
+      energy[k] += weight * span * loads_->model().flow(instant).battery_power_w;
+    }
+  }
+  return energy;
+}
+
+// What each cell costs beyond what the solver reckons with, as loads and the flow of power change within it,
+// what the time costs that it loses at corners, and what limits of motors at its ends cost [J].
+std::vector<double> RunPlanner::lost_j(const SpeedSolution& s, const std::vector<double>& driven,
+                                       double price_w) const {
+  std::vector<double> lost = driven;
+  const std::vector<double> reckoned = solver_->costs_j(s.z, price_w),
+                            corners_s = lost_at_corners_s(*grid_, s.z);
+  for (std::size_t k = 0; k < lost.size(); ++k) {
+    const double time_j = price_w * grid_->step[k] / mean_speed(s.z[k], s.z[k + 1]);
+    lost[k] = std::max(0.0, lost[k] + time_j - reckoned[k]) + price_w * corners_s[k] +
+              (s.ends_j.empty() ? 0 : s.ends_j[k]);
+  }
+  return lost;
 }
 
 // Where the solver finds nothing: the cheapest of the fastest profiles under lower and lower ceilings.
@@ -641,7 +731,7 @@ SpeedSolution RunPlanner::best_capped(double price_w) {
     for (std::size_t k = 1; k + 1 < nodes_.size(); ++k) capped.ceiling[k] = part * part * grid_->ceiling[k];
     const SpeedEnvelope envelope = speed_envelope(capped);
     if (!envelope.feasible) break;
-    const double cost = SpeedSolver(capped, envelope).cost_j(envelope.fastest, price_w);
+    const double cost = sum_of(SpeedSolver(capped, envelope).costs_j(envelope.fastest, price_w));
     if (!(cost < best.cost_j)) continue;
     best.z = envelope.fastest, best.cost_j = best.gap_j = cost, best.duration_s = envelope.shortest_s;
   }
@@ -659,7 +749,7 @@ RunAnswer RunPlanner::answer_of(const SpeedSolution& s, const std::vector<double
   answer.duration_s = s.duration_s;
   answer.energy_j = s.cost_j - price_w * s.duration_s;
   answer.gap_j = s.gap_j;
-  answer.discretisation_j = discretisation_j_ + s.ends_j;
+  answer.discretisation_j = discretisation_j_;
   answer.residual = s.residual;
   answer.convex = s.convex && loads_->electric().idle_w + price_w >= 0;
   answer.iterations = s.iterations;
@@ -687,13 +777,8 @@ Result<RunAnswer> RunPlanner::fastest() {
   if (!grid_) {
     if (auto ok = build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
   }
-  find_fastest();
-  if (fastest_) return answer_of(fastest_->solution, fastest_->nodes, 0);
-  SpeedSolution solution;
-  solution.z = envelope_->fastest;
-  solution.duration_s = envelope_->shortest_s;
-  solution.cost_j = SpeedSolver(*grid_, *envelope_).cost_j(solution.z, 0);
-  return answer_of(solution, nodes_, 0);
+  const FastMotion& fast = fastest_motion();
+  return answer_of(fast.solution, fast.nodes, 0);
 }
 
 }  // namespace joulecast::planning

@@ -59,7 +59,6 @@ class RunPlanner {
 
   const Run& run() const { return *run_; }
   bool uniform() const { return uniform_; }  // loads are the same all along
-  // Of a grid: of the finest so far.
   double shortest_s();
 
   // Of the run's coordinate.
@@ -71,24 +70,33 @@ class RunPlanner {
 
   double ceiling_at(double way) const;
   Bound ceiling_bound(double way) const;
+  double voltage_limit_v() const;
   void find_line();
   void find_motion();
   RunAnswer answer_of(SteppedMotion motion) const;
+  // On a grid of its own.
+  struct FastMotion {
+    std::vector<double> nodes;
+    SpeedSolution solution;
+  };
+  const FastMotion& fastest_motion();
   Result<RunAnswer> fastest();
   Result<SpeedSolution> solve_grid(double price_w, const std::stop_token& stop);
   SpeedSolution best_capped(double price_w);
+  std::vector<double> driven_j(const std::vector<double>& nodes, const std::vector<double>& z) const;
+  std::vector<double> lost_j(const SpeedSolution& s, const std::vector<double>& driven, double price_w) const;
   RunAnswer answer_of(const SpeedSolution& solution, const std::vector<double>& nodes, double price_w) const;
-  void find_fastest();
   bool motors_break(double speed, double acceleration) const;
   bool motors_hold(double top, double most) const;
   Result<void> build_grid();
+  SpeedGrid grid_over(const std::vector<double>& nodes) const;
   void build(std::vector<double> nodes);
   Result<void> check_feasible() const;
-  std::vector<double> split_for_motors(const std::vector<double>& z) const;
-  void add_end_loads(SpeedGrid& grid) const;
+  static std::vector<double> split(const std::vector<double>& nodes, const std::vector<double>& lost,
+                                   double most, double least_parts);
+  void add_end_loads(const std::vector<double>& nodes, SpeedGrid& grid) const;
   std::vector<double> first_nodes(std::size_t cells) const;
   std::vector<double> with_corners(std::vector<double> nodes) const;
-  static std::vector<double> thinned(const std::vector<double>& nodes);
   std::vector<double> refined_nodes(const std::vector<double>& z, std::size_t cells) const;
   std::vector<double> resampled(const std::vector<double>& nodes, const std::vector<double>& z,
                                 const std::vector<double>& onto) const;
@@ -101,21 +109,15 @@ class RunPlanner {
   bool uniform_ = false, refined_ = false;
   std::optional<LineTask> line_;  // where power is quadratic: what the closed form solves
   std::array<dynamics::QuadraticPower, 2> motor_power_{};
-  WheelLoads loads_here_{};          // of a uniform run
-  bool motors_never_break_ = false;  // at any speed and acceleration within the other limits
-  double shortest_s_ = 0;            // of a quadrature: 0 until asked for
-  // On a grid on which motors' limits can bind, the fastest motion found so far.
-  struct FastMotion {
-    std::vector<double> nodes;
-    SpeedSolution solution;
-  };
-  std::optional<FastMotion> fastest_;
-  bool fastest_known_ = false;  // of the present grid
-  double discretisation_j_ = 0;
-  std::unique_ptr<UniformMotion> motion_;  // of a uniform run, where wanted
+  WheelLoads loads_here_{};                           // of a uniform run
+  bool motors_never_break_ = false;                   // at any speed and acceleration within the other limits
+  double shortest_s_ = 0;                             // without a grid: 0 until asked for
+  std::optional<FastMotion> fastest_;                 // of a grid, once asked for
+  double coarse_error_j_ = 0, discretisation_j_ = 0;  // of a grid
+  std::unique_ptr<UniformMotion> motion_;             // of a uniform run, where wanted
   std::vector<double> nodes_;
-  std::vector<double> fine_nodes_;   // of a run whose loads vary along the way, until the first solve
-  std::unique_ptr<SpeedGrid> grid_;  // the solver refers to them
+  std::vector<double> fastest_nodes_;  // that the search for the fastest motion begins with
+  std::unique_ptr<SpeedGrid> grid_;    // the solver refers to them
   std::unique_ptr<SpeedEnvelope> envelope_;
   std::unique_ptr<SpeedSolver> solver_;
 };

@@ -1,9 +1,11 @@
 #include "planning/speed_solver.h"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "dynamics/stribeck_curve.h"
@@ -48,6 +50,19 @@ constexpr int most_iterations = 200;
 constexpr unsigned bound_of(std::size_t end, std::size_t side, bool voltage) {
   return static_cast<unsigned>(2 + 8 * end + (voltage ? 4 : 0) + 2 * side);
 }
+
+// A sum of logarithms, few of which are taken.
+class Logarithms {
+ public:
+  void add(double x) {
+    product_ *= x;
+    if (product_ < 1e-200) sum_ += std::log(product_), product_ = 1;
+  }
+  double sum() const { return sum_ + std::log(product_); }
+
+ private:
+  double product_ = 1, sum_ = 0;
+};
 
 // Shortens a step so that a positive value keeps its share: N&W (19.9).
 void shorten(double value, double change, double& step) {
@@ -192,42 +207,40 @@ bool SpeedSolver::inside(const std::vector<double>& z) const {
 // Cost less mu times the logarithms of all slacks; infinite outside.
 double SpeedSolver::merit(const std::vector<double>& z, double mu) const {
   const std::size_t n = grid_.cells();
-  double sum = 0, product = 1, logs = 0;
-  const auto barrier = [&](double slack) {
-    product *= slack;
-    if (product < 1e-200) logs += std::log(product), product = 1;
-  };
+  double sum = 0;
+  Logarithms logs;
   for (std::size_t k = 0; k < n; ++k) {
     const double v = mean_speed(z[k], z[k + 1]), q = (z[k + 1] - z[k]) / (2 * grid_.step[k]);
     bool ok = true;
     each_bound(k, z[k], z[k + 1], [&](unsigned, double g, auto...) {
       ok = ok && g < 0;
-      if (ok) barrier(-g);
+      if (ok) logs.add(-g);
     });
     if (k > 0) {
       const double room = 1 - z[k] / grid_.ceiling[k];
       ok = ok && room > 0 && z[k] > 0;
-      if (ok) barrier(room), barrier(std::min(1.0, z[k] / grid_.ceiling[k]));
+      if (ok) logs.add(room), logs.add(z[k] / grid_.ceiling[k]);
     }
     if (!ok) return std::numeric_limits<double>::infinity();
     sum += cost(k, v, q);
   }
-  return sum - mu * (logs + std::log(product));
+  return sum - mu * logs.sum();
 }
 
 void SpeedSolver::start_from(const std::vector<double>& z) {
   assert(z.size() == z_.size());
-  trial_ = z;
-  for (std::size_t k = 1; k < grid_.cells(); ++k) trial_[k] = std::min(z[k], 0.9999 * grid_.ceiling[k]);
-  if (!inside(trial_)) return;
-  z_ = trial_;
-  started_ = true;
+  for (const double share : {0.9999, 0.999, 0.99, 0.95}) {
+    z_ = z;
+    for (std::size_t k = 1; k < grid_.cells(); ++k) z_[k] *= share;
+    started_ = inside(z_);
+    if (started_) break;
+  }
 }
 
 // Cost over the way of a cell, its derivatives, and its part of the kinks' gap.
 SpeedSolver::Local SpeedSolver::local(std::size_t k) {
   const Electric& e = grid_.electric;
-  const Cell& c = cells_[k];
+  Cell& c = cells_[k];
   const double v = c.v, q = c.q;
   Local l;
   l.f = idle_ / v, l.fv = -l.f / v, l.fvv = -2 * l.fv / v;
@@ -252,6 +265,7 @@ SpeedSolver::Local SpeedSolver::local(std::size_t k) {
       direct_v -= y * i * i, cross -= y1 * i * i, direct_vv += 2 * y * i * i * i;
     }
     const double ev = direct_v + slope * t.tv, eq = slope * t.tq;
+    c.energy[s] = {energy, ev, eq};
     const double evv = direct_vv + 2 * cross * t.tv + bend * t.tv * t.tv + slope * t.tvv;
     const double evq = cross * t.tq + bend * t.tv * t.tq + slope * t.tvq;
     const double eqq = bend * t.tq * t.tq + slope * t.tqq;
@@ -277,6 +291,7 @@ SpeedSolver::Local SpeedSolver::local(std::size_t k) {
 // Gradient and tridiagonal Hessian of the Lagrangian with the bounds condensed, at z_.
 void SpeedSolver::assemble(double mu) {
   cost_here_ = kink_gap_ = 0;
+  Logarithms logs;
   const std::size_t n = grid_.cells();
   std::fill(gradient_.begin(), gradient_.end(), 0.0);
   std::fill(stationarity_.begin(), stationarity_.end(), 0.0);
@@ -304,6 +319,7 @@ void SpeedSolver::assemble(double mu) {
                [&](unsigned j, double g, double g0, double g1, double g00, double g01, double g11) {
                  const double slack = -g, y = c.multiplier[j], weight = y / slack;
                  c.slack[j] = slack;
+                 logs.add(slack);
                  d0 += weight * g0 * g0 + y * g00, d1 += weight * g1 * g1 + y * g11,
                      d01 += weight * g0 * g1 + y * g01;
                  gradient_[k] += mu / slack * g0, gradient_[k + 1] += mu / slack * g1;
@@ -316,10 +332,12 @@ void SpeedSolver::assemble(double mu) {
   }
   for (std::size_t k = 1; k < n; ++k) {
     const double a = 1 / grid_.ceiling[k], high = 1 - z_[k] * a, low = z_[k] * a;
+    logs.add(high), logs.add(low);
     diagonal_[k] += a * a * (ceiling_multiplier_[k] / high + floor_multiplier_[k] / low);
     gradient_[k] += mu * a * (1 / high - 1 / low);
     stationarity_[k] += a * (ceiling_multiplier_[k] - floor_multiplier_[k]);
   }
+  merit_here_ = cost_here_ - mu * logs.sum();
 }
 
 // LDL' of the tridiagonal matrix over the inner nodes; false when it is not positive definite.
@@ -463,24 +481,26 @@ double SpeedSolver::complementarity() const {
     gap += ceiling_multiplier_[k] * (1 - share) + floor_multiplier_[k] * share;
   }
   for (std::size_t k = 0; k < n; ++k) {
-    for (unsigned j = 0; j < most_bounds; ++j) {
-      if (bounds_[k] >> j & 1u) gap += cells_[k].multiplier[j] * cells_[k].slack[j];
+    for (unsigned mask = bounds_[k]; mask != 0; mask &= mask - 1) {
+      const auto j = static_cast<std::size_t>(std::countr_zero(mask));
+      gap += cells_[k].multiplier[j] * cells_[k].slack[j];
     }
   }
   return gap;
 }
 
-double SpeedSolver::cost_of_ends() const {
-  double sum = 0;
+std::vector<double> SpeedSolver::cost_of_ends() const {
+  if (!bounds_motors_) return {};
+  std::vector<double> cost(grid_.cells(), 0);
   for (std::size_t k = 0; k < grid_.cells(); ++k) {
     const Cell& c = cells_[k];
     for (unsigned j = 2; j < most_bounds; ++j) {
       const unsigned other = j < 10 ? j + 8 : j - 8;
       if ((bounds_[k] >> j & 1u) && (bounds_[k] >> other & 1u))
-        sum += c.multiplier[j] * 0.5 * std::max(0.0, c.slack[other] - c.slack[j]);
+        cost[k] += c.multiplier[j] * 0.5 * std::max(0.0, c.slack[other] - c.slack[j]);
     }
   }
-  return sum;
+  return cost;
 }
 
 // Largest residual of the stationarity, each by its speed squared.
@@ -510,11 +530,11 @@ double SpeedSolver::step_to_boundary() const {
 
 // Backtracks until the barrier function falls enough; 0 when it does not. The accepted point is in trial_.
 double SpeedSolver::line_search(double longest, double decrement, double mu, double scale) {
-  const double here = merit(z_, mu), noise = 1e-13 * scale;
+  const double noise = 1e-13 * scale;
   double length = longest;
   for (int halving = 0; halving < 30; ++halving) {
     for (std::size_t k = 0; k <= grid_.cells(); ++k) trial_[k] = z_[k] + length * step_[k];
-    if (merit(trial_, mu) <= here - sufficient_decrease * length * decrement + noise) return length;
+    if (merit(trial_, mu) <= merit_here_ - sufficient_decrease * length * decrement + noise) return length;
     length *= halving < 2 ? 0.6 : 0.3;
   }
   return 0;
@@ -535,11 +555,12 @@ void SpeedSolver::update_duals(double mu) {
       c.slack[j] = change;  // reused until the next assembly
       shorten(c.multiplier[j], change, longest);
     });
-    if (half_jump_ != 0) follow_kinks(k, dv, dq);
+    if (half_jump_ != 0) follow_kinks(c, dv, dq);
   }
   for (std::size_t k = 0; k < n; ++k) {
-    for (unsigned j = 0; j < most_bounds; ++j) {
-      if (bounds_[k] >> j & 1u) cells_[k].multiplier[j] += longest * cells_[k].slack[j];
+    for (unsigned mask = bounds_[k]; mask != 0; mask &= mask - 1) {
+      const auto j = static_cast<std::size_t>(std::countr_zero(mask));
+      cells_[k].multiplier[j] += longest * cells_[k].slack[j];
     }
   }
   for (std::size_t k = 1; k < n; ++k) {
@@ -551,17 +572,12 @@ void SpeedSolver::update_duals(double mu) {
   }
 }
 
-void SpeedSolver::follow_kinks(std::size_t k, double dv, double dq) {
-  Cell& c = cells_[k];
-  const Electric& e = grid_.electric;
+void SpeedSolver::follow_kinks(Cell& c, double dv, double dq) const {
   for (std::size_t s : {0u, 1u}) {
-    const WheelLoad& w = grid_.load(k)[s];
-    const Torque t = torque(w, c.v, c.q);
-    const double density = e.copper_w_n2_m2[s] * t.t / c.v, slope = 2 * density + e.back_emf * w.pace;
-    const double energy = (density + e.back_emf * w.pace) * t.t;
-    const double change = (slope * t.tv - density * t.t / c.v) * dv + slope * t.tq * dq;
-    const double root = std::sqrt(energy * energy + smoothing_ * smoothing_);
-    c.kink[s] = std::clamp((energy + (1 - c.kink[s] * energy / root) * change) / root, -1.0, 1.0);
+    const Energy& e = c.energy[s];
+    const double root = std::sqrt(e.j * e.j + smoothing_ * smoothing_);
+    c.kink[s] =
+        std::clamp((e.j + (1 - c.kink[s] * e.j / root) * (e.by_v * dv + e.by_q * dq)) / root, -1.0, 1.0);
   }
 }
 
@@ -585,13 +601,13 @@ std::array<bool, bound_count> SpeedSolver::binding(double unit_j) const {
   return binding;
 }
 
-double SpeedSolver::cost_j(const std::vector<double>& z, double price_w) {
+std::vector<double> SpeedSolver::costs_j(const std::vector<double>& z, double price_w) {
   idle_ = grid_.electric.idle_w + price_w;
   smoothing_ = 0;
-  double sum = 0;
+  std::vector<double> costs(grid_.cells());
   for (std::size_t k = 0; k < grid_.cells(); ++k)
-    sum += cost(k, mean_speed(z[k], z[k + 1]), (z[k + 1] - z[k]) / (2 * grid_.step[k]));
-  return sum;
+    costs[k] = cost(k, mean_speed(z[k], z[k + 1]), (z[k + 1] - z[k]) / (2 * grid_.step[k]));
+  return costs;
 }
 
 SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::stop_token& stop) {
@@ -639,7 +655,8 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::st
   }
   started_ = solution.converged;
   solution.z = z_;
-  solution.cost_j = cost_j(z_, price_w);
+  const std::vector<double> costs = costs_j(z_, price_w);
+  solution.cost_j = std::accumulate(costs.begin(), costs.end(), 0.0);
   solution.duration_s = duration_of(grid_, z_);
   solution.binding = binding(barrier.scale() / static_cast<double>(bound_total_));
   return solution;

@@ -15,9 +15,10 @@ struct SpeedSolution {
   std::vector<double> z;
   double cost_j = 0;  // motors, idle power and price of time, of the grid's midpoint rule
   double gap_j = 0;   // see Certificate
-  // What limits of motors cost at most that hold at the ends of cells: along a cell of constant acceleration
-  // a motor is used fully at one end only. Their multipliers times half the difference between the ends.
-  double ends_j = 0;
+  // Of each cell, what limits of motors cost that hold at its ends: at constant acceleration a motor is used
+  // fully at one end only. Their multipliers times half the difference between the ends; it falls with the
+  // cell's length. Empty where no motor's limit can bind.
+  std::vector<double> ends_j;
   double residual = 0;
   double duration_s = 0;
   bool convex = true;  // the Hessian at the solution needed no correction and the whole region is convex
@@ -39,13 +40,11 @@ class SpeedSolver {
   // Not converged when a stop is requested.
   SpeedSolution solve(double price_w, double tolerance = 1e-6, const std::stop_token& stop = {});
 
-  // Cost of a profile by the grid's midpoint rule.
-  double cost_j(const std::vector<double>& z, double price_w);
+  // Cost of a profile by the grid's midpoint rule, of each cell.
+  std::vector<double> costs_j(const std::vector<double>& z, double price_w);
 
-  // Whether a current or voltage limit can bind anywhere.
-  bool bounds_motors() const { return bounds_motors_; }
-
-  // Starts the next solve from this profile; ignored unless strictly inside the bounds.
+  // Starts the next solve from this profile, a little slower so that it is strictly inside the bounds;
+  // ignored where that does not make it so.
   void start_from(const std::vector<double>& z);
 
  private:
@@ -56,9 +55,14 @@ class SpeedSolver {
     double f = 0, fv = 0, fq = 0, fvv = 0, fvq = 0, fqq = 0;
     double dual_v = 0, dual_q = 0;  // slopes with the kink's dual in place of its own
   };
+  // A motor's energy over the way of a cell, and its derivatives.
+  struct Energy {
+    double j = 0, by_v = 0, by_q = 0;
+  };
   struct Cell {
     double v = 0, q = 0;
     std::array<double, 2> kink{};  // dual of phi's slope, in (-1, 1)
+    std::array<Energy, 2> energy{};
     std::array<double, most_bounds> multiplier{};
     std::array<double, most_bounds> slack{};
   };
@@ -96,12 +100,12 @@ class SpeedSolver {
   bool regularise(double damping, bool& corrected);
   void solve_step();
   double complementarity() const;
-  double cost_of_ends() const;
+  std::vector<double> cost_of_ends() const;
   double stationarity_residual() const;
   double step_to_boundary() const;
   double line_search(double longest, double decrement, double mu, double scale);
   void update_duals(double mu);
-  void follow_kinks(std::size_t cell, double dv, double dq);
+  void follow_kinks(Cell& cell, double dv, double dq) const;
   std::array<bool, bound_count> binding(double unit_j) const;
 
   const SpeedGrid& grid_;
@@ -114,8 +118,8 @@ class SpeedSolver {
   std::vector<Cell> cells_;
   std::vector<double> ceiling_multiplier_, floor_multiplier_;
   std::vector<double> gradient_, stationarity_, diagonal_, off_, magnitude_, pivot_, lower_, step_;
-  double cost_here_ = 0;  // at z_, smoothed
-  double kink_gap_ = 0;   // how far the dual slopes bound phi from below [J]
+  double cost_here_ = 0, merit_here_ = 0;  // at z_, smoothed
+  double kink_gap_ = 0;                    // how far the dual slopes bound phi from below [J]
   bool started_ = false, bounds_motors_ = false;
 };
 

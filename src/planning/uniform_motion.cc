@@ -16,6 +16,7 @@ namespace {
 constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double rounding = 1e-9;  // relative: of distances and speeds that the request gives
 constexpr double spare = 1e-7;     // of the distance: less is spread over the nodes
+constexpr double little = 1e-4;    // of the distance: may be driven at the speed of the turn
 constexpr int speed_samples = 64;  // where f is looked at for its minima
 constexpr int most_cuts =
     8;  // in halves, of a cell in which the acceleration or a motor's limit changes fast
@@ -250,9 +251,13 @@ void UniformMotion::pieces(const Shape& shape, Visit&& visit) const {
   }
 }
 
-double UniformMotion::distance(const Shape& shape) const {
+double UniformMotion::distance(Shape& shape) const {
   double sum = 0;
-  pieces(shape, [&](const Piece& piece) { sum += piece.distance(); });
+  shape.driven.clear();
+  pieces(shape, [&](const Piece& piece) {
+    shape.driven.push_back(piece);
+    sum += piece.distance();
+  });
   return sum;
 }
 
@@ -276,13 +281,17 @@ UniformMotion::Shape UniformMotion::turning(Shape shape, double nearest, double 
     }
   }
   double v = at_far > 0 ? zero_between(missing, near, at_near, far, at_far, 1e-6) : far;
-  const double aside = v - 1e-3 * (v - nearest), rough_slope = (missing(v) - missing(aside)) / (v - aside);
+  // Far enough aside that what few cells jump by is little.
+  const double aside = v - 0.05 * (v - nearest), rough_slope = (missing(v) - missing(aside)) / (v - aside);
   shape.price.rough = false;
   // The rest of the way, if any, is driven at the speed of the turn: the motion must not be too long.
   double m = missing(v), slope = rough_slope;
-  const double close = shape.price.fastest ? 1e-3 * spare : spare;  // deadlines are held against it
-  for (int k = 0; k < 12 && !(m <= close && (m >= -close || v == farthest || k > 8)); ++k) {
-    const double next = v - (m + 0.5 * close) / slope - (k > 5 ? 1e-4 * (v - nearest) : 0);
+  // Deadlines are held against the fastest. Else a little of the way at the speed of the turn costs only the
+  // square of its share.
+  const double close = shape.price.fastest ? 1e-3 * spare : spare,
+               missed = shape.price.fastest ? close : little;
+  for (int k = 0; k < 12 && !(m <= close && (m >= -missed || v == farthest || k > 8)); ++k) {
+    const double next = v - (m + 0.5 * missed) / slope - (k > 5 ? 1e-4 * (v - nearest) : 0);
     const double v_before = v, m_before = m;
     v = std::clamp(next, std::min(nearest, farthest), std::max(nearest, farthest));
     m = missing(v);
@@ -368,12 +377,8 @@ UniformMotion::Least UniformMotion::pointwise_least(const Piece& piece, const Pr
 SteppedMotion UniformMotion::written(const Shape& shape) const {
   SteppedMotion motion;
   const double idle_w = task_.electric.idle_w;
-  std::vector<Piece> driven;
   double covered = 0, way = 0;
-  pieces(shape, [&](const Piece& piece) {
-    driven.push_back(piece);
-    covered += piece.distance();
-  });
+  for (const Piece& piece : shape.driven) covered += piece.distance();
   const double cruise =
       shape.cruises && task_.distance > covered * (1 + spare) ? task_.distance - covered : 0;
   covered += cruise;
@@ -389,11 +394,16 @@ SteppedMotion UniformMotion::written(const Shape& shape) const {
       motion.discretisation_j += std::max(0.0, steady_cost(top_, shape.price.fixed_w) -
                                                    steady_cost(bare_top_, shape.price.fixed_w)) *
                                  cruise;
-    // The cost over the distance grows by f(v_turn) a unit, which is no less than f at the cheapest speed.
-    if (!shape.price.fastest)
-      motion.discretisation_j +=
-          cruise * std::max(0.0, steady_cost(shape.middle, shape.price.fixed_w) -
-                                     steady_cost(cheapest_speed(shape.price.fixed_w), shape.price.fixed_w));
+    // The cost over the distance grows by f(v_turn) a unit, and v_turn by no larger a share than the
+    // distance, at most to the cheapest speed.
+    if (!shape.price.fastest) {
+      const double cheapest = cheapest_speed(shape.price.fixed_w),
+                   grown = task_.distance / (task_.distance - cruise),
+                   turn = shape.middle < cheapest ? std::min(cheapest, shape.middle * grown)
+                                                  : std::max(cheapest, shape.middle / grown);
+      motion.discretisation_j += cruise * std::max(0.0, steady_cost(shape.middle, shape.price.fixed_w) -
+                                                            steady_cost(turn, shape.price.fixed_w));
+    }
     way += cruise;
     motion.way.push_back(way * scale), motion.speed.push_back(shape.middle);
     if (shape.middle >= task_.speed_limit * (1 - rounding))
@@ -402,7 +412,7 @@ SteppedMotion UniformMotion::written(const Shape& shape) const {
   bool held = false;
   double best_distance = cruise;
   if (task_.start_speed == shape.middle) hold(), held = true;
-  for (const Piece& piece : driven) {
+  for (const Piece& piece : shape.driven) {
     const double duration = piece.duration_s(), change = piece.to - piece.from;
     double power = 0, least = 0;
     for (const auto& [at, weight] : gauss3) {
@@ -426,7 +436,7 @@ SteppedMotion UniformMotion::written(const Shape& shape) const {
   motion.way.back() = task_.distance;
   // Those least integrals are of the best motion over another distance: lambda, which is the cost of a unit
   // of it more, is that of the speed there, which changes by no larger a share than the distance.
-  if (cruise == 0 && shape.cruises && !shape.price.fastest && best_distance > 0) {
+  if (shape.cruises && !shape.price.fastest && best_distance > 0) {
     const double off = std::fabs(task_.distance - best_distance), share = std::min(0.5, off / best_distance);
     motion.discretisation_j +=
         off *

@@ -127,6 +127,7 @@ class UniformMotion {
     Price price;
     double middle = 0;
     bool cruises = true;
+    std::vector<Piece> driven;  // as distance() found it
   };
 
   explicit UniformMotion(const UniformTask& task);
@@ -147,7 +148,7 @@ class UniformMotion {
   void leg(double from, double to, bool pivot_at_end, const Price& price, Visit&& visit) const;
   template <class Visit>
   void pieces(const Shape& shape, Visit&& visit) const;
-  double distance(const Shape& shape) const;
+  double distance(Shape& shape) const;
   std::optional<Shape> shape_at(double fixed_w) const;
   Shape turning(Shape shape, double nearest, double farthest) const;
   std::optional<Shape> monotone(Shape shape, double highest_lambda) const;
