@@ -80,7 +80,8 @@ inline constexpr auto traits_table = std::to_array<Traits>({
     {"resistance_error", 0.015, 0.010, 1, false, false, false, "wear",
      "motor winding, connectors and cables: measure ohms", "/motor/resistance_ohm"},
     {"winding_temperature", 0, 0, 0, false, false, true, "wear", "cooling of the motors"},
-    {"brush_drop", 0, 0, 0, false, false, false, "wear", "brushes and commutator"},
+    // Both brushes together drop 0.5 to 3 V (Hughes and Drury, Electric Motors and Drives, section 3.3).
+    {"brush_drop", 0.05, 0, 2, false, false, false, "wear", "brushes and commutator"},
     {"torque_constant_loss", 0.004, 0, 0.3, false, false, false, "wear",
      "magnets: heat, age; the gear ratio in the file"},
     {"inductance", 0, 0, 0, true, false, false, "model", "the motor's data sheet"},

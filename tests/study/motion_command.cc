@@ -24,6 +24,7 @@ Exit run_motion(const MotionTrialOptions& options) {
   motion::MotionRunSettings run;
   run.trial.seed = options.seed;
   run.trial.count = options.count;
+  run.trial.residuals_in_place = options.residuals_in_place;
   run.judge = {options.controls, options.prior_factor};
   run.jobs = options.jobs;
   run.keep = options.keep;

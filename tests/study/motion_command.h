@@ -18,6 +18,7 @@ struct MotionTrialOptions {
   double prior_factor = 1;
   std::string outcomes;  // file that takes a line for each case; empty: none
   bool json = false;
+  bool residuals_in_place = false;
 };
 
 // Whether an earlier --keep of such a trial left its cases in this folder.

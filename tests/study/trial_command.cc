@@ -25,6 +25,7 @@ struct Options {
   std::string keep, again, motion, outcomes;
   bool json = false;
   bool usual_plant = false;
+  bool residuals_in_place = false;
 };
 
 // One line a case on a terminal or in a log; nothing of it on standard output, which holds the answer.
@@ -38,7 +39,7 @@ Exit run(Options& options) {
     return run_motion({options.motion, options.only, options.again.empty() ? options.keep : options.again,
                        !options.again.empty(), t.seed, t.count, options.run.jobs,
                        options.run.diagnosis.controls, options.run.diagnosis.prior_factor, options.outcomes,
-                       options.json});
+                       options.json, options.residuals_in_place});
   }
   if (!options.only.empty()) {
     t.only = trial::kind_of(options.only == "double" ? "pair" : options.only);
@@ -111,14 +112,21 @@ void add_trial(CLI::App& program, Exit& exit) {
   auto* compare =
       command->add_flag("--compare", options->run.compare,
                         "judge every log by simpler methods too, and by the method with parts left out");
+  auto* motion =
+      command
+          ->add_option("--motion", options->motion,
+                       "folder of event logs with battery power: effects are planted into their motion; "
+                       "NAME.json beside NAME.lcmlog gives the robot's wheels")
+          ->type_name("FOLDER")
+          ->excludes(channels)
+          ->excludes(usual)
+          ->excludes(compare);
   command
-      ->add_option("--motion", options->motion,
-                   "folder of event logs with battery power: effects are planted into their motion; "
-                   "NAME.json beside NAME.lcmlog gives the robot's wheels")
-      ->type_name("FOLDER")
-      ->excludes(channels)
-      ->excludes(usual)
-      ->excludes(compare);
+      ->add_flag(
+          "--residuals-in-place", options->residuals_in_place,
+          "with --motion: what no regression explains of a log stays where it was recorded, and is not "
+          "resampled")
+      ->needs(motion);
   command
       ->add_option("--controls", options->run.diagnosis.controls,
                    "surrogates that the diagnosis makes of each log")

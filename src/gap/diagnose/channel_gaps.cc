@@ -73,8 +73,7 @@ std::vector<ChannelGap> channel_gaps(const Material& whole) {
     // The level is a nuisance: only what changes counts, which the fit of everything leaves.
     terminals.add(volts.after[k], volts.after[k], w.battery_voltage_v);
     turning.add(gyro.before[k], gyro.after[k], w.yaw_rate_rad_s);
-    const double read_w = volts_read ? w.motor_power_w[0] + w.motor_power_w[1]
-                                     : motor_power(w, whole.robot, 0) + motor_power(w, whole.robot, 1);
+    const double read_w = motors_power(w, whole.robot, volts_read);
     double rest_w = 0;
     for (const std::size_t s : {0u, 1u}) {
       const double winding = std::isfinite(w.voltage_v[s]) ? voltage[s].after[k] * w.current_a[s] : 0;

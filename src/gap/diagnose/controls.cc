@@ -5,7 +5,6 @@
 #include <cmath>
 #include <mutex>
 #include <random>
-#include <set>
 #include <thread>
 
 #include "gap/diagnose/naming.h"
@@ -85,12 +84,7 @@ class Surrogates {
     const Problem surrogate =
         make_problem(*linear_.columns, linear_.rows, linear_.noise, material_.blocks, &responses);
     const Explanation answer = explain(surrogate, {}, settings);
-    std::set<std::string> group{own.id()};
-    for (const Alternative& a : m.stated()) group.insert(problem_.hypotheses[a.hypothesis].id());
-    return std::ranges::any_of(answer.members, [&](const Member& other) {
-      return group.contains(surrogate.hypotheses[other.hypothesis].id()) &&
-             other.group_probability() >= least_named;
-    });
+    return finds(answer, surrogate, stated_ids(problem_, m));
   }
 
  private:

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <optional>
 #include <set>
 
 #include "gap/traits.h"
@@ -326,11 +328,10 @@ class Explainer {
       m.by_evidence = believed(holds);
       m.by_prediction = predicted(holds);
       if (settings_.predictive && !h.outside()) m.alternatives = alternatives(set, set[k]);
-      std::set<std::string> group{h.id()};
+      std::set<std::string> group = stated_ids(problem_, m);
       const auto holds_any = [&](const HypothesisSet& other) {
         return std::ranges::any_of(other, [&](std::size_t o) { return group.contains(hypothesis(o).id()); });
       };
-      for (const Alternative& a : m.stated()) group.insert(hypothesis(a.hypothesis).id());
       m.group_by_evidence = believed(holds_any);
       m.group_by_prediction = predicted(holds_any);
       for (const Alternative& a : m.alternatives) group.insert(hypothesis(a.hypothesis).id());
@@ -400,6 +401,18 @@ class Explainer {
 };
 
 }  // namespace
+
+std::set<std::string> stated_ids(const Problem& problem, const Member& member) {
+  std::set<std::string> ids{problem.hypotheses[member.hypothesis].id()};
+  for (const Alternative& a : member.stated()) ids.insert(problem.hypotheses[a.hypothesis].id());
+  return ids;
+}
+
+bool finds(const Explanation& explanation, const Problem& problem, const std::set<std::string>& ids) {
+  return std::ranges::any_of(explanation.members, [&](const Member& m) {
+    return ids.contains(problem.hypotheses[m.hypothesis].id()) && m.group_probability() >= least_named;
+  });
+}
 
 Explanation explain(const Mixture& mixture, const std::vector<bool>& left_out,
                     const ExplainSettings& settings) {

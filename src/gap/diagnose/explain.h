@@ -1,7 +1,6 @@
 #pragma once
 
-#include <map>
-#include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -65,6 +64,12 @@ struct Explanation {
   double outside_by_prediction = 0;
   HypothesisSet whole;  // the set with what does not matter by itself
 };
+
+// Ids of a member and of the alternatives that an answer names beside it.
+std::set<std::string> stated_ids(const Problem& problem, const Member& member);
+
+// Whether an explanation has one of these, likelier there than not.
+bool finds(const Explanation& explanation, const Problem& problem, const std::set<std::string>& ids);
 
 // Of all blocks that are not left out.
 Explanation explain(const Problem& problem, const std::vector<bool>& left_out = {},

@@ -69,10 +69,11 @@ class ThirdJudge {
     add(named);
     add(with_functions);
     const std::vector<Variant> variants = best_variants(kept_);
-    const double nothing = errors_.at(kept_).sum();
     // What closes too little of all blocks closes too little of parts left out.
+    const Errors& nothing = errors_.at(kept_);
+    const double least = price_of_a_member();
     if (with_functions == kept_ && std::ranges::none_of(variants, [&](const Variant& v) {
-          return nothing - v.left >= price_of_a_member();
+          return nothing.blocks.sum() - v.left >= least || nothing.power - v.left_of_power >= least;
         }))
       return;
     for (const Variant& v : variants) add(with(kept_, v.hypothesis));
@@ -106,16 +107,17 @@ class ThirdJudge {
   // Of each cause that may join, the variant that leaves least of all blocks [W, summed over rows].
   struct Variant {
     std::size_t hypothesis = 0;
-    double left = 0;
+    double left = 0, left_of_power = 0;
   };
   std::vector<Variant> best_variants(const HypothesisSet& base) const {
     std::map<std::string, Variant> best;
     for (std::size_t h = 0; h < problem_.hypotheses.size(); ++h) {
       if (!in_search(h) || !fits(base, h)) continue;
       const HypothesisSet set = with(base, h);
-      const double left = left_by(set, fitted(set, e_), {}).both().sum();
-      const auto [at, first] = best.try_emplace(hypothesis(h).id(), Variant{h, left});
-      if (!first && left < at->second.left) at->second = {h, left};
+      const Left left = left_by(set, fitted(set, e_), {});
+      const Variant variant{h, left.both().sum(), left.power.sum()};
+      const auto [at, first] = best.try_emplace(hypothesis(h).id(), variant);
+      if (!first && variant.left < at->second.left) at->second = variant;
     }
     std::vector<Variant> variants;
     for (const auto& [id, variant] : best) variants.push_back(variant);
@@ -188,8 +190,7 @@ class ThirdJudge {
       sums += left.both();
       power += left.power.sum();
     }
-    errors_[set] = sums;
-    power_[set] = power;
+    errors_[set] = {sums, power};
   }
 
   // The best by both, and the best by power: of two whose energies cancel neither closes any by itself.
@@ -197,8 +198,8 @@ class ThirdJudge {
     std::vector<std::pair<double, HypothesisSet>> by_both, by_power;
     for (const auto& [set, errors] : errors_) {
       if (set.size() != kept_.size() + 1 || !in_search_alone(set)) continue;
-      by_both.emplace_back(errors.sum(), set);
-      by_power.emplace_back(power_.at(set), set);
+      by_both.emplace_back(errors.blocks.sum(), set);
+      by_power.emplace_back(errors.power, set);
     }
     std::vector<HypothesisSet> best;
     for (auto* singles : {&by_both, &by_power}) {
@@ -239,7 +240,7 @@ class ThirdJudge {
     for (const auto& [set, errors] : errors_) {
       const auto at = static_cast<Eigen::Index>(w.sets.size());
       for (std::size_t k = 0; k < blocks_.size(); ++k)
-        w.left(at, static_cast<Eigen::Index>(k)) = errors[static_cast<Eigen::Index>(blocks_[k])];
+        w.left(at, static_cast<Eigen::Index>(k)) = errors.blocks[static_cast<Eigen::Index>(blocks_[k])];
       w.price[at] = w.a_member * static_cast<double>(size_of(set));
       w.sets.push_back(set);
     }
@@ -293,9 +294,8 @@ class ThirdJudge {
         m.alternatives = others;
         m.by_evidence = m.group_by_evidence = m.any_by_evidence = contested;
       }
-      std::set<std::string> group{h.id()};
-      m.by_prediction = std::max(m.by_prediction, probability(group));
-      for (const Alternative& a : m.stated()) group.insert(hypothesis(a.hypothesis).id());
+      m.by_prediction = std::max(m.by_prediction, probability({h.id()}));
+      std::set<std::string> group = stated_ids(problem_, m);
       m.group_by_prediction = std::max(m.group_by_prediction, probability(group));
       for (const Alternative& a : m.alternatives) group.insert(hypothesis(a.hypothesis).id());
       for (const Alternative& a : others) group.insert(hypothesis(a.hypothesis).id());
@@ -311,10 +311,10 @@ class ThirdJudge {
 
   // Whether parts left out are missed by more than what parts differ by and what formulas are off.
   bool clearly_worse(const HypothesisSet& set, const HypothesisSet& best) const {
-    const Eigen::ArrayXd apart = (errors_.at(set) - errors_.at(best)).array();
+    const Eigen::ArrayXd apart = (errors_.at(set).blocks - errors_.at(best).blocks).array();
     const double n = static_cast<double>(blocks_.size());
     const double square = std::max(0.0, apart.square().sum() - apart.sum() * apart.sum() / n);
-    return apart.sum() > std::max(std::sqrt(square), formulas_off * errors_.at(best).sum());
+    return apart.sum() > std::max(std::sqrt(square), formulas_off * errors_.at(best).blocks.sum());
   }
 
   // Which of those that leave hardly more it is, only the evidence says.
@@ -332,7 +332,7 @@ class ThirdJudge {
 
   // Other causes that leave hardly more in the place of one, the best first.
   std::vector<Alternative> as_good(const HypothesisSet& chosen, std::size_t member, const Weighed& w) const {
-    const double own = errors_.at(chosen).sum();
+    const double own = errors_.at(chosen).blocks.sum();
     const HypothesisSet rest = without(chosen, member);
     const double evidence = mixture_.log_joint(chosen);
     std::vector<std::pair<double, Alternative>> found;
@@ -341,7 +341,7 @@ class ThirdJudge {
       HypothesisSet other = set;
       for (const std::size_t h : rest) std::erase(other, h);
       if (other.size() != 1 || hypothesis(other.front()).id() == hypothesis(member).id()) continue;
-      const double more = errors.sum() - own;
+      const double more = errors.blocks.sum() - own;
       if (more >= w.a_member && !problem_.alike(member, other.front())) continue;
       // What leaves the same is put in the order of what is known beforehand.
       const double known = std::clamp(mixture_.log_joint(set) - evidence, -2.0, 2.0);
@@ -365,8 +365,12 @@ class ThirdJudge {
   std::vector<std::size_t> blocks_;
   HypothesisSet kept_;  // named causes that other channels show
   Eigen::VectorXd kept_strengths_;
-  std::map<HypothesisSet, Eigen::VectorXd> errors_;  // of sets, by block, each without its part
-  std::map<HypothesisSet, double> power_;            // of power alone
+  // What each set misses of parts that it is fitted without.
+  struct Errors {
+    Eigen::VectorXd blocks;  // of each block, power and energy
+    double power = 0;        // of power alone
+  };
+  std::map<HypothesisSet, Errors> errors_;
 };
 
 }  // namespace

@@ -120,8 +120,8 @@ double HeldOut::relative(const std::function<double(const BlockErrors&)>& error)
   return size > 0 ? sum / size : std::numeric_limits<double>::quiet_NaN();
 }
 
-double HeldOut::found_again(std::span<const std::string> ids) const {
-  const auto one_of = [&](const std::string& id) { return std::ranges::find(ids, id) != ids.end(); };
+double HeldOut::found_again(const std::set<std::string>& ids) const {
+  const auto one_of = [&](const std::string& id) { return ids.contains(id); };
   const auto times =
       std::ranges::count_if(named, [&](const auto& part) { return std::ranges::any_of(part, one_of); });
   return static_cast<double>(times) / static_cast<double>(parts);

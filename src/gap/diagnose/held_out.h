@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -29,7 +30,7 @@ struct HeldOut {
   std::vector<std::vector<Cause>> causes;       // and what was in force, the base of the fit first
 
   // Share of the fits without a part that name one of these.
-  double found_again(std::span<const std::string> ids) const;
+  double found_again(const std::set<std::string>& ids) const;
   // Sum of an error over all blocks, over that of |power|; NaN where no power is known.
   double unchanged() const { return relative(&BlockErrors::unchanged); }
   double explained() const { return relative(&BlockErrors::explained); }

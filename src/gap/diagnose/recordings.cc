@@ -282,10 +282,8 @@ bool Diagnoser::leave_out() {
 // alone.
 void Diagnoser::keep_found_again(const Problem& problem, const Explanation& explanation, Named& named) {
   for (std::size_t k = named.set.size(); k-- > 0;) {
-    std::vector<std::string> group{problem.hypotheses[named.set[k]].id()};
     const Member& m = *std::ranges::find(explanation.members, named.set[k], &Member::hypothesis);
-    for (const Alternative& a : m.stated()) group.push_back(problem.hypotheses[a.hypothesis].id());
-    if (held_out_->found_again(group) >= most_parts_name) continue;
+    if (held_out_->found_again(stated_ids(problem, m)) >= most_parts_name) continue;
     named.set.erase(named.set.begin() + static_cast<std::ptrdiff_t>(k));
     named.causes.erase(named.causes.begin() + static_cast<std::ptrdiff_t>(k));
   }

@@ -17,19 +17,19 @@ double motor_voltage(const Window& w, const robot::RobotModel& robot, std::size_
   return m.resistance_ohm * w.current_a[s] + m.voltage_constant_v_s_rad * m.gear_ratio * w.speed_rad_s[s];
 }
 
-double motor_power(const Window& w, const robot::RobotModel& robot, std::size_t s) {
-  return std::isfinite(w.motor_power_w[s]) ? w.motor_power_w[s] : w.current_a[s] * motor_voltage(w, robot, s);
+double motors_power(const Window& w, const robot::RobotModel& robot, bool volts_read) {
+  const auto motor = [&](std::size_t s) {
+    return volts_read ? w.motor_power_w[s] : w.current_a[s] * motor_voltage(w, robot, s);
+  };
+  return motor(0) + motor(1);
 }
 
 std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot,
                                    bool of_motors) {
   std::vector<double> power(windows.size());
   const bool volts = voltages_read(windows);
-  const auto motor = [&](const Window& w, std::size_t s) {
-    return volts ? w.motor_power_w[s] : motor_power(w, robot, s);
-  };
   std::ranges::transform(windows, power.begin(), [&](const Window& w) {
-    return of_motors ? robot.idle_power_w + motor(w, 0) + motor(w, 1) : w.battery_power_w;
+    return of_motors ? robot.idle_power_w + motors_power(w, robot, volts) : w.battery_power_w;
   });
   return power;
 }

@@ -15,11 +15,12 @@ bool voltages_read(std::span<const Window> windows);
 // the speed. NaN where neither is known.
 double motor_voltage(const Window& w, const robot::RobotModel& robot, std::size_t side);
 
-// What one motor takes in a window [W], by that voltage where none was read. NaN without a current.
-double motor_power(const Window& w, const robot::RobotModel& robot, std::size_t side);
+// What both motors take in a window [W]; where no motor's voltage was read at all (`volts_read` false) by the
+// voltages that the file's windings need. NaN without both currents.
+double motors_power(const Window& w, const robot::RobotModel& robot, bool volts_read);
 
 // Battery power of every window [W]; NaN where the battery was not read. `of_motors`: what the motors take
-// and the idle power of the robot file in its place, by the file's windings where no voltage was read at all.
+// and the idle power of the robot file in its place.
 std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot,
                                    bool of_motors);
 

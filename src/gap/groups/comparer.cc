@@ -170,14 +170,8 @@ std::vector<Controls> Comparer::permuted(const Mixture& mixture, const Explanati
     const Problem surrogate = contrast(rest, order, groups_);
     const Explanation answer = explain(surrogate, {}, data_.explain);
     for (std::size_t m = 0; m < controls.size(); ++m) {
-      const Member& member = explanation.members[m];
-      std::set<std::string> group{problem.hypotheses[member.hypothesis].id()};
-      for (const Alternative& a : member.stated()) group.insert(problem.hypotheses[a.hypothesis].id());
-      const bool found = std::ranges::any_of(answer.members, [&](const Member& other) {
-        return group.contains(surrogate.hypotheses[other.hypothesis].id()) &&
-               other.group_probability() >= least_named;
-      });
-      controls[m].named_in += found ? 1 : 0;
+      const std::set<std::string> group = stated_ids(problem, explanation.members[m]);
+      controls[m].named_in += finds(answer, surrogate, group) ? 1 : 0;
     }
     if (!goes_on(std::lerp(after_parts, 1.0,
                            static_cast<double>(s + 1) / static_cast<double>(settings_.controls))))

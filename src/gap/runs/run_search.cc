@@ -124,8 +124,7 @@ std::optional<std::vector<Controls>> control_runs(const RunColumns& columns,
   }
   for (std::size_t m = 0; m < members; ++m) {
     const Member& member = f.explanation.members[m];
-    std::set<std::string> group{f.problem.hypotheses[member.hypothesis].id()};
-    for (const Alternative& a : member.stated()) group.insert(f.problem.hypotheses[a.hypothesis].id());
+    const std::set<std::string> group = stated_ids(f.problem, member);
     const auto own = std::ranges::find(whole, member.hypothesis) - whole.begin();
     for (std::size_t s = 0; s < surrogates; ++s) {
       std::mt19937_64 random(s + 1);
@@ -140,11 +139,7 @@ std::optional<std::vector<Controls>> control_runs(const RunColumns& columns,
       }
       const Problem surrogate = make_problem(columns, f.scatter, block, &response);
       const Explanation answer = explain(surrogate, {}, settings_for(columns.runs().size()));
-      const bool found = std::ranges::any_of(answer.members, [&](const Member& other) {
-        return group.contains(surrogate.hypotheses[other.hypothesis].id()) &&
-               other.group_probability() >= least_named;
-      });
-      controls[m].named_in += found ? 1 : 0;
+      controls[m].named_in += finds(answer, surrogate, group) ? 1 : 0;
       if (!goes_on(static_cast<double>(m * surrogates + s + 1) / static_cast<double>(members * surrogates)))
         return std::nullopt;
     }

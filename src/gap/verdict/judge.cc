@@ -139,9 +139,7 @@ class Judge {
       // What is not found again without each part is no surer than that.
       double again = 1;
       if (f_.held_out && !f_.calibrated) {
-        std::vector<std::string> group = e.alternatives;
-        group.push_back(e.id);
-        again = f_.held_out->found_again(group);
+        again = f_.held_out->found_again(stated_ids(f_.problem, m));
         e.posterior = std::min(e.posterior, again);
       }
       // Found where it is not: no surer than the surrogates allow.

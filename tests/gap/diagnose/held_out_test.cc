@@ -65,7 +65,7 @@ TEST(HoldOut, CountsFitsThatNameOneOfAGroupAndWhatEnergiesDifferBy) {
   HeldOut held;
   held.parts = 4;
   held.named = {{"slope"}, {}, {"accessory_load", "slope"}, {"current_sensor_bias"}};
-  const auto found = [&](std::vector<std::string> ids) { return held.found_again(ids); };
+  const auto found = [&](const std::set<std::string>& ids) { return held.found_again(ids); };
   EXPECT_EQ(found({"slope"}), 0.5);
   EXPECT_EQ(found({"accessory_load", "current_sensor_bias"}), 0.5);
   EXPECT_EQ(found({"wheel_slip"}), 0);

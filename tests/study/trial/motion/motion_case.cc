@@ -145,8 +145,11 @@ void plant_outside(const MotionSettings& settings, std::size_t turn, Rng& rng, M
 }
 
 std::vector<std::vector<MeteredPower>> made_power(const MotionCase& c) {
-  Rng rng(c.noise_seed);
-  const auto noise_w = resampled(c.base->fit.residual_w, c.base->log.battery.period_s, rng);
+  auto noise_w = c.base->fit.residual_w;
+  if (c.noise_seed) {
+    Rng rng(*c.noise_seed);
+    noise_w = resampled(c.base->fit.residual_w, c.base->log.battery.period_s, rng);
+  }
   std::vector<std::vector<MeteredPower>> made;
   std::size_t n = 0;
   for (std::size_t m = 0; m < noise_w.size(); ++m) {
@@ -244,7 +247,8 @@ MotionCase draw_motion_case(const MotionSettings& settings, std::span<const Base
   Rng rng = Rng::stream(settings.seed, 400'000'000 + index);
   MotionCase c;
   c.index = index;
-  c.noise_seed = rng.next();
+  c.noise_seed = rng.next();  // drawn either way: the cases are the same
+  if (settings.residuals_in_place) c.noise_seed.reset();
   c.base = &logs[in_turn(settings.seed, 4, logs.size(), index)];
   c.truth.log = c.base->log.name;
   c.truth.kind = kind_at(settings, index);

@@ -34,7 +34,8 @@ struct MotionSettings {
   std::uint64_t seed = 1;
   std::size_t count = 40;
   std::optional<Kind> only;
-  std::string only_effect;  // an id of forms() or of an outside load
+  std::string only_effect;          // an id of forms() or of an outside load
+  bool residuals_in_place = false;  // not resampled
 };
 
 struct TrueEffect {
@@ -59,8 +60,8 @@ struct MotionCase {
   MotionTruth truth;
   Scene scene;
   std::vector<Planted> planted;
-  std::vector<double> outside_w;  // for all instants of the log; empty without
-  std::uint64_t noise_seed = 0;   // of the residuals
+  std::vector<double> outside_w;            // for all instants of the log; empty without
+  std::optional<std::uint64_t> noise_seed;  // of the residuals; without one they stay in place
 };
 [[nodiscard]] MotionCase draw_motion_case(const MotionSettings& settings, std::span<const BaseLog> logs,
                                           std::size_t index);
