@@ -99,9 +99,9 @@ SessionOutputs Pipeline::outputs_under(history::Epoch epoch) const {
   return outputs;
 }
 
-void Pipeline::hold(const InboundMessage& message) {
+void Pipeline::hold(const InboundMessage& message, bool has_model) {
   if (std::holds_alternative<RefusedMessage>(message.content)) return;
-  if (models_.find(message.robot_id) != nullptr)
+  if (has_model)
     keeping_->hear(message.robot_id, message.host_utime_us);
   else if (!unknown_robots_.contains(message.robot_id))
     return;
@@ -221,8 +221,9 @@ void Pipeline::handle(const InboundMessage& message) {
   refresh_models();
   Robot* robot = find(message.robot_id);
   if (robot == nullptr) {
-    if (models_.find(message.robot_id) == nullptr) count_unknown_robot(message);
-    if (keeping_ != nullptr) hold(message);
+    const bool has_model = models_.find(message.robot_id) != nullptr;
+    if (!has_model) count_unknown_robot(message);
+    if (keeping_ != nullptr) hold(message, has_model);
     return;
   }
   if (keeping_ != nullptr) keeping_->hear(message.robot_id, message.host_utime_us);

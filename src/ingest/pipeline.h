@@ -58,7 +58,7 @@ class Pipeline {
   Robot& add(const std::string& robot_id, const SessionOutputs& outputs);
   void deliver(Robot& robot, const InboundMessage& message);
   // In a cluster. Of robots without a model, too: it may come to this daemon after their first messages.
-  void hold(const InboundMessage& message);
+  void hold(const InboundMessage& message, bool has_model);
   // False when the store cannot be read for now, or the model is not known yet.
   bool take_up(const Keeping::Grant& grant);
   void let_go(const Keeping::Withdrawal& withdrawal);
