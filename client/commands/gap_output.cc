@@ -67,8 +67,10 @@ void print_checks(const json& d) {
   if (checks.empty()) return;
   fmt::print("checks of the recordings:\n");
   for (const json& check : checks)
-    print_item(text(check["says"]) +
-               (check["contradicted"] == true ? " It takes no part in what follows." : ""));
+    print_item(text(check["says"]) + (check["contradicted"] != true ? ""
+                                      : check.contains("few_missions")
+                                          ? " There it takes no part in what follows."
+                                          : " It takes no part in what follows."));
 }
 
 void print_gap(const json& d) {

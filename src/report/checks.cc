@@ -87,7 +87,9 @@ void checks_section(Page& page, std::span<const Check> checks) {
                "robot file. A channel that is contradicted takes no part in the diagnosis.");
   for (const Check& c : checks) {
     page.card(fmt::format("<p>{}</p><p class=\"quiet\">{}{}</p>", xml_escaped(c.says), small_print(c),
-                          c.contradicted ? "; <b>takes no part in the diagnosis</b>" : ""),
+                          !c.contradicted          ? ""
+                          : c.few_missions.empty() ? "; <b>takes no part in the diagnosis</b>"
+                                                   : "; <b>takes no part in the diagnosis there</b>"),
               c.contradicted);
   }
 }

@@ -24,6 +24,13 @@ std::string printed(const json& diagnosis) {
   return ::testing::internal::GetCapturedStdout();
 }
 
+TEST(GapOutput, AChannelThatIsWrongInFewMissionsTakesNoPartThere) {
+  gap::Diagnosis d = made_diagnosis();
+  d.checks[0].few_missions = {2};
+  EXPECT_NE(printed(gap::diagnosis_to_json(d)).find("It is reversed. There it takes no part"),
+            std::string::npos);
+}
+
 TEST(GapOutput, TellsChecksThenVerdictThenEffectsThenTheRefereeThenWhere) {
   const std::string text = printed(gap::diagnosis_to_json(made_diagnosis()));
   std::size_t at = 0;

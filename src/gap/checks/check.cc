@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "gap/checks/evaluation.h"
 #include "gap/checks/motors.h"
@@ -14,7 +15,9 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr std::size_t most_checks = 12;
+constexpr double not_known = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t most_checks = 12, most_missions_named = 3;
+constexpr double enough_moving_s = 10;  // of a mission, to say by itself that a channel is wrong in it
 
 bool contradicts_clock(const std::vector<Check>& checks) {
   return std::ranges::any_of(checks, [](const Check& c) { return c.contradicted && c.channel == "utime"; });
@@ -27,6 +30,32 @@ void shorten(std::vector<Check>& checks) {
         std::ranges::find_if(checks.rbegin(), checks.rend(), [](const Check& c) { return !c.contradicted; });
     if (last == checks.rend()) return;
     checks.erase(std::next(last).base());
+  }
+}
+
+bool holds_for(const Check& check, std::size_t mission) {
+  return check.few_missions.empty() || std::ranges::count(check.few_missions, mission) > 0;
+}
+
+using SilentReadings = std::array<bool, reading_count>;
+
+SilentReadings silent_readings(std::span<const Check> checks, std::size_t mission) {
+  SilentReadings silent{};
+  for (const Check& check : checks) {
+    if (!check.contradicted || !holds_for(check, mission)) continue;
+    for (std::size_t k = 0; k < reading_count; ++k)
+      silent[k] = silent[k] || belongs_to(reading_names[k], check.channel);
+  }
+  return silent;
+}
+
+void silence(telemetry::Recording& mission, const SilentReadings& silent) {
+  if (std::ranges::none_of(silent, [](bool s) { return s; })) return;
+  for (signals::Sample& sample : mission.samples) {
+    const auto readings = signals::numbers_of(sample);
+    for (std::size_t k = 0; k < reading_count; ++k) {
+      if (silent[k]) *readings[k] = signals::unmeasured;
+    }
   }
 }
 
@@ -129,7 +158,7 @@ std::vector<Check> check_observations(std::span<const Observation> observations,
 std::vector<Check> check_contradictions(std::span<const Observation> observations,
                                         const robot::RobotModel& robot) {
   if (observations.empty()) return {};
-  Asking asking(observations, robot, 0);
+  Asking asking(observations, robot, not_known);
   asking.ask(check_clock);
   if (!contradicts_clock(asking.checks)) {
     for (const auto check : {check_silence, check_signs_and_units, check_limits, check_readings})
@@ -142,32 +171,96 @@ std::vector<Check> check_contradictions(std::span<const Observation> observation
   return std::move(asking.checks);
 }
 
-std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
-                                    const robot::RobotModel& robot) {
+namespace {
+
+std::vector<Observation> observe_all(const telemetry::RecordingSet& recordings,
+                                     const robot::RobotModel& robot, const dynamics::DriveModel& drive) {
   std::vector<Observation> observations;
   observations.reserve(recordings.missions.size());
-  const dynamics::DriveModel drive = drive_of(robot, dynamics::active_effects(robot));
   for (const telemetry::Recording& mission : recordings.missions)
     observations.push_back(observe(mission, robot, drive));
-  return check_observations(observations, robot);
+  return observations;
+}
+
+// What missions contradict each by itself, but for the clock.
+std::vector<Check> asked_one_by_one(const std::vector<Observation>& observations,
+                                    const robot::RobotModel& robot) {
+  std::vector<Check> found;
+  for (std::size_t m = 0; m < observations.size(); ++m) {
+    if (observations[m].moving_s < enough_moving_s) continue;
+    for (Check& check : check_contradictions({&observations[m], 1}, robot)) {
+      if (!check.contradicted || check.channel == "utime") continue;
+      const auto same = std::ranges::find_if(
+          found, [&](const Check& c) { return c.id == check.id && c.channel == check.channel; });
+      (same == found.end() ? found.emplace_back(std::move(check)) : *same).few_missions.push_back(m);
+    }
+  }
+  return found;
+}
+
+// Whether both tell of one field, as of its two sides.
+bool of_one_field(const Check& a, const Check& b) {
+  const auto field = [](std::string_view reading) { return reading.substr(0, reading.find('.')); };
+  return std::ranges::any_of(reading_names, [&](std::string_view of_a) {
+    return belongs_to(of_a, a.channel) && std::ranges::any_of(reading_names, [&](std::string_view of_b) {
+             return belongs_to(of_b, b.channel) && field(of_a) == field(of_b);
+           });
+  });
+}
+
+// What is wrong in at most half of the missions: all together the others would hide it, or be blamed with it.
+// What is wrong in more is told of all, and is no witness here.
+std::vector<Check> wrong_in_few(const telemetry::RecordingSet& recordings,
+                                const std::vector<Observation>& observations, const robot::RobotModel& robot,
+                                const dynamics::DriveModel& drive) {
+  const std::size_t most = observations.size() / 2;
+  std::vector<Check> found = asked_one_by_one(observations, robot);
+  std::vector<Check> in_most;
+  for (const Check& c : found) {
+    if (c.few_missions.size() > most) in_most.push_back(c), in_most.back().few_missions.clear();
+  }
+  if (!in_most.empty()) {
+    telemetry::RecordingSet others = recordings;
+    silence_contradicted(others, in_most);
+    found = asked_one_by_one(observe_all(others, robot, drive), robot);
+    std::erase_if(found, [&](const Check& c) {
+      return std::ranges::any_of(in_most, [&](const Check& other) { return of_one_field(c, other); });
+    });
+  }
+  std::set<std::size_t> wrong;
+  for (const Check& c : found) wrong.insert(c.few_missions.begin(), c.few_missions.end());
+  if (wrong.size() > most) return {};
+  for (Check& c : found) {
+    std::string names;
+    for (std::size_t k = 0; k < std::min(c.few_missions.size(), most_missions_named); ++k)
+      names += (k > 0 ? ", " : "") + observations[c.few_missions[k]].mission_id;
+    c.says = fmt::format("In {} of {} missions ({}{}): {}", c.few_missions.size(), observations.size(), names,
+                         c.few_missions.size() > most_missions_named ? ", ..." : "", c.says);
+  }
+  return found;
+}
+
+}  // namespace
+
+std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
+                                    const robot::RobotModel& robot) {
+  const dynamics::DriveModel drive = drive_of(robot, dynamics::active_effects(robot));
+  std::vector<Observation> observations = observe_all(recordings, robot, drive);
+  std::vector<Check> checks = wrong_in_few(recordings, observations, robot, drive);
+  for (std::size_t m = 0; m < observations.size(); ++m) {
+    if (std::ranges::none_of(checks, [&](const Check& c) { return holds_for(c, m); })) continue;
+    telemetry::Recording mission = recordings.missions[m];
+    silence(mission, silent_readings(checks, m));
+    observations[m] = observe(mission, robot, drive);
+  }
+  const std::vector<Check> of_all = check_observations(observations, robot);
+  checks.insert(checks.end(), of_all.begin(), of_all.end());
+  return checks;
 }
 
 void silence_contradicted(telemetry::RecordingSet& recordings, std::span<const Check> checks) {
-  std::array<bool, reading_count> silent{};
-  for (const Check& check : checks) {
-    for (std::size_t k = 0; k < reading_count; ++k) {
-      if (check.contradicted && belongs_to(reading_names[k], check.channel)) silent[k] = true;
-    }
-  }
-  if (std::ranges::none_of(silent, [](bool s) { return s; })) return;
-  for (telemetry::Recording& mission : recordings.missions) {
-    for (signals::Sample& sample : mission.samples) {
-      const auto readings = signals::numbers_of(sample);
-      for (std::size_t k = 0; k < reading_count; ++k) {
-        if (silent[k]) *readings[k] = signals::unmeasured;
-      }
-    }
-  }
+  for (std::size_t m = 0; m < recordings.missions.size(); ++m)
+    silence(recordings.missions[m], silent_readings(checks, m));
 }
 
 }  // namespace joulecast::gap

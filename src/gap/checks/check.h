@@ -32,6 +32,8 @@ struct Check {
   // Of `step_between_missions`: the first mission after the step, in the order given. Missions before it and
   // from it on can be judged apart.
   std::optional<std::size_t> first_mission{};
+  // Of what holds for few of several missions: which, in the order given; the channel takes no part there.
+  std::vector<std::size_t> few_missions{};
 };
 
 // Most fundamental first, about a dozen at most; what follows from another check is not repeated. None needs
@@ -59,7 +61,8 @@ std::vector<Check> check_contradictions(std::span<const Observation> observation
 std::optional<std::array<telemetry::RecordingSet, 2>> split_at_step(const telemetry::RecordingSet& recordings,
                                                                     std::span<const Check> checks);
 
-// NaN for every reading of a contradicted channel. "utime" is left as it is.
+// NaN for every reading of a contradicted channel, of something that holds for few missions in these. "utime"
+// is left as it is.
 void silence_contradicted(telemetry::RecordingSet& recordings, std::span<const Check> checks);
 
 }  // namespace joulecast::gap

@@ -18,7 +18,7 @@ struct CheckContext {
   std::span<const Observation> seen;
   const robot::RobotModel& robot;
   const dynamics::DriveModel& model;
-  double motor_delay_s = 0;                         // motor_delay()
+  double motor_delay_s = 0;                         // motor_delay(); NaN: not known
   std::array<ValueTally, reading_count> tallies{};  // of all missions
   std::vector<std::string> silent{};  // channels contradicted so far: what they say is not asked again
 

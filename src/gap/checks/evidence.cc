@@ -89,12 +89,11 @@ class Gatherer {
 };
 
 void Gatherer::armatures() {
-  constexpr std::array<std::size_t, 3> terms{1, 2, 3};
   for (std::size_t k : {0u, 1u}) {
     if (!heard({reading::wheel_velocity + k, reading::motor_voltage + k, reading::motor_current + k}))
       continue;
     const auto relation = k == 0 ? Relation::armature_right : Relation::armature_left;
-    const BlockFit fit = fit_blocks(armature_blocks(c_.seen, relation, c_.motor_delay_s), 0, terms);
+    const BlockFit fit = fit_armature(c_.seen, relation, c_.motor_delay_s);
     const std::string side = side_name[k];
     Evidence* constant =
         add("the " + side + " motor's voltage constant, from its voltage, current and speed, is",
@@ -106,9 +105,7 @@ void Gatherer::armatures() {
         {{side_of(S::voltage_right, k), 1}, {side_of(S::current_right, k), -1}});
   }
   if (!heard({0, 1, 2, 3, 4, 5})) return;
-  constexpr std::array<std::size_t, 2> difference{1, 2};
-  const BlockFit fit =
-      fit_blocks(armature_blocks(c_.seen, Relation::armature_difference, c_.motor_delay_s), 0, difference);
+  const BlockFit fit = fit_armature(c_.seen, Relation::armature_difference, c_.motor_delay_s);
   const auto sides = [&](Evidence* e, std::uint32_t pairs) {
     if (e == nullptr) return;
     e->turned_by = pairs;

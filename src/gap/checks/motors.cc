@@ -15,15 +15,15 @@ constexpr std::array side_name{"right", "left"};
 constexpr double surely = 6;  // standard deviations between siblings
 // Motors of a pair differ so much without being worth a word: magnets and windings; grease and load.
 constexpr double winding_off = 0.10, load_off = 0.5;
-constexpr double agree = 0.35;   // logarithms of one sensor's factor from different constants
-constexpr double useless = 0.5;  // logarithm of a sensor's factor beyond which it is no sensor
+constexpr double agree = 0.35;           // logarithms of one sensor's factor from different constants
+constexpr double longest_delay_s = 0.1;  // of a cell of 0.4 s: beyond, its mean acceleration tells too little
+constexpr double useless = 0.5;          // logarithm of a sensor's factor beyond which it is no sensor
 
 MotorConstants constants_of(std::span<const Observation> seen, std::size_t side, double delay_s) {
-  constexpr std::array<std::size_t, 3> armature{1, 2, 3};
   constexpr std::array<std::size_t, 5> torque{1, 2, 3, 4, 5};
   MotorConstants m;
   const auto relation = side == 0 ? Relation::armature_right : Relation::armature_left;
-  const BlockFit electric = fit_blocks(armature_blocks(seen, relation, delay_s), 0, armature);
+  const BlockFit electric = fit_armature(seen, relation, delay_s);
   m.resistance_ohm = estimate(electric, 0);
   m.constant_v_s_rad = estimate(electric, 1);
   m.drop_v = estimate(electric, 2);
@@ -94,10 +94,20 @@ std::optional<Delay> motor_delay(std::span<const Observation> observations) {
   return std::nullopt;
 }
 
-std::vector<Products::Block> armature_blocks(std::span<const Observation> observations, Relation relation,
-                                             double delay_s) {
-  const std::size_t acceleration = relation == Relation::armature_difference ? 3 : 4;
-  return with_part_of(blocks_of(observations, relation), 2, acceleration, -delay_s);
+BlockFit fit_armature(std::span<const Observation> observations, Relation relation, double delay_s) {
+  const bool difference = relation == Relation::armature_difference;
+  const std::size_t acceleration = difference ? 3 : 4;
+  std::vector<std::size_t> terms{1, 2};
+  if (!difference) terms.push_back(3);
+  std::vector<Products::Block> blocks = blocks_of(observations, relation);
+  if (!std::isnan(delay_s))
+    return fit_blocks(with_part_of(std::move(blocks), 2, acceleration, -delay_s), 0, terms);
+  terms.push_back(acceleration);
+  const BlockFit fit = fit_blocks(blocks, 0, terms);
+  // Of a motor alone the current follows from the motion; of the differences it hardly does, and with a long
+  // delay R is anything.
+  const bool late = difference && fit.known() && -fit.coefficient[2] / fit.coefficient[1] > longest_delay_s;
+  return late ? BlockFit{} : fit;
 }
 
 std::array<MotorConstants, 2> motor_constants(std::span<const Observation> observations, double delay_s) {

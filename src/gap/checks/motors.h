@@ -26,10 +26,10 @@ struct MotorConstants {
 // wind up.
 std::optional<Delay> motor_delay(std::span<const Observation> observations);
 
-// Blocks of V, i, w, sign and acceleration of one motor (or their differences, without the sign), with the
-// speed of when the electrical readings were taken: w - delay a.
-std::vector<Products::Block> armature_blocks(std::span<const Observation> observations, Relation relation,
-                                             double delay_s);
+// V on i, w and sign of one motor, or of i and w of the differences of the sides: R, K and c. The speed is
+// that of when the electrical readings were taken, w - delay a; where the delay is not known (NaN) it is
+// estimated with them.
+BlockFit fit_armature(std::span<const Observation> observations, Relation relation, double delay_s);
 
 // [0] right, [1] left. The same of every robot of a kind are its siblings' to compare with.
 std::array<MotorConstants, 2> motor_constants(std::span<const Observation> observations, double delay_s);

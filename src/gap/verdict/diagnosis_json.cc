@@ -45,6 +45,7 @@ ordered_json checks_to_json(const Diagnosis& d) {
                       {"says", check.says},
                       {"contradicted", check.contradicted}});
     if (check.first_mission) checks.back()["first_mission"] = *check.first_mission;
+    if (!check.few_missions.empty()) checks.back()["few_missions"] = check.few_missions;
   }
   return checks;
 }

@@ -18,6 +18,14 @@ using nlohmann::json;
 using ::testing::IsEmpty;
 using testing::made_diagnosis;
 
+TEST(DiagnosisJson, WhatHoldsForFewMissionsNamesThem) {
+  Diagnosis d = made_diagnosis();
+  d.checks[0].few_missions = {2, 5};
+  const auto checks = diagnosis_to_json(d)["checks"];
+  EXPECT_EQ(checks[0]["few_missions"], json({2, 5}));
+  EXPECT_FALSE(checks[1].contains("few_missions"));
+}
+
 TEST(DiagnosisJson, TellsEveryField) {
   const Diagnosis d = made_diagnosis();
   const json told = diagnosis_to_json(d);
