@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -50,6 +51,15 @@ Result<GapTest> test_on_other_missions(const std::vector<std::string>& logs, con
                                        const robot::RobotModel& robot, const robot::RobotModel& corrected) {
   const auto others = telemetry::load_recordings(logs, robot_id);
   if (!others) return tl::unexpected(others.error());
+  for (const telemetry::Recording& mission : others->missions) {
+    const auto same = [&](const telemetry::Recording& d) {
+      return d.mission_id == mission.mission_id && !d.samples.empty() && !mission.samples.empty() &&
+             d.samples.front().utime_us == mission.samples.front().utime_us;
+    };
+    if (std::ranges::any_of(diagnosed, same))
+      return invalid("--test", "mission " + mission.mission_id +
+                                   " is one of the diagnosis; a test needs missions that had no part in it");
+  }
   std::vector<energy::DriveRun> runs;
   for (const telemetry::Recording& mission : others->missions)
     runs.push_back(

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "gap/diagnose/recordings.h"
+#include "gap/verdict/text.h"
 #include "tests/gap/checks/made_recordings.h"
 
 namespace joulecast::gap {
@@ -178,6 +180,99 @@ TEST(VirtualRobot, ALargeLossIsNotPatchedTogetherFromLargeErrorsThatCancel) {
   ASSERT_EQ(d.effects.size(), 1u);
   EXPECT_EQ(d.effects[0].id, "driver_loss");
   EXPECT_NEAR(d.effects[0].parameters[0].value, 0.42, 0.042);
+}
+
+// Battery power is right then, and nothing to be closed.
+TEST(VirtualRobot, MotorsSensorsThatAreWrongAloneAreNamed) {
+  struct Wrong {
+    const char* id;
+    double current_gain, current_bias_a, voltage_gain, value;
+  };
+  for (const Wrong& w :
+       {Wrong{"current_sensor_gain", 1.15, 0, 1, 0.15}, Wrong{"current_sensor_gain", 0.9, 0, 1, -0.1},
+        Wrong{"current_sensor_bias", 1, 0.5, 1, 0.5}, Wrong{"voltage_sensor_gain", 1, 0, 1.1, 0.1}}) {
+    made::Robot robot = virtual_missions({}, 17, true, 5);
+    for (telemetry::Recording& mission : robot.recordings.missions) {
+      for (auto& s : mission.samples) {
+        for (double& i : s.motor_current_a) i = w.current_gain * i + w.current_bias_a;
+        for (double& v : s.motor_voltage_v) v *= w.voltage_gain;
+      }
+    }
+    const Diagnosis d = diagnose_robot(robot);
+    SCOPED_TRACE(w.id);
+    EXPECT_EQ(name_of(d.verdict), "effects");
+    ASSERT_EQ(d.effects.size(), 1u);
+    EXPECT_EQ(d.effects[0].id, w.id);
+    EXPECT_GE(d.effects[0].probability, 0.9);
+    EXPECT_NEAR(d.effects[0].parameters[0].value, w.value, 0.1 * std::fabs(w.value));
+    EXPECT_LT(d.power_absolute_relative, 0.03);
+  }
+}
+
+// Longer than what is linear: it is taken out as the checks measure it, and hides nothing else.
+TEST(VirtualRobot, ABatteryThatIsReadHalfASecondLateIsADelay) {
+  for (const double gain : {1.0, 1.2}) {
+    made::Robot robot = virtual_missions({{"coulomb_friction", gain - 1}}, 18, false, 5);
+    for (telemetry::Recording& mission : robot.recordings.missions) {
+      const std::vector<signals::Sample> on_time = mission.samples;
+      const auto late = static_cast<std::size_t>(
+          std::lround(0.5e6 / static_cast<double>(on_time[1].utime_us - on_time[0].utime_us)));
+      for (std::size_t k = 0; k < on_time.size(); ++k) {
+        const signals::Sample& before = on_time[k < late ? 0 : k - late];
+        mission.samples[k].battery_current_a = before.battery_current_a;
+        mission.samples[k].battery_voltage_v = before.battery_voltage_v;
+      }
+    }
+    const Diagnosis d = diagnose_robot(robot);
+    EXPECT_EQ(name_of(d.verdict), "effects");
+    const auto delay = std::ranges::find(d.effects, "sensor_delay", &DiagnosedEffect::id);
+    ASSERT_NE(delay, d.effects.end());
+    EXPECT_NEAR(delay->parameters[0].value, 0.5, 0.02);
+    EXPECT_EQ(d.effects.size(), gain > 1 ? 2u : 1u);
+    ASSERT_TRUE(d.shrinkage);
+    EXPECT_GT(d.shrinkage->fraction, 0.75);
+  }
+}
+
+// Far from its file for the load alone: the file is not bent to it.
+TEST(VirtualRobot, ALoadThatFallsWithTimeIsToldInWattsAndCorrectsNoFile) {
+  made::Robot robot = virtual_missions({}, 19, false, 6);
+  const double first_w = 40;
+  for (telemetry::Recording& mission : robot.recordings.missions) {
+    const double length_us =
+        static_cast<double>(mission.samples.back().utime_us - mission.samples.front().utime_us);
+    for (auto& s : mission.samples) {
+      const double part = static_cast<double>(s.utime_us - mission.samples.front().utime_us) / length_us;
+      s.battery_current_a += first_w * (1 - part) / s.battery_voltage_v;
+    }
+  }
+  const Diagnosis d = diagnose_robot(robot);
+  EXPECT_EQ(d.outside.follows, "time");
+  EXPECT_EQ(d.outside.like, "accessory_load");
+  EXPECT_NEAR(d.outside.power_w[0], first_w * 5 / 6, 0.1 * first_w);
+  EXPECT_NEAR(d.outside.power_w[1], first_w / 6, 0.1 * first_w);
+  EXPECT_NE(outside_words(d.outside).find("independent of motion that follows time"), std::string::npos);
+  EXPECT_FALSE(d.refusal.empty());
+}
+
+// Some 25 W that come and go by the second: whatever else may be there, these recordings do not show that
+// nothing is.
+TEST(VirtualRobot, WhatMayBeNoiseAltogetherIsNotNothing) {
+  made::Robot robot = virtual_missions({}, 20, false, 6);
+  std::mt19937_64 engine(20);
+  std::normal_distribution<double> normal(0, 25);
+  for (telemetry::Recording& mission : robot.recordings.missions) {
+    double more_w = 0;
+    for (std::size_t k = 0; k < mission.samples.size(); ++k) {
+      if (k % 50 == 0) more_w = normal(engine);
+      const double more_a = more_w / mission.samples[k].battery_voltage_v;
+      mission.samples[k].battery_current_a += more_a;
+      mission.samples[k].battery_voltage_v -= robot.model.battery.internal_resistance_ohm * more_a;
+    }
+  }
+  const Diagnosis d = diagnose_robot(robot);
+  EXPECT_GT(d.noise_floor, 0.2);
+  EXPECT_EQ(name_of(d.verdict), "inconclusive");
 }
 
 }  // namespace

@@ -48,7 +48,8 @@ bool told_outside(const Hypothesis& hypothesis, const Member& member) {
 }
 
 bool shows_in_power(const Hypothesis& hypothesis) {
-  return !hypothesis.is_effect() || !traits_of(hypothesis.id()).elsewhere;
+  return !hypothesis.is_effect() ||
+         (!traits_of(hypothesis.id()).elsewhere && !moves_motors_alone(hypothesis));
 }
 
 double seen_share(const Mixture& mixture) {
@@ -128,7 +129,7 @@ Named name_causes(const Material& m, const Equations& e, const Problem& problem,
       double opened = least;
       std::optional<std::size_t> spare;
       for (const std::size_t h : set) {
-        if (!shows_in_power(problem.hypotheses[h]) || moves_motors_alone(problem.hypotheses[h])) continue;
+        if (!shows_in_power(problem.hypotheses[h])) continue;
         if (const double o = gap_with(without(set, h)) - all; o < opened) opened = o, spare = h;
       }
       if (!spare) break;

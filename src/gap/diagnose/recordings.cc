@@ -65,9 +65,10 @@ bool at_its_bound(const Cause& cause) {
 
 class Diagnoser {
  public:
+  // `delay_s`: of the electrical channels behind the wheels, as checks measured it.
   Diagnoser(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
-            const DiagnosisSettings& settings)
-      : recordings_(recordings), robot_(robot), settings_(settings) {}
+            const DiagnosisSettings& settings, double delay_s)
+      : recordings_(recordings), robot_(robot), settings_(settings), measured_delay_s_(delay_s) {}
 
   Result<Diagnosis> run();
 
@@ -107,12 +108,14 @@ class Diagnoser {
                  Named& named);
   std::vector<dynamics::ActiveEffect> instead_of(const Problem& problem, const Member& member) const;
   void add_wander(const Mixture& mixture, const Explanation& explanation, Findings& findings) const;
+  std::array<double, 2> load_by_time() const;
   void add_baseline();
   void lower_noise_floor(double left);
 
   const telemetry::RecordingSet& recordings_;
   const robot::RobotModel& robot_;
   const DiagnosisSettings& settings_;
+  double measured_delay_s_;
   std::vector<dynamics::ActiveEffect> adopted_;
   std::vector<std::string> covariates_;
   windows::Readings readings_;
@@ -206,7 +209,11 @@ bool Diagnoser::fit() {
                                 (robot_.motor.torque_constant_nm_a * robot_.motor.gear_ratio);
   const auto still = [&] { return goes_on(after_fit * 0.5); };
   // A delay is linear only while it is short beside the window, a bias only while it turns no current's sign:
-  // what is found is taken out of the windows and fitted again.
+  // what is found is taken out of the windows and fitted again, from what checks measured on.
+  if (measured_delay_s_ != 0) {
+    taken_out_.electrical_delay_s = measured_delay_s_;
+    view_ = view_of(taken_out_);
+  }
   for (int round = 0;; ++round) {
     fit_ = fit_windows(material(), {}, fit_settings_, still);
     if (fit_ && d_.power_absolute_relative > huge_gap && round == 0 && !from_motion_.alone()) {
@@ -216,6 +223,7 @@ bool Diagnoser::fit() {
       if (other->log_joint > fit_->log_joint) fit_ = std::move(other);
     }
     if (!fit_) return false;
+    if (!fit_settings_.again) break;
     const windows::WindowSettings before = taken_out_;
     take_out(fit_->causes, taken_out_);
     const bool settled =
@@ -385,6 +393,24 @@ void Diagnoser::add_wander(const Mixture& mixture, const Explanation& explanatio
   }
 }
 
+std::array<double, 2> Diagnoser::load_by_time() const {
+  std::vector<Cause> others = causes_;
+  std::erase_if(others,
+                [](const Cause& c) { return !c.by && c.effect.effect->info().id == "accessory_load"; });
+  const std::vector<double> model = modelled(others);
+  double end_s = 0;
+  for (const Window& w : view_.windows) end_s = std::max(end_s, w.t_s);
+  std::array<double, 2> sum{}, count{};
+  for (std::size_t k = 0; k < model.size(); ++k) {
+    const double t_s = view_.windows[k].t_s;
+    if (!std::isfinite(view_.power_w[k]) || (t_s > end_s / 3 && t_s < 2 * end_s / 3)) continue;
+    const std::size_t at = t_s > end_s / 3 ? 1 : 0;
+    sum[at] += view_.power_w[k] - model[k];
+    count[at] += 1;
+  }
+  return {sum[0] / std::max(count[0], 1.0), sum[1] / std::max(count[1], 1.0)};
+}
+
 void Diagnoser::add_baseline() {
   if (!held_out_ || d_.power == PowerSource::none) return;
   d_.baseline = baseline_of(*held_out_);
@@ -461,11 +487,13 @@ bool Diagnoser::judge_all() {
   for (const std::size_t h : named_)
     f.instead.push_back(instead_of(problem, *std::ranges::find(explanation.members, h, &Member::hypothesis)));
   add_wander(mixture, explanation, f);
+  f.load_by_time_w = load_by_time();
   add_baseline();
   if (!named_.empty() && d_.power != PowerSource::none)
     d_.shrinkage = shrinkage_of(*held_out_, problem.hypotheses, sought, d_.noise_floor);
   lower_noise_floor(std::min(held_out_->explained(), held_out_->referee()));
   judge(d_, f, robot_);
+  if (d_.verdict == Verdict::none) d_.where.clear();
   if (d_.power == PowerSource::none) {  // nothing says what a name closes, or moves at the battery
     for (DiagnosedEffect& e : d_.effects) e.share = e.power_w = missing;
   }
@@ -510,6 +538,17 @@ Diagnosis Diagnoser::nothing_to_judge() {
   return std::move(d_);
 }
 
+// Of the electrical channels behind the wheels. Where the gyro is ahead of the wheels, these are late, and all
+// else is ahead of them.
+double measured_delay_s(std::span<const Check> checks) {
+  const auto value_of = [&](std::string_view id) {
+    const auto at = std::ranges::find(checks, id, &Check::id);
+    return at == checks.end() ? 0.0 : at->value;
+  };
+  const double electrical_s = value_of("electrical_delay");
+  return electrical_s != 0 ? electrical_s : std::min(0.0, value_of("yaw_rate_delay"));
+}
+
 }  // namespace
 
 Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
@@ -521,14 +560,15 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   const telemetry::RecordingSet& trusted = cleared ? *cleared : recordings;
   // Where a sensor or the robot changed between missions each side is judged alone: the later one is today's.
   const auto sides = split_at_step(trusted, checks);
-  Result<Diagnosis> d = Diagnoser(sides ? (*sides)[1] : trusted, robot, settings).run();
+  const double delay_s = measured_delay_s(checks);
+  Result<Diagnosis> d = Diagnoser(sides ? (*sides)[1] : trusted, robot, settings, delay_s).run();
   if (!d) return d;
   d->checks.insert(d->checks.begin(), checks.begin(), checks.end());
   d->notes.insert(d->notes.begin(), recordings.notes.begin(), recordings.notes.end());
   if (sides) {
     DiagnosisSettings quick = settings;
     quick.controls = 0;
-    const Result<Diagnosis> earlier = Diagnoser((*sides)[0], robot, quick).run();
+    const Result<Diagnosis> earlier = Diagnoser((*sides)[0], robot, quick, delay_s).run();
     if (!earlier) return earlier;
     d->notes.push_back(earlier_words(*earlier, (*sides)[1].missions.front().mission_id));
   }

@@ -5,6 +5,11 @@
 #include "statistics/robust.h"
 
 namespace joulecast::gap {
+namespace {
+
+constexpr double near_zero = 0.5;  // of the range of a covariate
+
+}  // namespace
 
 std::vector<Modulation> modulations_of(std::span<const Window> windows) {
   std::vector<Modulation> modulations;
@@ -14,8 +19,11 @@ std::vector<Modulation> modulations_of(std::span<const Window> windows) {
     for (const Window& w : windows) {
       if (std::isfinite(w.covariates[k])) known.push_back(w.covariates[k]);
     }
-    if (2 * known.size() < windows.size() || std::ranges::min(known) == std::ranges::max(known)) continue;
-    modulations.push_back({k, statistics::median(std::move(known))});
+    if (2 * known.size() < windows.size()) continue;
+    const auto [least, most] = std::ranges::minmax(known);
+    if (least == most) continue;
+    const bool amount = least >= 0 && least < near_zero * (most - least);
+    modulations.push_back({k, amount ? 0.0 : statistics::median(std::move(known))});
   }
   return modulations;
 }

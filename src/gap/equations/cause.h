@@ -26,7 +26,8 @@ struct Modulation {
   }
 };
 
-// Each covariate that is known in at least half of the windows and differs among them, by its median.
+// Each covariate that is known in at least half of the windows and differs among them: by its median, or by 0
+// where it comes near 0 for how far it ranges, as a load in W or per cent does and a temperature does not.
 std::vector<Modulation> modulations_of(std::span<const Window> windows);
 
 // Something found, with its strength: an effect in force, or one whose strength, parameter `parameter`, is so

@@ -129,6 +129,7 @@ std::vector<FileCorrection> corrections_of(const robot::RobotModel& robot,
     const double value = mean_of(file[json::json_pointer(change->pointer)]);
     std::string name = change->pointer.substr(1);
     std::ranges::replace(name, '/', '.');
+    if ((1 + change->times) * value + change->plus == value) continue;
     const bool scales = change->times != 0;
     corrections.push_back({std::move(name), value, (1 + change->times) * value + change->plus,
                            scales ? deviations[k] * std::fabs(value) : deviations[k]});

@@ -1,5 +1,7 @@
 #include "gap/verdict/judge.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -8,6 +10,7 @@
 #include "gap/verdict/adopt.h"
 #include "gap/verdict/probability.h"
 #include "gap/verdict/text.h"
+#include "gap/verdict/words.h"
 
 namespace joulecast::gap {
 namespace {
@@ -28,6 +31,7 @@ constexpr double doubtful = 0.6;          // factor on names beside which someth
 constexpr double sure = 0.9;              // probability of such a name
 constexpr double varying = 0.7;           // most of a name whose strength varies, or that nothing proves
 constexpr double most_detectable = 0.08;  // share below which effects must be seen for "none"
+constexpr double most_noise = 0.2;        // of the power, that a file which is right may miss
 
 // A battery sensor that reads too much while the motors' are right: a load that follows the current would
 // read the same.
@@ -82,6 +86,7 @@ struct Doubts {
   bool unexplained = false;  // held-out parts keep more of the gap than right names leave
   bool partly = false;       // the same, whether or not they predict better than the regression
   bool like_load = false;
+  bool outside = false;  // what is outside the catalogue is the answer
   bool any_against() const { return idle || worse || unexplained || like_load; }
 };
 
@@ -192,7 +197,8 @@ class Judge {
       largest = m.share;
       by_function_ = true;
       d_.outside = {std::min(m.by_evidence, m.by_prediction), h.channel, h.variable, "", {}, controls};
-      if (h.variable == "time" && h.channel.starts_with("battery_power")) d_.outside.like = "accessory_load";
+      if (h.variable == "time" && h.channel.starts_with("battery_power"))
+        d_.outside.like = "accessory_load", d_.outside.power_w = f_.load_by_time_w;
     }
     if (f_.wandering) {
       const Member& m = f_.explanation.members[*f_.wandering];
@@ -270,11 +276,12 @@ class Judge {
     const bool seen_elsewhere =
         std::ranges::any_of(f_.named, [&](std::size_t h) { return !shows_in_power(hypothesis(h)); });
     const bool nothing = d_.effects.empty() || doubts_.idle || (!open && all_unsure && !seen_elsewhere);
+    doubts_.outside = outside;
     if (outside) {
       d_.verdict = Verdict::outside;
       d_.verdict_probability = d_.outside.probability;
     } else if (nothing) {
-      const bool blind = d_.detectable_share > most_detectable;
+      const bool blind = d_.detectable_share > most_detectable || d_.noise_floor > most_noise;
       const bool something = d_.outside.probability >= least_named;
       d_.verdict = !open && !blind && !something ? Verdict::none : Verdict::inconclusive;
       d_.verdict_probability = open ? 1 : std::max(f_.explanation.none, least_named);
@@ -334,7 +341,18 @@ class Judge {
     }
     if (d_.verdict == Verdict::not_this_robot)
       d_.corrections = corrections_of(robot_, d_.adoptable, deviations);
-    d_.refusal = refusal_of(d_, doubts_.worse_alone, doubts_.any_against());
+    d_.refusal = refusal_of(d_, doubts_.worse_alone, doubts_.any_against() || weakest_ < least_named);
+    if (d_.verdict == Verdict::not_this_robot && d_.refusal.empty()) d_.refusal = correction_refusal();
+  }
+
+  // Why a file that is not this robot's is not corrected by what was found.
+  std::string correction_refusal() const {
+    if (doubts_.outside) return "something that no effect of the catalogue describes is at work";
+    const auto unsteady =
+        std::ranges::find_if(d_.effects, [](const auto& e) { return e.varies > steady_wander; });
+    if (unsteady == d_.effects.end()) return {};
+    return fmt::format("the strength of {} varies along the recordings by {} of itself", unsteady->id,
+                       percent(unsteady->varies));
   }
 
   Diagnosis& d_;

@@ -29,6 +29,9 @@ struct Findings {
   // Member whose strength does not stand still, the one that moves most.
   std::optional<std::size_t> wandering{};
   std::array<double, 2> wandering_power_w{};
+  // Of a load independent of motion: what is measured beyond the other causes in the first and in the last
+  // third of the time since a mission began.
+  std::array<double, 2> load_by_time_w{};
   bool of_groups = false;  // strengths are differences between groups: large ones make no other robot
 };
 

@@ -69,6 +69,11 @@ void say_shrinkage(const Diagnosis& d, bool unexplained, std::vector<std::string
   }
 }
 
+bool of_motors_alone(const DiagnosedEffect& e) {
+  const auto battery = std::ranges::find(e.parameters, "battery", &DiagnosedParameter::name);
+  return battery != e.parameters.end() && battery->value == 0;
+}
+
 void say_effects(const Diagnosis& d, std::vector<std::string>& reasons) {
   for (const DiagnosedEffect& e : d.effects) {
     if (!e.alternatives.empty()) {
@@ -85,7 +90,8 @@ void say_effects(const Diagnosis& d, std::vector<std::string>& reasons) {
       reasons.push_back(sentence(fmt::format("the strength of {} varies along the recordings by {} of itself",
                                              words_of(e.id), percent(e.varies))));
     }
-    if ((e.id == "current_sensor_gain" || e.id == "voltage_sensor_gain") && d.motor_channels)
+    if ((e.id == "current_sensor_gain" || e.id == "voltage_sensor_gain") && d.motor_channels &&
+        !of_motors_alone(e))
       reasons.push_back(
           sentence(fmt::format("a load that follows the current would look like {}", words_of(e.id))));
   }
@@ -175,6 +181,11 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse, bool unexpl
           "{} of the power is missed where nothing could remove {}, and no effect of the catalogue "
           "accounts for it well enough to be named",
           percent(d.power_absolute_relative), percent(d.noise_floor))));
+    } else if (d.detectable_share < d.noise_floor) {
+      reasons.push_back(sentence(
+          fmt::format("{} of the power is missed, which may be noise or hide something: nothing in these "
+                      "recordings predicts it better",
+                      percent(d.power_absolute_relative))));
     } else {
       reasons.push_back(
           sentence(fmt::format("an effect that moves less than {} of the power could not have been seen in "
