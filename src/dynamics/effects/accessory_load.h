@@ -6,7 +6,7 @@ namespace joulecast::dynamics {
 
 struct AccessoryLoad {
   static constexpr std::array parameters =
-      std::to_array<EffectParameter>({{"power_w", "W", 0, -200, 2000, "extra constant power"}});
+      std::to_array<EffectParameter>({{"power_w", "W", 0, -2000, 20000, "extra constant power"}});
   static constexpr EffectInfo info{
       "accessory_load",
       ActsOn::battery_side,
