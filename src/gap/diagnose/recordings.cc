@@ -9,6 +9,7 @@
 #include "gap/diagnose/controls.h"
 #include "gap/diagnose/fewer_causes.h"
 #include "gap/diagnose/held_out.h"
+#include "gap/diagnose/late_battery.h"
 #include "gap/diagnose/naming.h"
 #include "gap/diagnose/referee.h"
 #include "gap/diagnose/refit.h"
@@ -538,15 +539,26 @@ Diagnosis Diagnoser::nothing_to_judge() {
   return std::move(d_);
 }
 
-// Of the electrical channels behind the wheels. Where the gyro is ahead of the wheels, these are late, and all
-// else is ahead of them.
-double measured_delay_s(std::span<const Check> checks) {
-  const auto value_of = [&](std::string_view id) {
-    const auto at = std::ranges::find(checks, id, &Check::id);
-    return at == checks.end() ? 0.0 : at->value;
-  };
-  const double electrical_s = value_of("electrical_delay");
-  return electrical_s != 0 ? electrical_s : std::min(0.0, value_of("yaw_rate_delay"));
+// A delay that the checks measured: of all electrical channels behind the wheels, or of the battery's behind
+// the motors'.
+struct MeasuredDelay {
+  double electrical_s = 0, battery_s = 0;
+};
+
+MeasuredDelay measured_delay(std::span<const Check> checks, const telemetry::RecordingSet& recordings) {
+  const auto check = [&](std::string_view id) { return std::ranges::find(checks, id, &Check::id); };
+  if (const auto late = check("electrical_delay"); late != checks.end()) {
+    const bool motors = std::ranges::any_of(recordings.missions, [](const telemetry::Recording& m) {
+      return std::ranges::any_of(m.samples, [](const auto& s) {
+        return std::isfinite(s.motor_current_a[0] + s.motor_current_a[1]);
+      });
+    });
+    if (late->channel == "battery_current" && motors) return {0, late->value};
+    return {late->value, 0};
+  }
+  // Where the gyro is ahead of the wheels, these are late, and all else is ahead of them.
+  const auto gyro = check("yaw_rate_delay");
+  return {gyro == checks.end() ? 0 : std::min(0.0, gyro->value), 0};
 }
 
 }  // namespace
@@ -557,18 +569,22 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   std::optional<telemetry::RecordingSet> cleared;
   if (std::ranges::any_of(checks, &Check::contradicted))
     silence_contradicted(cleared.emplace(recordings), checks);
+  const auto [electrical_s, battery_s] = measured_delay(checks, cleared ? *cleared : recordings);
+  if (battery_s != 0) {
+    if (!cleared) cleared = recordings;
+    for (telemetry::Recording& mission : cleared->missions) move_battery_back(mission, battery_s);
+  }
   const telemetry::RecordingSet& trusted = cleared ? *cleared : recordings;
   // Where a sensor or the robot changed between missions each side is judged alone: the later one is today's.
   const auto sides = split_at_step(trusted, checks);
-  const double delay_s = measured_delay_s(checks);
-  Result<Diagnosis> d = Diagnoser(sides ? (*sides)[1] : trusted, robot, settings, delay_s).run();
+  Result<Diagnosis> d = Diagnoser(sides ? (*sides)[1] : trusted, robot, settings, electrical_s).run();
   if (!d) return d;
   d->checks.insert(d->checks.begin(), checks.begin(), checks.end());
   d->notes.insert(d->notes.begin(), recordings.notes.begin(), recordings.notes.end());
   if (sides) {
     DiagnosisSettings quick = settings;
     quick.controls = 0;
-    const Result<Diagnosis> earlier = Diagnoser((*sides)[0], robot, quick, delay_s).run();
+    const Result<Diagnosis> earlier = Diagnoser((*sides)[0], robot, quick, electrical_s).run();
     if (!earlier) return earlier;
     d->notes.push_back(earlier_words(*earlier, (*sides)[1].missions.front().mission_id));
   }
