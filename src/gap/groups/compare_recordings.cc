@@ -117,9 +117,8 @@ double length_of(const Window& w) {
   return 0.5 * w.length_s;
 }
 
-// Fills groups, gap and limits; items of the comparison.
-std::vector<Item> measure(const Grouped& g, const robot::RobotModel& robot, std::span<const double> common_w,
-                          Comparison& c) {
+// Fills groups; items of the comparison.
+std::vector<Item> measure(const Grouped& g, const robot::RobotModel& robot, Comparison& c) {
   std::vector<Item> items;
   for (std::size_t m = 0; m < g.group_of_mission.size(); ++m) {
     ++c.groups[g.group_of_mission[m]].missions;
@@ -130,19 +129,15 @@ std::vector<Item> measure(const Grouped& g, const robot::RobotModel& robot, std:
     const double way_m =
         0.5 * robot.kinematics.wheel_radius_m * std::fabs(w.speed_rad_s[0] + w.speed_rad_s[1]) * length_of(w);
     const std::size_t group = g.group_of_mission[w.mission];
-    items.push_back(
-        {group, w.block, g.power_w[k], common_w[k], length_of(w), length_of(w), way_m, length_of(w)});
+    items.push_back({group, w.block, g.power_w[k], length_of(w), length_of(w), way_m, length_of(w)});
     ComparedGroup& own = c.groups[group];
-    const bool known = std::isfinite(g.power_w[k] + common_w[k]);
+    const bool known = std::isfinite(g.power_w[k]);
     if (known || g.power == PowerSource::none) own.way_m += way_m;
     if (!known) continue;
     own.energy_per_m_j += g.power_w[k] * length_of(w);
-    own.model_per_m_j += common_w[k] * length_of(w);
   }
   for (ComparedGroup& own : c.groups) {
-    const double way_m = g.power != PowerSource::none && own.way_m > 0 ? own.way_m : missing;
-    own.energy_per_m_j /= way_m;
-    own.model_per_m_j /= way_m;
+    own.energy_per_m_j /= g.power != PowerSource::none && own.way_m > 0 ? own.way_m : missing;
   }
   return items;
 }
@@ -206,9 +201,40 @@ Result<Grouped> make_groups(const telemetry::RecordingSet& recordings,
   return g;
 }
 
-// Gaps and noise of all groups together, around what they share.
+// Of each group by itself, since what differs between groups is no noise; powers count as far as there are
+// of them, other readings by how often they were read.
+std::vector<ChannelGap> gaps_of_groups(const Material& all, const Grouped& g) {
+  std::vector<ChannelGap> gaps;
+  std::map<std::string, double> whole;
+  for (std::size_t from = 0; from < g.windows.size();) {
+    const std::size_t group = g.group_of_mission[g.windows[from].mission];
+    double power = 0;
+    std::size_t to = from;
+    for (; to < g.windows.size() && g.group_of_mission[g.windows[to].mission] == group; ++to)
+      power += std::isfinite(g.power_w[to]) ? std::fabs(g.power_w[to]) : 0;
+    Material own = all;
+    own.windows = all.windows.subspan(from, to - from);
+    for (ChannelGap& gap : channel_gaps(own)) {
+      const double size =
+          gap.channel.ends_with("_power") && power > 0 ? power : static_cast<double>(to - from);
+      gap.absolute_relative *= size, gap.noise_floor *= size;
+      whole[gap.channel] += size;
+      const auto sum = std::ranges::find(gaps, gap.channel, &ChannelGap::channel);
+      if (sum == gaps.end()) {
+        gaps.push_back(std::move(gap));
+        continue;
+      }
+      sum->absolute_relative += gap.absolute_relative, sum->noise_floor += gap.noise_floor;
+    }
+    from = to;
+  }
+  for (ChannelGap& gap : gaps)
+    gap.absolute_relative /= whole[gap.channel], gap.noise_floor /= whole[gap.channel];
+  return gaps;
+}
+
 void describe(const telemetry::RecordingSet& recordings, const Grouped& g, const Material& material,
-              std::span<const Cause> causes, std::span<const double> common_w, Comparison& c) {
+              Comparison& c) {
   Diagnosis& d = c.diagnosis;
   d.robot_id = recordings.robot_id;
   d.missions = recordings.missions.size();
@@ -216,18 +242,10 @@ void describe(const telemetry::RecordingSet& recordings, const Grouped& g, const
   d.notes = recordings.notes;
   d.motor_channels = !g.from_motion.power;
   d.power = g.power;
-  const GapSize size = gap_size(g.power_w, common_w);
-  d.energy_relative = size.energy_relative;
-  d.power_absolute_relative = size.absolute_relative;
-  d.channels = channel_gaps(material);
+  d.channels = gaps_of_groups(material, g);
   const auto floor = std::ranges::find(
       d.channels, g.power == PowerSource::battery ? "battery_power" : "motor_power", &ChannelGap::channel);
   d.noise_floor = g.power == PowerSource::none || floor == d.channels.end() ? missing : floor->noise_floor;
-  if (g.power == PowerSource::none) d.energy_relative = d.power_absolute_relative = missing;
-  for (const Cause& cause : causes) {
-    c.common.push_back(cause.by ? "covariate:" + g.covariates[cause.by->covariate]
-                                : std::string(cause.effect.effect->info().id));
-  }
   add_limits(g, c);
 }
 
@@ -241,8 +259,8 @@ Cause strengthened(Cause cause, const Eigen::VectorXd& coefficients) {
   return cause;
 }
 
-// Power of every window with what all groups share and what its own has besides.
-std::vector<double> predicted(const Material& material, const Grouped& g, const std::vector<Cause>& shared,
+// Power of every window with the causes of its group.
+std::vector<double> predicted(const Material& material, const Grouped& g,
                               const std::vector<std::vector<Cause>>& by_group) {
   std::vector<double> power_w;
   std::size_t from = 0;
@@ -250,9 +268,7 @@ std::vector<double> predicted(const Material& material, const Grouped& g, const 
     const std::size_t group = g.group_of_mission[g.windows[from].mission];
     std::size_t to = from;
     while (to < g.windows.size() && g.group_of_mission[g.windows[to].mission] == group) ++to;
-    std::vector<Cause> causes = shared;
-    causes.insert(causes.end(), by_group[group].begin(), by_group[group].end());
-    const auto own = modelled_power(material.robot, material.adopted, causes,
+    const auto own = modelled_power(material.robot, material.adopted, by_group[group],
                                     std::span(g.windows).subspan(from, to - from));
     power_w.insert(power_w.end(), own.begin(), own.end());
     from = to;
@@ -302,7 +318,7 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   const Grouped& g = *grouped;
   const std::size_t groups = c.groups.size();
 
-  // What all groups share is found first, and everything linearised around it.
+  // Everything is linearised around what one finds in all groups.
   const Material material{robot,         *adopted,         g.windows,   g.group_of_block.size(),
                           g.from_motion, g.readings.row_s, g.covariates};
   FitSettings fit_settings;
@@ -315,29 +331,23 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   if (!fit || (settings.progress && !settings.progress(after_fit)))
     return fail(Fault::conflict, "", "comparison cancelled");
 
-  const std::vector<double> common_w = modelled_power(robot, *adopted, fit->causes, g.windows);
-  describe(recordings, g, material, fit->causes, common_w, c);
+  describe(recordings, g, material, c);
 
-  GroupedData data{robot,
-                   problem_of(fit->linear, g, groups, {}),
-                   g.group_of_block,
-                   measure(g, robot, common_w, c),
-                   {},
-                   {},
-                   {},
-                   {},
-                   {},
-                   {}};
+  GroupedData data{robot};
+  data.base = problem_of(fit->linear, g, groups, {});
+  data.group_of_block = g.group_of_block;
+  data.items = measure(g, robot, c);
   data.explain.most_members = 2;
-  data.shared = fit->causes;
   data.explain.most_families = 1;
+  data.explain.candidate = true;
+  data.around = fit->causes;
   data.explain.beam = 5;
   data.without = [&](const std::vector<bool>& out) { return problem_of(fit->linear, g, groups, out); };
   data.cause = [&](std::size_t h, const Eigen::VectorXd& coefficients) {
     return strengthened(fit->linear.columns->hypotheses()[h].cause(), coefficients);
   };
   data.predict = [&](const std::vector<std::vector<Cause>>& by_group) {
-    return predicted(material, g, fit->causes, by_group);
+    return predicted(material, g, by_group);
   };
   data.referee = [&](const std::vector<double>& missed, const std::vector<bool>& use) {
     return refereed(material, g, groups, missed, use);

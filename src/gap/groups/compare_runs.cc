@@ -22,19 +22,12 @@ RunSet without_own_label(RunSet set, std::span<const std::string> group_of_run) 
   return set;
 }
 
-// Runs with the group of each, around what all of them share.
+// Runs with the group of each.
 struct GroupedRuns {
   const RunSet& set;
   const RunColumns& columns;
   const std::vector<std::size_t>& block;
   const std::vector<std::size_t>& group;
-  const std::vector<Cause>& shared;
-
-  double modelled_j(std::size_t run, const std::vector<std::vector<Cause>>& by_group) const {
-    std::vector<Cause> causes = shared;
-    causes.insert(causes.end(), by_group[group[run]].begin(), by_group[group[run]].end());
-    return columns.modelled(run, causes).sum_j;
-  }
 
   // The plain regression of each group alone, on what the model misses of each run in use.
   std::vector<double> regression(const RunReferee& referee, const std::vector<double>& missed,
@@ -54,32 +47,24 @@ struct GroupedRuns {
   std::vector<Item> items(std::vector<ComparedGroup>& groups) const {
     std::vector<Item> items;
     for (std::size_t k = 0; k < block.size(); ++k) {
-      const auto modelled = columns.modelled(k, shared);
       const double measured = set.runs[k].measured_j(), way_m = set.runs[k].at.distance_m;
       items.push_back(
-          {group[k], block[k], measured, modelled.sum_j, 1 / measured, 1, way_m, modelled.duration_s});
+          {group[k], block[k], measured, 1 / measured, 1, way_m, columns.modelled(k, {}).duration_s});
       ComparedGroup& g = groups[group[k]];
       ++g.missions, ++g.samples;
       g.way_m += way_m;
       g.energy_per_m_j += measured;
-      g.model_per_m_j += modelled.sum_j;
     }
-    for (ComparedGroup& g : groups) g.energy_per_m_j /= g.way_m, g.model_per_m_j /= g.way_m;
+    for (ComparedGroup& g : groups) g.energy_per_m_j /= g.way_m;
     return items;
   }
 };
 
-void fill_gap(Diagnosis& d, const GroupedRuns& runs, std::span<const Item> items, double scatter) {
-  double measured_j = 0, modelled_j = 0;
-  for (const Item& item : items) measured_j += item.measured, modelled_j += item.common;
-  d.missions = d.samples = items.size();
-  d.motor_channels = runs.columns.by_motor();
+void describe(const RunColumns& columns, double scatter, Diagnosis& d) {
+  d.missions = d.samples = columns.runs().size();
+  d.motor_channels = columns.by_motor();
   d.power = d.motor_channels ? PowerSource::motors : PowerSource::battery;
-  d.energy_relative = (measured_j - modelled_j) / measured_j;
-  d.power_absolute_relative = runs.columns.error(runs.shared);
-  d.noise_floor = std::min(std::sqrt(2 / std::numbers::pi) * scatter, d.power_absolute_relative);
-  d.channels = {
-      {d.motor_channels ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
+  d.noise_floor = std::sqrt(2 / std::numbers::pi) * scatter;
 }
 
 }  // namespace
@@ -99,14 +84,13 @@ Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> 
   const RunSet compared = without_own_label(set, group_of_run);
   RunColumns columns(compared, robot, *std::move(adopted));
   const std::vector<std::size_t> block = blocks_of(compared.runs, group_of_run);
-  // What all runs share is found first; differences are judged around it.
-  const RunFinding shared = search_runs(columns, block);
-  columns.linearise_around(shared.causes);
+  // Differences are judged around what one finds in all runs.
+  const std::vector<Cause> around = search_runs(columns, block).causes;
+  columns.linearise_around(around);
   const RunReferee referee(columns);
-  const GroupedRuns runs{compared, columns, block, group, shared.causes};
+  const GroupedRuns runs{compared, columns, block, group};
 
-  GroupedData data{
-      robot, {}, std::vector<std::size_t>(1 + *std::ranges::max_element(block)), {}, {}, {}, {}, {}, {}, {}};
+  GroupedData data{robot};
   data.without = [&](const std::vector<bool>& out) {
     std::vector<bool> runs_out(out.empty() ? 0 : block.size());
     for (std::size_t k = 0; k < runs_out.size(); ++k) runs_out[k] = out[block[k]];
@@ -115,8 +99,10 @@ Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> 
   const RunScatter scatter = learn_scatter(columns, {}, group);
   data.base = make_problem(columns, scatter, block);
   data.explain.most_families = 1;
+  data.explain.candidate = true;
+  data.around = around;
   data.explain.most_members = 2;
-  data.shared = shared.causes;
+  data.group_of_block.resize(1 + *std::ranges::max_element(block));
   for (std::size_t k = 0; k < block.size(); ++k) data.group_of_block[block[k]] = group[k];
   data.items = runs.items(c.groups);
   data.cause = [&](std::size_t h, const Eigen::VectorXd& coefficients) {
@@ -124,19 +110,21 @@ Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> 
   };
   data.predict = [&](const std::vector<std::vector<Cause>>& by_group) {
     std::vector<double> energies;
-    for (std::size_t k = 0; k < block.size(); ++k) energies.push_back(runs.modelled_j(k, by_group));
+    for (std::size_t k = 0; k < block.size(); ++k)
+      energies.push_back(columns.modelled(k, by_group[group[k]]).sum_j);
     return energies;
   };
   data.referee = [&](const std::vector<double>& missed, const std::vector<bool>& use) {
     return runs.regression(referee, missed, use);
   };
   c.diagnosis.robot_id = robot.robot_id;
-  fill_gap(c.diagnosis, runs, data.items, scatter.run);
-  for (const std::size_t h : shared.named) c.common.push_back(columns.hypotheses()[h].id());
+  describe(columns, scatter.run, c.diagnosis);
   c.limits.emplace_back(
       "A group is what its name says and whatever else was different: day, payload, tyres, batteries, "
       "weather.");
   if (!compare_groups(data, settings, c)) return fail(Fault::conflict, "", "comparison cancelled");
+  c.diagnosis.channels = {{c.diagnosis.motor_channels ? "motor_power" : "battery_power",
+                           c.diagnosis.power_absolute_relative, c.diagnosis.noise_floor}};
   return c;
 }
 

@@ -14,15 +14,46 @@ namespace joulecast::gap {
 namespace {
 
 constexpr std::size_t most_parts = 6;
-constexpr double after_parts = 0.7;  // of the progress
+constexpr std::size_t most_shared = 4;  // causes that all groups share
+constexpr double after_parts = 0.7;     // of the progress
 
-// A cause in all groups.
+// A cause that differs between groups.
 struct Contrasted {
   std::size_t hypothesis = 0;
   Eigen::MatrixXd strengths, deviations;  // groups by coefficients, beside the mean over all
-  Eigen::VectorXd mean;                   // beyond what all groups are known to share
   std::size_t low = 0, high = 0;          // the groups that are furthest apart
 };
+
+// What all groups have.
+struct Shared {
+  std::vector<Cause> causes;  // the same in all
+  struct Mean {
+    std::size_t hypothesis = 0;
+    Eigen::VectorXd coefficients;
+  };
+  std::vector<Mean> means;  // of what differs between groups
+};
+
+// Of these hypotheses alone.
+Mixture::Estimate estimate_of(const Problem& problem, const HypothesisSet& set,
+                              const std::vector<bool>& out) {
+  std::vector<std::size_t> own;
+  for (const std::size_t h : set) {
+    const auto& more = problem.hypotheses[h].candidate.columns;
+    own.insert(own.end(), more.begin(), more.end());
+  }
+  if (own.empty()) return {};
+  std::ranges::sort(own);
+  return Mixture(problem, out, own).estimate(set);
+}
+
+// The likely causes, or else the one that the data speak for most.
+HypothesisSet named_in(const Problem& problem, const Explanation& explanation) {
+  const HypothesisSet likely = likely_causes(problem, explanation);
+  const auto candidate = std::ranges::find(explanation.members, true, &Member::candidate);
+  if (!likely.empty() || candidate == explanation.members.end()) return likely;
+  return {candidate->hypothesis};
+}
 
 class Comparer {
  public:
@@ -34,16 +65,16 @@ class Comparer {
  private:
   bool goes_on(double part) const { return !settings_.progress || settings_.progress(part); }
   bool power_known() const { return c_.diagnosis.power != PowerSource::none; }
-  Eigen::VectorXd coefficients_of(const Problem& problem, const HypothesisSet& set,
-                                  const std::vector<bool>& out, Eigen::VectorXd* sd = nullptr) const;
-  std::vector<Contrasted> contrasted(const Problem& base, const Problem& problem, const HypothesisSet& set,
-                                     const std::vector<bool>& out) const;
-  std::vector<double> predict(const std::vector<Contrasted>& causes) const;
-  double error(const std::vector<double>& predicted) const;
-  Problem alike(Problem base, const HypothesisSet& set, const Eigen::VectorXd& differences) const;
+  std::vector<Contrasted> contrasted(const Mixture::Estimate& differences, const HypothesisSet& set) const;
+  Shared shared_beside(const Problem& base, const std::vector<Contrasted>& causes,
+                       const std::vector<bool>& out) const;
+  std::vector<double> predict(const Shared& shared, const std::vector<Contrasted>& causes) const;
+  double error(const std::vector<double>& predicted, const std::vector<bool>& out = {}) const;
+  Problem alike(Problem base, const std::vector<Contrasted>& causes) const;
   std::vector<Controls> permuted(const Mixture& mixture, const Explanation& explanation) const;
   bool hold_out();
   Explanation explanation_of(const std::vector<Contrasted>& members) const;
+  void measure_common();
   void add_differences();
   void add_baseline();
   void judge_all();
@@ -56,47 +87,25 @@ class Comparer {
   Explanation explanation_;
   HypothesisSet named_;
   std::vector<Contrasted> causes_;
+  Shared shared_;
+  std::vector<double> common_;  // of every item, by the model with what all groups share
   std::optional<HeldOut> held_out_;
   std::vector<Controls> controls_;
 };
 
-Eigen::VectorXd Comparer::coefficients_of(const Problem& problem, const HypothesisSet& set,
-                                          const std::vector<bool>& out, Eigen::VectorXd* sd) const {
-  std::vector<std::size_t> own;
-  for (const std::size_t h : set) {
-    const auto& more = problem.hypotheses[h].candidate.columns;
-    own.insert(own.end(), more.begin(), more.end());
-  }
-  if (own.empty()) return {};
-  std::ranges::sort(own);
-  const Mixture::Estimate estimate = Mixture(problem, out, own).estimate(set);
-  if (sd != nullptr) *sd = estimate.sd;
-  return estimate.mean;
-}
-
-std::vector<Contrasted> Comparer::contrasted(const Problem& base, const Problem& problem,
-                                             const HypothesisSet& set, const std::vector<bool>& out) const {
-  Eigen::VectorXd sd;
-  const Eigen::VectorXd mean = coefficients_of(problem, set, out, &sd);
-  const Eigen::VectorXd level =
-      set.empty() ? Eigen::VectorXd() : coefficients_of(alike(base, set, mean), set, out);
-  Eigen::Index level_at = 0;
+std::vector<Contrasted> Comparer::contrasted(const Mixture::Estimate& differences,
+                                             const HypothesisSet& set) const {
   std::vector<Contrasted> result;
   Eigen::Index at = 0;
   for (const std::size_t h : set) {
-    const auto n = static_cast<Eigen::Index>(problem.hypotheses[h].candidate.columns.size());
+    const auto n = static_cast<Eigen::Index>(problem_.hypotheses[h].candidate.columns.size());
     const auto own = n / static_cast<Eigen::Index>(groups_ - 1);
     Contrasted c;
     c.hypothesis = h;
-    c.mean = level.segment(level_at, own);
-    level_at += own;
-    if (const Cause cause = base.hypotheses[h].cause();
-        std::ranges::any_of(data_.shared, [&](const Cause& other) { return other.same_kind(cause); }))
-      c.mean.setZero();
-    c.strengths = by_group(mean.segment(at, n), data_.group_of_block, groups_);
+    c.strengths = by_group(differences.mean.segment(at, n), data_.group_of_block, groups_);
     c.deviations = Eigen::MatrixXd::Zero(c.strengths.rows(), own);
     for (Eigen::Index g = 1; g < c.strengths.rows(); ++g)
-      c.deviations.row(g) = sd.segment(at + (g - 1) * own, own).transpose();
+      c.deviations.row(g) = differences.sd.segment(at + (g - 1) * own, own).transpose();
     // The first group is known as well as the others are beside it.
     c.deviations.row(0) = c.deviations.bottomRows(c.deviations.rows() - 1).colwise().mean();
     double furthest = -1;
@@ -115,40 +124,86 @@ std::vector<Contrasted> Comparer::contrasted(const Problem& base, const Problem&
   return result;
 }
 
-std::vector<double> Comparer::predict(const std::vector<Contrasted>& causes) const {
-  std::vector<std::vector<Cause>> by_group(groups_);
+// What all groups share is sought, and its strengths are estimated, where what differs between groups has
+// left the data: together, as each of them would otherwise be taken for all the others. What differs is
+// there, so that nothing speaks against its having a mean beforehand. Far from what is linear that may
+// predict worse than what everything is linear around, which stays then.
+Shared Comparer::shared_beside(const Problem& base, const std::vector<Contrasted>& causes,
+                               const std::vector<bool>& out) const {
+  Problem rest = alike(base, causes);
+  const auto differs = [&](const Hypothesis& h) {
+    return std::ranges::find_if(causes, [&](const Contrasted& c) {
+      return !h.outside() && rest.hypotheses[c.hypothesis].cause().same_kind(h.cause());
+    });
+  };
+  for (Hypothesis& h : rest.hypotheses) {
+    if (differs(h) != causes.end()) h.candidate.log_prior = 0;
+  }
+  ExplainSettings settings = data_.explain;
+  settings.most_members = most_shared;
+  settings.candidate = false;
+  HypothesisSet set;
+  for (const Member& m : explain(rest, out, settings).members) {
+    const Hypothesis& h = rest.hypotheses[m.hypothesis];
+    if (h.outside()) continue;
+    const auto other = differs(h);
+    set = with(std::move(set), other == causes.end() ? m.hypothesis : other->hypothesis);
+  }
+  const Eigen::VectorXd levels = estimate_of(rest, set, out).mean;
+  Shared shared, around{data_.around, {}};
+  for (const Contrasted& c : causes) {
+    around.means.push_back({c.hypothesis, Eigen::VectorXd::Zero(c.strengths.cols())});
+    // The mean of what only differs is that of the robot file.
+    if (!std::ranges::binary_search(set, c.hypothesis)) shared.means.push_back(around.means.back());
+  }
+  Eigen::Index at = 0;
+  for (const std::size_t h : set) {
+    const auto n = static_cast<Eigen::Index>(rest.hypotheses[h].candidate.columns.size());
+    if (differs(rest.hypotheses[h]) != causes.end())
+      shared.means.push_back({h, levels.segment(at, n)});
+    else
+      shared.causes.push_back(data_.cause(h, levels.segment(at, n)));
+    at += n;
+  }
+  if (power_known() && error(predict(around, causes), out) < error(predict(shared, causes), out))
+    return around;
+  return shared;
+}
+
+std::vector<double> Comparer::predict(const Shared& shared, const std::vector<Contrasted>& causes) const {
+  std::vector<std::vector<Cause>> by_group(groups_, shared.causes);
   for (std::size_t g = 0; g < groups_; ++g) {
-    for (const Contrasted& c : causes)
-      by_group[g].push_back(
-          data_.cause(c.hypothesis, c.mean + c.strengths.row(static_cast<Eigen::Index>(g)).transpose()));
+    for (const Shared::Mean& mean : shared.means) {
+      Eigen::VectorXd own = mean.coefficients;
+      const auto c = std::ranges::find(causes, mean.hypothesis, &Contrasted::hypothesis);
+      if (c != causes.end()) own += c->strengths.row(static_cast<Eigen::Index>(g)).transpose();
+      by_group[g].push_back(data_.cause(mean.hypothesis, own));
+    }
   }
   return data_.predict(by_group);
 }
 
-double Comparer::error(const std::vector<double>& predicted) const {
+double Comparer::error(const std::vector<double>& predicted, const std::vector<bool>& out) const {
   double sum = 0, size = 0;
   for (std::size_t k = 0; k < data_.items.size(); ++k) {
     const Item& item = data_.items[k];
-    if (!std::isfinite(item.measured + predicted[k])) continue;
+    if ((!out.empty() && out[item.block]) || !std::isfinite(item.measured + predicted[k])) continue;
     sum += item.weight * std::fabs(item.measured - predicted[k]);
     size += item.weight * std::fabs(item.measured);
   }
   return size > 0 ? sum / size : missing;
 }
 
-// The base problem as it would be if all groups were the mean one: what these hypotheses explain of each
-// block by its group has left its response.
-Problem Comparer::alike(Problem base, const HypothesisSet& set, const Eigen::VectorXd& differences) const {
+// The base problem as it would be if all groups were the mean one: what these explain of each block by its
+// group has left its response.
+Problem Comparer::alike(Problem base, const std::vector<Contrasted>& causes) const {
+  HypothesisSet set;
+  for (const Contrasted& c : causes) set.push_back(c.hypothesis);
   for (std::size_t g = 0; g < groups_; ++g) {
     Eigen::VectorXd own(0);
-    Eigen::Index at = 0;
-    for (const std::size_t h : set) {
-      const auto n = static_cast<Eigen::Index>(base.hypotheses[h].candidate.columns.size());
-      const auto all = n * static_cast<Eigen::Index>(groups_ - 1);
-      const Eigen::MatrixXd strengths = by_group(differences.segment(at, all), data_.group_of_block, groups_);
-      own.conservativeResize(own.size() + n);
-      own.tail(n) = strengths.row(static_cast<Eigen::Index>(g)).transpose();
-      at += all;
+    for (const Contrasted& c : causes) {
+      own.conservativeResize(own.size() + c.strengths.cols());
+      own.tail(c.strengths.cols()) = c.strengths.row(static_cast<Eigen::Index>(g)).transpose();
     }
     std::vector<bool> of_group;
     for (const std::size_t block_group : data_.group_of_block) of_group.push_back(block_group == g);
@@ -162,13 +217,15 @@ std::vector<Controls> Comparer::permuted(const Mixture& mixture, const Explanati
   const Problem& problem = mixture.problem();
   std::vector<Controls> controls(explanation.members.size(), Controls{settings_.controls, 0});
   if (explanation.members.empty()) return controls;
-  const Problem rest = alike(data_.base, explanation.whole, mixture.estimate(explanation.whole).mean);
+  const Problem rest = alike(data_.base, contrasted(mixture.estimate(explanation.whole), explanation.whole));
+  ExplainSettings quick = data_.explain;
+  quick.candidate = false;
   for (std::size_t s = 0; s < settings_.controls; ++s) {
     std::mt19937_64 random(s + 1);
     std::vector<std::size_t> order = data_.group_of_block;
     std::ranges::shuffle(order, random);
     const Problem surrogate = contrast(rest, order, groups_);
-    const Explanation answer = explain(surrogate, {}, data_.explain);
+    const Explanation answer = explain(surrogate, {}, quick);
     for (std::size_t m = 0; m < controls.size(); ++m) {
       const std::set<std::string> group = stated_ids(problem, explanation.members[m]);
       controls[m].named_in += finds(answer, surrogate, group) ? 1 : 0;
@@ -197,18 +254,20 @@ bool Comparer::hold_out() {
     for (std::size_t k = 0; k < use.size(); ++k) use[k] = !out[data_.items[k].block];
     const Problem base = data_.without(out);
     const Problem problem = contrast(base, data_.group_of_block, groups_);
-    const HypothesisSet named = likely_causes(problem, explain(problem, out, data_.explain));
+    const HypothesisSet named = named_in(problem, explain(problem, out, data_.explain));
     std::vector<std::string> ids;
     for (const std::size_t h : named) ids.push_back(problem.hypotheses[h].id());
     held.named.push_back(std::move(ids));
     if (power_known()) {
-      const std::vector<double> predicted = predict(contrasted(base, problem, named, out));
+      const std::vector<Contrasted> causes = contrasted(estimate_of(problem, named, out), named);
+      const Shared shared = shared_beside(base, causes, out);
+      const std::vector<double> common = predict(shared, {}), predicted = predict(shared, causes);
       std::vector<double> missed;
-      for (const Item& item : data_.items) missed.push_back(item.measured - item.common);
+      for (std::size_t k = 0; k < use.size(); ++k) missed.push_back(data_.items[k].measured - common[k]);
       const std::vector<double> refereed = data_.referee(missed, use);
       for (std::size_t k = 0; k < use.size(); ++k) {
         const Item& item = data_.items[k];
-        if (use[k] || !std::isfinite(item.measured + item.common)) continue;
+        if (use[k] || !std::isfinite(missed[k])) continue;
         BlockErrors& b = held.blocks[item.block];
         b.unchanged += item.weight * std::fabs(missed[k]);
         b.explained += item.weight * std::fabs(item.measured - predicted[k]);
@@ -220,6 +279,36 @@ bool Comparer::hold_out() {
   }
   held_out_ = std::move(held);
   return true;
+}
+
+// How the model with what all groups share stands to what was measured.
+void Comparer::measure_common() {
+  common_ = predict(shared_, {});
+  for (const Cause& cause : shared_.causes) {
+    const auto same = [&](const Hypothesis& h) { return !h.outside() && h.cause().same_kind(cause); };
+    if (std::ranges::none_of(causes_,
+                             [&](const Contrasted& c) { return same(problem_.hypotheses[c.hypothesis]); }))
+      c_.common.push_back(std::ranges::find_if(problem_.hypotheses, same)->id());
+  }
+  Diagnosis& d = c_.diagnosis;
+  if (!power_known()) {
+    for (ComparedGroup& group : c_.groups) group.model_per_m_j = missing;
+    d.energy_relative = d.power_absolute_relative = d.noise_floor = missing;
+    return;
+  }
+  std::vector<double> energy(groups_, 0);
+  double measured_j = 0, missed_j = 0;
+  for (std::size_t k = 0; k < common_.size(); ++k) {
+    const Item& item = data_.items[k];
+    if (!std::isfinite(item.measured + common_[k])) continue;
+    energy[item.group] += item.energy_per_unit * common_[k];
+    measured_j += item.energy_per_unit * item.measured;
+    missed_j += item.energy_per_unit * (item.measured - common_[k]);
+  }
+  for (std::size_t g = 0; g < groups_; ++g) c_.groups[g].model_per_m_j = energy[g] / c_.groups[g].way_m;
+  d.energy_relative = missed_j / measured_j;
+  d.power_absolute_relative = error(common_);
+  d.noise_floor = std::min(d.noise_floor, d.power_absolute_relative);
 }
 
 void Comparer::add_differences() {
@@ -234,8 +323,6 @@ void Comparer::add_differences() {
     d->by_motion_j = c_.groups[d->to].model_per_m_j - c_.groups[d->from].model_per_m_j;
     d->unexplained_j = d->energy_per_m_j - d->by_motion_j;
   }
-  std::vector<double> common;
-  for (const Item& item : data_.items) common.push_back(item.common);
   for (const Contrasted& c : causes_) {
     const Hypothesis& h = data_.base.hypotheses[c.hypothesis];
     ComparedEffect e;
@@ -243,12 +330,12 @@ void Comparer::add_differences() {
     const auto& info = h.effect.effect->info().parameters[h.parameter];
     e.parameter = h.is_effect() ? std::string(info.name) : "coefficient";
     e.unit = h.is_effect() ? std::string(info.unit) : h.unit;
-    const std::vector<double> with = power_known() ? predict({c}) : common;
+    const std::vector<double> with = power_known() ? predict(shared_, {c}) : common_;
     std::vector<double> energy(groups_, 0);
     for (std::size_t k = 0; k < with.size(); ++k) {
       const Item& item = data_.items[k];
-      if (std::isfinite(item.measured + item.common))
-        energy[item.group] += item.energy_per_unit * (with[k] - common[k]);
+      if (std::isfinite(item.measured + common_[k]))
+        energy[item.group] += item.energy_per_unit * (with[k] - common_[k]);
     }
     for (std::size_t g = 0; g < groups_; ++g) {
       const auto at = static_cast<Eigen::Index>(g);
@@ -293,9 +380,15 @@ void Comparer::add_baseline() {
 
 void Comparer::judge_all() {
   HypothesisSet members;
-  for (const Member& m : explanation_.members) members.push_back(m.hypothesis);
-  std::ranges::sort(members);
-  const Explanation explanation = explanation_of(contrasted(data_.base, problem_, members, {}));
+  for (const Member& m : explanation_.members) {
+    if (!m.candidate) members = with(std::move(members), m.hypothesis);
+  }
+  std::vector<Contrasted> all = contrasted(estimate_of(problem_, members, {}), members);
+  // A candidate is what it would be alone.
+  std::ranges::copy_if(causes_, std::back_inserter(all), [&](const Contrasted& c) {
+    return std::ranges::find(members, c.hypothesis) == members.end();
+  });
+  const Explanation explanation = explanation_of(all);
   Findings f{.problem = problem_,
              .explanation = explanation,
              .controls = controls_,
@@ -307,11 +400,11 @@ void Comparer::judge_all() {
     f.causes.push_back(data_.cause(c.hypothesis, (c.strengths.row(high) - c.strengths.row(low)).transpose()));
     double change = 0, time_s = 0;
     if (power_known()) {
-      const std::vector<double> with = predict({c});
+      const std::vector<double> with = predict(shared_, {c});
       for (std::size_t k = 0; k < with.size(); ++k) {
         const Item& item = data_.items[k];
-        if (!std::isfinite(with[k] + item.common)) continue;
-        change += item.energy_per_unit * std::fabs(with[k] - item.common);
+        if (!std::isfinite(with[k] + common_[k])) continue;
+        change += item.energy_per_unit * std::fabs(with[k] - common_[k]);
         time_s += item.time_s;
       }
     }
@@ -321,7 +414,7 @@ void Comparer::judge_all() {
     f.shares = statistics::shapley_shares(causes_.size(), [&](const std::vector<std::size_t>& some) {
       std::vector<Contrasted> own;
       for (const std::size_t k : some) own.push_back(causes_[k]);
-      return error(predict(own));
+      return error(predict(shared_, own));
     });
   } else {  // ordered by what they move
     for (const std::size_t h : named_)
@@ -342,8 +435,10 @@ bool Comparer::run() {
   const Mixture mixture(problem_);
   explanation_ = explain(mixture, {}, data_.explain);
   c_.diagnosis.detectable_share = seen_share(mixture);
-  named_ = likely_causes(problem_, explanation_);
-  causes_ = contrasted(data_.base, problem_, named_, {});
+  named_ = named_in(problem_, explanation_);
+  causes_ = contrasted(estimate_of(problem_, named_, {}), named_);
+  shared_ = shared_beside(data_.base, causes_, {});
+  measure_common();
   if (!hold_out()) return false;
   controls_ = permuted(mixture, explanation_);
   if (controls_.size() != explanation_.members.size()) return false;

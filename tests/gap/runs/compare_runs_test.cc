@@ -85,7 +85,22 @@ TEST(CompareRuns, FindsTheLoadOfAGroup) {
   if (e.id == "accessory_load") {
     EXPECT_NEAR(e.parameters.front().value, 6, 1.5);
   }
-  // What both groups share is no difference.
+  // The mean of both is no difference, and what differs is not alike.
+  EXPECT_LT(std::abs(c.diagnosis.energy_relative), 0.02);
+  EXPECT_TRUE(c.common.empty());
+  EXPECT_LT(c.diagnosis.baseline->explanation_held_out, 0.5 * c.diagnosis.baseline->unchanged_model_held_out);
+}
+
+// A load that the robot file lacks, in both groups, must not be taken for the mean of what differs.
+TEST(CompareRuns, FindsTheFrictionOfASurfaceBesideALoadOfAll) {
+  const Comparison c = compared(two_groups({.load_w = 6}, {.friction_nm = 0.3, .load_w = 6}, 48, 0.01, 5));
+  ASSERT_EQ(c.diagnosis.effects.size(), 1u);
+  const DiagnosedEffect& e = c.diagnosis.effects.front();
+  EXPECT_EQ(std::ranges::count(group_of(e), "coulomb_friction"), 1) << e.id;
+  EXPECT_EQ(name_of(c.diagnosis.verdict), "effects");
+  EXPECT_LT(c.diagnosis.baseline->explanation_held_out, 0.6 * c.diagnosis.baseline->unchanged_model_held_out);
+  ASSERT_TRUE(c.difference);
+  EXPECT_LT(std::abs(c.difference->unexplained_j), 0.35 * c.difference->energy_per_m_j);
   EXPECT_FALSE(c.common.empty());
 }
 

@@ -1,0 +1,79 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "gap/groups/compare.h"
+#include "tests/gap/checks/made_recordings.h"
+
+namespace joulecast::gap {
+namespace {
+
+namespace vr = virtual_robot;
+
+// Missions by turns in groups A and B, of which only battery power and motion are known; B takes more power.
+Comparison compared(const std::function<double(const signals::Sample&, const robot::RobotModel&)>& more_w) {
+  made::Robot robot = made::virtual_robot(vr::shipped_robots()[1].kind, 23, [](vr::SimulationSpec& spec) {
+    const vr::SimulationSpec usual;
+    spec.script = usual.script;
+    spec.rate_hz = usual.rate_hz;
+    spec.missions = 8;
+    spec.sensors.motor_channels = false;
+  });
+  std::vector<std::string> groups;
+  for (std::size_t m = 0; m < robot.recordings.missions.size(); ++m) {
+    groups.emplace_back(m % 2 == 0 ? "A" : "B");
+    if (m % 2 == 0) continue;
+    for (signals::Sample& s : robot.recordings.missions[m].samples)
+      s.battery_current_a += more_w(s, robot.model) / s.battery_voltage_v;
+  }
+  CompareSettings settings;
+  settings.controls = 4;
+  const auto comparison = compare_recordings(robot.recordings, groups, robot.model, settings);
+  EXPECT_TRUE(comparison) << (comparison ? "" : describe(comparison.error()));
+  return *comparison;
+}
+
+void expect_floor_without_the_difference(const Comparison& c) {
+  EXPECT_LT(c.diagnosis.noise_floor, 0.025);
+}
+
+TEST(CompareRecordings, FindsTheLoadOfAGroup) {
+  const Comparison c = compared([](const auto&, const auto&) { return 8.0; });
+  const Diagnosis& d = c.diagnosis;
+  ASSERT_EQ(d.effects.size(), 1u);
+  EXPECT_EQ(d.effects[0].id, "accessory_load");
+  EXPECT_EQ(name_of(d.verdict), "effects");
+  EXPECT_NEAR(d.effects[0].parameters.front().value, 8, 0.5);
+  EXPECT_LT(d.baseline->explanation_held_out, 0.4 * d.baseline->unchanged_model_held_out);
+  // Half of it is shared, and nothing else.
+  EXPECT_LT(std::fabs(d.energy_relative), 0.02);
+  EXPECT_TRUE(c.common.empty()) << c.common.front();
+  expect_floor_without_the_difference(c);
+}
+
+// A force that does not pass through the motors has the form of no effect exactly; the next is friction.
+TEST(CompareRecordings, SaysWhatADifferenceOutsideTheCatalogueIsLike) {
+  const Comparison c = compared([](const signals::Sample& s, const robot::RobotModel& robot) {
+    return 6 * robot.kinematics.wheel_radius_m *
+           std::fabs(s.wheel_velocity_rad_s[0] + s.wheel_velocity_rad_s[1]);
+  });
+  const Diagnosis& d = c.diagnosis;
+  ASSERT_EQ(d.effects.size(), 1u);
+  const DiagnosedEffect& e = d.effects[0];
+  EXPECT_TRUE(e.id == "coulomb_friction" || std::ranges::count(e.alternatives, "coulomb_friction") > 0)
+      << e.id;
+  EXPECT_LT(e.probability, 0.9);
+  EXPECT_LT(d.baseline->explanation_held_out, 0.6 * d.baseline->unchanged_model_held_out);
+  expect_floor_without_the_difference(c);
+}
+
+TEST(CompareRecordings, FindsNothingWhereGroupsAreAlike) {
+  const Comparison c = compared([](const auto&, const auto&) { return 0.0; });
+  EXPECT_TRUE(c.diagnosis.effects.empty());
+  EXPECT_EQ(name_of(c.diagnosis.verdict), "none");
+}
+
+}  // namespace
+}  // namespace joulecast::gap
