@@ -123,8 +123,8 @@ Result<void> check_mapping(const std::string& path, Report& report) {
 // Recordings of one robot against the robot file, as far as there is one.
 void check_recordings(Result<telemetry::RecordingSet> set, const std::string& name, Report& report) {
   if (!set)
-    report.findings.push_back(
-        {false, name, "", "is not held against the robot file: " + describe(set.error())});
+    report.findings.push_back({set.error().field == "utime", name, "",
+                               "is not held against the robot file: " + describe(set.error())});
   else if (report.robot)
     judge(*set, *report.robot, report.findings);
 }

@@ -16,6 +16,7 @@ constexpr double least_rate_hz = 10, greatest_rate_hz = 200;
 // The daemon integrates no longer silence (meter.gap_bridge_s) and takes no later stamp by default.
 constexpr double longest_bridged_s = 1;
 constexpr double clock_tolerance_s = 1;
+constexpr double strange_clock_s = 86400;  // of a log, whose recorder's clock may be off, too
 
 }  // namespace
 
@@ -38,6 +39,11 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
     add(std::abs(ahead_s) > 3600, "utime",
         fmt::format("stamps are {:.6g} s {} this computer's clock", std::abs(ahead_s),
                     ahead_s > 0 ? "ahead of" : "behind"),
+        ahead_s);
+  if (!live && std::abs(ahead_s) > strange_clock_s)
+    add(false, "utime",
+        fmt::format("stamps are {:.4g} days {} the times at which the log was recorded",
+                    std::abs(ahead_s) / 86400, ahead_s > 0 ? "ahead of" : "behind"),
         ahead_s);
   if (tally.subject != telemetry::Subject::telemetry) return;
   const double rate_hz = tally.rate_hz();

@@ -59,7 +59,7 @@ class Collector {
 
   void add(const std::string& id, const signals::Sample& sample) {
     if (const auto fault = check_plausible(sample)) {
-      if (fault->why == Implausibility::out_of_range) {
+      if (fault->why == Implausibility::out_of_range || fault->why == Implausibility::bad_clock) {
         BeyondRange& beyond =
             result_.beyond_range[std::string(fault->field.substr(0, fault->field.find('[')))];
         ++beyond.samples;

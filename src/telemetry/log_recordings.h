@@ -14,7 +14,7 @@
 
 namespace joulecast::telemetry {
 
-// Samples left out for a value of one field that no robot reads (plausible_ranges()).
+// Samples left out for a value of one field that no robot reads (plausible_ranges()), or a clock.
 struct BeyondRange {
   std::size_t samples = 0;
   double farthest = 0;  // from zero, of these values

@@ -23,6 +23,14 @@ std::string listed(const std::set<std::string, std::less<>>& names) {
   return text;
 }
 
+constexpr std::size_t enough_samples = 10;  // to say how often they come
+constexpr double greatest_rate_hz = 1100;   // of a robot; faster ones are another unit's
+
+double rate_hz(const Recording& mission) {
+  const std::size_t samples = mission.samples.size();
+  return samples < enough_samples ? 0 : static_cast<double>(samples - 1) / length_s(mission);
+}
+
 bool same(double a, double b) {
   return a == b || (std::isnan(a) && std::isnan(b));
 }
@@ -63,16 +71,24 @@ std::vector<Recording> joined(std::vector<Recording> missions, std::vector<std::
 
 }  // namespace
 
+std::string in_other_unit(std::string_view field, double value) {
+  if (field == "utime") return value > 0 ? " (in ns?)" : "";
+  if (field.ends_with("_current")) return " (in mA?)";
+  return field.ends_with("_voltage") ? " (in mV?)" : "";
+}
+
 Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<Recording> missions) {
   RecordingSet set;
   set.robot_id = std::move(robot_id);
   std::size_t without_speed = 0, twice = 0;
+  double fastest_hz = 0;
   std::erase_if(missions, [&](Recording& mission) {
     std::vector<signals::Sample>& samples = mission.samples;
     without_speed += std::erase_if(samples, [](const signals::Sample& s) {
       return !std::isfinite(s.wheel_velocity_rad_s[0]) || !std::isfinite(s.wheel_velocity_rad_s[1]);
     });
     twice += put_in_order(samples);
+    fastest_hz = std::max(fastest_hz, samples.size() < 2 ? 0 : rate_hz(mission));
     if (samples.size() >= 2) return false;
     set.notes.push_back("mission " + mission.mission_id + " holds no motion and was left out");
     return true;
@@ -91,10 +107,12 @@ Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<Record
     set.samples += mission.samples.size();
     set.missions.push_back(std::move(mission));
   }
-  if (set.missions.empty()) {
-    return invalid("log", fmt::format("holds no mission of at least {:g} s", shortest_mission_s));
-  }
-  return set;
+  if (!set.missions.empty()) return set;
+  const std::string none = fmt::format("holds no mission of at least {:g} s", shortest_mission_s);
+  if (fastest_hz < greatest_rate_hz) return invalid("log", none);
+  return invalid("utime", fmt::format("{}, as samples would come {:.3g} times a second: is utime given in ms "
+                                      "or s? joulecast expects us since 1970",
+                                      none, fastest_hz));
 }
 
 Result<RecordingSet> load_recordings(std::span<const std::string> paths, const std::string& robot_id,
@@ -110,21 +128,24 @@ Result<RecordingSet> load_recordings(std::span<const std::string> paths, const s
   }
   Result<RecordingSet> set =
       make_recording_set(robot_id.empty() ? *log->robots.begin() : robot_id, std::move(log->recordings));
-  if (!set) return set;
+  std::string beyond_ranges;
+  for (const auto& [field, beyond] : log->beyond_range) {
+    beyond_ranges += fmt::format("{}{} samples have a {} that no robot reads, as far as {:.4g}{}",
+                                 beyond_ranges.empty() ? "" : "; ", beyond.samples, field, beyond.farthest,
+                                 in_other_unit(field, beyond.farthest));
+  }
+  if (!set) {
+    if (!beyond_ranges.empty()) set.error().message += ": " + beyond_ranges;
+    if (log->beyond_range.contains("utime")) set.error().field = "utime";
+    return set;
+  }
+  set->beyond_range = std::move(log->beyond_range);
   set->unreadable = log->unreadable;
   if (log->unreadable > 0)
     set->notes.push_back(
         fmt::format("{} messages or values could not be read, break a limit or come twice", log->unreadable));
-  for (const auto& [field, beyond] : log->beyond_range) {
-    const bool current = field.ends_with("_current"), voltage = field.ends_with("_voltage");
-    set->notes.push_back(fmt::format(
-        "{} of these samples have a {} that no robot reads, as far as {:.4g}{}; what is left may be a biased "
-        "choice",
-        beyond.samples, field, beyond.farthest,
-        current   ? " (in mA?)"
-        : voltage ? " (in mV?)"
-                  : ""));
-  }
+  if (!beyond_ranges.empty())
+    set->notes.push_back("of these " + beyond_ranges + "; what is left may be a biased choice");
   if (log->samples_outside > 0)
     set->notes.push_back(
         fmt::format("{} samples lie before a mission's start or just after its end and were left out",

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/error.h"
+#include "telemetry/log_recordings.h"
 #include "telemetry/recording.h"
 
 namespace joulecast::telemetry {
@@ -15,12 +18,16 @@ struct RecordingSet {
   std::string robot_id;
   std::vector<Recording> missions;
   std::size_t samples = 0;
-  std::size_t unreadable = 0;      // of LogRecordings
-  std::vector<std::string> notes;  // missions that were joined, and whatever was left out
+  std::size_t unreadable = 0;                         // of LogRecordings
+  std::map<std::string, BeyondRange> beyond_range{};  // of LogRecordings
+  std::vector<std::string> notes;                     // missions that were joined, and whatever was left out
 };
 
 // Missions shorter than this say nothing by themselves [s].
 inline constexpr double shortest_mission_s = 5.0;
+
+// " (in mA?)": the unit that readings of a field which lie beyond all robots' are likely in; or nothing.
+std::string in_other_unit(std::string_view field, double value);
 
 // The missions of one robot in event logs (read_recordings). Where several robots are recorded, `robot_id`
 // picks one; empty: the logs must hold one robot only. Errors of read_recordings, and Fault::invalid without

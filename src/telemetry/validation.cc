@@ -149,7 +149,7 @@ std::string describe(const Implausible& fault) {
     case Implausibility::infinite:
       return text + " is infinite";
     case Implausibility::bad_clock:
-      return text + " lies before 1970 or after 2200";
+      return text + " lies before 1970 or after 2200" + (fault.value > 0 ? "; is it in ns?" : "");
     case Implausibility::bad_sequence:
       return text + " is negative";
     case Implausibility::out_of_range:

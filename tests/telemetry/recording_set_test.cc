@@ -117,6 +117,28 @@ TEST(RecordingSet, CountsWhatCannotBeRead) {
                           HasSubstr("1 samples lie before")));
 }
 
+TEST(RecordingSet, BlamesTheClockWhereItLeavesNoMission) {
+  const Recording good = mission("m1", 1.7e9, 30);
+  const auto loaded = [&](auto&& stamp) {
+    Log log;
+    for (signals::Sample s : good.samples) {
+      s.utime_us = stamp(s.utime_us);
+      log.add("a", s);
+    }
+    return log.load();
+  };
+  for (const std::int64_t divisor : {1'000, 1'000'000}) {
+    const auto set = loaded([&](std::int64_t utime_us) { return utime_us / divisor; });
+    ASSERT_FALSE(set);
+    EXPECT_EQ(set.error().field, "utime");
+    EXPECT_THAT(set.error().message, HasSubstr("in ms or s?")) << divisor;
+  }
+  const auto set = loaded([](std::int64_t utime_us) { return 1000 * utime_us; });
+  ASSERT_FALSE(set);
+  EXPECT_EQ(set.error().field, "utime");
+  EXPECT_THAT(set.error().message, HasSubstr("301 samples have a utime that no robot reads"));
+}
+
 TEST(RecordingSet, PutsSamplesInOrder) {
   Log log;
   Recording made = mission("m1", 10, 20);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <set>
 
@@ -244,6 +245,13 @@ std::vector<Check> wrong_in_few(const telemetry::RecordingSet& recordings,
 
 std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
                                     const robot::RobotModel& robot) {
+  if (std::vector<Check> checks = check_ranges(recordings); !checks.empty()) {
+    telemetry::RecordingSet rest = recordings;
+    rest.beyond_range.clear();
+    silence_contradicted(rest, checks);
+    std::ranges::move(check_recordings(rest, robot), std::back_inserter(checks));
+    return checks;
+  }
   const dynamics::DriveModel drive = drive_of(robot, dynamics::active_effects(robot));
   std::vector<Observation> observations = observe_all(recordings, robot, drive);
   std::vector<Check> checks = wrong_in_few(recordings, observations, robot, drive);

@@ -41,11 +41,13 @@ std::vector<Check> check_unit(const CheckContext& c) {
   const double begin_us = static_cast<double>(c.seen.front().clock.first_us()), year = year_of(begin_us);
   if (!(period > 0)) return {};
   if (!sane(period) || year > latest_year) {
-    for (const Unit& unit : units) {
+    const auto dated = [&](const Unit& unit) {
       const double then = year_of(begin_us * unit.factor);
-      if (!sane(period * unit.factor) ||
-          (year > latest_year && !(then > earliest_year && then < latest_year)))
-        continue;
+      return then > earliest_year && then < latest_year;
+    };
+    const bool by_year = year > latest_year || std::ranges::any_of(units, dated);
+    for (const Unit& unit : units) {
+      if (!sane(period * unit.factor) || (by_year && !dated(unit))) continue;
       return {clock_check(
           "utime_scale", 1 / unit.factor,
           fmt::format("utime looks given in {}: its rows would come every {:.3g} s, in {} every {:.3g} "

@@ -43,6 +43,9 @@ std::vector<Check> check_delays(const CheckContext& c);
 std::vector<Check> check_steps(const CheckContext& c);     // lasting changes between missions
 std::vector<Check> check_readings(const CheckContext& c);  // held, coarse, clipped, thrown, missing
 
+// Readings that are left out of the recordings, as far as they are many.
+std::vector<Check> check_ranges(const telemetry::RecordingSet& recordings);
+
 // "0.93 (0.91 to 0.95)", or the number alone where it has no interval.
 std::string with_interval(double value, const std::array<double, 2>& interval);
 Check make_check(std::string id, std::string channel, const Estimate& value, std::string says);

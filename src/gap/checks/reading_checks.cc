@@ -15,7 +15,8 @@ constexpr std::array<double, 2> no_interval{std::numeric_limits<double>::quiet_N
 // Readings that equations are built from.
 constexpr std::size_t used = reading::battery_current + 1;
 constexpr std::size_t fewest_spikes = 3;
-constexpr double coarse = 1;  // step over the standard deviation: rounding adds a third of it as noise
+constexpr double least_held = 1.5;  // periods of rows: what is new more often is new in each
+constexpr double coarse = 1;        // step over the standard deviation: rounding adds a third of it as noise
 constexpr double clipped_share = 0.01;
 constexpr std::size_t fewest_clips = 3, longest_plateau = 3;  // runs; usual repetitions of a value
 constexpr double lost_share = 0.5;
@@ -34,12 +35,25 @@ void add_to(std::string& list, std::string_view text) {
   list += text;
 }
 
+// Between rows on average, but for silences: less than the period where an import adds rows before changes of
+// readings that hold.
+double row_s(const CheckContext& c) {
+  double length_s = 0, steps = 0;
+  for (const Observation& o : c.seen) {
+    length_s += o.clock.length_s();
+    steps += static_cast<double>(o.clock.rows()) - 1;
+  }
+  return steps > 0 ? std::min(c.period_s(), length_s / steps) : c.period_s();
+}
+
 void check_held(const CheckContext& c, std::vector<Check>& checks) {
   std::string channels, says;
   double longest = 0;
+  const double between_rows_s = row_s(c);
   each_reading(c, [&](std::size_t k, const ValueTally& t) {
     if (t.held_rows() < 2) return;
-    const double period = static_cast<double>(t.held_rows()) * c.period_s();
+    const double period = static_cast<double>(t.held_rows()) * between_rows_s;
+    if (period < least_held * c.period_s()) return;
     add_to(channels, reading_names[k]);
     add_to(says, fmt::format("{} every {:.3g} s", reading_names[k], period));
     longest = std::max(longest, period);

@@ -8,9 +8,10 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr double alike = 0.2;     // neighbours that differ by less are the same level
-constexpr double thrown = 0.8;    // a value this far from the level of both its neighbours is a spike
-constexpr double well_off = 0.2;  // of the largest value: levels below say nothing of spikes
+constexpr double alike = 0.2;       // neighbours that differ by less are the same level
+constexpr double thrown = 0.8;      // a value this far from the level of both its neighbours is a spike
+constexpr std::int64_t corner = 8;  // a step of a clock that is so many times shorter than the one before
+constexpr double well_off = 0.2;    // of the largest value: levels below say nothing of spikes
 
 std::size_t octave(double value) {
   return static_cast<std::size_t>(std::clamp(std::ilogb(value) + 32, 0, 63));
@@ -160,12 +161,13 @@ void ClockTally::add(std::int64_t utime_us, std::int64_t sequence) {
     const std::int64_t step = utime_us - before_us_;
     if (step == 0) ++repeated_;
     if (step < 0) ++backward_;
-    if (step > 0) {
+    if (step > 0 && step >= step_us_ / corner) {
       const double place = 16 * std::log10(static_cast<double>(step));
       Class& c = steps_[std::min(static_cast<std::size_t>(place), classes - 1)];
       ++c.count;
       c.seconds += 1e-6 * static_cast<double>(step);
     }
+    step_us_ = step;
     if (sequence <= sequence_) ++disordered_;
   }
   ++rows_;

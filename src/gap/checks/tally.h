@@ -70,7 +70,9 @@ class ClockTally {
   std::int64_t first_us() const { return first_us_; }
   std::int64_t last_us() const { return last_us_; }
   double length_s() const { return 1e-6 * static_cast<double>(last_us_ - first_us_); }
-  double period_s() const;                            // between rows, usual; 0 without two that differ
+  // Between rows, usual; 0 without two that differ. A step that is short beside the one before is none: an
+  // import puts such before what a reading held (hold), and publishers that stalled catch up so.
+  double period_s() const;
   std::size_t repeated() const { return repeated_; }  // stamped like the row before
   std::size_t backward() const { return backward_; }  // stamped before it
   // Silences of more than ten usual periods and a second.
@@ -92,7 +94,7 @@ class ClockTally {
   };
 
   std::size_t rows_ = 0, repeated_ = 0, backward_ = 0, disordered_ = 0;
-  std::int64_t first_us_ = 0, last_us_ = 0, before_us_ = 0, sequence_ = 0;
+  std::int64_t first_us_ = 0, last_us_ = 0, before_us_ = 0, step_us_ = 0, sequence_ = 0;
   std::int64_t low_sequence_ = 0, high_sequence_ = 0;
   std::array<Class, classes> steps_{};
 };

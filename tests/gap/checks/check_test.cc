@@ -98,6 +98,48 @@ TEST(CheckRecordings, AWrongClockLeavesNothingElseToSay) {
   EXPECT_EQ(checks[0].channel, "utime");
 }
 
+TEST(CheckRecordings, TheUnitOfAClockIsToldByItsYear) {
+  for (const auto& [unit, factor] : {std::pair{"in ms", 1e-3}, {"in s", 1e-6}, {"in ns", 1e3}}) {
+    telemetry::RecordingSet set = scout().recordings;
+    mistakes::scale_clock(set, factor);
+    const auto checks = check_recordings(set, scout().model);
+    ASSERT_TRUE(find(checks, "utime_scale")) << unit;
+    EXPECT_NE(find(checks, "utime_scale")->says.find(std::string("given ") + unit), std::string::npos)
+        << find(checks, "utime_scale")->says;
+  }
+}
+
+TEST(CheckRecordings, ReadingsThatHoldBetweenSparseRowsAreNoFaultOfTheClock) {
+  telemetry::RecordingSet set = scout().recordings;
+  for (auto& mission : set.missions) {
+    std::vector<signals::Sample> stepped;
+    for (const signals::Sample& s : mission.samples) {
+      if (!stepped.empty()) {
+        stepped.push_back(stepped.back());
+        stepped.back().utime_us = s.utime_us - 100;  // as the import does it
+      }
+      stepped.push_back(s);
+    }
+    for (std::size_t k = 0; k < stepped.size(); ++k) stepped[k].sequence = static_cast<std::int64_t>(k);
+    mission.samples = std::move(stepped);
+  }
+  const auto checks = check_recordings(set, scout().model);
+  EXPECT_FALSE(find(checks, "utime_scale"));
+  EXPECT_FALSE(find(checks, "held_samples"));
+}
+
+TEST(CheckRecordings, AChannelOfWhichMuchIsBeyondAllRobotsTakesNoPart) {
+  telemetry::RecordingSet set = scout().recordings;
+  set.beyond_range["battery_current"] = {set.samples / 20, 2800};
+  EXPECT_FALSE(find(check_recordings(set, scout().model), "implausible_readings"));
+  set.beyond_range["battery_current"].samples = 2 * set.samples;
+  const auto checks = check_recordings(set, scout().model);
+  ASSERT_TRUE(find(checks, "implausible_readings"));
+  EXPECT_TRUE(checks.front().contradicted);
+  EXPECT_EQ(checks.front().channel, "battery_current");
+  EXPECT_NE(checks.front().says.find("(in mA?)"), std::string::npos);
+}
+
 TEST(CheckRecordings, ShortMissionsAreNamed) {
   telemetry::RecordingSet set = scout().recordings;
   set.missions.push_back(set.missions.front());

@@ -114,5 +114,14 @@ TEST(ClockTally, KnowsPeriodGapsAndDisorder) {
   EXPECT_NEAR(clock.length_s(), 999 * 0.02 + 2.98, 0.03);
 }
 
+TEST(ClockTally, StepsOfReadingsThatHoldAreNoPeriod) {
+  ClockTally clock;
+  for (std::int64_t k = 0; k < 200; ++k) {
+    if (k > 0) clock.add(500'000 * k - 100, 2 * k);
+    clock.add(500'000 * k, 2 * k + 1);
+  }
+  EXPECT_NEAR(clock.period_s(), 0.5, 1e-3);
+}
+
 }  // namespace
 }  // namespace joulecast::gap
