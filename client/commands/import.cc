@@ -118,6 +118,7 @@ nlohmann::json to_json(const Imported& one) {
           {"samples", report.samples},
           {"samples_added", report.samples_added},
           {"rows_without_motion", report.rows_without_motion},
+          {"rows_unsorted", report.rows_unsorted},
           {"rows_out_of_time", report.rows_out_of_time},
           {"rows_outside_mission", report.rows_outside_mission},
           {"rows_glitched", report.rows_glitched},
@@ -139,6 +140,10 @@ void print_text(const Options& options, const std::vector<Imported>& all) {
   }
   for (const Imported& one : all) {
     constexpr std::size_t shown = 10;
+    if (const std::size_t unsorted = one.import.report.rows_unsorted; unsorted > 0)
+      fmt::print("{}: {} rows are not in the order of time: put in order\n", one.table, unsorted);
+    if (const std::size_t twice = one.import.report.rows_out_of_time; twice > 0)
+      fmt::print("{}: {} rows have the time of another and are left out\n", one.table, twice);
     for (const telemetry::JoinReport& join : one.import.report.joins)
       fmt::print(
           "{} with {}: {} rows, {} matched, {} beyond the tolerance; lag {:.3f} s (median), {:.3f} s "

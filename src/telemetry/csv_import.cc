@@ -63,6 +63,13 @@ struct BoundLabels {
   std::size_t place = 0;
 };
 
+// A row of the main table, to be read in the order of time.
+struct RowPlace {
+  CsvTable::Place place;
+  std::int64_t since_zero_us = 0;
+  bool early = false;  // before a row that stands before it
+};
+
 class Importer {
  public:
   Importer(CsvTable table, std::string_view csv, const ImportMapping::Content& mapping,
@@ -82,6 +89,7 @@ class Importer {
   Result<BoundExpression> bind_expression(const FieldExpression& expression, std::string name);
   Result<std::vector<Reference>> bind_terms(const std::vector<ColumnTerm>& terms);
   bool is_held(const FieldExpression& expression) const;
+  std::vector<RowPlace> rows_in_order() const;
   Result<void> check_required(const std::vector<std::string_view>& row) const;
   Result<std::int64_t> time_of(const std::vector<std::string_view>& row);
   Result<void> take_cells(const std::vector<std::string_view>& row);
@@ -100,8 +108,9 @@ class Importer {
 
   [[nodiscard]] tl::unexpected<Error> refuse(const std::string& column, std::string_view text,
                                              const std::string& what) const {
-    return fail(Fault::corrupt, options_.source_name + ": line " + std::to_string(table_.line()),
-                "column '" + column + "': '" + std::string(text) + "' " + what);
+    return fail(
+        Fault::corrupt, options_.source_name + ": line " + std::to_string(table_.line()),
+        "column '" + column + "': '" + std::string(text) + "' " + what + decimal_hint(text, mapping_.layout));
   }
   [[nodiscard]] tl::unexpected<Error> located(Error error) const {
     error.field = options_.source_name + ": " + error.field;
@@ -270,6 +279,44 @@ Result<void> Importer::read_joined() {
     joined.series = std::move(*series);
   }
   return {};
+}
+
+// The rows of each mission by time; last the place where they end, or cannot be read on.
+std::vector<RowPlace> Importer::rows_in_order() const {
+  CsvTable table = table_;
+  std::vector<RowPlace> rows;
+  std::size_t begin = 0;  // of the mission
+  std::string mission;
+  std::int64_t newest_us = INT64_MIN;
+  const auto sort_mission = [&] {
+    std::stable_sort(rows.begin() + static_cast<std::ptrdiff_t>(begin), rows.end(),
+                     [](const RowPlace& a, const RowPlace& b) { return a.since_zero_us < b.since_zero_us; });
+  };
+  std::vector<std::string_view> row;
+  RowPlace at;
+  while (true) {
+    at = {table.place()};
+    const auto read = table.next(row);
+    if (!read || !*read) break;
+    const auto since_zero_us = parse_time_us(trimmed(row[time_place_]), mapping_.layout);
+    if (!since_zero_us) break;
+    at.since_zero_us = *since_zero_us;
+    if (!mapping_.mission_column.empty()) {
+      const std::string_view text = trimmed(row[mission_place_]);
+      if (text != mission && !(text.empty() && mapping_.hold_empty_cells)) {
+        sort_mission();
+        begin = rows.size();
+        mission = text;
+        newest_us = INT64_MIN;
+      }
+    }
+    at.early = at.since_zero_us < newest_us;
+    newest_us = std::max(newest_us, at.since_zero_us);
+    rows.push_back(at);
+  }
+  sort_mission();
+  rows.push_back(at);
+  return rows;
 }
 
 Result<void> Importer::check_required(const std::vector<std::string_view>& row) const {
@@ -561,11 +608,14 @@ Result<std::vector<Import>> Importer::run() {
   if (auto bound = bind(); !bound) return tl::unexpected(std::move(bound.error()));
   std::vector<std::string_view> row;
   std::size_t rows = 0;
-  for (;; ++rows) {
+  for (const RowPlace& at : rows_in_order()) {
+    table_.go_to(at.place);
     auto read = table_.next(row);
     if (!read) return located(std::move(read.error()));
     if (!*read) break;
     if (auto taken = take_row(row); !taken) return tl::unexpected(std::move(taken.error()));
+    open_.report.rows_unsorted += at.early;
+    ++rows;
   }
   const ImportReport last = open_.report;
   const bool open = !open_.recording.samples.empty();
@@ -575,6 +625,7 @@ Result<std::vector<Import>> Importer::run() {
                 "none of " + std::to_string(rows) + " rows gives a sample");
   if (!open) {
     result_.back().report.rows += last.rows;
+    result_.back().report.rows_unsorted += last.rows_unsorted;
     result_.back().report.rows_outside_mission += last.rows_outside_mission;
     result_.back().report.rows_without_motion += last.rows_without_motion;
   }

@@ -76,7 +76,8 @@ struct ImportReport {
   std::size_t samples = 0;               // `samples_added` among them
   std::size_t samples_added = 0;         // just before readings that hold change
   std::size_t rows_without_motion = 0;   // dropped: a wheel velocity is not known (yet)
-  std::size_t rows_out_of_time = 0;      // dropped: time did not advance
+  std::size_t rows_unsorted = 0;         // before the row before; put in order
+  std::size_t rows_out_of_time = 0;      // dropped: the time of the row before
   std::size_t rows_outside_mission = 0;  // dropped: the mission's column is empty
   std::size_t rows_glitched = 0;         // dropped by a limit's policy
   std::size_t cells_filled = 0;          // empty cells of used columns that repeat the value before

@@ -39,6 +39,15 @@ class CsvTable {
   // The next row with exactly as many fields as the header; false at the end. Views are valid until the next
   // call.
   Result<bool> next(std::vector<std::string_view>& fields);
+  // Where next() goes on, to come back to.
+  struct Place {
+    std::size_t at = 0, line = 1;
+  };
+  [[nodiscard]] Place place() const noexcept { return {at_, line_}; }
+  void go_to(Place place) noexcept {
+    at_ = place.at;
+    line_ = place.line;
+  }
   // Of the row read last, counted from 1.
   [[nodiscard]] std::size_t line() const noexcept { return row_line_; }
 

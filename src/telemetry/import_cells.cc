@@ -37,6 +37,11 @@ std::optional<double> parse_number(std::string_view text, bool decimal_comma) {
   return value;
 }
 
+std::string decimal_hint(std::string_view text, const TableLayout& layout) {
+  const bool comma = !layout.decimal_comma && text.find(',') != std::string_view::npos;
+  return comma && parse_number(text, true) ? R"(; a decimal comma needs "decimal": ",")" : "";
+}
+
 std::optional<std::int64_t> parse_time_us(std::string_view text, const TableLayout& layout) {
   const std::int64_t unit_ns = layout.time_unit_ns;
   if (unit_ns == 0) return parse_iso_us(text, layout);

@@ -56,8 +56,9 @@ Result<TableSeries> TableSeries::read(std::string_view csv, const TableLayout& l
     if (!more) return located(std::move(more.error()));
     if (!*more) break;
     const auto refuse = [&](const std::string& column, std::string_view text, const char* what) {
-      return fail(Fault::corrupt, source + ": line " + std::to_string(table->line()),
-                  "column '" + column + "': '" + std::string(text) + "' " + what);
+      return fail(
+          Fault::corrupt, source + ": line " + std::to_string(table->line()),
+          "column '" + column + "': '" + std::string(text) + "' " + what + decimal_hint(text, layout));
     };
     const std::string_view stamp = trimmed(row[*time_place]);
     const auto since_zero_us = parse_time_us(stamp, layout);

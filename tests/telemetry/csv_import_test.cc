@@ -98,10 +98,40 @@ TEST(CsvImport, RowsBeforeBothWheelsAreKnownGiveNoSample) {
 }
 
 TEST(CsvImport, RowsThatDoNotAdvanceTimeAreCounted) {
-  const auto import = import_csv("t,r,l\n1,1,1\n1,2,2\n0.5,3,3\n2,4,4\n", mapping_of(""));
+  const auto import = import_csv("t,r,l\n1,1,1\n1,2,2\n2,4,4\n", mapping_of(""));
   ASSERT_TRUE(import);
-  EXPECT_EQ(import->report.rows_out_of_time, 2u);
+  EXPECT_EQ(import->report.rows_out_of_time, 1u);
+  EXPECT_EQ(import->report.rows_unsorted, 0u);
   EXPECT_EQ(import->recording.samples[1].wheel_velocity_rad_s[0], 4);
+}
+
+TEST(CsvImport, RowsAreTakenInTheOrderOfTime) {
+  const auto import = import_csv("t,r,l\n3,3,3\n1,1,1\n2,,2\n2,7,7\n", mapping_of(""));
+  ASSERT_TRUE(import);
+  EXPECT_EQ(import->report.rows_unsorted, 3u);
+  EXPECT_EQ(import->report.rows_out_of_time, 1u);
+  const auto& samples = import->recording.samples;
+  ASSERT_EQ(samples.size(), 3u);
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(samples[k].utime_us, 1'000'000 * static_cast<std::int64_t>(k + 1));
+    EXPECT_EQ(samples[k].wheel_velocity_rad_s[1], static_cast<double>(k + 1));
+  }
+  EXPECT_EQ(samples[1].wheel_velocity_rad_s[0], 1);  // held from the row before in time
+  // Lines are those of the file.
+  EXPECT_THAT(import_csv("t,r,l\n3,3,3\n1,x,1\n", mapping_of("")).error().field,
+              testing::HasSubstr("line 3"));
+  EXPECT_THAT(import_csv("t,r,l\n3,3,3\nx,1,1\n1,1,1\n", mapping_of("")).error().field,
+              testing::HasSubstr("line 3"));
+}
+
+TEST(CsvImport, ADecimalCommaThatTheMappingLacksIsNamed) {
+  const auto mapping = mapping_of(R"("separator": ";", )");
+  EXPECT_THAT(import_csv("t;r;l\n0,5;1;1\n", mapping).error().message,
+              testing::HasSubstr(R"("decimal": ",")"));
+  EXPECT_THAT(import_csv("t;r;l\n0;1,5;1\n", mapping).error().message,
+              testing::HasSubstr(R"("decimal": ",")"));
+  EXPECT_THAT(import_csv("t;r;l\nx;1,5;1\n", mapping).error().message,
+              testing::Not(testing::HasSubstr("decimal")));
 }
 
 TEST(CsvImport, ExpressionsInTheirOrder) {
