@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -24,6 +25,9 @@ constexpr double first_per_decade = 10;
 constexpr std::size_t first_payloads = 5;
 // How closely cost must follow its line beyond the knee; the numerical solver's own noise is below it.
 constexpr double straightness = 4e-4;
+constexpr int payload_halvings = 6;  // that find the heaviest payload moved
+constexpr LegCost no_motion{std::numeric_limits<double>::quiet_NaN(),
+                            std::numeric_limits<double>::quiet_NaN()};
 
 // Weights of the cubic through four equally spaced points, `x` of a step beyond the second.
 std::array<double, 4> cubic(double x) {
@@ -224,11 +228,25 @@ double CostTable::Grid::error_against(Kind& kind, double per_decade) const {
   return worst;
 }
 
+// The heaviest payload that the motors move; nothing where they do not move the robot alone.
+std::optional<double> CostTable::Grid::heaviest(Kind& kind, double payload_limit_kg, CostTable& table) {
+  const auto moves = [&](double payload_kg) {
+    const auto walk = kind.walk(payload_kg, first_per_decade);
+    if (!walk && !table.obstacle_) table.obstacle_ = walk.error();
+    return walk.has_value();
+  };
+  if (moves(payload_limit_kg)) return payload_limit_kg;
+  if (!moves(0)) return std::nullopt;
+  return last_that(moves, 0, payload_limit_kg, payload_halvings);
+}
+
 void CostTable::Grid::build(Kind& kind, double payload_limit_kg, CostTable& table) {
   shortest_ = kind.shortest;
   log_shortest_ = std::log(shortest_);
-  payload_limit_kg_ = payload_limit_kg;
-  std::size_t payloads = payload_limit_kg > 0 ? first_payloads : 1;
+  const auto most_kg = heaviest(kind, payload_limit_kg, table);
+  if (!most_kg) return;
+  payload_limit_kg_ = *most_kg;
+  std::size_t payloads = *most_kg > 0 ? first_payloads : 1;
   double error = 0, per_decade = first_per_decade;
   for (int round = 0; round < rounds && !kind.stop.stop_requested(); ++round) {
     rows_.assign(payloads, Row());
@@ -241,7 +259,7 @@ void CostTable::Grid::build(Kind& kind, double payload_limit_kg, CostTable& tabl
         continue;
       }
       if (!table.obstacle_) table.obstacle_ = walk.error();
-      rows_[p].at_knee = rows_[p].per_length = {std::nan(""), std::nan("")};
+      rows_[p].at_knee = rows_[p].per_length = no_motion;
     }
     error = error_against(kind, per_decade);
     if (error <= (kind.numerical ? wanted_of_numerical : wanted_error)) break;
@@ -274,6 +292,7 @@ LegCost CostTable::Grid::along(const Row& row, double length, double log_length)
 // that moves with the payload, is then no kink in it.
 LegCost CostTable::Grid::at(double length, double payload_kg) const {
   if (!(length > 0)) return {};
+  if (rows_.empty() || payload_kg > payload_limit_kg_) return no_motion;
   const double log_length = std::log(length);
   if (rows_.size() == 1 || payload_kg == 0) return along(rows_[0], length, log_length);
   const auto [first, share] =

@@ -97,6 +97,7 @@ class CostTable {
     LegCost at(double length, double payload_kg) const;
 
    private:
+    static std::optional<double> heaviest(Kind& kind, double payload_limit_kg, CostTable& table);
     double payload_of(double row) const;
     Row row_of(const Walk& walk, double per_decade) const;
     LegCost along(const Row& row, double length, double log_length) const;
@@ -104,7 +105,7 @@ class CostTable {
 
     double shortest_ = 1, log_shortest_ = 0, payload_limit_kg_ = 0;
     bool knees_within_ = true;  // every row's, within the lengths asked for
-    std::vector<Row> rows_;     // payloads from none to the limit
+    std::vector<Row> rows_;     // payloads from none to the limit; none where nothing moves
   };
 
   Grid straight_, turn_;

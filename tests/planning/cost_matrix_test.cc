@@ -128,16 +128,31 @@ TEST(CostMatrix, CellsArePlans) {
 TEST(CostMatrix, SaysWhereTheLimitsAllowNoMotion) {
   robot::RobotModel weak = test::amr();
   weak.limits.current_a = 0.1;
-  const auto table = CostTable::make(weak, {});
-  ASSERT_TRUE(table) << describe(table.error());
-  ASSERT_TRUE(table->obstacle());
-  MatrixTask task;
-  task.empty = {Leg{{4}, {}}};
-  task.loaded = Leg{{4}, {}};
-  const CostMatrix matrix({{std::make_shared<const CostTable>(*table), 60, {}}}, {task});
-  std::vector<Cell> cells;
-  matrix.row(0, cells);
-  EXPECT_EQ(cells[0].obstacle, Obstacle::limits);
+  robot::RobotModel high_ohmic = test::amr();
+  high_ohmic.motor.resistance_ohm = 500;
+  // Moves some of the payload that it may carry.
+  robot::RobotModel rolling = test::amr();
+  rolling.limits.current_a = 1;
+  rolling.effects.push_back({"load_rolling_resistance", {{"coefficient", 0.02}}});
+  std::vector<MatrixTask> tasks(3);
+  for (const std::size_t t : {0u, 1u, 2u}) {
+    tasks[t].payload_kg = 30 * static_cast<double>(t);
+    tasks[t].empty = {Leg{{4}, {}}};
+    tasks[t].loaded = Leg{{4}, {1}};
+  }
+  for (const robot::RobotModel& robot : {weak, high_ohmic, rolling}) {
+    const auto table = CostTable::make(robot, {});
+    ASSERT_TRUE(table) << describe(table.error());
+    ASSERT_TRUE(table->obstacle());
+    const CostMatrix matrix({{std::make_shared<const CostTable>(*table), 60, {}}}, tasks);
+    std::vector<Cell> cells;
+    matrix.row(0, cells);
+    for (const std::size_t t : {0u, 1u, 2u}) {
+      const bool moves = !robot.effects.empty() && t < 2;
+      EXPECT_EQ(cells[t].obstacle, moves ? Obstacle::none : Obstacle::limits) << t;
+      EXPECT_EQ(std::isfinite(cells[t].energy_j), moves) << t;
+    }
+  }
 }
 
 }  // namespace
