@@ -67,10 +67,13 @@ struct Pricing {
   std::vector<PricedLeg> from_here;
 };
 
-Pricing as_usual(const AutonomyInput& input, const TaskPlan& plan, const forecast::LegPricer& pricer,
-                 const forecast::Forecaster& forecaster) {
+Result<Pricing> as_usual(const AutonomyInput& input, const TaskPlan& plan, const forecast::LegPricer& pricer,
+                         const forecast::Forecaster& forecaster) {
+  std::optional<Error> stuck;
   const auto price = [&](const std::vector<PlannedLeg>& legs, const StatedPace& pace) {
-    return forecast::price(forecaster, pricer, legs, pace, plan.halts_stated);
+    auto priced = forecast::price(forecaster, pricer, legs, pace, plan.halts_stated);
+    if (!stuck) stuck = forecast::obstacle(pricer, legs, priced);
+    return priced;
   };
   Pricing priced;
   priced.tasks.reserve(plan.tasks.size());
@@ -78,6 +81,7 @@ Pricing as_usual(const AutonomyInput& input, const TaskPlan& plan, const forecas
     priced.tasks.push_back(
         {price(plan.tasks[k].legs, input.tasks[k].pace), price(plan.tasks[k].to_charger, input.pace)});
   priced.from_here = price(plan.from_here, input.pace);
+  if (stuck) return tl::unexpected(std::move(*stuck));
   return priced;
 }
 
@@ -113,15 +117,19 @@ bool paces_stated(const AutonomyInput& input, const TaskPlan& plan) {
   return true;
 }
 
-// Where the motors do not reach the pace of the whole request, or else of one of its tasks.
+// Where the motors do not move the robot, or else do not reach the pace: of the whole request before those of
+// its tasks.
 std::optional<forecast::Limitation> limitation_of(const AutonomyInput& input, const TaskPlan& plan,
                                                   const forecast::LegPricer& pricer,
                                                   const RobotOutlook& robot, const AutonomyOutput& out) {
   const robot::RobotModel& model = robot.model->robot;
   auto limitation = forecast::limitation(pricer, model, out.pace, out.payload_kg);
-  for (std::size_t k = 0; k < input.tasks.size() && !limitation; ++k)
-    limitation = forecast::limitation(pricer, model, robot.forecaster->habit.with(input.tasks[k].pace).middle,
-                                      plan.tasks[k].greatest_payload_kg);
+  for (std::size_t k = 0; k < input.tasks.size() && (!limitation || limitation->moves); ++k) {
+    auto of_task =
+        forecast::limitation(pricer, model, robot.forecaster->habit.with(input.tasks[k].pace).middle,
+                             plan.tasks[k].greatest_payload_kg);
+    if (of_task && (!limitation || !of_task->moves)) limitation = std::move(of_task);
+  }
   return limitation;
 }
 
@@ -232,7 +240,9 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
     out.outlook = look(*best);
     return out;
   }
-  out.outlook = look(as_usual(input, plan, pricer, forecaster));
+  const auto usual = as_usual(input, plan, pricer, forecaster);
+  if (!usual) return tl::unexpected(usual.error());
+  out.outlook = look(*usual);
   if (best) out.minimum_energy_outlook = look(*best);
   return out;
 }

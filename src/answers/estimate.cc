@@ -114,8 +114,10 @@ Result<EstimateOutput> of_habit(const DriveInput& drive, const RobotOutlook& rob
   if (!path) return tl::unexpected(path.error());
   const forecast::Forecaster& forecaster = *robot.forecaster;
   const forecast::LegPricer pricer(robot.model->robot, robot.model->drive);
-  const forecast::PlanSum sum = forecast::sum_of(
-      forecaster, forecast::price(forecaster, pricer, forecast::planned_legs(*path), {}, false));
+  const auto legs = forecast::planned_legs(*path);
+  const auto priced = forecast::price(forecaster, pricer, legs, {}, false);
+  if (const auto stuck = forecast::obstacle(pricer, legs, priced)) return tl::unexpected(*stuck);
+  const forecast::PlanSum sum = forecast::sum_of(forecaster, priced);
   const forecast::Prediction expected = forecaster.energy(sum);
   EstimateOutput out;
   out.energy_j = expected.mean();

@@ -46,9 +46,10 @@ struct Matrix::State {
 
   Robot robot_of(const MatrixInput::Robot& given, const MatrixFleet& fleet) const;
   void assemble();
-  std::vector<Cell> usual_cells(std::size_t r, std::vector<double>& probability) const;
+  std::vector<Cell> usual_cells(std::size_t r, std::vector<double>& probability,
+                                std::optional<Error>& obstacle) const;
   std::optional<std::vector<double>> success(const Robot& robot, const std::vector<Cell>& cells) const;
-  std::string detail_of(Obstacle obstacle, std::size_t r) const;
+  std::string detail_of(Obstacle obstacle, std::size_t r, const std::optional<Error>& limits) const;
 };
 
 Robot Matrix::State::robot_of(const MatrixInput::Robot& given, const MatrixFleet& fleet) const {
@@ -88,8 +89,10 @@ void Matrix::State::assemble() {
   matrix = std::make_unique<planning::CostMatrix>(std::move(rows), input.tasks);
 }
 
-// Priced at the robot's usual pace and corrected by its forecast; chances of the same forecasts.
-std::vector<Cell> Matrix::State::usual_cells(std::size_t r, std::vector<double>& probability) const {
+// Priced at the robot's usual pace and corrected by its forecast; chances of the same forecasts. Why some
+// cells are beyond the motors goes into `obstacle`.
+std::vector<Cell> Matrix::State::usual_cells(std::size_t r, std::vector<double>& probability,
+                                             std::optional<Error>& obstacle) const {
   const Robot& robot = robots[r];
   std::vector<Cell> cells(input.tasks.size());
   if (robot.model == nullptr) {
@@ -113,8 +116,13 @@ std::vector<Cell> Matrix::State::usual_cells(std::size_t r, std::vector<double>&
     if (const double dwell_s = task.pickup_dwell_s + task.dropoff_dwell_s; dwell_s > 0)
       legs.push_back({Motion::stand, 0, 0, 0, dwell_s});
     const bool halts_stated = task.pickup_dwell_s + task.dropoff_dwell_s > 0;
-    const forecast::PlanSum sum =
-        forecast::sum_of(forecaster, forecast::price(forecaster, pricer, legs, {}, halts_stated));
+    const auto priced = forecast::price(forecaster, pricer, legs, {}, halts_stated);
+    if (auto stuck = forecast::obstacle(pricer, legs, priced)) {
+      cell.obstacle = Obstacle::limits;
+      if (!obstacle) obstacle = std::move(stuck);
+      continue;
+    }
+    const forecast::PlanSum sum = forecast::sum_of(forecaster, priced);
     cell.energy_j = forecaster.energy(sum).mean();
     cell.duration_s = forecaster.duration(sum).quantile(0.5);
     if (robot.charge)
@@ -144,15 +152,15 @@ std::optional<std::vector<double>> Matrix::State::success(const Robot& robot,
   return probability;
 }
 
-std::string Matrix::State::detail_of(Obstacle obstacle, std::size_t r) const {
+std::string Matrix::State::detail_of(Obstacle obstacle, std::size_t r,
+                                     const std::optional<Error>& limits) const {
   switch (obstacle) {
     case Obstacle::none:
       break;
     case Obstacle::payload:
       return fmt::format("this robot carries at most {} kg", robots[r].model->robot.limits.payload_kg);
     case Obstacle::limits:
-      return matrix->robot(r).table->obstacle() ? describe(*matrix->robot(r).table->obstacle())
-                                                : std::string("no motion within the limits");
+      return limits ? describe(*limits) : std::string("no motion within the limits");
     case Obstacle::pose:
       return "the robot reports no pose; give it in the request, or the way to the pick-up";
     case Obstacle::model:
@@ -206,9 +214,10 @@ MatrixRow Matrix::row(std::size_t r) const {
   MatrixRow out;
   out.robot_id = s.input.robots[r].robot_id;
   std::vector<Cell> cells;
+  std::optional<Error> limits;  // that some cells break
   if (s.input.driving == Driving::usual) {
     std::vector<double> probability(s.input.tasks.size(), std::nan(""));
-    cells = s.usual_cells(r, probability);
+    cells = s.usual_cells(r, probability, limits);
     if (robot.charge) out.success_probability = std::move(probability);
   } else {
     s.matrix->row(r, cells);
@@ -220,7 +229,11 @@ MatrixRow Matrix::row(std::size_t r) const {
     for (const dynamics::ActiveEffect& active : effects)
       if (active.effect->info().needs_position || active.effect->info().needs_heading)
         out.neglected_effects.emplace_back(active.effect->info().id);
-    if (s.matrix != nullptr) out.interpolation_error = s.matrix->robot(r).table->interpolation_error();
+    if (s.matrix != nullptr) {
+      const CostTable& table = *s.matrix->robot(r).table;
+      out.interpolation_error = table.interpolation_error();
+      limits = table.obstacle();
+    }
   }
   for (const Cell& cell : cells) {
     out.energy_j.push_back(cell.energy_j);
@@ -230,7 +243,8 @@ MatrixRow Matrix::row(std::size_t r) const {
     std::vector<std::size_t> tasks;
     for (std::size_t t = 0; t < cells.size(); ++t)
       if (cells[t].obstacle == obstacle) tasks.push_back(t);
-    if (!tasks.empty()) out.infeasible.push_back({obstacle, s.detail_of(obstacle, r), std::move(tasks)});
+    if (!tasks.empty())
+      out.infeasible.push_back({obstacle, s.detail_of(obstacle, r, limits), std::move(tasks)});
   }
   return out;
 }

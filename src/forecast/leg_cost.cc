@@ -1,5 +1,7 @@
 #include "forecast/leg_cost.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -55,6 +57,12 @@ double LegPricer::power_w(const Power& kind, double v, double a) const {
   return drive_->flow(instant(kind, v, a)).battery_power_w - standing_w_;
 }
 
+Cruise LegPricer::greatest(Motion motion) const {
+  if (motion == Motion::turn)
+    return {limits_.yaw_rate_rad_s, limits_.acceleration_m_s2 / drive_->parameters().half_track_m};
+  return {limits_.speed_m_s, limits_.acceleration_m_s2};
+}
+
 bool LegPricer::reaches(const Power& kind, double v, double a) const {
   const auto flow = drive_->flow(instant(kind, v, a));
   for (std::size_t side = 0; side < 2; ++side) {
@@ -66,32 +74,30 @@ bool LegPricer::reaches(const Power& kind, double v, double a) const {
 
 Reachable LegPricer::reachable(const Power& kind, const Cruise& wanted) const {
   Reachable found{wanted, true, 0, 0};
-  const bool turning = kind.motion == Motion::turn;
-  const double top = turning ? limits_.yaw_rate_rad_s : limits_.speed_m_s;
-  const double steepest =
-      turning ? limits_.acceleration_m_s2 / drive_->parameters().half_track_m : limits_.acceleration_m_s2;
-  if (kind.unbound && wanted.speed <= top && wanted.acceleration <= steepest) return found;
+  const Cruise most = greatest(kind.motion);
+  if (kind.unbound && wanted.speed <= most.speed && wanted.acceleration <= most.acceleration) return found;
   if (reaches(kind, wanted.speed, wanted.acceleration)) return found;
   constexpr int halvings = 30;
-  constexpr double creeping = 5e-3;  // of the cruise wanted
-  const auto greatest = [&](double low, double high, const auto& holds) {
+  const auto last = [&](double low, double high, const auto& holds) {
     for (int k = 0; k < halvings; ++k) (holds(0.5 * (low + high)) ? low : high) = 0.5 * (low + high);
     return low;
   };
-  const auto flow = drive_->flow(instant(kind, creeping * wanted.speed, 0));
+  constexpr double creeping = 5e-3;  // of the limits, whatever is wanted
+  const Cruise least{creeping * most.speed, creeping * most.acceleration};
+  const auto flow = drive_->flow(instant(kind, least.speed, least.acceleration));
   for (std::size_t side = 0; side < 2; ++side) {
     found.creeping_voltage_v = std::max(found.creeping_voltage_v, std::fabs(flow.voltage_v[side]));
     found.creeping_current_a = std::max(found.creeping_current_a, std::fabs(flow.current_a[side]));
   }
-  found.moves = reaches(kind, creeping * wanted.speed, creeping * wanted.acceleration);
+  found.moves = reaches(kind, least.speed, least.acceleration);
   if (!found.moves) return found;
   double& speed = found.cruise.speed;
   if (!reaches(kind, speed, 0)) {
     constexpr double usable = 0.95;  // of the speed at which nothing is left to accelerate with
-    speed = usable * greatest(creeping * speed, speed, [&](double v) { return reaches(kind, v, 0); });
+    speed = usable * last(std::min(least.speed, speed), speed, [&](double v) { return reaches(kind, v, 0); });
   }
   if (double& a = found.cruise.acceleration; !reaches(kind, speed, a)) {
-    a = greatest(0, a, [&](double less) { return reaches(kind, speed, less); });
+    a = last(0, a, [&](double less) { return reaches(kind, speed, less); });
     found.moves = a > 0;
   }
   return found;
@@ -102,13 +108,21 @@ Reachable LegPricer::reachable(Motion motion, double curvature_1_m, double paylo
   return reachable(power_of(motion, curvature_1_m, payload_kg, false), wanted);
 }
 
+Error LegPricer::obstacle(const PlannedLeg& leg) const {
+  const Cruise most = greatest(leg.motion);
+  const Reachable within = reachable(leg.motion, leg.curvature_1_m, leg.payload_kg, most);
+  const bool by_voltage = voltage_limit_v_ > 0 && within.creeping_voltage_v > voltage_limit_v_;
+  return {Fault::infeasible, by_voltage ? "limits/voltage_v" : "limits/current_a",
+          fmt::format("is {:.6g}, must be at least {:.6g} to {} with {:.4g} kg",
+                      by_voltage ? voltage_limit_v_ : current_limit_a_,
+                      by_voltage ? within.creeping_voltage_v : within.creeping_current_a,
+                      leg.motion == Motion::turn ? "turn" : "drive", leg.payload_kg)};
+}
+
 // Six evaluations give the six coefficients; three more must agree with them, braking hard among them, where
 // a robot that does not regenerate departs from the parabola.
 std::optional<dynamics::QuadraticPower> LegPricer::closed_form(const Power& kind) const {
-  const bool turning = kind.motion == Motion::turn;
-  const double v = turning ? limits_.yaw_rate_rad_s : limits_.speed_m_s;
-  const double a =
-      turning ? limits_.acceleration_m_s2 / drive_->parameters().half_track_m : limits_.acceleration_m_s2;
+  const auto [v, a] = greatest(kind.motion);
   const double p1 = power_w(kind, v / 3, 0), p2 = power_w(kind, 2 * v / 3, 0), p3 = power_w(kind, v, 0);
   const double up = power_w(kind, v / 3, a), down = power_w(kind, v / 3, -a), fast = power_w(kind, v, a);
   dynamics::QuadraticPower q;
@@ -139,10 +153,8 @@ const LegPricer::Power& LegPricer::power_of(Motion motion, double curvature_1_m,
     constexpr std::size_t most = 32;
     if (known_.size() == most) known_.clear();
     kind = &known_.emplace_back(Power{motion, curvature_1_m, payload_kg, {}});
-    const bool turning = motion == Motion::turn;
-    kind->unbound = reaches(
-        *kind, turning ? limits_.yaw_rate_rad_s : limits_.speed_m_s,
-        turning ? limits_.acceleration_m_s2 / drive_->parameters().half_track_m : limits_.acceleration_m_s2);
+    const Cruise top = greatest(motion);
+    kind->unbound = reaches(*kind, top.speed, top.acceleration);
   }
   // Curves seldom share their curvature: for one price, the closed form would cost more than it saves.
   if (!kind->tried && (often || curvature_1_m == 0)) {

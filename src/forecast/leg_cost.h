@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "base/error.h"
 #include "dynamics/drive_model.h"
 #include "dynamics/straight.h"
 #include "forecast/habit.h"
@@ -41,7 +42,7 @@ struct LegCost {
 struct Reachable {
   Cruise cruise;
   bool moves = true;
-  double creeping_voltage_v = 0;  // of the worse armature, hardly moving
+  double creeping_voltage_v = 0;  // of the worse armature, hardly moving; where the motors bound the cruise
   double creeping_current_a = 0;
 };
 
@@ -63,6 +64,8 @@ class LegPricer {
   // A past leg's way, likewise.
   LegCost usual(const Leg& leg, const Habit& habit) const;
   Reachable reachable(Motion motion, double curvature_1_m, double payload_kg, const Cruise& wanted) const;
+  // Of a leg that is impossible: the limit that does not let the robot move, and what moving takes.
+  Error obstacle(const PlannedLeg& leg) const;
   LegCost standing(double duration_s) const;
 
  private:
@@ -81,6 +84,7 @@ class LegPricer {
   dynamics::Instant instant(const Power& kind, double speed, double acceleration) const;
   bool reaches(const Power& kind, double speed, double acceleration) const;
   Reachable reachable(const Power& kind, const Cruise& wanted) const;
+  Cruise greatest(Motion motion) const;  // that the limits allow
   double power_w(const Power& kind, double speed, double acceleration) const;
   // `often`: so many prices are asked of it that a curve's closed form is worth finding.
   const Power& power_of(Motion motion, double curvature_1_m, double payload_kg, bool often) const;

@@ -114,6 +114,13 @@ std::vector<PricedLeg> price(const Forecaster& forecaster, const LegPricer& pric
   return priced;
 }
 
+std::optional<Error> obstacle(const LegPricer& pricer, std::span<const PlannedLeg> legs,
+                              std::span<const PricedLeg> priced) {
+  const auto stuck = std::ranges::find_if(priced, [](const PricedLeg& leg) { return leg.cost.impossible; });
+  if (stuck == priced.end()) return std::nullopt;
+  return pricer.obstacle(legs[static_cast<std::size_t>(stuck - priced.begin())]);
+}
+
 std::vector<PlannedLeg> typical_legs(const Forecaster& forecaster, double payload_kg) {
   std::vector<PlannedLeg> legs;
   for (const Leg& leg : forecaster.typical)

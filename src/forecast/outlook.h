@@ -114,5 +114,8 @@ void extend(PlanSum& sum, const Forecaster& forecaster, std::span<const PricedLe
 // be followed by a halt as the robot is used to make, unless the plan itself says where it stands.
 std::vector<PricedLeg> price(const Forecaster& forecaster, const LegPricer& pricer,
                              std::span<const PlannedLeg> legs, const StatedPace& stated, bool halts_stated);
+// Why the first leg that is impossible is so; nothing where all can be driven.
+std::optional<Error> obstacle(const LegPricer& pricer, std::span<const PlannedLeg> legs,
+                              std::span<const PricedLeg> priced);
 
 }  // namespace joulecast::forecast

@@ -198,6 +198,29 @@ TEST_F(AutonomyAnswer, AValueOfTimePricesThePlanOfADeadline) {
   EXPECT_EQ(fault({{"value_of_time_w", -1}}, &live_).field, "/value_of_time_w");
 }
 
+// The robot drives empty, but not with what a task loads.
+TEST_F(AutonomyAnswer, PlansNoTaskThatTheMotorsCannotDrive) {
+  robot::RobotModel robot = testing::nomad();
+  robot.effects.push_back({"load_rolling_resistance", {{"coefficient", 0.05}}});
+  const auto needed = [&](double payload_kg) {
+    const auto drive = *dynamics::drive_model(robot);
+    robot.limits.current_a = 1e-3;
+    return forecast::LegPricer(robot, drive)
+        .reachable(forecast::Motion::turn, 0, payload_kg, {1, 1})
+        .creeping_current_a;
+  };
+  robot.limits.current_a = 0.5 * (needed(0) + needed(10));
+  robot_ = untried(*model_in_force(robot, 3));
+  for (const char* driving : {"usual", "minimum_energy"}) {
+    const json answer =
+        ask({{"payload_kg", 0}, {"driving", driving}, {"tasks", {{{"distance_m", 5}, {"payload_kg", 10}}}}});
+    EXPECT_TRUE(answer["plan"].is_null()) << driving;
+    EXPECT_NE(answer["pace"]["limitation"].get<std::string>().find("With 10 kg the robot cannot"),
+              std::string::npos)
+        << answer["pace"];
+  }
+}
+
 TEST_F(AutonomyAnswer, FaultsNameTheField) {
   EXPECT_EQ(fault(json::object(), nullptr).field, "/state_of_charge");
   EXPECT_EQ(fault(json::object(), nullptr).fault, Fault::infeasible);

@@ -197,6 +197,21 @@ TEST_F(MatrixAnswer, OneRobotsTroubleIsItsOwn) {
   EXPECT_TRUE(rows[2]["infeasible"].empty());
 }
 
+TEST_F(MatrixAnswer, NothingIsDrivenThatTheMotorsCannotMove) {
+  robot::RobotModel robot = testing::nomad();
+  robot.robot_id = "a";
+  robot.motor.resistance_ohm = 500;
+  models_["a"] = *model_in_force(robot, 9);
+  for (const char* driving : {"usual", "minimum_energy"}) {
+    const json row = answer_to({{"robots", {"a"}}, {"tasks", {legs_}}, {"driving", driving}})["rows"][0];
+    EXPECT_TRUE(row["energy_j"][0].is_null()) << driving;
+    ASSERT_EQ(row["infeasible"].size(), 1u) << driving;
+    EXPECT_EQ(row["infeasible"][0]["reason"], "limits");
+    EXPECT_NE(row["infeasible"][0]["detail"].get<std::string>().find("limits/voltage_v: is "),
+              std::string::npos);
+  }
+}
+
 TEST_F(MatrixAnswer, NamesTheFieldAtFault) {
   const json a = {"a"};
   const auto with = [](json object, const char* name, json value) {

@@ -220,6 +220,19 @@ TEST(Estimate, UsualDrivingIsWhatTheForecastSays) {
   EXPECT_EQ(fault(estimated, {{"path", path}, {"driving", "usual"}, {"columns", true}}).field, "/columns");
 }
 
+// A robot whose motors do not move it drives nowhere, neither as usual nor at its best.
+TEST(Estimate, RefusesWhatTheMotorsCannotDrive) {
+  robot::RobotModel robot = testing::nomad();
+  robot.motor.resistance_ohm = 500;
+  const json path = {{{"kind", "straight"}, {"length_m", 10}}};
+  for (const char* driving : {"usual", "minimum_energy"}) {
+    const auto text = estimated({{"path", path}, {"driving", driving}}, **model_in_force(robot, 1));
+    ASSERT_FALSE(text) << driving;
+    EXPECT_EQ(text.error().fault, Fault::infeasible);
+    EXPECT_EQ(text.error().field, "limits/voltage_v");
+  }
+}
+
 // What the I/O thread may answer is decided before any path is made: a way of many knots is declined at once.
 TEST(Profile, OnlyShortStretchesAreBrief) {
   const auto brief = [](std::initializer_list<json> path) {
