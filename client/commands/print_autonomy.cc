@@ -107,6 +107,8 @@ void print_one(const json& a) {
     fmt::print("by {} missions of its own", c.value("missions", 0));
   else
     fmt::print("by its {}", basis == "model" ? "model, never tried" : "siblings");
+  if (const json& limitation = a["pace"]["limitation"]; limitation.is_string())
+    fmt::print("\n{}", limitation.get<std::string>());
   fmt::print("\n  {:<10} {:>12} {:>12} {:>12}\n", "", "5 %", "median", "95 %");
   const json &range = a["range_quantiles_m"], &time = a["run_time_quantiles_s"];
   fmt::print("  {:<10} {:>10} m {:>10} m {:>10} m\n", "range", figure(number(range, "p05")),

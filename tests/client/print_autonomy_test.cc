@@ -1,0 +1,36 @@
+#include "client/commands/print_autonomy.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+namespace joulecast::client {
+namespace {
+
+using nlohmann::json;
+
+TEST(PrintAutonomy, SaysWhyTheMotorsDoNotReachThePace) {
+  const json quantiles = {{"p05", nullptr}, {"p50", nullptr}, {"p95", nullptr}};
+  json answer = {{"robot_id", "amr"},
+                 {"charging", nullptr},
+                 {"driving", "usual"},
+                 {"pace", {{"speed_m_s", 0}, {"limitation", nullptr}}},
+                 {"consumption", {{"basis", "model"}}},
+                 {"range_quantiles_m", quantiles},
+                 {"run_time_quantiles_s", quantiles},
+                 {"drift", nullptr},
+                 {"plan", nullptr},
+                 {"minimum_energy", nullptr}};
+  const auto printed = [&] {
+    ::testing::internal::CaptureStdout();
+    print_autonomy(answer);
+    return ::testing::internal::GetCapturedStdout();
+  };
+  EXPECT_THAT(printed(), ::testing::Not(::testing::HasSubstr("cannot drive")));
+  answer["pace"]["limitation"] = "With 0 kg the robot cannot drive.";
+  EXPECT_THAT(printed(), ::testing::HasSubstr("\nWith 0 kg the robot cannot drive.\n"));
+}
+
+}  // namespace
+}  // namespace joulecast::client
