@@ -16,7 +16,8 @@ struct BrokenLimit {
   double allowed = 0;
 };
 
-inline constexpr double creep_rad_s = 10 * dynamics::friction_width_rad_s;
+// Faster, less than 6e-4 of the dry friction is missing.
+inline constexpr double creep_rad_s = 30 * dynamics::friction_width_rad_s;
 
 // Whether both wheels turn so slowly that their dry friction, which the drive model smooths through
 // standstill, is missing: what the motors then seem to bear is not what a robot's motors bear.

@@ -20,7 +20,7 @@ constexpr double little = 1e-4;    // of the distance: may be driven at the spee
 constexpr int speed_samples = 64;  // where f is looked at for its minima
 constexpr int most_cuts =
     8;  // in halves, of a cell in which the acceleration or a motor's limit changes fast
-constexpr double least_share = 0.8;  // of a cell's middle acceleration that motors must allow at its ends
+constexpr double least_share = 0.9;  // of a cell's acceleration that motors must allow at its ends
 
 // Whether a motor does what the other does, or its mirror image, as the left one in a turn in place.
 bool alike(const WheelLoad& a, const WheelLoad& b) {
@@ -196,16 +196,20 @@ void UniformMotion::piece(const End& from, const End& to, double change, const P
   const auto [least, greatest] = std::minmax({from.acceleration, at_middle.acceleration, to.acceleration});
   const bool jumps = greatest > change * least && halvings < most_cuts;
   const End cut{middle, at_middle.acceleration};
-  const double tolerance = closeness_ * (price.fastest ? hurried_tolerance : task_.motor_tolerance);
+  const double tolerance = price.fastest ? hurried_tolerance : task_.motor_tolerance;
   bool beyond = false;
   if (!price.rough && has_motor_limits()) {
+    // In the time that the accelerations within the limits take, by Simpson's rule: of a room that vanishes,
+    // the least within each cell would leave too much unused.
+    if (at_middle.bounded && at_middle.bound != Bound::acceleration && 2 * least > greatest)
+      at_middle.acceleration = 6 / (1 / from.acceleration + 4 / cut.acceleration + 1 / to.acceleration);
     for (const double end : {from.v, to.v}) {
       const Local there = local(end);
-      const Most strict = most(there, direction, 0);
-      beyond = beyond || at_middle.acceleration > most(there, direction, tolerance).acceleration ||
-               strict.acceleration < least_share * cut.acceleration;
-      if (strict.acceleration < at_middle.acceleration)
-        at_middle = {std::max(strict.acceleration, 1e-3 * at_middle.acceleration), strict.bound, true};
+      const Most most_there = most(there, direction, tolerance);
+      beyond = beyond || at_middle.acceleration > most_there.acceleration ||
+               most(there, direction, 0).acceleration < least_share * cut.acceleration;
+      if (most_there.acceleration < at_middle.acceleration)
+        at_middle = {std::max(most_there.acceleration, 1e-3 * cut.acceleration), most_there.bound, true};
     }
   }
   if (jumps || (beyond && halvings < most_cuts)) {
@@ -297,6 +301,13 @@ UniformMotion::Shape UniformMotion::turning(Shape shape, double nearest, double 
     m = missing(v);
     if (const double share = (m - m_before) / (v - v_before) / rough_slope; share > 0.2 && share < 5)
       slope = share * rough_slope;
+  }
+  // Where the motors' room vanishes towards the top speed, the distance grows far more steeply than few cells
+  // tell.
+  if (m < -little && v != farthest) {
+    const double at_farthest = missing(farthest);
+    v = at_farthest > 0 ? zero_between(missing, v, m, farthest, at_farthest, 1e-12) : farthest;
+    m = missing(v);
   }
   // Cells that are cut where the acceleration jumps make the distance jump a little with the speed.
   if (m > close) {
@@ -450,12 +461,10 @@ std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
   const bool bounded = std::isfinite(task.acceleration_limit) || motion.has_motor_limits();
   if ((!bounded && !(task.electric.down > 0)) || task.loads[0].gear != 0 || task.loads[1].gear != 0)
     return std::nullopt;
-  // Of little that friction leaves, little may be left unused: full tolerance from two fifths on.
+  // Something must be left to accelerate with at the top speed, little of what friction leaves.
   const double room = last_that(
-      [&](double share) { return motion.most(motion.local(0), 1, -share).acceleration > 0; }, 0, 1, 20);
-  motion.closeness_ = std::clamp(2.5 * room, 0.05, 1.0);
-  // Something must be left to accelerate with at the top speed.
-  double left = 0.5 * motion.closeness_ * hurried_tolerance;
+      [&](double share) { return motion.most(motion.local(0), 1, -share).acceleration > 0; }, 0, 1, 30);
+  double left = 0.5 * hurried_tolerance * room;
   const auto holds = [&](double v) { return motion.most(motion.local(v), 1, -left).acceleration > 0; };
   for (int k = 0; k < 30 && !holds(0); ++k) left *= 0.5;
   if (!holds(0)) return std::nullopt;

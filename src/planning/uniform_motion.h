@@ -22,8 +22,8 @@ struct UniformTask {
   double acceleration_limit = 0;
   double torque_limit_nm = 0, voltage_limit_v = 0;
   std::size_t cells = 64;  // of the speed range on either side of the cruise
-  // How far below its limit a motor may be used within a cell where that limit binds.
-  double motor_tolerance = 7e-4;
+  // How far beyond its limit a motor may be used at an end of a cell, as far below it at the other.
+  double motor_tolerance = 3e-4;
 };
 
 // Speeds at places along the way, the acceleration being constant in between.
@@ -61,8 +61,7 @@ tl::unexpected<Error> endless(double standing_w);
 // it are left likewise.
 //
 // Between nodes of the speed the acceleration is constant, so the answer is a motion that can be driven as it
-// is told: current and voltage limits are kept all along a cell. Cells are as small as motor_tolerance asks
-// for.
+// is told: current and voltage limits are kept on the average of a cell, and to motor_tolerance all along it.
 class UniformMotion {
  public:
   // motor_tolerance of the fastest motion, and what is to be asked for where time is short.
@@ -165,7 +164,6 @@ class UniformMotion {
   UniformTask task_;
   std::size_t motors_ = 2;  // that are reckoned; where both are alike, one
   double each_ = 1;         // how many each of them stands for
-  double closeness_ = 1;    // share of motor_tolerance that the room above friction allows
   double top_ = 0;          // the speed limit, or what the motors can hold with something left to accelerate
   double bare_top_ = 0;     // what they can just hold, where that is less than the speed limit
 };

@@ -137,9 +137,11 @@ TEST(Estimate, PlansAreWithinTheirLimits) {
       {{{"kind", "arc"}, {"radius_m", 1.2}, {"angle_rad", 2}}},
       {straight(2), {{"kind", "arc"}, {"radius_m", 0.8}, {"angle_rad", -1.5}}, straight(1)},
       {{{"kind", "clothoid"}, {"length_m", 4}, {"start_curvature_1_m", 0}, {"end_curvature_1_m", 0.7}}}};
-  for (const double current_a : {8.0, 0.8, 0.4}) {
+  // The last is just above what friction needs, and bounds the braking too.
+  for (const double current_a : {8.0, 0.8, 0.4, 0.235}) {
     robot::RobotModel robot = testing::nomad();
     robot.limits.current_a = current_a;
+    if (current_a < 0.3) robot.limits.acceleration_m_s2 = 2;
     for (const double returned : {1.0, 0.0}) {
       robot.effects = {{"no_regeneration", {{"fraction", 1 - returned}}}};
       const auto weak = **model_in_force(robot, 1);

@@ -151,6 +151,39 @@ TEST(Limited, CostsNoMoreThanWhatAnotherProgramFound) {
   }
 }
 
+// Of a current just above what friction needs, what is left to accelerate with vanishes towards the top
+// speed. No deadline makes a plan cheaper than it is in free time, and rows keep the limit.
+TEST(Limited, CurrentJustAboveFrictionIsUsedUp) {
+  for (const robot::RobotModel& whole : test::all_robots()) {
+    const auto& m = whole.motor;
+    const double friction_a =
+        std::max(m.friction_torque_nm[0], m.friction_torque_nm[1]) / (m.torque_constant_nm_a * m.gear_ratio);
+    if (!(friction_a > 0)) continue;
+    const auto planner = Planner::make(whole);
+    ASSERT_TRUE(planner);
+    for (const double above : {1.004, 1.02, 1.05, 1.1}) {
+      for (const Segment& segment : {Segment{Straight{3}}, Segment{Straight{40}}, Segment{TurnInPlace{2}}}) {
+        const auto path = make_path(std::vector<Segment>{segment}, {});
+        Problem problem;
+        problem.limits = limits_of(whole);
+        problem.limits.current_a = above * friction_a;
+        const auto free = planner->plan(*path, problem);
+        ASSERT_TRUE(free) << describe(free.error());
+        const double shortest = free->certificate.shortest_time_s;
+        const std::string label = whole.robot_id + " " + std::to_string(above) + " over " +
+                                  std::to_string(path->distance_m() + path->turned_rad());
+        for (const double longer : {1.0001, 1.002, 1.05}) {
+          Problem hurried = problem;
+          hurried.deadline_s = longer * shortest;
+          const auto plan = planner->plan(*path, hurried);
+          ASSERT_TRUE(plan) << label << describe(plan.error());
+          EXPECT_LT(free->summary.energy_j, plan->summary.energy_j * (1 + 1e-4)) << label << " " << longer;
+        }
+      }
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(TwelveProblems, LimitedProblems, testing::Range(0, 12));
 
 }  // namespace
