@@ -183,12 +183,18 @@ std::vector<Observation> observe_all(const telemetry::RecordingSet& recordings,
   return observations;
 }
 
+// Wheels that always read the same say nothing of how long the robot moves.
+bool tells_by_itself(const Observation& o) {
+  const bool level = o.of(reading::wheel_velocity).constant() && o.of(reading::wheel_velocity + 1).constant();
+  return (level ? o.clock.length_s() : o.moving_s) >= enough_moving_s;
+}
+
 // What missions contradict each by itself, but for the clock.
 std::vector<Check> asked_one_by_one(const std::vector<Observation>& observations,
                                     const robot::RobotModel& robot) {
   std::vector<Check> found;
   for (std::size_t m = 0; m < observations.size(); ++m) {
-    if (observations[m].moving_s < enough_moving_s) continue;
+    if (!tells_by_itself(observations[m])) continue;
     for (Check& check : check_contradictions({&observations[m], 1}, robot)) {
       if (!check.contradicted || check.channel == "utime") continue;
       const auto same = std::ranges::find_if(

@@ -17,11 +17,15 @@ constexpr double thrown = 0.8;            // ... and is this far from them
 constexpr double turning_share = 0.1;  // difference of the wheels over their sum, from which on a robot turns
 constexpr double least_way_rad = 0.2;  // of a span, by the wheels together
 constexpr double turning_rad = 0.3;    // difference of the wheels' angles in a span
-constexpr double braking_share = 0.05;   // of the fastest wheel speed, lost in a span
+constexpr double braking_share = 0.05;  // of the fastest wheel speed, lost in a span
+constexpr double map_moving_part =
+    0.1;  // of the fastest speed: far more than a map's readings stray in a span
+constexpr double map_jump =
+    3;  // times the fastest speed: a map that finds its place anew, or has other units
 constexpr double widest_turn_rad = 2.0;  // of a span whose chord is compared with its path
 
-constexpr std::array<std::size_t, relation_count> quantities{5, 5, 4, 6, 6, 4, 4, 3, 3, 3, 2,
-                                                             3, 4, 3, 2, 2, 4, 4, 4, 2, 5};
+constexpr std::array<std::size_t, relation_count> quantities{5, 5, 4, 6, 6, 4, 4, 3, 3, 3, 2, 3,
+                                                             4, 3, 2, 2, 4, 4, 4, 2, 3, 2, 3, 5};
 
 std::array<Products, relation_count> no_products() {
   std::array<Products, relation_count> products;
@@ -128,6 +132,15 @@ void Observer::take(const Cell& c) {
   const double speed = 0.5 * (p.wheel_radius_m[0] * right + p.wheel_radius_m[1] * left);
   const double turn = (p.wheel_radius_m[0] * right - p.wheel_radius_m[1] * left) / (2 * p.half_track_m);
   of(Relation::way).add({speed, std::fabs(speed), 1.0});
+  of(Relation::back_emf)
+      .add({c.voltage_v[0] - p.resistance_ohm[0] * c.current_a[0],
+            c.voltage_v[1] - p.resistance_ohm[1] * c.current_a[1], 1.0});
+  of(Relation::yaw).add({c.yaw_rate_rad_s, 1.0});
+  of(Relation::commanded)
+      .add({c.battery_power_w,
+            (std::fabs(c.command[0]) + p.half_track_m * std::fabs(or_zero(c.command[1]))) /
+                robot_.kinematics.wheel_radius_m,
+            1.0});
   of(Relation::command).add({speed, c.command[0]});
   of(Relation::command_turn).add({turn, c.command[1]});
   take_power(c);
@@ -161,6 +174,10 @@ void Observer::take_power(const Cell& c) {
 
 void Observer::take(const Span& s) {
   const double right = s.turned_rad[0], left = s.turned_rad[1];
+  if (std::isfinite(s.distance)) {
+    const double part = s.distance / (robot_.limits.speed_m_s * s.length_s);
+    if (part < map_jump) (part > map_moving_part ? seen_.map_moving_s : seen_.map_standing_s) += s.length_s;
+  }
   if (std::fabs(right) + std::fabs(left) < least_way_rad) return;
   of(Relation::heading_gyro).add({s.heading_rad, s.heading_deg, s.gyro_rad, s.length_s});
   of(Relation::heading_wheels).add({s.heading_rad, s.heading_deg, right, left});

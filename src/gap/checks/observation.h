@@ -42,6 +42,9 @@ enum class Relation : std::size_t {
   heading_wheels,  // turned by the map in rad, in degrees, by the right wheel, by the left
   travel,          // moved by the map along and across the heading, turned by the wheels
   distance,        // moved by the map, by the wheels
+  back_emf,        // voltage less that which the file's resistance takes, right, left, 1
+  yaw,             // yaw rate, 1; standing too
+  commanded,       // battery power, faster wheel's speed commanded, 1
   slip  // moved by the map along the heading, by the wheels, the same turning, braking; speed change
 };
 inline constexpr std::size_t relation_count = static_cast<std::size_t>(Relation::slip) + 1;
@@ -54,9 +57,10 @@ struct Observation {
   std::array<ValueTally, reading_count> values;
   std::array<Products, relation_count> relations;
   LagSums lags;
-  double moving_s = 0;            // some wheel turning
-  double fastest_m_s = 0;         // of half a second, by the file's wheel radius
-  double fastest_turn_rad_s = 0;  // of half a second, by the gyro
+  double moving_s = 0;                          // some wheel turning
+  double map_moving_s = 0, map_standing_s = 0;  // by the map alone
+  double fastest_m_s = 0;                       // of half a second, by the file's wheel radius
+  double fastest_turn_rad_s = 0;                // of half a second, by the gyro
 
   const ValueTally& of(std::size_t reading) const { return values[reading]; }
   const Products& of(Relation r) const { return relations[static_cast<std::size_t>(r)]; }

@@ -16,6 +16,11 @@ constexpr double enough_moving_s = 3;  // less says nothing of what should have 
 constexpr double least_swing = 0.002;  // of a battery's voltage: what any converter resolves
 constexpr double near_nominal = 0.25;
 constexpr double noise_share = 0.05;  // of the highest reading: how far below 0 an unsigned one may stray
+// Wheels that read one value for so long are asked whether anything else says that the motion changes. So
+// much of what the file allows is far beyond noise and drift: of the yaw rate, the speed commanded, the
+// voltage that turning induces; of its own mean, the battery's power.
+constexpr double level_s = 10;
+constexpr double turning_varies = 0.05, command_varies = 0.1, voltage_varies = 0.1, power_varies = 0.5;
 constexpr double supply_share = 0.5;  // of the nominal voltage: lower ones come with every halt
 
 // A channel, or a group of readings that one channel holds.
@@ -37,10 +42,14 @@ constexpr auto groups =
                           {"pose", reading::x, 3, false, false},
                           {"motor_temperature", reading::motor_temperature, 2, true, true}});
 
-std::string joined(const std::vector<std::string>& names) {
+std::string joined(const std::vector<std::string>& names, const char* between = ", ") {
   std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  for (const std::string& name : names) text += (text.empty() ? "" : between) + name;
   return text;
+}
+
+std::string by(const std::string& witnesses) {
+  return witnesses.empty() ? witnesses : " by " + witnesses;
 }
 
 // The group's silent channels: itself, or a side of it.
@@ -54,17 +63,58 @@ std::vector<std::string> silent_channels(const CheckContext& c, const Group& gro
   return group.sides ? names : std::vector<std::string>{};
 }
 
-Check dead_check(const std::vector<std::string>& dead) {
-  return {
-      "dead_channel",
-      joined(dead),
-      0,
-      no_interval,
-      fmt::format(
-          "{} {} exactly 0 all the time while the robot moves: a sensor that is dead or was never filled in; "
-          "joulecast expects NaN for what is not measured.",
-          joined(dead), dead.size() == 1 ? "is" : "are"),
-      true};
+// Standard deviation of a quantity; `one` is the constant among them.
+double deviation(std::span<const Products::Block> blocks, Eigen::Index k, Eigen::Index one) {
+  double rows = 0, sum = 0, square = 0;
+  for (const auto& block : blocks) rows += block.rows, sum += block.sums(k, one), square += block.sums(k, k);
+  return rows > 0 ? std::sqrt(std::max(square / rows - sum * sum / (rows * rows), 0.0)) : 0;
+}
+
+// What says that the robot's motion changes though its wheels always read the same. A robot that is held fast
+// is commanded, too, but then its battery does not follow the commands.
+std::string witnesses_of_motion(const CheckContext& c) {
+  const robot::Limits& limits = c.robot.limits;
+  std::vector<std::string> names;
+  double map_moving_s = 0, map_standing_s = 0;
+  for (const Observation& o : c.seen) map_moving_s += o.map_moving_s, map_standing_s += o.map_standing_s;
+  const bool stand = c.tally(reading::wheel_velocity).high() == 0 && c.tally(1).high() == 0;
+  if (deviation(c.blocks(Relation::yaw), 0, 1) > turning_varies * limits.yaw_rate_rad_s)
+    names.emplace_back("its gyro");
+  if (map_moving_s > level_s && (stand || map_standing_s > level_s)) names.emplace_back("its map");
+  const auto emf = c.blocks(Relation::back_emf), power = c.blocks(Relation::motion);
+  const double least_v = voltage_varies * c.robot.battery.nominal_voltage_v;
+  if (std::max(deviation(emf, 0, 2), deviation(emf, 1, 2)) > least_v) names.emplace_back("its motors");
+  constexpr std::array<std::size_t, 2> with_one{1, 2};
+  const auto commanded = c.blocks(Relation::commanded);
+  const Estimate follows = estimate(fit_blocks(commanded, 0, with_one), 0);
+  if (deviation(commanded, 1, 2) > command_varies * limits.speed_m_s / c.robot.kinematics.wheel_radius_m &&
+      follows.sure() && follows.value > 0)
+    names.emplace_back("its battery that follows the commands");
+  const ValueTally &volts = c.tally(reading::battery_voltage), &amps = c.tally(reading::battery_current);
+  if (!stand && volts.known() > 0 && amps.known() > 0 &&
+      deviation(power, 0, 2) > power_varies * std::fabs(volts.mean() * amps.mean()))
+    names.emplace_back("its battery's power");
+  return joined(names, " and ");
+}
+
+// ... of both wheels, where they never read anything else.
+std::string witnesses_against_wheels(const CheckContext& c) {
+  double length_s = 0;
+  for (const Observation& o : c.seen) length_s += o.clock.length_s();
+  if (!c.tally(0).constant() || !c.tally(1).constant() || length_s < level_s) return {};
+  return witnesses_of_motion(c);
+}
+
+Check dead_check(const std::vector<std::string>& dead, const std::string& witnesses) {
+  return {"dead_channel",
+          joined(dead),
+          0,
+          no_interval,
+          fmt::format("{} {} exactly 0 all the time while the robot moves{}: a sensor that is dead or was "
+                      "never filled in; "
+                      "joulecast expects NaN for what is not measured.",
+                      joined(dead), dead.size() == 1 ? "is" : "are", by(witnesses)),
+          true};
 }
 
 // The voltage that the battery's resistance must take off somewhere, over the voltage.
@@ -75,13 +125,14 @@ double expected_swing(const CheckContext& c) {
          c.robot.battery.nominal_voltage_v;
 }
 
-Check constant_check(const CheckContext& c, const std::string& channel, double value) {
+Check constant_check(const CheckContext& c, const std::string& channel, double value,
+                     const std::string& witnesses = {}) {
   Check check{"constant_channel", channel, value, no_interval, {}, true};
   if (channel != "battery_voltage") {
     check.says = fmt::format(
-        "{} is {:.5g} all the time while the robot moves: a constant written in, no measurement; "
+        "{} is {:.5g} all the time while the robot moves{}: a constant written in, no measurement; "
         "joulecast expects NaN for what is not measured.",
-        channel, value);
+        channel, value, by(witnesses));
     return check;
   }
   check.contradicted = std::fabs(value / c.robot.battery.nominal_voltage_v - 1) > near_nominal;
@@ -140,22 +191,24 @@ void check_unsigned(const CheckContext& c, std::size_t first, std::vector<Check>
 }  // namespace
 
 std::vector<Check> check_silence(const CheckContext& c) {
-  if (c.moving_s() < enough_moving_s) return {};
+  const std::string witnesses = witnesses_against_wheels(c);
+  if (c.moving_s() < enough_moving_s && witnesses.empty()) return {};
   std::vector<Check> checks;
   std::vector<std::string> dead;
   for (const Group& group : groups) {
     const auto zeros = [](const ValueTally& t) { return t.known() > 0 && t.zeros() == t.known(); };
     for (std::string& name : silent_channels(c, group, zeros)) dead.push_back(std::move(name));
   }
-  if (!dead.empty()) checks.push_back(dead_check(dead));
+  if (!dead.empty()) checks.push_back(dead_check(dead, witnesses));
   for (const Group& group : groups) {
-    if (group.may_be_level) continue;
+    const bool wheels = group.first == reading::wheel_velocity;
+    if (group.may_be_level && !(wheels && !witnesses.empty())) continue;
     if (group.name == "battery_voltage" && expected_swing(c) < least_swing) continue;
     const auto level = [](const ValueTally& t) { return t.constant() && t.low() != 0; };
     for (const std::string& name : silent_channels(c, group, level)) {
       const auto at = std::ranges::find_if(reading_names, [&](auto r) { return belongs_to(r, name); });
       const ValueTally& t = c.tally(static_cast<std::size_t>(at - reading_names.begin()));
-      checks.push_back(constant_check(c, name, t.low()));
+      checks.push_back(constant_check(c, name, t.low(), wheels ? witnesses : ""));
     }
   }
   check_unsigned(c, reading::motor_current, checks);

@@ -325,6 +325,53 @@ TEST(CheckContradictions, ADelayIsNone) {
   }
 }
 
+// A carrier's recordings in which only these channels stand beside the wheels.
+telemetry::RecordingSet carrier_with(const std::vector<std::size_t>& readings) {
+  static const made::Robot robot = made::virtual_robot("amr", 33);
+  telemetry::RecordingSet set = robot.recordings;
+  for (std::size_t k = reading::motor_voltage; k < reading_count; ++k) {
+    if (std::ranges::count(readings, k) == 0) mistakes::fill(set, {k}, signals::unmeasured);
+  }
+  return set;
+}
+
+robot::RobotModel carrier() {
+  return made::virtual_robot("amr", 33, [](vr::SimulationSpec& s) { s.missions = 1; }).model;
+}
+
+// Wheels that never read anything else, where others say that the robot moves; alone they may stand.
+TEST(CheckContradictions, WheelsThatAlwaysReadTheSameAreTold) {
+  using namespace reading;
+  const robot::RobotModel model = carrier();
+  const std::vector<std::vector<std::size_t>> witnesses{
+      {yaw_rate},
+      {x, y, heading},
+      {motor_voltage, motor_voltage + 1, motor_current, motor_current + 1},
+      {battery_voltage, battery_current, command_speed, command_turn}};
+  for (const double value : {0.0, 5.0}) {
+    for (const auto& witness : witnesses) {
+      telemetry::RecordingSet set = carrier_with(witness);
+      mistakes::fill(set, {0, 1}, value);
+      const auto checks = check_recordings(set, model);
+      const Check* check = find(checks, value == 0 ? "dead_channel" : "constant_channel");
+      ASSERT_TRUE(check) << witness.front() << ' ' << value;
+      EXPECT_EQ(check->channel, "wheel_velocity");
+      EXPECT_TRUE(check->contradicted);
+      EXPECT_NE(check->says.find("moves by its "), std::string::npos) << check->says;
+    }
+  }
+  // It stands at its place, commanded by nobody.
+  telemetry::RecordingSet standing = carrier_with({yaw_rate, x, y, heading});
+  mistakes::fill(standing, {0, 1}, 0);
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> noise(0, 1);
+  mistakes::each_sample(standing, [&](signals::Sample& s) {
+    s.yaw_rate_rad_s = 0.02 + 0.01 * noise(random);
+    s.pose = {3 + 0.02 * noise(random), 4 + 0.02 * noise(random), 0.01 * noise(random)};
+  });
+  EXPECT_TRUE(check_recordings(standing, model).empty());
+}
+
 // As they come to a daemon: one at a time, mission after mission.
 TEST(Observer, GivesWhatTheWholeRecordingGives) {
   const made::Robot& robot = scout();
