@@ -21,9 +21,11 @@
 #include "history/open_store.h"
 #include "history/spool.h"
 #include "history/writer.h"
+#include "ingest/contradiction_watch.h"
 #include "ingest/ingest_service.h"
 #include "ingest/keeping.h"
 #include "ingest/model_loading.h"
+#include "ingest/stored_contradictions.h"
 #include "server/api/live_robot.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
@@ -464,20 +466,24 @@ struct Application::Parts {
     return {};
   }
 
-  // What is known of robots until they speak again: their charge when they were last heard.
+  // What is known of robots until they speak again: their charge when they were last heard, and what
+  // contradicted them.
   Result<void> recall_states() {
     const auto robots = store->robots();
     if (!robots) return tl::unexpected(robots.error());
     for (const history::RobotRecord& robot : *robots) {
       const auto last = store->resume_state(robot.robot_id);
       if (!last) return tl::unexpected(last.error());
-      if (!last->has_value()) continue;
+      auto contradictions = ingest::stored_contradictions(*store, robot.robot_id);
+      if (!last->has_value() && contradictions.empty()) continue;
+      const std::int64_t heard_us = *last ? (*last)->utime_us : contradictions.front().told_utime_us;
       auto snapshot = std::make_shared<ingest::RobotSnapshot>();
       snapshot->robot_id = robot.robot_id;
-      snapshot->received_utime_us = std::min((*last)->utime_us, host_utime_us());
-      snapshot->sample.utime_us = (*last)->utime_us;
-      snapshot->state_of_charge = (*last)->state_of_charge;
-      snapshot->charge.estimate.charge = (*last)->state_of_charge;
+      snapshot->received_utime_us = std::min(heard_us, host_utime_us());
+      snapshot->sample.utime_us = heard_us;
+      if (*last && !ingest::doubts_battery(contradictions))
+        snapshot->state_of_charge = snapshot->charge.estimate.charge = (*last)->state_of_charge;
+      snapshot->contradictions = std::move(contradictions);
       fleet.publish(std::move(snapshot));
     }
     return {};

@@ -53,7 +53,8 @@ std::vector<Contradiction> contradictions_of(const gap::Observation& seen, const
     if (kind == ContradictionKind::constant && seen.moving_s < constant_s) continue;
     Contradiction& c = found.emplace_back();
     c.kind = kind;
-    c.untrue = (check.contradicted || (c.kind == ContradictionKind::limit && check.value > absurd_limit)) &&
+    c.untrue = (check.contradicted || kind == ContradictionKind::corrupt ||
+                (kind == ContradictionKind::limit && check.value > absurd_limit)) &&
                enters_accounts(check.channel);
     c.id = std::move(check.id);
     c.channel = std::move(check.channel);
@@ -106,6 +107,13 @@ bool told_in(const std::vector<Contradiction>& list, const Contradiction& one) {
 
 }  // namespace
 
+bool doubts_battery(const std::vector<Contradiction>& contradictions) {
+  return std::ranges::any_of(contradictions, [](const Contradiction& c) {
+    return c.untrue && c.kind != ContradictionKind::corrupt &&
+           c.channel.find("battery_") != std::string::npos;
+  });
+}
+
 ContradictionWatch::ContradictionWatch(const robot::RobotModel& robot, const dynamics::DriveModel& drive)
     : robot_(robot), observer_(robot, drive, false) {}
 
@@ -148,6 +156,8 @@ void ContradictionWatch::begin_mission(const std::string& mission_id, double pay
   samples_ = 0;
   next_ = first_samples;
   in_mission_ = true;
+  changed_ = changed_ || !of_mission_.empty();
+  of_mission_.clear();
   untrue_messages_.clear();
   for (const Contradiction& c : of_messages_) {
     if (c.untrue) untrue_messages_.push_back(c);
@@ -172,7 +182,14 @@ std::vector<Contradiction> ContradictionWatch::end_mission() {
   std::vector<Contradiction> found = contradictions_of(seen, robot_);
   judge_channels(found, seen.moving_s > 0);
   std::ranges::copy(untrue_messages_, std::back_inserter(found));
+  std::ranges::copy(of_mission_, std::back_inserter(found));
   return found;
+}
+
+void ContradictionWatch::doubt_mission(Contradiction why) {
+  if (!in_mission_ || told_in(of_mission_, why)) return;
+  of_mission_.push_back(std::move(why));
+  changed_ = true;
 }
 
 void ContradictionWatch::judge_channels(std::vector<Contradiction> found, bool replace) {
@@ -185,15 +202,22 @@ void ContradictionWatch::judge_channels(std::vector<Contradiction> found, bool r
     return [&list](const Contradiction& c) { return told_in(list, c); };
   };
   if (found.size() != of_channels_.size() || !std::ranges::all_of(found, in(of_channels_))) changed_ = true;
+  keep_channels(std::move(found));
+}
+
+void ContradictionWatch::keep_channels(std::vector<Contradiction> found) {
   of_channels_ = std::move(found);
-  doubts_battery_ = std::ranges::any_of(of_channels_, [](const Contradiction& c) {
-    return c.untrue && c.channel.find("battery_") != std::string::npos;
-  });
+  doubts_battery_ = ingest::doubts_battery(of_channels_);
+}
+
+void ContradictionWatch::recall(std::vector<Contradiction> of_last_mission) {
+  keep_channels(std::move(of_last_mission));
 }
 
 std::vector<Contradiction> ContradictionWatch::all() const {
   std::vector<Contradiction> list = of_messages_;
   std::ranges::copy(of_channels_, std::back_inserter(list));
+  std::ranges::copy(of_mission_, std::back_inserter(list));
   return list;
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/json_number.h"
+#include "ingest/stored_contradictions.h"
 #include "robot/robot_file.h"
 #include "telemetry/validation.h"
 
@@ -21,6 +22,7 @@ constexpr auto json_replace = nlohmann::json::error_handler_t::replace;
 constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
 constexpr std::int64_t report_contradiction_us = 3'600'000'000;
 constexpr double least_measured = 0.5;  // of a mission's time, for forecasts to learn from it
+
 nlohmann::json json_of(const Contradiction& c) {
   return {{"kind", contradiction_kind_names[static_cast<std::size_t>(c.kind)]},
           {"id", c.id},
@@ -60,6 +62,9 @@ RobotSession::RobotSession(std::string robot_id, const SessionSettings& settings
   if (const auto learned = outputs_.store.learned(robot_id_, refinement_topic);
       learned && learned->has_value())
     refinement_memory_ = (*learned)->body_json;
+  stored_contradictions_ = stored_contradictions(outputs_.store, robot_id_);
+  for (const Contradiction& c : stored_contradictions_)
+    contradictions_told_[c.id + ' ' + c.channel] = c.told_utime_us;
   changed_ = true;
 }
 
@@ -86,15 +91,21 @@ void RobotSession::meter_with(std::shared_ptr<const ModelInForce> model) {
     legs_.emplace(model_->robot);
     meter_ = std::make_unique<energy::Meter>(model_->drive, settings_.meter,
                                              [this](const energy::MeterPoint& point) { on_point(point); });
+    contradictions_ = std::make_unique<ContradictionWatch>(model_->robot, model_->drive);
+    if (!stored_contradictions_.empty()) {
+      snapshot_.contradictions = stored_contradictions_;
+      contradictions_->recall(std::exchange(stored_contradictions_, {}));
+    }
     auto charge = std::make_unique<ChargeWatch>(model_->robot);
     if (charge_ != nullptr) {
       charge->take_over(*charge_);
     } else {
       charge->recall(charge_memory_);
-      charge->recall(stored_charge_utime_us_, snapshot_.state_of_charge);
+      // Stored while the mission went on that turned out to be contradicted.
+      if (!contradictions_->doubts_battery())
+        charge->recall(stored_charge_utime_us_, snapshot_.state_of_charge);
     }
     charge_ = std::move(charge);
-    contradictions_ = std::make_unique<ContradictionWatch>(model_->robot, model_->drive);
     if (refinement_ != nullptr) {
       refinement_->use(model_->robot, model_->version);
     } else {
@@ -264,8 +275,37 @@ void RobotSession::interrupt() {
   meter_->interrupt();
 }
 
-void RobotSession::on_clock_step(const signals::Sample& sample) {
+void RobotSession::doubt_clock(const char* id, double value, std::string says) {
+  Contradiction c;
+  c.kind = ContradictionKind::clock;
+  c.id = id;
+  c.channel = "utime";
+  c.value = value;
+  c.says = std::move(says);
+  c.untrue = true;
+  contradictions_->doubt_mission(std::move(c));
+}
+
+void RobotSession::on_sample_before_start(const signals::Sample& sample) {
+  const std::int64_t before_us = open_->record.start_utime_us - sample.utime_us;
+  if (before_us <= settings_.sequence.gap_us) return;
+  if (!open_->record.incomplete) open_->mark_incomplete("samples are stamped before the mission's start");
+  const double before_s = 1e-6 * static_cast<double>(before_us);
+  doubt_clock("samples_before_start", before_s,
+              fmt::format("Samples of the mission are stamped {:.3g} s before its start and are left out: "
+                          "events and telemetry must be stamped by one clock, which is not set back.",
+                          before_s));
+}
+
+void RobotSession::on_clock_step(const signals::Sample& sample, std::int64_t elapsed_us) {
   interrupt();
+  if (open_ != nullptr && std::abs(elapsed_us) > settings_.sequence.gap_us) {
+    const double step_s = 1e-6 * static_cast<double>(elapsed_us);
+    doubt_clock("clock_set", step_s,
+                fmt::format("utime is set {} by {:.3g} s within the mission: what passed there is not known; "
+                            "joulecast expects a clock that is only steered while the robot drives.",
+                            step_s < 0 ? "back" : "forward", std::fabs(step_s)));
+  }
   missions_.on_clock_step(sample.utime_us);
   covariates_.on_clock_step(sample.utime_us);
   if (open_ != nullptr) open_->on_clock_step(snapshot_.received_utime_us);
@@ -297,7 +337,7 @@ void RobotSession::place(const signals::Sample& sample) {
   if (place.clock != telemetry::ClockStep::none) {
     on_fault(place.clock == telemetry::ClockStep::backward ? IngestFault::clock_backward
                                                            : IngestFault::clock_forward);
-    on_clock_step(sample);
+    on_clock_step(sample, place.elapsed_us);
   } else if (place.continues() && !place.gap && is_too_fast(place.elapsed_us)) {
     return;
   }
@@ -444,6 +484,7 @@ void RobotSession::on_own_sample(const signals::Sample& sample) {
   carry_out(step.actions);
   if (!step.belongs || open_ == nullptr) {
     show(sample);
+    if (open_ != nullptr) on_sample_before_start(sample);
     return on_fault(IngestFault::outside_mission);
   }
 

@@ -119,7 +119,10 @@ class RobotSession {
  private:
   // A sample in the order of its sequence number, or that no order helps.
   void place(const signals::Sample& sample);
-  void on_clock_step(const signals::Sample& sample);
+  void on_clock_step(const signals::Sample& sample, std::int64_t elapsed_us);
+  // A sample of the open mission that is stamped before its start.
+  void on_sample_before_start(const signals::Sample& sample);
+  void doubt_clock(const char* id, double value, std::string says);
   // What is integrated next does not continue what was.
   void interrupt();
   // Whether what came is not looked at, which is counted as a fault.
@@ -172,6 +175,7 @@ class RobotSession {
   std::deque<signals::Sample> held_;  // until it is clear whether a charger feeds the robot
   bool at_charger_ = false;
   std::unique_ptr<ContradictionWatch> contradictions_;
+  std::vector<Contradiction> stored_contradictions_;         // of the last mission of the last daemon
   std::map<std::string, std::int64_t> contradictions_told_;  // host's time when each was last reported
   CovariateWatch covariates_;
   TraceBuilder trace_;

@@ -15,6 +15,7 @@
 #include "ingest/contradiction_watch.h"
 #include "ingest/forecasts.h"
 #include "ingest/pipeline.h"
+#include "ingest/stored_contradictions.h"
 #include "telemetry/csv_import.h"
 #include "tests/gap/checks/made_recordings.h"
 #include "tests/ingest/harness.h"
@@ -188,7 +189,7 @@ std::vector<Mistake> usual_mistakes() {
        [](M&, Sample& s, const R&) { s.battery_current_a = 3; }},
       {"left wheel dead", K::dead, "wheel_velocity.left", true, "0 all the time",
        [](M&, Sample& s, const R&) { s.wheel_velocity_rad_s[1] = 0; }},
-      {"wheels fall to 0 for a sample", K::corrupt, "wheel_velocity", false, "jumps away and back",
+      {"wheels fall to 0 for a sample", K::corrupt, "wheel_velocity", true, "jumps away and back",
        [](M&, Sample& s, const R&) {
          if (s.sequence % 41 == 40) s.wheel_velocity_rad_s = {0, 0};
        }},
@@ -320,6 +321,64 @@ TEST(Contradictions, AreToldOnceAndGoWhenTheMistakeIsMended) {
   EXPECT_EQ(robot.harness->fleet.find(robot.model().robot_id)->missions_left_out.at("contradicted"), 2u);
 }
 
+TEST(Contradictions, AClockThatIsSetBackIsToldAndNothingIsLearntFromTheMission) {
+  Robot robot(drive("amr", true, 37));
+  const auto back = [](std::int64_t from_sequence, std::int64_t later_us) {
+    return [=](InboundMessage& m, Sample& s) {
+      const bool event = s.utime_us != 0 && std::get<Sample>(m.content).utime_us == 0;
+      m.host_utime_us += later_us;
+      s.utime_us += later_us;
+      if (!event && s.sequence >= from_sequence) s.utime_us -= 30'000'000;
+      s.sequence += later_us / 20'000;
+    };
+  };
+  const Sent set = robot.send(back(1000, 0));
+  const Contradiction* told = set.find(ContradictionKind::clock, "utime");
+  ASSERT_NE(told, nullptr) << set.told();
+  EXPECT_EQ(told->id, "clock_set");
+  EXPECT_NEAR(told->value, -30, 0.1);
+  EXPECT_TRUE(set.missions.at(0).incomplete);
+  EXPECT_FALSE(history::findings_of(set.missions[0]).teaches());
+  EXPECT_TRUE(std::ranges::any_of(set.warnings,
+                                  [](const std::string& w) { return w.find("set back by 30 s") != w.npos; }));
+  // Its events are not.
+  const Sent before = robot.send(back(0, 100'000'000));
+  told = before.find(ContradictionKind::clock, "utime");
+  ASSERT_NE(told, nullptr) << before.told();
+  EXPECT_EQ(told->id, "samples_before_start");
+  ASSERT_EQ(before.missions.size(), 2u);
+  EXPECT_TRUE(before.missions[1].incomplete);
+  EXPECT_FALSE(history::findings_of(before.missions[1]).teaches());
+  const Sent mended = robot.send(back(INT64_MAX, 200'000'000));
+  EXPECT_TRUE(mended.live.empty()) << mended.told();
+  EXPECT_FALSE(mended.missions.at(2).incomplete);
+  EXPECT_TRUE(history::findings_of(mended.missions[2]).teaches());
+}
+
+TEST(Contradictions, OutliveARestart) {
+  Robot robot(drive("amr", true, 38));
+  const Sent sent = robot.send([](InboundMessage&, Sample& s) { s.battery_current_a *= -1; });
+  const std::string& id = robot.model().robot_id;
+  const auto live = robot.harness->fleet.find(id);
+  ASSERT_FALSE(live->contradictions.empty());
+  const auto stored = stored_contradictions(*robot.harness->store, id);
+  ASSERT_EQ(stored.size(), live->contradictions.size());
+  EXPECT_TRUE(doubts_battery(stored));
+  robot.harness->restart();
+  Sample later;
+  later.utime_us = sent.missions.at(0).end_utime_us + 5'000'000;
+  later.sequence = 10'000;
+  robot.harness->pipeline->handle({id, later, later.utime_us, {0x0a000005, 40'000}});
+  robot.harness->pipeline->publish();
+  const auto again = robot.harness->fleet.find(id);
+  ASSERT_EQ(again->contradictions.size(), live->contradictions.size());
+  EXPECT_TRUE(again->contradictions[0].same(live->contradictions[0]));
+  EXPECT_TRUE(again->contradictions[0].says.starts_with("battery_current looks reversed"));
+  EXPECT_TRUE(again->contradictions[0].untrue);
+  EXPECT_EQ(std::isnan(again->state_of_charge), std::isnan(live->state_of_charge));
+  EXPECT_EQ(robot.harness->counters.contradictions[0].load(), sent.counted) << "told anew";
+}
+
 // A battery of 0 V would be empty; what was known of it before the mission stays known.
 TEST(Contradictions, TheChargeIsThatOfBeforeTheContradictedMission) {
   Robot robot(drive("amr", true, 35));
@@ -336,7 +395,7 @@ TEST(Contradictions, TheChargeIsThatOfBeforeTheContradictedMission) {
 }
 
 // Recordings that nobody made for these checks, mission by mission.
-// Two are told, and both are true: the Warthog was driven by hand, with commands of 0 written in, and the
+// Two are told, and both are so: the Warthog was driven by hand, with commands of 0 written in, and the
 // wheel speeds of one drive of the Husky fall to 0 for single rows.
 TEST(Contradictions, OfRealRecordingsNoneIsUntrue) {
   struct Source {
@@ -370,7 +429,7 @@ TEST(Contradictions, OfRealRecordingsNoneIsUntrue) {
       const auto note = [&] {
         for (const Contradiction& c : watch.all()) {
           const bool known = c.channel == "velocity_command" || c.id == "thrown_readings";
-          if (c.untrue || !known) told += c.says + "\n";
+          if ((c.untrue && c.kind != ContradictionKind::corrupt) || !known) told += c.says + "\n";
         }
       };
       for (const Sample& sample : import->recording.samples) {
