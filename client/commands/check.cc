@@ -110,11 +110,10 @@ Result<void> check_mapping(const std::string& path, Report& report) {
   const auto text = read_file(path);
   if (!text) return tl::unexpected(text.error());
   report.add(path, "mapping");
+  for (const auto& [field, says] : telemetry::mapping_faults(*text))
+    report.findings.push_back({true, path, field, says});
   const auto mapping = telemetry::ImportMapping::parse(*text);
-  if (!mapping) {
-    report.findings.push_back({true, path, mapping.error().field, mapping.error().message});
-    return {};
-  }
+  if (!mapping) return {};
   for (const auto& [field, says] : telemetry::suspicious(*mapping))
     report.findings.push_back({false, path, field, says});
   return {};
@@ -236,22 +235,8 @@ Result<void> check_server(const Options& options, Report& report) {
   const auto state = ask(*server, "/v1/robots/" + options.robot_id + "/state");
   if (!state) return tl::unexpected(state.error());
   report.add(options.robot_id, "robot of a daemon", {{"state", *state}});
-  const auto add = [&](bool fault, const char* field, std::string says) {
-    report.findings.push_back({fault, options.robot_id, field, std::move(says)});
-  };
-  if (!(*state)["live"].get<bool>()) add(false, "live", "the daemon does not hear it");
-  // Reasons that are no damage: see schemas/robot-state.schema.json.
-  constexpr std::array harmless{"restart", "gap", "outside_mission", "reused_mission_id"};
-  for (const auto& [reason, count] : (*state)["faults"].items()) {
-    const json& note = (*state)["fault_notes"].value(reason, json());
-    add(std::ranges::find(harmless, reason) == harmless.end(), "faults",
-        fmt::format("{} {}{}", count.get<std::uint64_t>(), reason,
-                    note.is_string() ? ": " + note.get<std::string>() : ""));
-  }
-  if (!(*state)["has_model"].get<bool>()) {
-    add(true, "has_model", "the daemon has no model of it: nothing is accounted for");
-    return {};
-  }
+  judge_state(*state, options.robot_id, report.findings);
+  if (!(*state)["has_model"].get<bool>()) return {};
   const auto detail = ask(*server, "/v1/robots/" + options.robot_id);
   if (!detail) return tl::unexpected(detail.error());
   const auto model = robot::read_robot((*detail)["model"]);
@@ -281,13 +266,18 @@ Result<void> check_files(const Options& options, Report& report) {
   return logs.empty() ? Result<void>() : check_logs(logs, options, report);
 }
 
+std::string reach(double top_speed_m_s) {
+  return top_speed_m_s > 0 ? fmt::format("the motors reach {:.3g} m/s", top_speed_m_s)
+                           : "the motors cannot drive it";
+}
+
 void print(const Report& report) {
   for (const json& subject : report.subjects) {
     const json figures = subject.value("figures", json());
     std::string text = subject["name"].get<std::string>() + ": " + subject["kind"].get<std::string>();
     if (figures.is_object())
-      text += fmt::format("; the motors reach {:.3g} m/s, the battery holds {:.4g} Wh{}",
-                          figures["top_speed_m_s"].get<double>(), figures["energy_wh"].get<double>(),
+      text += fmt::format("; {}, the battery holds {:.4g} Wh{}",
+                          reach(figures["top_speed_m_s"].get<double>()), figures["energy_wh"].get<double>(),
                           figures["standing_h"].is_null()
                               ? ""
                               : fmt::format(", {:.3g} h standing", figures["standing_h"].get<double>()));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -123,6 +124,49 @@ void judge(const telemetry::Import& import, const std::string& table, Findings& 
       findings.push_back(
           {true, table, join.table, "no row meets one of the main table: are the clocks the same?"});
   }
+}
+
+std::string faults_of(const telemetry::ChannelTally& tally) {
+  std::string text;
+  const auto add = [&](const std::string& name, std::uint64_t count, const std::string& says) {
+    if (count == 0) return;
+    text += fmt::format("{}{} {}{}", text.empty() ? "" : "; ", count, name, says.empty() ? "" : ": " + says);
+  };
+  for (const auto& [reason, fault] : tally.faults) add(reason, fault.first, fault.second);
+  // The numbers of two programs count each other's as missing and late.
+  if (tally.senders.size() > 1) {
+    return text + (text.empty() ? "" : "; ") +
+           fmt::format("{} senders, {} and {}: one robot_id is one robot's", tally.senders.size(),
+                       to_string(tally.senders[0]), to_string(tally.senders[1]));
+  }
+  const telemetry::SequenceCounters& s = tally.sequence;
+  add("missing", s.missing - std::min(s.missing, s.late), "");
+  add("duplicate", s.duplicate, "");
+  add("late", s.late, "");
+  add("restarts", s.restarts, "");
+  add("clock set back", s.clock_backward, "");
+  add("clock set forward", s.clock_forward, "");
+  return text;
+}
+
+void judge_state(const nlohmann::json& state, const std::string& robot_id, Findings& findings) {
+  const auto add = [&](bool fault, const char* field, std::string says) {
+    findings.push_back({fault, robot_id, field, std::move(says)});
+  };
+  if (!state["live"].get<bool>()) add(false, "live", "the daemon does not hear it");
+  for (const nlohmann::json& c : state["contradictions"])
+    findings.push_back({c["untrue"].get<bool>(), robot_id, c["channel"].get<std::string>(),
+                        c["id"].get<std::string>() + ": " + c["says"].get<std::string>()});
+  // Reasons that are no damage: see schemas/robot-state.schema.json.
+  constexpr std::array harmless{"restart", "gap", "outside_mission", "reused_mission_id"};
+  for (const auto& [reason, count] : state["faults"].items()) {
+    const nlohmann::json& note = state["fault_notes"].value(reason, nlohmann::json());
+    add(std::ranges::find(harmless, reason) == harmless.end(), "faults",
+        fmt::format("{} {}{}", count.get<std::uint64_t>(), reason,
+                    note.is_string() ? ": " + note.get<std::string>() : ""));
+  }
+  if (!state["has_model"].get<bool>())
+    add(true, "has_model", "the daemon has no model of it: nothing is accounted for");
 }
 
 nlohmann::json to_json(const Findings& findings) {

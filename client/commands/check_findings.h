@@ -39,6 +39,13 @@ void judge_fields(const std::string& channel, const telemetry::ChannelTally& tal
 // Of a table as read: what was dropped, filled, out of its limits or could not be joined.
 void judge(const telemetry::Import& import, const std::string& table, Findings& findings);
 
+// Of a robot's state as a daemon answers it (schemas/robot-state.schema.json): what it holds against the
+// robot, which may be silent by now.
+void judge_state(const nlohmann::json& state, const std::string& robot_id, Findings& findings);
+
+// What is wrong with a channel as transported, in a line; empty: nothing.
+[[nodiscard]] std::string faults_of(const telemetry::ChannelTally& tally);
+
 [[nodiscard]] nlohmann::json to_json(const Findings& findings);
 void print(const Findings& findings);
 // ok, fault, or warned where there are only warnings.

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "client/commands/accepts.h"
+#include "client/commands/check_findings.h"
 #include "client/commands/listen.h"
 #include "client/commands/table.h"
 #include "client/commands/tally_json.h"
@@ -42,23 +43,6 @@ std::string values_of(const telemetry::ChannelTally& tally) {
   for (const telemetry::FieldTally& field : tally.fields)
     if (field.measured > 0)
       text += fmt::format("{}{} {:.4g}", text.empty() ? "" : "  ", field.name, field.last);
-  return text;
-}
-
-std::string faults_of(const telemetry::ChannelTally& tally) {
-  std::string text;
-  const auto add = [&](const std::string& name, std::uint64_t count, const std::string& says) {
-    if (count == 0) return;
-    text += fmt::format("{}{} {}{}", text.empty() ? "" : "; ", count, name, says.empty() ? "" : ": " + says);
-  };
-  for (const auto& [reason, fault] : tally.faults) add(reason, fault.first, fault.second);
-  const telemetry::SequenceCounters& s = tally.sequence;
-  add("missing", s.missing - std::min(s.missing, s.late), "");
-  add("duplicate", s.duplicate, "");
-  add("late", s.late, "");
-  add("restarts", s.restarts, "");
-  add("clock set back", s.clock_backward, "");
-  add("clock set forward", s.clock_forward, "");
   return text;
 }
 

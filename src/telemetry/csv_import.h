@@ -31,11 +31,14 @@ class ImportMapping {
   std::shared_ptr<const Content> content_;
 };
 
-// What a mapping that can be used says that is hardly meant: JSON pointer and sentence.
-struct MappingWarning {
+// What a mapping says: JSON pointer and sentence.
+struct MappingFinding {
   std::string field, says;
 };
-[[nodiscard]] std::vector<MappingWarning> suspicious(const ImportMapping& mapping);
+// Of one that can be used: what is hardly meant.
+[[nodiscard]] std::vector<MappingFinding> suspicious(const ImportMapping& mapping);
+// Every fault of a mapping's text, of which parse() makes one error; empty where it has none.
+[[nodiscard]] std::vector<MappingFinding> mapping_faults(std::string_view text);
 
 // A joined table of the mapping, and the file that belongs to a main table.
 struct JoinedFile {

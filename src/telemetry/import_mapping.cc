@@ -19,18 +19,13 @@ namespace {
 
 using nlohmann::json;
 
-// Reads members of one JSON document; what is faulty gives defaults. All faults become one error: its field
-// is the first one's pointer.
+// Reads members of one JSON document; what is faulty gives defaults.
 class Reader {
  public:
-  std::optional<Error> error;
+  std::vector<MappingFinding> faults;
 
   void refuse(std::string pointer, std::string message) {
-    if (!refused_.insert(pointer).second) return;
-    if (error)
-      error->message += "; " + pointer + ": " + message;
-    else
-      error = Error{Fault::invalid, std::move(pointer), std::move(message)};
+    if (refused_.insert(pointer).second) faults.push_back({std::move(pointer), std::move(message)});
   }
 
   bool object(const json& value, const std::string& pointer, std::initializer_list<std::string_view> known) {
@@ -410,13 +405,25 @@ Result<ImportMapping> ImportMapping::parse(std::string_view text) {
   if (!document) return tl::unexpected(document.error());
   Reader reader;
   auto content = std::make_shared<const Content>(reader.mapping(*document));
-  if (reader.error) return tl::unexpected(std::move(*reader.error));
-  return ImportMapping(std::move(content));
+  if (reader.faults.empty()) return ImportMapping(std::move(content));
+  // One error of all, at the first one's place.
+  Error error{Fault::invalid, reader.faults.front().field, reader.faults.front().says};
+  for (std::size_t k = 1; k < reader.faults.size(); ++k)
+    error.message += "; " + reader.faults[k].field + ": " + reader.faults[k].says;
+  return tl::unexpected(std::move(error));
 }
 
-std::vector<MappingWarning> suspicious(const ImportMapping& mapping) {
+std::vector<MappingFinding> mapping_faults(std::string_view text) {
+  const auto document = parse_json(text);
+  if (!document) return {{document.error().field, document.error().message}};
+  Reader reader;
+  (void)reader.mapping(*document);
+  return std::move(reader.faults);
+}
+
+std::vector<MappingFinding> suspicious(const ImportMapping& mapping) {
   const ImportMapping::Content& content = mapping.content();
-  std::vector<MappingWarning> found;
+  std::vector<MappingFinding> found;
   std::map<std::string_view, const FieldExpression*> given;
   for (const FieldTarget& target : content.targets) given[target.name] = &target.expression;
   const auto has = [&](std::string_view name) { return given.contains(name); };

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "client/commands/check_findings.h"
 #include "client/commands/table.h"
 
 namespace joulecast::client {
@@ -69,6 +70,11 @@ TEST_F(CheckCommand, ARobotFileIsSoundSuspiciousOrFaulty) {
   EXPECT_THAT(printed_, HasSubstr("/mass/wheel_kg"));
   EXPECT_THAT(printed_, HasSubstr("/battery/capacity_ah"));
   EXPECT_EQ(check({file("d.json", "{")}), Exit::fault);
+
+  json stuck = amr_;
+  stuck["motor"]["resistance_ohm"] = 500;
+  EXPECT_EQ(check({file("e.json", stuck.dump())}), Exit::fault);
+  EXPECT_THAT(printed_, HasSubstr("the motors cannot drive it"));
 }
 
 TEST_F(CheckCommand, ATableIsReadThroughItsMapping) {
@@ -95,6 +101,51 @@ TEST_F(CheckCommand, ATableIsReadThroughItsMapping) {
   wrong["time"]["unit"] = "minutes";
   EXPECT_EQ(check({file("w.json", wrong.dump())}), Exit::fault);
   EXPECT_THAT(printed_, HasSubstr("/time/unit"));
+
+  wrong["robot_id"] = "a b";
+  wrong["fields"]["speed"] = 1;
+  EXPECT_EQ(check({file("v.json", wrong.dump()), "--json"}), Exit::fault);
+  std::vector<std::string> fields;
+  const json said = json::parse(printed_);
+  for (const json& finding : said["findings"]) fields.push_back(finding["field"].get<std::string>());
+  EXPECT_THAT(fields, testing::UnorderedElementsAre("/robot_id", "/time/unit", "/fields/speed"));
+}
+
+TEST_F(CheckCommand, RowsOutOfOrderAreTold) {
+  std::string csv = "t,r,l\n";
+  for (int k = 0; k < 200; ++k) csv += std::to_string(0.05 * (k ^ 1)) + ",1,1.5\n";
+  const std::string how = file("m.json", R"({"robot_id": "amr", "time": {"column": "t", "unit": "s"},
+      "fields": {"wheel_velocity": [{"column": "r"}, {"column": "l"}]}})");
+  (void)check({file("run.csv", csv), "--mapping", how});
+  EXPECT_THAT(printed_, HasSubstr("100 rows are before the row before"));
+  EXPECT_THAT(printed_, HasSubstr("200 messages"));
+}
+
+TEST(DaemonState, OfASilentRobotItsContradictionsAreTold) {
+  const json state = {{"live", false},
+                      {"has_model", true},
+                      {"faults", json::object()},
+                      {"fault_notes", json::object()},
+                      {"contradictions",
+                       {{{"id", "battery_current_reversed"},
+                         {"channel", "battery_current"},
+                         {"says", "battery_current looks reversed"},
+                         {"untrue", true}}}}};
+  Findings findings;
+  judge_state(state, "amr", findings);
+  ASSERT_EQ(findings.size(), 2u);
+  EXPECT_EQ(findings[1].field, "battery_current");
+  EXPECT_TRUE(findings[1].fault);
+  EXPECT_THAT(findings[1].says, HasSubstr("looks reversed"));
+}
+
+TEST(Channels, OfTwoSendersTheNumbersCountNothing) {
+  telemetry::ChannelTally tally;
+  tally.sequence.missing = 699'760;
+  tally.sequence.late = 239;
+  EXPECT_EQ(faults_of(tally), "699521 missing; 239 late");
+  tally.senders = {{0x0a000005, 40'000}, {0x0a000006, 40'001}};
+  EXPECT_EQ(faults_of(tally), "2 senders, 10.0.0.5:40000 and 10.0.0.6:40001: one robot_id is one robot's");
 }
 
 }  // namespace

@@ -493,7 +493,7 @@ TEST(ImportMapping, TellsEveryFaultAtOnceAndWhatIsSuspicious) {
   for (const char* pointer : {"/robt_id", "/payload_kg", "/decimal"}) EXPECT_THAT(all, HasSubstr(pointer));
   const auto warned = [](const std::string& fields) {
     std::vector<std::string> pointers;
-    for (const MappingWarning& warning : suspicious(mapping_of("", fields)))
+    for (const MappingFinding& warning : suspicious(mapping_of("", fields)))
       pointers.push_back(warning.field);
     return pointers;
   };
