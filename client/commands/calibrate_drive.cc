@@ -18,9 +18,11 @@
 #include "dynamics/drive_model.h"
 #include "energy/calibration.h"
 #include "energy/power_calibration.h"
+#include "gap/checks/check.h"
 #include "robot/robot_file.h"
 #include "telemetry/log_recordings.h"
 #include "telemetry/recording_climb.h"
+#include "telemetry/recording_set.h"
 
 namespace joulecast::client {
 namespace {
@@ -41,7 +43,29 @@ struct Options {
   energy::CalibrationOptions calibration;
   bool json = false;
   bool force = false;
+  bool contradicted = false;
 };
+
+// Channels that are identified from, or that it is tested by.
+bool uses(Method method, const std::string& channels) {
+  const auto names = [&](const char* field) { return channels.find(field) != std::string::npos; };
+  return names("utime") || names("wheel_velocity") || names("battery_") ||
+         (method != Method::power && (names("motor_voltage") || names("motor_current")));
+}
+
+// What contradicts a channel would be identified as a property of the robot.
+Result<void> refuse_contradicted(const robot::RobotModel& robot, Method method,
+                                 const std::vector<telemetry::Recording>& recordings) {
+  const auto set = telemetry::make_recording_set(robot.robot_id, recordings);
+  if (!set) return {};  // too short to be checked; whether it is to be identified from is said there
+  for (const gap::Check& check : gap::check_recordings(*set, robot)) {
+    if (check.contradicted && uses(method, check.channel))
+      return invalid(check.channel, check.says +
+                                        " Mend the recordings; --contradicted identifies from "
+                                        "what they say.");
+  }
+  return {};
+}
 
 Result<std::vector<telemetry::Recording>> load(const Options& options, const std::string& robot_id) {
   LogProgress progress("reading", options.logs);
@@ -132,6 +156,10 @@ Result<DriveOutcome> calibrate(const Options& options) {
   const Method method = options.method              ? *options.method
                         : has_motor_current(chosen) ? Method::steady
                                                     : Method::power;
+  if (!options.contradicted) {
+    if (const auto sound = refuse_contradicted(*robot, method, chosen); !sound)
+      return tl::unexpected(sound.error());
+  }
   DriveOutcome outcome;
   const auto name = std::ranges::find(methods, method, &std::pair<std::string, Method>::second);
   outcome.method = name->first;
@@ -192,6 +220,9 @@ void add_calibrate_drive(CLI::App& calibrate, Exit& exit) {
                    "constant speed: acceleration below this share of the top speed a second")
       ->check(positive())
       ->capture_default_str();
+  command->add_flag("--contradicted", options->contradicted,
+                    "identify even from channels that the checks of joulecast check contradict, as a robot "
+                    "file may make them that is far from the robot");
   command->add_flag("--json", options->json, "print the result as JSON");
   command->callback([options, &exit] { exit = run(*options); });
 }

@@ -13,6 +13,8 @@
 
 #include "client/commands/check_findings.h"
 #include "client/commands/table.h"
+#include "telemetry/event_log.h"
+#include "tests/gap/checks/made_recordings.h"
 
 namespace joulecast::client {
 namespace {
@@ -146,6 +148,50 @@ TEST(Channels, OfTwoSendersTheNumbersCountNothing) {
   EXPECT_EQ(faults_of(tally), "699521 missing; 239 late");
   tally.senders = {{0x0a000005, 40'000}, {0x0a000006, 40'001}};
   EXPECT_EQ(faults_of(tally), "2 senders, 10.0.0.5:40000 and 10.0.0.6:40001: one robot_id is one robot's");
+}
+
+TEST_F(CheckCommand, NothingIsCalibratedFromContradictedChannels) {
+  const auto robot = gap::made::virtual_robot("amr", 51, [](virtual_robot::SimulationSpec& spec) {
+    spec.missions = 2;
+    spec.sensors.motor_channels = false;
+  });
+  const auto calibrate = [&](double current_factor, std::vector<std::string> more) {
+    const std::string path = (folder_ / "run.lcmlog").string();
+    auto log = telemetry::EventLogWriter::create(path);
+    EXPECT_TRUE(log);
+    for (telemetry::Recording mission : robot.recordings.missions) {
+      for (signals::Sample& s : mission.samples) s.battery_current_a *= current_factor;
+      EXPECT_TRUE(telemetry::write_recording(*log, mission));
+    }
+    EXPECT_TRUE(log->close());
+    CLI::App program("joulecast");
+    Exit exit = Exit::internal;
+    add_calibrate(program, exit);
+    std::vector<std::string> words{"calibrate",
+                                   "drive",
+                                   path,
+                                   "--robot",
+                                   JOULECAST_SOURCE_DIR "/deploy/robots/amr.json",
+                                   "--out",
+                                   (folder_ / "out.json").string(),
+                                   "--force"};
+    words.insert(words.end(), more.begin(), more.end());
+    std::ranges::reverse(words);
+    fs::remove(folder_ / "out.json");
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    program.parse(words);
+    (void)testing::internal::GetCapturedStdout();
+    printed_ = testing::internal::GetCapturedStderr();
+    return exit;
+  };
+  EXPECT_EQ(calibrate(1, {}), Exit::ok) << printed_;
+  EXPECT_TRUE(fs::exists(folder_ / "out.json"));
+  EXPECT_NE(calibrate(-1, {}), Exit::ok);
+  EXPECT_THAT(printed_, HasSubstr("battery_current looks reversed"));
+  EXPECT_FALSE(fs::exists(folder_ / "out.json"));
+  (void)calibrate(-1, {"--contradicted"});
+  EXPECT_THAT(printed_, testing::Not(HasSubstr("looks reversed")));
 }
 
 }  // namespace
