@@ -105,14 +105,14 @@ class Request {
     auto solved = solve(problem_.value_of_time_w);
     if (!problem_.deadline_s) return solved;
     const double deadline = *problem_.deadline_s;
-    if (solved) unhurried_j_ = energy_j();
+    if (solved) least_j_ = energy_j();
     if (!solved) {
       // Without idle power, friction and value of time only a deadline ends the motion.
       if (solved.error().fault != Fault::infeasible || solved.error().field != "value_of_time_w")
         return solved;
       endless_ = true;
       if (auto ok = solve(1.0); !ok) return ok;
-      unhurried_j_ = 0;
+      least_j_ = 0;
     } else if (duration_s() <= deadline) {
       return {};
     }
@@ -137,7 +137,16 @@ class Request {
     const double least_s = least_time_s();
     if (deadline < least_s * (1 - 1e-9)) return too_soon(deadline, least_s);
     deadline_binds_ = true;
-    if (deadline <= least_s * (1 + 1e-7)) return solve(at_once_w);
+    if (deadline <= least_s * (1 + 1e-7)) {
+      const double usual_w = std::max(std::fabs(average_power_w()), 1e-3);
+      // Not on grids, which tell their own error less well the dearer time is.
+      for (const double dear : {3.0, 30.0, 300.0}) {
+        if (!cost().closed_form) break;
+        if (auto ok = solve(dear * usual_w); !ok) return ok;
+        bound_by(deadline);
+      }
+      return solve(at_once_w);
+    }
     // log(T - T_min) falls nearly linearly in log(idle + price): a bracket there, drawn in by the secant
     // through its ends (Illinois) or, where that stalls, by halving. Done a little
     // early.
@@ -146,7 +155,11 @@ class Request {
       return std::log(std::max(1e-12, duration_s() - least_s) / (deadline - least_s));
     };
     const auto met = [&] { return duration_s() <= deadline && duration_s() > deadline - early_s; };
-    const auto at = [&](double x) { return solve(std::exp(x) - idle); };
+    const auto at = [&](double x) {
+      auto done = solve(std::exp(x) - idle);
+      if (done) bound_by(deadline);
+      return done;
+    };
     // Of a higher price, energy is too small a share for solvers to see.
     const double steepest = std::log(1e6 * std::max(std::fabs(average_power_w()), 1e-3));
     double slow = std::log(idle + price_w_), late_slow = late(), fast = slow, late_fast = late_slow;
@@ -187,6 +200,14 @@ class Request {
     return solve(at_once_w);
   }
 
+  // What was just solved takes the least of energy and the price of its time: no motion that ends by the
+  // deadline takes less energy than that sum with the deadline's time.
+  void bound_by(double deadline) {
+    double least_j = energy_j() + price_w_ * (duration_s() - deadline);
+    for (const RunAnswer& a : answers_) least_j -= a.gap_j + a.discretisation_j;
+    least_j_ = std::max(least_j_, least_j);
+  }
+
   double duration_s() const {
     double sum = dwell_s_;
     for (const RunAnswer& a : answers_) sum += a.duration_s;
@@ -224,7 +245,7 @@ class Request {
   std::vector<RunPlanner> runs_;
   std::vector<RunAnswer> answers_;
   double dwell_s_ = 0, price_w_ = 0;
-  double unhurried_j_ = 0;  // energy at the value of time, where there is a deadline; no motion takes less
+  double least_j_ = 0;  // where there is a deadline: no motion that meets it takes less
   bool deadline_binds_ = false;
   bool endless_ = false;  // without a price of time
 };
@@ -417,11 +438,11 @@ Result<Plan> Request::written() {
   writer.dwell(path_.dwell_after_s, pose, path_.final_payload_kg);
   c.time_multiplier_w = price_w_;
   c.shortest_time_s = least_time_s();
-  // A motion that ends at the deadline saves at most the price of the time in between; of the fastest motion
-  // only that holds which holds without a deadline.
+  // A motion that ends at the deadline saves at most the price of the time in between; the fastest motion has
+  // no price, and is held against those of finite ones.
   if (deadline_binds_ && problem_.deadline_s) {
     c.gap_j += std::isfinite(price_w_) ? price_w_ * std::max(0.0, *problem_.deadline_s - duration_s())
-                                       : std::max(0.0, energy_j() - unhurried_j_);
+                                       : std::max(0.0, energy_j() - least_j_);
   }
   binding[static_cast<std::size_t>(Bound::deadline)] = deadline_binds_;
   for (std::size_t b = 0; b < bound_count; ++b) {

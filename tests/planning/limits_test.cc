@@ -184,6 +184,24 @@ TEST(Limited, CurrentJustAboveFrictionIsUsedUp) {
   }
 }
 
+// As fast as possible takes several times the least energy; how much could be saved by then is known all the
+// same.
+TEST(Limited, FastestPlansHaveATellingCertificate) {
+  robot::RobotModel robot = test::amr();
+  robot.limits.acceleration_m_s2 = 4;
+  robot.limits.current_a = 0;
+  const auto path = make_path(std::vector<Segment>{Straight{5}}, {});
+  Problem problem;
+  problem.limits = limits_of(robot);
+  const auto free = plan(robot, *path, problem);
+  ASSERT_TRUE(free) << describe(free.error());
+  problem.deadline_s = free->certificate.shortest_time_s;
+  const auto fastest = plan(robot, *path, problem);
+  ASSERT_TRUE(fastest) << describe(fastest.error());
+  EXPECT_GT(fastest->summary.energy_j, 1.05 * free->summary.energy_j);
+  EXPECT_LT(fastest->certificate.gap_j, 0.01 * fastest->summary.energy_j);
+}
+
 INSTANTIATE_TEST_SUITE_P(TwelveProblems, LimitedProblems, testing::Range(0, 12));
 
 }  // namespace
