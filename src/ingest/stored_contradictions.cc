@@ -11,13 +11,15 @@ std::vector<Contradiction> contradictions_in(const std::string& findings_json) {
   std::vector<Contradiction> found;
   if (!findings.is_object() || !findings.contains("contradictions")) return found;
   for (const nlohmann::json& each : findings["contradictions"]) {
+    if (!each.is_object()) continue;
     const auto kind = std::ranges::find(contradiction_kind_names, each.value("kind", ""));
     if (kind == contradiction_kind_names.end()) continue;
     Contradiction& c = found.emplace_back();
     c.kind = static_cast<ContradictionKind>(kind - contradiction_kind_names.begin());
     c.id = each.value("id", "");
     c.channel = each.value("channel", "");
-    c.value = each["value"].is_number() ? each["value"].get<double>() : signals::unmeasured;
+    const auto value = each.find("value");
+    c.value = value != each.end() && value->is_number() ? value->get<double>() : signals::unmeasured;
     c.says = each.value("says", "");
     c.untrue = true;
   }
