@@ -48,8 +48,8 @@ struct GroupedRuns {
     std::vector<Item> items;
     for (std::size_t k = 0; k < block.size(); ++k) {
       const double measured = set.runs[k].measured_j(), way_m = set.runs[k].at.distance_m;
-      items.push_back(
-          {group[k], block[k], measured, 1 / measured, 1, way_m, columns.modelled(k, {}).duration_s});
+      items.push_back({group[k], block[k], measured, 1 / std::max(measured, columns.size_j(k)), 1, way_m,
+                       columns.modelled(k, {}).duration_s});
       ComparedGroup& g = groups[group[k]];
       ++g.missions, ++g.samples;
       g.way_m += way_m;

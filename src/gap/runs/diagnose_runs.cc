@@ -11,6 +11,7 @@
 #include "gap/diagnose/account.h"
 #include "gap/diagnose/held_out.h"
 #include "gap/diagnose/naming.h"
+#include "gap/runs/run_checks.h"
 #include "gap/runs/run_referee.h"
 #include "gap/runs/run_search.h"
 #include "gap/verdict/judge.h"
@@ -72,7 +73,6 @@ class RunDiagnoser {
  private:
   bool goes_on(double part) const { return !settings_.progress || settings_.progress(part); }
   double measured(std::size_t run) const { return set_.runs[run].measured_j(); }
-  double error(std::size_t run, double energy_j) const { return std::fabs(1 - energy_j / measured(run)); }
 
   void measure();
   bool hold_out_parts();
@@ -138,9 +138,9 @@ bool RunDiagnoser::hold_out_parts() {
       if (!out[k]) continue;
       r_.runs[k].held_out_j = columns_.modelled(k, without.causes).sum_j;
       BlockErrors& b = held.blocks[block_[k]];
-      b.unchanged += error(k, r_.runs[k].model_j);
-      b.explained += error(k, r_.runs[k].held_out_j);
-      b.referee += error(k, refereed[k]);
+      b.unchanged += columns_.missed(k, r_.runs[k].model_j);
+      b.explained += columns_.missed(k, r_.runs[k].held_out_j);
+      b.referee += columns_.missed(k, refereed[k]);
       b.size += 1;
     }
     if (!goes_on(std::lerp(after_search, after_parts,
@@ -163,11 +163,11 @@ bool RunDiagnoser::hold_out_conditions() {
     std::vector<double> before, after;
     for (std::size_t k = 0; k < out.size(); ++k) {
       if (!out[k]) continue;
-      before.push_back(error(k, r_.runs[k].model_j));
-      after.push_back(error(k, columns_.modelled(k, without.causes).sum_j));
+      before.push_back(columns_.missed(k, r_.runs[k].model_j));
+      after.push_back(columns_.missed(k, columns_.modelled(k, without.causes).sum_j));
       l.before += before.back();
       l.after += after.back();
-      l.referee += error(k, refereed[k]);
+      l.referee += columns_.missed(k, refereed[k]);
     }
     l.runs = before.size();
     const auto n = static_cast<double>(l.runs);
@@ -283,8 +283,24 @@ void RunDiagnoser::add_limits() {
 }
 
 Result<RunDiagnosis> RunDiagnoser::run() {
+  r_.diagnosis.checks = check_runs(columns_);
+  const auto contradicted = std::ranges::find(r_.diagnosis.checks, true, &Check::contradicted);
   finding_ = search_runs(columns_, block_);
+  if (contradicted != r_.diagnosis.checks.end()) {
+    finding_.explanation.members.clear();
+    finding_.named.clear();
+    finding_.causes.clear();
+  }
   measure();
+  if (contradicted != r_.diagnosis.checks.end()) {
+    // Energies that are none say nothing of any cause.
+    r_.diagnosis.verdict = Verdict::inconclusive;
+    r_.diagnosis.verdict_probability = 1;
+    r_.diagnosis.reasons = {contradicted->says};
+    r_.diagnosis.refusal = contradicted->says;
+    add_limits();
+    return std::move(r_);
+  }
   if (!goes_on(after_search) || !hold_out_parts() || !hold_out_conditions() || !judge_all())
     return fail(Fault::conflict, "", "diagnosis cancelled");
   r_.turning = turning_term(set_.runs, robot_);

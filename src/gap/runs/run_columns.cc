@@ -27,6 +27,10 @@ constexpr double too_small_share =
     0.002;  // of a run's energy within the bounds: nothing is said of such an effect
 constexpr double common_scale = 0.01;   // of a calibrated model and of the meter that measured the runs
 constexpr std::size_t most_levels = 8;  // of a label
+// Of a run's energy over the model's against the usual ratio: a file that lacks most of the base load moves
+// it by less, between runs that mostly stand and that mostly drive.
+constexpr double far_off = 3;
+constexpr double near_zero = 0.2;  // of a covariate's range
 
 // Which variants of an effect energies of runs can speak of: shapes that they cannot distinguish are left at
 // their initial values.
@@ -88,6 +92,7 @@ RunColumns::RunColumns(const RunSet& set, const robot::RobotModel& robot, std::v
     ours += plain_.back().sum_j;
   }
   if (ours > 0) model_ratio_ = given / ours;
+  set_sizes();
   add_labels();
   add_effects();
   add_covariates();
@@ -97,8 +102,18 @@ RunColumns::RunColumns(const RunSet& set, const robot::RobotModel& robot, std::v
   linearise_around({});
 }
 
-// Each level of a label as a covariate that is 1 or 0, of two levels one; everything by its median over the
-// runs.
+void RunColumns::set_sizes() {
+  std::vector<double> ratios;
+  for (std::size_t k = 0; k < runs().size(); ++k)
+    ratios.push_back(runs()[k].measured_j() / modelled(k, {}).sum_j);
+  const double usual = statistics::median(ratios);
+  for (std::size_t k = 0; k < runs().size(); ++k) {
+    const bool far = std::fabs(std::log(ratios[k] / usual)) > std::log(far_off);
+    size_j_.push_back(far ? usual * modelled(k, {}).sum_j : runs()[k].measured_j());
+  }
+}
+
+// Each level of a label as a covariate that is 1 or 0, of two levels one.
 void RunColumns::add_labels() {
   for (std::size_t l = 0; l < set_.labels.size(); ++l) {
     std::set<std::string> levels;
@@ -121,8 +136,12 @@ void RunColumns::add_labels() {
     for (const auto& values : covariates_) {
       if (std::isfinite(values[c])) known.push_back(values[c]);
     }
-    const double centre = known.empty() ? 0 : statistics::median(std::move(known));
-    for (auto& values : covariates_) values[c] = std::isfinite(values[c]) ? values[c] - centre : 0;
+    if (known.empty()) known.push_back(0);
+    const auto [low, high] = std::ranges::minmax(known);
+    const double beside = near_zero * (high - low), middle = statistics::median(std::move(known));
+    const bool from_zero = !signals::is_label(covariate_names_[c]) && low <= beside && high >= -beside;
+    const double centre = from_zero ? 0 : middle;
+    for (auto& values : covariates_) values[c] = (std::isfinite(values[c]) ? values[c] : middle) - centre;
   }
 }
 
@@ -150,11 +169,16 @@ RunColumns::Energy RunColumns::modelled(std::size_t k, std::span<const Cause> ca
   return e;
 }
 
+double RunColumns::missed(std::size_t run, double energy_j) const {
+  const double measured = runs()[run].measured_j();
+  return std::fabs(measured - energy_j) / std::max(measured, size_j_[run]);
+}
+
 double RunColumns::error(std::span<const Cause> causes, const std::vector<bool>& left_out) const {
   double error = 0, count = 0;
   for (std::size_t k = 0; k < runs().size(); ++k) {
     if (!left_out.empty() && left_out[k]) continue;
-    error += std::fabs(1 - modelled(k, causes).sum_j / runs()[k].measured_j());
+    error += missed(k, modelled(k, causes).sum_j);
     ++count;
   }
   return error / count;
@@ -178,7 +202,7 @@ void RunColumns::add_effects() {
       for (std::size_t k = 0; k < runs().size(); ++k) {
         const Energy e = by_robot(k, in_run(k, {&moved, 1}));
         const double share = std::hypot(e.sum_j - plain_[k].sum_j, e.difference_j - plain_[k].difference_j) /
-                             runs()[k].measured_j() / std::fabs(step);
+                             size_j_[k] / std::fabs(step);
         mean += share / static_cast<double>(runs().size());
         largest = std::max(largest, share);
       }
@@ -230,9 +254,8 @@ void RunColumns::add_covariates() {
       for (std::size_t k = 0; k < runs().size(); ++k) {
         Cause one = cause;
         one.effect.values[one.parameter] = 1e-3 * carrier->candidate.expected;
-        mean += std::fabs(by_robot(k, in_run(k, {&one, 1})).sum_j - plain_[k].sum_j) /
-                runs()[k].measured_j() / (1e-3 * carrier->candidate.expected) /
-                static_cast<double>(runs().size());
+        mean += std::fabs(by_robot(k, in_run(k, {&one, 1})).sum_j - plain_[k].sum_j) / size_j_[k] /
+                (1e-3 * carrier->candidate.expected) / static_cast<double>(runs().size());
       }
       if (!(mean > 0)) continue;
       Hypothesis h;
@@ -289,13 +312,13 @@ void RunColumns::linearise_around(std::span<const Cause> causes, const Hypothesi
     const MissionRun& run = runs()[k];
     const Energy model = modelled(k, causes);
     rows_.push_back({k, false, Eigen::VectorXd::Zero(n), run.measured_j() - model.sum_j});
-    rows_.back().x[static_cast<Eigen::Index>(first_shift_ - 1)] = model.sum_j / run.measured_j();
+    rows_.back().x[static_cast<Eigen::Index>(first_shift_ - 1)] = model.sum_j / size_j_[k];
     if (tables_.size() > 1)
       rows_.back().x[static_cast<Eigen::Index>(first_shift_ + tables_.at(run.table))] = 1;
     if (run.by_motor()) {
       rows_.push_back(
           {k, true, Eigen::VectorXd::Zero(n), run.motor_j[0] - run.motor_j[1] - model.difference_j});
-      rows_.back().x[static_cast<Eigen::Index>(first_shift_ - 1)] = model.difference_j / run.measured_j();
+      rows_.back().x[static_cast<Eigen::Index>(first_shift_ - 1)] = model.difference_j / size_j_[k];
     }
   }
   std::vector<bool> done(columns_.size(), false);

@@ -42,9 +42,15 @@ class RunColumns {
   bool relative(std::size_t column) const { return column >= first_relative_; }
   // Columns of shifts of the tables; as many as there are tables, where there are several.
   std::size_t first_shift() const { return first_shift_; }
-  // Covariates and labels (as "surface=ice", 1 or 0), by how far each run is from the median; 0: not given.
+  // Covariates from zero, where runs were near it, so that a constant load beside them is what is left
+  // without them; otherwise, and labels (as "surface=ice", 1 or 0) always, by how far each run is from the
+  // median. Where one is not given the median stands.
   const std::vector<std::string>& covariates() const { return covariate_names_; }
   double covariate(std::size_t run, std::size_t index) const { return covariates_[run][index]; }
+
+  // What errors of a run are relative to [J]: its energy, or where that is far off, what the model and the
+  // other runs let expect, so that a wrong value, a small one above all, weighs no more than others.
+  double size_j(std::size_t run) const { return size_j_[run]; }
 
   bool by_motor() const { return by_motor_; }
   bool model_given() const { return model_given_; }
@@ -61,12 +67,15 @@ class RunColumns {
   };
   // By the model given with the run, or by the robot file, with these causes in force.
   Energy modelled(std::size_t run, std::span<const Cause> causes) const;
-  // Mean |measured - modelled| over the measured energies, of these runs (all, where empty).
+  // How far an energy is from the measured one, over that or size_j, whichever is larger.
+  double missed(std::size_t run, double energy_j) const;
+  // Its mean over these runs (all, where empty).
   double error(std::span<const Cause> causes, const std::vector<bool>& left_out = {}) const;
 
  private:
   Energy by_robot(std::size_t run, std::span<const dynamics::ActiveEffect> effects) const;
   std::vector<dynamics::ActiveEffect> in_run(std::size_t run, std::span<const Cause> causes) const;
+  void set_sizes();
   void add_labels();
   void add_effects();
   void add_covariates();
@@ -86,6 +95,7 @@ class RunColumns {
   std::size_t first_relative_ = 0, first_shift_ = 0;
   std::vector<std::string> not_visible_;
   std::vector<Energy> plain_;  // by the robot file, of each run
+  std::vector<double> size_j_;
   std::vector<RunRow> rows_;
   bool by_motor_ = true, model_given_ = true;
   double model_ratio_ = 1;

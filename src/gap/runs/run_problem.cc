@@ -6,6 +6,7 @@
 #include <memory>
 #include <numeric>
 
+#include "gap/runs/run_referee.h"
 #include "statistics/robust.h"
 
 namespace joulecast::gap {
@@ -203,11 +204,20 @@ RunScatter learn_scatter(const RunColumns& columns, const std::vector<bool>& lef
   RunScatter s;
   s.size_j.resize(static_cast<Eigen::Index>(columns.runs().size()));
   for (std::size_t k = 0; k < columns.runs().size(); ++k)
-    s.size_j[static_cast<Eigen::Index>(k)] = columns.runs()[k].measured_j();
+    s.size_j[static_cast<Eigen::Index>(k)] = columns.size_j(k);
   s.run = s.difference = least_scatter;
   s.weight = Eigen::VectorXd::Zero(n);
-  for (Eigen::Index k = 0; k < n; ++k)
-    s.weight[k] = !left_out.empty() && left_out[rows[static_cast<std::size_t>(k)].run] ? 0 : 1;
+  // A fit of everything follows single runs whose conditions no other has: what a plain regression is far
+  // from counts less from the beginning.
+  std::vector<double> measured;
+  for (const MissionRun& run : columns.runs()) measured.push_back(run.measured_j());
+  const std::vector<double> apart = RunReferee(columns).apart(measured, left_out);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const std::size_t run = rows[static_cast<std::size_t>(k)].run;
+    s.weight[k] = !left_out.empty() && left_out[run]
+                      ? 0
+                      : std::pow(statistics::huber_weight(apart[run], 1, RunReferee::gross), 2);
+  }
   const Eigen::VectorXd use = s.weight;
   for (int pass = 0; pass < 3; ++pass) {
     Relative r = relative(columns, s.size_j);
@@ -220,10 +230,11 @@ RunScatter learn_scatter(const RunColumns& columns, const std::vector<bool>& lef
     for (Eigen::Index k = 0; k < n; ++k) {
       const RunRow& row = rows[static_cast<std::size_t>(k)];
       if (use[k] == 0) continue;
-      s.weight[k] = statistics::huber_weight(fit.residual[k], 1, outlier);
-      const double measured = columns.runs()[row.run].measured_j();
-      if (!row.difference)
-        s.size_j[static_cast<Eigen::Index>(row.run)] = measured * std::clamp(1 - fit.left[k], 0.5, 2.0);
+      s.weight[k] = use[k] * statistics::huber_weight(fit.residual[k], 1, outlier);
+      if (row.difference) continue;
+      double& size_j = s.size_j[static_cast<Eigen::Index>(row.run)];
+      const double usual = columns.size_j(row.run);
+      size_j = std::clamp(measured[row.run] - fit.left[k] * size_j, 0.5 * usual, 2 * usual);
     }
   }
   return s;

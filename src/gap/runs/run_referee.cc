@@ -8,7 +8,7 @@ namespace joulecast::gap {
 RunReferee::RunReferee(const RunColumns& columns) {
   const auto& runs = columns.runs();
   const auto n = static_cast<Eigen::Index>(runs.size());
-  for (const MissionRun& run : runs) size_.push_back(run.measured_j());
+  for (std::size_t k = 0; k < runs.size(); ++k) size_.push_back(columns.size_j(k));
   const std::size_t most_terms = std::max<std::size_t>(2, runs.size() / 4);
   const auto take = [&](RefereeTerm term, auto&& value, bool always) {
     Eigen::VectorXd column(n);
@@ -58,6 +58,17 @@ RunReferee::Fit RunReferee::fit(const std::vector<double>& energy_j,
   const Eigen::VectorXd energies = x_ * fit.regression.coefficients;
   fit.energy_j.assign(energies.begin(), energies.end());
   return fit;
+}
+
+std::vector<double> RunReferee::apart(const std::vector<double>& energy_j,
+                                      const std::vector<bool>& left_out) const {
+  constexpr double least_spread = 0.01;  // of an energy, to which meters and conditions are known
+  const Fit fit = this->fit(energy_j, left_out);
+  const double spread = std::max(fit.regression.spread, least_spread);
+  std::vector<double> apart;
+  for (std::size_t k = 0; k < energy_j.size(); ++k)
+    apart.push_back((energy_j[k] - fit.energy_j[k]) / size_[k] / spread);
+  return apart;
 }
 
 }  // namespace joulecast::gap

@@ -1,0 +1,121 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "gap/runs/diagnose_runs.h"
+#include "gap/runs/run_columns.h"
+#include "made_runs.h"
+
+namespace joulecast::gap {
+namespace {
+
+constexpr double load_w = 6;
+
+// Runs of a robot that takes 6 W more than its file, with what happens to their energies.
+RunDiagnosis diagnosed(const std::function<void(RunSet&)>& change) {
+  const robot::RobotModel robot = testing::nomad();
+  std::mt19937_64 random(3);
+  RunSet set;
+  for (int k = 0; k < 40; ++k)
+    set.runs.push_back(testing::made(robot, testing::drawn(random), {.load_w = load_w}, 0.02, random));
+  change(set);
+  RunSettings settings;
+  settings.controls = 0;
+  return *diagnose_runs(set, robot, settings);
+}
+
+void expect_contradicted(const RunDiagnosis& r, const std::string& id, const std::string& begins) {
+  const Diagnosis& d = r.diagnosis;
+  ASSERT_EQ(d.checks.size(), 1u);
+  EXPECT_EQ(d.checks[0].id, id);
+  EXPECT_TRUE(d.checks[0].contradicted);
+  EXPECT_TRUE(d.checks[0].says.starts_with(begins)) << d.checks[0].says;
+  EXPECT_EQ(name_of(d.verdict), "inconclusive");
+  EXPECT_TRUE(d.effects.empty());
+  EXPECT_TRUE(d.adoptable.empty());
+}
+
+TEST(RunChecks, AreSilentOfWhatIsRight) {
+  EXPECT_TRUE(diagnosed([](RunSet&) {}).diagnosis.checks.empty());
+}
+
+TEST(RunChecks, TellEnergiesInAnotherUnit) {
+  for (const auto& [divisor, unit] : {std::pair{3600.0, "Wh"}, std::pair{1000.0, "kJ"}}) {
+    const RunDiagnosis r = diagnosed([&, by = divisor](RunSet& set) {
+      for (MissionRun& run : set.runs) run.energy_j /= by;
+    });
+    expect_contradicted(r, "energy_unit", "energy_j looks given in " + std::string(unit) + ":");
+  }
+}
+
+TEST(RunChecks, TellEnergiesThatAreAConstant) {
+  expect_contradicted(diagnosed([](RunSet& set) {
+                        for (MissionRun& run : set.runs) run.energy_j = set.runs.front().energy_j;
+                      }),
+                      "constant_channel", "energy_j is ");
+}
+
+// One run in forty, a few seconds of little energy or ten times too much: it is named, and moves nothing.
+TEST(RunChecks, NameARunThatIsNoneLikeTheOthers) {
+  for (const bool small : {true, false}) {
+    const RunDiagnosis r = diagnosed([&](RunSet& set) {
+      MissionRun& run = set.runs[7];
+      run.name = "odd";
+      if (small) {
+        run.at = {.distance_m = 0.5, .speed_m_s = 0.4, .acceleration_m_s2 = 0.35};
+        run.energy_j = 4;
+      } else {
+        run.energy_j *= 10;
+      }
+    });
+    const Diagnosis& d = r.diagnosis;
+    ASSERT_EQ(d.checks.size(), 1u) << small;
+    EXPECT_EQ(d.checks[0].id, "run_apart");
+    EXPECT_TRUE(d.checks[0].says.starts_with("Run odd took ")) << d.checks[0].says;
+    ASSERT_EQ(d.effects.size(), 1u);
+    EXPECT_TRUE(d.effects[0].id == "accessory_load" ||
+                std::ranges::count(d.effects[0].alternatives, "accessory_load") > 0)
+        << d.effects[0].id;
+    if (d.effects[0].id == "accessory_load") {
+      const DiagnosedParameter& p = d.effects[0].parameters.front();
+      EXPECT_NEAR(p.value, load_w, 0.15 * load_w) << small;
+      EXPECT_LT(p.deviation, 0.2 * load_w) << small;
+    }
+  }
+}
+
+// A load beside a covariate that was near zero is what is left without it; what is never near zero has none
+// that means anything, and which level of a label is zero is chance.
+TEST(RunCovariates, AreTakenFromZeroWhereRunsWereNearIt) {
+  std::mt19937_64 random(9);
+  std::uniform_real_distribution<double> heater(2, 60), temperature(18, 28);
+  RunSet set;
+  set.covariates = {"heater_w", "temperature_c"};
+  set.labels = {"surface"};
+  for (int k = 0; k < 20; ++k) {
+    set.runs.push_back(testing::made(testing::nomad(), testing::drawn(random), {}, 0.02, random));
+    set.runs.back().covariates = {heater(random), temperature(random)};
+    set.runs.back().labels = {k % 2 == 0 ? "hard" : "carpet"};
+  }
+  set.runs[5].covariates = {MissionRun::absent, MissionRun::absent};
+  const RunColumns columns(set, testing::nomad(), {});
+  double least = 1, most = 0;
+  for (std::size_t k = 0; k < set.runs.size(); ++k) {
+    if (k != 5) {
+      EXPECT_DOUBLE_EQ(columns.covariate(k, 0), set.runs[k].covariates[0]);
+    }
+    least = std::min(least, columns.covariate(k, 1));
+    most = std::max(most, columns.covariate(k, 1));
+    EXPECT_DOUBLE_EQ(std::fabs(columns.covariate(k, 2)), 0.5);
+  }
+  EXPECT_LT(least, 0);
+  EXPECT_GT(most, 0);
+  // What is not given is the median.
+  EXPECT_GT(columns.covariate(5, 0), 2);
+  EXPECT_DOUBLE_EQ(columns.covariate(5, 1), 0);
+}
+
+}  // namespace
+}  // namespace joulecast::gap
