@@ -22,7 +22,7 @@ struct UniformTask {
   double acceleration_limit = 0;
   double torque_limit_nm = 0, voltage_limit_v = 0;
   std::size_t cells = 64;  // of the speed range on either side of the cruise
-  // How far beyond its limit a motor may be used at an end of a cell, as far below it at the other.
+  // Share of a cell's acceleration that may be left unused for motors' limits to be kept at its ends.
   double motor_tolerance = 3e-4;
 };
 
@@ -61,7 +61,8 @@ tl::unexpected<Error> endless(double standing_w);
 // it are left likewise.
 //
 // Between nodes of the speed the acceleration is constant, so the answer is a motion that can be driven as it
-// is told: current and voltage limits are kept on the average of a cell, and to motor_tolerance all along it.
+// is told: current and voltage limits are kept all along a cell, to 2e-5. Cells are as small as
+// motor_tolerance asks for.
 class UniformMotion {
  public:
   // motor_tolerance of the fastest motion, and what is to be asked for where time is short.
