@@ -21,7 +21,7 @@ constexpr std::size_t block_rows = 100;
 constexpr std::size_t most_blocks = 16;
 constexpr std::size_t fewest_blocks = 3, most_groups = 64;
 constexpr double least_explained = 0.1;  // of the variance, at the best lag
-constexpr std::array<Eigen::Index, late_count> terms{6, 6, 5, 3};
+constexpr std::array<Eigen::Index, late_count> terms{6, 6, 5, 3, 3};
 constexpr int draws = 100;
 
 LagBlock empty(std::size_t late) {
@@ -67,9 +67,10 @@ double best_lag(const Eigen::VectorXd& part) {
 }  // namespace
 
 LagSums::Row LagSums::row_of(const signals::Sample& s) {
+  const double battery_w = s.battery_voltage_v * s.battery_current_a;
   return {s.wheel_velocity_rad_s,
-          {s.motor_current_a[0], s.motor_current_a[1], s.battery_voltage_v * s.battery_current_a,
-           s.yaw_rate_rad_s}};
+          s.motor_voltage_v[0] * s.motor_current_a[0] + s.motor_voltage_v[1] * s.motor_current_a[1],
+          {s.motor_current_a[0], s.motor_current_a[1], battery_w, s.yaw_rate_rad_s, battery_w}};
 }
 
 void LagSums::add(const signals::Sample& sample) {
@@ -104,6 +105,7 @@ void LagSums::take(const signals::Sample& sample) {
     const double part = (static_cast<double>(next_) - from) / (to - from);
     Row row;
     for (std::size_t k : {0u, 1u}) row.speed[k] = a.speed[k] + part * (b.speed[k] - a.speed[k]);
+    row.motor_power_w = a.motor_power_w + part * (b.motor_power_w - a.motor_power_w);
     for (std::size_t k = 0; k < late_count; ++k) row.late[k] = a.late[k] + part * (b.late[k] - a.late[k]);
     take(row);
   }
@@ -148,13 +150,15 @@ void LagSums::correlate() {
       x << way(w[late]), w[late], slope[late], slope[1 - late], way(w[late] - w[1 - late]), 1.0;
     else if (late == 2)
       x << std::fabs(speed), speed * speed, speed * (slope[0] + slope[1]), std::fabs(turn), 1.0;
-    else
+    else if (late == 3)
       x << w[0], w[1], 1.0;
+    else
+      x << rows_[centre].motor_power_w, std::fabs(rows_[centre].motor_power_w), 1.0;
     return x;
   };
   const bool moves = moving();
   for (std::size_t late = 0; late < late_count; ++late) {
-    if (late != static_cast<std::size_t>(Late::yaw_rate) && !moves) continue;
+    if (late < static_cast<std::size_t>(Late::yaw_rate) && !moves) continue;
     Eigen::VectorXd y(2 * reach() + 1);
     for (Eigen::Index l = 0; l < y.size(); ++l) y[l] = rows_[static_cast<std::size_t>(l)].late[late];
     const Eigen::VectorXd x = x_of(late);

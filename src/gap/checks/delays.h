@@ -14,9 +14,9 @@
 
 namespace joulecast::gap {
 
-// What is compared with the motion to see how late it comes.
-enum class Late : std::size_t { current_right, current_left, battery_power, yaw_rate };
-inline constexpr std::size_t late_count = 4;
+// What is compared with the motion to see how late it comes; the last with the motors' power.
+enum class Late : std::size_t { current_right, current_left, battery_power, yaw_rate, battery_by_motors };
+inline constexpr std::size_t late_count = 5;
 
 // Sums from which a channel's regression on the motion follows at every lag, by blocks of time.
 struct LagBlock {
@@ -41,6 +41,7 @@ class LagSums {
  private:
   struct Row {
     std::array<double, 2> speed{};
+    double motor_power_w = 0;
     std::array<double, late_count> late{};
   };
   static Row row_of(const signals::Sample& sample);

@@ -372,6 +372,21 @@ TEST(CheckContradictions, WheelsThatAlwaysReadTheSameAreTold) {
   EXPECT_TRUE(check_recordings(standing, model).empty());
 }
 
+// The battery's readings alone, where motors are measured too.
+TEST(CheckRecordings, ADelayOfTheBatteryAloneIsMeasuredAgainstTheMotors) {
+  static const made::Robot robot = made::virtual_robot("amr", 33);
+  for (const double delay_s : {0.0, 0.2, 0.5}) {
+    telemetry::RecordingSet set = robot.recordings;
+    mistakes::delay(set, {reading::battery_voltage, reading::battery_current}, delay_s);
+    const auto checks = check_recordings(set, robot.model);
+    const Check* check = find(checks, "electrical_delay");
+    ASSERT_EQ(check != nullptr, delay_s > 0) << delay_s;
+    if (check == nullptr) continue;
+    EXPECT_EQ(check->channel, "battery_current");
+    EXPECT_NEAR(check->value, delay_s, 0.03);
+  }
+}
+
 // As they come to a daemon: one at a time, mission after mission.
 TEST(Observer, GivesWhatTheWholeRecordingGives) {
   const made::Robot& robot = scout();
