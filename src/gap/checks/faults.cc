@@ -211,6 +211,18 @@ std::vector<Fault> known_faults(const robot::RobotModel& robot) {
   return t.take();
 }
 
+std::optional<Fault> odd_pose_scale(std::span<const Evidence> evidence) {
+  constexpr auto position = static_cast<std::size_t>(S::position);
+  const auto moved = std::ranges::find_if(
+      evidence, [](const Evidence& e) { return e.magnitude && e.exponent[position] == 1; });
+  if (moved == evidence.end()) return std::nullopt;
+  Table t;
+  t.add("pose_scale", "pose.x, pose.y", "off by a factor that no unit has", {S::position}, moved->ratio.value,
+        odd_surprise + 1);
+  const std::vector<Fault> odd = t.take();
+  return odd.empty() ? std::nullopt : std::optional(odd.front());
+}
+
 Explanation explain(std::span<const Evidence> evidence, std::span<const Fault> faults) {
   Explanation best;
   Set set;

@@ -23,6 +23,9 @@ struct Fault {
 // Every sign and unit mistake that is known for a robot of these dimensions.
 std::vector<Fault> known_faults(const robot::RobotModel& robot);
 
+// A map whose scale no known unit explains: off by what the evidence says.
+std::optional<Fault> odd_pose_scale(std::span<const Evidence> evidence);
+
 // The least surprising way to account for all evidence at once.
 struct Explanation {
   std::vector<const Fault*> faults;  // none: all is well

@@ -51,7 +51,8 @@ constexpr double over_limit = 1.5;
 
 std::vector<Check> check_signs_and_units(const CheckContext& c) {
   const std::vector<Evidence> evidence = gather_evidence(c);
-  const std::vector<Fault> faults = known_faults(c.robot);
+  std::vector<Fault> faults = known_faults(c.robot);
+  if (auto odd = odd_pose_scale(evidence)) faults.push_back(*std::move(odd));
   const Explanation explanation = explain(evidence, faults);
   std::vector<Check> checks;
   for (std::size_t k = 0; k < explanation.faults.size(); ++k) {

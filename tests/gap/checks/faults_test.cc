@@ -63,6 +63,24 @@ TEST_F(Faults, TheOneThatAccountsForAllIsBlamed) {
   }
 }
 
+// A map three times as far as wheels and gyro say: wheels in m/s would account for most of it, by a factor
+// that is not what was measured.
+TEST_F(Faults, AScaleOfTheMapThatNoUnitHasIsTheMaps) {
+  robot_.kinematics.wheel_radius_m = 0.292;
+  std::vector<Evidence> some = kinematics(1, 1);
+  for (Evidence& e : some) {
+    if (e.exponent[static_cast<std::size_t>(Source::position)] == 1) e.ratio = {2.98, 0.08, 50};
+  }
+  some.push_back(some[2]);
+  some.back().magnitude = some.back().both_sides = true;
+  std::vector<Fault> faults = known_faults(robot_);
+  faults.push_back(odd_pose_scale(some).value());
+  const Explanation explanation = explain(some, faults);
+  ASSERT_EQ(explanation.faults.size(), 1u);
+  EXPECT_EQ(explanation.faults[0]->id, "pose_scale");
+  EXPECT_NEAR(measured_factor(some, explanation, *explanation.faults[0]).factor, 2.98, 0.01);
+}
+
 TEST_F(Faults, TwoAtOnceAreFound) {
   const auto some = kinematics(-1, 30 / std::numbers::pi);
   const Explanation explanation = explain(some, faults_);
