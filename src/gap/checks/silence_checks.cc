@@ -6,6 +6,8 @@
 #include <limits>
 
 #include "gap/checks/evaluation.h"
+#include "gap/checks/evidence.h"
+#include "gap/checks/faults.h"
 
 namespace joulecast::gap {
 namespace {
@@ -21,6 +23,8 @@ constexpr double noise_share = 0.05;  // of the highest reading: how far below 0
 // voltage that turning induces; of its own mean, the battery's power.
 constexpr double level_s = 10;
 constexpr double turning_varies = 0.05, command_varies = 0.1, voltage_varies = 0.1, power_varies = 0.5;
+constexpr double voltage_moves =
+    0.1;                              // of the nominal one: what a load takes off a battery that is not empty
 constexpr double supply_share = 0.5;  // of the nominal voltage: lower ones come with every halt
 
 // A channel, or a group of readings that one channel holds.
@@ -162,6 +166,15 @@ bool check_supply(const CheckContext& c, std::vector<Check>& checks) {
   return true;
 }
 
+// Whether it is the wheels whose sides or signs are wrong: readings that keep theirs look unsigned against
+// them.
+bool wheels_look_wrong(const CheckContext& c) {
+  const std::vector<Evidence> evidence = gather_evidence(c);
+  const std::vector<Fault> faults = known_faults(c.robot);
+  return std::ranges::any_of(explain(evidence, faults).faults,
+                             [](const Fault* f) { return f->channel.starts_with("wheel_velocity"); });
+}
+
 // Currents or voltages that are positive whichever way the wheel turns. `first`: the right side's reading.
 void check_unsigned(const CheckContext& c, std::size_t first, std::vector<Check>& checks) {
   constexpr std::array<std::size_t, 2> ways{2, 3};
@@ -177,7 +190,7 @@ void check_unsigned(const CheckContext& c, std::size_t first, std::vector<Check>
     sides.emplace_back(reading_names[first + k]);
     backward = back;
   }
-  if (sides.empty()) return;
+  if (sides.empty() || (sides.size() == 1 && wheels_look_wrong(c))) return;
   const std::string field = first == reading::motor_current ? "motor_current" : "motor_voltage";
   const std::string channel = sides.size() == 2 ? field : sides.front();
   checks.push_back(make_check(
@@ -186,6 +199,25 @@ void check_unsigned(const CheckContext& c, std::size_t first, std::vector<Check>
                   "turns backward: its sign is lost; joulecast expects it positive driving forward.",
                   channel, with_interval(backward.value, backward.interval()))));
   checks.back().contradicted = true;
+}
+
+// A current that is the nominal voltage, beside a voltage that no battery of it has: one for the other.
+void check_battery_swap(const CheckContext& c, std::vector<Check>& checks) {
+  if (!c.has({reading::battery_voltage, reading::battery_current})) return;
+  const ValueTally &volts = c.tally(reading::battery_voltage), &amps = c.tally(reading::battery_current);
+  const double nominal = c.robot.battery.nominal_voltage_v;
+  const bool current_is_voltage =
+      std::fabs(amps.mean() / nominal - 1) < near_nominal && amps.deviation() < voltage_moves * nominal;
+  const bool voltage_is_none =
+      std::fabs(volts.mean()) < supply_share * nominal || std::fabs(volts.mean()) > nominal / supply_share;
+  if (!current_is_voltage || !voltage_is_none) return;
+  checks.push_back(
+      {"battery_swapped", "battery_voltage, battery_current", amps.mean() / nominal, no_interval,
+       fmt::format("battery_voltage is {:.3g} V on the average and battery_current {:.3g} A, always near the "
+                   "nominal {:.3g} V: they look swapped; joulecast expects V, and A that are positive while "
+                   "discharging.",
+                   volts.mean(), amps.mean(), nominal),
+       true});
 }
 
 }  // namespace
@@ -211,6 +243,7 @@ std::vector<Check> check_silence(const CheckContext& c) {
       checks.push_back(constant_check(c, name, t.low(), wheels ? witnesses : ""));
     }
   }
+  check_battery_swap(c, checks);
   check_unsigned(c, reading::motor_current, checks);
   if (!check_supply(c, checks)) check_unsigned(c, reading::motor_voltage, checks);
   return checks;

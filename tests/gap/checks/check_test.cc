@@ -387,6 +387,33 @@ TEST(CheckRecordings, ADelayOfTheBatteryAloneIsMeasuredAgainstTheMotors) {
   }
 }
 
+// As a daemon hears a carrier that has these channels alone.
+void told_of_one(const std::vector<std::size_t>& readings, std::string_view id, std::string_view channel,
+                 const std::function<void(telemetry::RecordingSet&)>& mistake) {
+  telemetry::RecordingSet set = carrier_with(readings);
+  const robot::RobotModel model = carrier();
+  for (const bool wrong : {false, true}) {
+    if (wrong) mistake(set);
+    for (const auto& mission : set.missions) {
+      const Observation seen = observe(mission, model, dynamics::DriveModel(model, {}));
+      const auto checks = check_contradictions({&seen, 1}, model);
+      ASSERT_EQ(checks.size(), wrong ? 1u : 0u) << mission.mission_id << ' ' << id;
+      if (!wrong) continue;
+      EXPECT_EQ(checks[0].id, id);
+      EXPECT_EQ(checks[0].channel, channel);
+      EXPECT_TRUE(checks[0].contradicted);
+    }
+  }
+}
+
+// Swapped wheels make the voltages look as if they had lost their signs.
+TEST(CheckContradictions, SwappedWheelsAreNoLostSigns) {
+  using namespace reading;
+  told_of_one({motor_voltage, motor_voltage + 1, motor_current, motor_current + 1},
+              "wheel_velocity_sides_swapped", "wheel_velocity",
+              [](telemetry::RecordingSet& set) { mistakes::swap_sides(set, {0}); });
+}
+
 // As they come to a daemon: one at a time, mission after mission.
 TEST(Observer, GivesWhatTheWholeRecordingGives) {
   const made::Robot& robot = scout();
