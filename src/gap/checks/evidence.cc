@@ -27,6 +27,8 @@ S side_of(S right, std::size_t side) {
 constexpr double constant_off = 0.35, resistance_off = 0.7, load_off = 1.1, inertia_off = 0.7;
 constexpr double skid = 0.7, track_off = 0.2, travel_off = 0.2, heading_off = 0.1, command_off = 0.3;
 constexpr double driver_off = 0.5, regeneration_off = 0.3, voltage_off = 0.25, limit_off = 0.3;
+// What speaks of a sign alone where the size is as the file says on both sides: no sound robot does so.
+constexpr double surely_trust = 12, alike_sides = 0.1;
 constexpr double anything = 1e3;
 constexpr double steepest_rad = 0.35;
 constexpr double unused_off = 1.5;  // limits need not be reached
@@ -76,6 +78,7 @@ class Gatherer {
   void armatures();
   void torques();
   void turning();
+  static double trust_of_sides(const Estimate& right, const Estimate& left, double else_trust);
   void turning_by_wheels(const BlockFit& fit, const std::string& turner, S source);
   void moving();
   void batteries();
@@ -149,17 +152,31 @@ void Gatherer::torques() {
                       {{side_of(S::current_right, k), 1}, {side_of(S::wheel_right, k), -1}});
     if (e != nullptr) lost(e, {side_of(S::wheel_right, k)});
   }
+  if (!heard({0, 1, 4, 5})) return;
+  // Straight on, motors of a pair do much the same, whatever the file has of them.
+  add("straight on, the right motor's current is", "the left one's",
+      ratio_of_sums(blocks(Relation::siblings), 0, 1, 2), load_off, load_off, 8,
+      {{S::current_right, 1}, {S::current_left, -1}, {S::wheel_right, -1}, {S::wheel_left, 1}});
+}
+
+// Of one number by the right and by the left wheel.
+double Gatherer::trust_of_sides(const Estimate& right, const Estimate& left, double else_trust) {
+  const bool alike = right.sure() && left.sure() &&
+                     std::fabs(std::log(std::fabs(right.value / left.value))) < alike_sides &&
+                     std::fabs(std::log(std::fabs(right.value))) < skid;
+  return alike ? surely_trust : else_trust;
 }
 
 // The turning of one wheel, by the gyro or the map.
 void Gatherer::turning_by_wheels(const BlockFit& fit, const std::string& turner, S source) {
   const double share = 0.5 / p_.half_track_m;
+  const std::array ratio{estimate(fit, 0) * (1 / (share * p_.wheel_radius_m[0])),
+                         estimate(fit, 1) * (-1 / (share * p_.wheel_radius_m[1]))};
+  const double trust = trust_of_sides(ratio[0], ratio[1], 8);
   for (std::size_t k : {0u, 1u}) {
-    const double expected = (k == 0 ? share : -share) * p_.wheel_radius_m[k];
-    Evidence* e =
-        add(std::string("over the turning of the ") + side_name[k] + " wheel " + turner,
-            "what the file's track gives", estimate(fit, static_cast<Eigen::Index>(k)) * (1 / expected), skid,
-            track_off, 8, {{source, 1}, {side_of(S::wheel_right, k), -1}});
+    Evidence* e = add(std::string("over the turning of the ") + side_name[k] + " wheel " + turner,
+                      "what the file's track gives", ratio[k], skid, track_off, trust,
+                      {{source, 1}, {side_of(S::wheel_right, k), -1}});
     if (e != nullptr) e->turned_by = 1;
   }
 }
@@ -220,14 +237,22 @@ void Gatherer::moving() {
           ratio_of_sums(blocks(Relation::way), 0, 1, 2), anything, anything, 1, {{S::wheel_right, 1}});
   both(forward);
   if (heard({reading::command_speed})) {
-    both(add("the wheels drive at", "the commanded speed",
-             estimate(fit_blocks(blocks(Relation::command), 0, one), 0), command_off, command_off, 8,
-             {{S::wheel_right, 1}, {S::command_speed, -1}}));
+    constexpr std::array<std::size_t, 2> commands{2, 3};
+    const auto by_command = blocks(Relation::command);
+    const std::array ratio{estimate(fit_blocks(by_command, 0, commands), 0),
+                           estimate(fit_blocks(by_command, 1, commands), 0)};
+    const double trust = trust_of_sides(ratio[0], ratio[1], 5);
+    for (std::size_t k : {0u, 1u}) {
+      add(std::string("the ") + side_name[k] + " wheel drives at", "the commanded speed", ratio[k],
+          command_off, command_off, trust, {{side_of(S::wheel_right, k), 1}, {S::command_speed, -1}});
+    }
   }
   if (heard({reading::command_turn})) {
-    Evidence* e = add("the wheels turn the robot at", "the commanded yaw rate",
-                      estimate(fit_blocks(blocks(Relation::command_turn), 0, one), 0), track_off, skid, 6,
-                      {{S::wheel_right, 1}, {S::command_turn, -1}});
+    const Estimate ratio = estimate(fit_blocks(blocks(Relation::command_turn), 0, one), 0);
+    const bool surely = std::fabs(std::log(std::fabs(ratio.value))) < track_off &&
+                        ratio.sd < alike_sides * std::fabs(ratio.value);
+    Evidence* e = add("the wheels turn the robot at", "the commanded yaw rate", ratio, track_off, skid,
+                      surely ? surely_trust : 6, {{S::wheel_right, 1}, {S::command_turn, -1}});
     both(e);
     if (e != nullptr) e->turned_by = 1;
   }
@@ -259,8 +284,19 @@ void Gatherer::batteries() {
                       {{S::battery_voltage, 1}, {S::battery_current, 1}});
     if (e == nullptr) continue;
     lost(e, {S::wheel_right, S::wheel_left, S::payload});
-    e->both_sides = true;
+    e->both_sides = e->by_power = true;
   }
+  // Signs that need no model: who drives and does not brake spends, but for descents; who stands spends
+  // unless it is charged. Long descents that no pitch tells of are known by a robot that spends while it
+  // stands.
+  const auto spends = [&](const char* says, const Estimate& power, double trust) {
+    add(says, "what the file's idle power is", power * (1 / std::max(p_.idle_power_w, 1.0)), anything,
+        anything, trust, {{S::battery_voltage, 1}, {S::battery_current, 1}});
+  };
+  spends("driving and not braking, descents left out, the battery gives",
+         ratio_of_sums(blocks(Relation::driving), 3, 2, 2), 8);
+  const Estimate idle = ratio_of_sums(blocks(Relation::idle), 0, 1, 1);
+  spends("standing, the battery gives", idle, idle.value > 0 ? 8 : 1.5);
 }
 
 void Gatherer::loads() {

@@ -49,6 +49,7 @@ struct Evidence {
       0;                    // bits of the pairs (wheel 1, voltage 2, current 4) whose swap reverses its sign
   bool magnitude = false;   // its sign is not seen
   bool by_gear = false;     // what the file expects is proportional to its gear ratio
+  bool by_power = false;    // ... to the powers of its file
   bool both_sides = false;  // means nothing where the sides of a pair are wrong by different factors
   // Means nothing where these are wrong by more than their sign.
   Sources<bool> lost_by{};

@@ -48,7 +48,10 @@ std::optional<double> predicted(const Evidence& e, const Combined& faults) {
   if (e.both_sides) {
     for (const S right : {S::wheel_right, S::voltage_right, S::current_right}) {
       const auto r = static_cast<std::size_t>(right);
-      if (factor[r] != factor[r + 1] && (e.exponent[r] != 0 || e.lost_by[r])) return std::nullopt;
+      // What a load takes hardly asks which way a wheel turns.
+      const bool differ = e.lost_by[r] ? std::fabs(factor[r]) != std::fabs(factor[r + 1])
+                                       : e.exponent[r] != 0 && factor[r] != factor[r + 1];
+      if (differ) return std::nullopt;
     }
   }
   for (std::uint32_t bit = 1; bit <= 4; bit *= 2) {
@@ -182,6 +185,8 @@ std::vector<Fault> known_faults(const robot::RobotModel& robot) {
         unit_surprise + 1);
   t.add("battery_current_scale", "battery_current", "divided by 1000 once too often", {S::battery_current},
         0.001, odd_surprise);
+  t.add("battery_current_scale", "battery_current", "given in W", {S::battery_current},
+        robot.battery.nominal_voltage_v, unit_surprise);
   t.add("battery_voltage_scale", "battery_voltage", "given in mV", {S::battery_voltage}, 1000, unit_surprise);
   t.add("battery_voltage_scale", "battery_voltage", "divided by 1000 once too often", {S::battery_voltage},
         0.001, odd_surprise);
@@ -270,12 +275,12 @@ Measured measured_factor(std::span<const Evidence> evidence, const Explanation& 
   const Combined others(rest), all(explanation.faults);
   Measured best;
   double most = 0;
-  bool by_gear = true;
+  bool by_gear = true, by_power = true;
   for (const Evidence& e : evidence) {
     const auto without = predicted(e, others), with = predicted(e, all);
     if (!without || !with || *without == *with) continue;
     const double supports = surprise_of(e, others) - surprise_of(e, all);
-    if (supports >= least_support) by_gear = by_gear && e.by_gear;
+    if (supports >= least_support) by_gear = by_gear && e.by_gear, by_power = by_power && e.by_power;
     if (supports <= most) continue;
     most = supports;
     // The exponent by which the fault's own factor enters: swaps turn the sign alone.
@@ -291,6 +296,7 @@ Measured measured_factor(std::span<const Evidence> evidence, const Explanation& 
     if (best.interval[0] > best.interval[1]) std::swap(best.interval[0], best.interval[1]);
   }
   best.by_gear = by_gear && best.evidence != nullptr;
+  best.by_power = by_power && best.evidence != nullptr;
   return best;
 }
 

@@ -43,6 +43,7 @@ struct Measured {
   std::array<double, 2> interval{};
   // Whether all that speaks for the fault goes by the file's gear ratio: a wrong one would look the same.
   bool by_gear = false;
+  bool by_power = false;  // ... or by its powers
 };
 Measured measured_factor(std::span<const Evidence> evidence, const Explanation& explanation,
                          const Fault& fault);

@@ -52,6 +52,13 @@ bool differs(const Estimate& log, double off) {
   return log.known() && std::fabs(log.value) > off && std::fabs(log.value) > surely * log.sd;
 }
 
+// Of the currents straight on, where both motors do the same at the same time; else of the fitted ones.
+Estimate steady_ratio(const CheckContext& c, const std::array<MotorConstants, 2>& m) {
+  const Estimate both = ratio_of_sums(c.blocks(Relation::siblings), 0, 1, 2);
+  if (both.sure() && both.value > 0) return {std::log(both.value), both.sd / both.value, both.freedom};
+  return log_ratio(m[0].steady_current_a, m[1].steady_current_a);
+}
+
 struct Pair {
   Estimate resistance, constant, steady, inertia;  // logarithms, right over left
 };
@@ -118,8 +125,7 @@ std::vector<Check> check_motors(const CheckContext& c) {
   if (!c.heard({0, 1, 2, 3, 4, 5})) return {};
   const auto m = motor_constants(c.seen, c.motor_delay_s);
   const Pair p{log_ratio(m[0].resistance_ohm, m[1].resistance_ohm),
-               log_ratio(m[0].constant_v_s_rad, m[1].constant_v_s_rad),
-               log_ratio(m[0].steady_current_a, m[1].steady_current_a),
+               log_ratio(m[0].constant_v_s_rad, m[1].constant_v_s_rad), steady_ratio(c, m),
                log_ratio(m[0].current_per_rad_s2_a, m[1].current_per_rad_s2_a)};
   std::string parts;
   const auto add = [&](const std::string& text) { parts += (parts.empty() ? "" : ", ") + text; };
@@ -127,7 +133,9 @@ std::vector<Check> check_motors(const CheckContext& c) {
   if (differs(p.constant, winding_off))
     add(part("K", m[0].constant_v_s_rad, m[1].constant_v_s_rad, "V s/rad"));
   if (differs(p.steady, load_off) || (current_sensor(p) && p.steady.known())) {
-    add(part("steady current", m[0].steady_current_a, m[1].steady_current_a, "A"));
+    add(m[0].steady_current_a.known() && m[1].steady_current_a.known()
+            ? part("steady current", m[0].steady_current_a, m[1].steady_current_a, "A")
+            : fmt::format("current straight on {:.3g} times as much", std::exp(p.steady.value)));
   }
   if (parts.empty()) return {};
   const std::size_t side = worse_side(m, c.robot.motor.resistance_ohm);

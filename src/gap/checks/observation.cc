@@ -24,8 +24,8 @@ constexpr double map_jump =
     3;  // times the fastest speed: a map that finds its place anew, or has other units
 constexpr double widest_turn_rad = 2.0;  // of a span whose chord is compared with its path
 
-constexpr std::array<std::size_t, relation_count> quantities{5, 5, 4, 6, 6, 4, 4, 3, 3, 3, 2, 3,
-                                                             4, 3, 2, 2, 4, 4, 4, 2, 3, 2, 3, 5};
+constexpr std::array<std::size_t, relation_count> quantities{5, 5, 4, 6, 6, 4, 4, 3, 4, 3, 2, 3, 4,
+                                                             3, 4, 2, 4, 4, 4, 2, 3, 3, 2, 3, 5};
 
 std::array<Products, relation_count> no_products() {
   std::array<Products, relation_count> products;
@@ -122,6 +122,8 @@ void Observer::take(const Cell& c) {
         .add({or_zero(i), or_zero(v), way > 0 ? 1.0 : 0.0, way < 0 ? 1.0 : 0.0});
   }
   const bool moves = c.way[0] != 0 || c.way[1] != 0;
+  if (moves && !turning && c.way[0] == c.way[1])
+    of(Relation::siblings).add({c.way[0] * c.current_a[0], c.way[0] * c.current_a[1], 1.0});
   if (moves) {
     of(Relation::armature_difference)
         .add(
@@ -141,7 +143,8 @@ void Observer::take(const Cell& c) {
             (std::fabs(c.command[0]) + p.half_track_m * std::fabs(or_zero(c.command[1]))) /
                 robot_.kinematics.wheel_radius_m,
             1.0});
-  of(Relation::command).add({speed, c.command[0]});
+  of(Relation::command)
+      .add({p.wheel_radius_m[0] * right, p.wheel_radius_m[1] * left, c.command[0], or_zero(c.command[1])});
   of(Relation::command_turn).add({turn, c.command[1]});
   take_power(c);
   seen_.fastest_m_s = std::max(seen_.fastest_m_s, std::fabs(speed));
@@ -166,10 +169,13 @@ void Observer::take_power(const Cell& c) {
   of(Relation::motion).add({c.battery_power_w, moving, 1.0});
   if (c.resting) of(Relation::idle).add({c.battery_power_w, 1.0});
   if (c.way[0] == 0 && c.way[1] == 0) return;
-  if (flow.ledger[signals::Term::kinetic] >= 0) of(Relation::driving).add({c.battery_power_w, modelled, 1.0});
   const double speed = 0.5 * robot_.kinematics.wheel_radius_m * (c.speed_rad_s[0] + c.speed_rad_s[1]);
   const double weight = robot_.total_mass_kg(c.payload_kg) * robot::standard_gravity_m_s2;
-  of(Relation::climb).add({c.battery_power_w - modelled, weight * speed * std::sin(c.pitch_rad), 1.0});
+  const double climb = weight * speed * std::sin(c.pitch_rad);
+  of(Relation::climb).add({c.battery_power_w - modelled, climb, 1.0});
+  if (flow.ledger[signals::Term::kinetic] < 0) return;
+  of(Relation::driving)
+      .add({c.battery_power_w, modelled, 1.0, c.battery_power_w - std::min(or_zero(climb), 0.0)});
 }
 
 void Observer::take(const Span& s) {

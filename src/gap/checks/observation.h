@@ -30,18 +30,20 @@ enum class Relation : std::size_t {
   ways_right,  // i, V, 1 forward, 1 backward
   ways_left,
   motors,          // battery power, power of both motors, 1
-  driving,         // battery power, the model's, 1; where the model sees no braking
+  driving,         // battery power, the model's, 1, battery power plus what descents give back; where the
+                   // model sees no braking
   motion,          // battery power, the model's but for the idle power, 1
   idle,            // battery power, 1; standing
   climb,           // battery power less the model's, m g v sin(pitch), 1
   gyro,            // yaw rate, w right, w left, 1
   way,             // speed of the robot by the wheels, its magnitude, 1
-  command,         // speed of the wheels, of the command
+  command,         // speed of the right wheel, of the left, of the command, turn commanded
   command_turn,    // turning of the wheels, of the command
   heading_gyro,    // turned by the map in rad, in degrees, by the gyro, time
   heading_wheels,  // turned by the map in rad, in degrees, by the right wheel, by the left
   travel,          // moved by the map along and across the heading, turned by the wheels
   distance,        // moved by the map, by the wheels
+  siblings,        // current of the right motor, of the left, 1; both the way they turn, straight on
   back_emf,        // voltage less that which the file's resistance takes, right, left, 1
   yaw,             // yaw rate, 1; standing too
   commanded,       // battery power, faster wheel's speed commanded, 1

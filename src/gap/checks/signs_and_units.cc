@@ -42,6 +42,8 @@ std::string also(const std::vector<const Fault*>& alternatives, const Measured& 
   if (measured.by_gear && measured.factor > 0) {
     add(fmt::format("a gear_ratio in the robot file {:.3g} times the robot's", measured.factor));
   }
+  if (measured.by_power && measured.factor > 0)
+    add(fmt::format("a robot file whose powers are {:.3g} times the robot's", 1 / measured.factor));
   return text.empty() ? text : text + " would look the same";
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <numeric>
@@ -372,21 +373,6 @@ TEST(CheckContradictions, WheelsThatAlwaysReadTheSameAreTold) {
   EXPECT_TRUE(check_recordings(standing, model).empty());
 }
 
-// The battery's readings alone, where motors are measured too.
-TEST(CheckRecordings, ADelayOfTheBatteryAloneIsMeasuredAgainstTheMotors) {
-  static const made::Robot robot = made::virtual_robot("amr", 33);
-  for (const double delay_s : {0.0, 0.2, 0.5}) {
-    telemetry::RecordingSet set = robot.recordings;
-    mistakes::delay(set, {reading::battery_voltage, reading::battery_current}, delay_s);
-    const auto checks = check_recordings(set, robot.model);
-    const Check* check = find(checks, "electrical_delay");
-    ASSERT_EQ(check != nullptr, delay_s > 0) << delay_s;
-    if (check == nullptr) continue;
-    EXPECT_EQ(check->channel, "battery_current");
-    EXPECT_NEAR(check->value, delay_s, 0.03);
-  }
-}
-
 // As a daemon hears a carrier that has these channels alone.
 void told_of_one(const std::vector<std::size_t>& readings, std::string_view id, std::string_view channel,
                  const std::function<void(telemetry::RecordingSet&)>& mistake) {
@@ -406,12 +392,93 @@ void told_of_one(const std::vector<std::size_t>& readings, std::string_view id, 
   }
 }
 
+TEST(CheckContradictions, AReversedWheelIsToldByGyroOrCommandsAlone) {
+  using namespace reading;
+  const auto reversed = [](telemetry::RecordingSet& set) { mistakes::multiply(set, {1}, -1); };
+  for (const std::vector<std::size_t>& others :
+       {std::vector<std::size_t>{yaw_rate}, {command_speed, command_turn}}) {
+    std::vector<std::size_t> readings{battery_voltage, battery_current};
+    readings.insert(readings.end(), others.begin(), others.end());
+    told_of_one(readings, "wheel_velocity_reversed", "wheel_velocity.left", reversed);
+  }
+}
+
+TEST(CheckContradictions, BatteryReadingsThatAreOthersAreTold) {
+  using namespace reading;
+  told_of_one({battery_voltage, battery_current}, "battery_current_scale", "battery_current",
+              [](telemetry::RecordingSet& set) {
+                mistakes::each_sample(set,
+                                      [](signals::Sample& s) { s.battery_current_a *= s.battery_voltage_v; });
+              });
+  told_of_one({battery_voltage, battery_current}, "battery_swapped", "battery_voltage, battery_current",
+              [](telemetry::RecordingSet& set) {
+                mistakes::each_sample(
+                    set, [](signals::Sample& s) { std::swap(s.battery_voltage_v, s.battery_current_a); });
+              });
+}
+
 // Swapped wheels make the voltages look as if they had lost their signs.
 TEST(CheckContradictions, SwappedWheelsAreNoLostSigns) {
   using namespace reading;
   told_of_one({motor_voltage, motor_voltage + 1, motor_current, motor_current + 1},
               "wheel_velocity_sides_swapped", "wheel_velocity",
               [](telemetry::RecordingSet& set) { mistakes::swap_sides(set, {0}); });
+}
+
+// A file that is far from the robot hides no sign: whoever drives spends, and motors of a pair do the same.
+TEST(CheckContradictions, SignsAreToldWithAPoorFile) {
+  using namespace reading;
+  robot::RobotModel poor = carrier();
+  for (double& t : poor.motor.friction_torque_nm) t /= 8;
+  poor.idle_power_w *= 3;
+  for (const bool wrong : {false, true}) {
+    telemetry::RecordingSet battery = carrier_with({battery_voltage, battery_current}),
+                            motors = carrier_with({motor_current, motor_current + 1});
+    if (wrong)
+      mistakes::multiply(battery, {battery_current}, -1), mistakes::multiply(motors, {motor_current}, -1);
+    const auto of_battery = check_recordings(battery, poor), of_motors = check_recordings(motors, poor);
+    EXPECT_EQ(find(of_battery, "battery_current_reversed") != nullptr, wrong);
+    const Check* right = find(of_motors, "motor_current_reversed");
+    ASSERT_EQ(right != nullptr, wrong);
+    if (right != nullptr) {
+      EXPECT_EQ(right->channel, "motor_current.right");
+    }
+  }
+}
+
+// Down a hill a robot that gets back more than it spends stands still, or tells of its pitch.
+TEST(CheckContradictions, ADescentIsNoReversedCurrent) {
+  robot::RobotModel model = carrier();
+  for (const bool pitch : {false, true}) {
+    const telemetry::Recording mission = made::mission(90, 20, [&](double t, signals::Sample& s) {
+      const made::Motion m = made::motion(t);
+      s.wheel_velocity_rad_s = m.speed;
+      const double speed = 0.5 * model.kinematics.wheel_radius_m * (m.speed[0] + m.speed[1]);
+      s.battery_voltage_v = model.battery.nominal_voltage_v + 0.01 * std::sin(17 * t);
+      s.battery_current_a = (20 - 60 * speed) / s.battery_voltage_v;
+      if (!pitch) return;
+      s.pitch_rad = -0.2;
+      // All that it gets back, and the lights are off where it stands.
+      s.battery_current_a = -60 * speed / s.battery_voltage_v;
+    });
+    const Observation seen = observe(mission, model, dynamics::DriveModel(model, {}));
+    for (const Check& c : check_contradictions({&seen, 1}, model)) EXPECT_FALSE(c.contradicted) << c.says;
+  }
+}
+
+// The battery's readings alone, where motors are measured too.
+TEST(CheckRecordings, ADelayOfTheBatteryAloneIsMeasuredAgainstTheMotors) {
+  static const made::Robot robot = made::virtual_robot("amr", 33);
+  for (const double delay_s : {0.0, 0.2, 0.5}) {
+    telemetry::RecordingSet set = robot.recordings;
+    mistakes::delay(set, {reading::battery_voltage, reading::battery_current}, delay_s);
+    const auto checks = check_recordings(set, robot.model);
+    const Check* check = find(checks, "electrical_delay");
+    ASSERT_EQ(check != nullptr, delay_s > 0) << delay_s;
+    if (check == nullptr) continue;
+    EXPECT_EQ(check->channel, "battery_current");
+    EXPECT_NEAR(check->value, delay_s, 0.03);
+  }
 }
 
 // As they come to a daemon: one at a time, mission after mission.

@@ -99,5 +99,27 @@ TEST(Frc, TheFileOfTheOtherGearIsFarFromTheRobot) {
   EXPECT_NE(find(checks, "robot_file")->says.find("voltage constant"), std::string::npos);
 }
 
+// Drives too short to tell the motors' resistance, each by itself.
+TEST(Frc, AMotorsCurrentIsToldByItsSibling) {
+  const fs::path folder = data / "real/frc3314_drivetrain";
+  JOULECAST_NEED_SHARED(fs::exists(folder), "recordings " << folder);
+  const auto robot = robot::load_robot(robots / "frc3314-low.json");
+  const auto checked = [&](std::size_t side, double factor) {
+    auto set = imported(tables_in(folder, "_low.csv"),
+                        text_of(JOULECAST_SOURCE_DIR "/deploy/import/frc3314_low.json"));
+    for (auto& mission : set.missions) {
+      for (auto& s : mission.samples) s.motor_current_a[side] *= factor;
+    }
+    return check_recordings(set, *robot);
+  };
+  const auto reversed = checked(0, -1);
+  ASSERT_TRUE(find(reversed, "motor_current_reversed"));
+  EXPECT_EQ(find(reversed, "motor_current_reversed")->channel, "motor_current.right");
+  const auto weak = checked(1, 1.0 / 3);
+  ASSERT_TRUE(find(weak, "motor_against_sibling"));
+  EXPECT_NEAR(find(weak, "motor_against_sibling")->value, 3, 1);
+  EXPECT_FALSE(find(checked(0, 1), "motor_against_sibling"));
+}
+
 }  // namespace
 }  // namespace joulecast::gap
