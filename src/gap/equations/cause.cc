@@ -11,6 +11,12 @@ constexpr double near_zero = 0.5;  // of the range of a covariate
 
 }  // namespace
 
+double centre_of(std::vector<double> known) {
+  const auto [least, most] = std::ranges::minmax(known);
+  const bool amount = least >= 0 && least < near_zero * (most - least);
+  return amount ? 0.0 : statistics::median(std::move(known));
+}
+
 std::vector<Modulation> modulations_of(std::span<const Window> windows) {
   std::vector<Modulation> modulations;
   const std::size_t count = windows.empty() ? 0 : windows.front().covariates.size();
@@ -20,10 +26,8 @@ std::vector<Modulation> modulations_of(std::span<const Window> windows) {
       if (std::isfinite(w.covariates[k])) known.push_back(w.covariates[k]);
     }
     if (2 * known.size() < windows.size()) continue;
-    const auto [least, most] = std::ranges::minmax(known);
-    if (least == most) continue;
-    const bool amount = least >= 0 && least < near_zero * (most - least);
-    modulations.push_back({k, amount ? 0.0 : statistics::median(std::move(known))});
+    if (std::ranges::min(known) == std::ranges::max(known)) continue;
+    modulations.push_back({k, centre_of(std::move(known))});
   }
   return modulations;
 }

@@ -26,8 +26,11 @@ struct Modulation {
   }
 };
 
-// Each covariate that is known in at least half of the windows and differs among them: by its median, or by 0
-// where it comes near 0 for how far it ranges, as a load in W or per cent does and a temperature does not.
+// From where a covariate is counted: 0 of an amount, which is never negative and comes near 0 for how far it
+// ranges, as a load in W or a share of a processor; else its median. `known`: its values, one at least.
+double centre_of(std::vector<double> known);
+
+// Each covariate that is known in at least half of the windows and differs among them.
 std::vector<Modulation> modulations_of(std::span<const Window> windows);
 
 // Something found, with its strength: an effect in force, or one whose strength, parameter `parameter`, is so

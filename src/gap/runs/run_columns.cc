@@ -30,7 +30,6 @@ constexpr std::size_t most_levels = 8;  // of a label
 // Of a run's energy over the model's against the usual ratio: a file that lacks most of the base load moves
 // it by less, between runs that mostly stand and that mostly drive.
 constexpr double far_off = 3;
-constexpr double near_zero = 0.2;  // of a covariate's range
 
 // Which variants of an effect energies of runs can speak of: shapes that they cannot distinguish are left at
 // their initial values.
@@ -137,10 +136,8 @@ void RunColumns::add_labels() {
       if (std::isfinite(values[c])) known.push_back(values[c]);
     }
     if (known.empty()) known.push_back(0);
-    const auto [low, high] = std::ranges::minmax(known);
-    const double beside = near_zero * (high - low), middle = statistics::median(std::move(known));
-    const bool from_zero = !signals::is_label(covariate_names_[c]) && low <= beside && high >= -beside;
-    const double centre = from_zero ? 0 : middle;
+    const double middle = statistics::median(known);
+    const double centre = signals::is_label(covariate_names_[c]) ? middle : centre_of(std::move(known));
     for (auto& values : covariates_) values[c] = (std::isfinite(values[c]) ? values[c] : middle) - centre;
   }
 }
