@@ -425,27 +425,6 @@ TEST(CheckContradictions, SwappedWheelsAreNoLostSigns) {
               [](telemetry::RecordingSet& set) { mistakes::swap_sides(set, {0}); });
 }
 
-// A file that is far from the robot hides no sign: whoever drives spends, and motors of a pair do the same.
-TEST(CheckContradictions, SignsAreToldWithAPoorFile) {
-  using namespace reading;
-  robot::RobotModel poor = carrier();
-  for (double& t : poor.motor.friction_torque_nm) t /= 8;
-  poor.idle_power_w *= 3;
-  for (const bool wrong : {false, true}) {
-    telemetry::RecordingSet battery = carrier_with({battery_voltage, battery_current}),
-                            motors = carrier_with({motor_current, motor_current + 1});
-    if (wrong)
-      mistakes::multiply(battery, {battery_current}, -1), mistakes::multiply(motors, {motor_current}, -1);
-    const auto of_battery = check_recordings(battery, poor), of_motors = check_recordings(motors, poor);
-    EXPECT_EQ(find(of_battery, "battery_current_reversed") != nullptr, wrong);
-    const Check* right = find(of_motors, "motor_current_reversed");
-    ASSERT_EQ(right != nullptr, wrong);
-    if (right != nullptr) {
-      EXPECT_EQ(right->channel, "motor_current.right");
-    }
-  }
-}
-
 // Down a hill a robot that gets back more than it spends stands still, or tells of its pitch.
 TEST(CheckContradictions, ADescentIsNoReversedCurrent) {
   robot::RobotModel model = carrier();

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -97,6 +98,34 @@ TEST(Frc, TheFileOfTheOtherGearIsFarFromTheRobot) {
   EXPECT_TRUE(std::ranges::none_of(checks, &Check::contradicted));
   ASSERT_TRUE(find(checks, "robot_file"));
   EXPECT_NE(find(checks, "robot_file")->says.find("voltage constant"), std::string::npos);
+}
+
+// With a file that knows neither scrub nor the ground: whoever drives spends, all the same.
+TEST(Husky, AReversedBatteryCurrentIsToldInEveryMission) {
+  const fs::path folder = data / "real/borealtc_husky/ICE";
+  JOULECAST_NEED_SHARED(fs::exists(folder), "recordings " << folder);
+  const auto robot = robot::load_robot(robots / "borealtc-husky.json");
+  const auto recorded =
+      imported(tables_in(folder, ".csv"), text_of(JOULECAST_SOURCE_DIR "/deploy/import/borealtc_husky.json"));
+  for (const bool wrong : {false, true}) {
+    auto set = recorded;
+    for (auto& mission : set.missions) {
+      for (auto& s : mission.samples) {
+        // No battery was recorded: one of 24 V that gives both motors' currents.
+        const double amps = std::fabs(s.motor_current_a[0]) + std::fabs(s.motor_current_a[1]);
+        s.battery_voltage_v = 24;
+        s.battery_current_a = wrong ? -amps : amps;
+        s.motor_current_a = {signals::unmeasured, signals::unmeasured};
+      }
+    }
+    const auto checks = check_recordings(set, *robot);
+    EXPECT_EQ(std::ranges::any_of(checks, &Check::contradicted), wrong);
+    const Check* reversed = find(checks, "battery_current_reversed");
+    ASSERT_EQ(reversed != nullptr, wrong);
+    if (reversed != nullptr) {
+      EXPECT_TRUE(reversed->few_missions.empty());
+    }
+  }
 }
 
 // Drives too short to tell the motors' resistance, each by itself.
