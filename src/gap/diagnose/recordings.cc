@@ -573,6 +573,8 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   if (battery_s != 0) {
     if (!cleared) cleared = recordings;
     for (telemetry::Recording& mission : cleared->missions) move_battery_back(mission, battery_s);
+    std::ranges::find(checks, "electrical_delay", &Check::id)->says +=
+        " What follows goes by readings that are moved back by that.";
   }
   const telemetry::RecordingSet& trusted = cleared ? *cleared : recordings;
   // Where a sensor or the robot changed between missions each side is judged alone: the later one is today's.
