@@ -275,5 +275,18 @@ TEST(VirtualRobot, WhatMayBeNoiseAltogetherIsNotNothing) {
   EXPECT_EQ(name_of(d.verdict), "inconclusive");
 }
 
+TEST(VirtualRobot, AMissionWhoseWheelsAreDeadTakesNoPart) {
+  made::Robot robot = virtual_missions({{"coulomb_friction", 0.6}}, 21, false, 5);
+  for (auto& s : robot.recordings.missions[2].samples) s.wheel_velocity_rad_s = {0, 0};
+  const Diagnosis d = diagnose_robot(robot);
+  ASSERT_FALSE(d.checks.empty());
+  EXPECT_EQ(d.checks[0].few_missions, std::vector<std::size_t>{2});
+  ASSERT_FALSE(d.effects.empty());
+  EXPECT_EQ(d.effects[0].id, "coulomb_friction");
+  EXPECT_TRUE(std::isfinite(d.noise_floor));
+  ASSERT_TRUE(d.baseline);
+  EXPECT_TRUE(std::isfinite(d.baseline->held_out));
+}
+
 }  // namespace
 }  // namespace joulecast::gap

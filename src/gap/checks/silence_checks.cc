@@ -20,9 +20,9 @@ constexpr double near_nominal = 0.25;
 constexpr double noise_share = 0.05;  // of the highest reading: how far below 0 an unsigned one may stray
 // Wheels that read one value for so long are asked whether anything else says that the motion changes. So
 // much of what the file allows is far beyond noise and drift: of the yaw rate, the speed commanded, the
-// voltage that turning induces; of its own mean, the battery's power.
+// voltage that turning induces.
 constexpr double level_s = 10;
-constexpr double turning_varies = 0.05, command_varies = 0.1, voltage_varies = 0.1, power_varies = 0.5;
+constexpr double turning_varies = 0.05, command_varies = 0.1, voltage_varies = 0.1;
 constexpr double voltage_moves =
     0.1;                              // of the nominal one: what a load takes off a battery that is not empty
 constexpr double supply_share = 0.5;  // of the nominal voltage: lower ones come with every halt
@@ -85,7 +85,7 @@ std::string witnesses_of_motion(const CheckContext& c) {
   if (deviation(c.blocks(Relation::yaw), 0, 1) > turning_varies * limits.yaw_rate_rad_s)
     names.emplace_back("its gyro");
   if (map_moving_s > level_s && (stand || map_standing_s > level_s)) names.emplace_back("its map");
-  const auto emf = c.blocks(Relation::back_emf), power = c.blocks(Relation::motion);
+  const auto emf = c.blocks(Relation::back_emf);
   const double least_v = voltage_varies * c.robot.battery.nominal_voltage_v;
   if (std::max(deviation(emf, 0, 2), deviation(emf, 1, 2)) > least_v) names.emplace_back("its motors");
   constexpr std::array<std::size_t, 2> with_one{1, 2};
@@ -94,10 +94,6 @@ std::string witnesses_of_motion(const CheckContext& c) {
   if (deviation(commanded, 1, 2) > command_varies * limits.speed_m_s / c.robot.kinematics.wheel_radius_m &&
       follows.sure() && follows.value > 0)
     names.emplace_back("its battery that follows the commands");
-  const ValueTally &volts = c.tally(reading::battery_voltage), &amps = c.tally(reading::battery_current);
-  if (!stand && volts.known() > 0 && amps.known() > 0 &&
-      deviation(power, 0, 2) > power_varies * std::fabs(volts.mean() * amps.mean()))
-    names.emplace_back("its battery's power");
   return joined(names, " and ");
 }
 

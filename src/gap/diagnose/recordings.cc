@@ -140,6 +140,7 @@ class Diagnoser {
 Diagnoser::View Diagnoser::view_of(const windows::WindowSettings& settings) const {
   View view;
   view.windows = windows::make_windows(recordings_.missions, robot_, readings_, settings);
+  keep_known_motion(view.windows);
   mark_turning_power(view.windows, dynamics::DriveModel(robot_, adopted_));
   windows::assign_blocks(view.windows, recordings_.missions);
   view.power_w = measured_power(view.windows, robot_, d_.power == PowerSource::motors);

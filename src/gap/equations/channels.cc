@@ -122,6 +122,10 @@ S metered_power(const dynamics::BasicDriveModel<S>& model, const Window& w) {
   return metered_powers(model, w).battery_w;
 }
 
+void keep_known_motion(std::vector<Window>& windows) {
+  std::erase_if(windows, [](const Window& w) { return !std::isfinite(w.speed_rad_s[0] + w.speed_rad_s[1]); });
+}
+
 void mark_turning_power(std::span<Window> windows, const dynamics::DriveModel& model) {
   const auto motor_power = [&](const dynamics::Instant& at) {
     const auto flow = model.flow(at);

@@ -58,6 +58,10 @@ extern template ChannelValues<double> residuals(const dynamics::BasicDriveModel<
 extern template ChannelValues<dynamics::Dual> residuals(const dynamics::BasicDriveModel<dynamics::Dual>&,
                                                         const Window&, const FromMotion&);
 
+// Leaves out windows whose motion is not known, as of a mission whose wheels a check silenced: nothing asks
+// for their power.
+void keep_known_motion(std::vector<Window>& windows);
+
 // Marks the windows in which the motors' power may change its sign, by the windows beside them. A model that
 // treats braking and driving power differently is not linear there, and the mean motion under a window says
 // too little.

@@ -72,6 +72,7 @@ void make_windows(Grouped& g, const robot::RobotModel& robot,
   g.covariates = windows::covariate_names(g.recordings.missions);
   g.readings = windows::find_readings(g.recordings.missions, robot);
   g.windows = windows::make_windows(g.recordings.missions, robot, g.readings);
+  keep_known_motion(g.windows);
   mark_turning_power(g.windows, dynamics::DriveModel(robot, adopted));
   assign_blocks(g);
   std::size_t currents = 0, voltages = 0;

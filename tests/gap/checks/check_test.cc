@@ -361,6 +361,10 @@ TEST(CheckContradictions, WheelsThatAlwaysReadTheSameAreTold) {
       EXPECT_NE(check->says.find("moves by its "), std::string::npos) << check->says;
     }
   }
+  // At one speed over rough ground: the battery alone is no witness.
+  telemetry::RecordingSet steady = carrier_with({battery_voltage, battery_current});
+  mistakes::fill(steady, {0, 1}, 5);
+  for (const Check& c : check_recordings(steady, model)) EXPECT_FALSE(c.contradicted) << c.says;
   // It stands at its place, commanded by nobody.
   telemetry::RecordingSet standing = carrier_with({yaw_rate, x, y, heading});
   mistakes::fill(standing, {0, 1}, 0);
