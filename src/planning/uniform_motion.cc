@@ -20,7 +20,7 @@ constexpr double little = 1e-4;    // of the distance: may be driven at the spee
 constexpr int speed_samples = 64;  // where f is looked at for its minima
 constexpr int most_cuts =
     8;  // in halves, of a cell in which the acceleration or a motor's limit changes fast
-constexpr double overuse = 2e-5;     // of a motor's limit, at one end of a cell
+constexpr double overuse = 2e-5;     // of a motor's limit, within a cell
 constexpr double least_share = 0.9;  // of a cell's acceleration that motors must allow at its ends
 
 // Whether a motor does what the other does, or its mirror image, as the left one in a turn in place.
@@ -205,8 +205,8 @@ void UniformMotion::piece(const End& from, const End& to, double change, const P
     if (at_middle.bounded && at_middle.bound != Bound::acceleration && 2 * least > greatest)
       at_middle.acceleration = 6 / (1 / from.acceleration + 4 / cut.acceleration + 1 / to.acceleration);
     const double mean = at_middle.acceleration;
-    for (const double end : {from.v, to.v}) {
-      const Local there = local(end);
+    for (const double v : {from.v, middle, to.v}) {
+      const Local there = local(v);
       const Most most_there = most(there, direction, overuse);
       beyond = beyond || most_there.acceleration < (1 - tolerance) * mean ||
                most(there, direction, 0).acceleration < least_share * cut.acceleration;

@@ -43,7 +43,9 @@ std::vector<Check> check_delays(const CheckContext& c) {
     // Where the motors' currents say the contrary it is the form of the load that looks like a delay.
     const auto own = c.has({4, 5}) ? delay_of(c.seen, motors) : std::nullopt;
     const auto d = delay_of(c.seen, battery);
-    if (behind && (behind->interval[0] > least || behind->interval[1] < -least)) {
+    // Currents that are wrong have another form than the battery's power, which any lag fits a little.
+    const bool sharp = behind && behind->interval[1] - behind->interval[0] < 0.5 * std::fabs(behind->value_s);
+    if (sharp && (behind->interval[0] > least || behind->interval[1] < -least)) {
       checks.push_back(delay_check("electrical_delay", "battery_current",
                                    "Voltage and current of the battery", *behind, "the motors' power"));
     } else if (checks.empty() && d && d->interval[0] > least && !(own && own->interval[1] < 0)) {
