@@ -7,6 +7,7 @@
 
 #include "gap/diagnose/account.h"
 #include "gap/diagnose/naming.h"
+#include "gap/diagnose/power_fit.h"
 #include "gap/verdict/judge.h"
 #include "statistics/shapley.h"
 
@@ -37,11 +38,7 @@ struct Shared {
 // Of these hypotheses alone.
 Mixture::Estimate estimate_of(const Problem& problem, const HypothesisSet& set,
                               const std::vector<bool>& out) {
-  std::vector<std::size_t> own;
-  for (const std::size_t h : set) {
-    const auto& more = problem.hypotheses[h].candidate.columns;
-    own.insert(own.end(), more.begin(), more.end());
-  }
+  std::vector<std::size_t> own = columns_of(problem.hypotheses, set);
   if (own.empty()) return {};
   std::ranges::sort(own);
   return Mixture(problem, out, own).estimate(set);

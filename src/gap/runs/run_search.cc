@@ -8,6 +8,7 @@
 #include <set>
 
 #include "gap/diagnose/naming.h"
+#include "gap/diagnose/power_fit.h"
 
 namespace joulecast::gap {
 namespace {
@@ -31,11 +32,7 @@ std::vector<bool> blocks_left_out(std::span<const std::size_t> block, const std:
 
 Eigen::VectorXd strengths_of(const Problem& problem, const HypothesisSet& set,
                              const std::vector<bool>& left_out) {
-  std::vector<std::size_t> own;
-  for (const std::size_t h : set) {
-    const auto& more = problem.hypotheses[h].candidate.columns;
-    own.insert(own.end(), more.begin(), more.end());
-  }
+  std::vector<std::size_t> own = columns_of(problem.hypotheses, set);
   std::ranges::sort(own);
   return set.empty() ? Eigen::VectorXd() : Mixture(problem, left_out, own).estimate(set).mean;
 }
